@@ -1,0 +1,163 @@
+"""C structs, sizes and byte-by-byte pack/unpack of every message."""
+
+from __future__ import annotations
+
+from .schema import GENERATED, TYPE_BYTES, Contract, Field, Message
+
+C_TYPE = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "i16": "int16_t", "i32": "int32_t"}
+
+
+def struct_name(message: Message) -> str:
+    return f"bt_msg_{message.name.lower()}"
+
+
+def declare(field: Field) -> str:
+    array = f"[{field.count}]" if field.count > 1 else ""
+    note = field.unit + (f" q{field.frac_bits}" if field.frac_bits else "")
+    return f"    {C_TYPE[field.type]} {field.name}{array}; // [{note}] {field.doc}"
+
+
+def header(contract: Contract) -> str:
+    wire, link = contract.link["wire"], contract.link
+    out = [
+        f"// {GENERATED}",
+        "// Messages of the USB link: structs, sizes, pack and unpack. Little-endian, packed.",
+        "// Units and Q formats stand beside each field; see protocol/MESSAGES.md.",
+        "#ifndef BIOTAC_WIRE_GEN_H",
+        "#define BIOTAC_WIRE_GEN_H",
+        "",
+        "#include <stdint.h>",
+        "",
+        f"#define BT_WIRE_MAJOR {wire['major']}",
+        f"#define BT_WIRE_MINOR {wire['minor']}",
+        f"#define BT_SCHEMA_HASH 0x{contract.hash:08X}u",
+        f"#define BT_FRAME_MAX_BYTES {wire['max_frame_bytes']} // id + payload + CRC",
+        f"#define BT_INVALID_COUNT 0x{wire['invalid_count']:04X}",
+        "#define BT_INVALID_I16 INT16_MIN",
+        "#define BT_INVALID_I32 INT32_MIN",
+        "",
+    ]
+    for name, enum in link["enum"].items():
+        out += [f"// {enum['doc']}", f"enum bt_{name} {{"]
+        out += [
+            f"    BT_{name.upper()}_{key} = {entry['value']}, // {entry['doc']}"
+            for key, entry in enum.items()
+            if key != "doc"
+        ]
+        out += ["};", ""]
+    for name, flags in link["flags"].items():
+        out += [f"// {flags['doc']}"]
+        out += [
+            f"#define BT_{name.upper()}_FLAG_{key} (1u << {entry['bit']}) // {entry['doc']}"
+            for key, entry in flags.items()
+            if key != "doc"
+        ]
+        out += [""]
+    out += ["enum bt_setting {"]
+    out += [f"    BT_SETTING_{n.upper()} = {s['id']}, // [{s['unit']}]" for n, s in link["setting"].items()]
+    out += ["};", f"#define BT_SETTINGS {len(link['setting'])}", ""]
+    out += [
+        "typedef struct {",
+        "    uint8_t id;",
+        "    int32_t min;",
+        "    int32_t max;",
+        "    int32_t initial;",
+        "} bt_setting_spec;",
+        "extern const bt_setting_spec bt_setting_specs[BT_SETTINGS];",
+        "",
+    ]
+    for message in contract.messages:
+        upper, struct = message.name, struct_name(message)
+        out += [f"// {message.doc}", f"#define BT_{upper}_ID 0x{message.id:02X}"]
+        out += [f"#define BT_{upper}_BYTES {message.payload_bytes}", "typedef struct {"]
+        out += [declare(field) for field in message.fields]
+        out += [f"}} {struct};"]
+        out += [f"void {struct}_pack(const {struct} *msg, uint8_t out[BT_{upper}_BYTES]);"]
+        out += [f"void {struct}_unpack({struct} *msg, const uint8_t in[BT_{upper}_BYTES]);", ""]
+    out += [
+        "// Payload length of a message id, without id and CRC; -1 when the id is unknown.",
+        "int bt_wire_payload_bytes(uint8_t id);",
+        "",
+        "#ifndef BT_CDEF // the rest is macros for the C tests",
+        "// X(name, type, count) for every field, so that tests can compare by name.",
+    ]
+    for message in contract.messages:
+        fields = " ".join(f"X({f.name}, {f.type}, {f.count})" for f in message.fields)
+        out += [f"#define BT_{message.name}_FIELDS(X) {fields}"]
+    names = " ".join(f"X({m.name}, {struct_name(m)})" for m in contract.messages)
+    out += [f"#define BT_WIRE_MESSAGES(X) {names}", "#endif", "", "#endif", ""]
+    return "\n".join(out)
+
+
+def source(contract: Contract) -> str:
+    out = [
+        f"// {GENERATED}",
+        '#include "wire_gen.h"',
+        "",
+        "static uint8_t *put(uint8_t *at, uint32_t value, int bytes)",
+        "{",
+        "    for (int k = 0; k < bytes; k++) {",
+        "        *at++ = (uint8_t)(value >> (8 * k));",
+        "    }",
+        "    return at;",
+        "}",
+        "",
+        "static const uint8_t *get(const uint8_t *at, uint32_t *value, int bytes)",
+        "{",
+        "    *value = 0;",
+        "    for (int k = 0; k < bytes; k++) {",
+        "        *value |= (uint32_t)*at++ << (8 * k);",
+        "    }",
+        "    return at;",
+        "}",
+        "",
+    ]
+    for message in contract.messages:
+        out += pack(message) + unpack(message)
+    out += ["int bt_wire_payload_bytes(uint8_t id)", "{", "    switch (id) {"]
+    for message in contract.messages:
+        out += [f"    case BT_{message.name}_ID:", f"        return BT_{message.name}_BYTES;"]
+    out += ["    default:", "        return -1;", "    }", "}", ""]
+    out += ["const bt_setting_spec bt_setting_specs[BT_SETTINGS] = {"]
+    for name, setting in contract.link["setting"].items():
+        low, high = setting["range"]
+        out += [f"    {{BT_SETTING_{name.upper()}, {low}, {high}, {setting['default']}}},"]
+    out += ["};", ""]
+    return "\n".join(out)
+
+
+def each(field: Field, statement: str) -> list[str]:
+    if field.count == 1:
+        return [f"    {statement.format(ref=field.name)}"]
+    return [
+        f"    for (int k = 0; k < {field.count}; k++) {{",
+        f"        {statement.format(ref=field.name + '[k]')}",
+        "    }",
+    ]
+
+
+def pack(message: Message) -> list[str]:
+    struct = struct_name(message)
+    out = [f"void {struct}_pack(const {struct} *msg, uint8_t out[BT_{message.name}_BYTES])", "{"]
+    out += ["    uint8_t *at = out;"]
+    for field in message.fields:
+        out += each(field, f"at = put(at, (uint32_t)msg->{{ref}}, {TYPE_BYTES[field.type]});")
+    return [*out, "    (void)at;", "}", ""]
+
+
+def unpack(message: Message) -> list[str]:
+    struct = struct_name(message)
+    out = [f"void {struct}_unpack({struct} *msg, const uint8_t in[BT_{message.name}_BYTES])", "{"]
+    out += ["    const uint8_t *at = in;", "    uint32_t value;"]
+    for field in message.fields:
+        size = TYPE_BYTES[field.type]
+        if field.count == 1:
+            out += [f"    at = get(at, &value, {size});", f"    msg->{field.name} = ({C_TYPE[field.type]})value;"]
+        else:
+            out += [
+                f"    for (int k = 0; k < {field.count}; k++) {{",
+                f"        at = get(at, &value, {size});",
+                f"        msg->{field.name}[k] = ({C_TYPE[field.type]})value;",
+                "    }",
+            ]
+    return [*out, "    (void)at;", "}", ""]

@@ -1,0 +1,50 @@
+"""protocol/MESSAGES.md: the tables a reader wants beside SPEC.md."""
+
+from __future__ import annotations
+
+from .schema import GENERATED, Contract, Message
+
+
+def messages(contract: Contract) -> str:
+    link = contract.link
+    wire = link["wire"]
+    out = [
+        "# Messages",
+        "",
+        f"<!-- {GENERATED} -->",
+        f"Wire version {wire['major']}.{wire['minor']}, schema hash `0x{contract.hash:08X}`. "
+        "Framing, CRC and handshake are in [SPEC.md](SPEC.md).",
+        "",
+        "| id | message | direction | payload | on the wire | answered by |",
+        "|---|---|---|---|---|---|",
+    ]
+    for m in contract.messages:
+        direction = "host to board" if m.id & 0x80 else "board to host"
+        whole = m.payload_bytes + 1 + 4 + 1 + 1  # id, CRC, COBS code byte, delimiter
+        reply = f"`{m.reply}`" if m.reply else ""
+        out.append(f"| 0x{m.id:02X} | `{m.name}` | {direction} | {m.payload_bytes} B | {whole} B | {reply} |")
+    for m in contract.messages:
+        out += ["", f"## {m.name} (0x{m.id:02X})", "", m.doc, "", *field_table(m)]
+    for name, enum in link["enum"].items():
+        out += ["", f"## enum {name}", "", enum["doc"], "", "| value | name | meaning |", "|---|---|---|"]
+        out += [f"| {e['value']} | `{k}` | {e['doc']} |" for k, e in enum.items() if k != "doc"]
+    for name, flags in link["flags"].items():
+        out += ["", f"## flags {name}", "", flags["doc"], "", "| bit | name | meaning |", "|---|---|---|"]
+        out += [f"| {e['bit']} | `{k}` | {e['doc']} |" for k, e in flags.items() if k != "doc"]
+    out += ["", "## Settings", "", "| id | name | unit | range | default | meaning |", "|---|---|---|---|---|---|"]
+    for name, s in link["setting"].items():
+        low, high = s["range"]
+        out.append(f"| {s['id']} | `{name}` | {s['unit']} | {low} to {high} | {s['default']} | {s['doc']} |")
+    return "\n".join(out) + "\n"
+
+
+def field_table(message: Message) -> list[str]:
+    out = ["| offset | field | type | unit | range | meaning |", "|---|---|---|---|---|---|"]
+    offset = 0
+    for f in message.fields:
+        kind = f"{f.type}[{f.count}]" if f.count > 1 else f.type
+        unit = f"{f.unit} (q{f.frac_bits})" if f.frac_bits else f.unit
+        span = f"{f.range[0]} to {f.range[1]}" if f.range else ""
+        out.append(f"| {offset} | `{f.name}` | {kind} | {unit} | {span} | {f.doc} |")
+        offset += f.size
+    return out

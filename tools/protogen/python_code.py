@@ -1,0 +1,148 @@
+"""The host's generated modules: _sensor.py (tables) and _wire.py (messages)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .schema import GENERATED, Contract, Field, Message
+
+STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
+NUMPY_CODE = {"u8": "u1", "u16": "<u2", "u32": "<u4", "i16": "<i2", "i32": "<i4"}
+
+
+def sensor(contract: Contract) -> str:
+    s = contract.sensor
+    geometry = s["geometry"]
+    out = [
+        f'"""{GENERATED}',
+        "",
+        "The sensor's side: channels, slot order, geometry (um, 1/1000) and conversions.",
+        '"""',
+        "",
+    ]
+    for key, value in s["bus"].items():
+        out.append(f"{key.upper()} = {value}")
+    out.append("")
+    commands = (f'"{c["name"]}": 0x{c["command"]:02X},' for c in s["channel"])
+    out += table("CHANNEL_COMMAND: dict[str, int]", "{", "}", commands)
+    out += table("SLOTS: tuple[str, ...]", "(", ")", (f'"{n}",' for n in s["frame"]["slots"]))
+    errors = (f'0x{e["word"]:04X}: "{e["doc"]}",' for e in s["error_word"])
+    out += table("ERROR_WORD: dict[int, str]", "{", "}", errors)
+    out.append(f"CORE_RADIUS_UM = {geometry['core_radius_um']}")
+    for kind in ("electrodes", "excitation"):
+        name = kind.upper().removesuffix("S")
+        rows = geometry[kind]
+        out.append(f"{name}_NAMES = ({', '.join(repr(r[0]) for r in rows)})".replace("'", '"'))
+        out += table(f"{name}_UM: tuple[tuple[int, int, int], ...]", "(", ")", (triple(r[1:4]) for r in rows))
+        normals = (triple(r[4:7]) for r in rows)
+        out += table(f"{name}_NORMAL_MILLI: tuple[tuple[int, int, int], ...]", "(", ")", normals)
+    for key, value in s["conversion"].items():
+        out.append(f"{key.upper()} = {value}")
+    return "\n".join(out) + "\n"
+
+
+def triple(values: list[int]) -> str:
+    return f"({', '.join(map(str, values))}),"
+
+
+def table(name: str, opening: str, closing: str, rows: Any) -> list[str]:
+    return [f"{name} = {opening}", *(f"    {row}" for row in rows), closing, ""]
+
+
+def wire(contract: Contract) -> str:
+    link = contract.link
+    out = [
+        f'"""{GENERATED}',
+        "",
+        "Messages of the USB link: enums, flags, one dataclass and one NumPy dtype per message.",
+        "Units and Q formats are in protocol/MESSAGES.md.",
+        '"""',
+        "",
+        "from __future__ import annotations",
+        "",
+        "import struct",
+        "from dataclasses import dataclass",
+        "from enum import IntEnum, IntFlag",
+        "from typing import Any, ClassVar, NamedTuple",
+        "",
+        "import numpy as np",
+        "",
+        f"WIRE_MAJOR = {link['wire']['major']}",
+        f"WIRE_MINOR = {link['wire']['minor']}",
+        f"SCHEMA_HASH = 0x{contract.hash:08X}",
+        f"MAX_FRAME_BYTES = {link['wire']['max_frame_bytes']}",
+        f"INVALID_COUNT = 0x{link['wire']['invalid_count']:04X}",
+        "INVALID_I16 = -(2**15)",
+        "INVALID_I32 = -(2**31)",
+        "",
+    ]
+    for name, enum in link["enum"].items():
+        out += enum_class(camel(name), "IntEnum", enum, "value", "{}")
+    for name, flags in link["flags"].items():
+        out += enum_class(camel(name) + "Flags", "IntFlag", flags, "bit", "1 << {}")
+    out += ["", "ERROR_DOC: dict[int, str] = {"]
+    out += [f'    {e["value"]}: "{e["doc"]}",' for k, e in link["enum"]["error"].items() if k != "doc"] + ["}", ""]
+    out += ["", "class Setting(IntEnum):", '    """Ids of the settings; see SETTINGS for units and ranges."""', ""]
+    out += [f"    {name.upper()} = {s['id']}" for name, s in link["setting"].items()]
+    out += ["", "", "class SettingSpec(NamedTuple):", '    """Unit, range and default of one setting."""', ""]
+    out += ["    unit: str", "    low: int", "    high: int", "    default: int", "    doc: str", "", ""]
+    out += ["SETTINGS: dict[Setting, SettingSpec] = {"]
+    for name, s in link["setting"].items():
+        low, high = s["range"]
+        out += [f"    Setting.{name.upper()}: SettingSpec(", f'        "{s["unit"]}", {low}, {high}, {s["default"]},']
+        out += [f'        "{s["doc"]}",', "    ),"]
+    out += ["}", ""]
+    for message in contract.messages:
+        out += message_class(message)
+    names = [class_name(m) for m in contract.messages]
+    out += ["", f"Message = {' | '.join(names)}", "", "MESSAGES: dict[int, type[Any]] = {"]
+    out += [f"    {name}.ID: {name}," for name in names] + ["}", ""]
+    out += ["# One array type per message id, for decoding many payloads at once."]
+    out += ["DTYPES: dict[int, np.dtype[Any]] = {"]
+    for message in contract.messages:
+        out += [f"    {class_name(message)}.ID: np.dtype(", "        ["]
+        out += [f"            {dtype_entry(f)}," for f in message.fields] + ["        ]", "    ),"]
+    return "\n".join([*out, "}"]) + "\n"
+
+
+def camel(name: str) -> str:
+    return "".join(part.capitalize() for part in name.lower().split("_"))
+
+
+def class_name(message: Message) -> str:
+    """Setting is the enum of setting ids; the message that carries one value is SettingValue."""
+    return "SettingValue" if message.name == "SETTING" else camel(message.name)
+
+
+def enum_class(name: str, base: str, entries: dict[str, Any], key: str, form: str) -> list[str]:
+    out = ["", f"class {name}({base}):", f'    """{entries["doc"]}"""', ""]
+    for member, entry in entries.items():
+        if member != "doc":
+            out.append(f"    {member} = {form.format(entry[key])}  # {entry['doc']}")
+    return [*out, ""]
+
+
+def dtype_entry(field: Field) -> str:
+    shape = f", ({field.count},)" if field.count > 1 else ""
+    return f'("{field.name}", "{NUMPY_CODE[field.type]}"{shape})'
+
+
+def message_class(message: Message) -> list[str]:
+    codes = "".join(f"{f.count if f.count > 1 else ''}{STRUCT_CODE[f.type]}" for f in message.fields)
+    out = ["", "@dataclass(frozen=True, slots=True)", f"class {class_name(message)}:", f'    """{message.doc}"""', ""]
+    for field in message.fields:
+        out.append(f"    {field.name}: {'tuple[int, ...]' if field.count > 1 else 'int'}")
+    out += ["", f"    ID: ClassVar[int] = 0x{message.id:02X}"]
+    out += [f'    STRUCT: ClassVar[struct.Struct] = struct.Struct("<{codes}")', ""]
+    args = [f"*self.{f.name}" if f.count > 1 else f"self.{f.name}" for f in message.fields]
+    out += ["    def pack(self) -> bytes:", f'        """Payload without id and CRC, {message.payload_bytes} bytes."""']
+    out += ["        return self.STRUCT.pack(", *(f"            {arg}," for arg in args), "        )", ""]
+    out += ["    @classmethod", f"    def unpack(cls, payload: bytes) -> {class_name(message)}:"]
+    out += ['        """Inverse of pack; struct.error when the length differs."""']
+    out += ["        v = cls.STRUCT.unpack(payload)", "        return cls("]
+    at = 0
+    for field in message.fields:
+        value = f"v[{at} : {at + field.count}]" if field.count > 1 else f"v[{at}]"
+        out.append(f"            {value},")
+        at += field.count
+    return [*out, "        )", ""]
