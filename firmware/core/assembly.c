@@ -1,0 +1,54 @@
+#include "assembly.h"
+
+// The frame's arrays follow the channel table; a new channel must be given a place below.
+_Static_assert(BT_CHANNEL_E19 - BT_CHANNEL_E1 + 1 == BT_ELECTRODES, "electrode channels must be consecutive");
+
+void bt_frame_clear(bt_frame *frame)
+{
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        frame->electrode[i] = BT_INVALID_COUNT;
+    }
+    for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
+        frame->pac[k] = BT_INVALID_COUNT;
+    }
+    frame->pdc = BT_INVALID_COUNT;
+    frame->tac = BT_INVALID_COUNT;
+    frame->tdc = BT_INVALID_COUNT;
+    frame->good_words = 0;
+    frame->t_us = 0;
+}
+
+// Which of the frame's PAC samples a PAC slot is: the number of PAC slots before it.
+static uint8_t pac_index(uint8_t slot)
+{
+    uint8_t index = 0;
+    for (uint8_t k = 0; k < slot; k++) {
+        index = (uint8_t)(index + (bt_slot_channel[k] == BT_CHANNEL_PAC));
+    }
+    return index;
+}
+
+void bt_frame_put(bt_frame *frame, uint8_t slot, uint16_t count)
+{
+    uint8_t channel = bt_slot_channel[slot];
+    frame->good_words = (uint8_t)(frame->good_words + (count != BT_INVALID_COUNT));
+    switch (channel) {
+    case BT_CHANNEL_PAC:
+        frame->pac[pac_index(slot)] = count;
+        break;
+    case BT_CHANNEL_PDC:
+        frame->pdc = count;
+        break;
+    case BT_CHANNEL_TAC:
+        frame->tac = count;
+        break;
+    case BT_CHANNEL_TDC:
+        frame->tdc = count;
+        break;
+    default:
+        if (channel >= BT_CHANNEL_E1 && channel <= BT_CHANNEL_E19) {
+            frame->electrode[channel - BT_CHANNEL_E1] = count;
+        }
+        break;
+    }
+}

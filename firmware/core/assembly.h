@@ -1,0 +1,28 @@
+// Frame assembly: 44 slots of one finger become one frame, with validity per channel.
+// A channel that got no good word in its own slot is BT_INVALID_COUNT, never an older value.
+// Units: counts 0..4095; t_us is device time, wraps at 2^32.
+#ifndef BIOTAC_ASSEMBLY_H
+#define BIOTAC_ASSEMBLY_H
+
+#include "sensor_gen.h"
+#include "wire_gen.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct {
+    uint32_t t_us; // when slot 0 was sampled, or would have been if it was lost
+    uint16_t electrode[BT_ELECTRODES];
+    uint16_t pdc;
+    uint16_t tac;
+    uint16_t tdc;
+    uint16_t pac[BT_PAC_PER_FRAME];
+    uint8_t good_words; // 0 means that nothing answered
+} bt_frame;
+
+void bt_frame_clear(bt_frame *frame);
+
+// Put the word of one slot in its place. count is 0..4095 or BT_INVALID_COUNT.
+void bt_frame_put(bt_frame *frame, uint8_t slot, uint16_t count);
+
+#endif
