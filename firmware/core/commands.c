@@ -1,0 +1,184 @@
+// What each command does. Every command is answered exactly once: by its own message, or by REPLY.
+#include "session.h"
+
+static void reply(bt_session *session, uint8_t req_id, uint8_t command, uint8_t error)
+{
+    uint8_t payload[BT_REPLY_BYTES];
+    bt_msg_reply msg = {.req_id = req_id, .command = command, .error = error};
+    bt_msg_reply_pack(&msg, payload);
+    bt_session_send(session, BT_REPLY_ID, payload);
+}
+
+static void hello(bt_session *session, const uint8_t *payload)
+{
+    uint8_t out[BT_HELLO_BYTES];
+    const bt_identity *identity = &session->identity;
+    bt_msg_hello_request request;
+    bt_msg_hello_request_unpack(&request, payload);
+    bt_msg_hello msg = {
+        .req_id = request.req_id,
+        .nonce = request.nonce,
+        .wire_major = BT_WIRE_MAJOR,
+        .wire_minor = BT_WIRE_MINOR,
+        .schema_hash = BT_SCHEMA_HASH,
+        .firmware_major = identity->firmware_version[0],
+        .firmware_minor = identity->firmware_version[1],
+        .firmware_patch = identity->firmware_version[2],
+        .board = identity->board,
+        .boot_id = identity->boot_id,
+        .slot_hz = BT_SLOT_HZ,
+        .fingers_present = bt_session_present(session),
+    };
+    for (int k = 0; k < 12; k++) {
+        msg.board_serial[k] = identity->board_serial[k];
+    }
+    bt_msg_hello_pack(&msg, out);
+    bt_session_send(session, BT_HELLO_ID, out);
+}
+
+static uint8_t start(bt_session *session, const uint8_t *payload, uint32_t now_us)
+{
+    bt_msg_start msg;
+    bt_msg_start_unpack(&msg, payload);
+    if (msg.fingers >> BT_MAX_FINGERS != 0) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    session->streams = msg.streams;
+    session->fingers = msg.fingers;
+    session->keepalive_ms = msg.keepalive_ms;
+    session->heard_us = now_us;
+    return BT_ERROR_OK;
+}
+
+static uint8_t tare_now(bt_session *session, const uint8_t *payload)
+{
+    bt_msg_tare_now msg;
+    bt_msg_tare_now_unpack(&msg, payload);
+    if (msg.finger >= BT_MAX_FINGERS || !session->finger[msg.finger].present) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    return bt_tare_now(&session->finger[msg.finger].tare);
+}
+
+static uint8_t tare_set(bt_session *session, const uint8_t *payload)
+{
+    bt_msg_tare_set msg;
+    bt_msg_tare_set_unpack(&msg, payload);
+    // Not refused for a finger that has not answered yet: a stored tare may come before frame one.
+    if (msg.finger >= BT_MAX_FINGERS) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    bt_baseline base;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        if (msg.tare_q4[i] > BT_E_MAX_Q4) {
+            return BT_ERROR_OUT_OF_RANGE;
+        }
+        base.electrode_q16[i] = (uint32_t)msg.tare_q4[i] << 12;
+    }
+    if (msg.pdc_tare_q4 > BT_E_MAX_Q4 && msg.pdc_tare_q4 != BT_INVALID_COUNT) {
+        return BT_ERROR_OUT_OF_RANGE;
+    }
+    base.pdc_q16 = msg.pdc_tare_q4 == BT_INVALID_COUNT ? BT_PDC_UNKNOWN : (uint32_t)msg.pdc_tare_q4 << 12;
+    return bt_tare_set(&session->finger[msg.finger].tare, &base);
+}
+
+static void sensor_info(bt_session *session, uint8_t req_id, uint8_t finger)
+{
+    uint8_t payload[BT_SENSOR_INFO_BYTES];
+    bt_sensor_info info = session->info[finger];
+    info.req_id = req_id;
+    info.finger = finger;
+    bt_msg_sensor_info_pack(&info, payload);
+    bt_session_send(session, BT_SENSOR_INFO_ID, payload);
+}
+
+static void setting(bt_session *session, uint8_t req_id, uint8_t id)
+{
+    uint8_t payload[BT_SETTING_BYTES];
+    bt_msg_setting msg = {.req_id = req_id, .setting = id, .value = bt_settings_get(&session->settings, id)};
+    bt_msg_setting_pack(&msg, payload);
+    bt_session_send(session, BT_SETTING_ID, payload);
+}
+
+static uint8_t set_setting(bt_session *session, const uint8_t *payload)
+{
+    bt_msg_set_setting msg;
+    bt_msg_set_setting_unpack(&msg, payload);
+    if (session->streams != 0) {
+        return BT_ERROR_BUSY; // one recording, one set of settings
+    }
+    uint8_t error = bt_settings_set(&session->settings, msg.setting, msg.value);
+    if (error == BT_ERROR_OK) {
+        session->kernel = bt_kernel_settings_from(&session->settings);
+        setting(session, msg.req_id, msg.setting);
+    }
+    return error;
+}
+
+// payload is NULL when its length does not fit the id; then nothing of it can be trusted, not
+// even where req_id is.
+void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_t now_us)
+{
+    if (id < 0x80) {
+        return; // one of our own, echoed by a terminal driver
+    }
+    if (payload == NULL) {
+        reply(session, 0, id, BT_ERROR_BAD_LENGTH);
+        return;
+    }
+    uint8_t req_id = payload[0];
+    uint8_t error = BT_ERROR_OK;
+    switch (id) {
+    case BT_HELLO_REQUEST_ID:
+        hello(session, payload);
+        return;
+    case BT_START_ID:
+        error = start(session, payload, now_us);
+        break;
+    case BT_STOP_ID:
+        session->streams = 0;
+        break;
+    case BT_PING_ID:
+        break;
+    case BT_TARE_NOW_ID:
+        error = tare_now(session, payload);
+        break;
+    case BT_TARE_SET_ID:
+        error = tare_set(session, payload);
+        break;
+    case BT_GET_STATUS_ID:
+        bt_session_send_status(session, req_id, now_us);
+        return;
+    case BT_GET_SENSOR_STATUS_ID:
+        if (payload[1] < BT_MAX_FINGERS) {
+            bt_session_send_sensor_status(session, req_id, payload[1], now_us);
+            return;
+        }
+        error = BT_ERROR_NO_SUCH_FINGER;
+        break;
+    case BT_GET_SENSOR_INFO_ID:
+        if (payload[1] < BT_MAX_FINGERS) {
+            sensor_info(session, req_id, payload[1]);
+            return;
+        }
+        error = BT_ERROR_NO_SUCH_FINGER;
+        break;
+    case BT_GET_SETTING_ID:
+        if (bt_settings_has(payload[1])) {
+            setting(session, req_id, payload[1]);
+            return;
+        }
+        error = BT_ERROR_UNKNOWN_SETTING;
+        break;
+    case BT_SET_SETTING_ID:
+        error = set_setting(session, payload);
+        if (error == BT_ERROR_OK) {
+            return;
+        }
+        break;
+    default:
+        error = BT_ERROR_UNKNOWN_COMMAND;
+        break;
+    }
+    reply(session, req_id, id, error);
+}

@@ -1,0 +1,147 @@
+#include "results.h"
+
+#include "fix.h"
+#include "poc.h"
+#include "wrench.h"
+
+#define ACTIVE_Q4          (15 * 16) // an electrode that moved this far takes part in the contact
+#define ACTIVE_FOR_TORSION 4
+#define BASE_OLD_FRAMES    6000 // one minute
+#define FAULT_ELECTRODES   2
+
+_Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
+
+bt_kernel_settings bt_kernel_settings_from(const bt_settings *settings)
+{
+    bt_kernel_settings kernel = {
+        .poc_weights = (int)bt_settings_get(settings, BT_SETTING_POC_WEIGHTS),
+        .force_gain_nn = {bt_settings_get(settings, BT_SETTING_FORCE_GAIN_X_NN),
+                          bt_settings_get(settings, BT_SETTING_FORCE_GAIN_Y_NN),
+                          bt_settings_get(settings, BT_SETTING_FORCE_GAIN_Z_NN)},
+        .torque_gain_nn = {bt_settings_get(settings, BT_SETTING_TORQUE_GAIN_Y_NN),
+                           bt_settings_get(settings, BT_SETTING_TORQUE_GAIN_Z_NN)},
+        .contact_energy_count2 = (uint32_t)bt_settings_get(settings, BT_SETTING_CONTACT_ENERGY_COUNT2),
+    };
+    return kernel;
+}
+
+void bt_signals_q4(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
+                   int32_t e_q4[BT_ELECTRODES])
+{
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        e_q4[i] = counts[i] == BT_INVALID_COUNT ? 0 : 16 * (int32_t)counts[i] - tare_q4[i];
+    }
+}
+
+static void invalidate(int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
+{
+    for (int d = 0; d < 3; d++) {
+        poc_um[d] = BT_INVALID_I16;
+        force_100un[d] = BT_INVALID_I32;
+        torque_mnmm[d] = BT_INVALID_I32;
+    }
+}
+
+uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *settings, int16_t poc_um[3],
+                   int32_t force_100un[3], int32_t torque_mnmm[3])
+{
+    int64_t force_un[3];
+    int64_t torque_yz[2];
+    int32_t poc_nm[3];
+    int saturated = 0;
+    uint32_t flags = 0;
+
+    invalidate(poc_um, force_100un, torque_mnmm);
+    bt_force_un(e_q4, settings->force_gain_nn, force_un);
+    bt_torque_yz_mnmm(e_q4, settings->torque_gain_nn, torque_yz);
+    for (int d = 0; d < 3; d++) {
+        force_100un[d] = bt_saturate_i32(bt_div_round(force_un[d], 100), &saturated);
+    }
+    torque_mnmm[1] = bt_saturate_i32(torque_yz[0], &saturated);
+    torque_mnmm[2] = bt_saturate_i32(torque_yz[1], &saturated);
+    if (bt_poc(e_q4, settings->poc_weights, poc_nm)) {
+        for (int d = 0; d < 3; d++) {
+            poc_um[d] = (int16_t)bt_div_round(poc_nm[d], 1000);
+        }
+        torque_mnmm[0] = bt_saturate_i32(bt_torque_x_derived_mnmm(poc_nm, force_un), &saturated);
+    } else {
+        flags |= BT_FRAME_FLAG_POC_INVALID;
+    }
+    return flags | (saturated ? BT_FRAME_FLAG_SATURATED : 0);
+}
+
+typedef struct {
+    uint64_t energy; // count^2
+    uint64_t bulge;  // count^2 of electrodes that gained
+    int active;
+} signal_shape;
+
+static signal_shape shape_of(const int32_t e_q4[BT_ELECTRODES])
+{
+    signal_shape shape = {0, 0, 0};
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        uint64_t square_q8 = (uint64_t)((int64_t)e_q4[i] * e_q4[i]);
+        shape.energy += square_q8;
+        shape.bulge += e_q4[i] > 0 ? square_q8 : 0;
+        shape.active += bt_abs(e_q4[i]) >= ACTIVE_Q4;
+    }
+    shape.energy >>= 8;
+    shape.bulge >>= 8;
+    return shape;
+}
+
+static uint32_t channel_flags(const bt_frame *frame)
+{
+    uint32_t flags = 0;
+    int unusable = 0;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        bool missing = frame->electrode[i] == BT_INVALID_COUNT;
+        bool railed = bt_count_railed(frame->electrode[i]);
+        flags |= missing ? BT_FRAME_FLAG_ELECTRODE_MISSING : 0;
+        flags |= railed ? BT_FRAME_FLAG_RAIL : 0;
+        unusable += missing || railed;
+    }
+    flags |= unusable > FAULT_ELECTRODES ? BT_FRAME_FLAG_FAULT : 0;
+    flags |= frame->pdc == BT_INVALID_COUNT ? BT_FRAME_FLAG_PDC_MISSING : 0;
+    flags |= frame->tac == BT_INVALID_COUNT ? BT_FRAME_FLAG_TAC_MISSING : 0;
+    flags |= frame->tdc == BT_INVALID_COUNT ? BT_FRAME_FLAG_TDC_MISSING : 0;
+    return flags;
+}
+
+// The PoC's outward normal is within 60 degrees of -z: c_z <= -r/2, on tip and cylinder alike.
+static bool faces_down(const int16_t poc_um[3])
+{
+    return poc_um[2] <= -BT_CORE_RADIUS_UM / 2;
+}
+
+void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_settings *settings,
+                bt_msg_frame *msg)
+{
+    msg->flags = channel_flags(frame) | BT_FRAME_FLAG_MX_DERIVED | BT_FRAME_FLAG_FX_WEAK;
+    msg->tare_state = tare->state;
+    msg->flags |= tare->changed ? BT_FRAME_FLAG_TARE_CHANGED : 0;
+    msg->pdc_tare_q4 =
+        tare->base.pdc_q16 == BT_PDC_UNKNOWN ? BT_INVALID_COUNT : bt_tare_q4(tare->base.pdc_q16);
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        msg->tare_q4[i] = bt_tare_q4(tare->base.electrode_q16[i]);
+    }
+    if (tare->reason == BT_TARE_REASON_NONE) {
+        msg->flags |= BT_FRAME_FLAG_UNTARED | BT_FRAME_FLAG_POC_INVALID;
+        invalidate(msg->poc_um, msg->force_100un, msg->torque_mnmm);
+        return;
+    }
+    int32_t e_q4[BT_ELECTRODES];
+    bt_signals_q4(frame->electrode, msg->tare_q4, e_q4);
+    msg->flags |= bt_kernel(e_q4, settings, msg->poc_um, msg->force_100un, msg->torque_mnmm);
+
+    uint32_t threshold = bt_tare_threshold_count2(tare, settings->contact_energy_count2);
+    signal_shape shape = shape_of(e_q4);
+    bool has_poc = !(msg->flags & BT_FRAME_FLAG_POC_INVALID);
+    bool torsion_ok = has_poc && faces_down(msg->poc_um) && shape.energy > threshold
+                      && shape.active >= ACTIVE_FOR_TORSION && !(msg->flags & BT_FRAME_FLAG_FAULT);
+    msg->flags |= tare->state == BT_TARE_STATE_CONTACT ? BT_FRAME_FLAG_CONTACT : 0;
+    msg->flags |= shape.energy < 4 * (uint64_t)threshold ? BT_FRAME_FLAG_POC_LOW : 0;
+    msg->flags |= shape.bulge > shape.energy - shape.bulge ? BT_FRAME_FLAG_SHEAR_MIX : 0;
+    msg->flags |= torsion_ok ? BT_FRAME_FLAG_TORSION_OK : 0;
+    msg->flags |= tare->contact_frames > BASE_OLD_FRAMES ? BT_FRAME_FLAG_BASE_OLD : 0;
+}

@@ -1,0 +1,75 @@
+// The conversation with the host: handshake, commands, streams, link statistics.
+// Knows no transport: bytes come in through bt_session_receive and leave through one function that
+// takes a whole frame or nothing. Times are device time in us, wrapping at 2^32.
+#ifndef BIOTAC_SESSION_H
+#define BIOTAC_SESSION_H
+
+#include "finger.h"
+#include "framing.h"
+#include "settings.h"
+
+typedef struct {
+    uint16_t board; // enum bt_board
+    uint8_t firmware_version[3];
+    uint8_t board_serial[12];
+    uint32_t boot_id;
+} bt_identity;
+
+// What a sensor says of itself, as it is sent.
+typedef bt_msg_sensor_info bt_sensor_info;
+
+// Takes all bytes or none; false means no room, or nobody there.
+typedef bool (*bt_link_write)(const uint8_t *data, size_t bytes);
+
+typedef struct {
+    bt_finger finger[BT_MAX_FINGERS];
+    bt_sensor_info info[BT_MAX_FINGERS];
+    bt_settings settings;
+    bt_kernel_settings kernel;
+    bt_identity identity;
+    bt_link_write write;
+    bt_deframer deframer;
+
+    uint8_t streams; // BT_STREAM_FLAG_*
+    uint8_t fingers; // bit mask of the fingers that START named
+    uint16_t keepalive_ms;
+    uint32_t heard_us; // when the host last said anything
+    uint32_t status_us;
+    uint32_t second_us; // uptime is counted in whole seconds from here
+    uint32_t uptime_s;
+    uint16_t status_seq;
+    uint16_t sensor_status_seq;
+
+    uint32_t messages_sent;
+    uint32_t messages_dropped;
+    uint32_t slots_late;
+    uint32_t rx_frames;
+    uint32_t rx_errors;
+} bt_session;
+
+void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, uint32_t now_us);
+
+// Bytes from the host. Every command gets exactly one reply.
+void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, uint32_t now_us);
+
+// A round of slots is complete: compute and send for every finger.
+void bt_session_round(bt_session *session);
+
+// Call often: keep-alive and periodic status.
+void bt_session_tick(bt_session *session, uint32_t now_us);
+
+// The host closed the port: nobody is there to stream to.
+void bt_session_link_down(bt_session *session);
+
+// Bit mask of the fingers whose sensor answers.
+uint8_t bt_session_present(const bt_session *session);
+
+// Send one message, counting it as sent or dropped.
+void bt_session_send(bt_session *session, uint8_t id, const uint8_t *payload);
+void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us);
+void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t finger, uint32_t now_us);
+
+// commands.c: one good frame from the host.
+void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_t now_us);
+
+#endif

@@ -1,0 +1,23 @@
+// The board's settings: one int32 each, ranges and defaults generated from link.toml.
+#ifndef BIOTAC_SETTINGS_H
+#define BIOTAC_SETTINGS_H
+
+#include "wire_gen.h"
+
+#include <stdint.h>
+
+typedef struct {
+    int32_t value[BT_SETTINGS]; // in the order of bt_setting_specs
+} bt_settings;
+
+void bt_settings_reset(bt_settings *settings);
+
+// id must be an enum bt_setting; asking for another one is a programming error and gives 0.
+int32_t bt_settings_get(const bt_settings *settings, uint8_t id);
+
+// Returns an enum bt_error: OK, UNKNOWN_SETTING or OUT_OF_RANGE; a refused value changes nothing.
+uint8_t bt_settings_set(bt_settings *settings, uint8_t id, int32_t value);
+
+uint8_t bt_settings_has(uint8_t id);
+
+#endif
