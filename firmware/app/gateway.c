@@ -1,0 +1,104 @@
+#include "gateway.h"
+
+#include "port.h"
+#include "properties.h"
+#include "word.h"
+
+#include "version.h"
+
+#define ALL_FINGERS ((1u << BT_MAX_FINGERS) - 1)
+
+void bt_gateway_init(bt_gateway *gateway)
+{
+    bt_identity identity = {
+        .board = port_board(),
+        .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},
+        .boot_id = port_boot_id(),
+    };
+    port_board_serial(identity.board_serial);
+    port_delay_us(BT_POWER_ON_MS * 1000);
+    bt_session_init(&gateway->session, &identity, port_link_write, port_now_us());
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_properties_read(f, &gateway->session.info[f]);
+        gateway->session.finger[f].present = gateway->session.info[f].present;
+    }
+    gateway->round_open = false;
+    gateway->link_was_up = false;
+    // Absent sensors are read too: one that is plugged in later shows up by itself.
+    uint32_t start_us = port_now_us() + BT_GAP_US + 1;
+    bt_sampler_start(&gateway->sampler, ALL_FINGERS, start_us);
+    port_alarm_at(start_us);
+}
+
+void bt_gateway_alarm(bt_gateway *gateway)
+{
+    port_alarm_at(bt_sampler_alarm(&gateway->sampler));
+}
+
+static void count_word(bt_word_counts *counts, enum bt_word kind, uint16_t word)
+{
+    switch (kind) {
+    case BT_WORD_GOOD:
+        counts->good++;
+        break;
+    case BT_WORD_STUCK:
+        counts->stuck++;
+        break;
+    case BT_WORD_ERROR:
+        counts->error++;
+        counts->last_error_word = word;
+        break;
+    case BT_WORD_PARITY:
+        counts->parity++;
+        break;
+    }
+}
+
+static void take_slot(bt_gateway *gateway, const bt_slot *slot)
+{
+    bt_session *session = &gateway->session;
+    // A new round number closes the one before, even when its last slots were lost.
+    if (gateway->round_open && slot->round != gateway->round) {
+        bt_session_round(session);
+        gateway->round_open = false;
+    }
+    if (!gateway->round_open) {
+        uint32_t t_us = slot->t_us - slot->slot * (1000000u / BT_SLOT_HZ);
+        for (int f = 0; f < BT_MAX_FINGERS; f++) {
+            bt_finger_begin(&session->finger[f], t_us);
+        }
+        gateway->round = slot->round;
+        gateway->round_open = true;
+    }
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        uint16_t count;
+        enum bt_word kind = bt_word_decode(slot->word[f], &count);
+        count_word(&session->finger[f].words, kind, slot->word[f]);
+        bt_frame_put(&session->finger[f].frame, slot->slot, count);
+    }
+    if (slot->slot == BT_SLOTS - 1) {
+        bt_session_round(session);
+        gateway->round_open = false;
+    }
+}
+
+void bt_gateway_poll(bt_gateway *gateway)
+{
+    bt_session *session = &gateway->session;
+    uint8_t bytes[64];
+    size_t n;
+    bool up = port_link_up();
+    if (gateway->link_was_up && !up) {
+        bt_session_link_down(session);
+    }
+    gateway->link_was_up = up;
+    while ((n = port_link_read(bytes, sizeof bytes)) > 0) {
+        bt_session_receive(session, bytes, n, port_now_us());
+    }
+    bt_slot slot;
+    while (bt_sampler_pop(&gateway->sampler, &slot)) {
+        take_slot(gateway, &slot);
+    }
+    session->slots_late = gateway->sampler.late;
+    bt_session_tick(session, port_now_us());
+}

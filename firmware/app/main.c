@@ -1,0 +1,19 @@
+#include "gateway.h"
+#include "port.h"
+
+static bt_gateway gateway;
+
+void bt_port_alarm(void)
+{
+    bt_gateway_alarm(&gateway);
+}
+
+int main(int argc, char **argv)
+{
+    port_init(argc, argv);
+    bt_gateway_init(&gateway);
+    for (;;) {
+        bt_gateway_poll(&gateway);
+        port_idle();
+    }
+}

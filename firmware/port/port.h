@@ -1,0 +1,50 @@
+// Everything the firmware needs of a board, on one page. One implementation per folder beside this.
+// Times are us of device time in uint32_t, wrapping; differences are taken modulo 2^32.
+#ifndef BIOTAC_PORT_H
+#define BIOTAC_PORT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+// Once, before anything else. argc and argv are for boards that have a command line.
+void port_init(int argc, char **argv);
+
+// ---- time -----------------------------------------------------------------------------------
+uint32_t port_now_us(void);
+
+// Busy wait, for a few us only.
+void port_delay_us(uint32_t us);
+
+// Call bt_port_alarm() from interrupt context once `at_us` has come; replaces an earlier alarm.
+void port_alarm_at(uint32_t at_us);
+
+// Defined by the app. Runs in interrupt context.
+void bt_port_alarm(void);
+
+// Sleep until an interrupt may have brought work.
+void port_idle(void);
+
+// ---- SPI ------------------------------------------------------------------------------------
+// Pull low the chip selects of the sensors in mask, release all others.
+void port_spi_select(uint8_t mask);
+
+// Exchange 16 bits, MSB first, mode 0, BT_SPI_HZ. Returns what MISO carried.
+uint16_t port_spi_transfer16(uint16_t mosi);
+
+// ---- link to the host -----------------------------------------------------------------------
+// Takes all bytes or none; false means no room, or nobody there.
+bool port_link_write(const uint8_t *data, size_t bytes);
+
+// Returns how many bytes came, 0 when none did.
+size_t port_link_read(uint8_t *data, size_t bytes);
+
+// A host has the port open (DTR).
+bool port_link_up(void);
+
+// ---- identity -------------------------------------------------------------------------------
+uint16_t port_board(void); // enum bt_board
+void port_board_serial(uint8_t serial[12]);
+uint32_t port_boot_id(void); // random at each boot
+
+#endif

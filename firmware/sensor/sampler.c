@@ -1,0 +1,99 @@
+#include "sampler.h"
+
+#include "port.h"
+
+#include <string.h>
+
+// port_now_us() truncates, so a settle time that must not be short needs one us more.
+#define SETTLE_TICKS_US (BT_SETTLE_US + 1)
+
+_Static_assert((BT_SLOT_RING & (BT_SLOT_RING - 1)) == 0 && BT_SLOT_RING <= 128,
+               "ring indices wrap in a byte");
+
+void bt_sampler_start(bt_sampler *sampler, uint8_t fingers, uint32_t start_us)
+{
+    memset(sampler, 0, sizeof *sampler);
+    sampler->fingers = fingers;
+    sampler->slot_start_us = start_us;
+}
+
+static void push(bt_sampler *sampler)
+{
+    uint8_t head = atomic_load_explicit(&sampler->head, memory_order_relaxed);
+    uint8_t tail = atomic_load_explicit(&sampler->tail, memory_order_acquire);
+    if ((uint8_t)(head - tail) == BT_SLOT_RING) {
+        sampler->late++;
+        return;
+    }
+    sampler->ring[head % BT_SLOT_RING] = sampler->current;
+    atomic_store_explicit(&sampler->head, (uint8_t)(head + 1), memory_order_release);
+}
+
+bool bt_sampler_pop(bt_sampler *sampler, bt_slot *slot)
+{
+    uint8_t tail = atomic_load_explicit(&sampler->tail, memory_order_relaxed);
+    uint8_t head = atomic_load_explicit(&sampler->head, memory_order_acquire);
+    if (head == tail) {
+        return false;
+    }
+    *slot = sampler->ring[tail % BT_SLOT_RING];
+    atomic_store_explicit(&sampler->tail, (uint8_t)(tail + 1), memory_order_release);
+    return true;
+}
+
+static void advance(bt_sampler *sampler)
+{
+    // 1/4400 s is 227.27 us: the fraction is carried, or the rate would drift by 0.1 %.
+    sampler->slot_start_us += 1000000 / BT_SLOT_HZ;
+    sampler->fraction += 1000000 % BT_SLOT_HZ;
+    if (sampler->fraction >= BT_SLOT_HZ) {
+        sampler->fraction -= BT_SLOT_HZ;
+        sampler->slot_start_us++;
+    }
+    if (++sampler->current.slot == BT_SLOTS) {
+        sampler->current.slot = 0;
+        sampler->current.round++;
+    }
+}
+
+static void send_command(bt_sampler *sampler)
+{
+    uint8_t command = bt_channel_command[bt_slot_channel[sampler->current.slot]];
+    sampler->current.t_us = port_now_us();
+    port_spi_select(sampler->fingers);
+    // All selected sensors drive MISO at once here; whatever it carries means nothing.
+    (void)port_spi_transfer16((uint16_t)(command << 8));
+    port_spi_select(0);
+}
+
+static void read_sensors(bt_sampler *sampler)
+{
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        sampler->current.word[f] = 0;
+        if (sampler->fingers >> f & 1) {
+            port_spi_select((uint8_t)(1u << f));
+            sampler->current.word[f] = port_spi_transfer16(BT_LISTEN_WORD);
+            port_spi_select(0);
+            port_delay_us(BT_GAP_US);
+        }
+    }
+}
+
+uint32_t bt_sampler_alarm(bt_sampler *sampler)
+{
+    if (!sampler->settling) {
+        send_command(sampler);
+        sampler->settling = true;
+        return port_now_us() + SETTLE_TICKS_US;
+    }
+    read_sensors(sampler);
+    sampler->settling = false;
+    push(sampler);
+    advance(sampler);
+    // An interrupt held off for longer than a slot loses slots, never the time base.
+    while ((int32_t)(sampler->slot_start_us - port_now_us()) < 0) {
+        sampler->late++;
+        advance(sampler);
+    }
+    return sampler->slot_start_us;
+}

@@ -1,0 +1,48 @@
+// Slot sampling of one to five sensors, driven by one timer alarm.
+//
+// A slot: all chip selects low, sample command to every sensor at once, chip selects high; at least
+// 50 us later each sensor is read by its own chip select. Two alarms per slot, so that nothing
+// spins through the 50 us. Words go to the main loop undecoded through a single-producer,
+// single-consumer ring; when the main loop is late, whole slots are lost and counted, and the
+// channels they held are missing from their frame. A word stays with the finger whose chip select
+// was low, whatever its neighbours answered.
+#ifndef BIOTAC_SAMPLER_H
+#define BIOTAC_SAMPLER_H
+
+#include "sensor_gen.h"
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#define BT_SLOT_RING 64 // a power of two; 64 slots are 14.5 ms of main loop delay
+
+typedef struct {
+    uint32_t round; // frame number since start
+    uint32_t t_us;  // when the sample command was sent
+    uint8_t slot;
+    uint16_t word[BT_MAX_FINGERS];
+} bt_slot;
+
+typedef struct {
+    uint8_t fingers; // bit mask of the sensors that are read
+    bool settling;   // the command is out, the read is due
+    bt_slot current;
+    uint32_t slot_start_us;
+    uint32_t fraction; // of slot_start_us, in 1/BT_SLOT_HZ us
+    bt_slot ring[BT_SLOT_RING];
+    atomic_uchar head;     // written by the interrupt only
+    atomic_uchar tail;     // written by the main loop only
+    _Atomic uint32_t late; // slots lost
+} bt_sampler;
+
+// The first slot begins at start_us. The caller arms the alarm for start_us.
+void bt_sampler_start(bt_sampler *sampler, uint8_t fingers, uint32_t start_us);
+
+// Interrupt context: do what is due. Returns when to be called next.
+uint32_t bt_sampler_alarm(bt_sampler *sampler);
+
+// Main loop: take the oldest slot. False when there is none.
+bool bt_sampler_pop(bt_sampler *sampler, bt_slot *slot);
+
+#endif
