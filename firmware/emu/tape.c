@@ -1,0 +1,74 @@
+#include "tape.h"
+
+#include "device.h"
+#include "sensor_gen.h"
+
+#include <string.h>
+
+#define HEADER_BYTES 24
+// Slot k begins k/4400 s after the start, truncated to us by the sampler: half a slot of slack
+// puts every sample command into its own slot.
+#define HALF_SLOT_NS (500000000ull / BT_SLOT_HZ)
+
+static uint32_t u32_at(const uint8_t *at)
+{
+    return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+}
+
+const char *bt_tape_open(bt_tape *tape, const uint8_t *bytes, size_t size)
+{
+    memset(tape, 0, sizeof *tape);
+    if (size < HEADER_BYTES || memcmp(bytes, "BTTAPE01", 8) != 0) {
+        return "not a tape of version 01";
+    }
+    tape->fingers = u32_at(bytes + 8);
+    tape->frames = u32_at(bytes + 12);
+    tape->samples = bytes + HEADER_BYTES;
+    if (u32_at(bytes + 16) != BT_SLOTS) {
+        return "made for another slot sequence";
+    }
+    if (tape->fingers < 1 || tape->fingers > BT_MAX_FINGERS || tape->frames < 1) {
+        return "wants 1 to 5 fingers and at least one frame";
+    }
+    if (size - HEADER_BYTES != (size_t)tape->frames * tape->fingers * BT_SLOTS * 2) {
+        return "its length does not fit its header";
+    }
+    return NULL;
+}
+
+static uint64_t slot_number(const bt_tape *tape, uint64_t t_ns)
+{
+    return (t_ns - tape->start_ns + HALF_SLOT_NS) * BT_SLOT_HZ / 1000000000ull;
+}
+
+uint16_t bt_tape_count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
+{
+    bt_tape *tape = context;
+    if (!tape->started) {
+        tape->started = true;
+        tape->start_ns = t_ns;
+    }
+    if (finger >= tape->fingers) {
+        return BT_EMU_STUCK_LOW;
+    }
+    uint64_t number = slot_number(tape, t_ns);
+    uint64_t frame = number / BT_SLOTS;
+    if (frame >= tape->frames) {
+        frame = tape->frames - 1;
+    }
+    // In the default sequence the slot tells the channel. Another sequence gets its channel's next
+    // sample of the same frame.
+    for (uint64_t k = 0; k < BT_SLOTS; k++) {
+        uint64_t slot = (number + k) % BT_SLOTS;
+        if ((bt_channel_command[bt_slot_channel[slot]] & 0x7E) >> 1 == channel) {
+            size_t at = (size_t)((frame * tape->fingers + finger) * BT_SLOTS + slot) * 2;
+            return (uint16_t)(tape->samples[at] | tape->samples[at + 1] << 8);
+        }
+    }
+    return BT_EMU_NO_CHANNEL;
+}
+
+bool bt_tape_over(const bt_tape *tape, uint64_t t_ns)
+{
+    return tape->started && slot_number(tape, t_ns) >= (uint64_t)tape->frames * BT_SLOTS;
+}

@@ -1,0 +1,261 @@
+// The board that is a process: emulated sensors on an emulated bus, the link on a pty, device time
+// that passes only as the firmware spends it.
+//
+//   biotac-sim --tape FILE [--pace X] [--hold] [--boot-id N] [--absent MASK]
+//
+// Writes "pty PATH" to stdout, and "end" once the tape is played and all of it handed over.
+// --pace: device seconds per second, 0 for as fast as the host reads (nothing is then dropped).
+// --hold: device time stands still until "run" comes on stdin. End of stdin ends the process.
+#define _DEFAULT_SOURCE
+#include "port.h"
+
+#include "clock.h"
+#include "device.h"
+#include "pty.h"
+#include "sensor_gen.h"
+#include "tape.h"
+#include "wire_gen.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define TRANSFER_NS    (16u * 1000000000u / BT_SPI_HZ)
+// How often the link is served, in device time: a USB board does so every millisecond.
+#define LINK_PERIOD_NS 1000000u
+
+static bt_tape tape;
+static bt_emu_device sensor[BT_MAX_FINGERS];
+static uint8_t selected;
+static uint32_t alarm_us;
+static bool armed;
+static bool held;
+static bool ended;
+static bool link_due = true;
+static uint64_t link_ns;
+static uint32_t boot_id;
+static bool paced;
+
+static void die(const char *what, const char *why)
+{
+    fprintf(stderr, "biotac-sim: %s: %s\n", what, why);
+    exit(2);
+}
+
+static void load_tape(const char *path)
+{
+    struct stat s;
+    int fd = open(path, O_RDONLY);
+    if (fd < 0 || fstat(fd, &s) != 0 || s.st_size == 0) {
+        die(path, fd < 0 ? strerror(errno) : "empty");
+    }
+    void *bytes = mmap(NULL, (size_t)s.st_size, PROT_READ, MAP_PRIVATE, fd, 0);
+    if (bytes == MAP_FAILED) {
+        die(path, strerror(errno));
+    }
+    const char *wrong = bt_tape_open(&tape, bytes, (size_t)s.st_size);
+    if (wrong != NULL) {
+        die(path, wrong);
+    }
+    (void)close(fd);
+}
+
+static void plug_in_sensors(unsigned absent)
+{
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        char serial[17];
+        (void)snprintf(serial, sizeof serial, "BTEMU0000000%04u", f + 1u);
+        bool present = f < tape.fingers && !(absent >> f & 1);
+        bt_emu_init(&sensor[f], f, present, serial, bt_tape_count, &tape);
+    }
+}
+
+void port_init(int argc, char **argv)
+{
+    const char *tape_path = NULL;
+    double pace = 1.0;
+    unsigned absent = 0;
+    boot_id = (uint32_t)getpid();
+    for (int k = 1; k < argc; k++) {
+        if (strcmp(argv[k], "--hold") == 0) {
+            held = true;
+        } else if (k + 1 == argc) {
+            die(argv[k], "unknown option, or its value is missing");
+        } else if (strcmp(argv[k], "--tape") == 0) {
+            tape_path = argv[++k];
+        } else if (strcmp(argv[k], "--pace") == 0) {
+            pace = atof(argv[++k]);
+        } else if (strcmp(argv[k], "--boot-id") == 0) {
+            boot_id = (uint32_t)strtoul(argv[++k], NULL, 0);
+        } else if (strcmp(argv[k], "--absent") == 0) {
+            absent = (unsigned)strtoul(argv[++k], NULL, 0);
+        } else {
+            die(argv[k], "unknown option");
+        }
+    }
+    if (tape_path == NULL) {
+        die("--tape", "missing; biotac sim makes one and passes it");
+    }
+    load_tape(tape_path);
+    plug_in_sensors(absent);
+    (void)fcntl(STDIN_FILENO, F_SETFL, fcntl(STDIN_FILENO, F_GETFL) | O_NONBLOCK);
+    paced = pace > 0;
+    clock_init(pace);
+    const char *path = pty_open(!paced);
+    if (path == NULL) {
+        die("no pty", strerror(errno));
+    }
+    printf("pty %s\n", path);
+    (void)fflush(stdout);
+}
+
+// ---- time -------------------------------------------------------------------------------------
+
+uint32_t port_now_us(void)
+{
+    return (uint32_t)(clock_now_ns() / 1000);
+}
+
+void port_delay_us(uint32_t us)
+{
+    clock_advance_ns((uint64_t)us * 1000);
+}
+
+void port_alarm_at(uint32_t at_us)
+{
+    alarm_us = at_us;
+    armed = true;
+}
+
+static uint64_t alarm_ns(void)
+{
+    uint64_t now_ns = clock_now_ns();
+    int32_t ahead_us = (int32_t)(alarm_us - (uint32_t)(now_ns / 1000));
+    return ahead_us <= 0 ? now_ns : (now_ns / 1000 + (uint64_t)ahead_us) * 1000;
+}
+
+static void read_control(void)
+{
+    char text[64];
+    ssize_t n = read(STDIN_FILENO, text, sizeof text);
+    if (n == 0) {
+        exit(0); // whoever started us is gone
+    }
+    if (n > 0 && memchr(text, 'r', (size_t)n) != NULL && held) { // "run"
+        held = false;
+        clock_rebase();
+    }
+}
+
+static void stand_still(void)
+{
+    static bool told;
+    link_due = true;
+    pty_flush();
+    if (ended && !told) {
+        told = true;
+        printf("end\n");
+        (void)fflush(stdout);
+    }
+    pty_wait(STDIN_FILENO, -1);
+    read_control();
+}
+
+void port_idle(void)
+{
+    if (!armed) {
+        return;
+    }
+    uint64_t next_ns = alarm_ns();
+    ended = ended || bt_tape_over(&tape, next_ns);
+    if (held || ended) {
+        stand_still();
+        return;
+    }
+    if (clock_now_ns() - link_ns >= LINK_PERIOD_NS) {
+        link_ns = clock_now_ns();
+        link_due = true;
+        pty_flush();
+        read_control();
+    }
+    int64_t wait_us = clock_wait_us(next_ns);
+    if (wait_us > 1000) { // shorter waits are caught up with: device time is exact either way
+        pty_wait(-1, wait_us);
+    }
+    if (next_ns > clock_now_ns()) {
+        clock_advance_ns(next_ns - clock_now_ns());
+    }
+    armed = false;
+    bt_port_alarm();
+}
+
+// ---- SPI --------------------------------------------------------------------------------------
+
+void port_spi_select(uint8_t mask)
+{
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_emu_select(&sensor[f], mask >> f & 1, clock_now_ns());
+    }
+    selected = mask;
+}
+
+uint16_t port_spi_transfer16(uint16_t mosi)
+{
+    uint16_t miso = 0;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (selected >> f & 1) {
+            miso |= bt_emu_transfer16(&sensor[f], mosi, clock_now_ns()); // several drive at once: contention
+        }
+    }
+    clock_advance_ns(TRANSFER_NS);
+    return miso;
+}
+
+// ---- link -------------------------------------------------------------------------------------
+
+bool port_link_write(const uint8_t *data, size_t bytes)
+{
+    return pty_write(data, bytes);
+}
+
+size_t port_link_read(uint8_t *data, size_t bytes)
+{
+    if (!link_due) {
+        return 0; // a system call per half slot would cost more than all else
+    }
+    size_t n = pty_read(data, bytes);
+    link_due = n > 0;
+    return n;
+}
+
+bool port_link_up(void)
+{
+    static bool up;
+    if (link_due) {
+        up = pty_up();
+    }
+    return up;
+}
+
+// ---- identity ---------------------------------------------------------------------------------
+
+uint16_t port_board(void)
+{
+    return BT_BOARD_POSIX_SIM;
+}
+
+void port_board_serial(uint8_t serial[12])
+{
+    memset(serial, 0, 12);
+    memcpy(serial, "posix-sim", 9);
+}
+
+uint32_t port_boot_id(void)
+{
+    return boot_id;
+}

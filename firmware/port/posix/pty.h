@@ -1,0 +1,23 @@
+// The simulated board's USB-serial port: a pseudo-terminal with a transmit ring.
+#ifndef BIOTAC_POSIX_PTY_H
+#define BIOTAC_POSIX_PTY_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+// Opens a pty and returns the path of the side that the host opens, or NULL with errno set.
+// lossless: a full ring waits for the host instead of refusing; device time stands still meanwhile.
+const char *pty_open(bool lossless);
+
+bool pty_up(void); // a host has it open
+bool pty_write(const uint8_t *data, size_t bytes);
+size_t pty_read(uint8_t *data, size_t bytes);
+
+// Hand the ring to the kernel as far as it takes it.
+void pty_flush(void);
+
+// Wait until the host sent something, `other` becomes readable (-1: none) or us have passed (-1: forever).
+void pty_wait(int other, int64_t us);
+
+#endif
