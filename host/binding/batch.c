@@ -1,0 +1,17 @@
+#include "binding.h"
+
+void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
+                      const bt_kernel_settings *settings, int16_t *poc_um, int32_t *force_100un,
+                      int32_t *torque_mnmm, uint32_t *flags)
+{
+    for (int64_t k = 0; k < n; k++) {
+        int32_t e_q4[BT_ELECTRODES];
+        bt_signals_q4(counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, e_q4);
+        flags[k] = bt_kernel(e_q4, settings, poc_um + 3 * k, force_100un + 3 * k, torque_mnmm + 3 * k);
+    }
+}
+
+uint32_t bt_binding_schema_hash(void)
+{
+    return BT_SCHEMA_HASH;
+}

@@ -1,0 +1,18 @@
+// What Python sees of the compiled core. The build runs this through the C preprocessor (with
+// BT_CDEF defined and empty standard headers) and gives the outcome to cffi, so that no declaration
+// is written twice.
+#ifndef BIOTAC_BINDING_H
+#define BIOTAC_BINDING_H
+
+#include "batch.h"
+#include "cobs.h"
+#include "crc32.h"
+#include "framing.h"
+#include "lin2013.h"
+#include "results.h"
+#include "tare.h"
+
+// Compared with host/biotac/_wire.py when the module is imported.
+uint32_t bt_binding_schema_hash(void);
+
+#endif

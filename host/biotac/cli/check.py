@@ -1,0 +1,51 @@
+"""biotac check REC"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from ..crosscheck import CrossCheck
+from ..recording import Recording
+
+NAME = "check"
+HELP = "Check every on-board result of a recording against the float64 reference."
+EXAMPLE = "biotac check grasp.mcap"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The recording."""
+    parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0: all results are right. 1: a result is wrong or wire frames were damaged. 2 (raised): unreadable."""
+    recording = Recording(args.recording)
+    outcome = CrossCheck()
+    outcome.add(recording.wire, recording.settings)
+    good = outcome.violations == 0 and recording.counts.bad == 0
+    if args.json:
+        facts = {
+            "recording": str(args.recording),
+            "good": good,
+            "frames": len(recording.frames),
+            "frames_lost": recording.frames_lost,
+            "crc_errors": recording.counts.bad_crc,
+            "problems": recording.problems,
+            "crosscheck": outcome.as_dict(),
+        }
+        print(json.dumps(facts))
+        return 0 if good else 1
+    for problem in recording.problems:
+        print(f"biotac: {problem}", file=sys.stderr)
+    for finding in outcome.findings:
+        print(finding)
+    verdict = "good" if good else f"{outcome.violations} violation(s), {recording.counts.bad} damaged wire frame(s)"
+    print(
+        f"{args.recording}: {len(recording.frames)} frames, {recording.frames_lost} lost, {verdict}; largest error "
+        f"PoC {outcome.poc_um_max:.3f} um, force {outcome.force_mn_max:.4f} mN, "
+        f"torque {outcome.torque_nmm_max:.5f} N*mm"
+    )
+    return 0 if good else 1

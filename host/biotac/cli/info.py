@@ -1,0 +1,83 @@
+"""biotac info PORT"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from typing import Any
+
+import biotac
+
+from .. import _wire as wire
+
+NAME = "info"
+HELP = "Say who is on a port: board, firmware, sensors, settings, counters."
+EXAMPLE = "biotac info /dev/ttyACM0"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The port."""
+    parser.add_argument("port", metavar="PORT", help="device path or sim:SOURCE")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what the board says of itself."""
+    with biotac.open(args.port) as hand:
+        hello = hand.info
+        sensors = [hand.sensor_info(f) for f in fingers_of(hello)]
+        settings = hand.settings()
+        status = hand.status()
+    if args.json:
+        facts: dict[str, Any] = {
+            "port": args.port,
+            "board": board_text(hello),
+            "firmware": version_text(hello),
+            "wire": f"{hello.wire_major}.{hello.wire_minor}",
+            "schema_hash": f"{hello.schema_hash:08x}",
+            "schema_matches": hello.schema_hash == wire.SCHEMA_HASH,
+            "serial_number": serial_text(hello),
+            "boot_id": hello.boot_id,
+            "sensors": [
+                {"finger": s.finger, "serial": text(s.serial), "software": text(s.software_version)} for s in sensors
+            ],
+            "settings": {s.name.lower(): value for s, value in settings.items()},
+            "status": dataclasses.asdict(status),
+        }
+        print(json.dumps(facts))
+        return 0
+    print(f"{board_text(hello)}, firmware {version_text(hello)}, wire {hello.wire_major}.{hello.wire_minor}")
+    print(f"serial {serial_text(hello)}, boot {hello.boot_id:08x}, up {status.uptime_s} s")
+    if hello.schema_hash != wire.SCHEMA_HASH:
+        print("its schema differs from this library's; fields that only one side knows are left out")
+    for s in sensors:
+        print(f"finger {s.finger}: BioTac {text(s.serial)}, software {text(s.software_version)}")
+    for setting, value in settings.items():
+        print(f"{setting.name.lower()} = {value} {wire.SETTINGS[setting].unit}")
+    return 0
+
+
+def fingers_of(hello: wire.Hello) -> list[int]:
+    """Indices of the sensors that answer."""
+    return [f for f in range(8) if hello.fingers_present >> f & 1]
+
+
+def text(values: tuple[int, ...]) -> str:
+    """Zero-padded ASCII to str."""
+    return bytes(values).rstrip(b"\0").decode("ascii", errors="replace")
+
+
+def board_text(hello: wire.Hello) -> str:
+    """The board's name, or its number when it is newer than this library."""
+    return wire.Board(hello.board).name if hello.board in list(wire.Board) else f"board {hello.board}"
+
+
+def version_text(hello: wire.Hello) -> str:
+    """Firmware release."""
+    return f"{hello.firmware_major}.{hello.firmware_minor}.{hello.firmware_patch}"
+
+
+def serial_text(hello: wire.Hello) -> str:
+    """The board's unique id: as text where it is text, else in hex."""
+    raw = bytes(hello.board_serial).rstrip(b"\0")
+    return raw.decode() if raw and all(0x20 <= b < 0x7F for b in raw) else bytes(hello.board_serial).hex()

@@ -1,0 +1,62 @@
+"""Argument parsing and exit codes."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+
+from ..errors import BiotacError
+from . import check, demo, info, list_ports, record, sim, stream, version
+
+VERBS = (demo, list_ports, info, stream, record, check, sim, version)
+
+EPILOG = """\
+A PORT is a device path (/dev/ttyACM0, COM3) or sim:SOURCE, a simulated board that plays a
+scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd).
+
+exit codes: 0 done   1 check found a violation   2 unusable file or argument   3 port cannot be
+opened   4 no gateway on the port   5 firmware of another wire version   6 board lost
+7 command refused   130 interrupted
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The whole command line."""
+    top = argparse.ArgumentParser(
+        prog="biotac",
+        description="BioTac fingertips over USB: forces, points of contact, torques.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
+    for module in VERBS:
+        verb = verbs.add_parser(
+            module.NAME,
+            help=module.HELP,
+            description=module.HELP,
+            epilog=f"example: {module.EXAMPLE}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        verb.add_argument("--json", action="store_true", help="print JSON for machines")
+        module.add_arguments(verb)
+        verb.set_defaults(run=module.run)
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one verb; return its exit code. Errors are one line on stderr."""
+    args = parser().parse_args(argv)
+    try:
+        return int(args.run(args))
+    except BiotacError as error:
+        print(f"biotac: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("biotac: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # Whoever read our output has had enough; keep Python from complaining while it shuts down.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0

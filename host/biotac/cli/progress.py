@@ -1,0 +1,29 @@
+"""A progress line on stderr for whatever takes longer than a second, on a terminal only."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+
+class Progress:
+    """Call ``show`` as often as you like; it prints a few times a second and cleans up after itself."""
+
+    def __init__(self, *, enabled: bool = True) -> None:
+        self._enabled = enabled and sys.stderr.isatty()
+        self._next = time.monotonic() + 1.0
+        self._width = 0
+
+    def show(self, text: str) -> None:
+        """Replace the line by text, at most five times a second, not before a second has passed."""
+        now = time.monotonic()
+        if not self._enabled or now < self._next:
+            return
+        self._next = now + 0.2
+        print(f"\r{text:<{self._width}}", end="", file=sys.stderr, flush=True)
+        self._width = max(self._width, len(text))
+
+    def done(self) -> None:
+        """Clear the line."""
+        if self._width:
+            print("\r" + " " * self._width + "\r", end="", file=sys.stderr, flush=True)

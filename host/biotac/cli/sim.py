@@ -1,0 +1,61 @@
+"""biotac sim SOURCE"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+from ..errors import PortError
+from ..link.ports import parse_pace
+from ..link.sim_process import SimBoard
+from ..sim.source import load_source
+
+NAME = "sim"
+HELP = "Run a simulated board on a pty that any serial program can open."
+EXAMPLE = "biotac sim press.toml --fingers 5"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Source and pace."""
+    parser.add_argument("source", metavar="SOURCE", help="scenario (.toml) or recorded counts (.npz, .btd)")
+    parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
+    parser.add_argument("--seconds", type=float, help="device time until it ends (default: the source's length)")
+    parser.add_argument("--pace", type=parse_pace, default=1.0, help="real (default), fast, or device s per s")
+    parser.add_argument("--link", type=Path, help="also make this path a symbolic link to the pty")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the pty's path, then run until Ctrl-C."""
+    source = load_source(args.source, fingers=args.fingers, seconds=args.seconds)
+    board = SimBoard(source, pace=args.pace, hold=False)
+    try:
+        if args.link is not None:
+            make_link(args.link, board.path)
+        facts = {"port": board.path, "source": source.name, "fingers": source.samples.shape[1]}
+        print(json.dumps(facts) if args.json else f"{board.path} plays {source.name}; Ctrl-C stops")
+        sys.stdout.flush()
+        board.wait()
+        # A board does not vanish when nothing more happens to its fingers: it goes on answering.
+        print(f"{source.name} is over; the board stays until Ctrl-C", file=sys.stderr)
+        signal.pause()
+    except KeyboardInterrupt:
+        pass  # the usual way to stop it
+    finally:
+        if args.link is not None and args.link.is_symlink():
+            args.link.unlink()
+        board.close()
+    return 0
+
+
+def make_link(link: Path, target: str) -> None:
+    """Replace a link left over from before; never anything else."""
+    if link.is_symlink():
+        link.unlink()
+    try:
+        os.symlink(target, link)
+    except OSError as error:
+        raise PortError(f"{link} cannot be made a link ({error.strerror}); choose another path") from error

@@ -1,0 +1,121 @@
+"""The compiled firmware core and its float64 reference, over whole arrays.
+
+Both run over the same recorded integers, so that any difference is arithmetic and nothing else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _wire as wire
+from .frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, to_units
+
+try:
+    from ._core import ffi, lib
+except ImportError as error:  # an editable tree without a build, or a wheel for another platform
+    raise ImportError(f"the compiled core is missing ({error}); install the package: pip install .") from error
+
+if lib.bt_binding_schema_hash() != wire.SCHEMA_HASH:
+    raise ImportError(
+        f"the compiled core was built for schema {lib.bt_binding_schema_hash():08x}, this Python code for "
+        f"{wire.SCHEMA_HASH:08x}; install the package again: pip install ."
+    )
+
+NN_PER_N = 1e9
+Settings = dict[wire.Setting, int]
+
+
+@dataclass(frozen=True)
+class Results:
+    """poc_mm, force_n, torque_nmm, each (n, 3) float64; NaN where there is no answer."""
+
+    poc_mm: NDArray[np.float64]
+    force_n: NDArray[np.float64]
+    torque_nmm: NDArray[np.float64]
+
+
+def default_settings() -> Settings:
+    """What a board starts with."""
+    return {setting: spec.default for setting, spec in wire.SETTINGS.items()}
+
+
+def compute(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
+    """Run the on-board integer kernels: counts (n, 19) 0..4095 or 0xFFFF for missing, tare in counts.
+
+    ``tare`` is (19,) or (n, 19), rounded to 1/16 count as the board does. Raises ValueError for other
+    shapes or ranges.
+    """
+    raw, tare_q4 = checked(counts, tare)
+    chosen = settings or default_settings()
+    kernel = ffi.new(
+        "bt_kernel_settings *",
+        {
+            "poc_weights": chosen[wire.Setting.POC_WEIGHTS],
+            "force_gain_nn": [chosen[s] for s in FORCE_GAINS],
+            "torque_gain_nn": [chosen[s] for s in TORQUE_GAINS],
+            "contact_energy_count2": chosen[wire.Setting.CONTACT_ENERGY_COUNT2],
+        },
+    )
+    n = len(raw)
+    poc_um = np.empty((n, 3), np.int16)
+    force_100un = np.empty((n, 3), np.int32)
+    torque_mnmm = np.empty((n, 3), np.int32)
+    flags = np.empty(n, np.uint32)
+    lib.bt_kernel_frames(
+        n,
+        ffi.from_buffer("uint16_t[]", raw),
+        ffi.from_buffer("uint16_t[]", tare_q4),
+        kernel,
+        ffi.from_buffer("int16_t[]", poc_um),
+        ffi.from_buffer("int32_t[]", force_100un),
+        ffi.from_buffer("int32_t[]", torque_mnmm),
+        ffi.from_buffer("uint32_t[]", flags),
+    )
+    return Results(
+        to_units(poc_um, UM_PER_MM), to_units(force_100un, FORCE_LSB_PER_N), to_units(torque_mnmm, MNMM_PER_NMM)
+    )
+
+
+def reference(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
+    """The same from firmware/reference: Lin 2013 Eq 1-4 in float64. Arguments as compute()."""
+    raw, tare_q4 = checked(counts, tare)
+    chosen = settings or default_settings()
+    gains = ffi.new(
+        "lin2013_settings *",
+        {
+            "poc_weights": chosen[wire.Setting.POC_WEIGHTS],
+            "force_gain": [chosen[s] / NN_PER_N for s in FORCE_GAINS],
+            "torque_gain": [chosen[s] / NN_PER_N for s in TORQUE_GAINS],
+        },
+    )
+    out = [np.empty((len(raw), 3), np.float64) for _ in range(3)]
+    lib.lin2013_frames(
+        len(raw),
+        ffi.from_buffer("uint16_t[]", raw),
+        ffi.from_buffer("uint16_t[]", tare_q4),
+        gains,
+        *(ffi.from_buffer("double[]", array) for array in out),
+    )
+    return Results(*out)
+
+
+FORCE_GAINS = (wire.Setting.FORCE_GAIN_X_NN, wire.Setting.FORCE_GAIN_Y_NN, wire.Setting.FORCE_GAIN_Z_NN)
+TORQUE_GAINS = (wire.Setting.TORQUE_GAIN_Y_NN, wire.Setting.TORQUE_GAIN_Z_NN)
+
+
+def checked(counts: Any, tare: Any) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
+    """Contiguous uint16 counts and tare_q4 of one shape, or ValueError."""
+    raw = np.atleast_2d(np.asarray(counts))
+    base = np.broadcast_to(np.asarray(tare, dtype=np.float64), raw.shape)
+    if raw.ndim != 2 or raw.shape[1] != 19:
+        raise ValueError(f"counts have shape {raw.shape}, expected (n, 19)")
+    if not np.all(((raw >= 0) & (raw <= 4095)) | (raw == wire.INVALID_COUNT)):
+        raise ValueError("counts must be 0..4095, or 0xFFFF for a missing electrode")
+    if not np.all((base >= 0) & (base <= 4095)):
+        raise ValueError("a tare must be 0..4095 counts")
+    tare_q4 = np.floor(base * 16 + 0.5).astype(np.uint16)
+    return np.ascontiguousarray(raw, dtype=np.uint16), np.ascontiguousarray(tare_q4)

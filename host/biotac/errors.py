@@ -1,0 +1,57 @@
+"""Everything this package raises on purpose, ordered by who failed.
+
+Each message is one line: what was seen, what was expected, and the cure. The command line maps
+``exit_code`` to its exit status; the codes are fixed (see ``biotac --help``).
+"""
+
+from __future__ import annotations
+
+
+class BiotacError(Exception):
+    """Base of all errors of this package."""
+
+    exit_code = 70
+
+
+class InputError(BiotacError):
+    """A file or an argument cannot be used."""
+
+    exit_code = 2
+
+
+class ScenarioError(InputError):
+    """A scenario file is malformed; the message names file, line and key."""
+
+
+class RecordingError(InputError):
+    """A recording cannot be read."""
+
+
+class PortError(BiotacError):
+    """The port does not exist, is busy or may not be opened."""
+
+    exit_code = 3
+
+
+class NotAGatewayError(BiotacError):
+    """Something is on the port, but it does not speak this protocol."""
+
+    exit_code = 4
+
+
+class WireVersionError(BiotacError):
+    """The firmware speaks another major version of the protocol."""
+
+    exit_code = 5
+
+
+class DeviceLostError(BiotacError):
+    """The board went away or fell silent in the middle of a conversation."""
+
+    exit_code = 6
+
+
+class CommandRefusedError(BiotacError):
+    """The board answered a command with an error code."""
+
+    exit_code = 7

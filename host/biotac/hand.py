@@ -1,0 +1,366 @@
+"""One board with its fingers: handshake, commands, frames."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import time
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from . import _wire as wire
+from .errors import CommandRefusedError, DeviceLostError, NotAGatewayError, WireVersionError
+from .frames import FRAME_DTYPE, PAC_DTYPE, Frame, StructArray
+from .framing import encode
+from .link import Link
+from .stream import Batch, StreamDecoder
+
+if TYPE_CHECKING:
+    from .recording.writer import Recorder
+
+ALL_FINGERS = 0b11111
+REPLY_TIMEOUT_S = 1.0
+REPLY_TRIES = 3
+# A streaming board sends a status every second by default; three missing ones are a dead link.
+SILENCE_S = 3.0
+
+Reply = TypeVar("Reply")
+
+
+@dataclass(frozen=True)
+class LinkStats:
+    """Health of the link as this side sees it."""
+
+    bytes_received: int
+    frames: int
+    frames_lost: int
+    crc_errors: int
+    other_errors: int
+
+
+class Hand:
+    """A board. Use as a context manager; made by ``biotac.open``.
+
+    This class reads only when asked: a slow caller makes the operating system's buffer fill and then
+    the board drop whole frames, which ``stats.frames_lost`` counts.
+    """
+
+    def __init__(self, link: Link) -> None:
+        self.link = link
+        self._decoder = StreamDecoder()
+        self._batches: deque[Batch] = deque()
+        self._replies: deque[Any] = deque()
+        self._recorder: Recorder | None = None
+        self._req_id = 0
+        self._bytes = 0
+        self._frames = 0
+        self._streaming = False
+        self._ended = False
+        try:
+            self.info = self._handshake()
+        except BaseException:
+            link.close()
+            raise
+
+    # ---- life ----------------------------------------------------------------------------------
+
+    @property
+    def port(self) -> str:
+        """The PORT this was opened as."""
+        return self.link.port
+
+    def __enter__(self) -> Hand:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop the stream, finish a recording, give the port back. Safe to call twice."""
+        try:
+            if self._streaming:
+                self._streaming = False
+                self.link.write(encode(wire.Stop.ID, wire.Stop(self._next_req_id()).pack()))
+        except DeviceLostError:
+            pass  # it is gone already, which is what closing wants
+        finally:
+            if self._recorder is not None:
+                self._recorder.close()
+                self._recorder = None
+            self.link.close()
+
+    def _handshake(self) -> wire.Hello:
+        # A board may still be streaming to whoever was here before: stop it, then look for the one
+        # HELLO that carries our nonce and let everything else pass.
+        nonce = secrets.randbits(32)
+        self._decoder = StreamDecoder()
+        for _ in range(REPLY_TRIES):
+            self.link.write(b"\0" + encode(wire.Stop.ID, wire.Stop(self._next_req_id()).pack()))
+            self._send(wire.HelloRequest(self._next_req_id(), nonce))
+            hello: wire.Hello | None = self._await(lambda m: isinstance(m, wire.Hello) and m.nonce == nonce)
+            if hello is not None:
+                break
+        else:
+            raise NotAGatewayError(self._describe_stranger())
+        if hello.wire_major != wire.WIRE_MAJOR:
+            raise WireVersionError(
+                f"the firmware on {self.port} speaks wire {hello.wire_major}.{hello.wire_minor}, this library "
+                f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}; install the firmware and the biotac-gateway of one release"
+            )
+        # What streamed before this handshake is nobody's: counting starts here.
+        self._decoder = StreamDecoder()
+        self._batches.clear()
+        self._replies.clear()
+        self._bytes = 0
+        self._frames = 0
+        if hello.wire_minor > wire.WIRE_MINOR:
+            self._decoder.accept_newer_minor()
+        return hello
+
+    def _describe_stranger(self) -> str:
+        counts = self._decoder.counts
+        if self._bytes == 0:
+            seen = "nothing answers"
+        elif counts.good:
+            seen = f"{counts.good} frames of this protocol came, but no HELLO"
+        else:
+            seen = f"{self._bytes} bytes came that are no frames of this protocol"
+        return (
+            f"no gateway on {self.port}: {seen}; expected a HELLO within "
+            f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check that this is the board's port and that it runs our firmware"
+        )
+
+    # ---- commands ------------------------------------------------------------------------------
+
+    def start(self, *, pac: bool = True, fingers: int = ALL_FINGERS) -> None:
+        """Start streaming frames, status and, unless told otherwise, PAC; ``fingers`` is a bit mask."""
+        streams = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
+        if pac:
+            streams |= wire.StreamFlags.PAC
+        # Keep-alive stays off: this class reads, and so could ping, only when its caller asks.
+        self._command(wire.Start(self._next_req_id(), int(streams), fingers, 0))
+        self._streaming = True
+        self.link.release()
+
+    def stop(self) -> None:
+        """Stop streaming. Frames already on their way are still delivered."""
+        self._command(wire.Stop(self._next_req_id()))
+        self._streaming = False
+
+    def ping(self) -> None:
+        """Wait for the board; everything it sent before has arrived afterwards."""
+        self._command(wire.Ping(self._next_req_id()))
+
+    def status(self) -> wire.Status:
+        """Counters of the board and its link."""
+        return self._ask(wire.GetStatus(self._next_req_id()), wire.Status)
+
+    def sensor_status(self, finger: int) -> wire.SensorStatus:
+        """Counters and tare state of one sensor."""
+        return self._ask(wire.GetSensorStatus(self._next_req_id(), finger), wire.SensorStatus)
+
+    def sensor_info(self, finger: int) -> wire.SensorInfo:
+        """What the sensor says of itself."""
+        return self._ask(wire.GetSensorInfo(self._next_req_id(), finger), wire.SensorInfo)
+
+    def tare(self, finger: int) -> None:
+        """Tare now; CommandRefusedError while the signals move."""
+        self._command(wire.TareNow(self._next_req_id(), finger))
+
+    def set_tare(self, finger: int, tare_counts: Any, pdc_counts: float | None = None) -> None:
+        """Use a stored tare: ``tare_counts`` (19,) in counts, kept to 1/16 count."""
+        tare_q4 = tuple(int(v) for v in np.rint(np.asarray(tare_counts, dtype=np.float64) * 16))
+        pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
+        self._command(wire.TareSet(self._next_req_id(), finger, tare_q4, pdc_q4))
+
+    def setting(self, setting: wire.Setting) -> int:
+        """Value of a setting, in its own unit (see wire.SETTINGS)."""
+        return self._ask(wire.GetSetting(self._next_req_id(), setting), wire.SettingValue).value
+
+    def set_setting(self, setting: wire.Setting, value: int) -> None:
+        """Change a setting until the next reboot; refused while streaming."""
+        self._ask(wire.SetSetting(self._next_req_id(), setting, value), wire.SettingValue)
+
+    def settings(self) -> dict[wire.Setting, int]:
+        """All settings."""
+        return {setting: self.setting(setting) for setting in wire.Setting}
+
+    # ---- frames --------------------------------------------------------------------------------
+
+    @property
+    def stats(self) -> LinkStats:
+        """Counts since the handshake."""
+        counts = self._decoder.counts
+        return LinkStats(self._bytes, self._frames, self._decoder.lost, counts.bad_crc, counts.bad - counts.bad_crc)
+
+    @property
+    def ended(self) -> bool:
+        """A simulated source has played to its end and everything of it has arrived."""
+        return self._ended
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield batches as they arrive, starting the stream if need be; ends with a simulated source."""
+        if not self._streaming and not self._ended:
+            self.start()
+        while True:
+            while self._batches:
+                yield self._batches.popleft()
+            if self._ended:
+                return
+            self._pump_stream()
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield typed frames as they arrive; ends only with a simulated source."""
+        for batch in self.batches():
+            for k in range(len(batch.frames)):
+                yield Frame.from_row(batch.frames[k])
+
+    def read(self, seconds: float) -> StructArray:
+        """Return the frames of the next ``seconds`` of device time as one FRAME_DTYPE array (n,).
+
+        Shorter when a simulated source ends first; empty when it has ended before.
+        """
+        return self.read_batch(seconds).frames
+
+    def read_batch(self, seconds: float) -> Batch:
+        """Like read, with the wire messages, PAC and events of the same time."""
+        taken: list[Batch] = []
+        end_us: int | None = None
+        for batch in self.batches():
+            if end_us is None and len(batch.frames):
+                end_us = int(batch.frames["t_us"][0]) + round(seconds * 1e6)
+            if end_us is None or not len(batch.frames) or batch.frames["t_us"].max() < end_us:
+                taken.append(batch)
+                continue
+            now, later = split_batch(batch, end_us)
+            taken.append(now)
+            self._batches.appendleft(later)
+            break
+        return join_batches(taken)
+
+    def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
+        """Write everything that arrives from now on to an MCAP file, until close or the recorder's close.
+
+        Raises InputError when the file exists and may not be overwritten.
+        """
+        from .recording.writer import Recorder
+
+        sensors = [self.sensor_info(f) for f in range(5) if self.info.fingers_present >> f & 1]
+        self._recorder = Recorder(
+            Path(path),
+            self.info,
+            self.settings(),
+            sensors,
+            self.port,
+            overwrite=overwrite,
+            mid_stream=self._streaming,
+        )
+        return self._recorder
+
+    # ---- plumbing ------------------------------------------------------------------------------
+
+    def _next_req_id(self) -> int:
+        self._req_id = self._req_id % 255 + 1
+        return self._req_id
+
+    def _send(self, message: Any) -> None:
+        self.link.write(encode(message.ID, message.pack()))
+
+    def _pump(self, timeout_s: float) -> bool:
+        chunk = self.link.read(timeout_s)
+        if self._recorder is not None:
+            self._recorder.write(chunk)
+        if not chunk:
+            return False
+        self._bytes += len(chunk)
+        batch = self._decoder.feed(chunk)
+        self._frames += len(batch.frames)
+        self._replies.extend(batch.messages)
+        if len(batch.frames) or len(batch.pac) or batch.messages:
+            self._batches.append(batch)
+        return True
+
+    def _pump_stream(self) -> None:
+        if self.link.ended:
+            self.ping()  # a barrier: its reply comes behind the last frame
+            self._ended = True
+            self._streaming = False
+            return
+        self._replies.clear()
+        if not self._pump(SILENCE_S) and not self.link.ended:
+            raise DeviceLostError(
+                f"{self.port} has been silent for {SILENCE_S:.0f} s while streaming; check the cable and open it again"
+            )
+
+    def _await(self, wanted: Any) -> Any:
+        """Pump until a message passes ``wanted``; None after a second without it."""
+        deadline = time.monotonic() + REPLY_TIMEOUT_S
+        while True:
+            while self._replies:
+                message = self._replies.popleft()
+                if wanted(message):
+                    return message
+            left = deadline - time.monotonic()
+            if left <= 0:
+                return None
+            self._pump(left)
+
+    def _ask(self, request: Any, kind: type[Reply]) -> Reply:
+        """Send a command, retry it, return its reply; CommandRefusedError when the board says no."""
+
+        def answers(m: Any) -> bool:
+            return isinstance(m, (kind, wire.Reply)) and bool(getattr(m, "req_id", 0) == request.req_id)
+
+        for _ in range(REPLY_TRIES):
+            self._send(request)
+            answer = self._await(answers)
+            if isinstance(answer, kind) and not (isinstance(answer, wire.Reply) and answer.error):
+                return answer
+            if answer is not None:
+                raise CommandRefusedError(describe_refusal(request, answer))
+        raise DeviceLostError(
+            f"{self.port} did not answer {type(request).__name__} within "
+            f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check the cable and open it again"
+        )
+
+    def _command(self, request: Any) -> None:
+        self._ask(request, wire.Reply)
+
+
+def describe_refusal(request: Any, reply: wire.Reply) -> str:
+    """One line naming the command and the board's reason."""
+    name = wire.Error(reply.error).name if reply.error in list(wire.Error) else f"error {reply.error}"
+    return f"the board refused {type(request).__name__}: {name} ({wire.ERROR_DOC.get(reply.error, 'unknown')})"
+
+
+def split_batch(batch: Batch, end_us: int) -> tuple[Batch, Batch]:
+    """Rows before device time ``end_us``, and the rest."""
+    now = batch.frames["t_us"] < end_us
+    pac_now = batch.pac["t_us"] < end_us
+    return (
+        Batch(batch.wire[now], batch.frames[now], batch.pac[pac_now], batch.messages),
+        Batch(batch.wire[~now], batch.frames[~now], batch.pac[~pac_now], []),
+    )
+
+
+def join_batches(batches: list[Batch]) -> Batch:
+    """One batch of all rows, in order."""
+    if not batches:
+        return Batch(np.empty(0, wire.DTYPES[wire.Frame.ID]), np.empty(0, FRAME_DTYPE), np.empty(0, PAC_DTYPE), [])
+    return Batch(
+        np.concatenate([b.wire for b in batches]),
+        np.concatenate([b.frames for b in batches]),
+        np.concatenate([b.pac for b in batches]),
+        [m for b in batches for m in b.messages],
+    )

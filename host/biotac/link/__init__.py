@@ -1,0 +1,12 @@
+"""Ways to reach a board; a PORT string names one.
+
+``/dev/ttyACM0``, ``COM3``   a serial port
+``sim:SOURCE``               a simulated board playing a scenario or a recording
+"""
+
+from __future__ import annotations
+
+from .base import Link
+from .ports import open_link
+
+__all__ = ["Link", "open_link"]

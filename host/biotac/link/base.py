@@ -1,0 +1,27 @@
+"""What the rest of the package needs of a link."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class Link(Protocol):
+    """A byte pipe to a board. Raises DeviceLostError when the board goes away."""
+
+    #: The PORT it was opened as, for messages.
+    port: str
+
+    #: The source is over: nothing new will come until a command asks for it.
+    ended: bool
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return all bytes that are there, waiting up to timeout_s for the first; may be empty."""
+
+    def write(self, data: bytes) -> None:
+        """Send all of data."""
+
+    def release(self) -> None:
+        """Let device time run, if it was held until the host was ready."""
+
+    def close(self) -> None:
+        """Give the port back. Safe to call twice."""

@@ -1,0 +1,140 @@
+"""Reading a recording, whole or cut off."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mcap.exceptions import InvalidMagic, McapError
+from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
+from mcap.stream_reader import StreamReader, breakup_chunk
+
+from .. import _wire as wire
+from ..errors import RecordingError
+from ..frames import StructArray
+from ..hand import join_batches
+from ..stream import StreamDecoder
+from . import layout
+
+
+class Recording:
+    """A recording in memory.
+
+    ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``wire`` the
+    FRAME messages as sent, ``messages`` the rest (tare changes, status). ``problems`` lists in words
+    what is missing or damaged; the rest is good. Raises RecordingError when nothing can be read.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self.problems: list[str] = []
+        metadata: dict[str, str] | None = None
+        blocks: list[bytes] = []
+        for record in self._records():
+            if isinstance(record, Metadata) and record.name == layout.METADATA_NAME:
+                metadata = record.metadata
+            elif isinstance(record, Message):
+                blocks.append(record.data)
+        if metadata is None:
+            raise RecordingError(self._without_metadata())
+        self._take_metadata(metadata)
+        decoder = StreamDecoder()
+        decoder.accept_newer_minor()
+        batch = join_batches([decoder.feed(block) for block in blocks])
+        self.frames: StructArray = batch.frames
+        self.wire: StructArray = batch.wire
+        self.pac: StructArray = batch.pac
+        self.messages: list[Any] = batch.messages
+        self.counts = decoder.counts
+        self.frames_lost = decoder.lost
+        self._describe_losses(decoder)
+
+    def _without_metadata(self) -> str:
+        if self.problems:
+            return f"{self.path} was cut off before its first record; nothing can be read: record it again"
+        return f"{self.path} is an MCAP file, but no biotac recording; expected one that `biotac record` wrote"
+
+    def _take_metadata(self, metadata: dict[str, str]) -> None:
+        if metadata.get("format") != layout.FORMAT_VERSION:
+            raise RecordingError(
+                f"{self.path} has recording format {metadata.get('format')}, this version reads "
+                f"{layout.FORMAT_VERSION}; install a newer biotac-gateway"
+            )
+        major = metadata["wire"].partition(".")[0]
+        if int(major) != wire.WIRE_MAJOR:
+            raise RecordingError(
+                f"{self.path} holds wire {metadata['wire']}, this version reads {wire.WIRE_MAJOR}.x; "
+                "install the biotac-gateway it was recorded with"
+            )
+        self.metadata = metadata
+        hello: dict[str, Any] = json.loads(metadata["hello"])
+        self.info = wire.Hello(**hello | {"board_serial": tuple(hello["board_serial"])})
+        named = json.loads(metadata["settings"])
+        # A setting that this recording's firmware did not have yet keeps its default.
+        self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting}
+
+    def _records(self) -> Iterator[McapRecord]:
+        try:
+            size = self.path.stat().st_size
+            stream = self.path.open("rb")
+        except OSError as error:
+            raise RecordingError(f"{self.path} cannot be read ({error.strerror}); check the path") from error
+        with stream:
+            topics: dict[int, str] = {}
+            whole = False
+            begun = False
+            try:
+                for record in StreamReader(stream, emit_chunks=True).records:
+                    begun = True
+                    inner = self._open_chunk(record) if isinstance(record, Chunk) else [record]
+                    for item in inner:
+                        if isinstance(item, Channel):
+                            topics[item.id] = item.topic
+                        if not isinstance(item, Message) or topics.get(item.channel_id) == layout.TOPIC:
+                            yield item
+                whole = True
+            except (McapError, struct.error, ValueError, EOFError) as error:
+                # Cut off in the middle of a record, and what came before it is good; unless it
+                # never was such a file.
+                if isinstance(error, InvalidMagic) and not begun:
+                    raise RecordingError(
+                        f"{self.path} is no MCAP file ({size} bytes, wrong first bytes); expected a file that "
+                        "`biotac record` wrote"
+                    ) from error
+            if not whole:
+                self.problems.append(
+                    f"{self.path.name} ends without its index, as after a kill or a full disk: "
+                    "up to its last second is missing, the rest is read"
+                )
+
+    def _open_chunk(self, chunk: Chunk) -> list[McapRecord]:
+        try:
+            return list(breakup_chunk(chunk, validate_crc=True))
+        except Exception as error:  # mcap, zstandard and struct each raise their own kinds
+            self.problems.append(f"one second of {self.path.name} is damaged and left out ({error})")
+            return []
+
+    def _describe_losses(self, decoder: StreamDecoder) -> None:
+        for finger, seq, lost in decoder.lost_after[:10]:
+            self.problems.append(f"finger {finger}: {lost} frame(s) missing after frame {seq}")
+        if len(decoder.lost_after) > 10:
+            self.problems.append(f"{len(decoder.lost_after) - 10} more gaps")
+        counts = decoder.counts
+        if counts.bad:
+            self.problems.append(
+                f"{counts.bad} wire frame(s) refused: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
+                f"{counts.bad_length} wrong length, {counts.too_long} too long"
+            )
+
+
+def load(path: str | os.PathLike[str]) -> StructArray:
+    """Return a recording's frames as one FRAME_DTYPE array (n,), in order of arrival.
+
+    Raises RecordingError when the file is no recording. A recording that was cut off gives what is
+    whole; use Recording to learn what is missing.
+    """
+    return Recording(path).frames

@@ -1,0 +1,46 @@
+"""Force and torque gains that fit one emulated finger: what its calibration would give.
+
+Lin Eq 3 and 4: F_d = S_d sum e n_d, M_d = T_d sum e (r x n)_d, with e = count - rest. Each gain is
+the least squares fit without offset of noise-free counts to the scenario's own truth, axis by axis.
+It is the best these five numbers can do on this scenario, so residuals show the method's error and
+not a missing calibration. M_x has no gain: the electrodes hardly see it (numerics.md 4).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from biotac._wire import SETTINGS
+from biotac.sim import surface
+from biotac.sim.surface import Floats
+
+_ARMS_MM = np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL)
+
+_SPECS = {setting.name.lower(): spec for setting, spec in SETTINGS.items()}
+
+_AXES: tuple[tuple[str, Floats], ...] = (
+    ("force_gain_x_nn", surface.ELECTRODE_NORMAL[:, 0]),
+    ("force_gain_y_nn", surface.ELECTRODE_NORMAL[:, 1]),
+    ("force_gain_z_nn", surface.ELECTRODE_NORMAL[:, 2]),
+    ("torque_gain_y_nn", _ARMS_MM[:, 1]),
+    ("torque_gain_z_nn", _ARMS_MM[:, 2]),
+)
+
+
+def fit_gains(signal: Floats, force_n: Floats, torque_nmm: Floats) -> dict[str, int]:
+    """Settings by name, in nN/count, from e (n, 19), forces (n, 3) and torques (n, 3).
+
+    An axis without truth (below 1 uN or 1 uN mm throughout) or without signal keeps its default and
+    is left out. Values are held within the setting's range.
+    """
+    truths = (force_n[:, 0], force_n[:, 1], force_n[:, 2], torque_nmm[:, 1], torque_nmm[:, 2])
+    gains: dict[str, int] = {}
+    for (name, weights), truth in zip(_AXES, truths, strict=True):
+        total = signal @ weights
+        energy = float(total @ total)
+        if np.abs(truth).max(initial=0.0) < 1e-6 or energy == 0.0:
+            continue
+        nano_per_count = 1e9 * float(total @ truth) / energy
+        spec = _SPECS[name]
+        gains[name] = round(min(max(nano_per_count, spec.low), spec.high))
+    return gains

@@ -1,0 +1,243 @@
+"""The scenario format: a TOML timeline of what touches the fingers.
+
+Top level: ``name``; ``seed`` (default 1); ``fingers`` (default: one per [[finger]], else 1);
+``gains = "fit"`` (see gains.py). ``[[finger]]``: ``seed``, ``profile`` ("new" or "worn"), ``serial``.
+``[[step]]``, played in order, each with ``seconds`` and optionally ``fingers = [0, ...]`` (others
+hold meanwhile):
+
+=============  ========================================================================
+``do``         keys
+=============  ========================================================================
+rest           let go within the first 0.1 s, then nothing touches
+press          ``force_n``; to start a contact also ``at = "E17"`` or ``at_mm = [x, y]``
+               and optionally ``tip_mm`` (width of the flat, default 7); 0 releases
+hold           keep everything as it is
+shear          ``shear_n = [x, y]``: tangential force to the tip and to E11's side
+twist          ``torsion_nmm``: about the outward normal
+slide          ``to = "E13"`` or ``to_mm = [x, y]``
+temperature    ``celsius``; contacts stay
+=============  ========================================================================
+
+Changes run straight over the step's time and stay until changed again. ``[[fault]]``: ``at_s``,
+``seconds``, ``finger``, ``kind`` (a key of FAULT_CODES), optionally ``channel`` (default: all).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from biotac import _sensor
+from biotac.errors import ScenarioError
+from biotac.sim import surface, tape
+from biotac.sim.physics import PROFILES, Profile
+from biotac.sim.source import MAX_SECONDS
+from biotac.sim.tables import Table, parse_toml
+from biotac.sim.timeline import Pose, Track
+
+RELEASE_S = 0.1
+FLAT_MM = 7.0  # numerics.md 3.1: a flat surface leaves a footprint of 3.5 mm radius
+FORCE_MAX_N = 50.0
+SHEAR_MAX_N = 20.0
+TORSION_MAX_NMM = 100.0
+SEED_MAX = 2**31 - 1
+
+FAULT_CODES = {
+    "bad_parity": tape.BAD_PARITY,
+    "stuck_low": tape.STUCK_LOW,
+    "stuck_high": tape.STUCK_HIGH,
+    "error_word": tape.ERROR_WORD,
+    "no_channel": tape.NO_CHANNEL,
+}
+
+STEP_KEYS: dict[str, tuple[str, ...]] = {
+    "rest": (),
+    "press": ("force_n", "at", "at_mm", "tip_mm"),
+    "hold": (),
+    "shear": ("shear_n",),
+    "twist": ("torsion_nmm",),
+    "slide": ("to", "to_mm"),
+    "temperature": ("celsius",),
+}
+
+
+@dataclass(frozen=True)
+class FingerSpec:
+    """Which sensor a finger has; ``serial`` is what it answers when asked, 16 characters."""
+
+    seed: int
+    profile: Profile
+    serial: str
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Words replaced by a tape code; ``channel`` None: every channel."""
+
+    at_s: float
+    seconds: float
+    finger: int
+    code: int
+    channel: str | None
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A valid scenario: one track and one sensor a finger, all tracks equally long."""
+
+    name: str
+    fit_gains: bool
+    fingers: tuple[FingerSpec, ...]
+    tracks: tuple[Track, ...]
+    faults: tuple[Fault, ...]
+    seconds: float
+
+
+def parse_scenario(data: bytes, *, file: str) -> Scenario:
+    """Read a scenario. Raises ScenarioError naming ``file``, the line, the table and the key."""
+    values, lines = parse_toml(data, file)
+    if not values:
+        raise ScenarioError(f"{file}:1: the file is empty: expected a name and [[step]] tables")
+    top = Table(values, file, "", lines, 0)
+    top.only(("name", "seed", "fingers", "gains", "finger", "step", "fault"))
+    name = top.text("name", r"[^\x00-\x1f]{1,64}", "1 to 64 printable characters")
+    seed = top.integer("seed", 0, SEED_MAX) if "seed" in top else 1
+    if "gains" in top:
+        top.choice("gains", ("fit",))
+    specs = _fingers(top, seed)
+    steps = top.tables("step")
+    if not steps:
+        raise top.error("step", "is missing", "at least one [[step]] table", "add one")
+    tracks = tuple(Track() for _ in specs)
+    for step in steps:
+        _add_step(step, tracks)
+    return Scenario(
+        name=name,
+        fit_gains="gains" in top,
+        fingers=specs,
+        tracks=tracks,
+        faults=tuple(_fault(table, len(specs), tracks[0].seconds) for table in top.tables("fault")),
+        seconds=tracks[0].seconds,
+    )
+
+
+def default_serial(seed: int) -> str:
+    """Serial number of a sensor without one of its own; 16 characters that begin with BT."""
+    return f"BTSIM{seed:011d}"
+
+
+def _fingers(top: Table, seed: int) -> tuple[FingerSpec, ...]:
+    tables = top.tables("finger")
+    count = len(tables) or 1
+    if "fingers" in top:
+        stated = top.integer("fingers", 1, _sensor.MAX_SENSORS)
+        if tables and stated != count:
+            raise top.error(
+                "fingers", f"is {stated}, with {count} [[finger]] tables", "as many as tables", "remove one"
+            )
+        count = stated
+    if count > _sensor.MAX_SENSORS:
+        raise top.error("finger", f"has {count} tables", f"at most {_sensor.MAX_SENSORS}", "remove some")
+    if not tables:
+        return tuple(FingerSpec(seed + k, "new", default_serial(seed + k)) for k in range(count))
+    specs = []
+    for index, table in enumerate(tables):
+        table.only(("seed", "profile", "serial"))
+        own = table.integer("seed", 0, SEED_MAX) if "seed" in table else seed + index
+        word = table.choice("profile", PROFILES) if "profile" in table else "new"
+        profile = next(known for known in PROFILES if known == word)  # narrows str to Profile
+        serial = default_serial(own)
+        if "serial" in table:
+            serial = table.text("serial", r"BT[!-+--~]{14}", "16 printable characters without comma that begin with BT")
+        specs.append(FingerSpec(own, profile, serial))
+    return tuple(specs)
+
+
+def _add_step(step: Table, tracks: tuple[Track, ...]) -> None:
+    do = step.choice("do", tuple(STEP_KEYS))
+    step.only(("do", "seconds", "fingers", *STEP_KEYS[do]), f" to {do}")
+    seconds = step.number("seconds", 0.01, MAX_SECONDS, "s")
+    if tracks[0].seconds + seconds > MAX_SECONDS:
+        raise step.error("seconds", "makes the scenario too long", f"at most {MAX_SECONDS:g} s in all", "shorten it")
+    acting = step.indices("fingers", len(tracks)) if "fingers" in step else tuple(range(len(tracks)))
+    for index, track in enumerate(tracks):
+        if index not in acting or do == "hold":
+            track.ramp(seconds, track.pose)
+        elif do == "rest":
+            letting_go = min(RELEASE_S, seconds / 2)
+            track.ramp(letting_go, track.pose.released())
+            track.ramp(seconds - letting_go, track.pose)
+        elif do == "temperature":
+            celsius = step.number("celsius", 5.0, 60.0, "C")
+            track.ramp(seconds, replace(track.pose, celsius=celsius))
+        elif do == "press":
+            _press(step, track, seconds)
+        else:
+            _move(step, do, track, seconds, index)
+
+
+def _press(step: Table, track: Track, seconds: float) -> None:
+    force_n = step.number("force_n", 0.0, FORCE_MAX_N, "N")
+    if track.pose.force_n > 0.0:
+        for key in ("at", "at_mm", "tip_mm"):
+            if key in step:
+                raise step.error(
+                    key, "is given while something touches", "a place only where a contact starts",
+                    "remove it, or slide or rest first",
+                )  # fmt: skip
+        end = replace(track.pose, force_n=force_n) if force_n > 0.0 else track.pose.released()
+        track.ramp(seconds, end)
+        return
+    if force_n == 0.0:
+        raise step.error("force_n", "is 0 and nothing touches", "more than 0 N to start a contact")
+    x_mm, y_mm = _place(step, "at", "at_mm")
+    tip_mm = step.number("tip_mm", 0.5, 10.0, "mm") if "tip_mm" in step else FLAT_MM
+    start = Pose(x_mm=x_mm, y_mm=y_mm, tip_mm=tip_mm, celsius=track.pose.celsius)
+    track.ramp(seconds, replace(start, force_n=force_n), start=start)
+
+
+def _move(step: Table, do: str, track: Track, seconds: float, finger: int) -> None:
+    pose = track.pose
+    if pose.force_n == 0.0:
+        raise step.error("do", f"is '{do}' but nothing touches finger {finger}", "a contact", "press first")
+    if do == "shear":
+        x_n, y_n = step.pair("shear_n", SHEAR_MAX_N, "N")
+        pose = replace(pose, shear_x_n=x_n, shear_y_n=y_n)
+    elif do == "twist":
+        torsion = step.number("torsion_nmm", -TORSION_MAX_NMM, TORSION_MAX_NMM, "N mm")
+        pose = replace(pose, torsion_nmm=torsion)
+    else:
+        x_mm, y_mm = _place(step, "to", "to_mm")
+        pose = replace(pose, x_mm=x_mm, y_mm=y_mm)
+    track.ramp(seconds, pose)
+
+
+def _place(step: Table, name_key: str, pair_key: str) -> tuple[float, float]:
+    """The contact's x and y: over a named electrode, or given."""
+    if name_key in step and pair_key in step:
+        raise step.error(pair_key, f"is given beside '{name_key}'", "one of the two", "remove one")
+    if name_key in step or pair_key not in step:
+        name = step.choice(name_key, _sensor.ELECTRODE_NAMES)
+        over = surface.project(surface.ELECTRODE_MM[[_sensor.ELECTRODE_NAMES.index(name)]])[0]
+        return float(over[0]), float(over[1])
+    x_mm, y_mm = step.pair(pair_key, -surface.PROXIMAL_END_MM, "mm")
+    if not surface.is_on_surface(x_mm, y_mm):
+        raise step.error(
+            pair_key, f"is [{x_mm:g}, {y_mm:g}]",
+            f"a point of the ventral surface: x from {surface.PROXIMAL_END_MM:g}, |y| up to "
+            f"{surface.RADIUS_MM:g}, and x^2 + y^2 up to {surface.RADIUS_MM:g}^2 where x > 0",
+        )  # fmt: skip
+    return x_mm, y_mm
+
+
+def _fault(table: Table, fingers: int, scenario_s: float) -> Fault:
+    table.only(("at_s", "seconds", "finger", "kind", "channel"))
+    channel = table.choice("channel", tuple(dict.fromkeys(_sensor.SLOTS))) if "channel" in table else None
+    at_s = table.number("at_s", 0.0, scenario_s - 0.01 if scenario_s > 0.01 else 0.0, "s")
+    return Fault(
+        at_s=at_s,
+        # a fault that ends after the scenario would say something the source does not do
+        seconds=table.number("seconds", 0.001, round(scenario_s - at_s, 9), "s"),
+        finger=table.integer("finger", 0, fingers - 1),
+        code=FAULT_CODES[table.choice("kind", tuple(FAULT_CODES))],
+        channel=channel,
+    )

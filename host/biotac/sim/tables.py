@@ -1,0 +1,185 @@
+"""Typed reads of TOML tables whose errors name the line and the key.
+
+The standard parser keeps no line numbers, so Lines finds headers and keys again by scanning the
+text. A multi-line string that looks like a header or a key can mislead it, by a few lines.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+from biotac.errors import ScenarioError
+
+_HEADER = re.compile(r"^\s*\[{1,2}\s*([A-Za-z0-9_\"'.-]+)\s*\]{1,2}\s*(#.*)?$")
+
+
+class Lines:
+    """Where tables and keys stand in a TOML text; lines count from 1."""
+
+    def __init__(self, text: str) -> None:
+        self._lines = text.split("\n")  # not splitlines: TOML ends lines at \n alone
+        self._headers = [
+            (number, match.group(1))
+            for number, line in enumerate(self._lines, 1)
+            if (match := _HEADER.match(line)) is not None
+        ]
+
+    def table(self, name: str, index: int) -> int:
+        """Line of the header of the ``index``-th table called ``name``; 1 if it has no header."""
+        places = [number for number, header in self._headers if header == name]
+        return places[index] if index < len(places) else 1
+
+    def key(self, start: int, key: str) -> int:
+        """Line of ``key`` in the table whose header is at line ``start`` (0: the top level).
+
+        A table under that key counts too; the header's line when there is neither.
+        """
+        ends = [number for number, _ in self._headers if number > start]
+        pattern = re.compile(rf"^\s*[\"']?{re.escape(key)}[\"']?\s*[=.]")
+        for number in range(start + 1, ends[0] if ends else len(self._lines) + 1):
+            if pattern.match(self._lines[number - 1]):
+                return number
+        places = [number for number, header in self._headers if header.strip("\"'") == key]
+        return places[0] if places and start == 0 else max(start, 1)
+
+
+def parse_toml(data: bytes, file: str) -> tuple[dict[str, Any], Lines]:
+    """Parse TOML. Raises ScenarioError with the parser's own line for what is no TOML."""
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise ScenarioError(f"{file}:{line}: not UTF-8 text: expected a TOML scenario") from None
+    try:
+        return tomllib.loads(text), Lines(text)
+    except tomllib.TOMLDecodeError as error:
+        seen = str(error)
+        place = re.search(r"\s*\(at line (\d+), column \d+\)|\s*\(at end of document\)", seen)
+        line = text.rstrip().count("\n") + 1
+        if place is not None:
+            line = int(place.group(1) or line)
+            seen = seen[: place.start()]
+        raise ScenarioError(f"{file}:{line}: no TOML: {seen}: expected `key = value`; correct it") from None
+    except (RecursionError, ValueError):
+        # arrays nested a thousand deep, or a number of thousands of digits
+        raise ScenarioError(f"{file}:1: Python cannot hold this TOML: expected a TOML scenario") from None
+
+
+class Table:
+    """One table: reads keys with type and range, and refuses what it does not know.
+
+    Every method raises ScenarioError ``file:LINE: label: key 'k' seen: expected ...; cure``.
+    """
+
+    def __init__(self, values: dict[str, Any], file: str, label: str, lines: Lines, start: int) -> None:
+        self.values = values
+        self._file = file
+        self._label = label
+        self._lines = lines
+        self._start = start
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def error(self, key: str, seen: str, expected: str, cure: str = "correct the value") -> ScenarioError:
+        """The error to raise about ``key``."""
+        line = self._lines.key(self._start, key)
+        label = f"{self._label}: " if self._label else ""
+        return ScenarioError(f"{self._file}:{line}: {label}key '{key}' {seen}: expected {expected}; {cure}")
+
+    def only(self, allowed: Sequence[str], what: str = "") -> None:
+        """Refuse keys other than ``allowed``; ``what`` says whose keys they are."""
+        for key in self.values:
+            if key not in allowed:
+                near = difflib.get_close_matches(key, allowed, 1)
+                cure = f"did you mean '{near[0]}'?" if near else "remove it"
+                raise self.error(key, "is unknown" + what, "one of " + ", ".join(allowed), cure)
+
+    def _value(self, key: str, expected: str) -> Any:
+        if key not in self.values:
+            raise self.error(key, "is missing", expected, "add it")
+        return self.values[key]
+
+    def number(self, key: str, low: float, high: float, unit: str) -> float:
+        """A finite number in low..high."""
+        expected = f"a number {low:g} to {high:g} {unit}".rstrip()
+        value = self._value(key, expected)
+        if not _is_number(value) or not low <= value <= high:
+            raise self.error(key, f"is {_show(value)}", expected)
+        return float(value)
+
+    def integer(self, key: str, low: int, high: int) -> int:
+        """A whole number in low..high."""
+        expected = f"a whole number {low} to {high}"
+        value = self._value(key, expected)
+        if type(value) is not int or not low <= value <= high:
+            raise self.error(key, f"is {_show(value)}", expected)
+        return value
+
+    def pair(self, key: str, limit: float, unit: str) -> tuple[float, float]:
+        """Two finite numbers in -limit..limit."""
+        expected = f"[x, y], each -{limit:g} to {limit:g} {unit}"
+        value = self._value(key, expected)
+        good = isinstance(value, list) and len(value) == 2
+        if not good or not all(_is_number(part) and abs(part) <= limit for part in value):
+            raise self.error(key, f"is {_show(value)}", expected)
+        return float(value[0]), float(value[1])
+
+    def choice(self, key: str, choices: Sequence[str]) -> str:
+        """One of the given words."""
+        expected = "one of " + ", ".join(choices)
+        value = self._value(key, expected)
+        if not isinstance(value, str) or value not in choices:
+            near = difflib.get_close_matches(str(value), choices, 1)
+            cure = f"did you mean '{near[0]}'?" if near else "correct the value"
+            raise self.error(key, f"is {_show(value)}", expected, cure)
+        return value
+
+    def text(self, key: str, pattern: str, expected: str) -> str:
+        """Text that matches ``pattern`` as a whole."""
+        value = self._value(key, expected)
+        if not isinstance(value, str) or re.fullmatch(pattern, value) is None:
+            raise self.error(key, f"is {_show(value)}", expected)
+        return value
+
+    def indices(self, key: str, count: int) -> tuple[int, ...]:
+        """A list of distinct indices below ``count``."""
+        expected = f"a list of different finger indices 0 to {count - 1}"
+        value = self._value(key, expected)
+        good = isinstance(value, list) and len(value) > 0
+        if not good or not all(type(part) is int and 0 <= part < count for part in value):
+            raise self.error(key, f"is {_show(value)}", expected)
+        if len(set(value)) != len(value):
+            raise self.error(key, f"is {_show(value)}", expected)
+        return tuple(value)
+
+    def tables(self, key: str) -> list[Table]:
+        """The ``[[key]]`` tables; none when there are none."""
+        value = self.values.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(part, dict) for part in value):
+            raise self.error(key, f"is {_show(value)}", f"[[{key}]] tables", "use double brackets")
+        return [
+            Table(part, self._file, f"{key} {index + 1}", self._lines, self._lines.table(key, index))
+            for index, part in enumerate(value)
+        ]
+
+
+def _is_number(value: object) -> bool:
+    # bool is an int to Python; it is no quantity. NaN and inf fail every range that follows.
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _show(value: object) -> str:
+    if isinstance(value, int) and value.bit_length() > 200:
+        return "a huge number"  # Python refuses to print some of them
+    text = repr(value).replace("\n", " ")
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,83 @@
+"""One finger's script: straight pieces between poses, evaluated at any time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from biotac.sim import surface
+from biotac.sim.physics import REST_CELSIUS, States
+from biotac.sim.surface import Floats
+
+
+@dataclass(frozen=True)
+class Pose:
+    """What touches a finger at one instant.
+
+    ``x_mm``, ``y_mm`` place the contact on the ventral surface; ``shear_x_n`` and ``shear_y_n`` are
+    tangential, towards the tip and towards E11's side; ``torsion_nmm`` is about the outward normal;
+    ``tip_mm`` is the width of the flat that presses. ``force_n`` = 0: nothing touches.
+    """
+
+    x_mm: float = 0.0
+    y_mm: float = 0.0
+    force_n: float = 0.0
+    shear_x_n: float = 0.0
+    shear_y_n: float = 0.0
+    torsion_nmm: float = 0.0
+    tip_mm: float = 0.0
+    celsius: float = REST_CELSIUS
+
+    def row(self) -> list[float]:
+        """As numbers, in field order."""
+        return [
+            self.x_mm, self.y_mm, self.force_n, self.shear_x_n, self.shear_y_n,
+            self.torsion_nmm, self.tip_mm, self.celsius,
+        ]  # fmt: skip
+
+    def released(self) -> Pose:
+        """The same place and temperature, without load."""
+        return replace(self, force_n=0.0, shear_x_n=0.0, shear_y_n=0.0, torsion_nmm=0.0)
+
+
+@dataclass
+class Track:
+    """Pieces in time order; ``pose`` is where the last one ends."""
+
+    pose: Pose = field(default_factory=Pose)
+    seconds: float = 0.0
+    _starts_s: list[float] = field(default_factory=list)
+    _lengths_s: list[float] = field(default_factory=list)
+    _from: list[list[float]] = field(default_factory=list)
+    _to: list[list[float]] = field(default_factory=list)
+
+    def ramp(self, seconds: float, end: Pose, start: Pose | None = None) -> None:
+        """Go straight to ``end``; ``start`` jumps first (without load a jump has no effect)."""
+        self._starts_s.append(self.seconds)
+        self._lengths_s.append(seconds)
+        self._from.append((start or self.pose).row())
+        self._to.append(end.row())
+        self.pose = end
+        self.seconds += seconds
+
+    def states(self, times_s: Floats) -> States:
+        """States at times (n,) of 0..seconds; later times keep the last pose."""
+        starts, lengths = np.array(self._starts_s), np.array(self._lengths_s)
+        begin, end = np.array(self._from), np.array(self._to)
+        piece = np.maximum(np.searchsorted(starts, times_s, side="right") - 1, 0)
+        share = np.clip((times_s - starts[piece]) / lengths[piece], 0.0, 1.0)[:, None]
+        pose = begin[piece] * (1.0 - share) + end[piece] * share
+        force = pose[:, 2]
+        contact = surface.on_surface(pose[:, 0:2])
+        to_tip, to_side = surface.tangents_at(surface.normals_at(contact))
+        touched = force > 0.0
+        shear = pose[:, 3:4] * to_tip + pose[:, 4:5] * to_side
+        return States(
+            contact_mm=contact,
+            force_n=force,
+            shear_n=np.where(touched[:, None], shear, 0.0),
+            torsion_nmm=np.where(touched, pose[:, 5], 0.0),
+            tip_radius_mm=pose[:, 6] / 2.0,
+            warm_c=pose[:, 7] - REST_CELSIUS,
+        )

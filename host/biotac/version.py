@@ -1,0 +1,7 @@
+"""The release of this package, from its metadata."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+__version__ = version("biotac-gateway")
