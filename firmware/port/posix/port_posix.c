@@ -1,7 +1,7 @@
 // The board that is a process: emulated sensors on an emulated bus, the link on a pty, device time
 // that passes only as the firmware spends it.
 //
-//   biotac-sim --tape FILE [--pace X] [--hold] [--boot-id N] [--absent MASK]
+//   biotac-sim --tape FILE [--pace X] [--hold] [--boot-id N] [--serials A,B,...]
 //
 // Writes "pty PATH" to stdout, and "end" once the tape is played and all of it handed over.
 // --pace: device seconds per second, 0 for as fast as the host reads (nothing is then dropped).
@@ -65,13 +65,19 @@ static void load_tape(const char *path)
     (void)close(fd);
 }
 
-static void plug_in_sensors(unsigned absent)
+// serials: one per finger, separated by commas; a finger without one gets one made up.
+static void plug_in_sensors(const char *serials)
 {
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         char serial[17];
         (void)snprintf(serial, sizeof serial, "BTEMU0000000%04u", f + 1u);
-        bool present = f < tape.fingers && !(absent >> f & 1);
-        bt_emu_init(&sensor[f], f, present, serial, bt_tape_count, &tape);
+        size_t given = strcspn(serials, ",");
+        if (given > 0 && given < sizeof serial) {
+            memset(serial, 0, sizeof serial);
+            memcpy(serial, serials, given);
+        }
+        serials += given + (serials[given] == ',');
+        bt_emu_init(&sensor[f], f, f < tape.fingers, serial, bt_tape_count, &tape);
     }
 }
 
@@ -79,7 +85,7 @@ void port_init(int argc, char **argv)
 {
     const char *tape_path = NULL;
     double pace = 1.0;
-    unsigned absent = 0;
+    const char *serials = "";
     boot_id = (uint32_t)getpid();
     for (int k = 1; k < argc; k++) {
         if (strcmp(argv[k], "--hold") == 0) {
@@ -92,8 +98,8 @@ void port_init(int argc, char **argv)
             pace = atof(argv[++k]);
         } else if (strcmp(argv[k], "--boot-id") == 0) {
             boot_id = (uint32_t)strtoul(argv[++k], NULL, 0);
-        } else if (strcmp(argv[k], "--absent") == 0) {
-            absent = (unsigned)strtoul(argv[++k], NULL, 0);
+        } else if (strcmp(argv[k], "--serials") == 0) {
+            serials = argv[++k];
         } else {
             die(argv[k], "unknown option");
         }
@@ -102,7 +108,7 @@ void port_init(int argc, char **argv)
         die("--tape", "missing; biotac sim makes one and passes it");
     }
     load_tape(tape_path);
-    plug_in_sensors(absent);
+    plug_in_sensors(serials);
     (void)fcntl(STDIN_FILENO, F_SETFL, fcntl(STDIN_FILENO, F_GETFL) | O_NONBLOCK);
     paced = pace > 0;
     clock_init(pace);

@@ -1,0 +1,101 @@
+"""What several test folders need: a scripted board on a pty, and where the real recordings are."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import threading
+import tty
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from biotac import _wire as wire
+from biotac.framing import Deframer, encode
+
+SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+Answer = Callable[[int, bytes], bytes]
+
+
+class ScriptedBoard:
+    """The far end of a pty: hands every good frame to a function and writes what that returns."""
+
+    def __init__(self, answer: Answer, greeting: bytes = b"") -> None:
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        self.path = os.ttyname(self._slave)
+        self._answer = answer
+        self._stop_read, self._stop_write = os.pipe()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        if greeting:
+            os.write(self._master, greeting)
+        self._thread.start()
+
+    def _run(self) -> None:
+        deframer = Deframer()
+        while True:
+            ready, _, _ = select.select([self._master, self._stop_read], [], [])
+            if self._stop_read in ready:
+                return
+            for message_id, payload in deframer.feed(os.read(self._master, 4096)):
+                reply = self._answer(message_id, payload)
+                if reply:
+                    os.write(self._master, reply)
+
+    def close(self) -> None:
+        os.write(self._stop_write, b"x")
+        self._thread.join()
+        for fd in (self._master, self._slave, self._stop_read, self._stop_write):
+            os.close(fd)
+
+
+def hello_for(request: bytes, **changes: int) -> bytes:
+    """A HELLO frame that answers a HELLO_REQUEST payload."""
+    asked = wire.HelloRequest.unpack(request)
+    facts = {
+        "req_id": asked.req_id,
+        "nonce": asked.nonce,
+        "wire_major": wire.WIRE_MAJOR,
+        "wire_minor": wire.WIRE_MINOR,
+        "schema_hash": wire.SCHEMA_HASH,
+        "firmware_major": 0,
+        "firmware_minor": 1,
+        "firmware_patch": 0,
+        "board": int(wire.Board.POSIX_SIM),
+        "board_serial": (0,) * 12,
+        "boot_id": 1,
+        "slot_hz": 4400,
+        "fingers_present": 1,
+    }
+    return encode(wire.Hello.ID, wire.Hello(**(facts | changes)).pack())
+
+
+@pytest.fixture
+def scripted_board() -> Iterator[Callable[..., ScriptedBoard]]:
+    """Factory of scripted boards that are closed after the test."""
+    boards: list[ScriptedBoard] = []
+
+    def make(answer: Answer, greeting: bytes = b"") -> ScriptedBoard:
+        boards.append(ScriptedBoard(answer, greeting))
+        return boards[-1]
+
+    yield make
+    for board in boards:
+        board.close()
+
+
+@pytest.fixture(scope="session")
+def hello() -> Callable[..., bytes]:
+    """Makes HELLO frames."""
+    return hello_for
+
+
+@pytest.fixture
+def shared_data() -> Path:
+    """Folder of real recordings; they are not ours to copy, so the test is skipped without them."""
+    if not SHARED_DATA.is_dir():
+        pytest.skip(f"no real recordings at {SHARED_DATA}: they may not be copied into this repository")
+    return SHARED_DATA

@@ -1,0 +1,167 @@
+"""One finger's bus faults, seen through the whole chain: its own frames say so, nobody else's change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac import FrameFlags
+from biotac import _wire as wire
+
+INVALID = 0xFFFF
+
+HEALTHY = """
+name = "healthy"
+seed = 5
+fingers = 3
+[[step]]
+do = "rest"
+seconds = 1.0
+[[step]]
+do = "press"
+seconds = 0.5
+at = "E17"
+force_n = 3.0
+[[step]]
+do = "hold"
+seconds = 1.0
+"""
+
+FAULT = """
+[[fault]]
+at_s = 1.8
+seconds = 0.3
+finger = 1
+kind = "{kind}"
+"""
+
+
+@pytest.fixture
+def play(board, tmp_path: Path):
+    """Stream a scenario text to its end; returns the frames, and the sensor counters of each finger."""
+
+    def run(text: str) -> tuple[np.ndarray, list[wire.SensorStatus]]:
+        path = tmp_path / "case.toml"
+        path.write_text(text)
+        hand = board(str(path))
+        frames = hand.read(100)
+        return frames, [hand.sensor_status(f) for f in range(4)]
+
+    return run
+
+
+def of(frames: np.ndarray, finger: int) -> np.ndarray:
+    return frames[frames["finger"] == finger]
+
+
+@pytest.mark.parametrize(
+    ("kind", "counter"),
+    [
+        ("bad_parity", "words_parity"),
+        ("stuck_low", "words_stuck"),
+        ("stuck_high", "words_stuck"),
+        ("error_word", "words_error"),
+        ("no_channel", "words_error"),
+    ],
+)
+def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(play, kind: str, counter: str) -> None:
+    healthy, before = play(HEALTHY)
+    faulty, after = play(HEALTHY + FAULT.format(kind=kind))
+    for finger in (0, 2):
+        assert of(faulty, finger).tobytes() == of(healthy, finger).tobytes()
+        assert getattr(after[finger], counter) == getattr(before[finger], counter) == 0
+    # 0.3 s are 30 rounds of 44 words. A round without one good word is not sent at all.
+    assert getattr(after[1], counter) == 30 * 44
+    assert len(of(healthy, 1)) - len(of(faulty, 1)) == 30
+    assert np.count_nonzero(np.diff(of(faulty, 1)["t_us"]) == 31 * 10_000) == 1
+
+
+def test_an_error_word_is_kept_for_the_user(play) -> None:
+    _, status = play(HEALTHY + FAULT.format(kind="error_word"))
+    assert status[1].last_error_word == 0xA52D
+
+
+def test_a_single_bad_channel_is_marked_missing_and_never_stale(play) -> None:
+    fault = FAULT.format(kind="bad_parity") + 'channel = "E5"\n'
+    frames, _ = play(HEALTHY + fault)
+    mine = of(frames, 1)
+    hurt = np.flatnonzero(mine["counts"][:, 4] == INVALID)
+    assert hurt.tolist() == list(range(180, 210))
+    missing = (mine["flags"] & FrameFlags.ELECTRODE_MISSING) != 0
+    assert np.array_equal(np.flatnonzero(missing), hurt)
+    assert not np.any(np.delete(mine["counts"], 4, axis=1) == INVALID)
+    # The finger is still held: its tare and its contact outlive the fault.
+    assert ((mine["flags"][180:] & FrameFlags.CONTACT) != 0).all()
+
+
+def test_a_missing_temperature_is_flagged_and_hurts_nothing_else(play) -> None:
+    fault = FAULT.format(kind="no_channel") + 'channel = "TDC"\n'
+    healthy, _ = play(HEALTHY)
+    frames, _ = play(HEALTHY + fault)
+    mine, other = of(frames, 1), of(healthy, 1)
+    hurt = slice(180, 210)
+    assert (mine["tdc"][hurt] == INVALID).all()
+    assert ((mine["flags"][hurt] & FrameFlags.TDC_MISSING) != 0).all()
+    assert mine["force_n"].tobytes() == other["force_n"].tobytes()
+
+
+def test_absent_sensors_send_nothing_and_read_as_stuck(play) -> None:
+    frames, status = play(HEALTHY)
+    assert set(frames["finger"]) == {0, 1, 2}
+    assert status[3].present == 0
+    assert status[3].words_good == 0
+    assert status[3].words_stuck > 0
+
+
+def test_every_slot_of_every_finger_was_read(play) -> None:
+    _, status = play(HEALTHY)
+    for finger in range(3):
+        words = status[finger]
+        assert words.words_good == 250 * 44
+        assert words.words_parity == words.words_stuck == words.words_error == 0
+
+
+def test_the_bundled_fault_scenario_runs_clean_on_its_neighbours(board) -> None:
+    hand = board("faults.toml")
+    frames = hand.read(100)
+    assert len(of(frames, 0)) == len(of(frames, 2)) == 1200
+    assert len(of(frames, 1)) < 1200
+    assert hand.stats.frames_lost == 0
+
+
+def test_only_the_named_fingers_are_streamed(board) -> None:
+    hand = board("press.toml?fingers=5&seconds=1")
+    hand.start(pac=False, fingers=0b10010)
+    batch = hand.read_batch(100)
+    assert set(batch.frames["finger"]) == {1, 4}
+    assert len(batch.pac) == 0
+
+
+def test_device_time_and_slots_are_exact_over_a_minute(board) -> None:
+    hand = board("drift.toml")
+    frames = hand.read(100)
+    status = hand.status()
+    assert status.slots_late == status.messages_dropped == 0
+    # 44 slots at 4400 Hz are 10 ms; the fraction of a us per slot must not add up.
+    for finger in (0, 1):
+        t_us = of(frames, finger)["t_us"]
+        assert np.array_equal(t_us - t_us[0], 10_000 * np.arange(6000))
+
+
+def test_a_host_that_leaves_and_returns_finds_a_stopped_board(tmp_path: Path) -> None:
+    from biotac.link.sim_process import SimBoard
+    from biotac.sim.source import load_source
+
+    board = SimBoard(load_source("press.toml", seconds=60), pace=1.0, hold=False)
+    try:
+        with biotac.open(board.path) as hand:
+            hand.start()
+            assert len(hand.read(0.1)) == 10
+            hand._streaming = False  # as if this host had been killed: no STOP is sent
+        with biotac.open(board.path) as hand:
+            assert hand.status().streams == 0
+    finally:
+        board.close()

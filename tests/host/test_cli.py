@@ -1,0 +1,160 @@
+"""Every verb, and every way to fail: one line on stderr, the fixed exit code, the cure."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import biotac
+from biotac.cli.main import VERBS, main, parser
+
+
+def run(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "biotac", *words], capture_output=True, text=True, check=False)
+
+
+def fails(capsys, code: int, *words: str) -> str:
+    """Run in this process; the verb must fail with this code and one line, which is returned."""
+    assert main(words) == code
+    error = capsys.readouterr().err
+    assert error.startswith("biotac: ")
+    assert error.count("\n") == 1
+    return error
+
+
+def test_help_fits_a_screen_and_every_verb_has_an_example() -> None:
+    assert parser().format_help().count("\n") <= 40
+    for module in VERBS:
+        assert run(module.NAME, "--help").stdout.rstrip().endswith(f"example: {module.EXAMPLE}")
+
+
+def test_version_names_release_and_wire(capsys) -> None:
+    assert main(["version", "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["biotac-gateway"] == biotac.__version__
+
+
+def test_list_shows_what_can_be_simulated(capsys) -> None:
+    assert main(["list", "--json"]) == 0
+    assert "sim:press.toml" in json.loads(capsys.readouterr().out)["scenarios"]
+
+
+def test_info_tells_board_sensors_and_settings(capsys) -> None:
+    assert main(["info", "sim:press.toml?fingers=3", "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["board"] == "POSIX_SIM"
+    assert [s["finger"] for s in facts["sensors"]] == [0, 1, 2]
+    assert all(s["serial"].startswith("BT") for s in facts["sensors"])
+    assert facts["settings"]["contact_energy_count2"] == 1000
+    assert facts["schema_matches"] is True
+
+
+def test_stream_prints_one_json_object_a_frame(capsys) -> None:
+    assert main(["stream", "sim:press.toml?pace=fast", "--seconds", "0.2", "--rate", "0", "--json"]) == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [row["seq"] for row in rows] == list(range(20))
+    assert rows[0]["force_n"] == [None] * 3
+    assert all(len(row["counts"]) == 19 for row in rows)
+
+
+def test_stream_thins_out_for_people(capsys) -> None:
+    assert main(["stream", "sim:press.toml?pace=fast", "--seconds", "1", "--rate", "5"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 5
+
+
+def test_record_then_check(capsys, tmp_path: Path) -> None:
+    out = tmp_path / "a.mcap"
+    assert main(["record", "sim:press.toml?fingers=2", str(out), "--seconds", "1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["frames_lost"] == 0
+    assert main(["check", str(out), "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["good"] is True
+    assert facts["crosscheck"]["violations"] == 0
+    assert facts["frames"] >= 200
+
+
+def test_record_does_not_overwrite(capsys, tmp_path: Path) -> None:
+    out = tmp_path / "a.mcap"
+    out.write_bytes(b"precious")
+    assert "--force" in fails(capsys, 2, "record", "sim:press.toml", str(out), "--seconds", "1")
+    assert out.read_bytes() == b"precious"
+
+
+def test_record_into_no_folder_is_refused(capsys, tmp_path: Path) -> None:
+    assert "cannot be written" in fails(capsys, 2, "record", "sim:press.toml", str(tmp_path / "no" / "a.mcap"))
+
+
+@pytest.mark.parametrize("verb", ["info", "stream"])
+def test_an_unknown_port_exits_3(capsys, verb: str) -> None:
+    assert "`biotac list`" in fails(capsys, 3, verb, "/dev/ttyNOWHERE7")
+    assert "expected a device path or sim:SOURCE" in fails(capsys, 3, verb, "telnet:1")
+
+
+def test_a_port_that_is_no_gateway_exits_4(capsys, scripted_board, monkeypatch) -> None:
+    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.02)
+    board = scripted_board(lambda i, p: b"OK\r\n")
+    assert "no gateway" in fails(capsys, 4, "info", board.path)
+
+
+def test_another_wire_version_exits_5(capsys, scripted_board, hello) -> None:
+    board = scripted_board(lambda i, p: hello(p, wire_major=2) if len(p) == 5 else b"")
+    assert "install the firmware and the biotac-gateway of one release" in fails(capsys, 5, "info", board.path)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("name = 'x'\n[[step]]\ndo = 'press\n", "bad.toml:3: "),
+        (
+            "name = 'x'\n\n[[step]]\ndo = 'rest'\nseconds = 1\n[[step]]\ndo = 'press'\nsecnds = 1\n",
+            ":8: step 2: key 'secnds'",
+        ),
+        ("name = 'x'\n[[step]]\ndo = 'jump'\nseconds = 1\n", ":3: step 1: key 'do'"),
+    ],
+)
+def test_a_malformed_scenario_exits_2_with_line_and_key(capsys, tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(text)
+    error = fails(capsys, 2, "demo", str(path), "--out", str(tmp_path / "out"))
+    assert "bad.toml" in error
+    assert words in error
+
+
+@pytest.mark.parametrize("source", ["nowhere.toml", "nowhere.npz", "data.csv", "nowhere.btd"])
+def test_a_source_that_is_not_there_exits_2(capsys, tmp_path: Path, source: str) -> None:
+    fails(capsys, 2, "demo", source, "--out", str(tmp_path))
+
+
+def test_too_many_fingers_exit_2(capsys, tmp_path: Path) -> None:
+    assert "expected 1 to 5" in fails(capsys, 2, "demo", "press.toml", "--fingers", "6", "--out", str(tmp_path))
+
+
+def test_usage_errors_exit_2() -> None:
+    assert run("fly").returncode == 2
+    assert run().returncode == 2
+
+
+def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:
+    link = tmp_path / "board"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "biotac", "sim", "press.toml", "--fingers", "2", "--link", str(link), "--json"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    try:
+        facts = json.loads(process.stdout.readline())
+        assert link.resolve() == Path(facts["port"])
+        with biotac.open(str(link)) as hand:
+            frames = hand.read(0.2)
+        assert len(frames) == 40
+        with biotac.open(facts["port"]) as again:  # a port that was closed opens again
+            assert again.info.fingers_present == 0b11
+    finally:
+        process.terminate()
+        process.wait()
+        process.stdout.close()

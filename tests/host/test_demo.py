@@ -1,0 +1,88 @@
+"""The whole chain: what the demo leaves and what it says of itself."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM, TORQUE_BOUND_NMM
+from biotac.demo import expected_frames, run_demo
+from biotac.sim.source import load_source
+
+
+def quiet(text: str) -> None:
+    """No progress line in tests."""
+
+
+def test_a_demo_leaves_recording_report_and_picture(tmp_path) -> None:
+    demo = run_demo("press.toml", tmp_path, show=quiet)
+    assert demo.good
+    assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
+    assert len(biotac.load(tmp_path / "demo.mcap")) == demo.facts["frames"]
+    assert json.loads((tmp_path / "report.json").read_text())["crosscheck"]["violations"] == 0
+    assert "cross-check violations | 0" in (tmp_path / "report.md").read_text()
+
+
+def test_presses_are_seen_and_released(tmp_path) -> None:
+    demo = run_demo("press.toml", tmp_path, show=quiet)
+    truth = demo.source.truth
+    assert truth is not None
+    frames = demo.batch.frames
+    contact = (frames["flags"] & biotac.FrameFlags.CONTACT) != 0
+    firm = np.linalg.norm(truth.force_n[:, 0], axis=1) > 2.0
+    touched = truth.contact[:, 0]
+    # A contact needs three frames to be believed, a release ten or more.
+    assert contact[firm].mean() > 0.97
+    assert not contact[:100].any()
+    assert contact[~touched].mean() < 0.25
+    reasons = [t["reason"] for t in demo.facts["tare_changes"]]
+    assert reasons.count("ROLL_BACK") == reasons.count("RELEASE") + reasons.count("RESIDUE") == 3
+
+
+def test_five_fingers_with_pac_for_a_minute_lose_nothing(tmp_path) -> None:
+    demo = run_demo("press.toml", tmp_path, fingers=5, seconds=60, show=quiet)
+    facts = demo.facts
+    assert demo.good
+    assert facts["frames"] == facts["pac_blocks"] == 30_000
+    assert facts["board_slots_late"] == facts["board_dropped"] == 0
+    assert facts["host_cpu_percent"] < 25
+    for finger in range(5):
+        mine = demo.batch.frames["finger"] == finger
+        assert np.array_equal(demo.batch.frames["seq"][mine], np.arange(6000))
+        assert np.array_equal(demo.batch.frames["counts"][mine], demo.source.samples[:, finger, 0:38:2])
+        mine = demo.batch.pac["finger"] == finger
+        assert np.array_equal(demo.batch.pac["pac"][mine], demo.source.samples[:, finger, 1::2])
+    assert facts["crosscheck"]["poc_um_max"] <= POC_BOUND_UM
+    assert facts["crosscheck"]["force_mn_max"] <= FORCE_BOUND_MN
+    assert facts["crosscheck"]["torque_nmm_max"] <= TORQUE_BOUND_NMM
+
+
+@pytest.mark.parametrize(
+    "name", ["syntouchcontact/F1.npz", "robotic_finger/trial_15330.npz", "btd_biotacsp/data.btd.gz"]
+)
+def test_every_recorded_row_arrives_in_order(shared_data, tmp_path, name: str) -> None:
+    demo = run_demo(str(shared_data / name), tmp_path, show=quiet)
+    source = load_source(shared_data / name)
+    assert demo.good
+    assert len(demo.batch.frames) == expected_frames(source) == len(source.samples)
+    assert np.array_equal(demo.batch.frames["seq"], np.arange(len(source.samples)))
+    assert np.array_equal(demo.batch.frames["counts"], source.samples[:, 0, 0:38:2])
+    check = demo.facts["crosscheck"]
+    assert check["frames"] == len(source.samples)
+    assert check["poc_um_max"] <= 1.2
+    assert check["force_mn_max"] <= 1.0
+    assert check["torque_nmm_max"] <= 0.02
+
+
+def test_real_presses_are_released(shared_data, tmp_path) -> None:
+    """Skin keeps signal and pressure after a press; a tare that only returns to its old value locks out."""
+    demo = run_demo(str(shared_data / "robotic_finger/trial_15330.npz"), tmp_path, show=quiet)
+    reasons = [t["reason"] for t in demo.facts["tare_changes"]]
+    assert reasons.count("RELEASE") + reasons.count("RESIDUE") >= 10
+    tared = (demo.batch.frames["flags"] & biotac.FrameFlags.TARE_CHANGED) != 0
+    rest_pdc = np.median(demo.batch.frames["pdc"][:600].astype(float))
+    rezeroed = demo.batch.wire["tare_state"] == 1
+    assert demo.batch.frames["pdc"][tared & rezeroed].max() <= rest_pdc + 60

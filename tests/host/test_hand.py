@@ -1,0 +1,146 @@
+"""The conversation with a board: handshake, refusals, stale streams, boards that go away."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac import _wire as wire
+from biotac.framing import encode
+
+
+def test_nothing_answers_is_no_gateway(scripted_board, monkeypatch) -> None:
+    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.02)
+    board = scripted_board(lambda message_id, payload: b"")
+    with pytest.raises(biotac.NotAGatewayError, match=r"nothing answers.*expected a HELLO.*check that this is"):
+        biotac.open(board.path)
+
+
+def test_another_kind_of_device_is_no_gateway(scripted_board, monkeypatch) -> None:
+    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.02)
+    board = scripted_board(lambda message_id, payload: b"$GPGGA,123519,4807.038,N*47\r\n")
+    with pytest.raises(biotac.NotAGatewayError, match="bytes came that are no frames"):
+        biotac.open(board.path)
+
+
+def test_another_wire_major_is_refused_with_both_versions(scripted_board, hello) -> None:
+    board = scripted_board(lambda i, p: hello(p, wire_major=9, wire_minor=3) if i == wire.HelloRequest.ID else b"")
+    with pytest.raises(biotac.WireVersionError, match=rf"wire 9\.3, this library {wire.WIRE_MAJOR}\."):
+        biotac.open(board.path)
+
+
+def test_a_stale_stream_and_an_old_hello_do_not_disturb_the_handshake(scripted_board, hello) -> None:
+    old = hello(wire.HelloRequest(1, 12345).pack(), boot_id=666)
+    stale = b"half a frame\x01\x02" + old + encode(wire.Pac.ID, bytes(wire.Pac.STRUCT.size)) * 20
+    board = scripted_board(lambda i, p: hello(p, boot_id=7) if i == wire.HelloRequest.ID else b"", greeting=stale)
+    with biotac.open(board.path) as hand:
+        assert hand.info.boot_id == 7
+        assert hand.stats.frames_lost == 0
+
+
+def test_a_refused_command_names_command_and_reason() -> None:
+    with biotac.open("sim:press.toml") as hand:
+        with pytest.raises(biotac.CommandRefusedError, match="refused SetSetting: OUT_OF_RANGE"):
+            hand.set_setting(biotac.Setting.POC_WEIGHTS, 3)
+        with pytest.raises(biotac.CommandRefusedError, match="refused GetSensorStatus: NO_SUCH_FINGER"):
+            hand.sensor_status(5)
+        hand.start()
+        with pytest.raises(biotac.CommandRefusedError, match=r"BUSY.*send STOP first"):
+            hand.set_setting(biotac.Setting.POC_WEIGHTS, 0)
+
+
+def test_settings_are_read_back() -> None:
+    with biotac.open("sim:drift.toml?seconds=1") as hand:
+        hand.set_setting(biotac.Setting.FORCE_GAIN_X_NN, -123_456)
+        assert hand.settings()[biotac.Setting.FORCE_GAIN_X_NN] == -123_456
+
+
+def test_read_returns_exactly_the_time_that_was_asked_for() -> None:
+    with biotac.open("sim:press.toml?fingers=2&seconds=3") as hand:
+        first = hand.read(0.5)
+        second = hand.read(1.0)
+    assert len(first) == 100
+    assert len(second) == 200
+    assert np.array_equal(np.sort(np.concatenate([first, second]), order=["finger", "seq"])["seq"], [*range(150)] * 2)
+
+
+def test_frames_are_typed_and_in_order() -> None:
+    with biotac.open("sim:press.toml?seconds=0.5") as hand:
+        frames = list(hand.frames())
+        assert hand.ended
+    assert [f.seq for f in frames] == list(range(50))
+    assert np.diff([f.t_us for f in frames]).tolist() == [10_000] * 49
+    assert biotac.FrameFlags.UNTARED in frames[0].flags
+    assert np.isnan(frames[0].force_n).all()
+    assert biotac.FrameFlags.UNTARED not in frames[-1].flags
+    assert not np.isnan(frames[-1].force_n).any()
+
+
+def test_the_same_source_gives_the_same_bytes(tmp_path) -> None:
+    raw = []
+    for name in ("a", "b"):
+        with biotac.open("sim:press.toml?seconds=2") as hand:
+            recorder = hand.record(tmp_path / f"{name}.mcap")
+            frames = hand.read(10)
+            recorder.close()
+        raw.append(biotac.Recording(tmp_path / f"{name}.mcap").wire.tobytes())
+        assert len(frames) == 200
+    assert raw[0] == raw[1]
+
+
+def test_a_tare_command_changes_the_tare_of_the_next_frame() -> None:
+    with biotac.open("sim:drift.toml?seconds=1") as hand:
+        hand.set_tare(0, np.full(19, 3000.0))
+        batch = hand.read_batch(0.1)
+    events = [m for m in batch.messages if isinstance(m, wire.Tare)]
+    assert batch.wire["tare_q4"][0].tolist() == [48000] * 19
+    assert (events[0].seq, events[0].reason) == (0, wire.TareReason.HOST_SET)
+
+
+def test_a_board_that_dies_in_mid_stream_is_named(monkeypatch) -> None:
+    hand = biotac.open("sim:drift.toml")
+    frames = hand.frames()
+    next(frames)
+    hand.link.board._process.kill()
+    with pytest.raises(biotac.DeviceLostError):
+        for _ in frames:
+            pass
+    hand.close()
+
+
+def test_a_silent_board_is_a_lost_board(scripted_board, hello, monkeypatch) -> None:
+    monkeypatch.setattr("biotac.hand.SILENCE_S", 0.05)
+
+    def answer(message_id: int, payload: bytes) -> bytes:
+        if message_id == wire.HelloRequest.ID:
+            return hello(payload)
+        return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, 0).pack())
+
+    board = scripted_board(answer)
+    with biotac.open(board.path) as hand, pytest.raises(biotac.DeviceLostError, match=r"silent.*check the cable"):
+        hand.read(1.0)
+
+
+def test_a_port_is_opened_once(scripted_board, hello) -> None:
+    board = scripted_board(lambda i, p: hello(p) if i == wire.HelloRequest.ID else b"")
+    with biotac.open(board.path), pytest.raises(biotac.PortError, match="in use by another program"):
+        biotac.open(board.path)
+
+
+@pytest.mark.parametrize(
+    ("port", "words"),
+    [
+        ("/dev/ttyNOWHERE7", r"no port /dev/ttyNOWHERE7; `biotac list`"),
+        (os.devnull, "cannot be opened as a serial port"),
+        ("modbus:1", "no kind of port is called 'modbus'"),
+        ("sim:", "no source"),
+        ("sim:press.toml?speed=2", "option 'speed'"),
+        ("sim:press.toml?pace=quick", "pace=real or pace=fast"),
+    ],
+)
+def test_a_port_that_cannot_be_opened_says_why(port: str, words: str) -> None:
+    with pytest.raises(biotac.PortError, match=words):
+        biotac.open(port)

@@ -1,0 +1,246 @@
+"""Recordings: the same arrays back, whatever was killed, cut or damaged."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
+
+import biotac
+from biotac import _wire as wire
+from biotac.framing import Deframer, encode
+
+SOURCE = "sim:press.toml?fingers=2&seconds=4"
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory) -> tuple[Path, np.ndarray, np.ndarray]:
+    """A good recording, and the frames and PAC that the live stream gave."""
+    path = tmp_path_factory.mktemp("rec") / "good.mcap"
+    with biotac.open(SOURCE) as hand:
+        hand.record(path)
+        batch = hand.read_batch(100)
+    return path, batch.frames, batch.pac
+
+
+def rewrite(path: Path, target: Path, change) -> None:
+    """Copy a recording through the mcap library, wire bytes going through ``change``."""
+    with path.open("rb") as stream, target.open("wb") as out:
+        reader = make_reader(stream)
+        writer = Writer(out, chunk_size=1, compression=CompressionType.ZSTD)
+        writer.start()
+        for schema, channel, message in reader.iter_messages():
+            schema_id = writer.register_schema(schema.name, schema.encoding, schema.data)
+            channel_id = writer.register_channel(channel.topic, channel.message_encoding, schema_id)
+            writer.add_message(channel_id, message.log_time, change(message.data), message.publish_time)
+        for metadata in reader.iter_metadata():
+            writer.add_metadata(metadata.name, metadata.metadata)
+        writer.finish()
+
+
+def alter_force(seq: int, finger: int, by: int):
+    """A change that adds ``by`` to force z of one frame and gives it a right CRC again."""
+
+    def change(data: bytes) -> bytes:
+        out = b""
+        for message_id, payload in Deframer().feed(data):
+            if message_id == wire.Frame.ID:
+                rows = np.frombuffer(payload, wire.DTYPES[wire.Frame.ID]).copy()
+                if rows["seq"][0] == seq and rows["finger"][0] == finger:
+                    rows["force_100un"][0, 2] += by
+                    payload = rows.tobytes()
+            out += encode(message_id, payload)
+        return out
+
+    return change
+
+
+def check(path: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "biotac", "check", str(path), *options], capture_output=True, text=True, check=False
+    )
+
+
+def test_reading_back_gives_the_same_arrays(recorded) -> None:
+    path, frames, pac = recorded
+    recording = biotac.Recording(path)
+    assert np.array_equal(biotac.load(path), frames, equal_nan=False) or frames_equal(biotac.load(path), frames)
+    assert np.array_equal(recording.pac, pac)
+    assert recording.problems == []
+    assert recording.frames_lost == 0
+
+
+def frames_equal(a: np.ndarray, b: np.ndarray) -> bool:
+    """Structured arrays with NaN."""
+    return a.dtype == b.dtype and a.tobytes() == b.tobytes()
+
+
+def test_load_has_the_documented_fields(recorded) -> None:
+    frames = biotac.load(recorded[0])
+    names = ["finger", "seq", "t_us", "counts", "pdc", "tac", "tdc", "poc_mm", "force_n", "torque_nmm", "flags"]
+    assert list(frames.dtype.names) == names
+    assert frames["counts"].shape == (800, 19)
+    assert frames["poc_mm"].shape == frames["force_n"].shape == frames["torque_nmm"].shape == (800, 3)
+
+
+def test_a_good_recording_passes(recorded) -> None:
+    done = check(recorded[0])
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "800 frames, 0 lost, good" in done.stdout
+
+
+@pytest.mark.parametrize("by", [1, -7])
+def test_one_altered_force_digit_fails_and_names_the_frame(recorded, tmp_path, by: int) -> None:
+    altered = tmp_path / "altered.mcap"
+    rewrite(recorded[0], altered, alter_force(seq=123, finger=1, by=by))
+    done = check(altered)
+    assert done.returncode == 1
+    assert "finger 1 frame 123" in done.stdout
+    assert "force" in done.stdout
+    assert done.stdout.count("frame 12") == 1
+
+
+def test_a_damaged_wire_byte_fails_and_names_the_gap(recorded, tmp_path) -> None:
+    damaged = tmp_path / "damaged.mcap"
+    state = {"done": False}
+
+    def change(data: bytes) -> bytes:
+        at = len(data) // 2
+        if state["done"] or data[at] in (0, 0x55):
+            return data
+        state["done"] = True
+        return data[:at] + bytes([data[at] ^ 0x55 or 1]) + data[at + 1 :]
+
+    rewrite(recorded[0], damaged, change)
+    assert state["done"]
+    done = check(damaged)
+    assert done.returncode == 1
+    assert "refused" in done.stderr
+
+
+@pytest.mark.parametrize("content", [b"", b"hello, I am no recording", bytes(1000)])
+def test_a_file_that_is_no_recording_exits_2_in_one_line(tmp_path, content: bytes) -> None:
+    path = tmp_path / "strange.mcap"
+    path.write_bytes(content)
+    done = check(path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("biotac: ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_missing_file_exits_2(tmp_path) -> None:
+    done = check(tmp_path / "nowhere.mcap")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "No such file" in done.stderr
+
+
+def test_another_mcap_file_is_not_taken_for_a_recording(tmp_path) -> None:
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as out:
+        writer = Writer(out)
+        writer.start()
+        writer.finish()
+    with pytest.raises(biotac.RecordingError, match="no biotac recording"):
+        biotac.Recording(path)
+
+
+def test_a_recording_of_another_wire_major_is_refused(recorded, tmp_path) -> None:
+    path = tmp_path / "newer.mcap"
+    with path.open("wb") as out:
+        writer = Writer(out)
+        writer.start()
+        writer.add_metadata("biotac", {"format": "1", "wire": "7.0", "hello": "{}", "settings": "{}"})
+        writer.finish()
+    with pytest.raises(biotac.RecordingError, match=r"wire 7\.0.*install the biotac-gateway it was recorded with"):
+        biotac.Recording(path)
+
+
+def test_a_recording_cut_anywhere_gives_what_is_whole_or_says_why(recorded, tmp_path) -> None:
+    path, frames, _ = recorded
+    whole = path.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    seen = set()
+    for length in [*range(0, 400, 37), *np.linspace(400, len(whole) - 1, 40).astype(int)]:
+        cut.write_bytes(whole[:length])
+        try:
+            recording = biotac.Recording(cut)
+        except biotac.RecordingError:
+            seen.add("refused")
+            continue
+        got = recording.frames
+        assert frames_equal(got, frames[: len(got)])
+        assert any("ends without its index" in p for p in recording.problems)
+        seen.add("all" if len(got) == len(frames) else "some" if len(got) else "none")
+    assert {"refused", "all"} <= seen
+
+
+def test_a_cut_recording_is_checked_with_a_warning(recorded, tmp_path) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(recorded[0].read_bytes()[:-50])
+    done = check(cut)
+    assert done.returncode == 0
+    assert done.stderr.count("\n") == 1
+    assert "ends without its index" in done.stderr
+
+
+def test_a_damaged_second_is_left_out_and_the_rest_is_read(recorded, tmp_path) -> None:
+    path, frames, _ = recorded
+    whole = bytearray(path.read_bytes())
+    with path.open("rb") as stream:
+        blocks = [r for r in StreamReader(stream, emit_chunks=True).records if type(r).__name__ == "Chunk"]
+    assert len(blocks) >= 1
+    at = bytes(whole).find(blocks[-1].data) + len(blocks[-1].data) // 2
+    whole[at] ^= 0xFF
+    damaged = tmp_path / "damaged.mcap"
+    damaged.write_bytes(whole)
+    recording = biotac.Recording(damaged)
+    assert any("damaged and left out" in p for p in recording.problems)
+    assert len(recording.frames) < len(frames)
+
+
+def test_an_existing_recording_is_not_overwritten(recorded) -> None:
+    before = recorded[0].read_bytes()
+    with biotac.open("sim:drift.toml?seconds=1") as hand, pytest.raises(biotac.InputError, match=r"exists.*--force"):
+        hand.record(recorded[0])
+    assert recorded[0].read_bytes() == before
+
+
+@pytest.mark.parametrize("after_chunks", [1, 3, 6])
+def test_a_killed_recorder_loses_at_most_its_last_second(tmp_path, after_chunks: int) -> None:
+    """The recorder prints a line per closed chunk, in frames on disk; it is killed right after one."""
+    path = tmp_path / "killed.mcap"
+    program = (
+        "import sys, biotac\n"
+        "from biotac.recording import writer\n"
+        "flush = writer.Recorder.flush\n"
+        "hand = biotac.open('sim:press.toml?seconds=600&fingers=5')\n"
+        "def told(self):\n"
+        "    flush(self); print(hand.stats.frames, flush=True)\n"
+        "writer.Recorder.flush = told\n"
+        "writer.FLUSH_BYTES = 65536\n"
+        f"hand.record({str(path)!r})\n"
+        "for batch in hand.batches(): pass\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    on_disk = [int(process.stdout.readline()) for _ in range(after_chunks)][-1]
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    recording = biotac.Recording(path)
+    # A frame whose bytes straddle the flush belongs to the next one.
+    assert len(recording.frames) >= on_disk - 50 > 0
+    assert recording.frames_lost == 0
+    assert recording.counts.bad == 0
+    for finger in range(5):
+        seq = recording.frames["seq"][recording.frames["finger"] == finger]
+        assert np.array_equal(seq, np.arange(len(seq)))
+    assert check(path).returncode == 0

@@ -1,0 +1,562 @@
+"""The scenario format: what a timeline does, and the line and key every mistake names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biotac import _wire
+from biotac.errors import InputError, ScenarioError
+from biotac.sim import Source, bundled_scenarios, load_source, sampling, surface, tape
+from biotac.sim.gains import fit_gains
+from biotac.sim.physics import Finger
+from biotac.sim.scenario import FAULT_CODES, parse_scenario
+
+REST = '[[step]]\ndo = "rest"\nseconds = 1.0\n'
+PRESS = '[[step]]\ndo = "press"\nseconds = 0.5\nat = "E17"\nforce_n = 5.0\n'
+
+
+def play(tmp_path: Path, text: str, **options: float) -> Source:
+    path = tmp_path / "try.toml"
+    path.write_text(text)
+    return load_source(path, **options)  # type: ignore[arg-type]
+
+
+# ---- what a timeline does ----------------------------------------------------------------------
+
+
+def test_a_press_ramps_holds_and_lets_go(tmp_path: Path) -> None:
+    text = 'name = "t"\n' + REST + PRESS + '[[step]]\ndo = "hold"\nseconds = 1\n' + REST
+    source = play(tmp_path, text)
+    truth = source.truth
+    assert truth is not None and source.samples.shape == (350, 1, 44)
+    force_z = truth.force_n[:, 0, 2]
+    assert not force_z[:100].any() and not truth.contact[:100].any()
+    np.testing.assert_allclose(force_z[100:150], 5.0 * (np.arange(50) + 0.5) / 50, rtol=1e-9)
+    np.testing.assert_allclose(force_z[150:250], 5.0)
+    np.testing.assert_allclose(force_z[250:260], 5.0 * (9.5 - np.arange(10)) / 10, rtol=1e-9)
+    assert truth.contact[100:260].all() and not truth.contact[260:].any()
+    np.testing.assert_allclose(truth.poc_mm[200, 0], [-2.8, 0.0, -5.08])
+    assert np.isnan(truth.poc_mm[50]).all() and np.isnan(truth.poc_mm[300]).all()
+    # the counts follow: E17 falls while pressed and comes back
+    e17 = source.samples[:, 0, 32].astype(float)
+    assert e17[150:250].mean() < e17[:100].mean() - 100 and abs(e17[300:].mean() - e17[:100].mean()) < 20
+
+
+def test_shear_twist_and_slide_stay_until_changed(tmp_path: Path) -> None:
+    text = (
+        'name = "t"\n' + PRESS
+        + '[[step]]\ndo = "shear"\nseconds = 0.1\nshear_n = [1.0, -2.0]\n'
+        + '[[step]]\ndo = "twist"\nseconds = 0.1\ntorsion_nmm = 4\n'
+        + '[[step]]\ndo = "slide"\nseconds = 0.1\nto_mm = [-9.8, 0.0]\n'
+        + '[[step]]\ndo = "hold"\nseconds = 0.1\n'
+        + '[[step]]\ndo = "press"\nseconds = 0.1\nforce_n = 0\n' + PRESS
+    )  # fmt: skip
+    truth = play(tmp_path, text).truth
+    assert truth is not None
+    np.testing.assert_allclose(truth.force_n[85, 0], [1.0, -2.0, 5.0], atol=1e-9)
+    contact, force = np.array([-9.8, 0.0, -5.08]), np.array([1.0, -2.0, 5.0])
+    np.testing.assert_allclose(truth.poc_mm[85, 0], contact, atol=1e-9)
+    np.testing.assert_allclose(truth.torque_nmm[85, 0], np.cross(contact, force) - (0, 0, 4.0), atol=1e-9)
+    # released, so the next press starts without shear or torsion
+    np.testing.assert_allclose(truth.force_n[-1, 0, :2], 0.0, atol=1e-12)
+
+
+def test_other_fingers_hold_while_one_acts(tmp_path: Path) -> None:
+    text = 'name = "t"\nfingers = 3\n' + PRESS.replace("[[step]]", "[[step]]\nfingers = [1]") + REST
+    truth = play(tmp_path, text).truth
+    assert truth is not None
+    assert truth.contact[:50].any(axis=0).tolist() == [False, True, False]
+
+
+def test_temperature_reaches_the_sensor_and_leaves_contacts_alone(tmp_path: Path) -> None:
+    text = 'name = "t"\n' + PRESS + '[[step]]\ndo = "temperature"\nseconds = 2\ncelsius = 35\n'
+    source = play(tmp_path, text)
+    assert source.truth is not None and source.truth.contact[60:].all()
+    tdc = source.samples[:, 0, sampling.TDC_SLOT].astype(float)
+    assert abs(tdc[:50].mean() - 1008.2) < 1 and abs(tdc[-1] - sampling.tdc_counts(np.array([35.0]))[0]) < 4
+
+
+def test_a_press_keeps_the_temperature_and_takes_the_width_of_its_tip() -> None:
+    text = (
+        'name = "t"\n[[step]]\ndo = "temperature"\nseconds = 1\ncelsius = 33\n'
+        + PRESS
+        + "tip_mm = 2.0\n"
+        + REST
+        + PRESS
+    )
+    (track,) = parse_scenario(text.encode(), file="try.toml").tracks
+    states = track.states(np.array([0.5, 1.4, 2.9]))
+    np.testing.assert_allclose(states.warm_c, [1.5, 3.0, 3.0])
+    np.testing.assert_allclose(states.tip_radius_mm[1:], [1.0, 3.5])  # 3.5 mm: numerics.md's flat
+
+
+def test_an_electrode_beside_the_midline_is_pressed_along_its_radius(tmp_path: Path) -> None:
+    truth = play(tmp_path, 'name = "t"\n' + PRESS.replace("E17", "E13")).truth
+    assert truth is not None
+    poc, force = truth.poc_mm[-1, 0], truth.force_n[-1, 0]
+    assert np.hypot(poc[1], poc[2]) == pytest.approx(surface.RADIUS_MM)
+    np.testing.assert_allclose(np.cross(poc * [0, 1, 1], force), 0.0, atol=1e-9)
+    assert force @ poc < 0  # into the finger
+
+
+def test_fingers_are_cut_and_repeated_with_sensors_of_their_own(tmp_path: Path) -> None:
+    text = 'name = "t"\nseed = 9\nfingers = 2\n' + PRESS.replace("[[step]]", "[[step]]\nfingers = [1]")
+    two, one, five = play(tmp_path, text), play(tmp_path, text, fingers=1), play(tmp_path, text, fingers=5)
+    np.testing.assert_array_equal(one.samples, two.samples[:, :1])
+    np.testing.assert_array_equal(five.samples[:, :2], two.samples)
+    assert five.truth is not None and five.truth.contact[-1].tolist() == [False, True, False, True, False]
+    assert len({five.samples[:, k].tobytes() for k in range(5)}) == 5
+    assert len(set(five.serials)) == 5 and all(len(serial) == 16 for serial in five.serials)
+
+
+def test_seconds_crop_and_repeat(tmp_path: Path) -> None:
+    text = 'name = "t"\n' + REST + PRESS + REST
+    whole, short = play(tmp_path, text), play(tmp_path, text, seconds=1.2)
+    long = play(tmp_path, text, seconds=7.0)
+    assert len(whole.samples) == 250 and len(short.samples) == 120 and len(long.samples) == 700
+    np.testing.assert_array_equal(short.samples, whole.samples[:120])
+    assert whole.truth is not None and long.truth is not None
+    np.testing.assert_array_equal(long.truth.force_n[:250], whole.truth.force_n)
+    np.testing.assert_array_equal(long.truth.force_n[250:500], whole.truth.force_n)
+    np.testing.assert_array_equal(long.truth.force_n[500:], whole.truth.force_n[:200])
+
+
+def test_the_last_frame_of_a_scenario_that_ends_in_contact_is_pressed(tmp_path: Path) -> None:
+    source = play(tmp_path, 'name = "t"\n' + REST + PRESS + '[[step]]\ndo = "hold"\nseconds = 0.5\n')
+    pdc = source.samples[-5:, 0, sampling.PDC_SLOT].astype(float)
+    assert pdc.min() > 1326 + 400
+
+
+def test_finger_tables_choose_the_sensors(tmp_path: Path) -> None:
+    text = (
+        'name = "t"\n[[finger]]\nprofile = "worn"\nseed = 4\nserial = "BT2P0220B11E0004"\n'
+        '[[finger]]\nseed = 4\n' + REST
+    )  # fmt: skip
+    source = play(tmp_path, text)
+    assert source.serials == ("BT2P0220B11E0004", "BTSIM00000000004")
+    for k, profile in enumerate(("worn", "new")):
+        mean = source.samples[:, k, sampling.ELECTRODE_SLOT].mean(axis=0)
+        np.testing.assert_allclose(mean, Finger(4, profile).rest_counts(np.zeros(1))[0], atol=3)
+
+
+# ---- faults ------------------------------------------------------------------------------------
+
+
+def test_a_fault_replaces_exactly_the_words_it_covers(tmp_path: Path) -> None:
+    fault = '[[fault]]\nat_s = 0.5\nseconds = 0.1\nfinger = 1\nkind = "{}"\n'
+    text = 'name = "t"\nfingers = 2\n' + REST
+    clean = play(tmp_path, text).samples
+    for kind, code in FAULT_CODES.items():
+        words = play(tmp_path, text + fault.format(kind)).samples
+        expected = clean.copy()
+        expected[50:60, 1, :] = code
+        np.testing.assert_array_equal(words, expected)
+    words = play(tmp_path, text + fault.format("bad_parity") + 'channel = "PAC"\n').samples
+    assert (words[50:60, 1, sampling.PAC_SLOT] == tape.BAD_PARITY).all()
+    assert (words == tape.BAD_PARITY).sum() == 220
+    # between frames: 4400 slots a second, so 0.502 s is slot 2209, the tenth of frame 50 (from 0: 9)
+    words = play(tmp_path, text + fault.format("stuck_low").replace("0.5", "0.502", 1)).samples
+    assert (words[50, 1, :9] < 4096).all() and (words[50, 1, 9:] == tape.STUCK_LOW).all()
+    assert (words[60, 1, :9] == tape.STUCK_LOW).all() and (words[60, 1, 9:] < 4096).all()
+
+
+# ---- gains -------------------------------------------------------------------------------------
+
+
+def test_fitted_gains_recover_gains_that_are_exact() -> None:
+    rng = np.random.default_rng(1)
+    signal = rng.normal(0.0, 100.0, (50, 19))
+    arms = np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL)
+    force = signal @ surface.ELECTRODE_NORMAL * [1e-3, 2e-4, 0.0]
+    torque = signal @ arms * [7e-3, -3e-3, 5.0]
+    assert fit_gains(signal, force, torque) == {
+        "force_gain_x_nn": 1_000_000,
+        "force_gain_y_nn": 200_000,
+        "torque_gain_y_nn": -3_000_000,
+        "torque_gain_z_nn": 100_000_000,  # 5e9, held at the setting's end
+    }
+    assert fit_gains(np.zeros((50, 19)), force, torque) == {}
+
+
+def test_gains_fit_the_axes_the_scenario_loads(tmp_path: Path) -> None:
+    text = 'name = "t"\ngains = "fit"\n' + REST + PRESS
+    source = play(tmp_path, text)
+    assert sorted(source.settings) == ["force_gain_z_nn", "torque_gain_y_nn"]
+    assert source.truth is not None
+    # noise of 1.5 counts and creep are all that parts the played counts from the fitted ones
+    signal = source.samples[:, 0, sampling.ELECTRODE_SLOT].astype(float)
+    signal -= signal[:90].mean(axis=0)
+    total, truth = signal @ surface.ELECTRODE_NORMAL[:, 2], source.truth.force_n[:, 0, 2]
+    expected = 1e9 * (total @ truth) / (total @ total)
+    assert source.settings["force_gain_z_nn"] == pytest.approx(expected, rel=0.03)
+    assert source.settings == play(tmp_path, text, seconds=0.5).settings
+
+
+def test_no_gains_unless_asked(tmp_path: Path) -> None:
+    assert play(tmp_path, 'name = "t"\n' + PRESS).settings == {}
+
+
+# ---- bundled scenarios -------------------------------------------------------------------------
+
+
+def test_the_bundled_scenarios_are_these() -> None:
+    assert bundled_scenarios() == ["drift.toml", "faults.toml", "poke.toml", "press.toml", "shear.toml"]
+
+
+@pytest.mark.parametrize("name", bundled_scenarios())
+def test_bundled_scenarios_play_and_can_be_repeated(name: str) -> None:
+    text = (Path(surface.__file__).parent / "scenarios" / name).read_bytes()
+    scenario = parse_scenario(text, file=name)
+    assert scenario.name + ".toml" == name
+    for track in scenario.tracks:
+        end = track.states(np.array([0.0, track.seconds]))
+        assert not end.force_n.any() and not end.warm_c.any()  # no jump where a repetition begins
+    source = load_source(name, seconds=3.0)
+    assert len(source.samples) == 300
+    known = {setting.name.lower(): spec for setting, spec in _wire.SETTINGS.items()}
+    assert all(known[key].low <= value <= known[key].high for key, value in source.settings.items())
+
+
+def test_press_is_about_ten_seconds_with_rests_for_the_tare() -> None:
+    truth = load_source("press.toml").truth
+    assert truth is not None and 900 <= len(truth.contact) <= 1100
+    touched = np.concatenate([[False], truth.contact[:, 0], [False]])
+    edges = np.flatnonzero(np.diff(touched.astype(int)))
+    rests = np.diff(np.concatenate([[0], edges, [len(truth.contact)]]))[0::2]
+    assert len(edges) == 6 and (rests >= 150).all()
+    assert truth.force_n[:, 0, 2].max() == pytest.approx(5.0)
+    assert np.abs(truth.torque_nmm).max() > 0 and np.abs(truth.force_n[:, 0, 1]).max() > 1
+
+
+def test_poke_visits_every_electrode_with_more_than_a_newton() -> None:
+    truth = load_source("poke.toml").truth
+    assert truth is not None
+    firm = np.linalg.norm(truth.force_n[:, 0], axis=1) > 1.0
+    places = np.unique(np.round(truth.poc_mm[firm, 0], 6), axis=0)
+    expected = np.unique(np.round(surface.project(surface.ELECTRODE_MM), 6), axis=0)
+    np.testing.assert_allclose(places, expected, atol=2e-6)
+
+
+def test_drift_never_touches_and_keeps_below_the_tares_slew() -> None:
+    source = load_source("drift.toml")
+    assert source.truth is not None and not source.truth.contact.any() and len(source.samples) == 6000
+    counts = source.samples[:, :, sampling.ELECTRODE_SLOT].astype(float)
+    # 10 s means are 10 s apart; the tare follows 0.5 count/s (numerics.md 1.4)
+    means = counts.reshape(6, 1000, -1).mean(axis=1)
+    slope = np.abs(np.diff(means, axis=0)).max() / 10.0
+    assert 0.1 < slope < 0.5
+
+
+def test_faults_shows_each_kind_once_on_one_of_three_fingers() -> None:
+    samples = load_source("faults.toml").samples
+    assert samples.shape[1] == 3 and (samples[:, [0, 2]] < 4096).all()
+    for code in tape.CODES:
+        frames = np.flatnonzero((samples[:, 1] == code).any(axis=1))
+        assert len(frames) > 0 and (np.diff(frames) == 1).all()  # one stretch
+
+
+# ---- mistakes ----------------------------------------------------------------------------------
+
+
+def step(text: str) -> str:
+    return f'name = "t"\n\n{PRESS}{text}'
+
+
+BAD: list[tuple[str, str, int, str, str]] = [
+    # (case, text, line, who, what)
+    (
+        "unknown step key",
+        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nat = "E1"\nforcen = 2\n',
+        6,
+        "step 1",
+        "'forcen' is unknown to press: expected one of do, seconds, fingers, force_n",
+    ),
+    (
+        "near miss",
+        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nat = "E1"\nforcen = 2\n',
+        6,
+        "step 1",
+        "did you mean 'force_n'?",
+    ),
+    (
+        "key of another step",
+        step('[[step]]\ndo = "hold"\nseconds = 1\ncelsius = 30\n'),
+        11,
+        "step 2",
+        "'celsius' is unknown to hold",
+    ),
+    ("unknown do", step('[[step]]\nseconds = 1\ndo = "pres"\n'), 10, "step 2", "did you mean 'press'?"),
+    ("missing do", step("[[step]]\nseconds = 1\n"), 8, "step 2", "'do' is missing"),
+    ("missing seconds", step('[[step]]\ndo = "hold"\n'), 8, "step 2", "'seconds' is missing"),
+    (
+        "missing force",
+        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nat = "E1"\n',
+        2,
+        "step 1",
+        "'force_n' is missing: expected a number 0 to 50 N; add it",
+    ),
+    (
+        "missing place",
+        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nforce_n = 1\n',
+        2,
+        "step 1",
+        "'at' is missing",
+    ),
+    ("text for a number", step('[[step]]\ndo = "hold"\nseconds = "1"\n'), 10, "step 2", "'seconds' is '1'"),
+    ("bool for a number", step('[[step]]\ndo = "hold"\nseconds = true\n'), 10, "step 2", "'seconds' is True"),
+    ("nan", step('[[step]]\ndo = "hold"\nseconds = nan\n'), 10, "step 2", "'seconds' is nan"),
+    ("inf", step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = inf\n'), 11, "step 2", "'force_n' is inf"),
+    (
+        "negative time",
+        step('[[step]]\ndo = "hold"\nseconds = -1\n'),
+        10,
+        "step 2",
+        "expected a number 0.01 to 3600 s",
+    ),
+    (
+        "too much force",
+        step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = 51\n'),
+        11,
+        "step 2",
+        "'force_n' is 51",
+    ),
+    (
+        "too long",
+        step('[[step]]\ndo = "hold"\nseconds = 3600\n'),
+        10,
+        "step 2",
+        "makes the scenario too long",
+    ),
+    ("no such electrode", 'name = "t"\n' + PRESS.replace("E17", "E20"), 5, "step 1", "'at' is 'E20'"),
+    ("two places", 'name = "t"\n' + PRESS + "at_mm = [0, 0]\n", 7, "step 1", "'at_mm' is given beside 'at'"),
+    (
+        "off the finger",
+        'name = "t"\n' + PRESS.replace('at = "E17"', "at_mm = [4.0, 4.0]"),
+        5,
+        "step 1",
+        "'at_mm' is [4, 4]: expected a point of the ventral surface",
+    ),
+    (
+        "three coordinates",
+        'name = "t"\n' + PRESS.replace('at = "E17"', "at_mm = [0, 0, 0]"),
+        5,
+        "step 1",
+        "'at_mm' is [0, 0, 0]: expected [x, y]",
+    ),
+    (
+        "place while touching",
+        step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = 2\nat = "E1"\n'),
+        12,
+        "step 2",
+        "'at' is given while something touches",
+    ),
+    (
+        "tip while touching",
+        step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = 2\ntip_mm = 2\n'),
+        12,
+        "step 2",
+        "'tip_mm' is given while something touches",
+    ),
+    (
+        "release of nothing",
+        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nforce_n = 0\n',
+        5,
+        "step 1",
+        "'force_n' is 0 and nothing touches",
+    ),
+    (
+        "shear of nothing",
+        'name = "t"\n[[step]]\ndo = "shear"\nseconds = 1\nshear_n = [1, 0]\n',
+        3,
+        "step 1",
+        "'do' is 'shear' but nothing touches finger 0",
+    ),
+    (
+        "shear nan",
+        step('[[step]]\ndo = "shear"\nseconds = 1\nshear_n = [nan, 0]\n'),
+        11,
+        "step 2",
+        "'shear_n' is [nan",
+    ),
+    (
+        "twist too far",
+        step('[[step]]\ndo = "twist"\nseconds = 1\ntorsion_nmm = 101\n'),
+        11,
+        "step 2",
+        "'torsion_nmm' is 101",
+    ),
+    ("slide nowhere", step('[[step]]\ndo = "slide"\nseconds = 1\n'), 8, "step 2", "'to' is missing"),
+    (
+        "too hot",
+        step('[[step]]\ndo = "temperature"\nseconds = 1\ncelsius = 61\n'),
+        11,
+        "step 2",
+        "'celsius' is 61",
+    ),
+    (
+        "finger out of range",
+        step('[[step]]\ndo = "hold"\nseconds = 1\nfingers = [1]\n'),
+        11,
+        "step 2",
+        "'fingers' is [1]",
+    ),
+    (
+        "finger twice",
+        step('[[step]]\ndo = "hold"\nseconds = 1\nfingers = [0, 0]\n'),
+        11,
+        "step 2",
+        "different",
+    ),
+    (
+        "no fingers at all",
+        step('[[step]]\ndo = "hold"\nseconds = 1\nfingers = []\n'),
+        11,
+        "step 2",
+        "'fingers' is []",
+    ),
+    ("unknown top key", 'name = "t"\nspeed = 2\n' + REST, 2, "", "key 'speed' is unknown"),
+    ("unknown table", 'name = "t"\n' + REST + "[[steps]]\n", 5, "", "key 'steps' is unknown"),
+    ("missing name", REST, 1, "", "key 'name' is missing"),
+    ("name is no text", "name = 3\n" + REST, 1, "", "key 'name' is 3"),
+    ("no steps", 'name = "t"\n', 1, "", "key 'step' is missing"),
+    (
+        "single brackets",
+        'name = "t"\n[step]\ndo = "rest"\n',
+        2,
+        "",
+        "expected [[step]] tables; use double brackets",
+    ),
+    ("gains", 'name = "t"\n\ngains = "best"\n' + REST, 3, "", "key 'gains' is 'best': expected one of fit"),
+    ("six fingers", 'name = "t"\nfingers = 6\n' + REST, 2, "", "key 'fingers' is 6"),
+    ("huge", 'name = "t"\nseed = 0x' + "f" * 9000 + "\n" + REST, 2, "", "key 'seed' is a huge number"),
+    (
+        "huge time",
+        step('[[step]]\ndo = "hold"\nseconds = 0x' + "f" * 9000 + "\n"),
+        10,
+        "step 2",
+        "a huge number",
+    ),
+    ("many digits", 'name = "t"\nseed = 1' + "0" * 9000 + "\n" + REST, 1, "", "Python cannot hold this TOML"),
+    (
+        "fault at the end",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 1\nseconds = 1\nfinger = 0\nkind = "stuck_low"\n',
+        6,
+        "fault 1",
+        "'at_s' is 1",
+    ),
+    ("key below a first header", REST + "seed = 1\n", 1, "", "key 'name' is missing"),
+    ("seed", 'name = "t"\nseed = -1\n' + REST, 2, "", "key 'seed' is -1"),
+    ("seed is no whole number", 'name = "t"\nseed = 1.5\n' + REST, 2, "", "key 'seed' is 1.5"),
+    (
+        "tables and fingers disagree",
+        'name = "t"\nfingers = 2\n[[finger]]\n' + REST,
+        2,
+        "",
+        "key 'fingers' is 2, with 1 [[finger]] tables",
+    ),
+    ("six tables", 'name = "t"\n' + "[[finger]]\n" * 6 + REST, 2, "", "key 'finger' has 6 tables"),
+    (
+        "profile",
+        'name = "t"\n[[finger]]\n[[finger]]\nprofile = "old"\n' + REST,
+        4,
+        "finger 2",
+        "'profile' is 'old'",
+    ),
+    ("serial", 'name = "t"\n[[finger]]\nserial = "BT1"\n' + REST, 3, "finger 1", "'serial' is 'BT1'"),
+    (
+        "fault kind",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 0\nseconds = 1\nfinger = 0\nkind = "odd"\n',
+        9,
+        "fault 1",
+        "'kind' is 'odd': expected one of bad_parity",
+    ),
+    (
+        "fault finger",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 0\nseconds = 1\nfinger = 1\nkind = "stuck_low"\n',
+        8,
+        "fault 1",
+        "'finger' is 1",
+    ),
+    (
+        "fault too late",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 2\nseconds = 1\nfinger = 0\nkind = "stuck_low"\n',
+        6,
+        "fault 1",
+        "'at_s' is 2",
+    ),
+    (
+        "fault too long",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 0.5\nseconds = 1\nfinger = 0\nkind = "stuck_low"\n',
+        7,
+        "fault 1",
+        "'seconds' is 1: expected a number 0.001 to 0.5 s",
+    ),
+    (
+        "fault channel",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 0\nseconds = 1\nfinger = 0\nkind = "stuck_low"\nchannel = "E20"\n',
+        10,
+        "fault 1",
+        "'channel' is 'E20'",
+    ),
+    ("no toml", 'name = "t"\n[[step]]\ndo = \n', 3, "", "no TOML"),
+    ("unfinished toml", 'name = "t"\nx = [1,\n', 2, "", "no TOML"),
+    ("key twice", 'name = "t"\nseed = 1\nseed = 2\n' + REST, 3, "", "no TOML"),
+    ("empty", "# nothing\n", 1, "", "the file is empty"),
+]
+
+
+@pytest.mark.parametrize(("text", "line", "who", "what"), [case[1:] for case in BAD], ids=[case[0] for case in BAD])
+def test_a_mistake_names_its_line_and_key(text: str, line: int, who: str, what: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        parse_scenario(text.encode(), file="try.toml")
+    message = str(caught.value)
+    assert message.startswith(f"try.toml:{line}: " + (f"{who}: " if who else "")), message
+    assert what in message and "\n" not in message and "expected" in message
+
+
+def test_text_that_is_not_utf8_names_its_line() -> None:
+    with pytest.raises(ScenarioError, match=r"try\.toml:2: not UTF-8"):
+        parse_scenario(b'name = "t"\n# \xff\n', file="try.toml")
+
+
+# ---- load_source -------------------------------------------------------------------------------
+
+
+def test_a_missing_scenario_lists_the_bundled_ones(tmp_path: Path) -> None:
+    for path in ("no_such.toml", tmp_path / "press.toml"):
+        with pytest.raises(InputError, match=r"or one of drift\.toml, faults\.toml, poke\.toml"):
+            load_source(path)
+
+
+def test_a_file_of_the_same_name_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "press.toml").write_text('name = "mine"\n' + REST)
+    assert load_source("press.toml").name == "mine"
+    assert load_source("poke.toml", seconds=0.1).name == "poke"
+
+
+def test_an_unknown_suffix_is_refused() -> None:
+    with pytest.raises(InputError, match=r"press\.csv: unknown kind of source: expected \.toml"):
+        load_source("press.csv")
+
+
+def test_a_folder_is_refused(tmp_path: Path) -> None:
+    for name in ("a.toml", "a.npz"):
+        (tmp_path / name).mkdir()
+        with pytest.raises(InputError, match="expected a"):
+            load_source(tmp_path / name)
+
+
+@pytest.mark.parametrize("fingers", [0, 6, -1, True, 1.5])
+def test_fingers_out_of_range_are_refused(fingers: int) -> None:
+    with pytest.raises(InputError, match="expected 1 to 5"):
+        load_source("press.toml", fingers=fingers)
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf"), 3601.0])
+def test_seconds_out_of_range_are_refused(seconds: float) -> None:
+    with pytest.raises(InputError, match=r"expected 0\.01 to 3600"):
+        load_source("press.toml", seconds=seconds)

@@ -1,0 +1,97 @@
+"""Sequence numbers, device time and losses across wraps, gaps and fingers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from biotac import _wire as wire
+from biotac.framing import encode
+from biotac.stream import StreamDecoder
+
+
+def frame(finger: int, seq: int, t_us: int, **changes: object) -> bytes:
+    facts: dict[str, object] = {
+        "seq": seq % 2**16,
+        "t_us": t_us % 2**32,
+        "finger": finger,
+        "tare_state": 1,
+        "flags": 0,
+        "counts": tuple(range(100, 119)),
+        "pdc": 2400,
+        "tac": 2000,
+        "tdc": 1000,
+        "poc_um": (1000, -2000, -5080),
+        "force_100un": (10000, -20000, 50000),
+        "torque_mnmm": (1000, 2000, -3000),
+        "tare_q4": (1600,) * 19,
+        "pdc_tare_q4": 2400 * 16,
+    }
+    return encode(wire.Frame.ID, wire.Frame(**(facts | changes)).pack())  # type: ignore[arg-type]
+
+
+def test_integers_become_mm_n_and_nmm() -> None:
+    row = StreamDecoder().feed(frame(0, 0, 0)).frames[0]
+    assert row["poc_mm"].tolist() == [1.0, -2.0, -5.08]
+    assert row["force_n"].tolist() == [1.0, -2.0, 5.0]
+    assert row["torque_nmm"].tolist() == [1.0, 2.0, -3.0]
+
+
+def test_an_invalid_result_is_nan_and_never_zero() -> None:
+    row = (
+        StreamDecoder()
+        .feed(frame(0, 0, 0, poc_um=(wire.INVALID_I16,) * 3, torque_mnmm=(wire.INVALID_I32, 0, 5)))
+        .frames[0]
+    )
+    assert np.isnan(row["poc_mm"]).all()
+    assert np.isnan(row["torque_nmm"][0])
+    assert row["torque_nmm"][1:].tolist() == [0.0, 0.005]
+    assert not np.isnan(row["force_n"]).any()
+
+
+def test_sequence_and_time_are_unwrapped_for_each_finger() -> None:
+    decoder = StreamDecoder()
+    sent = [(f, 65530 + k, 2**32 - 30_000 + 10_000 * k) for k in range(12) for f in (0, 3)]
+    frames = np.concatenate([decoder.feed(frame(*s)).frames for s in sent])
+    for finger in (0, 3):
+        mine = frames[frames["finger"] == finger]
+        assert mine["seq"].tolist() == list(range(65530, 65542))
+        assert np.all(np.diff(mine["t_us"]) == 10_000)
+    assert decoder.lost == 0
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_a_gap_is_counted_and_placed(at_once: bool) -> None:
+    decoder = StreamDecoder()
+    parts = [frame(1, seq, 10_000 * seq) for seq in (65533, 65534, 65539, 65540)]
+    for chunk in [b"".join(parts)] if at_once else parts:
+        decoder.feed(chunk)
+    assert decoder.lost == 4
+    assert decoder.lost_after == [(1, 65534, 4)]
+
+
+def test_a_stream_that_is_joined_in_the_middle_has_lost_nothing() -> None:
+    decoder = StreamDecoder()
+    decoder.feed(frame(0, 1234, 5_000_000) + frame(0, 1235, 5_010_000))
+    assert decoder.lost == 0
+
+
+def test_a_damaged_frame_is_lost_and_counted_and_the_next_one_is_not() -> None:
+    decoder = StreamDecoder()
+    good = [frame(0, seq, 10_000 * seq) for seq in range(3)]
+    broken = bytearray(good[1])
+    broken[20] ^= 0x40
+    got = decoder.feed(good[0] + bytes(broken) + good[2]).frames
+    assert got["seq"].tolist() == [0, 2]
+    assert (decoder.lost, decoder.counts.bad) == (1, 1)
+
+
+def test_a_newer_minor_may_append_fields_and_an_older_may_not_drop_them() -> None:
+    payload = wire.Reply(7, 0x81, 0).pack()
+    longer, shorter = encode(wire.Reply.ID, payload + b"new"), encode(wire.Reply.ID, payload[:-1])
+    strict, lenient = StreamDecoder(), StreamDecoder()
+    lenient.accept_newer_minor()
+    assert strict.feed(longer).messages == []
+    assert lenient.feed(longer).messages == [wire.Reply(7, 0x81, 0)]
+    assert lenient.feed(shorter).messages == []
+    assert (strict.counts.bad_length, lenient.counts.bad_length) == (1, 1)

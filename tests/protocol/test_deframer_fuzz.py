@@ -1,0 +1,93 @@
+"""The firmware's byte-wise deframer against the host's chunk-wise one: same bytes, same outcome."""
+
+from __future__ import annotations
+
+from biotac._core import ffi, lib
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from biotac import _wire as wire
+from biotac.framing import Deframer, encode
+
+OUTCOMES = {2: "too_long", 3: "bad_cobs", 4: "bad_crc", 5: "bad_length"}
+
+
+def deframe_in_c(stream: bytes) -> tuple[list[tuple[int, bytes]], dict[str, int]]:
+    deframer = ffi.new("bt_deframer *")
+    lib.bt_deframer_reset(deframer)
+    frames = []
+    counts = dict.fromkeys(OUTCOMES.values(), 0)
+    for byte in stream:
+        outcome = lib.bt_deframer_push(deframer, byte)
+        if outcome == 1:
+            payload = bytes(ffi.buffer(deframer.buffer))[1 : 1 + deframer.payload_bytes]
+            frames.append((deframer.id, payload))
+        elif outcome:
+            counts[OUTCOMES[outcome]] += 1
+    return frames, counts
+
+
+def deframe_in_python(chunks: list[bytes]) -> tuple[list[tuple[int, bytes]], dict[str, int]]:
+    deframer = Deframer()
+    frames = [frame for chunk in chunks for frame in deframer.feed(chunk)]
+    return frames, {name: getattr(deframer.counts, name) for name in OUTCOMES.values()}
+
+
+known_payload = st.sampled_from(sorted(wire.MESSAGES)).flatmap(
+    lambda i: st.tuples(
+        st.just(i), st.binary(min_size=wire.MESSAGES[i].STRUCT.size, max_size=wire.MESSAGES[i].STRUCT.size)
+    )
+)
+any_payload = st.tuples(st.integers(0, 255), st.binary(max_size=249))
+good_frame = st.one_of(known_payload, any_payload).map(lambda m: encode(*m))
+damaged_frame = st.tuples(good_frame, st.integers(0, 10_000), st.integers(0, 255)).map(
+    lambda t: t[0][: t[1] % len(t[0])] + bytes([t[2]]) + t[0][t[1] % len(t[0]) + 1 :]
+)
+cut_frame = st.tuples(good_frame, st.integers(0, 10_000)).map(lambda t: t[0][: t[1] % len(t[0])])
+junk = st.one_of(
+    st.binary(max_size=40),
+    st.sampled_from([b"AT+CGMI\r\n", b"\0\0\0", b"\xff" * 300, b"\x01" * 255 + b"\0", b"\x01" * 256 + b"\0"]),
+)
+streams = st.lists(st.one_of(good_frame, damaged_frame, cut_frame, junk), max_size=8).map(b"".join)
+
+
+@settings(max_examples=400, deadline=None)
+@given(streams, st.lists(st.integers(1, 300), min_size=1, max_size=20))
+def test_both_deframers_accept_the_same_frames_for_the_same_reasons(stream: bytes, cuts: list[int]) -> None:
+    chunks = []
+    at = 0
+    while at < len(stream):
+        step = cuts[len(chunks) % len(cuts)]
+        chunks.append(stream[at : at + step])
+        at += step
+    assert deframe_in_python(chunks) == deframe_in_c(stream)
+
+
+@settings(max_examples=200, deadline=None)
+@given(any_payload)
+def test_both_encoders_write_the_same_bytes(message: tuple[int, bytes]) -> None:
+    message_id, payload = message
+    out = ffi.new("uint8_t[]", 300)
+    n = lib.bt_frame_encode(message_id, payload, len(payload), out)
+    assert bytes(ffi.buffer(out, n)) == encode(message_id, payload)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=300), st.binary(max_size=300))
+def test_cobs_and_crc_agree_with_the_libraries(data: bytes, noise: bytes) -> None:
+    import zlib
+
+    from cobs import cobs
+
+    out = ffi.new("uint8_t[]", 700)
+    n = lib.bt_cobs_encode(data, len(data), out)
+    assert bytes(ffi.buffer(out, n)) == cobs.encode(data)
+    assert lib.bt_crc32(data, len(data)) == zlib.crc32(data)
+    stuffed = noise.replace(b"\0", b"\1")
+    m = lib.bt_cobs_decode(stuffed, len(stuffed), out)
+    try:
+        want = cobs.decode(stuffed)
+    except cobs.DecodeError:
+        assert m == -1
+    else:
+        assert bytes(ffi.buffer(out, m)) == want
