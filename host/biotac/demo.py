@@ -13,12 +13,12 @@ import numpy as np
 
 from . import _wire as wire
 from .crosscheck import CrossCheck
-from .hand import Hand, join_batches
+from .hand import Hand
 from .link.setup import prepare
 from .link.sim_process import SimLink
 from .recording import Recording
 from .sim.source import Source, load_source
-from .stream import Batch
+from .stream import Batch, join
 
 Show = Callable[[str], None]
 
@@ -72,7 +72,7 @@ def run_demo(
         cpu = time.process_time() - cpu
         stats = hand.stats
         status = hand.status()
-    joined = join_batches(batches)
+    joined = join(batches)
     rows, played_fingers = source.samples.shape[:2]
     device_s = rows / 100.0
     recorded = Recording(recording_path)

@@ -16,10 +16,10 @@ import numpy as np
 
 from . import _wire as wire
 from .errors import CommandRefusedError, DeviceLostError, NotAGatewayError, WireVersionError
-from .frames import FRAME_DTYPE, PAC_DTYPE, Frame, StructArray
+from .frames import Frame, StructArray
 from .framing import encode
 from .link import Link
-from .stream import Batch, StreamDecoder
+from .stream import Batch, StreamDecoder, join, split
 
 if TYPE_CHECKING:
     from .recording.writer import Recorder
@@ -243,11 +243,11 @@ class Hand:
             if end_us is None or not len(batch.frames) or batch.frames["t_us"].max() < end_us:
                 taken.append(batch)
                 continue
-            now, later = split_batch(batch, end_us)
+            now, later = split(batch, end_us)
             taken.append(now)
             self._batches.appendleft(later)
             break
-        return join_batches(taken)
+        return join(taken)
 
     def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
         """Write everything that arrives from now on to an MCAP file, until close or the recorder's close.
@@ -342,25 +342,3 @@ def describe_refusal(request: Any, reply: wire.Reply) -> str:
     """One line naming the command and the board's reason."""
     name = wire.Error(reply.error).name if reply.error in list(wire.Error) else f"error {reply.error}"
     return f"the board refused {type(request).__name__}: {name} ({wire.ERROR_DOC.get(reply.error, 'unknown')})"
-
-
-def split_batch(batch: Batch, end_us: int) -> tuple[Batch, Batch]:
-    """Rows before device time ``end_us``, and the rest."""
-    now = batch.frames["t_us"] < end_us
-    pac_now = batch.pac["t_us"] < end_us
-    return (
-        Batch(batch.wire[now], batch.frames[now], batch.pac[pac_now], batch.messages),
-        Batch(batch.wire[~now], batch.frames[~now], batch.pac[~pac_now], []),
-    )
-
-
-def join_batches(batches: list[Batch]) -> Batch:
-    """One batch of all rows, in order."""
-    if not batches:
-        return Batch(np.empty(0, wire.DTYPES[wire.Frame.ID]), np.empty(0, FRAME_DTYPE), np.empty(0, PAC_DTYPE), [])
-    return Batch(
-        np.concatenate([b.wire for b in batches]),
-        np.concatenate([b.frames for b in batches]),
-        np.concatenate([b.pac for b in batches]),
-        [m for b in batches for m in b.messages],
-    )

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _wire as wire
-from .frames import PAC_DTYPE, StructArray, frames_from_wire
+from .frames import FRAME_DTYPE, PAC_DTYPE, StructArray, frames_from_wire
 from .framing import Deframer, FramingCounts
 
 STREAMED = (wire.Frame.ID, wire.Pac.ID)
@@ -77,11 +77,20 @@ class StreamDecoder:
         """Take any number of bytes; return what they complete."""
         streamed: dict[int, list[bytes]] = {message_id: [] for message_id in STREAMED}
         others: list[Any] = []
+        parts: list[Batch] = []
         for message_id, payload in self._deframer.feed(chunk):
             if message_id in streamed:
                 streamed[message_id].append(payload)
             elif message_id in wire.MESSAGES:
                 others.append(wire.MESSAGES[message_id].unpack(payload))
+                if is_start(others[-1]):
+                    # What the board made before it was asked to stream was never sent: no loss.
+                    parts.append(self._convert(streamed, others))
+                    streamed, others = {message_id: [] for message_id in STREAMED}, []
+                    self._next_seq.clear()
+        return join([*parts, self._convert(streamed, others)]) if parts else self._convert(streamed, others)
+
+    def _convert(self, streamed: dict[int, list[bytes]], others: list[Any]) -> Batch:
         frame_wire = np.frombuffer(b"".join(streamed[wire.Frame.ID]), wire.DTYPES[wire.Frame.ID])
         pac_wire = np.frombuffer(b"".join(streamed[wire.Pac.ID]), wire.DTYPES[wire.Pac.ID])
         seq, t_us = self._extend(wire.Frame.ID, frame_wire)
@@ -110,3 +119,30 @@ class StreamDecoder:
             self.lost += int(gaps[at])
             self.lost_after.append((key[1], int(expected[at]) - 1, int(gaps[at])))
         self._next_seq[key] = int(seq[-1]) + 1
+
+
+def is_start(message: Any) -> bool:
+    """The board's yes to START."""
+    return isinstance(message, wire.Reply) and message.command == wire.Start.ID and message.error == wire.Error.OK
+
+
+def split(batch: Batch, end_us: int) -> tuple[Batch, Batch]:
+    """Rows before device time ``end_us``, and the rest."""
+    now = batch.frames["t_us"] < end_us
+    pac_now = batch.pac["t_us"] < end_us
+    return (
+        Batch(batch.wire[now], batch.frames[now], batch.pac[pac_now], batch.messages),
+        Batch(batch.wire[~now], batch.frames[~now], batch.pac[~pac_now], []),
+    )
+
+
+def join(batches: list[Batch]) -> Batch:
+    """One batch of all rows, in order."""
+    if not batches:
+        return Batch(np.empty(0, wire.DTYPES[wire.Frame.ID]), np.empty(0, FRAME_DTYPE), np.empty(0, PAC_DTYPE), [])
+    return Batch(
+        np.concatenate([b.wire for b in batches]),
+        np.concatenate([b.frames for b in batches]),
+        np.concatenate([b.pac for b in batches]),
+        [m for b in batches for m in b.messages],
+    )

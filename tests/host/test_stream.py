@@ -95,3 +95,11 @@ def test_a_newer_minor_may_append_fields_and_an_older_may_not_drop_them() -> Non
     assert lenient.feed(longer).messages == [wire.Reply(7, 0x81, 0)]
     assert lenient.feed(shorter).messages == []
     assert (strict.counts.bad_length, lenient.counts.bad_length) == (1, 1)
+
+
+def test_frames_made_while_nobody_listened_are_not_lost() -> None:
+    decoder = StreamDecoder()
+    started = encode(wire.Reply.ID, wire.Reply(9, wire.Start.ID, 0).pack())
+    batch = decoder.feed(frame(0, 5, 0) + started + frame(0, 900, 9_000_000) + frame(0, 902, 9_020_000))
+    assert batch.frames["seq"].tolist() == [5, 900, 902]
+    assert decoder.lost_after == [(0, 900, 1)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .schema import GENERATED, Contract, Message
+from .schema import GENERATED, Contract, Message, type_range
 
 
 def messages(contract: Contract) -> str:
@@ -44,7 +44,8 @@ def field_table(message: Message) -> list[str]:
     for f in message.fields:
         kind = f"{f.type}[{f.count}]" if f.count > 1 else f.type
         unit = f"{f.unit} (q{f.frac_bits})" if f.frac_bits else f.unit
-        span = f"{f.range[0]} to {f.range[1]}" if f.range else ""
+        low, high = f.range or type_range(f.type)
+        span = f"{low} to {high}"
         out.append(f"| {offset} | `{f.name}` | {kind} | {unit} | {span} | {f.doc} |")
         offset += f.size
     return out

@@ -16,8 +16,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from .. import _wire as wire
 from ..errors import RecordingError
 from ..frames import StructArray
-from ..hand import join_batches
-from ..stream import StreamDecoder
+from ..stream import StreamDecoder, join
 from . import layout
 
 
@@ -44,7 +43,7 @@ class Recording:
         self._take_metadata(metadata)
         decoder = StreamDecoder()
         decoder.accept_newer_minor()
-        batch = join_batches([decoder.feed(block) for block in blocks])
+        batch = join([decoder.feed(block) for block in blocks])
         self.frames: StructArray = batch.frames
         self.wire: StructArray = batch.wire
         self.pac: StructArray = batch.pac

@@ -147,7 +147,7 @@ def _fingers(top: Table, seed: int) -> tuple[FingerSpec, ...]:
         profile = next(known for known in PROFILES if known == word)  # narrows str to Profile
         serial = default_serial(own)
         if "serial" in table:
-            serial = table.text("serial", r"BT[!-+--~]{14}", "16 printable characters without comma that begin with BT")
+            serial = table.text("serial", r"BT[0-9A-Za-z]{14}", "16 letters and digits that begin with BT")
         specs.append(FingerSpec(own, profile, serial))
     return tuple(specs)
 
