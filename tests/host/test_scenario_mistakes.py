@@ -1,0 +1,272 @@
+"""Malformed scenarios: every mistake is refused with its line and key."""
+
+from __future__ import annotations
+
+import pytest
+
+from biotac.errors import ScenarioError
+from biotac.sim.scenario import parse_scenario
+
+REST = '[[step]]\ndo = "rest"\nseconds = 1.0\n'
+PRESS = '[[step]]\ndo = "press"\nseconds = 0.5\nat = "E17"\nforce_n = 5.0\n'
+
+
+def step(text: str) -> str:
+    return f'name = "t"\n\n{PRESS}{text}'
+
+
+BAD: list[tuple[str, str, int, str, str]] = [
+    # (case, text, line, who, what)
+    (
+        "unknown step key",
+        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nat = "E1"\nforcen = 2\n',
+        6,
+        "step 1",
+        "'forcen' is unknown to press: expected one of do, seconds, fingers, force_n",
+    ),
+    (
+        "near miss",
+        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nat = "E1"\nforcen = 2\n',
+        6,
+        "step 1",
+        "did you mean 'force_n'?",
+    ),
+    (
+        "key of another step",
+        step('[[step]]\ndo = "hold"\nseconds = 1\ncelsius = 30\n'),
+        11,
+        "step 2",
+        "'celsius' is unknown to hold",
+    ),
+    ("unknown do", step('[[step]]\nseconds = 1\ndo = "pres"\n'), 10, "step 2", "did you mean 'press'?"),
+    ("missing do", step("[[step]]\nseconds = 1\n"), 8, "step 2", "'do' is missing"),
+    ("missing seconds", step('[[step]]\ndo = "hold"\n'), 8, "step 2", "'seconds' is missing"),
+    (
+        "missing force",
+        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nat = "E1"\n',
+        2,
+        "step 1",
+        "'force_n' is missing: expected a number 0 to 50 N; add it",
+    ),
+    (
+        "missing place",
+        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nforce_n = 1\n',
+        2,
+        "step 1",
+        "'at' is missing",
+    ),
+    ("text for a number", step('[[step]]\ndo = "hold"\nseconds = "1"\n'), 10, "step 2", "'seconds' is '1'"),
+    ("bool for a number", step('[[step]]\ndo = "hold"\nseconds = true\n'), 10, "step 2", "'seconds' is True"),
+    ("nan", step('[[step]]\ndo = "hold"\nseconds = nan\n'), 10, "step 2", "'seconds' is nan"),
+    ("inf", step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = inf\n'), 11, "step 2", "'force_n' is inf"),
+    (
+        "negative time",
+        step('[[step]]\ndo = "hold"\nseconds = -1\n'),
+        10,
+        "step 2",
+        "expected a number 0.01 to 3600 s",
+    ),
+    (
+        "too much force",
+        step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = 51\n'),
+        11,
+        "step 2",
+        "'force_n' is 51",
+    ),
+    (
+        "too long",
+        step('[[step]]\ndo = "hold"\nseconds = 3600\n'),
+        10,
+        "step 2",
+        "makes the scenario too long",
+    ),
+    ("no such electrode", 'name = "t"\n' + PRESS.replace("E17", "E20"), 5, "step 1", "'at' is 'E20'"),
+    ("two places", 'name = "t"\n' + PRESS + "at_mm = [0, 0]\n", 7, "step 1", "'at_mm' is given beside 'at'"),
+    (
+        "off the finger",
+        'name = "t"\n' + PRESS.replace('at = "E17"', "at_mm = [4.0, 4.0]"),
+        5,
+        "step 1",
+        "'at_mm' is [4, 4]: expected a point of the ventral surface",
+    ),
+    (
+        "three coordinates",
+        'name = "t"\n' + PRESS.replace('at = "E17"', "at_mm = [0, 0, 0]"),
+        5,
+        "step 1",
+        "'at_mm' is [0, 0, 0]: expected [x, y]",
+    ),
+    (
+        "place while touching",
+        step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = 2\nat = "E1"\n'),
+        12,
+        "step 2",
+        "'at' is given while something touches",
+    ),
+    (
+        "tip while touching",
+        step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = 2\ntip_mm = 2\n'),
+        12,
+        "step 2",
+        "'tip_mm' is given while something touches",
+    ),
+    (
+        "release of nothing",
+        'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nforce_n = 0\n',
+        5,
+        "step 1",
+        "'force_n' is 0 and nothing touches",
+    ),
+    (
+        "shear of nothing",
+        'name = "t"\n[[step]]\ndo = "shear"\nseconds = 1\nshear_n = [1, 0]\n',
+        3,
+        "step 1",
+        "'do' is 'shear' but nothing touches finger 0",
+    ),
+    (
+        "shear nan",
+        step('[[step]]\ndo = "shear"\nseconds = 1\nshear_n = [nan, 0]\n'),
+        11,
+        "step 2",
+        "'shear_n' is [nan",
+    ),
+    (
+        "twist too far",
+        step('[[step]]\ndo = "twist"\nseconds = 1\ntorsion_nmm = 101\n'),
+        11,
+        "step 2",
+        "'torsion_nmm' is 101",
+    ),
+    ("slide nowhere", step('[[step]]\ndo = "slide"\nseconds = 1\n'), 8, "step 2", "'to' is missing"),
+    (
+        "too hot",
+        step('[[step]]\ndo = "temperature"\nseconds = 1\ncelsius = 61\n'),
+        11,
+        "step 2",
+        "'celsius' is 61",
+    ),
+    (
+        "finger out of range",
+        step('[[step]]\ndo = "hold"\nseconds = 1\nfingers = [1]\n'),
+        11,
+        "step 2",
+        "'fingers' is [1]",
+    ),
+    (
+        "finger twice",
+        step('[[step]]\ndo = "hold"\nseconds = 1\nfingers = [0, 0]\n'),
+        11,
+        "step 2",
+        "different",
+    ),
+    (
+        "no fingers at all",
+        step('[[step]]\ndo = "hold"\nseconds = 1\nfingers = []\n'),
+        11,
+        "step 2",
+        "'fingers' is []",
+    ),
+    ("unknown top key", 'name = "t"\nspeed = 2\n' + REST, 2, "", "key 'speed' is unknown"),
+    ("unknown table", 'name = "t"\n' + REST + "[[steps]]\n", 5, "", "key 'steps' is unknown"),
+    ("missing name", REST, 1, "", "key 'name' is missing"),
+    ("name is no text", "name = 3\n" + REST, 1, "", "key 'name' is 3"),
+    ("no steps", 'name = "t"\n', 1, "", "key 'step' is missing"),
+    (
+        "single brackets",
+        'name = "t"\n[step]\ndo = "rest"\n',
+        2,
+        "",
+        "expected [[step]] tables; use double brackets",
+    ),
+    ("gains", 'name = "t"\n\ngains = "best"\n' + REST, 3, "", "key 'gains' is 'best': expected one of fit"),
+    ("six fingers", 'name = "t"\nfingers = 6\n' + REST, 2, "", "key 'fingers' is 6"),
+    ("huge", 'name = "t"\nseed = 0x' + "f" * 9000 + "\n" + REST, 2, "", "key 'seed' is a huge number"),
+    (
+        "huge time",
+        step('[[step]]\ndo = "hold"\nseconds = 0x' + "f" * 9000 + "\n"),
+        10,
+        "step 2",
+        "a huge number",
+    ),
+    ("many digits", 'name = "t"\nseed = 1' + "0" * 9000 + "\n" + REST, 1, "", "Python cannot hold this TOML"),
+    (
+        "fault at the end",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 1\nseconds = 1\nfinger = 0\nkind = "stuck_low"\n',
+        6,
+        "fault 1",
+        "'at_s' is 1",
+    ),
+    ("key below a first header", REST + "seed = 1\n", 1, "", "key 'name' is missing"),
+    ("seed", 'name = "t"\nseed = -1\n' + REST, 2, "", "key 'seed' is -1"),
+    ("seed is no whole number", 'name = "t"\nseed = 1.5\n' + REST, 2, "", "key 'seed' is 1.5"),
+    (
+        "tables and fingers disagree",
+        'name = "t"\nfingers = 2\n[[finger]]\n' + REST,
+        2,
+        "",
+        "key 'fingers' is 2, with 1 [[finger]] tables",
+    ),
+    ("six tables", 'name = "t"\n' + "[[finger]]\n" * 6 + REST, 2, "", "key 'finger' has 6 tables"),
+    (
+        "profile",
+        'name = "t"\n[[finger]]\n[[finger]]\nprofile = "old"\n' + REST,
+        4,
+        "finger 2",
+        "'profile' is 'old'",
+    ),
+    ("serial", 'name = "t"\n[[finger]]\nserial = "BT1"\n' + REST, 3, "finger 1", "'serial' is 'BT1'"),
+    (
+        "fault kind",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 0\nseconds = 1\nfinger = 0\nkind = "odd"\n',
+        9,
+        "fault 1",
+        "'kind' is 'odd': expected one of bad_parity",
+    ),
+    (
+        "fault finger",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 0\nseconds = 1\nfinger = 1\nkind = "stuck_low"\n',
+        8,
+        "fault 1",
+        "'finger' is 1",
+    ),
+    (
+        "fault too late",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 2\nseconds = 1\nfinger = 0\nkind = "stuck_low"\n',
+        6,
+        "fault 1",
+        "'at_s' is 2",
+    ),
+    (
+        "fault too long",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 0.5\nseconds = 1\nfinger = 0\nkind = "stuck_low"\n',
+        7,
+        "fault 1",
+        "'seconds' is 1: expected a number 0.001 to 0.5 s",
+    ),
+    (
+        "fault channel",
+        'name = "t"\n' + REST + '[[fault]]\nat_s = 0\nseconds = 1\nfinger = 0\nkind = "stuck_low"\nchannel = "E20"\n',
+        10,
+        "fault 1",
+        "'channel' is 'E20'",
+    ),
+    ("no toml", 'name = "t"\n[[step]]\ndo = \n', 3, "", "no TOML"),
+    ("unfinished toml", 'name = "t"\nx = [1,\n', 2, "", "no TOML"),
+    ("key twice", 'name = "t"\nseed = 1\nseed = 2\n' + REST, 3, "", "no TOML"),
+    ("empty", "# nothing\n", 1, "", "the file is empty"),
+]
+
+
+@pytest.mark.parametrize(("text", "line", "who", "what"), [case[1:] for case in BAD], ids=[case[0] for case in BAD])
+def test_a_mistake_names_its_line_and_key(text: str, line: int, who: str, what: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        parse_scenario(text.encode(), file="try.toml")
+    message = str(caught.value)
+    assert message.startswith(f"try.toml:{line}: " + (f"{who}: " if who else "")), message
+    assert what in message and "\n" not in message and "expected" in message
+
+
+def test_text_that_is_not_utf8_names_its_line() -> None:
+    with pytest.raises(ScenarioError, match=r"try\.toml:2: not UTF-8"):
+        parse_scenario(b'name = "t"\n# \xff\n', file="try.toml")
