@@ -23,7 +23,7 @@ from .errors import (
 )
 from .frames import FRAME_DTYPE, PAC_DTYPE, Frame
 from .hand import Hand, LinkStats
-from .link import open_link
+from .opening import open
 from .recording import Recorder, Recording, load
 from .version import __version__
 
@@ -51,22 +51,3 @@ __all__ = [
     "load",
     "open",
 ]
-
-
-def open(port: str, *, pace: float = 0.0) -> Hand:
-    """Open a board and shake hands.
-
-    ``port`` is a device path (``/dev/ttyACM0``, ``COM3``) or ``sim:SOURCE`` for a simulated board,
-    where SOURCE is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``).
-    ``pace`` is for simulated boards: device seconds per second, 0 for as fast as this side reads.
-
-    The source's settings (an emulated finger's own gains) and stored tare are given to a simulated
-    board before it starts, as one would to a real one.
-
-    Raises PortError, NotAGatewayError, WireVersionError, or InputError for a source that cannot be
-    played.
-    """
-    from .link.setup import prepare
-
-    hand = Hand(open_link(port, pace=pace))
-    return prepare(hand)

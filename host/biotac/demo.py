@@ -13,9 +13,8 @@ import numpy as np
 
 from . import _wire as wire
 from .crosscheck import CrossCheck
-from .hand import Hand
-from .link.setup import prepare
 from .link.sim_process import SimLink
+from .opening import shake_hands
 from .recording import Recording
 from .sim.source import Source, load_source
 from .stream import Batch, join
@@ -56,7 +55,7 @@ def run_demo(
     recording_path = folder / "demo.mcap"
     wall = time.monotonic()
     # The board's counts are made; from here on it is a host with a board, and its cost is measured.
-    with prepare(Hand(SimLink(f"sim:{source.name}", source, pace=0.0))) as hand:
+    with shake_hands(SimLink(f"sim:{source.name}", source, pace=0.0)) as hand:
         settings = hand.settings()
         has_pac = bool(np.any(source.samples[:, :, 1::2] <= 4095))
         recorder = hand.record(recording_path, overwrite=True)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from ..sim.source import Source
 
 
 class Link(Protocol):
@@ -10,6 +13,9 @@ class Link(Protocol):
 
     #: The PORT it was opened as, for messages.
     port: str
+
+    #: What a simulated board plays; None for a real one.
+    source: Source | None
 
     #: The source is over: nothing new will come until a command asks for it.
     ended: bool

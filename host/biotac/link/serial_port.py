@@ -5,10 +5,14 @@ from __future__ import annotations
 import errno
 import os
 import select
+from typing import TYPE_CHECKING
 
 import serial
 
 from ..errors import DeviceLostError, PortError
+
+if TYPE_CHECKING:
+    from ..sim.source import Source
 
 READ_BYTES = 65536
 
@@ -18,6 +22,7 @@ class SerialLink:
 
     def __init__(self, path: str) -> None:
         self.port = path
+        self.source: Source | None = None
         self.ended = False
         try:
             self._serial = serial.Serial(path, 115200, timeout=0, write_timeout=2, exclusive=exclusive())

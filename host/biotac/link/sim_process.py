@@ -98,7 +98,6 @@ class SimLink(SerialLink):
 
     def __init__(self, port: str, source: Source, *, pace: float) -> None:
         self.board = SimBoard(source, pace=pace, hold=True)
-        self.source = source
         self._held = True
         try:
             super().__init__(self.board.path)
@@ -106,6 +105,7 @@ class SimLink(SerialLink):
             self.board.close()
             raise
         self.port = port
+        self.source = source
 
     def wait(self, timeout_s: float) -> bytes:
         """Wait for bytes, or for word that the source is over."""
