@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from biotac import _sensor
-from biotac.errors import RecordingError
-from biotac.sim import tape
+from .. import _sensor
+from ..errors import RecordingError
+from . import tape
 
 _FIRST_PAIR = 4
 _BEGIN = b"Begin File"

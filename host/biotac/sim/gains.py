@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from biotac._wire import SETTINGS
-from biotac.sim import surface
-from biotac.sim.surface import Floats
+from .._wire import SETTINGS
+from . import surface
+from .surface import Floats
 
 _ARMS_MM = np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL)
 

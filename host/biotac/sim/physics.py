@@ -14,9 +14,9 @@ from typing import Literal
 
 import numpy as np
 
-from biotac import _sensor
-from biotac.sim import surface
-from biotac.sim.surface import Floats
+from .. import _sensor
+from . import surface
+from .surface import Floats
 
 Profile = Literal["new", "worn"]
 PROFILES: tuple[Profile, ...] = ("new", "worn")

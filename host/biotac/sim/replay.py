@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from biotac import _sensor
-from biotac.errors import RecordingError
-from biotac.sim import sampling, tape
-from biotac.sim.btd import read_btd
-from biotac.sim.source import Source
+from .. import _sensor
+from ..errors import RecordingError
+from . import sampling, tape
+from .btd import read_btd
+from .source import Source
 
 _TARE_FRACTION = 16  # TARE_SET: counts with four fractional bits
 _SLOTS_OF = {

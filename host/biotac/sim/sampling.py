@@ -10,9 +10,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from biotac import _sensor
-from biotac.sim.physics import REST_CELSIUS, Finger, States
-from biotac.sim.surface import Floats
+from .. import _sensor
+from .physics import REST_CELSIUS, Finger, States
+from .surface import Floats
 
 Words = npt.NDArray[np.uint16]
 

@@ -26,13 +26,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from biotac import _sensor
-from biotac.errors import ScenarioError
-from biotac.sim import surface, tape
-from biotac.sim.physics import PROFILES, Profile
-from biotac.sim.source import MAX_SECONDS
-from biotac.sim.tables import Table, parse_toml
-from biotac.sim.timeline import Pose, Track
+from .. import _sensor
+from ..errors import ScenarioError
+from . import surface, tape
+from .physics import PROFILES, Profile
+from .source import MAX_SECONDS
+from .tables import Table, parse_toml
+from .timeline import Pose, Track
 
 RELEASE_S = 0.1
 FLAT_MM = 7.0  # numerics.md 3.1: a flat surface leaves a footprint of 3.5 mm radius

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from biotac import _sensor
-from biotac.errors import InputError
+from .. import _sensor
+from ..errors import InputError
 
 MAX_SECONDS = 3600.0  # 5 fingers for an hour are 160 MB of counts
 
@@ -75,9 +75,9 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
     Raises InputError (ScenarioError for the text of a scenario) naming what was seen and expected.
     """
     # here and not above: these modules build a Source, so they import this one
-    from biotac.sim.play import play
-    from biotac.sim.replay import load_btd, load_npz
-    from biotac.sim.scenario import parse_scenario
+    from .play import play
+    from .replay import load_btd, load_npz
+    from .scenario import parse_scenario
 
     if fingers is not None and not (type(fingers) is int and 1 <= fingers <= _sensor.MAX_SENSORS):
         raise InputError(f"fingers is {fingers!r}: expected 1 to {_sensor.MAX_SENSORS}")

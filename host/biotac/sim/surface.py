@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from biotac import _sensor
+from .. import _sensor
 
 Floats = npt.NDArray[np.float64]
 

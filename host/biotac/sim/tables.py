@@ -17,7 +17,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-from biotac.errors import ScenarioError
+from ..errors import ScenarioError
 
 _HEADER = re.compile(r"^\s*\[{1,2}\s*([A-Za-z0-9_\"'.-]+)\s*\]{1,2}\s*(#.*)?$")
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from biotac import _sensor
-from biotac.errors import InputError
-from biotac.sim.source import Source
+from .. import _sensor
+from ..errors import InputError
+from .source import Source
 
 NO_CHANNEL = 0xFFFF  # the sensor has no such channel: error word 0xA558
 BAD_PARITY = 0xFFFE  # a word with a flipped parity bit

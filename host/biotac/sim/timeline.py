@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from biotac.sim import surface
-from biotac.sim.physics import REST_CELSIUS, States
-from biotac.sim.surface import Floats
+from . import surface
+from .physics import REST_CELSIUS, States
+from .surface import Floats
 
 
 @dataclass(frozen=True)
