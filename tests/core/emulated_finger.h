@@ -1,0 +1,178 @@
+// A finger made of numbers: frames with noise, glitches, drift, a load and a pressure, for the tests
+// of the tare machine. Figures are those measured on real sensors (numerics 1.4).
+#ifndef BIOTAC_TEST_EMULATED_FINGER_H
+#define BIOTAC_TEST_EMULATED_FINGER_H
+
+#include "support.h"
+
+#include "tare.h"
+
+#include <math.h>
+
+#define SETTING_COUNT2 1000 // contact_energy_count2's default
+#define FRAMES_PER_S   100
+#define PDC_REST       1326
+
+typedef struct {
+    uint64_t seed;
+    double sigma; // noise of one count
+    double pdc_sigma;
+    double glitch_chance; // per sample: -28..-66 counts, never two in a row
+    double drift_per_s;   // counts, the same for all electrodes
+    bool has_pdc;
+    double t_s;
+    double load;     // length of the signal over all electrodes, counts
+    double pdc_load; // counts above rest
+    bool glitched[BT_ELECTRODES];
+    bt_tare tare;
+} emulated_finger;
+
+// Where a load shows: a press on the pad with some bulge around it. Its length is 1.
+static inline double load_shape(int i)
+{
+    static const double shape[BT_ELECTRODES] = {
+        0.08, -0.30, -0.34, -0.12, -0.26, 0.06, -0.15, -0.20, -0.20, -0.24,
+        0.08, -0.30, -0.34, -0.12, -0.26, 0.06, -0.38, -0.42, -0.10,
+    };
+    static double length;
+    if (length == 0) {
+        for (int k = 0; k < BT_ELECTRODES; k++) {
+            length += shape[k] * shape[k];
+        }
+        length = sqrt(length);
+    }
+    return shape[i] / length;
+}
+
+static inline double rest_count(const emulated_finger *finger, int i)
+{
+    return 2955 + 31 * i + finger->drift_per_s * finger->t_s;
+}
+
+static inline double gauss(uint64_t *seed)
+{
+    double u = 1 - random_unit(seed);
+    return sqrt(-2 * log(u)) * cos(2 * 3.14159265358979324 * random_unit(seed));
+}
+
+static inline uint16_t to_count(double value)
+{
+    return (uint16_t)(value < 1 ? 1 : value > 4089 ? 4089 : lround(value));
+}
+
+// The next frame, 10 ms after the one before.
+static inline bt_frame next_frame(emulated_finger *finger)
+{
+    bt_frame frame;
+    bt_frame_clear(&frame);
+    finger->t_s += 1.0 / FRAMES_PER_S;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        double value =
+            rest_count(finger, i) + finger->load * load_shape(i) + finger->sigma * gauss(&finger->seed);
+        bool glitch = !finger->glitched[i] && random_unit(&finger->seed) < finger->glitch_chance;
+        finger->glitched[i] = glitch;
+        frame.electrode[i] = to_count(value - (glitch ? (double)random_range(&finger->seed, 28, 66) : 0));
+    }
+    if (finger->has_pdc) {
+        frame.pdc = to_count(PDC_REST + finger->pdc_load + finger->pdc_sigma * gauss(&finger->seed));
+    }
+    frame.good_words = 44;
+    return frame;
+}
+
+// The next frame, but n electrodes from the first on read value.
+static inline bt_frame frame_without(emulated_finger *finger, int first, int n, uint16_t value)
+{
+    bt_frame frame = next_frame(finger);
+    for (int i = first; i < first + n; i++) {
+        frame.electrode[i] = value;
+    }
+    return frame;
+}
+
+// A quiet finger with exact counts, tared by its first frames.
+static inline void finger_init(emulated_finger *finger)
+{
+    memset(finger, 0, sizeof *finger);
+    finger->seed = 12;
+    finger->has_pdc = true;
+    bt_tare_reset(&finger->tare);
+}
+
+static inline void step(emulated_finger *finger)
+{
+    bt_frame frame = next_frame(finger);
+    bt_tare_update(&finger->tare, &frame, SETTING_COUNT2);
+}
+
+static inline void feed(emulated_finger *finger, const bt_frame *frame)
+{
+    bt_tare_update(&finger->tare, frame, SETTING_COUNT2);
+}
+
+static inline void run_frames(emulated_finger *finger, int frames)
+{
+    for (int k = 0; k < frames; k++) {
+        step(finger);
+    }
+}
+
+static inline void run_seconds(emulated_finger *finger, double seconds)
+{
+    run_frames(finger, (int)lround(seconds * FRAMES_PER_S));
+}
+
+// Steps until the machine is in state; fails after limit frames. Returns the frames it took.
+static inline int run_until(emulated_finger *finger, uint8_t state, int limit)
+{
+    for (int k = 1; k <= limit; k++) {
+        step(finger);
+        if (finger->tare.state == state) {
+            return k;
+        }
+    }
+    fail_msg("state %d not reached in %d frames; it is %d", state, limit, finger->tare.state);
+    return 0;
+}
+
+// A finger that has rested for five seconds.
+static inline emulated_finger resting_finger(void)
+{
+    emulated_finger finger;
+    finger_init(&finger);
+    run_seconds(&finger, 5);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+    return finger;
+}
+
+static inline emulated_finger touched_finger(double load, double pdc_load)
+{
+    emulated_finger finger = resting_finger();
+    finger.load = load;
+    finger.pdc_load = pdc_load;
+    (void)run_until(&finger, BT_TARE_STATE_CONTACT, 20);
+    return finger;
+}
+// Share of a signal of this length that the tare leaves: 1 when the tare is the true rest.
+static inline double share_kept(const emulated_finger *finger, double load)
+{
+    double sum = 0;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        double base = finger->tare.base.electrode_q16[i] / 65536.0;
+        sum += (rest_count(finger, i) + load * load_shape(i) - base) * load_shape(i);
+    }
+    return sum / load;
+}
+
+// Largest distance of any electrode's tare from its true rest.
+static inline double tare_error(const emulated_finger *finger)
+{
+    double worst = 0;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        double error = fabs(finger->tare.base.electrode_q16[i] / 65536.0 - rest_count(finger, i));
+        worst = error > worst ? error : worst;
+    }
+    return worst;
+}
+
+#endif

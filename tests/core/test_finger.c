@@ -1,0 +1,285 @@
+// One finger from slots to messages: assembly, validity, flags, sequence numbers.
+#include "support.h"
+
+#include "finger.h"
+
+static bt_finger finger;
+static bt_kernel_settings settings;
+static bt_msg_frame frame;
+static bt_msg_pac pac;
+static bt_msg_tare tare;
+static bool tare_changed;
+static uint32_t now_us;
+
+static int new_finger(void **state)
+{
+    (void)state;
+    bt_settings all;
+    bt_settings_reset(&all);
+    settings = bt_kernel_settings_from(&all);
+    bt_finger_reset(&finger, 3);
+    now_us = 1000;
+    return 0;
+}
+
+// Every slot has its own count, so that a word in a wrong place shows.
+static uint16_t slot_count(int slot)
+{
+    return (uint16_t)(2000 + 10 * slot);
+}
+
+// One round; missing is a bit mask of slots without a good word. Returns what finish says.
+static bool round_without(uint64_t missing)
+{
+    bt_finger_begin(&finger, now_us);
+    now_us += 10000;
+    for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
+        bt_frame_put(&finger.frame, slot, missing >> slot & 1 ? BT_INVALID_COUNT : slot_count(slot));
+    }
+    memset(&frame, 0xA5, sizeof frame);
+    memset(&pac, 0xA5, sizeof pac);
+    return bt_finger_finish(&finger, &settings, &frame, &pac, &tare, &tare_changed);
+}
+
+static void rounds(int n)
+{
+    for (int k = 0; k < n; k++) {
+        assert_true(round_without(0));
+    }
+}
+
+static void every_slot_lands_in_its_place(void **state)
+{
+    (void)state;
+    assert_true(round_without(0));
+    for (int i = 0; i < BT_ELECTRODES; i++) { // E1 PAC E2 PAC ... E19 PAC PDC PAC TAC PAC TDC PAC
+        assert_int_equal(frame.counts[i], slot_count(2 * i));
+    }
+    assert_int_equal(frame.pdc, slot_count(38));
+    assert_int_equal(frame.tac, slot_count(40));
+    assert_int_equal(frame.tdc, slot_count(42));
+    for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
+        assert_int_equal(pac.pac[k], slot_count(2 * k + 1));
+    }
+    assert_true(frame.finger == 3 && pac.finger == 3);
+    assert_int_equal(frame.t_us, 1000);
+    assert_int_equal(pac.t_us, 1000 + 227); // the first PAC is one slot later
+}
+
+static void a_missing_slot_is_marked_and_never_stale(void **state)
+{
+    (void)state;
+    rounds(20);
+    for (int slot = 0; slot < BT_SLOTS; slot++) {
+        assert_true(round_without((uint64_t)1 << slot));
+        uint32_t want = BT_FRAME_FLAG_MX_DERIVED | BT_FRAME_FLAG_FX_WEAK | BT_FRAME_FLAG_POC_LOW
+                        | BT_FRAME_FLAG_POC_INVALID;
+        if (slot % 2 == 1) {
+            assert_int_equal(pac.pac[slot / 2], BT_INVALID_COUNT);
+        } else if (slot < 38) {
+            want |= BT_FRAME_FLAG_ELECTRODE_MISSING;
+            assert_int_equal(frame.counts[slot / 2], BT_INVALID_COUNT);
+        } else {
+            static const uint32_t flags[] = {BT_FRAME_FLAG_PDC_MISSING, BT_FRAME_FLAG_TAC_MISSING,
+                                             BT_FRAME_FLAG_TDC_MISSING};
+            const uint16_t values[] = {frame.pdc, frame.tac, frame.tdc};
+            want |= flags[(slot - 38) / 2];
+            assert_int_equal(values[(slot - 38) / 2], BT_INVALID_COUNT);
+        }
+        assert_int_equal(frame.flags, want);
+        int invalid = 0;
+        for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
+            invalid += pac.pac[k] == BT_INVALID_COUNT;
+        }
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            invalid += frame.counts[i] == BT_INVALID_COUNT;
+        }
+        invalid += (frame.pdc == BT_INVALID_COUNT) + (frame.tac == BT_INVALID_COUNT);
+        assert_int_equal(invalid + (frame.tdc == BT_INVALID_COUNT), 1);
+    }
+}
+
+static void slots_that_never_came_are_missing_too(void **state)
+{
+    (void)state;
+    rounds(1);
+    bt_finger_begin(&finger, now_us);
+    bt_frame_put(&finger.frame, 43, 5); // the main loop was late for all others
+    assert_true(bt_finger_finish(&finger, &settings, &frame, &pac, &tare, &tare_changed));
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        assert_int_equal(frame.counts[i], BT_INVALID_COUNT);
+    }
+    assert_int_equal(pac.pac[21], 5);
+    assert_int_equal(pac.pac[20], BT_INVALID_COUNT);
+    assert_true(frame.flags & BT_FRAME_FLAG_FAULT);
+}
+
+static void an_absent_sensor_sends_nothing_and_counts_nothing(void **state)
+{
+    (void)state;
+    rounds(3);
+    assert_int_equal(frame.seq, 2);
+    for (int k = 0; k < 100; k++) {
+        assert_false(round_without(UINT64_MAX));
+        assert_false(tare_changed);
+        assert_false(finger.present);
+        assert_int_equal(frame.seq, 0xA5A5); // left alone
+    }
+    rounds(1);
+    assert_int_equal(frame.seq, 3);
+    assert_true(finger.present);
+}
+
+static void an_unplugged_sensor_loses_its_tare_after_25_rounds_and_not_before(void **state)
+{
+    (void)state;
+    rounds(20);
+    assert_int_equal(frame.tare_state, BT_TARE_STATE_REST);
+    for (int k = 0; k < 24; k++) {
+        (void)round_without(UINT64_MAX);
+    }
+    rounds(1);
+    assert_int_equal(frame.tare_state, BT_TARE_STATE_REST);
+    assert_false(frame.flags & BT_FRAME_FLAG_UNTARED);
+    for (int k = 0; k < 25; k++) {
+        (void)round_without(UINT64_MAX);
+    }
+    rounds(1);
+    assert_int_equal(frame.tare_state, BT_TARE_STATE_INIT);
+    assert_true(frame.flags & BT_FRAME_FLAG_UNTARED);
+}
+
+static void results_without_a_tare_are_invalid_and_not_zero(void **state)
+{
+    (void)state;
+    rounds(1);
+    assert_int_equal(frame.flags, BT_FRAME_FLAG_UNTARED | BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_MX_DERIVED
+                                      | BT_FRAME_FLAG_FX_WEAK);
+    assert_int_equal(frame.tare_state, BT_TARE_STATE_INIT);
+    assert_int_equal(frame.pdc_tare_q4, BT_INVALID_COUNT);
+    for (int d = 0; d < 3; d++) {
+        assert_int_equal(frame.poc_um[d], BT_INVALID_I16);
+        assert_int_equal(frame.force_100un[d], BT_INVALID_I32);
+        assert_int_equal(frame.torque_mnmm[d], BT_INVALID_I32);
+    }
+}
+
+static void a_new_tare_is_told_once_with_the_frame_that_first_uses_it(void **state)
+{
+    (void)state;
+    int told = 0;
+    for (int k = 0; k < 50; k++) {
+        rounds(1);
+        assert_int_equal((frame.flags & BT_FRAME_FLAG_TARE_CHANGED) != 0, tare_changed);
+        if (!tare_changed) {
+            continue;
+        }
+        told++;
+        assert_int_equal(tare.seq, frame.seq);
+        assert_int_equal(tare.t_us, frame.t_us);
+        assert_int_equal(tare.finger, 3);
+        assert_int_equal(tare.tare_state, BT_TARE_STATE_REST);
+        assert_int_equal(tare.reason, BT_TARE_REASON_START);
+        assert_int_equal(tare.pdc_tare_q16, slot_count(38) << 16);
+        assert_int_equal(frame.pdc_tare_q4, slot_count(38) << 4);
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            assert_int_equal(tare.tare_q16[i], slot_count(2 * i) << 16);
+            assert_int_equal(frame.tare_q4[i], slot_count(2 * i) << 4);
+        }
+    }
+    assert_int_equal(told, 1);
+}
+
+static void a_tare_set_by_the_host_is_used_and_told_from_the_next_frame_on(void **state)
+{
+    (void)state;
+    bt_baseline base = {.pdc_q16 = BT_TARE_UNKNOWN};
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        base.electrode_q16[i] = (uint32_t)(slot_count(2 * i) * 16 + 5) << 12; // 5/16 over the counts
+    }
+    rounds(20);
+    assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+    assert_false(round_without(UINT64_MAX)); // a silent round is no next frame
+    rounds(1);
+    assert_true(tare_changed);
+    assert_int_equal(tare.reason, BT_TARE_REASON_HOST_SET);
+    assert_int_equal(tare.seq, frame.seq);
+    assert_true(frame.flags & BT_FRAME_FLAG_TARE_CHANGED);
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        assert_int_equal(frame.tare_q4[i], slot_count(2 * i) * 16 + 5);
+    }
+    // 12.116 * 5/16 counts * 2.262234 mN: the sum of all normals at a compression of 5/16.
+    assert_int_equal(frame.force_100un[2], 86);
+    rounds(1);
+    assert_false(tare_changed);
+}
+
+static void a_railed_electrode_is_flagged_and_three_are_a_fault(void **state)
+{
+    (void)state;
+    rounds(20);
+    for (int railed = 0; railed <= 4; railed++) {
+        bt_finger_begin(&finger, now_us);
+        for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
+            bt_frame_put(&finger.frame, slot, slot < 2 * railed && slot % 2 == 0 ? 4095 : slot_count(slot));
+        }
+        assert_true(bt_finger_finish(&finger, &settings, &frame, &pac, &tare, &tare_changed));
+        assert_int_equal((frame.flags & BT_FRAME_FLAG_RAIL) != 0, railed > 0);
+        assert_int_equal((frame.flags & BT_FRAME_FLAG_FAULT) != 0, railed > 2);
+        assert_int_equal(frame.tare_state == BT_TARE_STATE_FAULT, railed > 2);
+        assert_int_equal(frame.counts[0], railed > 0 ? 4095 : slot_count(0)); // reported as read
+    }
+}
+
+static void a_held_press_is_flagged_by_its_shape_and_age(void **state)
+{
+    (void)state;
+    rounds(200);
+    for (int k = 0; k < 6200; k++) {
+        bt_finger_begin(&finger, now_us);
+        now_us += 10000;
+        for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
+            bool pad = slot == 32 || slot == 2 || slot == 22 || slot == 34; // E17, E2, E12, E18
+            int drop = pad ? 200 : slot == 38 ? -100 : 0;
+            bt_frame_put(&finger.frame, slot, (uint16_t)(slot_count(slot) - drop));
+        }
+        assert_true(bt_finger_finish(&finger, &settings, &frame, &pac, &tare, &tare_changed));
+        bool touched = frame.tare_state == BT_TARE_STATE_CONTACT;
+        assert_int_equal((frame.flags & BT_FRAME_FLAG_CONTACT) != 0, touched);
+        assert_true(touched || k < 5);
+        assert_true(frame.flags & BT_FRAME_FLAG_TORSION_OK); // on the pad, four electrodes, strong
+        assert_false(frame.flags
+                     & (BT_FRAME_FLAG_POC_LOW | BT_FRAME_FLAG_SHEAR_MIX | BT_FRAME_FLAG_POC_INVALID));
+        assert_int_equal((frame.flags & BT_FRAME_FLAG_BASE_OLD) != 0, finger.tare.contact_frames > 6000);
+    }
+    assert_true(frame.flags & BT_FRAME_FLAG_BASE_OLD);
+}
+
+static void seq_wraps_like_any_other_number(void **state)
+{
+    (void)state;
+    for (uint32_t k = 0; k < 65536 + 10; k++) {
+        rounds(1);
+        assert_int_equal(frame.seq, k & 0xFFFF);
+        assert_int_equal(pac.seq, frame.seq);
+    }
+}
+
+#define T(name) cmocka_unit_test_setup(name, new_finger)
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(every_slot_lands_in_its_place),
+        T(a_missing_slot_is_marked_and_never_stale),
+        T(slots_that_never_came_are_missing_too),
+        T(an_absent_sensor_sends_nothing_and_counts_nothing),
+        T(an_unplugged_sensor_loses_its_tare_after_25_rounds_and_not_before),
+        T(results_without_a_tare_are_invalid_and_not_zero),
+        T(a_new_tare_is_told_once_with_the_frame_that_first_uses_it),
+        T(a_tare_set_by_the_host_is_used_and_told_from_the_next_frame_on),
+        T(a_railed_electrode_is_flagged_and_three_are_a_fault),
+        T(a_held_press_is_flagged_by_its_shape_and_age),
+        T(seq_wraps_like_any_other_number),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,128 @@
+// Rounding and saturation: the one place where the core loses anything.
+#include "support.h"
+
+#include "fix.h"
+
+// Half away from zero, stated in 128 bits: round(|num| / den) = floor((2 |num| + den) / (2 den)).
+static int64_t rounded(int64_t num, int64_t den)
+{
+    unsigned __int128 magnitude = bt_abs(num);
+    unsigned __int128 quotient = (2 * magnitude + (uint64_t)den) / (2 * (unsigned __int128)(uint64_t)den);
+    return num < 0 ? (int64_t)(0 - (uint64_t)quotient) : (int64_t)quotient;
+}
+
+static void halves_go_away_from_zero(void **state)
+{
+    (void)state;
+    static const struct {
+        int64_t num, den, want;
+    } table[] = {
+        {0, 1, 0},   {1, 2, 1}, {-1, 2, -1}, {3, 2, 2},    {-3, 2, -2},  {5, 2, 3},      {-5, 2, -3},
+        {1, 3, 0},   {2, 3, 1}, {-1, 3, 0},  {-2, 3, -1},  {7, 4, 2},    {-7, 4, -2},    {6, 4, 2},
+        {-6, 4, -2}, {5, 4, 1}, {-5, 4, -1}, {49, 100, 0}, {50, 100, 1}, {-50, 100, -1},
+    };
+    for (size_t k = 0; k < sizeof table / sizeof *table; k++) {
+        assert_int_equal(bt_div_round(table[k].num, table[k].den), table[k].want);
+    }
+}
+
+static void division_by_one_changes_nothing(void **state)
+{
+    (void)state;
+    assert_int_equal(bt_div_round(INT64_MAX, 1), INT64_MAX);
+    assert_int_equal(bt_div_round(INT64_MIN, 1), INT64_MIN);
+}
+
+static void extremes_do_not_wrap(void **state)
+{
+    (void)state;
+    static const int64_t ends[] = {INT64_MAX,     INT64_MAX - 1, INT64_MIN,         INT64_MIN + 1,
+                                   INT64_MAX / 2, INT64_MIN / 2, INT64_MAX / 2 + 1, INT64_MIN / 2 - 1};
+    static const int64_t dens[] = {
+        1, 2, 3, 1000, 1 << 20, INT64_MAX / 2, INT64_MAX / 2 + 1, INT64_MAX - 1, INT64_MAX};
+    for (size_t n = 0; n < sizeof ends / sizeof *ends; n++) {
+        for (size_t d = 0; d < sizeof dens / sizeof *dens; d++) {
+            assert_int_equal(bt_div_round(ends[n], dens[d]), rounded(ends[n], dens[d]));
+        }
+    }
+    assert_int_equal(bt_div_round(INT64_MAX, INT64_MAX), 1);
+    assert_int_equal(bt_div_round(INT64_MIN, INT64_MAX), -1);
+    assert_int_equal(bt_div_round(INT64_MAX / 2, INT64_MAX), 0); // one below half
+    assert_int_equal(bt_div_round(INT64_MAX / 2 + 1, INT64_MAX), 1);
+}
+
+static void random_quotients_are_right(void **state)
+{
+    (void)state;
+    uint64_t seed = 2;
+    for (int k = 0; k < 200000; k++) {
+        int64_t num = (int64_t)(random_u64(&seed) >> random_range(&seed, 0, 60));
+        int64_t den = (int64_t)(random_u64(&seed) >> random_range(&seed, 1, 62)) | 1;
+        num = random_u64(&seed) & 1 ? num : -num;
+        den = k % 3 ? den : den / 2 + 1; // even ones have halves
+        assert_int_equal(bt_div_round(num, den), rounded(num, den));
+    }
+}
+
+static void rounding_is_odd(void **state)
+{
+    (void)state;
+    for (int64_t num = 0; num < 3000; num++) {
+        for (int64_t den = 1; den < 40; den++) {
+            assert_int_equal(bt_div_round(-num, den), -bt_div_round(num, den));
+        }
+    }
+}
+
+static void saturation_stops_short_of_the_invalid_mark(void **state)
+{
+    (void)state;
+    static const struct {
+        int64_t value;
+        int32_t want;
+        int saturated;
+    } table[] = {
+        {0, 0, 0},
+        {INT32_MAX, INT32_MAX, 0},
+        {-INT32_MAX, -INT32_MAX, 0},
+        {(int64_t)INT32_MAX + 1, INT32_MAX, 1},
+        {INT32_MIN, -INT32_MAX, 1},
+        {INT64_MAX, INT32_MAX, 1},
+        {INT64_MIN, -INT32_MAX, 1},
+    };
+    for (size_t k = 0; k < sizeof table / sizeof *table; k++) {
+        int saturated = 0;
+        assert_int_equal(bt_saturate_i32(table[k].value, &saturated), table[k].want);
+        assert_int_equal(saturated, table[k].saturated);
+    }
+    int saturated = 1;
+    (void)bt_saturate_i32(5, &saturated);
+    assert_int_equal(saturated, 1); // set, never cleared
+}
+
+static void magnitudes_and_clamps_hold_at_the_ends(void **state)
+{
+    (void)state;
+    assert_true(bt_abs(INT64_MIN) == (uint64_t)1 << 63);
+    assert_true(bt_abs(INT64_MAX) == (uint64_t)INT64_MAX);
+    assert_true(bt_abs(-1) == 1 && bt_abs(0) == 0);
+    assert_int_equal(bt_clamp(INT64_MIN, -7, 7), -7);
+    assert_int_equal(bt_clamp(INT64_MAX, -7, 7), 7);
+    assert_int_equal(bt_clamp(-7, -7, 7), -7);
+    assert_int_equal(bt_clamp(7, -7, 7), 7);
+    assert_int_equal(bt_clamp(0, -7, 7), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(halves_go_away_from_zero),
+        cmocka_unit_test(division_by_one_changes_nothing),
+        cmocka_unit_test(extremes_do_not_wrap),
+        cmocka_unit_test(random_quotients_are_right),
+        cmocka_unit_test(rounding_is_odd),
+        cmocka_unit_test(saturation_stops_short_of_the_invalid_mark),
+        cmocka_unit_test(magnitudes_and_clamps_hold_at_the_ends),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,307 @@
+// The integer kernels against the double reference (firmware/reference).
+//
+// Where the bounds come from (nothing is tuned):
+//  PoC    bt_poc rounds exact sums to nm, bt_kernel rounds that to um: per axis 0.5 um + 0.5 nm.
+//         scale_to_radius cuts components of at least 2^29 to integers and takes a floored root:
+//         three relative errors of 2^-29 on 5.08 mm, 0.03 nm. Norm: sqrt(3) * 0.50053 um.
+//  force  uN, then 0.1 mN: 0.05 mN + 0.5 uN.
+//  torque y, z: the sum is rounded to 1 um (1/16 count), 0.5 / 16e9 mN*mm per nN of gain, at most
+//         0.0032 mN*mm; then to 1 mN*mm.
+//  torque x: 0.5 mN*mm, |c| (<= 5.08 mm in y, z) times 0.5 uN twice, and |F_y| + |F_z| times 0.53 nm.
+#include "support.h"
+
+#include "fix.h"
+#include "lin2013.h"
+#include "poc.h"
+#include "results.h"
+#include "wrench.h"
+
+#include <math.h>
+
+#define POC_BOUND_UM      (0.5 * 1.7320508075688772 + 0.01)
+#define FORCE_BOUND_MN    (0.05 + 1e-3)
+#define TORQUE_BOUND_MNMM (0.5 + 0.004)
+
+static const bt_kernel_settings defaults = {
+    .force_gain_nn = {1063440, 252325, 2262234},
+    .torque_gain_nn = {2262234, 252325},
+};
+
+typedef struct {
+    double poc_um;
+    double force_mn;
+    double torque_yz_mnmm;
+    double torque_x_mnmm;
+} errors;
+
+static errors worst;
+static long frames_checked;
+
+static lin2013_result reference(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *settings)
+{
+    lin2013_settings in = {.poc_weights = settings->poc_weights};
+    lin2013_result out;
+    double e[BT_ELECTRODES];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        e[i] = e_q4[i] / 16.0;
+    }
+    for (int d = 0; d < 3; d++) {
+        in.force_gain[d] = settings->force_gain_nn[d] * 1e-9;
+    }
+    for (int d = 0; d < 2; d++) {
+        in.torque_gain[d] = settings->torque_gain_nn[d] * 1e-9;
+    }
+    lin2013(e, &in, &out);
+    return out;
+}
+
+static void raise_to(double *top, double value)
+{
+    *top = value > *top ? value : *top;
+}
+
+static void check_wrench(const lin2013_result *want, const int32_t force_100un[3],
+                         const int32_t torque_mnmm[3])
+{
+    for (int d = 0; d < 3; d++) {
+        double error = fabs(force_100un[d] * 0.1 - want->force_n[d] * 1000);
+        raise_to(&worst.force_mn, error);
+        assert_true(error <= FORCE_BOUND_MN);
+    }
+    for (int d = 1; d < 3; d++) {
+        double error = fabs(torque_mnmm[d] - want->torque_nmm[d] * 1000);
+        raise_to(&worst.torque_yz_mnmm, error);
+        assert_true(error <= TORQUE_BOUND_MNMM);
+    }
+}
+
+static void check_poc(const lin2013_result *want, const int16_t poc_um[3], int32_t torque_x_mnmm)
+{
+    double square = 0;
+    for (int d = 0; d < 3; d++) {
+        double error = poc_um[d] - want->poc_mm[d] * 1000;
+        square += error * error;
+    }
+    raise_to(&worst.poc_um, sqrt(square));
+    assert_true(sqrt(square) <= POC_BOUND_UM);
+
+    double force = fabs(want->force_n[1]) + fabs(want->force_n[2]);
+    double error = fabs(torque_x_mnmm - want->torque_nmm[0] * 1000);
+    raise_to(&worst.torque_x_mnmm, error);
+    assert_true(error <= 0.5 + 2 * 5.08 * 0.5e-3 + force * 0.53e-3 + 1e-6);
+}
+
+static void check_all_weights(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *gains)
+{
+    for (int weights = 0; weights <= 2; weights++) {
+        bt_kernel_settings settings = *gains;
+        settings.poc_weights = weights;
+        int16_t poc_um[3];
+        int32_t force_100un[3], torque_mnmm[3];
+        uint32_t flags = bt_kernel(e_q4, &settings, poc_um, force_100un, torque_mnmm);
+        lin2013_result want = reference(e_q4, &settings);
+        check_wrench(&want, force_100un, torque_mnmm);
+        if (isnan(want.poc_mm[0])) {
+            assert_int_equal(flags, BT_FRAME_FLAG_POC_INVALID);
+            assert_int_equal(torque_mnmm[0], BT_INVALID_I32);
+            for (int d = 0; d < 3; d++) {
+                assert_int_equal(poc_um[d], BT_INVALID_I16);
+            }
+        } else {
+            assert_int_equal(flags, 0); // no setting that link.toml allows saturates anything
+            check_poc(&want, poc_um, torque_mnmm[0]);
+        }
+        frames_checked++;
+    }
+}
+
+static bt_kernel_settings random_gains(uint64_t *seed)
+{
+    bt_kernel_settings settings = defaults;
+    for (int d = 0; d < 3; d++) {
+        settings.force_gain_nn[d] = (int32_t)random_range(seed, -BT_GAIN_MAX_NN, BT_GAIN_MAX_NN);
+        settings.torque_gain_nn[d % 2] = (int32_t)random_range(seed, -BT_GAIN_MAX_NN, BT_GAIN_MAX_NN);
+    }
+    return settings;
+}
+
+static const bt_kernel_settings largest_gains = {
+    .force_gain_nn = {BT_GAIN_MAX_NN, -BT_GAIN_MAX_NN, BT_GAIN_MAX_NN},
+    .torque_gain_nn = {-BT_GAIN_MAX_NN, BT_GAIN_MAX_NN},
+};
+
+static void single_electrodes_at_every_size(void **state)
+{
+    (void)state;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        for (int32_t size = 1; size <= BT_E_MAX_Q4; size = size * 2 + (size % 3 == 0)) {
+            int32_t e[BT_ELECTRODES] = {0};
+            e[i] = -size;
+            check_all_weights(e, &defaults);
+            check_all_weights(e, &largest_gains);
+            e[i] = size;
+            check_all_weights(e, &defaults);
+        }
+    }
+}
+
+static void all_electrodes_equal(void **state)
+{
+    (void)state;
+    for (int32_t size = -BT_E_MAX_Q4; size <= BT_E_MAX_Q4; size += size > -40 && size < 40 ? 1 : 7) {
+        int32_t e[BT_ELECTRODES];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            e[i] = size;
+        }
+        check_all_weights(e, &defaults);
+        check_all_weights(e, &largest_gains);
+    }
+}
+
+static void corners_of_the_box(void **state)
+{
+    (void)state;
+    uint64_t seed = 5;
+    for (int k = 0; k < 30000; k++) {
+        // Corners, then corners with zeros among them; the first two are all down and all up.
+        uint64_t signs = k < 2 ? 0 - (uint64_t)k : random_u64(&seed);
+        uint64_t zeros = k % 2 ? random_u64(&seed) : 0;
+        int32_t e[BT_ELECTRODES];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            e[i] = zeros >> i & 1 ? 0 : signs >> (i + 20) & 1 ? BT_E_MAX_Q4 : -BT_E_MAX_Q4;
+        }
+        check_all_weights(e, k % 3 ? &defaults : &largest_gains);
+    }
+}
+
+static void corners_that_make_every_sum_largest(void **state)
+{
+    (void)state;
+    for (int d = 0; d < 3; d++) {
+        for (int up = -1; up <= 1; up += 2) {
+            int32_t by_normal[BT_ELECTRODES], by_arm[BT_ELECTRODES], by_place[BT_ELECTRODES];
+            for (int i = 0; i < BT_ELECTRODES; i++) {
+                by_normal[i] = (bt_normal_milli[i][d] > 0 ? up : -up) * BT_E_MAX_Q4;
+                by_arm[i] = (bt_arm_nm[i][d] > 0 ? up : -up) * BT_E_MAX_Q4;
+                by_place[i] = (bt_electrode_um[i][d] > 0 ? up : -up) * BT_E_MAX_Q4;
+            }
+            check_all_weights(by_normal, &largest_gains);
+            check_all_weights(by_arm, &largest_gains);
+            check_all_weights(by_place, &largest_gains);
+        }
+    }
+}
+
+static void signals_of_one_lsb(void **state)
+{
+    (void)state;
+    uint64_t seed = 6;
+    for (int k = 0; k < 20000; k++) {
+        int32_t e[BT_ELECTRODES];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            e[i] = (int32_t)random_range(&seed, -1, 1);
+        }
+        check_all_weights(e, &defaults);
+    }
+}
+
+static int64_t moment_x(const int32_t e[BT_ELECTRODES], int power)
+{
+    int64_t sum = 0;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        sum += (int64_t)e[i] * (power == 2 ? e[i] : -1) * bt_electrode_um[i][0];
+    }
+    return sum;
+}
+
+// n = 1: E10 (1299 um) and E17 (-2800 um) reach every whole number between them.
+static void contacts_at_the_seam_with_linear_weights(void **state)
+{
+    (void)state;
+    int hits[7] = {0};
+    for (int32_t a = 1; a <= BT_E_MAX_Q4; a++) {
+        for (int64_t want = -3; want <= 3; want++) {
+            if ((1299 * (int64_t)a - want) % 2800 != 0) {
+                continue;
+            }
+            int32_t e[BT_ELECTRODES] = {[9] = -a, [16] = (int32_t)(-(1299 * (int64_t)a - want) / 2800)};
+            assert_int_equal(moment_x(e, 1), want);
+            check_all_weights(e, &defaults);
+            hits[want + 3]++;
+        }
+    }
+    for (int k = 0; k < 7; k++) {
+        assert_true(hits[k] > 10);
+    }
+}
+
+// n = 2: squares of ever smaller signals bring a random frame's N_x as near to 0 as they can.
+static void contacts_at_the_seam_with_square_weights(void **state)
+{
+    (void)state;
+    static const int forward[] = {6, 7, 8, 9, 0, 10};   // E7 E8 E9 E10 E1 E11
+    static const int backward[] = {18, 4, 3, 2, 16, 1}; // E19 E5 E4 E3 E17 E2
+    uint64_t seed = 7;
+    int near = 0, sides[2] = {0};
+    for (int k = 0; k < 20000; k++) {
+        int32_t e[BT_ELECTRODES] = {0};
+        e[5] = -(int32_t)random_range(&seed, 0, 30000);
+        e[17] = -(int32_t)random_range(&seed, 0, 9000);
+        for (int step = 0; step < 6; step++) {
+            int64_t sum = moment_x(e, 2);
+            int i = sum < 0 ? forward[step] : backward[step];
+            double size = sqrt(fabs((double)sum / bt_electrode_um[i][0]));
+            // Cut off, or one too many: both sides of the seam are reached.
+            e[i] =
+                -(int32_t)(size > BT_E_MAX_Q4 - 1 ? BT_E_MAX_Q4 : size + (double)random_range(&seed, 0, 1));
+        }
+        double weight = 0;
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            weight += (double)e[i] * e[i];
+        }
+        near += fabs((double)moment_x(e, 2) / weight) < 1; // um
+        sides[moment_x(e, 2) > 0]++;
+        check_all_weights(e, &defaults);
+    }
+    assert_true(near > 5000 && sides[0] > 1000 && sides[1] > 1000);
+}
+
+static void random_frames_in_six_sizes(void **state)
+{
+    (void)state;
+    static const int32_t sizes[6] = {16, 80, 800, 8000, 32000, BT_E_MAX_Q4};
+    uint64_t seed = 8;
+    for (int k = 0; k < 200000; k++) {
+        int32_t size = sizes[k % 6];
+        int32_t top = k / 6 % 2 ? size : size / 4; // mostly compressed, or evenly mixed
+        int32_t e[BT_ELECTRODES];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            e[i] = (int32_t)random_range(&seed, -size, top);
+        }
+        bt_kernel_settings gains = random_gains(&seed);
+        check_all_weights(e, k % 4 ? &defaults : &gains);
+    }
+}
+
+static int print_worst(void **state)
+{
+    (void)state;
+    print_message("worst of %ld: PoC %.4f um, force %.5f mN, torque y,z %.4f, x %.4f mN*mm\n", frames_checked,
+                  worst.poc_um, worst.force_mn, worst.torque_yz_mnmm, worst.torque_x_mnmm);
+    return 0;
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(single_electrodes_at_every_size),
+        cmocka_unit_test(all_electrodes_equal),
+        cmocka_unit_test(corners_of_the_box),
+        cmocka_unit_test(corners_that_make_every_sum_largest),
+        cmocka_unit_test(signals_of_one_lsb),
+        cmocka_unit_test(contacts_at_the_seam_with_linear_weights),
+        cmocka_unit_test(contacts_at_the_seam_with_square_weights),
+        cmocka_unit_test(random_frames_in_six_sizes),
+    };
+    return cmocka_run_group_tests(tests, NULL, print_worst);
+}

@@ -1,0 +1,239 @@
+// The conversation: every command gets exactly one reply.
+#include "fake_host.h"
+
+static const received_message *set(uint8_t setting, int32_t value)
+{
+    uint8_t payload[BT_SET_SETTING_BYTES];
+    bt_msg_set_setting msg = {.req_id = 77, .setting = setting, .value = value};
+    bt_msg_set_setting_pack(&msg, payload);
+    return host_ask(&session, BT_SET_SETTING_ID, payload, sizeof payload);
+}
+
+static uint8_t set_error(uint8_t setting, int32_t value)
+{
+    const received_message *message = set(setting, value);
+    bt_msg_reply reply;
+    if (message->id == BT_SETTING_ID) {
+        return BT_ERROR_OK;
+    }
+    assert_int_equal(message->id, BT_REPLY_ID);
+    bt_msg_reply_unpack(&reply, message->payload);
+    assert_int_equal(reply.command, BT_SET_SETTING_ID);
+    assert_int_equal(reply.req_id, 77);
+    return reply.error;
+}
+
+static int32_t get(uint8_t setting)
+{
+    uint8_t payload[2] = {5, setting};
+    const received_message *message = host_ask(&session, BT_GET_SETTING_ID, payload, 2);
+    bt_msg_setting value;
+    assert_int_equal(message->id, BT_SETTING_ID);
+    bt_msg_setting_unpack(&value, message->payload);
+    assert_true(value.req_id == 5 && value.setting == setting);
+    return value.value;
+}
+
+static void hello_tells_who_is_there_and_echoes_the_nonce(void **state)
+{
+    (void)state;
+    uint8_t payload[BT_HELLO_REQUEST_BYTES];
+    bt_msg_hello_request request = {.req_id = 200, .nonce = 0xCAFEBABE};
+    bt_msg_hello hello;
+    host_round(&session, 1 << 1 | 1 << 4, 2000);
+    bt_msg_hello_request_pack(&request, payload);
+    const received_message *message = host_ask(&session, BT_HELLO_REQUEST_ID, payload, sizeof payload);
+    assert_int_equal(message->id, BT_HELLO_ID);
+    bt_msg_hello_unpack(&hello, message->payload);
+    assert_int_equal(hello.req_id, 200);
+    assert_int_equal(hello.nonce, 0xCAFEBABE);
+    assert_int_equal(hello.wire_major, BT_WIRE_MAJOR);
+    assert_int_equal(hello.wire_minor, BT_WIRE_MINOR);
+    assert_int_equal(hello.schema_hash, BT_SCHEMA_HASH);
+    assert_true(hello.firmware_major == 1 && hello.firmware_minor == 2 && hello.firmware_patch == 3);
+    assert_int_equal(hello.board, BT_BOARD_PICO);
+    assert_int_equal(hello.boot_id, 0xB0071D);
+    assert_memory_equal(hello.board_serial, "ABCDEFGHIJKL", 12);
+    assert_int_equal(hello.slot_hz, 4400);
+    assert_int_equal(hello.fingers_present, 1 << 1 | 1 << 4);
+}
+
+static void every_command_gets_exactly_one_reply_with_its_req_id(void **state)
+{
+    (void)state;
+    static const struct {
+        uint8_t id, answer, req_id_at, req_id;
+    } table[] = {
+        {BT_HELLO_REQUEST_ID, BT_HELLO_ID, 0, 11},
+        {BT_START_ID, BT_REPLY_ID, 0, 12},
+        {BT_STOP_ID, BT_REPLY_ID, 0, 13},
+        {BT_PING_ID, BT_REPLY_ID, 0, 14},
+        {BT_TARE_NOW_ID, BT_REPLY_ID, 0, 15},
+        {BT_TARE_SET_ID, BT_REPLY_ID, 0, 16},
+        {BT_GET_STATUS_ID, BT_STATUS_ID, 6, 17},
+        {BT_GET_SENSOR_STATUS_ID, BT_SENSOR_STATUS_ID, 6, 18},
+        {BT_GET_SENSOR_INFO_ID, BT_SENSOR_INFO_ID, 0, 19},
+        {BT_GET_SETTING_ID, BT_SETTING_ID, 0, 20},
+        {BT_SET_SETTING_ID, BT_SETTING_ID, 0, 21},
+    };
+    for (int id = 0x80; id < 0x100; id++) { // the table holds every command there is
+        int listed = 0;
+        for (size_t k = 0; k < sizeof table / sizeof *table; k++) {
+            listed += table[k].id == id;
+        }
+        assert_int_equal(listed, bt_wire_payload_bytes((uint8_t)id) >= 0);
+    }
+    for (size_t k = 0; k < sizeof table / sizeof *table; k++) {
+        uint8_t payload[BT_FRAME_MAX_BYTES] = {table[k].req_id};
+        if (table[k].id == BT_GET_SETTING_ID || table[k].id == BT_SET_SETTING_ID) {
+            payload[1] = BT_SETTING_POC_WEIGHTS;
+        }
+        const received_message *message =
+            host_ask(&session, table[k].id, payload, (size_t)bt_wire_payload_bytes(table[k].id));
+        assert_int_equal(message->id, table[k].answer);
+        assert_int_equal(message->payload[table[k].req_id_at], table[k].req_id);
+    }
+}
+
+static void errors_are_told_by_name(void **state)
+{
+    (void)state;
+    static const uint8_t absent[2] = {1, 2}, beyond[2] = {1, 5}, no_setting[2] = {1, 99};
+    uint8_t tare[BT_TARE_SET_BYTES] = {1, 0};
+    assert_int_equal(host_error(&session, BT_TARE_NOW_ID, absent, 2), BT_ERROR_NO_SUCH_FINGER);
+    assert_int_equal(host_error(&session, BT_TARE_NOW_ID, beyond, 2), BT_ERROR_NO_SUCH_FINGER);
+    assert_int_equal(host_error(&session, BT_GET_SENSOR_STATUS_ID, beyond, 2), BT_ERROR_NO_SUCH_FINGER);
+    assert_int_equal(host_error(&session, BT_GET_SENSOR_INFO_ID, beyond, 2), BT_ERROR_NO_SUCH_FINGER);
+    assert_int_equal(host_error(&session, BT_GET_SETTING_ID, no_setting, 2), BT_ERROR_UNKNOWN_SETTING);
+    assert_int_equal(set_error(0, 1), BT_ERROR_UNKNOWN_SETTING);
+    assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1 << 5, 0), BT_ERROR_NO_SUCH_FINGER);
+    assert_int_equal(session.streams, 0);
+
+    tare[1] = 5;
+    assert_int_equal(host_error(&session, BT_TARE_SET_ID, tare, sizeof tare), BT_ERROR_NO_SUCH_FINGER);
+    tare[1] = 0;
+    tare[2 + 18] = 0xF1; // electrode 9 at 65521 sixteenths
+    tare[2 + 19] = 0xFF;
+    assert_int_equal(host_error(&session, BT_TARE_SET_ID, tare, sizeof tare), BT_ERROR_OUT_OF_RANGE);
+    tare[2 + 18] = 0xF0;
+    tare[2 + 38] = 0xFE; // pressure: 65534 is no count, 65535 means unknown
+    tare[2 + 39] = 0xFF;
+    assert_int_equal(host_error(&session, BT_TARE_SET_ID, tare, sizeof tare), BT_ERROR_OUT_OF_RANGE);
+    tare[2 + 38] = 0xFF;
+    assert_int_equal(host_error(&session, BT_TARE_SET_ID, tare, sizeof tare), BT_ERROR_OK);
+
+    host_round(&session, 1 << 2, 2000);
+    assert_int_equal(host_error(&session, BT_TARE_NOW_ID, absent, 2), BT_ERROR_NOT_STILL);
+    host_round(&session, 1 << 2, 4095);
+    assert_int_equal(host_error(&session, BT_TARE_NOW_ID, absent, 2), BT_ERROR_RAILED);
+}
+
+static void settings_hold_their_ranges_and_refused_values_change_nothing(void **state)
+{
+    (void)state;
+    for (int k = 0; k < BT_SETTINGS; k++) {
+        const bt_setting_spec *spec = &bt_setting_specs[k];
+        assert_int_equal(get(spec->id), spec->initial);
+        assert_int_equal(set_error(spec->id, spec->min), BT_ERROR_OK);
+        assert_int_equal(get(spec->id), spec->min);
+        assert_int_equal(set_error(spec->id, spec->min - 1), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(set_error(spec->id, INT32_MIN), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(get(spec->id), spec->min);
+        assert_int_equal(set_error(spec->id, spec->max), BT_ERROR_OK);
+        assert_int_equal(set_error(spec->id, spec->max + 1), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(set_error(spec->id, INT32_MAX), BT_ERROR_OUT_OF_RANGE);
+        assert_int_equal(get(spec->id), spec->max);
+    }
+}
+
+static void a_new_setting_is_what_the_kernels_use(void **state)
+{
+    (void)state;
+    const received_message *message = set(BT_SETTING_FORCE_GAIN_Z_NN, -12345);
+    bt_msg_setting value;
+    assert_int_equal(message->id, BT_SETTING_ID);
+    bt_msg_setting_unpack(&value, message->payload);
+    assert_true(value.req_id == 77 && value.value == -12345);
+    assert_int_equal(session.kernel.force_gain_nn[2], -12345);
+    assert_int_equal(set_error(BT_SETTING_POC_WEIGHTS, BT_POC_WEIGHTS_ABS_N2), BT_ERROR_OK);
+    assert_int_equal(session.kernel.poc_weights, BT_POC_WEIGHTS_ABS_N2);
+    assert_int_equal(set_error(BT_SETTING_CONTACT_ENERGY_COUNT2, 500), BT_ERROR_OK);
+    assert_int_equal(session.kernel.contact_energy_count2, 500);
+}
+
+static void settings_are_refused_while_streaming(void **state)
+{
+    (void)state;
+    assert_int_equal(start(BT_STREAM_FLAG_PAC, 1, 0), BT_ERROR_OK);
+    assert_int_equal(set_error(BT_SETTING_POC_WEIGHTS, 0), BT_ERROR_BUSY);
+    assert_int_equal(get(BT_SETTING_POC_WEIGHTS), BT_POC_WEIGHTS_COMPRESS_N1); // reading is allowed
+    assert_int_equal(stop(), BT_ERROR_OK);
+    assert_int_equal(set_error(BT_SETTING_POC_WEIGHTS, 0), BT_ERROR_OK);
+}
+
+static void unknown_commands_are_answered_as_such(void **state)
+{
+    (void)state;
+    for (int id = 0x80; id < 0x100; id++) {
+        if (bt_wire_payload_bytes((uint8_t)id) < 0) {
+            assert_int_equal(host_error(&session, (uint8_t)id, "\x21\x01\x02", 3), BT_ERROR_UNKNOWN_COMMAND);
+        }
+    }
+}
+
+static void an_unknown_command_without_payload_is_unknown_too(void **state)
+{
+    (void)state;
+    host_send(&session, 0xF0, "", 0, 0); // SPEC.md: a board answers REPLY(UNKNOWN_COMMAND)
+    assert_int_equal(host.count, 1);
+    assert_int_equal(host.message[0].id, BT_REPLY_ID);
+    assert_int_equal(host.message[0].payload[1], 0xF0);
+    assert_int_equal(host.message[0].payload[2], BT_ERROR_UNKNOWN_COMMAND);
+}
+
+static void a_wrong_length_is_answered_and_does_nothing(void **state)
+{
+    (void)state;
+    static const uint8_t zeros[BT_FRAME_MAX_BYTES];
+    for (int id = 0x80; id < 0x100; id++) {
+        int right = bt_wire_payload_bytes((uint8_t)id);
+        for (int bytes = 0; right >= 0 && bytes < 60; bytes++) {
+            if (bytes != right) {
+                assert_int_equal(host_error(&session, (uint8_t)id, zeros, (size_t)bytes),
+                                 BT_ERROR_BAD_LENGTH);
+            }
+        }
+    }
+    assert_int_equal(session.rx_frames, 0);
+    assert_true(session.rx_errors > 0);
+}
+
+static void an_echo_of_our_own_messages_is_not_answered(void **state)
+{
+    (void)state;
+    uint8_t payload[BT_FRAME_MAX_BYTES] = {1};
+    for (int id = 0; id < 0x80; id++) {
+        int bytes = bt_wire_payload_bytes((uint8_t)id);
+        host_send(&session, (uint8_t)id, payload, bytes < 0 ? 3 : (size_t)bytes, 0);
+        host_send(&session, (uint8_t)id, payload, bytes < 0 ? 0 : (size_t)bytes - 1, 0);
+    }
+    assert_int_equal(host.count, 0);
+}
+
+#define T(name) cmocka_unit_test_setup(name, new_session)
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(hello_tells_who_is_there_and_echoes_the_nonce),
+        T(every_command_gets_exactly_one_reply_with_its_req_id),
+        T(errors_are_told_by_name),
+        T(settings_hold_their_ranges_and_refused_values_change_nothing),
+        T(a_new_setting_is_what_the_kernels_use),
+        T(settings_are_refused_while_streaming),
+        T(unknown_commands_are_answered_as_such),
+        T(an_unknown_command_without_payload_is_unknown_too),
+        T(a_wrong_length_is_answered_and_does_nothing),
+        T(an_echo_of_our_own_messages_is_not_answered),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,174 @@
+// The tare machine under faults and host commands.
+#include "emulated_finger.h"
+
+// ---- fault -------------------------------------------------------------------------------------
+
+static void a_railed_electrode_is_one_at_the_end_of_its_range(void **state)
+{
+    (void)state;
+    for (int count = 0; count <= 4095; count++) {
+        assert_int_equal(bt_count_railed((uint16_t)count), count == 0 || count >= 4090);
+    }
+    assert_false(bt_count_railed(BT_INVALID_COUNT)); // missing, which is counted apart
+}
+
+static void railed_electrodes_are_never_tared(void **state)
+{
+    (void)state;
+    static const uint16_t ends[] = {0, 4090, 4095, BT_INVALID_COUNT};
+    for (int k = 0; k < 4; k++) {
+        emulated_finger finger;
+        finger_init(&finger);
+        for (int n = 0; n < 500; n++) {
+            bt_frame frame = frame_without(&finger, 6, 3, ends[k]);
+            feed(&finger, &frame);
+            assert_int_equal(finger.tare.state, BT_TARE_STATE_FAULT);
+            assert_int_equal(finger.tare.reason, BT_TARE_REASON_NONE);
+        }
+        assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_RAILED);
+        assert_int_equal(bt_tare_set(&finger.tare, &finger.tare.base), BT_ERROR_RAILED);
+        step(&finger); // never tared, so it starts over
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_INIT);
+        assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 12), 7, 10);
+        assert_true(tare_error(&finger) == 0);
+    }
+}
+
+static void a_fault_freezes_the_tare_and_release_rules_end_it(void **state)
+{
+    (void)state;
+    emulated_finger finger = resting_finger();
+    bt_baseline before = finger.tare.base;
+    for (int k = 0; k < 300; k++) {
+        bt_frame frame = frame_without(&finger, 0, 9, 0);
+        feed(&finger, &frame);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_FAULT);
+    }
+    assert_memory_equal(&finger.tare.base, &before, sizeof before);
+    step(&finger);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    assert_memory_equal(&finger.tare.base, &before, sizeof before);
+    assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 20), 8, 15);
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_RELEASE);
+}
+
+static void two_railed_electrodes_are_no_fault(void **state)
+{
+    (void)state;
+    emulated_finger finger = resting_finger();
+    bt_frame frame = frame_without(&finger, 3, 2, BT_INVALID_COUNT);
+    feed(&finger, &frame);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+    frame = frame_without(&finger, 3, 3, BT_INVALID_COUNT);
+    feed(&finger, &frame);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_FAULT);
+}
+
+static void after_a_fault_no_older_frame_makes_a_tare(void **state)
+{
+    (void)state;
+    emulated_finger finger = touched_finger(400, 300);
+    run_seconds(&finger, 1);
+    finger.load = 40; // released with residue, and about to be tared
+    finger.pdc_load = 10;
+    run_frames(&finger, 12);
+    while (finger.tare.settle_frames != 38) {
+        step(&finger);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    }
+    for (int k = 0; k < 100; k++) {
+        bt_frame frame = frame_without(&finger, 0, 9, 0);
+        feed(&finger, &frame);
+    }
+    finger.load = 43; // it crept while nobody could see it
+    for (int k = 0; k < 7; k++) {
+        step(&finger);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    }
+}
+
+static void one_faulty_frame_starts_the_history_over(void **state)
+{
+    (void)state;
+    emulated_finger finger = resting_finger();
+    bt_frame frame = frame_without(&finger, 0, 3, 4095);
+    feed(&finger, &frame);
+    for (int k = 0; k < 7; k++) {
+        step(&finger);
+        assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_NOT_STILL);
+    }
+}
+
+// ---- host commands -----------------------------------------------------------------------------
+
+static void tare_now_is_refused_while_the_signals_move(void **state)
+{
+    (void)state;
+    emulated_finger finger = resting_finger();
+    for (int k = 0; k < 40; k++) {
+        finger.load += 30;
+        step(&finger);
+    }
+    bt_tare before = finger.tare;
+    assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_NOT_STILL);
+    assert_memory_equal(&finger.tare, &before, sizeof before);
+    run_frames(&finger, 10); // held still: the host's word counts
+    assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_OK);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_HOST_NOW);
+    assert_true(finger.tare.changed);
+    assert_true(fabs(share_kept(&finger, finger.load)) < 0.001);
+}
+
+static void tare_now_is_refused_before_there_are_frames(void **state)
+{
+    (void)state;
+    emulated_finger finger;
+    finger_init(&finger);
+    for (int k = 0; k < 7; k++) {
+        assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_NOT_STILL);
+        step(&finger);
+    }
+}
+
+static void a_set_tare_holds_as_given_on_the_next_frame(void **state)
+{
+    (void)state;
+    emulated_finger finger = touched_finger(400, 100);
+    bt_baseline base = finger.tare.base;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        base.electrode_q16[i] = (uint32_t)(40000 + 100 * i) << 12; // 2500 counts and more
+    }
+    assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+    step(&finger);
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        assert_int_equal(bt_tare_q4(finger.tare.base.electrode_q16[i]), 40000 + 100 * i);
+    }
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_HOST_SET);
+}
+
+static void published_tares_round_half_away_from_zero(void **state)
+{
+    (void)state;
+    assert_int_equal(bt_tare_q4(0), 0);
+    assert_int_equal(bt_tare_q4(2047), 0);
+    assert_int_equal(bt_tare_q4(2048), 1);
+    assert_int_equal(bt_tare_q4(4095u << 16), 65520);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_railed_electrode_is_one_at_the_end_of_its_range),
+        cmocka_unit_test(railed_electrodes_are_never_tared),
+        cmocka_unit_test(a_fault_freezes_the_tare_and_release_rules_end_it),
+        cmocka_unit_test(two_railed_electrodes_are_no_fault),
+        cmocka_unit_test(one_faulty_frame_starts_the_history_over),
+        cmocka_unit_test(after_a_fault_no_older_frame_makes_a_tare),
+        cmocka_unit_test(tare_now_is_refused_while_the_signals_move),
+        cmocka_unit_test(tare_now_is_refused_before_there_are_frames),
+        cmocka_unit_test(a_set_tare_holds_as_given_on_the_next_frame),
+        cmocka_unit_test(published_tares_round_half_away_from_zero),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

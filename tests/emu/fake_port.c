@@ -1,0 +1,159 @@
+#include "fake_port.h"
+
+#include "port.h"
+#include "wire_gen.h"
+
+#include <string.h>
+
+#define TRANSFER_NS (16u * 1000000000u / BT_SPI_HZ)
+
+fake_port fake;
+bool (*fake_host_takes)(const uint8_t *data, size_t bytes);
+
+static uint8_t selected;
+static uint64_t released_ns;
+static bool released;
+static bool armed;
+static uint32_t alarm_us;
+static uint8_t incoming[512];
+static size_t incoming_bytes;
+static uint64_t seed;
+
+void fake_reset(bt_emu_source source, uint64_t start_ns)
+{
+    memset(&fake, 0, sizeof fake);
+    fake.now_ns = start_ns;
+    fake.shortest_gap_ns = UINT64_MAX;
+    fake.link_up = true;
+    selected = 0;
+    released = false;
+    armed = false;
+    incoming_bytes = 0;
+    seed = 1;
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        char serial[17] = "BTEMU00000000000";
+        serial[15] = (char)('1' + f);
+        bt_emu_init(&fake.sensor[f], f, true, serial, source, NULL);
+    }
+}
+
+bool fake_next_interrupt(void)
+{
+    if (!armed) {
+        return false;
+    }
+    // The alarm's time in 64 bits, from a difference modulo 2^32 as port.h defines it.
+    int32_t ahead_us = (int32_t)(alarm_us - port_now_us());
+    uint64_t at_ns = ahead_us > 0 ? (fake.now_ns / 1000 + (uint64_t)ahead_us) * 1000 : fake.now_ns;
+    if (fake.latency_ns > 0) {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        at_ns += seed % fake.latency_ns;
+    }
+    at_ns += fake.held_off_ns;
+    fake.held_off_ns = 0;
+    fake.now_ns = at_ns > fake.now_ns ? at_ns : fake.now_ns;
+    armed = false;
+    bt_port_alarm();
+    return true;
+}
+
+void fake_interrupts_until(uint64_t end_ns)
+{
+    while (fake.now_ns < end_ns && fake_next_interrupt()) {
+    }
+}
+
+void fake_host_sends(const uint8_t *data, size_t bytes)
+{
+    memcpy(incoming + incoming_bytes, data, bytes);
+    incoming_bytes += bytes;
+}
+
+// ---- port.h ------------------------------------------------------------------------------------
+
+uint32_t port_now_us(void)
+{
+    return (uint32_t)(fake.now_ns / 1000);
+}
+
+void port_delay_us(uint32_t us)
+{
+    fake.now_ns += (uint64_t)us * 1000;
+}
+
+void port_alarm_at(uint32_t at_us)
+{
+    alarm_us = at_us;
+    armed = true;
+}
+
+void port_spi_select(uint8_t mask)
+{
+    if (selected == 0 && mask != 0 && released && fake.now_ns - released_ns < fake.shortest_gap_ns) {
+        fake.shortest_gap_ns = fake.now_ns - released_ns;
+    }
+    if (selected != 0 && mask == 0) {
+        released_ns = fake.now_ns;
+        released = true;
+    }
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_emu_select(&fake.sensor[f], mask >> f & 1, fake.now_ns);
+    }
+    selected = mask;
+}
+
+uint16_t port_spi_transfer16(uint16_t mosi)
+{
+    uint16_t miso = 0;
+    if (mosi & 0x8000) {
+        sent_command command = {.t_ns = fake.now_ns, .mosi = mosi, .mask = selected};
+        if (fake.on_command != NULL) {
+            fake.on_command(&command);
+        }
+    } else if (selected == 0 || (selected & (selected - 1)) != 0) {
+        fake.selected_reads++;
+    }
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (selected >> f & 1) {
+            miso |= bt_emu_transfer16(&fake.sensor[f], mosi, fake.now_ns);
+        }
+    }
+    fake.now_ns += TRANSFER_NS;
+    return miso;
+}
+
+bool port_link_write(const uint8_t *data, size_t bytes)
+{
+    return fake_host_takes(data, bytes);
+}
+
+size_t port_link_read(uint8_t *data, size_t bytes)
+{
+    size_t n = incoming_bytes < bytes ? incoming_bytes : bytes;
+    memcpy(data, incoming, n);
+    incoming_bytes -= n;
+    memmove(incoming, incoming + n, incoming_bytes);
+    return n;
+}
+
+bool port_link_up(void)
+{
+    return fake.link_up;
+}
+
+uint16_t port_board(void)
+{
+    return BT_BOARD_POSIX_SIM;
+}
+
+void port_board_serial(uint8_t serial[12])
+{
+    memcpy(serial, "fake-board-1", 12);
+}
+
+uint32_t port_boot_id(void)
+{
+    return 42;
+}

@@ -1,0 +1,51 @@
+// port.h on a virtual clock, around five emulated sensors: the whole firmware without a board.
+// Time passes only as the firmware spends it, or as the test lets it.
+#ifndef BIOTAC_TEST_FAKE_PORT_H
+#define BIOTAC_TEST_FAKE_PORT_H
+
+#include "device.h"
+#include "sensor_gen.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+// One sample command as it was clocked out.
+typedef struct {
+    uint64_t t_ns;
+    uint16_t mosi;
+    uint8_t mask; // chip selects that were low
+} sent_command;
+
+typedef struct {
+    uint64_t now_ns;
+    bt_emu_device sensor[BT_MAX_FINGERS];
+    uint64_t latency_ns;  // from the alarm's time to its interrupt: at most this, at random
+    uint64_t held_off_ns; // the next interrupt comes this much later, once
+
+    // What the bus saw.
+    void (*on_command)(const sent_command *command); // may be NULL
+    uint64_t shortest_gap_ns;                        // between a chip select's rise and the next one's fall
+    uint32_t selected_reads;                         // reads with other than one chip select low
+
+    bool link_up;
+} fake_port;
+
+extern fake_port fake;
+
+// Sensors all present, their counts from source, the clock at start_ns.
+void fake_reset(bt_emu_source source, uint64_t start_ns);
+
+// Interrupts alone until end_ns: the main loop is busy elsewhere.
+void fake_interrupts_until(uint64_t end_ns);
+
+// The next interrupt; false when no alarm is set.
+bool fake_next_interrupt(void);
+
+// Bytes that port_link_read will give.
+void fake_host_sends(const uint8_t *data, size_t bytes);
+
+// Where port_link_write goes. Set before the firmware runs.
+extern bool (*fake_host_takes)(const uint8_t *data, size_t bytes);
+
+#endif

@@ -1,0 +1,120 @@
+// The whole firmware over the fake port, with sensors whose every count tells where it belongs, and
+// a host that keeps what it receives. Include once per executable: it holds the state.
+#ifndef BIOTAC_TEST_RIG_H
+#define BIOTAC_TEST_RIG_H
+
+#include "support.h"
+
+#include "fake_port.h"
+#include "framing.h"
+#include "gateway.h"
+#include "port.h"
+
+#define ROUND_NS   10000000ull
+#define MAX_ROUNDS 6100
+#define START_NS   1234567ull
+
+static bt_gateway gateway;
+
+void bt_port_alarm(void)
+{
+    bt_gateway_alarm(&gateway);
+}
+
+// ---- sensors -------------------------------------------------------------------------------------
+
+static struct {
+    uint8_t finger;
+    uint16_t fault; // what the finger's samples are
+    bool absent;
+    uint32_t one_in; // of so many samples; 0: none
+} trouble;
+
+static uint64_t first_command_ns;
+
+static inline uint16_t source(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
+{
+    (void)context;
+    if (first_command_ns == 0) {
+        first_command_ns = t_ns;
+    }
+    // Rounded to slots: some ns of latency must not change the data.
+    uint64_t slot = ((t_ns - first_command_ns) * BT_SLOT_HZ + 500000000ull) / 1000000000ull;
+    uint64_t mixed = (slot / BT_SLOTS * 64 + channel + 1u) * 0x9E3779B97F4A7C15ull;
+    mixed += (uint64_t)finger * 0xC2B2AE3D27D4EB4Full;
+    if (finger == trouble.finger && trouble.one_in != 0 && (mixed >> 20) % trouble.one_in == 0) {
+        return trouble.fault;
+    }
+    return (uint16_t)(1500u + 300u * finger + 10u * channel + (mixed >> 40) % 8);
+}
+
+// ---- what the host received -----------------------------------------------------------------------
+
+static struct {
+    bt_msg_frame frame[BT_MAX_FINGERS][MAX_ROUNDS];
+    int frames[BT_MAX_FINGERS];
+    bt_msg_pac pac[BT_MAX_FINGERS][MAX_ROUNDS];
+    bt_deframer deframer;
+} host;
+
+static inline bool take(const uint8_t *data, size_t bytes)
+{
+    for (size_t k = 0; k < bytes; k++) {
+        enum bt_deframed outcome = bt_deframer_push(&host.deframer, data[k]);
+        assert_true(outcome == BT_DEFRAMED_NOTHING || outcome == BT_DEFRAMED_GOOD);
+        if (outcome != BT_DEFRAMED_GOOD) {
+            continue;
+        }
+        const uint8_t *payload = host.deframer.buffer + 1;
+        uint8_t finger = payload[6];
+        if (host.deframer.id == BT_FRAME_ID) {
+            assert_true(host.frames[finger] < MAX_ROUNDS);
+            bt_msg_frame_unpack(&host.frame[finger][host.frames[finger]++], payload);
+        } else if (host.deframer.id == BT_PAC_ID) {
+            bt_msg_pac_unpack(&host.pac[finger][host.frames[finger] - 1], payload);
+        }
+    }
+    return true;
+}
+
+static uint64_t t0_ns; // of the first sample command
+
+static inline void boot(uint64_t start_ns)
+{
+    uint8_t encoded[BT_ENCODED_MAX_BYTES];
+    uint8_t payload[BT_START_BYTES];
+    bt_msg_start msg = {1, BT_STREAM_FLAG_FRAMES | BT_STREAM_FLAG_PAC, 0x1F, 0};
+    memset(&host, 0, sizeof host);
+    memset(&gateway, 0, sizeof gateway);
+    first_command_ns = 0;
+    fake_reset(source, start_ns);
+    fake_host_takes = take;
+    fake.sensor[trouble.finger].present = !trouble.absent;
+    bt_gateway_init(&gateway);
+    t0_ns = (uint64_t)gateway.sampler.slot_start_us * 1000;
+    bt_msg_start_pack(&msg, payload);
+    fake_host_sends(encoded, bt_frame_encode(BT_START_ID, payload, sizeof payload, encoded));
+    bt_gateway_poll(&gateway);
+}
+
+static inline void run_until(uint64_t end_ns)
+{
+    while (fake.now_ns < end_ns) {
+        assert_true(fake_next_interrupt());
+        bt_gateway_poll(&gateway);
+    }
+}
+
+static inline void run_rounds(uint64_t n)
+{
+    run_until(fake.now_ns + n * ROUND_NS);
+}
+
+static inline int no_trouble(void **state)
+{
+    (void)state;
+    memset(&trouble, 0, sizeof trouble);
+    return 0;
+}
+
+#endif

@@ -1,0 +1,263 @@
+// The emulated sensor against the data sheet's rules, bit by bit.
+#include "support.h"
+
+#include "device.h"
+#include "sensor_gen.h"
+#include "wire_gen.h"
+#include "word.h"
+
+static bt_emu_device device;
+static uint16_t next_count;
+static uint8_t asked_channel;
+static int samples;
+
+static uint16_t source(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
+{
+    (void)t_ns;
+    assert_ptr_equal(context, &device);
+    assert_int_equal(finger, 2);
+    asked_channel = channel;
+    samples++;
+    return next_count;
+}
+
+static int new_device(void **state)
+{
+    (void)state;
+    bt_emu_init(&device, 2, true, "BT0123456789ABCD", source, &device);
+    next_count = 2048;
+    samples = 0;
+    return 0;
+}
+
+// One transfer in its own chip select; it takes no time, so that the edges are exact.
+static uint16_t transfer(uint16_t mosi, uint64_t t_ns)
+{
+    bt_emu_select(&device, true, t_ns);
+    uint16_t miso = bt_emu_transfer16(&device, mosi, t_ns);
+    bt_emu_select(&device, false, t_ns);
+    return miso;
+}
+
+static uint16_t sample(uint8_t command, uint64_t t_ns)
+{
+    (void)transfer((uint16_t)(command << 8), t_ns);
+    return transfer(BT_LISTEN_WORD, t_ns + 50000);
+}
+
+static int ones(unsigned byte)
+{
+    int n = 0;
+    for (; byte != 0; byte >>= 1) {
+        n += (int)(byte & 1);
+    }
+    return n;
+}
+
+static void fifty_microseconds_are_kept_to_the_nanosecond(void **state)
+{
+    (void)state;
+    for (uint64_t wait_ns = 49980; wait_ns <= 50020; wait_ns++) {
+        (void)new_device(NULL);
+        (void)transfer(0xA200, 1000000);
+        uint16_t word = transfer(BT_LISTEN_WORD, 1000000 + wait_ns);
+        if (wait_ns < 50000) {
+            assert_int_equal(word, 0xA52D);
+            assert_int_equal(device.early_reads, 1);
+        } else {
+            assert_int_equal(word, 0x8001 | (2048 >> 5) << 9); // 1000000 P, 00000 00 P
+            assert_int_equal(device.early_reads, 0);
+        }
+    }
+}
+
+static void the_wait_counts_from_the_rising_edge_not_from_the_command(void **state)
+{
+    (void)state;
+    bt_emu_select(&device, true, 0);
+    (void)bt_emu_transfer16(&device, 0xA200, 0);
+    bt_emu_select(&device, false, 30000); // chip select held low for 30 us after the command
+    assert_int_equal(transfer(BT_LISTEN_WORD, 79999), 0xA52D);
+    (void)transfer(0xA200, 100000);
+    assert_int_not_equal(transfer(BT_LISTEN_WORD, 150000), 0xA52D);
+}
+
+static void every_count_comes_in_two_bytes_of_odd_parity(void **state)
+{
+    (void)state;
+    for (int count = 0; count <= 4095; count++) {
+        uint16_t decoded;
+        next_count = (uint16_t)count;
+        uint16_t word = sample(0xA2, 1000000);
+        assert_int_equal(ones(word >> 8) % 2, 1);
+        assert_int_equal(ones(word & 0xFF) % 2, 1);
+        assert_int_equal(word & 0x0006, 0);
+        assert_int_equal((word >> 9) * 32 + ((word & 0xFF) >> 3), count);
+        assert_int_equal(bt_word_decode(word, &decoded), BT_WORD_GOOD);
+        assert_int_equal(decoded, count);
+    }
+}
+
+static void no_other_word_is_taken_for_data(void **state)
+{
+    (void)state;
+    int good = 0;
+    for (unsigned word = 0; word <= 0xFFFF; word++) {
+        uint16_t count;
+        enum bt_word kind = bt_word_decode((uint16_t)word, &count);
+        bool odd = ones(word >> 8) % 2 == 1 && ones(word & 0xFF) % 2 == 1;
+        assert_int_equal(kind == BT_WORD_GOOD, odd);
+        assert_int_equal(kind == BT_WORD_STUCK, word == 0 || word == 0xFFFF);
+        assert_int_equal(kind == BT_WORD_ERROR, !odd && word >> 8 == 0xA5);
+        assert_true(kind == BT_WORD_GOOD ? count <= 4095 : count == BT_INVALID_COUNT);
+        good += kind == BT_WORD_GOOD;
+    }
+    assert_int_equal(good, 128 * 128);
+}
+
+static void every_single_bit_error_is_seen(void **state)
+{
+    (void)state;
+    for (int count = 0; count <= 4095; count++) {
+        next_count = (uint16_t)count;
+        uint16_t word = sample(0xA2, 1000000);
+        for (int bit = 0; bit < 16; bit++) {
+            uint16_t decoded;
+            assert_int_not_equal(bt_word_decode((uint16_t)(word ^ 1u << bit), &decoded), BT_WORD_GOOD);
+            assert_int_equal(decoded, BT_INVALID_COUNT);
+        }
+    }
+}
+
+static void one_sample_is_never_answered_twice(void **state)
+{
+    (void)state;
+    assert_int_equal(transfer(BT_LISTEN_WORD, 10), BT_ERROR_WORD_NO_DATA);
+    (void)sample(0xA2, 1000000);
+    assert_int_equal(transfer(BT_LISTEN_WORD, 2000000), BT_ERROR_WORD_NO_DATA);
+    bt_emu_select(&device, true, 3000000); // nor twice within one chip select
+    (void)bt_emu_transfer16(&device, 0xA200, 3000000);
+    bt_emu_select(&device, false, 3000000);
+    bt_emu_select(&device, true, 3060000);
+    assert_int_not_equal(bt_emu_transfer16(&device, BT_LISTEN_WORD, 3060000), BT_ERROR_WORD_NO_DATA);
+    assert_int_equal(bt_emu_transfer16(&device, BT_LISTEN_WORD, 3064000), BT_ERROR_WORD_NO_DATA);
+}
+
+static void the_sample_is_taken_at_the_command_and_a_new_one_replaces_it(void **state)
+{
+    (void)state;
+    (void)transfer(0xA200, 0);
+    next_count = 17;
+    assert_int_equal(transfer(BT_LISTEN_WORD, 60000) >> 9, 2048 >> 5);
+    (void)transfer(0xA200, 100000);
+    next_count = 3000;
+    uint16_t count;
+    (void)bt_word_decode(sample(0xA4, 200000), &count); // the first was never read
+    assert_int_equal(count, 3000);
+}
+
+static void only_odd_command_bytes_are_obeyed(void **state)
+{
+    (void)state;
+    for (unsigned command = 0x80; command <= 0xFF; command++) {
+        samples = 0;
+        uint16_t word = sample((uint8_t)command, command * 1000000ull);
+        if (ones(command) % 2 == 1) {
+            assert_int_equal(samples, 1);
+            assert_int_equal(asked_channel, (command & 0x7E) >> 1);
+        } else {
+            assert_int_equal(samples, 0);
+            assert_int_equal(word, 0xA545);
+        }
+    }
+}
+
+static void the_second_byte_of_a_sample_command_is_ignored(void **state)
+{
+    (void)state;
+    for (unsigned low = 0; low <= 0xFF; low++) {
+        (void)transfer((uint16_t)(0xA200 | low), low * 1000000);
+        assert_int_equal(transfer(BT_LISTEN_WORD, low * 1000000 + 50000) >> 9, 2048 >> 5);
+    }
+}
+
+static void unknown_commands_are_refused_by_word(void **state)
+{
+    (void)state;
+    assert_int_equal(sample(0x40, 0), 0xA53F);
+    assert_int_equal(sample(0x61, 1000000), 0xA53F); // property 0x00
+}
+
+static void every_fault_shows_on_the_bus_as_itself(void **state)
+{
+    (void)state;
+    static const struct {
+        uint16_t fault, word;
+        enum bt_word kind;
+    } table[] = {
+        {BT_EMU_TOO_EARLY, 0xA52D, BT_WORD_ERROR},
+        {BT_EMU_STUCK_HIGH, 0xFFFF, BT_WORD_STUCK},
+        {BT_EMU_STUCK_LOW, 0x0000, BT_WORD_STUCK},
+        {BT_EMU_NO_CHANNEL, 0xA558, BT_WORD_ERROR},
+    };
+    uint16_t count;
+    for (size_t k = 0; k < sizeof table / sizeof *table; k++) {
+        next_count = table[k].fault;
+        uint16_t word = sample(0xA2, k * 1000000);
+        assert_int_equal(word, table[k].word);
+        assert_int_equal(bt_word_decode(word, &count), table[k].kind);
+        assert_int_equal(count, BT_INVALID_COUNT);
+    }
+    next_count = BT_EMU_BAD_PARITY;
+    assert_int_equal(bt_word_decode(sample(0xA2, 9000000), &count), BT_WORD_PARITY);
+    device.present = false;
+    assert_int_equal(sample(0xA2, 10000000), 0x0000);
+}
+
+static void read_property(uint8_t selector, uint8_t *out, int bytes)
+{
+    (void)transfer((uint16_t)(BT_PROPERTY_READ_COMMAND << 8 | selector), 0);
+    bt_emu_select(&device, true, 60000);
+    for (int k = 0; k < bytes; k += 2) {
+        uint16_t word = bt_emu_transfer16(&device, BT_LISTEN_WORD, 60000 + 4000u * (unsigned)k);
+        out[k] = (uint8_t)(word >> 8);
+        out[k + 1] = (uint8_t)word;
+    }
+    bt_emu_select(&device, false, 200000);
+}
+
+static void properties_are_plain_bytes_padded_with_zeros(void **state)
+{
+    (void)state;
+    uint8_t out[20];
+    read_property(0x15, out, 20);
+    assert_memory_equal(out, "BT0123456789ABCD\0\0\0\0", 20);
+    read_property(0x10, out, 4);
+    assert_true(out[0] != 0 && out[1] != 0 && out[2] == 0 && out[3] == 0);
+    read_property(0x13, out, 4);
+    assert_true(out[0] >= '0' && out[0] <= '9' && out[3] >= '0' && out[3] <= '9');
+    read_property(0x70, out, 2);
+    assert_int_equal(out[0] * 256 + out[1], 4400);
+    (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x15, 0);
+    assert_int_equal(transfer(BT_LISTEN_WORD, 49999), 0xA52E); // too early, by another word
+}
+
+#define T(name) cmocka_unit_test_setup(name, new_device)
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(fifty_microseconds_are_kept_to_the_nanosecond),
+        T(the_wait_counts_from_the_rising_edge_not_from_the_command),
+        T(every_count_comes_in_two_bytes_of_odd_parity),
+        T(no_other_word_is_taken_for_data),
+        T(every_single_bit_error_is_seen),
+        T(one_sample_is_never_answered_twice),
+        T(the_sample_is_taken_at_the_command_and_a_new_one_replaces_it),
+        T(only_odd_command_bytes_are_obeyed),
+        T(the_second_byte_of_a_sample_command_is_ignored),
+        T(unknown_commands_are_refused_by_word),
+        T(every_fault_shows_on_the_bus_as_itself),
+        T(properties_are_plain_bytes_padded_with_zeros),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
