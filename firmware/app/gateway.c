@@ -63,7 +63,7 @@ static void take_slot(bt_gateway *gateway, const bt_slot *slot)
         gateway->round_open = false;
     }
     if (!gateway->round_open) {
-        uint32_t t_us = slot->t_us - slot->slot * (1000000u / BT_SLOT_HZ);
+        uint32_t t_us = slot->t_us - slot->slot * 1000000u / BT_SLOT_HZ;
         for (int f = 0; f < BT_MAX_FINGERS; f++) {
             bt_finger_begin(&session->finger[f], t_us);
         }

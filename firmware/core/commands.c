@@ -36,17 +36,19 @@ static void hello(bt_session *session, const uint8_t *payload)
     bt_session_send(session, BT_HELLO_ID, out);
 }
 
-static uint8_t start(bt_session *session, const uint8_t *payload, uint32_t now_us)
+static uint8_t start(bt_session *session, const uint8_t *payload)
 {
     bt_msg_start msg;
     bt_msg_start_unpack(&msg, payload);
+    if (msg.streams & ~(BT_STREAM_FLAG_FRAMES | BT_STREAM_FLAG_PAC | BT_STREAM_FLAG_STATUS)) {
+        return BT_ERROR_OUT_OF_RANGE;
+    }
     if (msg.fingers >> BT_MAX_FINGERS != 0) {
         return BT_ERROR_NO_SUCH_FINGER;
     }
     session->streams = msg.streams;
     session->fingers = msg.fingers;
     session->keepalive_ms = msg.keepalive_ms;
-    session->heard_us = now_us;
     return BT_ERROR_OK;
 }
 
@@ -78,7 +80,7 @@ static uint8_t tare_set(bt_session *session, const uint8_t *payload)
     if (msg.pdc_tare_q4 > BT_E_MAX_Q4 && msg.pdc_tare_q4 != BT_INVALID_COUNT) {
         return BT_ERROR_OUT_OF_RANGE;
     }
-    base.pdc_q16 = msg.pdc_tare_q4 == BT_INVALID_COUNT ? BT_PDC_UNKNOWN : (uint32_t)msg.pdc_tare_q4 << 12;
+    base.pdc_q16 = msg.pdc_tare_q4 == BT_INVALID_COUNT ? BT_TARE_UNKNOWN : (uint32_t)msg.pdc_tare_q4 << 12;
     return bt_tare_set(&session->finger[msg.finger].tare, &base);
 }
 
@@ -122,8 +124,9 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
     if (id < 0x80) {
         return; // one of our own, echoed by a terminal driver
     }
+    session->heard_us = now_us;
     if (payload == NULL) {
-        reply(session, 0, id, BT_ERROR_BAD_LENGTH);
+        reply(session, 0, id, bt_wire_payload_bytes(id) < 0 ? BT_ERROR_UNKNOWN_COMMAND : BT_ERROR_BAD_LENGTH);
         return;
     }
     uint8_t req_id = payload[0];
@@ -133,7 +136,7 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         hello(session, payload);
         return;
     case BT_START_ID:
-        error = start(session, payload, now_us);
+        error = start(session, payload);
         break;
     case BT_STOP_ID:
         session->streams = 0;

@@ -120,8 +120,7 @@ void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_sett
     msg->flags = channel_flags(frame) | BT_FRAME_FLAG_MX_DERIVED | BT_FRAME_FLAG_FX_WEAK;
     msg->tare_state = tare->state;
     msg->flags |= tare->changed ? BT_FRAME_FLAG_TARE_CHANGED : 0;
-    msg->pdc_tare_q4 =
-        tare->base.pdc_q16 == BT_PDC_UNKNOWN ? BT_INVALID_COUNT : bt_tare_q4(tare->base.pdc_q16);
+    msg->pdc_tare_q4 = bt_tare_q4(tare->base.pdc_q16);
     for (int i = 0; i < BT_ELECTRODES; i++) {
         msg->tare_q4[i] = bt_tare_q4(tare->base.electrode_q16[i]);
     }

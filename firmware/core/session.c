@@ -34,7 +34,6 @@ void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, 
         enum bt_deframed outcome = bt_deframer_push(&session->deframer, data[k]);
         if (outcome == BT_DEFRAMED_GOOD) {
             session->rx_frames++;
-            session->heard_us = now_us;
             bool empty = session->deframer.payload_bytes == 0; // of an unknown id; no req_id in it
             bt_command(session, session->deframer.id, empty ? NULL : session->deframer.buffer + 1, now_us);
         } else if (outcome == BT_DEFRAMED_BAD_LENGTH) {

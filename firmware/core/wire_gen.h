@@ -178,8 +178,8 @@ typedef struct {
     int16_t poc_um[3]; // [um] point of contact on the core's surface
     int32_t force_100un[3]; // [100 uN] force on the finger
     int32_t torque_mnmm[3]; // [mN*mm] torque on the finger about the origin; x is derived
-    uint16_t tare_q4[19]; // [count q4] tare subtracted from counts for these results
-    uint16_t pdc_tare_q4; // [count q4] pressure at rest
+    uint16_t tare_q4[19]; // [count q4] tare subtracted from counts for these results; 0xFFFF for an electrode never read
+    uint16_t pdc_tare_q4; // [count q4] pressure at rest; 0xFFFF when never read
 } bt_msg_frame;
 void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES]);
 void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES]);
@@ -206,8 +206,8 @@ typedef struct {
     uint8_t tare_state; // [enum tare_state] after the change
     uint8_t reason; // [enum tare_reason] why
     uint32_t noise_count2; // [count^2] noise energy over 19 electrodes at rest; 0 until measured
-    uint32_t tare_q16[19]; // [count q16] new tare
-    uint32_t pdc_tare_q16; // [count q16] new pressure at rest
+    uint32_t tare_q16[19]; // [count q16] new tare; 0xFFFFFFFF for an electrode never read
+    uint32_t pdc_tare_q16; // [count q16] new pressure at rest; 0xFFFFFFFF when never read
 } bt_msg_tare;
 void bt_msg_tare_pack(const bt_msg_tare *msg, uint8_t out[BT_TARE_BYTES]);
 void bt_msg_tare_unpack(bt_msg_tare *msg, const uint8_t in[BT_TARE_BYTES]);

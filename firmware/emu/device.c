@@ -126,7 +126,7 @@ static void take_command(bt_emu_device *device, uint16_t mosi, uint64_t t_ns)
     uint8_t command = (uint8_t)(mosi >> 8);
     if (command & 0x80) {
         if (ones(command) % 2 == 1) {
-            latch_sample(device, (command & 0x7E) >> 1, t_ns);
+            latch_sample(device, (uint8_t)((command & 0x7E) >> 1), t_ns);
         } else {
             device->pending = REFUSAL;
             device->word = BT_ERROR_WORD_COMMAND_PARITY;

@@ -83,13 +83,18 @@ def compute(counts: Any, tare: Any, settings: Settings | None = None) -> Results
 def reference(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
     """The same from firmware/reference: Lin 2013 Eq 1-4 in float64. Arguments as compute()."""
     raw, tare_q4 = checked(counts, tare)
-    chosen = settings or default_settings()
+    return reference_q4(raw, tare_q4, settings or default_settings())
+
+
+def reference_q4(counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settings: Settings) -> Results:
+    """reference() on the integers of FRAME messages, both (n, 19); no check, the wire had one."""
+    raw, tare_q4 = np.ascontiguousarray(counts), np.ascontiguousarray(tare_q4)
     gains = ffi.new(
         "lin2013_settings *",
         {
-            "poc_weights": chosen[wire.Setting.POC_WEIGHTS],
-            "force_gain": [chosen[s] / NN_PER_N for s in FORCE_GAINS],
-            "torque_gain": [chosen[s] / NN_PER_N for s in TORQUE_GAINS],
+            "poc_weights": settings[wire.Setting.POC_WEIGHTS],
+            "force_gain": [settings[s] / NN_PER_N for s in FORCE_GAINS],
+            "torque_gain": [settings[s] / NN_PER_N for s in TORQUE_GAINS],
         },
     )
     out = [np.empty((len(raw), 3), np.float64) for _ in range(3)]

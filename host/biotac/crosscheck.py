@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import _wire as wire
-from .core import Settings, reference
+from .core import Settings, reference_q4
 from .frames import StructArray, to_units
 
 # um per axis: 0.5 for the published um, 0.0005 for the nm before it, 0.0005 for the square root.
@@ -57,7 +57,7 @@ class CrossCheck:
         flags = messages["flags"]
         untared = (flags & wire.FrameFlags.UNTARED) != 0
         saturated = (flags & wire.FrameFlags.SATURATED) != 0
-        truth = reference(messages["counts"], messages["tare_q4"] / 16.0, settings)
+        truth = reference_q4(messages["counts"], messages["tare_q4"], settings)
         for name, got, want, scale, bound in (
             ("PoC", to_units(messages["poc_um"], 1), truth.poc_mm * 1e3, "um", POC_BOUND_UM),
             ("force", to_units(messages["force_100un"], 10), truth.force_n * 1e3, "mN", FORCE_BOUND_MN),

@@ -102,7 +102,7 @@ def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any
 
 
 def electrode_signals(messages: StructArray) -> NDArray[np.float64]:
-    """e = count - tare of FRAME messages, in counts, shape (n, 19); NaN for a missing electrode."""
-    counts = messages["counts"]
-    e = counts - messages["tare_q4"] / 16.0
-    return np.where(counts == INVALID_COUNT, np.nan, e)
+    """e = count - tare of FRAME messages, in counts, shape (n, 19); NaN where either is missing."""
+    counts, tare_q4 = messages["counts"], messages["tare_q4"]
+    missing = (counts == INVALID_COUNT) | (tare_q4 == INVALID_COUNT)
+    return np.where(missing, np.nan, counts - tare_q4 / 16.0)
