@@ -14,7 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
-from protogen import c_sensor, c_wire, docs, python_code, schema  # noqa: E402
+from protogen import c_fold, c_sensor, c_wire, docs, python_code, schema  # noqa: E402
 
 
 def outputs(root: Path) -> dict[Path, str]:
@@ -23,6 +23,8 @@ def outputs(root: Path) -> dict[Path, str]:
     return {
         root / "firmware/core/sensor_gen.h": c_sensor.header(contract),
         root / "firmware/core/sensor_gen.c": c_sensor.source(contract),
+        root / "firmware/core/fold_gen.h": c_fold.header(contract),
+        root / "firmware/core/fold_gen.c": c_fold.source(contract),
         root / "firmware/core/wire_gen.h": c_wire.header(contract),
         root / "firmware/core/wire_gen.c": c_wire.source(contract),
         root / "host/biotac/_sensor.py": python_code.sensor(contract),

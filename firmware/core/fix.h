@@ -1,10 +1,19 @@
-// The one place where the core rounds and saturates.
+// The one place where the core rounds, saturates and divides.
 // Rounding is half away from zero (protocol/SPEC.md); saturation stops one short of the type's
 // minimum, which means "invalid" on the wire.
 #ifndef BIOTAC_FIX_H
 #define BIOTAC_FIX_H
 
 #include <stdint.h>
+
+// 32-bit unsigned division. A board with a hardware divider defines it in its build; every
+// definition gives the same quotient.
+#ifndef BT_DIVIDE_U32
+#define BT_DIVIDE_U32(num, den) ((num) / (den))
+#endif
+
+// For generated sums that are cheaper called than inlined.
+#define BT_NOINLINE __attribute__((noinline))
 
 // num / den for den > 0. Works on magnitudes, so that -2.5 and 2.5 both move away from zero, and
 // never adds to num, so that no input near INT64_MAX can wrap.
@@ -19,23 +28,69 @@ static inline int64_t bt_div_round(int64_t num, int64_t den)
     return quotient;
 }
 
+// The same for a magnitude below 2^32 - den / 2: one 32-bit division.
+static inline uint32_t bt_div_round_u32(uint32_t num, uint32_t den)
+{
+    return BT_DIVIDE_U32(num + den / 2, den);
+}
+
 static inline int64_t bt_clamp(int64_t value, int64_t low, int64_t high)
 {
     return value < low ? low : value > high ? high : value;
 }
 
-// value held within +-INT32_MAX; *saturated is set, never cleared.
-static inline int32_t bt_saturate_i32(int64_t value, int *saturated)
-{
-    if (value > INT32_MAX || value < -INT32_MAX) {
-        *saturated = 1;
-    }
-    return (int32_t)bt_clamp(value, -INT32_MAX, INT32_MAX);
-}
-
 static inline uint64_t bt_abs(int64_t value)
 {
     return value < 0 ? 0 - (uint64_t)value : (uint64_t)value;
+}
+
+static inline uint32_t bt_abs32(int32_t value)
+{
+    return value < 0 ? 0 - (uint32_t)value : (uint32_t)value;
+}
+
+static inline int32_t bt_with_sign(uint32_t magnitude, int32_t sign)
+{
+    return sign < 0 ? -(int32_t)magnitude : (int32_t)magnitude;
+}
+
+// value / 2^bits towards minus infinity. Right-shifting a negative number is the compiler's choice;
+// every one we use copies the sign, and this line fails to compile with one that does not.
+_Static_assert(-1 >> 1 == -1, "the compiler must shift signed numbers arithmetically");
+static inline int32_t bt_shift_down(int32_t value, int bits)
+{
+    return value >> bits;
+}
+
+// (hi * 2^bits + lo) / 2^bits as a magnitude with a sign, so that opposite sums give opposite results.
+// Rounded up from a remainder of `from` on: 2^(bits - 1) rounds half away from zero, 2^bits towards 0.
+static inline int32_t bt_join(int32_t hi, int32_t lo, int bits, int32_t from)
+{
+    int32_t whole = hi + bt_shift_down(lo, bits);
+    int32_t rest = lo & ((1 << bits) - 1);
+    if (whole >= 0) {
+        return whole + (rest >= from);
+    }
+    if (rest != 0) { // whole was rounded down, away from zero
+        whole++;
+        rest = (1 << bits) - rest;
+    }
+    return whole - (rest >= from);
+}
+
+// value * multiplier / 2^(32 + bits), rounded half away from zero. multiplier <= 2^30, bits 1..7.
+// Four 16-bit products: a core without a long multiply would call a 64-bit routine instead. The sum
+// of the middle products stays below 2^32 because |value| < 2^31 and multiplier <= 2^30.
+static inline int32_t bt_scale(int32_t value, uint32_t multiplier, int bits)
+{
+    uint32_t magnitude = bt_abs32(value);
+    uint32_t high = magnitude >> 16;
+    uint32_t low = magnitude & 0xFFFF;
+    uint32_t m_high = multiplier >> 16;
+    uint32_t m_low = multiplier & 0xFFFF;
+    uint32_t middle = high * m_low + low * m_high + (low * m_low >> 16);
+    uint32_t top = high * m_high + (middle >> 16);
+    return bt_with_sign((top + (1u << (bits - 1))) >> bits, value);
 }
 
 #endif

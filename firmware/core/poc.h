@@ -1,7 +1,7 @@
-// Point of contact on the core's surface: Lin 2013 Eq 1 and 2, fused.
+// Point of contact on the core's surface: Lin 2013 Eq 1 and 2, fused, in 32-bit arithmetic.
 // In: signals e = count - tare in 1/16 count (q4), |e| <= 4095 counts; compression is negative.
-// Out: nm, rounded half away from zero; exact sums, so the error is below 1 nm per axis plus the
-// square root's 2^-30.
+// Out: um and 1/8 um, rounded half away from zero; within 1.1 um of the exact point
+// (tests/core/test_kernels.c), of which 0.87 um is the rounding to whole um itself.
 #ifndef BIOTAC_POC_H
 #define BIOTAC_POC_H
 
@@ -11,8 +11,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-// weights is an enum bt_poc_weights. Returns false, leaving poc_nm alone, when no electrode weighs
+typedef struct {
+    int16_t um[3];
+    int32_t fine_yz_um_q3[2]; // y and z in 1/8 um, for the lever of torque x
+} bt_point;
+
+// weights is an enum bt_poc_weights. Returns false, leaving point alone, when no electrode weighs
 // anything (every e is 0, or none is compressed): that is the only input without an answer.
-bool bt_poc(const int32_t e_q4[BT_ELECTRODES], int weights, int32_t poc_nm[3]);
+bool bt_poc(const int32_t e_q4[BT_ELECTRODES], int weights, bt_point *point);
 
 #endif

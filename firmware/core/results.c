@@ -13,13 +13,14 @@ _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
 
 bt_kernel_settings bt_kernel_settings_from(const bt_settings *settings)
 {
+    int32_t force_nn[3] = {bt_settings_get(settings, BT_SETTING_FORCE_GAIN_X_NN),
+                           bt_settings_get(settings, BT_SETTING_FORCE_GAIN_Y_NN),
+                           bt_settings_get(settings, BT_SETTING_FORCE_GAIN_Z_NN)};
+    int32_t torque_nn[2] = {bt_settings_get(settings, BT_SETTING_TORQUE_GAIN_Y_NN),
+                            bt_settings_get(settings, BT_SETTING_TORQUE_GAIN_Z_NN)};
     bt_kernel_settings kernel = {
         .poc_weights = (int)bt_settings_get(settings, BT_SETTING_POC_WEIGHTS),
-        .force_gain_nn = {bt_settings_get(settings, BT_SETTING_FORCE_GAIN_X_NN),
-                          bt_settings_get(settings, BT_SETTING_FORCE_GAIN_Y_NN),
-                          bt_settings_get(settings, BT_SETTING_FORCE_GAIN_Z_NN)},
-        .torque_gain_nn = {bt_settings_get(settings, BT_SETTING_TORQUE_GAIN_Y_NN),
-                           bt_settings_get(settings, BT_SETTING_TORQUE_GAIN_Z_NN)},
+        .gains = bt_gains_from(force_nn, torque_nn),
         .contact_energy_count2 = (uint32_t)bt_settings_get(settings, BT_SETTING_CONTACT_ENERGY_COUNT2),
     };
     return kernel;
@@ -45,29 +46,21 @@ static void invalidate(int16_t poc_um[3], int32_t force_100un[3], int32_t torque
 uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *settings, int16_t poc_um[3],
                    int32_t force_100un[3], int32_t torque_mnmm[3])
 {
-    int64_t force_un[3];
-    int64_t torque_yz[2];
-    int32_t poc_nm[3];
-    int saturated = 0;
-    uint32_t flags = 0;
-
-    invalidate(poc_um, force_100un, torque_mnmm);
-    bt_force_un(e_q4, settings->force_gain_nn, force_un);
-    bt_torque_yz_mnmm(e_q4, settings->torque_gain_nn, torque_yz);
-    for (int d = 0; d < 3; d++) {
-        force_100un[d] = bt_saturate_i32(bt_div_round(force_un[d], 100), &saturated);
-    }
-    torque_mnmm[1] = bt_saturate_i32(torque_yz[0], &saturated);
-    torque_mnmm[2] = bt_saturate_i32(torque_yz[1], &saturated);
-    if (bt_poc(e_q4, settings->poc_weights, poc_nm)) {
+    bt_point point;
+    bt_force(e_q4, &settings->gains, force_100un);
+    bt_torque_yz(e_q4, &settings->gains, torque_mnmm + 1);
+    if (!bt_poc(e_q4, settings->poc_weights, &point)) {
         for (int d = 0; d < 3; d++) {
-            poc_um[d] = (int16_t)bt_div_round(poc_nm[d], 1000);
+            poc_um[d] = BT_INVALID_I16;
         }
-        torque_mnmm[0] = bt_saturate_i32(bt_torque_x_derived_mnmm(poc_nm, force_un), &saturated);
-    } else {
-        flags |= BT_FRAME_FLAG_POC_INVALID;
+        torque_mnmm[0] = BT_INVALID_I32;
+        return BT_FRAME_FLAG_POC_INVALID;
     }
-    return flags | (saturated ? BT_FRAME_FLAG_SATURATED : 0);
+    for (int d = 0; d < 3; d++) {
+        poc_um[d] = point.um[d];
+    }
+    torque_mnmm[0] = bt_torque_x_derived(point.fine_yz_um_q3, force_100un);
+    return 0;
 }
 
 typedef struct {

@@ -7,12 +7,12 @@
 #include "assembly.h"
 #include "settings.h"
 #include "tare.h"
+#include "wrench.h"
 
 // What the kernels need of the settings, looked up once per change.
 typedef struct {
     int poc_weights;
-    int32_t force_gain_nn[3];
-    int32_t torque_gain_nn[2]; // y, z
+    bt_gains gains;
     uint32_t contact_energy_count2;
 } bt_kernel_settings;
 
@@ -26,8 +26,8 @@ void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_sett
 void bt_signals_q4(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
                    int32_t e_q4[BT_ELECTRODES]);
 
-// From signals to the three results and their invalid marks alone; returns POC_INVALID and
-// SATURATED flags. The host runs recorded counts through this same function.
+// From signals to the three results and their invalid marks alone; returns POC_INVALID or 0. The
+// host runs recorded counts through this same function.
 uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *settings, int16_t poc_um[3],
                    int32_t force_100un[3], int32_t torque_mnmm[3]);
 

@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x89FE539Du
+#define BT_SCHEMA_HASH 0x744EB2CFu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -76,7 +76,6 @@ enum bt_board {
 #define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s: drift has gone untracked
 #define BT_FRAME_FLAG_TARE_CHANGED (1u << 14) // this frame is the first with a new tare (see the TARE message)
 #define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes railed or missing: do not trust the results
-#define BT_FRAME_FLAG_SATURATED (1u << 16) // a force or torque did not fit and is held at the largest value
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME messages

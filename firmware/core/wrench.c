@@ -1,44 +1,93 @@
 #include "wrench.h"
 
 #include "fix.h"
+#include "fold_gen.h"
 
-#define UN_DIVISOR    (16 * 1000 * 1000LL) // 1/16 count * 1/1000 * nN -> uN
-#define MNMM_DIVISOR  (16 * 1000000000LL)  // 1/16 count * um * nN -> mN*mm
-#define LEVER_DIVISOR (1000000000LL)       // nm * uN -> mN*mm
-#define POC_MAX_NM    (BT_ELECTRODE_MAX_UM * 1000LL)
-#define FORCE_MAX_UN  (BT_SUM_NORMAL_MAX_Q4_MILLI * BT_GAIN_MAX_NN / UN_DIVISOR + 1)
+// sum * gain / 1.6e9 is 100 uN: 1/16 count * 1/1000 * nN. sum * gain / 1e9 is mN*mm: count * um * nN.
+// Multiplying by 2^bits / divisor and shifting replaces both divisions.
+#define FORCE_DIVISOR  1600000000LL
+#define FORCE_BITS     34
+#define TORQUE_DIVISOR 1000000000LL
+#define TORQUE_BITS    33
+
+// The lever: 1/8 um * 100 uN is 1/80000 mN*mm; products are split at 13 bits, and 2^13 / 80000 is
+// then applied as a multiplier of 2^33.
+#define LEVER_SPLIT_BITS 13
+#define LEVER_BITS       33
+#define LEVER_MULTIPLIER ((uint32_t)(((1ull << (LEVER_BITS + LEVER_SPLIT_BITS)) + 40000) / 80000))
+
+#define FORCE_MAX_100UN (BT_SUM_NORMAL_MAX_Q4_MILLI * BT_GAIN_MAX_NN / FORCE_DIVISOR + 1)
+#define FINE_MAX_UM_Q3  (8LL * BT_CORE_RADIUS_UM)
 
 _Static_assert(BT_SUM_NORMAL_MAX_Q4_MILLI <= INT32_MAX, "a force sum must fit int32");
-_Static_assert(BT_SUM_NORMAL_MAX_Q4_MILLI <= INT64_MAX / BT_GAIN_MAX_NN, "a scaled force sum must fit int64");
-_Static_assert(BT_SUM_ARM_MAX_Q4_NM / 1000 < INT64_MAX / BT_GAIN_MAX_NN,
-               "a scaled torque sum must fit int64");
-_Static_assert(FORCE_MAX_UN <= INT64_MAX / 2 / POC_MAX_NM, "the lever product must fit int64");
+_Static_assert(BT_FOLD_ARM_HI_MAX <= INT32_MAX && BT_FOLD_ARM_LO_MAX <= INT32_MAX,
+               "torque sums must fit int32");
+_Static_assert(((int64_t)BT_GAIN_MAX_NN << FORCE_BITS) / FORCE_DIVISOR <= 1 << 30,
+               "a force gain must fit bt_scale");
+_Static_assert(((int64_t)BT_GAIN_MAX_NN << TORQUE_BITS) / TORQUE_DIVISOR <= 1 << 30,
+               "a torque gain must fit bt_scale");
+_Static_assert(BT_FOLD_ARM_HI_MAX + (BT_FOLD_ARM_LO_MAX >> BT_FOLD_ARM_SPLIT_BITS) < INT32_MAX,
+               "a joined torque sum must fit int32");
+_Static_assert(1 << BT_FOLD_ARM_SPLIT_BITS == 16 * BT_FOLD_ARM_PER_UM,
+               "a joined torque sum is in count * um");
+_Static_assert(LEVER_MULTIPLIER <= 1 << 30, "the lever's factor must fit bt_scale");
+_Static_assert(2 * FINE_MAX_UM_Q3 * ((FORCE_MAX_100UN >> LEVER_SPLIT_BITS) + 1) < INT32_MAX / 2,
+               "the lever's high products must fit int32");
+_Static_assert(2 * FINE_MAX_UM_Q3 << LEVER_SPLIT_BITS < INT32_MAX, "the lever's low products must fit int32");
 
-void bt_force_un(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[3], int64_t force_un[3])
+static int32_t multiplier(int32_t gain_nn, int bits, int64_t divisor)
 {
+    return (int32_t)bt_div_round(gain_nn * ((int64_t)1 << bits), divisor);
+}
+
+bt_gains bt_gains_from(const int32_t force_nn[3], const int32_t torque_nn[2])
+{
+    bt_gains gains;
     for (int d = 0; d < 3; d++) {
-        int32_t sum = 0;
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            sum += e_q4[i] * bt_normal_milli[i][d];
-        }
-        force_un[d] = bt_div_round((int64_t)sum * gain_nn[d], UN_DIVISOR);
+        gains.force[d] = multiplier(force_nn[d], FORCE_BITS, FORCE_DIVISOR);
     }
-}
-
-void bt_torque_yz_mnmm(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[2], int64_t torque_mnmm[2])
-{
     for (int d = 0; d < 2; d++) {
-        int64_t sum_nm = 0;
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            sum_nm += (int64_t)e_q4[i] * bt_arm_nm[i][d + 1];
-        }
-        // The sum is exact in nm; um is still a thousandth of the published unit for any gain.
-        int64_t sum_um = bt_div_round(sum_nm, 1000);
-        torque_mnmm[d] = bt_div_round(sum_um * gain_nn[d], MNMM_DIVISOR);
+        gains.torque[d] = multiplier(torque_nn[d], TORQUE_BITS, TORQUE_DIVISOR);
+    }
+    return gains;
+}
+
+static int32_t scale(int32_t sum, int32_t gain, int bits)
+{
+    int32_t scaled = bt_scale(sum, bt_abs32(gain), bits - 32);
+    return gain < 0 ? -scaled : scaled;
+}
+
+void bt_force(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t force_100un[3])
+{
+    int32_t sum[3];
+    bt_fold_force(e_q4, sum);
+    for (int d = 0; d < 3; d++) {
+        force_100un[d] = scale(sum[d], gains->force[d], FORCE_BITS);
     }
 }
 
-int64_t bt_torque_x_derived_mnmm(const int32_t poc_nm[3], const int64_t force_un[3])
+void bt_torque_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t torque_mnmm[2])
 {
-    return bt_div_round(poc_nm[1] * force_un[2] - poc_nm[2] * force_un[1], LEVER_DIVISOR);
+    bt_split_sums sums;
+    bt_fold_torque(e_q4, &sums);
+    for (int d = 0; d < 2; d++) {
+        // Signals are in 1/16 count and arms in 1/16 um: hi, split off at 2^8, is in count * um.
+        int32_t half = 1 << (BT_FOLD_ARM_SPLIT_BITS - 1);
+        int32_t sum = bt_join(sums.hi[d + 1], sums.lo[d + 1], BT_FOLD_ARM_SPLIT_BITS, half);
+        torque_mnmm[d] = scale(sum, gains->torque[d], TORQUE_BITS);
+    }
+}
+
+int32_t bt_torque_x_derived(const int32_t poc_yz_um_q3[2], const int32_t force_100un[3])
+{
+    int32_t mask = (1 << LEVER_SPLIT_BITS) - 1;
+    int32_t y = poc_yz_um_q3[0];
+    int32_t z = poc_yz_um_q3[1];
+    int32_t fy = force_100un[1];
+    int32_t fz = force_100un[2];
+    int32_t high = y * bt_shift_down(fz, LEVER_SPLIT_BITS) - z * bt_shift_down(fy, LEVER_SPLIT_BITS);
+    int32_t low = y * (fz & mask) - z * (fy & mask);
+    int32_t lever = bt_join(high, low, LEVER_SPLIT_BITS, 1 << (LEVER_SPLIT_BITS - 1));
+    return bt_scale(lever, LEVER_MULTIPLIER, LEVER_BITS - 32);
 }

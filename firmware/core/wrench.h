@@ -1,6 +1,8 @@
-// Force and torque on the finger: Lin 2013 Eq 3 and 4, one gain per axis.
+// Force and torque on the finger: Lin 2013 Eq 3 and 4, one gain per axis, in 32-bit arithmetic.
 // In: e = count - tare in 1/16 count (q4), |e| <= 4095 counts; gains in nN per count.
 // Force and torque act on the finger; the torque is about the origin (centre of the tip sphere).
+// Outputs round half away from zero. No input overflows: the gains' range sees to it (assertions in
+// wrench.c), so there is nothing to saturate.
 #ifndef BIOTAC_WRENCH_H
 #define BIOTAC_WRENCH_H
 
@@ -8,16 +10,24 @@
 
 #include <stdint.h>
 
+// Gains as the sums are multiplied by them, worked out once per change of settings.
+typedef struct {
+    int32_t force[3];  // 100 uN per (1/16 count * 1/1000), times 2^34
+    int32_t torque[2]; // y, z: mN*mm per (count * um), times 2^33
+} bt_gains;
+
 #define BT_GAIN_MAX_NN 100000000 // the largest gain that link.toml lets through
 
-// Force in uN, rounded half away from zero; cannot overflow.
-void bt_force_un(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[3], int64_t force_un[3]);
+bt_gains bt_gains_from(const int32_t force_nn[3], const int32_t torque_nn[2]);
 
-// Torque y and z in mN*mm, rounded half away from zero; cannot overflow. gain_nn holds y and z.
-void bt_torque_yz_mnmm(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[2], int64_t torque_mnmm[2]);
+// Force in 100 uN.
+void bt_force(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t force_100un[3]);
+
+// Torque y and z in mN*mm.
+void bt_torque_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t torque_mnmm[2]);
 
 // Torque x from the lever, in mN*mm: (c x F)_x. Only E8 and E9 have any moment arm about x, so
 // Eq 4 cannot measure it; what is published is this derived value, and it is flagged so.
-int64_t bt_torque_x_derived_mnmm(const int32_t poc_nm[3], const int64_t force_un[3]);
+int32_t bt_torque_x_derived(const int32_t poc_yz_um_q3[2], const int32_t force_100un[3]);
 
 #endif

@@ -15,7 +15,7 @@ import numpy as np
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 0
-SCHEMA_HASH = 0x89FE539D
+SCHEMA_HASH = 0x744EB2CF
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 INVALID_I16 = -(2**15)
@@ -91,7 +91,6 @@ class FrameFlags(IntFlag):
     BASE_OLD = 1 << 13  # in contact for over 60 s: drift has gone untracked
     TARE_CHANGED = 1 << 14  # this frame is the first with a new tare (see the TARE message)
     FAULT = 1 << 15  # more than two electrodes railed or missing: do not trust the results
-    SATURATED = 1 << 16  # a force or torque did not fit and is held at the largest value
 
 
 class StreamFlags(IntFlag):

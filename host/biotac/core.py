@@ -50,16 +50,13 @@ def compute(counts: Any, tare: Any, settings: Settings | None = None) -> Results
     shapes or ranges.
     """
     raw, tare_q4 = checked(counts, tare)
-    chosen = settings or default_settings()
-    kernel = ffi.new(
-        "bt_kernel_settings *",
-        {
-            "poc_weights": chosen[wire.Setting.POC_WEIGHTS],
-            "force_gain_nn": [chosen[s] for s in FORCE_GAINS],
-            "torque_gain_nn": [chosen[s] for s in TORQUE_GAINS],
-            "contact_energy_count2": chosen[wire.Setting.CONTACT_ENERGY_COUNT2],
-        },
-    )
+    board = ffi.new("bt_settings *")
+    lib.bt_settings_reset(board)
+    for setting, value in (settings or default_settings()).items():
+        if lib.bt_settings_set(board, setting, value) != wire.Error.OK:
+            spec = wire.SETTINGS[setting]
+            raise ValueError(f"{setting.name} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
+    kernel = ffi.new("bt_kernel_settings *", lib.bt_kernel_settings_from(board))
     n = len(raw)
     poc_um = np.empty((n, 3), np.int16)
     force_100un = np.empty((n, 3), np.int32)

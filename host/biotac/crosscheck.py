@@ -1,8 +1,7 @@
 """Every on-board result against the float64 reference, fed with the counts and the tare of its frame.
 
-The bounds follow from rounding alone: the board's sums are exact, so a published value is off by at
-most half a unit per axis, plus what its inner steps round (see each constant). A single altered digit
-breaks them.
+The bounds follow from the board's number formats alone; tests/core/test_kernels.c derives them and
+searches for inputs that come near.
 """
 
 from __future__ import annotations
@@ -11,18 +10,34 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _wire as wire
-from .core import Settings, reference_q4
-from .frames import StructArray, to_units
+from .core import TORQUE_GAINS, Results, Settings, reference_q4
+from .frames import StructArray, electrode_signals, to_units
 
-# um per axis: 0.5 for the published um, 0.0005 for the nm before it, 0.0005 for the square root.
-POC_BOUND_UM = 3**0.5 * (0.5 + 0.001)
-# mN per axis: half of 0.1 mN, and half a uN before it.
-FORCE_BOUND_MN = 0.05 + 0.0005 + 1e-9
-# N*mm per axis: half a mN*mm; the um rounding of the torque sum at the largest gain (0.1 N/count,
-# 0.5/16 count*um) adds 0.0031 mN*mm, the lever's inputs (1 nm, 1 uN) 0.11 mN*mm at 100 N.
-TORQUE_BOUND_NMM = (0.5 + 0.12) / 1000
+# The PoC's distance: half a um per axis for the published um; direction and length to 2^-16 of
+# 5.08 mm; x to 2^-18 of 13.6 mm; weights cut at 2^-23 of the largest, magnified by at most 4.55.
+DIRECTION_UM = 3**0.5 * 5080 / 2**16 + 5080 / 2**16 + 0.2
+POC_BOUND_UM = 3**0.5 * 0.5 + 13600 / 2**18 + DIRECTION_UM
+# Per axis: half of the published 0.1 mN, and the gain's half unit on the largest possible sum.
+FORCE_BOUND_MN = 0.05 + 0.0024
+
+FINDINGS = 20  # violations that are put into words; the rest is counted
+
+
+def torque_bound_nmm(messages: StructArray, truth: Results, settings: Settings) -> NDArray[np.float64]:
+    """Bound of each torque axis, N*mm, shape (n, 3): it grows with the signals and, for x, the force.
+
+    y and z: half of the published mN*mm, arms known to 1/32 um, sums to half a count*um. x, the
+    lever: the errors of force and PoC times each other's size.
+    """
+    size = np.nansum(np.abs(electrode_signals(messages)), axis=1)
+    gains = np.array([abs(settings[s]) / 1e9 for s in TORQUE_GAINS])
+    yz = 0.5 + gains * (size[:, None] / 32 + 0.5) + np.abs(truth.torque_nmm[:, 1:]) * 1000 * 2.0**-33
+    force = np.abs(truth.force_n[:, 1:]).sum(axis=1)
+    x = 1 + 2 * 5.08 * FORCE_BOUND_MN + force * (0.125 + DIRECTION_UM)
+    return np.column_stack([x, yz]) / 1000
 
 
 @dataclass
@@ -34,6 +49,7 @@ class CrossCheck:
     poc_um_max: float = 0.0
     force_mn_max: float = 0.0
     torque_nmm_max: float = 0.0
+    torque_nmm_bound: float = 0.0  # the largest that any frame was held to
     findings: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
@@ -46,48 +62,57 @@ class CrossCheck:
             "force_mn_max": self.force_mn_max,
             "force_mn_bound": FORCE_BOUND_MN,
             "torque_nmm_max": self.torque_nmm_max,
-            "torque_nmm_bound": TORQUE_BOUND_NMM,
-            "findings": self.findings[:20],
+            "torque_nmm_bound": self.torque_nmm_bound,
+            "findings": self.findings,
         }
 
     def add(self, messages: StructArray, settings: Settings) -> None:
         """Check FRAME messages (n,) as they came over the wire; live or from a file."""
         if not len(messages):
             return
-        flags = messages["flags"]
-        untared = (flags & wire.FrameFlags.UNTARED) != 0
-        saturated = (flags & wire.FrameFlags.SATURATED) != 0
+        untared = (messages["flags"] & wire.FrameFlags.UNTARED) != 0
         truth = reference_q4(messages["counts"], messages["tare_q4"], settings)
-        for name, got, want, scale, bound in (
-            ("PoC", to_units(messages["poc_um"], 1), truth.poc_mm * 1e3, "um", POC_BOUND_UM),
-            ("force", to_units(messages["force_100un"], 10), truth.force_n * 1e3, "mN", FORCE_BOUND_MN),
-            ("torque", to_units(messages["torque_mnmm"], 1000), truth.torque_nmm, "N*mm", TORQUE_BOUND_NMM),
-        ):
-            want = np.where(untared[:, None], np.nan, want)
-            error = np.abs(got - want)
-            # The PoC is one point: its error is a distance. Force and torque count per axis.
-            size = np.sqrt((error**2).sum(axis=1)) if name == "PoC" else largest(error)
-            wrong = (size > bound) | np.any(np.isnan(got) != np.isnan(want), axis=1)
-            wrong &= ~saturated if name != "PoC" else True
-            self._note(name, messages, size, wrong, scale, bound)
-            counted = size[~np.isnan(size) & ~saturated]
-            maximum = float(counted.max()) if len(counted) else 0.0
-            key = {"PoC": "poc_um_max", "force": "force_mn_max", "torque": "torque_nmm_max"}[name]
-            setattr(self, key, max(getattr(self, key), maximum))
+        for values in (truth.poc_mm, truth.force_n, truth.torque_nmm):
+            values[untared] = np.nan  # without a tare there is nothing to be right about
+        torque_bound = torque_bound_nmm(messages, truth, settings)
+        self.torque_nmm_bound = max(self.torque_nmm_bound, float(torque_bound[~untared].max(initial=0.0)))
+
+        # The PoC is one point: its error is a distance. Force and torque count per axis.
+        poc_um = to_units(messages["poc_um"], 1) - truth.poc_mm * 1e3
+        distance_um = np.sqrt((poc_um**2).sum(axis=1, keepdims=True))
+        force_mn = np.abs(to_units(messages["force_100un"], 10) - truth.force_n * 1e3)
+        torque_nmm = np.abs(to_units(messages["torque_mnmm"], 1000) - truth.torque_nmm)
+        self.poc_um_max = max(self.poc_um_max, worst(distance_um))
+        self.force_mn_max = max(self.force_mn_max, worst(force_mn))
+        self.torque_nmm_max = max(self.torque_nmm_max, worst(torque_nmm))
+        self._judge("PoC", "um", messages, messages["poc_um"], truth.poc_mm, distance_um, POC_BOUND_UM)
+        self._judge("force", "mN", messages, messages["force_100un"], truth.force_n, force_mn, FORCE_BOUND_MN)
+        self._judge("torque", "N*mm", messages, messages["torque_mnmm"], truth.torque_nmm, torque_nmm, torque_bound)
         self.frames += len(messages)
 
-    def _note(self, name: str, messages: StructArray, size: Any, wrong: Any, unit: str, bound: float) -> None:
-        for k in np.flatnonzero(wrong):
+    def _judge(
+        self,
+        name: str,
+        unit: str,
+        messages: StructArray,
+        sent: NDArray[Any],
+        truth: NDArray[np.float64],
+        error: NDArray[np.float64],
+        bound: NDArray[np.float64] | float,
+    ) -> None:
+        one_sided = np.any(np.isnan(to_units(sent, 1)) != np.isnan(truth), axis=1)
+        outside = np.any(error > bound, axis=1)
+        for k in np.flatnonzero(one_sided | outside):
             self.violations += 1
-            if len(self.findings) < 20:
-                off = "valid on one side only" if np.isnan(size[k]) else f"off by {size[k]:.4g} {unit}"
+            off = "valid on one side only" if one_sided[k] else f"off by {np.nanmax(error[k]):.4g} {unit}"
+            limit = np.broadcast_to(bound, error.shape)[k].max()
+            if len(self.findings) < FINDINGS:
                 self.findings.append(
                     f"finger {messages['finger'][k]} frame {messages['seq'][k]} ({messages['t_us'][k] / 1e6:.3f} s): "
-                    f"{name} {off}, bound {bound:.4g} {unit}"
+                    f"{name} {off}, bound {limit:.4g} {unit}"
                 )
 
 
-def largest(error: Any) -> Any:
-    """Largest per row, NaN only where all are."""
-    filled = np.where(np.isnan(error), -1.0, error).max(axis=1)
-    return np.where(filled < 0, np.nan, filled)
+def worst(error: NDArray[np.float64]) -> float:
+    """Largest valid error, 0 without any."""
+    return float(np.nanmax(error, initial=0.0)) if not np.isnan(error).all() else 0.0

@@ -74,32 +74,6 @@ static void rounding_is_odd(void **state)
     }
 }
 
-static void saturation_stops_short_of_the_invalid_mark(void **state)
-{
-    (void)state;
-    static const struct {
-        int64_t value;
-        int32_t want;
-        int saturated;
-    } table[] = {
-        {0, 0, 0},
-        {INT32_MAX, INT32_MAX, 0},
-        {-INT32_MAX, -INT32_MAX, 0},
-        {(int64_t)INT32_MAX + 1, INT32_MAX, 1},
-        {INT32_MIN, -INT32_MAX, 1},
-        {INT64_MAX, INT32_MAX, 1},
-        {INT64_MIN, -INT32_MAX, 1},
-    };
-    for (size_t k = 0; k < sizeof table / sizeof *table; k++) {
-        int saturated = 0;
-        assert_int_equal(bt_saturate_i32(table[k].value, &saturated), table[k].want);
-        assert_int_equal(saturated, table[k].saturated);
-    }
-    int saturated = 1;
-    (void)bt_saturate_i32(5, &saturated);
-    assert_int_equal(saturated, 1); // set, never cleared
-}
-
 static void magnitudes_and_clamps_hold_at_the_ends(void **state)
 {
     (void)state;
@@ -116,13 +90,9 @@ static void magnitudes_and_clamps_hold_at_the_ends(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(halves_go_away_from_zero),
-        cmocka_unit_test(division_by_one_changes_nothing),
-        cmocka_unit_test(extremes_do_not_wrap),
-        cmocka_unit_test(random_quotients_are_right),
-        cmocka_unit_test(rounding_is_odd),
-        cmocka_unit_test(saturation_stops_short_of_the_invalid_mark),
-        cmocka_unit_test(magnitudes_and_clamps_hold_at_the_ends),
+        cmocka_unit_test(halves_go_away_from_zero), cmocka_unit_test(division_by_one_changes_nothing),
+        cmocka_unit_test(extremes_do_not_wrap),     cmocka_unit_test(random_quotients_are_right),
+        cmocka_unit_test(rounding_is_odd),          cmocka_unit_test(magnitudes_and_clamps_hold_at_the_ends),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

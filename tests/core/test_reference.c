@@ -137,10 +137,8 @@ static void many_frames_at_once_are_the_same_frames(void **state)
 
 // ---- the kernels by themselves -----------------------------------------------------------------
 
-static const bt_kernel_settings gains = {
-    .force_gain_nn = {1063440, 252325, 2262234},
-    .torque_gain_nn = {2262234, 252325},
-};
+static const int32_t force_nn[3] = {1063440, 252325, 2262234};
+static const int32_t torque_nn[2] = {2262234, 252325};
 
 typedef struct {
     uint32_t flags;
@@ -152,8 +150,7 @@ typedef struct {
 static results kernel(const int32_t e_q4[BT_ELECTRODES], int weights)
 {
     results out;
-    bt_kernel_settings settings = gains;
-    settings.poc_weights = weights;
+    bt_kernel_settings settings = {.poc_weights = weights, .gains = bt_gains_from(force_nn, torque_nn)};
     out.flags = bt_kernel(e_q4, &settings, out.poc_um, out.force_100un, out.torque_mnmm);
     return out;
 }
@@ -193,15 +190,15 @@ static void mirrored_signals_give_exactly_mirrored_results(void **state)
 
 static void assert_poc_refused(const int32_t e[BT_ELECTRODES], int weights)
 {
-    int32_t poc_nm[3] = {11, 22, 33};
+    bt_point point = {{11, 22, 33}, {44, 55}};
     results out = kernel(e, weights);
     assert_true(out.flags & BT_FRAME_FLAG_POC_INVALID);
     assert_int_equal(out.torque_mnmm[0], INT32_MIN);
     for (int d = 0; d < 3; d++) {
         assert_int_equal(out.poc_um[d], INT16_MIN);
     }
-    assert_false(bt_poc(e, weights, poc_nm));
-    assert_true(poc_nm[0] == 11 && poc_nm[1] == 22 && poc_nm[2] == 33);
+    assert_false(bt_poc(e, weights, &point));
+    assert_true(point.um[0] == 11 && point.um[1] == 22 && point.um[2] == 33 && point.fine_yz_um_q3[0] == 44);
 }
 
 static void no_signal_has_no_point_of_contact(void **state)
@@ -238,16 +235,17 @@ static void every_point_of_contact_lies_on_the_surface(void **state)
     (void)state;
     uint64_t seed = 11;
     for (int k = 0; k < 50000; k++) {
-        int32_t e[BT_ELECTRODES], poc_nm[3];
+        int32_t e[BT_ELECTRODES];
+        bt_point point;
         int64_t size = BT_E_MAX_Q4 >> (k % 16);
         for (int i = 0; i < BT_ELECTRODES; i++) {
             e[i] = (int32_t)random_range(&seed, -size, -1);
         }
-        assert_true(bt_poc(e, k % 3, poc_nm));
-        double x = poc_nm[0] > 0 ? poc_nm[0] : 0;
-        double length = sqrt(x * x + (double)poc_nm[1] * poc_nm[1] + (double)poc_nm[2] * poc_nm[2]);
-        assert_true(fabs(length - 5080000) < 2); // nm
-        assert_true(poc_nm[2] < 0 && poc_nm[0] >= -13600000);
+        assert_true(bt_poc(e, k % 3, &point));
+        double x = point.um[0] > 0 ? point.um[0] : 0;
+        double length = sqrt(x * x + (double)point.um[1] * point.um[1] + (double)point.um[2] * point.um[2]);
+        assert_true(fabs(length - 5080) < 0.5 * 1.7320508 + 0.2); // rounding to um, and the length's own
+        assert_true(point.um[2] < 0 && point.um[0] >= -13600);
     }
 }
 

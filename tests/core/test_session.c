@@ -154,7 +154,7 @@ static void a_new_setting_is_what_the_kernels_use(void **state)
     assert_int_equal(message->id, BT_SETTING_ID);
     bt_msg_setting_unpack(&value, message->payload);
     assert_true(value.req_id == 77 && value.value == -12345);
-    assert_int_equal(session.kernel.force_gain_nn[2], -12345);
+    assert_int_equal(bt_settings_get(&session.settings, BT_SETTING_FORCE_GAIN_Z_NN), -12345);
     assert_int_equal(set_error(BT_SETTING_POC_WEIGHTS, BT_POC_WEIGHTS_ABS_N2), BT_ERROR_OK);
     assert_int_equal(session.kernel.poc_weights, BT_POC_WEIGHTS_ABS_N2);
     assert_int_equal(set_error(BT_SETTING_CONTACT_ENERGY_COUNT2, 500), BT_ERROR_OK);

@@ -1,0 +1,117 @@
+#include "gold.h"
+
+#include "fix.h"
+#include "isqrt.h"
+
+// N_x in um times 1000 is the dividend of x in nm.
+_Static_assert(BT_SUM_SQUARES_R_MAX_Q8_UM <= INT64_MAX / 1000, "the x dividend must fit int64");
+_Static_assert(BT_SUM_SQUARES_MAX_Q8 <= INT64_MAX, "the weight sum must fit int64");
+// Every electrode lies below the axis, so a positive weight sum keeps (y, z) away from 0: the
+// direction below never is 0/0 (numerics: NaN-free by geometry).
+_Static_assert(BT_ELECTRODE_Z_MAX_UM < 0, "electrodes must have z < 0");
+
+static int64_t weight(int64_t e, int weights)
+{
+    switch (weights) {
+    case BT_POC_WEIGHTS_ABS_N2:
+        return e * e;
+    case BT_POC_WEIGHTS_COMPRESS_N2:
+        return e < 0 ? e * e : 0;
+    default:
+        return e < 0 ? -e : 0;
+    }
+}
+
+// Scale v[first..2] to length BT_CORE_RADIUS_UM, in nm. The components are brought to at most 30
+// bits first: their squares then sum to less than 2^62 for the square root, and what is cut off
+// is below 2^-28 of the result.
+static void scale_to_radius(const int64_t v[3], int first, int32_t out_nm[3])
+{
+    uint64_t largest = 0;
+    for (int d = first; d < 3; d++) {
+        largest |= bt_abs(v[d]);
+    }
+    int shift = 0;
+    while (largest >> shift >= (uint64_t)1 << 30) {
+        shift++;
+    }
+    int lift = 0;
+    while (shift == 0 && largest << lift < (uint64_t)1 << 29) {
+        lift++;
+    }
+    int64_t scaled[3] = {0, 0, 0};
+    uint64_t squares = 0;
+    for (int d = first; d < 3; d++) {
+        uint64_t magnitude = bt_abs(v[d]) >> shift << lift;
+        scaled[d] = v[d] < 0 ? -(int64_t)magnitude : (int64_t)magnitude;
+        squares += magnitude * magnitude;
+    }
+    int64_t length = (int64_t)bt_isqrt64(squares);
+    for (int d = first; d < 3; d++) {
+        out_nm[d] = (int32_t)bt_div_round(scaled[d] * (BT_CORE_RADIUS_UM * 1000), length);
+    }
+}
+
+bool gold_poc(const int32_t e_q4[BT_ELECTRODES], int weights, int32_t poc_nm[3])
+{
+    int64_t sum = 0;               // W of Eq 1
+    int64_t moment[3] = {0, 0, 0}; // N of Eq 1, um
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        int64_t w = weight(e_q4[i], weights);
+        sum += w;
+        for (int d = 0; d < 3; d++) {
+            moment[d] += w * bt_electrode_um[i][d];
+        }
+    }
+    if (sum == 0) {
+        return false;
+    }
+    if (moment[0] > 0) { // tip: a point on the sphere; its direction needs no division by W
+        scale_to_radius(moment, 0, poc_nm);
+    } else { // cylinder: keep x, move (y, z) out to the radius, which the paper's Eq 2 leaves out
+        scale_to_radius(moment, 1, poc_nm);
+        poc_nm[0] = (int32_t)bt_div_round(moment[0] * 1000, sum);
+    }
+    return true;
+}
+
+#define GAIN_MAX_NN   100000000LL
+#define UN_DIVISOR    (16 * 1000 * 1000LL) // 1/16 count * 1/1000 * nN -> uN
+#define MNMM_DIVISOR  (16 * 1000000000LL)  // 1/16 count * um * nN -> mN*mm
+#define LEVER_DIVISOR (1000000000LL)       // nm * uN -> mN*mm
+#define POC_MAX_NM    (BT_ELECTRODE_MAX_UM * 1000LL)
+#define FORCE_MAX_UN  (BT_SUM_NORMAL_MAX_Q4_MILLI * GAIN_MAX_NN / UN_DIVISOR + 1)
+
+_Static_assert(BT_SUM_NORMAL_MAX_Q4_MILLI <= INT32_MAX, "a force sum must fit int32");
+_Static_assert(BT_SUM_NORMAL_MAX_Q4_MILLI <= INT64_MAX / GAIN_MAX_NN, "a scaled force sum must fit int64");
+_Static_assert(BT_SUM_ARM_MAX_Q4_NM / 1000 < INT64_MAX / GAIN_MAX_NN, "a scaled torque sum must fit int64");
+_Static_assert(FORCE_MAX_UN <= INT64_MAX / 2 / POC_MAX_NM, "the lever product must fit int64");
+
+void gold_force_un(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[3], int64_t force_un[3])
+{
+    for (int d = 0; d < 3; d++) {
+        int32_t sum = 0;
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            sum += e_q4[i] * bt_normal_milli[i][d];
+        }
+        force_un[d] = bt_div_round((int64_t)sum * gain_nn[d], UN_DIVISOR);
+    }
+}
+
+void gold_torque_yz_mnmm(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[2], int64_t torque_mnmm[2])
+{
+    for (int d = 0; d < 2; d++) {
+        int64_t sum_nm = 0;
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            sum_nm += (int64_t)e_q4[i] * bt_arm_nm[i][d + 1];
+        }
+        // The sum is exact in nm; um is still a thousandth of the published unit for any gain.
+        int64_t sum_um = bt_div_round(sum_nm, 1000);
+        torque_mnmm[d] = bt_div_round(sum_um * gain_nn[d], MNMM_DIVISOR);
+    }
+}
+
+int64_t gold_torque_x_mnmm(const int32_t poc_nm[3], const int64_t force_un[3])
+{
+    return bt_div_round(poc_nm[1] * force_un[2] - poc_nm[2] * force_un[1], LEVER_DIVISOR);
+}

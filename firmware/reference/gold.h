@@ -1,0 +1,26 @@
+// The gold kernels: the same results with exact int64 sums and nothing folded or shortened.
+// They judge the kernels that ship (firmware/core) beside the double in lin2013.h; never built for
+// a board, where they cost ten times as much.
+// In: e in 1/16 count (q4), |e| <= 4095 counts; gains in nN per count. Rounding half away from zero.
+#ifndef BIOTAC_GOLD_H
+#define BIOTAC_GOLD_H
+
+#include "sensor_gen.h"
+#include "wire_gen.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+// PoC in nm, within 1 nm of Lin 2013 Eq 1 and 2. False, leaving poc_nm alone, when nothing weighs.
+bool gold_poc(const int32_t e_q4[BT_ELECTRODES], int weights, int32_t poc_nm[3]);
+
+// Force in uN, Eq 3.
+void gold_force_un(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[3], int64_t force_un[3]);
+
+// Torque y and z in mN*mm, Eq 4; gain_nn holds y and z.
+void gold_torque_yz_mnmm(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[2], int64_t torque_mnmm[2]);
+
+// Torque x in mN*mm: the lever (c x F)_x.
+int64_t gold_torque_x_mnmm(const int32_t poc_nm[3], const int64_t force_un[3]);
+
+#endif
