@@ -92,7 +92,8 @@ void bt_gateway_poll(bt_gateway *gateway)
         bt_session_link_down(session);
     }
     gateway->link_was_up = up;
-    while ((n = port_link_read(bytes, sizeof bytes)) > 0) {
+    // One bufferful per turn: a host that floods the link must not starve the slots.
+    if ((n = port_link_read(bytes, sizeof bytes)) > 0) {
         bt_session_receive(session, bytes, n, port_now_us());
     }
     bt_slot slot;

@@ -2,10 +2,6 @@
 
 #include <string.h>
 
-// A quarter of a second without one good word is an unplugged sensor; less may be a bus fault or
-// a late main loop, after which the tare still holds.
-#define UNPLUGGED_ROUNDS 25
-
 void bt_finger_reset(bt_finger *finger, uint8_t index)
 {
     memset(finger, 0, sizeof *finger);
@@ -52,14 +48,18 @@ bool bt_finger_finish(bt_finger *finger, const bt_kernel_settings *settings, bt_
     *tare_changed = false;
     if (finger->frame.good_words == 0) {
         finger->present = false;
-        if (finger->silent_rounds < UNPLUGGED_ROUNDS && ++finger->silent_rounds == UNPLUGGED_ROUNDS) {
-            // What is plugged in next may be another sensor: the tare must not outlive this one.
+        // What is plugged in next may be another sensor: the tare must not outlive this one. One that
+        // the host set for a sensor that never answered yet is not this one's.
+        if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS && ++finger->silent_rounds == BT_UNPLUGGED_ROUNDS
+            && finger->answered) {
             bt_tare_reset(&finger->tare);
+            finger->answered = false;
         }
         return false;
     }
     uint16_t seq = finger->seq++;
     finger->present = true;
+    finger->answered = true;
     finger->silent_rounds = 0;
     // A TARE command between two frames has changed the tare already.
     bool set_by_host = finger->tare.changed;

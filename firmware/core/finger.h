@@ -21,10 +21,15 @@ typedef struct {
     bool present; // the last whole frame had at least one good word
     uint16_t seq; // of the next frame; rounds in which nothing answered are not counted
     uint8_t silent_rounds;
+    bool answered;  // since it was plugged in
     bt_frame frame; // being assembled
     bt_tare tare;
     bt_word_counts words;
 } bt_finger;
+
+// A quarter of a second without one good word is an unplugged sensor; less may be a bus fault or
+// a late main loop, after which the tare still holds.
+#define BT_UNPLUGGED_ROUNDS 25
 
 void bt_finger_reset(bt_finger *finger, uint8_t index);
 

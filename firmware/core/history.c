@@ -42,13 +42,14 @@ void bt_history_add(bt_history *history, const bt_frame *frame)
     uint8_t next = (uint8_t)((history->head + 1) % BT_HISTORY_FRAMES);
     for (int i = 0; i < BT_ELECTRODES; i++) {
         uint16_t count = frame->electrode[i];
-        if (count != BT_INVALID_COUNT && before[i] == BT_INVALID_COUNT) {
+        bool usable = count != BT_INVALID_COUNT && !bt_count_railed(count);
+        if (usable && before[i] == BT_INVALID_COUNT) {
             // The first word ever: no mean and no median may reach to before it.
             for (int k = 0; k < BT_HISTORY_FRAMES; k++) {
                 history->counts[k][i] = count;
             }
         }
-        history->counts[next][i] = count == BT_INVALID_COUNT ? before[i] : count;
+        history->counts[next][i] = usable ? count : before[i];
     }
     // A pressure at the end of its range says nothing about contact.
     history->pdc_now = frame->pdc != BT_INVALID_COUNT && !bt_count_railed(frame->pdc);

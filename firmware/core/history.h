@@ -1,8 +1,8 @@
 // The last sixteen frames of one finger, and what the tare machine measures on them.
 //
-// A missing word repeats the one before it, so that one bad word does not look like motion; what is
-// repeated is never published. An electrode that was never read has BT_INVALID_COUNT throughout and
-// takes no part in any measure.
+// A missing or railed word repeats the one before it, so that one bad word neither looks like motion
+// nor enters a tare; what is repeated is never published. An electrode that was never read well has
+// BT_INVALID_COUNT throughout and takes no part in any measure.
 //
 // Units: counts; means in 1/65536 count (q16), rounded half away from zero; energies in count^2
 // summed over electrodes. "ago" counts frames back from the latest, 0.

@@ -30,7 +30,8 @@ void bt_signals_q4(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[
                    int32_t e_q4[BT_ELECTRODES])
 {
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        e_q4[i] = counts[i] == BT_INVALID_COUNT ? 0 : 16 * (int32_t)counts[i] - tare_q4[i];
+        bool missing = counts[i] == BT_INVALID_COUNT || tare_q4[i] == BT_INVALID_COUNT;
+        e_q4[i] = missing ? 0 : 16 * (int32_t)counts[i] - tare_q4[i];
     }
 }
 
@@ -129,8 +130,9 @@ void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_sett
     uint32_t threshold = bt_tare_threshold_count2(tare, settings->contact_energy_count2);
     signal_shape shape = shape_of(e_q4);
     bool has_poc = !(msg->flags & BT_FRAME_FLAG_POC_INVALID);
-    bool torsion_ok = has_poc && faces_down(msg->poc_um) && shape.energy > threshold
-                      && shape.active >= ACTIVE_FOR_TORSION && !(msg->flags & BT_FRAME_FLAG_FAULT);
+    bool complete = !(msg->flags & (BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_RAIL));
+    bool torsion_ok = has_poc && complete && faces_down(msg->poc_um) && shape.energy > threshold
+                      && shape.active >= ACTIVE_FOR_TORSION;
     msg->flags |= tare->state == BT_TARE_STATE_CONTACT ? BT_FRAME_FLAG_CONTACT : 0;
     msg->flags |= shape.energy < 4 * (uint64_t)threshold ? BT_FRAME_FLAG_POC_LOW : 0;
     msg->flags |= shape.bulge > shape.energy - shape.bulge ? BT_FRAME_FLAG_SHEAR_MIX : 0;

@@ -22,7 +22,8 @@ bt_kernel_settings bt_kernel_settings_from(const bt_settings *settings);
 void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_settings *settings,
                 bt_msg_frame *msg);
 
-// The signals the results rest on: e = count - tare in 1/16 count; a missing electrode gives 0.
+// The signals the results rest on: e = count - tare in 1/16 count; an electrode without
+// a count or without a tare gives 0.
 void bt_signals_q4(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
                    int32_t e_q4[BT_ELECTRODES]);
 

@@ -64,6 +64,9 @@ void bt_session_round(bt_session *session)
         bool tare_changed;
         uint8_t payload[BT_FRAME_MAX_BYTES];
         if (!bt_finger_finish(&session->finger[f], &session->kernel, &frame, &pac, &tare, &tare_changed)) {
+            if (session->finger[f].silent_rounds == BT_UNPLUGGED_ROUNDS) {
+                memset(&session->info[f], 0, sizeof session->info[f]); // the next one may be another
+            }
             continue;
         }
         if (!(session->fingers >> f & 1)) {

@@ -258,8 +258,10 @@ static bool released_by_pressure(bt_tare *tare)
     if (pdc_q16 > tare->pdc_peak_q16) {
         tare->pdc_peak_q16 = (int32_t)pdc_q16;
     }
+    // Without a press there is no release: a light touch while the pressure undershoots has no peak.
+    bool pressed = tare->pdc_peak_q16 >= RELEASE_FALL * PDC_HIT_Q16;
     bool fallen = pdc_q16 < SETTLE_PDC_Q16 && pdc_q16 * RELEASE_FALL < tare->pdc_peak_q16;
-    return settled_for(tare) >= SETTLE_FRAMES && fallen;
+    return settled_for(tare) >= SETTLE_FRAMES && pressed && fallen;
 }
 
 static uint64_t residue_limit(const bt_tare *tare)

@@ -145,7 +145,7 @@ typedef struct {
 void bt_msg_setting_pack(const bt_msg_setting *msg, uint8_t out[BT_SETTING_BYTES]);
 void bt_msg_setting_unpack(bt_msg_setting *msg, const uint8_t in[BT_SETTING_BYTES]);
 
-// What a sensor says of itself, read once at power-up. Reply to GET_SENSOR_INFO.
+// What a sensor says of itself, read once at power-up and forgotten when it is unplugged. Reply to GET_SENSOR_INFO.
 #define BT_SENSOR_INFO_ID 0x04
 #define BT_SENSOR_INFO_BYTES 29
 typedef struct {

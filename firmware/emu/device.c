@@ -8,7 +8,7 @@ enum pending {
     NOTHING,  // nothing was asked for, or its answer was already taken
     SAMPLE,   // word holds a sample that settles until released_ns + 50 us
     PROPERTY, // property bytes
-    REFUSAL,  // word holds an error word, ready at once
+    REFUSAL,  // word holds an error word, under the same 50 us
 };
 
 static unsigned ones(uint8_t byte)

@@ -13,7 +13,7 @@ void port_init(int argc, char **argv);
 // ---- time -----------------------------------------------------------------------------------
 uint32_t port_now_us(void);
 
-// Busy wait, for a few us only.
+// Busy wait: a few us between reads, and once the sensors' power-up time.
 void port_delay_us(uint32_t us);
 
 // Call bt_port_alarm() from interrupt context once `at_us` has come; replaces an earlier alarm.

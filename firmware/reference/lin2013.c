@@ -1,6 +1,7 @@
 #include "lin2013.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 static const double radius_mm = BT_CORE_RADIUS_UM / 1000.0;
@@ -92,7 +93,9 @@ void lin2013_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
         lin2013_result result;
         for (int i = 0; i < BT_ELECTRODES; i++) {
             uint16_t count = counts[k * BT_ELECTRODES + i];
-            e[i] = count == BT_INVALID_COUNT ? 0 : count - tare_q4[k * BT_ELECTRODES + i] / 16.0;
+            uint16_t tare = tare_q4[k * BT_ELECTRODES + i];
+            bool missing = count == BT_INVALID_COUNT || tare == BT_INVALID_COUNT;
+            e[i] = missing ? 0 : count - tare / 16.0;
         }
         lin2013(e, settings, &result);
         memcpy(poc_mm + 3 * k, result.poc_mm, sizeof result.poc_mm);

@@ -36,8 +36,8 @@ typedef struct {
 
 void lin2013(const double e[BT_ELECTRODES], const lin2013_settings *settings, lin2013_result *result);
 
-// For n frames: counts (n, 19) with BT_INVALID_COUNT for a missing electrode, tare_q4 (n, 19) in
-// 1/16 count; poc_mm, force_n, torque_nmm (n, 3).
+// For n frames: counts (n, 19) and tare_q4 (n, 19) in 1/16 count, either BT_INVALID_COUNT for an
+// electrode that then counts as zero signal; poc_mm, force_n, torque_nmm (n, 3).
 void lin2013_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                     const lin2013_settings *settings, double *poc_mm, double *force_n, double *torque_nmm);
 

@@ -17,12 +17,20 @@ void bt_sampler_start(bt_sampler *sampler, uint8_t fingers, uint32_t start_us)
     sampler->slot_start_us = start_us;
 }
 
+// Only the interrupt writes it: a plain load and store, where ++ would ask for an atomic
+// read-modify-write that a Cortex-M0+ does not have.
+static void count_late(bt_sampler *sampler)
+{
+    uint32_t late = atomic_load_explicit(&sampler->late, memory_order_relaxed);
+    atomic_store_explicit(&sampler->late, late + 1, memory_order_relaxed);
+}
+
 static void push(bt_sampler *sampler)
 {
     uint8_t head = atomic_load_explicit(&sampler->head, memory_order_relaxed);
     uint8_t tail = atomic_load_explicit(&sampler->tail, memory_order_acquire);
     if ((uint8_t)(head - tail) == BT_SLOT_RING) {
-        sampler->late++;
+        count_late(sampler);
         return;
     }
     sampler->ring[head % BT_SLOT_RING] = sampler->current;
@@ -92,7 +100,7 @@ uint32_t bt_sampler_alarm(bt_sampler *sampler)
     advance(sampler);
     // An interrupt held off for longer than a slot loses slots, never the time base.
     while ((int32_t)(sampler->slot_start_us - port_now_us()) < 0) {
-        sampler->late++;
+        count_late(sampler);
         advance(sampler);
     }
     return sampler->slot_start_us;

@@ -295,7 +295,7 @@ class SettingValue:
 
 @dataclass(frozen=True, slots=True)
 class SensorInfo:
-    """What a sensor says of itself, read once at power-up. Reply to GET_SENSOR_INFO."""
+    """What a sensor says of itself, read once at power-up and forgotten when it is unplugged. Reply to GET_SENSOR_INFO."""
 
     req_id: int
     finger: int

@@ -265,6 +265,41 @@ static void seq_wraps_like_any_other_number(void **state)
     }
 }
 
+static void an_electrode_without_a_tare_is_no_signal(void **state)
+{
+    (void)state;
+    uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
+    int32_t e_q4[BT_ELECTRODES];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        counts[i] = 3000;
+        tare_q4[i] = 3001 * 16;
+    }
+    tare_q4[4] = BT_INVALID_COUNT;
+    counts[5] = BT_INVALID_COUNT;
+    bt_signals_q4(counts, tare_q4, e_q4);
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        assert_int_equal(e_q4[i], i == 4 || i == 5 ? 0 : -16);
+    }
+}
+
+// The host may store a tare before the sensor has said a word.
+static void a_tare_set_before_the_sensor_answers_is_kept(void **state)
+{
+    (void)state;
+    bt_baseline base;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        base.electrode_q16[i] = (uint32_t)(slot_count(2 * i) - 1) << 16;
+    }
+    base.pdc_q16 = BT_TARE_UNKNOWN;
+    assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+    for (int k = 0; k < 60; k++) {
+        assert_false(round_without(~0ull));
+    }
+    assert_true(round_without(0));
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_HOST_SET);
+    assert_true(tare_changed);
+}
+
 #define T(name) cmocka_unit_test_setup(name, new_finger)
 int main(void)
 {
@@ -280,6 +315,8 @@ int main(void)
         T(a_railed_electrode_is_flagged_and_three_are_a_fault),
         T(a_held_press_is_flagged_by_its_shape_and_age),
         T(seq_wraps_like_any_other_number),
+        T(an_electrode_without_a_tare_is_no_signal),
+        T(a_tare_set_before_the_sensor_answers_is_kept),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

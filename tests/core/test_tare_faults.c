@@ -156,6 +156,37 @@ static void published_tares_round_half_away_from_zero(void **state)
     assert_int_equal(bt_tare_q4(4095u << 16), 65520);
 }
 
+// Skin undershoots after a press, so a light touch soon after may begin below the pressure at rest.
+static void a_held_load_is_kept_while_the_pressure_undershoots(void **state)
+{
+    (void)state;
+    for (int below = 0; below <= 5; below++) {
+        emulated_finger finger = touched_finger(1500, -below);
+        run_seconds(&finger, 30);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+        assert_true(share_kept(&finger, 1500) > 0.99);
+    }
+}
+
+static void an_electrode_that_was_railed_is_never_tared_at_its_end(void **state)
+{
+    (void)state;
+    static const uint16_t ends[] = {0, 4095};
+    for (int k = 0; k < 2; k++) {
+        emulated_finger finger;
+        finger_init(&finger);
+        for (int n = 0; n < 50; n++) {
+            bt_frame frame = frame_without(&finger, 2, 1, ends[k]);
+            feed(&finger, &frame);
+        }
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+        assert_int_equal(finger.tare.base.electrode_q16[2], BT_TARE_UNKNOWN);
+        run_seconds(&finger, 5);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+        assert_true(tare_error(&finger) < 1e-9);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -169,6 +200,8 @@ int main(void)
         cmocka_unit_test(tare_now_is_refused_before_there_are_frames),
         cmocka_unit_test(a_set_tare_holds_as_given_on_the_next_frame),
         cmocka_unit_test(published_tares_round_half_away_from_zero),
+        cmocka_unit_test(a_held_load_is_kept_while_the_pressure_undershoots),
+        cmocka_unit_test(an_electrode_that_was_railed_is_never_tared_at_its_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
