@@ -25,4 +25,11 @@ void bt_frame_clear(bt_frame *frame);
 // Put the word of one slot in its place. count is 0..4095 or BT_INVALID_COUNT.
 void bt_frame_put(bt_frame *frame, uint8_t slot, uint16_t count);
 
+// A count at the end of its range: 0, or 4090 and more.
+bool bt_count_railed(uint16_t count);
+
+// Electrodes that are missing or railed; with more than BT_USABLE_WITHOUT of them the frame is faulty.
+#define BT_USABLE_WITHOUT 2
+int bt_frame_unusable(const bt_frame *frame);
+
 #endif

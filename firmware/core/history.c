@@ -8,11 +8,6 @@
 _Static_assert(BT_MEAN_FRAMES + 2 <= BT_HISTORY_FRAMES, "the oldest median needs two frames more");
 _Static_assert(2 * MOTION_FRAMES <= BT_HISTORY_FRAMES, "motion compares two runs of frames");
 
-bool bt_count_railed(uint16_t count)
-{
-    return count == 0 || (count >= 4090 && count != BT_INVALID_COUNT);
-}
-
 void bt_history_reset(bt_history *history)
 {
     for (int k = 0; k < BT_HISTORY_FRAMES; k++) {

@@ -53,7 +53,4 @@ uint32_t bt_history_noise(const bt_history *history);
 // No electrode's medians of the last eight frames span more than span counts.
 bool bt_history_still(const bt_history *history, int span);
 
-// A count at the end of its range: 0, or 4090 and more.
-bool bt_count_railed(uint16_t count);
-
 #endif

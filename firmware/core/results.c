@@ -87,15 +87,13 @@ static signal_shape shape_of(const int32_t e_q4[BT_ELECTRODES])
 static uint32_t channel_flags(const bt_frame *frame)
 {
     uint32_t flags = 0;
-    int unusable = 0;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         bool missing = frame->electrode[i] == BT_INVALID_COUNT;
         bool railed = bt_count_railed(frame->electrode[i]);
         flags |= missing ? BT_FRAME_FLAG_ELECTRODE_MISSING : 0;
         flags |= railed ? BT_FRAME_FLAG_RAIL : 0;
-        unusable += missing || railed;
     }
-    flags |= unusable > FAULT_ELECTRODES ? BT_FRAME_FLAG_FAULT : 0;
+    flags |= bt_frame_unusable(frame) > BT_USABLE_WITHOUT ? BT_FRAME_FLAG_FAULT : 0;
     flags |= frame->pdc == BT_INVALID_COUNT ? BT_FRAME_FLAG_PDC_MISSING : 0;
     flags |= frame->tac == BT_INVALID_COUNT ? BT_FRAME_FLAG_TAC_MISSING : 0;
     flags |= frame->tdc == BT_INVALID_COUNT ? BT_FRAME_FLAG_TDC_MISSING : 0;

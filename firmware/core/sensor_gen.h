@@ -18,6 +18,7 @@
 #define BT_SETTLE_US 50
 #define BT_GAP_US 5
 #define BT_SLOT_HZ 4400
+#define BT_FRAME_MS 10 // one round of slots
 #define BT_POWER_ON_MS 100
 #define BT_LISTEN_WORD 0x0001
 #define BT_PROPERTY_READ_COMMAND 0x61

@@ -119,7 +119,7 @@ void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t 
         .present = finger->present,
         .tare_state = finger->tare.state,
         .tare_reason = finger->tare.reason,
-        .tare_age_ms = finger->tare.age_frames * 10,
+        .tare_age_ms = finger->tare.age_frames * BT_FRAME_MS,
         .noise_count2 = finger->tare.noise_count2,
         .words_good = finger->words.good,
         .words_stuck = finger->words.stuck,

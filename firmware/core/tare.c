@@ -25,7 +25,6 @@
 #define SETTLE_PDC_Q16  (30 << 16)  // pressure that real skin keeps after a press (+24 seen), not more
 #define RELEASE_FALL    4           // a release has fallen to a quarter of the contact's peak
 #define NOISE_SHIFT     6           // the noise estimate averages 64 rest frames
-#define UNUSABLE_FAULT  2           // more electrodes than this railed or missing is a fault
 #define DRIFT_FRAMES_PER_COUNT 400  // 15 counts/min, the worst drift measured
 #define DRIFT_LIMIT_BLIND      6000 // without pressure, 60 s of drift is all that may be forgiven
 #define DRIFT_LIMIT            60000
@@ -77,15 +76,6 @@ static bool pdc_known(const bt_tare *tare)
 static int64_t pdc_above_rest_q16(const bt_tare *tare)
 {
     return ((int64_t)bt_history_pdc_median(&tare->history) << 16) - tare->base.pdc_q16;
-}
-
-static int unusable_electrodes(const bt_frame *frame)
-{
-    int n = 0;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        n += frame->electrode[i] == BT_INVALID_COUNT || bt_count_railed(frame->electrode[i]);
-    }
-    return n;
 }
 
 uint32_t bt_tare_threshold_count2(const bt_tare *tare, uint32_t setting_count2)
@@ -308,7 +298,7 @@ void bt_tare_update(bt_tare *tare, const bt_frame *frame, uint32_t threshold_cou
 {
     tare->changed = false;
     tare->age_frames++;
-    if (unusable_electrodes(frame) > UNUSABLE_FAULT) {
+    if (bt_frame_unusable(frame) > BT_USABLE_WITHOUT) {
         // Nothing of a faulty frame may reach a tare: the history starts over when it clears.
         tare->state = BT_TARE_STATE_FAULT;
         bt_history_restart(&tare->history);

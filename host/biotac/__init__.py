@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from ._wire import FrameFlags, PocWeights, Setting
+from ._wire import FrameFlags, PocWeights, Setting, TareReason, TareState
 from .errors import (
     BiotacError,
     CommandRefusedError,
@@ -46,6 +46,8 @@ __all__ = [
     "RecordingError",
     "ScenarioError",
     "Setting",
+    "TareReason",
+    "TareState",
     "WireVersionError",
     "__version__",
     "load",

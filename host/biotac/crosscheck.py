@@ -88,7 +88,21 @@ class CrossCheck:
         self._judge("PoC", "um", messages, messages["poc_um"], truth.poc_mm, distance_um, POC_BOUND_UM)
         self._judge("force", "mN", messages, messages["force_100un"], truth.force_n, force_mn, FORCE_BOUND_MN)
         self._judge("torque", "N*mm", messages, messages["torque_mnmm"], truth.torque_nmm, torque_nmm, torque_bound)
+        self._judge_flag(messages)
         self.frames += len(messages)
+
+    def _judge_flag(self, messages: StructArray) -> None:
+        """POC_INVALID must stand exactly where the PoC is marked invalid."""
+        flagged = (messages["flags"] & wire.FrameFlags.POC_INVALID) != 0
+        marked = (messages["poc_um"] == wire.INVALID_I16).any(axis=1)
+        for k in np.flatnonzero(flagged != marked):
+            self._find(messages, int(k), "the POC_INVALID flag contradicts the PoC")
+
+    def _find(self, messages: StructArray, k: int, what: str) -> None:
+        self.violations += 1
+        if len(self.findings) < FINDINGS:
+            place = f"finger {messages['finger'][k]} frame {messages['seq'][k]} ({messages['t_us'][k] / 1e6:.3f} s)"
+            self.findings.append(f"{place}: {what}")
 
     def _judge(
         self,
@@ -103,14 +117,9 @@ class CrossCheck:
         one_sided = np.any(np.isnan(to_units(sent, 1)) != np.isnan(truth), axis=1)
         outside = np.any(error > bound, axis=1)
         for k in np.flatnonzero(one_sided | outside):
-            self.violations += 1
             off = "valid on one side only" if one_sided[k] else f"off by {np.nanmax(error[k]):.4g} {unit}"
             limit = np.broadcast_to(bound, error.shape)[k].max()
-            if len(self.findings) < FINDINGS:
-                self.findings.append(
-                    f"finger {messages['finger'][k]} frame {messages['seq'][k]} ({messages['t_us'][k] / 1e6:.3f} s): "
-                    f"{name} {off}, bound {limit:.4g} {unit}"
-                )
+            self._find(messages, int(k), f"{name} {off}, bound {limit:.4g} {unit}")
 
 
 def worst(error: NDArray[np.float64]) -> float:

@@ -10,12 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _wire as wire
 from .crosscheck import CrossCheck
+from .errors import InputError
 from .link.sim_process import SimLink
 from .opening import shake_hands
 from .recording import Recording
+from .sim.sampling import FRAME_HZ, PAC_SLOT
 from .sim.source import Source, load_source
 from .stream import Batch, join
 
@@ -51,13 +54,16 @@ def run_demo(
     from .picture import draw
 
     source = load_source(source_name, fingers=fingers, seconds=seconds)
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be made a folder ({error.strerror}); choose another --out") from error
     recording_path = folder / "demo.mcap"
     wall = time.monotonic()
     # The board's counts are made; from here on it is a host with a board, and its cost is measured.
     with shake_hands(SimLink(f"sim:{source.name}", source, pace=0.0)) as hand:
         settings = hand.settings()
-        has_pac = bool(np.any(source.samples[:, :, 1::2] <= 4095))
+        has_pac = bool(np.any(source.samples[:, :, PAC_SLOT] <= 4095))
         recorder = hand.record(recording_path, overwrite=True)
         cpu = time.process_time()
         outcome = CrossCheck()
@@ -73,7 +79,7 @@ def run_demo(
         status = hand.status()
     joined = join(batches)
     rows, played_fingers = source.samples.shape[:2]
-    device_s = rows / 100.0
+    device_s = rows / FRAME_HZ
     recorded = Recording(recording_path)
     never_came = max(0, expected_frames(source) - len(joined.frames) - stats.frames_lost)
     same = np.array_equal(recorded.wire, joined.wire) and np.array_equal(recorded.pac, joined.pac)
@@ -81,6 +87,7 @@ def run_demo(
         "source": source.name,
         "fingers": played_fingers,
         "rows": rows,
+        "rows_skipped": source.skipped_frames,
         "frames": len(joined.frames),
         "frames_lost": stats.frames_lost + never_came,
         "pac_blocks": len(joined.pac),
@@ -102,7 +109,7 @@ def run_demo(
         "report": str(folder / "report.md"),
         "picture": str(folder / "demo.png"),
     }
-    draw(source, joined, folder / "demo.png")
+    draw(source, joined, source_rows(source, joined), folder / "demo.png")
     (folder / "report.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
     (folder / "report.md").write_text(report_text(facts), encoding="utf-8")
     return DemoRun(source, joined, facts)
@@ -111,6 +118,19 @@ def run_demo(
 def expected_frames(source: Source) -> int:
     """Frames that the board owes: every round of every finger in which any word was good."""
     return int(np.count_nonzero(np.any((source.samples <= 4095), axis=2)))
+
+
+def source_rows(source: Source, batch: Batch) -> NDArray[np.int64]:
+    """The source's row that each frame was sampled from, shape (n,).
+
+    By time and not by seq: a round in which a finger gave no good word has a row but no seq.
+    """
+    t_us = batch.frames["t_us"]
+    if not len(t_us):
+        return np.empty(0, np.int64)
+    first_row = int(np.argmax(np.any(source.samples <= 4095, axis=(1, 2))))
+    rows = first_row + np.rint((t_us - t_us.min()) * FRAME_HZ / 1e6).astype(np.int64)
+    return np.asarray(np.clip(rows, 0, len(source.samples) - 1))
 
 
 def tare_changes(messages: list[Any]) -> list[dict[str, Any]]:
@@ -127,12 +147,11 @@ def force_error(source: Source, batch: Batch) -> list[float] | None:
     truth = source.known_force_n
     if truth is None:
         return None
-    frames = batch.frames
-    inside = frames["seq"] < source.samples.shape[0]
-    rows = frames[inside & ((frames["flags"] & wire.FrameFlags.CONTACT) != 0)]
-    if not len(rows):
+    touched = (batch.frames["flags"] & wire.FrameFlags.CONTACT) != 0
+    if not touched.any():
         return None
-    difference = rows["force_n"] - truth[rows["seq"], rows["finger"]]
+    frames, rows = batch.frames[touched], source_rows(source, batch)[touched]
+    difference = frames["force_n"] - truth[rows, frames["finger"]]
     return [float(v) for v in np.sqrt(np.nanmean(difference**2, axis=0))]
 
 

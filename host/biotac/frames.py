@@ -19,7 +19,8 @@ MNMM_PER_NMM = 1_000
 
 #: One row per finger and round of slots. ``counts``, ``pdc``, ``tac`` and ``tdc`` are raw counts
 #: 0..4095, 0xFFFF where no good word came. ``poc_mm``, ``force_n`` and ``torque_nmm`` are NaN where
-#: invalid; ``flags`` (FrameFlags) says why. ``t_us`` is device time since boot, unwrapped.
+#: invalid; ``flags`` (FrameFlags) says why. ``t_us`` is device time, unwrapped from the first value seen
+#: (a board that was up for over 71.6 minutes by then began earlier).
 FRAME_DTYPE = np.dtype(
     [
         ("finger", "u1"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import secrets
+import struct
 import time
 from collections import deque
 from collections.abc import Iterator
@@ -15,7 +16,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from . import _wire as wire
-from .errors import CommandRefusedError, DeviceLostError, NotAGatewayError, WireVersionError
+from ._sensor import MAX_SENSORS
+from .errors import CommandRefusedError, DeviceLostError, InputError, NotAGatewayError, WireVersionError
 from .frames import Frame, StructArray
 from .framing import encode
 from .link import Link
@@ -24,7 +26,7 @@ from .stream import Batch, StreamDecoder, join, split
 if TYPE_CHECKING:
     from .recording.writer import Recorder
 
-ALL_FINGERS = 0b11111
+ALL_FINGERS = (1 << MAX_SENSORS) - 1
 REPLY_TIMEOUT_S = 1.0
 REPLY_TRIES = 3
 # A streaming board sends a status every second by default; three missing ones are a dead link.
@@ -40,6 +42,8 @@ class LinkStats:
     bytes_received: int
     frames: int
     frames_lost: int
+    pac_lost: int
+    disordered: int  # sequence numbers that repeat or step back, as after a reboot
     crc_errors: int
     other_errors: int
 
@@ -62,6 +66,7 @@ class Hand:
         self._frames = 0
         self._streaming = False
         self._ended = False
+        self._closed = False
         try:
             self.info = self._handshake()
         except BaseException:
@@ -74,6 +79,10 @@ class Hand:
     def port(self) -> str:
         """The PORT this was opened as."""
         return self.link.port
+
+    def __repr__(self) -> str:
+        fingers = [f for f in range(MAX_SENSORS) if self.info.fingers_present >> f & 1]
+        return f"<biotac.Hand on {self.port}, fingers {fingers}{', closed' if self._closed else ''}>"
 
     def __enter__(self) -> Hand:
         return self
@@ -88,6 +97,9 @@ class Hand:
 
     def close(self) -> None:
         """Stop the stream, finish a recording, give the port back. Safe to call twice."""
+        if self._closed:
+            return
+        self._closed = True
         try:
             if self._streaming:
                 self._streaming = False
@@ -95,16 +107,19 @@ class Hand:
         except DeviceLostError:
             pass  # it is gone already, which is what closing wants
         finally:
-            if self._recorder is not None:
-                self._recorder.close()
-                self._recorder = None
-            self.link.close()
+            try:
+                if self._recorder is not None:
+                    self._recorder.close()
+            finally:
+                self.link.close()
 
     def _handshake(self) -> wire.Hello:
         # A board may still be streaming to whoever was here before: stop it, then look for the one
         # HELLO that carries our nonce and let everything else pass.
         nonce = secrets.randbits(32)
         self._decoder = StreamDecoder()
+        # The known fields of HELLO never change place, so that any peer can be told its version.
+        self._decoder.accept_newer_minor()
         for _ in range(REPLY_TRIES):
             self.link.write(b"\0" + encode(wire.Stop.ID, wire.Stop(self._next_req_id()).pack()))
             self._send(wire.HelloRequest(self._next_req_id(), nonce))
@@ -179,8 +194,14 @@ class Hand:
         self._command(wire.TareNow(self._next_req_id(), finger))
 
     def set_tare(self, finger: int, tare_counts: Any, pdc_counts: float | None = None) -> None:
-        """Use a stored tare: ``tare_counts`` (19,) in counts, kept to 1/16 count."""
-        tare_q4 = tuple(int(v) for v in np.rint(np.asarray(tare_counts, dtype=np.float64) * 16))
+        """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, kept to 1/16 count.
+
+        Raises ValueError for another shape or range.
+        """
+        tare = np.asarray(tare_counts, dtype=np.float64)
+        if tare.shape != (19,) or not np.all((tare >= 0) & (tare <= 4095)):
+            raise ValueError(f"tare_counts has shape {tare.shape}; expected 19 values of 0..4095 counts")
+        tare_q4 = tuple(int(v) for v in np.rint(tare * 16))
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
         self._command(wire.TareSet(self._next_req_id(), finger, tare_q4, pdc_q4))
 
@@ -202,7 +223,15 @@ class Hand:
     def stats(self) -> LinkStats:
         """Counts since the handshake."""
         counts = self._decoder.counts
-        return LinkStats(self._bytes, self._frames, self._decoder.lost, counts.bad_crc, counts.bad - counts.bad_crc)
+        return LinkStats(
+            bytes_received=self._bytes,
+            frames=self._frames,
+            frames_lost=self._decoder.lost,
+            pac_lost=self._decoder.lost_pac,
+            disordered=self._decoder.disordered,
+            crc_errors=counts.bad_crc,
+            other_errors=counts.bad - counts.bad_crc,
+        )
 
     @property
     def ended(self) -> bool:
@@ -210,13 +239,16 @@ class Hand:
         return self._ended
 
     def batches(self) -> Iterator[Batch]:
-        """Yield batches as they arrive, starting the stream if need be; ends with a simulated source."""
+        """Yield batches as they arrive, starting the stream if need be.
+
+        Ends with a simulated source, and when ``stop`` is called.
+        """
         if not self._streaming and not self._ended:
             self.start()
         while True:
             while self._batches:
                 yield self._batches.popleft()
-            if self._ended:
+            if self._ended or not self._streaming:
                 return
             self._pump_stream()
 
@@ -229,15 +261,23 @@ class Hand:
     def read(self, seconds: float) -> StructArray:
         """Return the frames of the next ``seconds`` of device time as one FRAME_DTYPE array (n,).
 
-        Shorter when a simulated source ends first; empty when it has ended before.
+        Shorter when a simulated source ends first; empty when it has ended before, or when no sensor
+        answered in that time. Raises ValueError unless seconds is a number above 0.
         """
         return self.read_batch(seconds).frames
 
     def read_batch(self, seconds: float) -> Batch:
         """Like read, with the wire messages, PAC and events of the same time."""
+        if not 0 < seconds < float("inf"):
+            raise ValueError(f"seconds is {seconds}, expected a number above 0")
         taken: list[Batch] = []
         end_us: int | None = None
+        first_status_us: int | None = None
         for batch in self.batches():
+            for status in (m for m in batch.messages if isinstance(m, wire.Status)):
+                first_status_us = status.t_us if first_status_us is None else first_status_us
+                if end_us is None and (status.t_us - first_status_us) % 2**32 > (seconds + SILENCE_S) * 1e6:
+                    return join(taken)  # the board is there, its sensors are not
             if end_us is None and len(batch.frames):
                 end_us = int(batch.frames["t_us"][0]) + round(seconds * 1e6)
             if end_us is None or not len(batch.frames) or batch.frames["t_us"].max() < end_us:
@@ -252,11 +292,14 @@ class Hand:
     def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
         """Write everything that arrives from now on to an MCAP file, until close or the recorder's close.
 
-        Raises InputError when the file exists and may not be overwritten.
+        Raises InputError when the file exists and may not be overwritten, cannot be written, or when
+        another recording of this hand is still open.
         """
         from .recording.writer import Recorder
 
-        sensors = [self.sensor_info(f) for f in range(5) if self.info.fingers_present >> f & 1]
+        if self._recorder is not None and not self._recorder.closed:
+            raise InputError(f"this hand is being recorded to {self._recorder.path}; close that recorder first")
+        sensors = [self.sensor_info(f) for f in range(MAX_SENSORS) if self.info.fingers_present >> f & 1]
         self._recorder = Recorder(
             Path(path),
             self.info,
@@ -275,7 +318,14 @@ class Hand:
         return self._req_id
 
     def _send(self, message: Any) -> None:
-        self.link.write(encode(message.ID, message.pack()))
+        if self._closed:
+            raise DeviceLostError(f"this Hand on {self.port} was closed; open the port again")
+        try:
+            payload = message.pack()
+        except struct.error as error:
+            name = type(message).__name__
+            raise InputError(f"{name} cannot hold these values ({error}); see its ranges in MESSAGES.md") from error
+        self.link.write(encode(message.ID, payload))
 
     def _pump(self, timeout_s: float) -> bool:
         chunk = self.link.read(timeout_s)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
+
 from . import _wire as wire
 from .hand import Hand
 from .link import Link, open_link
 
 
-def open(port: str, *, pace: float = 0.0) -> Hand:
+def open(port: str | os.PathLike[str], *, pace: float = 0.0) -> Hand:
     """Open a board and shake hands.
 
     ``port`` is a device path (``/dev/ttyACM0``, ``COM3``) or ``sim:SOURCE`` for a simulated board,
@@ -17,7 +19,7 @@ def open(port: str, *, pace: float = 0.0) -> Hand:
     Raises PortError, NotAGatewayError, WireVersionError, or InputError for a source that cannot be
     played.
     """
-    return shake_hands(open_link(port, pace=pace))
+    return shake_hands(open_link(os.fspath(port), pace=pace))
 
 
 def shake_hands(link: Link) -> Hand:

@@ -18,8 +18,8 @@ RADIUS_MM = sensor.CORE_RADIUS_UM / 1000
 AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")  # x, y, z: dark enough for white paper
 
 
-def draw(source: Source, batch: Batch, path: Path) -> None:
-    """Write a PNG of finger 0."""
+def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], path: Path) -> None:
+    """Write a PNG of finger 0; ``source_rows`` (n,) says which row of the source each frame is."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -30,7 +30,7 @@ def draw(source: Source, batch: Batch, path: Path) -> None:
     figure, axes = plt.subplots(1, 2, figsize=(13, 5.6), width_ratios=(1, 1.9), layout="constrained")
     figure.suptitle(f"{source.name}: finger 0 through the simulated board")
     draw_fingertip(figure, axes[0], frames, messages)
-    draw_force(axes[1], source, frames)
+    draw_force(axes[1], source, frames, source_rows[mine])
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
@@ -72,15 +72,14 @@ def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
     figure.colorbar(dots, ax=axes, shrink=0.7, label="signal [count]: compressed < 0 < bulged")
 
 
-def draw_force(axes: Any, source: Source, frames: Any) -> None:
+def draw_force(axes: Any, source: Source, frames: Any, rows: NDArray[np.int64]) -> None:
     """Force on the finger over device time, with the source's own force behind it."""
     t_s = frames["t_us"] / 1e6
     truth_n = source.known_force_n
     for axis, color in enumerate(AXIS_COLORS):
-        if truth_n is not None and len(frames):
-            inside = frames["seq"] < len(truth_n)
-            truth = truth_n[frames["seq"][inside], 0, axis]
-            axes.plot(t_s[inside], truth, color=color, linewidth=4, alpha=0.25, label=f"{'xyz'[axis]}, truth")
+        if truth_n is not None:
+            truth = truth_n[rows, 0, axis]
+            axes.plot(t_s, truth, color=color, linewidth=4, alpha=0.25, label=f"{'xyz'[axis]}, truth")
         axes.plot(t_s, frames["force_n"][:, axis], color=color, linewidth=1, label=f"{'xyz'[axis]}, board")
     contact = (frames["flags"] & wire.FrameFlags.CONTACT) != 0
     axes.fill_between(

@@ -34,17 +34,20 @@ class Batch:
 
 
 class Unwrapper:
-    """Extends a wrapping counter to int64, one value after another."""
+    """Extends a wrapping counter to int64, each value to the nearest after the one before."""
 
     def __init__(self, bits: int) -> None:
         self._modulus = 1 << bits
         self._last: int | None = None
 
     def extend(self, values: NDArray[Any]) -> NDArray[np.int64]:
-        """Return the unwrapped values; each is taken to be less than one wrap after the last."""
+        """Return the unwrapped values; steps back stay steps back."""
         raw = values.astype(np.int64)
+        if not len(raw):
+            return raw
         first = int(raw[0]) if self._last is None else self._last
-        steps = np.diff(raw, prepend=first % self._modulus) % self._modulus
+        half = self._modulus // 2
+        steps = (np.diff(raw, prepend=first % self._modulus) + half) % self._modulus - half
         out: NDArray[np.int64] = first + np.cumsum(steps)
         self._last = int(out[-1])
         return out
@@ -53,15 +56,18 @@ class Unwrapper:
 class StreamDecoder:
     """Chunks of bytes in, batches of arrays out.
 
-    ``lost`` counts the frames that the sequence numbers say were made but never came.
+    ``lost`` counts the frames, ``lost_pac`` the PAC blocks, that the sequence numbers say were made
+    but never came; ``disordered`` counts numbers that repeat or step back, as after a reboot.
     """
 
     def __init__(self) -> None:
         self._deframer = Deframer()
         self._seq: dict[tuple[int, int], Unwrapper] = defaultdict(lambda: Unwrapper(16))
-        self._time: dict[tuple[int, int], Unwrapper] = defaultdict(lambda: Unwrapper(32))
+        self._time = Unwrapper(32)  # one clock for all: a finger plugged in late is not early
         self._next_seq: dict[tuple[int, int], int] = {}
         self.lost = 0
+        self.lost_pac = 0
+        self.disordered = 0
         self.lost_after: list[tuple[int, int, int]] = []  # finger, seq before the gap, frames lost
 
     @property
@@ -103,21 +109,23 @@ class StreamDecoder:
 
     def _extend(self, message_id: int, rows: StructArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         seq = np.zeros(len(rows), np.int64)
-        t_us = np.zeros(len(rows), np.int64)
         for finger in np.unique(rows["finger"]):
             mine = rows["finger"] == finger
             key = (message_id, int(finger))
             seq[mine] = self._seq[key].extend(rows["seq"][mine])
-            t_us[mine] = self._time[key].extend(rows["t_us"][mine])
             self._count_gaps(key, seq[mine])
-        return seq, t_us
+        return seq, self._time.extend(rows["t_us"])
 
     def _count_gaps(self, key: tuple[int, int], seq: NDArray[np.int64]) -> None:
         expected = np.concatenate(([self._next_seq.get(key, int(seq[0]))], seq[:-1] + 1))
         gaps = seq - expected
-        for at in np.flatnonzero(gaps):
-            self.lost += int(gaps[at])
-            self.lost_after.append((key[1], int(expected[at]) - 1, int(gaps[at])))
+        self.disordered += int(np.count_nonzero(gaps < 0))
+        for at in np.flatnonzero(gaps > 0):
+            if key[0] == wire.Pac.ID:
+                self.lost_pac += int(gaps[at])
+            else:
+                self.lost += int(gaps[at])
+                self.lost_after.append((key[1], int(expected[at]) - 1, int(gaps[at])))
         self._next_seq[key] = int(seq[-1]) + 1
 
 

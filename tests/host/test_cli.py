@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import biotac
+import biotac.core
 from biotac.cli.main import VERBS, main, parser
 
 
@@ -136,6 +137,47 @@ def test_too_many_fingers_exit_2(capsys, tmp_path: Path) -> None:
 def test_usage_errors_exit_2() -> None:
     assert run("fly").returncode == 2
     assert run().returncode == 2
+    for seconds in ("0", "-1", "nan", "inf", "soon"):
+        done = run("stream", "sim:press.toml", "--seconds", seconds)
+        assert done.returncode == 2
+        assert "expected" in done.stderr
+
+
+def test_folders_that_cannot_be_made_exit_2(capsys, tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    for out in (file, file / "sub", Path("/dev/null"), Path("/proc/nowhere")):
+        assert "cannot be made a folder" in fails(capsys, 2, "demo", "press.toml", "--seconds", "1", "--out", str(out))
+    assert "is a folder" in fails(capsys, 2, "record", "sim:press.toml", str(tmp_path))
+
+
+def test_a_full_disk_exits_2_in_one_line() -> None:
+    done = run("record", "sim:press.toml", "/dev/full", "--force", "--seconds", "5")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "No space left" in done.stderr
+
+
+def test_demo_takes_the_ports_that_list_prints(capsys, tmp_path: Path) -> None:
+    assert main(["demo", "sim:press.toml", "--seconds", "1", "--out", str(tmp_path), "--json"]) == 0
+
+
+def test_a_simulated_board_has_its_fingers_own_gains(tmp_path: Path) -> None:
+    with biotac.open("sim:press.toml") as hand:
+        want = hand.settings()
+    link = tmp_path / "board"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "biotac", "sim", "press.toml", "--link", str(link)], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    try:
+        process.stdout.readline()
+        with biotac.open(link) as hand:
+            assert hand.settings() == want != biotac.core.default_settings()
+    finally:
+        process.terminate()
+        process.wait()
+        process.stdout.close()
+    assert not link.is_symlink()
 
 
 def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:

@@ -86,3 +86,15 @@ def test_real_presses_are_released(shared_data, tmp_path) -> None:
     rest_pdc = np.median(demo.batch.frames["pdc"][:600].astype(float))
     rezeroed = demo.batch.wire["tare_state"] == 1
     assert demo.batch.frames["pdc"][tared & rezeroed].max() <= rest_pdc + 60
+
+
+def test_truth_is_matched_by_time_where_rounds_are_missing(tmp_path) -> None:
+    steps = '[[step]]\ndo = "rest"\nseconds = 1.0\n[[step]]\ndo = "press"\nseconds = 0.5\nat = "E17"\nforce_n = 4.0\n'
+    text = f'name = "gap"\ngains = "fit"\n{steps}[[step]]\ndo = "hold"\nseconds = 1.0\n'
+    fault = '[[fault]]\nat_s = 0.5\nseconds = 0.2\nfinger = 0\nkind = "stuck_low"\n'
+    errors = []
+    for name, extra in (("whole", ""), ("gap", fault)):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text + extra)
+        errors.append(run_demo(str(path), tmp_path / name, show=quiet).facts["force_rmse_n"][2])
+    assert errors[1] == pytest.approx(errors[0], rel=0.02)

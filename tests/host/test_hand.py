@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import biotac
 from biotac import _wire as wire
-from biotac.framing import encode
+from biotac.framing import Deframer, encode
 
 
 def test_nothing_answers_is_no_gateway(scripted_board, monkeypatch) -> None:
@@ -138,9 +140,78 @@ def test_a_port_is_opened_once(scripted_board, hello) -> None:
         ("modbus:1", "no kind of port is called 'modbus'"),
         ("sim:", "no source"),
         ("sim:press.toml?speed=2", "option 'speed'"),
-        ("sim:press.toml?pace=quick", "pace=real or pace=fast"),
+        ("sim:press.toml?pace=quick", "pace is 'quick', expected real, fast or"),
+        ("sim:press.toml?pace=nan", "pace is 'nan', expected real, fast or"),
     ],
 )
 def test_a_port_that_cannot_be_opened_says_why(port: str, words: str) -> None:
     with pytest.raises(biotac.PortError, match=words):
         biotac.open(port)
+
+
+def test_a_newer_hello_is_read_as_far_as_it_is_known(scripted_board, hello) -> None:
+    def longer(payload: bytes, **changes: int) -> bytes:
+        (message_id, known), *_ = Deframer().feed(hello(payload, **changes))
+        return encode(message_id, known + b"new field")
+
+    board = scripted_board(lambda i, p: longer(p, wire_minor=9) if i == wire.HelloRequest.ID else b"")
+    with biotac.open(board.path) as hand:
+        assert hand.info.wire_minor == 9
+    board = scripted_board(lambda i, p: longer(p, wire_major=2) if i == wire.HelloRequest.ID else b"")
+    with pytest.raises(biotac.WireVersionError):
+        biotac.open(board.path)
+
+
+def test_stop_ends_the_iteration() -> None:
+    with biotac.open("sim:drift.toml") as hand:
+        seen = 0
+        for _ in hand.frames():
+            seen += 1
+            if seen == 50:
+                hand.stop()
+        assert 50 <= seen < 12_000
+
+
+def test_a_board_without_sensors_reads_nothing_and_says_so() -> None:
+    fault = '[[fault]]\nat_s = 0\nseconds = 20\nfinger = 0\nkind = "stuck_low"\n'
+    text = f'name = "none"\n[[step]]\ndo = "rest"\nseconds = 20\n{fault}'
+    path = Path(tempfile.mkdtemp()) / "none.toml"
+    path.write_text(text)
+    with biotac.open(f"sim:{path}") as hand:
+        assert len(hand.read(0.5)) == 0
+        assert not hand.ended  # it gave up on the sensors, not on the board
+
+
+def test_nothing_works_after_close_and_it_says_so() -> None:
+    hand = biotac.open("sim:drift.toml?seconds=1")
+    hand.close()
+    hand.close()
+    with pytest.raises(biotac.DeviceLostError, match="was closed; open the port again"):
+        hand.ping()
+    assert "closed" in repr(hand)
+
+
+def test_values_that_no_message_can_hold_are_refused() -> None:
+    with biotac.open("sim:drift.toml?seconds=1") as hand:
+        for bad in (np.full(18, 3000.0), np.full(19, -1.0), np.full(19, 5000.0), np.full(19, np.nan)):
+            with pytest.raises(ValueError, match="expected 19 values"):
+                hand.set_tare(0, bad)
+        with pytest.raises(biotac.InputError, match="SetSetting cannot hold"):
+            hand.set_setting(biotac.Setting.POC_WEIGHTS, 10**12)
+        for seconds in (0, -1, float("nan"), float("inf")):
+            with pytest.raises(ValueError, match="number above 0"):
+                hand.read(seconds)
+
+
+def test_one_recording_at_a_time_and_the_stream_goes_on_after_it(tmp_path) -> None:
+    with biotac.open("sim:drift.toml?seconds=3") as hand:
+        recorder = hand.record(tmp_path / "a.mcap")
+        with pytest.raises(biotac.InputError, match=r"being recorded to .*a\.mcap; close that recorder first"):
+            hand.record(tmp_path / "b.mcap")
+        hand.read(1.0)
+        recorder.close()
+        hand.read(1.0)
+        hand.record(tmp_path / "b.mcap")
+        hand.read(1.0)
+    assert biotac.Recording(tmp_path / "a.mcap").problems == []
+    assert len(biotac.load(tmp_path / "b.mcap")) > 0

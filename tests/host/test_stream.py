@@ -103,3 +103,30 @@ def test_frames_made_while_nobody_listened_are_not_lost() -> None:
     batch = decoder.feed(frame(0, 5, 0) + started + frame(0, 900, 9_000_000) + frame(0, 902, 9_020_000))
     assert batch.frames["seq"].tolist() == [5, 900, 902]
     assert decoder.lost_after == [(0, 900, 1)]
+
+
+def test_a_repeated_frame_is_no_gain_and_hides_no_loss() -> None:
+    decoder = StreamDecoder()
+    decoder.feed(b"".join(frame(0, seq, 10_000 * seq) for seq in (1, 2, 2, 3, 5)))
+    assert (decoder.lost, decoder.disordered) == (1, 1)
+
+
+def test_a_reboot_is_no_loss_of_sixty_thousand_frames() -> None:
+    decoder = StreamDecoder()
+    seq = decoder.feed(b"".join(frame(0, s, 10_000 * s) for s in (500, 501, 0, 1))).frames["seq"]
+    assert (decoder.lost, decoder.disordered) == (0, 1)
+    assert seq[-1] - seq[-2] == 1
+
+
+def test_a_finger_that_is_plugged_in_late_has_the_boards_time() -> None:
+    decoder = StreamDecoder()
+    decoder.feed(frame(0, 0, 2**32 - 5_000))
+    later = decoder.feed(frame(0, 1, 2**32 + 5_000) + frame(1, 0, 2**32 + 5_100)).frames
+    assert (later["t_us"] - 2**32).tolist() == [5_000, 5_100]
+
+
+def test_lost_pac_blocks_are_counted_apart() -> None:
+    decoder = StreamDecoder()
+    blocks = [wire.Pac(seq, 10_000 * seq, 0, (2000,) * 22) for seq in (0, 1, 4)]
+    decoder.feed(b"".join(encode(wire.Pac.ID, b.pack()) for b in blocks) + frame(0, 0, 0))
+    assert (decoder.lost, decoder.lost_pac) == (0, 2)

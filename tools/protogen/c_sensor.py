@@ -23,6 +23,14 @@ def row(values: tuple[int, ...], width: int = 6) -> str:
     return "{" + ", ".join(f"{v:{width}d}" for v in values) + "}"
 
 
+def frame_ms(contract: Contract) -> int:
+    """A round of slots is a whole number of ms, or all frame counts that stand for times are wrong."""
+    slots, hz = len(contract.sensor["frame"]["slots"]), contract.sensor["bus"]["slot_hz"]
+    if slots * 1000 % hz:
+        raise ValueError(f"sensor.toml: {slots} slots at {hz} Hz are no whole number of ms")
+    return int(slots * 1000 // hz)
+
+
 def header(contract: Contract) -> str:
     sensor, bus = contract.sensor, contract.sensor["bus"]
     table = electrodes(contract)
@@ -50,6 +58,7 @@ def header(contract: Contract) -> str:
         f"#define BT_SETTLE_US {bus['settle_us']}",
         f"#define BT_GAP_US {bus['gap_us']}",
         f"#define BT_SLOT_HZ {bus['slot_hz']}",
+        f"#define BT_FRAME_MS {frame_ms(contract)} // one round of slots",
         f"#define BT_POWER_ON_MS {bus['power_on_ms']}",
         f"#define BT_LISTEN_WORD 0x{bus['listen_word']:04X}",
         f"#define BT_PROPERTY_READ_COMMAND 0x{sensor['property_read']['command']:02X}",

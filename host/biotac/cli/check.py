@@ -21,11 +21,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: all results are right. 1: a result is wrong or wire frames were damaged. 2 (raised): unreadable."""
+    """0: what is there is right. 1: a wrong result, damaged data or no frame. 2 (raised): unreadable.
+
+    A recording that was merely cut off, as by a kill, is right as far as it goes; stderr says so.
+    """
     recording = Recording(args.recording)
     outcome = CrossCheck()
     outcome.add(recording.wire, recording.settings)
-    good = outcome.violations == 0 and recording.counts.bad == 0
+    damaged = recording.counts.bad + recording.damaged_chunks
+    good = outcome.violations == 0 and damaged == 0 and len(recording.frames) > 0
     if args.json:
         facts = {
             "recording": str(args.recording),
@@ -33,6 +37,7 @@ def run(args: argparse.Namespace) -> int:
             "frames": len(recording.frames),
             "frames_lost": recording.frames_lost,
             "crc_errors": recording.counts.bad_crc,
+            "cut_off": recording.cut_off,
             "problems": recording.problems,
             "crosscheck": outcome.as_dict(),
         }
@@ -42,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"biotac: {problem}", file=sys.stderr)
     for finding in outcome.findings:
         print(finding)
-    verdict = "good" if good else f"{outcome.violations} violation(s), {recording.counts.bad} damaged wire frame(s)"
+    verdict = "good" if good else f"{outcome.violations} violation(s), {damaged} damaged part(s)"
     print(
         f"{args.recording}: {len(recording.frames)} frames, {recording.frames_lost} lost, {verdict}; largest error "
         f"PoC {outcome.poc_um_max:.3f} um, force {outcome.force_mn_max:.4f} mN, "

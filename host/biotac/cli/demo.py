@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 from ..demo import run_demo
+from . import values
 from .progress import Progress
 
 NAME = "demo"
@@ -19,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "source", metavar="SOURCE", nargs="?", default="press.toml", help="scenario or recorded counts (press.toml)"
     )
-    parser.add_argument("--seconds", type=float, help="device time (default: the source's length)")
+    parser.add_argument("--seconds", type=values.seconds, help="device time (default: the source's length)")
     parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
     parser.add_argument("--out", type=Path, default=Path("biotac-demo"), help="folder for what it leaves")
 
@@ -27,7 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """0 when everything arrived and every result is within its bound, else 1."""
     progress = Progress()
-    demo = run_demo(args.source, args.out, fingers=args.fingers, seconds=args.seconds, show=progress.show)
+    demo = run_demo(
+        args.source.removeprefix("sim:"), args.out, fingers=args.fingers, seconds=args.seconds, show=progress.show
+    )
     progress.done()
     facts, check = demo.facts, demo.facts["crosscheck"]
     if args.json:
@@ -42,5 +45,7 @@ def run(args: argparse.Namespace) -> int:
         f"torque {check['torque_nmm_max']:.5f} N*mm at most; {check['violations']} violation(s)"
     )
     print(f"recording {facts['recording']}, report {facts['report']}")
+    if facts["rows_skipped"]:
+        print(f"{facts['rows_skipped']} incomplete row(s) of the recording were left out")
     print(f"picture {facts['picture']}")
     return 0 if demo.good else 1

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
+import threading
 from collections.abc import Sequence
 
-from ..errors import BiotacError
+from ..errors import BiotacError, InputError
 from . import check, demo, info, list_ports, record, sim, stream, version
 
 VERBS = (demo, list_ports, info, stream, record, check, sim, version)
@@ -48,10 +50,13 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; return its exit code. Errors are one line on stderr."""
     args = parser().parse_args(argv)
+    if threading.current_thread() is threading.main_thread():
+        # A terminated command leaves no simulator and no temporary file behind either.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return int(args.run(args))
     except BiotacError as error:
-        print(f"biotac: {error}", file=sys.stderr)
+        print(f"biotac: {one_line(error)}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
         print("biotac: interrupted", file=sys.stderr)
@@ -60,3 +65,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Whoever read our output has had enough; keep Python from complaining while it shuts down.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        print(f"biotac: {one_line(error)}; check the path and the space left", file=sys.stderr)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return InputError.exit_code
+
+
+def one_line(error: Exception) -> str:
+    """A message as one line, whatever a file name has in it."""
+    return " ".join(str(error).split())

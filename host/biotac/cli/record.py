@@ -8,6 +8,7 @@ from pathlib import Path
 
 import biotac
 
+from . import values
 from .progress import Progress
 
 NAME = "record"
@@ -19,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Port, file and time."""
     parser.add_argument("port", metavar="PORT", help="device path or sim:SOURCE")
     parser.add_argument("out", metavar="OUT", type=Path, help="file to write, .mcap")
-    parser.add_argument("--seconds", type=float, help="stop after this much device time (default: Ctrl-C)")
+    parser.add_argument("--seconds", type=values.seconds, help="device time to record (default: until Ctrl-C)")
     parser.add_argument("--force", action="store_true", help="overwrite OUT")
 
 

@@ -9,30 +9,42 @@ import signal
 import sys
 from pathlib import Path
 
-from ..errors import PortError
-from ..link.ports import parse_pace
+from ..errors import InputError, PortError
+from ..link.serial_port import SerialLink
 from ..link.sim_process import SimBoard
+from ..opening import shake_hands
 from ..sim.source import load_source
+from . import values
 
 NAME = "sim"
 HELP = "Run a simulated board on a pty that any serial program can open."
 EXAMPLE = "biotac sim press.toml --fingers 5"
+SCENARIO_S = 600.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Source and pace."""
     parser.add_argument("source", metavar="SOURCE", help="scenario (.toml) or recorded counts (.npz, .btd)")
     parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
-    parser.add_argument("--seconds", type=float, help="device time until it ends (default: the source's length)")
-    parser.add_argument("--pace", type=parse_pace, default=1.0, help="real (default), fast, or device s per s")
+    parser.add_argument(
+        "--seconds",
+        type=values.seconds,
+        help="device time (default: scenarios repeat for ten minutes, recordings play once)",
+    )
+    parser.add_argument("--pace", type=values.pace, default=1.0, help="real (default) or device seconds per second")
     parser.add_argument("--link", type=Path, help="also make this path a symbolic link to the pty")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the pty's path, then run until Ctrl-C."""
-    source = load_source(args.source, fingers=args.fingers, seconds=args.seconds)
-    board = SimBoard(source, pace=args.pace, hold=False)
+    if args.pace == 0:
+        raise InputError("a board on a pty needs a pace above 0; unpaced boards are for biotac.open and biotac demo")
+    name = args.source.removeprefix("sim:")
+    seconds = args.seconds or (SCENARIO_S if name.endswith(".toml") else None)
+    source = load_source(name, fingers=args.fingers, seconds=seconds)
+    board = SimBoard(source, pace=args.pace, hold=True)
     try:
+        prepare(board)
         if args.link is not None:
             make_link(args.link, board.path)
         facts = {"port": board.path, "source": source.name, "fingers": source.samples.shape[1]}
@@ -49,6 +61,14 @@ def run(args: argparse.Namespace) -> int:
             args.link.unlink()
         board.close()
     return 0
+
+
+def prepare(board: SimBoard) -> None:
+    """Give the board its source's settings and tare, as biotac.open does, and let its time run."""
+    link = SerialLink(board.path)
+    link.source = board.source
+    shake_hands(link).close()
+    board.release()
 
 
 def make_link(link: Path, target: str) -> None:

@@ -11,6 +11,7 @@ import biotac
 
 from .._wire import FrameFlags
 from ..frames import Frame
+from . import values
 
 NAME = "stream"
 HELP = "Print frames as they arrive: one line each, or one JSON object each."
@@ -20,7 +21,7 @@ EXAMPLE = "biotac stream sim:press.toml --rate 5"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Port, time and rate."""
     parser.add_argument("port", metavar="PORT", help="device path or sim:SOURCE")
-    parser.add_argument("--seconds", type=float, help="stop after this much device time")
+    parser.add_argument("--seconds", type=values.seconds, help="stop after this much device time")
     parser.add_argument("--rate", type=float, default=10.0, help="lines per second and finger (default 10; 0: all)")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass
 from urllib.parse import parse_qsl
@@ -39,13 +40,19 @@ def parse_sim(port: str, pace: float) -> SimPort:
             float(options["seconds"]) if "seconds" in options else None,
         )
     except ValueError as error:
-        raise PortError(f"{port}: {error}; expected numbers, or pace=real or pace=fast") from error
+        raise PortError(f"{port}: {error}; an example is sim:press.toml?pace=real&fingers=2&seconds=5") from error
 
 
 def parse_pace(text: str) -> float:
     """``real``, ``fast`` or device seconds per second."""
-    pace = {"real": 1.0, "fast": 0.0}.get(text)
-    return float(text) if pace is None else pace
+    named = {"real": 1.0, "fast": 0.0}
+    try:
+        pace = named[text] if text in named else float(text)
+    except ValueError:
+        pace = math.nan
+    if not 0 <= pace < math.inf:
+        raise ValueError(f"pace is {text!r}, expected real, fast or device seconds per second")
+    return pace
 
 
 def open_link(port: str, *, pace: float = 0.0) -> Link:

@@ -48,11 +48,8 @@ class SimBoard:
             self.close()
             raise PortError(f"the simulator did not start: {error or 'it said nothing'}")
         self.path = first[1]
-
-    @property
-    def running(self) -> bool:
-        """The process is alive."""
-        return self._process.poll() is None
+        # The board has mapped its tape by now; nothing is left behind however this process ends.
+        self._folder.cleanup()
 
     def stdout_fd(self) -> int:
         """Readable when the board has something to say, or is gone."""
@@ -85,7 +82,7 @@ class SimBoard:
         for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
             if pipe is not None:
                 pipe.close()
-        self._folder.cleanup()
+        self._folder.cleanup()  # again, for a board that did not start
 
     def _last_words(self) -> str:
         assert self._process.stderr is not None

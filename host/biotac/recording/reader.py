@@ -25,12 +25,15 @@ class Recording:
 
     ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``wire`` the
     FRAME messages as sent, ``messages`` the rest (tare changes, status). ``problems`` lists in words
-    what is missing or damaged; the rest is good. Raises RecordingError when nothing can be read.
+    what is missing or damaged; the rest is good. ``cut_off``: the file ends without its index;
+    ``damaged_chunks``: seconds that were left out. Raises RecordingError when nothing can be read.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
         self.problems: list[str] = []
+        self.cut_off = False
+        self.damaged_chunks = 0
         metadata: dict[str, str] | None = None
         blocks: list[bytes] = []
         for record in self._records():
@@ -40,7 +43,10 @@ class Recording:
                 blocks.append(record.data)
         if metadata is None:
             raise RecordingError(self._without_metadata())
-        self._take_metadata(metadata)
+        try:
+            self._take_metadata(metadata)
+        except (KeyError, TypeError, ValueError) as error:
+            raise RecordingError(f"{self.path} has damaged metadata ({error}); its frames cannot be judged") from error
         decoder = StreamDecoder()
         decoder.accept_newer_minor()
         batch = join([decoder.feed(block) for block in blocks])
@@ -50,6 +56,8 @@ class Recording:
         self.messages: list[Any] = batch.messages
         self.counts = decoder.counts
         self.frames_lost = decoder.lost
+        if self.cut_off and not len(self.frames):
+            raise RecordingError(f"{self.path} was cut off before its first second was whole; record it again")
         self._describe_losses(decoder)
 
     def _without_metadata(self) -> str:
@@ -86,6 +94,7 @@ class Recording:
             topics: dict[int, str] = {}
             whole = False
             begun = False
+            good_until = 0
             try:
                 for record in StreamReader(stream, emit_chunks=True).records:
                     begun = True
@@ -95,8 +104,9 @@ class Recording:
                             topics[item.id] = item.topic
                         if not isinstance(item, Message) or topics.get(item.channel_id) == layout.TOPIC:
                             yield item
+                    good_until = stream.tell()
                 whole = True
-            except (McapError, struct.error, ValueError, EOFError) as error:
+            except (McapError, struct.error, ValueError, EOFError, MemoryError) as error:
                 # Cut off in the middle of a record, and what came before it is good; unless it
                 # never was such a file.
                 if isinstance(error, InvalidMagic) and not begun:
@@ -105,15 +115,18 @@ class Recording:
                         "`biotac record` wrote"
                     ) from error
             if not whole:
+                self.cut_off = True
+                unread = size - good_until
                 self.problems.append(
-                    f"{self.path.name} ends without its index, as after a kill or a full disk: "
-                    "up to its last second is missing, the rest is read"
+                    f"{self.path.name} ends without its index, as after a kill or a full disk: its last {unread} bytes "
+                    "are missing or unreadable, what came before them is read"
                 )
 
     def _open_chunk(self, chunk: Chunk) -> list[McapRecord]:
         try:
             return list(breakup_chunk(chunk, validate_crc=True))
         except Exception as error:  # mcap, zstandard and struct each raise their own kinds
+            self.damaged_chunks += 1
             self.problems.append(f"one second of {self.path.name} is damaged and left out ({error})")
             return []
 

@@ -38,6 +38,8 @@ class Recorder:
         self._pending_since = 0.0
         self._skip_to_delimiter = mid_stream
         self._sequence = 0
+        if path.is_dir():
+            raise InputError(f"{path} is a folder; name a file in it")
         try:
             self._file = path.open("wb" if overwrite else "xb")
         except FileExistsError as error:
@@ -55,7 +57,12 @@ class Recorder:
         self._file.flush()
 
     def write(self, chunk: bytes) -> None:
-        """Take bytes as they came; an empty chunk only lets a second's worth out in time."""
+        """Take bytes as they came; an empty chunk only lets a second's worth out in time.
+
+        Does nothing once closed: the stream may go on after its recording.
+        """
+        if self._file.closed:
+            return
         if self._skip_to_delimiter:
             _, delimiter, chunk = chunk.partition(b"\0")
             self._skip_to_delimiter = not delimiter
@@ -75,6 +82,11 @@ class Recorder:
         self._sequence += 1
         self._pending.clear()
         self._file.flush()
+
+    @property
+    def closed(self) -> bool:
+        """Nothing is written any more."""
+        return self._file.closed
 
     def close(self) -> None:
         """Write what is left and the file's index. Safe to call twice."""

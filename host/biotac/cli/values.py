@@ -1,0 +1,27 @@
+"""Argument types that several verbs share."""
+
+from __future__ import annotations
+
+import argparse
+import math
+
+
+def seconds(text: str) -> float:
+    """A time above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is no time; expected seconds above 0")
+    return value
+
+
+def pace(text: str) -> float:
+    """real, fast, or device seconds per second."""
+    from ..link.ports import parse_pace
+
+    try:
+        return parse_pace(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
