@@ -7,13 +7,13 @@ tools/gen_protocol.py --check   exit 1, naming the files, when any of them has d
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
+from committed import write_or_check  # noqa: E402
 from protogen import c_fold, c_sensor, c_wire, docs, python_code, schema  # noqa: E402
 
 
@@ -35,21 +35,8 @@ def outputs(root: Path) -> dict[Path, str]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="compare, do not write")
-    args = parser.parse_args()
-    drifted = []
-    for path, text in outputs(ROOT).items():
-        if path.exists() and path.read_text(encoding="utf-8") == text:
-            continue
-        drifted.append(path.relative_to(ROOT))
-        if not args.check:
-            path.write_text(text, encoding="utf-8")
-    if args.check and drifted:
-        names = ", ".join(map(str, drifted))
-        print(f"drifted from protocol/*.toml: {names}; run tools/gen_protocol.py", file=sys.stderr)
-        return 1
-    return 0
+    description = (__doc__ or "").splitlines()[0]
+    return write_or_check(description, ROOT, outputs(ROOT), "protocol/*.toml", "tools/gen_protocol.py")
 
 
 if __name__ == "__main__":

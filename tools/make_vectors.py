@@ -11,7 +11,6 @@ second opinion (`judge`) from the same libraries must agree before anything is w
 
 from __future__ import annotations
 
-import argparse
 import random
 import struct
 import sys
@@ -28,6 +27,10 @@ except ModuleNotFoundError:  # Python 3.10
     import tomli as tomllib
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+
+from committed import write_or_check  # noqa: E402
+
 LINK: dict[str, Any] = tomllib.loads((ROOT / "protocol/link.toml").read_text(encoding="utf-8"))
 
 HEADER = "# Written by tools/make_vectors.py; do not edit. Format: README.md beside this file.\n"
@@ -327,21 +330,8 @@ def outputs() -> dict[Path, str]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="compare, do not write")
-    args = parser.parse_args()
-    drifted = []
-    for path, text in outputs().items():
-        if path.exists() and path.read_text(encoding="utf-8") == text:
-            continue
-        drifted.append(path.relative_to(ROOT))
-        if not args.check:
-            path.write_text(text, encoding="utf-8")
-    if args.check and drifted:
-        names = ", ".join(map(str, drifted))
-        print(f"drifted from tools/make_vectors.py: {names}; run it", file=sys.stderr)
-        return 1
-    return 0
+    description = (__doc__ or "").splitlines()[0]
+    return write_or_check(description, ROOT, outputs(), "tools/make_vectors.py", "it")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 #include "isqrt.h"
 
+// One result bit per step, from the top: no division, the same number of steps for every input.
 uint32_t bt_isqrt32(uint32_t n)
 {
     uint32_t root = 0;
@@ -12,19 +13,4 @@ uint32_t bt_isqrt32(uint32_t n)
         }
     }
     return root;
-}
-
-// One result bit per step, from the top: no division, the same number of steps for every input.
-uint32_t bt_isqrt64(uint64_t n)
-{
-    uint64_t root = 0;
-    for (uint64_t bit = (uint64_t)1 << 62; bit != 0; bit >>= 2) {
-        if (n >= root + bit) {
-            n -= root + bit;
-            root = (root >> 1) + bit;
-        } else {
-            root >>= 1;
-        }
-    }
-    return (uint32_t)root;
 }

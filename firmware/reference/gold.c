@@ -1,7 +1,6 @@
 #include "gold.h"
 
 #include "fix.h"
-#include "isqrt.h"
 
 // N_x in um times 1000 is the dividend of x in nm.
 _Static_assert(BT_SUM_SQUARES_R_MAX_Q8_UM <= INT64_MAX / 1000, "the x dividend must fit int64");
@@ -9,6 +8,20 @@ _Static_assert(BT_SUM_SQUARES_MAX_Q8 <= INT64_MAX, "the weight sum must fit int6
 // Every electrode lies below the axis, so a positive weight sum keeps (y, z) away from 0: the
 // direction below never is 0/0 (numerics: NaN-free by geometry).
 _Static_assert(BT_ELECTRODE_Z_MAX_UM < 0, "electrodes must have z < 0");
+
+uint32_t gold_isqrt64(uint64_t n)
+{
+    uint64_t root = 0;
+    for (uint64_t bit = (uint64_t)1 << 62; bit != 0; bit >>= 2) {
+        if (n >= root + bit) {
+            n -= root + bit;
+            root = (root >> 1) + bit;
+        } else {
+            root >>= 1;
+        }
+    }
+    return (uint32_t)root;
+}
 
 static int64_t weight(int64_t e, int weights)
 {
@@ -46,7 +59,7 @@ static void scale_to_radius(const int64_t v[3], int first, int32_t out_nm[3])
         scaled[d] = v[d] < 0 ? -(int64_t)magnitude : (int64_t)magnitude;
         squares += magnitude * magnitude;
     }
-    int64_t length = (int64_t)bt_isqrt64(squares);
+    int64_t length = (int64_t)gold_isqrt64(squares);
     for (int d = first; d < 3; d++) {
         out_nm[d] = (int32_t)bt_div_round(scaled[d] * (BT_CORE_RADIUS_UM * 1000), length);
     }

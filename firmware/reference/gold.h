@@ -11,6 +11,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+// Square root of 64 bits, the largest r with r * r <= n.
+uint32_t gold_isqrt64(uint64_t n);
+
 // PoC in nm, within 1 nm of Lin 2013 Eq 1 and 2. False, leaving poc_nm alone, when nothing weighs.
 bool gold_poc(const int32_t e_q4[BT_ELECTRODES], int weights, int32_t poc_nm[3]);
 

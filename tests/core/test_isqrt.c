@@ -1,6 +1,8 @@
-// The integer square root against bisection, and around every kind of square.
+// The integer square roots, the core's and the gold kernel's, against bisection, and around every kind of
+// square.
 #include "support.h"
 
+#include "gold.h"
 #include "isqrt.h"
 
 // Bisection on r <= n / r: no squaring, so nothing can overflow.
@@ -21,10 +23,10 @@ static uint32_t bisected(uint64_t n)
 
 static void check_around(uint64_t k)
 {
-    assert_int_equal(bt_isqrt64(k * k), k);
-    assert_int_equal(bt_isqrt64(k * k + 1), k == 0 ? 1 : k);
+    assert_int_equal(gold_isqrt64(k * k), k);
+    assert_int_equal(gold_isqrt64(k * k + 1), k == 0 ? 1 : k);
     if (k > 0) {
-        assert_int_equal(bt_isqrt64(k * k - 1), k - 1);
+        assert_int_equal(gold_isqrt64(k * k - 1), k - 1);
     }
 }
 
@@ -45,6 +47,24 @@ static void squares_and_their_neighbours_are_exact(void **state)
     }
 }
 
+// The largest root of 32 bits is 65535: every root and its neighbours, then both sides of random n.
+static void every_32_bit_root_is_exact(void **state)
+{
+    (void)state;
+    uint64_t seed = 4;
+    for (uint32_t k = 1; k <= 65535; k++) {
+        assert_int_equal(bt_isqrt32(k * k), k);
+        assert_int_equal(bt_isqrt32(k * k - 1), k - 1);
+        assert_int_equal(bt_isqrt32(k * k + 2 * k), k);
+    }
+    assert_int_equal(bt_isqrt32(0), 0);
+    assert_int_equal(bt_isqrt32(UINT32_MAX), 65535);
+    for (int k = 0; k < 200000; k++) {
+        uint32_t n = (uint32_t)random_u64(&seed);
+        assert_int_equal(bt_isqrt32(n), bisected(n));
+    }
+}
+
 static void the_top_of_the_range_is_exact(void **state)
 {
     (void)state;
@@ -52,10 +72,10 @@ static void the_top_of_the_range_is_exact(void **state)
         check_around(k);
     }
     for (uint64_t n = UINT64_MAX; n > UINT64_MAX - 3000; n--) {
-        assert_int_equal(bt_isqrt64(n), UINT32_MAX);
+        assert_int_equal(gold_isqrt64(n), UINT32_MAX);
     }
-    assert_int_equal(bt_isqrt64((uint64_t)1 << 63), 3037000499u);
-    assert_int_equal(bt_isqrt64(((uint64_t)1 << 63) - 1), 3037000499u);
+    assert_int_equal(gold_isqrt64((uint64_t)1 << 63), 3037000499u);
+    assert_int_equal(gold_isqrt64(((uint64_t)1 << 63) - 1), 3037000499u);
 }
 
 static void any_number_agrees_with_bisection(void **state)
@@ -63,11 +83,11 @@ static void any_number_agrees_with_bisection(void **state)
     (void)state;
     uint64_t seed = 4;
     for (uint64_t n = 0; n < 5000; n++) {
-        assert_int_equal(bt_isqrt64(n), bisected(n));
+        assert_int_equal(gold_isqrt64(n), bisected(n));
     }
     for (int k = 0; k < 200000; k++) {
         uint64_t n = random_u64(&seed) >> (k % 64);
-        assert_int_equal(bt_isqrt64(n), bisected(n));
+        assert_int_equal(gold_isqrt64(n), bisected(n));
     }
 }
 
@@ -75,6 +95,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(squares_and_their_neighbours_are_exact),
+        cmocka_unit_test(every_32_bit_root_is_exact),
         cmocka_unit_test(the_top_of_the_range_is_exact),
         cmocka_unit_test(any_number_agrees_with_bisection),
     };

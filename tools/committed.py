@@ -1,0 +1,27 @@
+"""Generated files are committed: write them, or check that nobody let them drift."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def write_or_check(description: str, root: Path, outputs: dict[Path, str], source: str, command: str) -> int:
+    """The whole command line of a generator.
+
+    Without arguments writes what differs; with --check writes nothing, names what drifted from
+    ``source``, and returns 1.
+    """
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--check", action="store_true", help="compare, do not write")
+    check = parser.parse_args().check
+    drifted = [path for path, text in outputs.items() if not path.exists() or path.read_text(encoding="utf-8") != text]
+    if check and drifted:
+        names = ", ".join(str(path.relative_to(root)) for path in drifted)
+        print(f"drifted from {source}: {names}; run {command}", file=sys.stderr)
+        return 1
+    if not check:
+        for path in drifted:
+            path.write_text(outputs[path], encoding="utf-8")
+    return 0
