@@ -5,6 +5,7 @@
 #define BIOTAC_BINDING_H
 
 #include "batch.h"
+#include "blocks.h"
 #include "cobs.h"
 #include "crc32.h"
 #include "framing.h"

@@ -2,33 +2,35 @@
 //
 // Every sum is a sum of whole numbers below 2^53 and therefore exact, in whatever order it is taken;
 // only the last few steps of a frame round. So a frame's results do not depend on its neighbours, on n
-// or on the compiler's vectors. Agrees with firmware/reference to 1e-12 (tests/host/test_batch.py).
+// or on the compiler's vectors.
 #ifndef BIOTAC_BLOCKS_H
 #define BIOTAC_BLOCKS_H
 
 #include "lin2013.h"
 
-#define BT_MIRRORED 7 // pairs of electrodes left and right of the midline
-#define BT_MIDLINE  5 // electrodes on it
-#define BT_FOLDED   12
-#define BT_RESULTS  9 // poc_mm, force_n, torque_nmm of one frame
+#define BT_MIRRORED       7  // pairs of electrodes left and right of the midline
+#define BT_FOLDED         12 // the pairs, and the electrodes on the midline
+#define BT_LINES          7  // of them along the finger, with y, z and normal in common
+#define BT_MIRRORED_LINES 4
+#define BT_RESULTS        9 // poc_mm, force_n, torque_nmm of one frame
 
-// The settings and the generated geometry as the loops want them: the pairs first, then the midline.
+// The settings and the generated geometry, folded at the midline.
 typedef struct {
     int poc_weights;
     double x_um[BT_FOLDED];
-    double z_um[BT_FOLDED];
-    double y_um[BT_MIRRORED];
-    double normal_x[BT_FOLDED]; // 1/1000
-    double normal_z[BT_FOLDED];
-    double normal_y[BT_MIRRORED];
     double arm_y_nm[BT_FOLDED];
     double arm_z_nm[BT_MIRRORED];
+    double y_um[BT_MIRRORED_LINES];
+    double z_um[BT_LINES];
+    double normal_x[BT_LINES]; // 1/1000
+    double normal_y[BT_MIRRORED_LINES];
+    double normal_z[BT_LINES];
     double force_scale[3];  // N per 1/16 count * 1/1000
     double torque_scale[2]; // N*mm per 1/16 count * nm
 } bt_block_plan;
 
-void bt_block_plan_init(bt_block_plan *plan, const lin2013_settings *settings);
+// 0 if the generated geometry does not fold as this file believes; the plan is not to be used then.
+int bt_block_plan_init(bt_block_plan *plan, const lin2013_settings *settings);
 
 // counts: n rows of 19 uint16, counts_stride bytes apart, of any alignment; 0..4095 or
 // BT_INVALID_COUNT. tare: n rows of 19 doubles in counts, 0..4095, tare_stride bytes apart, or one row

@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 from ._wire import FrameFlags, PocWeights, Setting, TareReason, TareState
+from .batch import RESULT_DTYPE, compute
 from .errors import (
     BiotacError,
     CommandRefusedError,
@@ -30,6 +31,7 @@ from .version import __version__
 __all__ = [
     "FRAME_DTYPE",
     "PAC_DTYPE",
+    "RESULT_DTYPE",
     "BiotacError",
     "CommandRefusedError",
     "DeviceLostError",
@@ -50,6 +52,7 @@ __all__ = [
     "TareState",
     "WireVersionError",
     "__version__",
+    "compute",
     "load",
     "open",
 ]

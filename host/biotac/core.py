@@ -43,7 +43,7 @@ def default_settings() -> Settings:
     return {setting: spec.default for setting, spec in wire.SETTINGS.items()}
 
 
-def compute(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
+def on_board(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
     """Run the on-board integer kernels: counts (n, 19) 0..4095 or 0xFFFF for missing, tare in counts.
 
     ``tare`` is (19,) or (n, 19), rounded to 1/16 count as the board does. Raises ValueError for other
@@ -78,7 +78,7 @@ def compute(counts: Any, tare: Any, settings: Settings | None = None) -> Results
 
 
 def reference(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
-    """The same from firmware/reference: Lin 2013 Eq 1-4 in float64. Arguments as compute()."""
+    """The same from firmware/reference: Lin 2013 Eq 1-4 in float64. Arguments as on_board()."""
     raw, tare_q4 = checked(counts, tare)
     return reference_q4(raw, tare_q4, settings or default_settings())
 
@@ -86,14 +86,7 @@ def reference(counts: Any, tare: Any, settings: Settings | None = None) -> Resul
 def reference_q4(counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settings: Settings) -> Results:
     """reference() on the integers of FRAME messages, both (n, 19); no check, the wire had one."""
     raw, tare_q4 = np.ascontiguousarray(counts), np.ascontiguousarray(tare_q4)
-    gains = ffi.new(
-        "lin2013_settings *",
-        {
-            "poc_weights": settings[wire.Setting.POC_WEIGHTS],
-            "force_gain": [settings[s] / NN_PER_N for s in FORCE_GAINS],
-            "torque_gain": [settings[s] / NN_PER_N for s in TORQUE_GAINS],
-        },
-    )
+    gains = formula_settings(settings)
     out = [np.empty((len(raw), 3), np.float64) for _ in range(3)]
     lib.lin2013_frames(
         len(raw),
@@ -103,6 +96,18 @@ def reference_q4(counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settin
         *(ffi.from_buffer("double[]", array) for array in out),
     )
     return Results(*out)
+
+
+def formula_settings(settings: Settings) -> Any:
+    """The C struct lin2013_settings, gains in N per count."""
+    return ffi.new(
+        "lin2013_settings *",
+        {
+            "poc_weights": settings[wire.Setting.POC_WEIGHTS],
+            "force_gain": [settings[s] / NN_PER_N for s in FORCE_GAINS],
+            "torque_gain": [settings[s] / NN_PER_N for s in TORQUE_GAINS],
+        },
+    )
 
 
 FORCE_GAINS = (wire.Setting.FORCE_GAIN_X_NN, wire.Setting.FORCE_GAIN_Y_NN, wire.Setting.FORCE_GAIN_Z_NN)

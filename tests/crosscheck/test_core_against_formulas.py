@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from biotac import PocWeights, Setting
-from biotac.core import compute, default_settings, reference
+from biotac.core import default_settings, on_board, reference
 from biotac.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 
 try:
@@ -75,7 +75,7 @@ def test_core_and_reference_meet_the_formulas_on_any_counts(counts, tare_q4, wei
     assert np.allclose(exact.poc_mm, poc, rtol=0, atol=1e-9, equal_nan=True)
     assert np.allclose(exact.force_n, force, rtol=1e-12, atol=1e-9)
     assert np.allclose(exact.torque_nmm, torque, rtol=1e-12, atol=1e-9, equal_nan=True)
-    board = compute(counts, tare_q4 / 16, settings_with(weights))
+    board = on_board(counts, tare_q4 / 16, settings_with(weights))
     within(board.poc_mm, poc, 1e3, POC_BOUND_UM, norm=True)
     within(board.force_n, force, 1e3, FORCE_BOUND_MN, norm=False)
     # Half a mN*mm, and arms known to 1/32 um on up to 19 x 4095 counts; x: the PoC's error times force.
@@ -87,20 +87,20 @@ def test_core_and_reference_meet_the_formulas_on_any_counts(counts, tare_q4, wei
 @pytest.mark.parametrize("weights", list(PocWeights))
 def test_no_weight_is_no_point_of_contact(weights) -> None:
     counts = np.full((1, 19), 2000)
-    board = compute(counts, 2000.0, settings_with(weights))
+    board = on_board(counts, 2000.0, settings_with(weights))
     assert np.isnan(board.poc_mm).all()
     assert np.isnan(board.torque_nmm[0, 0])
     assert board.force_n.tolist() == [[0, 0, 0]]
-    bulged = compute(counts + 5, 2000.0, settings_with(weights))
+    bulged = on_board(counts + 5, 2000.0, settings_with(weights))
     assert np.isnan(bulged.poc_mm).all() == (weights != PocWeights.ABS_N2)
 
 
 def test_a_missing_electrode_weighs_nothing() -> None:
     counts = np.full(19, 2000)
     counts[16] -= 300
-    with_all = compute(counts, 2000.0)
+    with_all = on_board(counts, 2000.0)
     counts[4] = 0xFFFF
-    without_one = compute(counts, 2000.0)
+    without_one = on_board(counts, 2000.0)
     assert np.array_equal(with_all.poc_mm, without_one.poc_mm)
     assert np.array_equal(with_all.force_n, without_one.force_n)
 
@@ -117,7 +117,7 @@ def test_a_missing_electrode_weighs_nothing() -> None:
 )
 def test_bad_arrays_are_refused_at_the_door(counts, tare) -> None:
     with pytest.raises(ValueError, match=r"expected|must be"):
-        compute(counts, tare)
+        on_board(counts, tare)
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_the_eight_real_vectors(shared_data, weights, key) -> None:
         assert np.abs(exact.poc_mm[0] - vector[key]).max() <= 1e-9
         assert np.abs(exact.force_n[0] - 0.1 * np.array(vector["fsum"])).max() <= 1e-9
         assert np.abs(exact.torque_nmm[0, 1:] - 0.1 * np.array(vector["tsum"][1:])).max() <= 1e-9
-        board = compute(vector["raw"], tare, unit)
+        board = on_board(vector["raw"], tare, unit)
         within(board.poc_mm, exact.poc_mm, 1e3, 1.2, norm=True)
         within(board.force_n, exact.force_n, 1e3, 1.0, norm=False)
         within(board.torque_nmm, exact.torque_nmm, 1, 0.02, norm=False)
