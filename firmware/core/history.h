@@ -11,11 +11,13 @@
 
 #include "assembly.h"
 
-#define BT_HISTORY_FRAMES 16
-#define BT_MEAN_FRAMES    8 // frames in a mean that a tare may be taken from
+#define BT_HISTORY_FRAMES 16 // a power of two, or taking indices modulo it costs a division
+#define BT_MEAN_FRAMES    8  // frames in a mean that a tare may be taken from
 
 typedef struct {
     uint16_t counts[BT_HISTORY_FRAMES][BT_ELECTRODES];
+    uint16_t median[BT_MEAN_FRAMES][BT_ELECTRODES]; // of each of the latest counts and the two before
+    uint16_t sum[BT_ELECTRODES];     // of the latest BT_MEAN_FRAMES counts, or as many as there are
     uint16_t pdc[BT_HISTORY_FRAMES]; // BT_INVALID_COUNT until pressure was read once
     uint8_t head;                    // the latest entry
     uint8_t filled;                  // valid entries, at most BT_HISTORY_FRAMES
@@ -31,13 +33,13 @@ void bt_history_add(bt_history *history, const bt_frame *frame);
 
 bool bt_history_known(const bt_history *history, int electrode);
 
-// Median of three consecutive counts ending `ago`: a single-sample glitch alone exceeds the contact
-// threshold, and one frame in ten has one.
-uint16_t bt_history_median(const bt_history *history, int electrode, int ago);
+// Medians of three consecutive counts ending `ago` (below BT_MEAN_FRAMES): a single-sample glitch alone
+// exceeds the contact threshold, and one frame in ten has one.
+const uint16_t *bt_history_medians(const bt_history *history, unsigned ago);
 uint16_t bt_history_pdc_median(const bt_history *history);
 
-// Mean of the last eight counts, or of as many as there are.
-uint32_t bt_history_mean_q16(const bt_history *history, int electrode);
+// Means of the last eight counts, or of as many as there are.
+void bt_history_means_q16(const bt_history *history, uint32_t mean_q16[BT_ELECTRODES]);
 
 // Mean of the last eight medians: for a new tare, which a glitch must not shift.
 uint32_t bt_history_settled_q16(const bt_history *history, int electrode);

@@ -74,10 +74,10 @@ static signal_shape shape_of(const int32_t e_q4[BT_ELECTRODES])
 {
     signal_shape shape = {0, 0, 0};
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        uint64_t square_q8 = (uint64_t)((int64_t)e_q4[i] * e_q4[i]);
+        uint32_t square_q8 = bt_abs32(e_q4[i]) * bt_abs32(e_q4[i]); // below 2^32: |e| is below 2^16
         shape.energy += square_q8;
         shape.bulge += e_q4[i] > 0 ? square_q8 : 0;
-        shape.active += bt_abs(e_q4[i]) >= ACTIVE_Q4;
+        shape.active += bt_abs32(e_q4[i]) >= ACTIVE_Q4;
     }
     shape.energy >>= 8;
     shape.bulge >>= 8;

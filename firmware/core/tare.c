@@ -33,36 +33,36 @@ _Static_assert(ROLL_BACK < BT_TARE_SNAPSHOTS, "the roll-back must be in the ring
 
 uint16_t bt_tare_q4(uint32_t base_q16)
 {
-    return base_q16 == BT_TARE_UNKNOWN ? BT_INVALID_COUNT : (uint16_t)bt_div_round(base_q16, 1 << 12);
+    return base_q16 == BT_TARE_UNKNOWN ? BT_INVALID_COUNT : (uint16_t)((base_q16 + (1 << 11)) >> 12);
 }
 
 // ---- measures against the baseline ----------------------------------------------------------
 
-static int64_t square_q8(int64_t difference_q16)
+// Values are below 2^28 and differences are rounded to 1/16 count, so that a square fits 32 bits.
+static uint32_t square_q8(uint32_t value_q16, uint32_t base_q16)
 {
-    int64_t q4 = bt_div_round(difference_q16, 1 << 12);
+    uint32_t q4 = (bt_abs32((int32_t)(value_q16 - base_q16)) + (1 << 11)) >> 12;
     return q4 * q4;
 }
 
 static uint32_t energy_of_medians(const bt_tare *tare)
 {
-    int64_t sum = 0;
+    const uint16_t *median = bt_history_medians(&tare->history, 0);
+    uint64_t sum = 0;
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        if (bt_history_known(&tare->history, i)) {
-            int64_t count_q16 = (int64_t)bt_history_median(&tare->history, i, 0) << 16;
-            sum += square_q8(count_q16 - tare->base.electrode_q16[i]);
+        if (median[i] != BT_INVALID_COUNT) {
+            sum += square_q8((uint32_t)median[i] << 16, tare->base.electrode_q16[i]);
         }
     }
     return (uint32_t)(sum >> 8);
 }
 
-static uint32_t energy_of_means(const bt_tare *tare)
+static uint32_t energy_of_means(const bt_tare *tare, const uint32_t mean_q16[BT_ELECTRODES])
 {
-    int64_t sum = 0;
+    uint64_t sum = 0;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         if (bt_history_known(&tare->history, i)) {
-            int64_t mean_q16 = bt_history_mean_q16(&tare->history, i);
-            sum += square_q8(mean_q16 - tare->base.electrode_q16[i]);
+            sum += square_q8(mean_q16[i], tare->base.electrode_q16[i]);
         }
     }
     return (uint32_t)(sum >> 8);
@@ -131,7 +131,7 @@ static void meet_new_channels(bt_tare *tare)
 {
     for (int i = 0; i < BT_ELECTRODES; i++) {
         if (tare->base.electrode_q16[i] == BT_TARE_UNKNOWN && bt_history_known(&tare->history, i)) {
-            uint32_t first_q16 = (uint32_t)bt_history_median(&tare->history, i, 0) << 16;
+            uint32_t first_q16 = (uint32_t)bt_history_medians(&tare->history, 0)[i] << 16;
             tare->base.electrode_q16[i] = first_q16;
             for (int k = 0; k < BT_TARE_SNAPSHOTS; k++) {
                 tare->snapshot[k].electrode_q16[i] = first_q16;
@@ -146,21 +146,22 @@ static void meet_new_channels(bt_tare *tare)
     }
 }
 
-static uint32_t follow(uint32_t base_q16, int64_t target_q16, int64_t step_q16)
+static uint32_t follow(uint32_t base_q16, uint32_t target_q16, int32_t step_q16)
 {
-    return (uint32_t)((int64_t)base_q16 + bt_clamp(target_q16 - base_q16, -step_q16, step_q16));
+    int32_t change_q16 = (int32_t)(target_q16 - base_q16);
+    change_q16 = change_q16 > step_q16 ? step_q16 : change_q16 < -step_q16 ? -step_q16 : change_q16;
+    return base_q16 + (uint32_t)change_q16;
 }
 
-static void track_drift(bt_tare *tare)
+static void track_drift(bt_tare *tare, const uint32_t mean_q16[BT_ELECTRODES])
 {
     for (int i = 0; i < BT_ELECTRODES; i++) {
         if (bt_history_known(&tare->history, i)) {
-            uint32_t mean_q16 = bt_history_mean_q16(&tare->history, i);
-            tare->base.electrode_q16[i] = follow(tare->base.electrode_q16[i], mean_q16, SLEW_Q16);
+            tare->base.electrode_q16[i] = follow(tare->base.electrode_q16[i], mean_q16[i], SLEW_Q16);
         }
     }
     if (pdc_known(tare)) {
-        int64_t pdc_q16 = (int64_t)bt_history_pdc_median(&tare->history) << 16;
+        uint32_t pdc_q16 = (uint32_t)bt_history_pdc_median(&tare->history) << 16;
         tare->base.pdc_q16 = follow(tare->base.pdc_q16, pdc_q16, PDC_SLEW_Q16);
     }
     if (--tare->snapshot_countdown == 0) {
@@ -182,8 +183,10 @@ static void measure_noise(bt_tare *tare, uint32_t setting_count2)
     if (tare->noise_frames < 1 << NOISE_SHIFT) { // plain mean first, so that it starts unbiased
         tare->noise_frames++;
     }
-    int64_t change_q8 = ((int64_t)sample << 8) - tare->noise_q8;
-    tare->noise_q8 = (uint32_t)(tare->noise_q8 + bt_div_round(change_q8, tare->noise_frames));
+    // The setting is at most 10^6 count^2, so that q8 fits 31 bits.
+    int32_t change_q8 = (int32_t)((sample << 8) - tare->noise_q8);
+    uint32_t step_q8 = bt_div_round_u32(bt_abs32(change_q8), tare->noise_frames);
+    tare->noise_q8 += (uint32_t)bt_with_sign(step_q8, change_q8);
     if (tare->noise_frames == 1 << NOISE_SHIFT) {
         tare->noise_count2 = tare->noise_q8 >> 8;
     }
@@ -200,11 +203,13 @@ static void update_init(bt_tare *tare)
 
 static void update_rest(bt_tare *tare, uint32_t setting_count2)
 {
+    uint32_t mean_q16[BT_ELECTRODES];
     bool hit = energy_of_medians(tare) > bt_tare_threshold_count2(tare, setting_count2)
                || (pdc_known(tare) && pdc_above_rest_q16(tare) > PDC_HIT_Q16);
     if (!hit) {
         tare->hits = 0;
-        track_drift(tare);
+        bt_history_means_q16(&tare->history, mean_q16);
+        track_drift(tare, mean_q16);
         measure_noise(tare, setting_count2);
         return;
     }
@@ -218,22 +223,19 @@ static void update_rest(bt_tare *tare, uint32_t setting_count2)
 }
 
 // How long the signals have rested where they are. Means of eight keep noise out.
-static uint8_t settled_for(bt_tare *tare)
+static uint8_t settled_for(bt_tare *tare, const uint32_t mean_q16[BT_ELECTRODES])
 {
-    const bt_history *history = &tare->history;
-    int pdc_change = bt_history_pdc_median(history) - tare->settle_pdc;
+    uint16_t pdc = bt_history_pdc_median(&tare->history);
+    int pdc_change = pdc - tare->settle_pdc;
     bool moved = pdc_change > SETTLE_PDC_SPAN || pdc_change < -SETTLE_PDC_SPAN;
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        int64_t change_q16 = (int64_t)bt_history_mean_q16(history, i) - tare->settle_q16[i];
-        moved = moved || bt_abs(change_q16) > SETTLE_SPAN_Q16;
+        moved = moved || bt_abs32((int32_t)(mean_q16[i] - tare->settle_q16[i])) > SETTLE_SPAN_Q16;
     }
     if (!moved) {
         return tare->settle_frames < UINT8_MAX ? ++tare->settle_frames : UINT8_MAX;
     }
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        tare->settle_q16[i] = bt_history_mean_q16(history, i);
-    }
-    tare->settle_pdc = bt_history_pdc_median(history);
+    memcpy(tare->settle_q16, mean_q16, sizeof tare->settle_q16);
+    tare->settle_pdc = pdc;
     tare->settle_frames = 0;
     return 0;
 }
@@ -242,7 +244,7 @@ static uint8_t settled_for(bt_tare *tare)
 // so that neither energy nor pressure come back to the tare. What tells a release then is that the
 // pressure has fallen far below the press's own peak and nothing moves any more. A load that only
 // grows is at its peak all the time and never passes.
-static bool released_by_pressure(bt_tare *tare)
+static bool released_by_pressure(bt_tare *tare, const uint32_t mean_q16[BT_ELECTRODES])
 {
     int64_t pdc_q16 = pdc_above_rest_q16(tare);
     if (pdc_q16 > tare->pdc_peak_q16) {
@@ -251,21 +253,25 @@ static bool released_by_pressure(bt_tare *tare)
     // Without a press there is no release: a light touch while the pressure undershoots has no peak.
     bool pressed = tare->pdc_peak_q16 >= RELEASE_FALL * PDC_HIT_Q16;
     bool fallen = pdc_q16 < SETTLE_PDC_Q16 && pdc_q16 * RELEASE_FALL < tare->pdc_peak_q16;
-    return settled_for(tare) >= SETTLE_FRAMES && pressed && fallen;
+    return settled_for(tare, mean_q16) >= SETTLE_FRAMES && pressed && fallen;
 }
 
-static uint64_t residue_limit(const bt_tare *tare)
+_Static_assert((uint64_t)DRIFT_LIMIT *DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
+
+static uint32_t residue_limit(const bt_tare *tare)
 {
-    uint64_t limit = pdc_known(tare) ? DRIFT_LIMIT : DRIFT_LIMIT_BLIND;
-    uint64_t frames = tare->contact_frames < limit ? tare->contact_frames : limit;
-    return RESIDUE_ENERGY
-           + BT_ELECTRODES * frames * frames / ((uint64_t)DRIFT_FRAMES_PER_COUNT * DRIFT_FRAMES_PER_COUNT);
+    uint32_t limit = pdc_known(tare) ? DRIFT_LIMIT : DRIFT_LIMIT_BLIND;
+    uint32_t frames = tare->contact_frames < limit ? tare->contact_frames : limit;
+    uint32_t drift_count2 = BT_DIVIDE_U32(frames * frames, DRIFT_FRAMES_PER_COUNT * DRIFT_FRAMES_PER_COUNT);
+    return RESIDUE_ENERGY + BT_ELECTRODES * drift_count2;
 }
 
 static void update_contact(bt_tare *tare)
 {
     tare->contact_frames++;
-    uint32_t energy = energy_of_means(tare);
+    uint32_t mean_q16[BT_ELECTRODES];
+    bt_history_means_q16(&tare->history, mean_q16);
+    uint32_t energy = energy_of_means(tare, mean_q16);
     tare->energy_peak = energy > tare->energy_peak ? energy : tare->energy_peak;
     bool pressure = pdc_known(tare);
     // Without pressure the energy itself must have fallen, or the first second of a slow load would
@@ -276,7 +282,7 @@ static void update_contact(bt_tare *tare)
     bool still = quiet && energy < residue_limit(tare) && bt_history_motion(&tare->history) < RESIDUE_MOTION;
     tare->calm_frames = calm ? (uint8_t)(tare->calm_frames + 1) : 0;
     tare->still_frames = still ? (uint8_t)(tare->still_frames + 1) : 0;
-    bool settled = pressure && released_by_pressure(tare);
+    bool settled = pressure && released_by_pressure(tare, mean_q16);
     if (tare->calm_frames >= CALM_FRAMES) {
         adopt_present(tare, BT_TARE_REASON_RELEASE);
     } else if (tare->still_frames >= RESIDUE_FRAMES || settled) {
