@@ -292,6 +292,9 @@ class Hand:
     def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
         """Write everything that arrives from now on to an MCAP file, until close or the recorder's close.
 
+        Frames that have arrived already and wait to be read are not in it; call it before ``start`` or
+        the first read to have all.
+
         Raises InputError when the file exists and may not be overwritten, cannot be written, or when
         another recording of this hand is still open.
         """
