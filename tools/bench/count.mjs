@@ -1,4 +1,5 @@
-// Runs a bench image on rp2040js and prints, as JSON, the instructions and cycles between marks.
+// Runs a bench image on rp2040js and prints, as JSON, a row per run between two marks: name,
+// instructions, cycles, and the value that the closing mark was given.
 // usage: node count.mjs IMAGE.bin ADDRESS_OF_BENCH_MARK
 // rp2040js counts cycles by the Cortex-M0+ manual, with no flash wait states and no bus contention.
 import fs from 'node:fs'
@@ -25,7 +26,7 @@ function nameAt(address) {
 
 const rows = []
 let open = null
-for (let instructions = 0; instructions < 2e8; instructions++) {
+for (let instructions = 0; instructions < 4e8; instructions++) {
   if (mcu.core.PC === mark) {
     const address = mcu.core.registers[0]
     if (address !== 0) {
@@ -36,7 +37,7 @@ for (let instructions = 0; instructions < 2e8; instructions++) {
       }
       open = { name, instructions, cycles: mcu.core.cycles }
     } else {
-      rows.push([open.name, instructions - open.instructions, mcu.core.cycles - open.cycles])
+      rows.push([open.name, instructions - open.instructions, mcu.core.cycles - open.cycles, mcu.core.registers[1] >>> 0])
     }
   }
   mcu.core.executeInstruction()

@@ -1,0 +1,45 @@
+// One number over many results of the shipped kernels: equal on every build that computes the same
+// bits. Frames run through every size and both signs by a fixed generator.
+#ifndef BIOTAC_BENCH_BITS_H
+#define BIOTAC_BENCH_BITS_H
+
+#include "crc32.h"
+#include "results.h"
+
+#define BITS_FRAMES 10000
+
+static inline uint32_t bits_step(uint32_t *seed)
+{
+    *seed = *seed * 1664525u + 1013904223u;
+    return *seed >> 8;
+}
+
+static inline uint32_t bits_hash(void)
+{
+    uint32_t seed = 7;
+    uint32_t chain[8] = {0};
+    bt_settings all;
+    bt_settings_reset(&all);
+    bt_kernel_settings settings = bt_kernel_settings_from(&all);
+    for (int k = 0; k < BITS_FRAMES; k++) {
+        int32_t e_q4[BT_ELECTRODES];
+        int16_t poc_um[3];
+        int32_t force_100un[3], torque_mnmm[3];
+        int32_t size = BT_E_MAX_Q4 >> (k % 16);
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            int32_t magnitude = (int32_t)(bits_step(&seed) % (uint32_t)(size + 1));
+            e_q4[i] = bits_step(&seed) & 3 ? -magnitude : magnitude;
+        }
+        settings.poc_weights = k % 3;
+        uint32_t flags = bt_kernel(e_q4, &settings, poc_um, force_100un, torque_mnmm);
+        for (int d = 0; d < 3; d++) {
+            chain[1 + d] = (uint32_t)force_100un[d];
+            chain[4 + d] = (uint32_t)torque_mnmm[d] ^ (uint32_t)(uint16_t)poc_um[d] << 16;
+        }
+        chain[7] = flags;
+        chain[0] = bt_crc32((const uint8_t *)chain, sizeof chain); // both builds are little-endian
+    }
+    return chain[0];
+}
+
+#endif
