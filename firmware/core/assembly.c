@@ -53,16 +53,11 @@ void bt_frame_put(bt_frame *frame, uint8_t slot, uint16_t count)
     }
 }
 
-bool bt_count_railed(uint16_t count)
-{
-    return count == 0 || (count >= 4090 && count != BT_INVALID_COUNT);
-}
-
 int bt_frame_unusable(const bt_frame *frame)
 {
     int n = 0;
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        n += frame->electrode[i] == BT_INVALID_COUNT || bt_count_railed(frame->electrode[i]);
+        n += !bt_count_usable(frame->electrode[i]);
     }
     return n;
 }

@@ -25,8 +25,20 @@ void bt_frame_clear(bt_frame *frame);
 // Put the word of one slot in its place. count is 0..4095 or BT_INVALID_COUNT.
 void bt_frame_put(bt_frame *frame, uint8_t slot, uint16_t count);
 
-// A count at the end of its range: 0, or 4090 and more.
-bool bt_count_railed(uint16_t count);
+#define BT_RAIL_COUNT 4090 // from here on, and at 0, a count is at the end of its range
+
+#ifndef BT_CDEF // asked for every electrode of every frame, so they are inlined
+// Neither missing nor railed; one comparison, in which 0 wraps to the top.
+static inline bool bt_count_usable(uint16_t count)
+{
+    return (uint32_t)count - 1 < BT_RAIL_COUNT - 1;
+}
+
+static inline bool bt_count_railed(uint16_t count)
+{
+    return !bt_count_usable(count) && count != BT_INVALID_COUNT;
+}
+#endif
 
 // Electrodes that are missing or railed; with more than BT_USABLE_WITHOUT of them the frame is faulty.
 #define BT_USABLE_WITHOUT 2

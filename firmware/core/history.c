@@ -65,7 +65,7 @@ static void add_pdc(bt_history *history, uint16_t pdc, uint8_t next)
 {
     uint16_t before = pdc_ago(history, 0);
     // A pressure at the end of its range says nothing about contact.
-    history->pdc_now = pdc != BT_INVALID_COUNT && !bt_count_railed(pdc);
+    history->pdc_now = bt_count_usable(pdc);
     if (history->pdc_now && before == BT_INVALID_COUNT) {
         for (int k = 0; k < BT_HISTORY_FRAMES; k++) {
             history->pdc[k] = pdc;
@@ -86,7 +86,7 @@ void bt_history_add(bt_history *history, const bt_frame *frame)
     uint16_t *median = history->median[next & (BT_MEAN_FRAMES - 1)];
     for (int i = 0; i < BT_ELECTRODES; i++) {
         uint16_t count = frame->electrode[i];
-        bool usable = count != BT_INVALID_COUNT && !bt_count_railed(count);
+        bool usable = bt_count_usable(count);
         if (usable && before[i] == BT_INVALID_COUNT) {
             begin_electrode(history, i, count);
         }
@@ -101,16 +101,6 @@ void bt_history_add(bt_history *history, const bt_frame *frame)
     if (history->filled < BT_HISTORY_FRAMES) {
         history->filled++;
     }
-}
-
-bool bt_history_known(const bt_history *history, int electrode)
-{
-    return history->counts[history->head][electrode] != BT_INVALID_COUNT;
-}
-
-const uint16_t *bt_history_medians(const bt_history *history, unsigned ago)
-{
-    return history->median[(history->head - ago) & (BT_MEAN_FRAMES - 1)];
 }
 
 uint16_t bt_history_pdc_median(const bt_history *history)

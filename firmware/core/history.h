@@ -31,11 +31,21 @@ void bt_history_restart(bt_history *history);
 
 void bt_history_add(bt_history *history, const bt_frame *frame);
 
-bool bt_history_known(const bt_history *history, int electrode);
-
+#ifndef BT_CDEF
 // Medians of three consecutive counts ending `ago` (below BT_MEAN_FRAMES): a single-sample glitch alone
-// exceeds the contact threshold, and one frame in ten has one.
-const uint16_t *bt_history_medians(const bt_history *history, unsigned ago);
+// exceeds the contact threshold, and one frame in ten has one. BT_INVALID_COUNT for an electrode that
+// was never read well.
+static inline const uint16_t *bt_history_medians(const bt_history *history, unsigned ago)
+{
+    return history->median[(history->head - ago) & (BT_MEAN_FRAMES - 1)];
+}
+
+static inline bool bt_history_known(const bt_history *history, int electrode)
+{
+    return bt_history_medians(history, 0)[electrode] != BT_INVALID_COUNT;
+}
+#endif
+
 uint16_t bt_history_pdc_median(const bt_history *history);
 
 // Means of the last eight counts, or of as many as there are.

@@ -31,11 +31,6 @@
 
 _Static_assert(ROLL_BACK < BT_TARE_SNAPSHOTS, "the roll-back must be in the ring");
 
-uint16_t bt_tare_q4(uint32_t base_q16)
-{
-    return base_q16 == BT_TARE_UNKNOWN ? BT_INVALID_COUNT : (uint16_t)((base_q16 + (1 << 11)) >> 12);
-}
-
 // ---- measures against the baseline ----------------------------------------------------------
 
 // Values are below 2^28 and differences are rounded to 1/16 count, so that a square fits 32 bits.

@@ -62,6 +62,11 @@ uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base);
 uint32_t bt_tare_threshold_count2(const bt_tare *tare, uint32_t setting_count2);
 
 // A baseline as it is subtracted and published: 1/16 count; BT_INVALID_COUNT when unknown.
-uint16_t bt_tare_q4(uint32_t base_q16);
+#ifndef BT_CDEF
+static inline uint16_t bt_tare_q4(uint32_t base_q16)
+{
+    return base_q16 == BT_TARE_UNKNOWN ? BT_INVALID_COUNT : (uint16_t)((base_q16 + (1 << 11)) >> 12);
+}
+#endif
 
 #endif
