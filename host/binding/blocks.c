@@ -351,3 +351,8 @@ int64_t bt_blocks(const bt_block_plan *plan, int64_t n, const void *counts, int6
     }
     return -1;
 }
+
+int bt_one_frame(const bt_block_plan *plan, const void *counts, const void *tare, void *results)
+{
+    return bt_blocks(plan, 1, counts, 0, tare, 0, results) < 0;
+}

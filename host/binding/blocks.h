@@ -40,4 +40,7 @@ int bt_block_plan_init(bt_block_plan *plan, const lin2013_settings *settings);
 int64_t bt_blocks(const bt_block_plan *plan, int64_t n, const void *counts, int64_t counts_stride,
                   const void *tare, int64_t tare_stride, void *results);
 
+// The same for one frame; true if it is in range. Fewer arguments: converting them counts here.
+int bt_one_frame(const bt_block_plan *plan, const void *counts, const void *tare, void *results);
+
 #endif

@@ -15,7 +15,8 @@ from . import _wire as wire
 from .frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, to_units
 
 try:
-    from ._core import ffi, lib
+    from ._core import ffi as ffi
+    from ._core import lib as lib
 except ImportError as error:  # an editable tree without a build, or a wheel for another platform
     raise ImportError(f"the compiled core is missing ({error}); install the package: pip install .") from error
 

@@ -1,0 +1,1 @@
+"""What `biotac bench` measures, with the contestants beside it."""
