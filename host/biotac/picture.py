@@ -50,7 +50,7 @@ def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
     signals = np.nan_to_num(electrode_signals(messages)) if len(messages) else np.zeros((1, 19))
     tared = (frames["flags"] & wire.FrameFlags.UNTARED) == 0
     energy = np.where(tared, (signals**2).sum(axis=1), 0.0) if len(messages) else np.zeros(1)
-    strongest = int(energy.argmax())
+    strongest = int(np.argmax(energy))
     limit = max(float(np.abs(signals[strongest]).max()), 1.0)
     dots = axes.scatter(
         across, along, c=signals[strongest], s=520, cmap="RdBu", vmin=-limit, vmax=limit, edgecolors="#444444"

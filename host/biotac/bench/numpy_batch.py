@@ -90,7 +90,7 @@ class Blocked:
             e, w, sums = self._e[:, :n], self._w[:, :n], self._sums[:, :n]
             np.copyto(e, some.T)
             np.subtract(e, column, out=e)
-            if some.max() == wire.INVALID_COUNT:
+            if np.max(some) == wire.INVALID_COUNT:
                 e[some.T == wire.INVALID_COUNT] = 0
             np.minimum(e, 0, out=w)
             np.matmul(self._of_weights, w, out=sums[:4])

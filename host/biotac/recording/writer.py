@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import time
@@ -46,6 +47,14 @@ class Recorder:
             raise InputError(f"{path} exists and would be overwritten; choose another name or say --force") from error
         except OSError as error:
             raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
+        try:
+            self._begin(describe(hello, settings, sensors, port))
+        except OSError:
+            with contextlib.suppress(OSError):  # the disk is as full as it was
+                self._file.close()
+            raise
+
+    def _begin(self, metadata: dict[str, str]) -> None:
         # A chunk size of one byte closes a chunk after every message, and each message is one
         # second: what is on disk is whole up to a second ago.
         self._writer = Writer(self._file, chunk_size=1, compression=CompressionType.ZSTD)
@@ -53,7 +62,7 @@ class Recorder:
         schema = resources.files("biotac").joinpath("schema.json").read_bytes()
         schema_id = self._writer.register_schema(layout.SCHEMA_NAME, layout.SCHEMA_ENCODING, schema)
         self._channel = self._writer.register_channel(layout.TOPIC, layout.MESSAGE_ENCODING, schema_id)
-        self._writer.add_metadata(layout.METADATA_NAME, describe(hello, settings, sensors, port))
+        self._writer.add_metadata(layout.METADATA_NAME, metadata)
         self._file.flush()
 
     def write(self, chunk: bytes) -> None:
@@ -92,9 +101,11 @@ class Recorder:
         """Write what is left and the file's index. Safe to call twice."""
         if self._file.closed:
             return
-        self.flush()
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self._file.close()
+        try:
+            self.flush()
+            self._writer.finish()  # type: ignore[no-untyped-call]
+        finally:
+            self._file.close()  # also on a full disk, or the interpreter would try once more at its end
 
 
 def describe(

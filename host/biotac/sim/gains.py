@@ -14,7 +14,7 @@ from .._wire import SETTINGS
 from . import surface
 from .surface import Floats
 
-_ARMS_MM = np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL)
+_ARMS_MM: Floats = np.asarray(np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL), dtype=np.float64)
 
 _SPECS = {setting.name.lower(): spec for setting, spec in SETTINGS.items()}
 

@@ -69,8 +69,8 @@ def read_tape(path: str | Path) -> npt.NDArray[np.uint16]:
         raise InputError(
             f"{path}: {len(data)} bytes: expected {expected} for {frames} frames of {fingers} fingers; {cure}"
         )
-    samples = np.frombuffer(data, dtype="<u2", offset=_HEADER.size).astype(np.uint16)
-    samples = samples.reshape(frames, fingers, slots)
+    words = np.frombuffer(data, dtype="<u2", offset=_HEADER.size).astype(np.uint16)
+    samples = words.reshape(frames, fingers, slots)
     _check(str(path), samples)
     return samples
 
