@@ -86,7 +86,7 @@ def special_values() -> list[tuple[str, str, dict[str, list[int]]]]:
         "tdc": [0xFFFF],
         "pdc_tare_q4": [0xFFFF],
     }
-    saturated = counting("FRAME") | {
+    extreme = counting("FRAME") | {
         "poc_um": [-13600, 5080, -5080],
         "force_100un": [2**31 - 1, -(2**31) + 1, -1],
         "torque_mnmm": [-(2**31), 2**31 - 1, -(2**31) + 1],
@@ -95,7 +95,7 @@ def special_values() -> list[tuple[str, str, dict[str, list[int]]]]:
     pac = counting("PAC") | {"pac": [0, 4095, 0xFFFF] + [2000 + k for k in range(19)]}
     return [
         ("FRAME", "results_invalid_and_words_missing", untared),
-        ("FRAME", "results_at_their_limits", saturated),
+        ("FRAME", "results_at_their_limits", extreme),
         ("PAC", "a_word_is_missing", pac),
         ("TARE", "pressure_never_read", counting("TARE") | {"pdc_tare_q16": [0xFFFFFFFF]}),
         ("TARE_SET", "pressure_unknown", counting("TARE_SET") | {"pdc_tare_q4": [0xFFFF]}),

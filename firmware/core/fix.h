@@ -1,6 +1,5 @@
-// The one place where the core rounds, saturates and divides.
-// Rounding is half away from zero (protocol/SPEC.md); saturation stops one short of the type's
-// minimum, which means "invalid" on the wire.
+// How the core divides, splits and rounds. What is published is rounded half away from zero
+// (protocol/SPEC.md). Nothing here saturates: every caller's range is bounded at compile time.
 #ifndef BIOTAC_FIX_H
 #define BIOTAC_FIX_H
 
@@ -32,11 +31,6 @@ static inline int64_t bt_div_round(int64_t num, int64_t den)
 static inline uint32_t bt_div_round_u32(uint32_t num, uint32_t den)
 {
     return BT_DIVIDE_U32(num + den / 2, den);
-}
-
-static inline int64_t bt_clamp(int64_t value, int64_t low, int64_t high)
-{
-    return value < low ? low : value > high ? high : value;
 }
 
 static inline uint64_t bt_abs(int64_t value)

@@ -5,7 +5,7 @@
 #include "isqrt.h"
 
 // Every electrode lies below the axis, so a positive weight sum keeps (y, z) away from 0: the
-// direction below never is 0/0 (numerics 1.3), and |N_z| always is large enough to normalise by.
+// direction below never is 0/0 (SPEC.md, Degenerate input), and |N_z| always is large enough to normalise by.
 _Static_assert(BT_ELECTRODE_Z_MAX_UM < 0, "electrodes must have z < 0");
 _Static_assert(BT_FOLD_HI_MAX <= INT32_MAX && BT_FOLD_LO_MAX <= INT32_MAX, "the folded sums must fit int32");
 _Static_assert((BT_FOLD_HI_MAX << BT_FOLD_SPLIT_BITS) / BT_ELECTRODE_MAX_UM < 1LL << 31,
@@ -108,6 +108,13 @@ static int16_t ratio_um(const bt_split_sums *sums, uint32_t total)
     return (int16_t)-(int32_t)bt_div_round_u32(dividend, divisor);
 }
 
+// The middle of what a value that was cut to 1/8 um may have been, in 1/16 um: cut values would pull
+// the lever of torque x towards the axis, and that by more the larger the force.
+static int32_t centre_q4(int32_t um_q3)
+{
+    return 2 * um_q3 + (um_q3 > 0) - (um_q3 < 0);
+}
+
 bool bt_poc(const int32_t e_q4[BT_ELECTRODES], int weights, bt_point *point)
 {
     uint32_t w[BT_ELECTRODES];
@@ -129,7 +136,7 @@ bool bt_poc(const int32_t e_q4[BT_ELECTRODES], int weights, bt_point *point)
     }
     point->um[1] = to_um(fine[1]);
     point->um[2] = to_um(fine[2]);
-    point->fine_yz_um_q3[0] = fine[1];
-    point->fine_yz_um_q3[1] = fine[2];
+    point->fine_yz_um_q4[0] = centre_q4(fine[1]);
+    point->fine_yz_um_q4[1] = centre_q4(fine[2]);
     return true;
 }

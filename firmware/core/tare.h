@@ -54,7 +54,7 @@ void bt_tare_reset(bt_tare *tare);
 // Take in one frame. threshold_count2 is the contact_energy setting.
 void bt_tare_update(bt_tare *tare, const bt_frame *frame, uint32_t threshold_count2);
 
-// Host commands; enum bt_error. NOW needs eight still frames; both are refused in FAULT.
+// Host commands; enum bt_error. NOW needs ten frames that hold still; both are refused in FAULT.
 uint8_t bt_tare_now(bt_tare *tare);
 uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base);
 

@@ -29,7 +29,7 @@ enum bt_error {
 
 // Where a finger's tare machine is (SPEC.md, Tare).
 enum bt_tare_state {
-    BT_TARE_STATE_INIT = 0, // no tare yet: waiting for eight still frames
+    BT_TARE_STATE_INIT = 0, // no tare yet: waiting for still frames
     BT_TARE_STATE_REST = 1, // tared, nothing touches; the tare follows slow drift
     BT_TARE_STATE_CONTACT = 2, // touched; the tare is frozen
     BT_TARE_STATE_FAULT = 3, // railed or dead electrodes; the tare is frozen and no new one is taken
@@ -38,7 +38,7 @@ enum bt_tare_state {
 // Why the tare last changed by more than drift tracking.
 enum bt_tare_reason {
     BT_TARE_REASON_NONE = 0, // never tared
-    BT_TARE_REASON_START = 1, // first eight still frames after power-up or plug-in
+    BT_TARE_REASON_START = 1, // first still frames after power-up or plug-in
     BT_TARE_REASON_RELEASE = 2, // contact ended: signals back at the tare
     BT_TARE_REASON_RESIDUE = 3, // contact ended with skin hysteresis left over
     BT_TARE_REASON_ROLL_BACK = 4, // contact began: tare taken from at least one second before
@@ -46,7 +46,7 @@ enum bt_tare_reason {
     BT_TARE_REASON_HOST_SET = 6, // TARE_SET command
 };
 
-// How electrode signals weigh in the point of contact (Lin Eq 1; numerics: real plates favour compression).
+// How electrode signals weigh in the point of contact (Lin Eq 1). On real plates compression does best.
 enum bt_poc_weights {
     BT_POC_WEIGHTS_ABS_N2 = 0, // |e|^2, the paper's
     BT_POC_WEIGHTS_COMPRESS_N1 = 1, // max(-e, 0)

@@ -10,14 +10,14 @@
 #define TORQUE_DIVISOR 1000000000LL
 #define TORQUE_BITS    33
 
-// The lever: 1/8 um * 100 uN is 1/80000 mN*mm; products are split at 13 bits, and 2^13 / 80000 is
+// The lever: 1/16 um * 100 uN is 1/160000 mN*mm; products are split at 13 bits, and 2^13 / 160000 is
 // then applied as a multiplier of 2^33.
 #define LEVER_SPLIT_BITS 13
 #define LEVER_BITS       33
-#define LEVER_MULTIPLIER ((uint32_t)(((1ull << (LEVER_BITS + LEVER_SPLIT_BITS)) + 40000) / 80000))
+#define LEVER_MULTIPLIER ((uint32_t)(((1ull << (LEVER_BITS + LEVER_SPLIT_BITS)) + 80000) / 160000))
 
 #define FORCE_MAX_100UN (BT_SUM_NORMAL_MAX_Q4_MILLI * BT_GAIN_MAX_NN / FORCE_DIVISOR + 1)
-#define FINE_MAX_UM_Q3  (8LL * BT_CORE_RADIUS_UM)
+#define FINE_MAX_UM_Q4  (16LL * BT_CORE_RADIUS_UM + 1)
 
 _Static_assert(BT_SUM_NORMAL_MAX_Q4_MILLI <= INT32_MAX, "a force sum must fit int32");
 _Static_assert(BT_FOLD_ARM_HI_MAX <= INT32_MAX && BT_FOLD_ARM_LO_MAX <= INT32_MAX,
@@ -31,9 +31,9 @@ _Static_assert(BT_FOLD_ARM_HI_MAX + (BT_FOLD_ARM_LO_MAX >> BT_FOLD_ARM_SPLIT_BIT
 _Static_assert(1 << BT_FOLD_ARM_SPLIT_BITS == 16 * BT_FOLD_ARM_PER_UM,
                "a joined torque sum is in count * um");
 _Static_assert(LEVER_MULTIPLIER <= 1 << 30, "the lever's factor must fit bt_scale");
-_Static_assert(2 * FINE_MAX_UM_Q3 * ((FORCE_MAX_100UN >> LEVER_SPLIT_BITS) + 1) < INT32_MAX / 2,
+_Static_assert(2 * FINE_MAX_UM_Q4 * ((FORCE_MAX_100UN >> LEVER_SPLIT_BITS) + 1) < INT32_MAX / 2,
                "the lever's high products must fit int32");
-_Static_assert(2 * FINE_MAX_UM_Q3 << LEVER_SPLIT_BITS < INT32_MAX, "the lever's low products must fit int32");
+_Static_assert(2 * FINE_MAX_UM_Q4 << LEVER_SPLIT_BITS < INT32_MAX, "the lever's low products must fit int32");
 
 static int32_t multiplier(int32_t gain_nn, int bits, int64_t divisor)
 {
@@ -79,11 +79,11 @@ void bt_torque_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int3
     }
 }
 
-int32_t bt_torque_x_derived(const int32_t poc_yz_um_q3[2], const int32_t force_100un[3])
+int32_t bt_torque_x_derived(const int32_t poc_yz_um_q4[2], const int32_t force_100un[3])
 {
     int32_t mask = (1 << LEVER_SPLIT_BITS) - 1;
-    int32_t y = poc_yz_um_q3[0];
-    int32_t z = poc_yz_um_q3[1];
+    int32_t y = poc_yz_um_q4[0];
+    int32_t z = poc_yz_um_q4[1];
     int32_t fy = force_100un[1];
     int32_t fz = force_100un[2];
     int32_t high = y * bt_shift_down(fz, LEVER_SPLIT_BITS) - z * bt_shift_down(fy, LEVER_SPLIT_BITS);

@@ -28,6 +28,6 @@ void bt_torque_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int3
 
 // Torque x from the lever, in mN*mm: (c x F)_x. Only E8 and E9 have any moment arm about x, so
 // Eq 4 cannot measure it; what is published is this derived value, and it is flagged so.
-int32_t bt_torque_x_derived(const int32_t poc_yz_um_q3[2], const int32_t force_100un[3]);
+int32_t bt_torque_x_derived(const int32_t poc_yz_um_q4[2], const int32_t force_100un[3]);
 
 #endif

@@ -6,7 +6,7 @@
 _Static_assert(BT_SUM_SQUARES_R_MAX_Q8_UM <= INT64_MAX / 1000, "the x dividend must fit int64");
 _Static_assert(BT_SUM_SQUARES_MAX_Q8 <= INT64_MAX, "the weight sum must fit int64");
 // Every electrode lies below the axis, so a positive weight sum keeps (y, z) away from 0: the
-// direction below never is 0/0 (numerics: NaN-free by geometry).
+// direction below never is 0/0 (SPEC.md, Degenerate input).
 _Static_assert(BT_ELECTRODE_Z_MAX_UM < 0, "electrodes must have z < 0");
 
 uint32_t gold_isqrt64(uint64_t n)

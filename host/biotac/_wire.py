@@ -39,7 +39,7 @@ class Error(IntEnum):
 class TareState(IntEnum):
     """Where a finger's tare machine is (SPEC.md, Tare)."""
 
-    INIT = 0  # no tare yet: waiting for eight still frames
+    INIT = 0  # no tare yet: waiting for still frames
     REST = 1  # tared, nothing touches; the tare follows slow drift
     CONTACT = 2  # touched; the tare is frozen
     FAULT = 3  # railed or dead electrodes; the tare is frozen and no new one is taken
@@ -49,7 +49,7 @@ class TareReason(IntEnum):
     """Why the tare last changed by more than drift tracking."""
 
     NONE = 0  # never tared
-    START = 1  # first eight still frames after power-up or plug-in
+    START = 1  # first still frames after power-up or plug-in
     RELEASE = 2  # contact ended: signals back at the tare
     RESIDUE = 3  # contact ended with skin hysteresis left over
     ROLL_BACK = 4  # contact began: tare taken from at least one second before
@@ -58,7 +58,7 @@ class TareReason(IntEnum):
 
 
 class PocWeights(IntEnum):
-    """How electrode signals weigh in the point of contact (Lin Eq 1; numerics: real plates favour compression)."""
+    """How electrode signals weigh in the point of contact (Lin Eq 1). On real plates compression does best."""
 
     ABS_N2 = 0  # |e|^2, the paper's
     COMPRESS_N1 = 1  # max(-e, 0)

@@ -87,8 +87,11 @@ def per_frame(tare: Any, settings: Settings | None = None) -> Callable[[NDArray[
     base_bytes, result, one_frame, dtype, shape = base.tobytes(), _buffer(out), lib.bt_one_frame, _COUNT, _ONE
 
     def results(counts: NDArray[np.uint16]) -> StructArray:
-        if counts.dtype is not dtype or counts.shape != shape:
-            raise ValueError(f"counts are {counts.dtype} of shape {counts.shape}, expected uint16 of (19,)")
+        if getattr(counts, "dtype", None) is not dtype or counts.shape != shape:
+            seen = (
+                f"{counts.dtype} of shape {counts.shape}" if isinstance(counts, np.ndarray) else type(counts).__name__
+            )
+            raise ValueError(f"counts are {seen}, expected uint16 of (19,)")
         if not one_frame(plan, counts.tobytes(), base_bytes, result):
             raise ValueError(_explain(0, counts, base))
         return out
@@ -145,10 +148,12 @@ def _checked_tare(tare: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
 
 
 def _checked_out(out: StructArray, shape: tuple[int, ...]) -> StructArray:
-    if not (out.dtype == RESULT_DTYPE and out.shape == shape and out.flags.carray):
-        raise ValueError(
-            f"out is {out.dtype} of shape {out.shape}, expected a contiguous, writeable RESULT_DTYPE of shape {shape}"
-        )
+    if not (isinstance(out, np.ndarray) and out.dtype == RESULT_DTYPE and out.shape == shape and out.flags.carray):
+        seen = f"{out.dtype} of shape {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
+        raise ValueError(f"out is {seen}, expected a contiguous, writeable RESULT_DTYPE of shape {shape}")
+    # The dtype has no alignment of its own, and C stores doubles.
+    if out.size and out.ctypes.data % 8:
+        raise ValueError("out begins at an odd address, expected one that float64 can be stored at")
     return out
 
 

@@ -34,9 +34,12 @@ def torque_bound_nmm(messages: StructArray, truth: Results, settings: Settings) 
     """
     size = np.nansum(np.abs(electrode_signals(messages)), axis=1)
     gains = np.array([abs(settings[s]) / 1e9 for s in TORQUE_GAINS])
-    yz = 0.5 + gains * (size[:, None] / 32 + 0.5) + np.abs(truth.torque_nmm[:, 1:]) * 1000 * 2.0**-33
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sums = np.nan_to_num(np.abs(truth.torque_nmm[:, 1:]) * 1000 / gains, posinf=0.0)
+    # The board's multiplier is a whole number of 2^-33: half of one on the sum in count*um.
+    yz = 0.5 + gains * (size[:, None] / 32 + 0.5) + sums * 2.0**-34
     force = np.abs(truth.force_n[:, 1:]).sum(axis=1)
-    x = 1 + 2 * 5.08 * FORCE_BOUND_MN + force * (0.125 + DIRECTION_UM)
+    x = 1 + 2 * 5.08 * FORCE_BOUND_MN + force * (0.0625 + DIRECTION_UM)
     return np.column_stack([x, yz]) / 1000
 
 
@@ -117,9 +120,14 @@ class CrossCheck:
         one_sided = np.any(np.isnan(to_units(sent, 1)) != np.isnan(truth), axis=1)
         outside = np.any(error > bound, axis=1)
         for k in np.flatnonzero(one_sided | outside):
-            off = "valid on one side only" if one_sided[k] else f"off by {np.nanmax(error[k]):.4g} {unit}"
-            limit = np.broadcast_to(bound, error.shape)[k].max()
-            self._find(messages, int(k), f"{name} {off}, bound {limit:.4g} {unit}")
+            if one_sided[k]:
+                self._find(messages, int(k), f"{name} is valid on one side only")
+                continue
+            limits = np.broadcast_to(bound, error.shape)[k]
+            axis = int(np.nanargmax(error[k] - limits))
+            place = f" {'xyz'[axis]}" if error.shape[1] == 3 else ""
+            off = f"off by {error[k, axis]:.4g} {unit}, bound {limits[axis]:.4g} {unit}"
+            self._find(messages, int(k), f"{name}{place} {off}")
 
 
 def worst(error: NDArray[np.float64]) -> float:

@@ -201,7 +201,7 @@ class Hand:
         tare = np.asarray(tare_counts, dtype=np.float64)
         if tare.shape != (19,) or not np.all((tare >= 0) & (tare <= 4095)):
             raise ValueError(f"tare_counts has shape {tare.shape}; expected 19 values of 0..4095 counts")
-        tare_q4 = tuple(int(v) for v in np.rint(tare * 16))
+        tare_q4 = tuple(int(v) for v in np.floor(tare * 16 + 0.5))
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
         self._command(wire.TareSet(self._next_req_id(), finger, tare_q4, pdc_q4))
 

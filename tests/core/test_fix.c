@@ -1,4 +1,4 @@
-// Rounding and saturation: the one place where the core loses anything.
+// The core's arithmetic helpers at their edges.
 #include "support.h"
 
 #include "fix.h"
@@ -74,25 +74,74 @@ static void rounding_is_odd(void **state)
     }
 }
 
-static void magnitudes_and_clamps_hold_at_the_ends(void **state)
+static void magnitudes_hold_at_the_ends(void **state)
 {
     (void)state;
     assert_true(bt_abs(INT64_MIN) == (uint64_t)1 << 63);
     assert_true(bt_abs(INT64_MAX) == (uint64_t)INT64_MAX);
     assert_true(bt_abs(-1) == 1 && bt_abs(0) == 0);
-    assert_int_equal(bt_clamp(INT64_MIN, -7, 7), -7);
-    assert_int_equal(bt_clamp(INT64_MAX, -7, 7), 7);
-    assert_int_equal(bt_clamp(-7, -7, 7), -7);
-    assert_int_equal(bt_clamp(7, -7, 7), 7);
-    assert_int_equal(bt_clamp(0, -7, 7), 0);
+    assert_true(bt_abs32(INT32_MIN) == (uint32_t)1 << 31 && bt_abs32(-1) == 1 && bt_abs32(0) == 0);
+    assert_int_equal(bt_with_sign(7, -1), -7);
+    assert_int_equal(bt_with_sign(7, 0), 7);
+    assert_int_equal(bt_shift_down(-1, 3), -1);
+    assert_int_equal(bt_shift_down(-8, 3), -1);
+    assert_int_equal(bt_shift_down(-9, 3), -2);
+}
+
+// The 32-bit helpers against the 64-bit one, which is tested above.
+static void scaling_is_a_rounded_division(void **state)
+{
+    (void)state;
+    uint64_t seed = 31;
+    for (int k = 0; k < 300000; k++) {
+        int bits = 1 + k % 7;
+        int32_t value = (int32_t)(random_range(&seed, -INT32_MAX, INT32_MAX) / (1 << k % 31));
+        uint32_t multiplier = (uint32_t)random_range(&seed, 0, 1 << 30);
+        multiplier = k % 11 ? multiplier : 1u << 30;
+        value = k % 13 ? value : k % 2 ? INT32_MAX : -INT32_MAX;
+        int64_t want = bt_div_round((int64_t)value * multiplier, (int64_t)1 << (32 + bits));
+        assert_true(bt_scale(value, multiplier, bits) == want);
+    }
+}
+
+static void joining_two_parts_rounds_or_cuts_their_sum(void **state)
+{
+    (void)state;
+    uint64_t seed = 32;
+    for (int k = 0; k < 300000; k++) {
+        int bits = 4 + k % 11;
+        int32_t hi = (int32_t)(random_range(&seed, -(1 << 29), 1 << 29) / (1 << k % 30));
+        int32_t lo = (int32_t)(random_range(&seed, -(1 << 30), 1 << 30) / (1 << k % 31));
+        int64_t sum = (int64_t)hi * (1 << bits) + lo;
+        assert_true(bt_join(hi, lo, bits, 1 << (bits - 1)) == bt_div_round(sum, 1 << bits));
+        assert_true(bt_join(hi, lo, bits, 1 << bits) == sum / (1 << bits)); // C cuts towards zero
+    }
+}
+
+static void small_divisions_round_to_the_nearest(void **state)
+{
+    (void)state;
+    uint64_t seed = 33;
+    for (int k = 0; k < 300000; k++) {
+        uint32_t den = 1 + (uint32_t)(random_u64(&seed) >> (33 + k % 31));
+        uint32_t num = (uint32_t)(random_u64(&seed) >> (32 + k % 32));
+        num = num > UINT32_MAX - den / 2 ? num - den / 2 : num;
+        assert_true(bt_div_round_u32(num, den) == bt_div_round(num, den));
+    }
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(halves_go_away_from_zero), cmocka_unit_test(division_by_one_changes_nothing),
-        cmocka_unit_test(extremes_do_not_wrap),     cmocka_unit_test(random_quotients_are_right),
-        cmocka_unit_test(rounding_is_odd),          cmocka_unit_test(magnitudes_and_clamps_hold_at_the_ends),
+        cmocka_unit_test(halves_go_away_from_zero),
+        cmocka_unit_test(division_by_one_changes_nothing),
+        cmocka_unit_test(extremes_do_not_wrap),
+        cmocka_unit_test(random_quotients_are_right),
+        cmocka_unit_test(rounding_is_odd),
+        cmocka_unit_test(magnitudes_hold_at_the_ends),
+        cmocka_unit_test(scaling_is_a_rounded_division),
+        cmocka_unit_test(joining_two_parts_rounds_or_cuts_their_sum),
+        cmocka_unit_test(small_divisions_round_to_the_nearest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

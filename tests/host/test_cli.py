@@ -143,6 +143,15 @@ def test_usage_errors_exit_2() -> None:
         assert "expected" in done.stderr
 
 
+@pytest.mark.parametrize(
+    "words", [("stream", "sim:press.toml", "--rate", "1e-308"), ("bench", "batch", "--frames", "1" + "0" * 14)]
+)
+def test_absurd_numbers_are_refused_at_the_door(words: tuple[str, ...]) -> None:
+    done = run(*words)
+    assert done.returncode == 2
+    assert "expected" in done.stderr.splitlines()[-1]
+
+
 def test_folders_that_cannot_be_made_exit_2(capsys, tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("")

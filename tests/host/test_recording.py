@@ -155,6 +155,15 @@ def test_damaged_metadata_is_a_recording_error(recorded, tmp_path) -> None:
             biotac.Recording(damaged)
 
 
+def test_an_absurd_record_length_is_no_traceback(recorded, tmp_path) -> None:
+    whole = recorded[0].read_bytes()
+    absurd = tmp_path / "absurd.mcap"
+    # After the eight magic bytes: one byte of opcode, eight of length.
+    absurd.write_bytes(whole[:9] + b"\xff" * 8 + whole[17:])
+    with pytest.raises(biotac.RecordingError):
+        biotac.Recording(absurd)
+
+
 @pytest.mark.parametrize("content", [b"", b"hello, I am no recording", bytes(1000)])
 def test_a_file_that_is_no_recording_exits_2_in_one_line(tmp_path, content: bytes) -> None:
     path = tmp_path / "strange.mcap"

@@ -11,6 +11,7 @@ from ..bench import batch
 NAME = "bench"
 HELP = "Measure how fast the maths is, against NumPy, in one run."
 EXAMPLE = "biotac bench batch"
+MAX_FRAMES = 10_000_000  # NumPy's contestants take half a kilobyte of memory per frame
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _frames(text: str) -> int:
     frames = int(text)
-    if frames < batch.SINGLE_FRAMES:
-        raise argparse.ArgumentTypeError(f"{frames} frames are too few to time, expected {batch.SINGLE_FRAMES} or more")
+    if not batch.SINGLE_FRAMES <= frames <= MAX_FRAMES:
+        raise argparse.ArgumentTypeError(f"{frames} frames, expected {batch.SINGLE_FRAMES} to {MAX_FRAMES}")
     return frames
 
 

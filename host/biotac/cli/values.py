@@ -17,6 +17,17 @@ def seconds(text: str) -> float:
     return value
 
 
+def rate(text: str) -> float:
+    """Lines per second; 0 means all, and one a day is the least."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (value == 0 or 1 / 86400 <= value < math.inf):
+        raise argparse.ArgumentTypeError(f"{text!r} is no rate; expected lines per second, or 0 for all")
+    return value
+
+
 def pace(text: str) -> float:
     """real, fast, or device seconds per second."""
     from ..link.ports import parse_pace

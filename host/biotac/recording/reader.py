@@ -106,7 +106,7 @@ class Recording:
                             yield item
                     good_until = stream.tell()
                 whole = True
-            except (McapError, struct.error, ValueError, EOFError, MemoryError) as error:
+            except (McapError, struct.error, ValueError, EOFError, MemoryError, OverflowError) as error:
                 # Cut off in the middle of a record, and what came before it is good; unless it
                 # never was such a file.
                 if isinstance(error, InvalidMagic) and not begun:
