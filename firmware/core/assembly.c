@@ -18,23 +18,13 @@ void bt_frame_clear(bt_frame *frame)
     frame->t_us = 0;
 }
 
-// Which of the frame's PAC samples a PAC slot is: the number of PAC slots before it.
-static uint8_t pac_index(uint8_t slot)
-{
-    uint8_t index = 0;
-    for (uint8_t k = 0; k < slot; k++) {
-        index = (uint8_t)(index + (bt_slot_channel[k] == BT_CHANNEL_PAC));
-    }
-    return index;
-}
-
 void bt_frame_put(bt_frame *frame, uint8_t slot, uint16_t count)
 {
     uint8_t channel = bt_slot_channel[slot];
     frame->good_words = (uint8_t)(frame->good_words + (count != BT_INVALID_COUNT));
     switch (channel) {
     case BT_CHANNEL_PAC:
-        frame->pac[pac_index(slot)] = count;
+        frame->pac[bt_slot_pac[slot]] = count;
         break;
     case BT_CHANNEL_PDC:
         frame->pdc = count;

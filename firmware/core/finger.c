@@ -18,13 +18,8 @@ void bt_finger_begin(bt_finger *finger, uint32_t t_us)
 
 static void fill_pac(const bt_finger *finger, uint16_t seq, bt_msg_pac *pac)
 {
-    // The first PAC slot is slot 1, one slot period after the frame's time.
-    uint8_t first = 0;
-    while (bt_slot_channel[first] != BT_CHANNEL_PAC) {
-        first++;
-    }
     pac->seq = seq;
-    pac->t_us = finger->frame.t_us + first * 1000000u / BT_SLOT_HZ;
+    pac->t_us = finger->frame.t_us + BT_FIRST_PAC_SLOT * 1000000u / BT_SLOT_HZ;
     pac->finger = finger->index;
     memcpy(pac->pac, finger->frame.pac, sizeof pac->pac);
 }

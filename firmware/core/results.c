@@ -6,8 +6,7 @@
 
 #define ACTIVE_Q4          (15 * 16) // an electrode that moved this far takes part in the contact
 #define ACTIVE_FOR_TORSION 4
-#define BASE_OLD_FRAMES    6000 // one minute
-#define FAULT_ELECTRODES   2
+#define BASE_OLD_FRAMES    (60000 / BT_FRAME_MS) // one minute
 
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
 

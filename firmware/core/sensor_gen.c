@@ -79,6 +79,10 @@ const uint8_t bt_slot_channel[BT_SLOTS] = {
     BT_CHANNEL_PAC,
 };
 
+const uint8_t bt_slot_pac[BT_SLOTS] = {
+    0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8, 9, 9, 10, 10, 11, 11, 12, 12, 13, 13, 14, 14, 15, 15, 16, 16, 17, 17, 18, 18, 19, 19, 20, 20, 21, 21,
+};
+
 const int16_t bt_electrode_um[BT_ELECTRODES][3] = {
     {   993,  -4855,  -1116}, // E1
     { -2700,  -3513,  -3670}, // E2

@@ -10,6 +10,7 @@
 #define BT_SLOTS 44
 #define BT_ELECTRODES 19
 #define BT_PAC_PER_FRAME 22
+#define BT_FIRST_PAC_SLOT 1
 #define BT_MAX_FINGERS 5
 #define BT_FULL_SCALE_COUNT 4095
 #define BT_CORE_RADIUS_UM 5080
@@ -85,6 +86,7 @@ enum bt_property {
 
 extern const uint8_t bt_channel_command[BT_CHANNELS]; // first byte of the sample command
 extern const uint8_t bt_slot_channel[BT_SLOTS];       // enum bt_channel of each slot
+extern const uint8_t bt_slot_pac[BT_SLOTS];           // PAC slots before each slot
 extern const int16_t bt_electrode_um[BT_ELECTRODES][3];
 extern const int16_t bt_normal_milli[BT_ELECTRODES][3];
 extern const int32_t bt_arm_nm[BT_ELECTRODES][3]; // r x n, exact

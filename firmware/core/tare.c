@@ -169,6 +169,8 @@ static void track_drift(bt_tare *tare, const uint32_t mean_q16[BT_ELECTRODES])
     }
 }
 
+_Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX <= INT32_MAX >> 8, "the noise in q8 must fit 31 bits");
+
 // The sample is capped at the setting: a vibration that grows slowly must not raise the threshold
 // ahead of itself for ever. The threshold so never exceeds four times the setting.
 static void measure_noise(bt_tare *tare, uint32_t setting_count2)
@@ -178,7 +180,6 @@ static void measure_noise(bt_tare *tare, uint32_t setting_count2)
     if (tare->noise_frames < 1 << NOISE_SHIFT) { // plain mean first, so that it starts unbiased
         tare->noise_frames++;
     }
-    // The setting is at most 10^6 count^2, so that q8 fits 31 bits.
     int32_t change_q8 = (int32_t)((sample << 8) - tare->noise_q8);
     uint32_t step_q8 = bt_div_round_u32(bt_abs32(change_q8), tare->noise_frames);
     tare->noise_q8 += (uint32_t)bt_with_sign(step_q8, change_q8);

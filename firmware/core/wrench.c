@@ -19,6 +19,15 @@
 #define FORCE_MAX_100UN (BT_SUM_NORMAL_MAX_Q4_MILLI * BT_GAIN_MAX_NN / FORCE_DIVISOR + 1)
 #define FINE_MAX_UM_Q4  (16LL * BT_CORE_RADIUS_UM + 1)
 
+// The bounds below are for gains of one range, the same on both sides of 0.
+#define HAS_GAIN_RANGE(name)                                                                                 \
+    (BT_SETTING_##name##_MAX == BT_GAIN_MAX_NN && BT_SETTING_##name##_MIN == -BT_GAIN_MAX_NN)
+_Static_assert(HAS_GAIN_RANGE(FORCE_GAIN_X_NN) && HAS_GAIN_RANGE(FORCE_GAIN_Y_NN)
+                   && HAS_GAIN_RANGE(FORCE_GAIN_Z_NN),
+               "the force gains' ranges must be one");
+_Static_assert(HAS_GAIN_RANGE(TORQUE_GAIN_Y_NN) && HAS_GAIN_RANGE(TORQUE_GAIN_Z_NN),
+               "the torque gains' ranges must be that of the force gains");
+
 _Static_assert(BT_SUM_NORMAL_MAX_Q4_MILLI <= INT32_MAX, "a force sum must fit int32");
 _Static_assert(BT_FOLD_ARM_HI_MAX <= INT32_MAX && BT_FOLD_ARM_LO_MAX <= INT32_MAX,
                "torque sums must fit int32");

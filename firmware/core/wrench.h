@@ -7,6 +7,7 @@
 #define BIOTAC_WRENCH_H
 
 #include "sensor_gen.h"
+#include "wire_gen.h"
 
 #include <stdint.h>
 
@@ -16,7 +17,7 @@ typedef struct {
     int32_t torque[2]; // y, z: mN*mm per (count * um), times 2^33
 } bt_gains;
 
-#define BT_GAIN_MAX_NN 100000000 // the largest gain that link.toml lets through
+#define BT_GAIN_MAX_NN BT_SETTING_FORCE_GAIN_X_NN_MAX // and every other gain's, see wrench.c
 
 bt_gains bt_gains_from(const int32_t force_nn[3], const int32_t torque_nn[2]);
 

@@ -88,16 +88,17 @@ bool gold_poc(const int32_t e_q4[BT_ELECTRODES], int weights, int32_t poc_nm[3])
     return true;
 }
 
-#define GAIN_MAX_NN   100000000LL
 #define UN_DIVISOR    (16 * 1000 * 1000LL) // 1/16 count * 1/1000 * nN -> uN
 #define MNMM_DIVISOR  (16 * 1000000000LL)  // 1/16 count * um * nN -> mN*mm
 #define LEVER_DIVISOR (1000000000LL)       // nm * uN -> mN*mm
 #define POC_MAX_NM    (BT_ELECTRODE_MAX_UM * 1000LL)
-#define FORCE_MAX_UN  (BT_SUM_NORMAL_MAX_Q4_MILLI * GAIN_MAX_NN / UN_DIVISOR + 1)
+#define FORCE_MAX_UN  (BT_SUM_NORMAL_MAX_Q4_MILLI * BT_SETTING_FORCE_GAIN_X_NN_MAX / UN_DIVISOR + 1)
 
 _Static_assert(BT_SUM_NORMAL_MAX_Q4_MILLI <= INT32_MAX, "a force sum must fit int32");
-_Static_assert(BT_SUM_NORMAL_MAX_Q4_MILLI <= INT64_MAX / GAIN_MAX_NN, "a scaled force sum must fit int64");
-_Static_assert(BT_SUM_ARM_MAX_Q4_NM / 1000 < INT64_MAX / GAIN_MAX_NN, "a scaled torque sum must fit int64");
+_Static_assert(BT_SUM_NORMAL_MAX_Q4_MILLI <= INT64_MAX / BT_SETTING_FORCE_GAIN_X_NN_MAX,
+               "a scaled force sum must fit int64");
+_Static_assert(BT_SUM_ARM_MAX_Q4_NM / 1000 < INT64_MAX / BT_SETTING_FORCE_GAIN_X_NN_MAX,
+               "a scaled torque sum must fit int64");
 _Static_assert(FORCE_MAX_UN <= INT64_MAX / 2 / POC_MAX_NM, "the lever product must fit int64");
 
 void gold_force_un(const int32_t e_q4[BT_ELECTRODES], const int32_t gain_nn[3], int64_t force_un[3])

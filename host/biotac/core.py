@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _wire as wire
-from .frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, to_units
+from .frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, tare_to_q4, to_units
 
 try:
     from ._core import ffi as ffi
@@ -125,5 +125,5 @@ def checked(counts: Any, tare: Any) -> tuple[NDArray[np.uint16], NDArray[np.uint
         raise ValueError("counts must be 0..4095, or 0xFFFF for a missing electrode")
     if not np.all((base >= 0) & (base <= 4095)):
         raise ValueError("a tare must be 0..4095 counts")
-    tare_q4 = np.floor(base * 16 + 0.5).astype(np.uint16)
+    tare_q4 = tare_to_q4(base)
     return np.ascontiguousarray(raw, dtype=np.uint16), np.ascontiguousarray(tare_q4)

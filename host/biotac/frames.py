@@ -102,6 +102,11 @@ def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any
     return out
 
 
+def tare_to_q4(tare_counts: NDArray[np.float64]) -> NDArray[np.uint16]:
+    """A tare in counts 0..4095 to the board's 1/16 count, halves up; any shape."""
+    return np.floor(tare_counts * 16 + 0.5).astype(np.uint16)
+
+
 def electrode_signals(messages: StructArray) -> NDArray[np.float64]:
     """e = count - tare of FRAME messages, in counts, shape (n, 19); NaN where either is missing."""
     counts, tare_q4 = messages["counts"], messages["tare_q4"]

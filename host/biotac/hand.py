@@ -18,7 +18,7 @@ import numpy as np
 from . import _wire as wire
 from ._sensor import MAX_SENSORS
 from .errors import CommandRefusedError, DeviceLostError, InputError, NotAGatewayError, WireVersionError
-from .frames import Frame, StructArray
+from .frames import Frame, StructArray, tare_to_q4
 from .framing import encode
 from .link import Link
 from .stream import Batch, StreamDecoder, join, split
@@ -80,9 +80,13 @@ class Hand:
         """The PORT this was opened as."""
         return self.link.port
 
+    @property
+    def fingers(self) -> list[int]:
+        """Indices of the fingers whose sensor answered when this was opened."""
+        return [f for f in range(MAX_SENSORS) if self.info.fingers_present >> f & 1]
+
     def __repr__(self) -> str:
-        fingers = [f for f in range(MAX_SENSORS) if self.info.fingers_present >> f & 1]
-        return f"<biotac.Hand on {self.port}, fingers {fingers}{', closed' if self._closed else ''}>"
+        return f"<biotac.Hand on {self.port}, fingers {self.fingers}{', closed' if self._closed else ''}>"
 
     def __enter__(self) -> Hand:
         return self
@@ -99,14 +103,14 @@ class Hand:
         """Stop the stream, finish a recording, give the port back. Safe to call twice."""
         if self._closed:
             return
-        self._closed = True
         try:
             if self._streaming:
                 self._streaming = False
-                self.link.write(encode(wire.Stop.ID, wire.Stop(self._next_req_id()).pack()))
+                self._send(wire.Stop(self._next_req_id()))
         except DeviceLostError:
             pass  # it is gone already, which is what closing wants
         finally:
+            self._closed = True
             try:
                 if self._recorder is not None:
                     self._recorder.close()
@@ -121,7 +125,8 @@ class Hand:
         # The known fields of HELLO never change place, so that any peer can be told its version.
         self._decoder.accept_newer_minor()
         for _ in range(REPLY_TRIES):
-            self.link.write(b"\0" + encode(wire.Stop.ID, wire.Stop(self._next_req_id()).pack()))
+            self.link.write(b"\0")  # ends whatever half frame a former program left behind
+            self._send(wire.Stop(self._next_req_id()))
             self._send(wire.HelloRequest(self._next_req_id(), nonce))
             hello: wire.Hello | None = self._await(lambda m: isinstance(m, wire.Hello) and m.nonce == nonce)
             if hello is not None:
@@ -201,7 +206,7 @@ class Hand:
         tare = np.asarray(tare_counts, dtype=np.float64)
         if tare.shape != (19,) or not np.all((tare >= 0) & (tare <= 4095)):
             raise ValueError(f"tare_counts has shape {tare.shape}; expected 19 values of 0..4095 counts")
-        tare_q4 = tuple(int(v) for v in np.floor(tare * 16 + 0.5))
+        tare_q4 = tuple(int(v) for v in tare_to_q4(tare))
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
         self._command(wire.TareSet(self._next_req_id(), finger, tare_q4, pdc_q4))
 
@@ -302,7 +307,7 @@ class Hand:
 
         if self._recorder is not None and not self._recorder.closed:
             raise InputError(f"this hand is being recorded to {self._recorder.path}; close that recorder first")
-        sensors = [self.sensor_info(f) for f in range(MAX_SENSORS) if self.info.fingers_present >> f & 1]
+        sensors = [self.sensor_info(f) for f in self.fingers]
         self._recorder = Recorder(
             Path(path),
             self.info,

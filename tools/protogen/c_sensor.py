@@ -5,7 +5,6 @@ from __future__ import annotations
 from .schema import GENERATED, Contract
 
 E_MAX_Q4 = 4095 * 16  # |count - tare| in 1/16 count
-BUS_UNITS = {"spi_hz": "Hz", "settle_us": "us", "gap_us": "us", "slot_hz": "Hz", "power_on_ms": "ms"}
 
 
 def electrodes(contract: Contract) -> list[tuple[str, tuple[int, ...], tuple[int, ...]]]:
@@ -50,6 +49,7 @@ def header(contract: Contract) -> str:
         f"#define BT_SLOTS {len(slots)}",
         f"#define BT_ELECTRODES {len(table)}",
         f"#define BT_PAC_PER_FRAME {slots.count('PAC')}",
+        f"#define BT_FIRST_PAC_SLOT {slots.index('PAC')}",
         f"#define BT_MAX_FINGERS {bus['max_sensors']}",
         f"#define BT_FULL_SCALE_COUNT {bus['full_scale_count']}",
         f"#define BT_CORE_RADIUS_UM {sensor['geometry']['core_radius_um']}",
@@ -87,6 +87,7 @@ def header(contract: Contract) -> str:
         "",
         "extern const uint8_t bt_channel_command[BT_CHANNELS]; // first byte of the sample command",
         "extern const uint8_t bt_slot_channel[BT_SLOTS];       // enum bt_channel of each slot",
+        "extern const uint8_t bt_slot_pac[BT_SLOTS];           // PAC slots before each slot",
         "extern const int16_t bt_electrode_um[BT_ELECTRODES][3];",
         "extern const int16_t bt_normal_milli[BT_ELECTRODES][3];",
         "extern const int32_t bt_arm_nm[BT_ELECTRODES][3]; // r x n, exact",
@@ -105,6 +106,8 @@ def source(contract: Contract) -> str:
     lines += [f"    [BT_CHANNEL_{c['name']}] = 0x{c['command']:02X}," for c in channels] + ["};", ""]
     lines += ["const uint8_t bt_slot_channel[BT_SLOTS] = {"]
     lines += [f"    BT_CHANNEL_{slot}," for slot in slots] + ["};", ""]
+    before = ", ".join(str(slots[:k].count("PAC")) for k in range(len(slots)))
+    lines += ["const uint8_t bt_slot_pac[BT_SLOTS] = {", f"    {before},", "};", ""]
     for name, kind, values in (
         ("bt_electrode_um", "int16_t", [r for _, r, _ in table]),
         ("bt_normal_milli", "int16_t", [n for _, _, n in table]),

@@ -56,6 +56,11 @@ def header(contract: Contract) -> str:
     out += ["enum bt_setting {"]
     out += [f"    BT_SETTING_{n.upper()} = {s['id']}, // [{s['unit']}]" for n, s in link["setting"].items()]
     out += ["};", f"#define BT_SETTINGS {len(link['setting'])}", ""]
+    out += ["// Ranges, for the bounds that the core asserts."]
+    for name, setting in link["setting"].items():
+        low, high = setting["range"]
+        out += [f"#define BT_SETTING_{name.upper()}_MIN ({low})", f"#define BT_SETTING_{name.upper()}_MAX {high}"]
+    out += [""]
     out += [
         "typedef struct {",
         "    uint8_t id;",

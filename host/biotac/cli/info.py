@@ -25,7 +25,7 @@ def run(args: argparse.Namespace) -> int:
     """Print what the board says of itself."""
     with biotac.open(args.port) as hand:
         hello = hand.info
-        sensors = [hand.sensor_info(f) for f in fingers_of(hello)]
+        sensors = [hand.sensor_info(f) for f in hand.fingers]
         settings = hand.settings()
         status = hand.status()
     if args.json:
@@ -55,11 +55,6 @@ def run(args: argparse.Namespace) -> int:
     for setting, value in settings.items():
         print(f"{setting.name.lower()} = {value} {wire.SETTINGS[setting].unit}")
     return 0
-
-
-def fingers_of(hello: wire.Hello) -> list[int]:
-    """Indices of the sensors that answer."""
-    return [f for f in range(8) if hello.fingers_present >> f & 1]
 
 
 def text(values: tuple[int, ...]) -> str:

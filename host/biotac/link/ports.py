@@ -11,8 +11,6 @@ from ..errors import PortError
 from .base import Link
 from .serial_port import SerialLink
 
-SCHEMES = ("sim",)
-
 
 @dataclass(frozen=True)
 class SimPort:

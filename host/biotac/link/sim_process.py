@@ -31,7 +31,7 @@ def executable() -> Path:
 class SimBoard:
     """A running simulator process; ``path`` is the pty that any serial program can open."""
 
-    def __init__(self, source: Source, *, pace: float, hold: bool, boot_id: int | None = None) -> None:
+    def __init__(self, source: Source, *, pace: float, hold: bool) -> None:
         self.source = source
         self._folder = tempfile.TemporaryDirectory(prefix="biotac-sim-")
         tape = Path(self._folder.name) / "counts.tape"
@@ -39,7 +39,6 @@ class SimBoard:
         command = [str(executable()), "--tape", str(tape), "--pace", str(pace)]
         command += ["--serials", ",".join(source.serials)] if source.serials else []
         command += ["--hold"] if hold else []
-        command += ["--boot-id", str(boot_id)] if boot_id is not None else []
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         assert self._process.stdout is not None
         first = self._process.stdout.readline().decode().split()
