@@ -1,38 +1,10 @@
 #include "results.h"
 
 #include "fix.h"
-#include "poc.h"
-#include "wrench.h"
 
 #define ACTIVE_Q4          (15 * 16) // an electrode that moved this far takes part in the contact
 #define ACTIVE_FOR_TORSION 4
 #define BASE_OLD_FRAMES    (60000 / BT_FRAME_MS) // one minute
-
-_Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
-
-bt_kernel_settings bt_kernel_settings_from(const bt_settings *settings)
-{
-    int32_t force_nn[3] = {bt_settings_get(settings, BT_SETTING_FORCE_GAIN_X_NN),
-                           bt_settings_get(settings, BT_SETTING_FORCE_GAIN_Y_NN),
-                           bt_settings_get(settings, BT_SETTING_FORCE_GAIN_Z_NN)};
-    int32_t torque_nn[2] = {bt_settings_get(settings, BT_SETTING_TORQUE_GAIN_Y_NN),
-                            bt_settings_get(settings, BT_SETTING_TORQUE_GAIN_Z_NN)};
-    bt_kernel_settings kernel = {
-        .poc_weights = (int)bt_settings_get(settings, BT_SETTING_POC_WEIGHTS),
-        .gains = bt_gains_from(force_nn, torque_nn),
-        .contact_energy_count2 = (uint32_t)bt_settings_get(settings, BT_SETTING_CONTACT_ENERGY_COUNT2),
-    };
-    return kernel;
-}
-
-void bt_signals_q4(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
-                   int32_t e_q4[BT_ELECTRODES])
-{
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        bool missing = counts[i] == BT_INVALID_COUNT || tare_q4[i] == BT_INVALID_COUNT;
-        e_q4[i] = missing ? 0 : 16 * (int32_t)counts[i] - tare_q4[i];
-    }
-}
 
 static void invalidate(int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
 {
@@ -41,26 +13,6 @@ static void invalidate(int16_t poc_um[3], int32_t force_100un[3], int32_t torque
         force_100un[d] = BT_INVALID_I32;
         torque_mnmm[d] = BT_INVALID_I32;
     }
-}
-
-uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *settings, int16_t poc_um[3],
-                   int32_t force_100un[3], int32_t torque_mnmm[3])
-{
-    bt_point point;
-    bt_force(e_q4, &settings->gains, force_100un);
-    bt_torque_yz(e_q4, &settings->gains, torque_mnmm + 1);
-    if (!bt_poc(e_q4, settings->poc_weights, &point)) {
-        for (int d = 0; d < 3; d++) {
-            poc_um[d] = BT_INVALID_I16;
-        }
-        torque_mnmm[0] = BT_INVALID_I32;
-        return BT_FRAME_FLAG_POC_INVALID;
-    }
-    for (int d = 0; d < 3; d++) {
-        poc_um[d] = point.um[d];
-    }
-    torque_mnmm[0] = bt_torque_x_derived(point.fine_yz_um_q4, force_100un);
-    return 0;
 }
 
 typedef struct {
@@ -122,7 +74,7 @@ void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_sett
     }
     int32_t e_q4[BT_ELECTRODES];
     bt_signals_q4(frame->electrode, msg->tare_q4, e_q4);
-    msg->flags |= bt_kernel(e_q4, settings, msg->poc_um, msg->force_100un, msg->torque_mnmm);
+    msg->flags |= bt_kernel(e_q4, settings, BT_WANT_ALL, msg->poc_um, msg->force_100un, msg->torque_mnmm);
 
     uint32_t threshold = bt_tare_threshold_count2(tare, settings->contact_energy_count2);
     signal_shape shape = shape_of(e_q4);

@@ -7,7 +7,8 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
     for (int64_t k = 0; k < n; k++) {
         int32_t e_q4[BT_ELECTRODES];
         bt_signals_q4(counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, e_q4);
-        flags[k] = bt_kernel(e_q4, settings, poc_um + 3 * k, force_100un + 3 * k, torque_mnmm + 3 * k);
+        flags[k] =
+            bt_kernel(e_q4, settings, BT_WANT_ALL, poc_um + 3 * k, force_100un + 3 * k, torque_mnmm + 3 * k);
     }
 }
 

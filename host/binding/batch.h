@@ -2,7 +2,7 @@
 #ifndef BIOTAC_BATCH_H
 #define BIOTAC_BATCH_H
 
-#include "results.h"
+#include "kernel.h"
 
 // counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). flags: (n,), POC_INVALID
 // only. Every row goes through bt_signals_q4 and bt_kernel as on the board.

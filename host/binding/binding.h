@@ -9,8 +9,8 @@
 #include "cobs.h"
 #include "crc32.h"
 #include "framing.h"
+#include "kernel.h"
 #include "lin2013.h"
-#include "results.h"
 #include "tare.h"
 
 // Compared with host/biotac/_wire.py when the module is imported.

@@ -14,9 +14,9 @@
 #include "support.h"
 
 #include "fix.h"
+#include "kernel.h"
 #include "lin2013.h"
 #include "poc.h"
-#include "results.h"
 #include "wrench.h"
 
 #include <math.h>
@@ -117,7 +117,7 @@ static void check_all_weights(const int32_t e_q4[BT_ELECTRODES], const gains_nn 
                                        .gains = bt_gains_from(gains->force_nn, gains->torque_nn)};
         int16_t poc_um[3];
         int32_t force_100un[3], torque_mnmm[3];
-        uint32_t flags = bt_kernel(e_q4, &settings, poc_um, force_100un, torque_mnmm);
+        uint32_t flags = bt_kernel(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);
         lin2013_result want = reference(e_q4, weights, gains);
         check_wrench(&want, size, gains, force_100un, torque_mnmm);
         if (isnan(want.poc_mm[0])) {
@@ -318,7 +318,7 @@ static void torque_x_is_good_to_2_mnmm_rms_up_to_40_n(void **state)
                                        .gains = bt_gains_from(defaults.force_nn, defaults.torque_nn)};
         int16_t poc_um[3];
         int32_t force_100un[3], torque_mnmm[3];
-        if (bt_kernel(e, &settings, poc_um, force_100un, torque_mnmm) != 0) {
+        if (bt_kernel(e, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm) != 0) {
             continue;
         }
         lin2013_result want = reference(e, k % 3, &defaults);
@@ -336,6 +336,33 @@ static void torque_x_is_good_to_2_mnmm_rms_up_to_40_n(void **state)
         double rms = sqrt(squares[bin] / frames[bin]);
         print_message("torque x up to %.0f N: %.2f mN*mm RMS\n", top_n[bin], rms);
         assert_true(rms <= 2);
+    }
+}
+
+// Whatever is asked for is what comes with everything; the rest is marked, never left or made up.
+static void what_nobody_wants_is_invalid(void **state)
+{
+    (void)state;
+    uint64_t seed = 10;
+    for (int k = 0; k < 3000; k++) {
+        int32_t e[BT_ELECTRODES];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            e[i] = k % 20 == 0 ? 0 : (int32_t)random_range(&seed, -8000, 2000);
+        }
+        bt_kernel_settings settings = {.poc_weights = k % 3,
+                                       .gains = bt_gains_from(defaults.force_nn, defaults.torque_nn)};
+        int16_t all_poc[3], poc[3];
+        int32_t all_force[3], all_torque[3], force[3], torque[3];
+        uint32_t all_flags = bt_kernel(e, &settings, BT_WANT_ALL, all_poc, all_force, all_torque);
+        for (uint32_t wanted = 0; wanted <= BT_WANT_ALL; wanted++) {
+            uint32_t flags = bt_kernel(e, &settings, wanted, poc, force, torque);
+            assert_int_equal(flags, wanted & (BT_WANT_POC | BT_WANT_TORQUE) ? all_flags : 0);
+            for (int d = 0; d < 3; d++) {
+                assert_int_equal(poc[d], wanted & BT_WANT_POC ? all_poc[d] : BT_INVALID_I16);
+                assert_int_equal(force[d], wanted & BT_WANT_FORCE ? all_force[d] : BT_INVALID_I32);
+                assert_int_equal(torque[d], wanted & BT_WANT_TORQUE ? all_torque[d] : BT_INVALID_I32);
+            }
+        }
     }
 }
 
@@ -368,6 +395,7 @@ int main(void)
         cmocka_unit_test(contacts_at_the_seam_with_square_weights),
         cmocka_unit_test(random_frames_in_six_sizes),
         cmocka_unit_test(torque_x_is_good_to_2_mnmm_rms_up_to_40_n),
+        cmocka_unit_test(what_nobody_wants_is_invalid),
         cmocka_unit_test(the_worst_of_all_is_within_what_is_promised),
     };
     return cmocka_run_group_tests(tests, NULL, print_worst);

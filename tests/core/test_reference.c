@@ -2,9 +2,9 @@
 // without any reference: symmetry, and refusal where there is no answer.
 #include "support.h"
 
+#include "kernel.h"
 #include "lin2013.h"
 #include "poc.h"
-#include "results.h"
 
 #include <math.h>
 
@@ -151,7 +151,7 @@ static results kernel(const int32_t e_q4[BT_ELECTRODES], int weights)
 {
     results out;
     bt_kernel_settings settings = {.poc_weights = weights, .gains = bt_gains_from(force_nn, torque_nn)};
-    out.flags = bt_kernel(e_q4, &settings, out.poc_um, out.force_100un, out.torque_mnmm);
+    out.flags = bt_kernel(e_q4, &settings, BT_WANT_ALL, out.poc_um, out.force_100un, out.torque_mnmm);
     return out;
 }
 

@@ -4,7 +4,7 @@
 #define BIOTAC_BENCH_BITS_H
 
 #include "crc32.h"
-#include "results.h"
+#include "kernel.h"
 
 #define BITS_FRAMES 10000
 
@@ -31,7 +31,7 @@ static inline uint32_t bits_hash(void)
             e_q4[i] = bits_step(&seed) & 3 ? -magnitude : magnitude;
         }
         settings.poc_weights = k % 3;
-        uint32_t flags = bt_kernel(e_q4, &settings, poc_um, force_100un, torque_mnmm);
+        uint32_t flags = bt_kernel(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);
         for (int d = 0; d < 3; d++) {
             chain[1 + d] = (uint32_t)force_100un[d];
             chain[4 + d] = (uint32_t)torque_mnmm[d] ^ (uint32_t)(uint16_t)poc_um[d] << 16;

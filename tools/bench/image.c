@@ -38,7 +38,7 @@ static void shipped(void)
 {
     int16_t poc_um[3];
     int32_t force_100un[3], torque_mnmm[3];
-    sink = (int32_t)bt_kernel(e_q4, &settings, poc_um, force_100un, torque_mnmm);
+    sink = (int32_t)bt_kernel(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);
     sink = poc_um[0] + force_100un[0] + torque_mnmm[0];
 }
 

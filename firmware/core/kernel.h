@@ -1,0 +1,39 @@
+// From counts and tare to signals, and from signals to point of contact, force and torque.
+// Output units are those of the FRAME message: um, 100 uN, mN*mm, rounded half away from zero;
+// a result that cannot be given is the type's minimum, never 0 and never an older one.
+#ifndef BIOTAC_KERNEL_H
+#define BIOTAC_KERNEL_H
+
+#include "sensor_gen.h"
+#include "settings.h"
+#include "wrench.h"
+
+#include <stdint.h>
+
+// What the kernels need of the settings, looked up once per change.
+typedef struct {
+    int poc_weights;
+    bt_gains gains;
+    uint32_t contact_energy_count2;
+} bt_kernel_settings;
+
+bt_kernel_settings bt_kernel_settings_from(const bt_settings *settings);
+
+// The signals the results rest on: e = count - tare in 1/16 count; an electrode without
+// a count or without a tare gives 0.
+void bt_signals_q4(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
+                   int32_t e_q4[BT_ELECTRODES]);
+
+// What to compute. What nobody wants is marked invalid; torque x needs a point and a force, which then
+// are computed but not given.
+#define BT_WANT_POC    1
+#define BT_WANT_FORCE  2
+#define BT_WANT_TORQUE 4
+#define BT_WANT_ALL    7
+
+// From signals to the results and their invalid marks alone. Returns POC_INVALID or 0, and 0 too when
+// neither PoC nor torque is wanted. The host runs recorded counts through this same function.
+uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *settings, uint32_t wanted,
+                   int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3]);
+
+#endif
