@@ -63,19 +63,16 @@ static void take_slot(bt_gateway *gateway, const bt_slot *slot)
         gateway->round_open = false;
     }
     if (!gateway->round_open) {
-        uint32_t t_us = slot->t_us - slot->slot * 1000000u / BT_SLOT_HZ;
-        for (int f = 0; f < BT_MAX_FINGERS; f++) {
-            bt_finger_begin(&session->finger[f], t_us);
-        }
+        bt_session_begin(session, slot->t_us - slot->slot * 1000000u / BT_SLOT_HZ);
         gateway->round = slot->round;
         gateway->round_open = true;
     }
+    uint16_t count[BT_MAX_FINGERS];
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        uint16_t count;
-        enum bt_word kind = bt_word_decode(slot->word[f], &count);
+        enum bt_word kind = bt_word_decode(slot->word[f], &count[f]);
         count_word(&session->finger[f].words, kind, slot->word[f]);
-        bt_frame_put(&session->finger[f].frame, slot->slot, count);
     }
+    bt_session_slot(session, slot->slot, count, slot->t_us);
     if (slot->slot == BT_SLOTS - 1) {
         bt_session_round(session);
         gateway->round_open = false;

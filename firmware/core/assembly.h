@@ -1,4 +1,4 @@
-// Frame assembly: 44 slots of one finger become one frame, with validity per channel.
+// A frame: the words of one finger in one round of 44 slots, with validity per channel.
 // A channel that got no good word in its own slot is BT_INVALID_COUNT, never an older value.
 // Units: counts 0..4095; t_us is device time, wraps at 2^32.
 #ifndef BIOTAC_ASSEMBLY_H
@@ -22,9 +22,6 @@ typedef struct {
 
 void bt_frame_clear(bt_frame *frame);
 
-// Put the word of one slot in its place. count is 0..4095 or BT_INVALID_COUNT.
-void bt_frame_put(bt_frame *frame, uint8_t slot, uint16_t count);
-
 #define BT_RAIL_COUNT 4090 // from here on, and at 0, a count is at the end of its range
 
 #ifndef BT_CDEF // asked for every electrode of every frame, so they are inlined
@@ -40,8 +37,6 @@ static inline bool bt_count_railed(uint16_t count)
 }
 #endif
 
-// Electrodes that are missing or railed; with more than BT_USABLE_WITHOUT of them the frame is faulty.
-#define BT_USABLE_WITHOUT 2
-int bt_frame_unusable(const bt_frame *frame);
+#define BT_USABLE_WITHOUT 2 // electrodes that may be missing or railed; with more the frame is faulty
 
 #endif

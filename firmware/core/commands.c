@@ -1,6 +1,10 @@
 // What each command does. Every command is answered exactly once: by its own message, or by REPLY.
 #include "session.h"
 
+#define QUANTITIES                                                                                           \
+    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_SIGMA        \
+     | BT_QUANTITY_FLAG_REST_FRAMES | BT_QUANTITY_FLAG_TOUCH)
+
 static void reply(bt_session *session, uint8_t req_id, uint8_t command, uint8_t error)
 {
     uint8_t payload[BT_REPLY_BYTES];
@@ -49,6 +53,28 @@ static uint8_t start(bt_session *session, const uint8_t *payload)
     session->streams = msg.streams;
     session->fingers = msg.fingers;
     session->keepalive_ms = msg.keepalive_ms;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        session->finger[f].fresh = true;
+        session->finger[f].unsent = 0;
+    }
+    return BT_ERROR_OK;
+}
+
+static uint8_t subscribe(bt_session *session, const uint8_t *payload)
+{
+    bt_msg_subscribe msg;
+    bt_msg_subscribe_unpack(&msg, payload);
+    if (msg.quantities & ~QUANTITIES) {
+        return BT_ERROR_OUT_OF_RANGE;
+    }
+    if (msg.fingers >> BT_MAX_FINGERS != 0) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (msg.fingers >> f & 1) {
+            session->finger[f].quantities = msg.quantities;
+        }
+    }
     return BT_ERROR_OK;
 }
 
@@ -111,7 +137,7 @@ static uint8_t set_setting(bt_session *session, const uint8_t *payload)
     }
     uint8_t error = bt_settings_set(&session->settings, msg.setting, msg.value);
     if (error == BT_ERROR_OK) {
-        session->kernel = bt_kernel_settings_from(&session->settings);
+        bt_session_use_settings(session);
         setting(session, msg.req_id, msg.setting);
     }
     return error;
@@ -142,6 +168,9 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         session->streams = 0;
         break;
     case BT_PING_ID:
+        break;
+    case BT_SUBSCRIBE_ID:
+        error = subscribe(session, payload);
         break;
     case BT_TARE_NOW_ID:
         error = tare_now(session, payload);

@@ -1,78 +1,172 @@
 #include "finger.h"
 
+#include "fix.h"
+
 #include <string.h>
+
+#define SUBSCRIBED_AT_FIRST                                                                                  \
+    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_REST_FRAMES)
 
 void bt_finger_reset(bt_finger *finger, uint8_t index)
 {
     memset(finger, 0, sizeof *finger);
     finger->index = index;
+    finger->quantities = SUBSCRIBED_AT_FIRST;
     bt_tare_reset(&finger->tare);
     bt_frame_clear(&finger->frame);
 }
 
-void bt_finger_begin(bt_finger *finger, uint32_t t_us)
+void bt_finger_begin(bt_finger *finger, uint32_t t_us, const bt_tare_settings *settings)
 {
-    bt_frame_clear(&finger->frame);
+    bt_tare_begin(&finger->tare, settings);
     finger->frame.t_us = t_us;
+    finger->frame.good_words = 0;
+    finger->next_slot = 0;
 }
 
-static void fill_pac(const bt_finger *finger, uint16_t seq, bt_msg_pac *pac)
+static bool place(bt_finger *finger, uint8_t slot, uint16_t count)
 {
-    pac->seq = seq;
-    pac->t_us = finger->frame.t_us + BT_FIRST_PAC_SLOT * 1000000u / BT_SLOT_HZ;
-    pac->finger = finger->index;
-    memcpy(pac->pac, finger->frame.pac, sizeof pac->pac);
+    bt_frame *frame = &finger->frame;
+    unsigned channel = bt_slot_channel[slot];
+    frame->good_words = (uint8_t)(frame->good_words + (count != BT_INVALID_COUNT));
+    if (channel == BT_CHANNEL_PAC) {
+        frame->pac[bt_slot_pac[slot]] = count;
+        return false;
+    }
+    unsigned electrode = channel - BT_CHANNEL_E1;
+    if (electrode < BT_ELECTRODES) {
+        frame->electrode[electrode] = count;
+        return bt_tare_electrode(&finger->tare, electrode, count);
+    }
+    switch (channel) {
+    case BT_CHANNEL_PDC:
+        frame->pdc = count;
+        return bt_tare_pressure(&finger->tare, count);
+    case BT_CHANNEL_TAC:
+        frame->tac = count;
+        break;
+    case BT_CHANNEL_TDC:
+        frame->tdc = count;
+        bt_tare_temperature(&finger->tare, count);
+        break;
+    }
+    return false;
 }
 
-static void fill_tare(const bt_finger *finger, uint16_t seq, bt_msg_tare *msg)
+bool bt_finger_put(bt_finger *finger, uint8_t slot, uint16_t count)
+{
+    while (finger->next_slot < slot) {
+        (void)place(finger, finger->next_slot++, BT_INVALID_COUNT);
+    }
+    finger->next_slot = (uint8_t)(slot + 1);
+    return place(finger, slot, count);
+}
+
+static void fall_silent(bt_finger *finger)
+{
+    finger->present = false;
+    // What is plugged in next may be another sensor: the tare must not outlive this one. One that
+    // the host set for a sensor that never answered yet is not this one's.
+    if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS && ++finger->silent_rounds == BT_UNPLUGGED_ROUNDS
+        && finger->answered) {
+        bt_tare_reset(&finger->tare);
+        finger->answered = false;
+    }
+}
+
+bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
+{
+    while (finger->next_slot < BT_SLOTS) {
+        (void)place(finger, finger->next_slot++, BT_INVALID_COUNT);
+    }
+    if (finger->frame.good_words == 0) {
+        fall_silent(finger);
+        return false;
+    }
+    finger->seq++;
+    finger->present = true;
+    finger->answered = true;
+    finger->silent_rounds = 0;
+    // A TARE command between two rounds has changed the tare already.
+    finger->tare_unsent = finger->tare.changed;
+    bt_tare_end(&finger->tare, settings);
+    finger->tare_unsent = finger->tare_unsent || finger->tare.changed;
+    finger->tare.changed = false;
+    return true;
+}
+
+bool bt_finger_idle(const bt_finger *finger)
 {
     const bt_tare *tare = &finger->tare;
-    msg->seq = seq;
+    bool untouched = tare->state == BT_TARE_STATE_REST ? tare->gate.room >= 0 && tare->hits == 0
+                                                       : tare->state == BT_TARE_STATE_INIT;
+    return untouched && !finger->tare_unsent && !(finger->quantities & BT_QUANTITY_FLAG_REST_FRAMES);
+}
+
+bool bt_finger_moved(const bt_finger *finger)
+{
+    uint32_t energy = 0;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        int32_t change = finger->tare.gate.smooth.lane[i] - finger->sent.lane[i];
+        energy += (uint32_t)(change * change);
+    }
+    return energy > finger->tare.threshold_count2;
+}
+
+// The sequence number of the round that has ended.
+static uint16_t seq_of(const bt_finger *finger)
+{
+    return (uint16_t)(finger->seq - 1);
+}
+
+void bt_finger_frame(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_frame *msg)
+{
+    const bt_frame *frame = &finger->frame;
+    msg->seq = seq_of(finger);
+    msg->t_us = frame->t_us;
+    msg->finger = finger->index;
+    msg->tare_state = finger->tare.state;
+    msg->pdc = frame->pdc;
+    msg->tac = frame->tac;
+    msg->tdc = frame->tdc;
+    msg->pdc_tare_q4 = bt_tare_q4(finger->tare.base.pdc_q16);
+    memcpy(msg->counts, frame->electrode, sizeof msg->counts);
+    memcpy(msg->tare_q4, finger->tare.electrode_q4, sizeof msg->tare_q4);
+    bt_results(frame, &finger->tare, settings, finger->quantities, msg);
+    msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
+    finger->sent = finger->tare.gate.smooth;
+}
+
+void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg)
+{
+    msg->seq = (uint16_t)(seq_of(finger) - frame_follows);
+    msg->t_us = finger->frame.t_us;
+    msg->finger = finger->index;
+    msg->tare_state = finger->tare.state;
+    msg->flags = bt_channel_flags(&finger->frame, &finger->tare) | BT_FRAME_FLAG_NOT_ASKED;
+    msg->frames = finger->unsent;
+    msg->energy_count2 = bt_gate_energy(&finger->tare.gate);
+    msg->pdc = finger->frame.pdc;
+    msg->tdc = finger->frame.tdc;
+}
+
+void bt_finger_pac(const bt_finger *finger, bt_msg_pac *msg)
+{
+    msg->seq = seq_of(finger);
+    msg->t_us = finger->frame.t_us + BT_FIRST_PAC_SLOT * 1000000u / BT_SLOT_HZ;
+    msg->finger = finger->index;
+    memcpy(msg->pac, finger->frame.pac, sizeof msg->pac);
+}
+
+void bt_finger_tare(const bt_finger *finger, bt_msg_tare *msg)
+{
+    const bt_tare *tare = &finger->tare;
+    msg->seq = seq_of(finger);
     msg->t_us = finger->frame.t_us;
     msg->finger = finger->index;
     msg->tare_state = tare->state;
     msg->reason = tare->reason;
-    msg->noise_count2 = tare->noise_count2;
+    msg->noise_count2 = tare->noise.count2;
     memcpy(msg->tare_q16, tare->base.electrode_q16, sizeof msg->tare_q16);
     msg->pdc_tare_q16 = tare->base.pdc_q16;
-}
-
-bool bt_finger_finish(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_frame *frame,
-                      bt_msg_pac *pac, bt_msg_tare *tare, bool *tare_changed)
-{
-    *tare_changed = false;
-    if (finger->frame.good_words == 0) {
-        finger->present = false;
-        // What is plugged in next may be another sensor: the tare must not outlive this one. One that
-        // the host set for a sensor that never answered yet is not this one's.
-        if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS && ++finger->silent_rounds == BT_UNPLUGGED_ROUNDS
-            && finger->answered) {
-            bt_tare_reset(&finger->tare);
-            finger->answered = false;
-        }
-        return false;
-    }
-    uint16_t seq = finger->seq++;
-    finger->present = true;
-    finger->answered = true;
-    finger->silent_rounds = 0;
-    // A TARE command between two frames has changed the tare already.
-    bool set_by_host = finger->tare.changed;
-    bt_tare_update(&finger->tare, &finger->frame, settings->contact_energy_count2);
-    finger->tare.changed = finger->tare.changed || set_by_host;
-    *tare_changed = finger->tare.changed;
-    if (*tare_changed) {
-        fill_tare(finger, seq, tare);
-    }
-    frame->seq = seq;
-    frame->t_us = finger->frame.t_us;
-    frame->finger = finger->index;
-    memcpy(frame->counts, finger->frame.electrode, sizeof frame->counts);
-    frame->pdc = finger->frame.pdc;
-    frame->tac = finger->frame.tac;
-    frame->tdc = finger->frame.tdc;
-    bt_results(&finger->frame, &finger->tare, settings, frame);
-    finger->tare.changed = false;
-    fill_pac(finger, seq, pac);
-    return true;
 }

@@ -1,5 +1,5 @@
-// One finger: slots in, stream messages out. Holds what belongs to that sensor alone, so that a
-// fault on one finger cannot reach another.
+// One finger: slots in, what to send out. Holds what belongs to that sensor alone, so that a fault on
+// one finger cannot reach another.
 #ifndef BIOTAC_FINGER_H
 #define BIOTAC_FINGER_H
 
@@ -21,9 +21,15 @@ typedef struct {
     bool present; // the last whole frame had at least one good word
     uint16_t seq; // of the next frame; rounds in which nothing answered are not counted
     uint8_t silent_rounds;
-    bool answered;  // since it was plugged in
-    bt_frame frame; // being assembled
+    bool answered;      // since it was plugged in
+    uint8_t next_slot;  // of this round
+    uint8_t quantities; // BT_QUANTITY_FLAG_*
+    uint16_t unsent;    // rounds for which an IDLE is still to speak
+    bool fresh;         // nothing was sent since START: the first is a FRAME
+    bool tare_unsent;   // the tare changed in the latest round
+    bt_frame frame;     // of the latest round, or being assembled
     bt_tare tare;
+    bt_lanes sent; // filtered counts when the last FRAME was sent
     bt_word_counts words;
 } bt_finger;
 
@@ -33,13 +39,28 @@ typedef struct {
 
 void bt_finger_reset(bt_finger *finger, uint8_t index);
 
-// A round of slots begins. Whatever the round before left unfilled stays marked as missing.
-void bt_finger_begin(bt_finger *finger, uint32_t t_us);
+// A round of slots begins.
+void bt_finger_begin(bt_finger *finger, uint32_t t_us, const bt_tare_settings *settings);
 
-// The round is over: run tare and kernels, fill the messages.
-// Returns false, filling nothing, when no word of the round was good: the sensor is absent.
-// tare_changed tells whether *tare holds a message to send.
-bool bt_finger_finish(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_frame *frame,
-                      bt_msg_pac *pac, bt_msg_tare *tare, bool *tare_changed);
+// The word of one slot: 0..4095 or BT_INVALID_COUNT. Slots come in order; those left out are missing.
+// Returns true in the slot in which a resting finger is first touched.
+bool bt_finger_put(bt_finger *finger, uint8_t slot, uint16_t count);
+
+// The round is over. False when no word of it was good: the sensor is absent, and nothing else of it
+// is to be read.
+bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings);
+
+// Nothing touches, nothing changed, and nobody asked for FRAMEs all the same: nothing to compute.
+bool bt_finger_idle(const bt_finger *finger);
+
+// The filtered counts have moved beyond noise since the last FRAME that was sent.
+bool bt_finger_moved(const bt_finger *finger);
+
+// The round that has ended as messages. PoC, force and torque are computed in the first. An IDLE stands for
+// `unsent` rounds, of which the round that has ended is the last or, when its FRAME follows, not one.
+void bt_finger_frame(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_frame *msg);
+void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg);
+void bt_finger_pac(const bt_finger *finger, bt_msg_pac *msg);
+void bt_finger_tare(const bt_finger *finger, bt_msg_tare *msg);
 
 #endif

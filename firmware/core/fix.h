@@ -11,8 +11,16 @@
 #define BT_DIVIDE_U32(num, den) ((num) / (den))
 #endif
 
-// For generated sums that are cheaper called than inlined.
+// For what is cheaper called than inlined.
 #define BT_NOINLINE __attribute__((noinline))
+
+// Before a loop over all electrodes: on a core without a pipeline to hide them, counting and branching cost
+// as much as the work.
+#if defined(__GNUC__) && !defined(__clang__)
+#define BT_UNROLL _Pragma("GCC unroll 20")
+#else
+#define BT_UNROLL
+#endif
 
 // num / den for den > 0. Works on magnitudes, so that -2.5 and 2.5 both move away from zero, and
 // never adds to num, so that no input near INT64_MAX can wrap.

@@ -1,9 +1,22 @@
 #include "kernel.h"
 
 #include "fix.h"
+#include "isqrt.h"
 #include "poc.h"
 
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
+
+// |gain| times the length of the electrodes' normals along one axis. Normals are in 1/1000: the root of
+// their squares is below 2^14; 1e5 nN are 100 uN.
+static uint32_t force_per_count(int32_t gain_nn, int axis)
+{
+    uint32_t squares = 0;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        squares += (uint32_t)(bt_normal_milli[i][axis] * bt_normal_milli[i][axis]);
+    }
+    uint64_t product = (uint64_t)bt_abs32(gain_nn) * bt_isqrt32(squares);
+    return (uint32_t)((product << 16) / 100000000u);
+}
 
 bt_kernel_settings bt_kernel_settings_from(const bt_settings *settings)
 {
@@ -15,8 +28,10 @@ bt_kernel_settings bt_kernel_settings_from(const bt_settings *settings)
     bt_kernel_settings kernel = {
         .poc_weights = (int)bt_settings_get(settings, BT_SETTING_POC_WEIGHTS),
         .gains = bt_gains_from(force_nn, torque_nn),
-        .contact_energy_count2 = (uint32_t)bt_settings_get(settings, BT_SETTING_CONTACT_ENERGY_COUNT2),
     };
+    for (int d = 0; d < 3; d++) {
+        kernel.force_per_count_100un_q16[d] = force_per_count(force_nn[d], d);
+    }
     return kernel;
 }
 

@@ -14,7 +14,7 @@
 typedef struct {
     int poc_weights;
     bt_gains gains;
-    uint32_t contact_energy_count2;
+    uint32_t force_per_count_100un_q16[3]; // by which one count of noise on every electrode moves the force
 } bt_kernel_settings;
 
 bt_kernel_settings bt_kernel_settings_from(const bt_settings *settings);
@@ -26,10 +26,10 @@ void bt_signals_q4(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[
 
 // What to compute. What nobody wants is marked invalid; torque x needs a point and a force, which then
 // are computed but not given.
-#define BT_WANT_POC    1
-#define BT_WANT_FORCE  2
-#define BT_WANT_TORQUE 4
-#define BT_WANT_ALL    7
+#define BT_WANT_POC    BT_QUANTITY_FLAG_POC
+#define BT_WANT_FORCE  BT_QUANTITY_FLAG_FORCE
+#define BT_WANT_TORQUE BT_QUANTITY_FLAG_TORQUE
+#define BT_WANT_ALL    (BT_WANT_POC | BT_WANT_FORCE | BT_WANT_TORQUE)
 
 // From signals to the results and their invalid marks alone. Returns POC_INVALID or 0, and 0 too when
 // neither PoC nor torque is wanted. The host runs recorded counts through this same function.

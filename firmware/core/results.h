@@ -8,8 +8,12 @@
 #include "kernel.h"
 #include "tare.h"
 
-// Fill flags, poc_um, force_100un, torque_mnmm, tare_q4 and pdc_tare_q4 of msg.
+// Fill flags, poc_um, force_100un, torque_mnmm and their sigmas of msg. quantities is a mask of
+// BT_QUANTITY_FLAG_*; what is not in it is not computed and marked invalid.
 void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_settings *settings,
-                bt_msg_frame *msg);
+                uint32_t quantities, bt_msg_frame *msg);
+
+// The flags that need no computing.
+uint32_t bt_channel_flags(const bt_frame *frame, const bt_tare *tare);
 
 #endif

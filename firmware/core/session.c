@@ -10,11 +10,20 @@ void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_w
     session->status_us = now_us;
     session->second_us = now_us;
     bt_settings_reset(&session->settings);
-    session->kernel = bt_kernel_settings_from(&session->settings);
+    bt_session_use_settings(session);
     bt_deframer_reset(&session->deframer);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         bt_finger_reset(&session->finger[f], f);
     }
+}
+
+void bt_session_use_settings(bt_session *session)
+{
+    const bt_settings *settings = &session->settings;
+    session->kernel = bt_kernel_settings_from(settings);
+    session->tare = bt_tare_settings_from(settings);
+    session->status_period_us = (uint32_t)bt_settings_get(settings, BT_SETTING_STATUS_PERIOD_MS) * 1000;
+    session->idle_rounds = (uint16_t)(bt_settings_get(settings, BT_SETTING_IDLE_PERIOD_MS) / BT_FRAME_MS);
 }
 
 void bt_session_send(bt_session *session, uint8_t id, const uint8_t *payload)
@@ -55,33 +64,129 @@ uint8_t bt_session_present(const bt_session *session)
     return mask;
 }
 
+// ---- streams --------------------------------------------------------------------------------
+
+static bool streams(const bt_session *session, const bt_finger *finger, uint8_t what)
+{
+    return (session->streams & what) && (session->fingers >> finger->index & 1);
+}
+
+void bt_session_begin(bt_session *session, uint32_t t_us)
+{
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_finger_begin(&session->finger[f], t_us, &session->tare);
+    }
+}
+
+static void send_touch(bt_session *session, const bt_finger *finger, uint8_t slot, uint32_t t_us)
+{
+    uint8_t payload[BT_TOUCH_BYTES];
+    if (!streams(session, finger, BT_STREAM_FLAG_FRAMES) || !(finger->quantities & BT_QUANTITY_FLAG_TOUCH)) {
+        return;
+    }
+    bt_msg_touch msg = {
+        .seq = finger->seq,
+        .t_us = t_us,
+        .finger = finger->index,
+        .slot = slot,
+        .energy_count2 = bt_gate_energy(&finger->tare.gate),
+    };
+    bt_msg_touch_pack(&msg, payload);
+    bt_session_send(session, BT_TOUCH_ID, payload);
+}
+
+void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_MAX_FINGERS], uint32_t t_us)
+{
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (bt_finger_put(&session->finger[f], slot, count[f])) {
+            send_touch(session, &session->finger[f], slot, t_us);
+        }
+    }
+}
+
+static void send_tare(bt_session *session, const bt_finger *finger)
+{
+    uint8_t payload[BT_TARE_BYTES];
+    bt_msg_tare msg;
+    bt_finger_tare(finger, &msg);
+    bt_msg_tare_pack(&msg, payload);
+    bt_session_send(session, BT_TARE_ID, payload);
+}
+
+static void send_idle(bt_session *session, bt_finger *finger, bool frame_follows)
+{
+    uint8_t payload[BT_IDLE_BYTES];
+    bt_msg_idle msg;
+    bt_finger_idle_message(finger, frame_follows, &msg);
+    bt_msg_idle_pack(&msg, payload);
+    bt_session_send(session, BT_IDLE_ID, payload);
+    finger->unsent = 0;
+}
+
+static void count_skips(bt_skips *skips, uint32_t quantities)
+{
+    // Torque x needs a point and a force: they are computed for it, though not sent.
+    bool torque = quantities & BT_QUANTITY_FLAG_TORQUE;
+    skips->poc += !(torque || quantities & BT_QUANTITY_FLAG_POC);
+    skips->force += !(torque || quantities & BT_QUANTITY_FLAG_FORCE);
+    skips->torque += !torque;
+    skips->sigma += !(quantities & BT_QUANTITY_FLAG_SIGMA);
+}
+
+static void send_frame(bt_session *session, bt_finger *finger)
+{
+    uint8_t payload[BT_FRAME_BYTES];
+    bt_msg_frame msg;
+    if (finger->tare_unsent) {
+        send_tare(session, finger);
+    }
+    bt_finger_frame(finger, &session->kernel, &msg);
+    bt_msg_frame_pack(&msg, payload);
+    bt_session_send(session, BT_FRAME_ID, payload);
+    count_skips(&session->skips, finger->quantities);
+}
+
+// A FRAME, or the silence that an IDLE ends: when its period is over, and before the next FRAME, so that
+// every round is accounted for and a gap is a loss.
+static void send_round(bt_session *session, bt_finger *finger)
+{
+    bool idle = bt_finger_idle(finger) && !finger->fresh;
+    if (idle && finger->unsent + 1 >= session->idle_rounds) {
+        idle = !bt_finger_moved(finger);
+    }
+    if (!idle) {
+        if (finger->unsent > 0) {
+            send_idle(session, finger, true);
+        }
+        finger->fresh = false;
+        send_frame(session, finger);
+        return;
+    }
+    session->skips.frames++;
+    count_skips(&session->skips, 0);
+    if (++finger->unsent >= session->idle_rounds) {
+        send_idle(session, finger, false);
+    }
+}
+
 void bt_session_round(bt_session *session)
 {
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_msg_frame frame;
-        bt_msg_pac pac;
-        bt_msg_tare tare;
-        bool tare_changed;
-        uint8_t payload[BT_FRAME_MAX_BYTES];
-        if (!bt_finger_finish(&session->finger[f], &session->kernel, &frame, &pac, &tare, &tare_changed)) {
-            if (session->finger[f].silent_rounds == BT_UNPLUGGED_ROUNDS) {
+        bt_finger *finger = &session->finger[f];
+        if (!bt_finger_end(finger, &session->tare)) {
+            if (finger->silent_rounds == BT_UNPLUGGED_ROUNDS) {
                 memset(&session->info[f], 0, sizeof session->info[f]); // the next one may be another
             }
             continue;
         }
-        if (!(session->fingers >> f & 1)) {
-            continue;
+        if (streams(session, finger, BT_STREAM_FLAG_FRAMES)) {
+            send_round(session, finger);
         }
-        if (session->streams & BT_STREAM_FLAG_FRAMES) {
-            if (tare_changed) {
-                bt_msg_tare_pack(&tare, payload);
-                bt_session_send(session, BT_TARE_ID, payload);
-            }
-            bt_msg_frame_pack(&frame, payload);
-            bt_session_send(session, BT_FRAME_ID, payload);
-        }
-        if (session->streams & BT_STREAM_FLAG_PAC) {
-            bt_msg_pac_pack(&pac, payload);
+        if (streams(session, finger, BT_STREAM_FLAG_PAC)) {
+            uint8_t payload[BT_PAC_BYTES];
+            bt_msg_pac msg;
+            bt_finger_pac(finger, &msg);
+            bt_msg_pac_pack(&msg, payload);
             bt_session_send(session, BT_PAC_ID, payload);
         }
     }
@@ -102,6 +207,11 @@ void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us
         .slots_late = session->slots_late,
         .rx_frames = session->rx_frames,
         .rx_errors = session->rx_errors,
+        .frames_idle = session->skips.frames,
+        .poc_skipped = session->skips.poc,
+        .force_skipped = session->skips.force,
+        .torque_skipped = session->skips.torque,
+        .sigma_skipped = session->skips.sigma,
     };
     bt_msg_status_pack(&msg, payload);
     bt_session_send(session, BT_STATUS_ID, payload);
@@ -120,7 +230,7 @@ void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t 
         .tare_state = finger->tare.state,
         .tare_reason = finger->tare.reason,
         .tare_age_ms = finger->tare.age_frames * BT_FRAME_MS,
-        .noise_count2 = finger->tare.noise_count2,
+        .noise_count2 = finger->tare.noise.count2,
         .words_good = finger->words.good,
         .words_stuck = finger->words.stuck,
         .words_error = finger->words.error,
@@ -141,8 +251,7 @@ void bt_session_tick(bt_session *session, uint32_t now_us)
         session->streams = 0;
         session->keepalive_ms = 0;
     }
-    uint32_t period_us = (uint32_t)bt_settings_get(&session->settings, BT_SETTING_STATUS_PERIOD_MS) * 1000;
-    if (now_us - session->status_us < period_us) {
+    if (now_us - session->status_us < session->status_period_us) {
         return;
     }
     session->status_us = now_us;

@@ -21,11 +21,23 @@ typedef bt_msg_sensor_info bt_sensor_info;
 // Takes all bytes or none; false means no room, or nobody there.
 typedef bool (*bt_link_write)(const uint8_t *data, size_t bytes);
 
+// Finger-rounds of a FRAME stream in which something was not done because nobody needed it; wrap at 2^32.
+typedef struct {
+    uint32_t frames; // an IDLE spoke instead
+    uint32_t poc;
+    uint32_t force;
+    uint32_t torque;
+    uint32_t sigma;
+} bt_skips;
+
 typedef struct {
     bt_finger finger[BT_MAX_FINGERS];
     bt_sensor_info info[BT_MAX_FINGERS];
     bt_settings settings;
-    bt_kernel_settings kernel;
+    bt_kernel_settings kernel; // these are of settings, looked up once per change
+    bt_tare_settings tare;
+    uint32_t status_period_us;
+    uint16_t idle_rounds;
     bt_identity identity;
     bt_link_write write;
     bt_deframer deframer;
@@ -42,6 +54,7 @@ typedef struct {
 
     uint32_t messages_sent;
     uint32_t messages_dropped;
+    bt_skips skips;
     uint32_t slots_late;
     uint32_t rx_frames;
     uint32_t rx_errors;
@@ -52,8 +65,14 @@ void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_w
 // Bytes from the host. Every command gets exactly one reply.
 void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, uint32_t now_us);
 
-// A round of slots is complete: compute and send for every finger.
+// A round of slots: begin, each slot's counts (BT_INVALID_COUNT where no good word came), end. Slots come
+// in order; those left out are missing. The end computes and sends what is subscribed to.
+void bt_session_begin(bt_session *session, uint32_t t_us);
+void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_MAX_FINGERS], uint32_t t_us);
 void bt_session_round(bt_session *session);
+
+// Settings have changed.
+void bt_session_use_settings(bt_session *session);
 
 // Call often: keep-alive and periodic status.
 void bt_session_tick(bt_session *session, uint32_t now_us);

@@ -4,92 +4,80 @@
 
 #include <string.h>
 
-// Frame counts and bounds of the machine (measured on real sensors; the settling rule comes from
-// real recordings). 100 frames are one second.
-#define STILL_SPAN      32        // counts an electrode may move in a window to tare from: six noise sigmas
-#define HITS            3         // frames over the threshold that make a contact
-#define PDC_HIT_Q16     (6 << 16) // pressure above rest that is a contact
-#define PDC_QUIET_Q16   (4 << 16) // pressure above rest that still is a release; one-sided, it undershoots
-#define SLEW_Q16        328       // 0.5 count/s: drift is followed no faster, so a load is not
-#define PDC_SLEW_Q16    131       // 0.2 count/s
-#define SNAPSHOT_FRAMES 25
-#define ROLL_BACK       4 // snapshots: at least one second before the contact was seen
-#define CALM_ENERGY     400
-#define CALM_FRAMES     10
-#define RESIDUE_ENERGY  6000 // count^2 that skin hysteresis may leave
-#define RESIDUE_MOTION  800
-#define RESIDUE_FRAMES  100
-#define SETTLE_SPAN_Q16 (12 << 16) // counts; settled signals stay this close to where they came to rest
-#define SETTLE_PDC_SPAN 4
-#define SETTLE_FRAMES   40
-#define SETTLE_PDC_Q16  (30 << 16)  // pressure that real skin keeps after a press (+24 seen), not more
-#define RELEASE_FALL    4           // a release has fallen to a quarter of the contact's peak
-#define NOISE_SHIFT     6           // the noise estimate averages 64 rest frames
+// Bounds of the machine, measured on real sensors; the settling rule comes from real recordings.
+#define HITS           3         // rounds over the threshold that make a contact
+#define PDC_HIT        6         // pressure above rest that is a contact
+#define PDC_QUIET      4         // pressure above rest that still is a release; one-sided, it undershoots
+#define SLEW_Q16       (8 * 328) // a sweep; 0.5 count/s: drift is followed no faster, so a load is not
+#define PDC_SLEW_Q16   (8 * 131) // 0.2 count/s
+#define SPAN_Q3        (12 * 8)  // means of still signals stay this close to where they came to rest
+#define NOW_SPAN_Q3    (32 * 8)  // and their latest filtered count this close to the mean: ten sigmas
+#define STILL_SWEEPS   2         // to tare from; the first one may hold what came before it
+#define CALM_ENERGY    400
+#define RESIDUE_ENERGY 6000         // count^2 that skin hysteresis may leave
+#define RESIDUE_SWEEPS 12           // 960 ms
+#define SETTLE_SWEEPS  5            // 400 ms
+#define SETTLE_PDC     30           // pressure that real skin keeps after a press (+24 seen), not more
+#define RELEASE_FALL   4            // a release has fallen to a quarter of the contact's peak
 #define DRIFT_FRAMES_PER_COUNT 400  // 15 counts/min, the worst drift measured
 #define DRIFT_LIMIT_BLIND      6000 // without pressure, 60 s of drift is all that may be forgiven
 #define DRIFT_LIMIT            60000
 
-_Static_assert(ROLL_BACK < BT_TARE_SNAPSHOTS, "the roll-back must be in the ring");
+bt_tare_settings bt_tare_settings_from(const bt_settings *settings)
+{
+    return (bt_tare_settings){
+        .contact_energy_count2 = (uint32_t)bt_settings_get(settings, BT_SETTING_CONTACT_ENERGY_COUNT2),
+        .thermal_gain_q16 = bt_thermal_gain_q16(bt_settings_get(settings, BT_SETTING_THERMAL_GAIN_MILLI)),
+    };
+}
 
 // ---- measures against the baseline ----------------------------------------------------------
 
-// Values are below 2^28 and differences are rounded to 1/16 count, so that a square fits 32 bits.
-static uint32_t square_q8(uint32_t value_q16, uint32_t base_q16)
-{
-    uint32_t q4 = (bt_abs32((int32_t)(value_q16 - base_q16)) + (1 << 11)) >> 12;
-    return q4 * q4;
-}
-
-static uint32_t energy_of_medians(const bt_tare *tare)
-{
-    const uint16_t *median = bt_history_medians(&tare->history, 0);
-    uint64_t sum = 0;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        if (median[i] != BT_INVALID_COUNT) {
-            sum += square_q8((uint32_t)median[i] << 16, tare->base.electrode_q16[i]);
-        }
-    }
-    return (uint32_t)(sum >> 8);
-}
-
-static uint32_t energy_of_means(const bt_tare *tare, const uint32_t mean_q16[BT_ELECTRODES])
-{
-    uint64_t sum = 0;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        if (bt_history_known(&tare->history, i)) {
-            sum += square_q8(mean_q16[i], tare->base.electrode_q16[i]);
-        }
-    }
-    return (uint32_t)(sum >> 8);
-}
-
 static bool pdc_known(const bt_tare *tare)
 {
-    return tare->history.pdc_now && tare->base.pdc_q16 != BT_TARE_UNKNOWN;
+    return tare->gate.pressure_now && tare->base.pdc_q16 != BT_TARE_UNKNOWN;
 }
 
-static int64_t pdc_above_rest_q16(const bt_tare *tare)
+static int32_t pdc_above_rest(const bt_tare *tare)
 {
-    return ((int64_t)bt_history_pdc_median(&tare->history) << 16) - tare->base.pdc_q16;
+    return tare->gate.smooth.lane[BT_LANE_PDC] - tare->gate.rest.lane[BT_LANE_PDC];
 }
 
-uint32_t bt_tare_threshold_count2(const bt_tare *tare, uint32_t setting_count2)
+// The square of a difference of means in count^2, rounded down. Differences are below 2^15: it fits,
+// and so does the sum over all electrodes.
+static uint32_t square(int32_t difference_q3)
 {
-    uint32_t noise = tare->noise_count2 * 4;
-    return noise > setting_count2 ? noise : setting_count2;
+    return bt_abs32(difference_q3) * bt_abs32(difference_q3) >> 6;
 }
 
 // ---- changes of the baseline ----------------------------------------------------------------
 
+static void use_electrode(bt_tare *tare, unsigned i)
+{
+    uint32_t base_q16 = tare->base.electrode_q16[i];
+    tare->electrode_q4[i] = bt_tare_q4(base_q16);
+    if (base_q16 != BT_TARE_UNKNOWN && !(tare->gate.unknown >> i & 1)) {
+        tare->gate.rest.lane[i] = (uint16_t)((base_q16 + (1 << 15)) >> 16);
+    }
+}
+
+static void use_pressure(bt_tare *tare)
+{
+    uint32_t base_q16 = tare->base.pdc_q16;
+    if (!(tare->gate.unknown >> BT_LANE_PDC & 1)) {
+        tare->gate.rest.lane[BT_LANE_PDC] =
+            base_q16 == BT_TARE_UNKNOWN ? 0 : (uint16_t)((base_q16 + (1 << 15)) >> 16);
+    }
+}
+
 static void forget_contact(bt_tare *tare)
 {
     tare->hits = 0;
-    tare->calm_frames = 0;
-    tare->still_frames = 0;
-    tare->settle_frames = 0;
+    tare->quiet_sweeps = 0;
     tare->contact_frames = 0;
     tare->energy_peak = 0;
-    tare->pdc_peak_q16 = 0;
+    tare->pdc_peak = 0;
+    bt_thermal_begin(&tare->thermal);
 }
 
 static void adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t reason)
@@ -99,232 +87,297 @@ static void adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t
     tare->reason = reason;
     tare->changed = true;
     tare->age_frames = 0;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        use_electrode(tare, i);
+    }
+    use_pressure(tare);
     forget_contact(tare);
-    tare->snapshot[0] = *base;
-    tare->snapshot_head = 0;
-    tare->snapshots = 1;
-    tare->snapshot_countdown = SNAPSHOT_FRAMES;
+    bt_rollback_start(&tare->rollback, base);
+    tare->partial = true;
+}
+
+static uint32_t present_q16(const bt_tare *tare, unsigned lane)
+{
+    bool unknown = tare->gate.unknown >> lane & 1;
+    return unknown ? BT_TARE_UNKNOWN : (uint32_t)tare->sweep.mean_q3.lane[lane] << 13;
 }
 
 static void adopt_present(bt_tare *tare, uint8_t reason)
 {
-    const bt_history *history = &tare->history;
     bt_baseline base;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        bool known = bt_history_known(history, i);
-        base.electrode_q16[i] = known ? bt_history_settled_q16(history, i) : BT_TARE_UNKNOWN;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        base.electrode_q16[i] = present_q16(tare, i);
     }
-    // The pressure of the last frames counts even when this very frame's word was bad.
-    bool pdc = bt_history_pdc_median(history) != BT_INVALID_COUNT;
-    base.pdc_q16 = pdc ? bt_history_pdc_mean_q16(history) : BT_TARE_UNKNOWN;
+    base.pdc_q16 = present_q16(tare, BT_LANE_PDC);
     adopt(tare, &base, BT_TARE_STATE_REST, reason);
 }
 
 // A channel whose first word comes only now begins at rest: against any other baseline it would
-// look like a contact.
-static void meet_new_channels(bt_tare *tare)
+// look like a contact. Not so one whose tare the host has set.
+static void meet_lane(bt_tare *tare, unsigned lane)
 {
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        if (tare->base.electrode_q16[i] == BT_TARE_UNKNOWN && bt_history_known(&tare->history, i)) {
-            uint32_t first_q16 = (uint32_t)bt_history_medians(&tare->history, 0)[i] << 16;
-            tare->base.electrode_q16[i] = first_q16;
-            for (int k = 0; k < BT_TARE_SNAPSHOTS; k++) {
-                tare->snapshot[k].electrode_q16[i] = first_q16;
-            }
+    uint32_t first_q16 = (uint32_t)tare->gate.smooth.lane[lane] << 16;
+    bool tared = tare->reason != BT_TARE_REASON_NONE;
+    bt_sweep_meet(&tare->sweep, lane, tare->gate.smooth.lane[lane]);
+    if (lane < BT_ELECTRODES) {
+        if (tared && tare->base.electrode_q16[lane] == BT_TARE_UNKNOWN) {
+            tare->base.electrode_q16[lane] = first_q16;
+            bt_rollback_meet(&tare->rollback, lane, first_q16);
         }
+        use_electrode(tare, lane);
+        return;
     }
-    if (tare->base.pdc_q16 == BT_TARE_UNKNOWN && tare->history.pdc_now && tare->state == BT_TARE_STATE_REST) {
-        tare->base.pdc_q16 = bt_history_pdc_mean_q16(&tare->history);
-        for (int k = 0; k < BT_TARE_SNAPSHOTS; k++) {
-            tare->snapshot[k].pdc_q16 = tare->base.pdc_q16;
+    if (tare->state == BT_TARE_STATE_REST && tare->base.pdc_q16 == BT_TARE_UNKNOWN) {
+        tare->base.pdc_q16 = first_q16;
+        bt_rollback_meet(&tare->rollback, lane, first_q16);
+    }
+    use_pressure(tare);
+}
+
+static BT_NOINLINE void meet(bt_tare *tare)
+{
+    for (unsigned lane = 0; tare->gate.met >> lane != 0; lane++) {
+        if (tare->gate.met >> lane & 1) {
+            meet_lane(tare, lane);
         }
     }
 }
 
-static uint32_t follow(uint32_t base_q16, uint32_t target_q16, int32_t step_q16)
+// ---- temperature ----------------------------------------------------------------------------
+
+void bt_tare_temperature(bt_tare *tare, uint16_t tdc)
 {
-    int32_t change_q16 = (int32_t)(target_q16 - base_q16);
-    change_q16 = change_q16 > step_q16 ? step_q16 : change_q16 < -step_q16 ? -step_q16 : change_q16;
-    return base_q16 + (uint32_t)change_q16;
+    bt_thermal_add(&tare->thermal, tdc, tare->sweep.round == BT_SWEEP_ROUNDS - 1);
 }
 
-static void track_drift(bt_tare *tare, const uint32_t mean_q16[BT_ELECTRODES])
+static BT_NOINLINE void warm_electrode(bt_tare *tare, unsigned i)
 {
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        if (bt_history_known(&tare->history, i)) {
-            tare->base.electrode_q16[i] = follow(tare->base.electrode_q16[i], mean_q16[i], SLEW_Q16);
-        }
+    int32_t warmed_q16 = (int32_t)tare->base.electrode_q16[i] + tare->thermal.step_q16;
+    int32_t top_q16 = BT_FULL_SCALE_COUNT << 16;
+    warmed_q16 = warmed_q16 < 0 ? 0 : warmed_q16 > top_q16 ? top_q16 : warmed_q16;
+    tare->base.electrode_q16[i] = (uint32_t)warmed_q16;
+    use_electrode(tare, i);
+}
+
+// ---- the lanes whose turn it is -------------------------------------------------------------
+
+// Only in a sweep that began at rest: a tare that was just set stays as given for a round at least, and
+// of a touch nothing is followed.
+static bool tracks(const bt_tare *tare)
+{
+    return tare->state == BT_TARE_STATE_REST && tare->hits == 0 && !tare->partial;
+}
+
+static void serve_electrode(bt_tare *tare, unsigned i)
+{
+    uint16_t mean_q3 = bt_sweep_close(&tare->sweep, i, SPAN_Q3);
+    uint32_t *base_q16 = &tare->base.electrode_q16[i];
+    if (mean_q3 == 0) {
+        return; // never read
     }
-    if (pdc_known(tare)) {
-        uint32_t pdc_q16 = (uint32_t)bt_history_pdc_median(&tare->history) << 16;
-        tare->base.pdc_q16 = follow(tare->base.pdc_q16, pdc_q16, PDC_SLEW_Q16);
-    }
-    if (--tare->snapshot_countdown == 0) {
-        tare->snapshot_countdown = SNAPSHOT_FRAMES;
-        tare->snapshot_head = (uint8_t)((tare->snapshot_head + 1) % BT_TARE_SNAPSHOTS);
-        tare->snapshot[tare->snapshot_head] = tare->base;
-        if (tare->snapshots < BT_TARE_SNAPSHOTS) {
-            tare->snapshots++;
+    if (tare->state == BT_TARE_STATE_CONTACT) {
+        tare->energy_count2 += square(mean_q3 - (int32_t)((*base_q16 + (1 << 12)) >> 13));
+        if (tare->thermal.step_q16 != 0) {
+            warm_electrode(tare, i);
         }
+        return;
+    }
+    tare->deviation_count2 += square(8 * tare->gate.smooth.lane[i] - mean_q3);
+    if (tracks(tare)) {
+        *base_q16 = bt_baseline_follow(*base_q16, (uint32_t)mean_q3 << 13, SLEW_Q16);
+        use_electrode(tare, i);
     }
 }
 
-_Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX <= INT32_MAX >> 8, "the noise in q8 must fit 31 bits");
-
-// The sample is capped at the setting: a vibration that grows slowly must not raise the threshold
-// ahead of itself for ever. The threshold so never exceeds four times the setting.
-static void measure_noise(bt_tare *tare, uint32_t setting_count2)
+static void serve_pressure(bt_tare *tare)
 {
-    uint32_t sample = bt_history_noise(&tare->history);
-    sample = sample < setting_count2 ? sample : setting_count2;
-    if (tare->noise_frames < 1 << NOISE_SHIFT) { // plain mean first, so that it starts unbiased
-        tare->noise_frames++;
+    uint16_t mean_q3 = bt_sweep_close(&tare->sweep, BT_LANE_PDC, SPAN_Q3);
+    if (tracks(tare) && pdc_known(tare)) {
+        tare->base.pdc_q16 = bt_baseline_follow(tare->base.pdc_q16, (uint32_t)mean_q3 << 13, PDC_SLEW_Q16);
+        use_pressure(tare);
     }
-    int32_t change_q8 = (int32_t)((sample << 8) - tare->noise_q8);
-    uint32_t step_q8 = bt_div_round_u32(bt_abs32(change_q8), tare->noise_frames);
-    tare->noise_q8 += (uint32_t)bt_with_sign(step_q8, change_q8);
-    if (tare->noise_frames == 1 << NOISE_SHIFT) {
-        tare->noise_count2 = tare->noise_q8 >> 8;
+}
+
+static void serve(bt_tare *tare)
+{
+    unsigned end = bt_sweep_end(&tare->sweep);
+    for (unsigned lane = bt_sweep_first(&tare->sweep); lane < end; lane++) {
+        if (lane < BT_ELECTRODES) {
+            serve_electrode(tare, lane);
+        } else {
+            serve_pressure(tare);
+        }
     }
 }
 
 // ---- states ---------------------------------------------------------------------------------
 
-static void update_init(bt_tare *tare)
+static BT_NOINLINE void count_hit(bt_tare *tare)
 {
-    if (bt_history_still(&tare->history, STILL_SPAN)) {
-        adopt_present(tare, BT_TARE_REASON_START);
-    }
-}
-
-static void update_rest(bt_tare *tare, uint32_t setting_count2)
-{
-    uint32_t mean_q16[BT_ELECTRODES];
-    bool hit = energy_of_medians(tare) > bt_tare_threshold_count2(tare, setting_count2)
-               || (pdc_known(tare) && pdc_above_rest_q16(tare) > PDC_HIT_Q16);
-    if (!hit) {
-        tare->hits = 0;
-        bt_history_means_q16(&tare->history, mean_q16);
-        track_drift(tare, mean_q16);
-        measure_noise(tare, setting_count2);
-        return;
-    }
+    tare->partial = true;
     if (++tare->hits < HITS) {
         return;
     }
-    int back = tare->snapshots > ROLL_BACK ? ROLL_BACK : tare->snapshots - 1;
-    int at = (tare->snapshot_head + BT_TARE_SNAPSHOTS - back) % BT_TARE_SNAPSHOTS;
-    bt_baseline before = tare->snapshot[at];
+    bt_baseline before = *bt_rollback_before(&tare->rollback);
     adopt(tare, &before, BT_TARE_STATE_CONTACT, BT_TARE_REASON_ROLL_BACK);
 }
 
-// How long the signals have rested where they are. Means of eight keep noise out.
-static uint8_t settled_for(bt_tare *tare, const uint32_t mean_q16[BT_ELECTRODES])
+static void follow_contact(bt_tare *tare)
 {
-    uint16_t pdc = bt_history_pdc_median(&tare->history);
-    int pdc_change = pdc - tare->settle_pdc;
-    bool moved = pdc_change > SETTLE_PDC_SPAN || pdc_change < -SETTLE_PDC_SPAN;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        moved = moved || bt_abs32((int32_t)(mean_q16[i] - tare->settle_q16[i])) > SETTLE_SPAN_Q16;
+    tare->contact_frames++;
+    if (pdc_known(tare) && pdc_above_rest(tare) > tare->pdc_peak) {
+        tare->pdc_peak = pdc_above_rest(tare);
     }
-    if (!moved) {
-        return tare->settle_frames < UINT8_MAX ? ++tare->settle_frames : UINT8_MAX;
-    }
-    memcpy(tare->settle_q16, mean_q16, sizeof tare->settle_q16);
-    tare->settle_pdc = pdc;
-    tare->settle_frames = 0;
-    return 0;
 }
-
-// On real fingers the skin's hysteresis leaves thousands of count^2 and some pressure after a press,
-// so that neither energy nor pressure come back to the tare. What tells a release then is that the
-// pressure has fallen far below the press's own peak and nothing moves any more. A load that only
-// grows is at its peak all the time and never passes.
-static bool released_by_pressure(bt_tare *tare, const uint32_t mean_q16[BT_ELECTRODES])
-{
-    int64_t pdc_q16 = pdc_above_rest_q16(tare);
-    if (pdc_q16 > tare->pdc_peak_q16) {
-        tare->pdc_peak_q16 = (int32_t)pdc_q16;
-    }
-    // Without a press there is no release: a light touch while the pressure undershoots has no peak.
-    bool pressed = tare->pdc_peak_q16 >= RELEASE_FALL * PDC_HIT_Q16;
-    bool fallen = pdc_q16 < SETTLE_PDC_Q16 && pdc_q16 * RELEASE_FALL < tare->pdc_peak_q16;
-    return settled_for(tare, mean_q16) >= SETTLE_FRAMES && pressed && fallen;
-}
-
-_Static_assert((uint64_t)DRIFT_LIMIT *DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
 
 static uint32_t residue_limit(const bt_tare *tare)
 {
+    _Static_assert((uint64_t)DRIFT_LIMIT * DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
     uint32_t limit = pdc_known(tare) ? DRIFT_LIMIT : DRIFT_LIMIT_BLIND;
     uint32_t frames = tare->contact_frames < limit ? tare->contact_frames : limit;
     uint32_t drift_count2 = BT_DIVIDE_U32(frames * frames, DRIFT_FRAMES_PER_COUNT * DRIFT_FRAMES_PER_COUNT);
     return RESIDUE_ENERGY + BT_ELECTRODES * drift_count2;
 }
 
-static void update_contact(bt_tare *tare)
+// On real fingers the skin's hysteresis leaves thousands of count^2 and some pressure after a press,
+// so that neither energy nor pressure come back to the tare. What tells a release then is that the
+// pressure has fallen far below the press's own peak and nothing moves any more. A load that only
+// grows is at its peak all the time and never passes; without a press there is no release: a light
+// touch while the pressure undershoots has no peak.
+static bool released_by_pressure(const bt_tare *tare)
 {
-    tare->contact_frames++;
-    uint32_t mean_q16[BT_ELECTRODES];
-    bt_history_means_q16(&tare->history, mean_q16);
-    uint32_t energy = energy_of_means(tare, mean_q16);
-    tare->energy_peak = energy > tare->energy_peak ? energy : tare->energy_peak;
+    int32_t above = pdc_above_rest(tare);
+    bool pressed = tare->pdc_peak >= RELEASE_FALL * PDC_HIT;
+    bool fallen = above < SETTLE_PDC && above * RELEASE_FALL < tare->pdc_peak;
+    return tare->sweep.still_sweeps >= SETTLE_SWEEPS && pressed && fallen;
+}
+
+// After a sweep in contact: has it ended?
+static void judge_release(bt_tare *tare)
+{
     bool pressure = pdc_known(tare);
+    tare->energy_peak = tare->energy_count2 > tare->energy_peak ? tare->energy_count2 : tare->energy_peak;
     // Without pressure the energy itself must have fallen, or the first second of a slow load would
     // pass for a residue.
     bool quiet =
-        pressure ? pdc_above_rest_q16(tare) < PDC_QUIET_Q16 : energy < tare->energy_peak / RELEASE_FALL;
-    bool calm = energy < CALM_ENERGY && (quiet || !pressure);
-    bool still = quiet && energy < residue_limit(tare) && bt_history_motion(&tare->history) < RESIDUE_MOTION;
-    tare->calm_frames = calm ? (uint8_t)(tare->calm_frames + 1) : 0;
-    tare->still_frames = still ? (uint8_t)(tare->still_frames + 1) : 0;
-    bool settled = pressure && released_by_pressure(tare, mean_q16);
-    if (tare->calm_frames >= CALM_FRAMES) {
+        pressure ? pdc_above_rest(tare) < PDC_QUIET : tare->energy_count2 < tare->energy_peak / RELEASE_FALL;
+    uint8_t still = tare->sweep.still_sweeps;
+    tare->quiet_sweeps = quiet ? (uint8_t)(tare->quiet_sweeps + (tare->quiet_sweeps < UINT8_MAX)) : 0;
+    bool residue = tare->quiet_sweeps >= RESIDUE_SWEEPS && still >= RESIDUE_SWEEPS
+                   && tare->energy_count2 < residue_limit(tare);
+    if (tare->energy_count2 < CALM_ENERGY && (quiet || !pressure)) {
         adopt_present(tare, BT_TARE_REASON_RELEASE);
-    } else if (tare->still_frames >= RESIDUE_FRAMES || settled) {
+    } else if (residue || (pressure && released_by_pressure(tare))) {
         adopt_present(tare, BT_TARE_REASON_RESIDUE);
     }
 }
 
+static BT_NOINLINE void end_sweep(bt_tare *tare, const bt_tare_settings *settings)
+{
+    // Sums over electrodes that were not all served in one state say nothing.
+    bool whole = !tare->partial;
+    if (tare->state == BT_TARE_STATE_INIT) {
+        if (tare->sweep.still_sweeps >= STILL_SWEEPS) {
+            // Measured before there is a threshold: a worn sensor's noise must not look like a touch.
+            bt_noise_add(&tare->noise, tare->deviation_count2, settings->contact_energy_count2);
+            adopt_present(tare, BT_TARE_REASON_START);
+        }
+    } else if (tare->state == BT_TARE_STATE_REST && whole) {
+        bt_rollback_keep(&tare->rollback, &tare->base);
+        bt_noise_add(&tare->noise, tare->deviation_count2, settings->contact_energy_count2);
+    } else if (tare->state == BT_TARE_STATE_CONTACT) {
+        bt_thermal_follow(&tare->thermal, settings->thermal_gain_q16);
+        if (whole) {
+            judge_release(tare);
+        }
+    }
+    tare->energy_count2 = 0;
+    tare->deviation_count2 = 0;
+    tare->partial = false;
+}
+
+// ---- a round --------------------------------------------------------------------------------
+
 void bt_tare_reset(bt_tare *tare)
 {
     memset(tare, 0, sizeof *tare);
-    bt_history_reset(&tare->history);
-    for (int i = 0; i < BT_ELECTRODES; i++) {
+    bt_gate_reset(&tare->gate);
+    bt_sweep_restart(&tare->sweep);
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         tare->base.electrode_q16[i] = BT_TARE_UNKNOWN;
+        tare->electrode_q4[i] = BT_INVALID_COUNT;
     }
     tare->base.pdc_q16 = BT_TARE_UNKNOWN;
 }
 
-void bt_tare_update(bt_tare *tare, const bt_frame *frame, uint32_t threshold_count2)
+void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings)
+{
+    tare->threshold_count2 = bt_noise_threshold(&tare->noise, settings->contact_energy_count2);
+    bool resting = tare->state == BT_TARE_STATE_REST;
+    bt_gate_begin(&tare->gate, resting ? (int32_t)tare->threshold_count2 : BT_GATE_NEVER);
+    tare->touched = tare->hits > 0; // what has begun is not seen to begin again
+}
+
+bool bt_tare_touch(bt_tare *tare)
+{
+    bool first = !tare->touched;
+    tare->touched = true;
+    return first;
+}
+
+bool bt_tare_pressure(bt_tare *tare, uint16_t count)
+{
+    return bt_gate_pressure(&tare->gate, count, PDC_HIT) < 0 && bt_tare_touch(tare);
+}
+
+void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings)
 {
     tare->changed = false;
     tare->age_frames++;
-    if (bt_frame_unusable(frame) > BT_USABLE_WITHOUT) {
-        // Nothing of a faulty frame may reach a tare: the history starts over when it clears.
+    if (bt_tare_faulty(tare)) {
+        // Nothing of a faulty round may reach a tare: the sweep starts over when it clears.
         tare->state = BT_TARE_STATE_FAULT;
-        bt_history_restart(&tare->history);
+        tare->hits = 0;
+        tare->partial = true;
+        bt_sweep_restart(&tare->sweep);
         return;
     }
-    bt_history_add(&tare->history, frame);
+    if (tare->gate.met != 0) {
+        meet(tare);
+    }
     if (tare->state == BT_TARE_STATE_FAULT) {
         // A tare from before the fault still holds, but what touched meanwhile is unknown:
         // CONTACT freezes it until the release rules have seen quiet signals.
         tare->state = tare->reason == BT_TARE_REASON_NONE ? BT_TARE_STATE_INIT : BT_TARE_STATE_CONTACT;
-        tare->calm_frames = 0;
-        tare->still_frames = 0;
-        tare->settle_frames = 0;
+        tare->quiet_sweeps = 0;
+    } else if (tare->state == BT_TARE_STATE_REST) {
+        if (tare->gate.room < 0) {
+            count_hit(tare);
+        } else {
+            tare->hits = 0;
+        }
     }
-    if (tare->state == BT_TARE_STATE_INIT) {
-        update_init(tare);
-        return;
+    if (tare->state == BT_TARE_STATE_CONTACT) {
+        follow_contact(tare);
     }
-    meet_new_channels(tare);
-    if (tare->state == BT_TARE_STATE_REST) {
-        update_rest(tare, threshold_count2);
-    } else {
-        update_contact(tare);
+    bt_sweep_add(&tare->sweep, &tare->gate.smooth);
+    serve(tare);
+    if (bt_sweep_next(&tare->sweep)) {
+        end_sweep(tare, settings);
     }
+}
+
+// ---- host commands --------------------------------------------------------------------------
+
+// Means are up to two sweeps old: what the signals do now must agree with them.
+static bool present_is_still(const bt_tare *tare)
+{
+    bool still = tare->sweep.still_sweeps >= STILL_SWEEPS;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        int change_q3 = 8 * tare->gate.smooth.lane[i] - tare->sweep.mean_q3.lane[i];
+        still = still && change_q3 <= NOW_SPAN_Q3 && change_q3 >= -NOW_SPAN_Q3;
+    }
+    return still;
 }
 
 uint8_t bt_tare_now(bt_tare *tare)
@@ -332,7 +385,7 @@ uint8_t bt_tare_now(bt_tare *tare)
     if (tare->state == BT_TARE_STATE_FAULT) {
         return BT_ERROR_RAILED;
     }
-    if (!bt_history_still(&tare->history, STILL_SPAN)) {
+    if (!present_is_still(tare)) {
         return BT_ERROR_NOT_STILL;
     }
     adopt_present(tare, BT_TARE_REASON_HOST_NOW);

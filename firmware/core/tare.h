@@ -5,67 +5,85 @@
 // at a bounded rate while nothing touches, freezes on contact, takes the tare back to before the
 // contact began, and re-tares after release once the signals are quiet (protocol/SPEC.md, Tare).
 //
-// Units: counts; baselines in 1/65536 count (q16); energies in count^2; time in frames of 10 ms.
-// One call per frame. Baselines round half away from zero when published in 1/16 count.
+// Units: counts; baselines in 1/65536 count (q16); energies in count^2; time in rounds of 10 ms and
+// sweeps of eight rounds. Baselines round half away from zero when published in 1/16 count.
 #ifndef BIOTAC_TARE_H
 #define BIOTAC_TARE_H
 
-#include "history.h"
+#include "baseline.h"
+#include "gate.h"
+#include "noise.h"
+#include "settings.h"
+#include "sweep.h"
+#include "thermal.h"
 
-#define BT_TARE_SNAPSHOTS 8
-#define BT_TARE_UNKNOWN   0xFFFFFFFFu // of a channel that was never read
+// What the machine needs of the settings.
+typedef struct {
+    uint32_t contact_energy_count2;
+    int32_t thermal_gain_q16; // counts that a resting electrode gains per count of TDC
+} bt_tare_settings;
+
+bt_tare_settings bt_tare_settings_from(const bt_settings *settings);
 
 typedef struct {
-    uint32_t electrode_q16[BT_ELECTRODES];
-    uint32_t pdc_q16;
-} bt_baseline;
-
-typedef struct {
+    bt_gate gate;
+    bt_sweep sweep;
     uint8_t state;  // enum bt_tare_state
     uint8_t reason; // enum bt_tare_reason of the last change
-    bool changed;   // the last update changed the tare by more than drift tracking
+    bool changed;   // the last round changed the tare by more than drift tracking
     bt_baseline base;
-    uint32_t noise_count2;   // at rest, summed over electrodes; 0 until measured
-    uint32_t age_frames;     // since the last change
-    uint32_t contact_frames; // since the contact was seen
-    bt_history history;
+    uint16_t electrode_q4[BT_ELECTRODES]; // base as it is subtracted; BT_INVALID_COUNT when unknown
+    uint32_t threshold_count2;            // energy above which a round counts as touched
+    uint32_t age_frames;                  // since the last change
+    uint32_t contact_frames;              // since the contact was seen
 
-    bt_baseline snapshot[BT_TARE_SNAPSHOTS]; // one per 250 ms at rest
-    uint8_t snapshot_head;
-    uint8_t snapshots;
-    uint8_t snapshot_countdown;
+    bt_rollback rollback;
+    bt_noise noise;
+    bt_thermal thermal;
 
-    uint8_t hits;         // consecutive frames over the contact threshold
-    uint8_t calm_frames;  // consecutive frames near the tare
-    uint8_t still_frames; // consecutive frames that do not move
-    uint8_t noise_frames; // rest frames in the noise estimate, up to its length
-    uint32_t noise_q8;
+    uint8_t hits;              // consecutive rounds in which the gate opened
+    uint8_t quiet_sweeps;      // consecutive sweeps with the pressure (without one: the energy) back
+    bool touched;              // in this round the gate opened, or before it and it is open still
+    bool partial;              // this sweep did not serve all electrodes in one state
+    uint32_t deviation_count2; // of this sweep: filtered counts from their means
+    uint32_t energy_count2;    // of this sweep: means from the tare
 
-    // Of the present contact: its strongest moment, and since when the signals rest where they are.
+    // Of the present contact: its strongest moment.
     uint32_t energy_peak;
-    int32_t pdc_peak_q16;
-    uint32_t settle_q16[BT_ELECTRODES];
-    uint16_t settle_pdc;
-    uint8_t settle_frames;
+    int32_t pdc_peak;
+
 } bt_tare;
 
 void bt_tare_reset(bt_tare *tare);
 
-// Take in one frame. threshold_count2 is the contact_energy setting.
-void bt_tare_update(bt_tare *tare, const bt_frame *frame, uint32_t threshold_count2);
+// A round: begin, then each electrode's and the pressure's word as it comes, then end.
+// Every channel is given once in a round, BT_INVALID_COUNT where no good word came.
+// A word's function returns true in the slot in which a resting finger is first touched.
+void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings);
+bool bt_tare_touch(bt_tare *tare);
+#ifndef BT_CDEF
+static inline bool bt_tare_electrode(bt_tare *tare, unsigned electrode, uint16_t count)
+{
+    if (tare->state != BT_TARE_STATE_REST) {
+        bt_gate_follow(&tare->gate, electrode, count);
+        return false;
+    }
+    return bt_gate_electrode(&tare->gate, electrode, count) < 0 && bt_tare_touch(tare);
+}
+#endif
+bool bt_tare_pressure(bt_tare *tare, uint16_t count);
+void bt_tare_temperature(bt_tare *tare, uint16_t tdc);
+void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings);
 
-// Host commands; enum bt_error. NOW needs ten frames that hold still; both are refused in FAULT.
+// Host commands; enum bt_error. NOW needs two sweeps that hold still; both are refused in FAULT.
 uint8_t bt_tare_now(bt_tare *tare);
 uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base);
 
-// Energy above which a frame counts as touched: the setting, or four times the noise if larger.
-uint32_t bt_tare_threshold_count2(const bt_tare *tare, uint32_t setting_count2);
-
-// A baseline as it is subtracted and published: 1/16 count; BT_INVALID_COUNT when unknown.
+// More electrodes of this round were missing or railed than results can do without.
 #ifndef BT_CDEF
-static inline uint16_t bt_tare_q4(uint32_t base_q16)
+static inline bool bt_tare_faulty(const bt_tare *tare)
 {
-    return base_q16 == BT_TARE_UNKNOWN ? BT_INVALID_COUNT : (uint16_t)((base_q16 + (1 << 11)) >> 12);
+    return tare->gate.missing + tare->gate.railed > BT_USABLE_WITHOUT;
 }
 #endif
 

@@ -194,6 +194,10 @@ void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
         at = put(at, (uint32_t)msg->tare_q4[k], 2);
     }
     at = put(at, (uint32_t)msg->pdc_tare_q4, 2);
+    at = put(at, (uint32_t)msg->poc_sigma_um, 2);
+    for (int k = 0; k < 3; k++) {
+        at = put(at, (uint32_t)msg->force_sigma_100un[k], 2);
+    }
     (void)at;
 }
 
@@ -239,6 +243,12 @@ void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
     }
     at = get(at, &value, 2);
     msg->pdc_tare_q4 = (uint16_t)value;
+    at = get(at, &value, 2);
+    msg->poc_sigma_um = (uint16_t)value;
+    for (int k = 0; k < 3; k++) {
+        at = get(at, &value, 2);
+        msg->force_sigma_100un[k] = (uint16_t)value;
+    }
     (void)at;
 }
 
@@ -326,6 +336,11 @@ void bt_msg_status_pack(const bt_msg_status *msg, uint8_t out[BT_STATUS_BYTES])
     at = put(at, (uint32_t)msg->slots_late, 4);
     at = put(at, (uint32_t)msg->rx_frames, 4);
     at = put(at, (uint32_t)msg->rx_errors, 4);
+    at = put(at, (uint32_t)msg->frames_idle, 4);
+    at = put(at, (uint32_t)msg->poc_skipped, 4);
+    at = put(at, (uint32_t)msg->force_skipped, 4);
+    at = put(at, (uint32_t)msg->torque_skipped, 4);
+    at = put(at, (uint32_t)msg->sigma_skipped, 4);
     (void)at;
 }
 
@@ -355,6 +370,16 @@ void bt_msg_status_unpack(bt_msg_status *msg, const uint8_t in[BT_STATUS_BYTES])
     msg->rx_frames = (uint32_t)value;
     at = get(at, &value, 4);
     msg->rx_errors = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->frames_idle = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->poc_skipped = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->force_skipped = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->torque_skipped = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->sigma_skipped = (uint32_t)value;
     (void)at;
 }
 
@@ -410,6 +435,74 @@ void bt_msg_sensor_status_unpack(bt_msg_sensor_status *msg, const uint8_t in[BT_
     msg->words_parity = (uint32_t)value;
     at = get(at, &value, 2);
     msg->last_error_word = (uint16_t)value;
+    (void)at;
+}
+
+void bt_msg_idle_pack(const bt_msg_idle *msg, uint8_t out[BT_IDLE_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->seq, 2);
+    at = put(at, (uint32_t)msg->t_us, 4);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->tare_state, 1);
+    at = put(at, (uint32_t)msg->flags, 4);
+    at = put(at, (uint32_t)msg->frames, 2);
+    at = put(at, (uint32_t)msg->energy_count2, 4);
+    at = put(at, (uint32_t)msg->pdc, 2);
+    at = put(at, (uint32_t)msg->tdc, 2);
+    (void)at;
+}
+
+void bt_msg_idle_unpack(bt_msg_idle *msg, const uint8_t in[BT_IDLE_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 2);
+    msg->seq = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->t_us = (uint32_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->tare_state = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->flags = (uint32_t)value;
+    at = get(at, &value, 2);
+    msg->frames = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->energy_count2 = (uint32_t)value;
+    at = get(at, &value, 2);
+    msg->pdc = (uint16_t)value;
+    at = get(at, &value, 2);
+    msg->tdc = (uint16_t)value;
+    (void)at;
+}
+
+void bt_msg_touch_pack(const bt_msg_touch *msg, uint8_t out[BT_TOUCH_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->seq, 2);
+    at = put(at, (uint32_t)msg->t_us, 4);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->slot, 1);
+    at = put(at, (uint32_t)msg->energy_count2, 4);
+    (void)at;
+}
+
+void bt_msg_touch_unpack(bt_msg_touch *msg, const uint8_t in[BT_TOUCH_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 2);
+    msg->seq = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->t_us = (uint32_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->slot = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->energy_count2 = (uint32_t)value;
     (void)at;
 }
 
@@ -486,6 +579,28 @@ void bt_msg_ping_unpack(bt_msg_ping *msg, const uint8_t in[BT_PING_BYTES])
     uint32_t value;
     at = get(at, &value, 1);
     msg->req_id = (uint8_t)value;
+    (void)at;
+}
+
+void bt_msg_subscribe_pack(const bt_msg_subscribe *msg, uint8_t out[BT_SUBSCRIBE_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->fingers, 1);
+    at = put(at, (uint32_t)msg->quantities, 1);
+    (void)at;
+}
+
+void bt_msg_subscribe_unpack(bt_msg_subscribe *msg, const uint8_t in[BT_SUBSCRIBE_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->fingers = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->quantities = (uint8_t)value;
     (void)at;
 }
 
@@ -653,6 +768,10 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_STATUS_BYTES;
     case BT_SENSOR_STATUS_ID:
         return BT_SENSOR_STATUS_BYTES;
+    case BT_IDLE_ID:
+        return BT_IDLE_BYTES;
+    case BT_TOUCH_ID:
+        return BT_TOUCH_BYTES;
     case BT_HELLO_REQUEST_ID:
         return BT_HELLO_REQUEST_BYTES;
     case BT_START_ID:
@@ -661,6 +780,8 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_STOP_BYTES;
     case BT_PING_ID:
         return BT_PING_BYTES;
+    case BT_SUBSCRIBE_ID:
+        return BT_SUBSCRIBE_BYTES;
     case BT_TARE_NOW_ID:
         return BT_TARE_NOW_BYTES;
     case BT_TARE_SET_ID:
@@ -689,4 +810,6 @@ const bt_setting_spec bt_setting_specs[BT_SETTINGS] = {
     {BT_SETTING_TORQUE_GAIN_Z_NN, -100000000, 100000000, 252325},
     {BT_SETTING_CONTACT_ENERGY_COUNT2, 50, 1000000, 1000},
     {BT_SETTING_STATUS_PERIOD_MS, 100, 60000, 1000},
+    {BT_SETTING_IDLE_PERIOD_MS, 20, 60000, 100},
+    {BT_SETTING_THERMAL_GAIN_MILLI, -5000, 5000, 500},
 };

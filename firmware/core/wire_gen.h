@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 #define BT_WIRE_MAJOR 1
-#define BT_WIRE_MINOR 0
-#define BT_SCHEMA_HASH 0x744EB2CFu
+#define BT_WIRE_MINOR 1
+#define BT_SCHEMA_HASH 0xD414ED88u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -76,11 +76,21 @@ enum bt_board {
 #define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s: drift has gone untracked
 #define BT_FRAME_FLAG_TARE_CHANGED (1u << 14) // this frame is the first with a new tare (see the TARE message)
 #define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes railed or missing: do not trust the results
+#define BT_FRAME_FLAG_TEMP (1u << 16) // since the contact began the temperature has moved by over a degree: the tare is doubtful
+#define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to and marked invalid (SUBSCRIBE)
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME messages
 #define BT_STREAM_FLAG_PAC (1u << 1) // PAC messages
 #define BT_STREAM_FLAG_STATUS (1u << 2) // STATUS and SENSOR_STATUS once per status_period_ms
+
+// What SUBSCRIBE asks for. What is not asked for is not computed.
+#define BT_QUANTITY_FLAG_POC (1u << 0) // point of contact; without it TORSION_OK is never set
+#define BT_QUANTITY_FLAG_FORCE (1u << 1) // force
+#define BT_QUANTITY_FLAG_TORQUE (1u << 2) // torque
+#define BT_QUANTITY_FLAG_SIGMA (1u << 3) // one-sigma of point of contact and force
+#define BT_QUANTITY_FLAG_REST_FRAMES (1u << 4) // a FRAME in every round; without it an untouched finger sends IDLE heartbeats
+#define BT_QUANTITY_FLAG_TOUCH (1u << 5) // TOUCH messages
 
 enum bt_setting {
     BT_SETTING_POC_WEIGHTS = 1, // [enum poc_weights]
@@ -91,8 +101,10 @@ enum bt_setting {
     BT_SETTING_TORQUE_GAIN_Z_NN = 6, // [nN/count]
     BT_SETTING_CONTACT_ENERGY_COUNT2 = 7, // [count^2]
     BT_SETTING_STATUS_PERIOD_MS = 8, // [ms]
+    BT_SETTING_IDLE_PERIOD_MS = 9, // [ms]
+    BT_SETTING_THERMAL_GAIN_MILLI = 10, // [count/1000 per TDC count]
 };
-#define BT_SETTINGS 8
+#define BT_SETTINGS 10
 
 // Ranges, for the bounds that the core asserts.
 #define BT_SETTING_POC_WEIGHTS_MIN (0)
@@ -111,6 +123,10 @@ enum bt_setting {
 #define BT_SETTING_CONTACT_ENERGY_COUNT2_MAX 1000000
 #define BT_SETTING_STATUS_PERIOD_MS_MIN (100)
 #define BT_SETTING_STATUS_PERIOD_MS_MAX 60000
+#define BT_SETTING_IDLE_PERIOD_MS_MIN (20)
+#define BT_SETTING_IDLE_PERIOD_MS_MAX 60000
+#define BT_SETTING_THERMAL_GAIN_MILLI_MIN (-5000)
+#define BT_SETTING_THERMAL_GAIN_MILLI_MAX 5000
 
 typedef struct {
     uint8_t id;
@@ -181,7 +197,7 @@ void bt_msg_sensor_info_unpack(bt_msg_sensor_info *msg, const uint8_t in[BT_SENS
 
 // One finger, one round of slots: counts, the tare that was subtracted, and the results.
 #define BT_FRAME_ID 0x10
-#define BT_FRAME_BYTES 126
+#define BT_FRAME_BYTES 134
 typedef struct {
     uint16_t seq; // [1] counts this finger's frames, sent or not
     uint32_t t_us; // [us] device time at which slot 0 was sampled; slot k is k/4400 s later
@@ -197,6 +213,8 @@ typedef struct {
     int32_t torque_mnmm[3]; // [mN*mm] torque on the finger about the origin; x is derived
     uint16_t tare_q4[19]; // [count q4] tare subtracted from counts for these results; 0xFFFF for an electrode never read
     uint16_t pdc_tare_q4; // [count q4] pressure at rest; 0xFFFF when never read
+    uint16_t poc_sigma_um; // [um] one standard deviation of the PoC from the measured noise, saturating; 0xFFFF when not computed or not measured yet
+    uint16_t force_sigma_100un[3]; // [100 uN] one standard deviation of the force, likewise
 } bt_msg_frame;
 void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES]);
 void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES]);
@@ -231,7 +249,7 @@ void bt_msg_tare_unpack(bt_msg_tare *msg, const uint8_t in[BT_TARE_BYTES]);
 
 // Health of the board and the link. Periodic, and reply to GET_STATUS.
 #define BT_STATUS_ID 0x13
-#define BT_STATUS_BYTES 33
+#define BT_STATUS_BYTES 53
 typedef struct {
     uint16_t seq; // [1] counts STATUS messages
     uint32_t t_us; // [us] device time of packing
@@ -244,6 +262,11 @@ typedef struct {
     uint32_t slots_late; // [1] slots lost because the main loop fell behind
     uint32_t rx_frames; // [1] good frames from the host
     uint32_t rx_errors; // [1] bad CRC, bad COBS, too long
+    uint32_t frames_idle; // [1] rounds of streamed fingers for which an IDLE spoke instead of a FRAME
+    uint32_t poc_skipped; // [1] rounds of streamed fingers in which no PoC was computed
+    uint32_t force_skipped; // [1] the same of force
+    uint32_t torque_skipped; // [1] the same of torque
+    uint32_t sigma_skipped; // [1] the same of the standard deviations
 } bt_msg_status;
 void bt_msg_status_pack(const bt_msg_status *msg, uint8_t out[BT_STATUS_BYTES]);
 void bt_msg_status_unpack(bt_msg_status *msg, const uint8_t in[BT_STATUS_BYTES]);
@@ -269,6 +292,36 @@ typedef struct {
 } bt_msg_sensor_status;
 void bt_msg_sensor_status_pack(const bt_msg_sensor_status *msg, uint8_t out[BT_SENSOR_STATUS_BYTES]);
 void bt_msg_sensor_status_unpack(bt_msg_sensor_status *msg, const uint8_t in[BT_SENSOR_STATUS_BYTES]);
+
+// Heartbeat of an untouched finger: it stands for the FRAMEs that were not sent.
+#define BT_IDLE_ID 0x15
+#define BT_IDLE_BYTES 22
+typedef struct {
+    uint16_t seq; // [1] of the latest round it stands for
+    uint32_t t_us; // [us] of the round that this and the next fields are of: that of seq, or the one after it when a FRAME follows at once
+    uint8_t finger; // [1] chip select index
+    uint8_t tare_state; // [enum tare_state] after that round
+    uint32_t flags; // [flags frame] of that round; results were not computed
+    uint16_t frames; // [1] rounds it stands for: since the last FRAME or IDLE of this finger
+    uint32_t energy_count2; // [count^2] sum of squares of the filtered signals
+    uint16_t pdc; // [count] static pressure; 0xFFFF where no good word came
+    uint16_t tdc; // [count] temperature; 0xFFFF where no good word came
+} bt_msg_idle;
+void bt_msg_idle_pack(const bt_msg_idle *msg, uint8_t out[BT_IDLE_BYTES]);
+void bt_msg_idle_unpack(bt_msg_idle *msg, const uint8_t in[BT_IDLE_BYTES]);
+
+// A resting finger's gate opened in this slot. A hint, sent at once; CONTACT follows if it stays open for three rounds.
+#define BT_TOUCH_ID 0x16
+#define BT_TOUCH_BYTES 12
+typedef struct {
+    uint16_t seq; // [1] of the round that is under way
+    uint32_t t_us; // [us] device time at which the slot was sampled
+    uint8_t finger; // [1] chip select index
+    uint8_t slot; // [1] which slot of the round
+    uint32_t energy_count2; // [count^2] sum of squares of the filtered signals of the round so far
+} bt_msg_touch;
+void bt_msg_touch_pack(const bt_msg_touch *msg, uint8_t out[BT_TOUCH_BYTES]);
+void bt_msg_touch_unpack(bt_msg_touch *msg, const uint8_t in[BT_TOUCH_BYTES]);
 
 // First message of a host. Allowed at any time.
 #define BT_HELLO_REQUEST_ID 0x80
@@ -310,7 +363,18 @@ typedef struct {
 void bt_msg_ping_pack(const bt_msg_ping *msg, uint8_t out[BT_PING_BYTES]);
 void bt_msg_ping_unpack(bt_msg_ping *msg, const uint8_t in[BT_PING_BYTES]);
 
-// Take the mean of the last eight frames as the new tare; refused while the signals move.
+// What FRAMEs hold from the next round on; until then POC, FORCE, TORQUE and REST_FRAMES. Kept until the next reboot.
+#define BT_SUBSCRIBE_ID 0x8B
+#define BT_SUBSCRIBE_BYTES 3
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t fingers; // [bit mask] for which fingers; others keep theirs
+    uint8_t quantities; // [flags quantity] what to compute and send
+} bt_msg_subscribe;
+void bt_msg_subscribe_pack(const bt_msg_subscribe *msg, uint8_t out[BT_SUBSCRIBE_BYTES]);
+void bt_msg_subscribe_unpack(bt_msg_subscribe *msg, const uint8_t in[BT_SUBSCRIBE_BYTES]);
+
+// Take the latest means of eight rounds as the new tare; refused while the signals move.
 #define BT_TARE_NOW_ID 0x84
 #define BT_TARE_NOW_BYTES 2
 typedef struct {
@@ -391,15 +455,18 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_REPLY_FIELDS(X) X(req_id, u8, 1) X(command, u8, 1) X(error, u8, 1)
 #define BT_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
 #define BT_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(flex_version, u8, 2) X(software_version, u8, 4) X(serial, u8, 16) X(cpu_khz, u16, 1) X(sampling_hz, u16, 1)
-#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1)
+#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
 #define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
-#define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1)
+#define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1)
 #define BT_SENSOR_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(tare_state, u8, 1) X(tare_reason, u8, 1) X(tare_age_ms, u32, 1) X(noise_count2, u32, 1) X(words_good, u32, 1) X(words_stuck, u32, 1) X(words_error, u32, 1) X(words_parity, u32, 1) X(last_error_word, u16, 1)
+#define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1)
+#define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
 #define BT_HELLO_REQUEST_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1)
 #define BT_START_FIELDS(X) X(req_id, u8, 1) X(streams, u8, 1) X(fingers, u8, 1) X(keepalive_ms, u16, 1)
 #define BT_STOP_FIELDS(X) X(req_id, u8, 1)
 #define BT_PING_FIELDS(X) X(req_id, u8, 1)
+#define BT_SUBSCRIBE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(quantities, u8, 1)
 #define BT_TARE_NOW_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_TARE_SET_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1)
 #define BT_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
@@ -407,7 +474,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_GET_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_GET_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1)
 #define BT_SET_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting)
 #endif
 
 #endif

@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from ._wire import FrameFlags, PocWeights, Setting, TareReason, TareState
+from ._wire import FrameFlags, PocWeights, QuantityFlags, Setting, TareReason, TareState
 from .batch import RESULT_DTYPE, compute
 from .errors import (
     BiotacError,
@@ -22,7 +22,7 @@ from .errors import (
     ScenarioError,
     WireVersionError,
 )
-from .frames import FRAME_DTYPE, PAC_DTYPE, Frame
+from .frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
 from .hand import Hand, LinkStats
 from .opening import open
 from .recording import Recorder, Recording, load
@@ -30,6 +30,7 @@ from .version import __version__
 
 __all__ = [
     "FRAME_DTYPE",
+    "IDLE_DTYPE",
     "PAC_DTYPE",
     "RESULT_DTYPE",
     "BiotacError",
@@ -43,6 +44,7 @@ __all__ = [
     "NotAGatewayError",
     "PocWeights",
     "PortError",
+    "QuantityFlags",
     "Recorder",
     "Recording",
     "RecordingError",

@@ -14,8 +14,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 WIRE_MAJOR = 1
-WIRE_MINOR = 0
-SCHEMA_HASH = 0x744EB2CF
+WIRE_MINOR = 1
+SCHEMA_HASH = 0xD414ED88
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 INVALID_I16 = -(2**15)
@@ -91,6 +91,8 @@ class FrameFlags(IntFlag):
     BASE_OLD = 1 << 13  # in contact for over 60 s: drift has gone untracked
     TARE_CHANGED = 1 << 14  # this frame is the first with a new tare (see the TARE message)
     FAULT = 1 << 15  # more than two electrodes railed or missing: do not trust the results
+    TEMP = 1 << 16  # since the contact began the temperature has moved by over a degree: the tare is doubtful
+    NOT_ASKED = 1 << 17  # some quantity is not subscribed to and marked invalid (SUBSCRIBE)
 
 
 class StreamFlags(IntFlag):
@@ -99,6 +101,17 @@ class StreamFlags(IntFlag):
     FRAMES = 1 << 0  # FRAME messages
     PAC = 1 << 1  # PAC messages
     STATUS = 1 << 2  # STATUS and SENSOR_STATUS once per status_period_ms
+
+
+class QuantityFlags(IntFlag):
+    """What SUBSCRIBE asks for. What is not asked for is not computed."""
+
+    POC = 1 << 0  # point of contact; without it TORSION_OK is never set
+    FORCE = 1 << 1  # force
+    TORQUE = 1 << 2  # torque
+    SIGMA = 1 << 3  # one-sigma of point of contact and force
+    REST_FRAMES = 1 << 4  # a FRAME in every round; without it an untouched finger sends IDLE heartbeats
+    TOUCH = 1 << 5  # TOUCH messages
 
 
 ERROR_DOC: dict[int, str] = {
@@ -125,6 +138,8 @@ class Setting(IntEnum):
     TORQUE_GAIN_Z_NN = 6
     CONTACT_ENERGY_COUNT2 = 7
     STATUS_PERIOD_MS = 8
+    IDLE_PERIOD_MS = 9
+    THERMAL_GAIN_MILLI = 10
 
 
 class SettingSpec(NamedTuple):
@@ -169,6 +184,14 @@ SETTINGS: dict[Setting, SettingSpec] = {
     Setting.STATUS_PERIOD_MS: SettingSpec(
         "ms", 100, 60000, 1000,
         "between two periodic STATUS rounds",
+    ),
+    Setting.IDLE_PERIOD_MS: SettingSpec(
+        "ms", 20, 60000, 100,
+        "between two IDLE heartbeats of an untouched finger",
+    ),
+    Setting.THERMAL_GAIN_MILLI: SettingSpec(
+        "count/1000 per TDC count", -5000, 5000, 500,
+        "how much a resting electrode gains per count of temperature: the tare follows it in contact; 700 to 970 seen on real fingers, where TDC alone does not tell all",
     ),
 }
 
@@ -356,12 +379,14 @@ class Frame:
     torque_mnmm: tuple[int, ...]
     tare_q4: tuple[int, ...]
     pdc_tare_q4: int
+    poc_sigma_um: int
+    force_sigma_100un: tuple[int, ...]
 
     ID: ClassVar[int] = 0x10
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HH")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3H")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 126 bytes."""
+        """Payload without id and CRC, 134 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -377,6 +402,8 @@ class Frame:
             *self.torque_mnmm,
             *self.tare_q4,
             self.pdc_tare_q4,
+            self.poc_sigma_um,
+            *self.force_sigma_100un,
         )
 
     @classmethod
@@ -398,6 +425,8 @@ class Frame:
             v[33 : 36],
             v[36 : 55],
             v[55],
+            v[56],
+            v[57 : 60],
         )
 
 
@@ -494,12 +523,17 @@ class Status:
     slots_late: int
     rx_frames: int
     rx_errors: int
+    frames_idle: int
+    poc_skipped: int
+    force_skipped: int
+    torque_skipped: int
+    sigma_skipped: int
 
     ID: ClassVar[int] = 0x13
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIII")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIIIIIIII")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 33 bytes."""
+        """Payload without id and CRC, 53 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -512,6 +546,11 @@ class Status:
             self.slots_late,
             self.rx_frames,
             self.rx_errors,
+            self.frames_idle,
+            self.poc_skipped,
+            self.force_skipped,
+            self.torque_skipped,
+            self.sigma_skipped,
         )
 
     @classmethod
@@ -530,6 +569,11 @@ class Status:
             v[8],
             v[9],
             v[10],
+            v[11],
+            v[12],
+            v[13],
+            v[14],
+            v[15],
         )
 
 
@@ -593,6 +637,90 @@ class SensorStatus:
             v[11],
             v[12],
             v[13],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Idle:
+    """Heartbeat of an untouched finger: it stands for the FRAMEs that were not sent."""
+
+    seq: int
+    t_us: int
+    finger: int
+    tare_state: int
+    flags: int
+    frames: int
+    energy_count2: int
+    pdc: int
+    tdc: int
+
+    ID: ClassVar[int] = 0x15
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBIHIHH")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 22 bytes."""
+        return self.STRUCT.pack(
+            self.seq,
+            self.t_us,
+            self.finger,
+            self.tare_state,
+            self.flags,
+            self.frames,
+            self.energy_count2,
+            self.pdc,
+            self.tdc,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Idle:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4],
+            v[5],
+            v[6],
+            v[7],
+            v[8],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """A resting finger's gate opened in this slot. A hint, sent at once; CONTACT follows if it stays open for three rounds."""
+
+    seq: int
+    t_us: int
+    finger: int
+    slot: int
+    energy_count2: int
+
+    ID: ClassVar[int] = 0x16
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 12 bytes."""
+        return self.STRUCT.pack(
+            self.seq,
+            self.t_us,
+            self.finger,
+            self.slot,
+            self.energy_count2,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Touch:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4],
         )
 
 
@@ -705,8 +833,38 @@ class Ping:
 
 
 @dataclass(frozen=True, slots=True)
+class Subscribe:
+    """What FRAMEs hold from the next round on; until then POC, FORCE, TORQUE and REST_FRAMES. Kept until the next reboot."""
+
+    req_id: int
+    fingers: int
+    quantities: int
+
+    ID: ClassVar[int] = 0x8B
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBB")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 3 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.fingers,
+            self.quantities,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Subscribe:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class TareNow:
-    """Take the mean of the last eight frames as the new tare; refused while the signals move."""
+    """Take the latest means of eight rounds as the new tare; refused while the signals move."""
 
     req_id: int
     finger: int
@@ -899,7 +1057,7 @@ class SetSetting:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Frame | Pac | Tare | Status | SensorStatus | HelloRequest | Start | Stop | Ping | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting
+Message = Hello | Reply | SettingValue | SensorInfo | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -911,10 +1069,13 @@ MESSAGES: dict[int, type[Any]] = {
     Tare.ID: Tare,
     Status.ID: Status,
     SensorStatus.ID: SensorStatus,
+    Idle.ID: Idle,
+    Touch.ID: Touch,
     HelloRequest.ID: HelloRequest,
     Start.ID: Start,
     Stop.ID: Stop,
     Ping.ID: Ping,
+    Subscribe.ID: Subscribe,
     TareNow.ID: TareNow,
     TareSet.ID: TareSet,
     GetStatus.ID: GetStatus,
@@ -985,6 +1146,8 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("torque_mnmm", "<i4", (3,)),
             ("tare_q4", "<u2", (19,)),
             ("pdc_tare_q4", "<u2"),
+            ("poc_sigma_um", "<u2"),
+            ("force_sigma_100un", "<u2", (3,)),
         ]
     ),
     Pac.ID: np.dtype(
@@ -1020,6 +1183,11 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("slots_late", "<u4"),
             ("rx_frames", "<u4"),
             ("rx_errors", "<u4"),
+            ("frames_idle", "<u4"),
+            ("poc_skipped", "<u4"),
+            ("force_skipped", "<u4"),
+            ("torque_skipped", "<u4"),
+            ("sigma_skipped", "<u4"),
         ]
     ),
     SensorStatus.ID: np.dtype(
@@ -1038,6 +1206,28 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("words_error", "<u4"),
             ("words_parity", "<u4"),
             ("last_error_word", "<u2"),
+        ]
+    ),
+    Idle.ID: np.dtype(
+        [
+            ("seq", "<u2"),
+            ("t_us", "<u4"),
+            ("finger", "u1"),
+            ("tare_state", "u1"),
+            ("flags", "<u4"),
+            ("frames", "<u2"),
+            ("energy_count2", "<u4"),
+            ("pdc", "<u2"),
+            ("tdc", "<u2"),
+        ]
+    ),
+    Touch.ID: np.dtype(
+        [
+            ("seq", "<u2"),
+            ("t_us", "<u4"),
+            ("finger", "u1"),
+            ("slot", "u1"),
+            ("energy_count2", "<u4"),
         ]
     ),
     HelloRequest.ID: np.dtype(
@@ -1062,6 +1252,13 @@ DTYPES: dict[int, np.dtype[Any]] = {
     Ping.ID: np.dtype(
         [
             ("req_id", "u1"),
+        ]
+    ),
+    Subscribe.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("fingers", "u1"),
+            ("quantities", "u1"),
         ]
     ),
     TareNow.ID: np.dtype(

@@ -77,6 +77,12 @@ class CrossCheck:
         truth = reference_q4(messages["counts"], messages["tare_q4"], settings)
         for values in (truth.poc_mm, truth.force_n, truth.torque_nmm):
             values[untared] = np.nan  # without a tare there is nothing to be right about
+        for values, sent in (
+            (truth.poc_mm, messages["poc_um"]),
+            (truth.force_n, messages["force_100un"]),
+            (truth.torque_nmm, messages["torque_mnmm"]),
+        ):
+            values[not_asked(messages, sent)] = np.nan
         torque_bound = torque_bound_nmm(messages, truth, settings)
         self.torque_nmm_bound = max(self.torque_nmm_bound, float(torque_bound[~untared].max(initial=0.0)))
 
@@ -98,7 +104,8 @@ class CrossCheck:
         """POC_INVALID must stand exactly where the PoC is marked invalid."""
         flagged = (messages["flags"] & wire.FrameFlags.POC_INVALID) != 0
         marked = (messages["poc_um"] == wire.INVALID_I16).any(axis=1)
-        for k in np.flatnonzero(flagged != marked):
+        skipped = not_asked(messages, messages["poc_um"])
+        for k in np.flatnonzero((flagged != marked) & ~skipped):
             self._find(messages, int(k), "the POC_INVALID flag contradicts the PoC")
 
     def _find(self, messages: StructArray, k: int, what: str) -> None:
@@ -128,6 +135,12 @@ class CrossCheck:
             place = f" {'xyz'[axis]}" if error.shape[1] == 3 else ""
             off = f"off by {error[k, axis]:.4g} {unit}, bound {limits[axis]:.4g} {unit}"
             self._find(messages, int(k), f"{name}{place} {off}")
+
+
+def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:
+    """Frames (n,) whose result ``sent`` (n, 3) nobody subscribed to: it is marked invalid altogether."""
+    asked_for_all = (messages["flags"] & wire.FrameFlags.NOT_ASKED) == 0
+    return np.asarray(~asked_for_all & np.isnan(to_units(sent, 1)).all(axis=1))
 
 
 def worst(error: NDArray[np.float64]) -> float:

@@ -20,7 +20,8 @@ MNMM_PER_NMM = 1_000
 #: One row per finger and round of slots. ``counts``, ``pdc``, ``tac`` and ``tdc`` are raw counts
 #: 0..4095, 0xFFFF where no good word came. ``poc_mm``, ``force_n`` and ``torque_nmm`` are NaN where
 #: invalid; ``flags`` (FrameFlags) says why. ``t_us`` is device time, unwrapped from the first value seen
-#: (a board that was up for over 71.6 minutes by then began earlier).
+#: (a board that was up for over 71.6 minutes by then began earlier). ``poc_sigma_mm`` and
+#: ``force_sigma_n`` are one standard deviation, from the noise measured at rest; NaN unless subscribed to.
 FRAME_DTYPE = np.dtype(
     [
         ("finger", "u1"),
@@ -33,12 +34,29 @@ FRAME_DTYPE = np.dtype(
         ("poc_mm", "<f8", (3,)),
         ("force_n", "<f8", (3,)),
         ("torque_nmm", "<f8", (3,)),
+        ("poc_sigma_mm", "<f8"),
+        ("force_sigma_n", "<f8", (3,)),
         ("flags", "<u4"),
     ]
 )
 
 #: Twenty-two dynamic pressure samples, 1/2200 s apart from ``t_us`` on; 0xFFFF where missing.
 PAC_DTYPE = np.dtype([("finger", "u1"), ("seq", "<u4"), ("t_us", "<i8"), ("pac", "<u2", (22,))])
+
+#: Heartbeats of untouched fingers (Hand.subscribe): a row stands for ``frames`` rounds of which no FRAME
+#: was sent; ``seq`` is the last of them. ``energy_count2`` is the sum of squared signals.
+IDLE_DTYPE = np.dtype(
+    [
+        ("finger", "u1"),
+        ("seq", "<u4"),
+        ("t_us", "<i8"),
+        ("frames", "<u2"),
+        ("energy_count2", "<u4"),
+        ("pdc", "<u2"),
+        ("tdc", "<u2"),
+        ("flags", "<u4"),
+    ]
+)
 
 StructArray = NDArray[np.void]
 
@@ -82,8 +100,8 @@ class Frame:
 
 
 def to_units(raw: NDArray[Any], per_unit: int) -> NDArray[np.float64]:
-    """Divide integers by ``per_unit``; the type's minimum, which means invalid, becomes NaN."""
-    invalid = INVALID_I16 if raw.dtype.itemsize == 2 else INVALID_I32
+    """Divide integers by ``per_unit``; invalid (the type's minimum, or 0xFFFF unsigned) becomes NaN."""
+    invalid = {"u2": INVALID_COUNT, "i2": INVALID_I16, "i4": INVALID_I32}[raw.dtype.str[1:]]
     out = raw / float(per_unit)
     out[raw == invalid] = np.nan
     return np.asarray(out, dtype=np.float64)
@@ -99,6 +117,8 @@ def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any
     out["poc_mm"] = to_units(messages["poc_um"], UM_PER_MM)
     out["force_n"] = to_units(messages["force_100un"], FORCE_LSB_PER_N)
     out["torque_nmm"] = to_units(messages["torque_mnmm"], MNMM_PER_NMM)
+    out["poc_sigma_mm"] = to_units(messages["poc_sigma_um"], UM_PER_MM)
+    out["force_sigma_n"] = to_units(messages["force_sigma_100un"], FORCE_LSB_PER_N)
     return out
 
 

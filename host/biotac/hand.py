@@ -173,6 +173,16 @@ class Hand:
         self._streaming = True
         self.link.release()
 
+    def subscribe(self, quantities: wire.QuantityFlags, *, fingers: int = ALL_FINGERS) -> None:
+        """Choose what the board computes and sends of ``fingers`` (a bit mask) in its frames.
+
+        What is left out is not computed; it arrives as NaN, under the flag NOT_ASKED. Without REST_FRAMES
+        an untouched finger sends heartbeats (``Batch.idle``) in place of frames, without loss of a touch:
+        a frame comes as soon as the signals move. At first it is POC | FORCE | TORQUE | REST_FRAMES; the
+        choice lasts until the board restarts.
+        """
+        self._command(wire.Subscribe(self._next_req_id(), fingers, int(quantities)))
+
     def stop(self) -> None:
         """Stop streaming. Frames already on their way are still delivered."""
         self._command(wire.Stop(self._next_req_id()))
@@ -283,9 +293,10 @@ class Hand:
                 first_status_us = status.t_us if first_status_us is None else first_status_us
                 if end_us is None and (status.t_us - first_status_us) % 2**32 > (seconds + SILENCE_S) * 1e6:
                     return join(taken)  # the board is there, its sensors are not
-            if end_us is None and len(batch.frames):
-                end_us = int(batch.frames["t_us"][0]) + round(seconds * 1e6)
-            if end_us is None or not len(batch.frames) or batch.frames["t_us"].max() < end_us:
+            first_us, last_us = batch.first_t_us(), batch.last_t_us()
+            if end_us is None and first_us is not None:
+                end_us = first_us + round(seconds * 1e6)
+            if end_us is None or last_us is None or last_us < end_us:
                 taken.append(batch)
                 continue
             now, later = split(batch, end_us)
@@ -345,7 +356,7 @@ class Hand:
         batch = self._decoder.feed(chunk)
         self._frames += len(batch.frames)
         self._replies.extend(batch.messages)
-        if len(batch.frames) or len(batch.pac) or batch.messages:
+        if len(batch.frames) or len(batch.pac) or len(batch.idle) or batch.messages:
             self._batches.append(batch)
         return True
 

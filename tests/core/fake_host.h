@@ -108,11 +108,13 @@ static inline uint8_t host_error(bt_session *session, uint8_t id, const void *pa
 // One round in which the fingers of mask answer with count on every channel.
 static inline void host_round(bt_session *session, uint8_t mask, uint16_t count)
 {
+    uint16_t counts[BT_MAX_FINGERS];
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_finger_begin(&session->finger[f], 0);
-        for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
-            bt_frame_put(&session->finger[f].frame, slot, mask >> f & 1 ? count : BT_INVALID_COUNT);
-        }
+        counts[f] = mask >> f & 1 ? count : BT_INVALID_COUNT;
+    }
+    bt_session_begin(session, 0);
+    for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
+        bt_session_slot(session, slot, counts, 0);
     }
     bt_session_round(session);
 }

@@ -5,6 +5,7 @@
 
 static bt_finger finger;
 static bt_kernel_settings settings;
+static bt_tare_settings tare_settings;
 static bt_msg_frame frame;
 static bt_msg_pac pac;
 static bt_msg_tare tare;
@@ -17,6 +18,7 @@ static int new_finger(void **state)
     bt_settings all;
     bt_settings_reset(&all);
     settings = bt_kernel_settings_from(&all);
+    tare_settings = bt_tare_settings_from(&all);
     bt_finger_reset(&finger, 3);
     now_us = 1000;
     return 0;
@@ -28,17 +30,31 @@ static uint16_t slot_count(int slot)
     return (uint16_t)(2000 + 10 * slot);
 }
 
+// What the session does at the end of a round, with everything subscribed to.
+static bool finish(void)
+{
+    if (!bt_finger_end(&finger, &tare_settings)) {
+        tare_changed = false;
+        return false;
+    }
+    tare_changed = finger.tare_unsent;
+    bt_finger_tare(&finger, &tare);
+    bt_finger_frame(&finger, &settings, &frame);
+    bt_finger_pac(&finger, &pac);
+    return true;
+}
+
 // One round; missing is a bit mask of slots without a good word. Returns what finish says.
 static bool round_without(uint64_t missing)
 {
-    bt_finger_begin(&finger, now_us);
+    bt_finger_begin(&finger, now_us, &tare_settings);
     now_us += 10000;
     for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
-        bt_frame_put(&finger.frame, slot, missing >> slot & 1 ? BT_INVALID_COUNT : slot_count(slot));
+        (void)bt_finger_put(&finger, slot, missing >> slot & 1 ? BT_INVALID_COUNT : slot_count(slot));
     }
     memset(&frame, 0xA5, sizeof frame);
     memset(&pac, 0xA5, sizeof pac);
-    return bt_finger_finish(&finger, &settings, &frame, &pac, &tare, &tare_changed);
+    return finish();
 }
 
 static void rounds(int n)
@@ -103,9 +119,9 @@ static void slots_that_never_came_are_missing_too(void **state)
 {
     (void)state;
     rounds(1);
-    bt_finger_begin(&finger, now_us);
-    bt_frame_put(&finger.frame, 43, 5); // the main loop was late for all others
-    assert_true(bt_finger_finish(&finger, &settings, &frame, &pac, &tare, &tare_changed));
+    bt_finger_begin(&finger, now_us, &tare_settings);
+    (void)bt_finger_put(&finger, 43, 5); // the main loop was late for all others
+    assert_true(finish());
     for (int i = 0; i < BT_ELECTRODES; i++) {
         assert_int_equal(frame.counts[i], BT_INVALID_COUNT);
     }
@@ -219,11 +235,11 @@ static void a_railed_electrode_is_flagged_and_three_are_a_fault(void **state)
     (void)state;
     rounds(20);
     for (int railed = 0; railed <= 4; railed++) {
-        bt_finger_begin(&finger, now_us);
+        bt_finger_begin(&finger, now_us, &tare_settings);
         for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
-            bt_frame_put(&finger.frame, slot, slot < 2 * railed && slot % 2 == 0 ? 4095 : slot_count(slot));
+            (void)bt_finger_put(&finger, slot, slot < 2 * railed && slot % 2 == 0 ? 4095 : slot_count(slot));
         }
-        assert_true(bt_finger_finish(&finger, &settings, &frame, &pac, &tare, &tare_changed));
+        assert_true(finish());
         assert_int_equal((frame.flags & BT_FRAME_FLAG_RAIL) != 0, railed > 0);
         assert_int_equal((frame.flags & BT_FRAME_FLAG_FAULT) != 0, railed > 2);
         assert_int_equal(frame.tare_state == BT_TARE_STATE_FAULT, railed > 2);
@@ -236,14 +252,14 @@ static void a_held_press_is_flagged_by_its_shape_and_age(void **state)
     (void)state;
     rounds(200);
     for (int k = 0; k < 6200; k++) {
-        bt_finger_begin(&finger, now_us);
+        bt_finger_begin(&finger, now_us, &tare_settings);
         now_us += 10000;
         for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
             bool pad = slot == 32 || slot == 2 || slot == 22 || slot == 34; // E17, E2, E12, E18
             int drop = pad ? 200 : slot == 38 ? -100 : 0;
-            bt_frame_put(&finger.frame, slot, (uint16_t)(slot_count(slot) - drop));
+            (void)bt_finger_put(&finger, slot, (uint16_t)(slot_count(slot) - drop));
         }
-        assert_true(bt_finger_finish(&finger, &settings, &frame, &pac, &tare, &tare_changed));
+        assert_true(finish());
         bool touched = frame.tare_state == BT_TARE_STATE_CONTACT;
         assert_int_equal((frame.flags & BT_FRAME_FLAG_CONTACT) != 0, touched);
         assert_true(touched || k < 5);

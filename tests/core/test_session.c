@@ -75,6 +75,7 @@ static void every_command_gets_exactly_one_reply_with_its_req_id(void **state)
         {BT_GET_SENSOR_INFO_ID, BT_SENSOR_INFO_ID, 0, 19},
         {BT_GET_SETTING_ID, BT_SETTING_ID, 0, 20},
         {BT_SET_SETTING_ID, BT_SETTING_ID, 0, 21},
+        {BT_SUBSCRIBE_ID, BT_REPLY_ID, 0, 22},
     };
     for (int id = 0x80; id < 0x100; id++) { // the table holds every command there is
         int listed = 0;
@@ -158,7 +159,7 @@ static void a_new_setting_is_what_the_kernels_use(void **state)
     assert_int_equal(set_error(BT_SETTING_POC_WEIGHTS, BT_POC_WEIGHTS_ABS_N2), BT_ERROR_OK);
     assert_int_equal(session.kernel.poc_weights, BT_POC_WEIGHTS_ABS_N2);
     assert_int_equal(set_error(BT_SETTING_CONTACT_ENERGY_COUNT2, 500), BT_ERROR_OK);
-    assert_int_equal(session.kernel.contact_energy_count2, 500);
+    assert_int_equal(session.tare.contact_energy_count2, 500);
 }
 
 static void settings_are_refused_while_streaming(void **state)

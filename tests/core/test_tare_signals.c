@@ -122,7 +122,7 @@ static void rest_for_ten_minutes(emulated_finger *finger, const char *what)
         worst = error > worst ? error : worst;
     }
     print_message("%s: no false contact, tare off by at most %.2f counts, noise %u count^2\n", what, worst,
-                  finger->tare.noise_count2);
+                  finger->tare.noise.count2);
     // A mean of eight frames is followed at half a count a second at most.
     assert_true(worst < 3 * finger->sigma);
     assert_int_equal(finger->tare.reason, BT_TARE_REASON_START);
@@ -161,25 +161,29 @@ static void the_threshold_rises_with_measured_noise_and_only_with_it(void **stat
     finger_init(&finger);
     finger.sigma = 1.5;
     run_seconds(&finger, 5);
-    assert_int_equal(bt_tare_threshold_count2(&finger.tare, SETTING_COUNT2), SETTING_COUNT2);
-    // Sigma 7: the median of three has 0.449 of its variance, over 19 electrodes 418 count^2.
+    assert_int_equal(finger.tare.threshold_count2, SETTING_COUNT2);
+    // Sigma 7: over 19 electrodes 931 count^2.
     finger_init(&finger);
     finger.sigma = 7;
     run_seconds(&finger, 20);
-    assert_in_range(finger.tare.noise_count2, 300, 560);
-    assert_int_equal(bt_tare_threshold_count2(&finger.tare, SETTING_COUNT2), 4 * finger.tare.noise_count2);
-    assert_int_equal(bt_tare_threshold_count2(&finger.tare, 100000), 100000);
+    assert_in_range(finger.tare.noise.count2, 800, 1000);
+    uint32_t noise_count2 = finger.tare.noise.count2;
+    step(&finger);
+    assert_int_equal(finger.tare.threshold_count2, 3 * noise_count2);
+    finger.settings.contact_energy_count2 = 100000;
+    step(&finger);
+    assert_int_equal(finger.tare.threshold_count2, 100000);
     // A load that creeps up below the threshold is no noise.
     finger_init(&finger);
     finger.has_pdc = false;
     run_seconds(&finger, 5);
-    uint32_t before = finger.tare.noise_count2;
+    uint32_t before = finger.tare.noise.count2;
     for (int k = 0; k < 100; k++) {
         finger.load += 0.25;
         step(&finger);
     }
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
-    assert_true(finger.tare.noise_count2 <= before + 25);
+    assert_true(finger.tare.noise.count2 <= before + 25);
 }
 
 static void a_growing_vibration_does_not_raise_the_threshold_out_of_reach(void **state)
@@ -196,7 +200,7 @@ static void a_growing_vibration_does_not_raise_the_threshold_out_of_reach(void *
         while (finger.tare.state == BT_TARE_STATE_REST) {
             if (++k == 3000) {
                 fail_msg("a swing of +-300 counts (90,000 count^2) is not seen; the threshold is %u",
-                         bt_tare_threshold_count2(&finger.tare, SETTING_COUNT2));
+                         finger.tare.threshold_count2);
             }
             finger.load = 0.1 * k * (k / half % 2 ? 1 : -1);
             step(&finger);
@@ -212,7 +216,7 @@ static void a_press_after_hours_of_drift_is_seen_whole(void **state)
     finger.drift_per_s = -0.1; // 720 counts in two hours
     run_seconds(&finger, 2 * 3600);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
-    assert_int_equal(finger.tare.age_frames, 2 * 3600 * FRAMES_PER_S - 10);
+    assert_int_equal(finger.tare.age_frames, 2 * 3600 * FRAMES_PER_S - 2 * BT_SWEEP_ROUNDS);
     assert_true(tare_error(&finger) < 1);
     finger.load = 400;
     (void)run_until(&finger, BT_TARE_STATE_CONTACT, 10);

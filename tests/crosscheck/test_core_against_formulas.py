@@ -130,7 +130,7 @@ def test_bad_arrays_are_refused_at_the_door(counts, tare) -> None:
 def test_the_eight_real_vectors(shared_data, weights, key) -> None:
     for vector in json.loads((shared_data / "test_vectors.json").read_text()):
         tare = np.array(vector["tare_q4"]) / 16
-        unit = settings_with(weights) | {s: 10**8 for s in Setting if "GAIN" in s.name}  # 0.1 N/count
+        unit = settings_with(weights) | {s: 10**8 for s in Setting if s.name.endswith("_NN")}  # 0.1 N/count
         exact = reference(vector["raw"], tare, unit)
         assert np.abs(exact.poc_mm[0] - vector[key]).max() <= 1e-9
         assert np.abs(exact.force_n[0] - 0.1 * np.array(vector["fsum"])).max() <= 1e-9

@@ -26,8 +26,15 @@ def frame(finger: int, seq: int, t_us: int, **changes: object) -> bytes:
         "torque_mnmm": (1000, 2000, -3000),
         "tare_q4": (1600,) * 19,
         "pdc_tare_q4": 2400 * 16,
+        "poc_sigma_um": wire.INVALID_COUNT,
+        "force_sigma_100un": (20, 30, 40),
     }
     return encode(wire.Frame.ID, wire.Frame(**(facts | changes)).pack())  # type: ignore[arg-type]
+
+
+def idle(finger: int, seq: int, t_us: int, frames: int) -> bytes:
+    message = wire.Idle(seq % 2**16, t_us % 2**32, finger, 1, 0, frames, 17, 2400, 1000)
+    return encode(wire.Idle.ID, message.pack())
 
 
 def test_integers_become_mm_n_and_nmm() -> None:
@@ -47,6 +54,39 @@ def test_an_invalid_result_is_nan_and_never_zero() -> None:
     assert np.isnan(row["torque_nmm"][0])
     assert row["torque_nmm"][1:].tolist() == [0.0, 0.005]
     assert not np.isnan(row["force_n"]).any()
+    assert np.isnan(row["poc_sigma_mm"])
+    assert row["force_sigma_n"].tolist() == [0.002, 0.003, 0.004]
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_heartbeats_account_for_the_rounds_without_a_frame(together: bool) -> None:
+    sent = [
+        frame(0, 65530, 0),
+        idle(0, 65540, 100_000, 10),  # 65531..65540, across the wrap
+        idle(0, 65545, 150_000, 5),
+        frame(0, 65546, 160_000),
+        frame(0, 65547, 170_000),
+    ]
+    decoder = StreamDecoder()
+    batches = [decoder.feed(b"".join(sent))] if together else [decoder.feed(s) for s in sent]
+    assert (decoder.lost, decoder.disordered) == (0, 0)
+    heartbeats = np.concatenate([b.idle for b in batches])
+    assert heartbeats["seq"].tolist() == [65540, 65545]
+    assert heartbeats["t_us"].tolist() == [100_000, 150_000]
+    assert heartbeats["frames"].tolist() == [10, 5]
+    assert heartbeats["energy_count2"].tolist() == [17, 17]
+    assert batches[-1].last_t_us() == 170_000
+
+
+@pytest.mark.parametrize("missing", [0, 1, 2, 3])
+def test_a_lost_heartbeat_or_frame_among_heartbeats_is_a_loss(missing: int) -> None:
+    sent = [(frame(1, 9, 0), 0), (idle(1, 19, 0, 10), 10), (idle(1, 24, 0, 5), 5), (frame(1, 25, 0), 1)]
+    sent.append((frame(1, 26, 0), 1))
+    decoder = StreamDecoder()
+    for k, (message, _) in enumerate(sent):
+        if k != missing:
+            decoder.feed(message)
+    assert decoder.lost == sent[missing][1]
 
 
 def test_sequence_and_time_are_unwrapped_for_each_finger() -> None:

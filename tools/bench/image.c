@@ -2,6 +2,8 @@
 // The runner (count.mjs) watches for the address of bench_mark and reads the name, or at the end of a
 // run the value, that it is given.
 #include "bits.h"
+#include "finger.h"
+#include "framing.h"
 #include "gold.h"
 #include "lin2013.h"
 #include "poc.h"
@@ -81,49 +83,90 @@ static void soft_double(void)
     sink = (int32_t)result.torque_nmm[0];
 }
 
-static bt_tare resting, touched;
-static bt_frame rest_frame, press_frame;
+static bt_finger resting, touched;
+static uint16_t rest_count[BT_SLOTS], press_count[BT_SLOTS];
 static bt_msg_frame message;
+static bt_tare_settings tare_settings;
 
-static void rest_round(void)
+static void slots(bt_finger *finger, const uint16_t count[BT_SLOTS])
 {
-    bt_tare_update(&resting, &rest_frame, settings.contact_energy_count2);
-    bt_results(&rest_frame, &resting, &settings, &message);
+    bt_finger_begin(finger, 0, &tare_settings);
+    for (uint8_t s = 0; s < BT_SLOTS; s++) {
+        sink = bt_finger_put(finger, s, count[s]);
+    }
 }
-
-static void contact_round(void)
+static void front(bt_finger *finger, const uint16_t count[BT_SLOTS])
 {
-    bt_tare_update(&touched, &press_frame, settings.contact_energy_count2);
-    bt_results(&press_frame, &touched, &settings, &message);
+    bt_tare_begin(&finger->tare, &tare_settings);
+    bool touch = false;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        touch |= bt_tare_electrode(&finger->tare, i, count[2 * i]);
+    }
+    sink = touch;
+    sink = bt_tare_pressure(&finger->tare, count[38]);
+    bt_tare_end(&finger->tare, &tare_settings);
 }
-
+static void gate(void)
+{
+    sink = bt_gate_electrode(&resting.tare.gate, 3, 2921);
+}
 static void rest_tare(void)
 {
-    bt_tare_update(&resting, &rest_frame, settings.contact_energy_count2);
+    front(&resting, rest_count);
 }
-
 static void contact_tare(void)
 {
-    bt_tare_update(&touched, &press_frame, settings.contact_energy_count2);
+    front(&touched, press_count);
+}
+static void rest_slots(void)
+{
+    slots(&resting, rest_count);
+}
+static void end_rest(void)
+{
+    sink = bt_finger_end(&resting, &tare_settings);
+}
+static void results_contact(void)
+{
+    bt_results(&touched.frame, &touched.tare, &settings, 7, &message);
+}
+static void contact_round(void)
+{
+    contact_tare();
+    results_contact();
+}
+static void rest_round(void)
+{
+    rest_tare();
+    sink = bt_finger_idle(&resting);
+}
+static uint8_t payload[BT_FRAME_BYTES], enc[BT_ENCODED_MAX_BYTES];
+static void send_contact(void)
+{
+    bt_finger_frame(&touched, &settings, &message);
+    bt_msg_frame_pack(&message, payload);
+    sink = (int)bt_frame_encode(BT_FRAME_ID, payload, sizeof payload, enc);
 }
 
 // Two fingers in the middle of their lives: one untouched, one pressed half a second ago.
 static void live(void)
 {
-    settings.contact_energy_count2 = 1000;
-    bt_tare_reset(&resting);
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        rest_frame.electrode[i] = (uint16_t)(2900 + 7 * i);
-        press_frame.electrode[i] = (uint16_t)(rest_frame.electrode[i] - 20 * (i % 13) - 40);
+    bt_settings all;
+    bt_settings_reset(&all);
+    tare_settings = bt_tare_settings_from(&all);
+    bt_finger_reset(&resting, 0);
+    for (int s = 0; s < BT_SLOTS; s++) {
+        rest_count[s] = (uint16_t)(2900 + 7 * s);
+        press_count[s] = (uint16_t)(rest_count[s] - (s < 38 ? 20 * (s % 13) + 40 : -100));
     }
-    rest_frame.pdc = 2400;
-    press_frame.pdc = 2500;
     for (int k = 0; k < 400; k++) {
-        rest_tare();
+        slots(&resting, rest_count);
+        sink = bt_finger_end(&resting, &tare_settings);
     }
     touched = resting;
     for (int k = 0; k < 50; k++) {
-        contact_tare();
+        slots(&touched, press_count);
+        sink = bt_finger_end(&touched, &tare_settings);
     }
 }
 
@@ -151,6 +194,11 @@ int main(void)
         {"shipped: torque", shipped_torque},
         {"gold int64", gold},
         {"double", soft_double},
+        {"gate", gate},
+        {"tare: rest slots", rest_slots},
+        {"tare: rest end", end_rest},
+        {"tare: results", results_contact},
+        {"tare: send", send_contact},
         {"tare at rest", rest_tare},
         {"tare in contact", contact_tare},
         {"whole frame at rest", rest_round},

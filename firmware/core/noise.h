@@ -1,0 +1,22 @@
+// The noise of a resting finger, and the threshold that keeps it from looking like a touch.
+//
+// Units: count^2, summed over 19 electrodes (q8 inside); white noise of sigma counts is 19 sigma^2.
+#ifndef BIOTAC_NOISE_H
+#define BIOTAC_NOISE_H
+
+#include <stdint.h>
+
+typedef struct {
+    uint32_t count2; // 0 until measured
+    uint32_t mean_q8;
+    uint8_t sweeps; // in the mean, up to its length
+} bt_noise;
+
+// A sweep at rest: the sum of squared distances of each electrode's count from the mean of the eight
+// it belongs to. A slow load hardly shows in it.
+void bt_noise_add(bt_noise *noise, uint32_t deviation_count2, uint32_t setting_count2);
+
+// Energy above which a round counts as touched: the setting, or three times the noise if larger.
+uint32_t bt_noise_threshold(const bt_noise *noise, uint32_t setting_count2);
+
+#endif

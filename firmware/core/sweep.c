@@ -1,0 +1,71 @@
+#include "sweep.h"
+
+#include "fix.h"
+
+#include <string.h>
+
+_Static_assert(BT_SWEEP_ROUNDS *BT_FULL_SCALE_COUNT <= UINT16_MAX,
+               "a sum must fit its half of a pair, or it would carry into its neighbour");
+_Static_assert((BT_SWEEP_ROUNDS - 1) * BT_SWEEP_LANES >= BT_LANES,
+               "the last round of a sweep serves no lane: it has the verdicts to reach");
+
+void bt_sweep_restart(bt_sweep *sweep)
+{
+    memset(sweep, 0, sizeof *sweep);
+}
+
+void bt_sweep_meet(bt_sweep *sweep, unsigned lane, uint16_t smooth)
+{
+    // The rounds since the lane's last turn, as if the word had been there all along. Its turn comes in
+    // round lane / BT_SWEEP_LANES, which adds the word once more.
+    unsigned turn = lane / BT_SWEEP_LANES;
+    unsigned left = (turn + BT_SWEEP_ROUNDS - sweep->round) % BT_SWEEP_ROUNDS;
+    sweep->sum.lane[lane] = (uint16_t)((BT_SWEEP_ROUNDS - 1 - left) * smooth);
+    sweep->mean_q3.lane[lane] = (uint16_t)(BT_SWEEP_ROUNDS * smooth);
+    sweep->settled_q3.lane[lane] = sweep->mean_q3.lane[lane];
+}
+
+static BT_NOINLINE void begin(bt_sweep *sweep, const bt_lanes *smooth)
+{
+    sweep->begun = true;
+    for (unsigned i = 0; i < BT_LANES; i++) {
+        bt_sweep_meet(sweep, i, smooth->lane[i]);
+    }
+}
+
+void bt_sweep_add(bt_sweep *sweep, const bt_lanes *smooth)
+{
+    if (!sweep->begun) {
+        begin(sweep, smooth);
+    }
+    BT_UNROLL
+    for (unsigned k = 0; k < BT_LANES / 2; k++) {
+        sweep->sum.pair[k] += smooth->pair[k];
+    }
+}
+
+uint16_t bt_sweep_close(bt_sweep *sweep, unsigned lane, int span_q3)
+{
+    uint16_t mean_q3 = sweep->sum.lane[lane];
+    sweep->sum.lane[lane] = 0;
+    sweep->mean_q3.lane[lane] = mean_q3;
+    int change_q3 = mean_q3 - sweep->settled_q3.lane[lane];
+    sweep->moved = sweep->moved || change_q3 > span_q3 || change_q3 < -span_q3;
+    return mean_q3;
+}
+
+bool bt_sweep_next(bt_sweep *sweep)
+{
+    if (++sweep->round < BT_SWEEP_ROUNDS) {
+        return false;
+    }
+    sweep->round = 0;
+    if (sweep->moved) {
+        sweep->settled_q3 = sweep->mean_q3;
+        sweep->still_sweeps = 0;
+    } else if (sweep->still_sweeps < UINT8_MAX) {
+        sweep->still_sweeps++;
+    }
+    sweep->moved = false;
+    return true;
+}
