@@ -148,3 +148,5 @@ const int32_t bt_arm_nm[BT_ELECTRODES][3] = {
     {        0,  -9800000,         0}, // E18
     {        0, -13600000,         0}, // E19
 };
+
+const uint16_t bt_normal_length_milli[3] = {  1038,   2917,   3069};

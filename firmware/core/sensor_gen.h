@@ -90,5 +90,6 @@ extern const uint8_t bt_slot_pac[BT_SLOTS];           // PAC slots before each s
 extern const int16_t bt_electrode_um[BT_ELECTRODES][3];
 extern const int16_t bt_normal_milli[BT_ELECTRODES][3];
 extern const int32_t bt_arm_nm[BT_ELECTRODES][3]; // r x n, exact
+extern const uint16_t bt_normal_length_milli[3];  // of all normals' x, y and z, as three vectors
 
 #endif

@@ -1,12 +1,8 @@
 #include "sigma.h"
 
 #include "fix.h"
-#include "isqrt.h"
 
 #define VARIANCE_PER_NOISE_Q16 (65536u / BT_ELECTRODES)
-
-_Static_assert((uint64_t)BT_SETTING_CONTACT_ENERGY_COUNT2_MAX *VARIANCE_PER_NOISE_Q16 < 1ull << 48,
-               "a variance in q16 must have a root");
 
 #define UNKNOWN BT_INVALID_COUNT
 #define TOP     (UNKNOWN - 1u)
@@ -16,15 +12,19 @@ static uint16_t saturate(uint64_t value)
     return (uint16_t)(value > TOP ? TOP : value);
 }
 
-// The root of 64 bits to 16 bits or so: shifted by an even number of bits into 32.
+// The largest r with r * r <= n, a bit at a time: only asked for with SIGMA.
 static uint64_t root(uint64_t n)
 {
-    int down = 0;
-    while (n >> 32 != 0) {
-        n >>= 2;
-        down++;
+    uint64_t r = 0;
+    for (uint64_t bit = 1ull << 62; bit != 0; bit >>= 2) {
+        uint64_t trial = r + bit;
+        r >>= 1;
+        if (n >= trial) {
+            n -= trial;
+            r += bit;
+        }
     }
-    return (uint64_t)bt_isqrt32((uint32_t)n) << down;
+    return r;
 }
 
 uint32_t bt_sigma_count_q8(uint32_t noise_count2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from .schema import GENERATED, Contract
 
 E_MAX_Q4 = 4095 * 16  # |count - tare| in 1/16 count
@@ -91,6 +93,7 @@ def header(contract: Contract) -> str:
         "extern const int16_t bt_electrode_um[BT_ELECTRODES][3];",
         "extern const int16_t bt_normal_milli[BT_ELECTRODES][3];",
         "extern const int32_t bt_arm_nm[BT_ELECTRODES][3]; // r x n, exact",
+        "extern const uint16_t bt_normal_length_milli[3];  // of all normals' x, y and z, as three vectors",
         "",
         "#endif",
         "",
@@ -117,4 +120,6 @@ def source(contract: Contract) -> str:
         width = 9 if kind == "int32_t" else 6
         lines += [f"    {row(v, width)}, // {t[0]}" for v, t in zip(values, table, strict=True)]
         lines += ["};", ""]
+    lengths = [round(math.hypot(*(n[d] for _, _, n in table))) for d in range(3)]
+    lines += [f"const uint16_t bt_normal_length_milli[3] = {row(lengths, 6)};", ""]
     return "\n".join(lines)
