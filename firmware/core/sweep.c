@@ -44,16 +44,6 @@ void bt_sweep_add(bt_sweep *sweep, const bt_lanes *smooth)
     }
 }
 
-uint16_t bt_sweep_close(bt_sweep *sweep, unsigned lane, int span_q3)
-{
-    uint16_t mean_q3 = sweep->sum.lane[lane];
-    sweep->sum.lane[lane] = 0;
-    sweep->mean_q3.lane[lane] = mean_q3;
-    int change_q3 = mean_q3 - sweep->settled_q3.lane[lane];
-    sweep->moved = sweep->moved || change_q3 > span_q3 || change_q3 < -span_q3;
-    return mean_q3;
-}
-
 bool bt_sweep_next(bt_sweep *sweep)
 {
     if (++sweep->round < BT_SWEEP_ROUNDS) {

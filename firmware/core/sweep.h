@@ -48,7 +48,19 @@ static inline unsigned bt_sweep_end(const bt_sweep *sweep)
 #endif
 
 // Close one lane's window, note whether it moved by more than span_q3, and return its mean.
-uint16_t bt_sweep_close(bt_sweep *sweep, unsigned lane, int span_q3);
+#ifndef BT_CDEF
+static inline uint16_t bt_sweep_close(bt_sweep *sweep, unsigned lane, int span_q3)
+{
+    uint16_t mean_q3 = sweep->sum.lane[lane];
+    sweep->sum.lane[lane] = 0;
+    sweep->mean_q3.lane[lane] = mean_q3;
+    int change_q3 = mean_q3 - sweep->settled_q3.lane[lane];
+    if (change_q3 > span_q3 || change_q3 < -span_q3) {
+        sweep->moved = true;
+    }
+    return mean_q3;
+}
+#endif
 
 // The round is over. True after a sweep's last round, where still_sweeps is brought up to date.
 bool bt_sweep_next(bt_sweep *sweep);

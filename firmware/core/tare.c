@@ -43,11 +43,11 @@ static int32_t pdc_above_rest(const bt_tare *tare)
     return tare->gate.smooth.lane[BT_LANE_PDC] - tare->gate.rest.lane[BT_LANE_PDC];
 }
 
-// The square of a difference of means in count^2, rounded down. Differences are below 2^15: it fits,
-// and so does the sum over all electrodes.
-static uint32_t square(int32_t difference_q3)
+// The square of a difference in count^2, rounded down. Differences are below 2^16 in 1/16 count: as unsigned,
+// the square fits, and so does the sum over all electrodes.
+static uint32_t square(int32_t difference_q4)
 {
-    return bt_abs32(difference_q3) * bt_abs32(difference_q3) >> 6;
+    return (uint32_t)difference_q4 * (uint32_t)difference_q4 >> 8;
 }
 
 // ---- changes of the baseline ----------------------------------------------------------------
@@ -176,13 +176,13 @@ static void serve_electrode(bt_tare *tare, unsigned i)
         return; // never read
     }
     if (tare->state == BT_TARE_STATE_CONTACT) {
-        tare->energy_count2 += square(mean_q3 - (int32_t)((*base_q16 + (1 << 12)) >> 13));
+        tare->energy_count2 += square(2 * mean_q3 - tare->electrode_q4[i]);
         if (tare->thermal.step_q16 != 0) {
             warm_electrode(tare, i);
         }
         return;
     }
-    tare->deviation_count2 += square(8 * tare->gate.smooth.lane[i] - mean_q3);
+    tare->deviation_count2 += square(16 * tare->gate.smooth.lane[i] - 2 * mean_q3);
     if (tracks(tare)) {
         *base_q16 = bt_baseline_follow(*base_q16, (uint32_t)mean_q3 << 13, SLEW_Q16);
         use_electrode(tare, i);
