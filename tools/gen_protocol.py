@@ -27,7 +27,7 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "firmware/core/fold_gen.c": c_fold.source(contract),
         root / "firmware/variants/fold_f32_gen.h": c_variants.folded(contract, c_variants.F32),
         root / "firmware/variants/fold_i64_gen.h": c_variants.folded(contract, c_variants.I64),
-        root / "firmware/variants/q15_gen.h": c_variants.q15_header(contract),
+        root / "firmware/variants/tables_gen.h": c_variants.tables(contract),
         root / "firmware/core/wire_gen.h": c_wire.header(contract),
         root / "firmware/core/wire_gen.c": c_wire.source(contract),
         root / "host/biotac/_sensor.py": python_code.sensor(contract),

@@ -1,5 +1,8 @@
-// float32 in the paper's order: firmware/reference/lin2013.c with float for double, and nothing else.
+// float32 in the paper's order: firmware/reference/lin2013.c with float for double, and Table 1 in mm
+// instead of a division of its integers in every frame.
 #include "variants.h"
+
+#include "tables_gen.h"
 
 #include <math.h>
 
@@ -24,7 +27,7 @@ static bool point_of_contact(const float e[BT_ELECTRODES], int weights, float po
         float w = weight(e[i], weights);
         total += w;
         for (int d = 0; d < 3; d++) {
-            c[d] += w * ((float)bt_electrode_um[i][d] / 1000.0F);
+            c[d] += w * f32_place_mm[i][d];
         }
     }
     if (!(total > 0)) {
@@ -53,7 +56,7 @@ bool variant_f32(const int32_t e_q4[BT_ELECTRODES], const variant_settings *sett
         float sum[3] = {0, 0, 0};
         for (int i = 0; i < BT_ELECTRODES; i++) {
             for (int d = 0; d < 3; d++) {
-                sum[d] += e[i] * ((float)bt_normal_milli[i][d] / 1000.0F);
+                sum[d] += e[i] * f32_normal[i][d];
             }
         }
         for (int d = 0; d < 3; d++) {
@@ -64,7 +67,7 @@ bool variant_f32(const int32_t e_q4[BT_ELECTRODES], const variant_settings *sett
         float sum[2] = {0, 0};
         for (int i = 0; i < BT_ELECTRODES; i++) {
             for (int d = 0; d < 2; d++) {
-                sum[d] += e[i] * ((float)bt_arm_nm[i][d + 1] / 1e6F);
+                sum[d] += e[i] * f32_arm_mm[i][d];
             }
         }
         for (int d = 0; d < 2; d++) {

@@ -5,36 +5,23 @@
 
 #include <stdint.h>
 
-#define FOLD_I64_WEIGHT_BITS 27 // a weight is below 2^this
-#define FOLD_I64_MOMENT_MAX 16362483220480LL
+#define FOLD_BEHIND_UM 13600 // no electrode lies farther from the tip than x = -this
 
-// sum w r in um; returns sum w.
-static inline uint32_t fold_i64_moments(const int32_t v[19], int64_t sum[3])
-{
-    sum[0] = (int64_t)(v[0] + v[10]) * 993
-             + (int64_t)(v[1] + v[11]) * -2700
-             + (int64_t)(v[2] + v[12]) * -6200
-             + (int64_t)(v[3] + v[13]) * -8000
-             + (int64_t)(v[4] + v[14]) * -10500
-             + (int64_t)(v[5] + v[15]) * -13400
-             + (int64_t)(v[7] + v[8]) * 3031
-             + (int64_t)v[6] * 4763
-             + (int64_t)v[9] * 1299
-             + (int64_t)v[16] * -2800
-             + (int64_t)v[17] * -9800
-             + (int64_t)v[18] * -13600;
-    sum[1] = (int64_t)(v[10] - v[0]) * 4855
-             + (int64_t)((v[11] - v[1]) + (v[12] - v[2]) + (v[14] - v[4])) * 3513
-             + (int64_t)((v[13] - v[3]) + (v[15] - v[5])) * 4956
-             + (int64_t)(v[8] - v[7]) * 1950;
-    sum[2] = (int64_t)((v[0] + v[10]) + (v[3] + v[13]) + (v[5] + v[15])) * -1116
-             + (int64_t)((v[1] + v[11]) + (v[2] + v[12]) + (v[4] + v[14])) * -3670
-             + (int64_t)(v[7] + v[8]) * -3330
-             + (int64_t)v[6] * -2330
-             + (int64_t)v[9] * -4330
-             + (int64_t)(v[16] + v[17] + v[18]) * -5080;
-    return (uint32_t)(v[0] + v[10]) + (uint32_t)(v[1] + v[11]) + (uint32_t)(v[2] + v[12]) + (uint32_t)(v[3] + v[13]) + (uint32_t)(v[4] + v[14]) + (uint32_t)(v[5] + v[15]) + (uint32_t)(v[7] + v[8]) + (uint32_t)v[6] + (uint32_t)v[9] + (uint32_t)v[16] + (uint32_t)v[17] + (uint32_t)v[18];
-}
+// For each pair of electrodes: left, right, and in um x + FOLD_BEHIND_UM, y of the right one, -z; for each
+// on the midline itself, x + FOLD_BEHIND_UM and -z.
+#define FOLD_PLACES(PAIR, SINGLE) \
+    PAIR(0, 10, 14593, 4855, 1116) \
+    PAIR(1, 11, 10900, 3513, 3670) \
+    PAIR(2, 12, 7400, 3513, 3670) \
+    PAIR(3, 13, 5600, 4956, 1116) \
+    PAIR(4, 14, 3100, 3513, 3670) \
+    PAIR(5, 15, 200, 4956, 1116) \
+    PAIR(7, 8, 16631, 1950, 3330) \
+    SINGLE(6, 18363, 2330) \
+    SINGLE(9, 14899, 4330) \
+    SINGLE(16, 10800, 5080) \
+    SINGLE(17, 3800, 5080) \
+    SINGLE(18, 0, 5080)
 
 // sum e n in e * 1/1000.
 static inline void fold_i64_force(const int32_t v[19], int32_t sum[3])

@@ -1,8 +1,8 @@
-// For a core with an FPU and a long multiply (Cortex-M4F): folded integer sums in int64, and float32
-// for the last division and root alone. The PoC is in 1/8 um.
+// For a core with an FPU and a long multiply (Cortex-M4F): exact integer sums, of force and torque with the
+// symmetry folded, and float32 for the last division and root alone. The PoC is in 1/8 um.
 //
-// Weights are brought to 27 bits, exact up to 724 counts where they are squares; above, what is cut is
-// below 2^-26 of the largest. The sums over them are exact; so are those of force and torque.
+// Weights have 30 bits: all of them are exact up to 2047 counts. In a frame beyond, squares are summed
+// once more, cut below 2^-29 of the largest; that costs as long again.
 #include "variants.h"
 
 #include "fix.h"
@@ -11,45 +11,84 @@
 #include <math.h>
 
 #define RADIUS_UM_Q3 ((float)(8 * BT_CORE_RADIUS_UM))
-#define SUM_SHIFT    13 // brings a moment to 32 bits
 #define FORCE_BITS   34 // of bt_gains
 #define ARM_SHIFT    12 // 1/16 count * nm to 1/16 count * 4096 nm
 
-_Static_assert(FOLD_I64_MOMENT_MAX >> SUM_SHIFT < INT32_MAX, "a moment must shift down to int32");
-// N_z alone is 1116 um times a weight of at least 2^26: what the shift drops is below 2^-23 of it.
-_Static_assert((((int64_t)-BT_ELECTRODE_Z_MAX_UM << (FOLD_I64_WEIGHT_BITS - 1)) >> SUM_SHIFT) >> 23 > 0,
-               "a shifted moment must keep what a float holds");
+_Static_assert(BT_SUM_SQUARES_R_MAX_Q8_UM >> 49 == 0, "a moment must have a high word that float holds");
 _Static_assert(BT_SUM_ARM_MAX_Q4_NM >> ARM_SHIFT < INT32_MAX, "a shifted torque sum must fit int32");
 _Static_assert(((int64_t)BT_GAIN_MAX_NN << FPU_TORQUE_BITS) / FPU_TORQUE_DIVISOR <= INT32_MAX,
                "a torque gain must fit int32");
 
-// Loops over the electrodes are worth unrolling where there are registers for it; gcc stops at 16.
+// The order below is the one that keeps the sums in registers. gcc would move loads to the front, additions
+// to the end and sums behind the next branch, and spill.
 #if defined(__GNUC__) && !defined(__clang__)
-#define UNROLLED _Pragma("GCC unroll 19")
+#define IN_ORDER                                                                                             \
+    __attribute__((noinline,                                                                                 \
+                   optimize("no-schedule-insns", "no-tree-reassoc", "no-tree-sink", "no-code-hoisting")))
 #else
-#define UNROLLED
+#define IN_ORDER
 #endif
 
-// The weights of Eq 1; returns all of them ORed together.
-static inline uint32_t weigh(const int32_t e_q4[BT_ELECTRODES], int weights, uint32_t w[BT_ELECTRODES])
+#define WEIGHT_BITS 30 // a pair of them is added within int32
+
+#define INLINED static inline __attribute__((always_inline))
+
+typedef struct {
+    int64_t weight;
+    int64_t x, y, z; // um
+    uint32_t all;    // the weights ORed together
+} weight_sums;
+
+INLINED uint32_t weight(int32_t e_q4, int weights)
 {
+    uint32_t e = (uint32_t)(weights == BT_POC_WEIGHTS_ABS_N2 ? e_q4 : e_q4 & bt_shift_down(e_q4, 31));
+    return weights == BT_POC_WEIGHTS_COMPRESS_N1 ? 0 - e : e * e;
+}
+
+// Eq 1's sums over weights cut by `down` bits, pair by pair so that they stay in registers.
+INLINED weight_sums sum_up(const int32_t e_q4[BT_ELECTRODES], int weights, int down)
+{
+    bool squared = weights != BT_POC_WEIGHTS_COMPRESS_N1; // else far from too large
+    uint64_t total = 0;
+    int64_t x = 0; // from the rearmost electrode on
+    int64_t y = 0;
+    int64_t z = 0; // downwards
     uint32_t all = 0;
-    if (weights == BT_POC_WEIGHTS_ABS_N2) {
-        UNROLLED
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            w[i] = (uint32_t)e_q4[i] * (uint32_t)e_q4[i];
-            all |= w[i];
-        }
-    } else {
-        bool square = weights == BT_POC_WEIGHTS_COMPRESS_N2;
-        UNROLLED
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            uint32_t compressed = 0 - (uint32_t)(e_q4[i] & bt_shift_down(e_q4[i], 31));
-            w[i] = square ? compressed * compressed : compressed;
-            all |= w[i];
-        }
+#define PAIR(left, right, x_um, y_um, z_um)                                                                  \
+    {                                                                                                        \
+        uint32_t a = weight(e_q4[left], weights);                                                            \
+        uint32_t b = weight(e_q4[right], weights);                                                           \
+        all |= squared ? a | b : 0;                                                                          \
+        int32_t even = (int32_t)((a >> down) + (b >> down));                                                 \
+        int32_t odd = (int32_t)((b >> down) - (a >> down));                                                  \
+        total += (uint32_t)even;                                                                             \
+        x += (int64_t)even * (x_um);                                                                         \
+        y += (int64_t)odd * (y_um);                                                                          \
+        z += (int64_t)even * (z_um);                                                                         \
     }
-    return all;
+#define SINGLE(i, x_um, z_um)                                                                                \
+    {                                                                                                        \
+        uint32_t a = weight(e_q4[i], weights);                                                               \
+        all |= squared ? a : 0;                                                                              \
+        int32_t even = (int32_t)(a >> down);                                                                 \
+        total += (uint32_t)even;                                                                             \
+        x += (int64_t)even * (x_um);                                                                         \
+        z += (int64_t)even * (z_um);                                                                         \
+    }
+    FOLD_PLACES(PAIR, SINGLE)
+#undef PAIR
+#undef SINGLE
+    int64_t weight_sum = (int64_t)total;
+    weight_sums sums = {weight_sum, x - weight_sum * FOLD_BEHIND_UM, y, -z, all};
+    return sums;
+}
+
+// To within 2^-23: hi * 2^32 + lo, with lo signed, so that a small negative number has no large parts.
+INLINED float to_float(int64_t value)
+{
+    int32_t hi = (int32_t)((value + ((int64_t)1 << 31)) >> 32);
+    int32_t lo = (int32_t)(uint32_t)value;
+    return (float)hi * 4294967296.0F + (float)lo;
 }
 
 static int32_t to_whole(float value)
@@ -57,40 +96,46 @@ static int32_t to_whole(float value)
     return (int32_t)(value < 0 ? value - 0.5F : value + 0.5F);
 }
 
-// The point in 1/8 um, not rounded yet.
-static bool point_of_contact(const int32_t e_q4[BT_ELECTRODES], int weights, float poc_um_q3[3])
+INLINED bool finish(weight_sums sums, float poc_um_q3[3])
 {
-    uint32_t w[BT_ELECTRODES];
-    int32_t v[BT_ELECTRODES];
-    uint32_t all = weigh(e_q4, weights, w);
-    if (all == 0) {
-        return false;
+    bool tip = sums.x > 0;
+    float x = to_float(sums.x);
+    float y = to_float(sums.y);
+    float z = to_float(sums.z);
+    float across = y * y + z * z;
+    float scale = RADIUS_UM_Q3 / sqrtf(tip ? across + x * x : across);
+    poc_um_q3[0] = tip ? x * scale : x * 8 / to_float(sums.weight);
+    poc_um_q3[1] = y * scale;
+    poc_um_q3[2] = z * scale;
+    return sums.weight != 0; // asked last, and what was divided by 0 is dropped: see IN_ORDER
+}
+
+// Once more, for a frame beyond 2047 counts whose weights are squares.
+BT_NOINLINE static bool point_of_large(const int32_t e_q4[BT_ELECTRODES], int weights, uint32_t all,
+                                       float poc_um_q3[3])
+{
+    return finish(sum_up(e_q4, weights, 32 - __builtin_clz(all) - WEIGHT_BITS), poc_um_q3);
+}
+
+// One copy of the sums for each kind of weights.
+INLINED bool point_of(const int32_t e_q4[BT_ELECTRODES], int weights, float poc_um_q3[3])
+{
+    weight_sums sums = sum_up(e_q4, weights, 0);
+    bool has_poc = finish(sums, poc_um_q3);
+    return sums.all >> WEIGHT_BITS ? point_of_large(e_q4, weights, sums.all, poc_um_q3) : has_poc;
+}
+
+// The point in 1/8 um, not rounded yet.
+IN_ORDER static bool point_of_contact(const int32_t e_q4[BT_ELECTRODES], int weights, float poc_um_q3[3])
+{
+    switch (weights) {
+    case BT_POC_WEIGHTS_ABS_N2:
+        return point_of(e_q4, BT_POC_WEIGHTS_ABS_N2, poc_um_q3);
+    case BT_POC_WEIGHTS_COMPRESS_N2:
+        return point_of(e_q4, BT_POC_WEIGHTS_COMPRESS_N2, poc_um_q3);
+    default:
+        return point_of(e_q4, BT_POC_WEIGHTS_COMPRESS_N1, poc_um_q3);
     }
-    int down = 32 - __builtin_clz(all) - FOLD_I64_WEIGHT_BITS;
-    if (down > 0) {
-        UNROLLED
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            v[i] = (int32_t)(w[i] >> down);
-        }
-    } else {
-        UNROLLED
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            v[i] = (int32_t)(w[i] << -down);
-        }
-    }
-    int64_t sum[3];
-    uint32_t total = fold_i64_moments(v, sum);
-    bool tip = sum[0] > 0;
-    float n[3];
-    for (int d = 0; d < 3; d++) {
-        n[d] = (float)(int32_t)(sum[d] >> SUM_SHIFT);
-    }
-    float across = n[1] * n[1] + n[2] * n[2];
-    float scale = RADIUS_UM_Q3 / sqrtf(tip ? across + n[0] * n[0] : across);
-    poc_um_q3[0] = tip ? n[0] * scale : n[0] * (8 << SUM_SHIFT) / (float)total;
-    poc_um_q3[1] = n[1] * scale;
-    poc_um_q3[2] = n[2] * scale;
-    return true;
 }
 
 // sum * multiplier / 2^bits, rounded half away from zero.

@@ -5,7 +5,7 @@
 
 #include "fix.h"
 #include "isqrt.h"
-#include "q15_gen.h"
+#include "tables_gen.h"
 
 #define RATIO_BITS 11 // 19 weights take 20 bits of 31
 

@@ -1,7 +1,7 @@
 #include "variants.h"
 
 #include "fix.h"
-#include "q15_gen.h"
+#include "tables_gen.h"
 
 const variant variants[VARIANTS] = {
     {"double", variant_double, variant_read_double, false},

@@ -19,7 +19,7 @@ GENERATED = (
     "firmware/core/wire_gen.c",
     "firmware/variants/fold_f32_gen.h",
     "firmware/variants/fold_i64_gen.h",
-    "firmware/variants/q15_gen.h",
+    "firmware/variants/tables_gen.h",
     "host/biotac/_sensor.py",
     "host/biotac/_wire.py",
     "protocol/MESSAGES.md",

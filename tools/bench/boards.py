@@ -10,6 +10,7 @@ import subprocess
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from m4f_model import Model, UnknownInstruction, runs
@@ -24,7 +25,9 @@ FOLDED = FIRMWARE / "core" / "fold_gen.c"
 CORE = sorted(set((FIRMWARE / "core").glob("*.c")) - {FOLDED})
 JUDGED = sorted([*(FIRMWARE / "reference").glob("*.c"), *(FIRMWARE / "variants").glob("*.c")])
 SHIPPED = sorted(path for room in ("core", "sensor", "app") for path in (FIRMWARE / room).glob("*.c"))
-INCLUDE = [f"-I{FIRMWARE / room}" for room in ("core", "reference", "variants", "sensor", "port", "app")] + [f"-I{HERE}"]
+INCLUDE = [f"-I{FIRMWARE / room}" for room in ("core", "reference", "variants", "sensor", "port", "app")] + [
+    f"-I{HERE}"
+]
 PACKAGES = {
     "arm-none-eabi-gcc": "gcc-arm-none-eabi libnewlib-arm-none-eabi",
     "qemu-system-arm": "qemu-system-arm",
@@ -136,7 +139,7 @@ def run_m4f(elf: Path) -> list[Row]:
     try:
         for k, run in enumerate(runs(_log(elf), addresses(elf)["bench_mark"])):
             # the last instruction is neighbour to the closing mark, whose address starts no pair
-            pairs = Counter(zip(run, run[1:], strict=False))
+            pairs = Counter(pairwise(run))
             rows.append((names[k][0], names[k][1], len(run), model.cycles(pairs)))
     except UnknownInstruction as unknown:
         raise Failed(str(unknown)) from None
@@ -186,5 +189,3 @@ def float_symbols() -> list[str]:
     command("arm-none-eabi-gcc", *words, *link, "-o", elf)
     names = {line.split()[-1] for line in command("arm-none-eabi-nm", elf).splitlines()}
     return sorted(name for name in names if FLOAT_SYMBOL.match(name))
-
-

@@ -20,13 +20,29 @@ MANY = re.compile(r"(ldm|stm|push|pop|vldm|vstm|vpush|vpop)")
 REGISTER_LIST = re.compile(r"\{([^}]*)\}")
 FP_REGISTER = re.compile(r"\bs\d+\b")
 CONDITION = re.compile(r"(eq|ne|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le|hs|lo)$")
-FP_ARITHMETIC = ("vadd", "vsub", "vmul", "vnmul", "vdiv", "vsqrt", "vmla", "vmls", "vfma", "vfms", "vcvt")
-READS_FIRST = ("vcmp", "vstr", "vpush", "vstm", "vmla", "vmls", "vfma", "vfms")
-PLAIN = frozenset(
-    "adc add addw and asr bfi bic clz cmn cmp eor it lsl lsr mla mls mov movt movw mul mvn neg nop orn orr rbit rev "
-    "ror rrx rsb sbc sbfx smlal smlabb smulbb smull sub subw sxtb sxth teq tst ubfx uadd8 umlal umull uxtb uxth vabs "
-    "vadd vcmp vcmpe vcvt vmov vmrs vmul vneg vnmul vsub".split()
-)  # one cycle each
+FP_ARITHMETIC = (
+    "vadd",
+    "vsub",
+    "vmul",
+    "vnmul",
+    "vdiv",
+    "vsqrt",
+    "vmla",
+    "vmls",
+    "vnmla",
+    "vnmls",
+    "vfma",
+    "vfms",
+    "vcvt",
+)
+READS_FIRST = ("vcmp", "vstr", "vpush", "vstm", "vmla", "vmls", "vnmla", "vnmls", "vfma", "vfms")
+# one cycle each
+ONE_CYCLE = """
+adc add addw and asr bfi bic clz cmn cmp eor it lsl lsr mla mls mov movt movw mul mvn neg nop orn orr rbit rev
+ror rrx rsb sbc sbfx smlal smlabb smulbb smull sub subw sxtb sxth teq tst ubfx uadd8 umlal umull uxtb uxth vabs
+vadd vcmp vcmpe vcvt vmov vmrs vmul vneg vnmul vsub
+"""
+PLAIN = frozenset(ONE_CYCLE.split())
 
 
 class UnknownInstruction(ValueError):
@@ -71,7 +87,22 @@ def base_name(text: str) -> str:
 
 
 def is_fixed(name: str) -> bool:
-    return name in ("sdiv", "udiv", "vdiv", "vsqrt", "vmla", "vmls", "vfma", "vfms", "ldrd", "strd", "vldr", "vstr")
+    return name in (
+        "sdiv",
+        "udiv",
+        "vdiv",
+        "vsqrt",
+        "vmla",
+        "vmls",
+        "vnmla",
+        "vnmls",
+        "vfma",
+        "vfms",
+        "ldrd",
+        "strd",
+        "vldr",
+        "vstr",
+    )
 
 
 def registers_in(operands: str) -> int:
@@ -91,7 +122,7 @@ def alone(i: Instruction) -> int:
         return 12
     if i.name in ("vdiv", "vsqrt"):
         return 14
-    if i.name in ("vmla", "vmls", "vfma", "vfms", "ldrd", "strd"):
+    if i.name in (*FP_ACCUMULATE, "ldrd", "strd"):
         return 3
     if i.name in ("vldr", "vstr"):
         return 3 if i.operands.startswith("d") else 2
