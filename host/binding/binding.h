@@ -9,6 +9,7 @@
 #include "cobs.h"
 #include "crc32.h"
 #include "framing.h"
+#include "kernels.h"
 #include "lin2013.h"
 #include "results.h"
 #include "tare.h"

@@ -20,22 +20,10 @@ MANY = re.compile(r"(ldm|stm|push|pop|vldm|vstm|vpush|vpop)")
 REGISTER_LIST = re.compile(r"\{([^}]*)\}")
 FP_REGISTER = re.compile(r"\bs\d+\b")
 CONDITION = re.compile(r"(eq|ne|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le|hs|lo)$")
-FP_ARITHMETIC = (
-    "vadd",
-    "vsub",
-    "vmul",
-    "vnmul",
-    "vdiv",
-    "vsqrt",
-    "vmla",
-    "vmls",
-    "vnmla",
-    "vnmls",
-    "vfma",
-    "vfms",
-    "vcvt",
-)
-READS_FIRST = ("vcmp", "vstr", "vpush", "vstm", "vmla", "vmls", "vnmla", "vnmls", "vfma", "vfms")
+FP_ACCUMULATE = ("vmla", "vmls", "vnmla", "vnmls", "vfma", "vfms")
+FP_ARITHMETIC = (*FP_ACCUMULATE, "vadd", "vsub", "vmul", "vnmul", "vdiv", "vsqrt", "vcvt")
+READS_FIRST = (*FP_ACCUMULATE, "vcmp", "vcmpe", "vstr", "vpush", "vstm")
+OTHERS = (*FP_ACCUMULATE, "sdiv", "udiv", "vdiv", "vsqrt", "ldrd", "strd", "vldr", "vstr")
 # one cycle each
 ONE_CYCLE = """
 adc add addw and asr bfi bic clz cmn cmp eor it lsl lsr mla mls mov movt movw mul mvn neg nop orn orr rbit rev
@@ -78,31 +66,12 @@ def base_name(text: str) -> str:
     name = text.split(".")[0]
     if re.match(r"it[te]{0,3}$", name):
         return "it"
-    if name in PLAIN or BRANCHES.match(name) or SINGLE.match(name) or MANY.match(name) or is_fixed(name):
+    if name in PLAIN or BRANCHES.match(name) or SINGLE.match(name) or MANY.match(name) or name in OTHERS:
         return name
     for shorter in (name[:-1] if name.endswith("s") else name, CONDITION.sub("", name)):
-        if shorter in PLAIN or BRANCHES.match(shorter) or SINGLE.match(shorter) or is_fixed(shorter):
+        if shorter in PLAIN or BRANCHES.match(shorter) or SINGLE.match(shorter) or shorter in OTHERS:
             return shorter
     return re.sub(r"s$", "", CONDITION.sub("", name))
-
-
-def is_fixed(name: str) -> bool:
-    return name in (
-        "sdiv",
-        "udiv",
-        "vdiv",
-        "vsqrt",
-        "vmla",
-        "vmls",
-        "vnmla",
-        "vnmls",
-        "vfma",
-        "vfms",
-        "ldrd",
-        "strd",
-        "vldr",
-        "vstr",
-    )
 
 
 def registers_in(operands: str) -> int:
