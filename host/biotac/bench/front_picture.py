@@ -8,12 +8,12 @@ from typing import Any
 from .front import EVERYTHING, Facts
 
 WEIGHTS = "compress n=1"  # what a board starts with
-FLOOR_UM = 2e-4  # smaller errors are drawn here, and said
+FLOOR_UM = 1e-4  # smaller errors are drawn here, and said
 PANELS = (("Cortex-M0+", ("m0plus", "m0plus_divider")), ("Cortex-M4F", ("m4f",)))
 HIGHLIGHT = {"shipped": "#c2410c", "int + FPU": "#15803d"}
 OTHER = "#334155"
 LEFT = ("double",)  # labels stand right of their points and above, but for these
-BELOW = ("float folded", "divider", "gold int64")
+BELOW = ("float folded", "divider", "gold int64", "double")
 
 
 def draw(all_facts: Facts, path: Path) -> None:
@@ -48,7 +48,7 @@ def _panel(axes: Any, all_facts: Facts, title: str, keys: tuple[str, ...]) -> No
     cycles_of = [cycles for _, cycles, _ in points]
     axes.set(xscale="log", yscale="log", xlabel="cycles per frame, everything wanted", title=title)
     axes.set_xlim(min(cycles_of) / 1.6, max(cycles_of) * 2.5)
-    axes.set_ylim(FLOOR_UM / 2, max(error_um for *_, error_um in points) * 6)
+    axes.set_ylim(FLOOR_UM / 4, max(error_um for *_, error_um in points) * 6)
     axes.grid(alpha=0.25, which="major")
 
 
