@@ -11,11 +11,12 @@
 #include <math.h>
 
 #define RADIUS_UM_Q3 ((float)(8 * BT_CORE_RADIUS_UM))
-#define FORCE_BITS   34 // of bt_gains
 #define ARM_SHIFT    12 // 1/16 count * nm to 1/16 count * 4096 nm
 
 _Static_assert(BT_SUM_SQUARES_R_MAX_Q8_UM >> 49 == 0, "a moment must have a high word that float holds");
 _Static_assert(BT_SUM_ARM_MAX_Q4_NM >> ARM_SHIFT < INT32_MAX, "a shifted torque sum must fit int32");
+_Static_assert(((int64_t)BT_GAIN_MAX_NN << FPU_FORCE_BITS) / FPU_FORCE_DIVISOR <= INT32_MAX,
+               "a force gain must fit int32");
 _Static_assert(((int64_t)BT_GAIN_MAX_NN << FPU_TORQUE_BITS) / FPU_TORQUE_DIVISOR <= INT32_MAX,
                "a torque gain must fit int32");
 
@@ -154,7 +155,7 @@ bool variant_fpu(const int32_t e_q4[BT_ELECTRODES], const variant_settings *sett
         int32_t sum[3];
         fold_i64_force(e_q4, sum);
         for (int d = 0; d < 3; d++) {
-            fpu->force_100un[d] = scale(sum[d], settings->shipped.gains.force[d], FORCE_BITS);
+            fpu->force_100un[d] = scale(sum[d], settings->fpu_force[d], FPU_FORCE_BITS);
         }
     }
     if (wanted & VARIANT_TORQUE) {

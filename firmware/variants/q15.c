@@ -4,7 +4,6 @@
 #include "variants.h"
 
 #include "fix.h"
-#include "isqrt.h"
 #include "tables_gen.h"
 
 #define RATIO_BITS 11 // 19 weights take 20 bits of 31
@@ -17,6 +16,18 @@ _Static_assert(-1 >> 1 == -1, "the compiler must shift signed numbers arithmetic
 static int32_t q15_times(int32_t a, int32_t b)
 {
     return bt_shift_down(a * b, 15);
+}
+
+// One result bit per step, as textbooks have it.
+static uint32_t root_of(uint32_t n)
+{
+    uint32_t root = 0;
+    for (uint32_t bit = (uint32_t)1 << 30; bit != 0; bit >>= 2) {
+        bool fits = n >= root + bit;
+        n -= fits ? root + bit : 0;
+        root = (root >> 1) + (fits ? bit : 0);
+    }
+    return root;
 }
 
 static int32_t weight(int32_t e, int weights)
@@ -54,7 +65,7 @@ static bool point_of_contact(const int16_t e[BT_ELECTRODES], int weights, int16_
     for (int d = tip ? 0 : 1; d < 3; d++) {
         square += (uint32_t)(c[d] * c[d]);
     }
-    int32_t length = (int32_t)bt_isqrt32(square);
+    int32_t length = (int32_t)root_of(square);
     for (int d = 0; d < 3; d++) {
         bool along = d == 0 && !tip;
         poc_um[d] = (int16_t)(along ? q15_times(c[d], Q15_PLACE_UM) : c[d] * BT_CORE_RADIUS_UM / length);

@@ -44,6 +44,8 @@ void variant_settings_init(variant_settings *settings, int poc_weights, const in
         settings->real64.force_gain[d] = gain_n;
         settings->f32_force[d] = (float)gain_n;
         settings->folded_force[d] = (float)(gain_n / 16); // 1000 mN/N * 1/16 * 1/1000
+        settings->fpu_force[d] =
+            (int32_t)bt_div_round(force_nn[d] * ((int64_t)1 << FPU_FORCE_BITS), FPU_FORCE_DIVISOR);
         settings->q15_force[d] = gain_of(gain_n * 1e4 / 8);
     }
     for (int d = 0; d < 2; d++) {

@@ -19,6 +19,10 @@
 #define VARIANT_TORQUE 4
 #define VARIANT_ALL    7
 
+// 1/16 count * 1/1000 * nN to 100 uN.
+#define FPU_FORCE_BITS    34
+#define FPU_FORCE_DIVISOR 1600000000LL
+
 // gain * 2^36 * 4096 / (16 * 10^12), the powers of two taken out: nN, 1/16 count, nm to mN*mm.
 #define FPU_TORQUE_SHIFT   36
 #define FPU_TORQUE_BITS    32
@@ -41,6 +45,7 @@ typedef struct {
     float f32_torque[2];    // N per count
     float folded_force[3];  // mN per (1/16 count * 1/1000)
     float folded_torque[2]; // mN*mm per (1/16 count * nm)
+    int32_t fpu_force[3];   // 100 uN per (1/16 count * 1/1000), times 2^34
     int32_t fpu_torque[2];  // mN*mm per (1/16 count * 4096 nm), times 2^36
     q15_gain q15_force[3];  // 100 uN per 1/8 count
     q15_gain q15_torque[2]; // mN*mm per (1/8 count * full scale of the arms)

@@ -1,6 +1,6 @@
 """C for the benchmark's own kernels: the symmetry-folded sums in float32 and int64, and tables.
 
-The folding itself is c_fold's. Here a processor has a multiplier that is wide enough (SMLAL) or an FPU,
+Here a processor has a multiplier that is wide enough (SMLAL) or an FPU,
 so that nothing is split in two.
 """
 
@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .c_fold import Folding, join
 from .c_sensor import arm_nm
+from .pairs import Folding, join
 from .schema import GENERATED, Contract
 
 Q15_ONE = 1 << 15
