@@ -108,11 +108,14 @@ static bool faces_down(const int16_t poc_um[3])
 
 static bool enough_active(const int32_t e_q4[BT_ELECTRODES])
 {
-    int active = 0;
-    for (int i = 0; i < BT_ELECTRODES && active < ACTIVE_FOR_TORSION; i++) {
-        active += bt_abs32(e_q4[i]) >= ACTIVE_Q4;
+    int wanted = ACTIVE_FOR_TORSION;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        // One comparison for both signs: what is in between wraps to below.
+        if ((uint32_t)(e_q4[i] + ACTIVE_Q4 - 1) > 2 * (ACTIVE_Q4 - 1) && --wanted == 0) {
+            return true;
+        }
     }
-    return active == ACTIVE_FOR_TORSION;
+    return false;
 }
 
 void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_settings *settings,

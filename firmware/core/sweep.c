@@ -44,11 +44,8 @@ void bt_sweep_add(bt_sweep *sweep, const bt_lanes *smooth)
     }
 }
 
-bool bt_sweep_next(bt_sweep *sweep)
+void bt_sweep_start_over(bt_sweep *sweep)
 {
-    if (++sweep->round < BT_SWEEP_ROUNDS) {
-        return false;
-    }
     sweep->round = 0;
     if (sweep->moved) {
         sweep->settled_q3 = sweep->mean_q3;
@@ -57,5 +54,4 @@ bool bt_sweep_next(bt_sweep *sweep)
         sweep->still_sweeps++;
     }
     sweep->moved = false;
-    return true;
 }

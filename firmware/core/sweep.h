@@ -62,7 +62,19 @@ static inline uint16_t bt_sweep_close(bt_sweep *sweep, unsigned lane, int span_q
 }
 #endif
 
-// The round is over. True after a sweep's last round, where still_sweeps is brought up to date.
-bool bt_sweep_next(bt_sweep *sweep);
+// After a sweep's last round: brings still_sweeps up to date and starts over.
+void bt_sweep_start_over(bt_sweep *sweep);
+
+// The round is over. True after a sweep's last one.
+#ifndef BT_CDEF
+static inline bool bt_sweep_next(bt_sweep *sweep)
+{
+    if (++sweep->round < BT_SWEEP_ROUNDS) {
+        return false;
+    }
+    bt_sweep_start_over(sweep);
+    return true;
+}
+#endif
 
 #endif

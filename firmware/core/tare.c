@@ -312,7 +312,9 @@ void bt_tare_reset(bt_tare *tare)
 
 void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings)
 {
-    tare->threshold_count2 = bt_noise_threshold(&tare->noise, settings->contact_energy_count2);
+    if (tare->sweep.round == 0) { // the noise is as old as the last sweep
+        tare->threshold_count2 = bt_noise_threshold(&tare->noise, settings->contact_energy_count2);
+    }
     bool resting = tare->state == BT_TARE_STATE_REST;
     bt_gate_begin(&tare->gate, resting ? (int32_t)tare->threshold_count2 : BT_GATE_NEVER);
     tare->touched = tare->hits > 0; // what has begun is not seen to begin again

@@ -10,6 +10,7 @@
 #include "crc32.h"
 #include "framing.h"
 #include "kernel.h"
+#include "kernels.h"
 #include "lin2013.h"
 #include "tare.h"
 

@@ -290,9 +290,14 @@ def test_the_contestants_of_the_benchmark_agree(capsys) -> None:
     assert "ns per frame" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("wrong", [["bench"], ["bench", "boards"], ["bench", "batch", "--frames", "3"]])
-def test_wrong_arguments_of_the_benchmark(wrong, capsys) -> None:
+def test_an_unknown_benchmark_is_a_wrong_argument(capsys) -> None:
     with pytest.raises(SystemExit) as stopped:
-        main(wrong)
+        main(["bench", "boards"])
     assert stopped.value.code == 2
     capsys.readouterr()
+
+
+@pytest.mark.parametrize(("what", "frames"), [("batch", "3"), ("batch", "10000001"), ("kernels", "99")])
+def test_recordings_of_no_use_are_refused(what, frames, capsys) -> None:
+    assert main(["bench", what, "--frames", frames]) == 2
+    assert f"--frames is {frames}, expected" in capsys.readouterr().err
