@@ -32,7 +32,8 @@ _Static_assert(((int64_t)BT_GAIN_MAX_NN << FPU_TORQUE_BITS) / FPU_TORQUE_DIVISOR
 
 #define WEIGHT_BITS 30 // a pair of them is added within int32
 
-#define INLINED static inline __attribute__((always_inline))
+#define INLINED  static inline __attribute__((always_inline))
+#define OUTLINED __attribute__((noinline))
 
 typedef struct {
     int64_t weight;
@@ -112,8 +113,8 @@ INLINED bool finish(weight_sums sums, float poc_um_q3[3])
 }
 
 // Once more, for a frame beyond 2047 counts whose weights are squares.
-BT_NOINLINE static bool point_of_large(const int32_t e_q4[BT_ELECTRODES], int weights, uint32_t all,
-                                       float poc_um_q3[3])
+OUTLINED static bool point_of_large(const int32_t e_q4[BT_ELECTRODES], int weights, uint32_t all,
+                                    float poc_um_q3[3])
 {
     return finish(sum_up(e_q4, weights, 32 - __builtin_clz(all) - WEIGHT_BITS), poc_um_q3);
 }

@@ -172,6 +172,12 @@ def count(board: Board) -> list[Row]:
     return run_m4f(elf) if board.machine == M4F else run_rp2040(elf)[0]
 
 
+def bits_frames() -> int:
+    found = re.search(r"#define BITS_FRAMES (\d+)", (HERE / "bits.h").read_text(encoding="utf-8"))
+    assert found is not None
+    return int(found.group(1))
+
+
 def bits(board: Board) -> int:
     """The hash over the shipped kernels' results on this board."""
     elf = build(board, "bits", HERE / "bits_image.c")
