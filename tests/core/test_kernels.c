@@ -1,29 +1,14 @@
-// The integer kernels against the double reference (firmware/reference).
-//
-// Where the bounds come from (nothing is tuned):
-//  PoC    the published um: 0.5 per axis. Direction components of 16 bits, rounded: 2^-16 of r per
-//         axis. Their length to half a unit of at least 2^15: 2^-16 of r along the radius. x on the
-//         cylinder: 2^-18 of up to 13.6 mm. Weights cut at 2^-23 of the largest, 19 of them, each
-//         moving the centroid by at most 19.4 mm of span and the projection magnifying it by up to
-//         r / 1.116 mm: 0.2 um for the unluckiest frame.
-//  force  0.05 mN, and the multiplier's half unit of 2^-34 on the largest sum: 0.0024 mN.
-//  torque y, z: 0.5 mN*mm; arms rounded to 1/16 um: T sum |e| / 32 um; the sum to 1 count*um: T / 2;
-//         the multiplier: 2^-34 of the sum.
-//  torque x: 0.5 mN*mm, twice; force off by 0.0524 mN on 5.08 mm in y and z; point off by 1/16 um
-//         (the middle of a cut) and by what the PoC's direction is, times the force.
+// The integer kernels against the double reference (firmware/reference), within kernel_bounds.h.
 #include "support.h"
 
 #include "fix.h"
 #include "kernel.h"
+#include "kernel_bounds.h"
 #include "lin2013.h"
 #include "poc.h"
 #include "wrench.h"
 
 #include <math.h>
-
-#define DIRECTION_UM   (1.7320508075688772 * 5080 / 65536 + 5080.0 / 65536 + 0.2)
-#define POC_BOUND_UM   (0.5 * 1.7320508075688772 + 13600.0 / 262144 + DIRECTION_UM)
-#define FORCE_BOUND_MN (0.05 + 0.0024)
 
 typedef struct {
     int32_t force_nn[3];
@@ -89,7 +74,7 @@ static void check_wrench(const lin2013_result *want, double size, const gains_nn
         if (gains == &defaults) {
             raise_to(&worst.torque_yz_mnmm, error);
         }
-        assert_true(error <= 0.5 + gain_n * (size / 32 + 0.5) + sum / 17179869184.0 + 1e-6);
+        assert_true(error <= torque_yz_bound_mnmm(size, gain_n, sum));
     }
 }
 
@@ -106,7 +91,7 @@ static void check_poc(const lin2013_result *want, const int16_t poc_um[3], int32
     double force = fabs(want->force_n[1]) + fabs(want->force_n[2]);
     double error = fabs(torque_x_mnmm - want->torque_nmm[0] * 1000);
     raise_to(&worst.torque_x_mnmm, error / (1 + force));
-    assert_true(error <= 1 + 2 * 5.08 * FORCE_BOUND_MN + force * (0.0625 + DIRECTION_UM));
+    assert_true(error <= torque_x_bound_mnmm(force));
 }
 
 static void check_all_weights(const int32_t e_q4[BT_ELECTRODES], const gains_nn *gains)
