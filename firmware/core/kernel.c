@@ -52,7 +52,7 @@ uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *
     }
     if (wanted & BT_WANT_TORQUE) {
         bt_torque_yz(e_q4, &settings->gains, torque_mnmm + 1);
-        torque_mnmm[0] = flags ? BT_INVALID_I32 : bt_torque_x_derived(point.fine_yz_um_q4, force_100un);
+        torque_mnmm[0] = flags ? BT_INVALID_I32 : bt_torque_x_derived(point.lever_yz, force_100un);
     } else {
         invalidate(torque_mnmm);
     }
