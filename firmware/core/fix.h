@@ -11,9 +11,6 @@
 #define BT_DIVIDE_U32(num, den) ((num) / (den))
 #endif
 
-// For generated sums that are cheaper called than inlined.
-#define BT_NOINLINE __attribute__((noinline))
-
 // num / den for den > 0. Works on magnitudes, so that -2.5 and 2.5 both move away from zero, and
 // never adds to num, so that no input near INT64_MAX can wrap.
 static inline int64_t bt_div_round(int64_t num, int64_t den)
@@ -48,28 +45,17 @@ static inline int32_t bt_with_sign(uint32_t magnitude, int32_t sign)
     return sign < 0 ? -(int32_t)magnitude : (int32_t)magnitude;
 }
 
+static inline int bt_bit_length(uint32_t value)
+{
+    return value == 0 ? 0 : 32 - __builtin_clz(value);
+}
+
 // value / 2^bits towards minus infinity. Right-shifting a negative number is the compiler's choice;
 // every one we use copies the sign, and this line fails to compile with one that does not.
 _Static_assert(-1 >> 1 == -1, "the compiler must shift signed numbers arithmetically");
 static inline int32_t bt_shift_down(int32_t value, int bits)
 {
     return value >> bits;
-}
-
-// (hi * 2^bits + lo) / 2^bits as a magnitude with a sign, so that opposite sums give opposite results.
-// Rounded up from a remainder of `from` on: 2^(bits - 1) rounds half away from zero, 2^bits towards 0.
-static inline int32_t bt_join(int32_t hi, int32_t lo, int bits, int32_t from)
-{
-    int32_t whole = hi + bt_shift_down(lo, bits);
-    int32_t rest = lo & ((1 << bits) - 1);
-    if (whole >= 0) {
-        return whole + (rest >= from);
-    }
-    if (rest != 0) { // whole was rounded down, away from zero
-        whole++;
-        rest = (1 << bits) - rest;
-    }
-    return whole - (rest >= from);
 }
 
 // value * multiplier / 2^(32 + bits), rounded half away from zero. multiplier <= 2^30, bits 1..7.

@@ -3,269 +3,400 @@
 
 #include "fix.h"
 
-static BT_NOINLINE void moment_x(const uint32_t *v, int32_t *hi_out, int32_t *lo_out)
+// min(e, 0), without a branch.
+static inline uint32_t compressed(int32_t e)
 {
-    int32_t hi = 0;
-    int32_t lo = 0;
-    {
-        int32_t g = (int32_t)((v[0] + v[10]));
-        hi += 993 * bt_shift_down(g, 14);
-        lo += 993 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)((v[1] + v[11]));
-        hi += -2700 * bt_shift_down(g, 14);
-        lo += -2700 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)((v[2] + v[12]));
-        hi += -6200 * bt_shift_down(g, 14);
-        lo += -6200 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)((v[3] + v[13]));
-        hi += -8000 * bt_shift_down(g, 14);
-        lo += -8000 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)((v[4] + v[14]));
-        hi += -10500 * bt_shift_down(g, 14);
-        lo += -10500 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)((v[5] + v[15]));
-        hi += -13400 * bt_shift_down(g, 14);
-        lo += -13400 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)((v[7] + v[8]));
-        hi += 3031 * bt_shift_down(g, 14);
-        lo += 3031 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)(v[6]);
-        hi += 4763 * bt_shift_down(g, 14);
-        lo += 4763 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)(v[9]);
-        hi += 1299 * bt_shift_down(g, 14);
-        lo += 1299 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)(v[16]);
-        hi += -2800 * bt_shift_down(g, 14);
-        lo += -2800 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)(v[17]);
-        hi += -9800 * bt_shift_down(g, 14);
-        lo += -9800 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)(v[18]);
-        hi += -13600 * bt_shift_down(g, 14);
-        lo += -13600 * (g & 16383);
-    }
-    *hi_out = hi;
-    *lo_out = lo;
+    return (uint32_t)(e & bt_shift_down(e, 31));
 }
 
-static BT_NOINLINE void moment_y(const uint32_t *v, int32_t *hi_out, int32_t *lo_out)
+void bt_fold_linear(const int32_t v[19], bt_linear_sums *sums)
 {
-    int32_t hi = 0;
-    int32_t lo = 0;
-    {
-        int32_t g = (int32_t)((v[10] - v[0]));
-        hi += 4855 * bt_shift_down(g, 14);
-        lo += 4855 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)((v[11] - v[1]) + (v[12] - v[2]) + (v[14] - v[4]));
-        hi += 3513 * bt_shift_down(g, 14);
-        lo += 3513 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)((v[13] - v[3]) + (v[15] - v[5]));
-        hi += 4956 * bt_shift_down(g, 14);
-        lo += 4956 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)((v[8] - v[7]));
-        hi += 1950 * bt_shift_down(g, 14);
-        lo += 1950 * (g & 16383);
-    }
-    *hi_out = hi;
-    *lo_out = lo;
+    uint32_t a, b, pair, even, odd;
+    uint32_t ahead = 0;
+    uint32_t y = 0;
+    uint32_t z = 0;
+    uint32_t behind = 0;
+    uint32_t total = 0;
+    // E1/E11
+    a = compressed(v[0]);
+    b = compressed(v[10]);
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    ahead -= 993 * pair;
+    z -= 1116 * even;
+    y -= 4855 * odd;
+    total -= even;
+    // E2/E12 E3/E13 E5/E15
+    a = compressed(v[1]);
+    b = compressed(v[11]);
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    behind -= 27 * pair;
+    a = compressed(v[2]);
+    b = compressed(v[12]);
+    pair = a + b;
+    even += pair;
+    odd += b - a;
+    behind -= 62 * pair;
+    a = compressed(v[4]);
+    b = compressed(v[14]);
+    pair = a + b;
+    even += pair;
+    odd += b - a;
+    behind -= 105 * pair;
+    z -= 3670 * even;
+    y -= 3513 * odd;
+    total -= even;
+    // E4/E14 E6/E16
+    a = compressed(v[3]);
+    b = compressed(v[13]);
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    behind -= 80 * pair;
+    a = compressed(v[5]);
+    b = compressed(v[15]);
+    pair = a + b;
+    even += pair;
+    odd += b - a;
+    behind -= 134 * pair;
+    z -= 1116 * even;
+    y -= 4956 * odd;
+    total -= even;
+    // E7
+    a = compressed(v[6]);
+    pair = a;
+    even = pair;
+    ahead -= 4763 * pair;
+    z -= 2330 * even;
+    total -= even;
+    // E8/E9
+    a = compressed(v[7]);
+    b = compressed(v[8]);
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    ahead -= 3031 * pair;
+    z -= 3330 * even;
+    y -= 1950 * odd;
+    total -= even;
+    // E10
+    a = compressed(v[9]);
+    pair = a;
+    even = pair;
+    ahead -= 1299 * pair;
+    z -= 4330 * even;
+    total -= even;
+    // E17 E18 E19
+    a = compressed(v[16]);
+    pair = a;
+    even = pair;
+    behind -= 28 * pair;
+    a = compressed(v[17]);
+    pair = a;
+    even += pair;
+    behind -= 98 * pair;
+    a = compressed(v[18]);
+    pair = a;
+    even += pair;
+    behind -= 136 * pair;
+    z -= 5080 * even;
+    total -= even;
+    sums->ahead = ahead;
+    sums->y = (int32_t)y;
+    sums->z = z;
+    sums->behind = behind;
+    sums->total = total;
 }
 
-static BT_NOINLINE void moment_z(const uint32_t *v, int32_t *hi_out, int32_t *lo_out)
+void bt_fold_split(const uint32_t v[19], int up, int down, bt_split_sums *sums)
 {
-    int32_t hi = 0;
-    int32_t lo = 0;
-    {
-        int32_t g = (int32_t)((v[0] + v[10]) + (v[3] + v[13]) + (v[5] + v[15]));
-        hi += -1116 * bt_shift_down(g, 14);
-        lo += -1116 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)((v[1] + v[11]) + (v[2] + v[12]) + (v[4] + v[14]));
-        hi += -3670 * bt_shift_down(g, 14);
-        lo += -3670 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)((v[7] + v[8]));
-        hi += -3330 * bt_shift_down(g, 14);
-        lo += -3330 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)(v[6]);
-        hi += -2330 * bt_shift_down(g, 14);
-        lo += -2330 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)(v[9]);
-        hi += -4330 * bt_shift_down(g, 14);
-        lo += -4330 * (g & 16383);
-    }
-    {
-        int32_t g = (int32_t)(v[16] + v[17] + v[18]);
-        hi += -5080 * bt_shift_down(g, 14);
-        lo += -5080 * (g & 16383);
-    }
-    *hi_out = hi;
-    *lo_out = lo;
-}
-
-void bt_fold_moments(const uint32_t v[19], bt_split_sums *sums)
-{
-    moment_x(v, &sums->hi[0], &sums->lo[0]);
-    moment_y(v, &sums->hi[1], &sums->lo[1]);
-    moment_z(v, &sums->hi[2], &sums->lo[2]);
+    uint32_t a, b, pair, even, odd;
+    uint32_t ahead_hi = 0;
+    uint32_t ahead_lo = 0;
+    uint32_t y_hi = 0;
+    uint32_t y_lo = 0;
+    uint32_t z_hi = 0;
+    uint32_t z_lo = 0;
+    uint32_t behind = 0;
+    uint32_t total = 0;
+    // E1/E11
+    a = v[0] << up >> down;
+    b = v[10] << up >> down;
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    ahead_hi += 15 * pair;
+    ahead_lo += 33 * pair;
+    z_hi += 17 * even;
+    z_lo += 28 * even;
+    y_hi += 75 * odd;
+    y_lo += 55 * odd;
+    total += even;
+    // E2/E12 E3/E13 E5/E15
+    a = v[1] << up >> down;
+    b = v[11] << up >> down;
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    behind += 27 * pair;
+    a = v[2] << up >> down;
+    b = v[12] << up >> down;
+    pair = a + b;
+    even += pair;
+    odd += b - a;
+    behind += 62 * pair;
+    a = v[4] << up >> down;
+    b = v[14] << up >> down;
+    pair = a + b;
+    even += pair;
+    odd += b - a;
+    behind += 105 * pair;
+    z_hi += 57 * even;
+    z_lo += 22 * even;
+    y_hi += 54 * odd;
+    y_lo += 57 * odd;
+    total += even;
+    // E4/E14 E6/E16
+    a = v[3] << up >> down;
+    b = v[13] << up >> down;
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    behind += 80 * pair;
+    a = v[5] << up >> down;
+    b = v[15] << up >> down;
+    pair = a + b;
+    even += pair;
+    odd += b - a;
+    behind += 134 * pair;
+    z_hi += 17 * even;
+    z_lo += 28 * even;
+    y_hi += 77 * odd;
+    y_lo += 28 * odd;
+    total += even;
+    // E7
+    a = v[6] << up >> down;
+    pair = a;
+    even = pair;
+    ahead_hi += 74 * pair;
+    ahead_lo += 27 * pair;
+    z_hi += 36 * even;
+    z_lo += 26 * even;
+    total += even;
+    // E8/E9
+    a = v[7] << up >> down;
+    b = v[8] << up >> down;
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    ahead_hi += 47 * pair;
+    ahead_lo += 23 * pair;
+    z_hi += 52 * even;
+    z_lo += 2 * even;
+    y_hi += 30 * odd;
+    y_lo += 30 * odd;
+    total += even;
+    // E10
+    a = v[9] << up >> down;
+    pair = a;
+    even = pair;
+    ahead_hi += 20 * pair;
+    ahead_lo += 19 * pair;
+    z_hi += 67 * even;
+    z_lo += 42 * even;
+    total += even;
+    // E17 E18 E19
+    a = v[16] << up >> down;
+    pair = a;
+    even = pair;
+    behind += 28 * pair;
+    a = v[17] << up >> down;
+    pair = a;
+    even += pair;
+    behind += 98 * pair;
+    a = v[18] << up >> down;
+    pair = a;
+    even += pair;
+    sums->behind[0] = behind;
+    behind = 0;
+    behind += 136 * pair;
+    z_hi += 79 * even;
+    z_lo += 24 * even;
+    total += even;
+    sums->behind[1] = behind;
+    sums->ahead_hi = ahead_hi;
+    sums->ahead_lo = ahead_lo;
+    sums->y_hi = (int32_t)y_hi;
+    sums->y_lo = (int32_t)y_lo;
+    sums->z_hi = z_hi;
+    sums->z_lo = z_lo;
+    sums->total = total;
 }
 
 void bt_fold_force(const int32_t v[19], int32_t sum[3])
 {
-    sum[0] = 196 * ((v[0] + v[10])) + 500 * ((v[7] + v[8]) + v[6] + v[9]);
-    sum[1] = 956 * ((v[10] - v[0])) + 692 * ((v[11] - v[1]) + (v[12] - v[2]) + (v[14] - v[4])) + 976 * ((v[13] - v[3]) + (v[15] - v[5]));
-    sum[2] = -220 * ((v[0] + v[10]) + (v[3] + v[13]) + (v[5] + v[15])) - 722 * ((v[1] + v[11]) + (v[2] + v[12]) + (v[4] + v[14])) - 866 * ((v[7] + v[8]) + v[6] + v[9]) - 1000 * (v[16] + v[17] + v[18]);
+    int32_t a, b, pair, even, odd;
+    int32_t x = 0;
+    int32_t y = 0;
+    int32_t z = 0;
+    // E1/E11
+    a = v[0];
+    b = v[10];
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    x += 196 * even;
+    y += 956 * odd;
+    z -= 220 * even;
+    // E2/E12 E3/E13 E5/E15
+    a = v[1];
+    b = v[11];
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    a = v[2];
+    b = v[12];
+    pair = a + b;
+    even += pair;
+    odd += b - a;
+    a = v[4];
+    b = v[14];
+    pair = a + b;
+    even += pair;
+    odd += b - a;
+    y += 692 * odd;
+    z -= 722 * even;
+    // E4/E14 E6/E16
+    a = v[3];
+    b = v[13];
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    a = v[5];
+    b = v[15];
+    pair = a + b;
+    even += pair;
+    odd += b - a;
+    y += 976 * odd;
+    z -= 220 * even;
+    // E7
+    a = v[6];
+    pair = a;
+    even = pair;
+    x += 500 * even;
+    z -= 866 * even;
+    // E8/E9
+    a = v[7];
+    b = v[8];
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    x += 500 * even;
+    z -= 866 * even;
+    // E10
+    a = v[9];
+    pair = a;
+    even = pair;
+    x += 500 * even;
+    z -= 866 * even;
+    // E17 E18 E19
+    a = v[16];
+    pair = a;
+    even = pair;
+    a = v[17];
+    pair = a;
+    even += pair;
+    a = v[18];
+    pair = a;
+    even += pair;
+    z -= 1000 * even;
+    sum[0] = x;
+    sum[1] = y;
+    sum[2] = z;
 }
 
-static BT_NOINLINE void torque_y(const int32_t *v, int32_t *hi_out, int32_t *lo_out)
+void bt_fold_torque(const int32_t v[19], int32_t sum[2])
 {
-    int32_t hi = 0;
-    int32_t lo = 0;
-    {
-        int32_t g = (int32_t)((v[0] + v[10]));
-        hi += -1 * g;
-        lo += 252 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[1] + v[11]));
-        hi += -122 * g;
-        lo += 42 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[2] + v[12]));
-        hi += -280 * g;
-        lo += 58 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[3] + v[13]));
-        hi += -110 * g;
-        lo += 0 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[4] + v[14]));
-        hi += -474 * g;
-        lo += 48 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[5] + v[15]));
-        hi += -185 * g;
-        lo += 192 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[7] + v[8]));
-        hi += 59 * g;
-        lo += 254 * g;
-    }
-    {
-        int32_t g = (int32_t)(v[6]);
-        hi += 184 * g;
-        lo += 252 * g;
-    }
-    {
-        int32_t g = (int32_t)(v[9]);
-        hi += -66 * g;
-        lo += 255 * g;
-    }
-    {
-        int32_t g = (int32_t)(v[16]);
-        hi += -175 * g;
-        lo += 0 * g;
-    }
-    {
-        int32_t g = (int32_t)(v[17]);
-        hi += -613 * g;
-        lo += 128 * g;
-    }
-    {
-        int32_t g = (int32_t)(v[18]);
-        hi += -850 * g;
-        lo += 0 * g;
-    }
-    *hi_out = hi;
-    *lo_out = lo;
-}
-
-static BT_NOINLINE void torque_z(const int32_t *v, int32_t *hi_out, int32_t *lo_out)
-{
-    int32_t hi = 0;
-    int32_t lo = 0;
-    {
-        int32_t g = (int32_t)((v[10] - v[0]));
-        hi += -1 * g;
-        lo += 220 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[11] - v[1]));
-        hi += -117 * g;
-        lo += 58 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[12] - v[2]));
-        hi += -269 * g;
-        lo += 218 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[13] - v[3]));
-        hi += -488 * g;
-        lo += 0 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[14] - v[4]));
-        hi += -455 * g;
-        lo += 224 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[15] - v[5]));
-        hi += -818 * g;
-        lo += 154 * g;
-    }
-    {
-        int32_t g = (int32_t)((v[8] - v[7]));
-        hi += -61 * g;
-        lo += 16 * g;
-    }
-    *hi_out = hi;
-    *lo_out = lo;
-}
-
-void bt_fold_torque(const int32_t v[19], bt_split_sums *sums)
-{
-    sums->hi[0] = 0;
-    sums->lo[0] = 0;
-    torque_y(v, &sums->hi[1], &sums->lo[1]);
-    torque_z(v, &sums->hi[2], &sums->lo[2]);
+    int32_t a, b, pair, even, odd, x_even, x_odd;
+    int32_t y_hi = 0;
+    int32_t y_line = 0;
+    int32_t y_lo = 0;
+    int32_t z_hi = 0;
+    int32_t z_line = 0;
+    int32_t z_lo = 0;
+    // E1/E11
+    a = v[0];
+    b = v[10];
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    y_lo -= 22 * even;
+    z_hi -= odd;
+    z_lo += 74 * odd;
+    // E2/E12 E3/E13 E5/E15
+    a = v[1];
+    b = v[11];
+    x_odd = 27 * (b - a);
+    x_even = 27 * (a + b);
+    a = v[2];
+    b = v[12];
+    x_odd += 62 * (b - a);
+    x_even += 62 * (a + b);
+    a = v[4];
+    b = v[14];
+    x_odd += 105 * (b - a);
+    x_even += 105 * (a + b);
+    y_hi -= 22 * x_even;
+    y_line -= 18 * x_even;
+    z_hi -= 21 * x_odd;
+    z_line -= 20 * x_odd;
+    // E4/E14 E6/E16
+    a = v[3];
+    b = v[13];
+    x_odd = 80 * (b - a);
+    x_even = 80 * (a + b);
+    a = v[5];
+    b = v[15];
+    x_odd += 134 * (b - a);
+    x_even += 134 * (a + b);
+    y_hi -= 6 * x_even;
+    y_line -= 28 * x_even;
+    z_hi -= 30 * x_odd;
+    z_line -= 16 * x_odd;
+    // E7
+    a = v[6];
+    pair = a;
+    even = pair;
+    y_hi += 925 * even;
+    y_lo -= 19 * even;
+    // E8/E9
+    a = v[7];
+    b = v[8];
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    y_hi += 300 * even;
+    y_lo -= 12 * even;
+    z_hi -= 305 * odd;
+    z_lo += 80 * odd;
+    // E10
+    a = v[9];
+    pair = a;
+    even = pair;
+    y_hi -= 325 * even;
+    y_lo -= 5 * even;
+    // E17 E18 E19
+    a = v[16];
+    x_even = 28 * a;
+    a = v[17];
+    x_even += 98 * a;
+    a = v[18];
+    x_even += 136 * a;
+    y_hi -= 31 * x_even;
+    y_line -= 8 * x_even;
+    sum[0] = y_hi + (y_line + y_lo / 8) / 32;
+    sum[1] = z_hi + (z_line + z_lo / 8) / 32;
 }

@@ -29,35 +29,45 @@ void bt_signals_q4(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[
     }
 }
 
-static void invalidate(int32_t result[3])
+// Not initialised by a copy: the board would call memcpy for it in every frame.
+static void mark_poc(int16_t poc_um[3])
 {
-    for (int d = 0; d < 3; d++) {
-        result[d] = BT_INVALID_I32;
-    }
+    poc_um[0] = BT_INVALID_I16;
+    poc_um[1] = BT_INVALID_I16;
+    poc_um[2] = BT_INVALID_I16;
+}
+
+static void mark(int32_t result[3])
+{
+    result[0] = BT_INVALID_I32;
+    result[1] = BT_INVALID_I32;
+    result[2] = BT_INVALID_I32;
 }
 
 uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *settings, uint32_t wanted,
                    int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
 {
-    bt_point point = {{BT_INVALID_I16, BT_INVALID_I16, BT_INVALID_I16}, {0, 0}};
-    uint32_t flags = 0;
-    if (wanted & (BT_WANT_POC | BT_WANT_TORQUE)) {
-        flags = bt_poc(e_q4, settings->poc_weights, &point) ? 0 : BT_FRAME_FLAG_POC_INVALID;
-    }
-    for (int d = 0; d < 3; d++) {
-        poc_um[d] = wanted & BT_WANT_POC ? point.um[d] : BT_INVALID_I16;
+    bt_point point;
+    bool asked = wanted & (BT_WANT_POC | BT_WANT_TORQUE);
+    bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
+    if (located && wanted & BT_WANT_POC) {
+        poc_um[0] = point.um[0];
+        poc_um[1] = point.um[1];
+        poc_um[2] = point.um[2];
+    } else {
+        mark_poc(poc_um);
     }
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
         bt_force(e_q4, &settings->gains, force_100un);
     }
     if (wanted & BT_WANT_TORQUE) {
         bt_torque_yz(e_q4, &settings->gains, torque_mnmm + 1);
-        torque_mnmm[0] = flags ? BT_INVALID_I32 : bt_torque_x_derived(point.fine_yz_um_q4, force_100un);
+        torque_mnmm[0] = located ? bt_torque_x_derived(point.lever_yz, force_100un) : BT_INVALID_I32;
     } else {
-        invalidate(torque_mnmm);
+        mark(torque_mnmm);
     }
     if (!(wanted & BT_WANT_FORCE)) {
-        invalidate(force_100un);
+        mark(force_100un);
     }
-    return flags;
+    return asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0;
 }

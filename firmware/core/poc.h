@@ -13,7 +13,7 @@
 
 typedef struct {
     int16_t um[3];
-    int32_t fine_yz_um_q4[2]; // y and z in 1/16 um, for the lever of torque x
+    int32_t lever_yz[2]; // y and z in 10 mm / 2^17, for torque x
 } bt_point;
 
 // weights is an enum bt_poc_weights. Returns false, leaving point alone, when no electrode weighs

@@ -3,21 +3,20 @@
 #include "fix.h"
 #include "fold_gen.h"
 
-// sum * gain / 1.6e9 is 100 uN: 1/16 count * 1/1000 * nN. sum * gain / 1e9 is mN*mm: count * um * nN.
+// sum * gain / 1.6e9 is 100 uN: 1/16 count * 1/1000 * nN. sum * gain / 5e9 is mN*mm: 1/16 count * 3.2 um
+// * nN.
 // Multiplying by 2^bits / divisor and shifting replaces both divisions.
 #define FORCE_DIVISOR  1600000000LL
 #define FORCE_BITS     34
-#define TORQUE_DIVISOR 1000000000LL
-#define TORQUE_BITS    33
+#define TORQUE_BITS    35
+#define TORQUE_DIVISOR (16LL * 1000000000000LL / BT_FOLD_TORQUE_UNIT_NM)
 
-// The lever: 1/16 um * 100 uN is 1/160000 mN*mm; products are split at 13 bits, and 2^13 / 160000 is
-// then applied as a multiplier of 2^33.
+// The lever: 10 mm / 2^17 * 100 uN is 2^-17 mN*mm; products are split at 13 bits.
+#define LEVER_BITS       17
 #define LEVER_SPLIT_BITS 13
-#define LEVER_BITS       33
-#define LEVER_MULTIPLIER ((uint32_t)(((1ull << (LEVER_BITS + LEVER_SPLIT_BITS)) + 80000) / 160000))
+#define LEVER_MAX        (((int64_t)BT_CORE_RADIUS_UM << LEVER_BITS) / 10000 + 2)
 
 #define FORCE_MAX_100UN (BT_SUM_NORMAL_MAX_Q4_MILLI * BT_GAIN_MAX_NN / FORCE_DIVISOR + 1)
-#define FINE_MAX_UM_Q4  (16LL * BT_CORE_RADIUS_UM + 1)
 
 // The bounds below are for gains of one range, the same on both sides of 0.
 #define HAS_GAIN_RANGE(name)                                                                                 \
@@ -29,20 +28,19 @@ _Static_assert(HAS_GAIN_RANGE(TORQUE_GAIN_Y_NN) && HAS_GAIN_RANGE(TORQUE_GAIN_Z_
                "the torque gains' ranges must be that of the force gains");
 
 _Static_assert(BT_SUM_NORMAL_MAX_Q4_MILLI <= INT32_MAX, "a force sum must fit int32");
-_Static_assert(BT_FOLD_ARM_HI_MAX <= INT32_MAX && BT_FOLD_ARM_LO_MAX <= INT32_MAX,
-               "torque sums must fit int32");
 _Static_assert(((int64_t)BT_GAIN_MAX_NN << FORCE_BITS) / FORCE_DIVISOR <= 1 << 30,
                "a force gain must fit bt_scale");
 _Static_assert(((int64_t)BT_GAIN_MAX_NN << TORQUE_BITS) / TORQUE_DIVISOR <= 1 << 30,
                "a torque gain must fit bt_scale");
-_Static_assert(BT_FOLD_ARM_HI_MAX + (BT_FOLD_ARM_LO_MAX >> BT_FOLD_ARM_SPLIT_BITS) < INT32_MAX,
-               "a joined torque sum must fit int32");
-_Static_assert(1 << BT_FOLD_ARM_SPLIT_BITS == 16 * BT_FOLD_ARM_PER_UM,
-               "a joined torque sum is in count * um");
-_Static_assert(LEVER_MULTIPLIER <= 1 << 30, "the lever's factor must fit bt_scale");
-_Static_assert(2 * FINE_MAX_UM_Q4 * ((FORCE_MAX_100UN >> LEVER_SPLIT_BITS) + 1) < INT32_MAX / 2,
-               "the lever's high products must fit int32");
-_Static_assert(2 * FINE_MAX_UM_Q4 << LEVER_SPLIT_BITS < INT32_MAX, "the lever's low products must fit int32");
+_Static_assert(BT_SUM_ARM_MAX_Q4_NM / BT_FOLD_TORQUE_UNIT_NM + 2 + BT_ELECTRODES * (int64_t)BT_E_MAX_Q4
+                   <= INT32_MAX,
+               "a torque sum must fit int32, though arms be rounded to whole units");
+_Static_assert((int64_t)BT_E_MAX_Q4 *(BT_FOLD_LINE_PARTS_MAX + BT_ELECTRODES) <= INT32_MAX
+                   && (int64_t)BT_E_MAX_Q4 * BT_ELECTRODES << (BT_FOLD_ARM_BITS - 1) <= INT32_MAX,
+               "a torque sum's fractions must fit int32");
+_Static_assert(2 * LEVER_MAX * ((FORCE_MAX_100UN >> LEVER_SPLIT_BITS) + 2) < INT32_MAX,
+               "the lever's high products and what the low ones add to them must fit int32");
+_Static_assert(2 * LEVER_MAX << LEVER_SPLIT_BITS < INT32_MAX, "the lever's low products must fit int32");
 
 static int32_t multiplier(int32_t gain_nn, int bits, int64_t divisor)
 {
@@ -78,25 +76,23 @@ void bt_force(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t 
 
 void bt_torque_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t torque_mnmm[2])
 {
-    bt_split_sums sums;
-    bt_fold_torque(e_q4, &sums);
+    int32_t sum[2];
+    bt_fold_torque(e_q4, sum);
     for (int d = 0; d < 2; d++) {
-        // Signals are in 1/16 count and arms in 1/16 um: hi, split off at 2^8, is in count * um.
-        int32_t half = 1 << (BT_FOLD_ARM_SPLIT_BITS - 1);
-        int32_t sum = bt_join(sums.hi[d + 1], sums.lo[d + 1], BT_FOLD_ARM_SPLIT_BITS, half);
-        torque_mnmm[d] = scale(sum, gains->torque[d], TORQUE_BITS);
+        torque_mnmm[d] = scale(sum[d], gains->torque[d], TORQUE_BITS);
     }
 }
 
-int32_t bt_torque_x_derived(const int32_t poc_yz_um_q4[2], const int32_t force_100un[3])
+int32_t bt_torque_x_derived(const int32_t lever_yz[2], const int32_t force_100un[3])
 {
-    int32_t mask = (1 << LEVER_SPLIT_BITS) - 1;
-    int32_t y = poc_yz_um_q4[0];
-    int32_t z = poc_yz_um_q4[1];
-    int32_t fy = force_100un[1];
-    int32_t fz = force_100un[2];
-    int32_t high = y * bt_shift_down(fz, LEVER_SPLIT_BITS) - z * bt_shift_down(fy, LEVER_SPLIT_BITS);
-    int32_t low = y * (fz & mask) - z * (fy & mask);
-    int32_t lever = bt_join(high, low, LEVER_SPLIT_BITS, 1 << (LEVER_SPLIT_BITS - 1));
-    return bt_scale(lever, LEVER_MULTIPLIER, LEVER_BITS - 32);
+    int32_t split = 1 << LEVER_SPLIT_BITS;
+    int32_t y = lever_yz[0];
+    int32_t z = lever_yz[1];
+    int32_t fy_high = force_100un[1] / split; // towards 0, so that mirrored signals give mirrored torques
+    int32_t fz_high = force_100un[2] / split;
+    int32_t fy_low = force_100un[1] - fy_high * split;
+    int32_t fz_low = force_100un[2] - fz_high * split;
+    int32_t lever = y * fz_high - z * fy_high + (y * fz_low - z * fy_low) / split;
+    uint32_t half = 1u << (LEVER_BITS - LEVER_SPLIT_BITS - 1);
+    return bt_with_sign((bt_abs32(lever) + half) >> (LEVER_BITS - LEVER_SPLIT_BITS), lever);
 }

@@ -14,7 +14,7 @@
 // Gains as the sums are multiplied by them, worked out once per change of settings.
 typedef struct {
     int32_t force[3];  // 100 uN per (1/16 count * 1/1000), times 2^34
-    int32_t torque[2]; // y, z: mN*mm per (count * um), times 2^33
+    int32_t torque[2]; // y, z: mN*mm per BT_FOLD_TORQUE_UNIT_NM of 1/16 count, times 2^35
 } bt_gains;
 
 #define BT_GAIN_MAX_NN BT_SETTING_FORCE_GAIN_X_NN_MAX // and every other gain's, see wrench.c
@@ -29,6 +29,6 @@ void bt_torque_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int3
 
 // Torque x from the lever, in mN*mm: (c x F)_x. Only E8 and E9 have any moment arm about x, so
 // Eq 4 cannot measure it; what is published is this derived value, and it is flagged so.
-int32_t bt_torque_x_derived(const int32_t poc_yz_um_q4[2], const int32_t force_100un[3]);
+int32_t bt_torque_x_derived(const int32_t lever_yz[2], const int32_t force_100un[3]);
 
 #endif

@@ -104,20 +104,6 @@ static void scaling_is_a_rounded_division(void **state)
     }
 }
 
-static void joining_two_parts_rounds_or_cuts_their_sum(void **state)
-{
-    (void)state;
-    uint64_t seed = 32;
-    for (int k = 0; k < 300000; k++) {
-        int bits = 4 + k % 11;
-        int32_t hi = (int32_t)(random_range(&seed, -(1 << 29), 1 << 29) / (1 << k % 30));
-        int32_t lo = (int32_t)(random_range(&seed, -(1 << 30), 1 << 30) / (1 << k % 31));
-        int64_t sum = (int64_t)hi * (1 << bits) + lo;
-        assert_true(bt_join(hi, lo, bits, 1 << (bits - 1)) == bt_div_round(sum, 1 << bits));
-        assert_true(bt_join(hi, lo, bits, 1 << bits) == sum / (1 << bits)); // C cuts towards zero
-    }
-}
-
 static void small_divisions_round_to_the_nearest(void **state)
 {
     (void)state;
@@ -140,7 +126,6 @@ int main(void)
         cmocka_unit_test(rounding_is_odd),
         cmocka_unit_test(magnitudes_hold_at_the_ends),
         cmocka_unit_test(scaling_is_a_rounded_division),
-        cmocka_unit_test(joining_two_parts_rounds_or_cuts_their_sum),
         cmocka_unit_test(small_divisions_round_to_the_nearest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -198,7 +198,7 @@ static void assert_poc_refused(const int32_t e[BT_ELECTRODES], int weights)
         assert_int_equal(out.poc_um[d], INT16_MIN);
     }
     assert_false(bt_poc(e, weights, &point));
-    assert_true(point.um[0] == 11 && point.um[1] == 22 && point.um[2] == 33 && point.fine_yz_um_q4[0] == 44);
+    assert_true(point.um[0] == 11 && point.um[1] == 22 && point.um[2] == 33 && point.lever_yz[0] == 44);
 }
 
 static void no_signal_has_no_point_of_contact(void **state)

@@ -1,9 +1,12 @@
-// The integer square roots, the core's and the gold kernel's, against bisection, and around every kind of
-// square.
+// The gold kernel's integer square root against bisection, and around every kind of square; the core's
+// reciprocal of one against double.
 #include "support.h"
 
 #include "gold.h"
-#include "isqrt.h"
+#include "root.h"
+#include "sensor_gen.h"
+
+#include <math.h>
 
 // Bisection on r <= n / r: no squaring, so nothing can overflow.
 static uint32_t bisected(uint64_t n)
@@ -47,22 +50,25 @@ static void squares_and_their_neighbours_are_exact(void **state)
     }
 }
 
-// The largest root of 32 bits is 65535: every root and its neighbours, then both sides of random n.
-static void every_32_bit_root_is_exact(void **state)
+// The core's 1 / sqrt, at every entry of its table, next to it, in the middle and anywhere.
+static void one_over_a_root_is_as_near_as_its_header_says(void **state)
 {
     (void)state;
     uint64_t seed = 4;
-    for (uint32_t k = 1; k <= 65535; k++) {
-        assert_int_equal(bt_isqrt32(k * k), k);
-        assert_int_equal(bt_isqrt32(k * k - 1), k - 1);
-        assert_int_equal(bt_isqrt32(k * k + 2 * k), k);
+    double share = BT_CORE_RADIUS_UM / (2.0 * BT_ROOT_UM_FACTOR);
+    double worst = 0;
+    for (int64_t k = 0; k < 2000000; k++) {
+        int64_t at = (1 << 30) + (k / 6 << BT_ROOT_STEP_BITS);
+        static const int64_t near[5] = {0, 1, -1, 1 << (BT_ROOT_STEP_BITS - 1), 3 << (BT_ROOT_STEP_BITS - 2)};
+        int64_t q = k % 6 < 5 ? at + near[k % 6] : UINT32_MAX - k;
+        q = q < 1 << 30 || q > UINT32_MAX ? (int64_t)((random_u64(&seed) >> 32) | 1u << 30) : q;
+        double want = share * 4294967296.0 / sqrt((double)q);
+        double error = fabs(bt_root_inverse((uint32_t)q) - want);
+        assert_true(error <= 1 + want * 5.8e-6); // 2^-17.4
+        worst = error / want > worst ? error / want : worst;
     }
-    assert_int_equal(bt_isqrt32(0), 0);
-    assert_int_equal(bt_isqrt32(UINT32_MAX), 65535);
-    for (int k = 0; k < 200000; k++) {
-        uint32_t n = (uint32_t)random_u64(&seed);
-        assert_int_equal(bt_isqrt32(n), bisected(n));
-    }
+    print_message("1 / sqrt: off by at most %.2e\n", worst);
+    assert_true(worst <= 1.0 / (1 << 16));
 }
 
 static void the_top_of_the_range_is_exact(void **state)
@@ -95,7 +101,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(squares_and_their_neighbours_are_exact),
-        cmocka_unit_test(every_32_bit_root_is_exact),
+        cmocka_unit_test(one_over_a_root_is_as_near_as_its_header_says),
         cmocka_unit_test(the_top_of_the_range_is_exact),
         cmocka_unit_test(any_number_agrees_with_bisection),
     };
