@@ -107,6 +107,9 @@ class IntegerDomain:
             return self.modulo(x, b, guard)[0]
         if op == "&" and isinstance(b, int) and b & (b + 1) == 0:
             return self.modulo(x, b.bit_length(), guard)[1]
+        if op == "&" and kind.signed and self.parts.get((x.term.get_id(), 0, kind.bits - 1), (None,))[0] is b:
+            # The sign, copied into every bit, keeps all of a negative number and nothing of others.
+            return Number(z3.If(x.term < 0, x.term, 0), min(x.low, 0), min(x.high, 0))
         if op in ("/", "%"):
             return self.divide(kind, x, y, guard)[op == "%"]
         if op == "<<":

@@ -1,14 +1,17 @@
 """Exact integer linear forms: what a sum over the electrodes is, and how large it and its parts can be.
 
-A form is a sum of known multiples of atoms. An atom is an input, or the high or the low part of a form
-that was split by a shift or a mask. Expanding the low parts (low = form - 2^bits high) decides equality
-of two sums exactly, as polynomials; the extreme values of a form over the box of its atoms are sums of
-|coefficient| times range, an L1 norm, and are reached when the atoms are inputs.
+A form is a sum of known multiples of atoms. An atom is an input, the compressed part min(e, 0) of one,
+the high or the low part of a form that was split by a shift or a mask, or what a division left over.
+Expanding the low parts (low = form - 2^bits high) decides equality of two sums exactly, as polynomials;
+the extreme values of a form over the box of its atoms are sums of |coefficient| times range, an L1 norm,
+and are reached when the atoms are inputs.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 from .cnumbers import CType, Unsupported
@@ -31,10 +34,14 @@ class Atom:
     of: Form | None = None
     bits: int = 0
     is_low: bool = False
+    is_rest: bool = False
+
+
+Rational = int | Fraction  # divisions leave fractions; every form's value still is a whole number
 
 
 class Form:
-    def __init__(self, terms: dict[Atom, int], constant: int = 0) -> None:
+    def __init__(self, terms: dict[Atom, Rational], constant: Rational = 0) -> None:
         self.terms = {atom: c for atom, c in terms.items() if c}
         self.constant = constant
         self.key = (frozenset(self.terms.items()), constant)
@@ -45,19 +52,19 @@ class Form:
     def __hash__(self) -> int:
         return hash(self.key)
 
-    def __add__(self, other: Form | int) -> Form:
-        if isinstance(other, int):
+    def __add__(self, other: Form | Rational) -> Form:
+        if not isinstance(other, Form):
             return Form(self.terms, self.constant + other)
         terms = dict(self.terms)
         for atom, c in other.terms.items():
             terms[atom] = terms.get(atom, 0) + c
         return Form(terms, self.constant + other.constant)
 
-    def __mul__(self, factor: int) -> Form:
+    def __mul__(self, factor: Rational) -> Form:
         return Form({atom: c * factor for atom, c in self.terms.items()}, self.constant * factor)
 
-    def __sub__(self, other: Form | int) -> Form:
-        return self + (-other if isinstance(other, int) else other * -1)
+    def __sub__(self, other: Form | Rational) -> Form:
+        return self + (other * -1)
 
     def __repr__(self) -> str:
         text = " + ".join(f"{c}*{atom.name}" for atom, c in self.terms.items())
@@ -66,7 +73,8 @@ class Form:
     def extreme(self, sign: int) -> tuple[int, dict[str, int]]:
         """The largest (sign 1) or smallest (-1) value over the box, and where it is taken."""
         at = {atom.name: atom.high if c * sign > 0 else atom.low for atom, c in self.terms.items()}
-        return self.constant + sum(c * at[atom.name] for atom, c in self.terms.items()), at
+        value = self.constant + sum(c * at[atom.name] for atom, c in self.terms.items())
+        return math.floor(value) if sign > 0 else math.ceil(value), at
 
     @property
     def low(self) -> int:
@@ -90,16 +98,21 @@ class Form:
             whole = atom.of.expanded()
             # The same number may have been split in two ways of writing it: name parts by what they are of.
             high = Atom(f"high{atom.bits}({sorted_text(whole)})", 0, 0)
-            out = out + (whole * c - Form({high: c << atom.bits}) if atom.is_low else Form({high: c}))
+            out = out + (whole * c - Form({high: c * (1 << atom.bits)}) if atom.is_low else Form({high: c}))
         return out
 
-    def coefficients(self, names: list[str]) -> list[int]:
-        """Of the expanded form, in that order; anything else in it is refused."""
+    def coefficients(self, names: list[str], *, cut: Rational = 0) -> list[Rational]:
+        """Of the expanded form, in that order. What divisions left over may add up to less than ``cut``;
+        anything else besides the names is refused."""
         expanded = self.expanded()
-        by_name = {atom.name: c for atom, c in expanded.terms.items()}
+        rests = [(atom, c) for atom, c in expanded.terms.items() if atom.is_rest]
+        by_name = {atom.name: c for atom, c in expanded.terms.items() if not atom.is_rest}
         strange = set(by_name) - set(names)
         if strange or expanded.constant:
             raise ValueError(f"not a sum over the inputs: {expanded.constant} and {sorted(strange)[:3]} are left")
+        lost = sum((Fraction(max(c, -c)) * max(-atom.low, atom.high) for atom, c in rests), Fraction(0))
+        if rests and lost >= cut:
+            raise ValueError(f"divisions cut {cut} or more")
         return [by_name.get(name, 0) for name in names]
 
 
@@ -149,10 +162,17 @@ class LinearDomain:
             return self.signed(form * factor, kind, "a product")
         if op in ("<<", ">>", "&") and isinstance(b, int) and isinstance(a, Form):
             return self.split(op, kind, a, b)
+        if op == "/" and isinstance(b, int) and b > 0:
+            return self.divide(kind, a, b)
+        if op == "&" and kind.signed and b == self.split(">>", kind, a, kind.bits - 1):
+            # The sign, copied into every bit, keeps all of a negative number and nothing of others.
+            return Form({Atom(f"min({sorted_text(a)},0)", min(a.low, 0), min(a.high, 0)): 1})
         raise Unsupported(f"{op} of signals is not linear")
 
     def split(self, op: str, kind: CType, a: Form, b: int) -> Form:
         self.checked(a, kind, "what is split")
+        if op in ("<<", ">>") and b == 0:
+            return a
         if op == "<<":
             if kind.signed and a.low < 0:
                 raise Overflow("a negative number shifted to the left", a.extreme(-1)[1])
@@ -163,6 +183,12 @@ class LinearDomain:
             raise Unsupported(f"a mask of {b:#x}")
         bits = b.bit_length()
         return Form({Atom(f"low{bits}({a})", 0, b, a, bits, True): 1})
+
+    def divide(self, kind: CType, a: Form, b: int) -> Form:
+        """Towards 0: a = b q + rest, where the rest has the sign of a."""
+        self.checked(a, kind, "what is divided")
+        rest = Atom(f"rest{b}({a})", -(b - 1) if a.low < 0 else 0, b - 1 if a.high > 0 else 0, is_rest=True)
+        return (a - Form({rest: 1})) * Fraction(1, b)
 
     def convert(self, x: Any, source: CType, target: CType, guard: Any) -> Any:
         if target.signed or target.bits > source.bits:

@@ -8,7 +8,7 @@ from functools import cache
 
 from .cnumbers import Unsupported
 from .machine import Machine
-from .source import ROOT, parse
+from .source import ROOT, parse, run_c
 from .storage import Value
 
 if sys.version_info >= (3, 11):
@@ -55,3 +55,10 @@ def constants(include: str, *names: str) -> list[int]:
     if not all(isinstance(value, Value) and isinstance(value.x, int) for value in values):
         raise Unsupported(f"{names} are not all constant")
     return [value.x for value in values]
+
+
+def doubles(include: str, *names: str) -> list[float]:
+    """What expressions of a header are worth as doubles: asked of a compiled program."""
+    prints = "".join(f'    printf("%.17g\\n", (double)({name}));\n' for name in names)
+    text = f'#include <stdio.h>\n#include "{include}"\nint main(void)\n{{\n{prints}    return 0;\n}}\n'
+    return [float(line) for line in run_c(text, (ROOT / "tests/core",)).split()]
