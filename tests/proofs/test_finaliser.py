@@ -158,7 +158,9 @@ def test_a_wrong_factor_and_one_bit_less_are_too_far_off(gappa: str, changes: di
     """Gappa's bound grows beyond what is claimed; the constants it reads are the ones that matter."""
     text = script(**changes)
     if "um_factor" in changes:  # the error then is the factor's own: no longer a small rest of the identity
-        text = text.replace("um - 5080 * te ->", f"um - 5080 * te -> 5080 * t * (1 / {UM_FACTOR}) +", 1)
+        text = changed(
+            text, f"um - {RADIUS} * te ->", f"um - {RADIUS} * te -> {RADIUS} * t * (1 + inverse_error) / {UM_FACTOR} +"
+        )
     low, high = interval(run(gappa, text), "um - ")
     direction_um, weights_um = doubles("kernel_bounds.h", "DIRECTION_UM", "0.28")
     assert max(-low, high) > 0.5 + direction_um - weights_um
