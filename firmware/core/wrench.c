@@ -61,8 +61,7 @@ bt_gains bt_gains_from(const int32_t force_nn[3], const int32_t torque_nn[2])
 
 static int32_t scale(int32_t sum, int32_t gain, int bits)
 {
-    int32_t scaled = bt_scale(sum, bt_abs32(gain), bits - 32);
-    return gain < 0 ? -scaled : scaled;
+    return bt_with_sign(bt_scale(bt_abs32(sum), bt_abs32(gain), bits - 32), sum ^ gain);
 }
 
 void bt_force(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t force_100un[3])
