@@ -3,9 +3,9 @@
 #include "fix.h"
 #include "fold_gen.h"
 
-// sum * gain / 1.6e9 is 100 uN: 1/16 count * 1/1000 * nN. sum * gain / 5e9 is mN*mm: 1/16 count * 3.2 um
-// * nN.
-// Multiplying by 2^bits / divisor and shifting replaces both divisions.
+// sum * gain / FORCE_DIVISOR is 100 uN: 1/16 count * 1/1000 * nN. sum * gain / TORQUE_DIVISOR is mN*mm:
+// 1/16 count * BT_FOLD_TORQUE_UNIT_NM * nN. Multiplying by 2^bits / divisor and shifting replaces both
+// divisions.
 #define FORCE_DIVISOR  1600000000LL
 #define FORCE_BITS     34
 #define TORQUE_BITS    35
