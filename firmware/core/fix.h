@@ -40,16 +40,6 @@ static inline uint32_t bt_abs32(int32_t value)
     return value < 0 ? 0 - (uint32_t)value : (uint32_t)value;
 }
 
-static inline int32_t bt_with_sign(uint32_t magnitude, int32_t sign)
-{
-    return sign < 0 ? -(int32_t)magnitude : (int32_t)magnitude;
-}
-
-static inline int bt_bit_length(uint32_t value)
-{
-    return value == 0 ? 0 : 32 - __builtin_clz(value);
-}
-
 // value / 2^bits towards minus infinity. Right-shifting a negative number is the compiler's choice;
 // every one we use copies the sign, and this line fails to compile with one that does not.
 _Static_assert(-1 >> 1 == -1, "the compiler must shift signed numbers arithmetically");
@@ -58,19 +48,29 @@ static inline int32_t bt_shift_down(int32_t value, int bits)
     return value >> bits;
 }
 
-// value * multiplier / 2^(32 + bits), rounded half away from zero. multiplier <= 2^30, bits 1..7.
-// Four 16-bit products: a core without a long multiply would call a 64-bit routine instead. The sum
-// of the middle products stays below 2^32 because |value| < 2^31 and multiplier <= 2^30.
-static inline int32_t bt_scale(int32_t value, uint32_t multiplier, int bits)
+// Without a branch. magnitude < 2^31.
+static inline int32_t bt_with_sign(uint32_t magnitude, int32_t sign)
 {
-    uint32_t magnitude = bt_abs32(value);
+    int32_t mask = bt_shift_down(sign, 31);
+    return ((int32_t)magnitude ^ mask) - mask;
+}
+
+static inline int bt_bit_length(uint32_t value)
+{
+    return value == 0 ? 0 : 32 - __builtin_clz(value);
+}
+
+// magnitude * multiplier / 2^(32 + bits), rounded half up. magnitude < 2^31, bits 1..7; the multiplier,
+// at most 2^30, comes in halves.
+// Four 16-bit products: a core without a long multiply would call a 64-bit routine instead. The sum
+// of the middle products stays below 2^32 because magnitude < 2^31 and multiplier <= 2^30.
+static inline uint32_t bt_scale(uint32_t magnitude, uint32_t m_high, uint32_t m_low, int bits)
+{
     uint32_t high = magnitude >> 16;
     uint32_t low = magnitude & 0xFFFF;
-    uint32_t m_high = multiplier >> 16;
-    uint32_t m_low = multiplier & 0xFFFF;
     uint32_t middle = high * m_low + low * m_high + (low * m_low >> 16);
     uint32_t top = high * m_high + (middle >> 16);
-    return bt_with_sign((top + (1u << (bits - 1))) >> bits, value);
+    return (top + (1u << (bits - 1))) >> bits;
 }
 
 #endif

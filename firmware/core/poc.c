@@ -137,7 +137,15 @@ static int16_t ratio_um(const moments *m)
 
 #define DIRECTION_BITS 16 // a direction's components
 
-// The direction n[first..2] put out to the core's radius.
+_Static_assert(2001 * (int64_t)BT_CORE_RADIUS_UM < 4000LL * BT_ROOT_UM_FACTOR,
+               "a component at the radius must stay below 2^32, though the table be off by 2^-14");
+_Static_assert(((int64_t)BT_ROOT_UM_FACTOR << 20) + (1 << BT_ROOT_UM_BITS) <= UINT32_MAX, "um must fit");
+_Static_assert(((int64_t)BT_ROOT_LEVER_FACTOR << 17) + BT_ROOT_LEVER_FACTOR + (1 << BT_ROOT_LEVER_BITS)
+                   <= UINT32_MAX,
+               "the lever must fit");
+
+// The direction n[first..2] put out to the core's radius. The largest component is at least 2^15, so that
+// a quarter of the length's square is at least 2^28.
 static void to_radius(const int32_t n[3], int first, bt_point *point)
 {
     uint32_t component[3];

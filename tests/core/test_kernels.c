@@ -324,33 +324,6 @@ static void torque_x_is_good_to_2_mnmm_rms_up_to_40_n(void **state)
     }
 }
 
-// Whatever is asked for is what comes with everything; the rest is marked, never left or made up.
-static void what_nobody_wants_is_invalid(void **state)
-{
-    (void)state;
-    uint64_t seed = 10;
-    for (int k = 0; k < 3000; k++) {
-        int32_t e[BT_ELECTRODES];
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            e[i] = k % 20 == 0 ? 0 : (int32_t)random_range(&seed, -8000, 2000);
-        }
-        bt_kernel_settings settings = {.poc_weights = k % 3,
-                                       .gains = bt_gains_from(defaults.force_nn, defaults.torque_nn)};
-        int16_t all_poc[3], poc[3];
-        int32_t all_force[3], all_torque[3], force[3], torque[3];
-        uint32_t all_flags = bt_kernel(e, &settings, BT_WANT_ALL, all_poc, all_force, all_torque);
-        for (uint32_t wanted = 0; wanted <= BT_WANT_ALL; wanted++) {
-            uint32_t flags = bt_kernel(e, &settings, wanted, poc, force, torque);
-            assert_int_equal(flags, wanted & (BT_WANT_POC | BT_WANT_TORQUE) ? all_flags : 0);
-            for (int d = 0; d < 3; d++) {
-                assert_int_equal(poc[d], wanted & BT_WANT_POC ? all_poc[d] : BT_INVALID_I16);
-                assert_int_equal(force[d], wanted & BT_WANT_FORCE ? all_force[d] : BT_INVALID_I32);
-                assert_int_equal(torque[d], wanted & BT_WANT_TORQUE ? all_torque[d] : BT_INVALID_I32);
-            }
-        }
-    }
-}
-
 // The bounds above are what can be proved frame by frame; this is what the headers promise.
 static void the_worst_of_all_is_within_what_is_promised(void **state)
 {
@@ -380,7 +353,6 @@ int main(void)
         cmocka_unit_test(contacts_at_the_seam_with_square_weights),
         cmocka_unit_test(random_frames_in_six_sizes),
         cmocka_unit_test(torque_x_is_good_to_2_mnmm_rms_up_to_40_n),
-        cmocka_unit_test(what_nobody_wants_is_invalid),
         cmocka_unit_test(the_worst_of_all_is_within_what_is_promised),
     };
     return cmocka_run_group_tests(tests, NULL, print_worst);

@@ -188,6 +188,32 @@ static void mirrored_signals_give_exactly_mirrored_results(void **state)
     }
 }
 
+// Whatever is asked for is what comes with everything; the rest is marked, never left or made up.
+static void what_nobody_wants_is_invalid(void **state)
+{
+    (void)state;
+    uint64_t seed = 10;
+    for (int k = 0; k < 3000; k++) {
+        int32_t e[BT_ELECTRODES];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            e[i] = k % 20 == 0 ? 0 : (int32_t)random_range(&seed, -8000, 2000);
+        }
+        bt_kernel_settings settings = {.poc_weights = k % 3, .gains = bt_gains_from(force_nn, torque_nn)};
+        int16_t all_poc[3], poc[3];
+        int32_t all_force[3], all_torque[3], force[3], torque[3];
+        uint32_t all_flags = bt_kernel(e, &settings, BT_WANT_ALL, all_poc, all_force, all_torque);
+        for (uint32_t wanted = 0; wanted <= BT_WANT_ALL; wanted++) {
+            uint32_t flags = bt_kernel(e, &settings, wanted, poc, force, torque);
+            assert_int_equal(flags, wanted & (BT_WANT_POC | BT_WANT_TORQUE) ? all_flags : 0);
+            for (int d = 0; d < 3; d++) {
+                assert_int_equal(poc[d], wanted & BT_WANT_POC ? all_poc[d] : BT_INVALID_I16);
+                assert_int_equal(force[d], wanted & BT_WANT_FORCE ? all_force[d] : BT_INVALID_I32);
+                assert_int_equal(torque[d], wanted & BT_WANT_TORQUE ? all_torque[d] : BT_INVALID_I32);
+            }
+        }
+    }
+}
+
 static void assert_poc_refused(const int32_t e[BT_ELECTRODES], int weights)
 {
     bt_point point = {{11, 22, 33}, {44, 55}};
@@ -257,6 +283,7 @@ int main(void)
         cmocka_unit_test(force_sums_worked_by_hand),
         cmocka_unit_test(torque_of_a_side_electrode_worked_by_hand),
         cmocka_unit_test(many_frames_at_once_are_the_same_frames),
+        cmocka_unit_test(what_nobody_wants_is_invalid),
         cmocka_unit_test(mirrored_signals_give_exactly_mirrored_results),
         cmocka_unit_test(no_signal_has_no_point_of_contact),
         cmocka_unit_test(bulges_alone_have_no_point_of_contact_by_compression),

@@ -77,8 +77,8 @@ def test_core_and_reference_meet_the_formulas_on_any_counts(counts, tare_q4, wei
     board = on_board(counts, tare_q4 / 16, settings_with(weights))
     within(board.poc_mm, poc, 1e3, POC_BOUND_UM, norm=True)
     within(board.force_n, force, 1e3, FORCE_BOUND_MN, norm=False)
-    # Half a mN*mm, and arms known to 1/32 um on up to 19 x 4095 counts; x: the PoC's error times force.
-    arms = 0.5 + GAINS["torque"].max() * 19 * 4095 / 32
+    # Half a mN*mm, and arms known to 1/160 um on up to 19 x 4095 counts; x: the PoC's error times force.
+    arms = 0.5 + GAINS["torque"].max() * (0.4 + 19 * 4095 / 160)
     lever = 1.6 + np.abs(force[:, 1:]).sum(axis=1).max() * 0.6
     within(board.torque_nmm, torque, 1, max(arms, lever) / 1000, norm=False)
 

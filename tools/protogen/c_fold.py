@@ -107,10 +107,10 @@ def title(line: Line) -> str:
     return f"    // {' '.join(names)}"
 
 
-def load(line: Line, member: tuple[int, int | None, int], k: int, form: str, kind: str) -> list[str]:
+def load(line: Line, member: tuple[int, int | None, int], k: int, form: str) -> list[str]:
     """Reads one pair or single into even (and odd), summing up along the line."""
     a, b, _ = member
-    out = [f"    {kind}a = {form.format(f'v[{a}]')};"] if k == 0 else [f"    a = {form.format(f'v[{a}]')};"]
+    out = [f"    a = {form.format(f'v[{a}]')};"]
     if b is None:
         return [*out, "    pair = a;", "    even = pair;" if k == 0 else "    even += pair;"]
     out += [f"    b = {form.format(f'v[{b}]')};", "    pair = a + b;"]
@@ -137,10 +137,11 @@ def moments(folding: Folding, *, split: bool) -> list[str]:
 
     used = 0
     moved = False
-    for line in folding.lines:
+    # From ahead to behind, so that only one sum of x is live at a time.
+    for line in sorted(folding.lines, key=lambda line: line.members[0][2] < 0):
         out.append(title(line))
         for k, member in enumerate(line.members):
-            out += load(line, member, k, form, "")
+            out += load(line, member, k, form)
             x = member[2]
             if x > 0:
                 out += product("ahead", x, "pair")
@@ -170,7 +171,7 @@ def force(folding: Folding) -> list[str]:
     for line in folding.lines:
         out.append(title(line))
         for k, member in enumerate(line.members):
-            out += load(line, member, k, "{}", "")
+            out += load(line, member, k, "{}")
         for d, (axis, term) in enumerate((("x", "even"), ("y", "odd"), ("z", "even"))):
             out += Sum(axis).add(line.normal[d] if d != 1 or line.mirrored else 0, term)
     return [*out, *(f"    sum[{d}] = {axis};" for d, axis in enumerate("xyz"))]
@@ -204,7 +205,7 @@ def torque(folding: Folding) -> list[str]:
         if not by_line(line):
             if len(line.members) != 1:
                 raise ValueError("sensor.toml: a line that faces along the finger has several electrodes")
-            out += load(line, line.members[0], 0, "{}", "")
+            out += load(line, line.members[0], 0, "{}")
             for axis, term, arm in zip("yz", ("even", "odd"), arms(line), strict=True):
                 if term == "even" or line.mirrored:
                     hi, lo = fraction(folding, arm)
