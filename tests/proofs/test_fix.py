@@ -64,7 +64,7 @@ CLAIMS = {
         [("magnitude", UINT), ("sign", INT)],
         lambda magnitude, sign: magnitude < 2**31,
         lambda result, magnitude, sign: result == z3.If(sign < 0, -magnitude, magnitude),
-        ("sign < 0 ?", "sign <= 0 ?"),
+        ("^ mask) - mask", "^ mask) + mask"),
     ),
     "abs": Claim(
         "bt_abs",
@@ -81,13 +81,17 @@ CLAIMS = {
         ("value < 0 ? 0 - (uint32_t)value", "value < 0 ? (uint32_t)-value"),  # undefined for the smallest number
     ),
 }
-# multiplier and value as fix.h states them. The smallest int32 is left out: its magnitude is 2^31.
+# The magnitude, the multiplier and the bits as fix.h states them.
 for _bits in range(1, 8):
     CLAIMS[f"scale_{_bits}"] = Claim(
         "bt_scale",
-        [("value", INT), ("multiplier", UINT), _bits],
-        lambda value, multiplier: z3.And(value > -(2**31), multiplier <= 2**30),
-        lambda result, value, multiplier, bits=_bits: rounded_half_away(result, value * multiplier, 1 << (32 + bits)),
+        [("magnitude", UINT), ("m_high", UINT), ("m_low", UINT), _bits],
+        lambda magnitude, m_high, m_low: z3.And(
+            magnitude < 2**31, m_low < 2**16, m_high * 65536 + m_low <= 2**30, m_high >= 0
+        ),
+        lambda result, magnitude, m_high, m_low, bits=_bits: rounded_half_away(
+            result, magnitude * (m_high * 65536 + m_low), 1 << (32 + bits)
+        ),
         ("(low * m_low >> 16)", "(low * m_low >> 17)"),
     )
 
@@ -134,7 +138,7 @@ def outside(case: Claim, assume: Callable[..., Any]) -> Claim:
     [
         ("div_round", lambda num, den: den >= 0),
         ("div_round_u32", lambda num, den: z3.And(den > 0, num <= 2**32 - den / 2)),
-        ("scale_1", lambda value, multiplier: z3.And(value > -(2**31), multiplier <= 2**32 - 1)),
+        ("scale_1", lambda magnitude, m_high, m_low: z3.And(magnitude < 2**31, m_low < 2**16, m_high < 2**16)),
         ("with_sign", lambda magnitude, sign: magnitude <= 2**31),
     ],
 )
@@ -170,18 +174,16 @@ def test_bits_and_integers_agree_on_shifts_masks_and_products() -> None:
 
     With a multiplier that is known, or z3 would have to find out how to multiply.
     """
-    for multiplier in (1, 3, 0x4000, 1 << 30):
+    for m_high, m_low in ((0, 1), (0, 3), (1, 0), (0x4000, 0)):
 
-        def claim(result: Any, value: Any, multiplier: int = multiplier) -> Any:
-            num = z3.SignExt(32, value) * multiplier
-            magnitude = z3.If(num < 0, -num, num) + (1 << 32) >> 33
-            return z3.SignExt(32, result) == z3.If(num < 0, -magnitude, magnitude)
+        def claim(result: Any, magnitude: Any, multiplier: int = m_high * 65536 + m_low) -> Any:
+            return z3.ZeroExt(32, result) == z3.LShR(z3.ZeroExt(32, magnitude) * multiplier + (1 << 32), 33)
 
         prove(
             parse(FIX),
             "bt_scale",
-            [("value", INT), multiplier, 1],
-            lambda value: value > -(2**31),
+            [("magnitude", UINT), m_high, m_low, 1],
+            lambda magnitude: z3.ULT(magnitude, 2**31),
             claim,
             domain=BitVectorDomain(),
         )

@@ -51,11 +51,13 @@ WRENCH = text_of(CORE / "wrench.c")
 HARNESS = """
 int32_t proof_force(int32_t sum, int32_t gain_nn)
 {
-    return scale(sum, multiplier(gain_nn, FORCE_BITS, FORCE_DIVISOR), FORCE_BITS);
+    bt_gain gain = multiplier(gain_nn, FORCE_BITS, FORCE_DIVISOR);
+    return scale(sum, &gain, FORCE_BITS);
 }
 int32_t proof_torque(int32_t sum, int32_t gain_nn)
 {
-    return scale(sum, multiplier(gain_nn, TORQUE_BITS, TORQUE_DIVISOR), TORQUE_BITS);
+    bt_gain gain = multiplier(gain_nn, TORQUE_BITS, TORQUE_DIVISOR);
+    return scale(sum, &gain, TORQUE_BITS);
 }
 int32_t proof_lever(int32_t y, int32_t z, int32_t fy, int32_t fz)
 {
@@ -119,7 +121,7 @@ def test_a_tighter_bound_is_refuted(which: tuple[str, int, int, int]) -> None:
 
 
 def test_a_lost_bit_of_the_multiplier_is_refuted() -> None:
-    text = changed(WRENCH, "bt_abs32(gain), bits - 32", "bt_abs32(gain) / 2 * 2, bits - 32")
+    text = changed(WRENCH, "(uint16_t)magnitude,", "(uint16_t)(magnitude / 2 * 2),")
     with pytest.raises(Refuted):
         scaled(text, *FORCE, multiplier_error=Fraction(1, 2))
 

@@ -110,6 +110,13 @@ class IntegerDomain:
         if op == "&" and kind.signed and self.parts.get((x.term.get_id(), 0, kind.bits - 1), (None,))[0] is b:
             # The sign, copied into every bit, keeps all of a negative number and nothing of others.
             return Number(z3.If(x.term < 0, x.term, 0), min(x.low, 0), min(x.high, 0))
+        if op == "^" and kind.signed and (y.low >= -1 and y.high <= 0):
+            # With 0, or with -1, which turns every bit over: -x - 1.
+            turned = Number(-x.term - 1, -x.high - 1, -x.low - 1)
+            if y.low == y.high:
+                return turned if y.low else x
+            low, high = min(x.low, turned.low), max(x.high, turned.high)
+            return Number(z3.If(y.term < 0, turned.term, x.term), low, high)
         if op in ("/", "%"):
             return self.divide(kind, x, y, guard)[op == "%"]
         if op == "<<":
