@@ -72,7 +72,7 @@ _Static_assert(LOW_BITS == 2 && BT_FOLD_X_UNIT_UM * 2 == QUARTER_X << (SPLIT_BIT
 static uint32_t squares_of(const int32_t e_q4[BT_ELECTRODES], uint32_t w[BT_ELECTRODES])
 {
     uint32_t all = 0;
-#pragma GCC unroll 19
+    BT_UNROLL
     for (int i = 0; i < BT_ELECTRODES; i++) {
         uint32_t e = (uint32_t)e_q4[i];
         w[i] = e * e;
@@ -84,7 +84,7 @@ static uint32_t squares_of(const int32_t e_q4[BT_ELECTRODES], uint32_t w[BT_ELEC
 static uint32_t compressed_squares_of(const int32_t e_q4[BT_ELECTRODES], uint32_t w[BT_ELECTRODES])
 {
     uint32_t all = 0;
-#pragma GCC unroll 19
+    BT_UNROLL
     for (int i = 0; i < BT_ELECTRODES; i++) {
         uint32_t e = (uint32_t)(e_q4[i] & bt_shift_down(e_q4[i], 31)); // min(e, 0) without a branch
         w[i] = e * e;
