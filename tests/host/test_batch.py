@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 import biotac
 from biotac import FRAME_DTYPE, RESULT_DTYPE, PocWeights, Setting
+from biotac import _wire as wire
 from biotac.batch import per_frame
 from biotac.bench import batch as bench
 from biotac.cli import main
@@ -288,6 +289,18 @@ def test_the_contestants_of_the_benchmark_agree(capsys) -> None:
     assert json.loads(capsys.readouterr().out)["frames"] == 1000
     assert main(["bench", "batch", "--frames", "1000"]) == 0
     assert "ns per frame" in capsys.readouterr().out
+
+
+def test_the_link_of_an_untouched_finger_is_measured(capsys) -> None:
+    assert main(["bench", "idle", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["saved_percent"] >= 80
+    # A FRAME a round, and a heartbeat in ten of them.
+    frame_bytes = wire.DTYPES[wire.Frame.ID].itemsize + 7
+    assert told["contact"]["bytes_per_s"] >= 100 * frame_bytes
+    assert told["rest_with_heartbeats"]["heartbeats"] >= 9 * told["rest_with_heartbeats"]["seconds"]
+    assert main(["bench", "idle"]) == 0
+    assert "fewer bytes per second" in capsys.readouterr().out
 
 
 def test_an_unknown_benchmark_is_a_wrong_argument(capsys) -> None:

@@ -7,11 +7,11 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from ..bench import batch, front, front_picture, kernels
+from ..bench import batch, front, front_picture, idle, kernels
 from ..errors import InputError
 
 NAME = "bench"
-HELP = "Measure the maths: the kernel variants' errors and cost, or whole recordings against NumPy."
+HELP = "Measure: the kernel variants' errors and cost, whole recordings against NumPy, the link of an untouched finger."
 EXAMPLE = "biotac bench kernels --counts counts.json --out front"
 BATCH_FRAMES = 200_000
 FRAMES = {"kernels": (100, 1_000_000), "batch": (batch.SINGLE_FRAMES, 10_000_000)}  # memory bounds both
@@ -25,8 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="WHAT",
         nargs="?",
         default="kernels",
-        choices=list(FRAMES),
-        help="kernels (default): every variant's errors and cost; batch: whole recordings, biotac.compute",
+        choices=[*FRAMES, "idle"],
+        help="kernels (default): every variant's errors and cost; batch: whole recordings, biotac.compute; "
+        "idle: bytes on the link at rest and in contact",
     )
     parser.add_argument(
         "--frames",
@@ -34,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help=f"kernels: per class (default {effort.frames}); batch: recording length (default {BATCH_FRAMES})",
     )
+    parser.add_argument("--source", default="press.toml", help="idle: what to play (default %(default)s)")
     climb = parser.add_argument_group("kernels")
     climb.add_argument("--restarts", type=_count, default=effort.restarts, metavar="N", help="of the hill climbing")
     climb.add_argument("--steps", type=_count, default=effort.steps, metavar="N", help="of each restart")
@@ -50,6 +52,8 @@ def _count(text: str) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Print and return 0, whatever the numbers are: they are for people to judge."""
+    if args.what == "idle":
+        return _idle(args)
     low, high = FRAMES[args.what]
     if args.frames is not None and not low <= args.frames <= high:
         raise InputError(f"--frames is {args.frames}, expected {low} to {high} for bench {args.what}")
@@ -76,6 +80,23 @@ def _write(out: Path, facts: front.Facts, *, with_picture: bool) -> None:
             front_picture.draw(facts, out / "front.png")
     except OSError as error:
         raise InputError(f"{out} cannot be written: {error.strerror}; choose another --out") from None
+
+
+def _idle(args: argparse.Namespace) -> int:
+    outcome = idle.measure(args.source)
+    if args.json:
+        print(json.dumps(asdict(outcome)))
+        return 0
+    print(f"{args.source}: {'finger time':>14} {'frames':>8} {'heartbeats':>11} {'bytes/s':>9}")
+    for name, share in (
+        ("in contact", outcome.contact),
+        ("at rest, REST_FRAMES", outcome.rest_with_frames),
+        ("at rest", outcome.rest_with_heartbeats),
+    ):
+        print(f"{name:22}{share.seconds:6.2f} s {share.frames:8} {share.heartbeats:11} {share.bytes_per_s:9.0f}")
+    print(f"at rest {outcome.saved_percent:.1f} % fewer bytes per second than in contact")
+    print("skipped: " + ", ".join(f"{name} {count}" for name, count in outcome.skipped.items()))
+    return 0
 
 
 def _batch(args: argparse.Namespace) -> int:
