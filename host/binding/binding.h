@@ -10,9 +10,9 @@
 #include "crc32.h"
 #include "framing.h"
 #include "kernel.h"
-#include "kernels.h"
 #include "lin2013.h"
 #include "tare.h"
+#include "variant_errors.h"
 
 // Compared with host/biotac/_wire.py when the module is imported.
 uint32_t bt_binding_schema_hash(void);

@@ -118,7 +118,8 @@ def table(all_facts: Facts) -> str:
         f"RMS and max over {effort['frames']} random frames of each of six classes; adv. is the worst that hill "
         f"climbing found, {effort['restarts']} restarts of {effort['steps']} steps. Host: times the shipped kernel's "
         "time, within this run. Cycles: everything wanted, the median of the counted frames (up to half of the ADC's "
-        "range) and the longest of the same frames doubled.",
+        "range) and the longest of the same frames doubled. The point's error is a distance, that of force and of "
+        "torque y, z is of the axis that is furthest off.",
     ]
     for weights in WEIGHT_NAMES.values():
         lines += ["", f"## Weights: {weights}", "", *_one_table(all_facts, weights)]

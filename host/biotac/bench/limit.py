@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Limit:
-    """RMS change over all places: um, mN, mN*mm (N*um)."""
+    """RMS change over all places, um, mN, mN*mm (N*um): of the point, and of the axis that changes most."""
 
     poc_um: float
     force_mn: float
@@ -53,10 +53,14 @@ def one_step(weights: PocWeights) -> Limit:
     changes = [_results(np.rint(c) - rest, settings) - _results(c - rest, settings) for c, rest in _presses()]
     change = np.concatenate(changes) * 1e3  # mm, N and N*mm to um, mN and mN*mm
 
-    def rms(columns: Floats) -> float:
-        return float(np.sqrt((columns**2).sum(axis=1).mean()))
+    def rms(sizes: Floats) -> float:
+        return float(np.sqrt((sizes**2).mean()))
 
-    return Limit(rms(change[:, :3]), rms(change[:, 3:6]), rms(change[:, 7:]), rms(change[:, 6:7]))
+    def furthest(columns: Floats) -> float:
+        return rms(np.abs(columns).max(axis=1))
+
+    point = rms(np.linalg.norm(change[:, :3], axis=1))
+    return Limit(point, furthest(change[:, 3:6]), furthest(change[:, 7:]), furthest(change[:, 6:7]))
 
 
 def frames_q4() -> NDArray[np.int32]:

@@ -1,10 +1,10 @@
 // How far each kernel variant is from the exact result, for the host's benchmark.
 //
 // The judge is neither of the references: sums of whole numbers in int64, exact, and the last quotient
-// or root in long double. A variant's error is the distance to it: of the point in um, of the force in mN,
-// of torque y and z, and of torque x, in mN*mm (N*um).
-#ifndef BIOTAC_KERNELS_H
-#define BIOTAC_KERNELS_H
+// or root in long double. A variant's error is what it is off by: the point's distance in um; of the force in
+// mN and of torque y and z in mN*mm (N*um), the axis that is furthest off; of torque x.
+#ifndef BIOTAC_VARIANT_ERRORS_H
+#define BIOTAC_VARIANT_ERRORS_H
 
 #include <stdint.h>
 
