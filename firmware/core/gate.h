@@ -25,7 +25,10 @@ typedef union {
     uint32_t pair[BT_LANES / 2];
 } bt_lanes;
 
-// Of a lane that never had a good word both are 0, which is no good word and adds no energy.
+// What both are of a lane that never had a good word: it adds no energy, every first word jumps from it, and
+// eight of it fit the sum of a sweep.
+#define BT_GATE_UNREAD 8191
+
 typedef struct {
     bt_lanes smooth;  // the filter's value
     bt_lanes rest;    // what it is compared with

@@ -172,8 +172,8 @@ static void serve_electrode(bt_tare *tare, unsigned i)
 {
     uint16_t mean_q3 = bt_sweep_close(&tare->sweep, i, SPAN_Q3);
     uint32_t *base_q16 = &tare->base.electrode_q16[i];
-    if (mean_q3 == 0) {
-        return; // never read
+    if (mean_q3 == BT_SWEEP_UNREAD_Q3) {
+        return;
     }
     if (tare->state == BT_TARE_STATE_CONTACT) {
         tare->energy_count2 += square(mean_q3 - (int32_t)((*base_q16 + (1 << 12)) >> 13));
