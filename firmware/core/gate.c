@@ -26,7 +26,6 @@ void bt_gate_begin(bt_gate *gate, int32_t limit_count2)
     gate->room = limit_count2;
     gate->jumped_before = gate->jumped;
     gate->jumped = 0;
-    gate->met = 0;
     gate->missing = 0;
     gate->railed = 0;
     gate->pressure_now = false;

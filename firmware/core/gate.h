@@ -35,7 +35,7 @@ typedef struct {
     int32_t room;     // energy left until the gate opens; negative once it has
     int32_t limit;    // the room that the round began with
     uint32_t unknown; // lanes without a good word so far, a bit each
-    uint32_t met;     // lanes whose first good word came in this round
+    uint32_t met;     // lanes whose first good word came and that the owner has not taken note of
     uint32_t jumped;  // lanes whose word was held back in this round
     uint32_t jumped_before;
     uint8_t missing; // electrodes of this round

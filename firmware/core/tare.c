@@ -141,6 +141,7 @@ static BT_NOINLINE void meet(bt_tare *tare)
             meet_lane(tare, lane);
         }
     }
+    tare->gate.met = 0;
 }
 
 // ---- temperature ----------------------------------------------------------------------------
