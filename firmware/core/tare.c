@@ -297,6 +297,19 @@ static BT_NOINLINE void end_sweep(bt_tare *tare, const bt_tare_settings *setting
     tare->partial = false;
 }
 
+// Nothing of a faulty round may reach a tare: the sweep starts over when it clears.
+static BT_NOINLINE void fault(bt_tare *tare)
+{
+    if (tare->state == BT_TARE_STATE_REST) {
+        bt_thermal_begin(&tare->thermal); // the tare that is frozen now holds for the temperature of now
+    }
+    tare->thermal.step_q16 = 0; // some lanes have had it: rather lost for the others than twice for these
+    tare->state = BT_TARE_STATE_FAULT;
+    tare->hits = 0;
+    tare->partial = true;
+    bt_sweep_restart(&tare->sweep);
+}
+
 // ---- a round --------------------------------------------------------------------------------
 
 void bt_tare_reset(bt_tare *tare)
@@ -336,11 +349,7 @@ void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings)
     tare->changed = false;
     tare->age_frames++;
     if (bt_tare_faulty(tare)) {
-        // Nothing of a faulty round may reach a tare: the sweep starts over when it clears.
-        tare->state = BT_TARE_STATE_FAULT;
-        tare->hits = 0;
-        tare->partial = true;
-        bt_sweep_restart(&tare->sweep);
+        fault(tare);
         return;
     }
     if (tare->gate.met != 0) {
