@@ -52,19 +52,26 @@ static inline bt_frame course_frame(emulated_finger *finger, int k)
         frame.electrode[i] = gone ? BT_INVALID_COUNT : frame.electrode[i];
     }
     frame.pdc = random_unit(&finger->seed) < 0.01 ? BT_INVALID_COUNT : frame.pdc;
-    frame.tdc = random_unit(&finger->seed) < 0.01 ? BT_INVALID_COUNT : (uint16_t)(1000 + k / 20);
-    frame.tac = random_unit(&finger->seed) < 0.01 ? BT_INVALID_COUNT : (uint16_t)(2000 + k % 7);
+    frame.tdc = (uint16_t)(random_unit(&finger->seed) < 0.01 ? BT_INVALID_COUNT : 1000 + k / 20);
+    frame.tac = (uint16_t)(random_unit(&finger->seed) < 0.01 ? BT_INVALID_COUNT : 2000 + k % 7);
     return frame;
 }
 
 static inline uint16_t course_word(const bt_frame *frame, uint8_t slot)
 {
     unsigned channel = bt_slot_channel[slot];
-    return channel == BT_CHANNEL_PAC   ? 2048
-           : channel == BT_CHANNEL_PDC ? frame->pdc
-           : channel == BT_CHANNEL_TAC ? frame->tac
-           : channel == BT_CHANNEL_TDC ? frame->tdc
-                                       : frame->electrode[channel - BT_CHANNEL_E1];
+    switch (channel) {
+    case BT_CHANNEL_PAC:
+        return 2048;
+    case BT_CHANNEL_PDC:
+        return frame->pdc;
+    case BT_CHANNEL_TAC:
+        return frame->tac;
+    case BT_CHANNEL_TDC:
+        return frame->tdc;
+    default:
+        return frame->electrode[channel - BT_CHANNEL_E1];
+    }
 }
 
 static inline bool course_away(int index, int k)
