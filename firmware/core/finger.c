@@ -53,13 +53,21 @@ static bool place(bt_finger *finger, uint8_t slot, uint16_t count)
     return false;
 }
 
+// What was left out before slot.
+static BT_NOINLINE bool fill(bt_finger *finger, uint8_t slot)
+{
+    bool touched = false;
+    while (finger->next_slot < slot) {
+        touched = place(finger, finger->next_slot++, BT_INVALID_COUNT) || touched;
+    }
+    return touched;
+}
+
 bool bt_finger_put(bt_finger *finger, uint8_t slot, uint16_t count)
 {
-    while (finger->next_slot < slot) {
-        (void)place(finger, finger->next_slot++, BT_INVALID_COUNT);
-    }
+    bool late = finger->next_slot < slot && fill(finger, slot);
     finger->next_slot = (uint8_t)(slot + 1);
-    return place(finger, slot, count);
+    return place(finger, slot, count) || late;
 }
 
 static void fall_silent(bt_finger *finger)
@@ -76,8 +84,8 @@ static void fall_silent(bt_finger *finger)
 
 bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
 {
-    while (finger->next_slot < BT_SLOTS) {
-        (void)place(finger, finger->next_slot++, BT_INVALID_COUNT);
+    if (finger->next_slot < BT_SLOTS) {
+        (void)fill(finger, BT_SLOTS);
     }
     if (finger->frame.good_words == 0) {
         fall_silent(finger);

@@ -45,7 +45,7 @@ void bt_finger_reset(bt_finger *finger, uint8_t index);
 void bt_finger_begin(bt_finger *finger, uint32_t t_us, const bt_tare_settings *settings);
 
 // The word of one slot: 0..4095 or BT_INVALID_COUNT. Slots come in order; those left out are missing.
-// Returns true in the slot in which a resting finger is first touched.
+// Returns true in the slot in which a resting finger is first touched, or in the next if that was left out.
 bool bt_finger_put(bt_finger *finger, uint8_t slot, uint16_t count);
 
 // The round is over. False when no word of it was good: the sensor is absent, and nothing else of it

@@ -4,6 +4,7 @@
 
 _Static_assert(BT_LANES % 2 == 0 && sizeof(bt_lanes) == BT_LANES * sizeof(uint16_t), "lanes go in pairs");
 _Static_assert(BT_LANES <= 32, "lanes are bits of a word");
+_Static_assert(BT_FULL_SCALE_COUNT + BT_GATE_JUMP < BT_GATE_UNREAD, "a first word must jump");
 _Static_assert(BT_ELECTRODES * BT_FULL_SCALE_COUNT * BT_FULL_SCALE_COUNT < BT_GATE_NEVER,
                "no round's energy reaches BT_GATE_NEVER");
 _Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX * 4LL < BT_GATE_NEVER, "a limit leaves room below zero");
@@ -12,6 +13,10 @@ void bt_gate_reset(bt_gate *gate)
 {
     memset(gate, 0, sizeof *gate);
     gate->unknown = (1u << BT_LANES) - 1;
+    for (unsigned i = 0; i < BT_LANES; i++) {
+        gate->smooth.lane[i] = BT_GATE_UNREAD;
+        gate->rest.lane[i] = BT_GATE_UNREAD;
+    }
     bt_gate_begin(gate, BT_GATE_NEVER);
 }
 

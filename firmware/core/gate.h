@@ -25,14 +25,17 @@ typedef union {
     uint32_t pair[BT_LANES / 2];
 } bt_lanes;
 
-// Of a lane that never had a good word both are 0, which is no good word and adds no energy.
+// What both are of a lane that never had a good word: it adds no energy, every first word jumps from it, and
+// eight of it fit the sum of a sweep.
+#define BT_GATE_UNREAD 8191
+
 typedef struct {
     bt_lanes smooth;  // the filter's value
     bt_lanes rest;    // what it is compared with
     int32_t room;     // energy left until the gate opens; negative once it has
     int32_t limit;    // the room that the round began with
     uint32_t unknown; // lanes without a good word so far, a bit each
-    uint32_t met;     // lanes whose first good word came in this round
+    uint32_t met;     // lanes whose first good word came and that the owner has not taken note of
     uint32_t jumped;  // lanes whose word was held back in this round
     uint32_t jumped_before;
     uint8_t missing; // electrodes of this round
@@ -53,7 +56,6 @@ static inline void bt_gate_begin(bt_gate *gate, int32_t limit_count2)
     gate->room = limit_count2;
     gate->jumped_before = gate->jumped;
     gate->jumped = 0;
-    gate->met = 0;
     gate->missing = 0;
     gate->railed = 0;
     gate->pressure_now = false;

@@ -14,7 +14,7 @@ typedef struct {
 
 // A sweep at rest: the sum of squared distances of each electrode's count from the mean of the eight
 // it belongs to. A slow load hardly shows in it.
-void bt_noise_add(bt_noise *noise, uint32_t deviation_count2, uint32_t setting_count2);
+void bt_noise_add(bt_noise *noise, uint32_t deviation_q6, uint32_t setting_count2);
 
 // Energy above which a round counts as touched: the setting, or three times the noise if larger.
 uint32_t bt_noise_threshold(const bt_noise *noise, uint32_t setting_count2);

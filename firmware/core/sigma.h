@@ -1,9 +1,14 @@
 // One standard deviation of the point of contact and of the force, from the noise measured at rest.
 //
-// To first order, an electrode's noise moves Eq 1's centroid by w'(e) (r_i - c) / W. With independent
-// noise of one size s on all electrodes that is s sqrt(sum w'^2 |r_i - c|^2) / W: numerics 2.4, for all
-// weights. c is the published point, which lies on the surface: of the noise it says what a user wants to
-// know, how far the point may jump, within some ten percent. The force is linear: S_d s |n_d|.
+// To first order, an electrode's noise moves Eq 1's centroid m by w'(e) (r_i - m) / W, and Eq 2 takes that to
+// the surface: of a move across the normal n it makes r / |m| times as much, of one along n nothing. On the
+// cylinder that is so of y and z, and x stays. With |m| = sum w r_i n / W and independent noise of one size s
+// on all electrodes:
+//
+//     tip        s sqrt(sum w'^2 |r_i x n|^2) r / sum w r_i n
+//     cylinder   the same in the y-z plane, and s sqrt(sum w'^2 (x_i - c_x)^2) / W along x
+//
+// n is c / r, of the published point c. The force is linear: S_d s |n_d|.
 //
 // Units: um and 100 uN, rounded to the nearest; saturates at 65534. 0xFFFF is not known.
 #ifndef BIOTAC_SIGMA_H

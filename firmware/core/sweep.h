@@ -14,9 +14,11 @@
 #define BT_SWEEP_ROUNDS 8
 #define BT_SWEEP_LANES  3 // served in one round
 
+#define BT_SWEEP_UNREAD_Q3 (BT_SWEEP_ROUNDS * BT_GATE_UNREAD)
+
 typedef struct {
     bt_lanes sum;
-    bt_lanes mean_q3;     // of each lane's latest eight rounds; 0 for a lane that was never read
+    bt_lanes mean_q3;     // of each lane's latest eight rounds; BT_SWEEP_UNREAD_Q3 for a lane never read
     bt_lanes settled_q3;  // the means that the signals have stayed near for still_sweeps
     uint8_t round;        // of the sweep, 0..BT_SWEEP_ROUNDS - 1
     uint8_t still_sweeps; // whole sweeps since the means came to rest; saturates

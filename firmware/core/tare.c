@@ -43,6 +43,10 @@ static int32_t pdc_above_rest(const bt_tare *tare)
     return tare->gate.smooth.lane[BT_LANE_PDC] - tare->gate.rest.lane[BT_LANE_PDC];
 }
 
+// More is no electrode's noise but a move, and more than any threshold.
+#define SQUARE_MAX_Q6 (BT_SETTING_CONTACT_ENERGY_COUNT2_MAX * 64u)
+_Static_assert((uint64_t)SQUARE_MAX_Q6 *BT_ELECTRODES <= UINT32_MAX, "the sum of a sweep must fit 32 bits");
+
 // The square of a difference in count^2, rounded down. Differences are below 2^16 in 1/16 count: as unsigned,
 // the square fits, and so does the sum over all electrodes.
 static uint32_t square(int32_t difference_q4)
@@ -141,6 +145,7 @@ static BT_NOINLINE void meet(bt_tare *tare)
             meet_lane(tare, lane);
         }
     }
+    tare->gate.met = 0;
 }
 
 // ---- temperature ----------------------------------------------------------------------------
@@ -172,8 +177,8 @@ static void serve_electrode(bt_tare *tare, unsigned i)
 {
     uint16_t mean_q3 = bt_sweep_close(&tare->sweep, i, SPAN_Q3);
     uint32_t *base_q16 = &tare->base.electrode_q16[i];
-    if (mean_q3 == 0) {
-        return; // never read
+    if (mean_q3 == BT_SWEEP_UNREAD_Q3) {
+        return;
     }
     if (tare->state == BT_TARE_STATE_CONTACT) {
         tare->energy_count2 += square(2 * mean_q3 - tare->electrode_q4[i]);
@@ -182,7 +187,9 @@ static void serve_electrode(bt_tare *tare, unsigned i)
         }
         return;
     }
-    tare->deviation_count2 += square(16 * tare->gate.smooth.lane[i] - 2 * mean_q3);
+    int32_t away_q3 = 8 * tare->gate.smooth.lane[i] - mean_q3;
+    uint32_t square_q6 = (uint32_t)(away_q3 * away_q3);
+    tare->deviation_q6 += square_q6 < SQUARE_MAX_Q6 ? square_q6 : SQUARE_MAX_Q6;
     if (tracks(tare)) {
         *base_q16 = bt_baseline_follow(*base_q16, (uint32_t)mean_q3 << 13, SLEW_Q16);
         use_electrode(tare, i);
@@ -279,12 +286,12 @@ static BT_NOINLINE void end_sweep(bt_tare *tare, const bt_tare_settings *setting
     if (tare->state == BT_TARE_STATE_INIT) {
         if (tare->sweep.still_sweeps >= STILL_SWEEPS) {
             // Measured before there is a threshold: a worn sensor's noise must not look like a touch.
-            bt_noise_add(&tare->noise, tare->deviation_count2, settings->contact_energy_count2);
+            bt_noise_add(&tare->noise, tare->deviation_q6, settings->contact_energy_count2);
             adopt_present(tare, BT_TARE_REASON_START);
         }
     } else if (tare->state == BT_TARE_STATE_REST && whole) {
         bt_rollback_keep(&tare->rollback, &tare->base);
-        bt_noise_add(&tare->noise, tare->deviation_count2, settings->contact_energy_count2);
+        bt_noise_add(&tare->noise, tare->deviation_q6, settings->contact_energy_count2);
     } else if (tare->state == BT_TARE_STATE_CONTACT) {
         bt_thermal_follow(&tare->thermal, settings->thermal_gain_q16);
         if (whole) {
@@ -292,8 +299,21 @@ static BT_NOINLINE void end_sweep(bt_tare *tare, const bt_tare_settings *setting
         }
     }
     tare->energy_count2 = 0;
-    tare->deviation_count2 = 0;
+    tare->deviation_q6 = 0;
     tare->partial = false;
+}
+
+// Nothing of a faulty round may reach a tare: the sweep starts over when it clears.
+static BT_NOINLINE void fault(bt_tare *tare)
+{
+    if (tare->state == BT_TARE_STATE_REST) {
+        bt_thermal_begin(&tare->thermal); // the tare that is frozen now holds for the temperature of now
+    }
+    tare->thermal.step_q16 = 0; // some lanes have had it: rather lost for the others than twice for these
+    tare->state = BT_TARE_STATE_FAULT;
+    tare->hits = 0;
+    tare->partial = true;
+    bt_sweep_restart(&tare->sweep);
 }
 
 // ---- a round --------------------------------------------------------------------------------
@@ -337,11 +357,7 @@ void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings)
     tare->changed = false;
     tare->age_frames++;
     if (bt_tare_faulty(tare)) {
-        // Nothing of a faulty round may reach a tare: the sweep starts over when it clears.
-        tare->state = BT_TARE_STATE_FAULT;
-        tare->hits = 0;
-        tare->partial = true;
-        bt_sweep_restart(&tare->sweep);
+        fault(tare);
         return;
     }
     if (tare->gate.met != 0) {

@@ -64,6 +64,48 @@ static void two_railed_electrodes_are_no_fault(void **state)
     assert_int_equal(finger.tare.state, BT_TARE_STATE_FAULT);
 }
 
+static void a_first_word_in_a_faulty_round_is_met_once_the_fault_clears(void **state)
+{
+    (void)state;
+    emulated_finger finger;
+    finger_init(&finger);
+    finger.has_pdc = false;
+    for (int k = 0; k < 50; k++) {
+        bt_frame frame = frame_without(&finger, 4, 1, BT_INVALID_COUNT);
+        (void)feed(&finger, &frame);
+    }
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+    bt_frame frame = frame_without(&finger, 8, 3, BT_INVALID_COUNT); // E5 has come, three others are gone
+    uint16_t rest = frame.electrode[4];
+    frame.electrode[4] = (uint16_t)(rest - 10); // nothing of a faulty round may reach a tare
+    (void)feed(&finger, &frame);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_FAULT);
+    assert_int_equal(finger.tare.electrode_q4[4], BT_INVALID_COUNT);
+    step(&finger);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    assert_int_equal(finger.tare.electrode_q4[4], 16 * rest);
+    assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 40), 8, 32);
+    assert_true(tare_error(&finger) == 0);
+}
+
+static void a_first_word_in_a_faulty_round_does_not_move_a_tare_from_the_host(void **state)
+{
+    (void)state;
+    emulated_finger finger;
+    finger_init(&finger);
+    bt_baseline base = {.pdc_q16 = 1300 << 16};
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        base.electrode_q16[i] = (uint32_t)(rest_count(&finger, i) - 10) << 16;
+    }
+    assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+    bt_frame frame = frame_without(&finger, 8, 3, BT_INVALID_COUNT);
+    (void)feed(&finger, &frame);
+    step(&finger);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    assert_memory_equal(&finger.tare.base, &base, sizeof base);
+    assert_int_equal(finger.tare.pdc_peak, PDC_REST - 1300);
+}
+
 static void after_a_fault_no_older_frame_makes_a_tare(void **state)
 {
     (void)state;
@@ -195,6 +237,8 @@ int main(void)
         cmocka_unit_test(a_fault_freezes_the_tare_and_release_rules_end_it),
         cmocka_unit_test(two_railed_electrodes_are_no_fault),
         cmocka_unit_test(one_faulty_frame_starts_the_history_over),
+        cmocka_unit_test(a_first_word_in_a_faulty_round_is_met_once_the_fault_clears),
+        cmocka_unit_test(a_first_word_in_a_faulty_round_does_not_move_a_tare_from_the_host),
         cmocka_unit_test(after_a_fault_no_older_frame_makes_a_tare),
         cmocka_unit_test(tare_now_is_refused_while_the_signals_move),
         cmocka_unit_test(tare_now_is_refused_before_there_are_frames),

@@ -1,0 +1,352 @@
+// The gate, word by word: what it holds back, what it lets through and in which slot, and that its energy
+// is the sum that it claims to be.
+#include "emulated_finger.h"
+
+#define LIMIT 1000
+
+// The gate's filter as a story: a word is believed when it is near the last believed one, or when the
+// round before had one that was not near either.
+typedef struct {
+    int believed; // 0: none yet
+    bool far_before;
+} lane_story;
+
+static bool good(uint16_t word)
+{
+    return word >= 1 && word <= 4089;
+}
+
+static int told(lane_story *story, uint16_t word)
+{
+    bool far = good(word) && story->believed != 0 && abs(word - story->believed) > 24;
+    if (good(word) && (!far || story->far_before)) {
+        story->believed = word;
+    }
+    story->far_before = far;
+    return story->believed;
+}
+
+// A gate whose electrodes have all read their rest once.
+static bt_gate rested_gate(const uint16_t rest[BT_ELECTRODES])
+{
+    bt_gate gate;
+    bt_gate_reset(&gate);
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        (void)bt_gate_electrode(&gate, i, rest[i]);
+    }
+    assert_int_equal(bt_gate_energy(&gate), 0);
+    return gate;
+}
+
+static uint32_t round_energy(bt_gate *gate, int32_t limit, const uint16_t word[BT_ELECTRODES])
+{
+    bt_gate_begin(gate, limit);
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        (void)bt_gate_electrode(gate, i, word[i]);
+    }
+    return bt_gate_energy(gate);
+}
+
+// ---- glitches --------------------------------------------------------------------------------------
+
+static void lone_glitches_of_any_size_reach_neither_energy_nor_means(void **state)
+{
+    (void)state;
+    uint16_t rest[BT_ELECTRODES], word[BT_ELECTRODES];
+    bt_sweep sweep;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        rest[i] = i % 2 ? 4045 : 45; // each can glitch by 4000
+    }
+    bt_gate gate = rested_gate(rest);
+    bt_sweep_restart(&sweep);
+    for (int round = 0; round < 2 * 3976; round++) {
+        memcpy(word, rest, sizeof word);
+        int glitching = round / 2 * 7 % BT_ELECTRODES;
+        int size = round % 2 ? 0 : 25 + round / 2;
+        word[glitching] = (uint16_t)(rest[glitching] + (glitching % 2 ? -size : size));
+        assert_int_equal(round_energy(&gate, LIMIT, word), 0);
+        bt_sweep_add(&sweep, &gate.smooth);
+        for (unsigned i = bt_sweep_first(&sweep); i < bt_sweep_end(&sweep) && i < BT_ELECTRODES; i++) {
+            assert_int_equal(bt_sweep_close(&sweep, i, 96), 8 * rest[i]);
+        }
+        (void)bt_sweep_next(&sweep);
+    }
+    // One count less is a word like any other.
+    word[3] = (uint16_t)(rest[3] - 24);
+    assert_int_equal(round_energy(&gate, LIMIT, word), 24 * 24);
+}
+
+static void a_glitch_on_every_electrode_at_once_is_held_back_too(void **state)
+{
+    (void)state;
+    uint64_t seed = 41;
+    uint16_t rest[BT_ELECTRODES], word[BT_ELECTRODES];
+    for (int trial = 0; trial < 1000; trial++) {
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            rest[i] = (uint16_t)random_range(&seed, 101, 4000);
+            word[i] = (uint16_t)(rest[i] - random_range(&seed, 25, 100));
+        }
+        bt_gate gate = rested_gate(rest);
+        assert_int_equal(round_energy(&gate, LIMIT, word), 0);
+        assert_int_equal(round_energy(&gate, LIMIT, rest), 0);
+        assert_int_equal(round_energy(&gate, LIMIT, word), 0); // and the next one is a new one
+        assert_true(round_energy(&gate, LIMIT, word) >= 19 * 25 * 25);
+    }
+}
+
+static void a_jump_and_a_gap_are_forgotten(void **state)
+{
+    (void)state;
+    static const uint16_t gaps[] = {BT_INVALID_COUNT, 0, 4090, 4095};
+    emulated_finger resting = resting_finger();
+    for (int k = 0; k < 4; k++) {
+        emulated_finger finger = resting;
+        const uint16_t course[] = {2000, gaps[k], 2000, gaps[k], 2000, 2000};
+        for (int round = 0; round < 6; round++) {
+            bt_frame frame = frame_without(&finger, 4, 1, course[round]);
+            assert_int_equal(feed(&finger, &frame), round == 5 ? 4 : -1);
+            assert_true(round == 5 || bt_gate_energy(&finger.tare.gate) == 0);
+        }
+        // The same with pressure.
+        finger = resting;
+        for (int round = 0; round < 6; round++) {
+            bt_frame frame = next_frame(&finger);
+            frame.pdc = course[round];
+            assert_int_equal(feed(&finger, &frame), round == 5 ? BT_LANE_PDC : -1);
+        }
+    }
+}
+
+// ---- touches ---------------------------------------------------------------------------------------
+
+static void a_step_is_seen_with_the_second_word_of_the_electrode_that_stepped(void **state)
+{
+    (void)state;
+    emulated_finger resting = resting_finger();
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        for (int size = 25; size <= 500; size += 25) {
+            emulated_finger finger = resting;
+            bt_frame frame = next_frame(&finger);
+            frame.electrode[i] = (uint16_t)(frame.electrode[i] - size);
+            assert_int_equal(feed(&finger, &frame), -1);
+            assert_int_equal(bt_gate_energy(&finger.tare.gate), 0);
+            assert_int_equal(feed(&finger, &frame), size * size > SETTING_COUNT2 ? i : -1);
+            assert_int_equal(bt_gate_energy(&finger.tare.gate), size * size);
+            assert_int_equal(feed(&finger, &frame), -1); // told once
+        }
+    }
+}
+
+static void the_slot_told_is_that_in_which_the_sum_passes_the_threshold(void **state)
+{
+    (void)state;
+    uint64_t seed = 42;
+    int seen[BT_ELECTRODES + 1] = {0};
+    emulated_finger resting = resting_finger();
+    for (int trial = 0; trial < 2000; trial++) {
+        emulated_finger finger = resting;
+        bt_frame frame = next_frame(&finger);
+        int size = (int)random_range(&seed, 4, 40);
+        int expected[2] = {-1, -1};
+        uint32_t sum[2] = {0, 0};
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            int change = (int)random_range(&seed, -size, size);
+            frame.electrode[i] = (uint16_t)(frame.electrode[i] + change);
+            for (int word = 0; word < 2; word++) {
+                sum[word] += word == 0 && abs(change) > 24 ? 0 : (uint32_t)(change * change);
+                expected[word] = expected[word] < 0 && sum[word] > SETTING_COUNT2 ? i : expected[word];
+            }
+        }
+        assert_int_equal(feed(&finger, &frame), expected[0]);
+        assert_int_equal(bt_gate_energy(&finger.tare.gate), sum[0]);
+        assert_int_equal(feed(&finger, &frame), expected[0] < 0 ? expected[1] : -1);
+        assert_int_equal(bt_gate_energy(&finger.tare.gate), sum[1]);
+        seen[expected[1] + 1]++;
+    }
+    for (int i = 0; i <= BT_ELECTRODES; i++) {
+        assert_true(i == 1 || i == 2 || seen[i] > 0); // E1 alone cannot, E1 and E2 hardly
+    }
+}
+
+static void motion_that_goes_on_is_followed_word_by_word(void **state)
+{
+    (void)state;
+    uint64_t seed = 43;
+    uint16_t word[BT_ELECTRODES];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        word[i] = 2000;
+    }
+    bt_gate gate = rested_gate(word);
+    for (int round = 0; round < 1000; round++) {
+        uint32_t energy = 0;
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            int size = (int)random_range(&seed, 25, 1500);
+            bool down = word[i] > 2589 || (word[i] > 1500 && random_unit(&seed) < 0.5);
+            word[i] = (uint16_t)(word[i] + (down ? -size : size));
+            energy += round == 0 ? 0 : (uint32_t)((word[i] - 2000) * (word[i] - 2000));
+        }
+        assert_int_equal(round_energy(&gate, BT_GATE_NEVER, word), energy);
+    }
+}
+
+static void pressure_opens_the_gate_and_leaves_the_energy_alone(void **state)
+{
+    (void)state;
+    emulated_finger resting = resting_finger();
+    for (int above = -300; above <= 300; above++) {
+        emulated_finger finger = resting;
+        finger.pdc_load = above;
+        bt_frame frame = next_frame(&finger);
+        frame.electrode[2] = (uint16_t)(frame.electrode[2] + 20);
+        int first = above > 6 && above <= 24 ? BT_LANE_PDC : -1;
+        int second = above > 24 ? BT_LANE_PDC : -1;
+        assert_int_equal(feed(&finger, &frame), first);
+        assert_int_equal(bt_gate_energy(&finger.tare.gate), 400);
+        assert_int_equal(feed(&finger, &frame), second);
+        assert_int_equal(bt_gate_energy(&finger.tare.gate), 400);
+        assert_int_equal(feed(&finger, &frame), -1);
+        assert_int_equal(finger.tare.hits, above <= 6 ? 0 : above <= 24 ? 0 : 2);
+        assert_int_equal(finger.tare.state,
+                         above > 6 && above <= 24 ? BT_TARE_STATE_CONTACT : BT_TARE_STATE_REST);
+    }
+}
+
+static void the_gate_stays_shut_where_nobody_rests(void **state)
+{
+    (void)state;
+    uint64_t seed = 44;
+    emulated_finger init, contact = touched_finger(400, 0), fault = resting_finger();
+    finger_init(&init);
+    emulated_finger *fingers[] = {&init, &contact, &fault};
+    static const uint8_t states[] = {BT_TARE_STATE_INIT, BT_TARE_STATE_CONTACT, BT_TARE_STATE_FAULT};
+    bt_frame dead = frame_without(&fault, 0, 3, 4095);
+    (void)feed(&fault, &dead);
+    for (int k = 0; k < 3; k++) {
+        for (int round = 0; round < 500; round++) {
+            bt_frame frame = next_frame(fingers[k]);
+            for (int i = k == 2 ? 3 : 0; i < BT_ELECTRODES; i++) {
+                frame.electrode[i] = (uint16_t)random_range(&seed, 1, 4089);
+            }
+            for (int i = 0; k == 2 && i < 3; i++) {
+                frame.electrode[i] = 4095;
+            }
+            frame.pdc = (uint16_t)random_range(&seed, 1, 4089);
+            assert_int_equal(fingers[k]->tare.state, states[k]);
+            assert_int_equal(feed(fingers[k], &frame), -1);
+            assert_true(fingers[k]->tare.gate.room >= 0);
+        }
+    }
+}
+
+// ---- the energy ------------------------------------------------------------------------------------
+
+static void the_energy_is_the_brute_force_sum_of_squares(void **state)
+{
+    (void)state;
+    static const uint16_t bad[] = {BT_INVALID_COUNT, 0, 4090, 4095};
+    uint64_t seed = 45;
+    uint16_t rest[BT_ELECTRODES], word[BT_ELECTRODES];
+    for (int course = 0; course < 200; course++) {
+        lane_story story[BT_ELECTRODES] = {{0, false}};
+        int reach = course % 2 ? 5000 : 60;
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            rest[i] = (uint16_t)random_range(&seed, 1, 4089);
+            word[i] = rest[i];
+            (void)told(&story[i], rest[i]);
+        }
+        bt_gate gate = rested_gate(rest);
+        for (int round = 0; round < 100; round++) {
+            uint32_t energy = 0;
+            int missing = 0, railed = 0;
+            for (int i = 0; i < BT_ELECTRODES; i++) {
+                int64_t value = random_unit(&seed) < 0.3 && good(word[i])
+                                    ? word[i]
+                                    : rest[i] + random_range(&seed, -reach, reach);
+                word[i] = (uint16_t)(value < 1 ? 1 : value > 4089 ? 4089 : value);
+                word[i] = random_unit(&seed) < 0.1 ? bad[random_range(&seed, 0, 3)] : word[i];
+                missing += word[i] == BT_INVALID_COUNT;
+                railed += !good(word[i]) && word[i] != BT_INVALID_COUNT;
+                int e = told(&story[i], word[i]) - rest[i];
+                energy += (uint32_t)(e * e);
+            }
+            assert_int_equal(round_energy(&gate, LIMIT, word), energy);
+            assert_int_equal(gate.room<0, energy> LIMIT);
+            assert_int_equal(gate.missing, missing);
+            assert_int_equal(gate.railed, railed);
+        }
+    }
+}
+
+static void nobody_waiting_means_the_same_filter(void **state)
+{
+    (void)state;
+    uint64_t seed = 46;
+    uint16_t rest[BT_ELECTRODES] = {0};
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        rest[i] = 1000;
+    }
+    bt_gate waited = rested_gate(rest), followed = waited;
+    for (int round = 0; round < 1000; round++) {
+        bt_gate_begin(&waited, LIMIT);
+        bt_gate_begin(&followed, BT_GATE_NEVER);
+        for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+            uint16_t word = (uint16_t)random_range(&seed, 960, 1040);
+            word = random_unit(&seed) < 0.1 ? BT_INVALID_COUNT : word;
+            (void)bt_gate_electrode(&waited, i, word);
+            bt_gate_follow(&followed, i, word);
+        }
+        assert_memory_equal(&waited.smooth, &followed.smooth, sizeof waited.smooth);
+        assert_int_equal(waited.jumped, followed.jumped);
+        assert_int_equal(waited.missing, followed.missing);
+    }
+}
+
+static void the_ends_of_the_range_do_not_overflow(void **state)
+{
+    (void)state;
+    static const int32_t limits[] = {50, 1000, 3 * BT_SETTING_CONTACT_ENERGY_COUNT2_MAX};
+    uint16_t low[BT_ELECTRODES], high[BT_ELECTRODES];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        low[i] = 1;
+        high[i] = 4089;
+    }
+    for (int k = 0; k < 3; k++) {
+        for (int up = 0; up < 2; up++) {
+            bt_gate gate = rested_gate(up ? low : high);
+            bt_gate_begin(&gate, limits[k]);
+            (void)bt_gate_pressure(&gate, 1, 6);
+            uint32_t full = 19u * 4088 * 4088;
+            assert_int_equal(round_energy(&gate, limits[k], up ? high : low), 0);
+            (void)bt_gate_pressure(&gate, 4089, 6);
+            assert_int_equal(round_energy(&gate, limits[k], up ? high : low), full);
+            assert_true(gate.room < 0);
+            assert_true(bt_gate_pressure(&gate, 4089, 6) < 0);
+            assert_int_equal(bt_gate_energy(&gate), full);
+            // And with the pressure first, though no slot order has it so.
+            bt_gate_begin(&gate, limits[k]);
+            assert_true(bt_gate_pressure(&gate, 4089, 6) < 0);
+            for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+                assert_true(bt_gate_electrode(&gate, i, up ? high[i] : low[i]) < 0);
+            }
+            assert_int_equal(bt_gate_energy(&gate), full);
+        }
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lone_glitches_of_any_size_reach_neither_energy_nor_means),
+        cmocka_unit_test(a_glitch_on_every_electrode_at_once_is_held_back_too),
+        cmocka_unit_test(a_jump_and_a_gap_are_forgotten),
+        cmocka_unit_test(a_step_is_seen_with_the_second_word_of_the_electrode_that_stepped),
+        cmocka_unit_test(the_slot_told_is_that_in_which_the_sum_passes_the_threshold),
+        cmocka_unit_test(motion_that_goes_on_is_followed_word_by_word),
+        cmocka_unit_test(pressure_opens_the_gate_and_leaves_the_energy_alone),
+        cmocka_unit_test(the_gate_stays_shut_where_nobody_rests),
+        cmocka_unit_test(the_energy_is_the_brute_force_sum_of_squares),
+        cmocka_unit_test(nobody_waiting_means_the_same_filter),
+        cmocka_unit_test(the_ends_of_the_range_do_not_overflow),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

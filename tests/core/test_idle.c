@@ -1,0 +1,334 @@
+// The heartbeat of an untouched finger: when it comes, what ends the silence, and what it saves.
+#include "course.h"
+
+#define FRAMES BT_STREAM_FLAG_FRAMES
+
+static uint32_t round_number;
+
+static int an_idle_session(void **state)
+{
+    (void)new_session(state);
+    round_number = 0;
+    assert_int_equal(subscribe(1, BT_QUANTITY_FLAG_POC), BT_ERROR_OK);
+    return 0;
+}
+
+// One round of finger 0 with these electrodes.
+static void play(const uint16_t electrode[BT_ELECTRODES])
+{
+    uint32_t t_us = 10000 * round_number++;
+    bt_session_begin(&session, t_us);
+    for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
+        uint16_t count[BT_MAX_FINGERS];
+        memset(count, 0xFF, sizeof count);
+        unsigned channel = bt_slot_channel[slot] - BT_CHANNEL_E1;
+        count[0] = channel < BT_ELECTRODES ? electrode[channel] : PDC_REST;
+        bt_session_slot(&session, slot, count, t_us + slot);
+    }
+    bt_session_round(&session);
+}
+
+static void play_level(int rounds, uint16_t level)
+{
+    uint16_t electrode[BT_ELECTRODES];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        electrode[i] = level;
+    }
+    for (int k = 0; k < rounds; k++) {
+        play(electrode);
+    }
+}
+
+static void set_setting(uint8_t setting, int32_t value)
+{
+    uint8_t payload[BT_SET_SETTING_BYTES];
+    bt_msg_set_setting msg = {.req_id = 3, .setting = setting, .value = value};
+    bt_msg_set_setting_pack(&msg, payload);
+    assert_int_equal(host_ask(&session, BT_SET_SETTING_ID, payload, sizeof payload)->id, BT_SETTING_ID);
+}
+
+static bt_msg_idle idle_at(int k)
+{
+    bt_msg_idle idle;
+    assert_true(k < host.count);
+    assert_int_equal(host.message[k].id, BT_IDLE_ID);
+    bt_msg_idle_unpack(&idle, host.message[k].payload);
+    return idle;
+}
+
+static uint16_t frame_seq_at(int k)
+{
+    assert_true(k < host.count);
+    assert_int_equal(host.message[k].id, BT_FRAME_ID);
+    return seq_at(&host.message[k]);
+}
+
+// ---- the period ------------------------------------------------------------------------------------
+
+static void heartbeats_come_in_their_period(void **state)
+{
+    static const int32_t periods_ms[] = {20, 29, 30, 100, 250, 1000, 60000};
+    for (int p = 0; p < 7; p++) {
+        (void)an_idle_session(state);
+        set_setting(BT_SETTING_IDLE_PERIOD_MS, periods_ms[p]);
+        play_level(50, 2000);
+        assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
+        host_forget();
+        int rounds = periods_ms[p] / 10; // whole rounds, never later than asked
+        play_level(1 + 5 * rounds, 2000);
+        assert_int_equal(host.count, 1 + 5);
+        assert_int_equal(frame_seq_at(0), 50);
+        for (int k = 1; k <= 5; k++) {
+            bt_msg_idle idle = idle_at(k);
+            assert_int_equal(idle.frames, rounds);
+            assert_int_equal(idle.seq, 50 + k * rounds);
+            assert_int_equal(idle.t_us, 10000 * (50 + k * rounds));
+            assert_int_equal(idle.finger, 0);
+            assert_int_equal(idle.energy_count2, 0);
+        }
+    }
+}
+
+static void a_start_is_answered_with_a_frame_at_every_phase(void **state)
+{
+    (void)state;
+    play_level(50, 2000);
+    for (int phase = 0; phase < 40; phase++) {
+        assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
+        host_forget();
+        uint16_t seq = session.finger[0].seq;
+        play_level(1 + phase, 2000);
+        assert_int_equal(frame_seq_at(0), seq);
+        for (int k = 1; k < host.count; k++) { // and nothing of before the START is told again
+            assert_int_equal(idle_at(k).seq, seq + 10 * k);
+            assert_int_equal(idle_at(k).frames, 10);
+        }
+        assert_int_equal(host.count, 1 + phase / 10);
+        if (phase % 2) {
+            assert_int_equal(stop(), BT_ERROR_OK);
+            play_level(3, 2000);
+        }
+    }
+}
+
+static void a_finger_without_a_tare_is_idle_too(void **state)
+{
+    (void)state;
+    assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
+    host_forget();
+    play_level(16, 2000); // two still sweeps make the first tare
+    assert_int_equal(frame_seq_at(0), 0);
+    assert_int_equal(idle_at(1).seq, 10);
+    assert_int_equal(idle_at(1).tare_state, BT_TARE_STATE_INIT);
+    assert_true(idle_at(1).flags & BT_FRAME_FLAG_UNTARED);
+    assert_int_equal(idle_at(2).seq, 14);
+    assert_int_equal(idle_at(2).frames, 4);
+    assert_int_equal(idle_at(2).tare_state, BT_TARE_STATE_REST);
+    assert_int_equal(host.message[3].id, BT_TARE_ID);
+    assert_int_equal(frame_seq_at(4), 15);
+    assert_int_equal(host.count, 5);
+}
+
+// ---- what ends the silence -------------------------------------------------------------------------
+
+static void a_rest_that_has_moved_beyond_noise_is_shown(void **state)
+{
+    (void)state;
+    play_level(50, 2000);
+    assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
+    host_forget();
+    play_level(1, 2000);
+    // A count every four seconds, which the tare follows. 19 d^2 passes 1000 with d = 8.
+    int since = 0, frames = 1, last = 2000;
+    for (int k = 1; k <= 400 * 40; k++) {
+        int level = 2000 + k / 400;
+        int before = host.count;
+        play_level(1, (uint16_t)level);
+        since++;
+        bool heartbeat = since == 10;
+        if (heartbeat && 19 * (level - last) * (level - last) > 1000) {
+            assert_int_equal(host.count, before + 2);
+            assert_int_equal(idle_at(before).frames, 9);
+            assert_int_equal(idle_at(before).seq, 50 + k - 1);
+            assert_int_equal(frame_seq_at(before + 1), 50 + k);
+            last = level;
+            frames++;
+            since = 0;
+        } else if (heartbeat) {
+            assert_int_equal(host.count, before + 1);
+            assert_int_equal(idle_at(before).seq, 50 + k);
+            since = 0;
+        } else {
+            assert_int_equal(host.count, before);
+        }
+    }
+    assert_int_equal(session.finger[0].tare.state, BT_TARE_STATE_REST);
+    assert_int_equal(frames, 1 + 40 / 8);
+}
+
+static void the_energy_of_a_heartbeat_is_that_of_its_round(void **state)
+{
+    (void)state;
+    uint64_t seed = 91;
+    uint16_t electrode[BT_ELECTRODES];
+    play_level(50, 2000);
+    assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
+    play_level(1, 2000);
+    for (int k = 0; k < 100; k++) {
+        uint32_t energy = 0;
+        host_forget();
+        play_level(9, 2000);
+        assert_int_equal(host.count, 0);
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            int e = (int)random_range(&seed, -6, 6); // 684 at most: no touch; and the tare moves little
+            electrode[i] = (uint16_t)(2000 + e);
+            energy += (uint32_t)(e * e);
+        }
+        play(electrode);
+        assert_int_equal(idle_at(0).energy_count2, energy);
+        assert_int_equal(session.finger[0].tare.gate.rest.lane[3], 2000);
+    }
+}
+
+static void asking_for_frames_at_rest_ends_the_silence_with_its_account(void **state)
+{
+    (void)state;
+    for (int phase = 1; phase < 10; phase++) {
+        (void)an_idle_session(state);
+        play_level(50, 2000);
+        assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
+        play_level(1 + phase, 2000);
+        assert_int_equal(subscribe(1, BT_QUANTITY_FLAG_REST_FRAMES), BT_ERROR_OK);
+        host_forget();
+        play_level(2, 2000);
+        assert_int_equal(idle_at(0).frames, phase);
+        assert_int_equal(idle_at(0).seq, 50 + phase);
+        assert_int_equal(frame_seq_at(1), 50 + phase + 1);
+        assert_int_equal(frame_seq_at(2), 50 + phase + 2);
+        assert_int_equal(host.count, 3);
+    }
+}
+
+static void a_lost_heartbeat_is_a_gap(void **state)
+{
+    (void)state;
+    play_level(50, 2000);
+    assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
+    host_forget();
+    play_level(11, 2000);
+    host.room = 0;
+    play_level(10, 2000);
+    host.room = SIZE_MAX;
+    play_level(10, 2000);
+    assert_int_equal(host.count, 3);
+    assert_int_equal(idle_at(1).seq, 60);
+    assert_int_equal(idle_at(2).seq, 80);
+    assert_int_equal(idle_at(2).frames, 10); // 61 to 70 are not told of twice
+    assert_int_equal(session.messages_dropped, 1);
+}
+
+// ---- subscriptions ---------------------------------------------------------------------------------
+
+static void unknown_quantities_and_fingers_are_refused_and_change_nothing(void **state)
+{
+    (void)state;
+    for (int fingers = 0; fingers < 256; fingers++) {
+        for (int quantities = 0; quantities < 256; quantities++) {
+            uint8_t before[BT_MAX_FINGERS];
+            uint8_t error = quantities >> 6 ? BT_ERROR_OUT_OF_RANGE
+                            : fingers >> 5  ? BT_ERROR_NO_SUCH_FINGER
+                                            : BT_ERROR_OK;
+            for (int f = 0; f < BT_MAX_FINGERS; f++) {
+                before[f] = session.finger[f].quantities;
+            }
+            assert_int_equal(subscribe((uint8_t)fingers, (uint8_t)quantities), error);
+            for (int f = 0; f < BT_MAX_FINGERS; f++) {
+                bool named = error == BT_ERROR_OK && fingers >> f & 1;
+                assert_int_equal(session.finger[f].quantities, named ? quantities : before[f]);
+            }
+        }
+    }
+}
+
+static void at_first_everything_but_sigmas_and_touches_is_sent(void **state)
+{
+    (void)new_session(state);
+    assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
+    host_forget();
+    play_level(40, 2000);
+    play_level(20, 1900);
+    assert_int_equal(host_count(BT_FRAME_ID), 60);
+    assert_int_equal(host_count(BT_IDLE_ID) + host_count(BT_TOUCH_ID), 0);
+    bt_msg_frame frame;
+    bt_msg_frame_unpack(&frame, host.message[host.count - 1].payload);
+    assert_false(frame.flags & BT_FRAME_FLAG_NOT_ASKED);
+    assert_true(frame.poc_um[0] != INT16_MIN && frame.force_100un[2] != INT32_MIN);
+    assert_true(frame.torque_mnmm[0] != INT32_MIN && frame.poc_sigma_um == 0xFFFF);
+}
+
+// ---- what it saves ---------------------------------------------------------------------------------
+
+static size_t bytes_written;
+
+static bool count_bytes(const uint8_t *data, size_t bytes)
+{
+    (void)data;
+    bytes_written += bytes;
+    return true;
+}
+
+static size_t bytes_of(emulated_finger *finger, int rounds)
+{
+    bytes_written = 0;
+    for (int k = 0; k < rounds; k++) {
+        bt_frame frame = next_frame(finger);
+        play(frame.electrode);
+    }
+    return bytes_written;
+}
+
+static void rest_takes_a_fifth_of_the_bytes_of_contact_at_most(void **state)
+{
+    (void)state;
+    static const double glitches[] = {0, 0.005}; // the worst sensor there is
+    for (int k = 0; k < 2; k++) {
+        (void)new_session(state);
+        emulated_finger finger;
+        finger_init(&finger);
+        finger.sigma = k == 0 ? 1.5 : 5;
+        finger.glitch_chance = glitches[k];
+        uint8_t at_first = session.finger[0].quantities;
+        assert_int_equal(subscribe(1, at_first & (uint8_t)~BT_QUANTITY_FLAG_REST_FRAMES), BT_ERROR_OK);
+        assert_int_equal(start(FRAMES, 1, 0), BT_ERROR_OK);
+        session.write = count_bytes;
+        (void)bytes_of(&finger, 500);
+        assert_int_equal(session.finger[0].tare.state, BT_TARE_STATE_REST);
+        size_t at_rest = bytes_of(&finger, 1000);
+        assert_int_equal(session.finger[0].tare.state, BT_TARE_STATE_REST);
+        finger.load = 600;
+        (void)bytes_of(&finger, 20);
+        size_t in_contact = bytes_of(&finger, 1000);
+        assert_int_equal(session.finger[0].tare.state, BT_TARE_STATE_CONTACT);
+        assert_int_equal(in_contact, 1000 * (BT_FRAME_BYTES + 7)); // id, CRC, COBS and delimiter
+        assert_true(at_rest > 0 && at_rest <= in_contact / 5);
+        print_message("at rest %zu bytes in ten seconds, in contact %zu\n", at_rest, in_contact);
+    }
+}
+
+#define T(name) cmocka_unit_test_setup(name, an_idle_session)
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(heartbeats_come_in_their_period),
+        T(a_start_is_answered_with_a_frame_at_every_phase),
+        T(a_finger_without_a_tare_is_idle_too),
+        T(a_rest_that_has_moved_beyond_noise_is_shown),
+        T(the_energy_of_a_heartbeat_is_that_of_its_round),
+        T(asking_for_frames_at_rest_ends_the_silence_with_its_account),
+        T(a_lost_heartbeat_is_a_gap),
+        T(unknown_quantities_and_fingers_are_refused_and_change_nothing),
+        T(at_first_everything_but_sigmas_and_touches_is_sent),
+        T(rest_takes_a_fifth_of_the_bytes_of_contact_at_most),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,384 @@
+// What temperature does to the tare in contact, against the low-pass in closed form.
+//
+// After n sweeps of a step by d the low-pass of eight sweeps has moved by d (1 - (7/8)^n). It is kept in
+// 1/256 count and each sweep cuts off less than one of them, of which 7/8 are left in the next: together
+// less than 8/256.
+#include "emulated_finger.h"
+
+#include "results.h"
+
+#define CUT   (8.0 / 256)
+#define APART 1000.0 // the bound: 500 counts up, 500 down
+#define T0    1000
+#define SWEEP BT_SWEEP_ROUNDS
+
+static uint16_t tdc_now; // what the finger's thermometer reads
+
+static void warm_round(emulated_finger *finger)
+{
+    bt_frame frame = next_frame(finger);
+    frame.tdc = tdc_now;
+    (void)feed(finger, &frame);
+}
+
+static void warm_rounds(emulated_finger *finger, int rounds)
+{
+    for (int k = 0; k < rounds; k++) {
+        warm_round(finger);
+    }
+}
+
+static emulated_finger warm_finger(int gain_milli)
+{
+    emulated_finger finger;
+    finger_init(&finger);
+    finger.settings.thermal_gain_q16 = bt_thermal_gain_q16(gain_milli);
+    tdc_now = T0;
+    warm_rounds(&finger, 500);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+    return finger;
+}
+
+// Held in contact, at the begin of a sweep.
+static void grasp(emulated_finger *finger)
+{
+    finger->load = 400;
+    finger->pdc_load = 300;
+    warm_rounds(finger, 5);
+    assert_int_equal(finger->tare.state, BT_TARE_STATE_CONTACT);
+    while (finger->tare.sweep.round != 0) {
+        warm_round(finger);
+    }
+}
+
+static emulated_finger held_finger(int gain_milli)
+{
+    emulated_finger finger = warm_finger(gain_milli);
+    grasp(&finger);
+    return finger;
+}
+
+static void let_go(emulated_finger *finger)
+{
+    finger->load = 0;
+    finger->pdc_load = 0;
+}
+
+static double moved(const emulated_finger *finger, const bt_baseline *from, int i)
+{
+    return ((double)finger->tare.base.electrode_q16[i] - from->electrode_q16[i]) / 65536;
+}
+
+static double low_passed(double step, int sweeps)
+{
+    return step * (1 - pow(7.0 / 8, sweeps));
+}
+
+static double clipped(double value, double low, double high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+// The tare's move that n sweeps of a TDC step must have made.
+static void assert_followed(const emulated_finger *finger, const bt_baseline *from, int gain_milli,
+                            double step, int sweeps)
+{
+    double gain = gain_milli / 1000.0;
+    double want = gain * low_passed(step, sweeps);
+    double off = fabs(gain) * CUT + fabs(step) * 0.5 / 65536 + 1.0 / 65536; // a gain and a product in q16
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        double start = from->electrode_q16[i] / 65536.0;
+        double low = clipped(start + clipped(want - off, -APART / 2, APART / 2), 0, 4095) - start;
+        double high = clipped(start + clipped(want + off, -APART / 2, APART / 2), 0, 4095) - start;
+        double got = moved(finger, from, i);
+        if (got < low || got > high) {
+            fail_msg("E%d moved by %.5f, not %.5f..%.5f; gain %d, step %g, %d sweeps", i + 1, got, low, high,
+                     gain_milli, step, sweeps);
+        }
+        assert_int_equal(finger->tare.electrode_q4[i], bt_tare_q4(finger->tare.base.electrode_q16[i]));
+        assert_int_equal(finger->tare.gate.rest.lane[i], lround(start + got));
+    }
+}
+
+static void a_gain_is_the_nearest_in_q16(void **state)
+{
+    (void)state;
+    for (int milli = -5000; milli <= 5000; milli++) {
+        assert_true(fabs(bt_thermal_gain_q16(milli) / 65536.0 - milli / 1000.0) <= 0.5 / 65536);
+    }
+}
+
+static void the_tare_follows_the_temperature_in_contact(void **state)
+{
+    (void)state;
+    static const int gains[] = {500, 700, 970, -500, 1, 5000, -5000};
+    static const int steps[] = {1, 40, 90, -1, -40, -90};
+    for (int g = 0; g < 7; g++) {
+        emulated_finger held = held_finger(gains[g]);
+        for (int s = 0; s < 6; s++) {
+            emulated_finger finger = held;
+            bt_baseline before = finger.tare.base;
+            tdc_now = (uint16_t)(T0 + steps[s]);
+            for (int sweep = 1; sweep <= 80; sweep++) {
+                warm_rounds(&finger, SWEEP);
+                assert_followed(&finger, &before, gains[g], steps[s], sweep - 1);
+            }
+            assert_int_equal(finger.tare.base.pdc_q16, before.pdc_q16); // pressure is not followed
+        }
+    }
+}
+
+static void the_ends_of_gain_and_temperature_are_bounded(void **state)
+{
+    (void)state;
+    for (int up = 0; up < 2; up++) {
+        for (int gain = -5000; gain <= 5000; gain += 2500) {
+            emulated_finger finger;
+            finger_init(&finger);
+            finger.settings.thermal_gain_q16 = bt_thermal_gain_q16(gain);
+            tdc_now = up ? 1 : 4089;
+            warm_rounds(&finger, 500);
+            // Tares near both ends too, where the range ends before the bound.
+            for (int i = 0; i < BT_ELECTRODES; i++) {
+                finger.tare.base.electrode_q16[i] = (uint32_t)(i % 3 == 0   ? 90
+                                                               : i % 3 == 1 ? 2000
+                                                                            : 4000)
+                                                    << 16;
+            }
+            bt_baseline base = finger.tare.base;
+            assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+            warm_rounds(&finger, 3);
+            grasp(&finger);
+            assert_memory_equal(&finger.tare.base, &base, sizeof base);
+            double step = up ? 4088 : -4088;
+            tdc_now = up ? 4089 : 1;
+            for (int sweep = 1; sweep <= 100; sweep++) {
+                warm_rounds(&finger, SWEEP);
+            }
+            assert_followed(&finger, &base, gain, step, 99);
+        }
+    }
+}
+
+static void each_electrode_follows_once_in_a_sweep_and_three_in_a_round(void **state)
+{
+    (void)state;
+    emulated_finger finger = held_finger(500);
+    tdc_now = T0 + 80;
+    warm_rounds(&finger, SWEEP);
+    for (int sweep = 0; sweep < 5; sweep++) {
+        int times[BT_ELECTRODES] = {0};
+        for (int round = 0; round < SWEEP; round++) {
+            bt_baseline before = finger.tare.base;
+            int in_round = 0;
+            warm_round(&finger);
+            for (int i = 0; i < BT_ELECTRODES; i++) {
+                bool follows = moved(&finger, &before, i) != 0;
+                times[i] += follows;
+                in_round += follows;
+            }
+            assert_true(in_round <= 3);
+        }
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            assert_int_equal(times[i], 1);
+        }
+    }
+}
+
+static void nothing_follows_at_rest_or_without_a_gain(void **state)
+{
+    (void)state;
+    static const int gains[] = {0, 5000};
+    for (int k = 0; k < 2; k++) {
+        emulated_finger finger = warm_finger(gains[k]);
+        if (gains[k] == 0) {
+            grasp(&finger);
+        }
+        bt_baseline before = finger.tare.base;
+        for (int round = 0; round < 2000; round++) {
+            tdc_now = (uint16_t)(T0 + round);
+            warm_round(&finger);
+            assert_memory_equal(&finger.tare.base, &before, sizeof before);
+        }
+        assert_int_equal(finger.tare.state, gains[k] == 0 ? BT_TARE_STATE_CONTACT : BT_TARE_STATE_REST);
+    }
+}
+
+static void a_missing_or_railed_temperature_holds(void **state)
+{
+    (void)state;
+    static const uint16_t bad[] = {BT_INVALID_COUNT, 0, 4090, 4095};
+    uint64_t seed = 51;
+    emulated_finger finger = held_finger(500);
+    bt_baseline before = finger.tare.base;
+    int taken = 0, followed = 0; // sweeps whose last round had a word; of which the tare knows
+    for (int sweep = 0; sweep < 200; sweep++) {
+        for (int round = 0; round < SWEEP; round++) {
+            bool good = random_unit(&seed) < 0.5;
+            tdc_now = good ? T0 + 80 : bad[random_range(&seed, 0, 3)];
+            warm_round(&finger);
+            followed = round == 0 ? taken : followed;
+            taken += good && round == SWEEP - 1;
+        }
+        assert_followed(&finger, &before, 500, 80, followed);
+    }
+    assert_in_range(taken, 60, 140);
+}
+
+static void a_first_temperature_in_contact_moves_nothing(void **state)
+{
+    (void)state;
+    emulated_finger finger;
+    finger_init(&finger);
+    finger.settings.thermal_gain_q16 = bt_thermal_gain_q16(500);
+    tdc_now = BT_INVALID_COUNT;
+    warm_rounds(&finger, 100);
+    grasp(&finger);
+    bt_baseline before = finger.tare.base;
+    tdc_now = 1800;
+    warm_rounds(&finger, 10 * SWEEP);
+    assert_memory_equal(&finger.tare.base, &before, sizeof before);
+    tdc_now = 1820;
+    warm_rounds(&finger, 10 * SWEEP);
+    assert_followed(&finger, &before, 500, 20, 9);
+}
+
+static void a_degree_is_flagged_in_contact_alone(void **state)
+{
+    (void)state;
+    bt_frame frame;
+    bt_frame_clear(&frame);
+    for (int step = -100; step <= 100; step++) {
+        emulated_finger finger = held_finger(0);
+        tdc_now = (uint16_t)(T0 + step);
+        for (int sweep = 1; sweep <= 60; sweep++) {
+            warm_rounds(&finger, SWEEP);
+            bool flag = bt_channel_flags(&frame, &finger.tare) & BT_FRAME_FLAG_TEMP;
+            double warmed = low_passed(step, sweep); // less at most CUT, towards minus infinity
+            if (fabs(warmed) > 33 && fabs(warmed - CUT) > 33) {
+                assert_true(flag);
+            } else if (fabs(warmed) <= 33 && fabs(warmed - CUT) <= 33) {
+                assert_false(flag);
+            }
+        }
+        let_go(&finger);
+        warm_rounds(&finger, 100);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+        tdc_now = T0;
+        warm_rounds(&finger, 500);
+        assert_false(bt_channel_flags(&frame, &finger.tare) & BT_FRAME_FLAG_TEMP);
+    }
+}
+
+static void nothing_leaks_into_the_next_contact(void **state)
+{
+    (void)state;
+    for (int rounds = 3 * SWEEP; rounds < 5 * SWEEP; rounds++) { // let go at every phase, while it warms
+        emulated_finger finger = held_finger(970);
+        tdc_now = T0 + 90;
+        warm_rounds(&finger, rounds);
+        let_go(&finger);
+        while (finger.tare.state == BT_TARE_STATE_CONTACT) {
+            warm_round(&finger);
+        }
+        bt_baseline base = finger.tare.base;
+        for (int k = 0; k < 800; k++) {
+            warm_round(&finger);
+            assert_memory_equal(&finger.tare.base, &base, sizeof base);
+        }
+        grasp(&finger);
+        warm_rounds(&finger, 20 * SWEEP);
+        assert_memory_equal(&finger.tare.base, &base, sizeof base);
+        assert_false(bt_thermal_warmed(&finger.tare.thermal));
+        // And it follows from there.
+        tdc_now = T0 + 60;
+        warm_rounds(&finger, 20 * SWEEP);
+        assert_followed(&finger, &base, 970, -30, 19);
+    }
+}
+
+static void a_tare_from_the_host_ends_the_following_at_once(void **state)
+{
+    (void)state;
+    for (int phase = 0; phase < SWEEP; phase++) {
+        emulated_finger finger = held_finger(500);
+        tdc_now = T0 + 90;
+        warm_rounds(&finger, 3 * SWEEP + phase);
+        assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_OK);
+        bt_baseline base = finger.tare.base;
+        warm_rounds(&finger, 50);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+        assert_memory_equal(&finger.tare.base, &base, sizeof base);
+    }
+}
+
+// ---- faults ----------------------------------------------------------------------------------------
+
+static void fault_round(emulated_finger *finger)
+{
+    bt_frame frame = frame_without(finger, 3, 3, BT_INVALID_COUNT);
+    frame.tdc = tdc_now;
+    (void)feed(finger, &frame);
+    assert_int_equal(finger->tare.state, BT_TARE_STATE_FAULT);
+}
+
+static void a_fault_in_contact_never_adds_a_step_twice(void **state)
+{
+    (void)state;
+    // A loose connector: faults in the midst of sweeps, some of whose lanes have had their step.
+    for (int rounds = 1; rounds <= 2 * SWEEP; rounds++) {
+        emulated_finger finger = held_finger(500);
+        bt_baseline before = finger.tare.base;
+        tdc_now = T0 + 80;
+        warm_rounds(&finger, 4 * SWEEP);
+        for (int fault = 0; fault < 200; fault++) {
+            warm_rounds(&finger, rounds);
+            fault_round(&finger);
+        }
+        warm_rounds(&finger, 100);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            // What a sweep that was cut short had to add may be lost, never more than all.
+            double got = moved(&finger, &before, i);
+            assert_true(got >= 0.5 * low_passed(80, 3) - 0.5 * CUT - 1e-3 && got <= 40 + 1e-3);
+        }
+    }
+}
+
+static void warmth_before_a_fault_is_not_added_after_it(void **state)
+{
+    (void)state;
+    // At rest the tare follows the counts, not the thermometer: what it read then is nothing to make up for.
+    emulated_finger finger = warm_finger(500);
+    tdc_now = T0 + 100;
+    warm_rounds(&finger, 1000);
+    bt_baseline before = finger.tare.base;
+    finger.load = 400; // held on, so that what comes after the fault stays a contact
+    finger.pdc_load = 300;
+    for (int k = 0; k < 10; k++) {
+        fault_round(&finger);
+    }
+    warm_rounds(&finger, 20 * SWEEP);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    assert_memory_equal(&finger.tare.base, &before, sizeof before);
+    assert_false(bt_thermal_warmed(&finger.tare.thermal));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_gain_is_the_nearest_in_q16),
+        cmocka_unit_test(the_tare_follows_the_temperature_in_contact),
+        cmocka_unit_test(the_ends_of_gain_and_temperature_are_bounded),
+        cmocka_unit_test(each_electrode_follows_once_in_a_sweep_and_three_in_a_round),
+        cmocka_unit_test(nothing_follows_at_rest_or_without_a_gain),
+        cmocka_unit_test(a_missing_or_railed_temperature_holds),
+        cmocka_unit_test(a_first_temperature_in_contact_moves_nothing),
+        cmocka_unit_test(a_degree_is_flagged_in_contact_alone),
+        cmocka_unit_test(nothing_leaks_into_the_next_contact),
+        cmocka_unit_test(a_tare_from_the_host_ends_the_following_at_once),
+        cmocka_unit_test(a_fault_in_contact_never_adds_a_step_twice),
+        cmocka_unit_test(warmth_before_a_fault_is_not_added_after_it),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
