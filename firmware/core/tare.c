@@ -232,15 +232,18 @@ static BT_NOINLINE void count_hit(bt_tare *tare)
 static void follow_contact(bt_tare *tare)
 {
     tare->contact_frames++;
-    if (pdc_known(tare) && pdc_above_rest(tare) > tare->pdc_peak) {
-        tare->pdc_peak = pdc_above_rest(tare);
+    if (pdc_known(tare)) {
+        tare->pressure_seen = true;
+        if (pdc_above_rest(tare) > tare->pdc_peak) {
+            tare->pdc_peak = pdc_above_rest(tare);
+        }
     }
 }
 
 static uint32_t residue_limit(const bt_tare *tare)
 {
     _Static_assert((uint64_t)DRIFT_LIMIT * DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
-    uint32_t limit = pdc_known(tare) ? DRIFT_LIMIT : DRIFT_LIMIT_BLIND;
+    uint32_t limit = tare->pressure_seen ? DRIFT_LIMIT : DRIFT_LIMIT_BLIND;
     uint32_t frames = tare->contact_frames < limit ? tare->contact_frames : limit;
     uint32_t drift_count2 = BT_DIVIDE_U32(frames * frames, DRIFT_FRAMES_PER_COUNT * DRIFT_FRAMES_PER_COUNT);
     return RESIDUE_ENERGY + BT_ELECTRODES * drift_count2;
@@ -250,19 +253,26 @@ static uint32_t residue_limit(const bt_tare *tare)
 // so that neither energy nor pressure come back to the tare. What tells a release then is that the
 // pressure has fallen far below the press's own peak and nothing moves any more. A load that only
 // grows is at its peak all the time and never passes; without a press there is no release: a light
-// touch while the pressure undershoots has no peak.
+// touch while the pressure undershoots has no peak. What would be tared are means, so it is the mean that
+// must have fallen, too: in the rounds right after a release they still are those of the press.
+static bool fallen_to(const bt_tare *tare, int32_t above)
+{
+    return above < SETTLE_PDC && above * RELEASE_FALL < tare->pdc_peak;
+}
+
 static bool released_by_pressure(const bt_tare *tare)
 {
-    int32_t above = pdc_above_rest(tare);
+    int32_t mean_above = (tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3) - tare->gate.rest.lane[BT_LANE_PDC];
     bool pressed = tare->pdc_peak >= RELEASE_FALL * PDC_HIT;
-    bool fallen = above < SETTLE_PDC && above * RELEASE_FALL < tare->pdc_peak;
+    bool fallen = fallen_to(tare, pdc_above_rest(tare)) && fallen_to(tare, mean_above);
     return tare->sweep.still_sweeps >= SETTLE_SWEEPS && pressed && fallen;
 }
 
 // After a sweep in contact: has it ended?
 static void judge_release(bt_tare *tare)
 {
-    bool pressure = pdc_known(tare);
+    // A word that was lost now is no reason to do without those of the other rounds.
+    bool pressure = tare->pressure_seen;
     tare->energy_peak = tare->energy_count2 > tare->energy_peak ? tare->energy_count2 : tare->energy_peak;
     // Without pressure the energy itself must have fallen, or the first second of a slow load would
     // pass for a residue.
@@ -300,6 +310,7 @@ static BT_NOINLINE void end_sweep(bt_tare *tare, const bt_tare_settings *setting
     }
     tare->energy_count2 = 0;
     tare->deviation_q6 = 0;
+    tare->pressure_seen = false;
     tare->partial = false;
 }
 

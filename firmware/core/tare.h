@@ -45,6 +45,7 @@ typedef struct {
     uint8_t quiet_sweeps;   // consecutive sweeps with the pressure (without one: the energy) back
     bool touched;           // in this round the gate opened, or before it and it is open still
     bool partial;           // this sweep did not serve all electrodes in one state
+    bool pressure_seen;     // in this sweep, in contact, at least one pressure word was good
     uint32_t deviation_q6;  // count^2; of this sweep: filtered counts from their means
     uint32_t energy_count2; // of this sweep: means from the tare
 

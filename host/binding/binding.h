@@ -8,9 +8,11 @@
 #include "blocks.h"
 #include "cobs.h"
 #include "crc32.h"
+#include "finger.h"
 #include "framing.h"
 #include "kernel.h"
 #include "lin2013.h"
+#include "replay.h"
 #include "tare.h"
 #include "variant_errors.h"
 
