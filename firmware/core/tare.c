@@ -5,23 +5,12 @@
 #include <string.h>
 
 // Bounds of the machine, measured on real sensors; the settling rule comes from real recordings.
-#define HITS           3         // rounds over the threshold that make a contact
-#define PDC_HIT        6         // pressure above rest that is a contact
-#define PDC_QUIET      4         // pressure above rest that still is a release; one-sided, it undershoots
-#define SLEW_Q16       (8 * 328) // a sweep; 0.5 count/s: drift is followed no faster, so a load is not
-#define PDC_SLEW_Q16   (8 * 131) // 0.2 count/s
-#define SPAN_Q3        (12 * 8)  // means of still signals stay this close to where they came to rest
-#define NOW_SPAN_Q3    (32 * 8)  // and their latest filtered count this close to the mean: ten sigmas
-#define STILL_SWEEPS   2         // to tare from; the first one may hold what came before it
-#define CALM_ENERGY    400
-#define RESIDUE_ENERGY 6000         // count^2 that skin hysteresis may leave
-#define RESIDUE_SWEEPS 12           // 960 ms
-#define SETTLE_SWEEPS  5            // 400 ms
-#define SETTLE_PDC     30           // pressure that real skin keeps after a press (+24 seen), not more
-#define RELEASE_FALL   4            // a release has fallen to a quarter of the contact's peak
-#define DRIFT_FRAMES_PER_COUNT 400  // 15 counts/min, the worst drift measured
-#define DRIFT_LIMIT_BLIND      6000 // without pressure, 60 s of drift is all that may be forgiven
-#define DRIFT_LIMIT            60000
+#define HITS         3         // rounds over the threshold that make a contact
+#define SLEW_Q16     (8 * 328) // a sweep; 0.5 count/s: drift is followed no faster, so a load is not
+#define PDC_SLEW_Q16 (8 * 131) // 0.2 count/s
+#define SPAN_Q3      (12 * 8)  // means of still signals stay this close to where they came to rest
+#define NOW_SPAN_Q3  (32 * 8)  // and their latest filtered count this close to the mean: ten sigmas
+#define STILL_SWEEPS 2         // to tare from; the first one may hold what came before it
 
 bt_tare_settings bt_tare_settings_from(const bt_settings *settings)
 {
@@ -77,10 +66,8 @@ static void use_pressure(bt_tare *tare)
 static void forget_contact(bt_tare *tare)
 {
     tare->hits = 0;
-    tare->quiet_sweeps = 0;
     tare->contact_frames = 0;
-    tare->energy_peak = 0;
-    tare->pdc_peak = 0;
+    bt_release_begin(&tare->release);
     bt_thermal_begin(&tare->thermal);
 }
 
@@ -233,59 +220,23 @@ static void follow_contact(bt_tare *tare)
 {
     tare->contact_frames++;
     if (pdc_known(tare)) {
-        tare->pressure_seen = true;
-        if (pdc_above_rest(tare) > tare->pdc_peak) {
-            tare->pdc_peak = pdc_above_rest(tare);
-        }
+        bt_release_pressure(&tare->release, pdc_above_rest(tare));
     }
-}
-
-static uint32_t residue_limit(const bt_tare *tare)
-{
-    _Static_assert((uint64_t)DRIFT_LIMIT * DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
-    uint32_t limit = tare->pressure_seen ? DRIFT_LIMIT : DRIFT_LIMIT_BLIND;
-    uint32_t frames = tare->contact_frames < limit ? tare->contact_frames : limit;
-    uint32_t drift_count2 = BT_DIVIDE_U32(frames * frames, DRIFT_FRAMES_PER_COUNT * DRIFT_FRAMES_PER_COUNT);
-    return RESIDUE_ENERGY + BT_ELECTRODES * drift_count2;
-}
-
-// On real fingers the skin's hysteresis leaves thousands of count^2 and some pressure after a press,
-// so that neither energy nor pressure come back to the tare. What tells a release then is that the
-// pressure has fallen far below the press's own peak and nothing moves any more. A load that only
-// grows is at its peak all the time and never passes; without a press there is no release: a light
-// touch while the pressure undershoots has no peak. What would be tared are means, so it is the mean that
-// must have fallen, too: in the rounds right after a release they still are those of the press.
-static bool fallen_to(const bt_tare *tare, int32_t above)
-{
-    return above < SETTLE_PDC && above * RELEASE_FALL < tare->pdc_peak;
-}
-
-static bool released_by_pressure(const bt_tare *tare)
-{
-    int32_t mean_above = (tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3) - tare->gate.rest.lane[BT_LANE_PDC];
-    bool pressed = tare->pdc_peak >= RELEASE_FALL * PDC_HIT;
-    bool fallen = fallen_to(tare, pdc_above_rest(tare)) && fallen_to(tare, mean_above);
-    return tare->sweep.still_sweeps >= SETTLE_SWEEPS && pressed && fallen;
 }
 
 // After a sweep in contact: has it ended?
 static void judge_release(bt_tare *tare)
 {
-    // A word that was lost now is no reason to do without those of the other rounds.
-    bool pressure = tare->pressure_seen;
-    tare->energy_peak = tare->energy_count2 > tare->energy_peak ? tare->energy_count2 : tare->energy_peak;
-    // Without pressure the energy itself must have fallen, or the first second of a slow load would
-    // pass for a residue.
-    bool quiet =
-        pressure ? pdc_above_rest(tare) < PDC_QUIET : tare->energy_count2 < tare->energy_peak / RELEASE_FALL;
-    uint8_t still = tare->sweep.still_sweeps;
-    tare->quiet_sweeps = quiet ? (uint8_t)(tare->quiet_sweeps + (tare->quiet_sweeps < UINT8_MAX)) : 0;
-    bool residue = tare->quiet_sweeps >= RESIDUE_SWEEPS && still >= RESIDUE_SWEEPS
-                   && tare->energy_count2 < residue_limit(tare);
-    if (tare->energy_count2 < CALM_ENERGY && (quiet || !pressure)) {
-        adopt_present(tare, BT_TARE_REASON_RELEASE);
-    } else if (residue || (pressure && released_by_pressure(tare))) {
-        adopt_present(tare, BT_TARE_REASON_RESIDUE);
+    bt_release_sweep sweep = {
+        .energy_count2 = tare->energy_count2,
+        .contact_frames = tare->contact_frames,
+        .above = pdc_above_rest(tare),
+        .mean_above = (tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3) - tare->gate.rest.lane[BT_LANE_PDC],
+        .still_sweeps = tare->sweep.still_sweeps,
+    };
+    uint8_t reason = bt_release_judge(&tare->release, &sweep);
+    if (reason != BT_TARE_REASON_NONE) {
+        adopt_present(tare, reason);
     }
 }
 
@@ -310,7 +261,7 @@ static BT_NOINLINE void end_sweep(bt_tare *tare, const bt_tare_settings *setting
     }
     tare->energy_count2 = 0;
     tare->deviation_q6 = 0;
-    tare->pressure_seen = false;
+    tare->release.pressure_seen = false;
     tare->partial = false;
 }
 
@@ -360,7 +311,7 @@ bool bt_tare_touch(bt_tare *tare)
 
 bool bt_tare_pressure(bt_tare *tare, uint16_t count)
 {
-    return bt_gate_pressure(&tare->gate, count, PDC_HIT) < 0 && bt_tare_touch(tare);
+    return bt_gate_pressure(&tare->gate, count, BT_PDC_HIT) < 0 && bt_tare_touch(tare);
 }
 
 void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings)
@@ -378,7 +329,7 @@ void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings)
         // A tare from before the fault still holds, but what touched meanwhile is unknown:
         // CONTACT freezes it until the release rules have seen quiet signals.
         tare->state = tare->reason == BT_TARE_REASON_NONE ? BT_TARE_STATE_INIT : BT_TARE_STATE_CONTACT;
-        tare->quiet_sweeps = 0;
+        tare->release.quiet_sweeps = 0;
     } else if (tare->state == BT_TARE_STATE_REST) {
         if (tare->gate.room < 0) {
             count_hit(tare);

@@ -103,7 +103,7 @@ static void a_first_word_in_a_faulty_round_does_not_move_a_tare_from_the_host(vo
     step(&finger);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
     assert_memory_equal(&finger.tare.base, &base, sizeof base);
-    assert_int_equal(finger.tare.pdc_peak, PDC_REST - 1300);
+    assert_int_equal(finger.tare.release.pdc_peak, PDC_REST - 1300);
 }
 
 static void after_a_fault_no_older_frame_makes_a_tare(void **state)
