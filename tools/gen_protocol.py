@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
 from committed import write_or_check  # noqa: E402
-from protogen import c_fold, c_root, c_sensor, c_wire, docs, python_code, schema  # noqa: E402
+from protogen import c_fold, c_root, c_sensor, c_variants, c_wire, docs, python_code, schema  # noqa: E402
 
 
 def outputs(root: Path) -> dict[Path, str]:
@@ -27,6 +27,9 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "firmware/core/fold_gen.c": c_fold.source(contract),
         root / "firmware/core/root_gen.h": c_root.header(contract),
         root / "firmware/core/root_gen.c": c_root.source(contract),
+        root / "firmware/variants/fold_f32_gen.h": c_variants.folded(contract, c_variants.F32),
+        root / "firmware/variants/fold_i64_gen.h": c_variants.folded(contract, c_variants.I64),
+        root / "firmware/variants/tables_gen.h": c_variants.tables(contract),
         root / "firmware/core/wire_gen.h": c_wire.header(contract),
         root / "firmware/core/wire_gen.c": c_wire.source(contract),
         root / "host/biotac/_sensor.py": python_code.sensor(contract),

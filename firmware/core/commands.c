@@ -120,6 +120,15 @@ static void sensor_info(bt_session *session, uint8_t req_id, uint8_t finger)
     bt_session_send(session, BT_SENSOR_INFO_ID, payload);
 }
 
+static void point(bt_session *session, uint8_t req_id, uint8_t finger)
+{
+    uint8_t payload[BT_POINT_BYTES];
+    bt_msg_point msg = {.req_id = req_id};
+    bt_finger_point(&session->finger[finger], &session->kernel, &msg);
+    bt_msg_point_pack(&msg, payload);
+    bt_session_send(session, BT_POINT_ID, payload);
+}
+
 static void setting(bt_session *session, uint8_t req_id, uint8_t id)
 {
     uint8_t payload[BT_SETTING_BYTES];
@@ -191,6 +200,13 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
     case BT_GET_SENSOR_INFO_ID:
         if (payload[1] < BT_MAX_FINGERS) {
             sensor_info(session, req_id, payload[1]);
+            return;
+        }
+        error = BT_ERROR_NO_SUCH_FINGER;
+        break;
+    case BT_GET_POINT_ID:
+        if (payload[1] < BT_MAX_FINGERS && session->finger[payload[1]].present) {
+            point(session, req_id, payload[1]);
             return;
         }
         error = BT_ERROR_NO_SUCH_FINGER;

@@ -178,3 +178,21 @@ void bt_finger_tare(const bt_finger *finger, bt_msg_tare *msg)
     memcpy(msg->tare_q16, tare->base.electrode_q16, sizeof msg->tare_q16);
     msg->pdc_tare_q16 = tare->base.pdc_q16;
 }
+
+void bt_finger_point(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_point *msg)
+{
+    int32_t e_q4[BT_ELECTRODES];
+    bt_point point = {.um = {BT_INVALID_I16, BT_INVALID_I16, BT_INVALID_I16}};
+    bt_signals_q4(finger->frame.electrode, finger->tare.electrode_q4, e_q4);
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        bt_running_put(&finger->running, i, e_q4[i]);
+    }
+    if (finger->tare.reason != BT_TARE_REASON_NONE) {
+        (void)bt_running_point(&finger->running, settings->poc_weights, &point);
+    }
+    msg->finger = finger->index;
+    msg->seq = finger->seq;
+    msg->slot = finger->next_slot;
+    msg->tare_state = finger->tare.state;
+    memcpy(msg->poc_um, point.um, sizeof msg->poc_um);
+}

@@ -5,6 +5,7 @@
 
 #include "assembly.h"
 #include "results.h"
+#include "running.h"
 #include "tare.h"
 
 // Counts of what the bus delivered; wrap at 2^32.
@@ -29,7 +30,8 @@ typedef struct {
     bool tare_unsent;   // the tare changed in the latest round
     bt_frame frame;     // of the latest round, or being assembled
     bt_tare tare;
-    bt_lanes sent; // filtered counts when the last FRAME was sent
+    bt_running running; // of the latest GET_POINT
+    bt_lanes sent;      // filtered counts when the last FRAME was sent
     bt_word_counts words;
 } bt_finger;
 
@@ -61,6 +63,10 @@ bool bt_finger_moved(const bt_finger *finger);
 void bt_finger_frame(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_frame *msg);
 void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg);
 void bt_finger_pac(const bt_finger *finger, bt_msg_pac *msg);
+
+// Where the finger is touched now, from the latest word of every electrode, be it of this round or of the
+// one before.
+void bt_finger_point(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_point *msg);
 void bt_finger_tare(const bt_finger *finger, bt_msg_tare *msg);
 
 #endif

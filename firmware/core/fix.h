@@ -71,15 +71,14 @@ static inline int bt_bit_length(uint32_t value)
     return value == 0 ? 0 : 32 - __builtin_clz(value);
 }
 
-// magnitude * multiplier / 2^(32 + bits), rounded half up. magnitude < 2^31, multiplier <= 2^30, bits 1..7.
+// magnitude * multiplier / 2^(32 + bits), rounded half up. magnitude < 2^31, bits 1..7; the multiplier,
+// at most 2^30, comes in halves.
 // Four 16-bit products: a core without a long multiply would call a 64-bit routine instead. The sum
 // of the middle products stays below 2^32 because magnitude < 2^31 and multiplier <= 2^30.
-static inline uint32_t bt_scale(uint32_t magnitude, uint32_t multiplier, int bits)
+static inline uint32_t bt_scale(uint32_t magnitude, uint32_t m_high, uint32_t m_low, int bits)
 {
     uint32_t high = magnitude >> 16;
     uint32_t low = magnitude & 0xFFFF;
-    uint32_t m_high = multiplier >> 16;
-    uint32_t m_low = multiplier & 0xFFFF;
     uint32_t middle = high * m_low + low * m_high + (low * m_low >> 16);
     uint32_t top = high * m_high + (middle >> 16);
     return (top + (1u << (bits - 1))) >> bits;

@@ -27,6 +27,30 @@ void bt_fold_linear(const int32_t v[19], bt_linear_sums *sums)
     z -= 1116 * even;
     y -= 4855 * odd;
     total -= even;
+    // E7
+    a = compressed(v[6]);
+    pair = a;
+    even = pair;
+    ahead -= 4763 * pair;
+    z -= 2330 * even;
+    total -= even;
+    // E8/E9
+    a = compressed(v[7]);
+    b = compressed(v[8]);
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    ahead -= 3031 * pair;
+    z -= 3330 * even;
+    y -= 1950 * odd;
+    total -= even;
+    // E10
+    a = compressed(v[9]);
+    pair = a;
+    even = pair;
+    ahead -= 1299 * pair;
+    z -= 4330 * even;
+    total -= even;
     // E2/E12 E3/E13 E5/E15
     a = compressed(v[1]);
     b = compressed(v[11]);
@@ -64,30 +88,6 @@ void bt_fold_linear(const int32_t v[19], bt_linear_sums *sums)
     behind -= 134 * pair;
     z -= 1116 * even;
     y -= 4956 * odd;
-    total -= even;
-    // E7
-    a = compressed(v[6]);
-    pair = a;
-    even = pair;
-    ahead -= 4763 * pair;
-    z -= 2330 * even;
-    total -= even;
-    // E8/E9
-    a = compressed(v[7]);
-    b = compressed(v[8]);
-    pair = a + b;
-    even = pair;
-    odd = b - a;
-    ahead -= 3031 * pair;
-    z -= 3330 * even;
-    y -= 1950 * odd;
-    total -= even;
-    // E10
-    a = compressed(v[9]);
-    pair = a;
-    even = pair;
-    ahead -= 1299 * pair;
-    z -= 4330 * even;
     total -= even;
     // E17 E18 E19
     a = compressed(v[16]);
@@ -135,6 +135,37 @@ void bt_fold_split(const uint32_t v[19], int up, int down, bt_split_sums *sums)
     y_hi += 75 * odd;
     y_lo += 55 * odd;
     total += even;
+    // E7
+    a = v[6] << up >> down;
+    pair = a;
+    even = pair;
+    ahead_hi += 74 * pair;
+    ahead_lo += 27 * pair;
+    z_hi += 36 * even;
+    z_lo += 26 * even;
+    total += even;
+    // E8/E9
+    a = v[7] << up >> down;
+    b = v[8] << up >> down;
+    pair = a + b;
+    even = pair;
+    odd = b - a;
+    ahead_hi += 47 * pair;
+    ahead_lo += 23 * pair;
+    z_hi += 52 * even;
+    z_lo += 2 * even;
+    y_hi += 30 * odd;
+    y_lo += 30 * odd;
+    total += even;
+    // E10
+    a = v[9] << up >> down;
+    pair = a;
+    even = pair;
+    ahead_hi += 20 * pair;
+    ahead_lo += 19 * pair;
+    z_hi += 67 * even;
+    z_lo += 42 * even;
+    total += even;
     // E2/E12 E3/E13 E5/E15
     a = v[1] << up >> down;
     b = v[11] << up >> down;
@@ -176,37 +207,6 @@ void bt_fold_split(const uint32_t v[19], int up, int down, bt_split_sums *sums)
     z_lo += 28 * even;
     y_hi += 77 * odd;
     y_lo += 28 * odd;
-    total += even;
-    // E7
-    a = v[6] << up >> down;
-    pair = a;
-    even = pair;
-    ahead_hi += 74 * pair;
-    ahead_lo += 27 * pair;
-    z_hi += 36 * even;
-    z_lo += 26 * even;
-    total += even;
-    // E8/E9
-    a = v[7] << up >> down;
-    b = v[8] << up >> down;
-    pair = a + b;
-    even = pair;
-    odd = b - a;
-    ahead_hi += 47 * pair;
-    ahead_lo += 23 * pair;
-    z_hi += 52 * even;
-    z_lo += 2 * even;
-    y_hi += 30 * odd;
-    y_lo += 30 * odd;
-    total += even;
-    // E10
-    a = v[9] << up >> down;
-    pair = a;
-    even = pair;
-    ahead_hi += 20 * pair;
-    ahead_lo += 19 * pair;
-    z_hi += 67 * even;
-    z_lo += 42 * even;
     total += even;
     // E17 E18 E19
     a = v[16] << up >> down;

@@ -20,17 +20,6 @@ void bt_gate_reset(bt_gate *gate)
     bt_gate_begin(gate, BT_GATE_NEVER);
 }
 
-void bt_gate_begin(bt_gate *gate, int32_t limit_count2)
-{
-    gate->limit = limit_count2;
-    gate->room = limit_count2;
-    gate->jumped_before = gate->jumped;
-    gate->jumped = 0;
-    gate->missing = 0;
-    gate->railed = 0;
-    gate->pressure_now = false;
-}
-
 int32_t bt_gate_repeat(bt_gate *gate, unsigned electrode, uint16_t count)
 {
     gate->missing = (uint8_t)(gate->missing + (count == BT_INVALID_COUNT));

@@ -49,7 +49,18 @@ typedef struct {
 void bt_gate_reset(bt_gate *gate);
 
 // A round begins; the gate opens when its energy passes limit_count2, below BT_GATE_NEVER.
-void bt_gate_begin(bt_gate *gate, int32_t limit_count2);
+#ifndef BT_CDEF
+static inline void bt_gate_begin(bt_gate *gate, int32_t limit_count2)
+{
+    gate->limit = limit_count2;
+    gate->room = limit_count2;
+    gate->jumped_before = gate->jumped;
+    gate->jumped = 0;
+    gate->missing = 0;
+    gate->railed = 0;
+    gate->pressure_now = false;
+}
+#endif
 
 // Out of the ordinary: a word that is missing or railed, and one that jumps. The first returns the room
 // left, the second the filter's new value.

@@ -33,22 +33,20 @@ _Static_assert((int64_t)BT_E_MAX_Q4 * BT_FOLD_BEHIND_UNITS * QUARTER_X <= INT32_
 _Static_assert((int64_t)BT_E_MAX_Q4 *BT_FOLD_Y_UM <= INT32_MAX, "the linear sum of y must fit int32");
 _Static_assert((int64_t)BT_E_MAX_Q4 *BT_FOLD_Z_UM <= UINT32_MAX, "the linear sum of z must fit uint32");
 
-static void linear_moments(const int32_t e_q4[BT_ELECTRODES], moments *m)
+static void linear_moments(const bt_linear_sums *sums, moments *m)
 {
-    bt_linear_sums sums;
-    bt_fold_linear(e_q4, &sums);
-    m->x_backward = BT_FOLD_X_UNIT_UM * sums.behind - sums.ahead;
-    m->total = sums.total;
-    if (sums.total <= WHOLE_TOTAL) {
+    m->x_backward = BT_FOLD_X_UNIT_UM * sums->behind - sums->ahead;
+    m->total = sums->total;
+    if (sums->total <= WHOLE_TOTAL) {
         m->bits = 0;
         m->n[0] = -(int32_t)m->x_backward;
-        m->n[1] = sums.y;
-        m->n[2] = -(int32_t)sums.z;
+        m->n[1] = sums->y;
+        m->n[2] = -(int32_t)sums->z;
     } else {
         m->bits = LINEAR_BITS;
-        m->n[0] = (int32_t)(sums.ahead >> LINEAR_BITS) - (int32_t)(QUARTER_X * sums.behind);
-        m->n[1] = sums.y / (1 << LINEAR_BITS);
-        m->n[2] = -(int32_t)(sums.z >> LINEAR_BITS);
+        m->n[0] = (int32_t)(sums->ahead >> LINEAR_BITS) - (int32_t)(QUARTER_X * sums->behind);
+        m->n[1] = sums->y / (1 << LINEAR_BITS);
+        m->n[2] = -(int32_t)(sums->z >> LINEAR_BITS);
     }
 }
 
@@ -74,7 +72,7 @@ _Static_assert(LOW_BITS == 2 && BT_FOLD_X_UNIT_UM * 2 == QUARTER_X << (SPLIT_BIT
 static uint32_t squares_of(const int32_t e_q4[BT_ELECTRODES], uint32_t w[BT_ELECTRODES])
 {
     uint32_t all = 0;
-#pragma GCC unroll 19
+    BT_UNROLL
     for (int i = 0; i < BT_ELECTRODES; i++) {
         uint32_t e = (uint32_t)e_q4[i];
         w[i] = e * e;
@@ -86,7 +84,7 @@ static uint32_t squares_of(const int32_t e_q4[BT_ELECTRODES], uint32_t w[BT_ELEC
 static uint32_t compressed_squares_of(const int32_t e_q4[BT_ELECTRODES], uint32_t w[BT_ELECTRODES])
 {
     uint32_t all = 0;
-#pragma GCC unroll 19
+    BT_UNROLL
     for (int i = 0; i < BT_ELECTRODES; i++) {
         uint32_t e = (uint32_t)(e_q4[i] & bt_shift_down(e_q4[i], 31)); // min(e, 0) without a branch
         w[i] = e * e;
@@ -182,22 +180,35 @@ static void to_radius(const int32_t n[3], int first, bt_point *point)
     }
 }
 
+static bool point_of(const moments *m, bt_point *point)
+{
+    if (m->total == 0) {
+        return false;
+    }
+    if (m->n[0] >= 0) { // tip: a point on the sphere; its direction needs no division by W
+        to_radius(m->n, 0, point);
+    } else { // cylinder: keep x, move (y, z) out to the radius, which the paper's Eq 2 leaves out
+        to_radius(m->n, 1, point);
+        point->um[0] = ratio_um(m);
+    }
+    return true;
+}
+
+bool bt_poc_linear(const bt_linear_sums *sums, bt_point *point)
+{
+    moments m;
+    linear_moments(sums, &m);
+    return point_of(&m, point);
+}
+
 bool bt_poc(const int32_t e_q4[BT_ELECTRODES], int weights, bt_point *point)
 {
     moments m;
     if (weights == BT_POC_WEIGHTS_COMPRESS_N1) {
-        linear_moments(e_q4, &m);
-    } else {
-        square_moments(e_q4, weights, &m);
+        bt_linear_sums sums;
+        bt_fold_linear(e_q4, &sums);
+        return bt_poc_linear(&sums, point);
     }
-    if (m.total == 0) {
-        return false;
-    }
-    if (m.n[0] >= 0) { // tip: a point on the sphere; its direction needs no division by W
-        to_radius(m.n, 0, point);
-    } else { // cylinder: keep x, move (y, z) out to the radius, which the paper's Eq 2 leaves out
-        to_radius(m.n, 1, point);
-        point->um[0] = ratio_um(&m);
-    }
-    return true;
+    square_moments(e_q4, weights, &m);
+    return point_of(&m, point);
 }

@@ -5,6 +5,7 @@
 #ifndef BIOTAC_POC_H
 #define BIOTAC_POC_H
 
+#include "fold_gen.h"
 #include "sensor_gen.h"
 #include "wire_gen.h"
 
@@ -19,5 +20,8 @@ typedef struct {
 // weights is an enum bt_poc_weights. Returns false, leaving point alone, when no electrode weighs
 // anything (every e is 0, or none is compressed): that is the only input without an answer.
 bool bt_poc(const int32_t e_q4[BT_ELECTRODES], int weights, bt_point *point);
+
+// The same with weights max(-e, 0), from their sums.
+bool bt_poc_linear(const bt_linear_sums *sums, bt_point *point);
 
 #endif

@@ -36,16 +36,26 @@ static inline void add_to_shape(signal_shape *shape_q2, int32_t e_q4)
     }
 }
 
-// Signals and shape in one pass when every electrode has a count and a tare, which is nearly always.
+// Signals and shape in one pass where every electrode has a count and a tare. Called, not inlined: then the
+// compiler walks plain pointers.
+static BT_NOINLINE signal_shape all_signals(const uint16_t counts[BT_ELECTRODES],
+                                            const uint16_t tare_q4[BT_ELECTRODES],
+                                            int32_t e_q4[BT_ELECTRODES])
+{
+    signal_shape shape_q2 = {0, 0};
+    BT_UNROLL
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        e_q4[i] = 16 * (int32_t)counts[i] - tare_q4[i];
+        add_to_shape(&shape_q2, e_q4[i]);
+    }
+    return shape_q2;
+}
+
 static signal_shape signals(const bt_frame *frame, const bt_tare *tare, int32_t e_q4[BT_ELECTRODES])
 {
     signal_shape shape = {0, 0};
     if (tare->gate.missing == 0 && !(tare->gate.unknown & ((1u << BT_ELECTRODES) - 1))) {
-        BT_UNROLL
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            e_q4[i] = 16 * (int32_t)frame->electrode[i] - tare->electrode_q4[i];
-            add_to_shape(&shape, e_q4[i]);
-        }
+        shape = all_signals(frame->electrode, tare->electrode_q4, e_q4);
     } else {
         bt_signals_q4(frame->electrode, tare->electrode_q4, e_q4);
         for (int i = 0; i < BT_ELECTRODES; i++) {
@@ -98,11 +108,14 @@ static bool faces_down(const int16_t poc_um[3])
 
 static bool enough_active(const int32_t e_q4[BT_ELECTRODES])
 {
-    int active = 0;
-    for (int i = 0; i < BT_ELECTRODES && active < ACTIVE_FOR_TORSION; i++) {
-        active += bt_abs32(e_q4[i]) >= ACTIVE_Q4;
+    int wanted = ACTIVE_FOR_TORSION;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        // One comparison for both signs: what is in between wraps to below.
+        if ((uint32_t)(e_q4[i] + ACTIVE_Q4 - 1) > 2 * (ACTIVE_Q4 - 1) && --wanted == 0) {
+            return true;
+        }
     }
-    return active == ACTIVE_FOR_TORSION;
+    return false;
 }
 
 void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_settings *settings,

@@ -34,14 +34,6 @@ uint32_t bt_sigma_count_q8(uint32_t noise_count2)
     return (uint32_t)root((uint64_t)noise_count2 * VARIANCE_PER_NOISE_Q16);
 }
 
-void bt_sigma_unknown(bt_msg_frame *msg)
-{
-    msg->poc_sigma_um = UNKNOWN;
-    for (int d = 0; d < 3; d++) {
-        msg->force_sigma_100un[d] = UNKNOWN;
-    }
-}
-
 static uint32_t square_of(int32_t value)
 {
     return bt_abs32(value) * bt_abs32(value);

@@ -16,7 +16,15 @@
 
 #include "kernel.h"
 
-void bt_sigma_unknown(bt_msg_frame *msg);
+#ifndef BT_CDEF
+static inline void bt_sigma_unknown(bt_msg_frame *msg)
+{
+    msg->poc_sigma_um = BT_INVALID_COUNT;
+    for (int d = 0; d < 3; d++) {
+        msg->force_sigma_100un[d] = BT_INVALID_COUNT;
+    }
+}
+#endif
 
 // e_q4 are the signals that msg's results were computed from, noise_count2 is bt_tare's.
 void bt_sigma(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *settings, uint32_t noise_count2,

@@ -44,21 +44,8 @@ void bt_sweep_add(bt_sweep *sweep, const bt_lanes *smooth)
     }
 }
 
-uint16_t bt_sweep_close(bt_sweep *sweep, unsigned lane, int span_q3)
+void bt_sweep_start_over(bt_sweep *sweep)
 {
-    uint16_t mean_q3 = sweep->sum.lane[lane];
-    sweep->sum.lane[lane] = 0;
-    sweep->mean_q3.lane[lane] = mean_q3;
-    int change_q3 = mean_q3 - sweep->settled_q3.lane[lane];
-    sweep->moved = sweep->moved || change_q3 > span_q3 || change_q3 < -span_q3;
-    return mean_q3;
-}
-
-bool bt_sweep_next(bt_sweep *sweep)
-{
-    if (++sweep->round < BT_SWEEP_ROUNDS) {
-        return false;
-    }
     sweep->round = 0;
     if (sweep->moved) {
         sweep->settled_q3 = sweep->mean_q3;
@@ -67,5 +54,4 @@ bool bt_sweep_next(bt_sweep *sweep)
         sweep->still_sweeps++;
     }
     sweep->moved = false;
-    return true;
 }

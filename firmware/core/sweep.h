@@ -50,9 +50,33 @@ static inline unsigned bt_sweep_end(const bt_sweep *sweep)
 #endif
 
 // Close one lane's window, note whether it moved by more than span_q3, and return its mean.
-uint16_t bt_sweep_close(bt_sweep *sweep, unsigned lane, int span_q3);
+#ifndef BT_CDEF
+static inline uint16_t bt_sweep_close(bt_sweep *sweep, unsigned lane, int span_q3)
+{
+    uint16_t mean_q3 = sweep->sum.lane[lane];
+    sweep->sum.lane[lane] = 0;
+    sweep->mean_q3.lane[lane] = mean_q3;
+    int change_q3 = mean_q3 - sweep->settled_q3.lane[lane];
+    if (change_q3 > span_q3 || change_q3 < -span_q3) {
+        sweep->moved = true;
+    }
+    return mean_q3;
+}
+#endif
 
-// The round is over. True after a sweep's last round, where still_sweeps is brought up to date.
-bool bt_sweep_next(bt_sweep *sweep);
+// After a sweep's last round: brings still_sweeps up to date and starts over.
+void bt_sweep_start_over(bt_sweep *sweep);
+
+// The round is over. True after a sweep's last one.
+#ifndef BT_CDEF
+static inline bool bt_sweep_next(bt_sweep *sweep)
+{
+    if (++sweep->round < BT_SWEEP_ROUNDS) {
+        return false;
+    }
+    bt_sweep_start_over(sweep);
+    return true;
+}
+#endif
 
 #endif

@@ -5,23 +5,12 @@
 #include <string.h>
 
 // Bounds of the machine, measured on real sensors; the settling rule comes from real recordings.
-#define HITS           3         // rounds over the threshold that make a contact
-#define PDC_HIT        6         // pressure above rest that is a contact
-#define PDC_QUIET      4         // pressure above rest that still is a release; one-sided, it undershoots
-#define SLEW_Q16       (8 * 328) // a sweep; 0.5 count/s: drift is followed no faster, so a load is not
-#define PDC_SLEW_Q16   (8 * 131) // 0.2 count/s
-#define SPAN_Q3        (12 * 8)  // means of still signals stay this close to where they came to rest
-#define NOW_SPAN_Q3    (32 * 8)  // and their latest filtered count this close to the mean: ten sigmas
-#define STILL_SWEEPS   2         // to tare from; the first one may hold what came before it
-#define CALM_ENERGY    400
-#define RESIDUE_ENERGY 6000         // count^2 that skin hysteresis may leave
-#define RESIDUE_SWEEPS 12           // 960 ms
-#define SETTLE_SWEEPS  5            // 400 ms
-#define SETTLE_PDC     30           // pressure that real skin keeps after a press (+24 seen), not more
-#define RELEASE_FALL   4            // a release has fallen to a quarter of the contact's peak
-#define DRIFT_FRAMES_PER_COUNT 400  // 15 counts/min, the worst drift measured
-#define DRIFT_LIMIT_BLIND      6000 // without pressure, 60 s of drift is all that may be forgiven
-#define DRIFT_LIMIT            60000
+#define HITS         3         // rounds over the threshold that make a contact
+#define SLEW_Q16     (8 * 328) // a sweep; 0.5 count/s: drift is followed no faster, so a load is not
+#define PDC_SLEW_Q16 (8 * 131) // 0.2 count/s
+#define SPAN_Q3      (12 * 8)  // means of still signals stay this close to where they came to rest
+#define NOW_SPAN_Q3  (32 * 8)  // and their latest filtered count this close to the mean: ten sigmas
+#define STILL_SWEEPS 2         // to tare from; the first one may hold what came before it
 
 bt_tare_settings bt_tare_settings_from(const bt_settings *settings)
 {
@@ -47,11 +36,11 @@ static int32_t pdc_above_rest(const bt_tare *tare)
 #define SQUARE_MAX_Q6 (BT_SETTING_CONTACT_ENERGY_COUNT2_MAX * 64u)
 _Static_assert((uint64_t)SQUARE_MAX_Q6 *BT_ELECTRODES <= UINT32_MAX, "the sum of a sweep must fit 32 bits");
 
-// The square of a difference of means in count^2, rounded down. Differences are below 2^15: it fits,
-// and so does the sum over all electrodes.
-static uint32_t square(int32_t difference_q3)
+// The square of a difference in count^2, rounded down. Differences are below 2^16 in 1/16 count: as unsigned,
+// the square fits, and so does the sum over all electrodes.
+static uint32_t square(int32_t difference_q4)
 {
-    return bt_abs32(difference_q3) * bt_abs32(difference_q3) >> 6;
+    return (uint32_t)difference_q4 * (uint32_t)difference_q4 >> 8;
 }
 
 // ---- changes of the baseline ----------------------------------------------------------------
@@ -77,10 +66,8 @@ static void use_pressure(bt_tare *tare)
 static void forget_contact(bt_tare *tare)
 {
     tare->hits = 0;
-    tare->quiet_sweeps = 0;
     tare->contact_frames = 0;
-    tare->energy_peak = 0;
-    tare->pdc_peak = 0;
+    bt_release_begin(&tare->release);
     bt_thermal_begin(&tare->thermal);
 }
 
@@ -181,7 +168,7 @@ static void serve_electrode(bt_tare *tare, unsigned i)
         return;
     }
     if (tare->state == BT_TARE_STATE_CONTACT) {
-        tare->energy_count2 += square(mean_q3 - (int32_t)((*base_q16 + (1 << 12)) >> 13));
+        tare->energy_count2 += square(2 * mean_q3 - tare->electrode_q4[i]);
         if (tare->thermal.step_q16 != 0) {
             warm_electrode(tare, i);
         }
@@ -232,50 +219,24 @@ static BT_NOINLINE void count_hit(bt_tare *tare)
 static void follow_contact(bt_tare *tare)
 {
     tare->contact_frames++;
-    if (pdc_known(tare) && pdc_above_rest(tare) > tare->pdc_peak) {
-        tare->pdc_peak = pdc_above_rest(tare);
+    if (pdc_known(tare)) {
+        bt_release_pressure(&tare->release, pdc_above_rest(tare));
     }
-}
-
-static uint32_t residue_limit(const bt_tare *tare)
-{
-    _Static_assert((uint64_t)DRIFT_LIMIT * DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
-    uint32_t limit = pdc_known(tare) ? DRIFT_LIMIT : DRIFT_LIMIT_BLIND;
-    uint32_t frames = tare->contact_frames < limit ? tare->contact_frames : limit;
-    uint32_t drift_count2 = BT_DIVIDE_U32(frames * frames, DRIFT_FRAMES_PER_COUNT * DRIFT_FRAMES_PER_COUNT);
-    return RESIDUE_ENERGY + BT_ELECTRODES * drift_count2;
-}
-
-// On real fingers the skin's hysteresis leaves thousands of count^2 and some pressure after a press,
-// so that neither energy nor pressure come back to the tare. What tells a release then is that the
-// pressure has fallen far below the press's own peak and nothing moves any more. A load that only
-// grows is at its peak all the time and never passes; without a press there is no release: a light
-// touch while the pressure undershoots has no peak.
-static bool released_by_pressure(const bt_tare *tare)
-{
-    int32_t above = pdc_above_rest(tare);
-    bool pressed = tare->pdc_peak >= RELEASE_FALL * PDC_HIT;
-    bool fallen = above < SETTLE_PDC && above * RELEASE_FALL < tare->pdc_peak;
-    return tare->sweep.still_sweeps >= SETTLE_SWEEPS && pressed && fallen;
 }
 
 // After a sweep in contact: has it ended?
 static void judge_release(bt_tare *tare)
 {
-    bool pressure = pdc_known(tare);
-    tare->energy_peak = tare->energy_count2 > tare->energy_peak ? tare->energy_count2 : tare->energy_peak;
-    // Without pressure the energy itself must have fallen, or the first second of a slow load would
-    // pass for a residue.
-    bool quiet =
-        pressure ? pdc_above_rest(tare) < PDC_QUIET : tare->energy_count2 < tare->energy_peak / RELEASE_FALL;
-    uint8_t still = tare->sweep.still_sweeps;
-    tare->quiet_sweeps = quiet ? (uint8_t)(tare->quiet_sweeps + (tare->quiet_sweeps < UINT8_MAX)) : 0;
-    bool residue = tare->quiet_sweeps >= RESIDUE_SWEEPS && still >= RESIDUE_SWEEPS
-                   && tare->energy_count2 < residue_limit(tare);
-    if (tare->energy_count2 < CALM_ENERGY && (quiet || !pressure)) {
-        adopt_present(tare, BT_TARE_REASON_RELEASE);
-    } else if (residue || (pressure && released_by_pressure(tare))) {
-        adopt_present(tare, BT_TARE_REASON_RESIDUE);
+    bt_release_sweep sweep = {
+        .energy_count2 = tare->energy_count2,
+        .contact_frames = tare->contact_frames,
+        .above = pdc_above_rest(tare),
+        .mean_above = (tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3) - tare->gate.rest.lane[BT_LANE_PDC],
+        .still_sweeps = tare->sweep.still_sweeps,
+    };
+    uint8_t reason = bt_release_judge(&tare->release, &sweep);
+    if (reason != BT_TARE_REASON_NONE) {
+        adopt_present(tare, reason);
     }
 }
 
@@ -300,6 +261,7 @@ static BT_NOINLINE void end_sweep(bt_tare *tare, const bt_tare_settings *setting
     }
     tare->energy_count2 = 0;
     tare->deviation_q6 = 0;
+    tare->release.pressure_seen = false;
     tare->partial = false;
 }
 
@@ -332,7 +294,9 @@ void bt_tare_reset(bt_tare *tare)
 
 void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings)
 {
-    tare->threshold_count2 = bt_noise_threshold(&tare->noise, settings->contact_energy_count2);
+    if (tare->sweep.round == 0) { // the noise is as old as the last sweep
+        tare->threshold_count2 = bt_noise_threshold(&tare->noise, settings->contact_energy_count2);
+    }
     bool resting = tare->state == BT_TARE_STATE_REST;
     bt_gate_begin(&tare->gate, resting ? (int32_t)tare->threshold_count2 : BT_GATE_NEVER);
     tare->touched = tare->hits > 0; // what has begun is not seen to begin again
@@ -347,7 +311,7 @@ bool bt_tare_touch(bt_tare *tare)
 
 bool bt_tare_pressure(bt_tare *tare, uint16_t count)
 {
-    return bt_gate_pressure(&tare->gate, count, PDC_HIT) < 0 && bt_tare_touch(tare);
+    return bt_gate_pressure(&tare->gate, count, BT_PDC_HIT) < 0 && bt_tare_touch(tare);
 }
 
 void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings)
@@ -365,7 +329,7 @@ void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings)
         // A tare from before the fault still holds, but what touched meanwhile is unknown:
         // CONTACT freezes it until the release rules have seen quiet signals.
         tare->state = tare->reason == BT_TARE_REASON_NONE ? BT_TARE_STATE_INIT : BT_TARE_STATE_CONTACT;
-        tare->quiet_sweeps = 0;
+        tare->release.quiet_sweeps = 0;
     } else if (tare->state == BT_TARE_STATE_REST) {
         if (tare->gate.room < 0) {
             count_hit(tare);

@@ -13,6 +13,7 @@
 #include "baseline.h"
 #include "gate.h"
 #include "noise.h"
+#include "release.h"
 #include "settings.h"
 #include "sweep.h"
 #include "thermal.h"
@@ -40,18 +41,13 @@ typedef struct {
     bt_rollback rollback;
     bt_noise noise;
     bt_thermal thermal;
+    bt_release release;
 
     uint8_t hits;           // consecutive rounds in which the gate opened
-    uint8_t quiet_sweeps;   // consecutive sweeps with the pressure (without one: the energy) back
     bool touched;           // in this round the gate opened, or before it and it is open still
     bool partial;           // this sweep did not serve all electrodes in one state
     uint32_t deviation_q6;  // count^2; of this sweep: filtered counts from their means
     uint32_t energy_count2; // of this sweep: means from the tare
-
-    // Of the present contact: its strongest moment.
-    uint32_t energy_peak;
-    int32_t pdc_peak;
-
 } bt_tare;
 
 void bt_tare_reset(bt_tare *tare);

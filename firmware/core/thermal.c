@@ -4,7 +4,6 @@
 #include "fix.h"
 
 #define TDC_SHIFT   3           // a low-pass of eight sweeps: TDC has steps of half an electrode count
-#define WARMED_Q8   (33 << 8)   // one degree: 30 degrees read about 1000 counts, 31 about 1033
 #define APPLIED_MAX (500 << 16) // 15 degrees; more is a broken thermometer
 
 _Static_assert((int64_t)BT_SETTING_THERMAL_GAIN_MILLI_MAX * 65536 / 1000 <= INT32_MAX,
@@ -47,9 +46,4 @@ void bt_thermal_follow(bt_thermal *thermal, int32_t gain_q16)
     due_q16 = due_q16 > APPLIED_MAX ? APPLIED_MAX : due_q16 < -APPLIED_MAX ? -APPLIED_MAX : due_q16;
     thermal->step_q16 = (int32_t)due_q16 - thermal->applied_q16;
     thermal->applied_q16 = (int32_t)due_q16;
-}
-
-bool bt_thermal_warmed(const bt_thermal *thermal)
-{
-    return bt_abs32(warmed_q8(thermal)) > WARMED_Q8;
 }

@@ -11,6 +11,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#define BT_WARMED_Q8 (33u << 8) // one degree: 30 degrees read about 1000 counts, 31 about 1033
+
 typedef struct {
     uint32_t tdc_q8;      // low-passed over eight sweeps; 0 until read
     uint32_t tdc_then_q8; // when the contact began
@@ -31,6 +33,11 @@ void bt_thermal_begin(bt_thermal *thermal);
 void bt_thermal_follow(bt_thermal *thermal, int32_t gain_q16);
 
 // By more than a degree since the contact began.
-bool bt_thermal_warmed(const bt_thermal *thermal);
+#ifndef BT_CDEF
+static inline bool bt_thermal_warmed(const bt_thermal *thermal)
+{
+    return thermal->tdc_q8 - thermal->tdc_then_q8 + BT_WARMED_Q8 > 2 * BT_WARMED_Q8;
+}
+#endif
 
 #endif

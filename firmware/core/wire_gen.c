@@ -167,6 +167,41 @@ void bt_msg_sensor_info_unpack(bt_msg_sensor_info *msg, const uint8_t in[BT_SENS
     (void)at;
 }
 
+void bt_msg_point_pack(const bt_msg_point *msg, uint8_t out[BT_POINT_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->seq, 2);
+    at = put(at, (uint32_t)msg->slot, 1);
+    at = put(at, (uint32_t)msg->tare_state, 1);
+    for (int k = 0; k < 3; k++) {
+        at = put(at, (uint32_t)msg->poc_um[k], 2);
+    }
+    (void)at;
+}
+
+void bt_msg_point_unpack(bt_msg_point *msg, const uint8_t in[BT_POINT_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 2);
+    msg->seq = (uint16_t)value;
+    at = get(at, &value, 1);
+    msg->slot = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->tare_state = (uint8_t)value;
+    for (int k = 0; k < 3; k++) {
+        at = get(at, &value, 2);
+        msg->poc_um[k] = (int16_t)value;
+    }
+    (void)at;
+}
+
 void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
 {
     uint8_t *at = out;
@@ -604,6 +639,25 @@ void bt_msg_subscribe_unpack(bt_msg_subscribe *msg, const uint8_t in[BT_SUBSCRIB
     (void)at;
 }
 
+void bt_msg_get_point_pack(const bt_msg_get_point *msg, uint8_t out[BT_GET_POINT_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    (void)at;
+}
+
+void bt_msg_get_point_unpack(bt_msg_get_point *msg, const uint8_t in[BT_GET_POINT_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    (void)at;
+}
+
 void bt_msg_tare_now_pack(const bt_msg_tare_now *msg, uint8_t out[BT_TARE_NOW_BYTES])
 {
     uint8_t *at = out;
@@ -758,6 +812,8 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_SETTING_BYTES;
     case BT_SENSOR_INFO_ID:
         return BT_SENSOR_INFO_BYTES;
+    case BT_POINT_ID:
+        return BT_POINT_BYTES;
     case BT_FRAME_ID:
         return BT_FRAME_BYTES;
     case BT_PAC_ID:
@@ -782,6 +838,8 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_PING_BYTES;
     case BT_SUBSCRIBE_ID:
         return BT_SUBSCRIBE_BYTES;
+    case BT_GET_POINT_ID:
+        return BT_GET_POINT_BYTES;
     case BT_TARE_NOW_ID:
         return BT_TARE_NOW_BYTES;
     case BT_TARE_SET_ID:

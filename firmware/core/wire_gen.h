@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 1
-#define BT_SCHEMA_HASH 0xD414ED88u
+#define BT_SCHEMA_HASH 0x96B1C90Au
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -195,6 +195,20 @@ typedef struct {
 void bt_msg_sensor_info_pack(const bt_msg_sensor_info *msg, uint8_t out[BT_SENSOR_INFO_BYTES]);
 void bt_msg_sensor_info_unpack(bt_msg_sensor_info *msg, const uint8_t in[BT_SENSOR_INFO_BYTES]);
 
+// Where a finger is touched right now, inside a round, from the latest word of every electrode. Reply to GET_POINT.
+#define BT_POINT_ID 0x05
+#define BT_POINT_BYTES 12
+typedef struct {
+    uint8_t req_id; // [1] of the request
+    uint8_t finger; // [1] chip select index
+    uint16_t seq; // [1] of the round that is under way
+    uint8_t slot; // [1] slots of it that were taken in
+    uint8_t tare_state; // [enum tare_state] after the round before
+    int16_t poc_um[3]; // [um] point of contact on the core's surface; invalid without weight or tare
+} bt_msg_point;
+void bt_msg_point_pack(const bt_msg_point *msg, uint8_t out[BT_POINT_BYTES]);
+void bt_msg_point_unpack(bt_msg_point *msg, const uint8_t in[BT_POINT_BYTES]);
+
 // One finger, one round of slots: counts, the tare that was subtracted, and the results.
 #define BT_FRAME_ID 0x10
 #define BT_FRAME_BYTES 134
@@ -374,6 +388,16 @@ typedef struct {
 void bt_msg_subscribe_pack(const bt_msg_subscribe *msg, uint8_t out[BT_SUBSCRIBE_BYTES]);
 void bt_msg_subscribe_unpack(bt_msg_subscribe *msg, const uint8_t in[BT_SUBSCRIBE_BYTES]);
 
+// Ask for POINT, without waiting for the round's end.
+#define BT_GET_POINT_ID 0x8C
+#define BT_GET_POINT_BYTES 2
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] which finger
+} bt_msg_get_point;
+void bt_msg_get_point_pack(const bt_msg_get_point *msg, uint8_t out[BT_GET_POINT_BYTES]);
+void bt_msg_get_point_unpack(bt_msg_get_point *msg, const uint8_t in[BT_GET_POINT_BYTES]);
+
 // Take the latest means of eight rounds as the new tare; refused while the signals move.
 #define BT_TARE_NOW_ID 0x84
 #define BT_TARE_NOW_BYTES 2
@@ -455,6 +479,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_REPLY_FIELDS(X) X(req_id, u8, 1) X(command, u8, 1) X(error, u8, 1)
 #define BT_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
 #define BT_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(flex_version, u8, 2) X(software_version, u8, 4) X(serial, u8, 16) X(cpu_khz, u16, 1) X(sampling_hz, u16, 1)
+#define BT_POINT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(seq, u16, 1) X(slot, u8, 1) X(tare_state, u8, 1) X(poc_um, i16, 3)
 #define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
 #define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
@@ -467,6 +492,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_STOP_FIELDS(X) X(req_id, u8, 1)
 #define BT_PING_FIELDS(X) X(req_id, u8, 1)
 #define BT_SUBSCRIBE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(quantities, u8, 1)
+#define BT_GET_POINT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_TARE_NOW_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_TARE_SET_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1)
 #define BT_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
@@ -474,7 +500,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_GET_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_GET_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1)
 #define BT_SET_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting)
 #endif
 
 #endif

@@ -42,9 +42,12 @@ _Static_assert(2 * LEVER_MAX * ((FORCE_MAX_100UN >> LEVER_SPLIT_BITS) + 2) < INT
                "the lever's high products and what the low ones add to them must fit int32");
 _Static_assert(2 * LEVER_MAX << LEVER_SPLIT_BITS < INT32_MAX, "the lever's low products must fit int32");
 
-static int32_t multiplier(int32_t gain_nn, int bits, int64_t divisor)
+static bt_gain multiplier(int32_t gain_nn, int bits, int64_t divisor)
 {
-    return (int32_t)bt_div_round(gain_nn * ((int64_t)1 << bits), divisor);
+    int32_t rounded = (int32_t)bt_div_round(gain_nn * ((int64_t)1 << bits), divisor);
+    uint32_t magnitude = bt_abs32(rounded);
+    bt_gain gain = {(uint16_t)(magnitude >> 16), (uint16_t)magnitude, bt_shift_down(rounded, 31)};
+    return gain;
 }
 
 bt_gains bt_gains_from(const int32_t force_nn[3], const int32_t torque_nn[2])
@@ -59,9 +62,9 @@ bt_gains bt_gains_from(const int32_t force_nn[3], const int32_t torque_nn[2])
     return gains;
 }
 
-static int32_t scale(int32_t sum, int32_t gain, int bits)
+static int32_t scale(int32_t sum, const bt_gain *gain, int bits)
 {
-    return bt_with_sign(bt_scale(bt_abs32(sum), bt_abs32(gain), bits - 32), sum ^ gain);
+    return bt_with_sign(bt_scale(bt_abs32(sum), gain->high, gain->low, bits - 32), sum ^ gain->sign);
 }
 
 void bt_force(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t force_100un[3])
@@ -69,7 +72,7 @@ void bt_force(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t 
     int32_t sum[3];
     bt_fold_force(e_q4, sum);
     for (int d = 0; d < 3; d++) {
-        force_100un[d] = scale(sum[d], gains->force[d], FORCE_BITS);
+        force_100un[d] = scale(sum[d], &gains->force[d], FORCE_BITS);
     }
 }
 
@@ -78,7 +81,7 @@ void bt_torque_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int3
     int32_t sum[2];
     bt_fold_torque(e_q4, sum);
     for (int d = 0; d < 2; d++) {
-        torque_mnmm[d] = scale(sum[d], gains->torque[d], TORQUE_BITS);
+        torque_mnmm[d] = scale(sum[d], &gains->torque[d], TORQUE_BITS);
     }
 }
 

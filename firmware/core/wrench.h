@@ -13,8 +13,13 @@
 
 // Gains as the sums are multiplied by them, worked out once per change of settings.
 typedef struct {
-    int32_t force[3];  // 100 uN per (1/16 count * 1/1000), times 2^34
-    int32_t torque[2]; // y, z: mN*mm per BT_FOLD_TORQUE_UNIT_NM of 1/16 count, times 2^35
+    uint16_t high, low; // magnitude
+    int32_t sign;       // 0 or -1
+} bt_gain;
+
+typedef struct {
+    bt_gain force[3];  // 100 uN per (1/16 count * 1/1000), times 2^34
+    bt_gain torque[2]; // y, z: mN*mm per BT_FOLD_TORQUE_UNIT_NM of 1/16 count, times 2^35
 } bt_gains;
 
 #define BT_GAIN_MAX_NN BT_SETTING_FORCE_GAIN_X_NN_MAX // and every other gain's, see wrench.c

@@ -8,10 +8,13 @@
 #include "blocks.h"
 #include "cobs.h"
 #include "crc32.h"
+#include "finger.h"
 #include "framing.h"
 #include "kernel.h"
 #include "lin2013.h"
+#include "replay.h"
 #include "tare.h"
+#include "variant_errors.h"
 
 // Compared with host/biotac/_wire.py when the module is imported.
 uint32_t bt_binding_schema_hash(void);

@@ -22,6 +22,7 @@ from .errors import (
     ScenarioError,
     WireVersionError,
 )
+from .finger import FINGER_DTYPE, Finger
 from .frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
 from .hand import Hand, LinkStats
 from .opening import open
@@ -29,6 +30,7 @@ from .recording import Recorder, Recording, load
 from .version import __version__
 
 __all__ = [
+    "FINGER_DTYPE",
     "FRAME_DTYPE",
     "IDLE_DTYPE",
     "PAC_DTYPE",
@@ -36,6 +38,7 @@ __all__ = [
     "BiotacError",
     "CommandRefusedError",
     "DeviceLostError",
+    "Finger",
     "Frame",
     "FrameFlags",
     "Hand",

@@ -15,7 +15,7 @@ import numpy as np
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 1
-SCHEMA_HASH = 0xD414ED88
+SCHEMA_HASH = 0x96B1C90A
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 INVALID_I16 = -(2**15)
@@ -358,6 +358,45 @@ class SensorInfo:
             v[9 : 25],
             v[25],
             v[26],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Where a finger is touched right now, inside a round, from the latest word of every electrode. Reply to GET_POINT."""
+
+    req_id: int
+    finger: int
+    seq: int
+    slot: int
+    tare_state: int
+    poc_um: tuple[int, ...]
+
+    ID: ClassVar[int] = 0x05
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBHBB3h")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 12 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.seq,
+            self.slot,
+            self.tare_state,
+            *self.poc_um,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Point:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4],
+            v[5 : 8],
         )
 
 
@@ -863,6 +902,33 @@ class Subscribe:
 
 
 @dataclass(frozen=True, slots=True)
+class GetPoint:
+    """Ask for POINT, without waiting for the round's end."""
+
+    req_id: int
+    finger: int
+
+    ID: ClassVar[int] = 0x8C
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 2 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> GetPoint:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class TareNow:
     """Take the latest means of eight rounds as the new tare; refused while the signals move."""
 
@@ -1057,13 +1123,14 @@ class SetSetting:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
     Reply.ID: Reply,
     SettingValue.ID: SettingValue,
     SensorInfo.ID: SensorInfo,
+    Point.ID: Point,
     Frame.ID: Frame,
     Pac.ID: Pac,
     Tare.ID: Tare,
@@ -1076,6 +1143,7 @@ MESSAGES: dict[int, type[Any]] = {
     Stop.ID: Stop,
     Ping.ID: Ping,
     Subscribe.ID: Subscribe,
+    GetPoint.ID: GetPoint,
     TareNow.ID: TareNow,
     TareSet.ID: TareSet,
     GetStatus.ID: GetStatus,
@@ -1128,6 +1196,16 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("serial", "u1", (16,)),
             ("cpu_khz", "<u2"),
             ("sampling_hz", "<u2"),
+        ]
+    ),
+    Point.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+            ("seq", "<u2"),
+            ("slot", "u1"),
+            ("tare_state", "u1"),
+            ("poc_um", "<i2", (3,)),
         ]
     ),
     Frame.ID: np.dtype(
@@ -1259,6 +1337,12 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("req_id", "u1"),
             ("fingers", "u1"),
             ("quantities", "u1"),
+        ]
+    ),
+    GetPoint.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
         ]
     ),
     TareNow.ID: np.dtype(

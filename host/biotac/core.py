@@ -51,12 +51,7 @@ def on_board(counts: Any, tare: Any, settings: Settings | None = None) -> Result
     shapes or ranges.
     """
     raw, tare_q4 = checked(counts, tare)
-    board = ffi.new("bt_settings *")
-    lib.bt_settings_reset(board)
-    for setting, value in (settings or default_settings()).items():
-        if lib.bt_settings_set(board, setting, value) != wire.Error.OK:
-            spec = wire.SETTINGS[setting]
-            raise ValueError(f"{setting.name} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
+    board = board_settings(settings or default_settings())
     kernel = ffi.new("bt_kernel_settings *", lib.bt_kernel_settings_from(board))
     n = len(raw)
     poc_um = np.empty((n, 3), np.int16)
@@ -76,6 +71,20 @@ def on_board(counts: Any, tare: Any, settings: Settings | None = None) -> Result
     return Results(
         to_units(poc_um, UM_PER_MM), to_units(force_100un, FORCE_LSB_PER_N), to_units(torque_mnmm, MNMM_PER_NMM)
     )
+
+
+def board_settings(settings: Settings) -> Any:
+    """The C struct bt_settings with these values; what they do not name has its default.
+
+    Raises ValueError for a value out of the setting's range.
+    """
+    board = ffi.new("bt_settings *")
+    lib.bt_settings_reset(board)
+    for setting, value in settings.items():
+        if lib.bt_settings_set(board, setting, value) != wire.Error.OK:
+            spec = wire.SETTINGS[setting]
+            raise ValueError(f"{setting.name} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
+    return board
 
 
 def reference(counts: Any, tare: Any, settings: Settings | None = None) -> Results:

@@ -204,6 +204,13 @@ class Hand:
         """What the sensor says of itself."""
         return self._ask(wire.GetSensorInfo(self._next_req_id(), finger), wire.SensorInfo)
 
+    def point(self, finger: int) -> wire.Point:
+        """Where ``finger`` is touched right now (``poc_um``), without waiting for the end of a round.
+
+        INVALID_I16 throughout without a touch or a tare. CommandRefusedError when no sensor answers there.
+        """
+        return self._ask(wire.GetPoint(self._next_req_id(), finger), wire.Point)
+
     def tare(self, finger: int) -> None:
         """Tare now; CommandRefusedError while the signals move."""
         self._command(wire.TareNow(self._next_req_id(), finger))

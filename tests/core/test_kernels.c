@@ -1,34 +1,14 @@
-// The integer kernels against the double reference (firmware/reference).
-//
-// Where the bounds come from (nothing is tuned):
-//  PoC    the published um: 0.5 per axis. Direction components of 16 bits, rounded: 2^-16 of r per
-//         axis. Their reciprocal length: a chord within 2^-17.4 of the curve, and two units of 17 bits
-//         (one of the table's, one for being halved) of at least 75000, along the radius. Components at
-//         the radius cut to 20 bits: 2^-20 of r per axis, and to be safe as much for the share. Squares
-//         cut at 2^-21 of the largest: |N| is at least 1116 um of that, and less than one unit is lost
-//         per electrode, together no more than (107.8, 27.3, 57.3) mm: 0.28 um for the unluckiest frame.
-//         Linear weights are exact, and so is the division by W.
-//  force  0.05 mN, and the multiplier's half unit of 2^-34 on the largest sum: 0.0024 mN.
-//  torque y, z: 0.5 mN*mm; arms rounded to 1/256 of 3.2 um: T sum |e| / 160 um; less than two units cut:
-//         0.4 T; the multiplier: half of 2^-35 of the sum in units of 0.2 count*um.
-//  torque x: 0.5 mN*mm, and 1/16 where products are cut; force off by 0.0524 mN on 5.08 mm in y and z;
-//         point off by 1/16 um (half of the 0.04 um that the middle of a cut may be off, and half of the
-//         0.08 um of the lever's unit) and by what the PoC's direction is, times the force.
+// The integer kernels against the double reference (firmware/reference), within kernel_bounds.h.
 #include "support.h"
 
 #include "fix.h"
 #include "kernel.h"
+#include "kernel_bounds.h"
 #include "lin2013.h"
 #include "poc.h"
 #include "wrench.h"
 
 #include <math.h>
-
-#define SQRT_3         1.7320508075688772
-#define LENGTH_UM      (5080 * (5.8e-6 + 2.0 / 75000))
-#define DIRECTION_UM   (SQRT_3 * 5080 / 65536 + LENGTH_UM + SQRT_3 * 5080 / 524288 + 0.28)
-#define POC_BOUND_UM   (0.5 * SQRT_3 + DIRECTION_UM)
-#define FORCE_BOUND_MN (0.05 + 0.0024)
 
 typedef struct {
     int32_t force_nn[3];
@@ -94,7 +74,7 @@ static void check_wrench(const lin2013_result *want, double size, const gains_nn
         if (gains == &defaults) {
             raise_to(&worst.torque_yz_mnmm, error);
         }
-        assert_true(error <= 0.5 + gain_n * (size / 160 + 0.4) + sum * 5 / 68719476736.0 + 1e-6);
+        assert_true(error <= torque_yz_bound_mnmm(size, gain_n, sum));
     }
 }
 
@@ -111,7 +91,7 @@ static void check_poc(const lin2013_result *want, const int16_t poc_um[3], int32
     double force = fabs(want->force_n[1]) + fabs(want->force_n[2]);
     double error = fabs(torque_x_mnmm - want->torque_nmm[0] * 1000);
     raise_to(&worst.torque_x_mnmm, error / (1 + force));
-    assert_true(error <= 0.5 + 0.0625 + 2 * 5.08 * FORCE_BOUND_MN + force * (0.0625 + DIRECTION_UM));
+    assert_true(error <= torque_x_bound_mnmm(force));
 }
 
 static void check_all_weights(const int32_t e_q4[BT_ELECTRODES], const gains_nn *gains)

@@ -76,6 +76,7 @@ static void every_command_gets_exactly_one_reply_with_its_req_id(void **state)
         {BT_GET_SETTING_ID, BT_SETTING_ID, 0, 20},
         {BT_SET_SETTING_ID, BT_SETTING_ID, 0, 21},
         {BT_SUBSCRIBE_ID, BT_REPLY_ID, 0, 22},
+        {BT_GET_POINT_ID, BT_POINT_ID, 0, 23},
     };
     for (int id = 0x80; id < 0x100; id++) { // the table holds every command there is
         int listed = 0;
@@ -84,6 +85,7 @@ static void every_command_gets_exactly_one_reply_with_its_req_id(void **state)
         }
         assert_int_equal(listed, bt_wire_payload_bytes((uint8_t)id) >= 0);
     }
+    host_round(&session, 1, 2000); // GET_POINT wants a sensor that answers
     for (size_t k = 0; k < sizeof table / sizeof *table; k++) {
         uint8_t payload[BT_FRAME_MAX_BYTES] = {table[k].req_id};
         if (table[k].id == BT_GET_SETTING_ID || table[k].id == BT_SET_SETTING_ID) {
@@ -103,6 +105,8 @@ static void errors_are_told_by_name(void **state)
     uint8_t tare[BT_TARE_SET_BYTES] = {1, 0};
     assert_int_equal(host_error(&session, BT_TARE_NOW_ID, absent, 2), BT_ERROR_NO_SUCH_FINGER);
     assert_int_equal(host_error(&session, BT_TARE_NOW_ID, beyond, 2), BT_ERROR_NO_SUCH_FINGER);
+    assert_int_equal(host_error(&session, BT_GET_POINT_ID, absent, 2), BT_ERROR_NO_SUCH_FINGER);
+    assert_int_equal(host_error(&session, BT_GET_POINT_ID, beyond, 2), BT_ERROR_NO_SUCH_FINGER);
     assert_int_equal(host_error(&session, BT_GET_SENSOR_STATUS_ID, beyond, 2), BT_ERROR_NO_SUCH_FINGER);
     assert_int_equal(host_error(&session, BT_GET_SENSOR_INFO_ID, beyond, 2), BT_ERROR_NO_SUCH_FINGER);
     assert_int_equal(host_error(&session, BT_GET_SETTING_ID, no_setting, 2), BT_ERROR_UNKNOWN_SETTING);

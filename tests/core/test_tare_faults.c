@@ -103,7 +103,7 @@ static void a_first_word_in_a_faulty_round_does_not_move_a_tare_from_the_host(vo
     step(&finger);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
     assert_memory_equal(&finger.tare.base, &base, sizeof base);
-    assert_int_equal(finger.tare.pdc_peak, PDC_REST - 1300);
+    assert_int_equal(finger.tare.release.pdc_peak, PDC_REST - 1300);
 }
 
 static void after_a_fault_no_older_frame_makes_a_tare(void **state)
@@ -229,9 +229,44 @@ static void an_electrode_that_was_railed_is_never_tared_at_its_end(void **state)
     }
 }
 
+// Eight phases of a sweep: in one of them the verdict comes right after the release, when the pressure has
+// fallen and the means of eight rounds still are those of the press.
+static void a_sudden_release_never_tares_the_press(void **state)
+{
+    (void)state;
+    for (int phase = 0; phase < 2 * BT_SWEEP_ROUNDS; phase++) {
+        emulated_finger finger = touched_finger(400, 200);
+        run_frames(&finger, 200 + phase);
+        finger.load = 0;
+        finger.pdc_load = 0;
+        (void)run_until(&finger, BT_TARE_STATE_REST, 100);
+        assert_true(tare_error(&finger) < 1);
+        assert_int_equal(finger.tare.base.pdc_q16 >> 16, PDC_REST);
+    }
+}
+
+// Light loads are seen by the pressure long before the electrodes; one lost word is no reason to think that
+// there is none.
+static void one_lost_pressure_word_does_not_end_a_light_contact(void **state)
+{
+    (void)state;
+    for (int phase = 0; phase < 2 * BT_SWEEP_ROUNDS; phase++) {
+        emulated_finger finger = touched_finger(15, 40); // 225 count^2
+        run_frames(&finger, 50 + phase);
+        bt_frame frame = next_frame(&finger);
+        frame.pdc = BT_INVALID_COUNT;
+        (void)feed(&finger, &frame);
+        run_frames(&finger, 50);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+        assert_int_equal(finger.tare.reason, BT_TARE_REASON_ROLL_BACK);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_sudden_release_never_tares_the_press),
+        cmocka_unit_test(one_lost_pressure_word_does_not_end_a_light_contact),
         cmocka_unit_test(a_railed_electrode_is_one_at_the_end_of_its_range),
         cmocka_unit_test(railed_electrodes_are_never_tared),
         cmocka_unit_test(a_fault_freezes_the_tare_and_release_rules_end_it),

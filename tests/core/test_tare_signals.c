@@ -171,7 +171,7 @@ static void the_threshold_rises_with_measured_noise_and_only_with_it(void **stat
     step(&finger);
     assert_int_equal(finger.tare.threshold_count2, 3 * noise_count2);
     finger.settings.contact_energy_count2 = 100000;
-    step(&finger);
+    run_frames(&finger, BT_SWEEP_ROUNDS);
     assert_int_equal(finger.tare.threshold_count2, 100000);
     // A load that creeps up below the threshold is no noise.
     finger_init(&finger);

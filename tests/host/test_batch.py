@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 import biotac
 from biotac import FRAME_DTYPE, RESULT_DTYPE, PocWeights, Setting
+from biotac import _wire as wire
 from biotac.batch import per_frame
 from biotac.bench import batch as bench
 from biotac.cli import main
@@ -290,9 +291,26 @@ def test_the_contestants_of_the_benchmark_agree(capsys) -> None:
     assert "ns per frame" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("wrong", [["bench"], ["bench", "boards"], ["bench", "batch", "--frames", "3"]])
-def test_wrong_arguments_of_the_benchmark(wrong, capsys) -> None:
+def test_the_link_of_an_untouched_finger_is_measured(capsys) -> None:
+    assert main(["bench", "idle", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["saved_percent"] >= 80
+    # A FRAME a round, and a heartbeat in ten of them.
+    frame_bytes = wire.DTYPES[wire.Frame.ID].itemsize + 7
+    assert told["contact"]["bytes_per_s"] >= 100 * frame_bytes
+    assert told["rest_with_heartbeats"]["heartbeats"] >= 9 * told["rest_with_heartbeats"]["seconds"]
+    assert main(["bench", "idle"]) == 0
+    assert "fewer bytes per second" in capsys.readouterr().out
+
+
+def test_an_unknown_benchmark_is_a_wrong_argument(capsys) -> None:
     with pytest.raises(SystemExit) as stopped:
-        main(wrong)
+        main(["bench", "boards"])
     assert stopped.value.code == 2
     capsys.readouterr()
+
+
+@pytest.mark.parametrize(("what", "frames"), [("batch", "3"), ("batch", "10000001"), ("kernels", "99")])
+def test_recordings_of_no_use_are_refused(what, frames, capsys) -> None:
+    assert main(["bench", what, "--frames", frames]) == 2
+    assert f"--frames is {frames}, expected" in capsys.readouterr().err

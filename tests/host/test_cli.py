@@ -62,6 +62,15 @@ def test_stream_prints_one_json_object_a_frame(capsys) -> None:
     assert all(len(row["counts"]) == 19 for row in rows)
 
 
+def test_stream_of_touched_fingers_is_silent_at_rest(capsys) -> None:
+    assert main(["stream", "sim:press.toml?pace=fast", "--seconds", "4", "--rate", "0", "--json", "--touched"]) == 0
+    flags = [json.loads(line)["flags"] for line in capsys.readouterr().out.splitlines()]
+    touched = sum(f & biotac.FrameFlags.CONTACT != 0 for f in flags)
+    assert touched > 100
+    # The first, the tares, the rounds before a contact is sure, and what moved: not a second's worth.
+    assert len(flags) - touched < 20
+
+
 def test_stream_thins_out_for_people(capsys) -> None:
     assert main(["stream", "sim:press.toml?pace=fast", "--seconds", "1", "--rate", "5"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == 5

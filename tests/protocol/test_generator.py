@@ -11,12 +11,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCES = ("protocol", "tools", "firmware/core", "host/biotac")
+SOURCES = ("protocol", "tools", "firmware/core", "firmware/variants", "host/biotac")
 GENERATED = (
     "firmware/core/sensor_gen.h",
     "firmware/core/sensor_gen.c",
     "firmware/core/wire_gen.h",
     "firmware/core/wire_gen.c",
+    "firmware/variants/fold_f32_gen.h",
+    "firmware/variants/fold_i64_gen.h",
+    "firmware/variants/tables_gen.h",
     "host/biotac/_sensor.py",
     "host/biotac/_wire.py",
     "protocol/MESSAGES.md",

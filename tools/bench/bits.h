@@ -6,7 +6,7 @@
 #include "crc32.h"
 #include "kernel.h"
 
-#define BITS_FRAMES 10000
+#define BITS_FRAMES 100000
 
 static inline uint32_t bits_step(uint32_t *seed)
 {

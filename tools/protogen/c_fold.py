@@ -137,7 +137,8 @@ def moments(folding: Folding, *, split: bool) -> list[str]:
 
     used = 0
     moved = False
-    for line in folding.lines:
+    # From ahead to behind, so that only one sum of x is live at a time.
+    for line in sorted(folding.lines, key=lambda line: line.members[0][2] < 0):
         out.append(title(line))
         for k, member in enumerate(line.members):
             out += load(line, member, k, form)

@@ -1,37 +1,106 @@
-"""biotac bench WHAT"""
+"""biotac bench [WHAT]"""
 
 from __future__ import annotations
 
 import argparse
 import json
 from dataclasses import asdict
+from pathlib import Path
 
-from ..bench import batch
+from ..bench import batch, front, front_picture, idle, kernels
+from ..errors import InputError
 
 NAME = "bench"
-HELP = "Measure how fast the maths is, against NumPy, in one run."
-EXAMPLE = "biotac bench batch"
-MAX_FRAMES = 10_000_000  # NumPy's contestants take half a kilobyte of memory per frame
+HELP = "Measure: the kernel variants' errors and cost, whole recordings against NumPy, the link of an untouched finger."
+EXAMPLE = "biotac bench kernels --counts counts.json --out front"
+BATCH_FRAMES = 200_000
+FRAMES = {"kernels": (100, 1_000_000), "batch": (batch.SINGLE_FRAMES, 10_000_000)}  # memory bounds both
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What, and how much of it."""
-    parser.add_argument("what", metavar="WHAT", choices=["batch"], help="batch: whole recordings, biotac.compute")
+    effort = kernels.Effort()
     parser.add_argument(
-        "--frames", type=_frames, default=200_000, metavar="N", help="recording length (default %(default)s)"
+        "what",
+        metavar="WHAT",
+        nargs="?",
+        default="kernels",
+        choices=[*FRAMES, "idle"],
+        help="kernels (default): every variant's errors and cost; batch: whole recordings, biotac.compute; "
+        "idle: bytes on the link at rest and in contact",
     )
+    parser.add_argument(
+        "--frames",
+        type=int,
+        metavar="N",
+        help=f"kernels: per class (default {effort.frames}); batch: recording length (default {BATCH_FRAMES})",
+    )
+    parser.add_argument("--source", default="press.toml", help="idle: what to play (default %(default)s)")
+    climb = parser.add_argument_group("kernels")
+    climb.add_argument("--restarts", type=_count, default=effort.restarts, metavar="N", help="of the hill climbing")
+    climb.add_argument("--steps", type=_count, default=effort.steps, metavar="N", help="of each restart")
+    climb.add_argument("--counts", type=Path, metavar="FILE", help="what tools/bench/run --json wrote")
+    climb.add_argument("--out", type=Path, metavar="DIR", help="write front.md and front.json, with counts front.png")
 
 
-def _frames(text: str) -> int:
-    frames = int(text)
-    if not batch.SINGLE_FRAMES <= frames <= MAX_FRAMES:
-        raise argparse.ArgumentTypeError(f"{frames} frames, expected {batch.SINGLE_FRAMES} to {MAX_FRAMES}")
-    return frames
+def _count(text: str) -> int:
+    count = int(text)
+    if not 1 <= count <= 1_000_000:
+        raise argparse.ArgumentTypeError(f"{count}, expected 1 to 1000000")
+    return count
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print and return 0, whatever the ratios are: they are for people to judge."""
-    outcome = batch.measure(args.frames)
+    """Print and return 0, whatever the numbers are: they are for people to judge."""
+    if args.what == "idle":
+        return _idle(args)
+    low, high = FRAMES[args.what]
+    if args.frames is not None and not low <= args.frames <= high:
+        raise InputError(f"--frames is {args.frames}, expected {low} to {high} for bench {args.what}")
+    return _batch(args) if args.what == "batch" else _kernels(args)
+
+
+def _kernels(args: argparse.Namespace) -> int:
+    counts = front.load_counts(args.counts, kernels.names()) if args.counts else None
+    frames = args.frames or kernels.Effort().frames
+    outcome = kernels.measure(kernels.Effort(frames, args.restarts, args.steps))
+    facts = front.facts(outcome, counts)
+    if args.out:
+        _write(args.out, facts, with_picture=counts is not None)
+    print(json.dumps(facts) if args.json else front.table(facts), end="")
+    return 0
+
+
+def _write(out: Path, facts: front.Facts, *, with_picture: bool) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "front.md").write_text(front.table(facts), encoding="utf-8")
+        (out / "front.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
+        if with_picture:
+            front_picture.draw(facts, out / "front.png")
+    except OSError as error:
+        raise InputError(f"{out} cannot be written: {error.strerror}; choose another --out") from None
+
+
+def _idle(args: argparse.Namespace) -> int:
+    outcome = idle.measure(args.source)
+    if args.json:
+        print(json.dumps(asdict(outcome)))
+        return 0
+    print(f"{args.source}: {'finger time':>14} {'frames':>8} {'heartbeats':>11} {'bytes/s':>9}")
+    for name, share in (
+        ("in contact", outcome.contact),
+        ("at rest, REST_FRAMES", outcome.rest_with_frames),
+        ("at rest", outcome.rest_with_heartbeats),
+    ):
+        print(f"{name:22}{share.seconds:6.2f} s {share.frames:8} {share.heartbeats:11} {share.bytes_per_s:9.0f}")
+    print(f"at rest {outcome.saved_percent:.1f} % fewer bytes per second than in contact")
+    print("skipped: " + ", ".join(f"{name} {count}" for name, count in outcome.skipped.items()))
+    return 0
+
+
+def _batch(args: argparse.Namespace) -> int:
+    outcome = batch.measure(args.frames or BATCH_FRAMES)
     if args.json:
         print(json.dumps(asdict(outcome)))
         return 0

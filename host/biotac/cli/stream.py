@@ -9,7 +9,7 @@ from typing import Any
 
 import biotac
 
-from .._wire import FrameFlags
+from .._wire import FrameFlags, QuantityFlags
 from ..frames import Frame
 from . import values
 
@@ -25,6 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rate", type=values.rate, default=10.0, help="lines per second and finger (default 10; 0: all)"
     )
+    parser.add_argument(
+        "--touched", action="store_true", help="only fingers that are touched; untouched ones send heartbeats"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -34,6 +37,8 @@ def run(args: argparse.Namespace) -> int:
     end_us: int | None = None
     # A person wants to see it happen: simulated boards run in real time here.
     with biotac.open(args.port, pace=1.0) as hand:
+        if args.touched:
+            hand.subscribe(QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE)
         for frame in hand.frames():
             if end_us is None and args.seconds is not None:
                 end_us = frame.t_us + round(args.seconds * 1e6)

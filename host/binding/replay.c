@@ -1,0 +1,62 @@
+#include "binding.h"
+
+#include <string.h>
+
+_Static_assert(BT_REPLAY_BYTES == BT_FRAME_BYTES + 3 + 3 * 4,
+               "a row is a frame, three bytes and three words");
+_Static_assert(BT_REPLAY_NO_TOUCH >= BT_SLOTS, "no touch must be no slot");
+
+static void mark_absent(const bt_finger *finger, bt_msg_frame *msg)
+{
+    memset(msg, 0, sizeof *msg);
+    memset(msg->counts, 0xFF, sizeof msg->counts);
+    memset(msg->tare_q4, 0xFF, sizeof msg->tare_q4);
+    memset(msg->force_sigma_100un, 0xFF, sizeof msg->force_sigma_100un);
+    msg->pdc = msg->tac = msg->tdc = msg->pdc_tare_q4 = msg->poc_sigma_um = BT_INVALID_COUNT;
+    for (int d = 0; d < 3; d++) {
+        msg->poc_um[d] = BT_INVALID_I16;
+        msg->force_100un[d] = msg->torque_mnmm[d] = BT_INVALID_I32;
+    }
+    msg->seq = (uint16_t)(finger->seq - 1); // as the last frame: a round without a word has no number
+    msg->t_us = finger->frame.t_us;
+    msg->finger = finger->index;
+    msg->tare_state = finger->tare.state;
+    msg->flags = BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_PDC_MISSING
+                 | BT_FRAME_FLAG_TAC_MISSING | BT_FRAME_FLAG_TDC_MISSING | BT_FRAME_FLAG_FAULT;
+}
+
+int64_t bt_replay_row_bytes(void)
+{
+    return BT_REPLAY_BYTES;
+}
+
+void bt_replay(bt_finger *finger, const bt_settings *settings, int64_t n, const uint16_t *words,
+               const uint32_t *t_us, uint8_t *rows)
+{
+    bt_tare_settings tare_settings = bt_tare_settings_from(settings);
+    bt_kernel_settings kernel_settings = bt_kernel_settings_from(settings);
+    for (int64_t k = 0; k < n; k++, words += BT_SLOTS, rows += BT_REPLAY_BYTES) {
+        uint8_t touch_slot = BT_REPLAY_NO_TOUCH;
+        bt_msg_frame msg;
+        bt_finger_begin(finger, t_us[k], &tare_settings);
+        for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
+            if (bt_finger_put(finger, slot, words[slot])) {
+                touch_slot = slot;
+            }
+        }
+        bool present = bt_finger_end(finger, &tare_settings);
+        if (present) {
+            bt_finger_frame(finger, &kernel_settings, &msg);
+        } else {
+            mark_absent(finger, &msg);
+        }
+        bt_msg_frame_pack(&msg, rows);
+        uint8_t *rest = rows + BT_FRAME_BYTES;
+        rest[0] = present;
+        rest[1] = finger->tare.reason;
+        rest[2] = touch_slot;
+        uint32_t measures[3] = {bt_gate_energy(&finger->tare.gate), finger->tare.noise.count2,
+                                finger->tare.threshold_count2};
+        memcpy(rest + 3, measures, sizeof measures);
+    }
+}

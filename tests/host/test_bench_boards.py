@@ -1,0 +1,91 @@
+"""tools/bench without its emulators: the Cortex-M4F's cycle model, QEMU's log, and what counts as floating point."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def model(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(str(ROOT / "tools/bench"))
+    import m4f_model
+
+    return m4f_model
+
+
+def listing(*instructions: str) -> str:
+    """objdump's lines: two bytes each, four with a .w or a v in front."""
+    lines, address = [], 0x100
+    for text in instructions:
+        wide = ".w" in text.split()[0] or text.startswith("v")
+        name, _, operands = text.partition(" ")
+        lines.append(f"{address:8x}:\t{'e000 e000' if wide else 'e000'}      \t{name}\t{operands}")
+        address += 4 if wide else 2
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("instructions", "cycles"),
+    [
+        (("adds r0, r0, #1", "bx lr"), 1),
+        (("ldr r0, [r1, #4]", "adds r0, #1"), 2),
+        (("ldr r0, [r1, #4]", "ldr.w r2, [r1, #8]", "adds r0, #1"), 3),
+        (("str r0, [r1, #4]", "adds r0, #1"), 1),
+        (("str r0, [r1, r2]", "adds r0, #1"), 2),
+        (("push {r4, r5, r6, lr}", "nop"), 5),
+        (("stmdb.w sp!, {r4-r11, lr}", "nop"), 10),
+        (("smlal.w r0, r1, r2, r3", "nop"), 1),
+        (("udiv.w r0, r1, r2", "nop"), 12),
+        (("vsqrt.f32 s0, s1", "vmov r0, s2"), 14),
+        (("vsqrt.f32 s0, s1", "vmul.f32 s2, s0, s3"), 15),
+        (("vmul.f32 s0, s1, s2", "vmul.f32 s0, s1, s2"), 1),
+        (("vpush {d8, d9}", "nop"), 5),
+        (("moveq r0, #1", "nop"), 1),
+        (("itte ne", "nop"), 1),
+    ],
+)
+def test_cycles_of_neighbours(model, instructions, cycles) -> None:
+    code = model.Model(listing(*instructions))
+    assert code.cycles(Counter(pairwise(sorted(code.code)))) == cycles
+
+
+def test_a_branch_costs_more_when_it_is_taken(model) -> None:
+    code = model.Model(listing("beq.n 104", "nop", "nop"))
+    assert code.cycles(Counter([(0x100, 0x102)])) == 1
+    assert code.cycles(Counter([(0x100, 0x104)])) == 3
+
+
+def test_an_unknown_instruction_is_named(model) -> None:
+    code = model.Model(listing("qadd16 r0, r1, r2", "nop"))
+    with pytest.raises(model.UnknownInstruction, match="no cycles for qadd16"):
+        code.cycles(Counter([(0x100, 0x102)]))
+
+
+@pytest.mark.parametrize("size", [1, 7, 60, 61, 1000])
+def test_runs_are_cut_out_of_the_log_whatever_its_chunks(model, size) -> None:
+    addresses = [0x10, 0x40, 0x20, 0x22, 0x40, 0x30, 0x40, 0x24, 0x40, 0x50]
+    log = b"".join(b"Trace 0: 0x7f00 [00800408/%08x/00000110/ff000201] name\n" % a for a in addresses)
+    chunks = [log[k : k + size] for k in range(0, len(log), size)]
+    assert list(model.runs(chunks, 0x40)) == [[0x20, 0x22], [0x24]]
+
+
+@pytest.mark.parametrize(
+    ("name", "is_float"),
+    [
+        *((name, True) for name in ("__aeabi_fadd", "__aeabi_dmul", "__aeabi_i2f", "__aeabi_ui2d", "__aeabi_d2iz")),
+        *((name, True) for name in ("__aeabi_dcmplt", "__aeabi_cfcmple", "__mulsf3", "__floatsidf", "__aeabi_ul2d")),
+        *((name, False) for name in ("__aeabi_uidiv", "__aeabi_lmul", "__aeabi_idivmod", "bt_fold_force", "memcpy")),
+    ],
+)
+def test_what_counts_as_floating_point(model, name, is_float) -> None:
+    import boards
+
+    assert bool(boards.FLOAT_SYMBOL.match(name)) is is_float
+    assert str(ROOT / "tools/bench") in sys.path

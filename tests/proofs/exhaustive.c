@@ -1,0 +1,47 @@
+// bt_root_inverse for every one of the 3 * 2^30 arguments it is made for.
+// usage: exhaustive [all]
+//
+// It looks only at the bits of q from BT_ROOT_STEP_BITS - 16 on, and what is wanted falls with q: the
+// first and the last q of each run with the same bits are its extremes, so nothing is left out (a third
+// of a second). "all" asks for every q all the same (20 s).
+//
+// What is wanted comes from the double's square root, which is good to 2^-53: nothing beside the 2^-17
+// that is measured. Errors are split as root.h splits them: one unit, and a part of the result itself.
+#include "root.h"
+#include "sensor_gen.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#define CHORD 5.8e-6 // 2^-17.4, as kernel_bounds.h has it
+
+static double worst, least, most;
+
+static int check(uint64_t q)
+{
+    uint32_t got = bt_root_inverse((uint32_t)q);
+    double want = BT_CORE_RADIUS_UM / (2.0 * BT_ROOT_UM_FACTOR) * 4294967296.0 / sqrt((double)q);
+    double off = got - want;
+    worst = fmax(worst, (fabs(off) - 1) / want);
+    least = fmin(least, off / want);
+    most = fmax(most, off / want);
+    if (fabs(off) > 1 + want * CHORD) {
+        printf("bt_root_inverse(%llu) is %u, %.3f from the exact %.3f\n", (unsigned long long)q, got, off,
+               want);
+        return 1;
+    }
+    return 0;
+}
+
+int main(int argc, char **argv)
+{
+    (void)argv;
+    uint64_t run = argc > 1 ? 1 : 1u << (BT_ROOT_STEP_BITS - 16);
+    for (uint64_t q = 1u << 30; q <= UINT32_MAX; q += run) {
+        if (check(q) || check(q + run - 1)) {
+            return 1;
+        }
+    }
+    printf("relative %.4e %.4e beyond_a_unit %.4e of %.1e\n", least, most, worst, CHORD);
+    return 0;
+}

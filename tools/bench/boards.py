@@ -1,0 +1,201 @@
+"""The emulated boards: how their images are built, run, and what comes back."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+from m4f_model import Model, UnknownInstruction, runs
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+FIRMWARE = ROOT / "firmware"
+BUILD = ROOT / "build" / "bench"
+FRAMES = 12  # per weighting
+# What a Cortex-M0+ with its eight registers wants compiled otherwise than with -O3: the folded sums stay in
+# order, and the tare machine's loops keep one index instead of a pointer for each array.
+OPTIONS = {"fold_gen.c": ("-Os", "-fno-tree-reassoc", "-fno-tree-ter"), "tare.c": ("-O3", "-fno-ivopts")}
+APART = [FIRMWARE / "core" / name for name in OPTIONS]
+CORE = sorted(set((FIRMWARE / "core").glob("*.c")) - set(APART))
+JUDGED = sorted([*(FIRMWARE / "reference").glob("*.c"), *(FIRMWARE / "variants").glob("*.c")])
+SHIPPED = sorted(path for room in ("core", "sensor", "app") for path in (FIRMWARE / room).glob("*.c"))
+INCLUDE = [f"-I{FIRMWARE / room}" for room in ("core", "reference", "variants", "sensor", "port", "app")] + [
+    f"-I{HERE}"
+]
+PACKAGES = {
+    "arm-none-eabi-gcc": "gcc-arm-none-eabi libnewlib-arm-none-eabi",
+    "qemu-system-arm": "qemu-system-arm",
+    "node": "nodejs",
+    "npm": "npm",
+    "cc": "gcc",
+}
+FLOAT_SYMBOL = re.compile(
+    r"__aeabi_(c?[fd](add|sub|rsub|mul|div|neg|cmp\w*|2\w+|rcmp\w*)|u?[il]2[fd]|u?l2[fd]|h2f\w*|f2h\w*|d2h\w*)$"
+    r"|__(add|sub|mul|div|neg|eq|ne|lt|le|gt|ge|cmp|unord)[sdt]f[23]$|__(fix|float|extend|trunc)\w*[sd]f\w*$|_dtoa_r$"
+)
+
+Row = tuple[str, str, int, int]  # kernel, scene, instructions, cycles
+
+
+class Failed(Exception):
+    """One sentence for the user."""
+
+
+@dataclass(frozen=True)
+class Board:
+    """A core in an emulator."""
+
+    key: str
+    title: str
+    cycles_by: str
+    machine: tuple[str, ...]
+    start: str
+    script: str
+    options: tuple[str, ...] = ()
+
+
+M0PLUS = ("-mcpu=cortex-m0plus",)
+M4F = ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
+RP2040JS = "rp2040js 1.4.1, by the Cortex-M0+ manual without flash wait states or bus contention"
+QEMU = "instructions counted in QEMU mps2-an386, cycles by a model of the Cortex-M4 manual without memory wait states"
+BOARDS = (
+    Board("m0plus", "Cortex-M0+", RP2040JS, M0PLUS, "m0plus.c", "m0plus.ld"),
+    Board("m0plus_divider", "Cortex-M0+ with RP2040 divider", RP2040JS, M0PLUS, "m0plus.c", "m0plus.ld",
+          ("-include", "rp2040_divider.h")),
+    Board("m4f", "Cortex-M4F", QEMU, M4F, "m4f.c", "m4f.ld"),
+)  # fmt: skip
+
+
+def need() -> None:
+    for tool, package in PACKAGES.items():
+        if shutil.which(tool) is None:
+            raise Failed(f"{tool} is missing; install it: apt-get install {package}")
+    BUILD.mkdir(parents=True, exist_ok=True)
+    command("npm", "ci", "--silent")
+
+
+def command(*words: object) -> str:
+    done = subprocess.run([str(w) for w in words], cwd=HERE, capture_output=True, text=True)
+    if done.returncode:
+        raise Failed(f"{words[0]} failed: {(done.stderr or done.stdout).strip()}")
+    return done.stdout
+
+
+def build(board: Board, name: str, *sources: object) -> Path:
+    """An image of these sources, the core and what it is compared with."""
+    elf = BUILD / f"{board.key}_{name}.elf"
+    compiler = ["arm-none-eabi-gcc", "-std=c11", "-mthumb", *board.machine, "-ffunction-sections", "-fdata-sections"]
+    # As everywhere else: no products fused into sums, and no errno for a square root.
+    compiler += ["-ffp-contract=off", "-fno-math-errno", f"-DBENCH_FRAMES={FRAMES}", *INCLUDE, *board.options]
+    link = ["-nostartfiles", "--specs=nano.specs", "--specs=nosys.specs", "-Wl,--gc-sections", f"-L{HERE}"]
+    apart = []
+    for source in APART:
+        apart.append(elf.with_suffix(f".{source.stem}.o"))
+        command(*compiler, *OPTIONS[source.name], "-c", source, "-o", apart[-1])
+    command(*compiler, "-O3", *link, "-T", HERE / board.script, HERE / board.start, *sources, *CORE, *JUDGED, *apart,
+            "-lm", "-o", elf)  # fmt: skip
+    return elf
+
+
+def addresses(elf: Path) -> dict[str, int]:
+    cells = (line.split() for line in command("arm-none-eabi-nm", elf).splitlines())
+    return {c[2]: int(c[0], 16) for c in cells if len(c) == 3}
+
+
+def run_rp2040(elf: Path) -> tuple[list[Row], list[int]]:
+    """Rows, and the results that the image computed."""
+    flat = elf.with_suffix(".bin")
+    command("arm-none-eabi-objcopy", "-O", "binary", elf, flat)
+    at = addresses(elf)
+    # a function that the image does not use is not in it; nothing runs at address 0
+    watched = [f"{at.get(name, 0):x}" for name in ("bench_mark", "bench_name", "bench_result", "bench_end")]
+    answer = json.loads(command("node", HERE / "count.mjs", flat, *watched))
+    return [tuple(row) for row in answer["rows"]], answer["results"]
+
+
+def qemu(elf: Path) -> list[str]:
+    semihosting = "enable=on,target=native"
+    return ["qemu-system-arm", "-M", "mps2-an386", "-kernel", str(elf), "-display", "none", "-monitor", "none",
+            "-serial", "none", "-semihosting-config", semihosting]  # fmt: skip
+
+
+def qemu_says(elf: Path) -> list[str]:
+    """What the image wrote by semihosting, which is QEMU's stderr."""
+    done = subprocess.run(qemu(elf), stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise Failed(f"qemu-system-arm failed: {done.stderr.strip()[-200:]}")
+    return done.stderr.splitlines()
+
+
+def run_m4f(elf: Path) -> list[Row]:
+    """Rows. QEMU runs twice: for the names of the runs, and for the instructions in them."""
+    names = [tuple(line.split("\t")) for line in qemu_says(elf)]
+    model = Model(command("arm-none-eabi-objdump", "-d", elf))
+    rows: list[Row] = []
+    try:
+        for k, run in enumerate(runs(_log(elf), addresses(elf)["bench_mark"])):
+            # the last instruction is neighbour to the closing mark, whose address starts no pair
+            pairs = Counter(pairwise(run))
+            rows.append((names[k][0], names[k][1], len(run), model.cycles(pairs)))
+    except UnknownInstruction as unknown:
+        raise Failed(str(unknown)) from None
+    if len(rows) != len(names):
+        raise Failed(f"QEMU's log has {len(rows)} runs of {len(names)}; it must log blocks (qemu-system-arm 7 does)")
+    return rows
+
+
+def _log(elf: Path) -> Iterator[bytes]:
+    """QEMU's log, one line per instruction, through a pipe: it would be a gigabyte on disk."""
+    reader, writer = os.pipe()
+    words = [*qemu(elf), "-singlestep", "-d", "exec,nochain", "-D", f"/dev/fd/{writer}"]
+    process = subprocess.Popen(words, pass_fds=[writer], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    os.close(writer)
+    try:
+        with open(reader, "rb") as log:
+            while chunk := log.read(1 << 20):
+                yield chunk
+    finally:
+        process.kill()
+        process.wait()
+
+
+def count(board: Board) -> list[Row]:
+    elf = build(board, "count", HERE / "image.c", HERE / "scenes.c")
+    return run_m4f(elf) if board.machine == M4F else run_rp2040(elf)[0]
+
+
+def bits_frames() -> int:
+    found = re.search(r"#define BITS_FRAMES (\d+)", (HERE / "bits.h").read_text(encoding="utf-8"))
+    assert found is not None
+    return int(found.group(1))
+
+
+def bits(board: Board) -> int:
+    """The hash over the shipped kernels' results on this board."""
+    elf = build(board, "bits", HERE / "bits_image.c")
+    return int(qemu_says(elf)[0], 16) if board.machine == M4F else run_rp2040(elf)[1][0]
+
+
+def bits_here() -> int:
+    """The same by this machine's own compiler."""
+    program = BUILD / "bits"
+    command("cc", "-std=c11", "-O2", *INCLUDE, *CORE, *APART, HERE / "bits.c", "-o", program)
+    return int(command(program), 16)
+
+
+def float_symbols() -> list[str]:
+    """Floating-point helpers in an M0+ image of the shipped files alone. The port is left open."""
+    elf = BUILD / "shipped.elf"
+    words = ["-std=c11", "-mthumb", *M0PLUS, "-O2", *INCLUDE, *SHIPPED, "-nostartfiles", "--specs=nano.specs"]
+    link = ["--specs=nosys.specs", "-Wl,-e,main", "-Wl,--unresolved-symbols=ignore-all", "-Wl,--no-warn-mismatch"]
+    command("arm-none-eabi-gcc", *words, *link, "-o", elf)
+    names = {line.split()[-1] for line in command("arm-none-eabi-nm", elf).splitlines()}
+    return sorted(name for name in names if FLOAT_SYMBOL.match(name))

@@ -1,0 +1,175 @@
+"""Cycles of a Cortex-M4F from the addresses it went through: a model, no silicon was measured.
+
+Per instruction as the Cortex-M4 technical reference manual (r0p1, 3.3.1 and 7.2.2) has it, with memory
+that never waits. Where the manual gives a range, the worst is taken: integer division 12, a taken branch 3.
+What it leaves open is left out: an IT that is folded away, VDIV beside integer work. An instruction that
+its IT block skips costs what it would cost if it ran.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+TAKEN = 2  # cycles that a taken branch adds to its one: the pipeline is filled again
+BRANCHES = re.compile(r"(b|bl|bx|blx|b(eq|ne|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le|hs|lo)|cbn?z|tb[bh])$")
+SINGLE = re.compile(r"(ldr|str)s?[bh]?t?$")
+MANY = re.compile(r"(ldm|stm|push|pop|vldm|vstm|vpush|vpop)")
+REGISTER_LIST = re.compile(r"\{([^}]*)\}")
+FP_REGISTER = re.compile(r"\bs\d+\b")
+CONDITION = re.compile(r"(eq|ne|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le|hs|lo)$")
+FP_ACCUMULATE = ("vmla", "vmls", "vnmla", "vnmls", "vfma", "vfms")
+FP_ARITHMETIC = (*FP_ACCUMULATE, "vadd", "vsub", "vmul", "vnmul", "vdiv", "vsqrt", "vcvt")
+READS_FIRST = (*FP_ACCUMULATE, "vcmp", "vcmpe", "vstr", "vpush", "vstm")
+OTHERS = (*FP_ACCUMULATE, "sdiv", "udiv", "vdiv", "vsqrt", "ldrd", "strd", "vldr", "vstr")
+# one cycle each
+ONE_CYCLE = """
+adc add addw and asr bfi bic clz cmn cmp eor it lsl lsr mla mls mov movt movw mul mvn neg nop orn orr rbit rev
+ror rrx rsb sbc sbfx smlal smlabb smulbb smull sub subw sxtb sxth teq tst ubfx uadd8 umlal umull uxtb uxth vabs
+vadd vcmp vcmpe vcvt vmov vmrs vmul vneg vnmul vsub
+"""
+PLAIN = frozenset(ONE_CYCLE.split())
+
+
+class UnknownInstruction(ValueError):
+    """The model has no cost for it."""
+
+
+@dataclass(frozen=True)
+class Instruction:
+    """One line of objdump."""
+
+    address: int
+    size: int
+    name: str  # without width, type and condition
+    operands: str
+
+
+def decode(disassembly: str) -> dict[int, Instruction]:
+    """Address -> instruction, from `objdump -d --no-show-raw-insn`'s longer form with the raw bytes."""
+    out: dict[int, Instruction] = {}
+    for line in disassembly.splitlines():
+        cells = line.split("\t")
+        if len(cells) < 3 or not cells[0].strip().endswith(":"):
+            continue
+        address = int(cells[0].strip()[:-1], 16)
+        size = len(cells[1].replace(" ", "")) // 2
+        operands = cells[3].split(";")[0].split("@")[0].strip() if len(cells) > 3 else ""
+        out[address] = Instruction(address, size, base_name(cells[2].strip()), operands)
+    return out
+
+
+def base_name(text: str) -> str:
+    """subs.w -> sub, vmul.f32 -> vmul, moveq -> mov, itte -> it."""
+    name = text.split(".")[0]
+    if re.match(r"it[te]{0,3}$", name):
+        return "it"
+    if name in PLAIN or BRANCHES.match(name) or SINGLE.match(name) or MANY.match(name) or name in OTHERS:
+        return name
+    for shorter in (name[:-1] if name.endswith("s") else name, CONDITION.sub("", name)):
+        if shorter in PLAIN or BRANCHES.match(shorter) or SINGLE.match(shorter) or shorter in OTHERS:
+            return shorter
+    return re.sub(r"s$", "", CONDITION.sub("", name))
+
+
+def registers_in(operands: str) -> int:
+    """How many words a register list moves."""
+    count = 0
+    found = REGISTER_LIST.search(operands)
+    for part in (found.group(1) if found else "").split(","):
+        first, _, last = part.strip().partition("-")
+        words = 2 if first.startswith("d") else 1
+        count += words * (int(last[1:]) - int(first[1:]) + 1 if last else 1)
+    return count
+
+
+def alone(i: Instruction) -> int:
+    """Cycles of one instruction, before its neighbours are looked at."""
+    if i.name in ("sdiv", "udiv"):
+        return 12
+    if i.name in ("vdiv", "vsqrt"):
+        return 14
+    if i.name in (*FP_ACCUMULATE, "ldrd", "strd"):
+        return 3
+    if i.name in ("vldr", "vstr"):
+        return 3 if i.operands.startswith("d") else 2
+    if i.name in ("tbb", "tbh"):
+        return 2
+    if MANY.match(i.name):
+        return 1 + registers_in(i.operands)
+    if SINGLE.match(i.name):
+        stored_at_once = i.name.startswith("str") and not re.search(r"\[[^\],]+, [a-z]", i.operands)
+        return 1 if stored_at_once else 2
+    if i.name == "vmov":
+        return 2 if i.operands.count(",") > 1 else 1
+    if i.name in PLAIN or BRANCHES.match(i.name):
+        return 1
+    raise UnknownInstruction(f"the Cortex-M4F model has no cycles for {i.name} {i.operands}; add them to m4f_model.py")
+
+
+def step(a: Instruction, b: Instruction) -> int:
+    """Cycles of ``a`` when ``b`` follows: what a branch, a result that is awaited or a pipelined load do."""
+    cycles = alone(a)
+    jumped = b.address != a.address + a.size
+    if jumped:
+        cycles += TAKEN
+    if SINGLE.match(a.name) and SINGLE.match(b.name) and alone(b) == 2 and not jumped:
+        cycles -= 1  # of b, whose address goes out while a's data comes in
+    if a.name in FP_ARITHMETIC and reads(b, a.operands.split(",")[0]):
+        cycles += 1
+    return cycles
+
+
+def reads(i: Instruction, register: str) -> bool:
+    if not FP_REGISTER.fullmatch(register):
+        return False
+    operands = i.operands if i.name in READS_FIRST else i.operands.partition(",")[2]
+    return register in FP_REGISTER.findall(operands)
+
+
+class Model:
+    """Cycles over a run, each pair of neighbours worked out once."""
+
+    def __init__(self, disassembly: str) -> None:
+        self.code = decode(disassembly)
+        self.known: dict[tuple[int, int], int] = {}
+
+    def cycles(self, pairs: Counter[tuple[int, int]]) -> int:
+        """Of every first instruction of ``pairs`` of neighbours, with how often they came."""
+        return sum(times * self._pair(pair) for pair, times in pairs.items())
+
+    def _pair(self, pair: tuple[int, int]) -> int:
+        if pair not in self.known:
+            self.known[pair] = step(self.code[pair[0]], self.code[pair[1]])
+        return self.known[pair]
+
+
+TRACE = re.compile(rb"\[[0-9a-f]+/([0-9a-f]+)/")
+
+
+def runs(chunks: Iterable[bytes], mark: int) -> Iterable[list[int]]:
+    """Addresses between two marks, run by run, from QEMU's log of executed blocks of one instruction."""
+    wanted = b"%08x" % mark
+    rest = b""
+    open_run: list[bytes] | None = None
+    for chunk in chunks:
+        whole, newline, rest = (rest + chunk).rpartition(b"\n")
+        seen = TRACE.findall(whole + newline)
+        at = 0
+        while True:
+            try:
+                end = seen.index(wanted, at)
+            except ValueError:
+                end = len(seen)
+            if open_run is not None:
+                open_run += seen[at:end]
+            if end == len(seen):
+                break
+            if open_run is None:
+                open_run = []
+            else:
+                yield [int(a, 16) for a in open_run]
+                open_run = None
+            at = end + 1

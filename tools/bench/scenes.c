@@ -1,0 +1,177 @@
+// Fingers in the middle of their lives, untouched or pressed half a second ago. Each scene has fingers of
+// its own, so that its runs are consecutive rounds and every turn of a sweep is among them.
+#include "scenes.h"
+
+#include "finger.h"
+#include "framing.h"
+
+#define LANES BT_LANES // a round's words that the front end looks at: electrodes, then pressure
+
+static uint16_t rest_count[BT_SLOTS], press_count[BT_SLOTS];
+static uint16_t rest_lane[LANES], press_lane[LANES];
+static bt_tare_settings tare_settings;
+static bt_gate gate;
+static bt_finger rest_front, press_front, rest_whole, press_whole, press_force, press_poc, press_sigma;
+static bt_finger rest_five[BT_MAX_FINGERS], press_five[BT_MAX_FINGERS], rest_words, press_sent;
+static bt_msg_frame message;
+static uint8_t payload[BT_FRAME_BYTES], encoded[BT_ENCODED_MAX_BYTES];
+
+// What keeps the compiler from dropping a result.
+static volatile uint32_t sink;
+
+static void words(bt_finger *finger, const uint16_t count[BT_SLOTS])
+{
+    bool touched = false;
+    bt_finger_begin(finger, 0, &tare_settings);
+    for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
+        touched |= bt_finger_put(finger, slot, count[slot]);
+    }
+    sink = touched;
+}
+
+static void front_end(bt_finger *finger, const uint16_t count[LANES])
+{
+    bool touched = false;
+    bt_tare_begin(&finger->tare, &tare_settings);
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        touched |= bt_tare_electrode(&finger->tare, i, count[i]);
+    }
+    touched |= bt_tare_pressure(&finger->tare, count[BT_LANE_PDC]);
+    bt_tare_end(&finger->tare, &tare_settings);
+    sink = touched;
+}
+
+static void untouched(bt_finger *finger)
+{
+    front_end(finger, rest_lane);
+    sink = bt_finger_idle(finger);
+}
+
+static void pressed(bt_finger *finger, const bt_kernel_settings *settings, uint32_t quantities)
+{
+    front_end(finger, press_lane);
+    bt_results(&finger->frame, &finger->tare, settings, quantities, &message);
+}
+
+static void one_word(const bt_kernel_settings *settings)
+{
+    (void)settings;
+    sink = (uint32_t)bt_gate_electrode(&gate, 3, rest_lane[3]);
+}
+
+static void front_at_rest(const bt_kernel_settings *settings)
+{
+    (void)settings;
+    front_end(&rest_front, rest_lane);
+}
+
+static void front_in_contact(const bt_kernel_settings *settings)
+{
+    (void)settings;
+    front_end(&press_front, press_lane);
+}
+
+static void whole_at_rest(const bt_kernel_settings *settings)
+{
+    (void)settings;
+    untouched(&rest_whole);
+}
+
+static void whole_in_contact(const bt_kernel_settings *settings)
+{
+    pressed(&press_whole, settings, BT_WANT_ALL);
+}
+
+static void force_only(const bt_kernel_settings *settings)
+{
+    pressed(&press_force, settings, BT_WANT_FORCE);
+}
+
+static void poc_only(const bt_kernel_settings *settings)
+{
+    pressed(&press_poc, settings, BT_WANT_POC);
+}
+
+static void with_sigma(const bt_kernel_settings *settings)
+{
+    pressed(&press_sigma, settings, BT_WANT_ALL | BT_QUANTITY_FLAG_SIGMA);
+}
+
+static void five_at_rest(const bt_kernel_settings *settings)
+{
+    (void)settings;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        untouched(&rest_five[f]);
+    }
+}
+
+static void five_in_contact(const bt_kernel_settings *settings)
+{
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        pressed(&press_five[f], settings, BT_WANT_ALL);
+    }
+}
+
+static void all_words(const bt_kernel_settings *settings)
+{
+    (void)settings;
+    words(&rest_words, rest_count);
+    sink = bt_finger_end(&rest_words, &tare_settings);
+}
+
+// From the finished round to bytes for the link.
+static void sent(const bt_kernel_settings *settings)
+{
+    bt_finger_frame(&press_sent, settings, &message);
+    bt_msg_frame_pack(&message, payload);
+    sink = (uint32_t)bt_frame_encode(BT_FRAME_ID, payload, sizeof payload, encoded);
+}
+
+const bench_scene bench_scenes[BENCH_SCENES] = {
+    {"gate", "one word", one_word},
+    {"front end", "at rest", front_at_rest},
+    {"front end", "in contact", front_in_contact},
+    {"whole frame", "at rest", whole_at_rest},
+    {"whole frame", "in contact", whole_in_contact},
+    {"whole frame", "in contact, force only", force_only},
+    {"whole frame", "in contact, PoC only", poc_only},
+    {"whole frame", "in contact, with sigma", with_sigma},
+    {"five fingers", "at rest", five_at_rest},
+    {"five fingers", "in contact", five_in_contact},
+    {"link", "44 words taken in, at rest", all_words},
+    {"link", "FRAME computed, packed, framed", sent},
+};
+
+static void run(bt_finger *finger, const uint16_t count[BT_SLOTS], int rounds)
+{
+    for (int k = 0; k < rounds; k++) {
+        words(finger, count);
+        sink = bt_finger_end(finger, &tare_settings);
+    }
+}
+
+void bench_scenes_init(void)
+{
+    bt_settings all;
+    bt_settings_reset(&all);
+    tare_settings = bt_tare_settings_from(&all);
+    for (int s = 0; s < BT_SLOTS; s++) {
+        rest_count[s] = (uint16_t)(2900 + 7 * s);
+        press_count[s] = (uint16_t)(rest_count[s] - (s < 2 * BT_ELECTRODES ? 20 * (s % 13) + 40 : -100));
+    }
+    for (int k = 0; k < LANES; k++) { // E1 PAC E2 PAC ... E19 PAC PDC
+        rest_lane[k] = rest_count[2 * k];
+        press_lane[k] = press_count[2 * k];
+    }
+    bt_finger_reset(&rest_front, 0);
+    run(&rest_front, rest_count, 400);
+    gate = rest_front.tare.gate;
+    rest_whole = rest_words = press_front = rest_front;
+    run(&press_front, press_count, 50);
+    press_front.tare.noise.count2 = 400; // exact counts have none
+    press_whole = press_force = press_poc = press_sigma = press_sent = press_front;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        rest_five[f] = rest_front;
+        press_five[f] = press_front;
+    }
+}

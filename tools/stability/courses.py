@@ -1,0 +1,152 @@
+"""What a finger goes through: a script of loads and temperatures, the counts the sensor model makes of it,
+and, from the model and not from the board, what it reads at rest and under load.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from biotac import _wire as wire
+from biotac.finger import Finger
+from biotac.frames import StructArray
+from biotac.sim import physics, sampling
+from biotac.sim.surface import Floats
+from biotac.sim.timeline import Pose, Track
+
+PAD = Pose(x_mm=-2.8, y_mm=0.0, tip_mm=2.0)  # over E17
+LEAD_S = 10.0  # of rest before anything happens: the tare is taken and the noise measured
+
+
+class Sensor(physics.Finger):
+    """The model's finger, whose answer to the latest states is worked out once: twice is asked for it."""
+
+    def counts(self, states: physics.States) -> Floats:
+        """As physics.Finger's, and as new each time: who asks writes into it."""
+        latest, answer = self.__dict__.get("_latest", (None, None))
+        if latest is not states:
+            answer = super().counts(states)
+            self._latest = (states, answer)
+        return np.array(answer)
+
+
+@dataclass(frozen=True)
+class Course:
+    """n frames of one finger. ``words`` are what Finger.feed takes; the rest is the model's truth.
+
+    ``force_n`` (n,): the greatest normal force within the frame. ``rest`` (n, 19): counts without load at the
+    frame's middle, with drift and temperature; ``reads`` (n, 19): counts with load and creep, without noise;
+    ``signal`` (n, 19): what the load alone makes of ``rest``.
+    """
+
+    sensor: physics.Finger
+    words: dict[str, np.ndarray]
+    force_n: Floats
+    rest: Floats
+    reads: Floats
+    signal: Floats
+
+    def __len__(self) -> int:
+        return len(self.force_n)
+
+    def run(
+        self, settings: dict[wire.Setting, int] | None = None, *, pdc: bool = True, tdc: bool = True
+    ) -> StructArray:
+        """The board's rows for this course, with or without the pressure and the thermometer."""
+        skipped = {name for name, there in (("pdc", pdc), ("tdc", tdc)) if not there}
+        return Finger(settings).feed(**{name: words for name, words in self.words.items() if name not in skipped})
+
+    def kept(self, rows: StructArray) -> Floats:
+        """Share of the signal (n,) that the tare leaves: 1 when it is the true rest; NaN without a load."""
+        missing = self.rest - rows["tare_q4"] / 16.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share: Floats = 1.0 + (missing * self.signal).sum(axis=1) / (self.signal**2).sum(axis=1)
+        return share
+
+    def tare_error(self, rows: StructArray) -> Floats:
+        """Greatest distance (n,) of an electrode's tare from what it reads at rest, in counts."""
+        error: Floats = np.abs(self.rest - rows["tare_q4"] / 16.0).max(axis=1)
+        return error
+
+
+@dataclass
+class Script:
+    """A course as it is written: ``track`` grows, ``sensor`` may be changed before make()."""
+
+    sensor: physics.Finger
+    track: Track = field(default_factory=Track)
+
+    def rest(self, seconds: float) -> Script:
+        """Nothing touches."""
+        self.track.ramp(seconds, self.track.pose.released())
+        return self
+
+    def hold(self, seconds: float) -> Script:
+        """Everything stays."""
+        self.track.ramp(seconds, self.track.pose)
+        return self
+
+    def load(self, force_n: float, n_per_s: float, at: Pose | None = None) -> Script:
+        """To this normal force at this rate; ``at`` is where, after a release."""
+        place = at or self.track.pose
+        seconds = max(abs(force_n - self.track.pose.force_n) / n_per_s, sampling.FRAME_S)
+        start = replace(place, force_n=self.track.pose.force_n, celsius=self.track.pose.celsius) if at else None
+        self.track.ramp(seconds, replace(place, force_n=force_n, celsius=self.track.pose.celsius), start)
+        return self
+
+    def warm(self, celsius: float, seconds: float) -> Script:
+        """By this much within this time, all else staying."""
+        self.track.ramp(seconds, replace(self.track.pose, celsius=self.track.pose.celsius + celsius))
+        return self
+
+    def make(self) -> Course:
+        """The counts and the truth."""
+        frames = round(self.track.seconds / sampling.FRAME_S)
+        times = np.arange(frames + 1) * sampling.FRAME_S
+        states = self.track.states(times)
+        samples = sampling.sample(self.sensor, states)
+        drift = self.sensor.drift_per_min / 60.0 * times[:, None]
+        still = self.sensor.rest_counts(states.warm_c)
+        loaded = self.sensor.counts(states)
+        rest = still + drift
+        creep = self.sensor.creep_share * sampling._lag(loaded - still)
+        return Course(
+            sensor=self.sensor,
+            words={
+                "counts": samples[:, sampling.ELECTRODE_SLOT],
+                "pdc": samples[:, sampling.PDC_SLOT],
+                "tac": samples[:, sampling.TAC_SLOT],
+                "tdc": samples[:, sampling.TDC_SLOT],
+            },
+            force_n=np.maximum(states.force_n[:-1], states.force_n[1:]),
+            rest=_middle(rest),
+            reads=_middle(loaded + creep + drift),
+            signal=_middle(loaded - still),
+        )
+
+
+def script(seed: int, profile: physics.Profile = "new", lead_s: float = LEAD_S) -> Script:
+    """A sensor of its own that has rested for ``lead_s``."""
+    begun = Script(Sensor(seed, profile))
+    begun.track.pose = PAD
+    return begun.rest(lead_s)
+
+
+def resting(sensor: physics.Finger, seconds: float, seed: int, start_s: float = 0.0) -> dict[str, np.ndarray]:
+    """Words of a finger that nothing touches, from ``start_s`` of its drift on: cheap enough for hours."""
+    frames = round(seconds * sampling.FRAME_HZ)
+    rng = np.random.default_rng([seed, round(start_s)])
+    time_min = (start_s + np.arange(frames) * sampling.FRAME_S) / 60.0
+    counts = rng.standard_normal((frames, 19), dtype=np.float32) * np.float32(sensor.noise_counts)
+    counts += sensor.rest_counts(np.zeros(1)) + time_min[:, None] * sensor.drift_per_min
+    hit = rng.random((frames, 19), dtype=np.float32) < sensor.glitch_share
+    hit[1:] &= ~hit[:-1]  # never two in a row
+    counts -= hit * rng.uniform(30.0, 66.0, (frames, 19))
+    pdc = sampling.PDC_REST + rng.standard_normal(frames) * sampling.PDC_NOISE
+    return {"counts": np.rint(counts).astype(np.uint16), "pdc": np.rint(pdc).astype(np.uint16)}
+
+
+def _middle(boundary: Floats) -> Floats:
+    middle: Floats = (boundary[:-1] + boundary[1:]) / 2.0
+    return middle
