@@ -77,7 +77,7 @@ static uint16_t poc_sigma_um(const int32_t e_q4[BT_ELECTRODES], int weights, con
         total += weight;
         lever += (int64_t)weight * out;
     }
-    if (total == 0 || lever <= 0) {
+    if (lever <= 0) { // nothing weighs, or too little to say where
         return UNKNOWN;
     }
     uint64_t along_q8 = quotient_q8(root(along) * sigma_q8, total);

@@ -211,6 +211,22 @@ static void pressure_opens_the_gate_and_leaves_the_energy_alone(void **state)
     }
 }
 
+static void pressure_without_a_known_rest_opens_nothing(void **state)
+{
+    (void)state;
+    emulated_finger finger = resting_finger();
+    bt_baseline base = finger.tare.base;
+    base.pdc_q16 = BT_TARE_UNKNOWN;
+    assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+    for (int round = 0; round < 200; round++) {
+        finger.pdc_load = 5 * round;
+        bt_frame frame = next_frame(&finger);
+        assert_int_equal(feed(&finger, &frame), -1);
+        assert_true(finger.tare.gate.room >= 0);
+    }
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+}
+
 static void the_gate_stays_shut_where_nobody_rests(void **state)
 {
     (void)state;
@@ -226,6 +242,9 @@ static void the_gate_stays_shut_where_nobody_rests(void **state)
             bt_frame frame = next_frame(fingers[k]);
             for (int i = k == 2 ? 3 : 0; i < BT_ELECTRODES; i++) {
                 frame.electrode[i] = (uint16_t)random_range(&seed, 1, 4089);
+            }
+            for (int n = 0; k < 2 && n < 2; n++) { // repeated words add what they stand for
+                frame.electrode[random_range(&seed, 0, 18)] = BT_INVALID_COUNT;
             }
             for (int i = 0; k == 2 && i < 3; i++) {
                 frame.electrode[i] = 4095;
@@ -343,6 +362,7 @@ int main(void)
         cmocka_unit_test(the_slot_told_is_that_in_which_the_sum_passes_the_threshold),
         cmocka_unit_test(motion_that_goes_on_is_followed_word_by_word),
         cmocka_unit_test(pressure_opens_the_gate_and_leaves_the_energy_alone),
+        cmocka_unit_test(pressure_without_a_known_rest_opens_nothing),
         cmocka_unit_test(the_gate_stays_shut_where_nobody_rests),
         cmocka_unit_test(the_energy_is_the_brute_force_sum_of_squares),
         cmocka_unit_test(nobody_waiting_means_the_same_filter),

@@ -174,6 +174,14 @@ static void what_is_not_known_is_marked(void **state)
     msg = sigmas(e, BT_POC_WEIGHTS_COMPRESS_N1, 100);
     assert_true(msg.poc_um[0] != BT_INVALID_I16);
     assert_int_equal(msg.poc_sigma_um, 0xFFFF);
+    // One that so little outweighs what makes half a count: it lies on the other side of the finger.
+    e[3] = -8 / 16.0;
+    for (int i = 10; i < 16; i++) {
+        e[i] = -7 / 16.0;
+    }
+    msg = sigmas(e, BT_POC_WEIGHTS_COMPRESS_N1, 100);
+    assert_true(msg.poc_um[1] > 3500);
+    assert_int_equal(msg.poc_sigma_um, 0xFFFF);
 }
 
 static void sigmas_saturate_below_the_mark(void **state)
@@ -232,7 +240,7 @@ static void the_noise_is_that_of_nineteen_electrodes(void **state)
     // sweep adds 8/7 of nineteen. Sixteen sweeps are a plain mean: 16 * 19 independent squares a finger.
     // Rounding to counts adds 1/12. Up to sigma 4 the gate holds back one word in 40,000.
     static const double noises[] = {1, 1.5, 2.5, 4};
-    const unsigned fingers = 400;
+    const unsigned fingers = 1500;
     for (unsigned k = 0; k < 4; k++) {
         double sum = 0;
         for (unsigned f = 1; f <= fingers; f++) {
@@ -256,6 +264,29 @@ static void the_noise_is_that_of_nineteen_electrodes(void **state)
     }
 }
 
+static void a_move_of_everything_does_not_wrap_the_noise(void **state)
+{
+    (void)state;
+    // Set by the host just before a sweep ends: the next one's windows begin before the move. With d = 3206
+    // the squares are 418 d^2 in 1/64, which in 32 bits would be next to nothing.
+    emulated_finger finger;
+    bt_baseline base = {.pdc_q16 = BT_TARE_UNKNOWN};
+    finger_init(&finger);
+    finger.settings.contact_energy_count2 = BT_SETTING_CONTACT_ENERGY_COUNT2_MAX;
+    for (int round = 0; round < 2 * BT_SWEEP_ROUNDS; round++) {
+        bt_frame frame = frame_without(&finger, 0, BT_ELECTRODES, round < 7 ? 1 : 1 + 3206);
+        frame.pdc = BT_INVALID_COUNT;
+        for (int i = 0; round == 7 && i < BT_ELECTRODES; i++) {
+            base.electrode_q16[i] = (1 + 3206) << 16;
+        }
+        assert_true(round != 7 || bt_tare_set(&finger.tare, &base) == BT_ERROR_OK);
+        (void)feed(&finger, &frame);
+    }
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+    assert_int_equal(finger.tare.noise.sweeps, 1);
+    assert_int_equal(finger.tare.noise.count2, BT_SETTING_CONTACT_ENERGY_COUNT2_MAX); // capped
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -267,6 +298,7 @@ int main(void)
         cmocka_unit_test(sigmas_saturate_below_the_mark),
         cmocka_unit_test(only_what_is_asked_for_has_a_sigma),
         cmocka_unit_test(the_noise_is_that_of_nineteen_electrodes),
+        cmocka_unit_test(a_move_of_everything_does_not_wrap_the_noise),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
