@@ -4,7 +4,7 @@
 
 _Static_assert(BT_LANES % 2 == 0 && sizeof(bt_lanes) == BT_LANES * sizeof(uint16_t), "lanes go in pairs");
 _Static_assert(BT_LANES <= 32, "lanes are bits of a word");
-_Static_assert(BT_FULL_SCALE_COUNT + BT_GATE_JUMP < BT_GATE_UNREAD, "a first word must jump");
+_Static_assert(BT_FULL_SCALE_COUNT + BT_GATE_FAR < BT_GATE_UNREAD, "a first word must be far");
 _Static_assert(BT_ELECTRODES * BT_FULL_SCALE_COUNT * BT_FULL_SCALE_COUNT < BT_GATE_NEVER,
                "no round's energy reaches BT_GATE_NEVER");
 _Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX * 4LL < BT_GATE_NEVER, "a limit leaves room below zero");
@@ -29,7 +29,7 @@ int32_t bt_gate_repeat(bt_gate *gate, unsigned electrode, uint16_t count)
     return gate->room -= e * e;
 }
 
-uint16_t bt_gate_jump(bt_gate *gate, unsigned lane, uint16_t count)
+uint16_t bt_gate_far(bt_gate *gate, unsigned lane, uint16_t count)
 {
     uint32_t bit = 1u << lane;
     if (gate->unknown & bit) {
@@ -38,15 +38,15 @@ uint16_t bt_gate_jump(bt_gate *gate, unsigned lane, uint16_t count)
         gate->rest.lane[lane] = count;
         return count;
     }
-    gate->jumped |= bit;
-    return gate->jumped_before & bit ? count : gate->smooth.lane[lane];
+    gate->far |= bit;
+    return gate->far_before & bit ? count : gate->smooth.lane[lane];
 }
 
 int32_t bt_gate_pressure(bt_gate *gate, uint16_t count, int32_t above)
 {
     gate->pressure_now = bt_count_usable(count);
     if (gate->pressure_now) {
-        uint16_t smooth = bt_gate_filter(gate, BT_LANE_PDC, count);
+        uint16_t smooth = bt_gate_filter(gate, BT_LANE_PDC, count, gate->smooth.lane[BT_LANE_PDC]);
         uint16_t rest = gate->rest.lane[BT_LANE_PDC];
         if (rest != 0 && smooth - rest > above && gate->room >= 0 && gate->limit != BT_GATE_NEVER) {
             // Both move, so that the energy stays what it is.

@@ -3,8 +3,10 @@
 // the slot in which it happens and not at the round's end.
 //
 // A real sensor's glitches are single samples 28 to 66 counts off; one alone is over the contact
-// threshold, and one round in ten has one. So a word that jumps is held back until the next one: if that
-// jumps too, it is a touch. Motion that goes on is followed word by word.
+// threshold, and one round in ten has one. So a word far from rest is held back until the next one: if that
+// is far, too, it is a touch. (Far from the word before would be worse: that one's own noise counts as well,
+// and the way back from a glitch that passed would be held in its turn.) Where no touch is waited for,
+// because there is no tare or it is frozen, it is the jump from word to word that must be confirmed.
 //
 // A missing or railed word repeats the filter's value, so that it neither looks like motion nor enters
 // a tare; what is repeated is never published.
@@ -25,7 +27,7 @@ typedef union {
     uint32_t pair[BT_LANES / 2];
 } bt_lanes;
 
-// What both are of a lane that never had a good word: it adds no energy, every first word jumps from it, and
+// What both are of a lane that never had a good word: it adds no energy, every first word is far from it, and
 // eight of it fit the sum of a sweep.
 #define BT_GATE_UNREAD 8191
 
@@ -36,8 +38,8 @@ typedef struct {
     int32_t limit;    // the room that the round began with
     uint32_t unknown; // lanes without a good word so far, a bit each
     uint32_t met;     // lanes whose first good word came and that the owner has not taken note of
-    uint32_t jumped;  // lanes whose word was held back in this round
-    uint32_t jumped_before;
+    uint32_t far;     // lanes whose word of this round was far off, held back or not
+    uint32_t far_before;
     uint8_t missing; // electrodes of this round
     uint8_t railed;
     bool pressure_now; // this round had a good pressure word
@@ -54,27 +56,26 @@ static inline void bt_gate_begin(bt_gate *gate, int32_t limit_count2)
 {
     gate->limit = limit_count2;
     gate->room = limit_count2;
-    gate->jumped_before = gate->jumped;
-    gate->jumped = 0;
+    gate->far_before = gate->far;
+    gate->far = 0;
     gate->missing = 0;
     gate->railed = 0;
     gate->pressure_now = false;
 }
 #endif
 
-// Out of the ordinary: a word that is missing or railed, and one that jumps. The first returns the room
+// Out of the ordinary: a word that is missing or railed, and one that is far off. The first returns the room
 // left, the second the filter's new value.
 int32_t bt_gate_repeat(bt_gate *gate, unsigned electrode, uint16_t count);
-uint16_t bt_gate_jump(bt_gate *gate, unsigned lane, uint16_t count);
+uint16_t bt_gate_far(bt_gate *gate, unsigned lane, uint16_t count);
 
-#define BT_GATE_JUMP 24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
+#define BT_GATE_FAR 24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
 
 #ifndef BT_CDEF // in every slot, so these are inlined
-static inline uint16_t bt_gate_filter(bt_gate *gate, unsigned lane, uint16_t count)
+static inline uint16_t bt_gate_filter(bt_gate *gate, unsigned lane, uint16_t count, uint16_t from)
 {
-    uint32_t from_below = (uint32_t)count - gate->smooth.lane[lane] + BT_GATE_JUMP;
-    if (from_below > 2 * BT_GATE_JUMP) {
-        count = bt_gate_jump(gate, lane, count);
+    if ((uint32_t)count - from + BT_GATE_FAR > 2 * BT_GATE_FAR) {
+        count = bt_gate_far(gate, lane, count);
     }
     gate->smooth.lane[lane] = count;
     return count;
@@ -84,7 +85,7 @@ static inline uint16_t bt_gate_filter(bt_gate *gate, unsigned lane, uint16_t cou
 static inline void bt_gate_follow(bt_gate *gate, unsigned electrode, uint16_t count)
 {
     if (bt_count_usable(count)) {
-        (void)bt_gate_filter(gate, electrode, count);
+        (void)bt_gate_filter(gate, electrode, count, gate->smooth.lane[electrode]);
     } else {
         (void)bt_gate_repeat(gate, electrode, count);
     }
@@ -96,7 +97,8 @@ static inline int32_t bt_gate_electrode(bt_gate *gate, unsigned electrode, uint1
     if (!bt_count_usable(count)) {
         return bt_gate_repeat(gate, electrode, count);
     }
-    int32_t e = bt_gate_filter(gate, electrode, count) - gate->rest.lane[electrode];
+    uint16_t smooth = bt_gate_filter(gate, electrode, count, gate->rest.lane[electrode]);
+    int32_t e = smooth - gate->rest.lane[electrode]; // a first word sets its own rest
     return gate->room -= e * e;
 }
 #endif

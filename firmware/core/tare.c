@@ -32,10 +32,6 @@ static int32_t pdc_above_rest(const bt_tare *tare)
     return tare->gate.smooth.lane[BT_LANE_PDC] - tare->gate.rest.lane[BT_LANE_PDC];
 }
 
-// More is no electrode's noise but a move, and more than any threshold.
-#define SQUARE_MAX_Q6 (BT_SETTING_CONTACT_ENERGY_COUNT2_MAX * 64u)
-_Static_assert((uint64_t)SQUARE_MAX_Q6 *BT_ELECTRODES <= UINT32_MAX, "the sum of a sweep must fit 32 bits");
-
 // The square of a difference in count^2, rounded down. Differences are below 2^16 in 1/16 count: as unsigned,
 // the square fits, and so does the sum over all electrodes.
 static uint32_t square(int32_t difference_q4)
@@ -174,9 +170,10 @@ static void serve_electrode(bt_tare *tare, unsigned i)
         }
         return;
     }
+    // Where it is used, every round was below the threshold: the sum stays far below 2^32.
     int32_t away_q3 = 8 * tare->gate.smooth.lane[i] - mean_q3;
     uint32_t square_q6 = (uint32_t)(away_q3 * away_q3);
-    tare->deviation_q6 += square_q6 < SQUARE_MAX_Q6 ? square_q6 : SQUARE_MAX_Q6;
+    tare->deviation_q6 += square_q6;
     if (tracks(tare)) {
         *base_q16 = bt_baseline_follow(*base_q16, (uint32_t)mean_q3 << 13, SLEW_Q16);
         use_electrode(tare, i);
@@ -252,7 +249,9 @@ static BT_NOINLINE void end_sweep(bt_tare *tare, const bt_tare_settings *setting
         }
     } else if (tare->state == BT_TARE_STATE_REST && whole) {
         bt_rollback_keep(&tare->rollback, &tare->base);
-        bt_noise_add(&tare->noise, tare->deviation_q6, settings->contact_energy_count2);
+        if (!tare->partial_before) { // or its windows reach back into a touch
+            bt_noise_add(&tare->noise, tare->deviation_q6, settings->contact_energy_count2);
+        }
     } else if (tare->state == BT_TARE_STATE_CONTACT) {
         bt_thermal_follow(&tare->thermal, settings->thermal_gain_q16);
         if (whole) {
@@ -262,6 +261,7 @@ static BT_NOINLINE void end_sweep(bt_tare *tare, const bt_tare_settings *setting
     tare->energy_count2 = 0;
     tare->deviation_q6 = 0;
     tare->release.pressure_seen = false;
+    tare->partial_before = tare->partial;
     tare->partial = false;
 }
 

@@ -46,6 +46,7 @@ typedef struct {
     uint8_t hits;           // consecutive rounds in which the gate opened
     bool touched;           // in this round the gate opened, or before it and it is open still
     bool partial;           // this sweep did not serve all electrodes in one state
+    bool partial_before;    // nor did the one before
     uint32_t deviation_q6;  // count^2; of this sweep: filtered counts from their means
     uint32_t energy_count2; // of this sweep: means from the tare
 } bt_tare;

@@ -179,7 +179,7 @@ SETTINGS: dict[Setting, SettingSpec] = {
     ),
     Setting.CONTACT_ENERGY_COUNT2: SettingSpec(
         "count^2", 50, 1000000, 1000,
-        "sum of e^2 above which a finger is touched (Lin IV.B); raised to four times the measured noise energy",
+        "sum of e^2 above which a finger is touched (Lin IV.B); raised to three times the measured noise energy",
     ),
     Setting.STATUS_PERIOD_MS: SettingSpec(
         "ms", 100, 60000, 1000,

@@ -264,29 +264,6 @@ static void the_noise_is_that_of_nineteen_electrodes(void **state)
     }
 }
 
-static void a_move_of_everything_does_not_wrap_the_noise(void **state)
-{
-    (void)state;
-    // Set by the host just before a sweep ends: the next one's windows begin before the move. With d = 3206
-    // the squares are 418 d^2 in 1/64, which in 32 bits would be next to nothing.
-    emulated_finger finger;
-    bt_baseline base = {.pdc_q16 = BT_TARE_UNKNOWN};
-    finger_init(&finger);
-    finger.settings.contact_energy_count2 = BT_SETTING_CONTACT_ENERGY_COUNT2_MAX;
-    for (int round = 0; round < 2 * BT_SWEEP_ROUNDS; round++) {
-        bt_frame frame = frame_without(&finger, 0, BT_ELECTRODES, round < 7 ? 1 : 1 + 3206);
-        frame.pdc = BT_INVALID_COUNT;
-        for (int i = 0; round == 7 && i < BT_ELECTRODES; i++) {
-            base.electrode_q16[i] = (1 + 3206) << 16;
-        }
-        assert_true(round != 7 || bt_tare_set(&finger.tare, &base) == BT_ERROR_OK);
-        (void)feed(&finger, &frame);
-    }
-    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
-    assert_int_equal(finger.tare.noise.sweeps, 1);
-    assert_int_equal(finger.tare.noise.count2, BT_SETTING_CONTACT_ENERGY_COUNT2_MAX); // capped
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -298,7 +275,6 @@ int main(void)
         cmocka_unit_test(sigmas_saturate_below_the_mark),
         cmocka_unit_test(only_what_is_asked_for_has_a_sigma),
         cmocka_unit_test(the_noise_is_that_of_nineteen_electrodes),
-        cmocka_unit_test(a_move_of_everything_does_not_wrap_the_noise),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -82,6 +82,20 @@ def test_ten_minutes_of_rest_have_no_contact(profile: str, noise: float, glitche
     assert error <= 5 * noise / 8**0.5 + abs(per_min) / 60 * 0.16 + 1 / 16
 
 
+@pytest.mark.xfail(reason="the gate holds back jumps of over 24 counts, and noise makes a glitch of 28 less than that")
+def test_two_glitches_among_noise_are_no_touch() -> None:
+    # About once an hour on a worn sensor; tools/stress counts it. The first glitch passes for motion, the word after
+    # it, which is the way back, is held back as a jump, and the second glitch is no jump from there.
+    rest = np.full((100, 19), 3000)
+    noise = np.where(np.arange(19) % 2, 5, -5)  # 450 count^2 on the other electrodes
+    words = np.tile(rest[0] + noise, (7, 1))
+    words[:, 5] = 3000 + np.array([-10, -32, 0, -52, 0, 0, 0])
+    finger = Finger()
+    finger.feed(rest, np.full(100, 1326))
+    rows = finger.feed(words, np.full(7, 1326))
+    assert (rows["tare_state"] == TareState.REST).all()
+
+
 @pytest.mark.parametrize("per_min", [15.0, -15.0])
 def test_after_hours_of_drift_a_press_is_seen_whole(per_min: float) -> None:
     # An hour at the worst drift is as far as the converter's range goes: 900 counts.

@@ -1,0 +1,86 @@
+"""A few random courses of those that tools/stress draws for hours, and the proof that its verdicts can fail."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from biotac import TareReason, TareState
+from stability import fuzz
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_random_course_breaks_nothing(seed: int) -> None:
+    recipe = fuzz.draw(seed)
+    assert fuzz.judge(recipe).broken == [], recipe
+
+
+@pytest.mark.parametrize("seed", [33, 58, 75, 123])
+def test_courses_that_once_broke_something_do_not_again(seed: int) -> None:
+    # 33: a press tared by its sudden release; the others: a light contact ended by one lost pressure word.
+    assert fuzz.judge(fuzz.draw(seed)).broken == []
+
+
+def test_hours_of_rest_without_glitches_have_no_contact() -> None:
+    assert sum(fuzz.rest(seed, 600.0, worn=False) for seed in range(12)) == 0
+
+
+def spoilt(monkeypatch: pytest.MonkeyPatch, change) -> list[str]:
+    """What is said of a course when the board's rows are changed on their way to the verdict."""
+
+    class Spoilt(fuzz.Finger):
+        def feed(self, *words, **named):
+            rows = super().feed(*words, **named)
+            change(rows)
+            return rows
+
+    monkeypatch.setattr(fuzz, "Finger", Spoilt)
+    return fuzz.judge(next(filter(is_plain, map(fuzz.draw, range(200))))).broken
+
+
+def is_plain(recipe: fuzz.Recipe) -> bool:
+    """A quiet sensor with pressure, and a load that must be held."""
+    return recipe.pdc and recipe.profile == "new" and any(how.get("force_n", 0) > 3 for _, how in recipe.steps)
+
+
+def forget_contacts(rows: np.ndarray) -> None:
+    rows["tare_state"] = TareState.REST
+
+
+def never_release(rows: np.ndarray) -> None:
+    rows["tare_state"][2000:] = TareState.CONTACT
+
+
+def tare_a_load(rows: np.ndarray) -> None:
+    first = int(np.flatnonzero(rows["tare_state"] == TareState.CONTACT)[0])
+    begins = rows["tare_state"] == TareState.CONTACT
+    rows["flags"][begins] |= 1 << 14
+    rows["tare_reason"][first:] = TareReason.RELEASE
+
+
+def touch_at_rest(rows: np.ndarray) -> None:
+    rows["flags"][500] |= 1 << 14
+    rows["tare_reason"][500] = TareReason.ROLL_BACK
+
+
+def wrong_force(rows: np.ndarray) -> None:
+    rows["force_100un"][1500, 1] += 2
+
+
+def lose_a_number(rows: np.ndarray) -> None:
+    rows["seq"][700:] += 1
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (forget_contacts, "the finger is at rest"),
+        (never_release, "not tared within"),
+        (tare_a_load, "was tared away"),
+        (touch_at_rest, "contact without load"),
+        (wrong_force, "force y off by"),
+        (lose_a_number, "the sequence has a gap"),
+    ],
+)
+def test_every_verdict_can_fail(monkeypatch: pytest.MonkeyPatch, change, words: str) -> None:
+    assert any(words in broken for broken in spoilt(monkeypatch, change))

@@ -1,0 +1,251 @@
+"""Tare courses drawn at random, and what must hold in every frame of each, whatever was drawn.
+
+A course is a list of steps, so that one that fails can be shortened to the steps that matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from biotac import FrameFlags, Setting, TareReason, TareState
+from biotac import _wire as wire
+from biotac.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM, CrossCheck
+from biotac.finger import Finger
+from biotac.frames import StructArray
+from biotac.sim.timeline import Pose
+
+from .courses import LEAD_S, Course, Script, Sensor, resting
+
+#: With pressure: 14 sweeps of 80 ms for a residue, and 1.4 s until creep of 150 counts (5 % of the largest
+#: signal, 10 s) moves by less than the 12 counts that count as still.
+TARED_WITHIN = 300
+HELD_N = 1.0  # what is pressed harder than this is never tared away
+LATE = 10  # frames after a touch in which it is still its cause: three hits, a glitch, one lost word
+RELEASES = (TareReason.RELEASE, TareReason.RESIDUE)
+
+Step = tuple[str, dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """All that makes a course; printed when it fails."""
+
+    seed: int
+    profile: str
+    pdc: bool
+    lost_share: float
+    drift_scale: float
+    settings: dict[str, int]
+    steps: tuple[Step, ...]
+
+
+@dataclass
+class Outcome:
+    """What was found in a course. ``broken``: invariants that did not hold, in words; empty: good."""
+
+    broken: list[str] = field(default_factory=list)
+    frames: int = 0
+    poc_um: float = 0.0
+    force_mn: float = 0.0
+    torque_share: float = 0.0
+    release_frames: int = 0  # the longest from a release to the tare, with pressure
+    releases: int = 0
+    held_frames: int = 0  # over HELD_N with pressure
+    tared_away: int = 0  # re-zeroed with a load of that
+    idle_touches: int = 0  # contacts begun without a load, which creep or temperature explain
+    locked: int = 0  # without pressure: still in contact at the end of a course
+
+
+def draw(seed: int) -> Recipe:
+    """A random course of one to two minutes."""
+    rng = np.random.default_rng([seed, 99])
+
+    def log_uniform(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    steps: list[Step] = []
+    for _ in range(int(rng.integers(2, 5))):
+        force = log_uniform(0.3, 20.0)
+        steps.append(("load", {"force_n": force, "n_per_s": max(log_uniform(0.02, 20.0), force / 40.0), **_place(rng)}))
+        for _ in range(int(rng.integers(1, 4))):
+            steps.append(_during(rng, force))
+        steps.append(("release", {"n_per_s": log_uniform(0.5, 20.0)}))
+        steps.append(("rest", {"seconds": float(rng.uniform(4.0, 10.0))}))
+        if rng.random() < 0.3:
+            steps.append(("warm", {"celsius": float(rng.uniform(-0.05, 0.05)), "seconds": 5.0}))
+    return Recipe(
+        seed=seed,
+        profile=str(rng.choice(["new", "worn"])),
+        pdc=bool(rng.random() < 0.75),
+        lost_share=float(rng.choice([0.0, 0.0, 0.002, 0.01])),
+        drift_scale=float(rng.choice([0.0, 1.0, 1.0])),
+        settings={
+            "poc_weights": int(rng.integers(0, 3)),
+            "thermal_gain_milli": int(rng.choice([0, 500, 1000])),
+            "force_gain_z_nn": int(rng.choice([2_262_234, -2_262_234, 100_000_000])),
+        },
+        steps=tuple(steps),
+    )
+
+
+def _place(rng: np.random.Generator) -> dict[str, float]:
+    x_mm = float(rng.uniform(-12.0, 4.0))
+    side = 0.9 * np.sqrt(5.08**2 - max(x_mm, 0.0) ** 2)
+    return {"x_mm": x_mm, "y_mm": float(rng.uniform(-side, side)), "tip_mm": float(rng.choice([1.2, 2.0, 3.6, 7.0]))}
+
+
+def _during(rng: np.random.Generator, force_n: float) -> Step:
+    seconds = float(rng.uniform(0.3, 6.0))
+    kind = int(rng.integers(0, 5))
+    if kind == 0:
+        return "slide", {"seconds": seconds, **_place(rng)}
+    if kind == 1:
+        shear = rng.uniform(-0.4, 0.4, 2) * force_n
+        return "shear", {"seconds": seconds, "shear_x_n": float(shear[0]), "shear_y_n": float(shear[1])}
+    if kind == 2:
+        return "force", {"seconds": seconds, "force_n": max(float(rng.uniform(0.2, 1.0)) * force_n, 0.3)}
+    if kind == 3:
+        return "warm", {"celsius": float(rng.uniform(-4.0, 4.0)), "seconds": seconds}
+    return "hold", {"seconds": seconds}
+
+
+def make(recipe: Recipe) -> Course:
+    """The recipe's course, with words lost as it says."""
+    script = Script(Sensor(recipe.seed, "worn" if recipe.profile == "worn" else "new"))
+    script.sensor.drift_per_min = script.sensor.drift_per_min * recipe.drift_scale
+    script.rest(LEAD_S)
+    for kind, how in recipe.steps:
+        if kind == "load":
+            place = {name: how[name] for name in ("x_mm", "y_mm", "tip_mm")}
+            script.load(how["force_n"], how["n_per_s"], Pose(**place))
+        elif kind == "release":
+            script.load(0.0, how["n_per_s"])
+        elif kind == "rest":
+            script.rest(how["seconds"])
+        elif kind == "warm":
+            script.warm(how["celsius"], how["seconds"])
+        else:
+            pose = replace(script.track.pose, **{name: value for name, value in how.items() if name != "seconds"})
+            script.track.ramp(how["seconds"], pose)
+    course = script.make()
+    rng = np.random.default_rng([recipe.seed, 98])
+    for words in course.words.values():
+        words[rng.random(words.shape) < recipe.lost_share] = wire.INVALID_COUNT
+    return course
+
+
+def judge(recipe: Recipe) -> Outcome:
+    """Run the course through the board's code and look at every frame."""
+    course = make(recipe)
+    settings = {setting: spec.default for setting, spec in wire.SETTINGS.items()}
+    settings |= {Setting[name.upper()]: value for name, value in recipe.settings.items()}
+    words = {name: value for name, value in course.words.items() if recipe.pdc or name != "pdc"}
+    rows = Finger(settings).feed(**words)
+    outcome = Outcome(frames=len(rows))
+    _judge_results(rows, settings, outcome)
+    _judge_ranges(rows, settings, outcome)
+    _judge_touches(course, rows, outcome)
+    if recipe.pdc:
+        _judge_loads(course, rows, outcome)
+    else:
+        outcome.locked = int(course.force_n[-200:].max() == 0 and rows["tare_state"][-1] == TareState.CONTACT)
+    return outcome
+
+
+def _judge_results(rows: StructArray, settings: dict[Setting, int], outcome: Outcome) -> None:
+    check = CrossCheck()
+    check.add(rows, settings)
+    outcome.broken += check.findings[:3]
+    outcome.poc_um = check.poc_um_max
+    outcome.force_mn = check.force_mn_max
+    outcome.torque_share = check.torque_nmm_max / check.torque_nmm_bound if check.torque_nmm_bound else 0.0
+
+
+def _judge_ranges(rows: StructArray, settings: dict[Setting, int], outcome: Outcome) -> None:
+    tares = rows["tare_q4"][(rows["flags"] & FrameFlags.UNTARED) == 0]
+    known = tares[tares != wire.INVALID_COUNT]
+    limit = settings[Setting.CONTACT_ENERGY_COUNT2]
+    for held, what in (
+        (bool((known <= 65520).all()), "a tare is out of range"),
+        # 19 electrodes of 4095 counts; and three times the noise, which is capped at the setting
+        (bool((rows["energy_count2"] <= 19 * 4095**2).all()), "an energy wrapped"),
+        (bool((rows["threshold_count2"] <= 3 * limit).all()), "the threshold passed three times the setting"),
+        (bool((np.diff(rows["seq"].astype(np.int64)) == rows["present"][1:]).all()), "the sequence has a gap"),
+        (bool((rows["tare_state"] <= TareState.FAULT).all()), "the state is none"),
+    ):
+        if not held:
+            outcome.broken.append(what)
+
+
+def _judge_touches(course: Course, rows: StructArray, outcome: Outcome) -> None:
+    """A contact begins with a load, or because what the finger reads has left its tare."""
+    begins = (rows["tare_reason"] == TareReason.ROLL_BACK) & ((rows["flags"] & FrameFlags.TARE_CHANGED) != 0)
+    # Noise of 2.5 times its mean on 19 electrodes comes once in 3,000 rounds, in three running once in 10^10.
+    noise = np.sqrt(2.5 * 19) * course.sensor.noise_counts
+    for k in np.flatnonzero(begins).tolist():
+        if course.force_n[max(k - LATE, 0) : k + 1].max() > 0:
+            continue
+        outcome.idle_touches += 1
+        away = np.linalg.norm(course.reads[k] - rows["tare_q4"][k - 1] / 16.0)
+        if away + noise < np.sqrt(rows["threshold_count2"][k]):
+            outcome.broken.append(f"frame {k}: contact without load, {away:.1f} counts from the tare")
+
+
+def _judge_loads(course: Course, rows: StructArray, outcome: Outcome) -> None:
+    changed = (rows["flags"] & FrameFlags.TARE_CHANGED) != 0
+    released = changed & np.isin(rows["tare_reason"], RELEASES)
+    held = course.force_n > HELD_N
+    outcome.held_frames = int(held.sum())
+    outcome.tared_away = int((released & held).sum())
+    for k in np.flatnonzero(released & held)[:3].tolist():
+        outcome.broken.append(f"frame {k}: a load of {course.force_n[k]:.2f} N was tared away")
+    # Seen once it has lasted; a lost word and the glitch filter each take a round.
+    lasting = held.copy()
+    for back in range(1, LATE + 1):
+        lasting[back:] &= held[:-back]
+        lasting[:back] = False
+    for k in np.flatnonzero(lasting & (rows["tare_state"] == TareState.REST))[:1].tolist():
+        outcome.broken.append(f"frame {k}: {course.force_n[k]:.2f} N for {LATE} frames, and the finger is at rest")
+    force = course.force_n
+    for k in (np.flatnonzero((force[:-1] > 0) & (force[1:] == 0)) + 1).tolist():
+        after = rows["tare_state"][k : k + TARED_WITHIN]
+        if len(after) < TARED_WITHIN or force[k : k + TARED_WITHIN].max() > 0:
+            continue
+        at_rest = np.flatnonzero(after == TareState.REST)
+        outcome.releases += 1
+        if len(at_rest):
+            outcome.release_frames = max(outcome.release_frames, int(at_rest[0]))
+        else:
+            outcome.broken.append(f"frame {k}: released, and not tared within {TARED_WITHIN} frames")
+
+
+def rest(seed: int, seconds: float, *, worn: bool) -> int:
+    """Contacts that the board sees on a drifting finger that nothing touches; any is one too many."""
+    sensor = Sensor(seed, "worn" if worn else "new")
+    # The worst drift that was measured, either way.
+    sensor.drift_per_min = np.full(19, 15.0 if seed % 2 else -15.0)
+    rows = Finger().feed(**resting(sensor, seconds, seed))
+    changed = (rows["flags"] & FrameFlags.TARE_CHANGED) != 0
+    return int((changed & (rows["tare_reason"] == TareReason.ROLL_BACK)).sum())
+
+
+def shortest(recipe: Recipe) -> Recipe:
+    """Steps left out, and what is random calmed down, as long as something is still broken."""
+    calm: list[dict[str, Any]] = [{"lost_share": 0.0}, {"drift_scale": 0.0}, {"profile": "new"}, {"settings": {}}]
+    for change in calm:
+        tried = replace(recipe, **change)
+        recipe = tried if judge(tried).broken else recipe
+    left_out = True
+    while left_out:  # what is left may spare a step that could not be spared before
+        left_out = False
+        for k in reversed(range(len(recipe.steps))):
+            tried = replace(recipe, steps=recipe.steps[:k] + recipe.steps[k + 1 :])
+            if judge(tried).broken:
+                recipe, left_out = tried, True
+    return recipe
+
+
+BOUNDS = {"poc_um": POC_BOUND_UM, "force_mn": FORCE_BOUND_MN, "torque_share": 1.0, "release_frames": TARED_WITHIN}
