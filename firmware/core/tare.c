@@ -246,19 +246,21 @@ static uint32_t residue_limit(const bt_tare *tare)
 // so that neither energy nor pressure come back to the tare. What tells a release then is that the
 // pressure has fallen far below the press's own peak and nothing moves any more. A load that only
 // grows is at its peak all the time and never passes; without a press there is no release: a light
-// touch while the pressure undershoots has no peak. What would be tared are means, so it is the mean that
-// must have fallen, too: in the rounds right after a release they still are those of the press.
-static bool fallen_to(const bt_tare *tare, int32_t above)
+// touch while the pressure undershoots has no peak.
+static bool released_by_pressure(const bt_tare *tare, int32_t above)
 {
-    return above < SETTLE_PDC && above * RELEASE_FALL < tare->pdc_peak;
+    bool pressed = tare->pdc_peak >= RELEASE_FALL * PDC_HIT;
+    bool fallen = above < SETTLE_PDC && above * RELEASE_FALL < tare->pdc_peak;
+    return tare->sweep.still_sweeps >= SETTLE_SWEEPS && pressed && fallen;
 }
 
-static bool released_by_pressure(const bt_tare *tare)
+// What would be tared are means, and in the rounds right after a release they still are those of the press:
+// the pressure and its mean must both have fallen.
+static int32_t mean_or_present_above_rest(const bt_tare *tare)
 {
-    int32_t mean_above = (tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3) - tare->gate.rest.lane[BT_LANE_PDC];
-    bool pressed = tare->pdc_peak >= RELEASE_FALL * PDC_HIT;
-    bool fallen = fallen_to(tare, pdc_above_rest(tare)) && fallen_to(tare, mean_above);
-    return tare->sweep.still_sweeps >= SETTLE_SWEEPS && pressed && fallen;
+    int32_t mean = tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3;
+    int32_t present = tare->gate.smooth.lane[BT_LANE_PDC];
+    return (mean > present ? mean : present) - tare->gate.rest.lane[BT_LANE_PDC];
 }
 
 // After a sweep in contact: has it ended?
@@ -269,15 +271,15 @@ static void judge_release(bt_tare *tare)
     tare->energy_peak = tare->energy_count2 > tare->energy_peak ? tare->energy_count2 : tare->energy_peak;
     // Without pressure the energy itself must have fallen, or the first second of a slow load would
     // pass for a residue.
-    bool quiet =
-        pressure ? pdc_above_rest(tare) < PDC_QUIET : tare->energy_count2 < tare->energy_peak / RELEASE_FALL;
+    int32_t above = mean_or_present_above_rest(tare);
+    bool quiet = pressure ? above < PDC_QUIET : tare->energy_count2 < tare->energy_peak / RELEASE_FALL;
     uint8_t still = tare->sweep.still_sweeps;
     tare->quiet_sweeps = quiet ? (uint8_t)(tare->quiet_sweeps + (tare->quiet_sweeps < UINT8_MAX)) : 0;
     bool residue = tare->quiet_sweeps >= RESIDUE_SWEEPS && still >= RESIDUE_SWEEPS
                    && tare->energy_count2 < residue_limit(tare);
     if (tare->energy_count2 < CALM_ENERGY && (quiet || !pressure)) {
         adopt_present(tare, BT_TARE_REASON_RELEASE);
-    } else if (residue || (pressure && released_by_pressure(tare))) {
+    } else if (residue || (pressure && released_by_pressure(tare, above))) {
         adopt_present(tare, BT_TARE_REASON_RESIDUE);
     }
 }
