@@ -39,22 +39,16 @@ static uint32_t residue_limit(const bt_release *release, uint32_t contact_frames
     return RESIDUE_ENERGY + BT_ELECTRODES * drift_count2;
 }
 
-static bool fallen_to(const bt_release *release, int32_t above)
-{
-    return above < SETTLE_PDC && above * FALL < release->pdc_peak;
-}
-
 // On real fingers the skin's hysteresis leaves thousands of count^2 and some pressure after a press,
 // so that neither energy nor pressure come back to the tare. What tells a release then is that the
 // pressure has fallen far below the press's own peak and nothing moves any more. A load that only
 // grows is at its peak all the time and never passes; without a press there is no release: a light
-// touch while the pressure undershoots has no peak. What would be tared are means, so it is the mean that
-// must have fallen, too: in the rounds right after a release they still are those of the press.
+// touch while the pressure undershoots has no peak.
 static bool settled(const bt_release *release, const bt_release_sweep *sweep)
 {
     bool pressed = release->pdc_peak >= FALL * BT_PDC_HIT;
-    return sweep->still_sweeps >= SETTLE_SWEEPS && pressed && fallen_to(release, sweep->above)
-           && fallen_to(release, sweep->mean_above);
+    bool fallen = sweep->above < SETTLE_PDC && sweep->above * FALL < release->pdc_peak;
+    return sweep->still_sweeps >= SETTLE_SWEEPS && pressed && fallen;
 }
 
 uint8_t bt_release_judge(bt_release *release, const bt_release_sweep *sweep)

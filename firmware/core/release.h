@@ -22,8 +22,7 @@ typedef struct {
 typedef struct {
     uint32_t energy_count2; // of the means from the tare
     uint32_t contact_frames;
-    int32_t above;      // pressure over its tare, filtered, now
-    int32_t mean_above; // and its mean of eight rounds
+    int32_t above; // pressure over its tare: what it is now or its mean of eight rounds, whichever is more
     uint8_t still_sweeps;
 } bt_release_sweep;
 

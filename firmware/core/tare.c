@@ -221,14 +221,16 @@ static void follow_contact(bt_tare *tare)
     }
 }
 
-// After a sweep in contact: has it ended?
+// After a sweep in contact: has it ended? What would be tared are means, and in the rounds right after a
+// release they still are those of the press: the pressure and its mean must both have fallen.
 static void judge_release(bt_tare *tare)
 {
+    int32_t mean = tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3;
+    int32_t now = tare->gate.smooth.lane[BT_LANE_PDC];
     bt_release_sweep sweep = {
         .energy_count2 = tare->energy_count2,
         .contact_frames = tare->contact_frames,
-        .above = pdc_above_rest(tare),
-        .mean_above = (tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3) - tare->gate.rest.lane[BT_LANE_PDC],
+        .above = (mean > now ? mean : now) - tare->gate.rest.lane[BT_LANE_PDC],
         .still_sweeps = tare->sweep.still_sweeps,
     };
     uint8_t reason = bt_release_judge(&tare->release, &sweep);

@@ -185,7 +185,7 @@ static void motion_that_goes_on_is_followed_word_by_word(void **state)
     for (int round = 0; round < 1000; round++) {
         uint32_t energy = 0;
         for (int i = 0; i < BT_ELECTRODES; i++) {
-            int size = (int)random_range(&seed, 25, 1500);
+            int size = (int)random_range(&seed, 25, 1300); // never back to within 24 counts of rest
             bool down = word[i] > 2589 || (word[i] > 1500 && random_unit(&seed) < 0.5);
             word[i] = (uint16_t)(word[i] + (down ? -size : size));
             energy += round == 0 ? 0 : (uint32_t)((word[i] - 100) * (word[i] - 100));

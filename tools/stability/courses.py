@@ -103,7 +103,7 @@ class Script:
     def make(self) -> Course:
         """The counts and the truth."""
         frames = round(self.track.seconds / sampling.FRAME_S)
-        times = np.arange(frames + 1) * sampling.FRAME_S
+        times: Floats = np.arange(frames + 1, dtype=np.float64) * sampling.FRAME_S
         states = self.track.states(times)
         samples = sampling.sample(self.sensor, states)
         drift = self.sensor.drift_per_min / 60.0 * times[:, None]
