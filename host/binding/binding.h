@@ -6,6 +6,7 @@
 
 #include "batch.h"
 #include "blocks.h"
+#include "bounds.h"
 #include "cobs.h"
 #include "crc32.h"
 #include "finger.h"

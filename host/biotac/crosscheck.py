@@ -1,7 +1,7 @@
 """Every on-board result against the float64 reference, fed with the counts and the tare of its frame.
 
-The bounds follow from the board's number formats alone; tests/core/test_kernels.c derives them and
-searches for inputs that come near.
+The bounds follow from the board's number formats alone; firmware/reference/kernel_bounds.h derives them, and
+tests/core/test_kernels.c searches for inputs that come near.
 """
 
 from __future__ import annotations
@@ -13,15 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _wire as wire
-from .core import TORQUE_GAINS, Results, Settings, reference_q4
+from .core import TORQUE_GAINS, Results, Settings, ffi, lib, reference_q4
 from .frames import StructArray, electrode_signals, to_units
 
-# The PoC's distance: half a um per axis for the published um; direction and length to 2^-16 of
-# 5.08 mm; x to 2^-18 of 13.6 mm; weights cut at 2^-23 of the largest, magnified by at most 4.55.
-DIRECTION_UM = 3**0.5 * 5080 / 2**16 + 5080 / 2**16 + 0.2
-POC_BOUND_UM = 3**0.5 * 0.5 + 13600 / 2**18 + DIRECTION_UM
-# Per axis: half of the published 0.1 mN, and the gain's half unit on the largest possible sum.
-FORCE_BOUND_MN = 0.05 + 0.0024
+#: The PoC's distance and the force of each axis, see firmware/reference/kernel_bounds.h.
+POC_BOUND_UM: float = lib.bt_poc_bound_um()
+FORCE_BOUND_MN: float = lib.bt_force_bound_mn()
 
 FINDINGS = 20  # violations that are put into words; the rest is counted
 
@@ -29,18 +26,18 @@ FINDINGS = 20  # violations that are put into words; the rest is counted
 def torque_bound_nmm(messages: StructArray, truth: Results, settings: Settings) -> NDArray[np.float64]:
     """Bound of each torque axis, N*mm, shape (n, 3): it grows with the signals and, for x, the force.
 
-    y and z: half of the published mN*mm, arms known to 1/32 um, sums to half a count*um. x, the
-    lever: the errors of force and PoC times each other's size.
+    The formulas stand in firmware/reference/kernel_bounds.h.
     """
     size = np.nansum(np.abs(electrode_signals(messages)), axis=1)
     gains = np.array([abs(settings[s]) / 1e9 for s in TORQUE_GAINS])
     with np.errstate(divide="ignore", invalid="ignore"):
         sums = np.nan_to_num(np.abs(truth.torque_nmm[:, 1:]) * 1000 / gains, posinf=0.0)
-    # The board's multiplier is a whole number of 2^-33: half of one on the sum in count*um.
-    yz = 0.5 + gains * (size[:, None] / 32 + 0.5) + sums * 2.0**-34
     force = np.abs(truth.force_n[:, 1:]).sum(axis=1)
-    x = 1 + 2 * 5.08 * FORCE_BOUND_MN + force * (0.0625 + DIRECTION_UM)
-    return np.column_stack([x, yz]) / 1000
+    out = np.empty((len(messages), 3))
+    columns = [np.ascontiguousarray(a) for a in (size, sums, force, gains)]
+    pointers = [ffi.from_buffer("double[]", a) for a in (*columns, out)]
+    lib.bt_torque_bounds_mnmm(len(messages), *pointers)
+    return out / 1000
 
 
 @dataclass

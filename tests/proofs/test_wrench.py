@@ -1,6 +1,6 @@
 """Force and torque (firmware/core/wrench.c): every product fits, and how far each result is from the exact one.
 
-The bounds proved are the parts of tests/core/kernel_bounds.h that these functions are answerable for.
+The bounds proved are the parts of firmware/reference/kernel_bounds.h that these functions are answerable for.
 """
 
 from __future__ import annotations

@@ -82,6 +82,19 @@ def test_ten_minutes_of_rest_have_no_contact(profile: str, noise: float, glitche
     assert error <= 5 * noise / 8**0.5 + abs(per_min) / 60 * 0.16 + 1 / 16
 
 
+def test_ten_hours_of_a_worn_finger_have_no_contact() -> None:
+    # White noise of sigma 5, glitches in 0.5 % of the words and never two in a row, 15 counts a minute.
+    random = np.random.default_rng(5)
+    for hour in range(10):
+        counts = random.normal(random.uniform(2955, 3589, 19), 5.0, (360_000, 19))
+        counts += np.linspace(0, 900 if hour % 2 else -900, 360_000)[:, None]
+        glitched = random.random(counts.shape) < 0.005
+        glitched[1:] &= ~glitched[:-1]
+        counts -= glitched * random.uniform(28, 66, counts.shape)
+        rows = Finger().feed(np.rint(counts), np.rint(random.normal(1326, 1, 360_000)))
+        assert changes(rows) == [TareReason.START]
+
+
 def test_two_glitches_among_noise_are_no_touch() -> None:
     # Confirming jumps from word to word, the first glitch passed for motion, the word after it, which is the way
     # back, was held back as a jump, and the second glitch was no jump from there.

@@ -61,4 +61,4 @@ def doubles(include: str, *names: str) -> list[float]:
     """What expressions of a header are worth as doubles: asked of a compiled program."""
     prints = "".join(f'    printf("%.17g\\n", (double)({name}));\n' for name in names)
     text = f'#include <stdio.h>\n#include "{include}"\nint main(void)\n{{\n{prints}    return 0;\n}}\n'
-    return [float(line) for line in run_c(text, (ROOT / "tests/core",)).split()]
+    return [float(line) for line in run_c(text, (ROOT / "firmware/reference",)).split()]

@@ -1,5 +1,6 @@
 // How far the shipped kernel's results may be from the formulas in double (firmware/reference/lin2013.h).
-// Held by tests/core/test_kernels.c frame by frame and by tests/fuzz; parts are proved in tests/proofs.
+// Held by tests/core/test_kernels.c frame by frame, by tests/fuzz and by `biotac check`; parts are proved in
+// tests/proofs.
 //
 // Where the bounds come from (nothing is tuned):
 //  PoC    the published um: 0.5 per axis. Direction components of 16 bits, rounded: 2^-16 of r per
@@ -15,8 +16,8 @@
 //  torque x: 0.5 mN*mm, and 1/16 where products are cut; force off by 0.0524 mN on 5.08 mm in y and z;
 //         point off by 1/16 um (half of the 0.04 um that the middle of a cut may be off, and half of the
 //         0.08 um of the lever's unit) and by what the PoC's direction is, times the force.
-#ifndef BIOTAC_TEST_KERNEL_BOUNDS_H
-#define BIOTAC_TEST_KERNEL_BOUNDS_H
+#ifndef BIOTAC_KERNEL_BOUNDS_H
+#define BIOTAC_KERNEL_BOUNDS_H
 
 #define SQRT_3         1.7320508075688772
 #define LENGTH_UM      (5080 * (5.8e-6 + 2.0 / 75000))
