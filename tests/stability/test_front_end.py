@@ -86,12 +86,13 @@ def test_ten_hours_of_a_worn_finger_have_no_contact() -> None:
     # White noise of sigma 5, glitches in 0.5 % of the words and never two in a row, 15 counts a minute.
     random = np.random.default_rng(5)
     for hour in range(10):
-        counts = random.normal(random.uniform(2955, 3589, 19), 5.0, (360_000, 19))
+        counts = random.normal(random.uniform(2955, 3100, 19), 5.0, (360_000, 19))
         counts += np.linspace(0, 900 if hour % 2 else -900, 360_000)[:, None]
         glitched = random.random(counts.shape) < 0.005
         glitched[1:] &= ~glitched[:-1]
         counts -= glitched * random.uniform(28, 66, counts.shape)
-        rows = Finger().feed(np.rint(counts), np.rint(random.normal(1326, 1, 360_000)))
+        pdc = np.rint(random.normal(1326, 1, 360_000)).astype(np.uint16)
+        rows = Finger().feed(np.rint(counts).astype(np.uint16), pdc)
         assert changes(rows) == [TareReason.START]
 
 
