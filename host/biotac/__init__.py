@@ -24,9 +24,10 @@ from .errors import (
 )
 from .finger import FINGER_DTYPE, Finger
 from .frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
-from .hand import Hand, LinkStats
+from .hand import Hand
 from .opening import open
 from .recording import Recorder, Recording, load
+from .stream import LinkStats
 from .version import __version__
 
 __all__ = [

@@ -8,7 +8,6 @@ import struct
 import time
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -21,7 +20,7 @@ from .errors import CommandRefusedError, DeviceLostError, InputError, NotAGatewa
 from .frames import Frame, StructArray, tare_to_q4
 from .framing import encode
 from .link import Link
-from .stream import Batch, StreamDecoder, join, split
+from .stream import Batch, LinkStats, StreamDecoder, join, split
 
 if TYPE_CHECKING:
     from .recording.writer import Recorder
@@ -33,19 +32,6 @@ REPLY_TRIES = 3
 SILENCE_S = 3.0
 
 Reply = TypeVar("Reply")
-
-
-@dataclass(frozen=True)
-class LinkStats:
-    """Health of the link as this side sees it."""
-
-    bytes_received: int
-    frames: int
-    frames_lost: int
-    pac_lost: int
-    disordered: int  # sequence numbers that repeat or step back, as after a reboot
-    crc_errors: int
-    other_errors: int
 
 
 class Hand:
@@ -244,16 +230,7 @@ class Hand:
     @property
     def stats(self) -> LinkStats:
         """Counts since the handshake."""
-        counts = self._decoder.counts
-        return LinkStats(
-            bytes_received=self._bytes,
-            frames=self._frames,
-            frames_lost=self._decoder.lost,
-            pac_lost=self._decoder.lost_pac,
-            disordered=self._decoder.disordered,
-            crc_errors=counts.bad_crc,
-            other_errors=counts.bad - counts.bad_crc,
-        )
+        return self._decoder.stats(self._bytes, self._frames)
 
     @property
     def ended(self) -> bool:

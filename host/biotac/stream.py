@@ -67,6 +67,19 @@ class Unwrapper:
         return out
 
 
+@dataclass(frozen=True)
+class LinkStats:
+    """Health of the link as this side sees it."""
+
+    bytes_received: int
+    frames: int
+    frames_lost: int
+    pac_lost: int
+    disordered: int  # sequence numbers that repeat or step back, as after a reboot
+    crc_errors: int
+    other_errors: int
+
+
 class StreamDecoder:
     """Chunks of bytes in, batches of arrays out.
 
@@ -88,6 +101,18 @@ class StreamDecoder:
     def counts(self) -> FramingCounts:
         """What became of the bytes so far."""
         return self._deframer.counts
+
+    def stats(self, bytes_received: int, frames: int) -> LinkStats:
+        """All counts, with what the caller has counted."""
+        return LinkStats(
+            bytes_received=bytes_received,
+            frames=frames,
+            frames_lost=self.lost,
+            pac_lost=self.lost_pac,
+            disordered=self.disordered,
+            crc_errors=self.counts.bad_crc,
+            other_errors=self.counts.bad - self.counts.bad_crc,
+        )
 
     def accept_newer_minor(self) -> None:
         """The peer's wire minor is newer: its messages may be longer than known here."""
