@@ -1,5 +1,5 @@
 // One emulated Pico: the chip with an image in its flash, run instruction by instruction in emulated time.
-import { ConsoleLogger, LogLevel, RP2040, SimulationClock } from 'rp2040js'
+import { ConsoleLogger, LogLevel, RP2040 } from 'rp2040js'
 
 import { correctCore, DeviceTime, wakes } from './faults.mjs'
 
@@ -103,9 +103,8 @@ export class Machine {
 
   #start(nanos, worldNanos) {
     if (this.mcu) this.flash.set(this.mcu.flash.subarray(0, FLASH_BYTES))
-    const clock = new SimulationClock()
-    clock.nanosCounter = nanos
-    const mcu = new RP2040(clock)
+    const mcu = new RP2040()
+    mcu.clock.nanosCounter = nanos
     mcu.logger = new ConsoleLogger(LogLevel.Error, true)
     mcu.flash.set(this.flash)
     correctCore(mcu.core)

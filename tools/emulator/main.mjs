@@ -1,8 +1,9 @@
 // An emulated Pico on a pty. `biotac sim --board pico` and biotac.open("emu:pico?source=...") start it.
 //
-//   node main.mjs --image BIN --wasm sensors.wasm --tape FILE --pty PATH [--pace X] [--hold] [--serials A,B,...]
+//   node main.mjs --image BIN --wasm sensors.wasm --tape FILE --pty PATH --master FD
+//                 [--pace X] [--hold] [--serials A,B,...]
 //
-// File descriptor 3 is the pty's master side, non-blocking; PATH is the name of its other side, to be told.
+// FD is the open master side of a pty, non-blocking; PATH is the name of its other side, to be told.
 // Like the posix board this writes "pty PATH" once the port can be opened, and "end" once the tape is played and
 // all of it handed over; "run" on stdin ends a hold, the end of stdin ends the process. More lines for stdin:
 //   [@SECONDS] VERB   stop reading, go on reading, unplug, plug, cut power: now, or at a time of the sensors' world
@@ -13,7 +14,6 @@ import { parseArgs } from 'node:util'
 import { Pty } from './pty.mjs'
 import { Rig } from './rig.mjs'
 
-const MASTER_FD = 3
 const STRETCH_NS = 1e6
 const BOOT_NS = 10e9 // a board that has not begun to sample by then will not
 const POLL_MS = 1
@@ -24,6 +24,7 @@ const { values: options } = parseArgs({
     wasm: text,
     tape: text,
     pty: text,
+    master: text,
     pace: { type: 'string', default: '1' },
     serials: { type: 'string', default: '' },
     hold: { type: 'boolean', default: false },
@@ -46,7 +47,7 @@ function start() {
 }
 
 const pace = Number(options.pace)
-const pty = new Pty(MASTER_FD)
+const pty = new Pty(Number(options.master))
 const rig = start()
 let asked = false // to end the hold
 let told = false // that the tape is over
