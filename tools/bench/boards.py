@@ -79,7 +79,7 @@ def need() -> None:
         if shutil.which(tool) is None:
             raise Failed(f"{tool} is missing; install it: apt-get install {package}")
     BUILD.mkdir(parents=True, exist_ok=True)
-    command("npm", "ci", "--silent")
+    command("npm", "ci", "--silent", "--prefix", HERE.parent)
 
 
 def command(*words: object) -> str:

@@ -10,8 +10,8 @@
 #define _DEFAULT_SOURCE
 #include "port.h"
 
+#include "bus.h"
 #include "clock.h"
-#include "device.h"
 #include "flash.h"
 #include "pty.h"
 #include "sensor_gen.h"
@@ -32,8 +32,7 @@
 #define LINK_PERIOD_NS 1000000u
 
 static bt_tape tape;
-static bt_emu_device sensor[BT_MAX_FINGERS];
-static uint8_t selected;
+static bt_emu_bus bus;
 static uint32_t alarm_us;
 static bool armed;
 static bool held;
@@ -65,22 +64,6 @@ static void load_tape(const char *path)
         die(path, wrong);
     }
     (void)close(fd);
-}
-
-// serials: one per finger, separated by commas; a finger without one gets one made up.
-static void plug_in_sensors(const char *serials)
-{
-    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        char serial[17];
-        (void)snprintf(serial, sizeof serial, "BTEMU0000000%04u", f + 1u);
-        size_t given = strcspn(serials, ",");
-        if (given > 0 && given < sizeof serial) {
-            memset(serial, 0, sizeof serial);
-            memcpy(serial, serials, given);
-        }
-        serials += given + (serials[given] == ',');
-        bt_emu_init(&sensor[f], f, f < tape.fingers, serial, bt_tape_count, &tape);
-    }
 }
 
 void port_init(int argc, char **argv)
@@ -117,7 +100,7 @@ void port_init(int argc, char **argv)
     if (wrong != NULL) {
         die(flash_path, wrong);
     }
-    plug_in_sensors(serials);
+    bt_emu_bus_init(&bus, tape.fingers, serials, bt_tape_count, &tape);
     (void)fcntl(STDIN_FILENO, F_SETFL, fcntl(STDIN_FILENO, F_GETFL) | O_NONBLOCK);
     paced = pace > 0;
     clock_init(pace);
@@ -213,20 +196,12 @@ void port_idle(void)
 
 void port_spi_select(uint8_t mask)
 {
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_emu_select(&sensor[f], mask >> f & 1, clock_now_ns());
-    }
-    selected = mask;
+    bt_emu_bus_select(&bus, mask, clock_now_ns());
 }
 
 uint16_t port_spi_transfer16(uint16_t mosi)
 {
-    uint16_t miso = 0;
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        if (selected >> f & 1) {
-            miso |= bt_emu_transfer16(&sensor[f], mosi, clock_now_ns()); // several drive at once: contention
-        }
-    }
+    uint16_t miso = bt_emu_bus_transfer16(&bus, mosi, clock_now_ns());
     clock_advance_ns(TRANSFER_NS);
     return miso;
 }
