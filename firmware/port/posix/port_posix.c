@@ -1,16 +1,18 @@
 // The board that is a process: emulated sensors on an emulated bus, the link on a pty, device time
 // that passes only as the firmware spends it.
 //
-//   biotac-sim --tape FILE [--pace X] [--hold] [--boot-id N] [--serials A,B,...]
+//   biotac-sim --tape FILE [--pace X] [--hold] [--boot-id N] [--serials A,B,...] [--flash FILE]
 //
 // Writes "pty PATH" to stdout, and "end" once the tape is played and all of it handed over.
 // --pace: device seconds per second, 0 for as fast as the host reads (nothing is then dropped).
+// --flash: where saved settings are kept; without it they are gone with the process.
 // --hold: device time stands still until "run" comes on stdin. End of stdin ends the process.
 #define _DEFAULT_SOURCE
 #include "port.h"
 
 #include "bus.h"
 #include "clock.h"
+#include "flash.h"
 #include "pty.h"
 #include "sensor_gen.h"
 #include "tape.h"
@@ -69,6 +71,7 @@ void port_init(int argc, char **argv)
     const char *tape_path = NULL;
     double pace = 1.0;
     const char *serials = "";
+    const char *flash_path = NULL;
     boot_id = (uint32_t)getpid();
     for (int k = 1; k < argc; k++) {
         if (strcmp(argv[k], "--hold") == 0) {
@@ -83,6 +86,8 @@ void port_init(int argc, char **argv)
             boot_id = (uint32_t)strtoul(argv[++k], NULL, 0);
         } else if (strcmp(argv[k], "--serials") == 0) {
             serials = argv[++k];
+        } else if (strcmp(argv[k], "--flash") == 0) {
+            flash_path = argv[++k];
         } else {
             die(argv[k], "unknown option");
         }
@@ -91,6 +96,10 @@ void port_init(int argc, char **argv)
         die("--tape", "missing; biotac sim makes one and passes it");
     }
     load_tape(tape_path);
+    const char *wrong = flash_open(flash_path);
+    if (wrong != NULL) {
+        die(flash_path, wrong);
+    }
     bt_emu_bus_init(&bus, tape.fingers, serials, bt_tape_count, &tape);
     (void)fcntl(STDIN_FILENO, F_SETFL, fcntl(STDIN_FILENO, F_GETFL) | O_NONBLOCK);
     paced = pace > 0;
@@ -221,6 +230,11 @@ bool port_link_up(void)
         up = pty_up();
     }
     return up;
+}
+
+bool port_reboot_bootloader(void)
+{
+    return false; // a process has no loader
 }
 
 // ---- identity ---------------------------------------------------------------------------------
