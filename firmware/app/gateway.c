@@ -2,14 +2,47 @@
 
 #include "port.h"
 #include "properties.h"
+#include "storage.h"
 #include "word.h"
 
 #include "version.h"
 
 #define ALL_FINGERS ((1u << BT_MAX_FINGERS) - 1)
 
+static const bt_flash flash = {
+    .erase = port_flash_erase,
+    .program = port_flash_program,
+    .read = port_flash_read,
+};
+
+static uint8_t save_settings(const bt_settings *settings)
+{
+    uint8_t record[BT_SETTINGS_RECORD_BYTES];
+    bt_settings_pack(settings, record);
+    return bt_storage_write(&flash, BT_RECORD_SETTINGS, BT_SETTINGS_RECORD_VERSION, record, sizeof record)
+               ? BT_ERROR_OK
+               : BT_ERROR_NOT_STORED;
+}
+
+static uint8_t reboot_bootloader(void)
+{
+    return port_reboot_bootloader() ? BT_ERROR_OK : BT_ERROR_NOT_HERE;
+}
+
+static void load_settings(bt_session *session)
+{
+    uint8_t record[BT_STORAGE_MAX_BYTES];
+    uint16_t version;
+    int bytes = bt_storage_read(&flash, BT_RECORD_SETTINGS, &version, record, sizeof record);
+    if (bytes > 0) {
+        bt_settings_unpack(&session->settings, version, record, (size_t)bytes);
+        bt_session_use_settings(session);
+    }
+}
+
 void bt_gateway_init(bt_gateway *gateway)
 {
+    static const bt_board_actions actions = {save_settings, reboot_bootloader};
     bt_identity identity = {
         .board = port_board(),
         .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},
@@ -18,6 +51,8 @@ void bt_gateway_init(bt_gateway *gateway)
     port_board_serial(identity.board_serial);
     port_delay_us(BT_POWER_ON_MS * 1000);
     bt_session_init(&gateway->session, &identity, port_link_write, port_now_us());
+    bt_session_use_board(&gateway->session, &actions);
+    load_settings(&gateway->session);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         bt_properties_read(f, &gateway->session.info[f]);
         gateway->session.finger[f].present = gateway->session.info[f].present;

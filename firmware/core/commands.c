@@ -152,6 +152,25 @@ static uint8_t set_setting(bt_session *session, const uint8_t *payload)
     return error;
 }
 
+static uint8_t save_settings(const bt_session *session)
+{
+    if (session->streams != 0) {
+        return BT_ERROR_BUSY; // sampling stands still while flash is written
+    }
+    return session->board.save_settings == NULL ? BT_ERROR_NOT_HERE
+                                                : session->board.save_settings(&session->settings);
+}
+
+static uint8_t reboot_bootloader(const bt_session *session, const uint8_t *payload)
+{
+    bt_msg_reboot_bootloader msg;
+    bt_msg_reboot_bootloader_unpack(&msg, payload);
+    if (msg.magic != BT_BOOTLOADER_MAGIC) {
+        return BT_ERROR_OUT_OF_RANGE;
+    }
+    return session->board.reboot_bootloader == NULL ? BT_ERROR_NOT_HERE : session->board.reboot_bootloader();
+}
+
 // payload is NULL when its length does not fit the id; then nothing of it can be trusted, not
 // even where req_id is.
 void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_t now_us)
@@ -223,6 +242,12 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         if (error == BT_ERROR_OK) {
             return;
         }
+        break;
+    case BT_REBOOT_BOOTLOADER_ID:
+        error = reboot_bootloader(session, payload);
+        break;
+    case BT_SAVE_SETTINGS_ID:
+        error = save_settings(session);
         break;
     default:
         error = BT_ERROR_UNKNOWN_COMMAND;

@@ -17,6 +17,11 @@ void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_w
     }
 }
 
+void bt_session_use_board(bt_session *session, const bt_board_actions *actions)
+{
+    session->board = *actions;
+}
+
 void bt_session_use_settings(bt_session *session)
 {
     const bt_settings *settings = &session->settings;

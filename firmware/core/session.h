@@ -21,6 +21,12 @@ typedef bt_msg_sensor_info bt_sensor_info;
 // Takes all bytes or none; false means no room, or nobody there.
 typedef bool (*bt_link_write)(const uint8_t *data, size_t bytes);
 
+// What the session asks of its board. Both return an enum bt_error.
+typedef struct {
+    uint8_t (*save_settings)(const bt_settings *settings);
+    uint8_t (*reboot_bootloader)(void); // OK: it happens once the reply is out
+} bt_board_actions;
+
 // Finger-rounds of a FRAME stream in which something was not done because nobody needed it; wrap at 2^32.
 typedef struct {
     uint32_t frames; // an IDLE spoke instead
@@ -40,6 +46,7 @@ typedef struct {
     uint16_t idle_rounds;
     bt_identity identity;
     bt_link_write write;
+    bt_board_actions board;
     bt_deframer deframer;
 
     uint8_t streams; // BT_STREAM_FLAG_*
@@ -61,6 +68,9 @@ typedef struct {
 } bt_session;
 
 void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, uint32_t now_us);
+
+// Until this is called, or where an action is NULL, the commands for it are answered NOT_HERE.
+void bt_session_use_board(bt_session *session, const bt_board_actions *actions);
 
 // Bytes from the host. Every command gets exactly one reply.
 void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, uint32_t now_us);

@@ -40,3 +40,27 @@ uint8_t bt_settings_set(bt_settings *settings, uint8_t id, int32_t value)
     settings->value[at] = value;
     return BT_ERROR_OK;
 }
+
+void bt_settings_pack(const bt_settings *settings, uint8_t record[BT_SETTINGS_RECORD_BYTES])
+{
+    for (int k = 0; k < BT_SETTINGS; k++) {
+        uint8_t *pair = record + k * BT_SETTING_PAIR_BYTES;
+        uint32_t value = (uint32_t)settings->value[k];
+        pair[0] = bt_setting_specs[k].id;
+        for (int b = 0; b < 4; b++) {
+            pair[1 + b] = (uint8_t)(value >> 8 * b);
+        }
+    }
+}
+
+void bt_settings_unpack(bt_settings *settings, uint16_t version, const uint8_t *record, size_t bytes)
+{
+    if (version != BT_SETTINGS_RECORD_VERSION) {
+        return;
+    }
+    for (; bytes >= BT_SETTING_PAIR_BYTES; record += BT_SETTING_PAIR_BYTES, bytes -= BT_SETTING_PAIR_BYTES) {
+        uint32_t value = (uint32_t)record[1] | (uint32_t)record[2] << 8 | (uint32_t)record[3] << 16
+                         | (uint32_t)record[4] << 24;
+        (void)bt_settings_set(settings, record[0], (int32_t)value); // refused: the default stays
+    }
+}

@@ -801,6 +801,41 @@ void bt_msg_set_setting_unpack(bt_msg_set_setting *msg, const uint8_t in[BT_SET_
     (void)at;
 }
 
+void bt_msg_reboot_bootloader_pack(const bt_msg_reboot_bootloader *msg, uint8_t out[BT_REBOOT_BOOTLOADER_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->magic, 4);
+    (void)at;
+}
+
+void bt_msg_reboot_bootloader_unpack(bt_msg_reboot_bootloader *msg, const uint8_t in[BT_REBOOT_BOOTLOADER_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->magic = (uint32_t)value;
+    (void)at;
+}
+
+void bt_msg_save_settings_pack(const bt_msg_save_settings *msg, uint8_t out[BT_SAVE_SETTINGS_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    (void)at;
+}
+
+void bt_msg_save_settings_unpack(bt_msg_save_settings *msg, const uint8_t in[BT_SAVE_SETTINGS_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    (void)at;
+}
+
 int bt_wire_payload_bytes(uint8_t id)
 {
     switch (id) {
@@ -854,6 +889,10 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_GET_SETTING_BYTES;
     case BT_SET_SETTING_ID:
         return BT_SET_SETTING_BYTES;
+    case BT_REBOOT_BOOTLOADER_ID:
+        return BT_REBOOT_BOOTLOADER_BYTES;
+    case BT_SAVE_SETTINGS_ID:
+        return BT_SAVE_SETTINGS_BYTES;
     default:
         return -1;
     }

@@ -7,10 +7,11 @@
 #include <stdint.h>
 
 #define BT_WIRE_MAJOR 1
-#define BT_WIRE_MINOR 1
-#define BT_SCHEMA_HASH 0x96B1C90Au
+#define BT_WIRE_MINOR 2
+#define BT_SCHEMA_HASH 0xC9384ADEu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
+#define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
 #define BT_INVALID_I16 INT16_MIN
 #define BT_INVALID_I32 INT32_MIN
 
@@ -25,6 +26,8 @@ enum bt_error {
     BT_ERROR_BUSY = 6, // not while streaming: send STOP first
     BT_ERROR_NOT_STILL = 7, // the signals move too much to tare: release the finger and try again
     BT_ERROR_RAILED = 8, // more than two electrodes are at the end of their range: check the sensor
+    BT_ERROR_NOT_HERE = 9, // this kind of board cannot do that
+    BT_ERROR_NOT_STORED = 10, // the flash did not take it; what was stored before still stands
 };
 
 // Where a finger's tare machine is (SPEC.md, Tare).
@@ -459,7 +462,7 @@ typedef struct {
 void bt_msg_get_setting_pack(const bt_msg_get_setting *msg, uint8_t out[BT_GET_SETTING_BYTES]);
 void bt_msg_get_setting_unpack(bt_msg_get_setting *msg, const uint8_t in[BT_GET_SETTING_BYTES]);
 
-// Change a setting until the next reboot; refused while streaming, so that one recording has one set.
+// Change a setting until the next reboot, or for good with SAVE_SETTINGS; refused while streaming, so that one recording has one set.
 #define BT_SET_SETTING_ID 0x8A
 #define BT_SET_SETTING_BYTES 6
 typedef struct {
@@ -469,6 +472,25 @@ typedef struct {
 } bt_msg_set_setting;
 void bt_msg_set_setting_pack(const bt_msg_set_setting *msg, uint8_t out[BT_SET_SETTING_BYTES]);
 void bt_msg_set_setting_unpack(bt_msg_set_setting *msg, const uint8_t in[BT_SET_SETTING_BYTES]);
+
+// Leave the firmware for the board's loader: it replies, is gone from the bus, and comes back as a drive. Allowed at any time.
+#define BT_REBOOT_BOOTLOADER_ID 0x8D
+#define BT_REBOOT_BOOTLOADER_BYTES 5
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint32_t magic; // [1] 0xB0071DE5; anything else is OUT_OF_RANGE, so that no stray frame takes a hand down
+} bt_msg_reboot_bootloader;
+void bt_msg_reboot_bootloader_pack(const bt_msg_reboot_bootloader *msg, uint8_t out[BT_REBOOT_BOOTLOADER_BYTES]);
+void bt_msg_reboot_bootloader_unpack(bt_msg_reboot_bootloader *msg, const uint8_t in[BT_REBOOT_BOOTLOADER_BYTES]);
+
+// Keep the settings in force over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves the settings stored before, or these, whole.
+#define BT_SAVE_SETTINGS_ID 0x8E
+#define BT_SAVE_SETTINGS_BYTES 1
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+} bt_msg_save_settings;
+void bt_msg_save_settings_pack(const bt_msg_save_settings *msg, uint8_t out[BT_SAVE_SETTINGS_BYTES]);
+void bt_msg_save_settings_unpack(bt_msg_save_settings *msg, const uint8_t in[BT_SAVE_SETTINGS_BYTES]);
 
 // Payload length of a message id, without id and CRC; -1 when the id is unknown.
 int bt_wire_payload_bytes(uint8_t id);
@@ -500,7 +522,9 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_GET_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_GET_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1)
 #define BT_SET_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting)
+#define BT_REBOOT_BOOTLOADER_FIELDS(X) X(req_id, u8, 1) X(magic, u32, 1)
+#define BT_SAVE_SETTINGS_FIELDS(X) X(req_id, u8, 1)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings)
 #endif
 
 #endif

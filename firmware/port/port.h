@@ -42,6 +42,17 @@ size_t port_link_read(uint8_t *data, size_t bytes);
 // A host has the port open (DTR).
 bool port_link_up(void);
 
+// ---- flash for settings ---------------------------------------------------------------------
+// Two sectors; sizes and offsets as in storage.h. Interrupts may be held off while erasing and programming,
+// for up to 0.4 s. False when the flash did not do it.
+bool port_flash_erase(uint32_t sector_offset);
+bool port_flash_program(uint32_t page_offset, const uint8_t *page);
+void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes);
+
+// Leave for the loader as soon as what was written to the link is out, or after a short while. False when
+// this board has none.
+bool port_reboot_bootloader(void);
+
 // ---- identity -------------------------------------------------------------------------------
 uint16_t port_board(void); // enum bt_board
 void port_board_serial(uint8_t serial[12]);

@@ -14,10 +14,11 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 WIRE_MAJOR = 1
-WIRE_MINOR = 1
-SCHEMA_HASH = 0x96B1C90A
+WIRE_MINOR = 2
+SCHEMA_HASH = 0xC9384ADE
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
+BOOTLOADER_MAGIC = 0xB0071DE5
 INVALID_I16 = -(2**15)
 INVALID_I32 = -(2**31)
 
@@ -34,6 +35,8 @@ class Error(IntEnum):
     BUSY = 6  # not while streaming: send STOP first
     NOT_STILL = 7  # the signals move too much to tare: release the finger and try again
     RAILED = 8  # more than two electrodes are at the end of their range: check the sensor
+    NOT_HERE = 9  # this kind of board cannot do that
+    NOT_STORED = 10  # the flash did not take it; what was stored before still stands
 
 
 class TareState(IntEnum):
@@ -124,6 +127,8 @@ ERROR_DOC: dict[int, str] = {
     6: "not while streaming: send STOP first",
     7: "the signals move too much to tare: release the finger and try again",
     8: "more than two electrodes are at the end of their range: check the sensor",
+    9: "this kind of board cannot do that",
+    10: "the flash did not take it; what was stored before still stands",
 }
 
 
@@ -1095,7 +1100,7 @@ class GetSetting:
 
 @dataclass(frozen=True, slots=True)
 class SetSetting:
-    """Change a setting until the next reboot; refused while streaming, so that one recording has one set."""
+    """Change a setting until the next reboot, or for good with SAVE_SETTINGS; refused while streaming, so that one recording has one set."""
 
     req_id: int
     setting: int
@@ -1123,7 +1128,58 @@ class SetSetting:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting
+@dataclass(frozen=True, slots=True)
+class RebootBootloader:
+    """Leave the firmware for the board's loader: it replies, is gone from the bus, and comes back as a drive. Allowed at any time."""
+
+    req_id: int
+    magic: int
+
+    ID: ClassVar[int] = 0x8D
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BI")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 5 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.magic,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> RebootBootloader:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SaveSettings:
+    """Keep the settings in force over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves the settings stored before, or these, whole."""
+
+    req_id: int
+
+    ID: ClassVar[int] = 0x8E
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 1 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> SaveSettings:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+        )
+
+
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -1151,6 +1207,8 @@ MESSAGES: dict[int, type[Any]] = {
     GetSensorInfo.ID: GetSensorInfo,
     GetSetting.ID: GetSetting,
     SetSetting.ID: SetSetting,
+    RebootBootloader.ID: RebootBootloader,
+    SaveSettings.ID: SaveSettings,
 }
 
 # One array type per message id, for decoding many payloads at once.
@@ -1387,6 +1445,17 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("req_id", "u1"),
             ("setting", "u1"),
             ("value", "<i4"),
+        ]
+    ),
+    RebootBootloader.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("magic", "<u4"),
+        ]
+    ),
+    SaveSettings.ID: np.dtype(
+        [
+            ("req_id", "u1"),
         ]
     ),
 }

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from . import _wire as wire
 from .crosscheck import CrossCheck
 from .errors import InputError
-from .link.sim_process import SimLink
+from .link.sim_process import SimBoard, SimLink
 from .opening import shake_hands
 from .recording import Recording
 from .sim.sampling import FRAME_HZ, PAC_SLOT
@@ -61,7 +61,7 @@ def run_demo(
     recording_path = folder / "demo.mcap"
     wall = time.monotonic()
     # The board's counts are made; from here on it is a host with a board, and its cost is measured.
-    with shake_hands(SimLink(f"sim:{source.name}", source, pace=0.0)) as hand:
+    with shake_hands(SimLink(f"sim:{source.name}", SimBoard(source, pace=0.0, hold=True))) as hand:
         settings = hand.settings()
         has_pac = bool(np.any(source.samples[:, :, PAC_SLOT] <= 4095))
         recorder = hand.record(recording_path, overwrite=True)

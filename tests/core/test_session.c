@@ -77,6 +77,8 @@ static void every_command_gets_exactly_one_reply_with_its_req_id(void **state)
         {BT_SET_SETTING_ID, BT_SETTING_ID, 0, 21},
         {BT_SUBSCRIBE_ID, BT_REPLY_ID, 0, 22},
         {BT_GET_POINT_ID, BT_POINT_ID, 0, 23},
+        {BT_REBOOT_BOOTLOADER_ID, BT_REPLY_ID, 0, 24},
+        {BT_SAVE_SETTINGS_ID, BT_REPLY_ID, 0, 25},
     };
     for (int id = 0x80; id < 0x100; id++) { // the table holds every command there is
         int listed = 0;
@@ -131,6 +133,53 @@ static void errors_are_told_by_name(void **state)
     assert_int_equal(host_error(&session, BT_TARE_NOW_ID, absent, 2), BT_ERROR_NOT_STILL);
     host_round(&session, 1 << 2, 4095);
     assert_int_equal(host_error(&session, BT_TARE_NOW_ID, absent, 2), BT_ERROR_RAILED);
+}
+
+static bt_settings saved;
+static int saves, reboots;
+
+static uint8_t save(const bt_settings *settings)
+{
+    saved = *settings;
+    saves++;
+    return BT_ERROR_OK;
+}
+
+static uint8_t reboot(void)
+{
+    reboots++;
+    return BT_ERROR_OK;
+}
+
+static uint8_t reboot_error(uint32_t magic)
+{
+    uint8_t payload[BT_REBOOT_BOOTLOADER_BYTES];
+    bt_msg_reboot_bootloader msg = {.req_id = 1, .magic = magic};
+    bt_msg_reboot_bootloader_pack(&msg, payload);
+    return host_error(&session, BT_REBOOT_BOOTLOADER_ID, payload, sizeof payload);
+}
+
+static void saving_and_leaving_are_the_boards_to_do(void **state)
+{
+    (void)state;
+    static const uint8_t req_id = 9;
+    static const bt_board_actions actions = {save, reboot};
+    assert_int_equal(host_error(&session, BT_SAVE_SETTINGS_ID, &req_id, 1), BT_ERROR_NOT_HERE);
+    assert_int_equal(reboot_error(0xB0071DE5), BT_ERROR_NOT_HERE);
+    bt_session_use_board(&session, &actions);
+    saves = reboots = 0;
+    assert_int_equal(set_error(BT_SETTING_IDLE_PERIOD_MS, 250), BT_ERROR_OK);
+    assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1, 0), BT_ERROR_OK);
+    assert_int_equal(host_error(&session, BT_SAVE_SETTINGS_ID, &req_id, 1), BT_ERROR_BUSY);
+    assert_int_equal(saves, 0);
+    assert_int_equal(host_error(&session, BT_STOP_ID, &req_id, 1), BT_ERROR_OK);
+    assert_int_equal(host_error(&session, BT_SAVE_SETTINGS_ID, &req_id, 1), BT_ERROR_OK);
+    assert_true(saves == 1 && bt_settings_get(&saved, BT_SETTING_IDLE_PERIOD_MS) == 250);
+    assert_int_equal(reboot_error(0), BT_ERROR_OUT_OF_RANGE);
+    assert_int_equal(reboot_error(0xB0071DE4), BT_ERROR_OUT_OF_RANGE);
+    assert_int_equal(reboots, 0);
+    assert_int_equal(reboot_error(0xB0071DE5), BT_ERROR_OK);
+    assert_int_equal(reboots, 1);
 }
 
 static void settings_hold_their_ranges_and_refused_values_change_nothing(void **state)
@@ -236,6 +285,7 @@ int main(void)
         T(a_new_setting_is_what_the_kernels_use),
         T(settings_are_refused_while_streaming),
         T(unknown_commands_are_answered_as_such),
+        T(saving_and_leaving_are_the_boards_to_do),
         T(an_unknown_command_without_payload_is_unknown_too),
         T(a_wrong_length_is_answered_and_does_nothing),
         T(an_echo_of_our_own_messages_is_not_answered),

@@ -22,6 +22,7 @@ static uint64_t seed;
 void fake_reset(bt_emu_source source, uint64_t start_ns)
 {
     memset(&fake, 0, sizeof fake);
+    memset(fake.flash, 0xFF, sizeof fake.flash);
     fake.now_ns = start_ns;
     fake.shortest_gap_ns = UINT64_MAX;
     fake.link_up = true;
@@ -141,6 +142,34 @@ size_t port_link_read(uint8_t *data, size_t bytes)
 bool port_link_up(void)
 {
     return fake.link_up;
+}
+
+bool port_flash_erase(uint32_t sector_offset)
+{
+    memset(fake.flash + sector_offset, 0xFF, BT_FLASH_SECTOR_BYTES);
+    return true;
+}
+
+bool port_flash_program(uint32_t page_offset, const uint8_t *page)
+{
+    if (fake.flash_broken) {
+        return false;
+    }
+    for (int k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
+        fake.flash[page_offset + (uint32_t)k] &= page[k];
+    }
+    return true;
+}
+
+void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
+{
+    memcpy(data, fake.flash + offset, bytes);
+}
+
+bool port_reboot_bootloader(void)
+{
+    fake.reboots++;
+    return fake.has_loader;
 }
 
 uint16_t port_board(void)

@@ -5,6 +5,7 @@
 
 #include "device.h"
 #include "sensor_gen.h"
+#include "storage.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -29,6 +30,11 @@ typedef struct {
     uint32_t selected_reads;                         // reads with other than one chip select low
 
     bool link_up;
+
+    uint8_t flash[BT_STORAGE_BYTES];
+    bool flash_broken; // programs nothing
+    bool has_loader;
+    int reboots; // how often the loader was asked for
 } fake_port;
 
 extern fake_port fake;

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,13 +17,16 @@ from pathlib import Path
 from m4f_model import Model, UnknownInstruction, runs
 
 HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+
+from image.symbols import FLOAT_SYMBOL  # noqa: E402
+
 ROOT = HERE.parent.parent
 FIRMWARE = ROOT / "firmware"
 BUILD = ROOT / "build" / "bench"
 FRAMES = 12  # per weighting
-# What a Cortex-M0+ with its eight registers wants compiled otherwise than with -O3: the folded sums stay in
-# order, and the tare machine's loops keep one index instead of a pointer for each array.
-OPTIONS = {"fold_gen.c": ("-Os", "-fno-tree-reassoc", "-fno-tree-ter"), "tare.c": ("-O3", "-fno-ivopts")}
+# What some files want compiled otherwise than with -O3; the boards' images are built by the same facts.
+OPTIONS = json.loads((FIRMWARE / "boards" / "compile_options.json").read_text(encoding="utf-8"))["files"]
 APART = [FIRMWARE / "core" / name for name in OPTIONS]
 CORE = sorted(set((FIRMWARE / "core").glob("*.c")) - set(APART))
 JUDGED = sorted([*(FIRMWARE / "reference").glob("*.c"), *(FIRMWARE / "variants").glob("*.c")])
@@ -37,10 +41,6 @@ PACKAGES = {
     "npm": "npm",
     "cc": "gcc",
 }
-FLOAT_SYMBOL = re.compile(
-    r"__aeabi_(c?[fd](add|sub|rsub|mul|div|neg|cmp\w*|2\w+|rcmp\w*)|u?[il]2[fd]|u?l2[fd]|h2f\w*|f2h\w*|d2h\w*)$"
-    r"|__(add|sub|mul|div|neg|eq|ne|lt|le|gt|ge|cmp|unord)[sdt]f[23]$|__(fix|float|extend|trunc)\w*[sd]f\w*$|_dtoa_r$"
-)
 
 Row = tuple[str, str, int, int]  # kernel, scene, instructions, cycles
 
@@ -69,7 +69,7 @@ QEMU = "instructions counted in QEMU mps2-an386, cycles by a model of the Cortex
 BOARDS = (
     Board("m0plus", "Cortex-M0+", RP2040JS, M0PLUS, "m0plus.c", "m0plus.ld"),
     Board("m0plus_divider", "Cortex-M0+ with RP2040 divider", RP2040JS, M0PLUS, "m0plus.c", "m0plus.ld",
-          ("-include", "rp2040_divider.h")),
+          ("-include", str(FIRMWARE / "port" / "rp2040" / "divider.h"))),
     Board("m4f", "Cortex-M4F", QEMU, M4F, "m4f.c", "m4f.ld"),
 )  # fmt: skip
 
@@ -79,7 +79,7 @@ def need() -> None:
         if shutil.which(tool) is None:
             raise Failed(f"{tool} is missing; install it: apt-get install {package}")
     BUILD.mkdir(parents=True, exist_ok=True)
-    command("npm", "ci", "--silent")
+    command("npm", "ci", "--silent", "--prefix", HERE.parent)
 
 
 def command(*words: object) -> str:

@@ -72,6 +72,7 @@ def wire(contract: Contract) -> str:
         f"SCHEMA_HASH = 0x{contract.hash:08X}",
         f"MAX_FRAME_BYTES = {link['wire']['max_frame_bytes']}",
         f"INVALID_COUNT = 0x{link['wire']['invalid_count']:04X}",
+        f"BOOTLOADER_MAGIC = 0x{link['wire']['bootloader_magic']:08X}",
         "INVALID_I16 = -(2**15)",
         "INVALID_I32 = -(2**31)",
         "",

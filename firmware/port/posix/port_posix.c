@@ -1,16 +1,18 @@
 // The board that is a process: emulated sensors on an emulated bus, the link on a pty, device time
 // that passes only as the firmware spends it.
 //
-//   biotac-sim --tape FILE [--pace X] [--hold] [--boot-id N] [--serials A,B,...]
+//   biotac-sim --tape FILE [--pace X] [--hold] [--boot-id N] [--serials A,B,...] [--flash FILE]
 //
 // Writes "pty PATH" to stdout, and "end" once the tape is played and all of it handed over.
 // --pace: device seconds per second, 0 for as fast as the host reads (nothing is then dropped).
+// --flash: where saved settings are kept; without it they are gone with the process.
 // --hold: device time stands still until "run" comes on stdin. End of stdin ends the process.
 #define _DEFAULT_SOURCE
 #include "port.h"
 
+#include "bus.h"
 #include "clock.h"
-#include "device.h"
+#include "flash.h"
 #include "pty.h"
 #include "sensor_gen.h"
 #include "tape.h"
@@ -30,8 +32,7 @@
 #define LINK_PERIOD_NS 1000000u
 
 static bt_tape tape;
-static bt_emu_device sensor[BT_MAX_FINGERS];
-static uint8_t selected;
+static bt_emu_bus bus;
 static uint32_t alarm_us;
 static bool armed;
 static bool held;
@@ -65,27 +66,12 @@ static void load_tape(const char *path)
     (void)close(fd);
 }
 
-// serials: one per finger, separated by commas; a finger without one gets one made up.
-static void plug_in_sensors(const char *serials)
-{
-    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        char serial[17];
-        (void)snprintf(serial, sizeof serial, "BTEMU0000000%04u", f + 1u);
-        size_t given = strcspn(serials, ",");
-        if (given > 0 && given < sizeof serial) {
-            memset(serial, 0, sizeof serial);
-            memcpy(serial, serials, given);
-        }
-        serials += given + (serials[given] == ',');
-        bt_emu_init(&sensor[f], f, f < tape.fingers, serial, bt_tape_count, &tape);
-    }
-}
-
 void port_init(int argc, char **argv)
 {
     const char *tape_path = NULL;
     double pace = 1.0;
     const char *serials = "";
+    const char *flash_path = NULL;
     boot_id = (uint32_t)getpid();
     for (int k = 1; k < argc; k++) {
         if (strcmp(argv[k], "--hold") == 0) {
@@ -100,6 +86,8 @@ void port_init(int argc, char **argv)
             boot_id = (uint32_t)strtoul(argv[++k], NULL, 0);
         } else if (strcmp(argv[k], "--serials") == 0) {
             serials = argv[++k];
+        } else if (strcmp(argv[k], "--flash") == 0) {
+            flash_path = argv[++k];
         } else {
             die(argv[k], "unknown option");
         }
@@ -108,7 +96,11 @@ void port_init(int argc, char **argv)
         die("--tape", "missing; biotac sim makes one and passes it");
     }
     load_tape(tape_path);
-    plug_in_sensors(serials);
+    const char *wrong = flash_open(flash_path);
+    if (wrong != NULL) {
+        die(flash_path, wrong);
+    }
+    bt_emu_bus_init(&bus, tape.fingers, serials, bt_tape_count, &tape);
     (void)fcntl(STDIN_FILENO, F_SETFL, fcntl(STDIN_FILENO, F_GETFL) | O_NONBLOCK);
     paced = pace > 0;
     clock_init(pace);
@@ -204,20 +196,12 @@ void port_idle(void)
 
 void port_spi_select(uint8_t mask)
 {
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_emu_select(&sensor[f], mask >> f & 1, clock_now_ns());
-    }
-    selected = mask;
+    bt_emu_bus_select(&bus, mask, clock_now_ns());
 }
 
 uint16_t port_spi_transfer16(uint16_t mosi)
 {
-    uint16_t miso = 0;
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        if (selected >> f & 1) {
-            miso |= bt_emu_transfer16(&sensor[f], mosi, clock_now_ns()); // several drive at once: contention
-        }
-    }
+    uint16_t miso = bt_emu_bus_transfer16(&bus, mosi, clock_now_ns());
     clock_advance_ns(TRANSFER_NS);
     return miso;
 }
@@ -246,6 +230,11 @@ bool port_link_up(void)
         up = pty_up();
     }
     return up;
+}
+
+bool port_reboot_bootloader(void)
+{
+    return false; // a process has no loader
 }
 
 // ---- identity ---------------------------------------------------------------------------------

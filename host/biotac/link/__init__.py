@@ -2,6 +2,7 @@
 
 ``/dev/ttyACM0``, ``COM3``   a serial port
 ``sim:SOURCE``               a simulated board playing a scenario or a recording
+``emu:pico?source=SOURCE``   the same with a board's flash image in an emulator
 """
 
 from __future__ import annotations

@@ -5,40 +5,62 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl
 
 from ..errors import PortError
 from .base import Link
 from .serial_port import SerialLink
 
+if TYPE_CHECKING:
+    from ..sim.source import Source
+    from .sim_process import SimBoard
+
 
 @dataclass(frozen=True)
 class SimPort:
-    """A parsed ``sim:SOURCE?pace=X&fingers=N&seconds=S``."""
+    """A parsed ``sim:SOURCE?...`` or ``emu:BOARD?source=SOURCE&...``."""
 
+    board: str  # "posix", or what is emulated
     source: str
     pace: float
     fingers: int | None
     seconds: float | None
+    image: str | None
+
+
+FORMS = {
+    "sim": "sim:SOURCE?pace=X&fingers=N&seconds=S",
+    "emu": "emu:pico?source=SOURCE&image=FILE&pace=X&fingers=N&seconds=S",
+}
+EXAMPLES = {
+    "sim": "sim:press.toml?pace=real&fingers=2&seconds=5",
+    "emu": "emu:pico?source=press.toml&pace=real&fingers=2&seconds=5",
+}
+COMMON_OPTIONS = {"pace", "fingers", "seconds"}
 
 
 def parse_sim(port: str, pace: float) -> SimPort:
-    """Split a sim: port; ``pace`` is the default, in device seconds per second (0: unpaced)."""
-    source, _, query = port.removeprefix("sim:").partition("?")
+    """Split a sim: or emu: port; ``pace`` is the default, in device seconds per second (0: unpaced)."""
+    scheme, _, rest = port.partition(":")
+    head, _, query = rest.partition("?")
     options = dict(parse_qsl(query))
-    unknown = set(options) - {"pace", "fingers", "seconds"}
+    board, source = ("posix", head) if scheme == "sim" else (head, options.pop("source", ""))
+    unknown = set(options) - COMMON_OPTIONS - ({"image"} if scheme == "emu" else set())
     if unknown or not source:
         seen = f"option {sorted(unknown)[0]!r}" if unknown else "no source"
-        raise PortError(f"{port}: {seen}; expected sim:SOURCE?pace=X&fingers=N&seconds=S")
+        raise PortError(f"{port}: {seen}; expected {FORMS[scheme]}")
     try:
         return SimPort(
+            board,
             source,
             parse_pace(options["pace"]) if "pace" in options else pace,
             int(options["fingers"]) if "fingers" in options else None,
             float(options["seconds"]) if "seconds" in options else None,
+            options.get("image"),
         )
     except ValueError as error:
-        raise PortError(f"{port}: {error}; an example is sim:press.toml?pace=real&fingers=2&seconds=5") from error
+        raise PortError(f"{port}: {error}; an example is {EXAMPLES[scheme]}") from error
 
 
 def parse_pace(text: str) -> float:
@@ -60,14 +82,27 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
     cannot be played.
     """
     scheme, colon, _ = port.partition(":")
-    if scheme == "sim" and colon:
+    if scheme in FORMS and colon:
         # Imported here: a user of a real board needs neither the physics nor its import time.
         from ..sim.source import load_source
         from .sim_process import SimLink
 
         sim = parse_sim(port, pace)
         source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
-        return SimLink(port, source, pace=sim.pace)
+        return SimLink(port, start_board(sim.board, source, pace=sim.pace, image=sim.image))
     if colon and os.sep not in port and not port.upper().startswith("COM") and len(scheme) > 1:
-        raise PortError(f"no kind of port is called {scheme!r}; expected a device path or sim:SOURCE")
+        raise PortError(f"no kind of port is called {scheme!r}; expected a device path, sim:SOURCE or emu:pico")
     return SerialLink(port)
+
+
+def start_board(board: str, source: Source, *, pace: float, image: str | None = None) -> SimBoard:
+    """Start a board that is a program, held until its release: ``posix`` or an emulated one.
+
+    Raises PortError naming what is missing and how to get it.
+    """
+    from .emulated import EmulatedBoard
+    from .sim_process import SimBoard
+
+    if board == "posix":
+        return SimBoard(source, pace=pace, hold=True)
+    return EmulatedBoard(board, source, pace=pace, hold=True, image=image)

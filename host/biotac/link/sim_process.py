@@ -33,13 +33,20 @@ class SimBoard:
 
     def __init__(self, source: Source, *, pace: float, hold: bool) -> None:
         self.source = source
+        self.over = False  # the tape is played, and everything of it handed over
+        self._heard = b""
+        self._answers: list[str] = []
         self._folder = tempfile.TemporaryDirectory(prefix="biotac-sim-")
         tape = Path(self._folder.name) / "counts.tape"
         write_tape(tape, source)
-        command = [str(executable()), "--tape", str(tape), "--pace", str(pace)]
-        command += ["--serials", ",".join(source.serials)] if source.serials else []
-        command += ["--hold"] if hold else []
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        options = ["--tape", str(tape), "--pace", str(pace)]
+        options += ["--serials", ",".join(source.serials)] if source.serials else []
+        options += ["--hold"] if hold else []
+        try:
+            self._process = self._start(options)
+        except BaseException:
+            self._folder.cleanup()
+            raise
         assert self._process.stdout is not None
         first = self._process.stdout.readline().decode().split()
         if len(first) != 2 or first[0] != "pty":
@@ -47,31 +54,46 @@ class SimBoard:
             self.close()
             raise PortError(f"the simulator did not start: {error or 'it said nothing'}")
         self.path = first[1]
-        # The board has mapped its tape by now; nothing is left behind however this process ends.
+        # The board has read its tape by now; nothing is left behind however this process ends.
         self._folder.cleanup()
+
+    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
+        command = [str(executable()), *options]
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
     def stdout_fd(self) -> int:
         """Readable when the board has something to say, or is gone."""
         assert self._process.stdout is not None
         return self._process.stdout.fileno()
 
-    def heard_end(self) -> bool:
-        """Read what the board says; true once its tape is played out."""
-        text = os.read(self.stdout_fd(), 4096)
+    def hear(self) -> None:
+        """Read what the board says; waits for it."""
+        text = os.read(self.stdout_fd(), 65536)
         if not text:
             raise DeviceLostError(f"the simulated board died: {self._last_words() or 'no message'}")
-        return b"end" in text
+        *lines, self._heard = (self._heard + text).split(b"\n")
+        for line in lines:
+            if line == b"end":
+                self.over = True
+            else:
+                self._answers.append(line.decode())
+
+    def say(self, line: str) -> None:
+        """Tell the process that is the board, beside the link."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{line}\n".encode())
+        self._process.stdin.flush()
 
     def release(self) -> None:
         """Let a held board's time run."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(b"run\n")
-        self._process.stdin.flush()
+        self.say("run")
 
     def wait(self, timeout_s: float | None = None) -> bool:
         """Wait until the tape is over or timeout_s have passed; true when it is over."""
         ready, _, _ = select.select([self.stdout_fd()], [], [], timeout_s)
-        return bool(ready) and self.heard_end()
+        if ready:
+            self.hear()
+        return self.over
 
     def close(self) -> None:
         """End the process and remove its files. Safe to call twice."""
@@ -90,25 +112,26 @@ class SimBoard:
 
 
 class SimLink(SerialLink):
-    """A SerialLink to a simulator of its own."""
+    """A SerialLink to a simulated board of its own, which it closes."""
 
-    def __init__(self, port: str, source: Source, *, pace: float) -> None:
-        self.board = SimBoard(source, pace=pace, hold=True)
+    def __init__(self, port: str, board: SimBoard) -> None:
+        self.board = board
         self._held = True
         try:
-            super().__init__(self.board.path)
+            super().__init__(board.path)
         except BaseException:
-            self.board.close()
+            board.close()
             raise
         self.port = port
-        self.source = source
+        self.source = board.source
 
     def wait(self, timeout_s: float) -> bytes:
         """Wait for bytes, or for word that the source is over."""
-        watched = [self._serial.fileno()] + ([] if self.ended else [self.board.stdout_fd()])
+        watched = [self._serial.fileno()] + ([] if self.board.over else [self.board.stdout_fd()])
         ready, _, _ = select.select(watched, [], [], timeout_s)
-        if len(watched) > 1 and watched[1] in ready and self.board.heard_end():
-            self.ended = True
+        if len(watched) > 1 and watched[1] in ready:
+            self.board.hear()
+        self.ended = self.board.over
         return b""
 
     def release(self) -> None:

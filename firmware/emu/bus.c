@@ -1,0 +1,41 @@
+#include "bus.h"
+
+#include <string.h>
+
+#define SERIAL_CHARS (sizeof((bt_emu_device *)0)->serial - 1)
+
+void bt_emu_bus_init(bt_emu_bus *bus, uint32_t fingers, const char *serials, bt_emu_source source,
+                     void *context)
+{
+    bus->selected = 0;
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        char serial[] = "BTEMU00000000001";
+        serial[SERIAL_CHARS - 1] = (char)('1' + f);
+        size_t given = strcspn(serials, ",");
+        if (given > 0 && given <= SERIAL_CHARS) {
+            memset(serial, 0, sizeof serial);
+            memcpy(serial, serials, given);
+        }
+        serials += given + (serials[given] == ',');
+        bt_emu_init(&bus->sensor[f], f, f < fingers, serial, source, context);
+    }
+}
+
+void bt_emu_bus_select(bt_emu_bus *bus, uint8_t mask, uint64_t t_ns)
+{
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_emu_select(&bus->sensor[f], mask >> f & 1, t_ns);
+    }
+    bus->selected = mask;
+}
+
+uint16_t bt_emu_bus_transfer16(bt_emu_bus *bus, uint16_t mosi, uint64_t t_ns)
+{
+    uint16_t miso = 0;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (bus->selected >> f & 1) {
+            miso |= bt_emu_transfer16(&bus->sensor[f], mosi, t_ns);
+        }
+    }
+    return miso;
+}

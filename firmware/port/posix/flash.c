@@ -1,0 +1,60 @@
+#define _DEFAULT_SOURCE
+#include "flash.h"
+
+#include "port.h"
+#include "storage.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static uint8_t memory[BT_STORAGE_BYTES];
+static uint8_t *flash = memory;
+
+const char *flash_open(const char *path)
+{
+    struct stat s;
+    memset(memory, 0xFF, sizeof memory);
+    if (path == NULL) {
+        return NULL;
+    }
+    int fd = open(path, O_RDWR | O_CREAT, 0666);
+    if (fd < 0 || fstat(fd, &s) != 0) {
+        return strerror(errno);
+    }
+    if (s.st_size == 0 && write(fd, memory, sizeof memory) != (ssize_t)sizeof memory) {
+        return "cannot be filled; is the disk full?";
+    }
+    if (s.st_size != 0 && s.st_size != BT_STORAGE_BYTES) {
+        return "is no flash file: its size is not that of two sectors";
+    }
+    void *bytes = mmap(NULL, BT_STORAGE_BYTES, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+    (void)close(fd);
+    if (bytes == MAP_FAILED) {
+        return strerror(errno);
+    }
+    flash = bytes;
+    return NULL;
+}
+
+bool port_flash_erase(uint32_t sector_offset)
+{
+    memset(flash + sector_offset, 0xFF, BT_FLASH_SECTOR_BYTES);
+    return true;
+}
+
+bool port_flash_program(uint32_t page_offset, const uint8_t *page)
+{
+    for (int k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
+        flash[page_offset + (uint32_t)k] &= page[k];
+    }
+    return true;
+}
+
+void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
+{
+    memcpy(data, flash + offset, bytes);
+}

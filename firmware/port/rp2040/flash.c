@@ -1,0 +1,145 @@
+// The flash chip itself: settings in its last two sectors, and its unique number.
+// While it erases, programs or answers commands, no program can be read from it. So that code is in SRAM,
+// calls nothing but the chip's ROM, and runs with interrupts off.
+#include "port.h"
+
+#include "storage.h"
+#include "system.h"
+
+#include "rp2040_regs.h"
+
+#include <string.h>
+
+#define FLASH_BYTES    (2u * 1024 * 1024)
+#define STORAGE_OFFSET (FLASH_BYTES - BT_STORAGE_BYTES) // boards/pico/pico.ld keeps the image off it
+
+#define BOOT2_WORDS  64
+#define SECTOR_ERASE 0x20 // the flash's command for BT_FLASH_SECTOR_BYTES
+
+// Read unique ID: the command, four dummy bytes, then the eight of the number.
+#define UNIQUE_ID_COMMAND 0x4B
+#define UNIQUE_ID_AT      5
+#define UNIQUE_ID_TURNS   100000u // 4.8 ms at least; it takes 20 us
+#define SSI_FIFO          14      // bytes on their way; it holds 16
+
+typedef void (*rom_action)(void);
+typedef void (*rom_erase)(uint32_t offset, uint32_t bytes, uint32_t block_bytes, uint32_t block_command);
+typedef void (*rom_program)(uint32_t offset, const uint8_t *data, uint32_t bytes);
+
+static struct {
+    rom_action connect;  // "IF": the pins to the flash
+    rom_action exit_xip; // "EX": the flash out of any read mode, into commands
+    rom_action flush;    // "FC": forget what was read
+    rom_erase erase;     // "RE"
+    rom_program program; // "RP"
+} rom;
+
+// boot2 in SRAM: it makes the flash readable again.
+static uint32_t boot2_copy[BOOT2_WORDS];
+static bool usable;
+
+void flash_start(void)
+{
+    rom.connect = (rom_action)rom_function('I', 'F');
+    rom.exit_xip = (rom_action)rom_function('E', 'X');
+    rom.flush = (rom_action)rom_function('F', 'C');
+    rom.erase = (rom_erase)rom_function('R', 'E');
+    rom.program = (rom_program)rom_function('R', 'P');
+    memcpy(boot2_copy, (const void *)(uintptr_t)XIP_BASE, sizeof boot2_copy);
+    usable = rom.connect != NULL && rom.exit_xip != NULL && rom.flush != NULL && rom.erase != NULL
+             && rom.program != NULL;
+}
+
+IN_SRAM static uint32_t leave_xip(void)
+{
+    uint32_t primask;
+    __asm volatile("mrs %0, primask\n cpsid i" : "=r"(primask)::"memory");
+    rom.connect();
+    rom.exit_xip();
+    return primask;
+}
+
+IN_SRAM static void back_to_xip(uint32_t primask)
+{
+    rom.flush();
+    ((rom_action)((uintptr_t)boot2_copy | 1))(); // Thumb
+    __asm volatile("msr primask, %0" ::"r"(primask) : "memory");
+}
+
+IN_SRAM static void erase_sector(uint32_t offset)
+{
+    uint32_t primask = leave_xip();
+    rom.erase(offset, BT_FLASH_SECTOR_BYTES, BT_FLASH_SECTOR_BYTES, SECTOR_ERASE);
+    back_to_xip(primask);
+}
+
+// page must not be in flash.
+IN_SRAM static void program_page(uint32_t offset, const uint8_t *page)
+{
+    uint32_t primask = leave_xip();
+    rom.program(offset, page, BT_FLASH_PAGE_BYTES);
+    back_to_xip(primask);
+}
+
+bool port_flash_erase(uint32_t sector_offset)
+{
+    if (!usable || sector_offset >= BT_STORAGE_BYTES) {
+        return false;
+    }
+    watchdog_feed(); // at the beginning of 0.4 s in which the main loop cannot
+    erase_sector(STORAGE_OFFSET + sector_offset);
+    return true;
+}
+
+bool port_flash_program(uint32_t page_offset, const uint8_t *page)
+{
+    if (!usable || page_offset >= BT_STORAGE_BYTES) {
+        return false;
+    }
+    program_page(STORAGE_OFFSET + page_offset, page);
+    return true;
+}
+
+void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
+{
+    memcpy(data, (const uint8_t *)(uintptr_t)(XIP_BASE + STORAGE_OFFSET) + offset, bytes);
+}
+
+// Sends a command and takes as many bytes as it sends, chip select held low throughout. False when the
+// serial interface stopped in the middle.
+IN_SRAM static bool exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
+{
+    uint32_t sent = 0;
+    uint32_t come = 0;
+    uint32_t primask = leave_xip();
+    IO_QSPI_SS_CTRL = (IO_QSPI_SS_CTRL & ~IO_QSPI_OUTOVER_BITS) | IO_QSPI_OUTOVER_LOW;
+    for (uint32_t turn = 0; turn < UNIQUE_ID_TURNS && come < bytes; turn++) {
+        uint32_t status = SSI_SR;
+        if (sent < bytes && sent - come < SSI_FIFO && (status & SSI_SR_TFNF)) {
+            SSI_DR0 = sent == 0 ? command : 0;
+            sent++;
+        }
+        if (come < sent && (status & SSI_SR_RFNE)) {
+            answer[come++] = (uint8_t)SSI_DR0;
+        }
+    }
+    IO_QSPI_SS_CTRL = (IO_QSPI_SS_CTRL & ~IO_QSPI_OUTOVER_BITS) | IO_QSPI_OUTOVER_HIGH;
+    IO_QSPI_SS_CTRL = IO_QSPI_SS_CTRL & ~IO_QSPI_OUTOVER_BITS; // the serial interface's own again
+    back_to_xip(primask);
+    return come == bytes;
+}
+
+bool flash_unique_id(uint8_t id[FLASH_ID_BYTES])
+{
+    uint8_t answer[UNIQUE_ID_AT + FLASH_ID_BYTES];
+    uint8_t all = 0xFF, any = 0;
+    if (!usable || !exchange(UNIQUE_ID_COMMAND, answer, sizeof answer)) {
+        return false;
+    }
+    for (int k = 0; k < FLASH_ID_BYTES; k++) {
+        id[k] = answer[UNIQUE_ID_AT + k];
+        all &= id[k];
+        any |= id[k];
+    }
+    return all != 0xFF && any != 0; // a line that nobody drives
+}

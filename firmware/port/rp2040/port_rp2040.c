@@ -1,0 +1,122 @@
+// The RP2040 without a vendor's SDK: start-up in order, identity, and the main loop's rest.
+#include "port.h"
+
+#include "crc32.h"
+#include "system.h"
+#include "wire_gen.h"
+
+#include "rp2040_regs.h"
+
+#include <string.h>
+
+#define RANDOM_BYTES 64
+
+// How long a reboot into the loader waits for what was said before: at least until the host has its answer
+// to a control request, at most until it obviously does not read.
+#define LEAVE_AFTER_US  10000u
+#define LEAVE_LATEST_US 200000u
+
+static const char no_id[] = "no-flash-id";
+static uint8_t unique_id[FLASH_ID_BYTES];
+static bool has_id;
+static char serial_text[2 * FLASH_ID_BYTES + 1];
+static uint32_t boot_id;
+static bool leaving;
+static uint32_t leave_us;
+
+static void make_serial_text(void)
+{
+    static const char digits[] = "0123456789ABCDEF";
+    if (!has_id) {
+        memcpy(serial_text, no_id, sizeof no_id);
+        return;
+    }
+    for (int k = 0; k < FLASH_ID_BYTES; k++) {
+        serial_text[2 * k] = digits[unique_id[k] >> 4];
+        serial_text[2 * k + 1] = digits[unique_id[k] & 15];
+    }
+}
+
+// Random at each boot. The ring oscillator's bit is biased and neighbours are alike, so many are taken in
+// through a CRC, with a count that a reset other than power-on leaves alone: two boots in a row then differ
+// even where the oscillator's bit is stuck.
+static void make_boot_id(void)
+{
+    uint8_t noise[RANDOM_BYTES + FLASH_ID_BYTES + 4];
+    for (int k = 0; k < RANDOM_BYTES; k++) {
+        uint32_t byte = 0;
+        for (int bit = 0; bit < 8; bit++) {
+            byte = byte << 1 | (ROSC_RANDOMBIT & 1);
+        }
+        noise[k] = (uint8_t)byte;
+    }
+    memcpy(noise + RANDOM_BYTES, unique_id, FLASH_ID_BYTES);
+    uint32_t boots = WATCHDOG_SCRATCH0 + 1;
+    WATCHDOG_SCRATCH0 = boots;
+    for (int k = 0; k < 4; k++) {
+        noise[RANDOM_BYTES + FLASH_ID_BYTES + k] = (uint8_t)(boots >> 8 * k);
+    }
+    boot_id = bt_crc32(noise, sizeof noise);
+}
+
+void port_init(int argc, char **argv)
+{
+    (void)argc;
+    (void)argv;
+    flash_start();
+    has_id = flash_unique_id(unique_id);
+    if (!clocks_start()) {
+        system_reset(); // without its crystal the board can neither keep time nor speak USB
+    }
+    watchdog_start();
+    make_serial_text();
+    make_boot_id();
+    spi_start();
+    timer_start();
+    usb_start(serial_text);
+}
+
+void port_idle(void)
+{
+    if (usb_touched()) {
+        (void)port_reboot_bootloader();
+    }
+    uint32_t since_us = port_now_us() - leave_us;
+    if (leaving && since_us >= LEAVE_AFTER_US && (usb_all_sent() || since_us >= LEAVE_LATEST_US)) {
+        rom_enter_loader();
+    }
+    watchdog_feed(); // nowhere else but before a flash erase: a main loop that hangs ends in a reset
+    timer_sleep();
+}
+
+bool port_reboot_bootloader(void)
+{
+    if (!rom_has_loader()) {
+        return false;
+    }
+    if (!leaving) {
+        leaving = true;
+        leave_us = port_now_us();
+    }
+    return true;
+}
+
+uint16_t port_board(void)
+{
+    return BT_BOARD_PICO;
+}
+
+void port_board_serial(uint8_t serial[12])
+{
+    memset(serial, 0, 12);
+    if (has_id) {
+        memcpy(serial, unique_id, FLASH_ID_BYTES);
+    } else {
+        memcpy(serial, no_id, sizeof no_id - 1);
+    }
+}
+
+uint32_t port_boot_id(void)
+{
+    return boot_id;
+}

@@ -1,0 +1,175 @@
+// Registers of the RP2040 and its Cortex-M0+ core, by their data-sheet names; only those this port uses.
+// Section numbers are those of the RP2040 data sheet. Every register is a 32-bit word.
+#ifndef BIOTAC_RP2040_REGS_H
+#define BIOTAC_RP2040_REGS_H
+
+#include <stdint.h>
+
+#define REG32(address) (*(volatile uint32_t *)(uintptr_t)(address))
+
+// 2.1.2: each peripheral's registers (not SIO, nor the core's) again, where a write sets or clears bits.
+#define REG_SET(reg) (*(&(reg) + 0x2000 / 4))
+#define REG_CLR(reg) (*(&(reg) + 0x3000 / 4))
+
+// ---- 2.3.1 SIO: single-cycle IO
+#define SIO_GPIO_OUT_SET REG32(0xD0000014u)
+#define SIO_GPIO_OUT_CLR REG32(0xD0000018u)
+#define SIO_GPIO_OE_SET  REG32(0xD0000024u)
+
+// ---- 2.4.8 core: NVIC, SCB
+#define NVIC_ISER REG32(0xE000E100u)
+#define NVIC_ICER REG32(0xE000E180u)
+#define NVIC_IPR0 REG32(0xE000E400u) // priorities of interrupts 0..3, the two upper bits of each byte
+#define NVIC_IPR1 REG32(0xE000E404u) // 4..7
+#define VTOR      REG32(0xE000ED08u)
+
+// ---- 2.3.2 interrupts
+#define TIMER_IRQ_0 0
+#define USBCTRL_IRQ 5
+
+// ---- 2.13 power-on state machine
+#define PSM_WDSEL      REG32(0x40010008u)
+#define PSM_WDSEL_ROSC (1u << 0)
+#define PSM_WDSEL_XOSC (1u << 1)
+#define PSM_WDSEL_ALL  0x1FFFFu
+
+// ---- 2.14 resets
+#define RESETS_RESET      REG32(0x4000C000u)
+#define RESETS_RESET_DONE REG32(0x4000C008u)
+#define RESETS_IO_BANK0   (1u << 5)
+#define RESETS_PADS_BANK0 (1u << 8)
+#define RESETS_PLL_SYS    (1u << 12)
+#define RESETS_PLL_USB    (1u << 13)
+#define RESETS_SPI0       (1u << 16)
+#define RESETS_TIMER      (1u << 21)
+#define RESETS_USBCTRL    (1u << 24)
+
+// ---- 2.15 clocks
+#define CLK_REF_CTRL       REG32(0x40008030u)
+#define CLK_REF_SELECTED   REG32(0x40008038u)
+#define CLK_SYS_CTRL       REG32(0x4000803Cu)
+#define CLK_SYS_SELECTED   REG32(0x40008044u)
+#define CLK_PERI_CTRL      REG32(0x40008048u)
+#define CLK_USB_CTRL       REG32(0x40008054u)
+#define CLK_SYS_RESUS_CTRL REG32(0x40008078u)
+#define CLK_REF_SRC_XOSC   2u
+#define CLK_SYS_SRC_AUX    1u // from PLL_SYS, the aux source after reset
+#define CLK_ENABLE         (1u << 11)
+
+// ---- 2.16 XOSC, 2.17 ROSC, 2.18 PLL
+#define XOSC_CTRL           REG32(0x40024000u)
+#define XOSC_STATUS         REG32(0x40024004u)
+#define XOSC_STARTUP        REG32(0x4002400Cu)
+#define XOSC_CTRL_1_15MHZ   0xAA0u
+#define XOSC_CTRL_ENABLE    (0xFABu << 12)
+#define XOSC_STABLE         (1u << 31)
+#define ROSC_RANDOMBIT      REG32(0x4006001Cu)
+#define PLL_SYS_BASE        0x40028000u
+#define PLL_USB_BASE        0x4002C000u
+#define PLL_CS(base)        REG32((base) + 0x0u)
+#define PLL_PWR(base)       REG32((base) + 0x4u)
+#define PLL_FBDIV_INT(base) REG32((base) + 0x8u)
+#define PLL_PRIM(base)      REG32((base) + 0xCu)
+#define PLL_CS_LOCK         (1u << 31)
+#define PLL_PWR_PD          (1u << 0)
+#define PLL_PWR_POSTDIVPD   (1u << 3)
+#define PLL_PWR_VCOPD       (1u << 5)
+
+// ---- 2.19 pins
+#define IO_BANK0_GPIO_CTRL(n) REG32(0x40014004u + 8u * (n))
+#define GPIO_FUNC_SPI         1u
+#define GPIO_FUNC_SIO         5u
+#define PADS_BANK0_GPIO(n)    REG32(0x4001C004u + 4u * (n))
+#define PADS_IE               (1u << 6)
+#define PADS_DRIVE_4MA        (1u << 4)
+#define PADS_PDE              (1u << 2)
+#define PADS_SCHMITT          (1u << 1)
+#define IO_QSPI_SS_CTRL       REG32(0x4001800Cu)
+#define IO_QSPI_OUTOVER_LOW   (2u << 8)
+#define IO_QSPI_OUTOVER_HIGH  (3u << 8)
+#define IO_QSPI_OUTOVER_BITS  (3u << 8)
+
+// ---- 4.1 USB device controller
+#define USB_DPRAM_BASE         0x50100000u
+#define USB_EP_IN_CONTROL(ep)  REG32(USB_DPRAM_BASE + 8u * (ep))      // ep > 0
+#define USB_EP_OUT_CONTROL(ep) REG32(USB_DPRAM_BASE + 8u * (ep) + 4u) // ep > 0
+#define USB_BUFFER_IN(ep)      REG32(USB_DPRAM_BASE + 0x80u + 8u * (ep))
+#define USB_BUFFER_OUT(ep)     REG32(USB_DPRAM_BASE + 0x84u + 8u * (ep))
+#define USB_EP0_BUFFER         0x100u // offset of endpoint 0's data, both ways
+#define USB_EP_ENABLE          (1u << 31)
+#define USB_EP_INT_PER_BUFFER  (1u << 29)
+#define USB_EP_TYPE_BULK       (2u << 26)
+#define USB_EP_TYPE_INTERRUPT  (3u << 26)
+#define USB_BUFFER_FULL        (1u << 15)
+#define USB_BUFFER_DATA1       (1u << 13)
+#define USB_BUFFER_STALL       (1u << 11)
+#define USB_BUFFER_AVAILABLE   (1u << 10)
+#define USB_BUFFER_LENGTH      0x3FFu
+#define USB_ADDR_ENDP          REG32(0x50110000u)
+#define USB_MAIN_CTRL          REG32(0x50110040u)
+#define USB_SIE_CTRL           REG32(0x5011004Cu)
+#define USB_SIE_STATUS         REG32(0x50110050u)
+#define USB_BUFF_STATUS        REG32(0x50110058u) // bit 2 ep: IN, bit 2 ep + 1: OUT
+#define USB_EP_STALL_ARM       REG32(0x50110068u)
+#define USB_USB_MUXING         REG32(0x50110074u)
+#define USB_USB_PWR            REG32(0x50110078u)
+#define USB_INTE               REG32(0x50110090u)
+#define USB_INTS               REG32(0x50110098u)
+#define USB_CONTROLLER_EN      (1u << 0)
+#define USB_SIE_EP0_INT_1BUF   (1u << 29)
+#define USB_SIE_PULLUP_EN      (1u << 16)
+#define USB_SIE_BUS_RESET      (1u << 19)
+#define USB_SIE_SETUP_REC      (1u << 17)
+#define USB_SIE_RESUME         (1u << 11)
+#define USB_SIE_SUSPENDED      (1u << 4)
+#define USB_STALL_EP0_IN       (1u << 0)
+#define USB_STALL_EP0_OUT      (1u << 1)
+#define USB_MUXING_TO_PHY      (1u << 0)
+#define USB_MUXING_SOFTCON     (1u << 3)
+#define USB_PWR_VBUS_DETECT    (1u << 3)
+#define USB_PWR_VBUS_OVERRIDE  (1u << 2)
+#define USB_INT_SETUP_REQ      (1u << 16)
+#define USB_INT_RESUME         (1u << 15)
+#define USB_INT_SUSPEND        (1u << 14)
+#define USB_INT_BUS_RESET      (1u << 12)
+#define USB_INT_BUFF_STATUS    (1u << 4)
+
+// ---- 4.4 SPI: an ARM PL022
+#define SPI0_SSPCR0    REG32(0x4003C000u)
+#define SPI0_SSPCR1    REG32(0x4003C004u)
+#define SPI0_SSPDR     REG32(0x4003C008u)
+#define SPI0_SSPSR     REG32(0x4003C00Cu)
+#define SPI0_SSPCPSR   REG32(0x4003C010u)
+#define SSPCR0_DSS_16  15u // data size less one; FRF, SPO and SPH are 0: Motorola, mode 0
+#define SSPCR0_SCR_LSB 8
+#define SSPCR1_SSE     (1u << 1)
+#define SSPSR_RNE      (1u << 2)
+#define SSPSR_BSY      (1u << 4)
+
+// ---- 4.6 timer
+#define TIMER_ALARM0     REG32(0x40054010u)
+#define TIMER_ARMED      REG32(0x40054020u)
+#define TIMER_TIMERAWL   REG32(0x40054028u)
+#define TIMER_INTR       REG32(0x40054034u)
+#define TIMER_INTE       REG32(0x40054038u)
+#define TIMER_INTF       REG32(0x4005403Cu)
+#define TIMER_ALARM0_BIT 1u
+
+// ---- 4.7 watchdog
+#define WATCHDOG_CTRL        REG32(0x40058000u)
+#define WATCHDOG_LOAD        REG32(0x40058004u)
+#define WATCHDOG_SCRATCH0    REG32(0x4005800Cu) // keeps its value over every reset but power-on
+#define WATCHDOG_TICK        REG32(0x4005802Cu)
+#define WATCHDOG_TRIGGER     (1u << 31)
+#define WATCHDOG_ENABLE      (1u << 30)
+#define WATCHDOG_PAUSE       (7u << 24) // while a debugger holds a core
+#define WATCHDOG_TICK_ENABLE (1u << 9)
+
+// ---- 4.10 SSI: the flash's serial interface
+#define SSI_SR      REG32(0x18000028u)
+#define SSI_DR0     REG32(0x18000060u)
+#define SSI_SR_TFNF (1u << 1)
+#define SSI_SR_RFNE (1u << 3)
+#define XIP_BASE    0x10000000u
+
+#endif

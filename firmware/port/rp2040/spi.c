@@ -1,0 +1,64 @@
+// The sensors' bus: SPI0, 16-bit frames, mode 0, with the chip selects as plain outputs.
+#include "port.h"
+
+#include "pins.h"
+#include "sensor_gen.h"
+#include "system.h"
+#include "wait.h"
+
+// SCK = clk_peri / (CPSDVSR * (1 + SCR)) = 125 MHz / 28 = 4.46 MHz: the nearest to BT_SPI_HZ there is, and
+// far from the sensor's 10 MHz.
+#define CLK_PERI_HZ 125000000u
+#define CPSDVSR     2u
+#define SCR         13u
+_Static_assert(CLK_PERI_HZ / (CPSDVSR * (1 + SCR)) < BT_SPI_HZ + BT_SPI_HZ / 50
+                   && CLK_PERI_HZ / (CPSDVSR * (1 + SCR)) > BT_SPI_HZ - BT_SPI_HZ / 50,
+               "SCK within 2 % of the bus rate");
+
+#define SELECT(n)   (1u << PIN_SELECT_##n)
+#define ALL_SELECTS (SELECT(0) | SELECT(1) | SELECT(2) | SELECT(3) | SELECT(4))
+_Static_assert(BT_MAX_FINGERS == 5, "as many chip selects as fingers");
+
+static void output(uint32_t pin, uint32_t function)
+{
+    PADS_BANK0_GPIO(pin) = PADS_DRIVE_4MA | PADS_SCHMITT | PADS_IE;
+    IO_BANK0_GPIO_CTRL(pin) = function;
+}
+
+void spi_start(void)
+{
+    static const uint8_t selects[BT_MAX_FINGERS] = {PIN_SELECT_0, PIN_SELECT_1, PIN_SELECT_2, PIN_SELECT_3,
+                                                    PIN_SELECT_4};
+    // High before they become outputs: no sensor may see a select on the way up.
+    SIO_GPIO_OUT_SET = ALL_SELECTS;
+    SIO_GPIO_OE_SET = ALL_SELECTS;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        output(selects[f], GPIO_FUNC_SIO);
+    }
+    SPI0_SSPCPSR = CPSDVSR;
+    SPI0_SSPCR0 = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
+    SPI0_SSPCR1 = SSPCR1_SSE;
+    output(PIN_SCK, GPIO_FUNC_SPI);
+    output(PIN_MOSI, GPIO_FUNC_SPI);
+    // Pulled down: where no sensor drives the line, words read 0x0000, which the driver takes for absent.
+    PADS_BANK0_GPIO(PIN_MISO) = PADS_IE | PADS_SCHMITT | PADS_PDE;
+    IO_BANK0_GPIO_CTRL(PIN_MISO) = GPIO_FUNC_SPI;
+}
+
+IN_SRAM void port_spi_select(uint8_t mask)
+{
+    // No table: it would be in flash.
+    uint32_t low = (uint32_t)(mask & 1) << PIN_SELECT_0 | (uint32_t)(mask >> 1 & 1) << PIN_SELECT_1
+                   | (uint32_t)(mask >> 2 & 1) << PIN_SELECT_2 | (uint32_t)(mask >> 3 & 1) << PIN_SELECT_3
+                   | (uint32_t)(mask >> 4 & 1) << PIN_SELECT_4;
+    SIO_GPIO_OUT_SET = ALL_SELECTS & ~low;
+    SIO_GPIO_OUT_CLR = low;
+}
+
+IN_SRAM uint16_t port_spi_transfer16(uint16_t mosi)
+{
+    SPI0_SSPDR = mosi;
+    // Not busy is later than received: the clock has gone low by then, and the select may rise.
+    bool done = wait_for(&SPI0_SSPSR, SSPSR_RNE | SSPSR_BSY, SSPSR_RNE, WAIT_SPI_TURNS);
+    return done ? (uint16_t)SPI0_SSPDR : 0; // 0 reads as a sensor that is not there
+}

@@ -1,0 +1,86 @@
+#include "system.h"
+
+#include "wait.h"
+
+// clk_ref is the crystal's 12 MHz; PLL output = 12 MHz * fbdiv / (postdiv1 * postdiv2), with the oscillator
+// inside (12 MHz * fbdiv) between 750 and 1600 MHz.
+#define CRYSTAL_MHZ 12u
+
+// 1 ms for the crystal to start, in units of 256 periods (data sheet 2.16.3).
+#define XOSC_STARTUP_DELAY ((CRYSTAL_MHZ * 1000u + 128u) / 256u)
+
+#define WATCHDOG_US 1000000u // longer than a flash sector's erase, 0.4 s at most
+
+static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, uint32_t postdiv2)
+{
+    PLL_CS(base) = 1; // reference divider
+    PLL_FBDIV_INT(base) = fbdiv;
+    REG_CLR(PLL_PWR(base)) = PLL_PWR_PD | PLL_PWR_VCOPD;
+    if (!wait_for(&PLL_CS(base), PLL_CS_LOCK, PLL_CS_LOCK, WAIT_CLOCKS_TURNS)) {
+        return false;
+    }
+    PLL_PRIM(base) = postdiv1 << 16 | postdiv2 << 12;
+    REG_CLR(PLL_PWR(base)) = PLL_PWR_POSTDIVPD;
+    return true;
+}
+
+static bool take_out_of_reset(uint32_t blocks)
+{
+    REG_SET(RESETS_RESET) = blocks;
+    REG_CLR(RESETS_RESET) = blocks;
+    return wait_for(&RESETS_RESET_DONE, blocks, blocks, WAIT_CLOCKS_TURNS);
+}
+
+bool clocks_start(void)
+{
+    CLK_SYS_RESUS_CTRL = 0;
+    XOSC_STARTUP = XOSC_STARTUP_DELAY;
+    XOSC_CTRL = XOSC_CTRL_1_15MHZ | XOSC_CTRL_ENABLE;
+    if (!wait_for(&XOSC_STATUS, XOSC_STABLE, XOSC_STABLE, WAIT_CLOCKS_TURNS)) {
+        return false;
+    }
+    // Away from the PLLs before they are touched: after a watchdog reset they may be in use.
+    REG_CLR(CLK_SYS_CTRL) = CLK_SYS_SRC_AUX;
+    if (!wait_for(&CLK_SYS_SELECTED, 1u << 0, 1u << 0, WAIT_CLOCKS_TURNS)) {
+        return false;
+    }
+    CLK_REF_CTRL = CLK_REF_SRC_XOSC;
+    if (!wait_for(&CLK_REF_SELECTED, 1u << CLK_REF_SRC_XOSC, 1u << CLK_REF_SRC_XOSC, WAIT_CLOCKS_TURNS)
+        || !take_out_of_reset(RESETS_PLL_SYS | RESETS_PLL_USB)
+        || !start_pll(PLL_SYS_BASE, 125, 6, 2)    // 1500 / 12 = 125 MHz
+        || !start_pll(PLL_USB_BASE, 100, 5, 5)) { // 1200 / 25 = 48 MHz
+        return false;
+    }
+    CLK_SYS_CTRL = 0;
+    CLK_SYS_CTRL = CLK_SYS_SRC_AUX;
+    if (!wait_for(&CLK_SYS_SELECTED, 1u << CLK_SYS_SRC_AUX, 1u << CLK_SYS_SRC_AUX, WAIT_CLOCKS_TURNS)) {
+        return false;
+    }
+    CLK_PERI_CTRL = CLK_ENABLE; // from clk_sys
+    CLK_USB_CTRL = CLK_ENABLE;  // from PLL_USB
+    WATCHDOG_TICK = CRYSTAL_MHZ | WATCHDOG_TICK_ENABLE;
+    return take_out_of_reset(RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_SPI0 | RESETS_TIMER
+                             | RESETS_USBCTRL);
+}
+
+void watchdog_start(void)
+{
+    WATCHDOG_CTRL = 0;
+    // Everything but the oscillators, so that the chip comes up as after power-on.
+    PSM_WDSEL = PSM_WDSEL_ALL & ~(PSM_WDSEL_ROSC | PSM_WDSEL_XOSC);
+    watchdog_feed();
+    WATCHDOG_CTRL = WATCHDOG_PAUSE | WATCHDOG_ENABLE;
+}
+
+void watchdog_feed(void)
+{
+    WATCHDOG_LOAD = 2 * WATCHDOG_US; // RP2040-E1: it counts down twice a tick
+}
+
+void system_reset(void)
+{
+    PSM_WDSEL = PSM_WDSEL_ALL & ~(PSM_WDSEL_ROSC | PSM_WDSEL_XOSC);
+    WATCHDOG_CTRL = WATCHDOG_TRIGGER;
+    for (;;) { // some cycles at most: the reset is on its way
+    }
+}

@@ -1,0 +1,54 @@
+// What the files of this port call of each other.
+#ifndef BIOTAC_RP2040_SYSTEM_H
+#define BIOTAC_RP2040_SYSTEM_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+// Code that runs from SRAM: interrupts that must not wait for the flash, and whatever runs while the flash
+// cannot be read. noinline, or it would end up in its caller's flash.
+#define IN_SRAM __attribute__((section(".sram_code"), noinline))
+
+// ---- system.c: clocks, watchdog, reset
+// 125 MHz from the crystal, 48 MHz for USB, the 1 us tick; false when the crystal or a PLL never came up.
+bool clocks_start(void);
+void watchdog_start(void);
+void watchdog_feed(void);
+void system_reset(void) __attribute__((noreturn));
+
+// ---- timer.c
+void timer_start(void);
+void timer_interrupt(void);
+
+// Sleep until an interrupt calls timer_wake, or not at all when one has since the last call.
+void timer_sleep(void);
+
+// Something came that the main loop should look at; port_idle will not sleep over it. For interrupts.
+void timer_wake(void);
+
+// ---- spi.c
+void spi_start(void);
+
+// ---- rom.c: functions of the chip's boot ROM; NULL when it has none of that name
+void *rom_function(char first, char second);
+bool rom_has_loader(void);
+void rom_enter_loader(void) __attribute__((noreturn));
+
+// ---- flash.c
+#define FLASH_ID_BYTES 8
+// Before any interrupt is on. Keeps what is needed to read the program again after the flash was used.
+void flash_start(void);
+// The flash's own unique number, which is the board's. False when the flash tells none.
+bool flash_unique_id(uint8_t id[FLASH_ID_BYTES]);
+
+// ---- usb.c
+// serial: text that stays; what the host shows as the serial number.
+void usb_start(const char *serial);
+void usb_interrupt(void);
+bool usb_all_sent(void);
+
+// Once: a host set 1200 baud and let DTR go, the customary sign to enter the loader.
+bool usb_touched(void);
+
+#endif

@@ -1,0 +1,57 @@
+// Time, the sampler's alarm, and sleep.
+#include "port.h"
+
+#include "system.h"
+#include "wait.h"
+
+static volatile bool woken;
+
+void timer_start(void)
+{
+    REG_SET(TIMER_INTE) = TIMER_ALARM0_BIT;
+    NVIC_ISER = 1u << TIMER_IRQ_0;
+}
+
+IN_SRAM uint32_t port_now_us(void)
+{
+    return TIMER_TIMERAWL;
+}
+
+IN_SRAM void port_delay_us(uint32_t us)
+{
+    wait_us(us);
+}
+
+IN_SRAM void port_alarm_at(uint32_t at_us)
+{
+    TIMER_ALARM0 = at_us;
+    // It fires when the clock is equal to it: one that is already past would wait for 71 minutes.
+    if ((int32_t)(at_us - TIMER_TIMERAWL) <= 0) {
+        TIMER_ARMED = TIMER_ALARM0_BIT; // writing 1 disarms
+        REG_SET(TIMER_INTF) = TIMER_ALARM0_BIT;
+    }
+}
+
+IN_SRAM void timer_wake(void)
+{
+    woken = true;
+}
+
+IN_SRAM void timer_interrupt(void)
+{
+    REG_CLR(TIMER_INTF) = TIMER_ALARM0_BIT;
+    TIMER_INTR = TIMER_ALARM0_BIT; // writing 1 clears
+    bt_port_alarm();
+    timer_wake();
+}
+
+// Interrupts are held off, and still one of them ends WFI: none can slip in between looking and sleeping.
+void timer_sleep(void)
+{
+    __asm volatile("cpsid i" ::: "memory");
+    if (!woken) {
+        __asm volatile("dsb\n wfi\n cpsie i\n isb\n cpsid i" ::: "memory"); // its handler runs here
+    }
+    woken = false;
+    __asm volatile("cpsie i" ::: "memory");
+}

@@ -1,0 +1,292 @@
+// Records in flash whose power is cut at every byte of every erase and every program: after each cut the old
+// record or the new one is there, whole, and the storage goes on working.
+#include "support.h"
+
+#include "settings.h"
+#include "storage.h"
+
+#define NEIGHBOUR 7  // another record that must outlive everything
+#define SAVES     40 // over two changes of sector
+
+// ---- NOR flash on a failing supply -----------------------------------------------------------------
+
+static uint8_t flash_bytes[BT_STORAGE_BYTES];
+static long steps_left; // bytes that are still erased or programmed before power fails; -1: it holds
+static bool backwards;  // of a sector or page, the last byte first
+static bool ragged;     // the byte at which power fails has only some of its bits done
+static uint64_t seed = 1;
+static long steps;
+static int erases;
+static jmp_buf power_fails;
+
+static void step(size_t at, uint8_t value)
+{
+    uint8_t changing = (uint8_t)(flash_bytes[at] ^ value);
+    if (steps_left == 0) {
+        flash_bytes[at] ^= ragged ? (uint8_t)(changing & random_u64(&seed)) : 0;
+        longjmp(power_fails, 1);
+    }
+    steps_left -= steps_left > 0;
+    steps++;
+    flash_bytes[at] = value;
+}
+
+static size_t in_order(size_t k, size_t bytes)
+{
+    return backwards ? bytes - 1 - k : k;
+}
+
+static bool erase(uint32_t offset)
+{
+    assert_true(offset % BT_FLASH_SECTOR_BYTES == 0 && offset < BT_STORAGE_BYTES);
+    erases++;
+    for (size_t k = 0; k < BT_FLASH_SECTOR_BYTES; k++) {
+        step(offset + in_order(k, BT_FLASH_SECTOR_BYTES), 0xFF);
+    }
+    return true;
+}
+
+static bool program(uint32_t offset, const uint8_t *page)
+{
+    assert_true(offset % BT_FLASH_PAGE_BYTES == 0 && offset < BT_STORAGE_BYTES);
+    for (size_t k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
+        size_t at = offset + in_order(k, BT_FLASH_PAGE_BYTES);
+        step(at, flash_bytes[at] & page[at - offset]); // programming never sets a bit
+    }
+    return true;
+}
+
+static void read_flash(uint32_t offset, uint8_t *data, size_t bytes)
+{
+    assert_true(offset + bytes <= BT_STORAGE_BYTES);
+    memcpy(data, flash_bytes + offset, bytes);
+}
+
+static const bt_flash flash = {erase, program, read_flash};
+
+static int new_flash(void **state)
+{
+    (void)state;
+    memset(flash_bytes, 0xFF, sizeof flash_bytes);
+    steps_left = -1;
+    backwards = ragged = false;
+    erases = 0;
+    return 0;
+}
+
+// ---- records that tell which they are -----------------------------------------------------------------
+
+static size_t make(uint8_t *data, uint16_t id, int number)
+{
+    size_t bytes = 20 + (size_t)(number * 7 + id) % 200;
+    for (size_t k = 0; k < bytes; k++) {
+        data[k] = (uint8_t)(number * 31 + id + (int)k);
+    }
+    return bytes;
+}
+
+static bool write_one(uint16_t id, int number)
+{
+    uint8_t data[BT_STORAGE_MAX_BYTES];
+    size_t bytes = make(data, id, number);
+    return bt_storage_write(&flash, id, (uint16_t)number, data, bytes);
+}
+
+// Which one is there, whole; -1 when none is.
+static int stored(uint16_t id)
+{
+    uint8_t data[BT_STORAGE_MAX_BYTES], want[BT_STORAGE_MAX_BYTES];
+    uint16_t version;
+    int bytes = bt_storage_read(&flash, id, &version, data, sizeof data);
+    if (bytes < 0) {
+        return -1;
+    }
+    assert_int_equal(bytes, make(want, id, version));
+    assert_memory_equal(data, want, (size_t)bytes);
+    return version;
+}
+
+static void a_new_flash_holds_nothing(void **state)
+{
+    (void)state;
+    assert_int_equal(stored(BT_RECORD_SETTINGS), -1);
+    memset(flash_bytes, 0, sizeof flash_bytes); // nor does one that is full of something else
+    assert_int_equal(stored(BT_RECORD_SETTINGS), -1);
+    assert_true(write_one(BT_RECORD_SETTINGS, 1));
+    assert_int_equal(stored(BT_RECORD_SETTINGS), 1);
+}
+
+static void the_latest_record_of_each_id_is_found_over_many_writes(void **state)
+{
+    (void)state;
+    int last[BT_STORAGE_IDS + 1] = {0};
+    for (int number = 1; number < 1000; number++) {
+        uint16_t id = (uint16_t)random_range(&seed, 1, BT_STORAGE_IDS);
+        assert_true(write_one(id, number));
+        last[id] = number;
+        for (uint16_t other = 1; other <= BT_STORAGE_IDS; other++) {
+            assert_int_equal(stored(other), last[other] == 0 ? -1 : last[other]);
+        }
+    }
+    // Seven of fifteen pages are taken after a change of sector: at least seven writes lie between two.
+    assert_in_range(erases, 1000 / 15, 1000 / 7);
+}
+
+static void the_same_again_wears_nothing(void **state)
+{
+    (void)state;
+    assert_true(write_one(1, 5));
+    long before = steps;
+    assert_true(write_one(1, 5));
+    assert_int_equal(steps, before);
+}
+
+static void what_does_not_fit_is_refused(void **state)
+{
+    (void)state;
+    uint8_t data[BT_STORAGE_MAX_BYTES + 1] = {0};
+    assert_false(bt_storage_write(&flash, 1, 0, data, sizeof data));
+    assert_false(bt_storage_write(&flash, 0, 0, data, 1));
+    assert_false(bt_storage_write(&flash, BT_STORAGE_IDS + 1, 0, data, 1));
+    assert_true(bt_storage_write(&flash, 1, 0, data, BT_STORAGE_MAX_BYTES));
+}
+
+static void generations_may_wrap(void **state)
+{
+    (void)state;
+    assert_true(write_one(1, 0));
+    // The sector in use claims generation 2^32 - 1; its CRC follows from its own bytes by a second CRC-32.
+    uint8_t *page = flash_bytes;
+    uint32_t crc = 0xFFFFFFFFu;
+    memset(page + 16, 0xFF, 4);
+    for (int k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
+        crc ^= k >= 12 && k < 16 ? 0xFF : page[k];
+        for (int bit = 0; bit < 8; bit++) {
+            crc = crc & 1 ? crc >> 1 ^ 0xEDB88320u : crc >> 1;
+        }
+    }
+    crc = ~crc;
+    for (int k = 0; k < 4; k++) {
+        page[12 + k] = (uint8_t)(crc >> 8 * k);
+    }
+    assert_int_equal(stored(1), 0);
+    for (int number = 1; number < SAVES; number++) {
+        assert_true(write_one(1, number));
+        assert_int_equal(stored(1), number);
+    }
+}
+
+// ---- power cuts ----------------------------------------------------------------------------------------
+
+// Save `number` with power failing after `cut` bytes. True when it was through before that.
+static bool save_with_cut(int number, long cut)
+{
+    steps_left = cut;
+    if (setjmp(power_fails) != 0) {
+        steps_left = -1;
+        return false;
+    }
+    assert_true(write_one(BT_RECORD_SETTINGS, number));
+    steps_left = -1;
+    return true;
+}
+
+static int cuts;
+
+static void cut_everywhere(void)
+{
+    static uint8_t before[BT_STORAGE_BYTES];
+    assert_true(write_one(NEIGHBOUR, 77));
+    assert_true(write_one(BT_RECORD_SETTINGS, 0));
+    for (int number = 1; number < SAVES; number++) {
+        memcpy(before, flash_bytes, sizeof before);
+        for (long cut = 0; !save_with_cut(number, cut); cut++) {
+            cuts++;
+            int found = stored(BT_RECORD_SETTINGS);
+            assert_true(found == number - 1 || found == number);
+            assert_int_equal(stored(NEIGHBOUR), 77);
+            // What the cut left behind is no obstacle, and neither is a second cut in the next save.
+            uint8_t after_cut[BT_STORAGE_BYTES];
+            memcpy(after_cut, flash_bytes, sizeof after_cut);
+            (void)save_with_cut(500, (long)random_range(&seed, 0, 5000));
+            int again = stored(BT_RECORD_SETTINGS);
+            assert_true(again == found || again == 500);
+            memcpy(flash_bytes, after_cut, sizeof after_cut);
+            assert_true(write_one(BT_RECORD_SETTINGS, 999));
+            assert_int_equal(stored(BT_RECORD_SETTINGS), 999);
+            assert_int_equal(stored(NEIGHBOUR), 77);
+            memcpy(flash_bytes, before, sizeof before);
+        }
+        assert_int_equal(stored(BT_RECORD_SETTINGS), number);
+    }
+    assert_in_range(erases, 3, 1000000);
+}
+
+static void a_cut_at_any_byte_leaves_the_old_record_or_the_new(void **state)
+{
+    (void)state;
+    cuts = 0;
+    cut_everywhere();
+    // Every save programs a page at least; two change the sector, which erases one and programs two more.
+    assert_true(cuts >= (SAVES - 1) * BT_FLASH_PAGE_BYTES + 2 * BT_FLASH_SECTOR_BYTES);
+}
+
+static void nor_does_the_order_within_a_page_matter(void **state)
+{
+    (void)state;
+    backwards = true;
+    cut_everywhere();
+}
+
+static void nor_do_half_done_bytes(void **state)
+{
+    (void)state;
+    ragged = true;
+    cut_everywhere();
+}
+
+// ---- settings ------------------------------------------------------------------------------------------
+
+static void settings_come_back_and_others_keep_their_defaults(void **state)
+{
+    (void)state;
+    bt_settings settings, back;
+    uint8_t record[BT_SETTINGS_RECORD_BYTES + 7];
+    bt_settings_reset(&settings);
+    for (int k = 0; k < BT_SETTINGS; k++) {
+        settings.value[k] = k % 2 == 0 ? bt_setting_specs[k].min : bt_setting_specs[k].max;
+    }
+    bt_settings_pack(&settings, record);
+    bt_settings_reset(&back);
+    bt_settings_unpack(&back, BT_SETTINGS_RECORD_VERSION, record, BT_SETTINGS_RECORD_BYTES);
+    assert_memory_equal(&back, &settings, sizeof back);
+    // An unknown id, a value out of range and half a pair are passed over.
+    memcpy(record + BT_SETTINGS_RECORD_BYTES, "\xFA\1\0\0\0\1\2", 7);
+    record[1] = record[2] = record[3] = record[4] = 0x7F;
+    bt_settings_reset(&back);
+    settings.value[0] = bt_setting_specs[0].initial;
+    bt_settings_unpack(&back, BT_SETTINGS_RECORD_VERSION, record, sizeof record);
+    assert_memory_equal(&back, &settings, sizeof back);
+    bt_settings_reset(&back);
+    bt_settings_unpack(&back, BT_SETTINGS_RECORD_VERSION + 1, record, sizeof record);
+    bt_settings_reset(&settings);
+    assert_memory_equal(&back, &settings, sizeof back);
+}
+
+#define T(test) cmocka_unit_test_setup(test, new_flash)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(a_new_flash_holds_nothing),
+        T(the_latest_record_of_each_id_is_found_over_many_writes),
+        T(the_same_again_wears_nothing),
+        T(what_does_not_fit_is_refused),
+        T(generations_may_wrap),
+        T(a_cut_at_any_byte_leaves_the_old_record_or_the_new),
+        T(nor_does_the_order_within_a_page_matter),
+        T(nor_do_half_done_bytes),
+        T(settings_come_back_and_others_keep_their_defaults),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

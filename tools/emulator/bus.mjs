@@ -1,0 +1,173 @@
+// The USB wire: one transaction at a time, at full speed, to the endpoint buffers of the chip's controller.
+//
+// rp2040js answers buffers as soon as they are armed, storms OUT endpoints with empty packets and knows no NAK.
+// This takes over DPRAMUpdated: a buffer stays with the controller until the host's token has come for it. What
+// silicon would not forgive is counted: wrong data toggles, AVAILABLE written together with the rest of its word.
+
+const AVAILABLE = 1 << 10
+const STALL = 1 << 11
+const DATA1 = 1 << 13
+const FULL = 1 << 15
+const LENGTH = 0x3ff
+const CONTROLS = 0x80 // of buffers: 8 bytes an endpoint, IN before OUT
+const CONTROLS_END = 0x100
+const EP0_BUFFER = 0x100
+const ENDPOINT_ENABLE = 1 << 31
+const DOUBLE_BUFFER = 1 << 30
+const INTERRUPT_PER_BUFFER = 1 << 29
+const EP0_INT_1BUF = 1 << 29 // of SIE_CTRL
+const SIE_STATUS = 0x50
+const DATA_SEQ_ERROR = 1 << 31
+const SETUP_REC = 1 << 17
+const SUSPENDED = 1 << 4
+const SOF_RD = 0x48
+const FRAME_NS = 1e6
+const OVERHEAD_BYTES = 13 // token, handshake, sync, CRC, gaps: what leaves 19 bulk packets of 64 bytes a frame
+const BITS_PER_S = 12e6
+
+export class UsbBus {
+  constructor(mcu) {
+    this.mcu = mcu
+    this.usb = mcu.usbCtrl
+    this.view = mcu.usbDPRAMView
+    this.toggles = new Map() // what the host expects or sends next: endpoint*2 + out -> 0 or 1
+    this.written = new Map()
+    this.counters = { toggle_errors: 0, available_not_last: 0, in_packets: 0, out_packets: 0 }
+    this.onArmed = () => {}
+    this.wire = mcu.clock.createAlarm(() => {
+      const finish = this.finish
+      this.finish = null
+      finish()
+    })
+    this.finish = null
+    this.usb.DPRAMUpdated = (offset, value) => this.#written(offset, value)
+    this.#correctRegisters()
+  }
+
+  get busy() {
+    return this.finish !== null
+  }
+
+  /** Run `then` after so many bytes have crossed the wire. */
+  transact(bytes, then) {
+    this.finish = then
+    const bits = (bytes + OVERHEAD_BYTES) * 8
+    this.wire.schedule(Math.ceil((bits / BITS_PER_S) * 125e6) * 8) // whole cycles of 8 ns
+  }
+
+  abort() {
+    this.wire.cancel()
+    this.finish = null
+  }
+
+  control(endpoint, out) {
+    return this.view.getUint32(CONTROLS + endpoint * 8 + (out ? 4 : 0), true)
+  }
+
+  armed(endpoint, out) {
+    return !!(this.control(endpoint, out) & AVAILABLE) && (endpoint === 0 || this.#enabled(endpoint, out))
+  }
+
+  stalled(endpoint, out) {
+    const armed = endpoint !== 0 || this.usb.epStallArm & (out ? 2 : 1)
+    return !!(this.control(endpoint, out) & STALL) && !!armed
+  }
+
+  length(endpoint, out) {
+    return this.control(endpoint, out) & LENGTH
+  }
+
+  setToggle(endpoint, out, value) {
+    this.toggles.set(endpoint * 2 + (out ? 1 : 0), value)
+  }
+
+  setup(packet) {
+    this.mcu.usbDPRAM.set(packet)
+    this.usb.epStallArm &= ~3
+    this.setToggle(0, false, 1)
+    this.setToggle(0, true, 1)
+    this.usb.sieStatus |= SETUP_REC
+    this.usb.sieStatusUpdated()
+  }
+
+  /** Take an armed IN buffer; null when its toggle says that the host has had it already. */
+  takeIn(endpoint) {
+    const control = this.control(endpoint, false)
+    const at = this.#buffer(endpoint, false)
+    const data = this.mcu.usbDPRAM.slice(at, at + (control & LENGTH))
+    const fresh = this.#toggled(endpoint, false, control)
+    this.counters.in_packets++
+    this.#done(endpoint, false, control & ~(AVAILABLE | FULL))
+    return fresh ? data : null
+  }
+
+  /** Fill an armed OUT buffer. */
+  putOut(endpoint, data) {
+    const control = this.control(endpoint, true)
+    this.counters.out_packets++
+    if (!this.#toggled(endpoint, true, control)) {
+      this.usb.sieStatus |= DATA_SEQ_ERROR // the controller drops it; the buffer stays armed
+      this.usb.sieStatusUpdated()
+      return
+    }
+    this.mcu.usbDPRAM.set(data, this.#buffer(endpoint, true))
+    this.#done(endpoint, true, (control & ~(AVAILABLE | LENGTH)) | FULL | data.length)
+  }
+
+  #toggled(endpoint, out, control) {
+    const key = endpoint * 2 + (out ? 1 : 0)
+    const expected = this.toggles.get(key) ?? 0
+    const right = (control & DATA1 ? 1 : 0) === expected
+    if (right) this.toggles.set(key, expected ^ 1)
+    else this.counters.toggle_errors++
+    return right
+  }
+
+  #done(endpoint, out, control) {
+    const at = CONTROLS + endpoint * 8 + (out ? 4 : 0)
+    this.view.setUint32(at, control, true)
+    this.written.set(at, control >>> 0)
+    const told = endpoint === 0 ? this.usb.sieCtrl & EP0_INT_1BUF : this.#endpoint(endpoint, out) & INTERRUPT_PER_BUFFER
+    if (told) this.usb.indicateBufferReady(endpoint, out)
+  }
+
+  #endpoint(endpoint, out) {
+    return this.usb.readEndpointControlReg(endpoint, out)
+  }
+
+  #enabled(endpoint, out) {
+    const control = this.#endpoint(endpoint, out)
+    if (control & DOUBLE_BUFFER) throw new Error(`endpoint ${endpoint} is double-buffered, which this emulator lacks`)
+    return !!(control & ENDPOINT_ENABLE)
+  }
+
+  #buffer(endpoint, out) {
+    return endpoint === 0 ? EP0_BUFFER : this.#endpoint(endpoint, out) & 0xffc0
+  }
+
+  #written(offset, value) {
+    if (offset < CONTROLS || offset >= CONTROLS_END) return
+    const before = this.written.get(offset) ?? 0
+    this.written.set(offset, value >>> 0)
+    if (!(value & AVAILABLE)) {
+      if (value & STALL) this.onArmed()
+      return
+    }
+    if ((before & ~AVAILABLE) !== (value & ~AVAILABLE)) this.counters.available_not_last++
+    this.onArmed()
+  }
+
+  #correctRegisters() {
+    const { usb } = this
+    const write = usb.writeUint32.bind(usb)
+    const read = usb.readUint32.bind(usb)
+    usb.writeUint32 = (offset, value) => {
+      // SUSPENDED is cleared by writing it, which rp2040js leaves out.
+      if (offset === SIE_STATUS && usb.rawWriteValue & SUSPENDED) usb.sieStatus &= ~SUSPENDED
+      write(offset, value)
+    }
+    usb.readUint32 = (offset) =>
+      // A device reads the host's frame number there.
+      offset === SOF_RD ? Math.floor(this.mcu.clock.nanos / FRAME_NS) & 0x7ff : read(offset)
+  }
+}

@@ -1,0 +1,132 @@
+// An emulated Pico on a pty. `biotac sim --board pico` and biotac.open("emu:pico?source=...") start it.
+//
+//   node main.mjs --image BIN --wasm sensors.wasm --tape FILE --pty PATH --master FD
+//                 [--pace X] [--hold] [--serials A,B,...]
+//
+// FD is the open master side of a pty, non-blocking; PATH is the name of its other side, to be told.
+// Like the posix board this writes "pty PATH" once the port can be opened, and "end" once the tape is played and
+// all of it handed over; "run" on stdin ends a hold, the end of stdin ends the process. More lines for stdin:
+//   [@SECONDS] VERB   stop reading, go on reading, unplug, plug, cut power: now, or at a time of the sensors' world
+//   counters          answers "counters JSON"
+import fs from 'node:fs'
+import { parseArgs } from 'node:util'
+
+import { Pty } from './pty.mjs'
+import { Rig } from './rig.mjs'
+
+const STRETCH_NS = 1e6
+const BOOT_NS = 10e9 // a board that has not begun to sample by then will not
+const POLL_MS = 1
+const text = { type: 'string' }
+const { values: options } = parseArgs({
+  options: {
+    image: text,
+    wasm: text,
+    tape: text,
+    pty: text,
+    master: text,
+    pace: { type: 'string', default: '1' },
+    serials: { type: 'string', default: '' },
+    hold: { type: 'boolean', default: false },
+  },
+})
+
+function die(what, why) {
+  console.error(`emulator: ${what}: ${why}`)
+  process.exit(2)
+}
+
+function start() {
+  try {
+    const [image, wasm, tape] = [options.image, options.wasm, options.tape].map((path) => fs.readFileSync(path))
+    const { serials, hold } = options
+    return new Rig({ image, wasm, tape, serials, hold, port: pty, lossless: pace === 0 })
+  } catch (error) {
+    return die(options.image, error.message)
+  }
+}
+
+const pace = Number(options.pace)
+const pty = new Pty(Number(options.master))
+const rig = start()
+let asked = false // to end the hold
+let told = false // that the tape is over
+let polled = 0
+let base = null // [wall ms, world ms] that pacing counts from
+
+/** Boot to the first sample, so that what the host does later meets the same board every time. */
+function boot() {
+  while (options.hold && !rig.still) {
+    if (rig.machine.nanos > BOOT_NS) {
+      die(options.image, `does not sample within ${BOOT_NS / 1e9} s of its time; is it the gateway's image?`)
+    }
+    rig.run(STRETCH_NS)
+  }
+  console.log(`pty ${options.pty}`)
+}
+
+function ahead() {
+  if (pace === 0 || rig.machine.time.held) {
+    base = null
+    return false
+  }
+  const [wall, world] = [performance.now(), rig.machine.worldNanos / 1e6]
+  base ??= [wall, world]
+  return (world - base[1]) / pace > wall - base[0]
+}
+
+/** One turn; returns true when there is nothing to do for a while. */
+function turn() {
+  let news = false
+  if (performance.now() - polled >= POLL_MS || rig.still) {
+    polled = performance.now()
+    news = pty.poll()
+    pty.flush()
+  }
+  if (pace === 0 && pty.pendingBytes > 0) {
+    pty.flush()
+    return true // unpaced nothing is dropped: emulated time waits for the program that reads
+  }
+  if (rig.still && !news && pty.up === rig.usb.open) {
+    if (asked && rig.waiting) {
+      rig.release()
+    } else {
+      if (rig.ended && !told) {
+        told = true
+        console.log('end')
+      }
+      return true
+    }
+  }
+  if (ahead()) return true
+  rig.run(STRETCH_NS)
+  return false
+}
+
+function line(words) {
+  if (words === 'run') {
+    asked = true
+  } else if (words === 'counters') {
+    console.log(`counters ${JSON.stringify(rig.counters())}`)
+  } else {
+    const [, seconds, verb] = words.match(/^(?:@([0-9.]+) )?(.*)$/)
+    if (seconds === undefined) rig.act(verb)
+    else rig.plan(Number(seconds), verb)
+  }
+}
+
+let unfinished = ''
+process.stdin.on('data', (chunk) => {
+  const lines = (unfinished + chunk).split('\n')
+  unfinished = lines.pop()
+  for (const words of lines) line(words)
+})
+process.stdin.on('end', () => process.exit(0)) // whoever started us is gone
+
+function loop() {
+  if (turn()) setTimeout(loop, POLL_MS)
+  else setImmediate(loop)
+}
+
+boot()
+loop()

@@ -1,0 +1,105 @@
+// The whole rig: a machine, its sensors, the USB host and the port, and what a test may do to them.
+import { Machine } from './machine.mjs'
+import { Sensors } from './sensors.mjs'
+import { UsbHost } from './usb.mjs'
+
+export class Rig {
+  /** port: a Pty or something like it. hold: device time stands still from the first sample on until release(). */
+  constructor({ image, wasm, tape, serials, port, hold, lossless }) {
+    this.port = port
+    this.reading = true
+    this.plugged = true
+    this.waiting = hold // for release()
+    this.received = 0
+    this.events = [] // [world ns, verb], sorted
+    this.sensors = new Sensors(wasm, tape, serials)
+    this.lossless = lossless
+    this.machine = new Machine(image, (machine) => this.#attach(machine))
+  }
+
+  /** Device time stands still, and the board has done all that can be done meanwhile. */
+  get still() {
+    return this.machine.time.held && this.machine.quiet && !this.usb.bus.busy
+  }
+
+  get ended() {
+    return this.sensors.over
+  }
+
+  /** Run for so long in emulated time, less when everything stands still. */
+  run(nanos) {
+    this.usb.setOpen(this.port.up)
+    this.usb.poke()
+    const end = this.machine.nanos + nanos
+    while (this.machine.nanos < end) {
+      const world = this.machine.worldNanos
+      while (this.events.length > 0 && this.events[0][0] <= world) this.act(this.events.shift()[1])
+      const next = this.events.length > 0 && !this.machine.time.held ? this.events[0][0] - world : Infinity
+      this.machine.runUntil(Math.min(end, this.machine.nanos + next))
+      if (this.still) return
+    }
+  }
+
+  release() {
+    this.waiting = false
+    this.machine.time.release()
+  }
+
+  /** Have a verb done at a time of the world; seconds since its first power-up. */
+  plan(seconds, verb) {
+    this.events.push([Math.round(seconds * 1e9), verb])
+    this.events.sort((a, b) => a[0] - b[0])
+  }
+
+  /** Throws an Error for a verb that there is not. */
+  act(verb) {
+    const verbs = {
+      'stop reading': () => (this.reading = false),
+      'go on reading': () => (this.reading = true),
+      unplug: () => this.usb.setPlugged((this.plugged = false)),
+      plug: () => this.usb.setPlugged((this.plugged = true)),
+      'cut power': () => {
+        this.sensors.powerCycle()
+        this.machine.powerCycle()
+      },
+    }
+    if (!(verb in verbs)) throw new Error(`no verb ${verb}: expected one of ${Object.keys(verbs).join(', ')}`)
+    verbs[verb]()
+    this.usb.poke()
+  }
+
+  counters() {
+    const { machine, usb } = this
+    return {
+      emulated_s: machine.nanos / 1e9,
+      world_s: machine.worldNanos / 1e9,
+      boots: machine.boots,
+      watchdog_resets: machine.watchdogResets,
+      instructions: machine.instructions,
+      slept: machine.sleptNanos / Math.max(1, machine.nanos),
+      sensors: this.sensors.counters(),
+      usb: { state: usb.state, device: usb.device, failed: usb.failed, received: this.received, ...usb.bus.counters },
+    }
+  }
+
+  /** After each power-up and reset of the chip. */
+  #attach(machine) {
+    this.sensors.wire(machine.mcu, () => machine.worldNanos)
+    const spi = machine.mcu.spi[0]
+    const transmit = spi.onTransmit
+    spi.onTransmit = (mosi) => {
+      transmit(mosi)
+      if ((this.waiting && this.sensors.started) || this.sensors.over) machine.time.hold()
+    }
+    this.usb = new UsbHost(machine.mcu, {
+      onData: (bytes) => {
+        this.received += bytes.length
+        this.port.put(bytes)
+      },
+      canTake: () => this.reading && (this.lossless || this.port.hasRoom),
+      take: (n) => this.port.take(n),
+    })
+    this.usb.setPlugged(this.plugged)
+    this.usb.setOpen(this.port.up)
+  }
+}

@@ -1,0 +1,89 @@
+// The emulated BioTacs on the chip's SPI0: firmware/emu/ as WebAssembly, called in the middle of a transfer, so
+// that what a sensor answers follows from the exact emulated time of each edge.
+import { GPIOPinState } from 'rp2040js'
+
+const MISO = 16
+const SCK = 18
+const MOSI = 19
+const CHIP_SELECTS = [17, 20, 21, 22, 26] // of fingers 0 to 4: firmware/boards/pico
+const SPI_FUNCTION = 1
+const WORD_BITS = 16
+const FASTEST_HZ = 10e6 // data sheet
+
+/** The sensors, whatever board they are wired to. Throws an Error that says what is wrong with the tape. */
+export class Sensors {
+  constructor(wasm, tape, serials) {
+    const module = new WebAssembly.Module(wasm)
+    this.calls = new WebAssembly.Instance(module).exports
+    const at = this.calls.room(tape.length)
+    if (at === 0) throw new Error(`no memory for a tape of ${tape.length} bytes`)
+    this.#bytes().set(tape, at)
+    this.#bytes().set(Buffer.from(`${serials}\0`), this.calls.serials())
+    const wrong = this.calls.plug_in(tape.length)
+    if (wrong !== 0) throw new Error(this.#text(wrong))
+    this.transfers = 0
+    this.overlaps = 0 // transfers with more than one chip select low: commands to all, else contention
+    this.misconfigured = 0
+  }
+
+  /** Somebody has asked for a sample. */
+  get started() {
+    return this.calls.started() !== 0
+  }
+
+  /** Somebody has asked for a sample behind the tape's last. */
+  get over() {
+    return this.calls.over() !== 0
+  }
+
+  counters() {
+    const early = CHIP_SELECTS.map((_, finger) => this.calls.early_reads(finger))
+    const { transfers, overlaps, misconfigured } = this
+    return { transfers, overlaps, misconfigured, early_reads: early }
+  }
+
+  powerCycle() {
+    this.calls.power_cycle()
+  }
+
+  /** Solder them to a chip. nanos() is the time the sensors live in. */
+  wire(mcu, nanos) {
+    const spi = mcu.spi[0]
+    let mask = 0
+    CHIP_SELECTS.forEach((pin, finger) => {
+      mcu.gpio[pin].addListener((state) => {
+        // A pin that is not driven is pulled up at the sensor.
+        mask = state === GPIOPinState.Low ? mask | (1 << finger) : mask & ~(1 << finger)
+        this.calls.select(mask, nanos())
+      })
+    })
+    let word = 0
+    const done = mcu.clock.createAlarm(() => spi.completeTransmit(word))
+    spi.onTransmit = (mosi) => {
+      this.transfers++
+      if (mask & (mask - 1)) this.overlaps++
+      word = this.#answer(mcu, spi, mosi, nanos())
+      // As published a transfer takes no time at all.
+      done.schedule(Math.max(1, Math.round(WORD_BITS * (mcu.clkSys / spi.clockFrequency))) * (1e9 / mcu.clkSys))
+    }
+  }
+
+  #answer(mcu, spi, mosi, nanos) {
+    const wired = [MISO, SCK, MOSI].every((pin) => mcu.gpio[pin].functionSelect === SPI_FUNCTION)
+    const right = spi.enabled && spi.dataBits === WORD_BITS && spi.spiMode === 0 && spi.clockFrequency <= FASTEST_HZ
+    if (!wired || !right) {
+      this.misconfigured++ // the sensor would make something of it; nobody knows what
+      return 0xffff
+    }
+    return this.calls.transfer(mosi, nanos)
+  }
+
+  #bytes() {
+    return new Uint8Array(this.calls.memory.buffer) // anew each time: growing detaches it
+  }
+
+  #text(at) {
+    const bytes = this.#bytes()
+    return Buffer.from(bytes.subarray(at, bytes.indexOf(0, at))).toString()
+  }
+}

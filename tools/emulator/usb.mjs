@@ -1,0 +1,256 @@
+// The host at the other end of the USB cable: it enumerates a CDC-ACM device as Linux does, opens and closes its
+// port, and reads only when it is told to, so that the device feels back-pressure.
+import { UsbBus } from './bus.mjs'
+
+const IN = 0x80
+const GET_DESCRIPTOR = 6
+const DEVICE = 1
+const CONFIGURATION = 2
+const STRING = 3
+const SET_ADDRESS = 5
+const SET_CONFIGURATION = 9
+const SET_LINE_CODING = 0x20
+const SET_CONTROL_LINE_STATE = 0x22
+const TO_INTERFACE = 0x21 // class request
+const DTR = 1
+const RTS = 2
+const BULK = 2
+const ENDPOINT_DESCRIPTOR = 5
+const ADDRESS = 5
+const PACKET = 64
+const PULLUP = 1 << 16 // of SIE_CTRL
+const CONTROLLER_ON = 1 // of MAIN_CTRL
+const BUS_RESET = 1 << 19 // of SIE_STATUS
+const CONNECTED = 1 << 16
+const SUSPENDED = 1 << 4
+const MS = 1e6
+const DEBOUNCE_NS = 10 * MS // a real host waits ten times as long before it resets and after
+const SUSPEND_NS = 3 * MS
+const ANSWER_NS = 500 * MS // a control transfer that takes longer has failed
+
+const u16 = (value) => [value & 0xff, value >> 8]
+
+export class UsbHost {
+  /** onData(bytes) gets what the device sends; canTake() says whether more may come. */
+  constructor(mcu, { onData, canTake, take }) {
+    this.bus = new UsbBus(mcu)
+    this.usb = mcu.usbCtrl
+    this.onData = onData
+    this.canTake = canTake
+    this.take = take // take(n): up to n bytes to send, or null
+    this.open = false // the port, by some program
+    this.plugged = true
+    this.state = 'detached'
+    this.device = {} // what enumeration found
+    this.transfers = [] // control transfers to do
+    this.failed = []
+    this.timer = mcu.clock.createAlarm(() => this.later())
+    this.deadline = mcu.clock.createAlarm(() => this.#fail('was not answered'))
+    this.later = () => {}
+    this.bus.onArmed = () => this.poke()
+    this.#watchPullup()
+  }
+
+  /** Some program opens or closes the port: DTR follows. */
+  setOpen(open) {
+    if (open === this.open) return
+    this.open = open
+    if (this.state === 'configured') this.#tellLines()
+  }
+
+  /** Pull the cable, in whatever the wire was doing; true puts it back. */
+  setPlugged(plugged) {
+    if (plugged === this.plugged) return
+    this.plugged = plugged
+    if (plugged) return this.#attach()
+    this.bus.abort()
+    this.deadline.cancel()
+    this.transfers = []
+    this.state = 'detached'
+    this.usb.sieStatus &= ~CONNECTED
+    this.#after(SUSPEND_NS, () => {
+      this.usb.sieStatus |= SUSPENDED
+      this.usb.sieStatusUpdated()
+    })
+  }
+
+  /** Start the next transaction, if there is one to do and the wire is free. */
+  poke() {
+    if (this.bus.busy || this.state === 'detached' || this.state === 'reset') return
+    if (this.transfers.length > 0) return this.#control(this.transfers[0])
+    if (this.state === 'configured' && this.device.in) this.#bulk()
+  }
+
+  #bulk() {
+    const { bus, device } = this
+    if (bus.armed(device.out, true)) {
+      const bytes = this.take(Math.min(PACKET, bus.length(device.out, true)))
+      if (bytes !== null) {
+        return bus.transact(bytes.length, () => {
+          bus.putOut(device.out, bytes)
+          this.poke()
+        })
+      }
+    }
+    if (this.open && bus.armed(device.in, false) && this.canTake()) {
+      bus.transact(bus.length(device.in, false), () => {
+        const data = bus.takeIn(device.in)
+        if (data !== null && data.length > 0) this.onData(data)
+        this.poke()
+      })
+    }
+  }
+
+  // ---- control transfers ---------------------------------------------------------------------------
+
+  /** Queue one; then(data) gets what an IN transfer brought, or null when the device refused. */
+  request(type, request, value, index, dataOrLength, then = () => {}) {
+    const data = type & IN ? null : Uint8Array.from(dataOrLength)
+    const length = data === null ? dataOrLength : data.length
+    const packet = [type, request, ...u16(value), ...u16(index), ...u16(length)]
+    this.transfers.push({ packet, data, length, got: [], sent: 0, then, stage: 'setup' })
+    this.poke()
+  }
+
+  #control(t) {
+    const { bus } = this
+    if (t.stage === 'setup') {
+      this.deadline.schedule(ANSWER_NS)
+      return bus.transact(8, () => {
+        bus.setup(Uint8Array.from(t.packet))
+        t.stage = t.length > 0 ? 'data' : 'status'
+        this.poke()
+      })
+    }
+    const toDevice = (t.stage === 'data') === (t.data !== null)
+    // The status stage runs against the data; without data it comes from the device.
+    const out = t.stage === 'status' && t.length === 0 ? false : toDevice
+    if (bus.stalled(0, out)) return this.#fail('was refused')
+    if (!bus.armed(0, out)) return
+    const bytes = out ? this.#nextOut(t) : bus.length(0, false)
+    bus.transact(out ? bytes.length : bytes, () => {
+      if (out) bus.putOut(0, bytes)
+      else this.#gotIn(t, bus.takeIn(0))
+      this.#nextStage(t, out)
+      this.poke()
+    })
+  }
+
+  #nextOut(t) {
+    if (t.stage === 'status') return new Uint8Array(0)
+    return t.data.slice(t.sent, t.sent + PACKET)
+  }
+
+  #gotIn(t, data) {
+    t.short = data !== null && data.length < PACKET
+    if (t.stage === 'data' && data !== null) t.got.push(...data)
+  }
+
+  #nextStage(t, out) {
+    if (t.stage === 'status') {
+      this.deadline.cancel()
+      this.transfers.shift()
+      t.then(Uint8Array.from(t.got))
+      return
+    }
+    if (out) t.sent += PACKET
+    const over = out ? t.sent >= t.length : t.short || t.got.length >= t.length
+    if (!over) return
+    t.stage = 'status'
+    this.bus.setToggle(0, !out, 1)
+  }
+
+  #fail(how) {
+    this.deadline.cancel()
+    const t = this.transfers.shift()
+    this.failed.push(`request ${t.packet.map((b) => b.toString(16).padStart(2, '0')).join(' ')} ${how}`)
+    t.then(null)
+    this.poke()
+  }
+
+  // ---- attach and enumerate --------------------------------------------------------------------------
+
+  #after(nanos, then) {
+    this.later = then
+    this.timer.schedule(nanos)
+  }
+
+  #watchPullup() {
+    const { usb } = this
+    const write = usb.writeUint32.bind(usb)
+    let pulled = false
+    usb.writeUint32 = (offset, value) => {
+      write(offset, value)
+      const up = !!(usb.sieCtrl & PULLUP) && !!(usb.mainCtrl & CONTROLLER_ON)
+      if (up && !pulled) this.#attach()
+      pulled = up
+    }
+    usb.onUSBEnabled = undefined
+    usb.onResetReceived = () => {
+      if (this.state === 'reset') this.#after(DEBOUNCE_NS, () => this.#enumerate())
+    }
+    this.isPulled = () => pulled
+  }
+
+  #attach() {
+    if (!this.plugged) return
+    this.state = 'reset'
+    this.device = {}
+    this.#after(DEBOUNCE_NS, () => {
+      this.usb.sieStatus &= ~SUSPENDED
+      this.usb.sieStatus |= BUS_RESET | CONNECTED
+      this.usb.sieStatusUpdated()
+    })
+  }
+
+  #enumerate() {
+    this.state = 'addressing'
+    this.#descriptor(DEVICE, 0, 18, () =>
+      this.request(0, SET_ADDRESS, ADDRESS, 0, [], () =>
+        this.#descriptor(DEVICE, 0, 18, (device) =>
+          this.#descriptor(CONFIGURATION, 0, 9, (head) => {
+            if (device === null || head === null) return
+            const length = head[2] | (head[3] << 8)
+            this.#descriptor(CONFIGURATION, 0, length, (all) => this.#configure(device, all))
+          }),
+        ),
+      ),
+    )
+  }
+
+  #descriptor(kind, index, length, then) {
+    this.request(IN, GET_DESCRIPTOR, (kind << 8) | index, kind === STRING ? 0x409 : 0, length, then)
+  }
+
+  #configure(device, all) {
+    if (all === null) return
+    const word = (at) => device[at] | (device[at + 1] << 8)
+    this.device = { vendor: word(8), product: word(10), release: word(12), address: this.usb.addrEndp & 0x7f }
+    this.device.configuration_bytes = all.length
+    for (let at = 0; at < all.length && all[at] > 0; at += all[at]) {
+      if (all[at + 1] !== ENDPOINT_DESCRIPTOR || (all[at + 3] & 3) !== BULK) continue
+      this.device[all[at + 2] & IN ? 'in' : 'out'] = all[at + 2] & 15
+    }
+    const names = { manufacturer: device[14], name: device[15], serial: device[16] }
+    for (const [key, index] of Object.entries(names)) {
+      if (index === 0) continue
+      this.#descriptor(STRING, index, 255, (text) => {
+        if (text !== null) this.device[key] = Buffer.from(text.subarray(2, text[0])).toString('utf16le')
+      })
+    }
+    this.request(0, SET_CONFIGURATION, all[5], 0, [], () => {
+      this.bus.setToggle(this.device.in, false, 0)
+      this.bus.setToggle(this.device.out, true, 0)
+      this.state = 'configured'
+      this.#tellLines()
+    })
+  }
+
+  #tellLines() {
+    if (this.open) {
+      const coding = [...u16(115200 & 0xffff), ...u16(115200 >>> 16), 0, 0, 8]
+      this.request(TO_INTERFACE, SET_LINE_CODING, 0, 0, coding)
+    }
+    this.request(TO_INTERFACE, SET_CONTROL_LINE_STATE, this.open ? DTR | RTS : 0, 0, [])
+  }
+}

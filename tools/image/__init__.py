@@ -1,0 +1,1 @@
+"""What is made of a linked firmware image, and what is checked on it."""

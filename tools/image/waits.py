@@ -1,0 +1,53 @@
+"""Waits without a bound, looked for in a port's C source.
+
+Every loop on a register goes through the helpers of wait.h. Elsewhere a `while` or `do` is refused whatever
+it waits for, and so is a `for` whose condition reads a register or is missing, but for the one after a reset
+was asked for.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+HELPERS = "wait.h"
+REGISTERS = "rp2040_regs.h"
+AFTER_RESET = "system_reset"
+COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
+LOOP = re.compile(r"\b(while|do|for)\b\s*(\(|\{)")
+DEFINED = re.compile(r"^#define (\w+)(?:\(\w+\))?\s+(?:REG32|\(\*)", re.M)
+
+
+def unbounded(port: Path) -> list[str]:
+    """One line for each loop that is not allowed."""
+    registers = set(DEFINED.findall((port / REGISTERS).read_text(encoding="utf-8")))
+    wrong = []
+    for path in sorted(port.glob("*.[ch]")):
+        if path.name != HELPERS:
+            text = COMMENT.sub(lambda m: re.sub(r"[^\n]", " ", m.group()), path.read_text(encoding="utf-8"))
+            wrong += [f"{path.name}:{line}: {why}" for line, why in loops(text, registers)]
+    return wrong
+
+
+def loops(text: str, registers: set[str]) -> list[tuple[int, str]]:
+    found = []
+    for match in LOOP.finditer(text):
+        line = text.count("\n", 0, match.start()) + 1
+        if match.group(1) != "for":
+            found.append((line, f"a {match.group(1)} loop; waits go through {HELPERS}"))
+            continue
+        condition = parenthesis(text, match.end() - 1).split(";")[1]
+        if not condition.strip() and f"void {AFTER_RESET}(void)" not in text[: match.start()].rsplit("\n}", 1)[-1]:
+            found.append((line, "a for loop without an end"))
+        elif used := registers & set(re.findall(r"\w+", condition)):
+            found.append((line, f"a for loop that waits for {min(used)}; waits go through {HELPERS}"))
+    return found
+
+
+def parenthesis(text: str, start: int) -> str:
+    depth = 0
+    for at in range(start, len(text)):
+        depth += (text[at] == "(") - (text[at] == ")")
+        if depth == 0:
+            return text[start + 1 : at]
+    return text[start + 1 :]
