@@ -150,6 +150,16 @@ def test_the_command_writes_table_json_and_picture(tmp_path, counts, capsys) -> 
     assert (tmp_path / "out/front.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_whole_rounds_have_a_table_of_their_own(tmp_path, counts, capsys) -> None:
+    for core in counts["cores"].values():
+        core["kernels"]["whole frame"] = {"at rest": [{w: 7 + k for w in front.COUNTED} for k in range(3)]}
+    path = tmp_path / "counts.json"
+    path.write_text(json.dumps(counts))
+    assert main(["bench", "kernels", "--frames", "100", "--steps", "20", "--restarts", "1", "--counts", str(path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "| whole frame, at rest | 7, 7 | 8, 8 | 9, 9 | 7, 7 | 8, 8 | 9, 9 |" in lines
+
+
 def test_bench_alone_is_kernels(capsys) -> None:
     assert main(["bench", "--json", "--frames", "100", "--steps", "20", "--restarts", "1"]) == 0
     facts = json.loads(capsys.readouterr().out)

@@ -89,7 +89,18 @@ def facts(outcome: Outcome, counts: Facts | None) -> Facts:
         "budget_share": limit.BUDGET_SHARE,
         "cores": {key: {word: core[word] for word in ("title", "cycles_by")} for key, core in cores.items()},
         "variants": variants,
+        "scenes": {key: _scenes(core["kernels"], outcome) for key, core in cores.items()},
         "exceptions": exceptions(outcome),
+    }
+
+
+def _scenes(counted: Facts, outcome: Outcome) -> Facts:
+    """What a board does around the kernel: title to a row for each kind of weights."""
+    return {
+        f"{title}, {scene}": rows
+        for title, scenes in counted.items()
+        if title not in outcome.variants
+        for scene, rows in scenes.items()
     }
 
 
@@ -125,9 +136,22 @@ def table(all_facts: Facts) -> str:
         lines += ["", f"## Weights: {weights}", "", *_one_table(all_facts, weights)]
     lines += ["", f"## Beyond 1/{round(1 / all_facts['budget_share'])} of an ADC step at 1 N", ""]
     lines += [f"* {line}" for line in all_facts["exceptions"]] or ["None."]
+    if all_facts["scenes"]:
+        lines += ["", "## Whole rounds on the boards: cycles, longest", "", *_scene_table(all_facts)]
     for core in all_facts["cores"].values():
         lines += ["", f"{core['title']}: {core['cycles_by']}."]
     return "\n".join([*lines, ""])
+
+
+def _scene_table(all_facts: Facts) -> list[str]:
+    cores, scenes = all_facts["cores"], all_facts["scenes"]
+    weights = list(WEIGHT_NAMES.values())
+    head = ["scene", *(f"{core['title']}, {w}" for core in cores.values() for w in weights)]
+    rows = [head, ["---"] * len(head)]
+    for scene in next(iter(scenes.values())):
+        cells = (row for key in cores for row in scenes[key][scene])
+        rows.append([scene, *(f"{row['cycles']}, {row['cycles_max']}" for row in cells)])
+    return ["| " + " | ".join(row) + " |" for row in rows]
 
 
 def _one_table(all_facts: Facts, weights: str) -> list[str]:
