@@ -142,20 +142,3 @@ export class DeviceTime {
     }
   }
 }
-
-const ROSC = 0x40060
-const RANDOMBIT = 0x1c
-
-/** The ring oscillator's random bit, which rp2040js leaves at 1: the same series in the same boot of every run. */
-export function installRandomBit(mcu, seed) {
-  let state = (0x9e3779b9 * (seed + 1)) >>> 0
-  const rosc = mcu.peripherals[ROSC]
-  const read = rosc.readUint32.bind(rosc)
-  rosc.readUint32 = (offset) => {
-    if (offset !== RANDOMBIT) return read(offset)
-    state ^= state << 13
-    state ^= state >>> 17
-    state ^= state << 5
-    return state & 1
-  }
-}

@@ -1,16 +1,13 @@
 // One emulated Pico: the chip with an image in its flash, run instruction by instruction in emulated time.
 import { ConsoleLogger, LogLevel, RP2040 } from 'rp2040js'
 
-import { correctCore, DeviceTime, execute, installRandomBit, wakes } from './faults.mjs'
-import { FlashLife, installRom } from './rom.mjs'
+import { correctCore, DeviceTime, execute, wakes } from './faults.mjs'
 
 const FLASH_BYTES = 2 * 1024 * 1024 // of a Pico
 const BOOT2_BYTES = 0x100
 const BOOT2_AT = 0x20041f00 // where the boot ROM copies the first 256 bytes of flash, and jumps to
 const SRAM = 0x20000000
 const REASON_TIMER = 1
-const BRANCH_TO_ITSELF = 0xe7fe
-const HUNG_AT = 0x20041ff0 // behind the stack that boot2 used
 
 /** CRC-32 as the boot ROM checks it over boot2: polynomial 0x04C11DB7, MSB first, no final inversion. */
 function bootCrc(bytes) {
@@ -40,7 +37,6 @@ export class Machine {
     this.attach = attach
     this.flash = new Uint8Array(FLASH_BYTES).fill(0xff)
     this.flash.set(image)
-    this.life = new FlashLife()
     this.boots = 0
     this.watchdogResets = 0
     this.instructions = 0
@@ -67,11 +63,8 @@ export class Machine {
   /** Run until the emulated time, or until nothing more will happen while time is held. */
   runUntil(nanos) {
     while (this.nanos < nanos) {
-      if (this.powerCut) this.powerCycle()
       if (this.resetAsked !== null) this.#reset()
-      if (this.inLoader) {
-        this.mcu.clock.tick(nanos - this.nanos)
-      } else if (this.mcu.core.waiting) {
+      if (this.mcu.core.waiting) {
         if (!this.#sleep(nanos)) return
       } else {
         this.#work(nanos)
@@ -79,17 +72,10 @@ export class Machine {
     }
   }
 
-  /** The program's main loop is caught for good; its interrupts go on. */
-  hang() {
-    this.mcu.writeUint16(HUNG_AT, BRANCH_TO_ITSELF)
-    this.mcu.core.waiting = false
-    this.mcu.core.PC = HUNG_AT
-  }
-
   #work(nanos) {
     const { core, clock } = this.mcu
     let instructions = 0
-    while (!core.waiting && clock.nanos < nanos && !this.stopped) {
+    while (!core.waiting && clock.nanos < nanos && this.resetAsked === null) {
       clock.tick(execute(core) * this.nanosPerCycle)
       instructions++
     }
@@ -102,7 +88,7 @@ export class Machine {
     while (!wakes(core)) {
       if (clock.nextAlarm === null && this.time.held) return false
       const left = nanos - clock.nanos
-      if (left <= 0 || this.stopped) return true
+      if (left <= 0 || this.resetAsked !== null) return true
       const asleep = clock.nextAlarm === null ? left : Math.min(left, clock.nanosToNextAlarm)
       this.sleptNanos += asleep
       clock.tick(asleep)
@@ -137,26 +123,15 @@ export class Machine {
     mcu.logger = new ConsoleLogger(LogLevel.Error, true)
     mcu.flash.set(this.flash)
     correctCore(mcu.core)
-    installRandomBit(mcu, this.boots)
-    installRom(mcu, this.life, {
-      onPowerCut: () => (this.powerCut = this.stopped = true),
-      onLoader: () => (this.inLoader = this.stopped = true),
-    })
     this.mcu = mcu
     this.time = new DeviceTime(mcu)
     this.worldBefore = worldNanos
     this.boots++
-    this.resetAsked = null // the watchdog's reason
-    this.powerCut = false
-    this.inLoader = false
-    this.stopped = false // one of the three
+    this.resetAsked = null
     this.nanosPerCycle = 1e9 / mcu.clkSys
     mcu.addClockListener((hz) => (this.nanosPerCycle = 1e9 / hz))
     const watchdog = mcu.peripherals[0x40058]
-    watchdog.onWatchdogTrigger = () => {
-      this.resetAsked = watchdog.reason || REASON_TIMER
-      this.stopped = true
-    }
+    watchdog.onWatchdogTrigger = () => (this.resetAsked = watchdog.reason || REASON_TIMER)
     this.#enterBoot2()
     this.attach(this)
   }

@@ -6,8 +6,7 @@
 // FD is the open master side of a pty, non-blocking; PATH is the name of its other side, to be told.
 // Like the posix board this writes "pty PATH" once the port can be opened, and "end" once the tape is played and
 // all of it handed over; "run" on stdin ends a hold, the end of stdin ends the process. More lines for stdin:
-//   [@SECONDS] VERB   now, or at a time of the sensors' world: stop reading, go on reading, unplug, plug, hang,
-//                     cut power, cut power in flash write N (counted from now)
+//   [@SECONDS] VERB   stop reading, go on reading, unplug, plug, cut power: now, or at a time of the sensors' world
 //   counters          answers "counters JSON"
 import fs from 'node:fs'
 import { parseArgs } from 'node:util'

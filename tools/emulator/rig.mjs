@@ -58,13 +58,10 @@ export class Rig {
       'go on reading': () => (this.reading = true),
       unplug: () => this.usb.setPlugged((this.plugged = false)),
       plug: () => this.usb.setPlugged((this.plugged = true)),
-      'cut power': () => this.machine.powerCycle(),
-      hang: () => this.machine.hang(),
-    }
-    const write = verb.match(/^cut power in flash write ([0-9]+)$/)
-    if (write !== null) {
-      this.machine.life.cutAt = this.machine.life.writes + Number(write[1])
-      return
+      'cut power': () => {
+        this.sensors.powerCycle()
+        this.machine.powerCycle()
+      },
     }
     if (!(verb in verbs)) throw new Error(`no verb ${verb}: expected one of ${Object.keys(verbs).join(', ')}`)
     verbs[verb]()
@@ -78,8 +75,6 @@ export class Rig {
       world_s: machine.worldNanos / 1e9,
       boots: machine.boots,
       watchdog_resets: machine.watchdogResets,
-      in_loader: machine.inLoader,
-      flash: { erases: machine.life.erases, programs: machine.life.programs, breaches: machine.life.breaches },
       instructions: machine.instructions,
       slept: machine.sleptNanos / Math.max(1, machine.nanos),
       sensors: this.sensors.counters(),
@@ -89,8 +84,6 @@ export class Rig {
 
   /** After each power-up and reset of the chip. */
   #attach(machine) {
-    if (machine.boots > 1 && machine.watchdogResets === this.resetsSeen) this.sensors.powerCycle()
-    this.resetsSeen = machine.watchdogResets
     this.sensors.wire(machine.mcu, () => machine.worldNanos)
     const spi = machine.mcu.spi[0]
     const transmit = spi.onTransmit
