@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
-from image import boot2, stack, symbols, uf2, waits
+from image import boot2, stack, symbols, uf2, waits  # noqa: E402
 
 PORT = ROOT / "firmware/port/rp2040"
 
