@@ -24,6 +24,9 @@ NEEDED = {
     "the emulator": (ROOT / "tools/node_modules/rp2040js", "tools/emulator/prepare"),
     "the emulated sensors": (ROOT / "build/emulator/sensors.wasm", "tools/emulator/prepare"),
 }
+PAGE = 256
+SECTOR = 4096
+RECORDS = SECTOR // PAGE - 1
 PATIENCE_S = 60  # of wall clock, for what takes a few ms of the board's time
 WORLD = "name = 'rest'\nseed = 1\nfingers = 1\n[[step]]\ndo = 'rest'\nseconds = 600\n"
 
@@ -93,31 +96,33 @@ def test_saved_settings_are_in_force_after_power_was_off(pico: Pico) -> None:
     assert pico.boot_id() != first
 
 
-def test_a_power_cut_while_saving_leaves_the_old_settings_or_the_new(pico: Pico) -> None:
+def cut_at_each(pico: Pico, cuts: tuple[int, ...], saved: int) -> None:
+    """Power fails at each of these bytes of a save; every time the old settings or the new ones are there."""
+    for cut in cuts:
+        boots = pico.counters()["boots"]
+        pico.save_with_cut(1000 + cut, cut)
+        pico.until(lambda facts, before=boots: facts["boots"] == before + 1)
+        pico.up(boots + 1)
+        found = pico.hand.setting(Setting.IDLE_PERIOD_MS)
+        assert found in (saved, 1000 + cut), cut
+        saved = found
+
+
+def test_a_power_cut_while_a_record_is_written_leaves_the_old_settings_or_the_new(pico: Pico) -> None:
     pico.hand.set_setting(Setting.IDLE_PERIOD_MS, 20)
     pico.hand.save_settings()
-    boots, old = 1, 20
-    # 14 records fill the sector; the next save erases the other one and moves there.
-    for value in range(21, 21 + 13):
+    cut_at_each(pico, (0, 1, 15, 16, 65, 66, PAGE - 1), 20)
+    assert pico.counters()["flash"]["erases"] == 1
+
+
+def test_a_power_cut_while_the_sector_changes_leaves_the_old_settings_or_the_new(pico: Pico) -> None:
+    for value in range(20, 20 + RECORDS):  # the first sector is full then
         pico.hand.set_setting(Setting.IDLE_PERIOD_MS, value)
         pico.hand.save_settings()
-        old = value
-    page, sector = 256, 4096
-    for cut in (0, 1, 12, page - 1, page, page + 1, 2 * page - 1, page + 1000, sector, sector + 1, sector + page):
-        new = 1000 + cut
-        before = pico.counters()["flash"]["bytes"]
-        pico.save_with_cut(new, cut)
-        time.sleep(0.2)
-        facts = pico.until(lambda facts, b=boots: facts["boots"] > b or facts["flash"]["bytes"] - before >= page)
-        if facts["boots"] > boots:
-            boots += 1
-        pico.up(boots)
-        if facts["boots"] == 1 + (boots - 1) and facts["flash"]["bytes"] - before >= page and cut >= page:
-            pico.board.say("cut power after 0 flash bytes")
-        found = pico.hand.setting(Setting.IDLE_PERIOD_MS)
-        assert found in (old, new)
-        old = found
-    assert pico.counters()["flash"]["erases"] >= 2
+    assert pico.counters()["flash"]["erases"] == 1
+    cuts = (0, 1, SECTOR - 1, SECTOR, SECTOR + 100, SECTOR + PAGE, SECTOR + PAGE + 10, SECTOR + 2 * PAGE - 1)
+    cut_at_each(pico, cuts, 20 + RECORDS - 1)
+    assert pico.counters()["flash"]["erases"] == 1 + len(cuts)
 
 
 def test_the_loader_is_entered_by_command_once_the_reply_is_out(pico: Pico) -> None:
