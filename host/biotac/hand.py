@@ -221,6 +221,14 @@ class Hand:
         """Change a setting until the next reboot; refused while streaming."""
         self._ask(wire.SetSetting(self._next_req_id(), setting, value), wire.SettingValue)
 
+    def save_settings(self) -> None:
+        """Keep the settings in force over reboots. Not while streaming: the board loses slots meanwhile."""
+        self._command(wire.SaveSettings(self._next_req_id()))
+
+    def reboot_bootloader(self) -> None:
+        """Send the board into its loader; it goes away and comes back as a drive."""
+        self._command(wire.RebootBootloader(self._next_req_id(), wire.BOOTLOADER_MAGIC))
+
     def settings(self) -> dict[wire.Setting, int]:
         """All settings."""
         return {setting: self.setting(setting) for setting in wire.Setting}

@@ -131,7 +131,10 @@ export class Machine {
     this.nanosPerCycle = 1e9 / mcu.clkSys
     mcu.addClockListener((hz) => (this.nanosPerCycle = 1e9 / hz))
     const watchdog = mcu.peripherals[0x40058]
-    watchdog.onWatchdogTrigger = () => (this.resetAsked = watchdog.reason || REASON_TIMER)
+    watchdog.onWatchdogTrigger = () => {
+      this.resetAsked = watchdog.reason || REASON_TIMER
+      watchdog.timer.enable = false // published: it fires again and again at this instant, and time stops
+    }
     this.#enterBoot2()
     this.attach(this)
   }

@@ -1,5 +1,6 @@
 // The whole rig: a machine, its sensors, the USB host and the port, and what a test may do to them.
 import { Machine } from './machine.mjs'
+import { Board, BootRom } from './rom.mjs'
 import { Sensors } from './sensors.mjs'
 import { UsbHost } from './usb.mjs'
 
@@ -14,6 +15,8 @@ export class Rig {
     this.events = [] // [world ns, verb], sorted
     this.sensors = new Sensors(wasm, tape, serials)
     this.lossless = lossless
+    this.board = new Board()
+    this.loaders = 0 // how often the program left for the UF2 loader
     this.machine = new Machine(image, (machine) => this.#attach(machine))
   }
 
@@ -36,6 +39,10 @@ export class Rig {
       while (this.events.length > 0 && this.events[0][0] <= world) this.act(this.events.shift()[1])
       const next = this.events.length > 0 && !this.machine.time.held ? this.events[0][0] - world : Infinity
       this.machine.runUntil(Math.min(end, this.machine.nanos + next))
+      if (this.powerFailed) {
+        this.powerFailed = false
+        this.act('cut power')
+      }
       if (this.still) return
     }
   }
@@ -56,12 +63,20 @@ export class Rig {
     const verbs = {
       'stop reading': () => (this.reading = false),
       'go on reading': () => (this.reading = true),
+      // A main loop that nothing wakes any more: the watchdog's business.
+      'lose interrupts': () => (this.machine.mcu.core.enabledInterrupts = 0),
+      'touch at 1200 baud': () => this.usb.touch(1200),
       unplug: () => this.usb.setPlugged((this.plugged = false)),
       plug: () => this.usb.setPlugged((this.plugged = true)),
       'cut power': () => {
         this.sensors.powerCycle()
         this.machine.powerCycle()
       },
+    }
+    const cut = /^cut power after (\d+) flash bytes$/.exec(verb)
+    if (cut) {
+      this.board.cutAfter = Number(cut[1])
+      return
     }
     if (!(verb in verbs)) throw new Error(`no verb ${verb}: expected one of ${Object.keys(verbs).join(', ')}`)
     verbs[verb]()
@@ -77,6 +92,8 @@ export class Rig {
       watchdog_resets: machine.watchdogResets,
       instructions: machine.instructions,
       slept: machine.sleptNanos / Math.max(1, machine.nanos),
+      loaders: this.loaders,
+      flash: this.board.counters,
       sensors: this.sensors.counters(),
       usb: { state: usb.state, device: usb.device, failed: usb.failed, received: this.received, ...usb.bus.counters },
     }
@@ -84,6 +101,18 @@ export class Rig {
 
   /** After each power-up and reset of the chip. */
   #attach(machine) {
+    this.rom = new BootRom(machine.mcu, this.board, {
+      onLoader: () => {
+        this.loaders++
+        this.act('unplug') // the program's device is gone; the loader's own is not modelled
+      },
+      onCut: () => {
+        this.powerFailed = true
+        const { core } = machine.mcu // it does nothing more
+        core.PM = core.waiting = true
+        core.enabledInterrupts = 0
+      },
+    })
     this.sensors.wire(machine.mcu, () => machine.worldNanos)
     const spi = machine.mcu.spi[0]
     const transmit = spi.onTransmit

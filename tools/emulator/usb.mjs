@@ -58,6 +58,13 @@ export class UsbHost {
     if (this.state === 'configured') this.#tellLines()
   }
 
+  /** Some program opens the port at this rate and closes it again. */
+  touch(rate) {
+    this.request(TO_INTERFACE, SET_LINE_CODING, 0, 0, [...u16(rate & 0xffff), ...u16(rate >>> 16), 0, 0, 8])
+    this.request(TO_INTERFACE, SET_CONTROL_LINE_STATE, DTR | RTS, 0, [])
+    this.request(TO_INTERFACE, SET_CONTROL_LINE_STATE, 0, 0, [])
+  }
+
   /** Pull the cable, in whatever the wire was doing; true puts it back. */
   setPlugged(plugged) {
     if (plugged === this.plugged) return

@@ -18,8 +18,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from image import stack, waits  # noqa: E402
-from image.symbols import FLOAT_SYMBOL, LIBRARY_SYMBOL  # noqa: E402
+from image import stack, waits
+from image.symbols import FLOAT_SYMBOL, LIBRARY_SYMBOL
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PORT = ROOT / "firmware" / "port" / "rp2040"

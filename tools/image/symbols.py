@@ -9,4 +9,6 @@ FLOAT_SYMBOL = re.compile(
     r"|__(add|sub|mul|div|neg|eq|ne|lt|le|gt|ge|cmp|unord)[sdt]f[23]$|__(fix|float|extend|trunc)\w*[sd]f\w*$|_dtoa_r$"
 )
 # A heap, or text formatting that brings one.
-LIBRARY_SYMBOL = re.compile(r"_?(m|c|re)alloc(_r)?$|_?free(_r)?$|_?sbrk(_r)?$|_?v?(s|sn|f|as)?i?printf(_r)?$|_svfi?printf_r$|abort$|exit$")
+LIBRARY_SYMBOL = re.compile(
+    r"_?(m|c|re)alloc(_r)?$|_?free(_r)?$|_?sbrk(_r)?$|_?v?(s|sn|f|as)?i?printf(_r)?$|_svfi?printf_r$|abort$|exit$"
+)

@@ -12,7 +12,9 @@ import struct
 import sys
 from pathlib import Path
 
-from boot2 import CODE_BYTES, block
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from image.boot2 import CODE_BYTES, block
 
 FLASH = 0x10000000
 PAGE = 256

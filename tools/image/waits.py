@@ -1,6 +1,6 @@
 """Waits without a bound, looked for in a port's C source.
 
-Every loop on a register goes through the helpers of wait.h. Elsewhere a `while` or `do` is refused whatever
+Every loop on a register goes through the helpers of wait.h. Elsewhere a `while` is refused whatever
 it waits for, and so is a `for` whose condition reads a register or is missing, but for the one after a reset
 was asked for.
 """
@@ -14,7 +14,7 @@ HELPERS = "wait.h"
 REGISTERS = "rp2040_regs.h"
 AFTER_RESET = "system_reset"
 COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
-LOOP = re.compile(r"\b(while|do|for)\b\s*(\(|\{)")
+LOOP = re.compile(r"\b(while|for)\b\s*\(")
 DEFINED = re.compile(r"^#define (\w+)(?:\(\w+\))?\s+(?:REG32|\(\*)", re.M)
 
 
@@ -34,7 +34,7 @@ def loops(text: str, registers: set[str]) -> list[tuple[int, str]]:
     for match in LOOP.finditer(text):
         line = text.count("\n", 0, match.start()) + 1
         if match.group(1) != "for":
-            found.append((line, f"a {match.group(1)} loop; waits go through {HELPERS}"))
+            found.append((line, f"a while loop; waits go through {HELPERS}"))
             continue
         condition = parenthesis(text, match.end() - 1).split(";")[1]
         if not condition.strip() and f"void {AFTER_RESET}(void)" not in text[: match.start()].rsplit("\n}", 1)[-1]:

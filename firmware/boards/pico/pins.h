@@ -14,4 +14,7 @@
 #define PIN_SELECT_3 22
 #define PIN_SELECT_4 26
 
+// The Pico's own regulator, not on a board pin: high keeps it from its power-save mode, which ripples more.
+#define PIN_SMPS_PWM 23
+
 #endif

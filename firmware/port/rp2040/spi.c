@@ -29,6 +29,9 @@ void spi_start(void)
 {
     static const uint8_t selects[BT_MAX_FINGERS] = {PIN_SELECT_0, PIN_SELECT_1, PIN_SELECT_2, PIN_SELECT_3,
                                                     PIN_SELECT_4};
+    SIO_GPIO_OUT_SET = 1u << PIN_SMPS_PWM; // the sensors' supply: less than 20 mV of ripple
+    SIO_GPIO_OE_SET = 1u << PIN_SMPS_PWM;
+    output(PIN_SMPS_PWM, GPIO_FUNC_SIO);
     // High before they become outputs: no sensor may see a select on the way up.
     SIO_GPIO_OUT_SET = ALL_SELECTS;
     SIO_GPIO_OE_SET = ALL_SELECTS;

@@ -85,11 +85,8 @@ def find_tools(board: str, image: str | None) -> Tools:
         raise PortError(f"the emulator is not ready; run {folder / 'prepare'} once")
     path = Path(image) if image else root / "build" / "pico" / "biotac-pico.bin"
     if not path.is_file():
-        cure = (
-            "check the path"
-            if image
-            else f"build it: cmake -S {root / 'firmware'} --preset pico && cmake --build {path.parent}"
-        )
+        build = f"cmake -S {root / 'firmware'} --preset {board} && cmake --build {path.parent}"
+        cure = "check the path" if image else f"build it: {build}"
         raise PortError(f"no image at {path}; {cure}")
     return Tools(node, folder / "main.mjs", sensors, path)
 

@@ -1,0 +1,151 @@
+"""The Pico's own: settings in its flash over power cuts, the way into its loader, its watchdog. Emulated.
+
+The flash chip and the boot ROM are this project's models (tools/emulator/rom.mjs); silicon has not been tried.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import biotac
+from biotac import Setting
+from biotac import _wire as wire
+
+ROOT = Path(__file__).resolve().parents[2]
+NEEDED = {
+    "the image": (ROOT / "build/pico/biotac-pico.bin", "cmake -S firmware --preset pico && cmake --build build/pico"),
+    "the emulator": (ROOT / "tools/node_modules/rp2040js", "tools/emulator/prepare"),
+    "the emulated sensors": (ROOT / "build/emulator/sensors.wasm", "tools/emulator/prepare"),
+}
+PAGE = 256
+SECTOR = 4096
+RECORDS = SECTOR // PAGE - 1
+PATIENCE_S = 60  # of wall clock, for what takes a few ms of the board's time
+WORLD = "name = 'rest'\nseed = 1\nfingers = 1\n[[step]]\ndo = 'rest'\nseconds = 600\n"
+
+
+class Pico:
+    """An emulated board that is asked nothing but questions, and what may be done to it."""
+
+    def __init__(self, source: Path) -> None:
+        self.hand = biotac.open(f"emu:pico?source={source}&pace=fast")
+        self.board: Any = self.hand.link.board  # type: ignore[attr-defined]
+        self.hand.stop()
+        self.hand.link.release()
+
+    def counters(self) -> dict[str, Any]:
+        return self.board.counters()
+
+    def until(self, true: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        end = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end:
+            facts = self.counters()
+            if true(facts):
+                return facts
+            time.sleep(0.05)
+        raise AssertionError(f"it did not come to that: {facts}")
+
+    def up(self, boots: int) -> None:
+        """Booted so many times, and the port open."""
+        self.until(lambda facts: facts["boots"] == boots and facts["usb"]["state"] == "configured")
+        self.hand.ping()
+
+    def boot_id(self) -> int:
+        return self.hand._ask(wire.HelloRequest(self.hand._next_req_id(), 1), wire.Hello).boot_id
+
+    def save_with_cut(self, value: int, cut: int) -> None:
+        """Power fails once so many bytes of flash were erased or programmed."""
+        self.hand.set_setting(Setting.IDLE_PERIOD_MS, value)
+        self.board.say(f"cut power after {cut} flash bytes")
+        self.hand._send(wire.SaveSettings(self.hand._next_req_id()))
+
+
+@pytest.fixture
+def pico(tmp_path: Path) -> Iterator[Pico]:
+    for what, (path, cure) in NEEDED.items():
+        if not path.exists() or shutil.which("node") is None:
+            assert "BIOTAC_CI" not in os.environ, f"{what} is missing"
+            pytest.skip(f"{what} is missing: {cure}")
+    source = tmp_path / "rest.toml"
+    source.write_text(WORLD)
+    made = Pico(source)
+    yield made
+    wrong = made.counters()["flash"]["wrong"]
+    made.hand.close()
+    assert wrong == []  # no code was read from a flash that was busy, and the like
+
+
+def test_saved_settings_are_in_force_after_power_was_off(pico: Pico) -> None:
+    assert pico.hand.setting(Setting.IDLE_PERIOD_MS) == 100
+    pico.hand.set_setting(Setting.IDLE_PERIOD_MS, 250)
+    pico.hand.set_setting(Setting.FORCE_GAIN_X_NN, -7)
+    pico.hand.save_settings()
+    pico.hand.set_setting(Setting.IDLE_PERIOD_MS, 260)  # not saved
+    first = pico.boot_id()
+    pico.board.say("cut power")
+    pico.up(2)
+    assert pico.hand.setting(Setting.IDLE_PERIOD_MS) == 250
+    assert pico.hand.setting(Setting.FORCE_GAIN_X_NN) == -7
+    assert pico.boot_id() != first
+
+
+def cut_at_each(pico: Pico, cuts: tuple[int, ...], saved: int) -> None:
+    """Power fails at each of these bytes of a save; every time the old settings or the new ones are there."""
+    for cut in cuts:
+        boots = pico.counters()["boots"]
+        pico.save_with_cut(1000 + cut, cut)
+        pico.until(lambda facts, before=boots: facts["boots"] == before + 1)
+        pico.up(boots + 1)
+        found = pico.hand.setting(Setting.IDLE_PERIOD_MS)
+        assert found in (saved, 1000 + cut), cut
+        saved = found
+
+
+def test_a_power_cut_while_a_record_is_written_leaves_the_old_settings_or_the_new(pico: Pico) -> None:
+    pico.hand.set_setting(Setting.IDLE_PERIOD_MS, 20)
+    pico.hand.save_settings()
+    cut_at_each(pico, (0, 1, 15, 16, 65, 66, PAGE - 1), 20)
+    assert pico.counters()["flash"]["erases"] == 1
+
+
+def test_a_power_cut_while_the_sector_changes_leaves_the_old_settings_or_the_new(pico: Pico) -> None:
+    for value in range(20, 20 + RECORDS):  # the first sector is full then
+        pico.hand.set_setting(Setting.IDLE_PERIOD_MS, value)
+        pico.hand.save_settings()
+    assert pico.counters()["flash"]["erases"] == 1
+    cuts = (0, 1, SECTOR - 1, SECTOR, SECTOR + 100, SECTOR + PAGE, SECTOR + PAGE + 10, SECTOR + 2 * PAGE - 1)
+    cut_at_each(pico, cuts, 20 + RECORDS - 1)
+    assert pico.counters()["flash"]["erases"] == 1 + len(cuts)
+
+
+def test_the_loader_is_entered_by_command_once_the_reply_is_out(pico: Pico) -> None:
+    pico.hand.reboot_bootloader()
+    facts = pico.until(lambda facts: facts["loaders"] == 1)
+    assert facts["usb"]["state"] == "detached"
+    assert facts["watchdog_resets"] == 0
+
+
+def test_the_loader_is_entered_by_a_touch_at_1200_baud(pico: Pico) -> None:
+    pico.board.say("touch at 1200 baud")
+    pico.until(lambda facts: facts["loaders"] == 1)
+
+
+def test_a_board_that_hangs_starts_again_as_another_boot(pico: Pico) -> None:
+    first = pico.boot_id()
+    pico.board.say("lose interrupts")
+    facts = pico.until(lambda facts: facts["watchdog_resets"] == 1)
+    assert facts["boots"] == 2
+    pico.up(2)
+    assert pico.boot_id() != first
+
+
+def test_the_flashs_number_is_the_boards_and_the_usb_serial(pico: Pico) -> None:
+    assert bytes(pico.hand.info.board_serial).hex() == "e6605838831f5b2c" + "00000000"
+    assert pico.counters()["usb"]["device"]["serial"] == "E6605838831F5B2C"

@@ -1,0 +1,113 @@
+"""tools/image: the second-stage boot's CRC, UF2, and the checks on an image, with inputs that must fail them."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+from image import boot2, stack, symbols, uf2, waits  # noqa: E402
+
+PORT = ROOT / "firmware/port/rp2040"
+
+
+def test_the_boot_crc_is_crc32_mpeg2() -> None:
+    assert boot2.crc32_mpeg2(b"123456789") == 0x0376E6E7  # catalogue of parametrised CRC algorithms
+    data = bytes(range(252))
+    # A CRC with nothing inverted at the end is zero over data and its own CRC, most significant byte first.
+    assert boot2.crc32_mpeg2(data + boot2.crc32_mpeg2(data).to_bytes(4, "big")) == 0
+    assert boot2.block(b"ab") == b"ab" + bytes(250) + boot2.crc32_mpeg2(b"ab" + bytes(250)).to_bytes(4, "little")
+    with pytest.raises(ValueError, match="253 bytes"):
+        boot2.block(bytes(253))
+
+
+def test_uf2_is_what_its_specification_says() -> None:
+    image = boot2.block(b"boot") + bytes(range(256)) + b"tail"
+    blocks = struct.iter_unpack("<8I476sI", uf2.uf2(image))
+    seen = b""
+    for k, (first, second, flags, at, size, number, count, family, data, last) in enumerate(blocks):
+        assert (first, second, last) == (0x0A324655, 0x9E5D5157, 0x0AB16F30)
+        assert (flags, family) == (0x2000, 0xE48BFF56)  # family id present: RP2040
+        assert (at, size, number, count) == (0x10000000 + 256 * k, 256, k, 3)
+        assert data[256:] == bytes(220)
+        seen += data[:256]
+    assert seen == image + bytes(252)
+
+
+def test_uf2_refuses_an_image_that_the_chip_would_not_start() -> None:
+    image = bytearray(boot2.block(b"boot") + b"program")
+    image[1] ^= 1
+    with pytest.raises(ValueError, match="second-stage boot"):
+        uf2.uf2(bytes(image))
+
+
+LISTING = """
+10000100 <main>:
+10000100:\tb5f0      \tpush\t{r4, r5, r6, r7, lr}
+10000102:\tb082      \tsub\tsp, #8
+10000104:\tf000 f800 \tbl\t10000110 <helper>
+10000108:\te7fa      \tb.n\t10000100 <main>
+
+10000110 <helper>:
+10000110:\tb510      \tpush\t{r4, lr}
+10000112:\tf000 f800 \tbl\t10000120 <__in_sram_veneer>
+10000116:\tbd10      \tpop\t{r4, pc}
+
+10000120 <__in_sram_veneer>:
+10000120:\tb401      \tpush\t{r0}
+10000122:\t4760      \tbx\tip
+
+20000000 <in_sram>:
+20000000:\t4798      \tblx\tr3
+"""
+
+
+def program(**pointers: tuple[str, ...]) -> stack.Program:
+    return stack.Program(stack.read_functions(LISTING.splitlines()), {"helper": 24}, pointers)
+
+
+def test_the_stack_is_that_of_the_deepest_chain() -> None:
+    depth, chain = program(in_sram=()).deepest("main")
+    assert (depth, chain) == (28 + 24 + 4, ("main", "helper", "__in_sram_veneer", "in_sram"))
+
+
+def test_what_cannot_be_bounded_is_refused() -> None:
+    with pytest.raises(stack.Unknown, match="in_sram calls through a pointer"):
+        program().deepest("main")
+    with pytest.raises(stack.Unknown, match="recursion: main -> helper"):
+        program(in_sram=("helper",)).deepest("main")
+
+
+def test_forbidden_symbols() -> None:
+    for name in ("__aeabi_fadd", "__aeabi_dmul", "__aeabi_i2d", "__divsf3"):
+        assert symbols.FLOAT_SYMBOL.match(name), name
+    for name in ("malloc", "_malloc_r", "free", "calloc", "printf", "snprintf", "_vfiprintf_r", "vsnprintf", "_sbrk"):
+        assert symbols.LIBRARY_SYMBOL.match(name), name
+    for name in ("__aeabi_ldivmod", "__aeabi_uidiv", "memcpy", "first_free", "bt_session_send", "print_font"):
+        assert not symbols.FLOAT_SYMBOL.match(name) and not symbols.LIBRARY_SYMBOL.match(name), name
+
+
+def test_the_port_waits_only_with_a_bound() -> None:
+    assert waits.unbounded(PORT) == []
+
+
+@pytest.mark.parametrize(
+    ("code", "why"),
+    [
+        ("void f(void)\n{\n    while (!(SPI0_SSPSR & SSPSR_RNE)) {\n    }\n}\n", "x.c:3: a while loop"),
+        ("void f(void)\n{\n    do {\n    } while (TIMER_TIMERAWL != 3);\n}\n", "x.c:4: a while loop"),
+        ("void f(void)\n{\n    for (; PLL_CS(b) == 0;) {\n    }\n}\n", "x.c:3: a for loop that waits for PLL_CS"),
+        ("void f(void)\n{\n    for (;;) {\n    }\n}\n", "x.c:3: a for loop without an end"),
+        ("void f(void)\n{\n    for (int k = 0; k < 9; k++) {\n    } // while (SPI0_SSPSR)\n}\n", None),
+    ],
+)
+def test_waits_are_found(tmp_path: Path, code: str, why: str | None) -> None:
+    (tmp_path / waits.REGISTERS).write_text((PORT / waits.REGISTERS).read_text())
+    (tmp_path / "x.c").write_text(code)
+    found = waits.unbounded(tmp_path)
+    assert (len(found) == 1 and found[0].startswith(why)) if why else found == []

@@ -1,0 +1,213 @@
+// What surrounds the program on a real chip and rp2040js has not: the boot ROM's functions, the flash chip's
+// own commands, and the ring oscillator's random bit. Modelled from the RP2040 data sheet (2.8.3, 2.17, 4.10) and
+// the W25Q16JV's. The ROM's calls are real calls, to two instructions: BKPT, which comes here, and BX LR.
+
+const FUNC_TABLE = 0x40
+const LOOKUP = 0x20
+const FIRST_STUB = 0x80
+const BKPT = 0xbe00
+const BX_LR = 0x4770
+const WFI_FOREVER = [0xbf30, 0xe7fd] // wfi; b back to it
+const THUMB = 1
+const XIP = 0x10000000
+const XIP_END = 0x14000000
+const SECTOR = 4096
+const PAGE = 256
+const ERASE_NS = 45e6 // typical; the data sheet allows 400 ms
+const PROGRAM_NS = 0.7e6
+const CYCLE_NS = 8
+
+const SSI = 0x18000
+const SSI_SSIENR = 0x08
+const SSI_SR = 0x28
+const SSI_DR0 = 0x60
+const SR_TFNF = 2
+const SR_RFNE = 8
+const IO_QSPI = 0x40018
+const IO_QSPI_SS_CTRL = 0x0c
+const OUTOVER_LOW = 2 << 8
+const OUTOVER = 3 << 8
+const ROSC = 0x40060
+const ROSC_RANDOMBIT = 0x1c
+const READ_UNIQUE_ID = 0x4b
+const UNIQUE_ID_DUMMIES = 4
+
+/** What outlives a power cycle, for the rig to keep. */
+export class Board {
+  constructor({ uniqueId = [0xe6, 0x60, 0x58, 0x38, 0x83, 0x1f, 0x5b, 0x2c], seed = 1 } = {}) {
+    this.uniqueId = uniqueId
+    this.random = seed
+    this.cutAfter = null // bytes erased or programmed until power fails
+    this.counters = { erases: 0, programs: 0, bytes: 0, wrong: [] }
+  }
+
+  randomBit() {
+    this.random ^= this.random << 13
+    this.random ^= this.random >>> 17
+    this.random ^= this.random << 5
+    return this.random & 1
+  }
+}
+
+export class BootRom {
+  /** onLoader(): the program asked for the UF2 loader. onCut(): power fails in the middle of a flash write. */
+  constructor(mcu, board, { onLoader, onCut }) {
+    this.mcu = mcu
+    this.board = board
+    this.onLoader = onLoader
+    this.onCut = onCut
+    this.readable = true // the flash, as memory
+    this.answer = []
+    this.command = null
+    this.#install()
+    this.#unreadable(false)
+    this.#flashInterface()
+    this.#randomBit()
+  }
+
+  #install() {
+    const names = ['IF', 'EX', 'FC', 'RE', 'RP', 'UB']
+    this.actions = [() => this.#lookup(), () => {}, () => this.#unreadable(true), () => {}]
+    this.actions.push(() => this.#erase(), () => this.#program(), () => this.#loader())
+    const words = new Uint16Array(0x200)
+    words[0x14 / 2] = FUNC_TABLE
+    words[0x18 / 2] = LOOKUP | THUMB
+    words.set([BKPT, BX_LR], LOOKUP / 2)
+    names.forEach((name, k) => {
+      const at = FIRST_STUB + 8 * k
+      words.set([name.charCodeAt(0) | (name.charCodeAt(1) << 8), at | THUMB], FUNC_TABLE / 2 + 2 * k)
+      words.set([BKPT | (k + 1), ...(name === 'UB' ? WFI_FOREVER : [BX_LR])], at / 2)
+    })
+    this.mcu.bootrom.set(new Uint32Array(words.buffer))
+    this.mcu.onBreak = (number) => this.actions[number]?.()
+  }
+
+  get #r() {
+    return this.mcu.core.registers
+  }
+
+  #wrong(what) {
+    const { wrong } = this.board.counters
+    if (wrong.length < 10) wrong.push(`${what} at ${(this.mcu.core.PC >>> 0).toString(16)}`)
+  }
+
+  #lookup() {
+    const code = this.#r[1] & 0xffff
+    let at = this.#r[0]
+    while (this.mcu.readUint16(at) !== 0 && this.mcu.readUint16(at) !== code) at += 4
+    this.#r[0] = this.mcu.readUint16(at) === 0 ? 0 : this.mcu.readUint16(at + 2)
+  }
+
+  // ---- flash ---------------------------------------------------------------------------------------
+
+  /** From leaving XIP on, until boot2 has set the interface up again, nothing may be read from flash. */
+  #unreadable(yes) {
+    const { mcu } = this
+    this.readable = !yes
+    // Assigned both ways, never deleted: an object that lost a property runs several times slower.
+    for (const name of ['readUint16', 'readUint32']) {
+      const read = Object.getPrototypeOf(mcu)[name]
+      mcu[name] = !yes
+        ? read
+        : (address) => {
+            if (address >>> 0 >= XIP && address >>> 0 < XIP_END) this.#wrong('flash read while it is no memory')
+            return read.call(mcu, address)
+          }
+    }
+  }
+
+  /** Bytes one by one, so that power can fail after any of them. False when it did. */
+  #change(at, bytes, value) {
+    const { board, mcu } = this
+    for (let k = 0; k < bytes; k++) {
+      if (board.cutAfter === 0) {
+        board.cutAfter = null
+        this.onCut()
+        return false
+      }
+      if (board.cutAfter !== null) board.cutAfter--
+      board.counters.bytes++
+      mcu.flash[at + k] = value(k)
+    }
+    return true
+  }
+
+  #allowed(at, bytes, unit, what) {
+    if (this.readable) this.#wrong(`${what} without leaving XIP`)
+    else if (!this.mcu.core.PM) this.#wrong(`${what} with interrupts on`)
+    else if (at % unit !== 0 || bytes % unit !== 0) this.#wrong(`${what} of ${bytes} bytes at ${at}`)
+    else return true
+    return false
+  }
+
+  #erase() {
+    const [at, bytes] = this.#r
+    if (!this.#allowed(at, bytes, SECTOR, 'erase')) return
+    this.board.counters.erases++
+    this.#spend((ERASE_NS * bytes) / SECTOR)
+    this.#change(at, bytes, () => 0xff)
+  }
+
+  #program() {
+    const [at, from, bytes] = this.#r
+    if (!this.#allowed(at, bytes, PAGE, 'program')) return
+    this.board.counters.programs++
+    this.#spend((PROGRAM_NS * bytes) / PAGE)
+    this.#change(at, bytes, (k) => this.mcu.flash[at + k] & this.mcu.readUint8(from + k))
+  }
+
+  #spend(nanos) {
+    this.mcu.core.owedCycles += Math.round(nanos / CYCLE_NS)
+  }
+
+  /** The serial interface by hand, as a program reads the unique number; and boot2's setting it up. */
+  #flashInterface() {
+    const { mcu } = this
+    const ssi = mcu.peripherals[SSI]
+    const read = ssi.readUint32.bind(ssi)
+    const write = ssi.writeUint32.bind(ssi)
+    let select = 0
+    ssi.readUint32 = (offset) => {
+      if (offset === SSI_SR) return SR_TFNF | (this.answer.length > 0 ? SR_RFNE : 0)
+      if (offset === SSI_DR0) return this.answer.shift() ?? 0
+      return read(offset)
+    }
+    ssi.writeUint32 = (offset, value) => {
+      write(offset, value)
+      if (offset === SSI_SSIENR && value === 1) this.#unreadable(false)
+      if (offset === SSI_DR0) this.answer.push((select & OUTOVER) === OUTOVER_LOW ? this.#byte(value & 0xff) : 0xff)
+    }
+    const pins = mcu.peripherals[IO_QSPI]
+    pins.readUint32 = (offset) => (offset === IO_QSPI_SS_CTRL ? select : 0)
+    pins.writeUint32 = (offset, value) => {
+      if (offset !== IO_QSPI_SS_CTRL) return
+      if ((value & OUTOVER) !== OUTOVER_LOW) this.command = null
+      select = value
+    }
+  }
+
+  #byte(value) {
+    if (this.command === null) {
+      this.command = { code: value, at: 0 }
+      return 0xff
+    }
+    const k = this.command.at++ - UNIQUE_ID_DUMMIES
+    return this.command.code === READ_UNIQUE_ID && k >= 0 ? (this.board.uniqueId[k] ?? 0xff) : 0xff
+  }
+
+  // ---- the rest ----------------------------------------------------------------------------------------
+
+  #randomBit() {
+    const rosc = this.mcu.peripherals[ROSC]
+    rosc.readUint32 = (offset) => (offset === ROSC_RANDOMBIT ? this.board.randomBit() : 0)
+  }
+
+  /** The program is gone: its interrupts and its watchdog are off, and the ROM's own USB is not modelled. */
+  #loader() {
+    const { core, peripherals } = this.mcu
+    core.PM = true
+    core.enabledInterrupts = 0
+    peripherals[0x40058].timer.enable = peripherals[0x40058].alarm.enable = false
+    this.onLoader()
+  }
+}
