@@ -20,6 +20,12 @@ SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 Answer = Callable[[int, bytes], bytes]
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Here and not in tests/hil: pytest asks only the outermost conftest files for options."""
+    parser.addoption("--rig", action="append", help="run tests/hil against this rig only; may be repeated")
+    parser.addoption("--port", help="a real board's port, for the rig 'real' of tests/hil")
+
+
 class ScriptedBoard:
     """The far end of a pty: hands every good frame to a function and writes what that returns."""
 

@@ -1,23 +1,52 @@
-"""The board under test. Today the posix process; the rig is a fixture so that boards can join."""
+"""Every test here runs against every rig of rigs/*.toml. --rig NAME picks one, --port names a real board."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
 import biotac
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from rig import Rig, all_rigs, in_ci, prepare
+
+RIGS = all_rigs()
+READY: dict[str, str | None] = {}
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    if "rig_name" in metafunc.fixturenames:
+        chosen = metafunc.config.getoption("--rig") or list(RIGS)
+        unknown = set(chosen) - set(RIGS)
+        if unknown:
+            raise pytest.UsageError(f"no rig {sorted(unknown)[0]}: expected one of {', '.join(RIGS)}")
+        metafunc.parametrize("rig_name", chosen, scope="session")
+
 
 @pytest.fixture
-def board() -> Iterator[Callable[[str], biotac.Hand]]:
-    """Opens simulated boards with a source; closes them after the test."""
-    hands: list[biotac.Hand] = []
+def rig(rig_name: str, request: pytest.FixtureRequest) -> Iterator[Rig]:
+    """The board under test; whatever was opened on it is closed after the test."""
+    port = request.config.getoption("--port")
+    facts = RIGS[rig_name]
+    if "{port}" in facts["port"] and port is None:
+        pytest.skip(f"{rig_name}: no --port was given, so there is no board to test")
+    if rig_name not in READY:
+        READY[rig_name] = prepare(facts)
+    why = READY[rig_name]
+    if why is not None:
+        if in_ci():
+            pytest.fail(f"{rig_name}: {why}")
+        pytest.skip(f"{rig_name}: {why}")
+    rig = Rig(rig_name, facts, port)
+    yield rig
+    rig.close()
 
-    def make(source: str) -> biotac.Hand:
-        hands.append(biotac.open(f"sim:{source}"))
-        return hands[-1]
 
-    yield make
-    for hand in hands:
-        hand.close()
+@pytest.fixture
+def board(rig: Rig) -> Callable[[str], biotac.Hand]:
+    """Opens the rig's board with a source to play."""
+    return rig.play

@@ -153,17 +153,11 @@ def test_device_time_and_slots_are_exact_over_a_minute(board) -> None:
         assert np.array_equal(t_us - t_us[0], 10_000 * np.arange(6000))
 
 
-def test_a_host_that_leaves_and_returns_finds_a_stopped_board(tmp_path: Path) -> None:
-    from biotac.link.sim_process import SimBoard
-    from biotac.sim.source import load_source
-
-    board = SimBoard(load_source("press.toml", seconds=60), pace=1.0, hold=False)
-    try:
-        with biotac.open(board.path) as hand:
-            hand.start()
-            assert len(hand.read(0.1)) == 10
-            hand._streaming = False  # as if this host had been killed: no STOP is sent
-        with biotac.open(board.path) as hand:
-            assert hand.status().streams == 0
-    finally:
-        board.close()
+def test_a_host_that_leaves_and_returns_finds_a_stopped_board(rig) -> None:
+    board = rig.on_a_pty("press.toml", pace=1.0)
+    with biotac.open(board.path) as hand:
+        hand.start()
+        assert len(hand.read(0.1)) == 10
+        hand._streaming = False  # as if this host had been killed: no STOP is sent
+    with biotac.open(board.path) as hand:
+        assert hand.status().streams == 0

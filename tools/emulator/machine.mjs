@@ -1,7 +1,7 @@
 // One emulated Pico: the chip with an image in its flash, run instruction by instruction in emulated time.
 import { ConsoleLogger, LogLevel, RP2040 } from 'rp2040js'
 
-import { correctCore, DeviceTime, wakes } from './faults.mjs'
+import { correctCore, DeviceTime, execute, wakes } from './faults.mjs'
 
 const FLASH_BYTES = 2 * 1024 * 1024 // of a Pico
 const BOOT2_BYTES = 0x100
@@ -64,23 +64,38 @@ export class Machine {
   runUntil(nanos) {
     while (this.nanos < nanos) {
       if (this.resetAsked !== null) this.#reset()
-      const { core, clock } = this.mcu
-      if (!core.waiting) {
-        const cycles = core.executeInstruction() + core.owedCycles
-        core.owedCycles = 0
-        this.instructions++
-        clock.tick(cycles * this.nanosPerCycle)
-      } else if (wakes(core)) {
-        core.waiting = false
-        core.interruptsUpdated = true
+      if (this.mcu.core.waiting) {
+        if (!this.#sleep(nanos)) return
       } else {
-        if (this.time.held && clock.nextAlarm === null) return
-        const left = nanos - clock.nanos
-        const asleep = clock.nextAlarm === null ? left : Math.min(left, clock.nanosToNextAlarm)
-        this.sleptNanos += asleep
-        clock.tick(asleep)
+        this.#work(nanos)
       }
     }
+  }
+
+  #work(nanos) {
+    const { core, clock } = this.mcu
+    let instructions = 0
+    while (!core.waiting && clock.nanos < nanos && this.resetAsked === null) {
+      clock.tick(execute(core) * this.nanosPerCycle)
+      instructions++
+    }
+    this.instructions += instructions
+  }
+
+  /** Sleep until something wakes the core; false when nothing ever will. */
+  #sleep(nanos) {
+    const { core, clock } = this.mcu
+    while (!wakes(core)) {
+      if (clock.nextAlarm === null && this.time.held) return false
+      const left = nanos - clock.nanos
+      if (left <= 0 || this.resetAsked !== null) return true
+      const asleep = clock.nextAlarm === null ? left : Math.min(left, clock.nanosToNextAlarm)
+      this.sleptNanos += asleep
+      clock.tick(asleep)
+    }
+    core.waiting = false
+    core.interruptsUpdated = true
+    return true
   }
 
   /** Power off and on again, at this instant: RAM is lost, flash stays. */

@@ -16,7 +16,8 @@ VERBS = (demo, list_ports, info, stream, record, check, sim, bench, version)
 
 EPILOG = """\
 A PORT is a device path (/dev/ttyACM0, COM3) or sim:SOURCE, a simulated board that plays a
-scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd).
+scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), or
+emu:pico?source=SOURCE, a Pico's flash image in an emulator that plays the same.
 
 exit codes: 0 done   1 check found a violation   2 unusable file or argument   3 port cannot be
 opened   4 no gateway on the port   5 firmware of another wire version   6 board lost

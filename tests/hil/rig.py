@@ -1,0 +1,83 @@
+"""A rig: a board with its surroundings, and what can be done to it. rigs/*.toml describe them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomllib
+
+import biotac
+from biotac.link.ports import start_board
+from biotac.link.sim_process import SimBoard
+from biotac.sim.source import load_source
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+
+
+@dataclass
+class Rig:
+    """One of rigs/*.toml, with what was opened on it during a test."""
+
+    name: str
+    facts: dict[str, Any]
+    port: str | None
+    opened: list[biotac.Hand | SimBoard] = field(default_factory=list)
+
+    def need(self, ability: str) -> None:
+        """Skip the test when this rig has not got the ability."""
+        why = self.facts.get("cannot", {}).get(ability)
+        if why is not None:
+            pytest.skip(f"{self.name}: {why}")
+
+    def open(self, source: str = "press.toml") -> biotac.Hand:
+        """Open the board; a rig that plays scenarios plays ``source``, which may carry ?options."""
+        path, _, options = source.partition("?")
+        port = self.facts["port"].format(source=path, options=options, port=self.port)
+        hand = biotac.open(port)
+        self.opened.append(hand)
+        return hand
+
+    def play(self, source: str) -> biotac.Hand:
+        """Open the board with ``source``, or skip when it cannot be played."""
+        self.need("scenarios")
+        return self.open(source)
+
+    def on_a_pty(self, source: str, *, pace: float) -> SimBoard:
+        """The board as ``biotac sim`` starts it; its time runs from the start."""
+        self.need("scenarios")
+        board = start_board(self.facts["board"], load_source(source, seconds=60), pace=pace)
+        board.release()
+        self.opened.append(board)
+        return board
+
+    def close(self) -> None:
+        for one in reversed(self.opened):
+            one.close()
+        self.opened.clear()
+
+
+def all_rigs() -> dict[str, dict[str, Any]]:
+    return {path.stem: tomllib.loads(path.read_text()) for path in sorted((HERE / "rigs").glob("*.toml"))}
+
+
+def prepare(facts: dict[str, Any]) -> str | None:
+    """Build what the rig needs; returns why it cannot be used, or None."""
+    missing = [tool for tool in facts.get("tools", []) if shutil.which(tool) is None]
+    if missing:
+        return f"{', '.join(missing)} missing; tools/test installs what this rig needs"
+    for words in facts.get("prepare", []):
+        done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
+        if done.returncode:
+            raise RuntimeError(f"{' '.join(words)} failed: {(done.stderr or done.stdout).strip()}")
+    return None
+
+
+def in_ci() -> bool:
+    return bool(os.environ.get("BIOTAC_CI"))

@@ -1,0 +1,128 @@
+"""The link to the host: enumeration, handshake, a host that stops reading, a cable pulled, power lost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac import _wire as wire
+
+BOARDS = {"posix": wire.Board.POSIX_SIM, "pico": wire.Board.PICO}
+# What a test of silicon would not forgive, and the emulator counts.
+BREACHES = ("toggle_errors", "available_not_last")
+
+
+def test_the_board_says_what_it_is(rig) -> None:
+    hand = rig.open()
+    if "board" in rig.facts:
+        assert hand.info.board == BOARDS[rig.facts["board"]]
+    assert hand.info.slot_hz == 4400
+    assert any(hand.info.board_serial)
+    for finger in hand.fingers:
+        info = hand.sensor_info(finger)
+        assert bytes(info.serial).startswith(b"BT")
+        assert info.sampling_hz == 4400
+
+
+def test_usb_enumerates_and_breaks_no_rule(rig) -> None:
+    rig.need("counters")
+    hand = rig.open("press.toml?fingers=5&seconds=0.5")
+    assert len(hand.read(10)) == 250
+    usb = hand.link.board.counters()["usb"]
+    assert usb["state"] == "configured"
+    assert usb["failed"] == []
+    assert {key: usb[key] for key in BREACHES} == dict.fromkeys(BREACHES, 0)
+    assert usb["device"]["address"] == 5  # as the host of the rig chose
+    assert usb["device"]["serial"]
+
+
+@pytest.mark.parametrize("fingers", range(1, 6))
+def test_every_slot_of_one_to_five_fingers_is_sampled_and_nothing_lost(board, fingers: int) -> None:
+    hand = board(f"press.toml?fingers={fingers}&seconds=1")
+    assert hand.fingers == list(range(fingers))
+    frames = hand.read(10)
+    status = hand.status()
+    assert (status.slots_late, status.messages_dropped, hand.stats.frames_lost) == (0, 0, 0)
+    for finger in range(5):
+        words = hand.sensor_status(finger)
+        assert words.words_good == (100 * 44 if finger < fingers else 0)
+        assert words.words_parity == words.words_error == 0
+        mine = frames[frames["finger"] == finger]
+        assert len(mine) == (100 if finger < fingers else 0)
+
+
+def test_the_bus_is_driven_by_the_data_sheets_rules(rig) -> None:
+    rig.need("counters")
+    hand = rig.open("press.toml?fingers=5&seconds=0.5")
+    hand.read(10)
+    bus = hand.link.board.counters()["sensors"]
+    assert bus["early_reads"] == [0] * 5
+    assert bus["misconfigured"] == 0
+    # Only sample commands may go to several at once; the last slot's is out when time ends.
+    assert bus["overlaps"] == 50 * 44 + 1
+
+
+def test_the_same_scenario_gives_the_same_bytes(board) -> None:
+    def played():
+        batch = board("press.toml?seconds=2").read_batch(10)
+        return batch.wire.tobytes(), batch.pac.tobytes()
+
+    assert played() == played()
+
+
+def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(rig) -> None:
+    rig.need("cable")
+    hand = rig.open("press.toml?fingers=5&seconds=2")
+    hand.link.board.plan(1.0, "stop reading")
+    hand.link.board.plan(1.5, "go on reading")
+    frames = hand.read(10)
+    status = hand.status()
+    assert status.messages_dropped > 0
+    assert hand.stats.frames_lost > 100  # half a second of five fingers, less what the ring holds
+    assert (hand.stats.crc_errors, hand.stats.other_errors) == (0, 0)
+    assert status.slots_late == 0  # sampling does not care
+    assert len(frames) + hand.stats.frames_lost == 5 * 200
+
+
+def test_a_cable_pulled_in_mid_frame_stops_the_stream_and_a_new_host_is_served(rig) -> None:
+    rig.need("cable")
+    hand = rig.open("press.toml?fingers=5&seconds=2")
+    hand.link.board.plan(1.2345, "unplug")
+    hand.link.board.plan(1.5, "plug")
+    frames = hand.read(10)
+    assert 90 * 5 < len(frames) < 125 * 5
+    assert hand.link.board.counters()["usb"]["state"] == "configured"
+    status = hand.status()
+    assert status.streams == 0
+    assert status.slots_late == 0
+    assert hand.sensor_status(4).words_good == 200 * 44
+
+
+def test_a_board_that_lost_power_is_another_boot(rig, tmp_path: Path) -> None:
+    rig.need("power")
+    board = rig.on_a_pty("press.toml", pace=0)
+    with biotac.open(board.path) as hand:
+        first = hand.info
+    board.say("cut power")
+    with biotac.open(board.path) as hand:
+        assert hand.info.boot_id != first.boot_id
+        assert hand.info.board_serial == first.board_serial
+    assert board.counters()["boots"] == 2
+
+
+def test_recorded_counts_give_the_same_results_as_the_simulated_board(board, shared_data: Path) -> None:
+    trial = shared_data / "robotic_finger" / "trial_15330.npz"
+    here = board(f"{trial}?seconds=20").read_batch(1000).wire
+    with biotac.open(f"sim:{trial}?seconds=20") as hand:
+        there = hand.read_batch(1000).wire
+    assert len(here) == len(there) == 2000
+    for field in set(wire_fields(here)) - {"t_us"}:  # boards do not start at the same microsecond
+        assert here[field].tobytes() == there[field].tobytes(), field
+
+
+def wire_fields(frames: np.ndarray) -> tuple[str, ...]:
+    assert frames.dtype.names is not None
+    return frames.dtype.names
