@@ -9,6 +9,10 @@
 
 #define ALL_FINGERS ((1u << BT_MAX_FINGERS) - 1)
 
+// The gap after the last property read, and the time a slow board takes from here until its alarm is set: an
+// alarm that is past by then would make the first slot late, and its frame's time with it.
+#define START_AHEAD_US (BT_GAP_US + 50)
+
 static const bt_flash flash = {
     .erase = port_flash_erase,
     .program = port_flash_program,
@@ -60,7 +64,7 @@ void bt_gateway_init(bt_gateway *gateway)
     gateway->round_open = false;
     gateway->link_was_up = false;
     // Absent sensors are read too: one that is plugged in later shows up by itself.
-    uint32_t start_us = port_now_us() + BT_GAP_US + 1;
+    uint32_t start_us = port_now_us() + START_AHEAD_US;
     bt_sampler_start(&gateway->sampler, ALL_FINGERS, start_us);
     port_alarm_at(start_us);
 }

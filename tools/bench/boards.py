@@ -79,7 +79,10 @@ def need() -> None:
         if shutil.which(tool) is None:
             raise Failed(f"{tool} is missing; install it: apt-get install {package}")
     BUILD.mkdir(parents=True, exist_ok=True)
-    command("npm", "ci", "--silent", "--prefix", HERE.parent)
+    installed, wanted = HERE.parent / "node_modules" / ".package-lock.json", HERE.parent / "package-lock.json"
+    # Only when it is out of date: tools/emulator, which shares it, may be running.
+    if not installed.is_file() or installed.stat().st_mtime < wanted.stat().st_mtime:
+        command("npm", "ci", "--silent", "--prefix", HERE.parent)
 
 
 def command(*words: object) -> str:
