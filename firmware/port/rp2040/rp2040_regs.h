@@ -19,9 +19,9 @@
 // ---- 2.4.8 core: NVIC, SCB
 #define NVIC_ISER REG32(0xE000E100u)
 #define NVIC_ICER REG32(0xE000E180u)
-#define NVIC_IPR0 REG32(0xE000E400u) // priorities of interrupts 0..3, the two upper bits of each byte
-#define NVIC_IPR1 REG32(0xE000E404u) // 4..7
-#define VTOR      REG32(0xE000ED08u)
+#define NVIC_IPR1                                                                                            \
+    REG32(0xE000E404u) // priorities of interrupts 4..7, the two upper bits of each byte; 0 first
+#define VTOR REG32(0xE000ED08u)
 
 // ---- 2.3.2 interrupts
 #define TIMER_IRQ_0 0

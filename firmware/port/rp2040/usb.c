@@ -37,7 +37,7 @@ static volatile bool suspended;
 static volatile bool dtr;
 static volatile bool touched;
 static volatile bool in_busy; // the controller holds a packet for the host
-static bool out_armed;
+static volatile bool out_armed;
 static bool last_was_full;
 static bool delimiter_due;
 static uint32_t in_toggle;
@@ -287,6 +287,8 @@ bool port_link_write(const uint8_t *data, size_t bytes)
         tx[head++ % TX_RING] = data[k];
     }
     set(&tx_head, head);
+    // The interrupt either sees the new bytes, or has left in_busy false by now; likewise when reading.
+    atomic_signal_fence(memory_order_seq_cst);
     if (!in_busy) {
         hold_off();
         send_next();
@@ -304,6 +306,7 @@ size_t port_link_read(uint8_t *data, size_t bytes)
         data[k] = rx[tail++ % RX_RING];
     }
     set(&rx_tail, tail);
+    atomic_signal_fence(memory_order_seq_cst);
     if (taken > 0 && !out_armed) {
         hold_off();
         receive_next();

@@ -1,0 +1,96 @@
+// Settings from the command through the gateway into flash, and back at the next boot.
+#include "rig.h"
+
+static uint8_t error;
+
+static bool take_reply(const uint8_t *data, size_t bytes)
+{
+    for (size_t k = 0; k < bytes; k++) {
+        if (bt_deframer_push(&host.deframer, data[k]) == BT_DEFRAMED_GOOD
+            && host.deframer.id == BT_REPLY_ID) {
+            error = host.deframer.buffer[1 + 2];
+        }
+    }
+    return true;
+}
+
+static uint8_t ask(uint8_t id, const void *payload, size_t bytes)
+{
+    uint8_t encoded[BT_ENCODED_MAX_BYTES];
+    fake_host_takes = take_reply;
+    error = 0xFF;
+    fake_host_sends(encoded, bt_frame_encode(id, payload, bytes, encoded));
+    bt_gateway_poll(&gateway);
+    return error;
+}
+
+static void set(uint8_t setting, int32_t value)
+{
+    uint8_t payload[BT_SET_SETTING_BYTES];
+    bt_msg_set_setting msg = {.req_id = 1, .setting = setting, .value = value};
+    bt_msg_set_setting_pack(&msg, payload);
+    (void)ask(BT_SET_SETTING_ID, payload, sizeof payload);
+    assert_int_equal(bt_settings_get(&gateway.session.settings, setting), value);
+}
+
+static uint8_t plain(uint8_t id)
+{
+    static const uint8_t req_id = 1;
+    return ask(id, &req_id, 1);
+}
+
+// Flash stays as it is, all else is lost.
+static void power_cycle(void)
+{
+    memset(&gateway, 0, sizeof gateway);
+    bt_gateway_init(&gateway);
+}
+
+static void saved_settings_are_in_force_after_the_next_boot(void **state)
+{
+    (void)state;
+    boot(START_NS);
+    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_BUSY);
+    assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
+    set(BT_SETTING_IDLE_PERIOD_MS, 250);
+    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_OK);
+    set(BT_SETTING_CONTACT_ENERGY_COUNT2, 77); // not saved
+    power_cycle();
+    assert_int_equal(bt_settings_get(&gateway.session.settings, BT_SETTING_IDLE_PERIOD_MS), 250);
+    assert_int_equal(gateway.session.idle_rounds, 25); // and the session works by it
+    assert_int_equal(bt_settings_get(&gateway.session.settings, BT_SETTING_CONTACT_ENERGY_COUNT2), 1000);
+}
+
+static void a_flash_that_takes_nothing_is_told(void **state)
+{
+    (void)state;
+    boot(START_NS);
+    assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
+    fake.flash_broken = true;
+    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_NOT_STORED);
+}
+
+static void a_board_without_a_loader_says_so(void **state)
+{
+    (void)state;
+    uint8_t payload[BT_REBOOT_BOOTLOADER_BYTES];
+    bt_msg_reboot_bootloader msg = {.req_id = 1, .magic = BT_BOOTLOADER_MAGIC};
+    bt_msg_reboot_bootloader_pack(&msg, payload);
+    boot(START_NS);
+    assert_int_equal(ask(BT_REBOOT_BOOTLOADER_ID, payload, sizeof payload), BT_ERROR_NOT_HERE);
+    fake.has_loader = true;
+    assert_int_equal(ask(BT_REBOOT_BOOTLOADER_ID, payload, sizeof payload), BT_ERROR_OK);
+    assert_int_equal(fake.reboots, 2);
+}
+
+#define T(test) cmocka_unit_test_setup(test, no_trouble)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(saved_settings_are_in_force_after_the_next_boot),
+        T(a_flash_that_takes_nothing_is_told),
+        T(a_board_without_a_loader_says_so),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
