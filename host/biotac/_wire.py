@@ -15,7 +15,7 @@ import numpy as np
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 1
-SCHEMA_HASH = 0x96B1C90A
+SCHEMA_HASH = 0xC6ACB7FF
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 INVALID_I16 = -(2**15)
@@ -70,6 +70,7 @@ class Board(IntEnum):
 
     POSIX_SIM = 1  # a process on a pty with emulated sensors
     PICO = 2  # Raspberry Pi Pico (RP2040)
+    LINUX_SBC = 3  # a Linux computer with the sensors on its own SPI bus (spidev)
 
 
 class FrameFlags(IntFlag):

@@ -18,7 +18,7 @@ EXAMPLE = "biotac info /dev/ttyACM0"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The port."""
-    parser.add_argument("port", metavar="PORT", help="device path or sim:SOURCE")
+    parser.add_argument("port", metavar="PORT", help="device path, spidev:BUS.DEVICE or sim:SOURCE")
 
 
 def run(args: argparse.Namespace) -> int:

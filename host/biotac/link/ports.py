@@ -68,6 +68,12 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
         sim = parse_sim(port, pace)
         source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
         return SimLink(port, source, pace=sim.pace)
+    if scheme == "spidev" and colon:
+        from .spidev_link import SpidevLink
+
+        return SpidevLink(port)
     if colon and os.sep not in port and not port.upper().startswith("COM") and len(scheme) > 1:
-        raise PortError(f"no kind of port is called {scheme!r}; expected a device path or sim:SOURCE")
+        raise PortError(
+            f"no kind of port is called {scheme!r}; expected a device path, spidev:BUS.DEVICE or sim:SOURCE"
+        )
     return SerialLink(port)
