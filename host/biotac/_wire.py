@@ -15,7 +15,7 @@ import numpy as np
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 2
-SCHEMA_HASH = 0xC9384ADE
+SCHEMA_HASH = 0x46FFF30F
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -73,6 +73,7 @@ class Board(IntEnum):
 
     POSIX_SIM = 1  # a process on a pty with emulated sensors
     PICO = 2  # Raspberry Pi Pico (RP2040)
+    LINUX_SBC = 3  # a Linux computer with the sensors on its own SPI bus (spidev)
 
 
 class FrameFlags(IntFlag):

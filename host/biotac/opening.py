@@ -12,7 +12,8 @@ from .link import Link, open_link
 def open(port: str | os.PathLike[str], *, pace: float = 0.0) -> Hand:
     """Open a board and shake hands.
 
-    ``port`` is a device path (``/dev/ttyACM0``, ``COM3``) or ``sim:SOURCE`` for a simulated board,
+    ``port`` is a device path (``/dev/ttyACM0``, ``COM3``), ``spidev:0.0,0.1`` for sensors on this computer's
+    own SPI bus, one BUS.DEVICE a finger, or ``sim:SOURCE`` for a simulated board,
     where SOURCE is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``), or
     ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the same.
     ``pace`` is for simulated and emulated boards: device seconds per second, 0 for as fast as this side reads.

@@ -101,7 +101,8 @@ def test_record_into_no_folder_is_refused(capsys, tmp_path: Path) -> None:
 @pytest.mark.parametrize("verb", ["info", "stream"])
 def test_an_unknown_port_exits_3(capsys, verb: str) -> None:
     assert "`biotac list`" in fails(capsys, 3, verb, "/dev/ttyNOWHERE7")
-    assert "expected a device path, sim:SOURCE or emu:pico" in fails(capsys, 3, verb, "telnet:1")
+    expected = "expected a device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico"
+    assert expected in fails(capsys, 3, verb, "telnet:1")
 
 
 def test_a_port_that_is_no_gateway_exits_4(capsys, scripted_board, monkeypatch) -> None:

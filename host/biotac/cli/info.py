@@ -18,7 +18,9 @@ EXAMPLE = "biotac info /dev/ttyACM0"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The port."""
-    parser.add_argument("port", metavar="PORT", help="device path, sim:SOURCE or emu:pico?source=SOURCE")
+    parser.add_argument(
+        "port", metavar="PORT", help="device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

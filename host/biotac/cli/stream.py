@@ -20,7 +20,9 @@ EXAMPLE = "biotac stream sim:press.toml --rate 5"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Port, time and rate."""
-    parser.add_argument("port", metavar="PORT", help="device path, sim:SOURCE or emu:pico?source=SOURCE")
+    parser.add_argument(
+        "port", metavar="PORT", help="device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE"
+    )
     parser.add_argument("--seconds", type=values.seconds, help="stop after this much device time")
     parser.add_argument(
         "--rate", type=values.rate, default=10.0, help="lines per second and finger (default 10; 0: all)"

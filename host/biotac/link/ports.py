@@ -90,8 +90,14 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
         sim = parse_sim(port, pace)
         source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
         return SimLink(port, start_board(sim.board, source, pace=sim.pace, image=sim.image))
+    if scheme == "spidev" and colon:
+        from .spidev_link import SpidevLink
+
+        return SpidevLink(port)
     if colon and os.sep not in port and not port.upper().startswith("COM") and len(scheme) > 1:
-        raise PortError(f"no kind of port is called {scheme!r}; expected a device path, sim:SOURCE or emu:pico")
+        raise PortError(
+            f"no kind of port is called {scheme!r}; expected a device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico"
+        )
     return SerialLink(port)
 
 

@@ -1,0 +1,201 @@
+// How spidev's bus differs from a microcontroller's, and what is done about it:
+// - It selects one sensor at a time. A word for several is sent to one after the other, so fingers sample
+//   not at once but one transfer apart; the 50 us run from the last of them.
+// - It raises the chip select after every call, and a property's bytes come within one period. The first word
+//   that is listened to after a property command therefore fetches all that a property can have.
+#include "sbc.h"
+
+#include "gateway.h"
+#include "port.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define PROPERTY_BYTES sizeof(((bt_msg_sensor_info *)NULL)->serial) // no property is longer
+#define PROPERTY_WORDS ((uint8_t)(PROPERTY_BYTES / 2))
+
+struct bt_sbc {
+    bt_gateway gateway;
+    void *python;
+    uint8_t devices; // bit mask of fingers that are wired
+    uint32_t boot_id;
+    uint32_t due_us;
+    uint8_t selected;
+    bool asked;    // the last word of the period before was a property command
+    bool unsent;   // the last word was for sensors that are not wired
+    uint8_t taken; // words of `ahead` that were given out
+    uint8_t ahead_words;
+    uint8_t ahead[PROPERTY_BYTES];
+};
+
+// port.h has no argument for the board: this is the one that the running call is for.
+static _Thread_local bt_sbc *board;
+
+bt_sbc *bt_sbc_new(void *python, uint8_t devices, uint32_t boot_id)
+{
+    bt_sbc *sbc = calloc(1, sizeof *sbc);
+    if (sbc != NULL) {
+        sbc->python = python;
+        sbc->devices = (uint8_t)((1u << devices) - 1);
+        sbc->boot_id = boot_id;
+    }
+    return sbc;
+}
+
+void bt_sbc_free(bt_sbc *sbc)
+{
+    free(sbc);
+}
+
+void bt_sbc_start(bt_sbc *sbc)
+{
+    board = sbc;
+    bt_gateway_init(&sbc->gateway);
+}
+
+void bt_sbc_poll(bt_sbc *sbc)
+{
+    board = sbc;
+    bt_gateway_poll(&sbc->gateway);
+}
+
+void bt_sbc_alarm(bt_sbc *sbc)
+{
+    board = sbc;
+    bt_gateway_alarm(&sbc->gateway);
+}
+
+uint32_t bt_sbc_due_us(const bt_sbc *sbc)
+{
+    return sbc->due_us;
+}
+
+// ---- time -------------------------------------------------------------------------------------
+
+uint32_t port_now_us(void)
+{
+    return bt_sbc_now_us(board->python);
+}
+
+void port_delay_us(uint32_t us)
+{
+    // Nobody needs a pause from what never was on the bus, and four absent fingers' would cost a tenth of a
+    // slot.
+    if (!board->unsent) {
+        bt_sbc_delay_us(board->python, us);
+    }
+}
+
+void port_alarm_at(uint32_t at_us)
+{
+    board->due_us = at_us;
+}
+
+// ---- SPI --------------------------------------------------------------------------------------
+
+void port_spi_select(uint8_t mask)
+{
+    board->selected = mask & board->devices;
+    board->unsent = mask != 0 ? board->selected == 0 : board->unsent;
+    board->taken = 0;
+    board->ahead_words = 0;
+}
+
+static uint16_t exchange(uint8_t finger, uint16_t mosi, uint8_t words)
+{
+    uint8_t *bytes = board->ahead;
+    for (int k = 0; k < words; k++) {
+        bytes[2 * k] = (uint8_t)(mosi >> 8);
+        bytes[2 * k + 1] = (uint8_t)mosi;
+    }
+    bt_sbc_exchange(board->python, finger, bytes, (size_t)words * 2);
+    return (uint16_t)(bytes[0] << 8 | bytes[1]);
+}
+
+static uint16_t listen(uint8_t finger)
+{
+    if (board->taken == 0) {
+        board->ahead_words = board->asked ? PROPERTY_WORDS : 1;
+        board->asked = false;
+        (void)exchange(finger, BT_LISTEN_WORD, board->ahead_words);
+    }
+    if (board->taken == board->ahead_words) {
+        return 0;
+    }
+    const uint8_t *at = board->ahead + 2 * board->taken++;
+    return (uint16_t)(at[0] << 8 | at[1]);
+}
+
+uint16_t port_spi_transfer16(uint16_t mosi)
+{
+    uint16_t miso = 0;
+    if (mosi != BT_LISTEN_WORD) {
+        board->asked = mosi >> 8 == BT_PROPERTY_READ_COMMAND;
+    }
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        if (board->selected >> f & 1) {
+            miso |= mosi == BT_LISTEN_WORD ? listen(f) : exchange(f, mosi, 1);
+        }
+    }
+    return miso;
+}
+
+// ---- link -------------------------------------------------------------------------------------
+
+bool port_link_write(const uint8_t *data, size_t bytes)
+{
+    return bt_sbc_link_write(board->python, data, bytes);
+}
+
+size_t port_link_read(uint8_t *data, size_t bytes)
+{
+    return bt_sbc_link_read(board->python, data, bytes);
+}
+
+bool port_link_up(void)
+{
+    return true; // the host is this process
+}
+
+// ---- flash: none, so settings last as long as the process ---------------------------------------
+
+bool port_flash_erase(uint32_t sector_offset)
+{
+    (void)sector_offset;
+    return false;
+}
+
+bool port_flash_program(uint32_t page_offset, const uint8_t *page)
+{
+    (void)page_offset;
+    (void)page;
+    return false;
+}
+
+void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
+{
+    (void)offset;
+    memset(data, 0xFF, bytes);
+}
+
+bool port_reboot_bootloader(void)
+{
+    return false;
+}
+
+// ---- identity ---------------------------------------------------------------------------------
+
+uint16_t port_board(void)
+{
+    return BT_BOARD_LINUX_SBC;
+}
+
+void port_board_serial(uint8_t serial[12])
+{
+    memcpy(serial, "linux-spidev", 12);
+}
+
+uint32_t port_boot_id(void)
+{
+    return board->boot_id;
+}

@@ -1,0 +1,41 @@
+// The board that is a Linux computer: the gateway app over a port whose bus, clock and link are Python's.
+//
+// The same sampler, session and framing as on every board. Python's spidev knows whole chip-select periods
+// only, one sensor at a time; how that differs from a microcontroller's bus is told in sbc.c.
+#ifndef BIOTAC_SBC_H
+#define BIOTAC_SBC_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct bt_sbc bt_sbc;
+
+// devices: how many sensors are wired, fingers 0 to devices - 1. python: handed to every function below.
+// NULL without memory. Several may live at once, each on a thread of its own.
+bt_sbc *bt_sbc_new(void *python, uint8_t devices, uint32_t boot_id);
+void bt_sbc_free(bt_sbc *sbc);
+
+// main.c, taken apart, since Python has the loop: start once, then poll, and alarm whenever bt_sbc_due_us()
+// has come.
+void bt_sbc_start(bt_sbc *sbc);
+void bt_sbc_poll(bt_sbc *sbc);
+void bt_sbc_alarm(bt_sbc *sbc);
+uint32_t bt_sbc_due_us(const bt_sbc *sbc);
+
+// Python's part of port.h. exchange: one chip-select period of one sensor; what MISO carried replaces bytes.
+#ifdef BT_CDEF
+extern "Python+C" uint32_t bt_sbc_now_us(void *python);
+extern "Python+C" void bt_sbc_delay_us(void *python, uint32_t us);
+extern "Python+C" void bt_sbc_exchange(void *python, uint8_t finger, uint8_t *bytes, size_t n);
+extern "Python+C" bool bt_sbc_link_write(void *python, const uint8_t *data, size_t bytes);
+extern "Python+C" size_t bt_sbc_link_read(void *python, uint8_t *data, size_t bytes);
+#else
+uint32_t bt_sbc_now_us(void *python);
+void bt_sbc_delay_us(void *python, uint32_t us);
+void bt_sbc_exchange(void *python, uint8_t finger, uint8_t *bytes, size_t n);
+bool bt_sbc_link_write(void *python, const uint8_t *data, size_t bytes);
+size_t bt_sbc_link_read(void *python, uint8_t *data, size_t bytes);
+#endif
+
+#endif

@@ -1,0 +1,246 @@
+"""Sensors on the computer's own SPI bus: the board's code over spidev, against the simulated board."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac import _wire as wire
+from biotac.link import spidev_link
+from biotac.sim.source import load_source
+from biotac.stream import Batch
+
+_spec = importlib.util.spec_from_file_location("fake_spidev", Path(__file__).with_name("fake_spidev.py"))
+assert _spec is not None and _spec.loader is not None
+fake_spidev = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(fake_spidev)
+
+Board = Callable[..., tuple[biotac.Hand, "fake_spidev.Bus"]]
+SECONDS = 2.0
+
+
+@pytest.fixture
+def board(monkeypatch, tmp_path: Path) -> Iterator[Board]:
+    """Opens spidev ports on emulated sensors; time stands still until the bus's clock is told to run."""
+    hands: list[biotac.Hand] = []
+
+    def make(scenario: str, fingers: int, *, absent: frozenset[int] = frozenset()) -> tuple[biotac.Hand, object]:
+        source = load_source(scenario, fingers=fingers, seconds=SECONDS)
+        bus = fake_spidev.Bus(source, tmp_path, absent)
+        monkeypatch.setitem(sys.modules, "spidev", bus.module())
+        monkeypatch.setattr(spidev_link, "MonotonicClock", lambda: bus.clock)
+        hands.append(biotac.open("spidev:" + ",".join(f"0.{f}" for f in range(fingers))))
+        for name, value in source.settings.items():
+            hands[-1].set_setting(biotac.Setting[name.upper()], value)
+        return hands[-1], bus
+
+    yield make
+    for hand in hands:
+        hand.close()
+
+
+def run(hand: biotac.Hand, bus: fake_spidev.Bus) -> Batch:
+    hand.start()
+    bus.clock.run(SECONDS + 0.1)
+    return hand.read_batch(SECONDS)
+
+
+def simulated(scenario: str, fingers: int) -> Batch:
+    with biotac.open(f"sim:{scenario}?fingers={fingers}&seconds={SECONDS}") as hand:
+        return hand.read_batch(SECONDS)
+
+
+def same(ours: np.ndarray, theirs: np.ndarray) -> None:
+    """Every field bit for bit, but for when the board was switched on."""
+    assert len(ours) == len(theirs) > 0
+    for name in ours.dtype.names:
+        a, b = ours[name], theirs[name]
+        if name == "t_us":
+            a, b = a - a[0], b - b[0]
+        assert a.tobytes() == b.tobytes(), name
+
+
+@pytest.mark.parametrize(("scenario", "fingers"), [("press.toml", 1), ("shear.toml", 3), ("faults.toml", 2)])
+def test_the_wire_is_that_of_the_simulated_board(board: Board, scenario: str, fingers: int) -> None:
+    hand, bus = board(scenario, fingers)
+    ours, theirs = run(hand, bus), simulated(scenario, fingers)
+    assert len(ours.wire) == 100 * SECONDS * fingers
+    same(ours.wire, theirs.wire)
+    same(ours.pac, theirs.pac)
+    events = [[m for m in batch.messages if isinstance(m, wire.Tare)] for batch in (ours, theirs)]
+    assert [(m.finger, m.seq, m.reason, m.tare_q16) for m in events[0]] == [
+        (m.finger, m.seq, m.reason, m.tare_q16) for m in events[1]
+    ]
+    assert events[0]
+    assert hand.stats.frames_lost == 0
+    status = hand.status()
+    assert (status.slots_late, status.messages_dropped) == (0, 0)
+
+
+def test_it_says_who_it_is_and_who_the_sensors_are(board: Board) -> None:
+    hand, _ = board("press.toml", 2)
+    assert hand.info.board == wire.Board.LINUX_SBC
+    assert bytes(hand.info.board_serial) == b"linux-spidev"
+    assert hand.fingers == [0, 1]
+    with biotac.open("sim:press.toml?fingers=2&seconds=1") as other:
+        for finger in range(5):
+            ours, theirs = hand.sensor_info(finger), other.sensor_info(finger)
+            assert ours.present == theirs.present == (finger < 2)
+            assert (ours.serial, ours.software_version, ours.flex_version) == (
+                theirs.serial,
+                theirs.software_version,
+                theirs.flex_version,
+            )
+            assert (ours.cpu_khz, ours.sampling_hz) == (theirs.cpu_khz, theirs.sampling_hz)
+
+
+def test_a_missing_sensor_leaves_the_others_alone(board: Board) -> None:
+    hand, bus = board("shear.toml", 3, absent=frozenset({1}))
+    assert hand.fingers == [0, 2]
+    ours, theirs = run(hand, bus), simulated("shear.toml", 3)
+    assert set(ours.wire["finger"]) == {0, 2}
+    same(ours.wire, theirs.wire[theirs.wire["finger"] != 1])
+    status = hand.sensor_status(1)
+    assert not status.present
+    assert status.words_good == 0 < status.words_stuck
+
+
+def test_fingers_are_sampled_one_transfer_apart_and_settle_50_us_from_the_last(board: Board) -> None:
+    hand, bus = board("press.toml", 5)
+    run(hand, bus)
+    commands = bus.commands()
+    assert [device for device, _ in commands[:10]] == [0, 1, 2, 3, 4] * 2
+    first, last = commands[0][1], commands[4][1]
+    assert last - first == 4 * bus.transfer_ns
+    reads = [t_ns for _, word, t_ns in bus.log if word == fake_spidev.LISTEN_WORD and t_ns > last]
+    assert 50_000 <= reads[0] - (last + bus.transfer_ns) < 53_000
+    assert [emu.early_reads for emu in bus.sensors] == [0] * 5
+
+
+def test_a_bus_too_slow_for_every_slot_loses_counted_slots_and_no_time(board: Board) -> None:
+    hand, bus = board("press.toml", 2)
+    bus.overhead_ns = 100_000
+    frames = run(hand, bus).frames
+    assert np.diff(frames["t_us"][frames["finger"] == 0]).tolist() == [10_000] * (int(100 * SECONDS) - 1)
+    bus.clock.wait()
+    sampled = len(bus.commands()) // 2
+    late = hand.status().slots_late
+    assert late > 0
+    assert abs(sampled + late - 4400 * (SECONDS + 0.1)) <= 4
+    assert [emu.early_reads for emu in bus.sensors] == [0, 0]
+
+
+def test_a_host_that_does_not_read_loses_whole_frames(board: Board, monkeypatch) -> None:
+    monkeypatch.setattr(spidev_link, "OUTBOX_BYTES", 8192)
+    hand, bus = board("press.toml", 1)
+    hand.start()
+    hand.ping()
+    bus.clock.run(SECONDS)
+    bus.clock.wait()
+    dropped = hand.status().messages_dropped
+    assert dropped > 0
+    assert (hand.stats.crc_errors, hand.stats.other_errors) == (0, 0)
+
+
+def test_a_bus_that_fails_is_a_lost_board(board: Board) -> None:
+    hand, bus = board("press.toml", 1)
+    hand.start()
+    bus.fault = OSError(110, "Connection timed out")
+    bus.clock.run(1.0)
+    with pytest.raises(biotac.DeviceLostError, match=r"spidev:0\.0 failed.*Connection timed out.*open it again"):
+        hand.read(1.0)
+    hand.close()
+    assert bus.opened[0].closed
+
+
+def test_closing_gives_the_devices_back_and_ends_the_thread(board: Board) -> None:
+    hand, bus = board("press.toml", 2)
+    link = hand.link
+    hand.close()
+    hand.close()
+    assert isinstance(link, spidev_link.SpidevLink)
+    assert not link._thread.is_alive()
+    assert [spi.closed for spi in bus.opened] == [True, True]
+
+
+@pytest.mark.parametrize(
+    ("port", "words"),
+    [
+        ("spidev:", r"'' is no SPI device; expected BUS\.DEVICE"),
+        ("spidev:0", "'0' is no SPI device"),
+        ("spidev:0.0,", "'' is no SPI device"),
+        ("spidev:0.x", r"'0\.x' is no SPI device"),
+        ("spidev:0.-1", r"'0\.-1' is no SPI device"),
+        ("spidev:0.0,0.0", r"0\.0 stands there twice; each finger needs"),
+        ("spidev:0.0,0.00", r"0\.0 stands there twice"),
+        ("spidev:0.0,0.1,0.2,1.0,1.1,1.2", "6 devices; expected at most 5"),
+    ],
+)
+def test_a_bad_port_says_what_is_expected(port: str, words: str) -> None:
+    with pytest.raises(biotac.PortError, match=words):
+        biotac.open(port)
+
+
+def test_without_spidev_it_names_the_extra(monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "spidev", None)
+    with pytest.raises(biotac.PortError, match=r"needs spidev.*pip install 'biotac-gateway\[spi\]'"):
+        biotac.open("spidev:0.0")
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (FileNotFoundError(2, "No such file or directory"), r"no SPI device /dev/spidev0\.1; switch SPI on"),
+        (PermissionError(13, "Permission denied"), r"no permission to open /dev/spidev0\.1; sudo usermod -aG spi"),
+        (OSError(16, "Device or resource busy"), r"/dev/spidev0\.1 cannot be used .*busy"),
+    ],
+)
+def test_a_device_that_does_not_open_says_why_and_the_others_are_closed(monkeypatch, error, words) -> None:
+    opened = []
+
+    class Spi:
+        closed = False
+
+        def open(self, bus: int, device: int) -> None:
+            if device == 1:
+                raise error
+            opened.append(self)
+
+        def close(self) -> None:
+            self.closed = True
+
+    module = ModuleType("spidev")
+    monkeypatch.setattr(module, "SpiDev", Spi, raising=False)
+    monkeypatch.setitem(sys.modules, "spidev", module)
+    with pytest.raises(biotac.PortError, match=words):
+        biotac.open("spidev:0.0,0.1")
+    assert [spi.closed for spi in opened] == [True]
+
+
+def test_the_computers_clock_sleeps_through_long_waits_and_never_returns_early(monkeypatch) -> None:
+    now, slept = [10**12], []
+
+    def tick() -> int:
+        now[0] += 100  # looking takes time
+        return now[0]
+
+    def sleep(seconds: float) -> None:
+        slept.append(seconds)
+        now[0] += round(seconds * 1e9) + 7_000  # and oversleeps
+
+    monkeypatch.setattr(spidev_link.time, "monotonic_ns", tick)
+    monkeypatch.setattr(spidev_link.time, "sleep", sleep)
+    clock = spidev_link.MonotonicClock()
+    assert clock.wait_until(10**12 + 227_000)
+    assert clock.now_ns() >= 10**12 + 227_000
+    assert slept == [pytest.approx(127e-6, abs=1e-6)]
+    before = now[0]
+    clock.delay_ns(5_000)
+    assert now[0] >= before + 5_000
