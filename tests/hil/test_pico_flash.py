@@ -5,25 +5,18 @@ The flash chip and the boot ROM are this project's models (tools/emulator/rom.mj
 
 from __future__ import annotations
 
-import os
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rig import Rig
 
 import biotac
 from biotac import Setting
 from biotac import _wire as wire
 
-ROOT = Path(__file__).resolve().parents[2]
-NEEDED = {
-    "the image": (ROOT / "build/pico/biotac-pico.bin", "cmake -S firmware --preset pico && cmake --build build/pico"),
-    "the emulator": (ROOT / "tools/node_modules/rp2040js", "tools/emulator/prepare"),
-    "the emulated sensors": (ROOT / "build/emulator/sensors.wasm", "tools/emulator/prepare"),
-}
 PAGE = 256
 SECTOR = 4096
 RECORDS = SECTOR // PAGE - 1
@@ -34,8 +27,8 @@ WORLD = "name = 'rest'\nseed = 1\nfingers = 1\n[[step]]\ndo = 'rest'\nseconds = 
 class Pico:
     """An emulated board that is asked nothing but questions, and what may be done to it."""
 
-    def __init__(self, source: Path) -> None:
-        self.hand = biotac.open(f"emu:pico?source={source}&pace=fast")
+    def __init__(self, hand: biotac.Hand) -> None:
+        self.hand = hand
         self.board: Any = self.hand.link.board  # type: ignore[attr-defined]
         self.hand.stop()
         self.hand.link.release()
@@ -68,14 +61,11 @@ class Pico:
 
 
 @pytest.fixture
-def pico(tmp_path: Path) -> Iterator[Pico]:
-    for what, (path, cure) in NEEDED.items():
-        if not path.exists() or shutil.which("node") is None:
-            assert "BIOTAC_CI" not in os.environ, f"{what} is missing"
-            pytest.skip(f"{what} is missing: {cure}")
+def pico(rig: Rig, tmp_path: Path) -> Iterator[Pico]:
+    rig.need("flash")
     source = tmp_path / "rest.toml"
     source.write_text(WORLD)
-    made = Pico(source)
+    made = Pico(rig.open(f"{source}?pace=fast"))
     yield made
     wrong = made.counters()["flash"]["wrong"]
     made.hand.close()
