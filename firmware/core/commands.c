@@ -1,10 +1,6 @@
 // What each command does. Every command is answered exactly once: by its own message, or by REPLY.
 #include "session.h"
 
-#define QUANTITIES                                                                                           \
-    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_SIGMA        \
-     | BT_QUANTITY_FLAG_REST_FRAMES | BT_QUANTITY_FLAG_TOUCH)
-
 static void reply(bt_session *session, uint8_t req_id, uint8_t command, uint8_t error)
 {
     uint8_t payload[BT_REPLY_BYTES];
@@ -44,7 +40,7 @@ static uint8_t start(bt_session *session, const uint8_t *payload)
 {
     bt_msg_start msg;
     bt_msg_start_unpack(&msg, payload);
-    if (msg.streams & ~(BT_STREAM_FLAG_FRAMES | BT_STREAM_FLAG_PAC | BT_STREAM_FLAG_STATUS)) {
+    if (msg.streams & ~BT_STREAM_FLAGS) {
         return BT_ERROR_OUT_OF_RANGE;
     }
     if (msg.fingers >> BT_MAX_FINGERS != 0) {
@@ -64,7 +60,7 @@ static uint8_t subscribe(bt_session *session, const uint8_t *payload)
 {
     bt_msg_subscribe msg;
     bt_msg_subscribe_unpack(&msg, payload);
-    if (msg.quantities & ~QUANTITIES) {
+    if (msg.quantities & ~BT_QUANTITY_FLAGS) {
         return BT_ERROR_OUT_OF_RANGE;
     }
     if (msg.fingers >> BT_MAX_FINGERS != 0) {

@@ -106,8 +106,8 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
 bool bt_finger_idle(const bt_finger *finger)
 {
     const bt_tare *tare = &finger->tare;
-    bool untouched = tare->state == BT_TARE_STATE_REST ? tare->gate.room >= 0 && tare->hits == 0
-                                                       : tare->state == BT_TARE_STATE_INIT;
+    bool untouched =
+        tare->state == BT_TARE_STATE_REST ? tare->gate.room >= 0 : tare->state == BT_TARE_STATE_INIT;
     return untouched && !finger->tare_unsent && !(finger->quantities & BT_QUANTITY_FLAG_REST_FRAMES);
 }
 

@@ -23,7 +23,7 @@ void bt_gate_reset(bt_gate *gate)
 int32_t bt_gate_repeat(bt_gate *gate, unsigned electrode, uint16_t count)
 {
     gate->missing = (uint8_t)(gate->missing + (count == BT_INVALID_COUNT));
-    gate->railed = (uint8_t)(gate->railed + (count != BT_INVALID_COUNT));
+    gate->railed = (uint8_t)(gate->railed + bt_count_railed(count));
     // A glitch, a gap and a glitch are no touch: what was held back before a gap is forgotten.
     int32_t e = (int32_t)gate->smooth.lane[electrode] - gate->rest.lane[electrode];
     return gate->room -= e * e;

@@ -3,19 +3,12 @@
 #include "fix.h"
 #include "sigma.h"
 
+#include <stddef.h>
+
 #define ACTIVE_Q4          (15 * 16) // an electrode that moved this far takes part in the contact
 #define ACTIVE_FOR_TORSION 4
 #define POC_LOW            4                     // times the contact threshold
 #define BASE_OLD_FRAMES    (60000 / BT_FRAME_MS) // one minute
-
-static void invalidate(int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
-{
-    for (int d = 0; d < 3; d++) {
-        poc_um[d] = BT_INVALID_I16;
-        force_100un[d] = BT_INVALID_I32;
-        torque_mnmm[d] = BT_INVALID_I32;
-    }
-}
 
 // Of a round's own signals, cut to 1/2 count.
 typedef struct {
@@ -79,7 +72,9 @@ static BT_NOINLINE uint32_t trouble(const bt_frame *frame, const bt_tare *tare)
     return flags;
 }
 
-_Static_assert((BT_FULL_SCALE_COUNT & BT_INVALID_COUNT) != BT_INVALID_COUNT, "a count is no missing word");
+_Static_assert((BT_FULL_SCALE_COUNT & (BT_FULL_SCALE_COUNT + 1)) == 0
+                   && BT_INVALID_COUNT > BT_FULL_SCALE_COUNT,
+               "counts ORed are no more than a count, but with a missing word among them they are");
 
 uint32_t bt_channel_flags(const bt_frame *frame, const bt_tare *tare)
 {
@@ -126,7 +121,8 @@ void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_sett
     bt_sigma_unknown(msg);
     if (flags & BT_FRAME_FLAG_UNTARED) {
         msg->flags = flags;
-        invalidate(msg->poc_um, msg->force_100un, msg->torque_mnmm);
+        // Asked for nothing, the kernel marks everything and looks at no signal.
+        (void)bt_kernel(NULL, settings, 0, msg->poc_um, msg->force_100un, msg->torque_mnmm);
         return;
     }
     int32_t e_q4[BT_ELECTRODES];

@@ -1,5 +1,7 @@
 #include "settings.h"
 
+#include "little_endian.h"
+
 static int find(uint8_t id)
 {
     for (int k = 0; k < BT_SETTINGS; k++) {
@@ -45,11 +47,8 @@ void bt_settings_pack(const bt_settings *settings, uint8_t record[BT_SETTINGS_RE
 {
     for (int k = 0; k < BT_SETTINGS; k++) {
         uint8_t *pair = record + k * BT_SETTING_PAIR_BYTES;
-        uint32_t value = (uint32_t)settings->value[k];
         pair[0] = bt_setting_specs[k].id;
-        for (int b = 0; b < 4; b++) {
-            pair[1 + b] = (uint8_t)(value >> 8 * b);
-        }
+        bt_put_u32(pair + 1, (uint32_t)settings->value[k]);
     }
 }
 
@@ -59,8 +58,7 @@ void bt_settings_unpack(bt_settings *settings, uint16_t version, const uint8_t *
         return;
     }
     for (; bytes >= BT_SETTING_PAIR_BYTES; record += BT_SETTING_PAIR_BYTES, bytes -= BT_SETTING_PAIR_BYTES) {
-        uint32_t value = (uint32_t)record[1] | (uint32_t)record[2] << 8 | (uint32_t)record[3] << 16
-                         | (uint32_t)record[4] << 24;
-        (void)bt_settings_set(settings, record[0], (int32_t)value); // refused: the default stays
+        // Refused: the default stays.
+        (void)bt_settings_set(settings, record[0], (int32_t)bt_get_u32(record + 1));
     }
 }

@@ -1,6 +1,7 @@
 #include "storage.h"
 
 #include "crc32.h"
+#include "little_endian.h"
 
 #include <string.h>
 
@@ -11,23 +12,6 @@
 #define NO_SECTOR (-1)
 
 _Static_assert(BT_STORAGE_IDS < PAGES - 1, "one record of each id and a new one must fit a sector");
-
-static uint32_t get32(const uint8_t *at)
-{
-    return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
-}
-
-static void put32(uint8_t *at, uint32_t value)
-{
-    for (int k = 0; k < 4; k++) {
-        at[k] = (uint8_t)(value >> 8 * k);
-    }
-}
-
-static uint16_t get16(const uint8_t *at)
-{
-    return (uint16_t)(at[0] | at[1] << 8);
-}
 
 // ---- one page -------------------------------------------------------------------------------------
 // u32 magic, u16 id, u16 version, u32 size, u32 CRC-32, data; the rest stays erased.
@@ -45,17 +29,17 @@ static void make_page(uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id, uint16_t v
                       size_t bytes)
 {
     memset(page, 0xFF, BT_FLASH_PAGE_BYTES);
-    put32(page, MAGIC);
-    put32(page + 4, id | (uint32_t)version << 16);
-    put32(page + 8, (uint32_t)bytes);
+    bt_put_u32(page, MAGIC);
+    bt_put_u32(page + 4, id | (uint32_t)version << 16);
+    bt_put_u32(page + 8, (uint32_t)bytes);
     memcpy(page + BT_STORAGE_HEADER_BYTES, data, bytes);
-    put32(page + CRC_AT, page_crc(page));
+    bt_put_u32(page + CRC_AT, page_crc(page));
 }
 
 static bool page_is(const uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id)
 {
-    return get32(page) == MAGIC && get16(page + 4) == id && get32(page + 8) <= BT_STORAGE_MAX_BYTES
-           && get32(page + CRC_AT) == page_crc(page);
+    return bt_get_u32(page) == MAGIC && bt_get_u16(page + 4) == id
+           && bt_get_u32(page + 8) <= BT_STORAGE_MAX_BYTES && bt_get_u32(page + CRC_AT) == page_crc(page);
 }
 
 static bool page_blank(const uint8_t page[BT_FLASH_PAGE_BYTES])
@@ -102,7 +86,7 @@ static int sector_in_use(const bt_flash *flash, uint32_t *generation)
         if (!page_is(page, IN_USE_ID)) {
             continue;
         }
-        uint32_t its = get32(page + BT_STORAGE_HEADER_BYTES);
+        uint32_t its = bt_get_u32(page + BT_STORAGE_HEADER_BYTES);
         if (found == NO_SECTOR || (int32_t)(its - *generation) > 0) {
             found = sector;
             *generation = its;
@@ -155,7 +139,7 @@ static bool move_on(const bt_flash *flash, int from, uint32_t generation, uint16
             return false;
         }
     }
-    put32(data, generation + 1);
+    bt_put_u32(data, generation + 1);
     make_page(page, IN_USE_ID, 0, data, sizeof data);
     return keep_page(flash, to, 0, page);
 }
@@ -170,8 +154,8 @@ int bt_storage_read(const bt_flash *flash, uint16_t id, uint16_t *version, uint8
     if (sector == NO_SECTOR || latest(flash, sector, id, page) == 0) {
         return -1;
     }
-    size_t bytes = get32(page + 8);
-    *version = get16(page + 6);
+    size_t bytes = bt_get_u32(page + 8);
+    *version = bt_get_u16(page + 6);
     memcpy(data, page + BT_STORAGE_HEADER_BYTES, bytes < max_bytes ? bytes : max_bytes);
     return (int)bytes;
 }

@@ -172,8 +172,7 @@ static void serve_electrode(bt_tare *tare, unsigned i)
     }
     // Where it is used, every round was below the threshold: the sum stays far below 2^32.
     int32_t away_q3 = 8 * tare->gate.smooth.lane[i] - mean_q3;
-    uint32_t square_q6 = (uint32_t)(away_q3 * away_q3);
-    tare->deviation_q6 += square_q6;
+    tare->deviation_q6 += (uint32_t)(away_q3 * away_q3);
     if (tracks(tare)) {
         *base_q16 = bt_baseline_follow(*base_q16, (uint32_t)mean_q3 << 13, SLEW_Q16);
         use_electrode(tare, i);

@@ -82,11 +82,13 @@ enum bt_board {
 #define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes railed or missing: do not trust the results
 #define BT_FRAME_FLAG_TEMP (1u << 16) // since the contact began the temperature has moved by over a degree: the tare is doubtful
 #define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to and marked invalid (SUBSCRIBE)
+#define BT_FRAME_FLAGS 0x3FFFFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME messages
 #define BT_STREAM_FLAG_PAC (1u << 1) // PAC messages
 #define BT_STREAM_FLAG_STATUS (1u << 2) // STATUS and SENSOR_STATUS once per status_period_ms
+#define BT_STREAM_FLAGS 0x7u // all there are
 
 // What SUBSCRIBE asks for. What is not asked for is not computed.
 #define BT_QUANTITY_FLAG_POC (1u << 0) // point of contact; without it TORSION_OK is never set
@@ -95,6 +97,7 @@ enum bt_board {
 #define BT_QUANTITY_FLAG_SIGMA (1u << 3) // one-sigma of point of contact and force
 #define BT_QUANTITY_FLAG_REST_FRAMES (1u << 4) // a FRAME in every round; without it an untouched finger sends IDLE heartbeats
 #define BT_QUANTITY_FLAG_TOUCH (1u << 5) // TOUCH messages
+#define BT_QUANTITY_FLAGS 0x3Fu // all there are
 
 enum bt_setting {
     BT_SETTING_POC_WEIGHTS = 1, // [enum poc_weights]

@@ -43,13 +43,6 @@ _ELECTRODES = len(sensor.ELECTRODE_NAMES)
 _SLOTS = np.array(sensor.SLOTS)
 _ELECTRODE_SLOTS = np.array([sensor.SLOTS.index(name) for name in sensor.ELECTRODE_NAMES])
 _SLOW = ("PDC", "TAC", "TDC")
-_AT_FIRST = (
-    wire.QuantityFlags.POC
-    | wire.QuantityFlags.FORCE
-    | wire.QuantityFlags.TORQUE
-    | wire.QuantityFlags.REST_FRAMES
-)  # fmt: skip
-
 if FINGER_DTYPE.itemsize != lib.bt_replay_row_bytes():
     raise ImportError(
         "the compiled core has other rows than this Python code; install the package again: pip install ."
@@ -60,8 +53,8 @@ class Finger:
     """One finger of a board: its tare machine and its kernels, in the state that all rounds so far left.
 
     ``settings`` are the board's; what they do not name has its default. ``index`` (0..4) is the finger's
-    number in the rows. ``quantities`` is the subscription: QuantityFlags.SIGMA adds standard deviations.
-    Raises ValueError for a setting or an index out of range.
+    number in the rows. ``quantities`` is the subscription, by default the board's own; QuantityFlags.SIGMA adds
+    standard deviations. Raises ValueError for a setting or an index out of range.
 
     >>> finger = Finger()
     >>> rows = finger.feed(np.full((30, 19), 3000))
@@ -74,7 +67,7 @@ class Finger:
         settings: Settings | None = None,
         *,
         index: int = 0,
-        quantities: wire.QuantityFlags = _AT_FIRST,
+        quantities: wire.QuantityFlags | None = None,
     ) -> None:
         if not 0 <= index < sensor.MAX_SENSORS:
             raise ValueError(f"index is {index}, expected 0 to {sensor.MAX_SENSORS - 1}")
@@ -88,7 +81,8 @@ class Finger:
     def reset(self) -> None:
         """As after power-up: no tare, seq 0 comes next."""
         lib.bt_finger_reset(self._finger, self._index)
-        self._finger.quantities = int(self._quantities)
+        if self._quantities is not None:
+            self._finger.quantities = int(self._quantities)
         self._next_us = 0
 
     def feed(

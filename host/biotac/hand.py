@@ -25,6 +25,8 @@ from .stream import Batch, LinkStats, StreamDecoder, join, split
 if TYPE_CHECKING:
     from .recording.writer import Recorder
 
+#: What a FRAME can say of a contact, for Hand.subscribe.
+RESULTS = wire.QuantityFlags.POC | wire.QuantityFlags.FORCE | wire.QuantityFlags.TORQUE
 ALL_FINGERS = (1 << MAX_SENSORS) - 1
 REPLY_TIMEOUT_S = 1.0
 REPLY_TRIES = 3

@@ -137,27 +137,19 @@ class StreamDecoder:
 
     def _convert(self, streamed: Arrivals, others: list[Any]) -> Batch:
         frame_wire, idle_wire, pac_wire = (streamed.rows(m) for m in (wire.Frame.ID, wire.Idle.ID, wire.Pac.ID))
+        n = len(frame_wire)
         # FRAMEs and IDLEs share one numbering: together they account for every round.
-        both = np.empty(len(frame_wire) + len(idle_wire), ROUND_DTYPE)
-        for rows, at in ((frame_wire, slice(None, len(frame_wire))), (idle_wire, slice(len(frame_wire), None))):
-            for name in ("finger", "seq", "t_us"):
-                both[name][at] = rows[name]
-        both["rounds"] = 1
-        both["rounds"][len(frame_wire) :] = idle_wire["frames"]
+        both = np.concatenate([numbered(frame_wire, 1), numbered(idle_wire, idle_wire["frames"])])
         order = np.argsort(streamed.order(wire.Frame.ID) + streamed.order(wire.Idle.ID))
         seq, t_us = np.empty((2, len(both)), np.int64)
         seq[order], t_us[order] = self._extend(wire.Frame.ID, both[order])
-        frames = frames_from_wire(frame_wire, seq[: len(frame_wire)], t_us[: len(frame_wire)])
+        frames = frames_from_wire(frame_wire, seq[:n], t_us[:n])
         idle = np.empty(len(idle_wire), IDLE_DTYPE)
-        idle["seq"], idle["t_us"] = seq[len(frame_wire) :], t_us[len(frame_wire) :]
+        idle["seq"], idle["t_us"] = seq[n:], t_us[n:]
         for name in ("finger", "frames", "energy_count2", "pdc", "tdc", "flags"):
             idle[name] = idle_wire[name]
         pac = np.empty(len(pac_wire), PAC_DTYPE)
-        numbered = np.empty(len(pac_wire), ROUND_DTYPE)
-        for name in ("finger", "seq", "t_us"):
-            numbered[name] = pac_wire[name]
-        numbered["rounds"] = 1
-        pac["seq"], pac["t_us"] = self._extend(wire.Pac.ID, numbered)
+        pac["seq"], pac["t_us"] = self._extend(wire.Pac.ID, numbered(pac_wire, 1))
         pac["finger"] = pac_wire["finger"]
         pac["pac"] = pac_wire["pac"]
         return Batch(frame_wire, frames, pac, idle, others)
@@ -206,6 +198,15 @@ class Arrivals:
     def order(self, message_id: int) -> list[int]:
         """When each came."""
         return self._order[message_id]
+
+
+def numbered(messages: StructArray, rounds: Any) -> StructArray:
+    """What ROUND_DTYPE wants of stream messages (n,) that stand for ``rounds`` rounds each."""
+    out = np.empty(len(messages), ROUND_DTYPE)
+    for name in ("finger", "seq", "t_us"):
+        out[name] = messages[name]
+    out["rounds"] = rounds
+    return out
 
 
 def is_start(message: Any) -> bool:

@@ -53,7 +53,8 @@ def header(contract: Contract) -> str:
             for key, entry in flags.items()
             if key != "doc"
         ]
-        out += [""]
+        known = sum(1 << entry["bit"] for key, entry in flags.items() if key != "doc")
+        out += [f"#define BT_{name.upper()}_FLAGS 0x{known:X}u // all there are", ""]
     out += ["enum bt_setting {"]
     out += [f"    BT_SETTING_{n.upper()} = {s['id']}, // [{s['unit']}]" for n, s in link["setting"].items()]
     out += ["};", f"#define BT_SETTINGS {len(link['setting'])}", ""]

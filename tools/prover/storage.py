@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,7 +39,7 @@ class Frame:
     result: Any = None
 
 
-class Storage:
+class Storage(ABC):
     """Names and what they hold; the expressions in declarations are the machine's business."""
 
     types: dict[str, Any]
@@ -46,17 +47,21 @@ class Storage:
     structs: dict[str, Any]
     frame: Frame
 
+    @abstractmethod
     def expression(self, node: Any) -> Any:
-        raise NotImplementedError
+        """See the machine."""
 
+    @abstractmethod
     def number(self, node: Any) -> Value:
-        raise NotImplementedError
+        """See the machine."""
 
+    @abstractmethod
     def constant(self, node: Any) -> int:
-        raise NotImplementedError
+        """See the machine."""
 
+    @abstractmethod
     def converted(self, value: Value, kind: CType) -> Any:
-        raise NotImplementedError
+        """See the machine."""
 
     def scalar(self, node: Any) -> CType | None:
         """The number type a declaration or type name stands for; None when it is no number."""

@@ -14,11 +14,11 @@ import numpy as np
 import biotac
 
 from .. import _wire as wire
+from ..hand import RESULTS
 from ..stream import Batch
 
 FRAME_S = 0.01  # one round of slots
 OVERHEAD = 7  # id, CRC, COBS and delimiter (protocol/SPEC.md, Frames)
-EVERYTHING = wire.QuantityFlags.POC | wire.QuantityFlags.FORCE | wire.QuantityFlags.TORQUE
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class Outcome:
 
 def measure(source: str) -> Outcome:
     """Play ``source`` (of biotac.open, without ``sim:``) twice, with frames and with heartbeats at rest."""
-    eager, _ = _play(source, EVERYTHING | wire.QuantityFlags.REST_FRAMES)
-    lazy, status = _play(source, EVERYTHING)
+    eager, _ = _play(source, RESULTS | wire.QuantityFlags.REST_FRAMES)
+    lazy, status = _play(source, RESULTS)
     rest, contact = _share(lazy, touched=False), _share(lazy, touched=True)
     saved = 100 * (1 - rest.bytes_per_s / contact.bytes_per_s) if contact.bytes_per_s else float("nan")
     skipped = {

@@ -9,8 +9,9 @@ from typing import Any
 
 import biotac
 
-from .._wire import FrameFlags, QuantityFlags
+from .._wire import FrameFlags
 from ..frames import Frame
+from ..hand import RESULTS
 from . import values
 
 NAME = "stream"
@@ -40,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     # A person wants to see it happen: simulated boards run in real time here.
     with biotac.open(args.port, pace=1.0) as hand:
         if args.touched:
-            hand.subscribe(QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE)
+            hand.subscribe(RESULTS)
         for frame in hand.frames():
             if end_us is None and args.seconds is not None:
                 end_us = frame.t_us + round(args.seconds * 1e6)

@@ -1,0 +1,24 @@
+// Numbers as bytes, the lowest first, as on the wire and in stored records.
+#ifndef BIOTAC_LITTLE_ENDIAN_H
+#define BIOTAC_LITTLE_ENDIAN_H
+
+#include <stdint.h>
+
+static inline void bt_put_u32(uint8_t *at, uint32_t value)
+{
+    for (int k = 0; k < 4; k++) {
+        at[k] = (uint8_t)(value >> 8 * k);
+    }
+}
+
+static inline uint32_t bt_get_u32(const uint8_t *at)
+{
+    return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+}
+
+static inline uint16_t bt_get_u16(const uint8_t *at)
+{
+    return (uint16_t)(at[0] | at[1] << 8);
+}
+
+#endif
