@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
 from committed import write_or_check  # noqa: E402
-from protogen import c_fold, c_root, c_sensor, c_variants, c_wire, docs, python_code, schema  # noqa: E402
+from protogen import c_crc, c_fold, c_root, c_sensor, c_variants, c_wire, docs, python_code, schema  # noqa: E402
 
 
 def outputs(root: Path) -> dict[Path, str]:
@@ -23,6 +23,7 @@ def outputs(root: Path) -> dict[Path, str]:
     return {
         root / "firmware/core/sensor_gen.h": c_sensor.header(contract),
         root / "firmware/core/sensor_gen.c": c_sensor.source(contract),
+        root / "firmware/core/crc32_gen.c": c_crc.source(),
         root / "firmware/core/fold_gen.h": c_fold.header(contract),
         root / "firmware/core/fold_gen.c": c_fold.source(contract),
         root / "firmware/core/root_gen.h": c_root.header(contract),

@@ -1,26 +1,5 @@
 #include "cobs.h"
 
-size_t bt_cobs_encode(const uint8_t *in, size_t bytes, uint8_t *out)
-{
-    size_t code_at = 0;
-    size_t at = 1;
-    uint8_t code = 1;
-    for (size_t k = 0; k < bytes; k++) {
-        if (in[k] != 0) {
-            out[at++] = in[k];
-            code++;
-        }
-        // A full block at the very end needs no successor; the decoder adds no zero after it.
-        if (in[k] == 0 || (code == 0xFF && k + 1 < bytes)) {
-            out[code_at] = code;
-            code = 1;
-            code_at = at++;
-        }
-    }
-    out[code_at] = code;
-    return at;
-}
-
 int bt_cobs_decode(const uint8_t *in, size_t bytes, uint8_t *out)
 {
     size_t at = 0;

@@ -6,6 +6,22 @@
 #include <stddef.h>
 #include <stdint.h>
 
+extern const uint32_t bt_crc32_table[256];
+
 uint32_t bt_crc32(const uint8_t *data, size_t bytes);
+
+// The same byte by byte, for who looks at each byte anyway: start, one step for each, end.
+#define BT_CRC32_START 0xFFFFFFFFu
+#ifndef BT_CDEF
+static inline uint32_t bt_crc32_step(uint32_t crc, uint8_t byte)
+{
+    return crc >> 8 ^ bt_crc32_table[(crc ^ byte) & 0xFF];
+}
+
+static inline uint32_t bt_crc32_end(uint32_t crc)
+{
+    return ~crc;
+}
+#endif
 
 #endif

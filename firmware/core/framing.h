@@ -7,7 +7,7 @@
 #include "wire_gen.h"
 
 #define BT_CRC_BYTES         4
-#define BT_ENCODED_MAX_BYTES (BT_COBS_MAX_BYTES(BT_FRAME_MAX_BYTES) + 1)
+#define BT_ENCODED_MAX_BYTES (BT_FRAME_MAX_BYTES + 2) // COBS and the delimiter add one each
 
 // Appends nothing and keeps nothing: out receives one whole frame with its delimiter.
 // payload_bytes <= BT_FRAME_MAX_BYTES - 5. Returns the number of bytes written.

@@ -33,6 +33,13 @@ const uint8_t bt_channel_command[BT_CHANNELS] = {
 };
 
 const uint8_t bt_slot_channel[BT_SLOTS] = {
+    BT_CHANNEL_PAC,
+    BT_CHANNEL_PDC,
+    BT_CHANNEL_PAC,
+    BT_CHANNEL_TAC,
+    BT_CHANNEL_PAC,
+    BT_CHANNEL_TDC,
+    BT_CHANNEL_PAC,
     BT_CHANNEL_E1,
     BT_CHANNEL_PAC,
     BT_CHANNEL_E2,
@@ -70,17 +77,10 @@ const uint8_t bt_slot_channel[BT_SLOTS] = {
     BT_CHANNEL_E18,
     BT_CHANNEL_PAC,
     BT_CHANNEL_E19,
-    BT_CHANNEL_PAC,
-    BT_CHANNEL_PDC,
-    BT_CHANNEL_PAC,
-    BT_CHANNEL_TAC,
-    BT_CHANNEL_PAC,
-    BT_CHANNEL_TDC,
-    BT_CHANNEL_PAC,
 };
 
 const uint8_t bt_slot_pac[BT_SLOTS] = {
-    0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8, 9, 9, 10, 10, 11, 11, 12, 12, 13, 13, 14, 14, 15, 15, 16, 16, 17, 17, 18, 18, 19, 19, 20, 20, 21, 21,
+    0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8, 9, 9, 10, 10, 11, 11, 12, 12, 13, 13, 14, 14, 15, 15, 16, 16, 17, 17, 18, 18, 19, 19, 20, 20, 21, 21, 22,
 };
 
 const int16_t bt_electrode_um[BT_ELECTRODES][3] = {

@@ -174,8 +174,18 @@ static void send_round(bt_session *session, bt_finger *finger)
     }
 }
 
+static void send_pac(bt_session *session, const bt_finger *finger)
+{
+    uint8_t payload[BT_PAC_BYTES];
+    bt_msg_pac msg;
+    bt_finger_pac(finger, &msg);
+    bt_msg_pac_pack(&msg, payload);
+    bt_session_send(session, BT_PAC_ID, payload);
+}
+
 void bt_session_round(bt_session *session)
 {
+    uint32_t answering = 0; // bit mask
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         bt_finger *finger = &session->finger[f];
         if (!bt_finger_end(finger, &session->tare)) {
@@ -184,15 +194,15 @@ void bt_session_round(bt_session *session)
             }
             continue;
         }
+        answering |= 1u << f;
         if (streams(session, finger, BT_STREAM_FLAG_FRAMES)) {
             send_round(session, finger);
         }
-        if (streams(session, finger, BT_STREAM_FLAG_PAC)) {
-            uint8_t payload[BT_PAC_BYTES];
-            bt_msg_pac msg;
-            bt_finger_pac(finger, &msg);
-            bt_msg_pac_pack(&msg, payload);
-            bt_session_send(session, BT_PAC_ID, payload);
+    }
+    // Vibration after all fingers' forces: who closes a grip waits for those.
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (answering >> f & 1 && streams(session, &session->finger[f], BT_STREAM_FLAG_PAC)) {
+            send_pac(session, &session->finger[f]);
         }
     }
 }

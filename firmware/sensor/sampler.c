@@ -76,13 +76,17 @@ static void send_command(bt_sampler *sampler)
 
 static void read_sensors(bt_sampler *sampler)
 {
+    bool first = true;
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         sampler->current.word[f] = 0;
         if (sampler->fingers >> f & 1) {
+            if (!first) {
+                port_delay_us(BT_GAP_US);
+            }
+            first = false;
             port_spi_select((uint8_t)(1u << f));
             sampler->current.word[f] = port_spi_transfer16(BT_LISTEN_WORD);
             port_spi_select(0);
-            port_delay_us(BT_GAP_US);
         }
     }
 }
@@ -98,8 +102,9 @@ uint32_t bt_sampler_alarm(bt_sampler *sampler)
     sampler->settling = false;
     push(sampler);
     advance(sampler);
-    // An interrupt held off for longer than a slot loses slots, never the time base.
-    while ((int32_t)(sampler->slot_start_us - port_now_us()) < 0) {
+    // An interrupt held off for longer than a slot loses slots, never the time base; and the next command is
+    // no sooner after the last read than the bus allows.
+    while ((int32_t)(sampler->slot_start_us - port_now_us()) <= BT_GAP_US) {
         count_late(sampler);
         advance(sampler);
     }

@@ -45,6 +45,13 @@ CHANNEL_COMMAND: dict[str, int] = {
 }
 
 SLOTS: tuple[str, ...] = (
+    "PAC",
+    "PDC",
+    "PAC",
+    "TAC",
+    "PAC",
+    "TDC",
+    "PAC",
     "E1",
     "PAC",
     "E2",
@@ -82,13 +89,6 @@ SLOTS: tuple[str, ...] = (
     "E18",
     "PAC",
     "E19",
-    "PAC",
-    "PDC",
-    "PAC",
-    "TAC",
-    "PAC",
-    "TDC",
-    "PAC",
 )
 
 ERROR_WORD: dict[int, str] = {

@@ -211,15 +211,22 @@ static void cobs_examples_hold_in_both_directions(void **state)
 {
     (void)state;
     char line[LINE_BYTES], first[LINE_BYTES], second[LINE_BYTES];
-    int good = 0, bad = 0;
+    int good = 0, written = 0, bad = 0;
     FILE *file = open_vectors("cobs.txt");
     while (next_line(file, line)) {
-        uint8_t plain[1024], encoded[1024], out[BT_COBS_MAX_BYTES(1024)];
+        uint8_t plain[1024], encoded[1024], out[1024];
         if (sscanf(line, "good %4095s %4095s", first, second) == 2) {
             size_t plain_bytes = bytes_from_hex(first, plain, sizeof plain);
             size_t encoded_bytes = bytes_from_hex(second, encoded, sizeof encoded);
-            assert_int_equal(bt_cobs_encode(plain, plain_bytes, out), encoded_bytes);
-            assert_memory_equal(out, encoded, encoded_bytes);
+            if (plain_bytes <= BT_COBS_BLOCK_BYTES) {
+                bt_cobs_block block = bt_cobs_begin(out);
+                for (size_t k = 0; k < plain_bytes; k++) {
+                    bt_cobs_put(&block, plain[k]);
+                }
+                assert_int_equal(bt_cobs_end(&block) - out, encoded_bytes);
+                assert_memory_equal(out, encoded, encoded_bytes);
+                written++;
+            }
             assert_int_equal(bt_cobs_decode(encoded, encoded_bytes, encoded), plain_bytes); // in place
             assert_memory_equal(encoded, plain, plain_bytes);
             good++;
@@ -230,7 +237,7 @@ static void cobs_examples_hold_in_both_directions(void **state)
             bad++;
         }
     }
-    assert_true(good >= 12 && bad >= 5);
+    assert_true(good >= 12 && written >= 8 && bad >= 5);
 }
 
 static void crc32_known_answers_hold(void **state)

@@ -65,14 +65,14 @@ static void a_touch_shows_as_soon_as_its_electrodes_slots_have_passed(void **sta
     e_q4[2] = -16 * 500;
     assert_true(bt_poc(e_q4, BT_POC_WEIGHTS_COMPRESS_N1, &want));
     bt_session_begin(&session, 0);
-    for (uint8_t slot = 0; slot < 10; slot++) {
-        counts[0] = slot == 4 ? 2500 : 3000; // E1 PAC E2 PAC E3
+    for (uint8_t slot = 0; slot < 16; slot++) {
+        counts[0] = slot == 11 ? 2500 : 3000; // PAC PDC PAC TAC PAC TDC PAC E1 PAC E2 PAC E3
         bt_session_slot(&session, slot, counts, 0);
         bt_msg_point now = ask();
         assert_int_equal(now.slot, slot + 1);
         assert_int_equal(now.seq, before.seq);
         for (int d = 0; d < 3; d++) {
-            assert_int_equal(now.poc_um[d], slot < 4 ? BT_INVALID_I16 : want.um[d]);
+            assert_int_equal(now.poc_um[d], slot < 11 ? BT_INVALID_I16 : want.um[d]);
         }
     }
 }

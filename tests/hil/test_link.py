@@ -54,6 +54,16 @@ def test_every_slot_of_one_to_five_fingers_is_sampled_and_nothing_lost(board, fi
         assert len(mine) == (100 if finger < fingers else 0)
 
 
+def test_the_host_has_all_frames_of_a_round_a_millisecond_after_its_last_electrode(rig) -> None:
+    rig.need("counters")
+    hand = rig.open("press.toml?fingers=5&seconds=4")
+    assert len(hand.read(10)) == 5 * 400
+    latency = hand.link.board.counters()["latency"]
+    assert (latency["frames"], latency["unmatched"]) == (5 * 400, 0)
+    assert latency["p99_us"] <= 1000
+    assert latency["worst_us"] <= 1500  # rounds that bring five TAREs, or STATUS, are longer by those
+
+
 def test_the_bus_is_driven_by_the_data_sheets_rules(rig) -> None:
     rig.need("counters")
     hand = rig.open("press.toml?fingers=5&seconds=0.5")

@@ -48,9 +48,9 @@ def test_every_channel_lands_in_its_slots(tmp_path: Path) -> None:
     assert source.samples.shape == (7, 1, 44) and source.samples.dtype == np.uint16
     for row in range(7):
         words = list(source.samples[row, 0])
-        assert words[0::2][:19] == list(fields["E"][row])
-        assert words[1::2] == list(fields["PAC"][row])
-        assert [words[k] for k in (38, 40, 42)] == [fields[name][row] for name in ("PDC", "TAC", "TDC")]
+        assert words[7::2] == list(fields["E"][row])
+        assert words[0::2] == list(fields["PAC"][row])
+        assert [words[k] for k in (1, 3, 5)] == [fields[name][row] for name in ("PDC", "TAC", "TDC")]
     assert source.truth is None and source.settings == {} and source.name == "a.npz"
 
 
@@ -178,16 +178,16 @@ def test_btd_frames_are_put_into_our_slot_order(tmp_path: Path, name: str) -> No
     source = load_source(write_btd(tmp_path / name, btd_lines()))
     assert source.samples.shape == (3, 1, 44) and source.skipped_frames == 0
     frame = list(source.samples[1, 0])
-    # the file's slots are PAC E1 PAC E2 ...: its places 1, 3, ... are ours 0, 2, ...
-    assert frame[0::2] == [100 + place for place in range(1, 44, 2)]
-    assert frame[1::2] == [100 + place for place in range(0, 44, 2)]
+    # the file's slots are PAC E1 PAC E2 ... E19 PAC PDC PAC TAC PAC TDC, ours begin with PAC PDC PAC TAC PAC TDC
+    assert frame[0::2] == [100 + place for place in range(0, 44, 2)]
+    assert frame[1::2] == [100 + place for place in (39, 41, 43, *range(1, 39, 2))]
 
 
 def test_every_sensor_that_was_there_is_a_finger(tmp_path: Path) -> None:
     lines = [[*line[:4], 7, 0, *line[6:]] for line in btd_lines()]
     source = load_source(write_btd(tmp_path / "a.btd", lines))
     assert source.samples.shape == (3, 2, 44) and (source.samples[:, 0] == 7).all()
-    assert source.samples[0, 1, 0] == 1
+    assert source.samples[0, 1, 1] == 39  # PDC
     assert load_source(tmp_path / "a.btd", fingers=1).samples.shape == (3, 1, 44)
     three = load_source(tmp_path / "a.btd", fingers=3).samples
     np.testing.assert_array_equal(three[:, 2], three[:, 0])
@@ -207,7 +207,7 @@ def test_incomplete_frames_are_left_out_and_counted(tmp_path: Path) -> None:
     del lines[44 + 10]
     source = load_source(write_btd(tmp_path / "a.btd", lines))
     assert source.skipped_frames == 2 and len(source.samples) == 2
-    assert list(source.samples[:, 0, 0]) == [1, 201]
+    assert list(source.samples[:, 0, 1]) == [39, 239]  # PDC
 
 
 def edited(row: int, column: int, value: float) -> list[list[float]]:

@@ -1,4 +1,5 @@
 // The whole rig: a machine, its sensors, the USB host and the port, and what a test may do to them.
+import { Latency } from './latency.mjs'
 import { Machine } from './machine.mjs'
 import { Board, BootRom } from './rom.mjs'
 import { Sensors } from './sensors.mjs'
@@ -12,6 +13,7 @@ export class Rig {
     this.plugged = true
     this.waiting = hold // for release()
     this.received = 0
+    this.latency = new Latency()
     this.events = [] // [world ns, verb], sorted
     this.sensors = new Sensors(wasm, tape, serials)
     this.lossless = lossless
@@ -94,6 +96,7 @@ export class Rig {
       slept: machine.sleptNanos / Math.max(1, machine.nanos),
       loaders: this.loaders,
       flash: this.board.counters,
+      latency: this.latency.counters(),
       sensors: this.sensors.counters(),
       usb: { state: usb.state, device: usb.device, failed: usb.failed, received: this.received, ...usb.bus.counters },
     }
@@ -118,11 +121,13 @@ export class Rig {
     const transmit = spi.onTransmit
     spi.onTransmit = (mosi) => {
       transmit(mosi)
+      this.latency.sampled(mosi, machine.time.nanos)
       if ((this.waiting && this.sensors.started) || this.sensors.over) machine.time.hold()
     }
     this.usb = new UsbHost(machine.mcu, {
       onData: (bytes) => {
         this.received += bytes.length
+        this.latency.received(bytes, machine.time.nanos)
         this.port.put(bytes)
       },
       canTake: () => this.reading && (this.lossless || this.port.hasRoom),

@@ -31,13 +31,17 @@ ROM = "(boot ROM)"
 ROM_STACK_BYTES = 256  # an allowance: the ROM does not tell
 EXCEPTION_BYTES = 32 + 4  # what the core pushes, with alignment
 
+SENDERS = (
+    "bt_session_send",
+    "bt_session_round",
+    "bt_session_send_status",
+    "bt_session_send_sensor_status",
+    "send_frame",
+)
 # What may be called where the code calls through a pointer.
 FLASH_CALLS = ("port_flash_erase", "port_flash_program", "port_flash_read")
 POINTERS = {
-    "bt_session_send": ("port_link_write",),
-    "bt_session_round": ("port_link_write",),
-    "bt_session_send_status": ("port_link_write",),
-    "bt_session_send_sensor_status": ("port_link_write",),
+    **dict.fromkeys(SENDERS, ("port_link_write",)),
     "bt_command": ("port_link_write", "save_settings", "reboot_bootloader"),
     "sector_in_use": FLASH_CALLS,
     "latest": FLASH_CALLS,

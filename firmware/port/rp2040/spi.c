@@ -8,7 +8,7 @@
 
 // SCK = clk_peri / (CPSDVSR * (1 + SCR)) = 125 MHz / 28 = 4.46 MHz: the nearest to BT_SPI_HZ there is, and
 // far from the sensor's 10 MHz.
-#define CLK_PERI_HZ 125000000u
+#define CLK_PERI_HZ CLK_SYS_HZ
 #define CPSDVSR     2u
 #define SCR         13u
 _Static_assert(CLK_PERI_HZ / (CPSDVSR * (1 + SCR)) < BT_SPI_HZ + BT_SPI_HZ / 50

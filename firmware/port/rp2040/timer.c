@@ -17,9 +17,15 @@ IN_SRAM uint32_t port_now_us(void)
     return TIMER_TIMERAWL;
 }
 
+#define SHORT_US 10 // the gap between two reads of the bus, four times a slot
+
 IN_SRAM void port_delay_us(uint32_t us)
 {
-    wait_us(us);
+    if (us <= SHORT_US) {
+        wait_short_us(us);
+    } else {
+        wait_us(us);
+    }
 }
 
 IN_SRAM void port_alarm_at(uint32_t at_us)

@@ -8,6 +8,7 @@
 #include "usb_descriptors.h"
 
 #include <stdatomic.h>
+#include <string.h>
 
 #define TX_RING 4096 // 40 ms of five fingers' frames
 #define RX_RING 256  // some commands; when it is full the host is told to wait
@@ -76,6 +77,19 @@ static bool link_open(void)
     return configured && dtr;
 }
 
+static uint32_t min(uint32_t a, uint32_t b)
+{
+    return a < b ? a : b;
+}
+
+// The controller's memory is volatile, so no memcpy.
+static void copy_out(volatile uint8_t *to, const uint8_t *from, uint32_t bytes)
+{
+    for (uint32_t k = 0; k < bytes; k++) {
+        to[k] = from[k];
+    }
+}
+
 static void send_next(void)
 {
     if (in_busy || !link_open()) {
@@ -89,9 +103,12 @@ static void send_next(void)
         out[bytes++] = 0;
         delimiter_due = false;
     }
-    for (; waiting > 0 && bytes < USB_PACKET_BYTES; waiting--) {
-        out[bytes++] = tx[tail++ % TX_RING];
-    }
+    uint32_t taken = min(waiting, USB_PACKET_BYTES - bytes);
+    uint32_t first = min(taken, TX_RING - tail % TX_RING); // the rest lies at the ring's start
+    copy_out(out + bytes, tx + tail % TX_RING, first);
+    copy_out(out + bytes + first, tx, taken - first);
+    bytes += taken;
+    tail += taken;
     // A host waits for more after a full packet; when there is none, an empty one tells it so.
     if (bytes == 0 && !last_was_full) {
         return;
@@ -283,10 +300,10 @@ bool port_link_write(const uint8_t *data, size_t bytes)
     if (!port_link_up() || bytes > TX_RING - (head - get(&tx_tail))) {
         return false;
     }
-    for (size_t k = 0; k < bytes; k++) {
-        tx[head++ % TX_RING] = data[k];
-    }
-    set(&tx_head, head);
+    uint32_t first = min((uint32_t)bytes, TX_RING - head % TX_RING);
+    memcpy(tx + head % TX_RING, data, first);
+    memcpy(tx, data + first, bytes - first);
+    set(&tx_head, head + (uint32_t)bytes);
     // The interrupt either sees the new bytes, or has left in_busy false by now; likewise when reading.
     atomic_signal_fence(memory_order_seq_cst);
     if (!in_busy) {

@@ -4,6 +4,7 @@
 #define BIOTAC_RP2040_WAIT_H
 
 #include "rp2040_regs.h"
+#include "system.h"
 
 #include <stdbool.h>
 
@@ -21,6 +22,16 @@ static inline bool wait_for(const volatile uint32_t *reg, uint32_t mask, uint32_
         }
     }
     return true;
+}
+
+// At least us microseconds, and hardly more at the image's clock; on a slower one it takes longer. For the
+// few that a wait on the timer, which ticks once in a us, would lengthen by up to two.
+#define WAIT_TURN_CYCLES  3u
+#define WAIT_TURNS_PER_US (CLK_SYS_HZ / 1000000u / WAIT_TURN_CYCLES + 1)
+static inline void wait_short_us(uint32_t us)
+{
+    uint32_t turns = us * WAIT_TURNS_PER_US;
+    __asm volatile("1: sub %0, #1\n bne 1b" : "+l"(turns) : : "cc");
 }
 
 // At least us microseconds; not for more than a second. The timer ticks while clk_ref runs, so the bound in

@@ -1,0 +1,75 @@
+// How long after a round's last electrode was sampled the last byte of its FRAMEs is with the host, in device time.
+// Watches the bus for sample commands and the USB for FRAMEs; the image knows nothing of it.
+import fs from 'node:fs'
+
+const SCHEMA = JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url)))
+const FRAME_ID = SCHEMA.link.message.FRAME.id
+const command = (name) => SCHEMA.sensor.channel.find((channel) => channel.name === name).command << 8
+const SLOTS = SCHEMA.sensor.frame.slots
+const SLOT_US = 1e6 / SCHEMA.sensor.bus.slot_hz
+const MARK_AT = SLOTS.findIndex((name) => name !== 'PAC') // the first slot that comes once a round
+const MARK = command(SLOTS[MARK_AT])
+const LAST = command(SLOTS.findLast((name) => /^E\d+$/.test(name)))
+const T_US_AT = 3 // in a FRAME: id, seq, then the time of its first slot
+const SAME_ROUND_US = 200 // t_us is read shortly before the command goes out
+const ROUNDS = 8 // that are remembered: no FRAME is later than that
+
+/** The first bytes of a COBS frame, decoded; shorter when the frame is. */
+function head(encoded, wanted) {
+  const out = []
+  let at = 0
+  while (at < encoded.length && out.length < wanted) {
+    const code = encoded[at]
+    out.push(...encoded.slice(at + 1, at + code))
+    at += code
+    if (code < 0xff && at < encoded.length) out.push(0)
+  }
+  return Uint8Array.from(out.slice(0, wanted))
+}
+
+export class Latency {
+  constructor() {
+    this.rounds = [] // [device us of the first slot, of the last electrode]
+    this.unfinished = []
+    this.us = [] // one a FRAME
+    this.unmatched = 0 // FRAMEs whose round was not seen on the bus
+  }
+
+  sampled(mosi, nanos) {
+    if (mosi === MARK) {
+      this.rounds.push([nanos / 1000 - MARK_AT * SLOT_US, null])
+      if (this.rounds.length > ROUNDS) this.rounds.shift()
+    } else if (mosi === LAST && this.rounds.length > 0) {
+      this.rounds.at(-1)[1] = nanos / 1000
+    }
+  }
+
+  /** Bytes that the host has got by now. */
+  received(bytes, nanos) {
+    for (const byte of bytes) {
+      if (byte !== 0) {
+        this.unfinished.push(byte)
+        continue
+      }
+      const start = head(this.unfinished, T_US_AT + 4)
+      if (start.length === T_US_AT + 4 && start[0] === FRAME_ID) this.#frame(start, nanos / 1000)
+      this.unfinished = []
+    }
+  }
+
+  counters() {
+    const sorted = [...this.us].sort((a, b) => a - b)
+    const at = (share) => sorted[Math.floor(share * (sorted.length - 1))] ?? null
+    return { frames: sorted.length, unmatched: this.unmatched, median_us: at(0.5), p99_us: at(0.99), worst_us: at(1) }
+  }
+
+  #frame(start, us) {
+    const t_us = new DataView(start.buffer).getUint32(T_US_AT, true)
+    const round = this.rounds.find(([first]) => Math.abs((first % 2 ** 32) - t_us) < SAME_ROUND_US)
+    if (!round || round[1] === null) {
+      this.unmatched++
+      return
+    }
+    this.us.push(us - round[1])
+  }
+}
