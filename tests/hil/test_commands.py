@@ -1,0 +1,112 @@
+"""Every command on every rig: its own reply, its refusals, and what it does to the stream."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac import FrameFlags, Setting, TareReason, TareState
+from biotac import _wire as wire
+from biotac.framing import encode
+
+TARE_Q4 = (3000 * 16,) * 19
+NO_FINGER = 5
+COMMANDS = {
+    wire.HelloRequest: ((0x600D,), wire.Hello),
+    wire.Start: ((int(wire.StreamFlags.FRAMES), 1, 0), wire.Reply),
+    wire.Stop: ((), wire.Reply),
+    wire.Ping: ((), wire.Reply),
+    wire.Subscribe: ((1, int(wire.QuantityFlags.POC)), wire.Reply),
+    wire.GetPoint: ((0,), wire.Point),
+    wire.TareNow: ((0,), wire.Reply),
+    wire.TareSet: ((0, TARE_Q4, wire.INVALID_COUNT), wire.Reply),
+    wire.GetStatus: ((), wire.Status),
+    wire.GetSensorStatus: ((0,), wire.SensorStatus),
+    wire.GetSensorInfo: ((0,), wire.SensorInfo),
+    wire.GetSetting: ((int(Setting.IDLE_PERIOD_MS),), wire.SettingValue),
+    wire.SetSetting: ((int(Setting.IDLE_PERIOD_MS), 100), wire.SettingValue),
+    wire.SaveSettings: ((), wire.Reply),
+    wire.RebootBootloader: ((1,), wire.Reply),  # not the magic number: refused, and it stays
+}
+REFUSED = [
+    (wire.GetPoint, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
+    (wire.GetSensorInfo, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
+    (wire.GetSensorStatus, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
+    (wire.TareNow, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
+    (wire.TareSet, (0, (0xFFF1,) * 19, 0), wire.Error.OUT_OF_RANGE),
+    (wire.GetSetting, (0,), wire.Error.UNKNOWN_SETTING),
+    (wire.SetSetting, (int(Setting.IDLE_PERIOD_MS), 1), wire.Error.OUT_OF_RANGE),
+    (wire.Start, (0x80, 1, 0), wire.Error.OUT_OF_RANGE),
+    (wire.Subscribe, (1, 0x80), wire.Error.OUT_OF_RANGE),
+    (wire.RebootBootloader, (1,), wire.Error.OUT_OF_RANGE),
+]
+
+
+def replies_to(hand: biotac.Hand, message_id: int, payload: bytes) -> list[Any]:
+    """All that comes back for one message and the PING behind it, but not the PING's reply."""
+    hand.link.write(encode(message_id, payload))
+    seen: list[Any] = []
+    hand.link.write(encode(wire.Ping.ID, wire.Ping(255).pack()))
+
+    def last(message: Any) -> bool:
+        seen.append(message)
+        return isinstance(message, wire.Reply) and message.req_id == 255
+
+    assert hand._await(last) is not None
+    return [m for m in seen[:-1] if isinstance(m, wire.Reply) or getattr(m, "req_id", 0) == 7]
+
+
+def test_every_command_has_one_reply_of_its_own_kind(board) -> None:
+    hand = board("press.toml")
+    hand.read(0.5)  # tared, so that TARE_NOW may be obeyed
+    hand.stop()
+    assert {m.ID for m in COMMANDS} == {m for m in wire.MESSAGES if m >= 0x80}
+    for kind, (values, reply) in COMMANDS.items():
+        answers = replies_to(hand, kind.ID, kind(7, *values).pack())
+        assert [type(a) for a in answers] == [reply], kind
+        if kind is wire.Start:
+            hand.stop()
+
+
+@pytest.mark.parametrize(("kind", "values", "error"), REFUSED)
+def test_what_cannot_be_done_is_refused_with_its_reason(board, kind: Any, values: tuple[Any, ...], error: int) -> None:
+    (answer,) = replies_to(board("press.toml"), kind.ID, kind(7, *values).pack())
+    assert (type(answer), answer.command, answer.error) == (wire.Reply, kind.ID, error)
+
+
+def test_a_command_from_the_future_and_one_of_wrong_length_are_answered_in_words(board) -> None:
+    hand = board("press.toml")
+    (unknown,) = replies_to(hand, 0xEE, bytes([7, 1, 2]))
+    assert (unknown.command, unknown.error) == (0xEE, wire.Error.UNKNOWN_COMMAND)
+    (short,) = replies_to(hand, wire.GetSetting.ID, bytes([7]))
+    assert (short.command, short.error) == (wire.GetSetting.ID, wire.Error.BAD_LENGTH)
+    assert short.req_id == 0  # where it would stand in a message of another length is anybody's guess
+
+
+def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:
+    hand = board("press.toml?seconds=3")
+    hand._command(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 200))
+    hand.link.release()
+    frames = 0
+    while hand._pump(1.0) and not hand.link.ended:
+        frames += sum(len(hand._batches.popleft().frames) for _ in range(len(hand._batches)))
+    assert 18 <= frames <= 22  # 200 ms of 10 ms rounds, and what was under way
+    assert hand.status().streams == 0
+
+
+def test_a_press_brings_its_tare_and_contact_events(board) -> None:
+    batch = board("press.toml?fingers=2").read_batch(20)
+    for finger in range(2):
+        frames = batch.frames[batch.frames["finger"] == finger]
+        tares = [m for m in batch.messages if isinstance(m, wire.Tare) and m.finger == finger]
+        assert tares[0].reason == TareReason.START and tares[0].tare_state == TareState.REST
+        first = frames[frames["seq"] == tares[0].seq]
+        assert len(first) == 1 and first["flags"][0] & FrameFlags.TARE_CHANGED
+        touched = (frames["flags"] & FrameFlags.CONTACT) != 0
+        assert np.count_nonzero(np.diff(touched.astype(int)) == 1) == np.count_nonzero(
+            np.diff(touched.astype(int)) == -1
+        )
+        assert touched.any() and not touched[: int(first["seq"][0])].any()
