@@ -3,12 +3,21 @@
 
 #include "fix.h"
 
-// Half away from zero, stated in 128 bits: round(|num| / den) = floor((2 |num| + den) / (2 den)).
+// Half away from zero: round(|num| / den) = floor((2 |num| + den) / (2 den)), stated in 128 bits where the
+// compiler has them. A 32-bit one has not: there by what is left over, twice which fits into 64 bits without
+// a sign.
 static int64_t rounded(int64_t num, int64_t den)
 {
-    unsigned __int128 magnitude = bt_abs(num);
-    unsigned __int128 quotient = (2 * magnitude + (uint64_t)den) / (2 * (unsigned __int128)(uint64_t)den);
-    return num < 0 ? (int64_t)(0 - (uint64_t)quotient) : (int64_t)quotient;
+    uint64_t magnitude = bt_abs(num);
+    uint64_t divisor = (uint64_t)den;
+#ifdef __SIZEOF_INT128__
+    uint64_t quotient =
+        (uint64_t)((2 * (unsigned __int128)magnitude + divisor) / (2 * (unsigned __int128)divisor));
+#else
+    uint64_t quotient = magnitude / divisor;
+    quotient += 2 * (magnitude - quotient * divisor) >= divisor;
+#endif
+    return num < 0 ? (int64_t)(0 - quotient) : (int64_t)quotient;
 }
 
 static void halves_go_away_from_zero(void **state)

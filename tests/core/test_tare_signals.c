@@ -122,7 +122,7 @@ static void rest_for_ten_minutes(emulated_finger *finger, const char *what)
         worst = error > worst ? error : worst;
     }
     print_message("%s: no false contact, tare off by at most %.2f counts, noise %u count^2\n", what, worst,
-                  finger->tare.noise.count2);
+                  (unsigned)finger->tare.noise.count2);
     // A mean of eight frames is followed at half a count a second at most.
     assert_true(worst < 3 * finger->sigma);
     assert_int_equal(finger->tare.reason, BT_TARE_REASON_START);
@@ -200,7 +200,7 @@ static void a_growing_vibration_does_not_raise_the_threshold_out_of_reach(void *
         while (finger.tare.state == BT_TARE_STATE_REST) {
             if (++k == 3000) {
                 fail_msg("a swing of +-300 counts (90,000 count^2) is not seen; the threshold is %u",
-                         finger.tare.threshold_count2);
+                         (unsigned)finger.tare.threshold_count2);
             }
             finger.load = 0.1 * k * (k / half % 2 ? 1 : -1);
             step(&finger);

@@ -80,7 +80,7 @@ static void t_us_is_that_of_slot_0_even_when_it_was_lost(void **state)
     }
     assert_true(lost > 5);
     if (worst_us > 1) { // the clock cuts to whole us
-        fail_msg("t_us is up to %u us off slot 0", worst_us);
+        fail_msg("t_us is up to %u us off slot 0", (unsigned)worst_us);
     }
 }
 

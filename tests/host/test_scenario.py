@@ -41,7 +41,7 @@ def test_a_press_ramps_holds_and_lets_go(tmp_path: Path) -> None:
     np.testing.assert_allclose(truth.poc_mm[200, 0], [-2.8, 0.0, -5.08])
     assert np.isnan(truth.poc_mm[50]).all() and np.isnan(truth.poc_mm[300]).all()
     # the counts follow: E17 falls while pressed and comes back
-    e17 = source.samples[:, 0, 32].astype(float)
+    e17 = source.samples[:, 0, sampling.ELECTRODE_SLOT[16]].astype(float)
     assert e17[150:250].mean() < e17[:100].mean() - 100 and abs(e17[300:].mean() - e17[:100].mean()) < 20
 
 

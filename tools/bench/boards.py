@@ -19,7 +19,9 @@ from m4f_model import Model, UnknownInstruction, runs
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
+import qemu  # noqa: E402
 from image.symbols import FLOAT_SYMBOL  # noqa: E402
+from qemu import Failed  # noqa: E402
 
 ROOT = HERE.parent.parent
 FIRMWARE = ROOT / "firmware"
@@ -45,10 +47,6 @@ PACKAGES = {
 Row = tuple[str, str, int, int]  # kernel, scene, instructions, cycles
 
 
-class Failed(Exception):
-    """One sentence for the user."""
-
-
 @dataclass(frozen=True)
 class Board:
     """A core in an emulator."""
@@ -57,20 +55,23 @@ class Board:
     title: str
     cycles_by: str
     machine: tuple[str, ...]
-    start: str
-    script: str
+    start: tuple[Path, ...]
+    script: Path
     options: tuple[str, ...] = ()
 
 
 M0PLUS = ("-mcpu=cortex-m0plus",)
 M4F = ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
 RP2040JS = "rp2040js 1.4.1, by the Cortex-M0+ manual without flash wait states or bus contention"
+M0PLUS_START = (HERE / "m0plus.c",)
+REFERENCE = FIRMWARE / "boards" / "m4f"  # the M4F's reset and memory are those of its board
 QEMU = "instructions counted in QEMU mps2-an386, cycles by a model of the Cortex-M4 manual without memory wait states"
 BOARDS = (
-    Board("m0plus", "Cortex-M0+", RP2040JS, M0PLUS, "m0plus.c", "m0plus.ld"),
-    Board("m0plus_divider", "Cortex-M0+ with RP2040 divider", RP2040JS, M0PLUS, "m0plus.c", "m0plus.ld",
+    Board("m0plus", "Cortex-M0+", RP2040JS, M0PLUS, M0PLUS_START, HERE / "m0plus.ld"),
+    Board("m0plus_divider", "Cortex-M0+ with RP2040 divider", RP2040JS, M0PLUS, M0PLUS_START, HERE / "m0plus.ld",
           ("-include", str(FIRMWARE / "port" / "rp2040" / "divider.h"))),
-    Board("m4f", "Cortex-M4F", QEMU, M4F, "m4f.c", "m4f.ld"),
+    Board("m4f", "Cortex-M4F", QEMU, M4F, (REFERENCE / "startup.c", HERE / "m4f.c"), REFERENCE / "m4f.ld",
+          (f"-I{REFERENCE}",)),
 )  # fmt: skip
 
 
@@ -98,12 +99,13 @@ def build(board: Board, name: str, *sources: object) -> Path:
     compiler = ["arm-none-eabi-gcc", "-std=c11", "-mthumb", *board.machine, "-ffunction-sections", "-fdata-sections"]
     # As everywhere else: no products fused into sums, and no errno for a square root.
     compiler += ["-ffp-contract=off", "-fno-math-errno", f"-DBENCH_FRAMES={FRAMES}", *INCLUDE, *board.options]
-    link = ["-nostartfiles", "--specs=nano.specs", "--specs=nosys.specs", "-Wl,--gc-sections", f"-L{HERE}"]
+    link = ["-nostartfiles", "--specs=nano.specs", "-Wl,--gc-sections"]
+    link += ["--specs=rdimon.specs" if board.machine == M4F else "--specs=nosys.specs"]
     apart = []
     for source in APART:
         apart.append(elf.with_suffix(f".{source.stem}.o"))
         command(*compiler, *OPTIONS[source.name], "-c", source, "-o", apart[-1])
-    command(*compiler, "-O3", *link, "-T", HERE / board.script, HERE / board.start, *sources, *CORE, *JUDGED, *apart,
+    command(*compiler, "-O3", *link, "-T", board.script, *board.start, *sources, *CORE, *JUDGED, *apart,
             "-lm", "-o", elf)  # fmt: skip
     return elf
 
@@ -124,18 +126,12 @@ def run_rp2040(elf: Path) -> tuple[list[Row], list[int]]:
     return [tuple(row) for row in answer["rows"]], answer["results"]
 
 
-def qemu(elf: Path) -> list[str]:
-    semihosting = "enable=on,target=native"
-    return ["qemu-system-arm", "-M", "mps2-an386", "-kernel", str(elf), "-display", "none", "-monitor", "none",
-            "-serial", "none", "-semihosting-config", semihosting]  # fmt: skip
-
-
 def qemu_says(elf: Path) -> list[str]:
-    """What the image wrote by semihosting, which is QEMU's stderr."""
-    done = subprocess.run(qemu(elf), stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise Failed(f"qemu-system-arm failed: {done.stderr.strip()[-200:]}")
-    return done.stderr.splitlines()
+    """The lines that the image printed."""
+    code, said = qemu.run(elf)
+    if code:
+        raise Failed(f"{elf.name} ended with {code} in QEMU: {said.strip()[-200:]}")
+    return said.splitlines()
 
 
 def run_m4f(elf: Path) -> list[Row]:
@@ -158,7 +154,7 @@ def run_m4f(elf: Path) -> list[Row]:
 def _log(elf: Path) -> Iterator[bytes]:
     """QEMU's log, one line per instruction, through a pipe: it would be a gigabyte on disk."""
     reader, writer = os.pipe()
-    words = [*qemu(elf), "-singlestep", "-d", "exec,nochain", "-D", f"/dev/fd/{writer}"]
+    words = [*qemu.words(elf), "-singlestep", "-d", "exec,nochain", "-D", f"/dev/fd/{writer}"]
     process = subprocess.Popen(words, pass_fds=[writer], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(writer)
     try:

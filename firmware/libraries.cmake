@@ -1,0 +1,45 @@
+# What board images, the simulator, the Python extension and the tests are made of. Whoever includes this has
+# biotac_options, an interface library of compile options, before.
+set(fw ${CMAKE_CURRENT_LIST_DIR})
+
+# Pure integer C: the same files on every board, in the simulator and under the Python tests.
+add_library(biotac_core STATIC
+  ${fw}/core/assembly.c ${fw}/core/baseline.c ${fw}/core/cobs.c ${fw}/core/commands.c ${fw}/core/crc32.c
+  ${fw}/core/crc32_gen.c
+  ${fw}/core/finger.c ${fw}/core/fold_gen.c ${fw}/core/framing.c ${fw}/core/gate.c ${fw}/core/kernel.c
+  ${fw}/core/noise.c ${fw}/core/poc.c ${fw}/core/release.c ${fw}/core/results.c ${fw}/core/root_gen.c
+  ${fw}/core/running.c ${fw}/core/sensor_gen.c ${fw}/core/session.c ${fw}/core/settings.c ${fw}/core/sigma.c
+  ${fw}/core/storage.c ${fw}/core/sweep.c ${fw}/core/tare.c
+  ${fw}/core/thermal.c ${fw}/core/wire_gen.c ${fw}/core/wrench.c)
+target_include_directories(biotac_core PUBLIC ${fw}/core)
+
+# The same maths in double, from the papers. Never linked into a board image.
+add_library(biotac_reference STATIC ${fw}/reference/lin2013.c ${fw}/reference/gold.c)
+target_include_directories(biotac_reference PUBLIC ${fw}/reference ${fw}/core)
+target_link_libraries(biotac_reference PUBLIC biotac_core m)
+
+# Kernels that do not ship, for the benchmark. Products are not fused into sums: no two compilers agree
+# on where, and the errors are to be the kernels' own.
+file(GLOB variants CONFIGURE_DEPENDS ${fw}/variants/*.c)
+add_library(biotac_variants STATIC ${variants})
+target_include_directories(biotac_variants PUBLIC ${fw}/variants)
+target_compile_options(biotac_variants PRIVATE -ffp-contract=off -fno-math-errno)
+target_link_libraries(biotac_variants PUBLIC biotac_reference)
+
+# The SPI driver, over port.h.
+add_library(biotac_sensor STATIC
+  ${fw}/sensor/properties.c ${fw}/sensor/sampler.c ${fw}/sensor/word.c)
+target_include_directories(biotac_sensor PUBLIC ${fw}/sensor ${fw}/port)
+target_link_libraries(biotac_sensor PUBLIC biotac_core)
+
+# The emulated sensor, as the bus sees it.
+add_library(biotac_emu STATIC ${fw}/emu/bus.c ${fw}/emu/device.c ${fw}/emu/tape.c)
+target_include_directories(biotac_emu PUBLIC ${fw}/emu)
+target_link_libraries(biotac_emu PUBLIC biotac_core)
+
+foreach(lib biotac_core biotac_reference biotac_variants biotac_sensor biotac_emu)
+  if(NOT CMAKE_CROSSCOMPILING)
+    set_target_properties(${lib} PROPERTIES POSITION_INDEPENDENT_CODE ON) # they go into Python's extension
+  endif()
+  target_link_libraries(${lib} PUBLIC biotac_options)
+endforeach()

@@ -1,0 +1,60 @@
+#!/usr/bin/env python3
+"""Run an image of the Cortex-M4F reference board (firmware/boards/m4f) in QEMU's mps2-an386.
+
+    tools/qemu.py [--seconds N] IMAGE.elf
+
+Prints what the image prints and exits as it does. An image that has not ended after N seconds (default 100) is
+ended, and what it said last is told.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+
+SECONDS = 100.0  # several times what the slowest image takes on an idle core
+
+
+class Failed(Exception):
+    """One sentence for the user."""
+
+
+def words(elf: Path) -> list[str]:
+    """QEMU's command line."""
+    return ["qemu-system-arm", "-M", "mps2-an386", "-kernel", str(elf), "-display", "none", "-monitor", "none",
+            "-serial", "none", "-semihosting-config", "enable=on,target=native"]  # fmt: skip
+
+
+def run(elf: Path, seconds: float = SECONDS) -> tuple[int, str]:
+    """The image's exit code, and what it printed."""
+    if not elf.is_file():
+        raise Failed(f"{elf} is missing; build it: cmake -S firmware --preset m4f && cmake --build build/m4f")
+    try:
+        done = subprocess.run(words(elf), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                              timeout=seconds, check=False)  # fmt: skip
+    except FileNotFoundError:
+        raise Failed("qemu-system-arm is missing; install it: apt-get install qemu-system-arm") from None
+    except subprocess.TimeoutExpired as late:
+        said = (late.stdout or b"").decode(errors="replace").splitlines()
+        last = f"it said {len(said)} lines, the last: {said[-1]}" if said else "it said nothing"
+        raise Failed(f"{elf.name} has not ended within {seconds:g} s; {last}") from None
+    return done.returncode, done.stdout.decode(errors="replace")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="end it after so long (default %(default)g)")
+    parser.add_argument("image", type=Path, help="an .elf of firmware/boards/m4f")
+    args = parser.parse_args()
+    code, said = run(args.image, args.seconds)
+    sys.stdout.write(said)
+    return code
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except Failed as failed:
+        sys.exit(f"tools/qemu.py: {failed}")
