@@ -22,6 +22,7 @@
 #define BT_STORAGE_IDS 7
 enum bt_record {
     BT_RECORD_SETTINGS = 1,
+    BT_RECORD_CALIBRATION = 2, // of finger 0; the next four are of fingers 1 to 4
 };
 
 // Offsets count bytes from the beginning of the two sectors. erase and program return false when the flash
