@@ -7,7 +7,7 @@
 
 #include <stdbool.h>
 
-#define BT_SERIAL_BYTES sizeof(((bt_msg_calibration *)NULL)->serial)
+#define BT_SERIAL_BYTES 16
 
 typedef struct {
     bool present;

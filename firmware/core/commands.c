@@ -226,7 +226,7 @@ static uint8_t save_calibrations(bt_session *session)
     return BT_ERROR_OK;
 }
 
-static uint8_t save_settings(bt_session *session)
+static uint8_t save(bt_session *session)
 {
     if (session->streams != 0) {
         return BT_ERROR_BUSY; // sampling stands still while flash is written
@@ -340,7 +340,7 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         error = reboot_bootloader(session, payload);
         break;
     case BT_SAVE_SETTINGS_ID:
-        error = save_settings(session);
+        error = save(session);
         break;
     default:
         error = BT_ERROR_UNKNOWN_COMMAND;

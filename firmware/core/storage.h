@@ -42,4 +42,11 @@ int bt_storage_read(const bt_flash *flash, uint16_t id, uint16_t *version, uint8
 bool bt_storage_write(const bt_flash *flash, uint16_t id, uint16_t version, const uint8_t *data,
                       size_t bytes);
 
+// One record as its page holds it, for who keeps records elsewhere: behind header and data all is 0xFF.
+void bt_storage_make_page(uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id, uint16_t version,
+                          const uint8_t *data, size_t bytes);
+
+// It holds a whole record of this id.
+bool bt_storage_page_is(const uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id);
+
 #endif
