@@ -365,6 +365,14 @@ def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp
     assert list(json.loads(capsys.readouterr().out)["calibrations"]) == ["1"]
 
 
+@pytest.mark.parametrize("what", ["show", "get", "put", "clear", "store", "load"])
+def test_every_part_of_the_verb_has_an_example(what: str, capsys) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["calibration", what, "--help"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out.rstrip().splitlines()[-1].startswith(f"example: biotac calibration {what} ")
+
+
 def test_a_file_is_shown(capsys, tmp_path: Path) -> None:
     path = tmp_path / "thumb.json"
     file.save(path, ODD, {})
