@@ -16,7 +16,7 @@ import pytest
 
 from biotac import Calibration
 from biotac.calibration import chip as chips
-from biotac.calibration import eeprom, file
+from biotac.calibration import eeprom, file, harness
 from biotac.calibration.chip import KINDS, Chip
 from biotac.cli.main import main
 from biotac.errors import InputError, PortError
@@ -263,3 +263,33 @@ def test_the_command_line_stores_shows_and_loads(monkeypatch, capsys, tmp_path: 
     assert main([*verb, "show", "--i2c", "1:0x50"]) == 2
     assert "wants --chip" in capsys.readouterr().err
     assert main([*verb, "show"]) == 2
+
+
+# ---- the EEPROMs of a port's fingers -------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("port", "bare", "places"),
+    [
+        ("spidev:0.0", "spidev:0.0", {}),
+        ("spidev:0.0?calibration=1:0x50:24c02", "spidev:0.0", {0: ("1:0x50", "24c02")}),
+        ("spidev:0.0,0.1?calibration=,1:0x57:24c32", "spidev:0.0,0.1", {1: ("1:0x57", "24c32")}),
+        ("spidev:0.0,0.1?calibration=1:80:24c01", "spidev:0.0,0.1", {0: ("1:80", "24c01")}),
+    ],
+)
+def test_a_port_names_its_fingers_eeproms(port: str, bare: str, places: dict[int, tuple[str, str]]) -> None:
+    assert harness.parse(port) == (bare, places)
+
+
+@pytest.mark.parametrize(
+    ("port", "words"),
+    [
+        ("spidev:0.0?kalibration=1:0x50:24c02", "option 'kalibration' is unknown; expected spidev:"),
+        ("spidev:0.0?calibration=1:0x50", "'1:0x50' names no kind of EEPROM"),
+        ("spidev:0.0?calibration=1:0x40:24c02", "is at 0x50 to 0x57"),
+        ("spidev:0.0?calibration=1:0x50:24c02,1:0x51:24c02", r"2 EEPROMs for 1 finger\(s\)"),
+    ],
+)
+def test_a_port_that_names_them_wrongly(port: str, words: str) -> None:
+    with pytest.raises(PortError, match=words):
+        harness.parse(port)
