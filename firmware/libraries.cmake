@@ -4,7 +4,8 @@ set(fw ${CMAKE_CURRENT_LIST_DIR})
 
 # Pure integer C: the same files on every board, in the simulator and under the Python tests.
 add_library(biotac_core STATIC
-  ${fw}/core/assembly.c ${fw}/core/baseline.c ${fw}/core/cobs.c ${fw}/core/commands.c ${fw}/core/crc32.c
+  ${fw}/core/assembly.c ${fw}/core/baseline.c ${fw}/core/calibration.c
+  ${fw}/core/cobs.c ${fw}/core/commands.c ${fw}/core/crc32.c
   ${fw}/core/crc32_gen.c
   ${fw}/core/finger.c ${fw}/core/fold_gen.c ${fw}/core/framing.c ${fw}/core/gate.c ${fw}/core/kernel.c
   ${fw}/core/noise.c ${fw}/core/poc.c ${fw}/core/release.c ${fw}/core/results.c ${fw}/core/root_gen.c

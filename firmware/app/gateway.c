@@ -7,6 +7,10 @@
 
 #include "version.h"
 
+_Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS
+                   && BT_CALIBRATION_RECORD_BYTES <= BT_STORAGE_MAX_BYTES,
+               "every finger's calibration must have a record of its own, and fit it");
+
 #define ALL_FINGERS ((1u << BT_MAX_FINGERS) - 1)
 
 // The gap after the last property read, and the time a slow board takes from here until its alarm is set: an
@@ -28,6 +32,20 @@ static uint8_t save_settings(const bt_settings *settings)
                : BT_ERROR_NOT_STORED;
 }
 
+static uint16_t calibration_id(uint8_t finger)
+{
+    return (uint16_t)(BT_RECORD_CALIBRATION + finger);
+}
+
+static uint8_t save_calibration(uint8_t finger, const bt_calibration *calibration)
+{
+    uint8_t record[BT_CALIBRATION_RECORD_BYTES];
+    size_t bytes = bt_calibration_pack(calibration, record);
+    return bt_storage_write(&flash, calibration_id(finger), BT_CALIBRATION_RECORD_VERSION, record, bytes)
+               ? BT_ERROR_OK
+               : BT_ERROR_NOT_STORED;
+}
+
 static uint8_t reboot_bootloader(void)
 {
     return port_reboot_bootloader() ? BT_ERROR_OK : BT_ERROR_NOT_HERE;
@@ -40,13 +58,23 @@ static void load_settings(bt_session *session)
     int bytes = bt_storage_read(&flash, BT_RECORD_SETTINGS, &version, record, sizeof record);
     if (bytes > 0) {
         bt_settings_unpack(&session->settings, version, record, (size_t)bytes);
-        bt_session_use_settings(session);
     }
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        bytes = bt_storage_read(&flash, calibration_id(f), &version, record, sizeof record);
+        if (bytes > 0) {
+            bt_calibration_unpack(&session->calibration[f], version, record, (size_t)bytes);
+        }
+    }
+    bt_session_use_settings(session);
 }
 
 void bt_gateway_init(bt_gateway *gateway)
 {
-    static const bt_board_actions actions = {save_settings, reboot_bootloader};
+    static const bt_board_actions actions = {
+        .save_settings = save_settings,
+        .save_calibration = save_calibration,
+        .reboot_bootloader = reboot_bootloader,
+    };
     bt_identity identity = {
         .board = port_board(),
         .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},
@@ -56,11 +84,11 @@ void bt_gateway_init(bt_gateway *gateway)
     port_delay_us(BT_POWER_ON_MS * 1000);
     bt_session_init(&gateway->session, &identity, port_link_write, port_now_us());
     bt_session_use_board(&gateway->session, &actions);
-    load_settings(&gateway->session);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         bt_properties_read(f, &gateway->session.info[f]);
         gateway->session.finger[f].present = gateway->session.info[f].present;
     }
+    load_settings(&gateway->session); // now that it is known which sensors a calibration can be for
     gateway->round_open = false;
     gateway->link_was_up = false;
     // Absent sensors are read too: one that is plugged in later shows up by itself.

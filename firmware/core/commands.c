@@ -1,6 +1,8 @@
 // What each command does. Every command is answered exactly once: by its own message, or by REPLY.
 #include "session.h"
 
+#include <string.h>
+
 static void reply(bt_session *session, uint8_t req_id, uint8_t command, uint8_t error)
 {
     uint8_t payload[BT_REPLY_BYTES];
@@ -45,6 +47,9 @@ static uint8_t start(bt_session *session, const uint8_t *payload)
     }
     if (msg.fingers >> BT_MAX_FINGERS != 0) {
         return BT_ERROR_NO_SUCH_FINGER;
+    }
+    if (msg.streams == 0) {
+        bt_session_stop(session);
     }
     session->streams = msg.streams;
     session->fingers = msg.fingers;
@@ -120,7 +125,7 @@ static void point(bt_session *session, uint8_t req_id, uint8_t finger)
 {
     uint8_t payload[BT_POINT_BYTES];
     bt_msg_point msg = {.req_id = req_id};
-    bt_finger_point(&session->finger[finger], &session->kernel, &msg);
+    bt_finger_point(&session->finger[finger], &session->kernel[finger], &msg);
     bt_msg_point_pack(&msg, payload);
     bt_session_send(session, BT_POINT_ID, payload);
 }
@@ -148,13 +153,89 @@ static uint8_t set_setting(bt_session *session, const uint8_t *payload)
     return error;
 }
 
-static uint8_t save_settings(const bt_session *session)
+static void calibration(bt_session *session, uint8_t req_id, uint8_t finger)
+{
+    uint8_t payload[BT_CALIBRATION_BYTES];
+    const bt_calibration *its = &session->calibration[finger];
+    bt_msg_calibration msg = {
+        .req_id = req_id,
+        .finger = finger,
+        .state = session->calibration_state[finger],
+        .made_s = its->made_s,
+    };
+    memcpy(msg.serial, its->serial, sizeof msg.serial);
+    for (int k = 0; k < BT_CALIBRATION_VALUES; k++) {
+        msg.value[k] =
+            its->present ? its->value[k] : bt_settings_get(&session->settings, bt_calibration_setting[k]);
+    }
+    bt_msg_calibration_pack(&msg, payload);
+    bt_session_send(session, BT_CALIBRATION_ID, payload);
+}
+
+static uint8_t set_calibration(bt_session *session, const uint8_t *payload)
+{
+    bt_msg_set_calibration msg;
+    bt_msg_set_calibration_unpack(&msg, payload);
+    if (msg.finger >= BT_MAX_FINGERS) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    if (session->streams != 0) {
+        return BT_ERROR_BUSY;
+    }
+    bt_settings trial = session->settings;
+    bt_calibration its = {.present = true, .unsaved = true, .made_s = msg.made_s};
+    memcpy(its.serial, msg.serial, sizeof its.serial);
+    memcpy(its.value, msg.value, sizeof its.value);
+    if (!bt_calibration_fits(&its, session->info[msg.finger].serial)) {
+        return BT_ERROR_OTHER_SENSOR;
+    }
+    uint8_t error = bt_calibration_apply(&its, &trial);
+    if (error == BT_ERROR_OK) {
+        session->calibration[msg.finger] = its;
+        bt_session_use_settings(session);
+        calibration(session, msg.req_id, msg.finger);
+    }
+    return error;
+}
+
+static uint8_t clear_calibration(bt_session *session, uint8_t finger)
+{
+    if (finger >= BT_MAX_FINGERS) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    if (session->streams != 0) {
+        return BT_ERROR_BUSY;
+    }
+    session->calibration[finger] = (bt_calibration){.unsaved = true};
+    bt_session_use_settings(session);
+    return BT_ERROR_OK;
+}
+
+static uint8_t save_calibrations(bt_session *session)
+{
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        // The others stay as they are stored, be it by a firmware that knows more than this one.
+        if (session->calibration[f].unsaved) {
+            uint8_t error = session->board.save_calibration(f, &session->calibration[f]);
+            if (error != BT_ERROR_OK) {
+                return error;
+            }
+            session->calibration[f].unsaved = false;
+        }
+    }
+    return BT_ERROR_OK;
+}
+
+static uint8_t save(bt_session *session)
 {
     if (session->streams != 0) {
         return BT_ERROR_BUSY; // sampling stands still while flash is written
     }
-    return session->board.save_settings == NULL ? BT_ERROR_NOT_HERE
-                                                : session->board.save_settings(&session->settings);
+    if (session->board.save_settings == NULL || session->board.save_calibration == NULL) {
+        return BT_ERROR_NOT_HERE;
+    }
+    uint8_t error = session->board.save_settings(&session->settings);
+    return error == BT_ERROR_OK ? save_calibrations(session) : error;
 }
 
 static uint8_t reboot_bootloader(const bt_session *session, const uint8_t *payload)
@@ -189,7 +270,7 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         error = start(session, payload);
         break;
     case BT_STOP_ID:
-        session->streams = 0;
+        bt_session_stop(session);
         break;
     case BT_PING_ID:
         break;
@@ -239,11 +320,27 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
             return;
         }
         break;
+    case BT_GET_CALIBRATION_ID:
+        if (payload[1] < BT_MAX_FINGERS) {
+            calibration(session, req_id, payload[1]);
+            return;
+        }
+        error = BT_ERROR_NO_SUCH_FINGER;
+        break;
+    case BT_SET_CALIBRATION_ID:
+        error = set_calibration(session, payload);
+        if (error == BT_ERROR_OK) {
+            return;
+        }
+        break;
+    case BT_CLEAR_CALIBRATION_ID:
+        error = clear_calibration(session, payload[1]);
+        break;
     case BT_REBOOT_BOOTLOADER_ID:
         error = reboot_bootloader(session, payload);
         break;
     case BT_SAVE_SETTINGS_ID:
-        error = save_settings(session);
+        error = save(session);
         break;
     default:
         error = BT_ERROR_UNKNOWN_COMMAND;

@@ -22,11 +22,32 @@ void bt_session_use_board(bt_session *session, const bt_board_actions *actions)
     session->board = *actions;
 }
 
+static uint8_t calibration_state(const bt_calibration *calibration, const bt_sensor_info *info)
+{
+    if (!calibration->present) {
+        return BT_CALIBRATION_STATE_NONE;
+    }
+    return bt_calibration_fits(calibration, info->serial) ? BT_CALIBRATION_STATE_IN_FORCE
+                                                          : BT_CALIBRATION_STATE_OTHER_SENSOR;
+}
+
+static void use_finger_settings(bt_session *session, int f)
+{
+    bt_settings own = session->settings;
+    session->calibration_state[f] = calibration_state(&session->calibration[f], &session->info[f]);
+    if (session->calibration_state[f] == BT_CALIBRATION_STATE_IN_FORCE) {
+        (void)bt_calibration_apply(&session->calibration[f], &own); // its ranges were seen to when it came
+    }
+    session->kernel[f] = bt_kernel_settings_from(&own);
+    session->tare[f] = bt_tare_settings_from(&own);
+}
+
 void bt_session_use_settings(bt_session *session)
 {
     const bt_settings *settings = &session->settings;
-    session->kernel = bt_kernel_settings_from(settings);
-    session->tare = bt_tare_settings_from(settings);
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        use_finger_settings(session, f);
+    }
     session->status_period_us = (uint32_t)bt_settings_get(settings, BT_SETTING_STATUS_PERIOD_MS) * 1000;
     session->idle_rounds = (uint16_t)(bt_settings_get(settings, BT_SETTING_IDLE_PERIOD_MS) / BT_FRAME_MS);
 }
@@ -79,7 +100,7 @@ static bool streams(const bt_session *session, const bt_finger *finger, uint8_t 
 void bt_session_begin(bt_session *session, uint32_t t_us)
 {
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_finger_begin(&session->finger[f], t_us, &session->tare);
+        bt_finger_begin(&session->finger[f], t_us, &session->tare[f]);
     }
 }
 
@@ -145,7 +166,7 @@ static void send_frame(bt_session *session, bt_finger *finger)
     if (finger->tare_unsent) {
         send_tare(session, finger);
     }
-    bt_finger_frame(finger, &session->kernel, &msg);
+    bt_finger_frame(finger, &session->kernel[finger->index], &msg);
     bt_msg_frame_pack(&msg, payload);
     bt_session_send(session, BT_FRAME_ID, payload);
     count_skips(&session->skips, finger->quantities);
@@ -183,14 +204,24 @@ static void send_pac(bt_session *session, const bt_finger *finger)
     bt_session_send(session, BT_PAC_ID, payload);
 }
 
+static void forget_sensor(bt_session *session, int f)
+{
+    if (session->info[f].present) {
+        memset(&session->info[f], 0, sizeof session->info[f]);
+        if (session->streams == 0) {
+            use_finger_settings(session, f);
+        }
+    }
+}
+
 void bt_session_round(bt_session *session)
 {
     uint32_t answering = 0; // bit mask
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         bt_finger *finger = &session->finger[f];
-        if (!bt_finger_end(finger, &session->tare)) {
+        if (!bt_finger_end(finger, &session->tare[f])) {
             if (finger->silent_rounds == BT_UNPLUGGED_ROUNDS) {
-                memset(&session->info[f], 0, sizeof session->info[f]); // the next one may be another
+                forget_sensor(session, f); // the next one may be another
             }
             continue;
         }
@@ -263,8 +294,7 @@ void bt_session_tick(bt_session *session, uint32_t now_us)
         session->uptime_s++;
     }
     if (session->keepalive_ms != 0 && now_us - session->heard_us > session->keepalive_ms * 1000u) {
-        session->streams = 0;
-        session->keepalive_ms = 0;
+        bt_session_stop(session);
     }
     if (now_us - session->status_us < session->status_period_us) {
         return;
@@ -280,9 +310,15 @@ void bt_session_tick(bt_session *session, uint32_t now_us)
     }
 }
 
-void bt_session_link_down(bt_session *session)
+void bt_session_stop(bt_session *session)
 {
     session->streams = 0;
     session->keepalive_ms = 0;
+    bt_session_use_settings(session);
+}
+
+void bt_session_link_down(bt_session *session)
+{
+    bt_session_stop(session);
     bt_deframer_reset(&session->deframer);
 }

@@ -4,6 +4,7 @@
 #ifndef BIOTAC_SESSION_H
 #define BIOTAC_SESSION_H
 
+#include "calibration.h"
 #include "finger.h"
 #include "framing.h"
 #include "settings.h"
@@ -21,9 +22,10 @@ typedef bt_msg_sensor_info bt_sensor_info;
 // Takes all bytes or none; false means no room, or nobody there.
 typedef bool (*bt_link_write)(const uint8_t *data, size_t bytes);
 
-// What the session asks of its board. Both return an enum bt_error.
+// What the session asks of its board. All return an enum bt_error.
 typedef struct {
     uint8_t (*save_settings)(const bt_settings *settings);
+    uint8_t (*save_calibration)(uint8_t finger, const bt_calibration *calibration);
     uint8_t (*reboot_bootloader)(void); // OK: it happens once the reply is out
 } bt_board_actions;
 
@@ -40,8 +42,10 @@ typedef struct {
     bt_finger finger[BT_MAX_FINGERS];
     bt_sensor_info info[BT_MAX_FINGERS];
     bt_settings settings;
-    bt_kernel_settings kernel; // these are of settings, looked up once per change
-    bt_tare_settings tare;
+    bt_calibration calibration[BT_MAX_FINGERS];
+    uint8_t calibration_state[BT_MAX_FINGERS]; // enum; these follow from what is above, once per change
+    bt_kernel_settings kernel[BT_MAX_FINGERS];
+    bt_tare_settings tare[BT_MAX_FINGERS];
     uint32_t status_period_us;
     uint16_t idle_rounds;
     bt_identity identity;
@@ -81,7 +85,7 @@ void bt_session_begin(bt_session *session, uint32_t t_us);
 void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_MAX_FINGERS], uint32_t t_us);
 void bt_session_round(bt_session *session);
 
-// Settings have changed.
+// Settings, calibrations or sensors have changed. Not while streaming: one recording, one set of settings.
 void bt_session_use_settings(bt_session *session);
 
 // Call often: keep-alive and periodic status.
@@ -89,6 +93,9 @@ void bt_session_tick(bt_session *session, uint32_t now_us);
 
 // The host closed the port: nobody is there to stream to.
 void bt_session_link_down(bt_session *session);
+
+// End every stream. What waited for that, a sensor unplugged meanwhile, then counts.
+void bt_session_stop(bt_session *session);
 
 // Bit mask of the fingers whose sensor answers.
 uint8_t bt_session_present(const bt_session *session);

@@ -25,8 +25,8 @@ static uint32_t page_crc(const uint8_t page[BT_FLASH_PAGE_BYTES])
     return bt_crc32(copy, sizeof copy);
 }
 
-static void make_page(uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id, uint16_t version, const uint8_t *data,
-                      size_t bytes)
+void bt_storage_make_page(uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id, uint16_t version,
+                          const uint8_t *data, size_t bytes)
 {
     memset(page, 0xFF, BT_FLASH_PAGE_BYTES);
     bt_put_u32(page, MAGIC);
@@ -36,7 +36,7 @@ static void make_page(uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id, uint16_t v
     bt_put_u32(page + CRC_AT, page_crc(page));
 }
 
-static bool page_is(const uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id)
+bool bt_storage_page_is(const uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id)
 {
     return bt_get_u32(page) == MAGIC && bt_get_u16(page + 4) == id
            && bt_get_u32(page + 8) <= BT_STORAGE_MAX_BYTES && bt_get_u32(page + CRC_AT) == page_crc(page);
@@ -83,7 +83,7 @@ static int sector_in_use(const bt_flash *flash, uint32_t *generation)
     *generation = 0;
     for (int sector = 0; sector < 2; sector++) {
         read_page(flash, sector, 0, page);
-        if (!page_is(page, IN_USE_ID)) {
+        if (!bt_storage_page_is(page, IN_USE_ID)) {
             continue;
         }
         uint32_t its = bt_get_u32(page + BT_STORAGE_HEADER_BYTES);
@@ -100,7 +100,7 @@ static int latest(const bt_flash *flash, int sector, uint16_t id, uint8_t out[BT
 {
     for (int page = PAGES - 1; page > 0; page--) {
         read_page(flash, sector, page, out);
-        if (page_is(out, id)) {
+        if (bt_storage_page_is(out, id)) {
             return page;
         }
     }
@@ -140,7 +140,7 @@ static bool move_on(const bt_flash *flash, int from, uint32_t generation, uint16
         }
     }
     bt_put_u32(data, generation + 1);
-    make_page(page, IN_USE_ID, 0, data, sizeof data);
+    bt_storage_make_page(page, IN_USE_ID, 0, data, sizeof data);
     return keep_page(flash, to, 0, page);
 }
 
@@ -168,7 +168,7 @@ bool bt_storage_write(const bt_flash *flash, uint16_t id, uint16_t version, cons
     if (id == 0 || id > BT_STORAGE_IDS || bytes > BT_STORAGE_MAX_BYTES) {
         return false;
     }
-    make_page(record, id, version, data, bytes);
+    bt_storage_make_page(record, id, version, data, bytes);
     int sector = sector_in_use(flash, &generation);
     if (sector == NO_SECTOR) {
         return move_on(flash, NO_SECTOR, 0, id, record);

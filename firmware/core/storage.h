@@ -22,6 +22,7 @@
 #define BT_STORAGE_IDS 7
 enum bt_record {
     BT_RECORD_SETTINGS = 1,
+    BT_RECORD_CALIBRATION = 2, // of finger 0; the next four are of fingers 1 to 4
 };
 
 // Offsets count bytes from the beginning of the two sectors. erase and program return false when the flash
@@ -40,5 +41,12 @@ int bt_storage_read(const bt_flash *flash, uint16_t id, uint16_t *version, uint8
 // still stands. Writes nothing when the same record is stored already: flash wears.
 bool bt_storage_write(const bt_flash *flash, uint16_t id, uint16_t version, const uint8_t *data,
                       size_t bytes);
+
+// One record as its page holds it, for who keeps records elsewhere: behind header and data all is 0xFF.
+void bt_storage_make_page(uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id, uint16_t version,
+                          const uint8_t *data, size_t bytes);
+
+// It holds a whole record of this id.
+bool bt_storage_page_is(const uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id);
 
 #endif

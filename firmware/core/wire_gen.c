@@ -202,6 +202,45 @@ void bt_msg_point_unpack(bt_msg_point *msg, const uint8_t in[BT_POINT_BYTES])
     (void)at;
 }
 
+void bt_msg_calibration_pack(const bt_msg_calibration *msg, uint8_t out[BT_CALIBRATION_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->state, 1);
+    for (int k = 0; k < 16; k++) {
+        at = put(at, (uint32_t)msg->serial[k], 1);
+    }
+    at = put(at, (uint32_t)msg->made_s, 4);
+    for (int k = 0; k < 7; k++) {
+        at = put(at, (uint32_t)msg->value[k], 4);
+    }
+    (void)at;
+}
+
+void bt_msg_calibration_unpack(bt_msg_calibration *msg, const uint8_t in[BT_CALIBRATION_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->state = (uint8_t)value;
+    for (int k = 0; k < 16; k++) {
+        at = get(at, &value, 1);
+        msg->serial[k] = (uint8_t)value;
+    }
+    at = get(at, &value, 4);
+    msg->made_s = (uint32_t)value;
+    for (int k = 0; k < 7; k++) {
+        at = get(at, &value, 4);
+        msg->value[k] = (int32_t)value;
+    }
+    (void)at;
+}
+
 void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
 {
     uint8_t *at = out;
@@ -836,6 +875,80 @@ void bt_msg_save_settings_unpack(bt_msg_save_settings *msg, const uint8_t in[BT_
     (void)at;
 }
 
+void bt_msg_get_calibration_pack(const bt_msg_get_calibration *msg, uint8_t out[BT_GET_CALIBRATION_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    (void)at;
+}
+
+void bt_msg_get_calibration_unpack(bt_msg_get_calibration *msg, const uint8_t in[BT_GET_CALIBRATION_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    (void)at;
+}
+
+void bt_msg_set_calibration_pack(const bt_msg_set_calibration *msg, uint8_t out[BT_SET_CALIBRATION_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    for (int k = 0; k < 16; k++) {
+        at = put(at, (uint32_t)msg->serial[k], 1);
+    }
+    at = put(at, (uint32_t)msg->made_s, 4);
+    for (int k = 0; k < 7; k++) {
+        at = put(at, (uint32_t)msg->value[k], 4);
+    }
+    (void)at;
+}
+
+void bt_msg_set_calibration_unpack(bt_msg_set_calibration *msg, const uint8_t in[BT_SET_CALIBRATION_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    for (int k = 0; k < 16; k++) {
+        at = get(at, &value, 1);
+        msg->serial[k] = (uint8_t)value;
+    }
+    at = get(at, &value, 4);
+    msg->made_s = (uint32_t)value;
+    for (int k = 0; k < 7; k++) {
+        at = get(at, &value, 4);
+        msg->value[k] = (int32_t)value;
+    }
+    (void)at;
+}
+
+void bt_msg_clear_calibration_pack(const bt_msg_clear_calibration *msg, uint8_t out[BT_CLEAR_CALIBRATION_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    (void)at;
+}
+
+void bt_msg_clear_calibration_unpack(bt_msg_clear_calibration *msg, const uint8_t in[BT_CLEAR_CALIBRATION_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    (void)at;
+}
+
 int bt_wire_payload_bytes(uint8_t id)
 {
     switch (id) {
@@ -849,6 +962,8 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_SENSOR_INFO_BYTES;
     case BT_POINT_ID:
         return BT_POINT_BYTES;
+    case BT_CALIBRATION_ID:
+        return BT_CALIBRATION_BYTES;
     case BT_FRAME_ID:
         return BT_FRAME_BYTES;
     case BT_PAC_ID:
@@ -893,6 +1008,12 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_REBOOT_BOOTLOADER_BYTES;
     case BT_SAVE_SETTINGS_ID:
         return BT_SAVE_SETTINGS_BYTES;
+    case BT_GET_CALIBRATION_ID:
+        return BT_GET_CALIBRATION_BYTES;
+    case BT_SET_CALIBRATION_ID:
+        return BT_SET_CALIBRATION_BYTES;
+    case BT_CLEAR_CALIBRATION_ID:
+        return BT_CLEAR_CALIBRATION_BYTES;
     default:
         return -1;
     }
@@ -909,4 +1030,14 @@ const bt_setting_spec bt_setting_specs[BT_SETTINGS] = {
     {BT_SETTING_STATUS_PERIOD_MS, 100, 60000, 1000},
     {BT_SETTING_IDLE_PERIOD_MS, 20, 60000, 100},
     {BT_SETTING_THERMAL_GAIN_MILLI, -5000, 5000, 500},
+};
+
+const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES] = {
+    BT_SETTING_POC_WEIGHTS,
+    BT_SETTING_FORCE_GAIN_X_NN,
+    BT_SETTING_FORCE_GAIN_Y_NN,
+    BT_SETTING_FORCE_GAIN_Z_NN,
+    BT_SETTING_TORQUE_GAIN_Y_NN,
+    BT_SETTING_TORQUE_GAIN_Z_NN,
+    BT_SETTING_THERMAL_GAIN_MILLI,
 };

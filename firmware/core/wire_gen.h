@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 #define BT_WIRE_MAJOR 1
-#define BT_WIRE_MINOR 2
-#define BT_SCHEMA_HASH 0x00E82D8Au
+#define BT_WIRE_MINOR 3
+#define BT_SCHEMA_HASH 0x16E934A8u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -28,6 +28,7 @@ enum bt_error {
     BT_ERROR_RAILED = 8, // more than two electrodes are at the end of their range: check the sensor
     BT_ERROR_NOT_HERE = 9, // this kind of board cannot do that
     BT_ERROR_NOT_STORED = 10, // the flash did not take it; what was stored before still stands
+    BT_ERROR_OTHER_SENSOR = 11, // made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it
 };
 
 // Where a finger's tare machine is (SPEC.md, Tare).
@@ -61,6 +62,13 @@ enum bt_board {
     BT_BOARD_POSIX_SIM = 1, // a process on a pty with emulated sensors
     BT_BOARD_PICO = 2, // Raspberry Pi Pico (RP2040)
     BT_BOARD_LINUX_SBC = 3, // a Linux computer with the sensors on its own SPI bus (spidev)
+};
+
+// Whether a finger's calibration is what its results come from.
+enum bt_calibration_state {
+    BT_CALIBRATION_STATE_NONE = 0, // there is none: the board's settings hold
+    BT_CALIBRATION_STATE_IN_FORCE = 1, // it holds in place of the settings
+    BT_CALIBRATION_STATE_OTHER_SENSOR = 2, // kept, but made for another sensor than the one read at start and there since: the settings hold
 };
 
 // State of one frame's results.
@@ -143,6 +151,9 @@ typedef struct {
 } bt_setting_spec;
 extern const bt_setting_spec bt_setting_specs[BT_SETTINGS];
 
+#define BT_CALIBRATION_VALUES 7
+extern const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES]; // enum bt_setting of each value
+
 // Who is there. Reply to HELLO_REQUEST.
 #define BT_HELLO_ID 0x01
 #define BT_HELLO_BYTES 35
@@ -215,6 +226,20 @@ typedef struct {
 } bt_msg_point;
 void bt_msg_point_pack(const bt_msg_point *msg, uint8_t out[BT_POINT_BYTES]);
 void bt_msg_point_unpack(bt_msg_point *msg, const uint8_t in[BT_POINT_BYTES]);
+
+// Calibration of one finger. Reply to GET_CALIBRATION and SET_CALIBRATION.
+#define BT_CALIBRATION_ID 0x06
+#define BT_CALIBRATION_BYTES 51
+typedef struct {
+    uint8_t req_id; // [1] of the command
+    uint8_t finger; // [1] chip select index
+    uint8_t state; // [enum calibration_state] whether it is in force; never changes while streaming
+    uint8_t serial[16]; // [ASCII] of the sensor it was made for; all zero: any sensor, or none is there
+    uint32_t made_s; // [s] when it was made, since 1970 UTC; 0: unknown
+    int32_t value[7]; // [the per-finger settings'] one for each, by id; with NONE the board's own
+} bt_msg_calibration;
+void bt_msg_calibration_pack(const bt_msg_calibration *msg, uint8_t out[BT_CALIBRATION_BYTES]);
+void bt_msg_calibration_unpack(bt_msg_calibration *msg, const uint8_t in[BT_CALIBRATION_BYTES]);
 
 // One finger, one round of slots: counts, the tare that was subtracted, and the results.
 #define BT_FRAME_ID 0x10
@@ -487,7 +512,7 @@ typedef struct {
 void bt_msg_reboot_bootloader_pack(const bt_msg_reboot_bootloader *msg, uint8_t out[BT_REBOOT_BOOTLOADER_BYTES]);
 void bt_msg_reboot_bootloader_unpack(bt_msg_reboot_bootloader *msg, const uint8_t in[BT_REBOOT_BOOTLOADER_BYTES]);
 
-// Keep the settings in force over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves the settings stored before, or these, whole.
+// Keep the settings and calibrations over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves what was stored before, or this, whole: of the settings and of each finger's calibration.
 #define BT_SAVE_SETTINGS_ID 0x8E
 #define BT_SAVE_SETTINGS_BYTES 1
 typedef struct {
@@ -495,6 +520,39 @@ typedef struct {
 } bt_msg_save_settings;
 void bt_msg_save_settings_pack(const bt_msg_save_settings *msg, uint8_t out[BT_SAVE_SETTINGS_BYTES]);
 void bt_msg_save_settings_unpack(bt_msg_save_settings *msg, const uint8_t in[BT_SAVE_SETTINGS_BYTES]);
+
+// Ask for CALIBRATION.
+#define BT_GET_CALIBRATION_ID 0x8F
+#define BT_GET_CALIBRATION_BYTES 2
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] which finger
+} bt_msg_get_calibration;
+void bt_msg_get_calibration_pack(const bt_msg_get_calibration *msg, uint8_t out[BT_GET_CALIBRATION_BYTES]);
+void bt_msg_get_calibration_unpack(bt_msg_get_calibration *msg, const uint8_t in[BT_GET_CALIBRATION_BYTES]);
+
+// Give a finger values of its own in place of the per-finger settings, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming.
+#define BT_SET_CALIBRATION_ID 0x90
+#define BT_SET_CALIBRATION_BYTES 50
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] which finger
+    uint8_t serial[16]; // [ASCII] of the sensor it was made for, which must be the one there (OTHER_SENSOR); all zero: any sensor
+    uint32_t made_s; // [s] when it was made, since 1970 UTC; 0: unknown
+    int32_t value[7]; // [the per-finger settings'] one for each, by id and in its range
+} bt_msg_set_calibration;
+void bt_msg_set_calibration_pack(const bt_msg_set_calibration *msg, uint8_t out[BT_SET_CALIBRATION_BYTES]);
+void bt_msg_set_calibration_unpack(bt_msg_set_calibration *msg, const uint8_t in[BT_SET_CALIBRATION_BYTES]);
+
+// Return a finger to the board's settings, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming.
+#define BT_CLEAR_CALIBRATION_ID 0x91
+#define BT_CLEAR_CALIBRATION_BYTES 2
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] which finger
+} bt_msg_clear_calibration;
+void bt_msg_clear_calibration_pack(const bt_msg_clear_calibration *msg, uint8_t out[BT_CLEAR_CALIBRATION_BYTES]);
+void bt_msg_clear_calibration_unpack(bt_msg_clear_calibration *msg, const uint8_t in[BT_CLEAR_CALIBRATION_BYTES]);
 
 // Payload length of a message id, without id and CRC; -1 when the id is unknown.
 int bt_wire_payload_bytes(uint8_t id);
@@ -506,6 +564,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
 #define BT_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(flex_version, u8, 2) X(software_version, u8, 4) X(serial, u8, 16) X(cpu_khz, u16, 1) X(sampling_hz, u16, 1)
 #define BT_POINT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(seq, u16, 1) X(slot, u8, 1) X(tare_state, u8, 1) X(poc_um, i16, 3)
+#define BT_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 7)
 #define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
 #define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
@@ -528,7 +587,10 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_SET_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
 #define BT_REBOOT_BOOTLOADER_FIELDS(X) X(req_id, u8, 1) X(magic, u32, 1)
 #define BT_SAVE_SETTINGS_FIELDS(X) X(req_id, u8, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings)
+#define BT_GET_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
+#define BT_SET_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 7)
+#define BT_CLEAR_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration)
 #endif
 
 #endif

@@ -14,6 +14,7 @@
 #include "framing.h"
 #include "kernel.h"
 #include "lin2013.h"
+#include "record.h"
 #include "replay.h"
 #include "sbc.h"
 #include "tape.h"

@@ -9,8 +9,9 @@
 
 from __future__ import annotations
 
-from ._wire import FrameFlags, PocWeights, QuantityFlags, Setting, TareReason, TareState
+from ._wire import CalibrationState, FrameFlags, PocWeights, QuantityFlags, Setting, TareReason, TareState
 from .batch import RESULT_DTYPE, compute
+from .calibration import Calibration
 from .errors import (
     BiotacError,
     CommandRefusedError,
@@ -37,6 +38,8 @@ __all__ = [
     "PAC_DTYPE",
     "RESULT_DTYPE",
     "BiotacError",
+    "Calibration",
+    "CalibrationState",
     "CommandRefusedError",
     "DeviceLostError",
     "Finger",

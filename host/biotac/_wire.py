@@ -14,8 +14,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 WIRE_MAJOR = 1
-WIRE_MINOR = 2
-SCHEMA_HASH = 0x00E82D8A
+WIRE_MINOR = 3
+SCHEMA_HASH = 0x16E934A8
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -37,6 +37,7 @@ class Error(IntEnum):
     RAILED = 8  # more than two electrodes are at the end of their range: check the sensor
     NOT_HERE = 9  # this kind of board cannot do that
     NOT_STORED = 10  # the flash did not take it; what was stored before still stands
+    OTHER_SENSOR = 11  # made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it
 
 
 class TareState(IntEnum):
@@ -74,6 +75,14 @@ class Board(IntEnum):
     POSIX_SIM = 1  # a process on a pty with emulated sensors
     PICO = 2  # Raspberry Pi Pico (RP2040)
     LINUX_SBC = 3  # a Linux computer with the sensors on its own SPI bus (spidev)
+
+
+class CalibrationState(IntEnum):
+    """Whether a finger's calibration is what its results come from."""
+
+    NONE = 0  # there is none: the board's settings hold
+    IN_FORCE = 1  # it holds in place of the settings
+    OTHER_SENSOR = 2  # kept, but made for another sensor than the one read at start and there since: the settings hold
 
 
 class FrameFlags(IntFlag):
@@ -130,6 +139,7 @@ ERROR_DOC: dict[int, str] = {
     8: "more than two electrodes are at the end of their range: check the sensor",
     9: "this kind of board cannot do that",
     10: "the flash did not take it; what was stored before still stands",
+    11: "made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it",
 }
 
 
@@ -200,6 +210,17 @@ SETTINGS: dict[Setting, SettingSpec] = {
         "how much a resting electrode gains per count of temperature: the tare follows it in contact; 700 to 970 seen on real fingers, where TDC alone does not tell all",
     ),
 }
+
+# What each value of a calibration stands for.
+CALIBRATION_SETTINGS: tuple[Setting, ...] = (
+    Setting.POC_WEIGHTS,
+    Setting.FORCE_GAIN_X_NN,
+    Setting.FORCE_GAIN_Y_NN,
+    Setting.FORCE_GAIN_Z_NN,
+    Setting.TORQUE_GAIN_Y_NN,
+    Setting.TORQUE_GAIN_Z_NN,
+    Setting.THERMAL_GAIN_MILLI,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -403,6 +424,45 @@ class Point:
             v[3],
             v[4],
             v[5 : 8],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Calibration of one finger. Reply to GET_CALIBRATION and SET_CALIBRATION."""
+
+    req_id: int
+    finger: int
+    state: int
+    serial: tuple[int, ...]
+    made_s: int
+    value: tuple[int, ...]
+
+    ID: ClassVar[int] = 0x06
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBB16BI7i")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 51 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.state,
+            *self.serial,
+            self.made_s,
+            *self.value,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Calibration:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3 : 19],
+            v[19],
+            v[20 : 27],
         )
 
 
@@ -1158,7 +1218,7 @@ class RebootBootloader:
 
 @dataclass(frozen=True, slots=True)
 class SaveSettings:
-    """Keep the settings in force over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves the settings stored before, or these, whole."""
+    """Keep the settings and calibrations over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves what was stored before, or this, whole: of the settings and of each finger's calibration."""
 
     req_id: int
 
@@ -1180,7 +1240,97 @@ class SaveSettings:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings
+@dataclass(frozen=True, slots=True)
+class GetCalibration:
+    """Ask for CALIBRATION."""
+
+    req_id: int
+    finger: int
+
+    ID: ClassVar[int] = 0x8F
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 2 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> GetCalibration:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SetCalibration:
+    """Give a finger values of its own in place of the per-finger settings, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming."""
+
+    req_id: int
+    finger: int
+    serial: tuple[int, ...]
+    made_s: int
+    value: tuple[int, ...]
+
+    ID: ClassVar[int] = 0x90
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB16BI7i")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 50 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            *self.serial,
+            self.made_s,
+            *self.value,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> SetCalibration:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2 : 18],
+            v[18],
+            v[19 : 26],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ClearCalibration:
+    """Return a finger to the board's settings, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming."""
+
+    req_id: int
+    finger: int
+
+    ID: ClassVar[int] = 0x91
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 2 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> ClearCalibration:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+        )
+
+
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -1188,6 +1338,7 @@ MESSAGES: dict[int, type[Any]] = {
     SettingValue.ID: SettingValue,
     SensorInfo.ID: SensorInfo,
     Point.ID: Point,
+    Calibration.ID: Calibration,
     Frame.ID: Frame,
     Pac.ID: Pac,
     Tare.ID: Tare,
@@ -1210,6 +1361,9 @@ MESSAGES: dict[int, type[Any]] = {
     SetSetting.ID: SetSetting,
     RebootBootloader.ID: RebootBootloader,
     SaveSettings.ID: SaveSettings,
+    GetCalibration.ID: GetCalibration,
+    SetCalibration.ID: SetCalibration,
+    ClearCalibration.ID: ClearCalibration,
 }
 
 # One array type per message id, for decoding many payloads at once.
@@ -1265,6 +1419,16 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("slot", "u1"),
             ("tare_state", "u1"),
             ("poc_um", "<i2", (3,)),
+        ]
+    ),
+    Calibration.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+            ("state", "u1"),
+            ("serial", "u1", (16,)),
+            ("made_s", "<u4"),
+            ("value", "<i4", (7,)),
         ]
     ),
     Frame.ID: np.dtype(
@@ -1457,6 +1621,27 @@ DTYPES: dict[int, np.dtype[Any]] = {
     SaveSettings.ID: np.dtype(
         [
             ("req_id", "u1"),
+        ]
+    ),
+    GetCalibration.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+        ]
+    ),
+    SetCalibration.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+            ("serial", "u1", (16,)),
+            ("made_s", "<u4"),
+            ("value", "<i4", (7,)),
+        ]
+    ),
+    ClearCalibration.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
         ]
     ),
 }

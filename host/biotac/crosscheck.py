@@ -6,6 +6,7 @@ tests/core/test_kernels.c searches for inputs that come near.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -66,8 +67,19 @@ class CrossCheck:
             "findings": self.findings,
         }
 
-    def add(self, messages: StructArray, settings: Settings) -> None:
-        """Check FRAME messages (n,) as they came over the wire; live or from a file."""
+    def add(self, messages: StructArray, settings: Settings, own: Mapping[int, Settings] | None = None) -> None:
+        """Check FRAME messages (n,) as they came over the wire; live or from a file.
+
+        ``own`` has the settings of the fingers with a calibration (Hand.finger_settings, Recording.finger_settings).
+        """
+        shared = np.ones(len(messages), bool)
+        for finger, its in (own or {}).items():
+            of_finger = messages["finger"] == finger
+            self._add(messages[of_finger], its)
+            shared &= ~of_finger
+        self._add(messages[shared], settings)
+
+    def _add(self, messages: StructArray, settings: Settings) -> None:
         if not len(messages):
             return
         untared = (messages["flags"] & wire.FrameFlags.UNTARED) != 0

@@ -1,4 +1,4 @@
-"""One board with its fingers: handshake, commands, frames."""
+"""One board with its fingers: handshake, streams, frames. Its commands are in commands.py."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, TypeVar
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from . import _wire as wire
 from ._sensor import MAX_SENSORS
+from .commands import ALL_FINGERS, Commands, Reply
 from .errors import CommandRefusedError, DeviceLostError, InputError, NotAGatewayError, WireVersionError
-from .frames import Frame, StructArray, tare_to_q4
+from .frames import Frame, StructArray
 from .framing import encode
 from .link import Link
 from .stream import Batch, LinkStats, StreamDecoder, join, split
@@ -27,16 +26,13 @@ if TYPE_CHECKING:
 
 #: What a FRAME can say of a contact, for Hand.subscribe.
 RESULTS = wire.QuantityFlags.POC | wire.QuantityFlags.FORCE | wire.QuantityFlags.TORQUE
-ALL_FINGERS = (1 << MAX_SENSORS) - 1
 REPLY_TIMEOUT_S = 1.0
 REPLY_TRIES = 3
 # A streaming board sends a status every second by default; three missing ones are a dead link.
 SILENCE_S = 3.0
 
-Reply = TypeVar("Reply")
 
-
-class Hand:
+class Hand(Commands):
     """A board. Use as a context manager; made by ``biotac.open``.
 
     This class reads only when asked: a slow caller makes the operating system's buffer fill and then
@@ -149,7 +145,7 @@ class Hand:
             f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check that this is the board's port and that it runs our firmware"
         )
 
-    # ---- commands ------------------------------------------------------------------------------
+    # ---- streams (further commands: commands.py) -----------------------------------------------
 
     def start(self, *, pac: bool = True, fingers: int = ALL_FINGERS) -> None:
         """Start streaming frames, status and, unless told otherwise, PAC; ``fingers`` is a bit mask."""
@@ -161,79 +157,10 @@ class Hand:
         self._streaming = True
         self.link.release()
 
-    def subscribe(self, quantities: wire.QuantityFlags, *, fingers: int = ALL_FINGERS) -> None:
-        """Choose what the board computes and sends of ``fingers`` (a bit mask) in its frames.
-
-        What is left out is not computed; it arrives as NaN, under the flag NOT_ASKED. Without REST_FRAMES
-        an untouched finger sends heartbeats (``Batch.idle``) in place of frames, without loss of a touch:
-        a frame comes as soon as the signals move. At first it is POC | FORCE | TORQUE | REST_FRAMES; the
-        choice lasts until the board restarts.
-        """
-        self._command(wire.Subscribe(self._next_req_id(), fingers, int(quantities)))
-
     def stop(self) -> None:
         """Stop streaming. Frames already on their way are still delivered."""
         self._command(wire.Stop(self._next_req_id()))
         self._streaming = False
-
-    def ping(self) -> None:
-        """Wait for the board; everything it sent before has arrived afterwards."""
-        self._command(wire.Ping(self._next_req_id()))
-
-    def status(self) -> wire.Status:
-        """Counters of the board and its link."""
-        return self._ask(wire.GetStatus(self._next_req_id()), wire.Status)
-
-    def sensor_status(self, finger: int) -> wire.SensorStatus:
-        """Counters and tare state of one sensor."""
-        return self._ask(wire.GetSensorStatus(self._next_req_id(), finger), wire.SensorStatus)
-
-    def sensor_info(self, finger: int) -> wire.SensorInfo:
-        """What the sensor says of itself."""
-        return self._ask(wire.GetSensorInfo(self._next_req_id(), finger), wire.SensorInfo)
-
-    def point(self, finger: int) -> wire.Point:
-        """Where ``finger`` is touched right now (``poc_um``), without waiting for the end of a round.
-
-        INVALID_I16 throughout without a touch or a tare. CommandRefusedError when no sensor answers there.
-        """
-        return self._ask(wire.GetPoint(self._next_req_id(), finger), wire.Point)
-
-    def tare(self, finger: int) -> None:
-        """Tare now; CommandRefusedError while the signals move."""
-        self._command(wire.TareNow(self._next_req_id(), finger))
-
-    def set_tare(self, finger: int, tare_counts: Any, pdc_counts: float | None = None) -> None:
-        """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, kept to 1/16 count.
-
-        Raises ValueError for another shape or range.
-        """
-        tare = np.asarray(tare_counts, dtype=np.float64)
-        if tare.shape != (19,) or not np.all((tare >= 0) & (tare <= 4095)):
-            raise ValueError(f"tare_counts has shape {tare.shape}; expected 19 values of 0..4095 counts")
-        tare_q4 = tuple(int(v) for v in tare_to_q4(tare))
-        pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
-        self._command(wire.TareSet(self._next_req_id(), finger, tare_q4, pdc_q4))
-
-    def setting(self, setting: wire.Setting) -> int:
-        """Value of a setting, in its own unit (see wire.SETTINGS)."""
-        return self._ask(wire.GetSetting(self._next_req_id(), setting), wire.SettingValue).value
-
-    def set_setting(self, setting: wire.Setting, value: int) -> None:
-        """Change a setting until the next reboot; refused while streaming."""
-        self._ask(wire.SetSetting(self._next_req_id(), setting, value), wire.SettingValue)
-
-    def save_settings(self) -> None:
-        """Keep the settings in force over reboots. Not while streaming: the board loses slots meanwhile."""
-        self._command(wire.SaveSettings(self._next_req_id()))
-
-    def reboot_bootloader(self) -> None:
-        """Send the board into its loader; it goes away and comes back as a drive."""
-        self._command(wire.RebootBootloader(self._next_req_id(), wire.BOOTLOADER_MAGIC))
-
-    def settings(self) -> dict[wire.Setting, int]:
-        """All settings."""
-        return {setting: self.setting(setting) for setting in wire.Setting}
 
     # ---- frames --------------------------------------------------------------------------------
 
@@ -317,6 +244,7 @@ class Hand:
             Path(path),
             self.info,
             self.settings(),
+            self.calibrations(),
             sensors,
             self.port,
             overwrite=overwrite,
@@ -396,9 +324,6 @@ class Hand:
             f"{self.port} did not answer {type(request).__name__} within "
             f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check the cable and open it again"
         )
-
-    def _command(self, request: Any) -> None:
-        self._ask(request, wire.Reply)
 
 
 def describe_refusal(request: Any, reply: wire.Reply) -> str:

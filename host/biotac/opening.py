@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 
 from . import _wire as wire
+from .calibration import Calibration, harness
 from .hand import Hand
 from .link import Link, open_link
 
@@ -13,15 +15,31 @@ def open(port: str | os.PathLike[str], *, pace: float = 0.0) -> Hand:
     """Open a board and shake hands.
 
     ``port`` is a device path (``/dev/ttyACM0``, ``COM3``), ``spidev:0.0,0.1`` for sensors on this computer's
-    own SPI bus, one BUS.DEVICE a finger, or ``sim:SOURCE`` for a simulated board,
+    own SPI bus, one BUS.DEVICE a finger (``?calibration=1:0x50:24c02``, one for each, loads what the EEPROMs on
+    their harnesses hold), or ``sim:SOURCE`` for a simulated board,
     where SOURCE is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``), or
     ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the same.
     ``pace`` is for simulated and emulated boards: device seconds per second, 0 for as fast as this side reads.
 
-    Raises PortError, NotAGatewayError, WireVersionError, or InputError for a source that cannot be
-    played.
+    Raises PortError, NotAGatewayError, WireVersionError, InputError for a source that cannot be played or an
+    EEPROM without a calibration, or CommandRefusedError for another sensor's.
     """
-    return shake_hands(open_link(os.fspath(port), pace=pace))
+    text = os.fspath(port)
+    if text.startswith("spidev:"):
+        bare, own = harness.load(text)
+        return calibrated(shake_hands(open_link(bare, pace=pace)), own)
+    return shake_hands(open_link(text, pace=pace))
+
+
+def calibrated(hand: Hand, own: Mapping[int, Calibration]) -> Hand:
+    """Give each finger its own. Closes the hand when that fails."""
+    try:
+        for finger, calibration in own.items():
+            hand.set_calibration(finger, calibration)
+    except BaseException:
+        hand.close()
+        raise
+    return hand
 
 
 def shake_hands(link: Link) -> Hand:

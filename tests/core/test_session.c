@@ -79,6 +79,9 @@ static void every_command_gets_exactly_one_reply_with_its_req_id(void **state)
         {BT_GET_POINT_ID, BT_POINT_ID, 0, 23},
         {BT_REBOOT_BOOTLOADER_ID, BT_REPLY_ID, 0, 24},
         {BT_SAVE_SETTINGS_ID, BT_REPLY_ID, 0, 25},
+        {BT_GET_CALIBRATION_ID, BT_CALIBRATION_ID, 0, 26},
+        {BT_SET_CALIBRATION_ID, BT_CALIBRATION_ID, 0, 27},
+        {BT_CLEAR_CALIBRATION_ID, BT_REPLY_ID, 0, 28},
     };
     for (int id = 0x80; id < 0x100; id++) { // the table holds every command there is
         int listed = 0;
@@ -145,6 +148,13 @@ static uint8_t save(const bt_settings *settings)
     return BT_ERROR_OK;
 }
 
+static uint8_t save_calibration(uint8_t finger, const bt_calibration *calibration)
+{
+    (void)finger;
+    (void)calibration;
+    return BT_ERROR_OK;
+}
+
 static uint8_t reboot(void)
 {
     reboots++;
@@ -163,7 +173,7 @@ static void saving_and_leaving_are_the_boards_to_do(void **state)
 {
     (void)state;
     static const uint8_t req_id = 9;
-    static const bt_board_actions actions = {save, reboot};
+    static const bt_board_actions actions = {save, save_calibration, reboot};
     assert_int_equal(host_error(&session, BT_SAVE_SETTINGS_ID, &req_id, 1), BT_ERROR_NOT_HERE);
     assert_int_equal(reboot_error(0xB0071DE5), BT_ERROR_NOT_HERE);
     bt_session_use_board(&session, &actions);
@@ -210,9 +220,9 @@ static void a_new_setting_is_what_the_kernels_use(void **state)
     assert_true(value.req_id == 77 && value.value == -12345);
     assert_int_equal(bt_settings_get(&session.settings, BT_SETTING_FORCE_GAIN_Z_NN), -12345);
     assert_int_equal(set_error(BT_SETTING_POC_WEIGHTS, BT_POC_WEIGHTS_ABS_N2), BT_ERROR_OK);
-    assert_int_equal(session.kernel.poc_weights, BT_POC_WEIGHTS_ABS_N2);
+    assert_int_equal(session.kernel[0].poc_weights, BT_POC_WEIGHTS_ABS_N2);
     assert_int_equal(set_error(BT_SETTING_CONTACT_ENERGY_COUNT2, 500), BT_ERROR_OK);
-    assert_int_equal(session.tare.contact_energy_count2, 500);
+    assert_int_equal(session.tare[0].contact_energy_count2, 500);
 }
 
 static void settings_are_refused_while_streaming(void **state)

@@ -2,7 +2,7 @@
 // record or the new one is there, whole, and the storage goes on working.
 #include "support.h"
 
-#include "settings.h"
+#include "calibration.h"
 #include "storage.h"
 
 #define NEIGHBOUR 7  // another record that must outlive everything
@@ -245,6 +245,96 @@ static void nor_do_half_done_bytes(void **state)
     cut_everywhere();
 }
 
+// ---- all that a board saves ----------------------------------------------------------------------------
+
+#define FINGERS  5
+#define ALL_CUTS 4 // saves of settings and five calibrations that are cut; sectors change twice
+
+// Settings and calibrations that tell which save they are of.
+static void save_all(int number)
+{
+    uint8_t settings_record[BT_SETTINGS_RECORD_BYTES], record[BT_CALIBRATION_RECORD_BYTES];
+    bt_settings settings;
+    bt_settings_reset(&settings);
+    assert_int_equal(bt_settings_set(&settings, BT_SETTING_IDLE_PERIOD_MS, 100 + number), BT_ERROR_OK);
+    bt_settings_pack(&settings, settings_record);
+    assert_true(bt_storage_write(&flash, BT_RECORD_SETTINGS, BT_SETTINGS_RECORD_VERSION, settings_record,
+                                 sizeof settings_record));
+    for (int f = 0; f < FINGERS; f++) {
+        bt_calibration its = {.present = true, .made_s = (uint32_t)(1000 * f + number)};
+        for (int k = 1; k < BT_CALIBRATION_VALUES; k++) {
+            its.value[k] = 100 * f + 10 * k - number;
+        }
+        size_t bytes = bt_calibration_pack(&its, record);
+        assert_true(bt_storage_write(&flash, (uint16_t)(BT_RECORD_CALIBRATION + f),
+                                     BT_CALIBRATION_RECORD_VERSION, record, bytes));
+    }
+}
+
+static int stored_settings(void)
+{
+    uint8_t record[BT_STORAGE_MAX_BYTES];
+    uint16_t version;
+    bt_settings settings;
+    bt_settings_reset(&settings);
+    int bytes = bt_storage_read(&flash, BT_RECORD_SETTINGS, &version, record, sizeof record);
+    assert_int_equal(bytes, BT_SETTINGS_RECORD_BYTES);
+    bt_settings_unpack(&settings, version, record, (size_t)bytes);
+    return bt_settings_get(&settings, BT_SETTING_IDLE_PERIOD_MS) - 100;
+}
+
+static int stored_calibration(int f)
+{
+    uint8_t record[BT_STORAGE_MAX_BYTES];
+    uint16_t version;
+    bt_calibration its;
+    int bytes =
+        bt_storage_read(&flash, (uint16_t)(BT_RECORD_CALIBRATION + f), &version, record, sizeof record);
+    assert_int_equal(bytes, BT_CALIBRATION_RECORD_BYTES);
+    bt_calibration_unpack(&its, version, record, (size_t)bytes);
+    assert_true(its.present);
+    int number = (int)its.made_s - 1000 * f;
+    for (int k = 1; k < BT_CALIBRATION_VALUES; k++) {
+        assert_int_equal(its.value[k], 100 * f + 10 * k - number);
+    }
+    return number;
+}
+
+static bool save_all_with_cut(int number, long cut)
+{
+    steps_left = cut;
+    if (setjmp(power_fails) != 0) {
+        steps_left = -1;
+        return false;
+    }
+    save_all(number);
+    steps_left = -1;
+    return true;
+}
+
+static void each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new(void **state)
+{
+    (void)state;
+    static uint8_t before[BT_STORAGE_BYTES];
+    save_all(0);
+    for (int number = 1; number <= ALL_CUTS; number++) {
+        memcpy(before, flash_bytes, sizeof before);
+        for (long cut = 0; !save_all_with_cut(number, cut); cut++) {
+            // They are written one after the other: where the old one begins, the rest is old.
+            int found = stored_settings();
+            assert_true(found == number || found == number - 1);
+            for (int f = 0; f < FINGERS; f++) {
+                int next = stored_calibration(f);
+                assert_true(next == found || (found == number && next == number - 1));
+                found = next;
+            }
+            memcpy(flash_bytes, before, sizeof before);
+        }
+        assert_int_equal(stored_calibration(FINGERS - 1), number);
+    }
+    assert_true(erases > 2 * BT_FLASH_SECTOR_BYTES); // a cut at every byte of two erases, at least
+}
+
 // ---- settings ------------------------------------------------------------------------------------------
 
 static void settings_come_back_and_others_keep_their_defaults(void **state)
@@ -286,6 +376,7 @@ int main(void)
         T(a_cut_at_any_byte_leaves_the_old_record_or_the_new),
         T(nor_does_the_order_within_a_page_matter),
         T(nor_do_half_done_bytes),
+        T(each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new),
         T(settings_come_back_and_others_keep_their_defaults),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,4 +1,4 @@
-// Settings from the command through the gateway into flash, and back at the next boot.
+// Settings and calibrations from the command through the gateway into flash, and back at the next boot.
 #include "rig.h"
 
 static uint8_t error;
@@ -61,6 +61,71 @@ static void saved_settings_are_in_force_after_the_next_boot(void **state)
     assert_int_equal(bt_settings_get(&gateway.session.settings, BT_SETTING_CONTACT_ENERGY_COUNT2), 1000);
 }
 
+// ---- calibrations --------------------------------------------------------------------------------------
+
+static uint8_t calibrate(uint8_t finger, int32_t gain_nn, bool forced)
+{
+    uint8_t payload[BT_SET_CALIBRATION_BYTES];
+    bt_msg_set_calibration msg = {.req_id = 1, .finger = finger, .made_s = 5};
+    for (int k = 1; k < BT_CALIBRATION_VALUES; k++) {
+        msg.value[k] = gain_nn;
+    }
+    if (!forced) {
+        memcpy(msg.serial, gateway.session.info[finger].serial, sizeof msg.serial);
+    }
+    bt_msg_set_calibration_pack(&msg, payload);
+    (void)ask(BT_SET_CALIBRATION_ID, payload, sizeof payload);
+    return gateway.session.calibration_state[finger];
+}
+
+static void saved_calibrations_hold_for_their_own_sensors_alone(void **state)
+{
+    (void)state;
+    const bt_session *session = &gateway.session;
+    boot(START_NS);
+    assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
+    assert_int_equal(calibrate(0, 10, false), BT_CALIBRATION_STATE_IN_FORCE);
+    assert_int_equal(calibrate(1, 20, true), BT_CALIBRATION_STATE_IN_FORCE);
+    assert_int_equal(calibrate(4, 30, false), BT_CALIBRATION_STATE_IN_FORCE);
+    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_OK);
+    assert_int_equal(calibrate(2, 40, false), BT_CALIBRATION_STATE_IN_FORCE); // not saved
+    power_cycle();
+    static const uint8_t same[BT_MAX_FINGERS] = {BT_CALIBRATION_STATE_IN_FORCE, BT_CALIBRATION_STATE_IN_FORCE,
+                                                 0, 0, BT_CALIBRATION_STATE_IN_FORCE};
+    assert_memory_equal(session->calibration_state, same, sizeof same);
+    assert_int_equal(session->calibration[4].value[1], 30);
+    // Fingers 0 and 1 change places: only what is forced may follow the place.
+    fake.sensor[0].serial[15] ^= 3;
+    fake.sensor[1].serial[15] ^= 3;
+    power_cycle();
+    static const uint8_t swapped[BT_MAX_FINGERS] = {BT_CALIBRATION_STATE_OTHER_SENSOR,
+                                                    BT_CALIBRATION_STATE_IN_FORCE, 0, 0,
+                                                    BT_CALIBRATION_STATE_IN_FORCE};
+    assert_memory_equal(session->calibration_state, swapped, sizeof swapped);
+    assert_int_equal(session->calibration[0].value[1], 10); // kept
+    // Absent, as another.
+    fake.sensor[4].present = false;
+    power_cycle();
+    assert_int_equal(session->calibration_state[4], BT_CALIBRATION_STATE_OTHER_SENSOR);
+}
+
+static void a_cleared_calibration_stays_cleared_once_saved(void **state)
+{
+    (void)state;
+    static const uint8_t finger_1[2] = {1, 1};
+    boot(START_NS);
+    assert_int_equal(plain(BT_STOP_ID), BT_ERROR_OK);
+    assert_int_equal(calibrate(1, 20, false), BT_CALIBRATION_STATE_IN_FORCE);
+    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_OK);
+    assert_int_equal(ask(BT_CLEAR_CALIBRATION_ID, finger_1, 2), BT_ERROR_OK);
+    power_cycle();
+    assert_int_equal(gateway.session.calibration_state[1], BT_CALIBRATION_STATE_IN_FORCE);
+    assert_int_equal(ask(BT_CLEAR_CALIBRATION_ID, finger_1, 2), BT_ERROR_OK);
+    assert_int_equal(plain(BT_SAVE_SETTINGS_ID), BT_ERROR_OK);
+    power_cycle();
+    assert_int_equal(gateway.session.calibration_state[1], BT_CALIBRATION_STATE_NONE);
+}
+
 static void a_flash_that_takes_nothing_is_told(void **state)
 {
     (void)state;
@@ -89,6 +154,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         T(saved_settings_are_in_force_after_the_next_boot),
+        T(saved_calibrations_hold_for_their_own_sensors_alone),
+        T(a_cleared_calibration_stays_cleared_once_saved),
         T(a_flash_that_takes_nothing_is_told),
         T(a_board_without_a_loader_says_so),
     };

@@ -3,7 +3,8 @@
 // their CRC, because no fuzzer guesses one.
 //
 // What must hold: the session writes only whole frames that decode to a message of its own; a good
-// command is answered exactly once; settings stay in their ranges. The rest is the sanitizers'.
+// command is answered exactly once; settings and calibrations stay in their ranges. The rest is the
+// sanitizers'.
 #include "input.h"
 
 #include "session.h"
@@ -103,6 +104,24 @@ static void check_settings(const bt_session *session)
     }
 }
 
+// What is in force was found good, and is what the finger works by.
+static void check_calibrations(const bt_session *session)
+{
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_settings own = session->settings;
+        const bt_calibration *its = &session->calibration[f];
+        if (session->calibration_state[f] == BT_CALIBRATION_STATE_IN_FORCE
+            && (!its->present || bt_calibration_apply(its, &own) != BT_ERROR_OK)) {
+            FAIL("finger %d works by a calibration that cannot be", f);
+        }
+        if (session->kernel[f].poc_weights != bt_settings_get(&own, BT_SETTING_POC_WEIGHTS)
+            || session->tare[f].contact_energy_count2
+                   != (uint32_t)bt_settings_get(&own, BT_SETTING_CONTACT_ENERGY_COUNT2)) {
+            FAIL("finger %d works by other values than are told", f);
+        }
+    }
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
@@ -138,6 +157,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
             break;
         }
         check_settings(&session);
+        check_calibrations(&session);
     }
     return 0;
 }

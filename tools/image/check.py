@@ -42,12 +42,13 @@ SENDERS = (
 FLASH_CALLS = ("port_flash_erase", "port_flash_program", "port_flash_read")
 POINTERS = {
     **dict.fromkeys(SENDERS, ("port_link_write",)),
-    "bt_command": ("port_link_write", "save_settings", "reboot_bootloader"),
+    "bt_command": ("port_link_write", "save_settings", "save_calibration", "reboot_bootloader"),
     "sector_in_use": FLASH_CALLS,
     "latest": FLASH_CALLS,
     "first_free": FLASH_CALLS,
     "keep_page": FLASH_CALLS,
     "move_on": FLASH_CALLS,
+    "bt_storage_read": FLASH_CALLS,
     "bt_storage_write": FLASH_CALLS,
     "leave_xip": (ROM,),
     "back_to_xip": (ROM,),

@@ -72,6 +72,9 @@ def header(contract: Contract) -> str:
         "} bt_setting_spec;",
         "extern const bt_setting_spec bt_setting_specs[BT_SETTINGS];",
         "",
+        f"#define BT_CALIBRATION_VALUES {len(contract.per_finger)}",
+        "extern const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES]; // enum bt_setting of each value",
+        "",
     ]
     for message in contract.messages:
         upper, struct = message.name, struct_name(message)
@@ -129,7 +132,8 @@ def source(contract: Contract) -> str:
     for name, setting in contract.link["setting"].items():
         low, high = setting["range"]
         out += [f"    {{BT_SETTING_{name.upper()}, {low}, {high}, {setting['default']}}},"]
-    out += ["};", ""]
+    out += ["};", "", "const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES] = {"]
+    out += [f"    BT_SETTING_{name.upper()}," for name in contract.per_finger] + ["};", ""]
     return "\n".join(out)
 
 

@@ -31,10 +31,12 @@ def messages(contract: Contract) -> str:
     for name, flags in link["flags"].items():
         out += ["", f"## flags {name}", "", flags["doc"], "", "| bit | name | meaning |", "|---|---|---|"]
         out += [f"| {e['bit']} | `{k}` | {e['doc']} |" for k, e in flags.items() if k != "doc"]
-    out += ["", "## Settings", "", "| id | name | unit | range | default | meaning |", "|---|---|---|---|---|---|"]
+    out += ["", "## Settings", "", "`per finger`: a finger's CALIBRATION has a value of its own for it.", ""]
+    out += ["| id | name | per finger | unit | range | default | meaning |", "|---|---|---|---|---|---|---|"]
     for name, s in link["setting"].items():
         low, high = s["range"]
-        out.append(f"| {s['id']} | `{name}` | {s['unit']} | {low} to {high} | {s['default']} | {s['doc']} |")
+        own = f"value[{contract.per_finger.index(name)}]" if name in contract.per_finger else ""
+        out.append(f"| {s['id']} | `{name}` | {own} | {s['unit']} | {low} to {high} | {s['default']} | {s['doc']} |")
     return "\n".join(out) + "\n"
 
 

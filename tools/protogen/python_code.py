@@ -92,7 +92,9 @@ def wire(contract: Contract) -> str:
         low, high = s["range"]
         out += [f"    Setting.{name.upper()}: SettingSpec(", f'        "{s["unit"]}", {low}, {high}, {s["default"]},']
         out += [f'        "{s["doc"]}",', "    ),"]
-    out += ["}", ""]
+    out += ["}", "", "# What each value of a calibration stands for."]
+    out += ["CALIBRATION_SETTINGS: tuple[Setting, ...] = ("]
+    out += [f"    Setting.{name.upper()}," for name in contract.per_finger] + [")", ""]
     for message in contract.messages:
         out += message_class(message)
     names = [class_name(m) for m in contract.messages]

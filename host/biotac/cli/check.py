@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
     """
     recording = Recording(args.recording)
     outcome = CrossCheck()
-    outcome.add(recording.wire, recording.settings)
+    outcome.add(recording.wire, recording.settings, recording.finger_settings)
     damaged = recording.counts.bad + recording.damaged_chunks
     good = outcome.violations == 0 and damaged == 0 and len(recording.frames) > 0
     if args.json:

@@ -10,6 +10,7 @@ from typing import Any
 import biotac
 
 from .. import _wire as wire
+from ..calibration.file import to_dict, when
 
 NAME = "info"
 HELP = "Say who is on a port: board, firmware, sensors, settings, counters."
@@ -29,6 +30,7 @@ def run(args: argparse.Namespace) -> int:
         hello = hand.info
         sensors = [hand.sensor_info(f) for f in hand.fingers]
         settings = hand.settings()
+        calibrations = hand.calibrations()
         status = hand.status()
     if args.json:
         facts: dict[str, Any] = {
@@ -43,6 +45,7 @@ def run(args: argparse.Namespace) -> int:
             "sensors": [
                 {"finger": s.finger, "serial": text(s.serial), "software": text(s.software_version)} for s in sensors
             ],
+            "calibrations": {finger: to_dict(its) for finger, its in calibrations.items()},
             "settings": {s.name.lower(): value for s, value in settings.items()},
             "status": dataclasses.asdict(status),
         }
@@ -53,7 +56,8 @@ def run(args: argparse.Namespace) -> int:
     if hello.schema_hash != wire.SCHEMA_HASH:
         print("its schema differs from this library's; fields that only one side knows are left out")
     for s in sensors:
-        print(f"finger {s.finger}: BioTac {text(s.serial)}, software {text(s.software_version)}")
+        own = f", calibration {when(calibrations[s.finger].made_s)}" if s.finger in calibrations else ""
+        print(f"finger {s.finger}: BioTac {text(s.serial)}, software {text(s.software_version)}{own}")
     for setting, value in settings.items():
         print(f"{setting.name.lower()} = {value} {wire.SETTINGS[setting].unit}")
     return 0

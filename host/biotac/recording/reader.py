@@ -14,6 +14,8 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from .. import _wire as wire
+from ..calibration.file import from_dict
+from ..calibration.values import own_settings
 from ..errors import RecordingError
 from ..frames import StructArray
 from ..stream import StreamDecoder, join
@@ -24,7 +26,8 @@ class Recording:
     """A recording in memory.
 
     ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``wire`` the
-    FRAME messages as sent, ``messages`` the rest (tare changes, status). ``problems`` lists in words
+    FRAME messages as sent, ``messages`` the rest (tare changes, status). ``settings`` are the board's and
+    ``calibrations`` those in force, by finger, when it began. ``problems`` lists in words
     what is missing or damaged; the rest is good. ``cut_off``: the file ends without its index;
     ``damaged_chunks``: seconds that were left out. Raises RecordingError when nothing can be read.
     """
@@ -81,8 +84,15 @@ class Recording:
         hello: dict[str, Any] = json.loads(metadata["hello"])
         self.info = wire.Hello(**hello | {"board_serial": tuple(hello["board_serial"])})
         named = json.loads(metadata["settings"])
-        # A setting that this recording's firmware did not have yet keeps its default.
+        own = json.loads(metadata.get("calibrations", "{}"))
+        # A setting or a calibration that this recording's firmware did not have yet: the default, and none.
+        self.calibrations = {int(finger): from_dict(its) for finger, its in own.items()}
         self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting}
+
+    @property
+    def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
+        """All settings that a finger's results come from, for the fingers that had a calibration in force."""
+        return own_settings(self.settings, self.calibrations)
 
     def _records(self) -> Iterator[McapRecord]:
         try:

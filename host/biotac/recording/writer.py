@@ -12,6 +12,8 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from .. import _wire as wire
+from ..calibration import Calibration
+from ..calibration.file import to_dict
 from ..errors import InputError
 from ..version import __version__
 from . import layout
@@ -28,6 +30,7 @@ class Recorder:
         path: Path,
         hello: wire.Hello,
         settings: dict[wire.Setting, int],
+        calibrations: dict[int, Calibration],
         sensors: list[wire.SensorInfo],
         port: str,
         *,
@@ -48,7 +51,7 @@ class Recorder:
         except OSError as error:
             raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
         try:
-            self._begin(describe(hello, settings, sensors, port))
+            self._begin(describe(hello, settings, calibrations, sensors, port))
         except OSError:
             with contextlib.suppress(OSError):  # the disk is as full as it was
                 self._file.close()
@@ -109,7 +112,11 @@ class Recorder:
 
 
 def describe(
-    hello: wire.Hello, settings: dict[wire.Setting, int], sensors: list[wire.SensorInfo], port: str
+    hello: wire.Hello,
+    settings: dict[wire.Setting, int],
+    calibrations: dict[int, Calibration],
+    sensors: list[wire.SensorInfo],
+    port: str,
 ) -> dict[str, str]:
     """The metadata record: everything needed to read and judge the wire later."""
     return {
@@ -119,5 +126,6 @@ def describe(
         "wire": f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}",
         "hello": json.dumps(dataclasses.asdict(hello)),
         "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
+        "calibrations": json.dumps({finger: to_dict(its) for finger, its in calibrations.items()}),
         "sensors": json.dumps([dataclasses.asdict(s) for s in sensors]),
     }

@@ -1,0 +1,143 @@
+"""A 24Cxx EEPROM on this computer's own I2C bus, through ``smbus2``.
+
+What such a chip asks of who writes to it: a write stays within one page, or it wraps to the page's beginning; and while
+the chip keeps a page, for up to 10 ms, it acknowledges nothing. So the next page waits until it does, and it is asked a
+bounded number of times rather than left alone for a guessed time.
+"""
+
+from __future__ import annotations
+
+import errno
+import re
+from types import TracebackType
+from typing import Any, NamedTuple
+
+from ..errors import InputError, PortError
+
+
+class Kind(NamedTuple):
+    """Size, largest write and address length of one type."""
+
+    size_bytes: int
+    page_bytes: int
+    address_bytes: int
+
+
+# By the data sheets (Microchip and Atmel agree, but for pages of 16 in a few 24C02; 8 fits those too).
+KINDS = {
+    "24c01": Kind(128, 8, 1),
+    "24c02": Kind(256, 8, 1),
+    "24c04": Kind(512, 16, 1),
+    "24c08": Kind(1024, 16, 1),
+    "24c16": Kind(2048, 16, 1),
+    "24c32": Kind(4096, 32, 2),
+    "24c64": Kind(8192, 32, 2),
+    "24c128": Kind(16384, 64, 2),
+    "24c256": Kind(32768, 64, 2),
+    "24c512": Kind(65536, 128, 2),
+}
+FIRST_ADDRESS, LAST_ADDRESS = 0x50, 0x57  # of every 24Cxx
+REACH_BYTES = 256  # a chip of one address byte has its further bytes at further bus addresses; nobody needs those here
+# A question takes 2 bytes on the bus, 18 us at 1 MHz, and a call of the system: together over 20 ms, twice a write.
+QUESTIONS = 1000
+# What drivers say when nothing acknowledged.
+NOT_ACKNOWLEDGED = {errno.ENXIO, errno.EREMOTEIO, errno.EIO}
+
+
+def parse_place(text: str) -> tuple[int, int]:
+    """Bus and address of ``1:0x50``; PortError for anything else."""
+    match = re.fullmatch(r"(\d{1,3}):(0[xX][0-9a-fA-F]{1,2}|\d{1,3})", text, re.ASCII)
+    if match is None:
+        raise PortError(f"{text!r} is no place on an I2C bus; expected BUS:ADDRESS, such as 1:0x50 (see i2cdetect -l)")
+    address = int(match[2], 0) if match[2][:2].lower() == "0x" else int(match[2])
+    if not FIRST_ADDRESS <= address <= LAST_ADDRESS:
+        raise PortError(f"{text}: a 24Cxx is at 0x{FIRST_ADDRESS:x} to 0x{LAST_ADDRESS:x}; check its address pins")
+    return int(match[1]), address
+
+
+class Chip:
+    """One EEPROM; use as a context manager. Raises PortError when it cannot be reached."""
+
+    def __init__(self, place: str, kind: str) -> None:
+        self.place = f"EEPROM {place}"
+        self.kind = KINDS[kind]
+        if self.kind.size_bytes < REACH_BYTES:
+            raise InputError(
+                f"{self.place}: a {kind} has {self.kind.size_bytes} bytes, expected {REACH_BYTES} or more; use a 24c02"
+            )
+        bus, self._address = parse_place(place)
+        try:
+            import smbus2
+        except ImportError as error:
+            raise PortError(
+                f"{self.place} needs smbus2 ({error}); pip install 'biotac-gateway[i2c]', on Linux"
+            ) from error
+        self._message: Any = smbus2.i2c_msg
+        try:
+            self._bus = smbus2.SMBus(bus)
+        except OSError as error:
+            raise PortError(_describe_open_error(bus, error)) from error
+
+    def __enter__(self) -> Chip:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the bus back."""
+        self._bus.close()
+
+    def read(self, at: int, count: int) -> bytes:
+        """``count`` bytes from ``at`` on."""
+        answer = self._message.read(self._address, count)
+        self._transfer(self._message.write(self._address, self._pointer(at)), answer)
+        return bytes(answer)
+
+    def write(self, at: int, data: bytes) -> None:
+        """Page by page; returns once the chip has kept the last."""
+        while data:
+            room = self.kind.page_bytes - at % self.kind.page_bytes
+            self._transfer(self._message.write(self._address, [*self._pointer(at), *data[:room]]))
+            self._wait()
+            at, data = at + room, data[room:]
+
+    def _pointer(self, at: int) -> list[int]:
+        assert 0 <= at < REACH_BYTES
+        return list(at.to_bytes(self.kind.address_bytes, "big"))
+
+    def _transfer(self, *messages: Any) -> None:
+        try:
+            self._bus.i2c_rdwr(*messages)
+        except OSError as error:
+            if error.errno in NOT_ACKNOWLEDGED:
+                raise PortError(
+                    f"{self.place}: nothing acknowledges ({error.strerror}); check power, SDA, SCL and the address "
+                    "(i2cdetect shows it)"
+                ) from error
+            raise PortError(f"{self.place}: the bus failed ({error}); check its wires and try again") from error
+
+    def _wait(self) -> None:
+        """Until a write is kept. A read is the question: whatever the chip is, it changes nothing there."""
+        for _ in range(QUESTIONS):
+            try:
+                self._bus.i2c_rdwr(self._message.read(self._address, 1))
+            except OSError as error:
+                if error.errno not in NOT_ACKNOWLEDGED:
+                    raise PortError(f"{self.place}: the bus failed ({error}); check its wires and try again") from error
+            else:
+                return
+        raise PortError(
+            f"{self.place} was given a page and has not acknowledged {QUESTIONS} questions since; check its power and "
+            "store again: the calibration before still stands"
+        )
+
+
+def _describe_open_error(bus: int, error: OSError) -> str:
+    if isinstance(error, FileNotFoundError):
+        return f"no I2C bus {bus}; switch I2C on (raspi-config, Interface Options) and see ls /dev/i2c-*"
+    if isinstance(error, PermissionError):
+        return f"no permission to open /dev/i2c-{bus}; sudo usermod -aG i2c $USER, and log in again"
+    return f"/dev/i2c-{bus} cannot be opened ({error}); see ls /dev/i2c-*"

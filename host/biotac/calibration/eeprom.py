@@ -1,0 +1,78 @@
+"""A calibration in an EEPROM: two places, written in turn, so that a torn write never costs the old one.
+
+Each place is a CRC-32 over the rest of it, a generation, and the record as a board's flash holds it
+(protocol/SPEC.md, Calibrations). The valid place with the later generation holds; a write goes to the other one, whose
+CRC is wrong until its last byte is kept. The places are the same in every chip: naming another size moves none.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from typing import NamedTuple
+
+from ..errors import InputError, PortError
+from . import record
+from .chip import Chip
+from .values import Calibration
+
+PLACE_BYTES = 128
+PLACES = 2
+CRC = struct.Struct("<I")
+GENERATION = struct.Struct("<I")
+
+
+class Kept(NamedTuple):
+    """What one place holds."""
+
+    place: int
+    generation: int
+    record: bytes  # and 0xFF behind it
+
+
+def load(chip: Chip) -> Calibration:
+    """The calibration in this chip. InputError when there is none that can be used."""
+    raw = [_read(chip, place) for place in range(PLACES)]
+    newest = _newest(raw)
+    if newest is None:
+        if all(set(data) == {0xFF} for data in raw):
+            raise InputError(f"{chip.place} is blank; `biotac calibration store` writes to it")
+        raise InputError(
+            f"{chip.place} holds no calibration: neither place's CRC is right; check --chip, or store it again"
+        )
+    return record.unpack(newest.record, chip.place)
+
+
+def store(chip: Chip, calibration: Calibration) -> bool:
+    """Keep the calibration; false when it was there already, and nothing is worn. PortError when it is not kept."""
+    newest = _newest([_read(chip, place) for place in range(PLACES)])
+    body = record.pack(calibration).ljust(PLACE_BYTES - CRC.size - GENERATION.size, b"\xff")
+    if newest is not None and newest.record == body:
+        return False
+    place = 0 if newest is None else 1 - newest.place
+    generation = 1 if newest is None else (newest.generation + 1) % 2**32
+    covered = GENERATION.pack(generation) + body
+    whole = CRC.pack(zlib.crc32(covered)) + covered
+    chip.write(place * PLACE_BYTES, whole)
+    if _read(chip, place) != whole:
+        raise PortError(
+            f"{chip.place} reads back other bytes than were written; check --chip and the chip's write protection (WP)"
+        )
+    return True
+
+
+def _read(chip: Chip, place: int) -> bytes:
+    return chip.read(place * PLACE_BYTES, PLACE_BYTES)
+
+
+def _newest(raw: list[bytes]) -> Kept | None:
+    newest: Kept | None = None
+    for place, data in enumerate(raw):
+        covered = data[CRC.size :]
+        if CRC.unpack_from(data) != (zlib.crc32(covered),):
+            continue
+        (generation,) = GENERATION.unpack_from(covered)
+        # Modulo 2^32: later is what comes within half the circle.
+        if newest is None or 0 < (generation - newest.generation) % 2**32 < 2**31:
+            newest = Kept(place, generation, covered[GENERATION.size :])
+    return newest

@@ -1,0 +1,153 @@
+"""What a board can be asked and told, a method each; streams are hand.py's."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, TypeVar
+
+import numpy as np
+
+from . import _wire as wire
+from ._sensor import MAX_SENSORS
+from .calibration.values import Calibration, own_settings
+from .errors import WireVersionError
+from .frames import tare_to_q4
+
+ALL_FINGERS = (1 << MAX_SENSORS) - 1
+CALIBRATION_SINCE_MINOR = 3  # of wire 1.x
+
+Reply = TypeVar("Reply")
+
+
+class Commands(ABC):
+    """The commands of a Hand. Each raises CommandRefusedError with the board's reason, or DeviceLostError."""
+
+    info: wire.Hello
+
+    @abstractmethod
+    def _next_req_id(self) -> int: ...
+
+    @abstractmethod
+    def _ask(self, request: Any, reply: type[Reply]) -> Reply:
+        """Send a request and wait for its reply."""
+
+    def _command(self, request: Any) -> None:
+        self._ask(request, wire.Reply)
+
+    def subscribe(self, quantities: wire.QuantityFlags, *, fingers: int = ALL_FINGERS) -> None:
+        """Choose what the board computes and sends of ``fingers`` (a bit mask) in its frames.
+
+        What is left out is not computed; it arrives as NaN, under the flag NOT_ASKED. Without REST_FRAMES
+        an untouched finger sends heartbeats (``Batch.idle``) in place of frames, without loss of a touch:
+        a frame comes as soon as the signals move. At first it is POC | FORCE | TORQUE | REST_FRAMES; the
+        choice lasts until the board restarts.
+        """
+        self._command(wire.Subscribe(self._next_req_id(), fingers, int(quantities)))
+
+    def ping(self) -> None:
+        """Wait for the board; everything it sent before has arrived afterwards."""
+        self._command(wire.Ping(self._next_req_id()))
+
+    def status(self) -> wire.Status:
+        """Counters of the board and its link."""
+        return self._ask(wire.GetStatus(self._next_req_id()), wire.Status)
+
+    def sensor_status(self, finger: int) -> wire.SensorStatus:
+        """Counters and tare state of one sensor."""
+        return self._ask(wire.GetSensorStatus(self._next_req_id(), finger), wire.SensorStatus)
+
+    def sensor_info(self, finger: int) -> wire.SensorInfo:
+        """What the sensor says of itself."""
+        return self._ask(wire.GetSensorInfo(self._next_req_id(), finger), wire.SensorInfo)
+
+    def point(self, finger: int) -> wire.Point:
+        """Where ``finger`` is touched right now (``poc_um``), without waiting for the end of a round.
+
+        INVALID_I16 throughout without a touch or a tare. CommandRefusedError when no sensor answers there.
+        """
+        return self._ask(wire.GetPoint(self._next_req_id(), finger), wire.Point)
+
+    def tare(self, finger: int) -> None:
+        """Tare now; CommandRefusedError while the signals move."""
+        self._command(wire.TareNow(self._next_req_id(), finger))
+
+    def set_tare(self, finger: int, tare_counts: Any, pdc_counts: float | None = None) -> None:
+        """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, kept to 1/16 count.
+
+        Raises ValueError for another shape or range.
+        """
+        tare = np.asarray(tare_counts, dtype=np.float64)
+        if tare.shape != (19,) or not np.all((tare >= 0) & (tare <= 4095)):
+            raise ValueError(f"tare_counts has shape {tare.shape}; expected 19 values of 0..4095 counts")
+        tare_q4 = tuple(int(v) for v in tare_to_q4(tare))
+        pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
+        self._command(wire.TareSet(self._next_req_id(), finger, tare_q4, pdc_q4))
+
+    def setting(self, setting: wire.Setting) -> int:
+        """Value of a setting, in its own unit (see wire.SETTINGS)."""
+        return self._ask(wire.GetSetting(self._next_req_id(), setting), wire.SettingValue).value
+
+    def set_setting(self, setting: wire.Setting, value: int) -> None:
+        """Change a setting until the next reboot; refused while streaming."""
+        self._ask(wire.SetSetting(self._next_req_id(), setting, value), wire.SettingValue)
+
+    def save_settings(self) -> None:
+        """Keep the settings in force over reboots. Not while streaming: the board loses slots meanwhile."""
+        self._command(wire.SaveSettings(self._next_req_id()))
+
+    def reboot_bootloader(self) -> None:
+        """Send the board into its loader; it goes away and comes back as a drive."""
+        self._command(wire.RebootBootloader(self._next_req_id(), wire.BOOTLOADER_MAGIC))
+
+    def settings(self) -> dict[wire.Setting, int]:
+        """All settings."""
+        return {setting: self.setting(setting) for setting in wire.Setting}
+
+    # ---- calibrations --------------------------------------------------------------------------
+
+    def calibration(self, finger: int) -> Calibration | None:
+        """The finger's own values in place of the settings, None without; see calibration_state."""
+        told = self._calibration(finger)
+        return None if told.state == wire.CalibrationState.NONE else _known(told)
+
+    def calibration_state(self, finger: int) -> wire.CalibrationState:
+        """Whether the finger's results come from its calibration, or the sensor is another than its own."""
+        return wire.CalibrationState(self._calibration(finger).state)
+
+    def set_calibration(self, finger: int, calibration: Calibration) -> None:
+        """Give a finger values of its own until the next reboot, or for good with save_settings.
+
+        Refused while streaming, and for another sensor's serial number than the one that answered there when
+        the board started; ``serial=""`` is for any.
+        """
+        its = calibration
+        request = wire.SetCalibration(self._next_req_id(), finger, its.wire_serial(), its.made_s, its.wire_values())
+        self._ask(request, wire.Calibration)
+
+    def clear_calibration(self, finger: int) -> None:
+        """Return a finger to the board's settings, until the next reboot or, with save_settings, for good."""
+        self._command(wire.ClearCalibration(self._next_req_id(), finger))
+
+    def calibrations(self) -> dict[int, Calibration]:
+        """The calibrations in force, by finger; none on a board whose firmware knows of none."""
+        if self.info.wire_minor < CALIBRATION_SINCE_MINOR:
+            return {}
+        told = [self._calibration(finger) for finger in range(MAX_SENSORS)]
+        return {m.finger: _known(m) for m in told if m.state == wire.CalibrationState.IN_FORCE}
+
+    def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
+        """All settings that a finger's results come from, for the fingers with a calibration in force."""
+        return own_settings(self.settings(), self.calibrations())
+
+    def _calibration(self, finger: int) -> wire.Calibration:
+        return self._ask(wire.GetCalibration(self._next_req_id(), finger), wire.Calibration)
+
+
+def _known(told: wire.Calibration) -> Calibration:
+    try:
+        return Calibration.from_wire(told.serial, told.made_s, told.value)
+    except ValueError as error:
+        raise WireVersionError(
+            f"the board's calibration of finger {told.finger} is none that this library knows ({error}); install the "
+            "biotac-gateway of the firmware's release"
+        ) from error

@@ -1,0 +1,305 @@
+// Calibrations: whose they are, when they hold, what they replace, and what of them is stored.
+#include "fake_host.h"
+
+#define SENSOR "BTEMU00000000042" // 16 bytes, as the sensor says it
+
+static const int32_t values[BT_CALIBRATION_VALUES] = {BT_POC_WEIGHTS_ABS_N2, 1, -2, 3, -4, 5, -600};
+
+static void plug(uint8_t finger, const char *serial)
+{
+    bt_sensor_info *info = &session.info[finger];
+    memset(info, 0, sizeof *info);
+    info->present = serial[0] != 0;
+    memcpy(info->serial, serial, strlen(serial));
+}
+
+static const received_message *send_set(uint8_t finger, const char *serial, const int32_t *value)
+{
+    uint8_t payload[BT_SET_CALIBRATION_BYTES];
+    bt_msg_set_calibration msg = {.req_id = 31, .finger = finger, .made_s = 1763731310};
+    memcpy(msg.serial, serial, strlen(serial));
+    memcpy(msg.value, value, sizeof msg.value);
+    bt_msg_set_calibration_pack(&msg, payload);
+    return host_ask(&session, BT_SET_CALIBRATION_ID, payload, sizeof payload);
+}
+
+static uint8_t set_error(uint8_t finger, const char *serial, const int32_t *value)
+{
+    const received_message *message = send_set(finger, serial, value);
+    if (message->id == BT_CALIBRATION_ID) {
+        return BT_ERROR_OK;
+    }
+    assert_true(message->id == BT_REPLY_ID && message->payload[0] == 31);
+    return message->payload[2];
+}
+
+static bt_msg_calibration get(uint8_t finger)
+{
+    uint8_t payload[2] = {9, finger};
+    bt_msg_calibration msg;
+    const received_message *message = host_ask(&session, BT_GET_CALIBRATION_ID, payload, 2);
+    assert_int_equal(message->id, BT_CALIBRATION_ID);
+    bt_msg_calibration_unpack(&msg, message->payload);
+    assert_true(msg.req_id == 9 && msg.finger == finger);
+    return msg;
+}
+
+static uint8_t clear(uint8_t finger)
+{
+    uint8_t payload[2] = {9, finger};
+    return host_error(&session, BT_CLEAR_CALIBRATION_ID, payload, 2);
+}
+
+static void set_setting(uint8_t setting, int32_t value)
+{
+    uint8_t payload[BT_SET_SETTING_BYTES];
+    bt_msg_set_setting msg = {.req_id = 1, .setting = setting, .value = value};
+    bt_msg_set_setting_pack(&msg, payload);
+    assert_int_equal(host_ask(&session, BT_SET_SETTING_ID, payload, sizeof payload)->id, BT_SETTING_ID);
+}
+
+// That finger's kernels and tare machine work by these values.
+static void assert_works_by(uint8_t finger, const int32_t *value)
+{
+    int32_t force_nn[3] = {value[1], value[2], value[3]}, torque_nn[2] = {value[4], value[5]};
+    bt_gains gains = bt_gains_from(force_nn, torque_nn);
+    assert_int_equal(session.kernel[finger].poc_weights, value[0]);
+    assert_memory_equal(&session.kernel[finger].gains, &gains, sizeof gains);
+    assert_int_equal(session.tare[finger].thermal_gain_q16, bt_thermal_gain_q16(value[6]));
+}
+
+static void initial_values(int32_t value[BT_CALIBRATION_VALUES])
+{
+    bt_settings settings;
+    bt_settings_reset(&settings);
+    for (int k = 0; k < BT_CALIBRATION_VALUES; k++) {
+        value[k] = bt_settings_get(&settings, bt_calibration_setting[k]);
+    }
+}
+
+static void without_one_the_settings_hold_and_are_told(void **state)
+{
+    (void)state;
+    int32_t initial[BT_CALIBRATION_VALUES];
+    initial_values(initial);
+    bt_msg_calibration msg = get(3);
+    assert_int_equal(msg.state, BT_CALIBRATION_STATE_NONE);
+    assert_memory_equal(msg.value, initial, sizeof initial);
+    set_setting(BT_SETTING_FORCE_GAIN_Z_NN, 77);
+    assert_int_equal(get(3).value[3], 77);
+}
+
+static void one_finger_has_its_own_and_the_others_the_settings(void **state)
+{
+    (void)state;
+    int32_t initial[BT_CALIBRATION_VALUES];
+    initial_values(initial);
+    plug(2, SENSOR);
+    const received_message *message = send_set(2, SENSOR, values);
+    bt_msg_calibration msg;
+    assert_int_equal(message->id, BT_CALIBRATION_ID);
+    bt_msg_calibration_unpack(&msg, message->payload);
+    assert_true(msg.req_id == 31 && msg.finger == 2 && msg.state == BT_CALIBRATION_STATE_IN_FORCE);
+    assert_true(msg.made_s == 1763731310 && memcmp(msg.serial, SENSOR, 16) == 0);
+    assert_memory_equal(msg.value, values, sizeof values);
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        assert_works_by(f, f == 2 ? values : initial);
+    }
+    // A setting changes for all but that one, until that one is cleared.
+    set_setting(BT_SETTING_THERMAL_GAIN_MILLI, 4000);
+    initial[6] = 4000;
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        assert_works_by(f, f == 2 ? values : initial);
+    }
+    assert_int_equal(clear(2), BT_ERROR_OK);
+    assert_int_equal(clear(2), BT_ERROR_OK); // harmless twice
+    assert_int_equal(get(2).state, BT_CALIBRATION_STATE_NONE);
+    assert_works_by(2, initial);
+}
+
+static void another_sensors_is_refused_unless_it_is_forced(void **state)
+{
+    (void)state;
+    plug(1, SENSOR);
+    assert_int_equal(set_error(1, "BTEMU00000000043", values), BT_ERROR_OTHER_SENSOR);
+    assert_int_equal(set_error(0, SENSOR, values), BT_ERROR_OTHER_SENSOR); // none is there
+    assert_int_equal(get(1).state, BT_CALIBRATION_STATE_NONE);
+    assert_int_equal(set_error(1, "", values), BT_ERROR_OK);
+    assert_int_equal(get(1).state, BT_CALIBRATION_STATE_IN_FORCE);
+    assert_works_by(1, values);
+    assert_int_equal(set_error(5, "", values), BT_ERROR_NO_SUCH_FINGER);
+    assert_int_equal(clear(5), BT_ERROR_NO_SUCH_FINGER);
+    assert_int_equal(host_error(&session, BT_GET_CALIBRATION_ID, "\1\5", 2), BT_ERROR_NO_SUCH_FINGER);
+}
+
+static void every_value_keeps_its_settings_range(void **state)
+{
+    (void)state;
+    int32_t initial[BT_CALIBRATION_VALUES];
+    initial_values(initial);
+    for (int k = 0; k < BT_CALIBRATION_VALUES; k++) {
+        const bt_setting_spec *spec = bt_setting_specs;
+        while (spec->id != bt_calibration_setting[k]) {
+            spec++;
+        }
+        int32_t tried[BT_CALIBRATION_VALUES];
+        memcpy(tried, values, sizeof tried);
+        for (int side = 0; side < 2; side++) {
+            tried[k] = side == 0 ? spec->min : spec->max;
+            assert_int_equal(set_error(0, "", tried), BT_ERROR_OK);
+            tried[k] += side == 0 ? -1 : 1;
+            assert_int_equal(set_error(0, "", tried), BT_ERROR_OUT_OF_RANGE);
+            tried[k] = side == 0 ? INT32_MIN : INT32_MAX;
+            assert_int_equal(set_error(0, "", tried), BT_ERROR_OUT_OF_RANGE);
+        }
+        assert_int_equal(get(0).value[k], spec->max); // what was refused changed nothing
+    }
+}
+
+static void nothing_changes_while_streaming(void **state)
+{
+    (void)state;
+    plug(0, SENSOR);
+    assert_int_equal(set_error(0, SENSOR, values), BT_ERROR_OK);
+    host_round(&session, 1, 2000);
+    assert_int_equal(start(BT_STREAM_FLAG_PAC, 1, 0), BT_ERROR_OK);
+    assert_int_equal(set_error(0, "", values), BT_ERROR_BUSY);
+    assert_int_equal(clear(0), BT_ERROR_BUSY);
+    for (int k = 0; k < 2 * BT_UNPLUGGED_ROUNDS; k++) {
+        host_round(&session, 0, 0);
+    }
+    // Unplugged, what comes next may be another sensor; but one recording has one set of values.
+    assert_false(session.info[0].present);
+    assert_int_equal(get(0).state, BT_CALIBRATION_STATE_IN_FORCE);
+    assert_works_by(0, values);
+    assert_int_equal(stop(), BT_ERROR_OK);
+    assert_int_equal(get(0).state, BT_CALIBRATION_STATE_OTHER_SENSOR);
+    int32_t initial[BT_CALIBRATION_VALUES];
+    initial_values(initial);
+    assert_works_by(0, initial);
+    assert_memory_equal(get(0).value, values, sizeof values); // it is kept
+}
+
+static void a_sensor_unplugged_at_rest_takes_its_calibration_along_at_once(void **state)
+{
+    (void)state;
+    plug(0, SENSOR);
+    assert_int_equal(set_error(0, SENSOR, values), BT_ERROR_OK);
+    assert_int_equal(set_error(1, "", values), BT_ERROR_OK);
+    host_round(&session, 3, 2000);
+    for (int k = 0; k < BT_UNPLUGGED_ROUNDS; k++) {
+        assert_int_equal(session.calibration_state[0], BT_CALIBRATION_STATE_IN_FORCE);
+        host_round(&session, 0, 0);
+    }
+    assert_int_equal(get(0).state, BT_CALIBRATION_STATE_OTHER_SENSOR);
+    assert_int_equal(get(1).state, BT_CALIBRATION_STATE_IN_FORCE); // for any sensor
+}
+
+static void every_end_of_a_stream_counts(void **state)
+{
+    (void)state;
+    for (int way = 0; way < 4; way++) {
+        plug(0, SENSOR);
+        assert_int_equal(set_error(0, SENSOR, values), BT_ERROR_OK);
+        host_round(&session, 1, 2000);
+        assert_int_equal(start(BT_STREAM_FLAG_PAC, 1, way == 2 ? 100 : 0), BT_ERROR_OK);
+        for (int k = 0; k < BT_UNPLUGGED_ROUNDS; k++) {
+            host_round(&session, 0, 0);
+        }
+        if (way == 0) {
+            assert_int_equal(stop(), BT_ERROR_OK);
+        } else if (way == 1) {
+            bt_session_link_down(&session);
+        } else if (way == 2) {
+            bt_session_tick(&session, 100001); // the host has been silent for too long
+        } else {
+            assert_int_equal(start(0, 1, 0), BT_ERROR_OK);
+        }
+        assert_int_equal(session.calibration_state[0], BT_CALIBRATION_STATE_OTHER_SENSOR);
+    }
+}
+
+// ---- what is stored ----------------------------------------------------------------------------------
+
+static uint8_t saved_fingers;
+
+static uint8_t save_settings(const bt_settings *settings)
+{
+    (void)settings;
+    return BT_ERROR_OK;
+}
+
+static uint8_t save_calibration(uint8_t finger, const bt_calibration *calibration)
+{
+    (void)calibration;
+    saved_fingers |= (uint8_t)(1u << finger);
+    return finger == 4 ? BT_ERROR_NOT_STORED : BT_ERROR_OK;
+}
+
+static uint8_t save(void)
+{
+    saved_fingers = 0;
+    return host_error(&session, BT_SAVE_SETTINGS_ID, "\7", 1);
+}
+
+static void only_what_has_changed_is_stored(void **state)
+{
+    (void)state;
+    static const bt_board_actions actions = {save_settings, save_calibration, NULL};
+    bt_session_use_board(&session, &actions);
+    assert_int_equal(save(), BT_ERROR_OK);
+    assert_int_equal(saved_fingers, 0); // a newer firmware's, unknown here, outlives this
+    assert_int_equal(set_error(1, "", values), BT_ERROR_OK);
+    assert_int_equal(clear(3), BT_ERROR_OK);
+    assert_int_equal(save(), BT_ERROR_OK);
+    assert_int_equal(saved_fingers, 1 << 1 | 1 << 3);
+    assert_int_equal(save(), BT_ERROR_OK);
+    assert_int_equal(saved_fingers, 0);
+    assert_int_equal(clear(4), BT_ERROR_OK);
+    assert_int_equal(save(), BT_ERROR_NOT_STORED);
+    assert_int_equal(save(), BT_ERROR_NOT_STORED); // it is tried again
+}
+
+static void a_record_is_read_back_and_a_strange_one_passed_over(void **state)
+{
+    (void)state;
+    bt_calibration out = {.present = true, .made_s = 0xFEDCBA98}, back;
+    uint8_t record[BT_CALIBRATION_RECORD_BYTES + 1];
+    memcpy(out.serial, SENSOR, sizeof out.serial);
+    memcpy(out.value, values, sizeof values);
+    assert_int_equal(bt_calibration_pack(&out, record), 48);
+    // The layout that calibration.h states: serial, made_s, values, little-endian.
+    assert_memory_equal(record, SENSOR "\x98\xBA\xDC\xFE\0\0\0\0\1\0\0\0\xFE\xFF\xFF\xFF", 32);
+    bt_calibration_unpack(&back, 1, record, 48);
+    assert_memory_equal(&back, &out, sizeof out);
+    bt_calibration_unpack(&back, 2, record, 48);
+    assert_false(back.present);
+    bt_calibration_unpack(&back, 1, record, 47);
+    assert_false(back.present);
+    bt_calibration_unpack(&back, 1, record, 49);
+    assert_false(back.present);
+    bt_calibration_unpack(&back, 1, record, 0); // a cleared one
+    assert_false(back.present);
+    record[20] = 3; // no such weights
+    bt_calibration_unpack(&back, 1, record, 48);
+    assert_false(back.present);
+    out.present = false;
+    assert_int_equal(bt_calibration_pack(&out, record), 0);
+}
+
+#define T(name) cmocka_unit_test_setup(name, new_session)
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(without_one_the_settings_hold_and_are_told),
+        T(one_finger_has_its_own_and_the_others_the_settings),
+        T(another_sensors_is_refused_unless_it_is_forced),
+        T(every_value_keeps_its_settings_range),
+        T(nothing_changes_while_streaming),
+        T(a_sensor_unplugged_at_rest_takes_its_calibration_along_at_once),
+        T(every_end_of_a_stream_counts),
+        T(only_what_has_changed_is_stored),
+        T(a_record_is_read_back_and_a_strange_one_passed_over),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

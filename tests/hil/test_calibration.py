@@ -1,0 +1,110 @@
+"""A finger's own calibration on every rig: set, told, refused, cleared, in every frame; and after power was off."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from rig import Rig
+
+import biotac
+from biotac import Calibration, CalibrationState, PocWeights
+from biotac.crosscheck import CrossCheck
+from biotac.errors import CommandRefusedError
+from biotac.recording import Recording
+
+OWN = Calibration(PocWeights.COMPRESS_N2, (900_000, -800_000, 700_000), (600_000, -500_000), 300, "", 1_763_731_310)
+BOOT_S = 60  # of wall clock
+
+
+def for_finger(hand: biotac.Hand, finger: int) -> Calibration:
+    return replace(OWN, serial=bytes(hand.sensor_info(finger).serial).rstrip(b"\0").decode())
+
+
+def test_a_calibration_is_set_told_and_cleared(board: Callable[[str], biotac.Hand]) -> None:
+    hand = board("press.toml?fingers=2")
+    assert [hand.calibration(f) for f in range(5)] == [None] * 5
+    mine = for_finger(hand, 1)
+    hand.set_calibration(1, mine)
+    assert (hand.calibration(1), hand.calibration_state(1)) == (mine, CalibrationState.IN_FORCE)
+    assert hand.calibration_state(0) == CalibrationState.NONE
+    hand.clear_calibration(1)
+    assert (hand.calibration(1), hand.calibration_state(1)) == (None, CalibrationState.NONE)
+
+
+def test_another_sensors_is_refused_and_any_sensors_is_not(board: Callable[[str], biotac.Hand]) -> None:
+    hand = board("press.toml?fingers=2")
+    with pytest.raises(CommandRefusedError, match="OTHER_SENSOR"):
+        hand.set_calibration(0, for_finger(hand, 1))
+    with pytest.raises(CommandRefusedError, match="OTHER_SENSOR"):
+        hand.set_calibration(4, for_finger(hand, 1))  # nobody is there
+    assert hand.calibration(0) is None
+    hand.set_calibration(0, OWN)
+    assert hand.calibration_state(0) == CalibrationState.IN_FORCE
+
+
+def test_nothing_is_changed_while_streaming(board: Callable[[str], biotac.Hand]) -> None:
+    hand = board("press.toml")
+    hand.set_calibration(0, OWN)
+    hand.start()
+    with pytest.raises(CommandRefusedError, match="send STOP first"):
+        hand.set_calibration(0, Calibration())
+    with pytest.raises(CommandRefusedError, match="send STOP first"):
+        hand.clear_calibration(0)
+    assert hand.calibration(0) == OWN  # asking is allowed
+    hand.stop()
+    hand.clear_calibration(0)
+
+
+def test_frames_of_two_fingers_come_from_each_ones_own_gains(
+    board: Callable[[str], biotac.Hand], tmp_path: Path
+) -> None:
+    hand = board("shear.toml?fingers=2&seconds=3")
+    hand.set_calibration(1, for_finger(hand, 1))
+    settings, own = hand.settings(), hand.finger_settings()
+    hand.record(tmp_path / "two.mcap")
+    messages = hand.read_batch(2.5).wire
+    hand.close()
+    touched = (messages["flags"] & biotac.FrameFlags.CONTACT) != 0
+    assert {int(f) for f in messages["finger"][touched]} == {0, 1}
+    right, blind = CrossCheck(), CrossCheck()
+    right.add(messages, settings, own)
+    assert (right.violations, right.frames) == (0, len(messages))
+    blind.add(messages, settings)
+    assert blind.violations > 50
+    recording = Recording(tmp_path / "two.mcap")
+    assert (recording.settings, recording.finger_settings) == (settings, own)
+
+
+def test_a_saved_calibration_holds_after_power_was_off(rig: Rig) -> None:
+    rig.need("power")
+    hand = rig.open("press.toml?fingers=2&pace=fast")
+    hand.stop()
+    hand.link.release()
+    mine = for_finger(hand, 0)
+    hand.set_calibration(0, mine)
+    hand.set_calibration(1, OWN)
+    hand.save_settings()
+    hand.clear_calibration(0)  # not saved
+    reboot(hand, 2)
+    assert hand.calibrations() == {0: mine, 1: OWN}
+    hand.clear_calibration(0)
+    hand.save_settings()
+    reboot(hand, 3)
+    assert hand.calibrations() == {1: OWN}
+
+
+def reboot(hand: biotac.Hand, boots: int) -> None:
+    board = hand.link.board  # type: ignore[attr-defined]
+    board.say("cut power")
+    end = time.monotonic() + BOOT_S
+    while time.monotonic() < end:
+        facts = board.counters()
+        if facts["boots"] == boots and facts["usb"]["state"] == "configured":
+            hand.ping()
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"it did not come back: {facts}")

@@ -1,0 +1,390 @@
+"""A finger's own calibration: its values, its file, its record, and what boards, recordings and verbs do with it."""
+
+from __future__ import annotations
+
+import json
+import struct
+import subprocess
+import zlib
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac import Calibration, CalibrationState, PocWeights, Setting
+from biotac import _wire as wire
+from biotac.calibration import file, record
+from biotac.cli.main import main
+from biotac.crosscheck import CrossCheck
+from biotac.framing import encode
+from biotac.link.sim_process import SimBoard, SimLink
+from biotac.recording import Recording
+from biotac.sim.source import load_source
+
+SERIAL = "BTEMU00000000042"
+ODD = Calibration(PocWeights.ABS_N2, (1, -2, 3), (-4, 5), -600, SERIAL, 1_763_731_310)
+
+
+# ---- values ------------------------------------------------------------------------------------
+
+
+def test_the_values_are_the_per_finger_settings_by_id() -> None:
+    # By hand from link.toml: ids 1 to 6 and 10.
+    assert ODD.wire_values() == (0, 1, -2, 3, -4, 5, -600)
+    assert [int(s) for s in ODD.settings()] == [1, 2, 3, 4, 5, 6, 10]
+    assert Calibration.from_wire(ODD.wire_serial(), ODD.made_s, ODD.wire_values()) == ODD
+    assert bytes(replace(ODD, serial="BT1").wire_serial()) == b"BT1" + bytes(13)
+    defaults = {s: wire.SETTINGS[s].default for s in wire.CALIBRATION_SETTINGS}
+    assert Calibration().settings() == defaults
+
+
+@pytest.mark.parametrize("k", range(7))
+def test_a_value_keeps_its_settings_range(k: int) -> None:
+    spec = wire.SETTINGS[wire.CALIBRATION_SETTINGS[k]]
+    for value, good in ((spec.low, True), (spec.low - 1, False), (spec.high, True), (spec.high + 1, False)):
+        values = [*ODD.wire_values()]
+        values[k] = value
+        if good:
+            assert Calibration.from_wire(b"", 0, values).wire_values()[k] == value
+        else:
+            with pytest.raises(ValueError, match=f"{wire.CALIBRATION_SETTINGS[k].name.lower()} is {value}, expected"):
+                Calibration.from_wire(b"", 0, values)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"force_gain_nn": (1, 2)}, "force_gain_nn has 2 values, expected 3"),
+        ({"torque_gain_nn": (1, 2.0)}, "torque_gain_nn is 2.0, expected a whole number"),
+        ({"poc_weights": True}, "poc_weights is True, expected a whole number"),
+        ({"thermal_gain_milli": "5"}, "thermal_gain_milli is '5', expected a whole number"),
+        ({"made_s": 2**32}, "expected seconds since 1970"),
+        ({"made_s": -1}, "expected seconds since 1970"),
+        ({"serial": "BT" + 15 * "0"}, "expected up to 16 ASCII"),
+        ({"serial": "BTä"}, "expected up to 16 ASCII"),
+        ({"serial": "BT\n"}, "expected up to 16 ASCII"),
+        ({"serial": 5}, "expected up to 16 ASCII"),
+    ],
+)
+def test_what_is_no_calibration_is_refused(change: dict[str, object], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        replace(ODD, **change)  # type: ignore[arg-type]
+
+
+def test_numpy_integers_are_whole_numbers() -> None:
+    gains = np.array([5, 6, 7])
+    assert Calibration(force_gain_nn=tuple(gains)) == Calibration(force_gain_nn=(5, 6, 7))  # type: ignore[arg-type]
+
+
+# ---- file --------------------------------------------------------------------------------------
+
+
+def test_a_file_is_read_back_and_tells_where_it_comes_from(tmp_path: Path) -> None:
+    path = tmp_path / "thumb.json"
+    file.save(path, ODD, {"by": "hand"})
+    assert file.load(path) == ODD
+    tree = json.loads(path.read_text())
+    assert (tree["poc_weights"], tree["force_gain_nn"]) == ("ABS_N2", {"x": 1, "y": -2, "z": 3})
+    assert tree["provenance"] == {"by": "hand"}
+    with pytest.raises(biotac.InputError, match="exists and would be overwritten"):
+        file.save(path, ODD, {})
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"format": "biotac"}, 'it has no "format": "biotac-calibration"'),
+        ({"version": 2}, "its version is 2, expected 1; a newer biotac-gateway"),
+        ({"gain": 1}, "key 'gain' is unknown; expected"),
+        ({"made_s": None}, "made_s is None, expected a whole number"),
+        ({"poc_weights": 1}, "poc_weights is 1, expected ABS_N2, COMPRESS_N1, COMPRESS_N2"),
+        ({"poc_weights": ["ABS_N2"]}, "poc_weights is"),
+        ({"force_gain_nn": {"x": 1, "y": 2}}, "expected an object with x, y, z"),
+        ({"torque_gain_nn": [1, 2]}, "expected an object with y, z"),
+        ({"force_gain_nn": {"x": 1, "y": 2, "z": 100_000_001}}, "force_gain_z_nn is 100000001, expected -100000000"),
+        ({"thermal_gain_milli": 0.5}, "thermal_gain_milli is 0.5, expected a whole"),
+        ({"provenance": "hand"}, "provenance is no object"),
+    ],
+)
+def test_a_file_that_cannot_be_used_says_why(tmp_path: Path, change: dict[str, object], words: str) -> None:
+    path = tmp_path / "bad.json"
+    path.write_text(json.dumps(file.to_dict(ODD) | change))
+    with pytest.raises(biotac.InputError, match=words) as refusal:
+        file.load(path)
+    assert str(refusal.value).startswith(f"{path} is no calibration")
+
+
+@pytest.mark.parametrize("key", [key for key in file.KEYS if key != "provenance"])
+def test_every_key_but_provenance_must_be_there(key: str) -> None:
+    tree = file.to_dict(ODD)
+    del tree[key], tree["provenance"]
+    with pytest.raises(ValueError, match=key):
+        file.from_dict(tree)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "5", "{", '{"format": NaN}', "[" * 100_000, "\x00"])
+def test_what_is_no_file_at_all(text: str) -> None:
+    with pytest.raises(biotac.InputError, match="it is no calibration that can be used"):
+        file.loads(text, "it")
+
+
+def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
+    with pytest.raises(biotac.InputError, match="cannot be read"):
+        file.load(tmp_path / "none.json")
+    with pytest.raises(biotac.InputError, match="cannot be written"):
+        file.save(tmp_path / "no" / "such.json", ODD, {})
+    (tmp_path / "latin.json").write_bytes(b'{"by": "M\xfcller"}')
+    with pytest.raises(biotac.InputError, match="is no text"):
+        file.load(tmp_path / "latin.json")
+
+
+# ---- record ------------------------------------------------------------------------------------
+
+
+def test_a_record_is_that_of_the_specification() -> None:
+    data = SERIAL.encode() + struct.pack("<I7i", 1_763_731_310, 0, 1, -2, 3, -4, 5, -600)
+    header = struct.pack("<IHHI", 0x52544F42, 2, 1, 48)
+    crc = zlib.crc32((header + b"\xff" * 4 + data).ljust(256, b"\xff"))
+    assert record.pack(ODD) == header + struct.pack("<I", crc) + data
+    assert record.unpack(record.pack(ODD), "it") == ODD
+    assert record.unpack(record.pack(ODD).ljust(256, b"\xff"), "it") == ODD
+
+
+def sealed(record_id: int, version: int, data: bytes) -> bytes:
+    header = struct.pack("<IHHI", 0x52544F42, record_id, version, len(data))
+    crc = zlib.crc32((header + b"\xff" * 4 + data).ljust(256, b"\xff"))
+    return header + struct.pack("<I", crc) + data
+
+
+GOOD = record.pack(ODD)[16:]
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "no whole record"),
+        (record.pack(ODD)[:-3], "no whole record: its CRC is wrong"),
+        (record.pack(ODD) + b"\0", "no whole record"),
+        (sealed(1, 1, GOOD), "something else than a calibration"),
+        (sealed(7, 1, GOOD), "something else than a calibration"),
+        (sealed(2, 2, GOOD), "newer version"),
+        (sealed(2, 1, b""), "was cleared"),
+        (sealed(2, 1, GOOD[:20] + b"\7" + GOOD[21:]), "out of its range"),
+        (sealed(2, 1, b"B\xe4" + GOOD[2:]), "cannot be"),
+    ],
+)
+def test_a_record_that_is_none_says_why(data: bytes, words: str) -> None:
+    with pytest.raises(biotac.InputError, match=words):
+        record.unpack(data, "it")
+
+
+@pytest.mark.parametrize("at", range(64))
+def test_no_byte_of_a_record_may_change(at: int) -> None:
+    data = bytearray(record.pack(ODD))
+    data[at] ^= 0x20
+    with pytest.raises(biotac.InputError):
+        record.unpack(bytes(data), "it")
+
+
+# ---- a board with flash --------------------------------------------------------------------------
+
+
+class FlashBoard(SimBoard):
+    """A simulated board whose flash is a file."""
+
+    flash: Path
+
+    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
+        return super()._start([*options, "--flash", str(self.flash)])
+
+
+def boot(flash: Path, serials: list[str] | None = None) -> biotac.Hand:
+    source = load_source("press.toml", fingers=2, seconds=1)
+    FlashBoard.flash = flash
+    board = FlashBoard(replace(source, serials=serials) if serials else source, pace=0.0, hold=True)
+    return biotac.Hand(SimLink("sim:flash", board))
+
+
+def serial_of(hand: biotac.Hand, finger: int) -> str:
+    return bytes(hand.sensor_info(finger).serial).rstrip(b"\0").decode()
+
+
+def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_path: Path) -> None:
+    flash = tmp_path / "flash"
+    with boot(flash) as hand:
+        mine = replace(ODD, serial=serial_of(hand, 0))
+        hand.set_calibration(0, mine)
+        hand.set_calibration(1, replace(ODD, serial=""))
+        hand.save_settings()
+        hand.clear_calibration(1)  # not saved
+    assert record.pack(mine) in flash.read_bytes()
+    with boot(flash) as hand:
+        assert hand.calibrations() == {0: mine, 1: replace(ODD, serial="")}
+        hand.clear_calibration(1)
+        hand.save_settings()
+    with boot(flash, ["BTOTHER", "BTANOTHER"]) as hand:
+        assert hand.calibration_state(0) == CalibrationState.OTHER_SENSOR
+        assert hand.calibration(0) == mine
+        assert (hand.calibration(1), hand.calibration_state(1)) == (None, CalibrationState.NONE)
+        assert hand.calibrations() == {}
+
+
+# ---- boards, recordings ------------------------------------------------------------------------
+
+
+def test_a_board_that_knows_of_no_calibrations_is_not_asked(scripted_board, hello) -> None:
+    asked: list[int] = []
+
+    def answer(message_id: int, payload: bytes) -> bytes:
+        asked.append(message_id)
+        return hello(payload, wire_minor=2) if message_id == wire.HelloRequest.ID else b""
+
+    with biotac.open(scripted_board(answer).path) as hand:
+        assert hand.calibrations() == {}
+    assert wire.GetCalibration.ID not in asked
+
+
+def test_another_sensors_calibration_is_refused_in_words() -> None:
+    with biotac.open("sim:press.toml") as hand:
+        with pytest.raises(biotac.CommandRefusedError, match=r"SetCalibration: OTHER_SENSOR .*restart the board"):
+            hand.set_calibration(0, ODD)
+        with pytest.raises(biotac.CommandRefusedError, match="NO_SUCH_FINGER"):
+            hand.calibration(5)
+
+
+@pytest.fixture
+def two_gains(tmp_path: Path) -> Path:
+    """A recording of two fingers, one with the board's settings and one with its own."""
+    path = tmp_path / "two.mcap"
+    with biotac.open("sim:shear.toml?fingers=2&seconds=3") as hand:
+        gains = Calibration(PocWeights.COMPRESS_N2, (900_000, 800_000, 700_000), (600_000, 500_000), 300)
+        hand.set_calibration(1, replace(gains, serial=serial_of(hand, 1), made_s=7))
+        hand.record(path)
+        hand.read(2.5)
+    return path
+
+
+def test_a_recording_knows_the_calibrations_and_is_checked_by_them(two_gains: Path, capsys) -> None:
+    recording = Recording(two_gains)
+    assert list(recording.calibrations) == [1]
+    assert recording.calibrations[1].force_gain_nn == (900_000, 800_000, 700_000)
+    assert main(["check", str(two_gains)]) == 0
+    assert "good" in capsys.readouterr().out
+    # Without them the same frames are wrong, those of that finger and no others.
+    blind = CrossCheck()
+    blind.add(recording.wire, recording.settings)
+    assert blind.violations > 50
+    assert all(text.startswith("finger 1 ") for text in blind.findings)
+    # And with them on the wrong finger.
+    swapped = CrossCheck()
+    swapped.add(recording.wire, recording.settings, {0: recording.finger_settings[1]})
+    assert swapped.violations > 2 * blind.violations - 10
+
+
+def test_a_recording_of_before_there_were_any_is_still_checked(monkeypatch, capsys, tmp_path: Path) -> None:
+    from biotac.recording import writer
+
+    now = writer.describe
+    monkeypatch.setattr(writer, "describe", lambda *a: {k: v for k, v in now(*a).items() if k != "calibrations"})
+    path = tmp_path / "old.mcap"
+    assert main(["record", "sim:press.toml", str(path), "--seconds", "1"]) == 0
+    assert Recording(path).calibrations == {}
+    assert main(["check", str(path)]) == 0
+
+
+def test_a_recording_with_a_broken_calibration_is_refused(monkeypatch, tmp_path: Path) -> None:
+    from biotac.recording import writer
+
+    now = writer.describe
+    monkeypatch.setattr(writer, "describe", lambda *a: now(*a) | {"calibrations": '{"0": {"format": "x"}}'})
+    path = tmp_path / "broken.mcap"
+    assert main(["record", "sim:press.toml", str(path), "--seconds", "1"]) == 0
+    with pytest.raises(biotac.RecordingError, match="damaged metadata"):
+        Recording(path)
+
+
+def test_a_calibration_that_a_newer_board_tells_out_of_range_is_no_crash(scripted_board, hello) -> None:
+    def answer(message_id: int, payload: bytes) -> bytes:
+        if message_id == wire.GetCalibration.ID:
+            told = wire.Calibration(payload[0], payload[1], 1, (66, 84) + (0,) * 14, 0, (9, 0, 0, 0, 0, 0, 0))
+            return encode(wire.Calibration.ID, told.pack())
+        return hello(payload) if message_id == wire.HelloRequest.ID else b""
+
+    with (
+        biotac.open(scripted_board(answer).path) as hand,
+        pytest.raises(biotac.WireVersionError, match="poc_weights is 9"),
+    ):
+        hand.calibration(0)
+
+
+# ---- command line --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def port() -> Iterator[str]:
+    board = SimBoard(load_source("press.toml", fingers=2, seconds=60), pace=1.0, hold=True)
+    board.release()
+    yield board.path
+    board.close()
+
+
+def test_the_verbs_move_a_calibration_to_a_board_and_back(port: str, capsys, tmp_path: Path) -> None:
+    path, back = tmp_path / "thumb.json", tmp_path / "back.json"
+    with biotac.open(port) as hand:
+        mine = replace(ODD, serial=serial_of(hand, 1))
+    file.save(path, mine, {})
+    verb = ["calibration"]
+    assert main([*verb, "get", port, "--finger", "1", str(back)]) == 2
+    assert "finger 1 on" in capsys.readouterr().err
+    assert main([*verb, "put", port, str(path), "--finger", "0"]) == 7
+    assert "OTHER_SENSOR" in capsys.readouterr().err
+    assert main([*verb, "put", port, str(path), "--finger", "0", "--force", "--save"]) == 0
+    assert "finger 0: in force, saved; for any sensor, made 2025-11-21" in capsys.readouterr().out
+    assert main([*verb, "put", port, str(path), "--finger", "1"]) == 0
+    assert "until the next reboot" in capsys.readouterr().out
+    assert main([*verb, "get", port, "--finger", "1", str(back)]) == 0
+    assert file.load(back) == mine
+    assert json.loads(back.read_text())["provenance"]["finger"] == 1
+    assert main([*verb, "get", port, "--finger", "1", str(back)]) == 2
+    assert main([*verb, "get", port, "--finger", "0", str(back), "--force"]) == 0
+    assert file.load(back) == replace(mine, serial="")
+    capsys.readouterr()
+    assert main([*verb, "show", port]) == 0
+    shown = capsys.readouterr().out
+    assert "finger 1: in force; for sensor BT" in shown
+    assert shown.count("thermal_gain_milli = -600 count/1000 per TDC count") == 2
+    assert main([*verb, "clear", port, "--finger", "0"]) == 0
+    capsys.readouterr()
+    assert main([*verb, "show", port, "--json"]) == 0
+    states = {finger: its["state"] for finger, its in json.loads(capsys.readouterr().out).items()}
+    assert states == {"0": "NONE", "1": "IN_FORCE", "2": "NONE", "3": "NONE", "4": "NONE"}
+    assert main(["info", port, "--json"]) == 0
+    assert list(json.loads(capsys.readouterr().out)["calibrations"]) == ["1"]
+
+
+@pytest.mark.parametrize("what", ["show", "get", "put", "clear", "store", "load"])
+def test_every_part_of_the_verb_has_an_example(what: str, capsys) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["calibration", what, "--help"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out.rstrip().splitlines()[-1].startswith(f"example: biotac calibration {what} ")
+
+
+def test_a_file_is_shown(capsys, tmp_path: Path) -> None:
+    path = tmp_path / "thumb.json"
+    file.save(path, ODD, {})
+    assert main(["calibration", "show", str(path)]) == 0
+    assert f"{path}: for sensor {SERIAL}, made 2025-11-21 13:21 UTC" in capsys.readouterr().out
+    assert main(["calibration", "show", "--json", str(path)]) == 0
+    assert file.from_dict(json.loads(capsys.readouterr().out)) == ODD
+
+
+def test_settings_leave_a_calibrated_finger_alone() -> None:
+    with biotac.open("sim:press.toml?fingers=2&seconds=1") as hand:
+        hand.set_calibration(1, replace(ODD, serial=""))
+        hand.set_setting(Setting.FORCE_GAIN_X_NN, 42)
+        assert hand.finger_settings()[1] == hand.settings() | ODD.settings()
+        assert hand.setting(Setting.FORCE_GAIN_X_NN) == 42
