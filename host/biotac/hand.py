@@ -215,11 +215,11 @@ class Hand:
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
         self._command(wire.TareSet(self._next_req_id(), finger, tare_q4, pdc_q4))
 
-    def setting(self, setting: wire.Setting) -> int:
+    def setting(self, setting: wire.Setting | int) -> int:
         """Value of a setting, in its own unit (see wire.SETTINGS)."""
         return self._ask(wire.GetSetting(self._next_req_id(), setting), wire.SettingValue).value
 
-    def set_setting(self, setting: wire.Setting, value: int) -> None:
+    def set_setting(self, setting: wire.Setting | int, value: int) -> None:
         """Change a setting until the next reboot; refused while streaming."""
         self._ask(wire.SetSetting(self._next_req_id(), setting, value), wire.SettingValue)
 
@@ -391,7 +391,7 @@ class Hand:
             if isinstance(answer, kind) and not (isinstance(answer, wire.Reply) and answer.error):
                 return answer
             if answer is not None:
-                raise CommandRefusedError(describe_refusal(request, answer))
+                raise CommandRefusedError(describe_refusal(request, answer), answer.error)
         raise DeviceLostError(
             f"{self.port} did not answer {type(request).__name__} within "
             f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check the cable and open it again"

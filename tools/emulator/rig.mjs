@@ -21,6 +21,7 @@ export class Rig {
     this.board = new Board()
     this.loaders = 0 // how often the chip went to its UF2 loader
     this.loader = null // while it is there
+    this.images = 0 // that the loader has taken whole
     this.machine = new Machine(image, (machine) => this.#attach(machine))
   }
 
@@ -103,6 +104,7 @@ export class Rig {
       instructions: machine.instructions,
       slept: machine.sleptNanos / Math.max(1, machine.nanos),
       loaders: this.loaders,
+      images: this.images,
       loader: this.loader === null ? null : this.loader.counters(),
       flash: this.board.counters,
       sensors: this.sensors.counters(),
@@ -123,7 +125,10 @@ export class Rig {
       flash: machine.mcu.flash,
       flashBytes: FLASH_BYTES,
       board: this.board,
-      onDone: () => machine.restart(),
+      onDone: () => {
+        this.images++
+        machine.restart()
+      },
       onCut: () => this.#failPower(machine),
     })
     this.#cable(this.plugged)
