@@ -57,6 +57,7 @@ class FakeBoard:
         self.answers = True
         self.takes = True
         self.comes_back = True
+        self.refuses_loader = 0  # or the error it answers
         self.refuses: set[int] = set()  # settings it refuses to change
         self._hello = hello
         self._link = scripted_board(self._answer)
@@ -74,6 +75,8 @@ class FakeBoard:
         if message_id == wire.SaveSettings.ID:
             self.events.append("save")
             self.stored = dict(self.settings)
+        if message_id == wire.RebootBootloader.ID and self.refuses_loader:
+            return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, self.refuses_loader).pack())
         if message_id == wire.RebootBootloader.ID:
             self.events.append("loader")
             self.in_loader = True

@@ -175,12 +175,44 @@ def test_a_board_in_its_loader_is_flashed_and_given_a_backup(fake: FakeBoard, tm
     assert bare.settings is None
 
 
+def test_a_backup_to_restore_goes_before_the_boards_own_settings(fake: FakeBoard, tmp_path: Path) -> None:
+    image = read_image(make_image(tmp_path))
+    flash(image, fake, [fake], backup_path=tmp_path / "first.json")
+    fake.settings[9] = fake.stored[9] = 250
+    flash(image, fake, [fake], backup_path=tmp_path / "own.json", restore_from=read_backup(tmp_path / "first.json"))
+    assert fake.stored[9] == wire.SETTINGS[wire.Setting.IDLE_PERIOD_MS].default
+    assert read_backup(tmp_path / "own.json").values[9] == 250
+    fake.comes_back = False
+    kept = read_backup(tmp_path / "first.json")
+    assert "third.json, for --restore" in fails(fake, tmp_path, backup_path=tmp_path / "third.json", restore_from=kept)
+
+
+def test_a_setting_that_a_board_never_had_hides_none_behind_it(fake: FakeBoard, tmp_path: Path) -> None:
+    del fake.settings[3], fake.stored[3]
+    outcome = flash(read_image(make_image(tmp_path)), fake, [fake])
+    assert outcome.backup is not None
+    assert sorted(outcome.backup.values) == [1, 2, *range(4, 12)]
+
+
 def test_two_boards_are_not_mixed_up(fake: FakeBoard, tmp_path: Path) -> None:
     class Another(FakeBoard):
         ready = lambda self: True  # noqa: E731
 
     fake.__class__ = Another
     assert "another board is in its loader" in fails(fake, tmp_path, InputError)
+    assert fake.events == []
+
+
+def test_firmware_from_before_the_loaders_command_is_left_by_touch(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.refuses_loader = wire.Error.UNKNOWN_COMMAND
+    outcome = flash(read_image(make_image(tmp_path)), fake, [fake])
+    assert fake.events == ["touch", "write"]
+    assert outcome.backup is not None
+
+
+def test_a_board_without_a_loader_is_not_flashed(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.refuses_loader = wire.Error.NOT_HERE
+    assert "NOT_HERE" in fails(fake, tmp_path)
     assert fake.events == []
 
 
@@ -235,6 +267,7 @@ def test_ports_that_cannot_be_flashed(
     assert "`biotac list`" in refused(capsys, 3, "/dev/ttyNOWHERE7", image)
     assert "neither running nor in its loader" in refused(capsys, 3, image)
     assert "has no image to be flashed" in refused(capsys, 2, "sim:press.toml", image)
+    assert "are no UF2" in refused(capsys, 2, "--emulated", str(Path(__file__)))
     assert "leave one out" in refused(capsys, 2, "--emulated", "/dev/ttyACM0", image)
     assert "leave one out" in refused(capsys, 2, "--no-backup", "--backup", "x", image)
     ports |= {"/dev/ttyACM0": "A", "/dev/ttyACM1": "B"}

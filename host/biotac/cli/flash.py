@@ -75,8 +75,8 @@ def say(text: str) -> None:
 
 
 def sort_out(port: str | None, image: str | None, *, emulated: bool) -> tuple[str | None, Path | None]:
-    """Both words are optional: a first one that ends in .uf2 is the image."""
-    if image is None and port is not None and port.lower().endswith(".uf2"):
+    """Both words are optional: a single one is the image when it ends in .uf2, or can be nothing else."""
+    if image is None and port is not None and (emulated or port.lower().endswith(".uf2")):
         port, image = None, port
     if emulated and port is not None:
         raise InputError(f"--emulated stands for {EMULATED}, and {port} is another PORT; leave one out")
@@ -139,7 +139,9 @@ def summary(outcome: Outcome) -> str:
         lines.append("its settings are those in its flash; none were read before, none were restored")
     else:
         changed = ", ".join(settings.changed)
-        lines.append(f"all {len(outcome.backup.values) - len(settings.unknown)} settings are as before")
+        lines.append(
+            f"all {len(outcome.backup.values) - len(settings.unknown)} settings are as in {outcome.backup.path}"
+        )
         lines[-1] += f"; restored and saved: {changed}" if changed else ", none had to be restored"
         if settings.unknown:
             lines.append(f"this firmware does not know {', '.join(settings.unknown)}; see {outcome.backup.path}")

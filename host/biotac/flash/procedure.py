@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .. import _wire as wire
-from ..errors import BiotacError, FlashError, InputError, NotAGatewayError, WireVersionError
+from ..errors import BiotacError, CommandRefusedError, FlashError, InputError, NotAGatewayError, WireVersionError
 from ..hand import Hand
 from ..identity import board_text, serial_text, version_text
 from .backup import Backup, Restored, default_path, read_settings, restore, write_backup
@@ -24,7 +24,7 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """``before`` is None when nothing answered before, ``settings`` when there were none to put back."""
+    """``before`` is None when nothing answered before; ``backup`` is what was put back, if anything was."""
 
     port: str
     loader: str
@@ -61,15 +61,15 @@ def flash(
         )
     loader = first_ready(loaders)
     before: wire.Hello | None = None
-    backup = restore_from
+    written: Backup | None = None
     if loader is None:
-        before, found = leave(image, target, backup_path=backup_path, keep=keep, say=say)
-        backup = restore_from or found
+        before, written = leave(image, target, backup_path=backup_path, keep=keep, say=say)
     elif target.there():
         raise InputError(
             f"{target.port} is there, and another board is in its loader ({loader.name}); unplug one of them"
         )
-    with step(backup):
+    backup = restore_from or written
+    with step(written or restore_from):
         if loader is None:
             loader = wait_for(lambda: first_ready(loaders), LOADER_S)
             if loader is None:
@@ -112,8 +112,22 @@ def leave(
         if backup is not None:
             say(f"{len(backup.values)} settings are in {backup.path}")
         with step(backup):
-            hand.reboot_bootloader()
-        return hand.info, backup
+            knows = command_loader(hand)
+    if not knows:
+        with step(backup):
+            target.touch()
+    return hand.info, backup
+
+
+def command_loader(hand: Hand) -> bool:
+    """Send the board to its loader; False when its firmware is from before there was a command for that."""
+    try:
+        hand.reboot_bootloader()
+    except CommandRefusedError as refused:
+        if refused.error != wire.Error.UNKNOWN_COMMAND:
+            raise
+        return False
+    return True
 
 
 def save(hand: Hand, path: Path | None) -> Backup:
