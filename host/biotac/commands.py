@@ -83,11 +83,11 @@ class Commands(ABC):
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
         self._command(wire.TareSet(self._next_req_id(), finger, tare_q4, pdc_q4))
 
-    def setting(self, setting: wire.Setting) -> int:
+    def setting(self, setting: wire.Setting | int) -> int:
         """Value of a setting, in its own unit (see wire.SETTINGS)."""
         return self._ask(wire.GetSetting(self._next_req_id(), setting), wire.SettingValue).value
 
-    def set_setting(self, setting: wire.Setting, value: int) -> None:
+    def set_setting(self, setting: wire.Setting | int, value: int) -> None:
         """Change a setting until the next reboot; refused while streaming."""
         self._ask(wire.SetSetting(self._next_req_id(), setting, value), wire.SettingValue)
 

@@ -52,6 +52,16 @@ class DeviceLostError(BiotacError):
 
 
 class CommandRefusedError(BiotacError):
-    """The board answered a command with an error code."""
+    """The board answered a command with an error code, ``error``."""
 
     exit_code = 7
+
+    def __init__(self, message: str, error: int = 0) -> None:
+        super().__init__(message)
+        self.error = error
+
+
+class FlashError(BiotacError):
+    """Writing an image to a board did not come to its end; the message says where the settings are."""
+
+    exit_code = 8

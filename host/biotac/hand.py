@@ -319,7 +319,7 @@ class Hand(Commands):
             if isinstance(answer, kind) and not (isinstance(answer, wire.Reply) and answer.error):
                 return answer
             if answer is not None:
-                raise CommandRefusedError(describe_refusal(request, answer))
+                raise CommandRefusedError(describe_refusal(request, answer), answer.error)
         raise DeviceLostError(
             f"{self.port} did not answer {type(request).__name__} within "
             f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check the cable and open it again"

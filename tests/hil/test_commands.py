@@ -14,6 +14,7 @@ from biotac.framing import encode
 
 TARE_Q4 = (3000 * 16,) * 19
 NO_FINGER = 5
+ANY_SENSOR = (0,) * 16
 COMMANDS = {
     wire.HelloRequest: ((0x600D,), wire.Hello),
     wire.Start: ((int(wire.StreamFlags.FRAMES), 1, 0), wire.Reply),
@@ -28,6 +29,9 @@ COMMANDS = {
     wire.GetSensorInfo: ((0,), wire.SensorInfo),
     wire.GetSetting: ((int(Setting.IDLE_PERIOD_MS),), wire.SettingValue),
     wire.SetSetting: ((int(Setting.IDLE_PERIOD_MS), 100), wire.SettingValue),
+    wire.GetCalibration: ((0,), wire.Calibration),
+    wire.SetCalibration: ((0, ANY_SENSOR, 0, tuple(biotac.Calibration().settings().values())), wire.Calibration),
+    wire.ClearCalibration: ((0,), wire.Reply),
     wire.SaveSettings: ((), wire.Reply),
     wire.RebootBootloader: ((1,), wire.Reply),  # not the magic number: refused, and it stays
 }
@@ -35,6 +39,7 @@ REFUSED = [
     (wire.GetPoint, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
     (wire.GetSensorInfo, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
     (wire.GetSensorStatus, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
+    (wire.GetCalibration, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
     (wire.TareNow, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
     (wire.TareSet, (0, (0xFFF1,) * 19, 0), wire.Error.OUT_OF_RANGE),
     (wire.GetSetting, (0,), wire.Error.UNKNOWN_SETTING),

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
-from image import boot2, stack, symbols, uf2, waits  # noqa: E402
+from image import boot2, note, stack, symbols, uf2, waits  # noqa: E402
 
 PORT = ROOT / "firmware/port/rp2040"
 
@@ -44,6 +44,29 @@ def test_uf2_refuses_an_image_that_the_chip_would_not_start() -> None:
     image[1] ^= 1
     with pytest.raises(ValueError, match="second-stage boot"):
         uf2.uf2(bytes(image))
+
+
+NOTE = b"BIOTAC image" + struct.pack("<HH3BBB3x", 1, 2, 3, 4, 5, 6, 7)
+
+
+def test_the_note_of_an_image_is_found() -> None:
+    found = note.read(bytes(320) + NOTE + b"program")
+    assert (found.board, found.firmware, found.wire) == (2, (3, 4, 5), (6, 7))
+
+
+@pytest.mark.parametrize(
+    ("image", "why"),
+    [
+        (bytes(320), "0 image notes"),
+        (bytes(321) + NOTE, "0 image notes"),  # not where a linker puts it: somebody's text
+        (NOTE + NOTE, "2 image notes"),
+        (NOTE[:-1], "0 image notes"),
+        (NOTE[:12] + b"\2" + NOTE[13:], "layout 2"),
+    ],
+)
+def test_an_image_that_does_not_say_what_it_is_is_not_built(image: bytes, why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        note.read(image)
 
 
 LISTING = """

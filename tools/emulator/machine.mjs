@@ -3,11 +3,12 @@ import { ConsoleLogger, LogLevel, RP2040 } from 'rp2040js'
 
 import { correctCore, DeviceTime, execute, wakes } from './faults.mjs'
 
-const FLASH_BYTES = 2 * 1024 * 1024 // of a Pico
+export const FLASH_BYTES = 2 * 1024 * 1024 // of a Pico
 const BOOT2_BYTES = 0x100
 const BOOT2_AT = 0x20041f00 // where the boot ROM copies the first 256 bytes of flash, and jumps to
 const SRAM = 0x20000000
 const REASON_TIMER = 1
+const LOADER_DONE = Symbol('the boot ROM has a whole image')
 
 /** CRC-32 as the boot ROM checks it over boot2: polynomial 0x04C11DB7, MSB first, no final inversion. */
 function bootCrc(bytes) {
@@ -19,13 +20,18 @@ function bootCrc(bytes) {
   return crc >>> 0
 }
 
+/** The boot ROM would run this second-stage boot, and not go to its loader. */
+function bootable(flash) {
+  const stored = Buffer.from(flash.subarray(BOOT2_BYTES - 4, BOOT2_BYTES)).readUInt32LE(0)
+  return bootCrc(flash.subarray(0, BOOT2_BYTES - 4)) === stored
+}
+
 /** Throws an Error that says why the boot ROM would not start this image. */
 export function checkImage(image) {
   if (image.length <= BOOT2_BYTES || image.length > FLASH_BYTES) {
     throw new Error(`has ${image.length} bytes: expected a flash image of 257 bytes to 2 MiB`)
   }
-  const crc = bootCrc(image.subarray(0, BOOT2_BYTES - 4))
-  if (crc !== image.readUInt32LE(BOOT2_BYTES - 4)) {
+  if (!bootable(image)) {
     throw new Error('does not begin with a second-stage boot and its CRC: expected the .bin of a Pico image')
   }
 }
@@ -57,7 +63,7 @@ export class Machine {
   /** Nothing will happen any more unless somebody outside does something. */
   get quiet() {
     const { core, clock } = this.mcu
-    return core.waiting && !wakes(core) && clock.nextAlarm === null
+    return core.waiting && !wakes(core) && clock.nextAlarm === null && this.resetAsked === null
   }
 
   /** Run until the emulated time, or until nothing more will happen while time is held. */
@@ -103,7 +109,13 @@ export class Machine {
     this.#start(this.nanos, this.worldNanos)
   }
 
+  /** The loader is done and restarts the chip, as soon as what runs now is over. */
+  restart() {
+    this.resetAsked = LOADER_DONE
+  }
+
   #reset() {
+    if (this.resetAsked === LOADER_DONE) return this.powerCycle() // the ROM has used RAM for itself
     const scratch = this.mcu.peripherals[0x40058].scratchData
     const reason = this.resetAsked
     const { sram } = this.mcu
@@ -142,6 +154,11 @@ export class Machine {
   /** What the boot ROM does: the first 256 bytes run from SRAM and find their own way to the image. */
   #enterBoot2() {
     const { core, sram, flash } = this.mcu
+    this.inLoader = !bootable(flash)
+    if (this.inLoader) {
+      core.PM = core.waiting = true // the ROM's own code, which is not here
+      return
+    }
     sram.set(flash.subarray(0, BOOT2_BYTES), BOOT2_AT - SRAM)
     core.SP = BOOT2_AT
     core.LR = 0

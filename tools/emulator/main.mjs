@@ -6,8 +6,11 @@
 // FD is the open master side of a pty, non-blocking; PATH is the name of its other side, to be told.
 // Like the posix board this writes "pty PATH" once the port can be opened, and "end" once the tape is played and
 // all of it handed over; "run" on stdin ends a hold, the end of stdin ends the process. More lines for stdin:
-//   [@SECONDS] VERB   stop reading, go on reading, unplug, plug, cut power: now, or at a time of the sensors' world
+//   [@SECONDS] VERB   stop reading, go on reading, unplug, plug, cut power, write uf2 FILE: now, or at a time of the
+//                     sensors' world
 //   counters          answers "counters JSON"
+//   until SECONDS JSON  answers likewise once the counters are those of JSON, or "never JSON" with what they are when
+//                     so much emulated time has passed or nothing will happen any more
 import fs from 'node:fs'
 import { parseArgs } from 'node:util'
 
@@ -52,6 +55,7 @@ const rig = start()
 let asked = false // to end the hold
 let told = false // that the tape is over
 let polled = 0
+let awaited = null // {counters, nanos}: what `until` was told
 let base = null // [wall ms, world ms] that pacing counts from
 
 /** Boot to the first sample, so that what the host does later meets the same board every time. */
@@ -63,6 +67,25 @@ function boot() {
     rig.run(STRETCH_NS)
   }
   console.log(`pty ${options.pty}`)
+}
+
+function answer(word) {
+  console.log(`${word} ${JSON.stringify(rig.counters())}`)
+}
+
+/** Some of the counters, groups of them included, are these. */
+function are(counters, wanted) {
+  return Object.entries(wanted).every(([name, value]) =>
+    value !== null && typeof value === 'object' ? are(counters[name] ?? {}, value) : counters[name] === value,
+  )
+}
+
+function tellAwaited(nothingElse) {
+  if (awaited === null) return
+  const so = are(rig.counters(), awaited.counters)
+  if (!so && !nothingElse && rig.machine.nanos < awaited.nanos) return
+  awaited = null
+  answer(so ? 'counters' : 'never')
 }
 
 function ahead() {
@@ -95,11 +118,13 @@ function turn() {
         told = true
         console.log('end')
       }
+      tellAwaited(true)
       return true
     }
   }
   if (ahead()) return true
   rig.run(STRETCH_NS)
+  tellAwaited(false)
   return false
 }
 
@@ -107,7 +132,10 @@ function line(words) {
   if (words === 'run') {
     asked = true
   } else if (words === 'counters') {
-    console.log(`counters ${JSON.stringify(rig.counters())}`)
+    answer('counters')
+  } else if (words.startsWith('until ')) {
+    const [, seconds, counters] = words.match(/^until ([0-9.]+) (.*)$/)
+    awaited = { counters: JSON.parse(counters), nanos: rig.machine.nanos + Number(seconds) * 1e9 }
   } else {
     const [, seconds, verb] = words.match(/^(?:@([0-9.]+) )?(.*)$/)
     if (seconds === undefined) rig.act(verb)

@@ -1,6 +1,9 @@
 // The whole rig: a machine, its sensors, the USB host and the port, and what a test may do to them.
+import fs from 'node:fs'
+
 import { Latency } from './latency.mjs'
-import { Machine } from './machine.mjs'
+import { Loader } from './loader.mjs'
+import { FLASH_BYTES, Machine } from './machine.mjs'
 import { Board, BootRom } from './rom.mjs'
 import { Sensors } from './sensors.mjs'
 import { UsbHost } from './usb.mjs'
@@ -18,7 +21,9 @@ export class Rig {
     this.sensors = new Sensors(wasm, tape, serials)
     this.lossless = lossless
     this.board = new Board()
-    this.loaders = 0 // how often the program left for the UF2 loader
+    this.loaders = 0 // how often the chip went to its UF2 loader
+    this.loader = null // while it is there
+    this.images = 0 // that the loader has taken whole
     this.machine = new Machine(image, (machine) => this.#attach(machine))
   }
 
@@ -68,8 +73,8 @@ export class Rig {
       // A main loop that nothing wakes any more: the watchdog's business.
       'lose interrupts': () => (this.machine.mcu.core.enabledInterrupts = 0),
       'touch at 1200 baud': () => this.usb.touch(1200),
-      unplug: () => this.usb.setPlugged((this.plugged = false)),
-      plug: () => this.usb.setPlugged((this.plugged = true)),
+      unplug: () => this.#cable(false),
+      plug: () => this.#cable(true),
       'cut power': () => {
         this.sensors.powerCycle()
         this.machine.powerCycle()
@@ -78,6 +83,12 @@ export class Rig {
     const cut = /^cut power after (\d+) flash bytes$/.exec(verb)
     if (cut) {
       this.board.cutAfter = Number(cut[1])
+      return
+    }
+    const file = /^write uf2 (.+)$/.exec(verb)
+    if (file) {
+      if (this.loader === null) throw new Error('no drive to write a UF2 to: the board is not in its loader')
+      this.loader.copy(fs.readFileSync(file[1]))
       return
     }
     if (!(verb in verbs)) throw new Error(`no verb ${verb}: expected one of ${Object.keys(verbs).join(', ')}`)
@@ -95,6 +106,8 @@ export class Rig {
       instructions: machine.instructions,
       slept: machine.sleptNanos / Math.max(1, machine.nanos),
       loaders: this.loaders,
+      images: this.images,
+      loader: this.loader === null ? null : this.loader.counters(),
       flash: this.board.counters,
       latency: this.latency.counters(),
       sensors: this.sensors.counters(),
@@ -102,19 +115,42 @@ export class Rig {
     }
   }
 
+  /** The program's device is on the bus only while the program runs; the loader's own is not modelled. */
+  #cable(plugged) {
+    this.plugged = plugged
+    this.usb.setPlugged(plugged && this.loader === null)
+  }
+
+  #enterLoader(machine) {
+    this.loaders++
+    this.loader = new Loader({
+      clock: machine.mcu.clock,
+      flash: machine.mcu.flash,
+      flashBytes: FLASH_BYTES,
+      board: this.board,
+      onDone: () => {
+        this.images++
+        machine.restart()
+      },
+      onCut: () => this.#failPower(machine),
+    })
+    this.#cable(this.plugged)
+  }
+
+  /** Power is gone; run() turns it on again. */
+  #failPower(machine) {
+    this.powerFailed = true
+    const { core } = machine.mcu // it does nothing more
+    core.PM = core.waiting = true
+    core.enabledInterrupts = 0
+  }
+
   /** After each power-up and reset of the chip. */
   #attach(machine) {
+    this.loader = null
     this.rom = new BootRom(machine.mcu, this.board, {
-      onLoader: () => {
-        this.loaders++
-        this.act('unplug') // the program's device is gone; the loader's own is not modelled
-      },
-      onCut: () => {
-        this.powerFailed = true
-        const { core } = machine.mcu // it does nothing more
-        core.PM = core.waiting = true
-        core.enabledInterrupts = 0
-      },
+      onLoader: () => this.#enterLoader(machine),
+      onCut: () => this.#failPower(machine),
     })
     this.sensors.wire(machine.mcu, () => machine.worldNanos)
     const spi = machine.mcu.spi[0]
@@ -135,5 +171,6 @@ export class Rig {
     })
     this.usb.setPlugged(this.plugged)
     this.usb.setOpen(this.port.up)
+    if (machine.inLoader) this.#enterLoader(machine)
   }
 }

@@ -47,6 +47,20 @@ export class Board {
     this.random ^= this.random << 5
     return this.random & 1
   }
+
+  /** Bytes of flash one by one, so that power can fail after any of them. False when it did. */
+  change(flash, at, bytes, value) {
+    for (let k = 0; k < bytes; k++) {
+      if (this.cutAfter === 0) {
+        this.cutAfter = null
+        return false
+      }
+      if (this.cutAfter !== null) this.cutAfter--
+      this.counters.bytes++
+      flash[at + k] = value(k)
+    }
+    return true
+  }
 }
 
 export class BootRom {
@@ -116,20 +130,8 @@ export class BootRom {
     }
   }
 
-  /** Bytes one by one, so that power can fail after any of them. False when it did. */
   #change(at, bytes, value) {
-    const { board, mcu } = this
-    for (let k = 0; k < bytes; k++) {
-      if (board.cutAfter === 0) {
-        board.cutAfter = null
-        this.onCut()
-        return false
-      }
-      if (board.cutAfter !== null) board.cutAfter--
-      board.counters.bytes++
-      mcu.flash[at + k] = value(k)
-    }
-    return true
+    if (!this.board.change(this.mcu.flash, at, bytes, value)) this.onCut()
   }
 
   #allowed(at, bytes, unit, what) {
@@ -202,7 +204,7 @@ export class BootRom {
     rosc.readUint32 = (offset) => (offset === ROSC_RANDOMBIT ? this.board.randomBit() : 0)
   }
 
-  /** The program is gone: its interrupts and its watchdog are off, and the ROM's own USB is not modelled. */
+  /** The program is gone: its interrupts and its watchdog are off. What the loader then does: loader.mjs. */
   #loader() {
     const { core, peripherals } = this.mcu
     core.PM = true

@@ -16,8 +16,8 @@ from .._sensor import MAX_SENSORS
 from ..calibration import Calibration, eeprom, file
 from ..calibration.chip import KINDS, Chip
 from ..errors import InputError
+from ..identity import serial_text
 from ..version import __version__
-from .info import serial_text
 
 NAME = "calibration"
 HELP = "Show, get, put or store a finger's calibration."

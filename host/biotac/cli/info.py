@@ -11,6 +11,7 @@ import biotac
 
 from .. import _wire as wire
 from ..calibration.file import to_dict, when
+from ..identity import board_text, serial_text, version_text
 
 NAME = "info"
 HELP = "Say who is on a port: board, firmware, sensors, settings, counters."
@@ -35,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         facts: dict[str, Any] = {
             "port": args.port,
-            "board": board_text(hello),
+            "board": board_text(hello.board),
             "firmware": version_text(hello),
             "wire": f"{hello.wire_major}.{hello.wire_minor}",
             "schema_hash": f"{hello.schema_hash:08x}",
@@ -51,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
         }
         print(json.dumps(facts))
         return 0
-    print(f"{board_text(hello)}, firmware {version_text(hello)}, wire {hello.wire_major}.{hello.wire_minor}")
+    print(f"{board_text(hello.board)}, firmware {version_text(hello)}, wire {hello.wire_major}.{hello.wire_minor}")
     print(f"serial {serial_text(hello)}, boot {hello.boot_id:08x}, up {status.uptime_s} s")
     if hello.schema_hash != wire.SCHEMA_HASH:
         print("its schema differs from this library's; fields that only one side knows are left out")
@@ -66,19 +67,3 @@ def run(args: argparse.Namespace) -> int:
 def text(values: tuple[int, ...]) -> str:
     """Zero-padded ASCII to str."""
     return bytes(values).rstrip(b"\0").decode("ascii", errors="replace")
-
-
-def board_text(hello: wire.Hello) -> str:
-    """The board's name, or its number when it is newer than this library."""
-    return wire.Board(hello.board).name if hello.board in list(wire.Board) else f"board {hello.board}"
-
-
-def version_text(hello: wire.Hello) -> str:
-    """Firmware release."""
-    return f"{hello.firmware_major}.{hello.firmware_minor}.{hello.firmware_patch}"
-
-
-def serial_text(hello: wire.Hello) -> str:
-    """The board's unique id: as text where it is text, else in hex."""
-    raw = bytes(hello.board_serial).rstrip(b"\0")
-    return raw.decode() if raw and all(0x20 <= b < 0x7F for b in raw) else bytes(hello.board_serial).hex()

@@ -10,9 +10,9 @@ from serial.tools import list_ports
 
 from ..errors import BiotacError
 from ..hand import Hand
+from ..identity import serial_text, version_text
 from ..link import open_link
 from ..sim.source import bundled_scenarios
-from .info import serial_text, version_text
 
 NAME = "list"
 HELP = "List serial ports, and the scenarios that can be simulated."

@@ -10,9 +10,9 @@ import threading
 from collections.abc import Sequence
 
 from ..errors import BiotacError, InputError
-from . import bench, calibration, check, demo, info, list_ports, record, sim, stream, version
+from . import bench, calibration, check, demo, flash, info, list_ports, record, sim, stream, version
 
-VERBS = (demo, list_ports, info, stream, record, check, calibration, sim, bench, version)
+VERBS = (demo, list_ports, info, stream, record, check, calibration, sim, flash, bench, version)
 
 EPILOG = """\
 A PORT is a device path (/dev/ttyACM0, COM3) or sim:SOURCE, a simulated board that plays a
@@ -21,7 +21,7 @@ emu:pico?source=SOURCE, a Pico's flash image in an emulator that plays the same.
 
 exit codes: 0 done   1 check found a violation   2 unusable file or argument   3 port cannot be
 opened   4 no gateway on the port   5 firmware of another wire version   6 board lost
-7 command refused   130 interrupted
+7 command refused   8 flashing failed   130 interrupted
 """
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import PortError
+from ..errors import DeviceLostError, PortError
 from ..sim.source import Source
 from .sim_process import SimBoard
 
@@ -63,10 +63,26 @@ class EmulatedBoard(SimBoard):
     def counters(self) -> dict[str, Any]:
         """What the emulator counted: time, resets, transfers, USB packets, breaches of the rules."""
         self.say("counters")
+        return self._counted()[1]
+
+    def until(self, seconds: float, **counters: Any) -> dict[str, Any]:
+        """Wait until these counters are so, and return all of them then.
+
+        DeviceLostError when they are not within ``seconds`` of emulated time. Time that is held, or waits for
+        whoever has the link open to read, does not pass.
+        """
+        self.say(f"until {seconds:.6f} {json.dumps(counters)}")
+        word, facts = self._counted()
+        if word == "never":
+            seen = {name: facts.get(name) for name in counters}
+            raise DeviceLostError(f"within {seconds:g} s of its time the emulated board came to {seen}, not {counters}")
+        return facts
+
+    def _counted(self) -> tuple[str, dict[str, Any]]:
         while not self._answers:
             self.hear()
-        facts: dict[str, Any] = json.loads(self._answers.pop(0).removeprefix("counters "))
-        return facts
+        word, _, text = self._answers.pop(0).partition(" ")
+        return word, json.loads(text)
 
 
 def find_tools(board: str, image: str | None) -> Tools:

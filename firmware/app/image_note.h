@@ -1,0 +1,37 @@
+// What an image says of itself, for whoever flashes it: a block of constants that is found by its first 12
+// bytes, anywhere in the image at a multiple of 4. `biotac flash` refuses an image that has not exactly one,
+// or one for another board; tools/image/note.py refuses to build it.
+#ifndef BIOTAC_IMAGE_NOTE_H
+#define BIOTAC_IMAGE_NOTE_H
+
+#include "version.h"
+#include "wire_gen.h"
+
+#include <stdint.h>
+
+#define BT_IMAGE_NOTE_LAYOUT 1
+
+// Little-endian, without gaps. A later layout may append fields; these stay where they are.
+typedef struct {
+    char magic[12]; // "BIOTAC image", without a final zero
+    uint16_t layout;
+    uint16_t board; // enum bt_board
+    uint8_t firmware_version[3];
+    uint8_t wire_major;
+    uint8_t wire_minor;
+    uint8_t zero[3];
+} bt_image_note;
+_Static_assert(sizeof(bt_image_note) == 24, "the flasher reads it byte by byte");
+
+// The same constants as HELLO's, so that what an image claims is what it will answer.
+#define BT_IMAGE_NOTE(board_)                                                                                \
+    {                                                                                                        \
+        .magic = {'B', 'I', 'O', 'T', 'A', 'C', ' ', 'i', 'm', 'a', 'g', 'e'},                               \
+        .layout = BT_IMAGE_NOTE_LAYOUT,                                                                      \
+        .board = (board_),                                                                                   \
+        .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},                          \
+        .wire_major = BT_WIRE_MAJOR,                                                                         \
+        .wire_minor = BT_WIRE_MINOR,                                                                         \
+    }
+
+#endif

@@ -1,0 +1,11 @@
+"""Putting an image onto a board, and its settings back: ``biotac flash``."""
+
+from __future__ import annotations
+
+from .backup import Backup, read_backup
+from .image import Image, read_image
+from .loader import Loader
+from .procedure import Outcome, flash
+from .target import Target
+
+__all__ = ["Backup", "Image", "Loader", "Outcome", "Target", "flash", "read_backup", "read_image"]

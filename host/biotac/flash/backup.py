@@ -1,0 +1,112 @@
+"""A board's settings: read over the wire, kept in a file, put back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from .. import _wire as wire
+from ..errors import CommandRefusedError, InputError
+from ..hand import Hand
+from ..identity import board_text, serial_text, version_text
+
+FORMAT = "biotac settings 1"
+LAST_ID = 255
+
+
+@dataclass(frozen=True)
+class Backup:
+    """Values by setting id: a board may have settings that this library does not know."""
+
+    path: Path
+    values: dict[int, int]
+
+
+@dataclass(frozen=True)
+class Restored:
+    """What became of a backup's settings; the rest were as they should be."""
+
+    changed: tuple[str, ...]
+    unknown: tuple[str, ...]  # to the new firmware
+
+
+def setting_name(setting: int) -> str:
+    """A setting's name, or its number when it is newer than this library."""
+    return wire.Setting(setting).name.lower() if setting in list(wire.Setting) else f"setting {setting}"
+
+
+def read_settings(hand: Hand) -> dict[int, int]:
+    """All settings of the board: those of this library that it has, and those that follow them."""
+    values: dict[int, int] = {}
+    for setting in range(1, LAST_ID + 1):
+        try:
+            values[setting] = hand.setting(setting)
+        except CommandRefusedError as refused:
+            if refused.error != wire.Error.UNKNOWN_SETTING:
+                raise
+            if setting > max(wire.Setting):
+                break  # ids are given without gaps, so nothing newer follows
+    return values
+
+
+def default_path(hello: wire.Hello) -> Path:
+    """A name that says whose settings and when, in the working directory."""
+    return Path(f"biotac-settings-{serial_text(hello)}-{datetime.now():%Y%m%d-%H%M%S}.json")
+
+
+def write_backup(path: Path, hello: wire.Hello, values: dict[int, int]) -> Backup:
+    """Write what was read; never over an existing file."""
+    facts = {
+        "format": FORMAT,
+        "board": board_text(hello.board),
+        "serial_number": serial_text(hello),
+        "firmware": version_text(hello),
+        "boot_id": hello.boot_id,
+        "settings": [{"id": key, "name": setting_name(key), "value": value} for key, value in values.items()],
+    }
+    try:
+        with open(path, "x", encoding="utf-8") as file:
+            file.write(json.dumps(facts, indent=1) + "\n")
+    except FileExistsError as error:
+        raise InputError(f"{path} exists and may hold other settings; choose another --backup") from error
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); choose another --backup") from error
+    return Backup(path.resolve(), values)
+
+
+def read_backup(path: Path) -> Backup:
+    """Read what write_backup wrote."""
+    try:
+        facts = json.loads(path.read_text(encoding="utf-8"))
+        if facts["format"] != FORMAT:
+            raise ValueError(f"its format is {facts['format']!r}")
+        values = {int(one["id"]): int(one["value"]) for one in facts["settings"]}
+    except OSError as error:
+        raise InputError(
+            f"{path} cannot be read ({error.strerror}); expected a file written by biotac flash"
+        ) from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} holds no settings ({error}); expected a file written by biotac flash") from error
+    return Backup(path.resolve(), values)
+
+
+def restore(hand: Hand, wanted: dict[int, int]) -> Restored:
+    """Set and save what differs, and read all back.
+
+    Settings that the firmware does not know are left out. Raises CommandRefusedError for a value that it does not
+    take, and InputError when a value does not read back.
+    """
+    found = read_settings(hand)
+    changed = [key for key, value in wanted.items() if key in found and found[key] != value]
+    for key in changed:
+        hand.set_setting(key, wanted[key])
+    if changed:
+        hand.save_settings()
+        found = read_settings(hand)
+    for key, value in wanted.items():
+        if found.get(key, value) != value:
+            raise InputError(f"{setting_name(key)} reads {found[key]} after {value} was restored; set it by hand")
+    unknown = [setting_name(key) for key in wanted if key not in found]
+    return Restored(tuple(map(setting_name, changed)), tuple(unknown))

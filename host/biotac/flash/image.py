@@ -1,0 +1,138 @@
+"""A board's image as UF2 (https://github.com/microsoft/uf2): read, and refused unless a board can take all of it.
+
+The boot ROM skips, without a word, what it does not like in a UF2. So everything it could skip is an error here.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import InputError
+from ..identity import board_text
+
+BLOCK_BYTES = 512
+HEAD = struct.Struct("<8I")
+PAGE_BYTES = 256
+MAGIC = (0x0A324655, 0x9E5D5157, 0x0AB16F30)
+FLAG_FAMILY = 0x2000
+FLAG_NOT_FLASH = 0x0001
+FAMILY_RP2040 = 0xE48BFF56
+
+FLASH_AT = 0x10000000
+FLASH_BYTES = 2 * 1024 * 1024  # of a Pico
+SETTINGS_BYTES = 2 * 4096  # at the flash's end: firmware/core/storage.h
+BOOT2_BYTES = 252  # and its CRC behind it
+
+# firmware/app/image_note.h
+NOTE = struct.Struct("<12sHH3BBB3x")
+NOTE_MAGIC = b"BIOTAC image"
+NOTE_LAYOUT = 1
+NOTE_ALIGNMENT = 4
+
+
+@dataclass(frozen=True)
+class Note:
+    """What an image says of itself."""
+
+    board: int
+    firmware: tuple[int, int, int]
+    wire: tuple[int, int]
+
+    @property
+    def version(self) -> str:
+        """Firmware release."""
+        return ".".join(map(str, self.firmware))
+
+    def __str__(self) -> str:
+        return f"{board_text(self.board)}, firmware {self.version}, wire {'.'.join(map(str, self.wire))}"
+
+
+@dataclass(frozen=True)
+class Image:
+    """A checked UF2 file."""
+
+    path: Path
+    blocks: tuple[bytes, ...]
+    note: Note
+
+    def boot_last(self) -> tuple[bytes, ...]:
+        """The blocks with the second-stage boot's at the end.
+
+        Its sector is erased with the first of them, so until the very last block the chip has nothing to boot: a
+        loss of power leaves the board in its loader, not in half an image. The boot ROM takes blocks in any order.
+        """
+        return (*self.blocks[1:], self.blocks[0])
+
+
+def read_image(path: Path) -> Image:
+    """Read and check a UF2 file; InputError says what is wrong with it."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror}); expected an image, .uf2") from error
+    try:
+        blocks = split(data)
+        payload = join_payloads(blocks)
+        check_boot2(payload)
+        return Image(path, blocks, find_note(payload))
+    except ValueError as error:
+        raise InputError(f"{path} is not flashed: {error}") from error
+
+
+def split(data: bytes) -> tuple[bytes, ...]:
+    """Blocks of a UF2 file."""
+    if not data or len(data) % BLOCK_BYTES:
+        raise ValueError(f"{len(data)} bytes are no UF2, which has blocks of {BLOCK_BYTES}; take the build's .uf2 file")
+    return tuple(data[at : at + BLOCK_BYTES] for at in range(0, len(data), BLOCK_BYTES))
+
+
+def join_payloads(blocks: tuple[bytes, ...]) -> bytes:
+    """The flash's bytes from its first on."""
+    end = FLASH_AT + FLASH_BYTES - SETTINGS_BYTES
+    pages = []
+    for k, block in enumerate(blocks):
+        first, second, flags, address, size, number, count, family = HEAD.unpack_from(block)
+        if (first, second, *struct.unpack_from("<I", block, BLOCK_BYTES - 4)) != MAGIC:
+            raise ValueError(f"block {k} has not the marks of UF2; take the build's .uf2 file")
+        if not flags & FLAG_FAMILY or flags & FLAG_NOT_FLASH or family != FAMILY_RP2040:
+            seen = f"of family 0x{family:08X}" if flags & FLAG_FAMILY else "of no family"
+            raise ValueError(f"block {k} is {seen}; expected 0x{FAMILY_RP2040:08X}, the RP2040's flash")
+        if size != PAGE_BYTES:
+            raise ValueError(f"block {k} carries {size} bytes; the RP2040 takes {PAGE_BYTES}")
+        if (number, count) != (k, len(blocks)):
+            raise ValueError(f"block {k} of {len(blocks)} says it is {number} of {count}: the file is cut or mixed up")
+        if not FLASH_AT <= address <= FLASH_AT + FLASH_BYTES - PAGE_BYTES:
+            raise ValueError(f"block {k} goes to 0x{address:08X}, which is no flash of this board")
+        if address + PAGE_BYTES > end:
+            raise ValueError(f"block {k} goes to 0x{address:08X}, where the settings are (from 0x{end:08X})")
+        if address != FLASH_AT + k * PAGE_BYTES:
+            # A gap would be legal UF2, but RP2040-E14 makes the boot ROM erase sectors wrongly around it.
+            raise ValueError(f"block {k} goes to 0x{address:08X}; expected 0x{FLASH_AT + k * PAGE_BYTES:08X}, no gaps")
+        pages.append(block[HEAD.size : HEAD.size + PAGE_BYTES])
+    return b"".join(pages)
+
+
+def check_boot2(payload: bytes) -> None:
+    """The chip starts only what has the right CRC behind its second-stage boot (RP2040 data sheet 2.8.1.3.1)."""
+    crc = 0xFFFFFFFF
+    for byte in payload[:BOOT2_BYTES]:
+        crc ^= byte << 24
+        for _ in range(8):
+            crc = (crc << 1 ^ (0x04C11DB7 if crc & 0x80000000 else 0)) & 0xFFFFFFFF
+    stored = int.from_bytes(payload[BOOT2_BYTES : BOOT2_BYTES + 4], "little")
+    if crc != stored:
+        raise ValueError(f"its second-stage boot has CRC 0x{stored:08X}; the chip would want 0x{crc:08X}")
+
+
+def find_note(payload: bytes) -> Note:
+    """What the image says of itself."""
+    last = len(payload) - NOTE.size
+    notes = [at for at in range(0, last + 1, NOTE_ALIGNMENT) if payload.startswith(NOTE_MAGIC, at)]
+    if len(notes) != 1:
+        raise ValueError(f"it says {len(notes)} times which board it is for; expected once: is it this gateway's?")
+    _, layout, board, *numbers = NOTE.unpack_from(payload, notes[0])
+    if layout != NOTE_LAYOUT:
+        raise ValueError(f"its note has layout {layout}, this library knows {NOTE_LAYOUT}; update biotac-gateway")
+    return Note(board, (numbers[0], numbers[1], numbers[2]), (numbers[3], numbers[4]))

@@ -1,0 +1,112 @@
+"""The drive that an RP2040's loader shows: a file that is written to it goes into the flash, block by block."""
+
+from __future__ import annotations
+
+import glob
+import os
+import re
+import string
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from ..errors import FlashError
+from .image import Image
+from .loader import Show
+
+LABEL = "RPI-RP2"
+INFO = "INFO_UF2.TXT"
+INFO_LINE = f"Board-ID: {LABEL}"
+FILE = "BIOTAC.UF2"
+
+
+class DriveLoader:
+    """``folders`` lists where drives are mounted, ``attached`` says whether one is there that is not mounted."""
+
+    name = f"drive {LABEL}"
+
+    def __init__(
+        self, folders: Callable[[], list[Path]] | None = None, attached: Callable[[], bool] | None = None
+    ) -> None:
+        self._folders = folders or mounted_folders
+        self._attached = attached or (lambda: disk_by_label().exists())
+
+    def drives(self) -> list[Path]:
+        """Mounted drives of boards in their loader."""
+        return [folder for folder in self._folders() if is_loader(folder)]
+
+    def ready(self) -> bool:
+        """See Loader.ready."""
+        drives = self.drives()
+        if len(drives) > 1:
+            raise FlashError(
+                f"{len(drives)} boards are in their loader ({', '.join(map(str, drives))}); unplug all but one"
+            )
+        return len(drives) == 1
+
+    def cure(self) -> str:
+        """See Loader.cure."""
+        if not self._attached():
+            return f"no drive {LABEL} is there: plug the board in with BOOTSEL held, or look at the cable"
+        return f"the drive {LABEL} is there but not mounted: `udisksctl mount -b {disk_by_label()}`, or open it by hand"
+
+    def write(self, image: Image, show: Show) -> None:
+        """See Loader.write."""
+        path = self.drives()[0] / FILE
+        *most, last = image.boot_last()
+        written = 0
+        try:
+            # Unbuffered, and synced before the last block: the operating system must not write that one earlier.
+            with open(path, "wb", buffering=0) as file:
+                for block in most:
+                    file.write(block)
+                    written += 1
+                    show(written, len(image.blocks))
+                os.fsync(file.fileno())
+                written += 1
+                file.write(last)
+                os.fsync(file.fileno())
+        except OSError as error:
+            # With the last block the board restarts, and the drive is gone under whoever still closes the file.
+            if written < len(image.blocks):
+                raise FlashError(
+                    f"{path} took {written} of {len(image.blocks)} blocks ({error.strerror}); the board stays in its "
+                    "loader: plug it in again and flash again"
+                ) from error
+        show(len(image.blocks), len(image.blocks))
+
+
+def is_loader(folder: Path) -> bool:
+    """A drive with an RP2040's loader behind it says so in a file."""
+    try:
+        return INFO_LINE in (folder / INFO).read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError:
+        return False
+
+
+def mounted_folders() -> list[Path]:
+    """Where this system mounts drives."""
+    if os.name == "nt":
+        return [Path(f"{letter}:\\") for letter in string.ascii_uppercase[2:]]
+    if sys.platform == "darwin":
+        return [Path(found) for found in sorted(glob.glob("/Volumes/*"))]
+    return linux_folders(Path("/"))
+
+
+def linux_folders(root: Path) -> list[Path]:
+    """The customary places, and wherever else somebody mounted something by hand."""
+    places = [found for pattern in ("media/*", "media/*/*", "run/media/*/*") for found in sorted(root.glob(pattern))]
+    try:
+        mounts = (root / "proc/mounts").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        mounts = []
+    for line in mounts:
+        device, folder, *_ = [*line.split(), "", ""]
+        if device.startswith("/dev/"):
+            places.append(Path(re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), folder)))  # a blank is \040
+    return list(dict.fromkeys(place.resolve() for place in places))
+
+
+def disk_by_label() -> Path:
+    """Linux names an attached drive by its label, mounted or not."""
+    return Path("/dev/disk/by-label") / LABEL

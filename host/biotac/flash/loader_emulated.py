@@ -1,0 +1,40 @@
+"""The loader of an emulated board, which is this project's model of it (tools/emulator/loader.mjs)."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from ..link.emulated import EmulatedBoard
+from .image import Image
+from .loader import Show
+
+WRITE_S = 5.0  # of emulated time; an image of 48 KiB takes 0.7 s
+
+
+class EmulatedLoader:
+    """Hands files to the emulator in place of the drive."""
+
+    name = "emulated loader"
+
+    def __init__(self, board: EmulatedBoard) -> None:
+        self._board = board
+
+    def ready(self) -> bool:
+        """See Loader.ready."""
+        return self._board.counters()["loader"] is not None
+
+    def cure(self) -> str:
+        """See Loader.cure."""
+        return "the emulated program did not leave for its loader: is that image this gateway's?"
+
+    def write(self, image: Image, show: Show) -> None:
+        """See Loader.write."""
+        show(0, len(image.blocks))
+        before = self._board.counters()["images"]
+        with tempfile.TemporaryDirectory(prefix="biotac-flash-") as folder:
+            path = Path(folder) / "image.uf2"
+            path.write_bytes(b"".join(image.boot_last()))
+            self._board.say(f"write uf2 {path}")
+            self._board.until(WRITE_S, images=before + 1)
+        show(len(image.blocks), len(image.blocks))

@@ -1,0 +1,51 @@
+"""Raspberry Pi's picotool, where it is installed: it needs no mounted drive, but permission for the USB device."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+
+from ..errors import FlashError
+from .image import Image
+from .loader import Show
+
+TOOL = "picotool"
+ASK_S = 10
+LOAD_S = 120
+
+
+class PicotoolLoader:
+    """Never ready without picotool on PATH."""
+
+    name = TOOL
+
+    def __init__(self) -> None:
+        self._heard = ""
+
+    def ready(self) -> bool:
+        """See Loader.ready."""
+        return shutil.which(TOOL) is not None and self._run("info", seconds=ASK_S)
+
+    def cure(self) -> str:
+        """See Loader.cure."""
+        if shutil.which(TOOL) is None:
+            return "or install picotool, which needs no mounted drive"
+        return f"picotool says: {self._heard}"
+
+    def write(self, image: Image, show: Show) -> None:
+        """See Loader.write. Picotool reads back what it wrote, and starts the board."""
+        show(0, len(image.blocks))
+        if not self._run("load", "-v", "-x", str(image.path), seconds=LOAD_S):
+            raise FlashError(f"picotool did not load {image.path}: {self._heard}; plug the board in with BOOTSEL held")
+        show(len(image.blocks), len(image.blocks))
+
+    def _run(self, *words: str, seconds: float) -> bool:
+        try:
+            done = subprocess.run(
+                [TOOL, *words], capture_output=True, text=True, errors="replace", timeout=seconds, check=False
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            self._heard = str(error)
+            return False
+        self._heard = " ".join((done.stderr or done.stdout).split()) or f"nothing, exit code {done.returncode}"
+        return done.returncode == 0

@@ -1,0 +1,161 @@
+"""Flashing from end to end: nothing is touched before the settings are in a file, and nothing is believed but HELLO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import _wire as wire
+from ..errors import BiotacError, CommandRefusedError, FlashError, InputError, NotAGatewayError, WireVersionError
+from ..hand import Hand
+from ..identity import board_text, serial_text, version_text
+from .backup import Backup, Restored, default_path, read_settings, restore, write_backup
+from .image import Image
+from .loader import Loader
+from .loader import Show as ShowBlocks
+from .target import Target
+from .waiting import wait_for
+
+LOADER_S = 20.0  # from the command to a drive that is mounted; desktops take some seconds
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """``before`` is None when nothing answered before; ``backup`` is what was put back, if anything was."""
+
+    port: str
+    loader: str
+    before: wire.Hello | None
+    after: wire.Hello
+    backup: Backup | None
+    settings: Restored | None
+
+
+def flash(
+    image: Image,
+    target: Target,
+    loaders: Sequence[Loader],
+    *,
+    backup_path: Path | None = None,
+    keep: bool = True,
+    restore_from: Backup | None = None,
+    say: Say = lambda text: None,
+    show: ShowBlocks = lambda done, of: None,
+) -> Outcome:
+    """Write ``image`` to the board, and give it its settings back.
+
+    The settings go to ``backup_path`` (default: a new file in the working directory) first; without ``keep`` they
+    do not, and a board whose firmware does not answer is flashed too. A board that is in its loader already cannot
+    be asked for its settings; ``restore_from`` is what it gets then, and otherwise too.
+
+    Raises InputError before anything is touched for an image that is not the board's, FlashError for whatever fails
+    from then on.
+    """
+    if image.note.wire[0] != wire.WIRE_MAJOR:
+        raise InputError(
+            f"{image.path} speaks wire {image.note.wire[0]}, this library {wire.WIRE_MAJOR}: it could not tell whether "
+            "flashing worked; install the biotac-gateway of the image's release"
+        )
+    loader = first_ready(loaders)
+    before: wire.Hello | None = None
+    written: Backup | None = None
+    if loader is None:
+        before, written = leave(image, target, backup_path=backup_path, keep=keep, say=say)
+    elif target.there():
+        raise InputError(
+            f"{target.port} is there, and another board is in its loader ({loader.name}); unplug one of them"
+        )
+    backup = restore_from or written
+    with step(written or restore_from):
+        if loader is None:
+            loader = wait_for(lambda: first_ready(loaders), LOADER_S)
+            if loader is None:
+                cures = "; ".join(one.cure() for one in loaders)
+                raise FlashError(f"no board in its loader was found within {LOADER_S:.0f} s: {cures}; flash again then")
+        say(f"writing {len(image.blocks)} blocks to the {loader.name}")
+        loader.write(image, show)
+        say("waiting for the board to come back")
+        with target.reopen() as hand:
+            check(image, before, hand.info)
+            settings = None if backup is None else restore(hand, backup.values)
+            return Outcome(target.port, loader.name, before, hand.info, backup, settings)
+
+
+def first_ready(loaders: Sequence[Loader]) -> Loader | None:
+    """A way to a board that is in its loader now."""
+    return next((loader for loader in loaders if loader.ready()), None)
+
+
+def leave(
+    image: Image, target: Target, *, backup_path: Path | None, keep: bool, say: Say
+) -> tuple[wire.Hello | None, Backup | None]:
+    """Ask the board who it is, save its settings, and send it to its loader."""
+    try:
+        hand = target.open()
+    except (NotAGatewayError, WireVersionError) as error:
+        if keep:
+            raise type(error)(f"{error}, or flash it without a backup of its settings: --no-backup") from error
+        say(f"{error}; trying the touch at 1200 baud")
+        target.touch()
+        return None, None
+    with hand:
+        if hand.info.board != image.note.board:
+            raise InputError(
+                f"{image.path} is for {board_text(image.note.board)}, but {board_text(hand.info.board)} answers on "
+                f"{target.port}; take that board's image"
+            )
+        say(f"{target.port} runs firmware {version_text(hand.info)}, serial {serial_text(hand.info)}")
+        backup = save(hand, backup_path) if keep else None
+        if backup is not None:
+            say(f"{len(backup.values)} settings are in {backup.path}")
+        with step(backup):
+            knows = command_loader(hand)
+    if not knows:
+        with step(backup):
+            target.touch()
+    return hand.info, backup
+
+
+def command_loader(hand: Hand) -> bool:
+    """Send the board to its loader; False when its firmware is from before there was a command for that."""
+    try:
+        hand.reboot_bootloader()
+    except CommandRefusedError as refused:
+        if refused.error != wire.Error.UNKNOWN_COMMAND:
+            raise
+        return False
+    return True
+
+
+def save(hand: Hand, path: Path | None) -> Backup:
+    """All of the board's settings into a new file."""
+    return write_backup(path or default_path(hand.info), hand.info, read_settings(hand))
+
+
+def check(image: Image, before: wire.Hello | None, after: wire.Hello) -> None:
+    """Only what the board itself says counts as success."""
+    version = (after.firmware_major, after.firmware_minor, after.firmware_patch)
+    if before is not None and after.board_serial != before.board_serial:
+        raise FlashError(
+            f"serial {serial_text(after)} came back, not {serial_text(before)}; leave only one board plugged in"
+        )
+    if (after.board, version) != (image.note.board, image.note.firmware):
+        raise FlashError(
+            f"the board that came back is {board_text(after.board)}, firmware {version_text(after)}; expected "
+            f"{image.note}: the image was not taken, flash again"
+        )
+    if before is not None and after.boot_id == before.boot_id:
+        raise FlashError(f"the board still has boot id {after.boot_id:08x}: it has not restarted; plug it in again")
+
+
+@contextmanager
+def step(backup: Backup | None) -> Iterator[None]:
+    """Whatever fails ends in one sentence that says where the settings are."""
+    try:
+        yield
+    except BiotacError as error:
+        where = "" if backup is None else f"; the settings are in {backup.path}, for --restore"
+        raise FlashError(f"{error}{where}") from error

@@ -1,0 +1,47 @@
+"""An emulated board: its process stays while it restarts, and its port keeps its name."""
+
+from __future__ import annotations
+
+from ..errors import InputError
+from ..hand import Hand
+from ..link.emulated import EmulatedBoard
+from ..link.ports import parse_sim
+from ..link.serial_port import SerialLink
+from ..sim.source import load_source
+
+BACK_S = 10.0  # of emulated time
+WORLD_S = 600.0  # the tape must outlast all that is done here: behind its end time stands still
+
+
+class EmulatedTarget:
+    """Starts the board that an ``emu:`` PORT names."""
+
+    def __init__(self, port: str) -> None:
+        self.port = port
+        sim = parse_sim(port, 0.0)
+        if sim.board == "posix":
+            raise InputError(f"{port} has no image to be flashed; expected a device path or emu:pico?source=SOURCE")
+        source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds or WORLD_S)
+        self.board = EmulatedBoard(sim.board, source, pace=sim.pace, hold=True, image=sim.image)
+        self.board.release()
+
+    def there(self) -> bool:
+        """See Target.there."""
+        return bool(self.board.counters()["usb"]["state"] == "configured")
+
+    def open(self) -> Hand:
+        """See Target.open."""
+        return Hand(SerialLink(self.board.path))
+
+    def touch(self) -> None:
+        """See Target.touch."""
+        self.board.say("touch at 1200 baud")
+
+    def reopen(self) -> Hand:
+        """See Target.reopen."""
+        self.board.until(BACK_S, loader=None, usb={"state": "configured"})
+        return self.open()
+
+    def close(self) -> None:
+        """See Target.close."""
+        self.board.close()

@@ -1,0 +1,223 @@
+"""Flashing a board from its firmware to its firmware, and what power cuts in the middle leave. Emulated.
+
+The loader is this project's model of the boot ROM's (tools/emulator/loader.mjs); silicon has not been tried.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rig import ROOT, Rig
+
+from biotac import Setting
+from biotac import _wire as wire
+from biotac.cli.main import main
+from biotac.errors import FlashError, InputError, NotAGatewayError
+from biotac.flash import Image, Outcome, flash, read_image
+from biotac.flash.loader_emulated import EmulatedLoader
+from biotac.flash.target_emulated import EmulatedTarget
+
+BUILT = ROOT / "build/pico/biotac-pico.uf2"
+PAGE = 256
+SECTOR = 4096
+WORLD = "name = 'rest'\nseed = 1\nfingers = 1\n[[step]]\ndo = 'rest'\nseconds = 600\n"
+
+
+class Bench:
+    """An emulated board that runs the built image, the way to its loader, and a folder for backups."""
+
+    def __init__(self, rig: Rig, folder: Path) -> None:
+        source = folder / "rest.toml"
+        source.write_text(WORLD)
+        self.folder = folder
+        self.port = rig.facts["port"].format(source=source, options="pace=fast&seconds=300")
+        self.target = EmulatedTarget(self.port)
+        self.loader = EmulatedLoader(self.target.board)
+        self.flashed = 0
+
+    def flash(self, image: Image, **options: Any) -> Outcome:
+        self.flashed += 1
+        path = self.folder / f"backup{self.flashed}.json"
+        return flash(image, self.target, [self.loader], backup_path=path, **options)
+
+    def counters(self) -> dict[str, Any]:
+        return self.target.board.counters()
+
+    def set(self, setting: Setting, value: int, *, save: bool) -> None:
+        with self.target.open() as hand:
+            hand.set_setting(setting, value)
+            if save:
+                hand.save_settings()
+
+    def setting_after_a_power_cut(self, setting: Setting) -> int:
+        boots = self.counters()["boots"]
+        self.target.board.say("cut power")
+        self.target.board.until(5, boots=boots + 1, usb={"state": "configured"})
+        with self.target.open() as hand:
+            return hand.setting(setting)
+
+
+@pytest.fixture
+def bench(rig: Rig, tmp_path: Path) -> Iterator[Bench]:
+    rig.need("flashing")
+    made = Bench(rig, tmp_path)
+    yield made
+    wrong = made.counters()["flash"]["wrong"]
+    made.target.close()
+    assert wrong == []
+
+
+@pytest.fixture(scope="session")
+def next_release(tmp_path_factory: pytest.TempPathFactory) -> Image:
+    """The same sources with another patch number, built as the image is."""
+    folder = tmp_path_factory.mktemp("next")
+    shutil.copytree(ROOT / "firmware", folder / "firmware")
+    (folder / "tools").symlink_to(ROOT / "tools")
+    version = folder / "firmware/app/version.h"
+    patch = (read_image(BUILT).note.firmware[2] + 1) % 10
+    text, changes = re.subn(r"(BT_VERSION_PATCH) \d+", rf"\g<1> {patch}", version.read_text())
+    assert changes == 1
+    version.write_text(text)
+    build = folder / "build"
+    configure = ["cmake", "-S", str(folder / "firmware/boards/pico"), "-B", str(build), "-G", "Ninja"]
+    for words in (configure, ["cmake", "--build", str(build)]):
+        done = subprocess.run(words, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+    return read_image(build / "biotac-pico.uf2")
+
+
+def test_a_board_comes_back_with_its_settings(bench: Bench) -> None:
+    bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)
+    bench.set(Setting.FORCE_GAIN_X_NN, -7, save=False)  # in force, and lost with the reboot
+    before = bench.counters()
+    outcome = bench.flash(read_image(BUILT))
+    assert outcome.before is not None
+    assert outcome.before.boot_id != outcome.after.boot_id
+    assert outcome.before.board_serial == outcome.after.board_serial
+    assert outcome.settings is not None
+    assert outcome.settings.changed == ("force_gain_x_nn",)
+    assert bench.setting_after_a_power_cut(Setting.IDLE_PERIOD_MS) == 250
+    assert bench.setting_after_a_power_cut(Setting.FORCE_GAIN_X_NN) == -7
+    after = bench.counters()
+    assert after["loaders"] == before["loaders"] + 1
+    blocks = len(read_image(BUILT).blocks)
+    assert after["flash"]["programs"] - before["flash"]["programs"] == blocks + 1  # and one record of settings
+    assert after["flash"]["erases"] - before["flash"]["erases"] == -(-blocks * PAGE // SECTOR)
+
+
+def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_release: Image) -> None:
+    bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)
+    outcome = bench.flash(next_release)
+    assert outcome.before is not None
+    assert outcome.after.firmware_patch == next_release.note.firmware[2] != outcome.before.firmware_patch
+    assert outcome.settings is not None
+    assert outcome.settings.changed == ()
+    back = bench.flash(read_image(BUILT))
+    assert back.after.firmware_patch == outcome.before.firmware_patch
+    assert bench.setting_after_a_power_cut(Setting.IDLE_PERIOD_MS) == 250
+
+
+def spoiled(folder: Path, at: int, value: int) -> Path:
+    """The built image with one byte of its flash changed."""
+    data = bytearray(BUILT.read_bytes())
+    block, offset = divmod(at, PAGE)
+    data[block * 512 + 32 + offset] = value
+    path = folder / "spoiled.uf2"
+    path.write_bytes(data)
+    return path
+
+
+def test_a_wrong_image_leaves_the_board_alone(bench: Bench, tmp_path: Path) -> None:
+    before = bench.counters()
+    with bench.target.open() as hand:
+        boot_id = hand.info.boot_id
+    with pytest.raises(InputError, match="second-stage boot"):
+        read_image(spoiled(tmp_path, 1, 0xEE))
+    note = BUILT.read_bytes().index(b"BIOTAC image")
+    board_at = (note // 512) * PAGE + note % 512 - 32 + 14
+    other = read_image(spoiled(tmp_path, board_at, wire.Board.LINUX_SBC))
+    with pytest.raises(InputError, match="is for LINUX_SBC, but PICO answers"):
+        bench.flash(other)
+    with bench.target.open() as hand:
+        assert hand.info.boot_id == boot_id
+    after = bench.counters()
+    assert [after[name] for name in ("boots", "loaders")] == [before[name] for name in ("boots", "loaders")]
+    assert after["flash"] == before["flash"]
+
+
+@pytest.mark.parametrize("cut", [1, 2000, SECTOR + 100, SECTOR + 15 * PAGE + 7, 40_000, -PAGE + 8, -1])
+def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path: Path, cut: int) -> None:
+    """The boot block goes last: from the first byte to the last, what is left is a board in its loader."""
+    image = read_image(BUILT)
+    blocks = len(image.blocks)
+    total = -(-blocks * PAGE // SECTOR) * SECTOR + blocks * PAGE
+    bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)
+    bench.target.board.say(f"cut power after {cut if cut >= 0 else total + cut} flash bytes")
+    with pytest.raises(FlashError, match=r"emulated board came to .*backup1.json, for --restore"):
+        bench.flash(image)
+    facts = bench.counters()
+    assert facts["loader"] == {"blocks": 0, "of": 0, "waiting": 0, "ignored": 0}
+    assert facts["usb"]["state"] == "detached"
+    outcome = bench.flash(image)
+    assert outcome.before is None
+    with bench.target.open() as hand:
+        assert hand.setting(Setting.IDLE_PERIOD_MS) == 250
+
+
+def test_a_power_cut_before_the_first_byte_leaves_the_old_firmware(bench: Bench, next_release: Image) -> None:
+    bench.target.board.say("cut power after 0 flash bytes")
+    with pytest.raises(FlashError, match="the settings are in"):
+        bench.flash(next_release)
+    outcome = bench.flash(next_release)
+    assert outcome.before is not None
+    assert outcome.before.firmware_patch == read_image(BUILT).note.firmware[2]
+    assert outcome.after.firmware_patch == next_release.note.firmware[2]
+
+
+def test_firmware_that_does_not_answer_is_left_by_touch(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def mute() -> None:
+        raise NotAGatewayError("nothing answers")
+
+    opening = bench.target.open
+    monkeypatch.setattr(bench.target, "open", mute)
+    monkeypatch.setattr(bench.target, "reopen", lambda: (came_back(bench), opening())[1])
+    outcome = bench.flash(read_image(BUILT), keep=False)
+    assert (outcome.before, outcome.backup) == (None, None)
+    assert bench.counters()["loaders"] == 1
+
+
+def came_back(bench: Bench) -> None:
+    bench.target.board.until(10, loader=None, usb={"state": "configured"})
+
+
+def test_blocks_of_other_families_are_skipped_by_the_loader(bench: Bench, tmp_path: Path) -> None:
+    """As UF2 files for several chips have them; the host would refuse such a file, the boot ROM does not."""
+    foreign = bytearray(BUILT.read_bytes()[:512])
+    foreign[28:32] = (0xADA52840).to_bytes(4, "little")
+    foreign[32:288] = bytes(256)  # would leave nothing to boot
+    image = read_image(BUILT)
+    mixed = Image(image.path, (*image.blocks[:1], bytes(foreign), bytes(512), *image.blocks[1:]), image.note)
+    outcome = bench.flash(mixed)
+    assert outcome.settings is not None
+
+
+def test_the_command_on_an_emulated_board(
+    rig: Rig, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig.need("flashing")
+    monkeypatch.chdir(tmp_path)  # where the backup goes
+    monkeypatch.setenv("BIOTAC_EMULATOR", str(ROOT / "tools/emulator"))
+    assert (
+        main(["flash", rig.facts["port"].format(source="press.toml", options="fingers=1"), str(BUILT), "--json"]) == 0
+    )
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["firmware"] == facts["firmware_before"]
+    assert facts["boot_id"] != facts["boot_id_before"]
+    assert json.loads(Path(facts["backup"]).read_text())["settings"]

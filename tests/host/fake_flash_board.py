@@ -1,0 +1,161 @@
+"""A board to be flashed that is neither here nor emulated, images for it, and a clock that does not wait."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from biotac import _wire as wire
+from biotac.errors import DeviceLostError, PortError
+from biotac.flash import target_serial, waiting
+from biotac.flash.image import Image
+from biotac.framing import encode
+from biotac.hand import Hand
+from biotac.link.serial_port import SerialLink
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
+
+from image import boot2, uf2
+
+
+def note(
+    board: int = wire.Board.PICO, version: tuple[int, int, int] = (0, 2, 0), major: int = wire.WIRE_MAJOR
+) -> bytes:
+    return b"BIOTAC image" + struct.pack("<HH3BBB3x", 1, board, *version, major, 0)
+
+
+def program(said: bytes, pages: int = 20) -> bytes:
+    """The bytes of a flash that a chip would boot."""
+    return (boot2.block(b"boot") + bytes(64) + said).ljust(pages * 256, b"\x5a")
+
+
+def make_image(folder: Path, said: bytes | None = None, name: str = "new.uf2") -> Path:
+    path = folder / name
+    path.write_bytes(uf2.uf2(program(note() if said is None else said)))
+    return path
+
+
+class FakeBoard:
+    """Answers on a pty while it runs; takes an image while it is in its loader. What happens is listed in order."""
+
+    name = "fake loader"
+    serial = (1, 2, 3) + (0,) * 9
+
+    def __init__(self, scripted_board, hello) -> None:
+        self.events: list[str] = []
+        self.board = int(wire.Board.PICO)
+        self.version = (0, 1, 0)
+        self.boot_id = 7
+        self.settings = {int(s): spec.default for s, spec in wire.SETTINGS.items()} | {11: 42}  # one that is new to us
+        self.stored = dict(self.settings)
+        self.in_loader = False
+        self.answers = True
+        self.takes = True
+        self.comes_back = True
+        self.refuses_loader = 0  # or the error it answers
+        self.refuses: set[int] = set()  # settings it refuses to change
+        self._hello = hello
+        self._link = scripted_board(self._answer)
+        self.port = self._link.path
+
+    def _answer(self, message_id: int, payload: bytes) -> bytes:
+        if not self.answers:
+            return b""
+        if message_id == wire.HelloRequest.ID:
+            names = ("firmware_major", "firmware_minor", "firmware_patch")
+            version = dict(zip(names, self.version, strict=True))
+            return self._hello(payload, board=self.board, boot_id=self.boot_id, board_serial=self.serial, **version)
+        if message_id in (wire.GetSetting.ID, wire.SetSetting.ID):
+            return self._setting(message_id, payload)
+        if message_id == wire.SaveSettings.ID:
+            self.events.append("save")
+            self.stored = dict(self.settings)
+        if message_id == wire.RebootBootloader.ID and self.refuses_loader:
+            return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, self.refuses_loader).pack())
+        if message_id == wire.RebootBootloader.ID:
+            self.events.append("loader")
+            self.in_loader = True
+        return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, 0).pack())
+
+    def _setting(self, message_id: int, payload: bytes) -> bytes:
+        req_id, key = payload[:2]
+        error = 0 if key in self.settings else wire.Error.UNKNOWN_SETTING
+        if message_id == wire.SetSetting.ID and not error:
+            error = wire.Error.OUT_OF_RANGE if key in self.refuses else 0
+            if not error:
+                self.settings[key] = wire.SetSetting.unpack(payload).value
+                self.events.append(f"set {key}")
+        if error:
+            return encode(wire.Reply.ID, wire.Reply(req_id, message_id, error).pack())
+        return encode(wire.SettingValue.ID, wire.SettingValue(req_id, key, self.settings[key]).pack())
+
+    # Target
+    def there(self) -> bool:
+        return not self.in_loader
+
+    def open(self) -> Hand:
+        if self.in_loader:
+            raise PortError("no port")
+        return Hand(SerialLink(self._link.path))
+
+    def touch(self) -> None:
+        self.events.append("touch")
+        self.in_loader = True
+
+    def reopen(self) -> Hand:
+        if not self.comes_back:
+            raise DeviceLostError("the board did not come back; plug it in again")
+        return self.open()
+
+    def close(self) -> None:
+        pass
+
+    # Loader
+    def ready(self) -> bool:
+        return self.in_loader
+
+    def cure(self) -> str:
+        return "hold BOOTSEL"
+
+    def write(self, image: Image, show: Callable[[int, int], None]) -> None:
+        self.events.append("write")
+        self.in_loader = False
+        self.answers = True
+        self.boot_id += 1
+        self.settings = dict(self.stored)
+        if self.takes:
+            self.version = image.note.firmware
+
+
+def no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock that only sleeping moves on."""
+    now = [0.0]
+
+    def sleep(seconds: float) -> None:
+        now[0] += seconds
+
+    monkeypatch.setattr(waiting, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
+
+
+def plug_in(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """Device: serial number, of the gateways that are plugged in; change it as you like."""
+    plugged: dict[str, str] = {}
+
+    def comports() -> list[SimpleNamespace]:
+        ours = [SimpleNamespace(device=d, serial_number=n, vid=0x1209, pid=1) for d, n in plugged.items()]
+        return [SimpleNamespace(device="/dev/ttyUSB7", serial_number=None, vid=0x0403, pid=0x6001), *ours]
+
+    monkeypatch.setattr(target_serial.list_ports, "comports", comports)
+    no_waiting(monkeypatch)
+    return plugged
+
+
+def make_drive(folder: Path, board: str = "RPI-RP2") -> Path:
+    folder.mkdir(parents=True)
+    (folder / "INFO_UF2.TXT").write_text(f"UF2 Bootloader v2.0\r\nModel: Raspberry Pi RP2\r\nBoard-ID: {board}\r\n")
+    return folder

@@ -1,0 +1,310 @@
+"""biotac flash: the order of what is done, and what each failure leaves, with a fake board."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from biotac import _wire as wire
+from biotac.cli.main import main
+from biotac.errors import BiotacError, FlashError, InputError, NotAGatewayError
+from biotac.flash import flash, loader_drive, read_backup, read_image
+from biotac.flash.image import Image
+from biotac.flash.loader_drive import linux_folders
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from fake_flash_board import FakeBoard, make_drive, make_image, no_waiting, note, plug_in
+
+
+@pytest.fixture
+def fake(scripted_board, hello, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> FakeBoard:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.5)
+    no_waiting(monkeypatch)
+    return FakeBoard(scripted_board, hello)
+
+
+@pytest.fixture
+def ports(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    return plug_in(monkeypatch)
+
+
+def backups(folder: Path) -> list[Path]:
+    return sorted(folder.glob("biotac-settings-*.json"))
+
+
+def test_settings_are_in_a_file_before_anything_is_touched(fake: FakeBoard, tmp_path: Path) -> None:
+    seen: list[str] = []
+    fake.events = _Watched(lambda event: seen.append(f"{event} with {len(backups(tmp_path))}"))
+    outcome = flash(read_image(make_image(tmp_path)), fake, [fake])
+    assert seen == ["loader with 1", "write with 1"]
+    assert outcome.before is not None
+    assert (outcome.before.firmware_minor, outcome.after.firmware_minor) == (1, 2)
+    assert outcome.backup is not None
+    assert read_backup(outcome.backup.path).values == fake.settings
+    assert outcome.settings is not None
+    assert outcome.settings.changed == ()
+    facts = json.loads(outcome.backup.path.read_text())
+    assert facts["settings"][-1] == {"id": 11, "name": "setting 11", "value": 42}
+    assert facts["firmware"] == "0.1.0"
+
+
+class _Watched(list[str]):
+    def __init__(self, watch: Callable[[str], None]) -> None:
+        super().__init__()
+        self._watch = watch
+
+    def append(self, event: str) -> None:
+        super().append(event)
+        self._watch(event)
+
+
+def test_what_differs_afterwards_is_restored_and_saved(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.settings |= {1: 2, 9: 250}  # in force, and not stored
+    outcome = flash(read_image(make_image(tmp_path)), fake, [fake])
+    assert fake.events == ["loader", "write", "set 1", "set 9", "save"]
+    assert fake.stored[1] == 2
+    assert fake.stored[9] == 250
+    assert outcome.settings is not None
+    assert outcome.settings.changed == ("poc_weights", "idle_period_ms")
+
+
+def test_a_setting_that_the_new_firmware_has_not_is_named(fake: FakeBoard, tmp_path: Path) -> None:
+    del fake.stored[11]
+    outcome = flash(read_image(make_image(tmp_path)), fake, [fake])
+    assert outcome.settings is not None
+    assert outcome.settings.unknown == ("setting 11",)
+
+
+def fails(fake: FakeBoard, folder: Path, kind: type[BiotacError] = FlashError, **options: object) -> str:
+    with pytest.raises(kind) as caught:
+        flash(read_image(make_image(folder)), fake, [fake], **options)  # type: ignore[arg-type]
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_an_image_of_another_board_leaves_the_board_alone(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.board = int(wire.Board.POSIX_SIM)
+    assert "is for PICO, but POSIX_SIM answers" in fails(fake, tmp_path, InputError)
+    assert fake.events == []
+    assert backups(tmp_path) == []
+
+
+def test_an_image_of_another_wire_leaves_the_board_alone(fake: FakeBoard, tmp_path: Path) -> None:
+    image = read_image(make_image(tmp_path, note(major=wire.WIRE_MAJOR + 1)))
+    with pytest.raises(InputError, match="could not tell whether flashing worked"):
+        flash(image, fake, [fake])
+    assert fake.events == []
+
+
+def test_a_backup_is_never_written_over(fake: FakeBoard, tmp_path: Path) -> None:
+    precious = tmp_path / "precious.json"
+    precious.write_text("mine")
+    assert "choose another --backup" in fails(fake, tmp_path, InputError, backup_path=precious)
+    assert "choose another --backup" in fails(fake, tmp_path, InputError, backup_path=tmp_path / "no" / "x.json")
+    assert precious.read_text() == "mine"
+    assert fake.events == []
+
+
+def test_the_old_version_coming_back_is_no_success(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.takes = False
+    message = fails(fake, tmp_path)
+    assert "is PICO, firmware 0.1.0; expected PICO, firmware 0.2.0" in message
+    assert str(backups(tmp_path)[0]) in message
+
+
+def test_the_same_boot_is_no_success(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.boot_id -= 1
+    hello = fake._hello
+    fake._hello = lambda payload, **facts: hello(payload, **facts | {"boot_id": 6})
+    assert "still has boot id 00000006" in fails(fake, tmp_path)
+
+
+def test_another_board_coming_back_is_no_success(fake: FakeBoard, tmp_path: Path) -> None:
+    write = fake.write
+
+    def exchange(image: Image, show: Callable[[int, int], None]) -> None:
+        write(image, show)
+        fake.serial = (9,) * 12
+
+    fake.write = exchange  # type: ignore[method-assign]
+    assert "leave only one board plugged in" in fails(fake, tmp_path)
+
+
+def test_a_board_that_never_comes_back_leaves_its_settings(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.comes_back = False
+    message = fails(fake, tmp_path)
+    assert "did not come back" in message
+    assert message.endswith(f"the settings are in {backups(tmp_path)[0]}, for --restore")
+
+
+def test_a_value_that_is_not_taken_back_leaves_the_settings(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.settings[9] = 250
+    fake.refuses = {9}
+    message = fails(fake, tmp_path)
+    assert "refused SetSetting: OUT_OF_RANGE" in message
+    assert read_backup(backups(tmp_path)[0]).values[9] == 250
+
+
+def test_a_board_that_does_not_enter_its_loader(fake: FakeBoard, tmp_path: Path) -> None:
+    class Never(FakeBoard):
+        ready = lambda self: False  # noqa: E731
+
+    fake.__class__ = Never
+    message = fails(fake, tmp_path)
+    assert "no board in its loader was found within 20 s: hold BOOTSEL; flash again then" in message
+    assert fake.events == ["loader"]
+
+
+def test_a_board_in_its_loader_is_flashed_and_given_a_backup(fake: FakeBoard, tmp_path: Path) -> None:
+    first = flash(read_image(make_image(tmp_path)), fake, [fake], backup_path=tmp_path / "kept.json")
+    assert first.backup is not None
+    fake.in_loader = True
+    fake.stored[9] = 999
+    kept = read_backup(tmp_path / "kept.json")
+    outcome = flash(read_image(make_image(tmp_path)), fake, [fake], restore_from=kept)
+    assert outcome.before is None
+    assert fake.stored[9] == first.backup.values[9]
+    fake.in_loader = True
+    bare = flash(read_image(make_image(tmp_path)), fake, [fake])
+    assert bare.settings is None
+
+
+def test_a_backup_to_restore_goes_before_the_boards_own_settings(fake: FakeBoard, tmp_path: Path) -> None:
+    image = read_image(make_image(tmp_path))
+    flash(image, fake, [fake], backup_path=tmp_path / "first.json")
+    fake.settings[9] = fake.stored[9] = 250
+    flash(image, fake, [fake], backup_path=tmp_path / "own.json", restore_from=read_backup(tmp_path / "first.json"))
+    assert fake.stored[9] == wire.SETTINGS[wire.Setting.IDLE_PERIOD_MS].default
+    assert read_backup(tmp_path / "own.json").values[9] == 250
+    fake.comes_back = False
+    kept = read_backup(tmp_path / "first.json")
+    assert "third.json, for --restore" in fails(fake, tmp_path, backup_path=tmp_path / "third.json", restore_from=kept)
+
+
+def test_a_setting_that_a_board_never_had_hides_none_behind_it(fake: FakeBoard, tmp_path: Path) -> None:
+    del fake.settings[3], fake.stored[3]
+    outcome = flash(read_image(make_image(tmp_path)), fake, [fake])
+    assert outcome.backup is not None
+    assert sorted(outcome.backup.values) == [1, 2, *range(4, 12)]
+
+
+def test_two_boards_are_not_mixed_up(fake: FakeBoard, tmp_path: Path) -> None:
+    class Another(FakeBoard):
+        ready = lambda self: True  # noqa: E731
+
+    fake.__class__ = Another
+    assert "another board is in its loader" in fails(fake, tmp_path, InputError)
+    assert fake.events == []
+
+
+def test_firmware_from_before_the_loaders_command_is_left_by_touch(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.refuses_loader = wire.Error.UNKNOWN_COMMAND
+    outcome = flash(read_image(make_image(tmp_path)), fake, [fake])
+    assert fake.events == ["touch", "write"]
+    assert outcome.backup is not None
+
+
+def test_a_board_without_a_loader_is_not_flashed(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.refuses_loader = wire.Error.NOT_HERE
+    assert "NOT_HERE" in fails(fake, tmp_path)
+    assert fake.events == []
+
+
+def test_firmware_that_does_not_answer_is_touched_only_when_told(
+    fake: FakeBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.05)
+    fake.answers = False
+    assert "--no-backup" in fails(fake, tmp_path, NotAGatewayError)
+    assert fake.events == []
+    outcome = flash(read_image(make_image(tmp_path)), fake, [fake], keep=False)
+    assert fake.events == ["touch", "write"]
+    assert (outcome.before, outcome.backup) == (None, None)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": "else"}', '{"format": "biotac settings 1"}'])
+def test_a_backup_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "backup.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match="holds no settings"):
+        read_backup(path)
+
+
+# ---- the command -----------------------------------------------------------------------------------------
+
+
+def refused(capsys: pytest.CaptureFixture[str], code: int, *words: str) -> str:
+    assert main(["flash", *words]) == code
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[-1].startswith("biotac: ")
+    return lines[-1]
+
+
+def test_without_an_image_one_is_asked_for(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert "name the IMAGE" in refused(capsys, 2)
+    assert "cannot be read" in refused(capsys, 2, "nowhere.uf2")
+    built = tmp_path / "build/pico/biotac-pico.uf2"
+    built.parent.mkdir(parents=True)
+    built.write_bytes(b"none")
+    assert f"{built} is not flashed: 4 bytes are no UF2" in refused(capsys, 2)
+
+
+def test_ports_that_cannot_be_flashed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, ports: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(loader_drive, "mounted_folders", lambda: [])
+    image = str(make_image(tmp_path))
+    assert "`biotac list`" in refused(capsys, 3, "/dev/ttyNOWHERE7", image)
+    assert "neither running nor in its loader" in refused(capsys, 3, image)
+    assert "has no image to be flashed" in refused(capsys, 2, "sim:press.toml", image)
+    assert "are no UF2" in refused(capsys, 2, "--emulated", str(Path(__file__)))
+    assert "leave one out" in refused(capsys, 2, "--emulated", "/dev/ttyACM0", image)
+    assert "leave one out" in refused(capsys, 2, "--no-backup", "--backup", "x", image)
+    ports |= {"/dev/ttyACM0": "A", "/dev/ttyACM1": "B"}
+    assert "2 boards are plugged in (/dev/ttyACM0, /dev/ttyACM1)" in refused(capsys, 3, image)
+
+
+def test_the_whole_command_over_a_drive(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    ports: dict[str, str],
+    fake: FakeBoard,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The fake board's loader is a folder that appears, and a file in it that makes the board restart."""
+    ports[fake.port] = "E66"
+    image = make_image(tmp_path)
+    media = tmp_path / "media/me"
+    media.mkdir(parents=True)
+
+    def folders() -> list[Path]:
+        drive = media / "RPI-RP2"
+        if fake.in_loader and not drive.exists():
+            make_drive(drive)
+        return linux_folders(tmp_path)
+
+    def fsync(fd: int) -> None:
+        if (media / "RPI-RP2/BIOTAC.UF2").stat().st_size == image.stat().st_size:
+            fake.write(read_image(image), lambda done, of: None)
+
+    monkeypatch.setattr(loader_drive, "mounted_folders", folders)
+    monkeypatch.setattr(loader_drive.os, "fsync", fsync)
+    fake.settings[9] = 250
+    assert main(["flash", str(image), "--json"]) == 0
+    said = capsys.readouterr()
+    facts = json.loads(said.out)
+    assert (facts["firmware_before"], facts["firmware"]) == ("0.1.0", "0.2.0")
+    assert (facts["boot_id_before"], facts["boot_id"]) == (7, 8)
+    assert facts["settings_restored"] == ["idle_period_ms"]
+    assert Path(facts["backup"]).is_file()
+    assert "writing 20 blocks to the drive RPI-RP2" in said.err

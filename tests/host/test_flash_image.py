@@ -1,0 +1,103 @@
+"""biotac flash: which images are refused, and why."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from biotac import _wire as wire
+from biotac.errors import InputError
+from biotac.flash import read_image
+from biotac.flash.image import BLOCK_BYTES, FLASH_BYTES, SETTINGS_BYTES
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from fake_flash_board import make_image, note
+
+ROOT = Path(__file__).resolve().parents[2]
+FLASH = 0x10000000
+
+
+def changed(at: int, format_: str, value: int, block: int = 3) -> Callable[[bytes], bytes]:
+    """One field of one block is another."""
+
+    def change(data: bytes) -> bytes:
+        out = bytearray(data)
+        struct.pack_into(format_, out, block * BLOCK_BYTES + at, value)
+        return bytes(out)
+
+    return change
+
+
+def dropped(first: int, last: int) -> Callable[[bytes], bytes]:
+    return lambda data: data[: first * BLOCK_BYTES] + data[last * BLOCK_BYTES :]
+
+
+def swapped(data: bytes) -> bytes:
+    blocks = [data[at : at + BLOCK_BYTES] for at in range(0, len(data), BLOCK_BYTES)]
+    blocks[4], blocks[5] = blocks[5], blocks[4]
+    return b"".join(blocks)
+
+
+def test_an_image_says_what_it_is(tmp_path: Path) -> None:
+    image = read_image(make_image(tmp_path))
+    assert str(image.note) == f"PICO, firmware 0.2.0, wire {wire.WIRE_MAJOR}.0"
+    assert len(image.blocks) == 20
+    assert image.boot_last() == (*image.blocks[1:], image.blocks[0])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "why"),
+    [
+        (lambda data: b"", "0 bytes are no UF2"),
+        (lambda data: b"\x7fELF" + bytes(508), "block 0 has not the marks"),
+        (lambda data: data[:-1], "no UF2"),
+        (changed(508, "<I", 7), "block 3 has not the marks"),
+        (changed(8, "<I", 0), "block 3 is of no family"),
+        (changed(8, "<I", 0x2001), "block 3 is of family 0xE48BFF56"),
+        (changed(28, "<I", 0xE48BFF59), "family 0xE48BFF59; expected 0xE48BFF56"),
+        (changed(16, "<I", 476), "carries 476 bytes"),
+        (dropped(19, 20), "block 0 of 19 says it is 0 of 20"),
+        (dropped(4, 5), "the file is cut or mixed up"),
+        (swapped, "block 4 of 20 says it is 5 of 20"),
+        (changed(12, "<I", 0x20000000), "0x20000000, which is no flash"),
+        (changed(12, "<I", FLASH + FLASH_BYTES), "no flash of this board"),
+        (changed(12, "<I", FLASH + FLASH_BYTES - SETTINGS_BYTES), "where the settings are"),
+        (changed(12, "<I", FLASH + FLASH_BYTES - 256), "where the settings are"),
+        (changed(12, "<I", FLASH + FLASH_BYTES - SETTINGS_BYTES - 256), "expected 0x10000300, no gaps"),
+        (changed(32, "<B", 1, block=0), "second-stage boot has CRC"),
+    ],
+)
+def test_an_image_that_a_board_would_not_take_whole_is_refused(
+    tmp_path: Path, spoil: Callable[[bytes], bytes], why: str
+) -> None:
+    path = make_image(tmp_path)
+    path.write_bytes(spoil(path.read_bytes()))
+    with pytest.raises(InputError, match=why) as caught:
+        read_image(path)
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (b"", "0 times which board"),
+        (note() + note(), "2 times which board"),
+        (note()[:12] + b"\x02" + note()[13:], "layout 2"),
+    ],
+)
+def test_an_image_that_does_not_say_its_board_is_refused(tmp_path: Path, said: bytes, why: str) -> None:
+    with pytest.raises(InputError, match=why):
+        read_image(make_image(tmp_path, said))
+
+
+def test_the_settings_sectors_are_where_the_firmware_has_them() -> None:
+    storage = (ROOT / "firmware/core/storage.h").read_text()
+    assert "#define BT_FLASH_SECTOR_BYTES   4096" in storage
+    assert "#define BT_STORAGE_BYTES        (2 * BT_FLASH_SECTOR_BYTES)" in storage
+    assert "#define FLASH_BYTES    (2u * 1024 * 1024)" in (ROOT / "firmware/port/rp2040/flash.c").read_text()
+    assert (FLASH_BYTES, SETTINGS_BYTES) == (2 * 1024 * 1024, 2 * 4096)
