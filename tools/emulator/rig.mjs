@@ -6,6 +6,7 @@ import { Loader } from './loader.mjs'
 import { FLASH_BYTES, Machine } from './machine.mjs'
 import { Board, BootRom } from './rom.mjs'
 import { Sensors } from './sensors.mjs'
+import { SlotTiming } from './timing.mjs'
 import { UsbHost } from './usb.mjs'
 
 export class Rig {
@@ -17,6 +18,7 @@ export class Rig {
     this.waiting = hold // for release()
     this.received = 0
     this.latency = new Latency()
+    this.timing = new SlotTiming()
     this.events = [] // [world ns, verb], sorted
     this.sensors = new Sensors(wasm, tape, serials)
     this.lossless = lossless
@@ -110,6 +112,7 @@ export class Rig {
       loader: this.loader === null ? null : this.loader.counters(),
       flash: this.board.counters,
       latency: this.latency.counters(),
+      timing: this.timing.counters(),
       sensors: this.sensors.counters(),
       usb: { state: usb.state, device: usb.device, failed: usb.failed, received: this.received, ...usb.bus.counters },
     }
@@ -153,11 +156,13 @@ export class Rig {
       onCut: () => this.#failPower(machine),
     })
     this.sensors.wire(machine.mcu, () => machine.worldNanos)
+    this.timing.watch(machine.mcu, () => machine.time.nanos)
     const spi = machine.mcu.spi[0]
     const transmit = spi.onTransmit
     spi.onTransmit = (mosi) => {
       transmit(mosi)
       this.latency.sampled(mosi, machine.time.nanos)
+      this.timing.sampled(mosi, machine.time.nanos)
       if ((this.waiting && this.sensors.started) || this.sensors.over) machine.time.hold()
     }
     this.usb = new UsbHost(machine.mcu, {

@@ -5,7 +5,7 @@ import { GPIOPinState } from 'rp2040js'
 const MISO = 16
 const SCK = 18
 const MOSI = 19
-const CHIP_SELECTS = [17, 20, 21, 22, 26] // of fingers 0 to 4: firmware/boards/pico
+export const CHIP_SELECTS = [17, 20, 21, 22, 26] // of fingers 0 to 4: firmware/boards/pico
 const SPI_FUNCTION = 1
 const WORD_BITS = 16
 const FASTEST_HZ = 10e6 // data sheet
