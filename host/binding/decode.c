@@ -1,0 +1,159 @@
+#include "decode.h"
+
+#include "crc32.h"
+
+#include <string.h>
+
+_Static_assert(BT_FRAME_MAX_BYTES <= BT_COBS_BLOCK_BYTES, "undo_cobs() knows one block");
+_Static_assert(BT_DEFRAMED_BAD_LENGTH + 1 == BT_DECODE_OUTCOMES, "every outcome is counted");
+// A message takes its payload, id, CRC, COBS byte and delimiter from the input, more than it takes of any
+// row.
+_Static_assert(BT_DECODE_ROOM >= BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1, "the rest may complete too");
+
+#define COBS_MAX_BYTES (BT_FRAME_MAX_BYTES + 1)
+
+void bt_decoder_reset(bt_decoder *decoder)
+{
+    decoder->allow_longer = 0;
+    memset(decoder->outcomes, 0, sizeof decoder->outcomes);
+    memset(decoder->filled, 0, sizeof decoder->filled);
+    decoder->overlong = 0;
+    decoder->rest_bytes = 0;
+    for (int id = 0; id < 256; id++) {
+        decoder->payload_bytes[id] = (int16_t)bt_wire_payload_bytes((uint8_t)id);
+        decoder->kind[id] = BT_DECODED_OTHER;
+    }
+    decoder->kind[BT_FRAME_ID] = BT_DECODED_FRAME;
+    decoder->kind[BT_PAC_ID] = BT_DECODED_PAC;
+    decoder->kind[BT_IDLE_ID] = BT_DECODED_IDLE;
+    // Slice k: what a byte does to the CRC when k more bytes of zeros follow it.
+    memcpy(decoder->crc_slices[0], bt_crc32_table, sizeof decoder->crc_slices[0]);
+    for (int slice = 1; slice < BT_CRC_SLICES; slice++) {
+        for (int byte = 0; byte < 256; byte++) {
+            decoder->crc_slices[slice][byte] = bt_crc32_step(decoder->crc_slices[slice - 1][byte], 0);
+        }
+    }
+}
+
+// In any byte order, and one load where that is this machine's.
+static uint32_t u32_at(const uint8_t *at)
+{
+    return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+}
+
+// bt_crc32(), eight bytes at a time: half of all the time goes here.
+static uint32_t crc_of(const uint32_t (*slices)[256], const uint8_t *data, size_t bytes)
+{
+    uint32_t crc = BT_CRC32_START;
+    for (; bytes >= 8; data += 8, bytes -= 8) {
+        uint32_t low = crc ^ u32_at(data);
+        uint32_t high = u32_at(data + 4);
+        crc = slices[7][low & 0xFF] ^ slices[6][low >> 8 & 0xFF] ^ slices[5][low >> 16 & 0xFF]
+              ^ slices[4][low >> 24] ^ slices[3][high & 0xFF] ^ slices[2][high >> 8 & 0xFF]
+              ^ slices[1][high >> 16 & 0xFF] ^ slices[0][high >> 24];
+    }
+    for (; bytes > 0; data++, bytes--) {
+        crc = bt_crc32_step(crc, *data);
+    }
+    return bt_crc32_end(crc);
+}
+
+// 1 <= bytes <= COBS_MAX_BYTES without a zero; plain receives one byte less. 0 if it is not COBS.
+static int undo_cobs(const uint8_t *in, size_t bytes, uint8_t *plain)
+{
+    memcpy(plain, in + 1, bytes - 1);
+    size_t at = in[0];
+    for (; at < bytes; at += in[at]) {
+        plain[at - 1] = 0;
+    }
+    return at == bytes;
+}
+
+static void append(bt_decoder *decoder, int kind, const void *bytes, size_t count)
+{
+    memcpy(decoder->data[kind] + decoder->filled[kind], bytes, count);
+    decoder->filled[kind] += (uint32_t)count;
+}
+
+static void keep(bt_decoder *decoder, uint8_t id, const uint8_t *payload, size_t bytes)
+{
+    int kind = decoder->kind[id];
+    if (kind == BT_DECODED_OTHER) {
+        append(decoder, kind, (uint8_t[]){id, (uint8_t)bytes}, 2);
+    }
+    append(decoder, kind, payload, bytes);
+    append(decoder, BT_DECODED_IDS, &id, 1);
+}
+
+// What stood between two delimiters.
+static enum bt_deframed finish(bt_decoder *decoder, const uint8_t *in, size_t bytes)
+{
+    uint8_t plain[COBS_MAX_BYTES];
+    if (bytes == 0) {
+        return BT_DEFRAMED_NOTHING;
+    }
+    if (bytes > COBS_MAX_BYTES) {
+        return BT_DEFRAMED_TOO_LONG;
+    }
+    if (!undo_cobs(in, bytes, plain)) {
+        return BT_DEFRAMED_BAD_COBS;
+    }
+    if (bytes - 1 < 1 + BT_CRC_BYTES) {
+        return BT_DEFRAMED_BAD_CRC;
+    }
+    size_t covered = bytes - 1 - BT_CRC_BYTES;
+    if (crc_of((const uint32_t (*)[256])decoder->crc_slices, plain, covered) != u32_at(plain + covered)) {
+        return BT_DEFRAMED_BAD_CRC;
+    }
+    int payload_bytes = (int)covered - 1;
+    int expected = decoder->payload_bytes[plain[0]];
+    if (expected != BT_UNKNOWN_ID && payload_bytes != expected) {
+        if (!decoder->allow_longer || payload_bytes < expected) {
+            return BT_DEFRAMED_BAD_LENGTH;
+        }
+        payload_bytes = expected;
+    }
+    keep(decoder, plain[0], plain + 1, (size_t)payload_bytes);
+    return BT_DEFRAMED_GOOD;
+}
+
+// Never hoards what cannot become a frame: a delimiter may fail to come for ever.
+static void add_to_rest(bt_decoder *decoder, const uint8_t *data, size_t bytes)
+{
+    if (decoder->overlong || decoder->rest_bytes + bytes > COBS_MAX_BYTES) {
+        decoder->overlong = 1;
+        return;
+    }
+    memcpy(decoder->rest + decoder->rest_bytes, data, bytes);
+    decoder->rest_bytes = (uint16_t)(decoder->rest_bytes + bytes);
+}
+
+static enum bt_deframed finish_rest(bt_decoder *decoder, const uint8_t *data, size_t bytes)
+{
+    add_to_rest(decoder, data, bytes);
+    enum bt_deframed outcome =
+        decoder->overlong ? BT_DEFRAMED_TOO_LONG : finish(decoder, decoder->rest, decoder->rest_bytes);
+    decoder->overlong = 0;
+    decoder->rest_bytes = 0;
+    return outcome;
+}
+
+size_t bt_decode(bt_decoder *decoder, const uint8_t *data, size_t bytes)
+{
+    size_t taken = bytes < BT_DECODE_BYTES ? bytes : BT_DECODE_BYTES;
+    memset(decoder->filled, 0, sizeof decoder->filled);
+    const uint8_t *end = data + taken;
+    while (data < end) {
+        const uint8_t *zero = memchr(data, 0, (size_t)(end - data));
+        if (zero == NULL) {
+            add_to_rest(decoder, data, (size_t)(end - data));
+            break;
+        }
+        size_t piece = (size_t)(zero - data);
+        int fresh = decoder->rest_bytes == 0 && !decoder->overlong;
+        enum bt_deframed outcome = fresh ? finish(decoder, data, piece) : finish_rest(decoder, data, piece);
+        decoder->outcomes[outcome]++;
+        data = zero + 1;
+    }
+    return taken;
+}
