@@ -8,7 +8,7 @@
 
 #include "framing.h"
 
-#define BT_DECODE_BYTES    16384 // what one call takes; results of more than that would leave the cache
+#define BT_DECODE_BYTES    65536                   // what one call takes
 #define BT_DECODE_ROOM     (BT_DECODE_BYTES + 256) // the call's bytes and the rest of the call before
 #define BT_DECODE_OUTCOMES 6                       // enum bt_deframed
 #define BT_CRC_SLICES      8
@@ -47,7 +47,9 @@ typedef struct {
 // To be called first; nothing of the struct needs a value before.
 void bt_decoder_reset(bt_decoder *decoder);
 
-// Takes at most BT_DECODE_BYTES and returns how many. What the call before completed is gone.
+size_t bt_decode_bytes(void); // BT_DECODE_BYTES
+
+// Takes at most that many and returns how many. What the call before completed is gone.
 size_t bt_decode(bt_decoder *decoder, const uint8_t *data, size_t bytes);
 
 #endif

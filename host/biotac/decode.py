@@ -23,26 +23,28 @@ _from_buffer = ffi.from_buffer
 _unpack = ffi.unpack
 _frombuffer = np.frombuffer
 _FRAME, _PAC, _IDLE = (wire.DTYPES[message_id] for message_id in STREAMED)
+_NO_IDLE = np.frombuffer(b"", _IDLE)
 _KINDS = int(lib.BT_DECODED_KINDS)
+_ONE_STEP_BYTES = int(lib.bt_decode_bytes())
 
 # Not cleared, the reset sets what is read: most of it is room that a short connection never touches.
 _new = ffi.new_allocator(should_clear_after_alloc=False)
 
 
-@dataclass
+@dataclass(slots=True)
 class Decoded:
     """What one chunk of bytes completed.
 
     ``frames``, ``pacs`` and ``idles`` are the FRAME, PAC and IDLE messages as sent (wire.DTYPES), each in the
     order of arrival and read-only. ``others`` are the rest as (message id, payload), with the ids that this
-    library does not know. ``ids`` (n,) uint8 has the id of every message: it tells the order among all of them.
+    library does not know. ``ids`` has the id of every message, a byte each: it tells the order among all of them.
     """
 
     frames: StructArray
     pacs: StructArray
     idles: StructArray
     others: list[tuple[int, bytes]]
-    ids: NDArray[np.uint8]
+    ids: bytes
 
     def between(self, begin: int, end: int) -> Decoded:
         """Only the messages from number ``begin`` to before ``end``, counted over all of them from 0."""
@@ -56,12 +58,12 @@ class Decoded:
         )
 
     def _before(self, at: int) -> tuple[int, int, int, int]:
-        frames, pacs, idles = (int(np.count_nonzero(self.ids[:at] == message_id)) for message_id in STREAMED)
+        frames, pacs, idles = (self.ids.count(message_id, 0, at) for message_id in STREAMED)
         return frames, pacs, idles, at - frames - pacs - idles
 
     def order(self, message_id: int) -> NDArray[np.intp]:
         """Where among all messages those of ``message_id`` came, counted from 0."""
-        return np.flatnonzero(self.ids == message_id)
+        return np.flatnonzero(_frombuffer(self.ids, np.uint8) == message_id)
 
     def messages(self) -> list[tuple[int, bytes]]:
         """All as (message id, payload), in the order of arrival. Slow: for few messages."""
@@ -70,7 +72,7 @@ class Decoded:
         others = iter(self.others)
         return [
             (message_id, next(streams[message_id]).tobytes()) if message_id in streams else next(others)
-            for message_id in self.ids.tolist()
+            for message_id in self.ids
         ]
 
 
@@ -86,32 +88,37 @@ class Decoder:
         lib.bt_decoder_reset(self._state)
         # Views of the state; they do not keep it alive, self._state does.
         self._filled = self._state.filled
-        self._data = [ffi.buffer(data) for data in self._state.data]
+        self._frames, self._pacs, self._idles, self._others, self._ids = map(ffi.buffer, self._state.data)
 
     def feed(self, chunk: Buffer) -> Decoded:
         """Take any number of bytes; return what they complete."""
+        if type(chunk) is bytes and len(chunk) <= _ONE_STEP_BYTES:
+            # cffi hands the bytes' address over, which is faster than to borrow a buffer.
+            _decode(self._state, chunk, len(chunk))
+            return _decoded(*self._completed())
+        steps = []
         with _from_buffer(chunk) as data:
             size = len(data)
-            at = _decode(self._state, data, size)
-            completed = self._completed()
-            if at < size:
-                steps = [completed]
-                while at < size:
-                    at += _decode(self._state, data + at, size - at)
-                    steps.append(self._completed())
-                completed = [b"".join(parts) for parts in zip(*steps, strict=True)]
-        frames, pacs, idles, others, ids = completed
-        return Decoded(
-            _frombuffer(frames, _FRAME),
-            _frombuffer(pacs, _PAC),
-            _frombuffer(idles, _IDLE),
-            _pairs(others) if others else [],
-            _frombuffer(ids, np.uint8),
+            at = 0
+            while at < size:
+                at += _decode(self._state, data + at, size - at)
+                steps.append(self._completed())
+        return (
+            _decoded(*(b"".join(parts) for parts in zip(*steps, strict=True)))
+            if steps
+            else _decoded(b"", b"", b"", b"", b"")
         )
 
-    def _completed(self) -> list[bytes]:
+    def _completed(self) -> tuple[bytes, bytes, bytes, bytes, bytes]:
         """Copies, by enum bt_decoded: the next call writes over what this one completed."""
-        return [data[:n] for data, n in zip(self._data, _unpack(self._filled, _KINDS), strict=True)]
+        frames, pacs, idles, others, ids = _unpack(self._filled, _KINDS)
+        return (
+            self._frames[:frames],
+            self._pacs[:pacs],
+            self._idles[:idles] if idles else b"",
+            self._others[:others] if others else b"",
+            self._ids[:ids],
+        )
 
     @property
     def counts(self) -> FramingCounts:
@@ -130,6 +137,17 @@ class Decoder:
     @allow_longer.setter
     def allow_longer(self, allow: bool) -> None:
         self._state.allow_longer = allow
+
+
+def _decoded(frames: bytes, pacs: bytes, idles: bytes, others: bytes, ids: bytes) -> Decoded:
+    """Of what the C side gives out, by enum bt_decoded."""
+    return Decoded(
+        _frombuffer(frames, _FRAME),
+        _frombuffer(pacs, _PAC),
+        _frombuffer(idles, _IDLE) if idles else _NO_IDLE,
+        _pairs(others) if others else [],
+        ids,
+    )
 
 
 def _pairs(others: bytes) -> list[tuple[int, bytes]]:

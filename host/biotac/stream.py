@@ -165,8 +165,8 @@ def split_at_starts(decoded: Decoded) -> list[Decoded]:
     starts = [k for k, other in enumerate(decoded.others) if is_start(*other)]
     if not starts:
         return [decoded]
-    others_at = np.flatnonzero(~np.isin(decoded.ids, STREAMED))
-    ends = [int(others_at[k]) + 1 for k in starts]
+    others_at = [at for at, message_id in enumerate(decoded.ids) if message_id not in STREAMED]
+    ends = [others_at[k] + 1 for k in starts]
     return [decoded.between(begin, end) for begin, end in zip([0, *ends], [*ends, len(decoded.ids)], strict=True)]
 
 

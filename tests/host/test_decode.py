@@ -11,11 +11,12 @@ import pytest
 from deframer import Deframer, encode
 
 from biotac import _wire as wire
+from biotac.core import lib
 from biotac.decode import STREAMED, Decoded, Decoder
 
 Message = tuple[int, bytes]
 UNKNOWN_ID = 0x7E
-STEP_BYTES = 16384  # BT_DECODE_BYTES: where the decoder itself cuts
+STEP_BYTES = lib.bt_decode_bytes()  # where the decoder itself cuts
 
 
 def messages(random: np.random.Generator, n: int, longer_by: int = 0) -> list[Message]:
@@ -61,7 +62,7 @@ def assert_rows_are_those_of(decoded: Decoded, got: list[Message]) -> None:
 
 @pytest.mark.parametrize("allow_longer", [False, True])
 @pytest.mark.parametrize("rate", [0.0, 1e-3, 1e-2])
-@pytest.mark.parametrize("longest", [3, 64, 4096, 3 * STEP_BYTES])
+@pytest.mark.parametrize("longest", [3, 64, 4096, 100_000])
 def test_the_reference_finds_the_same_messages_and_damage(rate: float, longest: int, allow_longer: bool) -> None:
     random = np.random.default_rng([int(rate * 1e4), longest, allow_longer])
     data = b"".join(encode(*m) for m in messages(random, 600, longer_by=3))
@@ -83,7 +84,7 @@ def test_the_reference_finds_the_same_messages_and_damage(rate: float, longest: 
 @pytest.mark.parametrize("offset", range(-3, 4))
 def test_a_chunk_longer_than_the_decoders_own_step_is_one_chunk(offset: int) -> None:
     random = np.random.default_rng(5)
-    data = b"".join(encode(*m) for m in messages(random, 2000))
+    data = b"".join(encode(*m) for m in messages(random, 5000))
     data = data[: 2 * STEP_BYTES + offset]
     reference = Deframer()
     want = reference.feed(data)
