@@ -39,9 +39,10 @@ typedef struct {
     uint8_t rest[BT_FRAME_MAX_BYTES + 2];
 
     // Set up by the reset, from what is generated.
-    int16_t payload_bytes[256]; // by id, or BT_UNKNOWN_ID
-    uint8_t kind[256];          // by id, enum bt_decoded
-    uint32_t crc_slices[BT_CRC_SLICES][256];
+    int16_t payload_bytes[256];              // by id, or BT_UNKNOWN_ID
+    uint8_t kind[256];                       // by id, enum bt_decoded
+    uint32_t crc_slices[BT_CRC_SLICES][256]; // k: what a byte does to the CRC by the end of k more zeros
+    uint32_t crc_over_lane[2][4][256];       // what zeros do to a CRC, by its bytes: decode.c, crc_of()
 } bt_decoder;
 
 // To be called first; nothing of the struct needs a value before.
