@@ -23,7 +23,7 @@ _from_buffer = ffi.from_buffer
 _unpack = ffi.unpack
 _frombuffer = np.frombuffer
 _FRAME, _PAC, _IDLE = (wire.DTYPES[message_id] for message_id in STREAMED)
-_NO_IDLE = np.frombuffer(b"", _IDLE)
+_NO_FRAME, _NO_PAC, _NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (_FRAME, _PAC, _IDLE))
 _KINDS = int(lib.BT_DECODED_KINDS)
 _ONE_STEP_BYTES = int(lib.bt_decode_bytes())
 
@@ -88,36 +88,35 @@ class Decoder:
         lib.bt_decoder_reset(self._state)
         # Views of the state; they do not keep it alive, self._state does.
         self._filled = self._state.filled
-        self._frames, self._pacs, self._idles, self._others, self._ids = map(ffi.buffer, self._state.data)
+        self._data = [ffi.buffer(data) for data in self._state.data]
+        self._frames, self._pacs, self._idles, self._others, self._ids = self._data
 
     def feed(self, chunk: Buffer) -> Decoded:
         """Take any number of bytes; return what they complete."""
-        if type(chunk) is bytes and len(chunk) <= _ONE_STEP_BYTES:
-            # cffi hands the bytes' address over, which is faster than to borrow a buffer.
-            _decode(self._state, chunk, len(chunk))
-            return _decoded(*self._completed())
-        steps = []
+        size = len(chunk)
+        if type(chunk) is bytes and size <= _ONE_STEP_BYTES:
+            # cffi hands the bytes' address over, which is faster than to borrow a buffer. All in one place: to
+            # call for the parts is a quarter of the time of a chunk of 4096 bytes.
+            _decode(self._state, chunk, size)
+            n_frames, n_pacs, n_idles, n_others, n_ids = _unpack(self._filled, _KINDS)
+            return Decoded(
+                _frombuffer(self._frames[:n_frames], _FRAME) if n_frames else _NO_FRAME,
+                _frombuffer(self._pacs[:n_pacs], _PAC) if n_pacs else _NO_PAC,
+                _frombuffer(self._idles[:n_idles], _IDLE) if n_idles else _NO_IDLE,
+                _pairs(self._others[:n_others]) if n_others else [],
+                self._ids[:n_ids],
+            )
+        steps = [(b"",) * _KINDS]
         with _from_buffer(chunk) as data:
             size = len(data)
             at = 0
             while at < size:
                 at += _decode(self._state, data + at, size - at)
-                steps.append(self._completed())
-        return (
-            _decoded(*(b"".join(parts) for parts in zip(*steps, strict=True)))
-            if steps
-            else _decoded(b"", b"", b"", b"", b"")
-        )
-
-    def _completed(self) -> tuple[bytes, bytes, bytes, bytes, bytes]:
-        """Copies, by enum bt_decoded: the next call writes over what this one completed."""
-        frames, pacs, idles, others, ids = _unpack(self._filled, _KINDS)
-        return (
-            self._frames[:frames],
-            self._pacs[:pacs],
-            self._idles[:idles] if idles else b"",
-            self._others[:others] if others else b"",
-            self._ids[:ids],
+                # Copies: the next call writes over what this one completed.
+                steps.append(tuple(rows[:n] for rows, n in zip(self._data, _unpack(self._filled, _KINDS), strict=True)))
+        frames, pacs, idles, others, ids = (b"".join(parts) for parts in zip(*steps, strict=True))
+        return Decoded(
+            _frombuffer(frames, _FRAME), _frombuffer(pacs, _PAC), _frombuffer(idles, _IDLE), _pairs(others), ids
         )
 
     @property
@@ -137,17 +136,6 @@ class Decoder:
     @allow_longer.setter
     def allow_longer(self, allow: bool) -> None:
         self._state.allow_longer = allow
-
-
-def _decoded(frames: bytes, pacs: bytes, idles: bytes, others: bytes, ids: bytes) -> Decoded:
-    """Of what the C side gives out, by enum bt_decoded."""
-    return Decoded(
-        _frombuffer(frames, _FRAME),
-        _frombuffer(pacs, _PAC),
-        _frombuffer(idles, _IDLE) if idles else _NO_IDLE,
-        _pairs(others) if others else [],
-        ids,
-    )
 
 
 def _pairs(others: bytes) -> list[tuple[int, bytes]]:
