@@ -16,6 +16,7 @@ import numpy as np
 
 from . import _wire as wire
 from ._sensor import MAX_SENSORS
+from .clock import LAST_SAMPLE_US, DeviceClock
 from .errors import CommandRefusedError, DeviceLostError, InputError, NotAGatewayError, WireVersionError
 from .frames import Frame, StructArray, tare_to_q4
 from .framing import encode
@@ -55,6 +56,9 @@ class Hand:
         self._streaming = False
         self._ended = False
         self._closed = False
+        #: Device time as host time, fed by whatever is read; known after a first ``status`` or ``sync``.
+        #: A simulated board's time is no clock: it waits for the computer, which shows as ``resets``.
+        self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
         try:
             self.info = self._handshake()
         except BaseException:
@@ -181,8 +185,17 @@ class Hand:
         self._command(wire.Ping(self._next_req_id()))
 
     def status(self) -> wire.Status:
-        """Counters of the board and its link."""
-        return self._ask(wire.GetStatus(self._next_req_id()), wire.Status)
+        """Counters of the board and its link. Its time of answering also feeds ``clock``."""
+        # Of several tries the first one's time holds: whichever was answered had left by then, or later.
+        sent_s = time.monotonic()
+        status = self._ask(wire.GetStatus(self._next_req_id()), wire.Status)
+        self.clock.round_trip(sent_s, self._decoder.unwrap_t_us(status.t_us), time.monotonic())
+        return status
+
+    def sync(self, round_trips: int = 5) -> None:
+        """Ask for the board's time: ``clock`` gets its bound from round trips, and the drift from later ones."""
+        for _ in range(round_trips):
+            self.status()
 
     def sensor_status(self, finger: int) -> wire.SensorStatus:
         """Counters and tare state of one sensor."""
@@ -347,7 +360,11 @@ class Hand:
         if not chunk:
             return False
         self._bytes += len(chunk)
+        arrived_s = time.monotonic()
         batch = self._decoder.feed(chunk)
+        last_us = batch.last_t_us()
+        if last_us is not None:
+            self.clock.arrived(last_us + LAST_SAMPLE_US, arrived_s)
         self._frames += len(batch.frames)
         self._replies.extend(batch.messages)
         if len(batch.frames) or len(batch.pac) or len(batch.idle) or batch.messages:
