@@ -8,6 +8,7 @@ import struct
 import time
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -35,6 +36,14 @@ REPLY_TRIES = 3
 SILENCE_S = 3.0
 
 Reply = TypeVar("Reply")
+
+
+@dataclass(frozen=True)
+class HandWarning:
+    """Something about a board that works, but not as well as it could."""
+
+    code: str
+    text: str  # one line with the cure
 
 
 class Hand:
@@ -71,6 +80,16 @@ class Hand:
     def port(self) -> str:
         """The PORT this was opened as."""
         return self.link.port
+
+    @property
+    def warnings(self) -> list[HandWarning]:
+        """What speaks against this board and this library together, in words; empty when nothing does."""
+        if self.info.schema_hash == wire.SCHEMA_HASH:
+            return []
+        text = (
+            f"the firmware on {self.port} has schema {self.info.schema_hash:08x}, this library {wire.SCHEMA_HASH:08x}"
+        )
+        return [HandWarning("schema_differs", f"{text}; what only one side knows is left out: {cure(self.info)}")]
 
     @property
     def fingers(self) -> list[int]:
@@ -126,10 +145,7 @@ class Hand:
         else:
             raise NotAGatewayError(self._describe_stranger())
         if hello.wire_major != wire.WIRE_MAJOR:
-            raise WireVersionError(
-                f"the firmware on {self.port} speaks wire {hello.wire_major}.{hello.wire_minor}, this library "
-                f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}; install the firmware and the biotac-gateway of one release"
-            )
+            raise WireVersionError(f"the firmware on {self.port} speaks {describe_mismatch(hello)}")
         # What streamed before this handshake is nobody's: counting starts here.
         self._decoder = StreamDecoder()
         self._batches.clear()
@@ -422,3 +438,16 @@ def describe_refusal(request: Any, reply: wire.Reply) -> str:
     """One line naming the command and the board's reason."""
     name = wire.Error(reply.error).name if reply.error in list(wire.Error) else f"error {reply.error}"
     return f"the board refused {type(request).__name__}: {name} ({wire.ERROR_DOC.get(reply.error, 'unknown')})"
+
+
+def describe_mismatch(hello: wire.Hello) -> str:
+    """Both wire versions, and the command that brings them together."""
+    mine = f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}"
+    return f"wire {hello.wire_major}.{hello.wire_minor}, this library {mine}; {cure(hello)}"
+
+
+def cure(hello: wire.Hello) -> str:
+    """The command that updates the older side; of one wire version the firmware, which is told from this library."""
+    if (hello.wire_major, hello.wire_minor) > (wire.WIRE_MAJOR, wire.WIRE_MINOR):
+        return "update this library: pip install -U biotac-gateway"
+    return "update the firmware: biotac flash"

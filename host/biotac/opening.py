@@ -5,23 +5,28 @@ from __future__ import annotations
 import os
 
 from . import _wire as wire
+from .discovery import SERIAL_PREFIX, choose
 from .hand import Hand
 from .link import Link, open_link
 
 
-def open(port: str | os.PathLike[str], *, pace: float = 0.0) -> Hand:
+def open(port: str | os.PathLike[str] | None = None, *, pace: float = 0.0) -> Hand:
     """Open a board and shake hands.
 
-    ``port`` is a device path (``/dev/ttyACM0``, ``COM3``), ``spidev:0.0,0.1`` for sensors on this computer's
-    own SPI bus, one BUS.DEVICE a finger, or ``sim:SOURCE`` for a simulated board,
-    where SOURCE is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``), or
+    Without ``port`` it is the only board on USB, found by its USB ids; nothing else is opened. ``port`` is
+    ``serial:E6605838831F5B2C``, a board's serial number; a device path (``/dev/ttyACM0``, ``COM3``);
+    ``spidev:0.0,0.1`` for sensors on this computer's own SPI bus, one BUS.DEVICE a finger; ``sim:SOURCE`` for a
+    simulated board, where SOURCE is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``); or
     ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the same.
     ``pace`` is for simulated and emulated boards: device seconds per second, 0 for as fast as this side reads.
 
     Raises PortError, NotAGatewayError, WireVersionError, or InputError for a source that cannot be
     played.
     """
-    return shake_hands(open_link(os.fspath(port), pace=pace))
+    name = None if port is None else os.fspath(port)
+    if name is None or name.startswith(SERIAL_PREFIX):
+        name = choose(name and name.removeprefix(SERIAL_PREFIX))
+    return shake_hands(open_link(name, pace=pace))
 
 
 def shake_hands(link: Link) -> Hand:

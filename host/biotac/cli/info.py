@@ -10,6 +10,8 @@ from typing import Any
 import biotac
 
 from .. import _wire as wire
+from ..discovery import serial_text
+from . import values
 
 NAME = "info"
 HELP = "Say who is on a port: board, firmware, sensors, settings, counters."
@@ -18,9 +20,7 @@ EXAMPLE = "biotac info /dev/ttyACM0"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The port."""
-    parser.add_argument(
-        "port", metavar="PORT", help="device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE"
-    )
+    values.add_port(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -30,9 +30,10 @@ def run(args: argparse.Namespace) -> int:
         sensors = [hand.sensor_info(f) for f in hand.fingers]
         settings = hand.settings()
         status = hand.status()
+        warnings = hand.warnings
     if args.json:
         facts: dict[str, Any] = {
-            "port": args.port,
+            "port": hand.port,
             "board": board_text(hello),
             "firmware": version_text(hello),
             "wire": f"{hello.wire_major}.{hello.wire_minor}",
@@ -50,8 +51,8 @@ def run(args: argparse.Namespace) -> int:
         return 0
     print(f"{board_text(hello)}, firmware {version_text(hello)}, wire {hello.wire_major}.{hello.wire_minor}")
     print(f"serial {serial_text(hello)}, boot {hello.boot_id:08x}, up {status.uptime_s} s")
-    if hello.schema_hash != wire.SCHEMA_HASH:
-        print("its schema differs from this library's; fields that only one side knows are left out")
+    for warning in warnings:
+        print(f"warning: {warning.text}")
     for s in sensors:
         print(f"finger {s.finger}: BioTac {text(s.serial)}, software {text(s.software_version)}")
     for setting, value in settings.items():
@@ -72,9 +73,3 @@ def board_text(hello: wire.Hello) -> str:
 def version_text(hello: wire.Hello) -> str:
     """Firmware release."""
     return f"{hello.firmware_major}.{hello.firmware_minor}.{hello.firmware_patch}"
-
-
-def serial_text(hello: wire.Hello) -> str:
-    """The board's unique id: as text where it is text, else in hex."""
-    raw = bytes(hello.board_serial).rstrip(b"\0")
-    return raw.decode() if raw and all(0x20 <= b < 0x7F for b in raw) else bytes(hello.board_serial).hex()

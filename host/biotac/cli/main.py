@@ -15,7 +15,7 @@ from . import bench, check, demo, info, list_ports, record, sim, stream, version
 VERBS = (demo, list_ports, info, stream, record, check, sim, bench, version)
 
 EPILOG = """\
-A PORT is a device path (/dev/ttyACM0, COM3) or sim:SOURCE, a simulated board that plays a
+A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, or sim:SOURCE, a simulated board that plays a
 scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), or
 emu:pico?source=SOURCE, a Pico's flash image in an emulator that plays the same.
 
