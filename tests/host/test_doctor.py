@@ -398,3 +398,18 @@ def test_the_doctor_leaves_the_stream_stopped() -> None:
     with biotac.open("sim:press.toml") as hand:
         listen(hand, 0.5)
         assert hand.status().streams == 0
+
+
+def test_a_program_on_a_pty_is_not_blamed_for_its_clock(tmp_path: Path, capsys) -> None:
+    words = [sys.executable, "-m", "biotac", "sim", "press.toml", "--json"]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    try:
+        port = json.loads(process.stdout.readline())["port"]
+        assert main(["doctor", port, "--seconds", "1.5", "--json"]) in (0, 1)
+        found = {f["code"] for f in json.loads(capsys.readouterr().out)["findings"]}
+        assert not found & {"clock_jumped", "clock_drift"}
+    finally:
+        process.terminate()
+        process.wait()
+        process.stdout.close()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 from .._sensor import MAX_SENSORS
 from ..errors import BiotacError, PortError
 from ..hand import Hand
@@ -45,7 +47,6 @@ def listen(hand: Hand, seconds: float) -> BoardFacts:
         hand.sync()
     hand.stop()
     batch = join(batches)
-    simulated = hand.link.source is not None
     return BoardFacts(
         hello=hand.info,
         sensors=sensors,
@@ -56,7 +57,12 @@ def listen(hand: Hand, seconds: float) -> BoardFacts:
         frames=batch.frames,
         idle=batch.idle,
         stats=hand.stats,
-        clock=None if simulated else hand.clock.now(),
+        clock=hand.clock.now() if has_crystal(hand) else None,
         clock_resets=hand.clock.resets,
         warnings=hand.warnings,
     )
+
+
+def has_crystal(hand: Hand) -> bool:
+    """Behind a pty is a program: its time waits for the computer, and is no clock."""
+    return hand.link.source is None and not os.path.realpath(hand.port).startswith("/dev/pts/")
