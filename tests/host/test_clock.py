@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import doctest
 import sys
 import time
 from pathlib import Path
@@ -13,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import biotac
+import biotac.clock
 from biotac import _sensor as sensor
 from biotac import _wire as wire
 from biotac.clock import LAST_SAMPLE_US, DeviceClock, channel_t_us, electrode_t_us, pac_t_us
@@ -206,6 +208,12 @@ def test_a_promise_stands_in_for_round_trips(seed: int) -> None:
     error_s = clock.host_time_s(t_us) - model.host_s(t_us)
     assert (np.abs(error_s) <= clock.uncertainty_s(t_us)).all()
     assert np.median(clock.uncertainty_s(t_us)) < 0.002
+
+
+def test_the_example_in_the_documentation_is_true() -> None:
+    done = doctest.testmod(biotac.clock)
+    assert done.attempted > 0
+    assert done.failed == 0
 
 
 def test_unix_time_needs_an_offset() -> None:

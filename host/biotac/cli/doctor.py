@@ -13,7 +13,7 @@ from ..doctor.timing import slots_per_s
 from . import values
 
 NAME = "doctor"
-HELP = "Find out what is wrong with a board, its sensors or this computer, and say what cures it."
+HELP = "Find what is wrong with a board, its sensors or this computer, and the cure."
 EXAMPLE = "biotac doctor --fingers 5"
 DESCRIPTION = f"""{HELP}
 Exit code 0: healthy; 1: there are findings. Their codes are fixed:

@@ -15,8 +15,8 @@ from . import bench, check, demo, doctor, info, list_ports, record, sim, stream,
 VERBS = (demo, list_ports, doctor, info, stream, record, check, sim, bench, udev_setup, version)
 
 EPILOG = """\
-A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, or sim:SOURCE, a simulated board that plays a
-scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), or
+A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, or sim:SOURCE, a simulated
+board that plays a scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), or
 emu:pico?source=SOURCE, a Pico's flash image in an emulator that plays the same.
 
 exit codes: 0 done   1 check or doctor found something   2 unusable file or argument   3 port cannot be

@@ -8,7 +8,7 @@ import json
 from ..doctor import udev
 
 NAME = "udev-setup"
-HELP = "Install the Linux rule that lets you open boards, and keeps ModemManager away (needs root)."
+HELP = "Install the Linux rule that lets you open boards (needs root)."
 EXAMPLE = "sudo biotac udev-setup"
 
 
