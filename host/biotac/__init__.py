@@ -26,7 +26,7 @@ from .errors import (
 )
 from .finger import FINGER_DTYPE, Finger
 from .frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
-from .hand import Hand
+from .hand import Hand, HandWarning
 from .opening import open
 from .recording import Recorder, Recording, load
 from .stream import LinkStats
@@ -48,6 +48,7 @@ __all__ = [
     "Frame",
     "FrameFlags",
     "Hand",
+    "HandWarning",
     "InputError",
     "LinkStats",
     "NotAGatewayError",

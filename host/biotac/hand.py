@@ -8,12 +8,14 @@ import struct
 import time
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from . import _wire as wire
 from ._sensor import MAX_SENSORS
+from .clock import LAST_SAMPLE_US, DeviceClock
 from .commands import ALL_FINGERS, Commands, Reply
 from .errors import CommandRefusedError, DeviceLostError, InputError, NotAGatewayError, WireVersionError
 from .frames import Frame, StructArray
@@ -30,6 +32,14 @@ REPLY_TIMEOUT_S = 1.0
 REPLY_TRIES = 3
 # A streaming board sends a status every second by default; three missing ones are a dead link.
 SILENCE_S = 3.0
+
+
+@dataclass(frozen=True)
+class HandWarning:
+    """Something about a board that works, but not as well as it could."""
+
+    code: str
+    text: str  # one line with the cure
 
 
 class Hand(Commands):
@@ -51,6 +61,9 @@ class Hand(Commands):
         self._streaming = False
         self._ended = False
         self._closed = False
+        #: Device time as host time, fed by whatever is read; known after a first ``status`` or ``sync``.
+        #: A simulated board's time is no clock: it waits for the computer, which shows as ``resets``.
+        self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
         try:
             self.info = self._handshake()
         except BaseException:
@@ -63,6 +76,16 @@ class Hand(Commands):
     def port(self) -> str:
         """The PORT this was opened as."""
         return self.link.port
+
+    @property
+    def warnings(self) -> list[HandWarning]:
+        """What speaks against this board and this library together, in words; empty when nothing does."""
+        if self.info.schema_hash == wire.SCHEMA_HASH:
+            return []
+        text = (
+            f"the firmware on {self.port} has schema {self.info.schema_hash:08x}, this library {wire.SCHEMA_HASH:08x}"
+        )
+        return [HandWarning("schema_differs", f"{text}; what only one side knows is left out: {cure(self.info)}")]
 
     @property
     def fingers(self) -> list[int]:
@@ -118,10 +141,7 @@ class Hand(Commands):
         else:
             raise NotAGatewayError(self._describe_stranger())
         if hello.wire_major != wire.WIRE_MAJOR:
-            raise WireVersionError(
-                f"the firmware on {self.port} speaks wire {hello.wire_major}.{hello.wire_minor}, this library "
-                f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}; install the firmware and the biotac-gateway of one release"
-            )
+            raise WireVersionError(f"the firmware on {self.port} speaks {describe_mismatch(hello)}")
         # What streamed before this handshake is nobody's: counting starts here.
         self._decoder = StreamDecoder()
         self._batches.clear()
@@ -161,6 +181,19 @@ class Hand(Commands):
         """Stop streaming. Frames already on their way are still delivered."""
         self._command(wire.Stop(self._next_req_id()))
         self._streaming = False
+
+    def status(self) -> wire.Status:
+        """Counters of the board and its link. Its time of answering also feeds ``clock``."""
+        # Of several tries the first one's time holds: whichever was answered had left by then, or later.
+        sent_s = time.monotonic()
+        status = super().status()
+        self.clock.round_trip(sent_s, self._decoder.unwrap_t_us(status.t_us), time.monotonic())
+        return status
+
+    def sync(self, round_trips: int = 5) -> None:
+        """Ask for the board's time: ``clock`` gets its bound from round trips, and the drift from later ones."""
+        for _ in range(round_trips):
+            self.status()
 
     # ---- frames --------------------------------------------------------------------------------
 
@@ -275,7 +308,11 @@ class Hand(Commands):
         if not chunk:
             return False
         self._bytes += len(chunk)
+        arrived_s = time.monotonic()
         batch = self._decoder.feed(chunk)
+        last_us = batch.last_t_us()
+        if last_us is not None:
+            self.clock.arrived(last_us + LAST_SAMPLE_US, arrived_s)
         self._frames += len(batch.wire)
         self._replies.extend(batch.messages)
         if len(batch.wire) or len(batch.pac) or len(batch.idle) or batch.messages:
@@ -330,3 +367,16 @@ def describe_refusal(request: Any, reply: wire.Reply) -> str:
     """One line naming the command and the board's reason."""
     name = wire.Error(reply.error).name if reply.error in list(wire.Error) else f"error {reply.error}"
     return f"the board refused {type(request).__name__}: {name} ({wire.ERROR_DOC.get(reply.error, 'unknown')})"
+
+
+def describe_mismatch(hello: wire.Hello) -> str:
+    """Both wire versions, and the command that brings them together."""
+    mine = f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}"
+    return f"wire {hello.wire_major}.{hello.wire_minor}, this library {mine}; {cure(hello)}"
+
+
+def cure(hello: wire.Hello) -> str:
+    """The command that updates the older side; of one wire version the firmware, which is told from this library."""
+    if (hello.wire_major, hello.wire_minor) > (wire.WIRE_MAJOR, wire.WIRE_MINOR):
+        return "update this library: pip install -U biotac-gateway"
+    return "update the firmware: biotac flash"

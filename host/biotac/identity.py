@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from . import _wire as wire
 
+# A Pico's number has 8 bytes; HELLO leaves room for 12 and fills up with zeros.
+SERIAL_BYTES = 8
+
 
 def board_text(board: int) -> str:
     """A board's name, or its number when it is newer than this library."""
@@ -16,6 +19,9 @@ def version_text(hello: wire.Hello) -> str:
 
 
 def serial_text(hello: wire.Hello) -> str:
-    """The board's unique id: as text where it is text, else in hex."""
-    raw = bytes(hello.board_serial).rstrip(b"\0")
-    return raw.decode() if raw and all(0x20 <= b < 0x7F for b in raw) else bytes(hello.board_serial).hex()
+    """The board's unique number as USB tells it: as text where it is text, else in hex."""
+    raw = bytes(hello.board_serial)
+    text = raw.rstrip(b"\0")
+    if text and all(0x20 <= b < 0x7F for b in text):
+        return text.decode()
+    return raw[: max(len(text), SERIAL_BYTES)].hex().upper()

@@ -7,24 +7,28 @@ from collections.abc import Mapping
 
 from . import _wire as wire
 from .calibration import Calibration, harness
+from .discovery import SERIAL_PREFIX, choose
 from .hand import Hand
 from .link import Link, open_link
 
 
-def open(port: str | os.PathLike[str], *, pace: float = 0.0) -> Hand:
+def open(port: str | os.PathLike[str] | None = None, *, pace: float = 0.0) -> Hand:
     """Open a board and shake hands.
 
-    ``port`` is a device path (``/dev/ttyACM0``, ``COM3``), ``spidev:0.0,0.1`` for sensors on this computer's
-    own SPI bus, one BUS.DEVICE a finger (``?calibration=1:0x50:24c02``, one for each, loads what the EEPROMs on
-    their harnesses hold), or ``sim:SOURCE`` for a simulated board,
-    where SOURCE is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``), or
+    Without ``port`` it is the only board on USB, found by its USB ids; nothing else is opened. ``port`` is
+    ``serial:E6605838831F5B2C``, a board's serial number; a device path (``/dev/ttyACM0``, ``COM3``);
+    ``spidev:0.0,0.1`` for sensors on this computer's own SPI bus, one BUS.DEVICE a finger
+    (``?calibration=1:0x50:24c02``, one for each, loads what the EEPROMs on their harnesses hold); ``sim:SOURCE``
+    for a simulated board, where SOURCE is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``); or
     ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the same.
     ``pace`` is for simulated and emulated boards: device seconds per second, 0 for as fast as this side reads.
 
     Raises PortError, NotAGatewayError, WireVersionError, InputError for a source that cannot be played or an
     EEPROM without a calibration, or CommandRefusedError for another sensor's.
     """
-    text = os.fspath(port)
+    text = None if port is None else os.fspath(port)
+    if text is None or text.startswith(SERIAL_PREFIX):
+        text = choose(text and text.removeprefix(SERIAL_PREFIX))
     if text.startswith("spidev:"):
         bare, own = harness.load(text)
         return calibrated(shake_hands(open_link(bare, pace=pace)), own)

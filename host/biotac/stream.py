@@ -115,6 +115,10 @@ class StreamDecoder:
         """The peer's wire minor is newer: its messages may be longer than known here."""
         self._decoder.allow_longer = True
 
+    def unwrap_t_us(self, t_us: int) -> int:
+        """A message's 32-bit device time on the same axis as the batches' ``t_us``."""
+        return int(self._time.extend(np.array([t_us]))[0])
+
     def feed(self, chunk: Buffer) -> Batch:
         """Take any number of bytes; return what they complete."""
         decoded = self._decoder.feed(chunk)

@@ -101,7 +101,7 @@ def test_record_into_no_folder_is_refused(capsys, tmp_path: Path) -> None:
 @pytest.mark.parametrize("verb", ["info", "stream"])
 def test_an_unknown_port_exits_3(capsys, verb: str) -> None:
     assert "`biotac list`" in fails(capsys, 3, verb, "/dev/ttyNOWHERE7")
-    expected = "expected a device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico"
+    expected = "expected a device path, serial:NUMBER, spidev:BUS.DEVICE, sim:SOURCE or emu:pico"
     assert expected in fails(capsys, 3, verb, "telnet:1")
 
 
@@ -113,7 +113,7 @@ def test_a_port_that_is_no_gateway_exits_4(capsys, scripted_board, monkeypatch) 
 
 def test_another_wire_version_exits_5(capsys, scripted_board, hello) -> None:
     board = scripted_board(lambda i, p: hello(p, wire_major=2) if len(p) == 5 else b"")
-    assert "install the firmware and the biotac-gateway of one release" in fails(capsys, 5, "info", board.path)
+    assert "pip install -U biotac-gateway" in fails(capsys, 5, "info", board.path)
 
 
 @pytest.mark.parametrize(

@@ -144,7 +144,8 @@ def check_link(link: dict[str, Any], messages: tuple[Message, ...]) -> None:
 
 def canonical(contract: Contract, *, with_docs: bool) -> str:
     """Both files as one JSON text in a fixed order; without docs it is what schema_hash covers."""
-    tree: dict[str, Any] = {"link": contract.link, "sensor": contract.sensor}
+    link = {name: part for name, part in contract.link.items() if name != "usb"}
+    tree: dict[str, Any] = {"link": link, "sensor": contract.sensor}
     if with_docs:
         return json.dumps({**tree, "schema_hash": contract.hash}, indent=1, sort_keys=True) + "\n"
     return json.dumps(strip_docs(tree), sort_keys=True, separators=(",", ":"))

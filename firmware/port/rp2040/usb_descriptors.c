@@ -1,16 +1,12 @@
 #include "usb_descriptors.h"
 
 #include "version.h"
+#include "wire_gen.h"
 
 #include <stddef.h>
 
 #define LOW(x)  ((x) & 0xFF)
 #define HIGH(x) ((x) >> 8)
-
-// pid.codes' test pair. Its rules allow it on benches, not in anything that is given away: a product id has
-// to be asked for (https://pid.codes) before boards with this image leave the house.
-#define VENDOR  0x1209
-#define PRODUCT 0x0001
 
 #define VERSION (BT_VERSION_MAJOR << 8 | BT_VERSION_MINOR << 4 | BT_VERSION_PATCH) // binary-coded decimal
 _Static_assert(BT_VERSION_MAJOR < 10 && BT_VERSION_MINOR < 10 && BT_VERSION_PATCH < 10, "one digit each");
@@ -25,10 +21,10 @@ const uint8_t usb_device_descriptor[USB_DEVICE_BYTES] = {
     0,
     0,                // class: communications
     USB_PACKET_BYTES, // of endpoint 0
-    LOW(VENDOR),
-    HIGH(VENDOR), //
-    LOW(PRODUCT),
-    HIGH(PRODUCT), //
+    LOW(BT_USB_VENDOR),
+    HIGH(BT_USB_VENDOR), //
+    LOW(BT_USB_PRODUCT),
+    HIGH(BT_USB_PRODUCT), //
     LOW(VERSION),
     HIGH(VERSION), //
     1,

@@ -12,6 +12,7 @@ import biotac
 from .. import _wire as wire
 from ..calibration.file import to_dict, when
 from ..identity import board_text, serial_text, version_text
+from . import values
 
 NAME = "info"
 HELP = "Say who is on a port: board, firmware, sensors, settings, counters."
@@ -20,9 +21,7 @@ EXAMPLE = "biotac info /dev/ttyACM0"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The port."""
-    parser.add_argument(
-        "port", metavar="PORT", help="device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE"
-    )
+    values.add_port(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -33,9 +32,10 @@ def run(args: argparse.Namespace) -> int:
         settings = hand.settings()
         calibrations = hand.calibrations()
         status = hand.status()
+        warnings = hand.warnings
     if args.json:
         facts: dict[str, Any] = {
-            "port": args.port,
+            "port": hand.port,
             "board": board_text(hello.board),
             "firmware": version_text(hello),
             "wire": f"{hello.wire_major}.{hello.wire_minor}",
@@ -54,8 +54,8 @@ def run(args: argparse.Namespace) -> int:
         return 0
     print(f"{board_text(hello.board)}, firmware {version_text(hello)}, wire {hello.wire_major}.{hello.wire_minor}")
     print(f"serial {serial_text(hello)}, boot {hello.boot_id:08x}, up {status.uptime_s} s")
-    if hello.schema_hash != wire.SCHEMA_HASH:
-        print("its schema differs from this library's; fields that only one side knows are left out")
+    for warning in warnings:
+        print(f"warning: {warning.text}")
     for s in sensors:
         own = f", calibration {when(calibrations[s.finger].made_s)}" if s.finger in calibrations else ""
         print(f"finger {s.finger}: BioTac {text(s.serial)}, software {text(s.software_version)}{own}")

@@ -10,16 +10,30 @@ import threading
 from collections.abc import Sequence
 
 from ..errors import BiotacError, InputError
-from . import bench, calibration, check, demo, flash, info, list_ports, record, sim, stream, version
+from . import bench, calibration, check, demo, doctor, flash, info, list_ports, record, sim, stream, udev_setup, version
 
-VERBS = (demo, list_ports, info, stream, record, check, calibration, sim, flash, bench, version)
+VERBS = (
+    demo,
+    list_ports,
+    doctor,
+    info,
+    stream,
+    record,
+    check,
+    calibration,
+    sim,
+    flash,
+    bench,
+    udev_setup,
+    version,
+)
 
 EPILOG = """\
-A PORT is a device path (/dev/ttyACM0, COM3) or sim:SOURCE, a simulated board that plays a
-scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), or
+A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, or sim:SOURCE, a simulated
+board that plays a scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), or
 emu:pico?source=SOURCE, a Pico's flash image in an emulator that plays the same.
 
-exit codes: 0 done   1 check found a violation   2 unusable file or argument   3 port cannot be
+exit codes: 0 done   1 check or doctor found something   2 unusable file or argument   3 port cannot be
 opened   4 no gateway on the port   5 firmware of another wire version   6 board lost
 7 command refused   8 flashing failed   130 interrupted
 """

@@ -21,9 +21,7 @@ EXAMPLE = "biotac stream sim:press.toml --rate 5"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Port, time and rate."""
-    parser.add_argument(
-        "port", metavar="PORT", help="device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE"
-    )
+    values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, help="stop after this much device time")
     parser.add_argument(
         "--rate", type=values.rate, default=10.0, help="lines per second and finger (default 10; 0: all)"
@@ -40,6 +38,8 @@ def run(args: argparse.Namespace) -> int:
     end_us: int | None = None
     # A person wants to see it happen: simulated boards run in real time here.
     with biotac.open(args.port, pace=1.0) as hand:
+        for warning in hand.warnings:
+            print(f"biotac: {warning.text}", file=sys.stderr)
         if args.touched:
             hand.subscribe(RESULTS)
         for frame in hand.frames():

@@ -36,3 +36,14 @@ def pace(text: str) -> float:
         return parse_pace(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def add_port(parser: argparse.ArgumentParser) -> None:
+    """PORT, which may be left out."""
+    parser.add_argument(
+        "port",
+        metavar="PORT",
+        nargs="?",
+        help="device path, serial:NUMBER, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE "
+        "(default: the only board on USB)",
+    )

@@ -96,7 +96,8 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
         return SpidevLink(port)
     if colon and os.sep not in port and not port.upper().startswith("COM") and len(scheme) > 1:
         raise PortError(
-            f"no kind of port is called {scheme!r}; expected a device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico"
+            f"no kind of port is called {scheme!r}; expected a device path, serial:NUMBER, "
+            "spidev:BUS.DEVICE, sim:SOURCE or emu:pico"
         )
     return SerialLink(port)
 

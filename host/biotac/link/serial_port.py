@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import serial
 
 from ..errors import DeviceLostError, PortError
+from .holders import holders, in_words
 
 if TYPE_CHECKING:
     from ..sim.source import Source
@@ -80,8 +81,9 @@ def describe_open_error(path: str, error: Exception) -> str:
     text = str(error).lower()
     if code == errno.ENOENT or "no such file" in text or "filenotfound" in text:
         return f"no port {path}; `biotac list` shows the ports of this machine"
-    if code == errno.EACCES or "permission" in text or "access is denied" in text:
-        return f"no permission to open {path}; add yourself to its group (Debian: dialout) and log in again"
-    if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text:
-        return f"{path} is in use by another program; close that program and try again"
+    # Windows says "access is denied" of a port that somebody has open; there it has no other meaning.
+    if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text or "access is denied" in text:
+        return f"{path} is in use by {in_words(holders(path))}; close that program and try again"
+    if code == errno.EACCES or "permission" in text:
+        return f"no permission to open {path}; `biotac doctor` tells how to get it"
     return f"{path} cannot be opened as a serial port ({error}); `biotac list` shows the ports of this machine"

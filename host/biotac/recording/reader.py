@@ -16,6 +16,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from .. import _wire as wire
 from ..calibration.file import from_dict
 from ..calibration.values import own_settings
+from ..clock import LAST_SAMPLE_US, DeviceClock
 from ..errors import RecordingError
 from ..frames import StructArray
 from ..stream import StreamDecoder, join
@@ -39,11 +40,13 @@ class Recording:
         self.damaged_chunks = 0
         metadata: dict[str, str] | None = None
         blocks: list[bytes] = []
+        written_s: list[float] = []
         for record in self._records():
             if isinstance(record, Metadata) and record.name == layout.METADATA_NAME:
                 metadata = record.metadata
             elif isinstance(record, Message):
                 blocks.append(record.data)
+                written_s.append(record.log_time / 1e9)
         if metadata is None:
             raise RecordingError(self._without_metadata())
         try:
@@ -52,7 +55,10 @@ class Recording:
             raise RecordingError(f"{self.path} has damaged metadata ({error}); its frames cannot be judged") from error
         decoder = StreamDecoder()
         decoder.accept_newer_minor()
-        batch = join([decoder.feed(block) for block in blocks])
+        batches = [decoder.feed(block) for block in blocks]
+        batch = join(batches)
+        ends_us = [b.last_t_us() for b in batches]
+        self._arrivals = [(t_us, at_s) for t_us, at_s in zip(ends_us, written_s, strict=True) if t_us is not None]
         self.frames: StructArray = batch.frames
         self.wire: StructArray = batch.wire
         self.pac: StructArray = batch.pac
@@ -62,6 +68,18 @@ class Recording:
         if self.cut_off and not len(self.frames):
             raise RecordingError(f"{self.path} was cut off before its first second was whole; record it again")
         self._describe_losses(decoder)
+
+    def clock(self, promised_delay_s: float = 0.01) -> DeviceClock:
+        """The board's clock against the recording computer's; its host_time_s is in seconds since 1970.
+
+        Each second was written when its last frame had come. A recording holds no round trips: the stated
+        uncertainty rests on ``promised_delay_s``, your word that in every 5 s one of these frames took no longer
+        from the board to the file.
+        """
+        clock = DeviceClock(promised_delay_s=promised_delay_s, unix_offset_s=0.0)
+        for t_us, at_s in self._arrivals:
+            clock.arrived(t_us + LAST_SAMPLE_US, at_s)
+        return clock
 
     def _without_metadata(self) -> str:
         if self.problems:

@@ -1,0 +1,119 @@
+"""A device's clock as the host sees it, over restarts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .segment import Fit, Segment
+
+WRAP_US = 2**32
+SEGMENTS_KEPT = 16
+
+
+class DeviceClock:
+    """Turns device time into host time, with a bound on the error.
+
+    Feed it with ``arrived`` for what streams and ``round_trip`` for questions: five at the start, then about two a
+    second, not in step with the board. Device times are unwrapped us (``frames["t_us"]``); ``extend`` unwraps one of
+    a message. Host times are seconds of one steady clock, ``time.monotonic()``; a delay before it is read does no
+    harm but a wider bound. ``unix_offset_s`` is ``time.time() - time.monotonic()``, for unix_time_s.
+
+    A stated uncertainty is a bound on the error, not a deviation: see segment.py for what it takes for granted. Half
+    the quickest round trip of it is a constant that cannot be seen from here. Without any round trip nothing is
+    known, unless ``promised_delay_s`` is given: the caller's word that in every 5 s one message took no longer.
+
+    A device that starts again, and a step of either clock, begin a new segment; times are of the latest unless
+    another of ``segments`` is asked. No I/O here, and no clock.
+    """
+
+    def __init__(self, *, promised_delay_s: float | None = None, unix_offset_s: float | None = None) -> None:
+        if promised_delay_s is not None and not 0 <= promised_delay_s < math.inf:
+            raise ValueError(f"promised_delay_s is {promised_delay_s}, expected seconds of 0 or more")
+        self.unix_offset_s = unix_offset_s
+        self.segments: list[Segment] = []  #: the latest last; not more than SEGMENTS_KEPT
+        self.resets = 0  #: segments begun after the first
+        self.quickest_round_trip_s = math.inf
+        self._promised_delay_s = promised_delay_s
+        self._because = ""
+
+    # ---- observations ----------------------------------------------------------------------------
+
+    def arrived(self, t_us: int, host_s: float) -> None:
+        """A message made at device time ``t_us`` or later was here at ``host_s``.
+
+        Of a chunk the newest message is enough. Of a round's messages take t_us + LAST_SAMPLE_US.
+        """
+        self._segment(t_us, -math.inf, host_s).arrive(t_us, host_s)
+        if self.segments[-1].contradicted:
+            self._begin(t_us, host_s, "no course of the clocks agrees with what was observed")
+            self.segments[-1].arrive(t_us, host_s)
+
+    def round_trip(self, sent_s: float, t_us: int, received_s: float) -> None:
+        """A question sent at ``sent_s`` was answered at device time ``t_us``; the answer was here at ``received_s``."""
+        if not sent_s <= received_s:
+            raise ValueError(f"received_s is {received_s}, before sent_s {sent_s}; both are of one steady clock")
+        self._segment(t_us, sent_s, received_s).send(t_us, sent_s)
+        self.quickest_round_trip_s = min(self.quickest_round_trip_s, received_s - sent_s)
+        self.arrived(t_us, received_s)
+
+    def restart(self, because: str = "the board restarted") -> None:
+        """What comes next is of another run of the device, as after another boot_id."""
+        self._because = because
+
+    def extend(self, t_us: int, host_s: float) -> int:
+        """A message's 32-bit ``t_us`` as unwrapped device time, by when it came.
+
+        Right as long as the guess from the host's time is within 35 minutes: for any silence but one of months.
+        """
+        if not self.segments:
+            return t_us
+        return t_us + WRAP_US * round((self.segments[-1].guess_t_us(host_s) - t_us) / WRAP_US)
+
+    def _segment(self, t_us: int, sent_s: float, arrived_s: float) -> Segment:
+        because = self._because
+        if self.segments and not because:
+            because = self.segments[-1].refuses(t_us, sent_s, arrived_s)
+        if because or not self.segments:
+            self._begin(t_us, arrived_s, because)
+        return self.segments[-1]
+
+    def _begin(self, t_us: int, host_s: float, because: str) -> None:
+        self.resets += len(self.segments) > 0
+        self._because = ""
+        self.segments.append(Segment(t_us, host_s, promised_delay_s=self._promised_delay_s, because=because))
+        del self.segments[:-SEGMENTS_KEPT]
+
+    # ---- answers ---------------------------------------------------------------------------------
+
+    def host_time_s(self, t_us: ArrayLike, *, segment: int = -1) -> NDArray[np.float64]:
+        """Host times of device times, in the shape of ``t_us``; NaN while nothing is known.
+
+        The same time can come out differently as more is observed, by no more than the uncertainties stated.
+        """
+        return self._times(t_us, segment)[0]
+
+    def uncertainty_s(self, t_us: ArrayLike, *, segment: int = -1) -> NDArray[np.float64]:
+        """Bounds on the error of host_time_s, in the shape of ``t_us``; infinite while nothing is known."""
+        return self._times(t_us, segment)[1]
+
+    def unix_time_s(self, t_us: ArrayLike, *, segment: int = -1) -> NDArray[np.float64]:
+        """Like host_time_s, in seconds since 1970. ValueError without a ``unix_offset_s``."""
+        if self.unix_offset_s is None:
+            raise ValueError("unix_offset_s is not set; it is time.time() - time.monotonic()")
+        return self.host_time_s(t_us, segment=segment) + self.unix_offset_s
+
+    def now(self) -> Fit:
+        """Offset and drift at the newest device time; ``known`` is false while nothing is."""
+        if not self.segments:
+            return Fit(math.nan)
+        return self.segments[-1].fit(self.segments[-1].last_t_us)
+
+    def _times(self, t_us: ArrayLike, segment: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        at = np.asarray(t_us, np.float64)
+        if not self.segments:
+            return np.full(at.shape, np.nan), np.full(at.shape, np.inf)
+        host_s, bound_s = self.segments[segment].times(at.ravel())
+        return host_s.reshape(at.shape), bound_s.reshape(at.shape)

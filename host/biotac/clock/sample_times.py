@@ -1,0 +1,44 @@
+"""Device times of single samples, from the slot in which each was taken.
+
+A round's t_us is the time of its slot 0; slot k is k/4400 s later. Times are float64 us: a round's are no whole us.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _sensor as sensor
+
+SLOT_US = 1e6 / sensor.SLOT_HZ
+#: From a round's t_us to its last sample: no message of the round can have left before.
+LAST_SAMPLE_US = int((len(sensor.SLOTS) - 1) * SLOT_US)
+ELECTRODES = tuple(f"E{k}" for k in range(1, 20))
+
+
+def channel_t_us(t_us: ArrayLike, channel: str) -> NDArray[np.float64]:
+    """Times (n, m) of a channel's m samples in the rounds that began at ``t_us`` (n,).
+
+    ``channel`` is E1..E19, PAC, PDC, TAC or TDC; ValueError for another. For PAC, t_us is that of the round's
+    FRAME; PAC messages have a t_us of their own, see pac_t_us.
+    """
+    slots = [k for k, name in enumerate(sensor.SLOTS) if name == channel]
+    if not slots:
+        raise ValueError(f"channel is {channel!r}, expected one of {', '.join(sorted(set(sensor.SLOTS)))}")
+    return _add(t_us, np.array(slots) * SLOT_US)
+
+
+def electrode_t_us(t_us: ArrayLike) -> NDArray[np.float64]:
+    """Times (n, 19) of the electrodes' samples E1..E19 in frames of ``t_us`` (n,)."""
+    return _add(t_us, np.array([sensor.SLOTS.index(name) for name in ELECTRODES]) * SLOT_US)
+
+
+def pac_t_us(t_us: ArrayLike) -> NDArray[np.float64]:
+    """Times (n, 22) of the samples of PAC messages of ``t_us`` (n,): every other slot, 2200 a second."""
+    slots = np.array([k for k, name in enumerate(sensor.SLOTS) if name == "PAC"])
+    return _add(t_us, (slots - slots[0]) * SLOT_US)
+
+
+def _add(t_us: ArrayLike, later_us: NDArray[np.float64]) -> NDArray[np.float64]:
+    out: NDArray[np.float64] = np.asarray(t_us, np.float64)[..., None] + later_us
+    return out

@@ -1,0 +1,240 @@
+"""One run of the device's clock against the host's, from observations that are never early.
+
+A message with device time t arrives after t; a question was sent before the device time in its answer. Nothing else
+is assumed of delays: no distribution, no typical value. Of the clocks it is assumed that the drift stays within
+MAX_DRIFT and changes no faster than WANDER_PER_S. Then the tangent to the true course at any device time t0 lies
+below every arrival and above every sending, each loosened by WANDER_PER_S / 2 * (t - t0)^2. The estimate is amid
+all lines that do (band.py), and the stated uncertainty reaches to the farthest of them: a bound, not a deviation.
+Old observations loosen until they say nothing; that is the forgetting.
+
+What cannot be seen is how the quickest round trip divides into the way there and the way back. The estimate takes
+about half, so it is off by a constant of at most half the quickest round trip. The stated uncertainty contains it.
+
+Sources: Moon, Skelly, Towsley, "Estimation and removal of clock skew from network delay measurements" (1999), for
+lines below arrivals; Klipper's clocksync.py and liblsl's time_receiver.cpp for round trips.
+"""
+
+from __future__ import annotations
+
+import bisect
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .band import between
+
+Array = NDArray[np.float64]
+
+#: Crystals are within 100 ppm; the rest is for a host whose clock is being steered.
+MAX_DRIFT = 500e-6
+#: A crystal that warms by 10 K in five minutes changes by some ppm: 0.02 ppm a second is above that.
+WANDER_PER_S = 0.02e-6
+#: Device time is in whole us, and so is never nearer than that.
+TICK_S = 1e-6
+#: Farther than this from a time, an observation has loosened by 0.2 ms and tells nothing new of it.
+REACH_S = 150.0
+#: Of the arrivals of so much host time, the quickest is kept.
+BUCKET_S = 1.0
+#: Between knots the course is taken as straight: WANDER_PER_S bends it by a quarter of a us.
+KNOT_S = 10.0
+#: Older observations are forgotten, and the times they were for become uncertain.
+KEEP_S = 3600.0
+#: Without round trips: in every so many seconds one message was as quick as was promised.
+PROMISE_S = 5.0
+#: A clock that goes back by more than this was started again; messages overtake each other by less.
+STEP_BACK_US = 1_000_000
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What is known of the clocks around one device time."""
+
+    t_us: float
+    host_s: float = math.nan
+    uncertainty_s: float = math.inf  #: the truth is within plus or minus this
+    drift_ppm: float = math.nan  #: of the device's clock against the host's; positive: the device's is fast
+    drift_uncertainty_ppm: float = math.inf  #: likewise a bound
+
+    @property
+    def known(self) -> bool:
+        """There were observations enough for a bound."""
+        return math.isfinite(self.uncertainty_s)
+
+    def extended(self, t_us: Array) -> tuple[Array, Array]:
+        """Host times and bounds at other device times, along the straight line of this one."""
+        away_s = (t_us - self.t_us) / 1e6
+        bend_s = WANDER_PER_S / 2 * away_s**2
+        host_s = self.host_s + away_s * (1.0 - self.drift_ppm / 1e6)
+        return host_s, self.uncertainty_s + np.abs(away_s) * self.drift_uncertainty_ppm / 1e6 + bend_s
+
+
+class Points:
+    """x: device time in s since the segment's start; y: host time since then minus x. In order of x."""
+
+    def __init__(self) -> None:
+        self._x: list[float] = []
+        self._y: list[float] = []
+
+    def add(self, x: float, y: float) -> None:
+        """Almost always behind the last."""
+        at = bisect.bisect_right(self._x, x)
+        self._x.insert(at, x)
+        self._y.insert(at, y)
+
+    def around(self, x0: float) -> tuple[Array, Array]:
+        """Those within reach, with x counted from x0."""
+        cut = slice(bisect.bisect_left(self._x, x0 - REACH_S), bisect.bisect_right(self._x, x0 + REACH_S))
+        return np.array(self._x[cut]) - x0, np.array(self._y[cut])
+
+    def forget_before(self, x: float) -> None:
+        """Drop what is older."""
+        n = bisect.bisect_left(self._x, x)
+        del self._x[:n], self._y[:n]
+
+
+class Segment:
+    """From a boot, or a jump of either clock, to the next."""
+
+    def __init__(self, t_us: int, host_s: float, *, promised_delay_s: float | None = None, because: str = "") -> None:
+        self.because = because  #: why this is not the first
+        self.first_t_us = t_us
+        self.last_t_us = t_us
+        self._first_host_s = host_s
+        self._promised_delay_s = promised_delay_s
+        self._arrived = Points()
+        self._sent = Points()
+        self._bucket: tuple[float, float] | None = None  # the quickest arrival since _bucket_from_s
+        self._bucket_from_s = host_s
+        self._latest = Fit(t_us)
+        self.contradicted = False  #: enough was observed, but no course of the clocks agrees with it
+        self._knots: dict[float, Fit] = {}  # those that no later observation will change
+        self._fresh: dict[float, Fit] = {}  # the others, until the next one
+
+    # ---- observations ----------------------------------------------------------------------------
+
+    def refuses(self, t_us: int, sent_s: float, arrived_s: float) -> str:
+        """Why an observation cannot be of this run; empty when it can."""
+        if t_us < self.last_t_us - STEP_BACK_US:
+            return "device time stepped back"
+        if self._latest.known:
+            host_s, bound_s = (float(v) for v in self._latest.extended(np.float64(t_us)))
+            if arrived_s < host_s - bound_s - TICK_S:
+                return "a message arrived before it can have been sent"
+            if sent_s > host_s + bound_s + TICK_S:
+                return "an answer is older than its question"
+        return ""
+
+    def arrive(self, t_us: int, host_s: float) -> None:
+        """A message that was made at device time t_us, or later, is here."""
+        x, y = self._xy(t_us, host_s)
+        slope = -self._latest.drift_ppm / 1e6 if self._latest.known else 0.0
+        self.last_t_us = max(self.last_t_us, t_us)
+        self._fresh.clear()
+        if self._bucket is None or host_s - self._bucket_from_s >= BUCKET_S:
+            self._close_bucket()
+            self._bucket_from_s, self._bucket = host_s, (x, y)
+        elif y - slope * x < self._bucket[1] - slope * self._bucket[0]:
+            self._bucket = (x, y)
+
+    def send(self, t_us: int, host_s: float) -> None:
+        """A question that was answered at device time t_us had left at host_s."""
+        self._sent.add(*self._xy(t_us, host_s))
+        self._fresh.clear()
+
+    def _close_bucket(self) -> None:
+        if self._bucket is not None:
+            self._arrived.add(*self._bucket)
+            self._bucket = None
+            oldest = (self.last_t_us - self.first_t_us) / 1e6 - KEEP_S
+            self._arrived.forget_before(oldest)
+            self._sent.forget_before(oldest)
+            self._latest = self.fit(self.last_t_us)
+            self.contradicted = not self._latest.known and self._observed(self._x(self.last_t_us)) is not None
+
+    # ---- what follows ----------------------------------------------------------------------------
+
+    def fit(self, t_us: float) -> Fit:
+        """The clocks at device time t_us; unknown without an arrival and a sending within reach."""
+        if t_us not in self._fresh:
+            self._fresh[t_us] = self._fit(t_us)
+        return self._fresh[t_us]
+
+    def times(self, t_us: Array) -> tuple[Array, Array]:
+        """Host times and their bounds at ``t_us`` (n,); NaN and infinity where nothing is known.
+
+        Straight between knots, so that times never run backwards and do not jump.
+        """
+        if not t_us.size:
+            return t_us.copy(), t_us.copy()
+        step, last = KNOT_S * 1e6, float(self.last_t_us)
+        begin, end = (
+            max(math.floor((min(t, last) - self.first_t_us) / step), 0) for t in (float(t_us.min()), float(t_us.max()))
+        )
+        fits = [self._knot(self.first_t_us + k * step) for k in range(begin, end + 2)]
+        fits = [fit for fit in fits if fit.t_us < last and fit.known]
+        fits += [fit for fit in [self.fit(last)] if fit.known]
+        if not fits:
+            return np.full(t_us.shape, np.nan), np.full(t_us.shape, np.inf)
+        at = [fit.t_us for fit in fits]
+        host_s: Array = np.interp(t_us, at, [fit.host_s for fit in fits])
+        bound_s: Array = np.interp(t_us, at, [fit.uncertainty_s for fit in fits])
+        gaps_s = np.diff(at, prepend=at[0], append=at[-1]) / 1e6
+        bound_s += WANDER_PER_S / 8 * gaps_s[np.searchsorted(at, t_us)] ** 2
+        for outside, fit in ((t_us < at[0], fits[0]), (t_us > at[-1], fits[-1])):
+            host_s[outside], bound_s[outside] = fit.extended(t_us[outside])
+        return host_s, bound_s
+
+    def guess_t_us(self, host_s: float) -> float:
+        """About which device time it is at host_s."""
+        return self.first_t_us + (host_s - self._first_host_s) * 1e6
+
+    def _knot(self, t_us: float) -> Fit:
+        fit = self._knots.get(t_us) or self.fit(t_us)
+        if self.last_t_us - t_us > (REACH_S + KNOT_S) * 1e6:
+            self._knots[t_us] = fit
+        return fit
+
+    def _observed(self, x0: float) -> tuple[tuple[Array, Array], tuple[Array, Array]] | None:
+        """Loosened arrivals and sendings around x0; None without one of each."""
+        x, y = self._arrived.around(x0)
+        if self._bucket is not None and abs(self._bucket[0] - x0) <= REACH_S:
+            x, y = np.append(x, self._bucket[0] - x0), np.append(y, self._bucket[1])
+        from_x, from_y = self._sent.around(x0)
+        if not len(from_x) and len(x) and self._promised_delay_s is not None:
+            from_x, from_y = quickest(x, y)
+            from_y = from_y - self._promised_delay_s
+        if not len(x) or not len(from_x):
+            return None
+        return (x, y + WANDER_PER_S / 2 * x**2 + TICK_S), (from_x, from_y - WANDER_PER_S / 2 * from_x**2 - TICK_S)
+
+    def _fit(self, t_us: float) -> Fit:
+        x0 = self._x(t_us)
+        observed = self._observed(x0)
+        band = observed and between(*observed, (-MAX_DRIFT, MAX_DRIFT))
+        if not band:
+            return Fit(t_us)
+        low, high = band.at_zero()
+        y, slope = band.centre()
+        return Fit(
+            t_us,
+            self._first_host_s + x0 + y,
+            max(high - y, y - low),
+            -slope * 1e6,
+            max(float(band.slopes[-1]) - slope, slope - float(band.slopes[0])) * 1e6,
+        )
+
+    def _x(self, t_us: float) -> float:
+        return (t_us - self.first_t_us) / 1e6
+
+    def _xy(self, t_us: float, host_s: float) -> tuple[float, float]:
+        x = self._x(t_us)
+        return x, host_s - self._first_host_s - x
+
+
+def quickest(x: Array, y: Array) -> tuple[Array, Array]:
+    """The least y of every PROMISE_S of x."""
+    groups = np.floor(x / PROMISE_S)
+    best = [np.flatnonzero(groups == g)[np.argmin(y[groups == g])] for g in np.unique(groups)]
+    return x[best], y[best]

@@ -1,0 +1,45 @@
+"""From the plug to the first answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..errors import DeviceLostError, NotAGatewayError, PortError
+from ..link.holders import in_words
+from .catalogue import Finding
+from .facts import Facts
+
+
+def check(facts: Facts) -> Iterator[Finding]:
+    """Plug, loader, permission, other programs, and whoever answers."""
+    system, error = facts.system, facts.error
+    for place in system.loaders:
+        yield Finding("in_loader", f"a board waits in its loader at {place}")
+    if facts.port is None:
+        yield from _nothing_to_open(facts)
+        return
+    if not system.permitted:
+        yield Finding("no_permission", f"{facts.port} may not be opened by you; it is {system.owner}")
+    elif isinstance(error, PortError) and ("in use" in str(error) or system.holders):
+        yield Finding("port_busy", f"{facts.port} is in use by {in_words(system.holders)}")
+    elif isinstance(error, PortError):
+        yield Finding("port_failed", str(error))
+    elif system.holders:
+        yield Finding("port_shared", f"{facts.port} is also open in {in_words(system.holders)}")
+    if system.modem_manager and not system.left_alone:
+        yield Finding("modem_manager", f"ModemManager is running, and udev has no ID_MM_DEVICE_IGNORE for {facts.port}")
+    if isinstance(error, NotAGatewayError):
+        yield Finding("not_a_gateway", str(error))
+    if isinstance(error, DeviceLostError):
+        yield Finding("board_lost", str(error))
+
+
+def _nothing_to_open(facts: Facts) -> Iterator[Finding]:
+    system = facts.system
+    if len(system.boards) > 1:
+        there = ", ".join(f"serial:{port.serial_number} on {port.device}" for port in system.boards)
+        yield Finding("several_boards", f"{len(system.boards)} boards: {there}")
+    elif system.usb_boards:
+        yield Finding("no_serial_port", "the board's USB ids are there, but no serial port with them")
+    elif not system.loaders:
+        yield Finding("no_board", "no serial port has our USB ids")

@@ -1,0 +1,71 @@
+"""What the checks judge. Plain values, so that a test can make any case up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .. import _wire as wire
+from ..clock import Fit
+from ..discovery import SerialPort
+from ..errors import BiotacError
+from ..frames import StructArray
+from ..hand import HandWarning
+from ..link.holders import Holder
+from ..stream import LinkStats
+
+
+@dataclass(frozen=True)
+class SystemFacts:
+    """This computer, without opening anything."""
+
+    boards: list[SerialPort] = field(default_factory=list)
+    usb_boards: int = 0  #: devices with our ids, whether they have a port or not; Linux only
+    loaders: list[str] = field(default_factory=list)  #: where boards wait in their loader
+    permitted: bool = True  #: this user may read and write the port
+    owner: str = ""  #: of the port, in words
+    holders: list[Holder] = field(default_factory=list)  #: who else has the port open
+    modem_manager: bool = False  #: it is running
+    left_alone: bool = False  #: by it, as udev has been told
+
+
+@dataclass(frozen=True)
+class BoardFacts:
+    """What a board said within some seconds. Lists of sensor states are by finger, all five."""
+
+    hello: wire.Hello
+    sensors: list[wire.SensorInfo]
+    before: wire.Status
+    after: wire.Status
+    sensors_before: list[wire.SensorStatus]
+    sensors_after: list[wire.SensorStatus]
+    frames: StructArray  #: FRAME_DTYPE
+    idle: StructArray  #: IDLE_DTYPE
+    stats: LinkStats
+    clock: Fit | None  #: None where the board's time is no clock: a simulated one
+    clock_resets: int
+    warnings: list[HandWarning]
+
+    @property
+    def present(self) -> list[int]:
+        """Fingers whose sensor answered at first."""
+        return [finger for finger in range(len(self.sensors_before)) if self.hello.fingers_present >> finger & 1]
+
+    def more(self, finger: int, counter: str) -> int:
+        """By how much a sensor's 32-bit counter has grown."""
+        first, last = (getattr(s[finger], counter) for s in (self.sensors_before, self.sensors_after))
+        return int(last - first) % 2**32
+
+    def more_of_board(self, counter: str) -> int:
+        """By how much one of the board's has grown."""
+        return int(getattr(self.after, counter) - getattr(self.before, counter)) % 2**32
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Everything about one port."""
+
+    port: str | None  #: None: there is nothing to open
+    system: SystemFacts = field(default_factory=SystemFacts)
+    error: BiotacError | None = None  #: why it could not be opened, or was lost
+    board: BoardFacts | None = None  #: None when it could not be examined
+    expected_fingers: int | None = None

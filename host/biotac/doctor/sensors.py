@@ -1,0 +1,53 @@
+"""Which sensors are there, and whether they belong together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from .catalogue import Finding
+from .facts import BoardFacts, Facts
+
+
+def check(facts: Facts) -> Iterator[Finding]:
+    """Absent, fewer than expected, lost on the way, of one serial number, of different versions."""
+    board = facts.board
+    if board is None:
+        return
+    if not board.present:
+        yield Finding("no_sensor", "no sensor answers on any of the five chip selects")
+        return
+    expected = facts.expected_fingers
+    if expected is not None and len(board.present) < expected:
+        there = ", ".join(map(str, board.present))
+        yield Finding("sensor_missing", f"{len(board.present)} of {expected} sensors answer: finger {there}")
+    yield from _lost(board)
+    yield from _serials(board)
+
+
+def _lost(board: BoardFacts) -> Iterator[Finding]:
+    for finger in board.present:
+        came = (board.frames["finger"] == finger).any() or (board.idle["finger"] == finger).any()
+        if not came:
+            yield Finding("sensor_lost", f"finger {finger} sent no frame")
+        elif not board.after.fingers_present >> finger & 1:
+            yield Finding("sensor_lost", f"finger {finger} stopped answering")
+
+
+def _serials(board: BoardFacts) -> Iterator[Finding]:
+    by_serial: dict[str, list[int]] = {}
+    kinds: dict[tuple[str, str], list[int]] = {}
+    for sensor in board.sensors:
+        by_serial.setdefault(ascii_text(sensor.serial), []).append(sensor.finger)
+        kind = ascii_text(sensor.flex_version), ascii_text(sensor.software_version)
+        kinds.setdefault(kind, []).append(sensor.finger)
+    for serial, fingers in by_serial.items():
+        if len(fingers) > 1:
+            yield Finding("same_serial", f"fingers {', '.join(map(str, fingers))} all call themselves {serial}")
+    if len(kinds) > 1:
+        words = [f"finger {', '.join(map(str, f))}: flex {flex}, software {sw}" for (flex, sw), f in kinds.items()]
+        yield Finding("mixed_sensors", "; ".join(words))
+
+
+def ascii_text(values: tuple[int, ...]) -> str:
+    """Zero-padded ASCII to str."""
+    return bytes(values).rstrip(b"\0").decode("ascii", errors="replace")

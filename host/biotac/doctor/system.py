@@ -1,0 +1,89 @@
+"""What this computer says of boards and ports without opening any: USB, permissions, other programs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from .. import _wire as wire
+from ..discovery import boards
+from ..link.holders import holders
+from .facts import SystemFacts
+
+#: Where the loader's drive turns up: macOS, then Linux desktops.
+DRIVES = ("Volumes/RPI-RP2", "media/*/RPI-RP2", "run/media/*/RPI-RP2")
+
+
+def look(port: str | None, *, root: Path = Path("/"), entries: Iterable[Any] | None = None) -> SystemFacts:
+    """Facts about this computer and ``port``; ``root`` is where /sys, /proc, /run and /dev are.
+
+    Without ``port``, or with serial:NUMBER, about the only board there is. Windows has none of these trees: there
+    only the boards are known.
+    """
+    found = boards(entries)
+    device = port
+    if port is None or port.startswith("serial:"):
+        device = found[0].device if len(found) == 1 else None
+    usb = list(usb_ids(root))
+    loaders = [name for name, ids in usb if ids == (wire.USB_LOADER_VENDOR, wire.USB_LOADER_PRODUCT)]
+    if not loaders:
+        loaders = [str(drive) for pattern in DRIVES for drive in sorted(root.glob(pattern))]
+    facts = SystemFacts(
+        boards=found,
+        usb_boards=sum(ids == (wire.USB_VENDOR, wire.USB_PRODUCT) for _, ids in usb),
+        loaders=loaders,
+    )
+    if device is None or not device.startswith("/dev/"):
+        return facts
+    path = root / device.lstrip("/")
+    return SystemFacts(
+        facts.boards,
+        facts.usb_boards,
+        facts.loaders,
+        permitted=not path.exists() or os.access(path, os.R_OK | os.W_OK),
+        owner=owner(path),
+        holders=[h for h in holders(device, root / "proc") if h.pid != os.getpid()],
+        modem_manager=modem_manager_runs(root) and Path(device).name.startswith("ttyACM"),
+        left_alone=left_alone(device, root),
+    )
+
+
+def usb_ids(root: Path) -> Iterable[tuple[str, tuple[int, int]]]:
+    """Name on the bus, vendor and product of each USB device (Linux)."""
+    for folder in sorted((root / "sys/bus/usb/devices").glob("*")):
+        with suppress(OSError, ValueError):
+            vendor, product = (int((folder / name).read_text(), 16) for name in ("idVendor", "idProduct"))
+            yield f"USB {folder.name}", (vendor, product)
+
+
+def owner(path: Path) -> str:
+    """Whose a port is, in words."""
+    with suppress(OSError, KeyError, ImportError):
+        import grp
+        import pwd
+
+        facts = path.stat()
+        user, group = pwd.getpwuid(facts.st_uid).pw_name, grp.getgrgid(facts.st_gid).gr_name
+        return f"{user}'s and group {group}'s, mode {facts.st_mode & 0o777:o}"
+    return "somebody else's"
+
+
+def modem_manager_runs(root: Path) -> bool:
+    """By the names of all processes."""
+    for name in (root / "proc").glob("[0-9]*/comm"):
+        with suppress(OSError):
+            if name.read_text().strip() == "ModemManager":
+                return True
+    return False
+
+
+def left_alone(device: str, root: Path) -> bool:
+    """Whether udev's database has ID_MM_DEVICE_IGNORE or ID_MM_PORT_IGNORE for the port."""
+    with suppress(OSError):
+        number = (root / "sys/class/tty" / Path(device).name / "dev").read_text().strip()
+        lines = (root / f"run/udev/data/c{number}").read_text().splitlines()
+        return any(line in lines for line in ("E:ID_MM_DEVICE_IGNORE=1", "E:ID_MM_PORT_IGNORE=1"))
+    return False

@@ -1,0 +1,69 @@
+"""Whether everything came, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .. import _sensor as sensor
+from .catalogue import Finding
+from .facts import BoardFacts, Facts
+
+#: A crystal is within 100 ppm, with its age and temperature.
+CRYSTAL_PPM = 100.0
+#: Slots come from the board's own clock: a hundredth off is no rounding.
+RATE_SHARE = 0.01
+
+
+def check(facts: Facts) -> Iterator[Finding]:
+    """Restarts, late slots, losses on either side, rate, drift."""
+    board = facts.board
+    if board is None:
+        return
+    if board.after.uptime_s < board.before.uptime_s or board.stats.disordered:
+        yield Finding("board_restarted", f"it has been up for {board.after.uptime_s} s")
+        return  # its counters began again: they say nothing
+    for counter, what in (("slots_late", "slots came too late"), ("messages_dropped", "messages found no room")):
+        more = board.more_of_board(counter)
+        if more:
+            yield Finding(counter, f"{more} {what}")
+    if board.stats.frames_lost or board.stats.pac_lost:
+        yield Finding(
+            "frames_lost", f"{board.stats.frames_lost} frames and {board.stats.pac_lost} PAC blocks are missing"
+        )
+    if board.stats.crc_errors or board.stats.other_errors:
+        seen = f"{board.stats.crc_errors} frames with a bad CRC, {board.stats.other_errors} otherwise damaged"
+        yield Finding("bytes_damaged", seen)
+    for finger in board.present:
+        rate = slots_per_s(board, finger)
+        if rate is not None and abs(rate / board.hello.slot_hz - 1) > RATE_SHARE:
+            yield Finding("rate_wrong", f"finger {finger}: {rate:.0f} slots a second, expected {board.hello.slot_hz}")
+    yield from _clock(board)
+
+
+def slots_per_s(board: BoardFacts, finger: int) -> float | None:
+    """By the board's own clock; None with less than two rounds.
+
+    The median from one round to the next: rounds without a good word are not numbered, and leave holes.
+    """
+    rounds = [rows[["seq", "t_us"]][rows["finger"] == finger] for rows in (board.frames, board.idle)]
+    seq, t_us = (np.concatenate([r[name] for r in rounds]) for name in ("seq", "t_us"))
+    order = np.argsort(t_us)
+    steps, times_us = np.diff(seq[order]), np.diff(t_us[order])
+    good = (steps > 0) & (times_us > 0)
+    if not good.any():
+        return None
+    return float(np.median(steps[good] * len(sensor.SLOTS) / (times_us[good] / 1e6)))
+
+
+def _clock(board: BoardFacts) -> Iterator[Finding]:
+    if board.clock is None:
+        return
+    if board.clock_resets:
+        yield Finding("clock_jumped", f"{board.clock_resets} times")
+    drift_ppm, bound_ppm = board.clock.drift_ppm, board.clock.drift_uncertainty_ppm
+    if board.clock.known and abs(drift_ppm) - bound_ppm > CRYSTAL_PPM:
+        yield Finding(
+            "clock_drift", f"{drift_ppm:+.0f} ppm, sure to {bound_ppm:.0f} ppm; up to {CRYSTAL_PPM:.0f} is usual"
+        )

@@ -1,0 +1,39 @@
+"""The udev rule that gives our boards to whoever sits at a Linux computer, and keeps ModemManager away."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .. import _wire as wire
+from ..errors import InputError, PortError
+
+# Before 73-seat-late.rules, or uaccess comes too late to have an effect.
+RULES = Path("/etc/udev/rules.d/70-biotac.rules")
+
+
+def rule() -> str:
+    """The file's text."""
+    ours = f'ATTRS{{idVendor}}=="{wire.USB_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_PRODUCT:04x}"'
+    loader = f'ATTRS{{idVendor}}=="{wire.USB_LOADER_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_LOADER_PRODUCT:04x}"'
+    ignore = 'ENV{ID_MM_DEVICE_IGNORE}="1", ENV{ID_MM_PORT_IGNORE}="1"'
+    return "\n".join(
+        [
+            "# BioTac gateway boards: for whoever sits at this computer, and not for ModemManager.",
+            "# Written by `biotac udev-setup`.",
+            f'SUBSYSTEM=="tty", {ours}, TAG+="uaccess", {ignore}',
+            f'SUBSYSTEM=="usb", {ours}, TAG+="uaccess", {ignore}',
+            "# The same boards in their loader.",
+            f'SUBSYSTEM=="usb", {loader}, TAG+="uaccess"',
+            "",
+        ]
+    )
+
+
+def install(path: Path = RULES) -> None:
+    """Write the rule. PortError without the right to, InputError where there is no udev."""
+    if not path.parent.is_dir():
+        raise InputError(f"no folder {path.parent}: this system has no udev; rules are for Linux")
+    try:
+        path.write_text(rule())
+    except PermissionError as error:
+        raise PortError(f"no permission to write {path}; it takes root: sudo biotac udev-setup") from error

@@ -1,0 +1,215 @@
+"""Finding and choosing boards, and saying who has a port, from lists and trees that a test makes up."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from serial.tools.list_ports_common import ListPortInfo
+
+import biotac
+from biotac import _wire as wire
+from biotac.cli.main import main
+from biotac.discovery import boards, choose, serial_ports
+from biotac.identity import serial_text
+from biotac.link.holders import Holder, holders
+from biotac.link.serial_port import describe_open_error
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def entry(device: str, serial: str | None = None, *, ours: bool = True, description: str = "a port") -> ListPortInfo:
+    info = ListPortInfo(device, skip_link_detection=True)
+    info.description = description
+    info.serial_number = serial
+    if ours:
+        info.vid, info.pid = wire.USB_VENDOR, wire.USB_PRODUCT
+    return info
+
+
+ONE = [entry("/dev/ttyACM0", "E6605838831F5B2C"), entry("/dev/ttyUSB0", "A5XK3RJT", ours=False)]
+TWO = [entry("COM10", "E6605838831F5B2C"), entry("COM3", "E660583883200000")]
+
+
+@pytest.fixture
+def plugged(monkeypatch):
+    """Makes this computer have these ports."""
+
+    def plug(entries: list[ListPortInfo]) -> None:
+        monkeypatch.setattr("biotac.discovery.list_ports.comports", lambda: entries)
+
+    return plug
+
+
+def test_the_firmware_and_the_host_have_their_ids_from_one_place() -> None:
+    source = (ROOT / "firmware/port/rp2040/usb_descriptors.c").read_text()
+    assert "LOW(BT_USB_VENDOR)" in source
+    assert "LOW(BT_USB_PRODUCT)" in source
+    assert "0x1209" not in source
+
+
+def test_only_our_usb_ids_are_boards() -> None:
+    assert [p.device for p in boards(ONE)] == ["/dev/ttyACM0"]
+    assert [p.device for p in serial_ports(ONE)] == ["/dev/ttyACM0", "/dev/ttyUSB0"]
+
+
+def test_com10_comes_after_com3() -> None:
+    assert [p.device for p in boards(TWO)] == ["COM3", "COM10"]
+
+
+def test_of_a_macs_two_names_the_one_that_does_not_wait_is_kept() -> None:
+    both = [entry("/dev/tty.usbmodem1"), entry("/dev/cu.usbmodem1"), entry("/dev/tty.usbmodem2")]
+    assert [p.device for p in boards(both)] == ["/dev/cu.usbmodem1", "/dev/tty.usbmodem2"]
+
+
+def test_the_only_board_needs_no_name() -> None:
+    assert choose(None, ONE) == "/dev/ttyACM0"
+
+
+@pytest.mark.parametrize("number", ["E6605838831F5B2C", "e6605838831f5b2c"])
+def test_a_board_is_chosen_by_its_serial_number(number: str) -> None:
+    assert choose(number, TWO) == "COM10"
+
+
+@pytest.mark.parametrize(
+    ("entries", "number", "words"),
+    [
+        ([], None, r"no board on any USB port; plug one in"),
+        ([ONE[1]], "A5XK3RJT", r"no board with serial number A5XK3RJT on any USB port"),
+        (ONE, "0", r"no board has serial number 0; there is serial:E6605838831F5B2C on /dev/ttyACM0"),
+        (TWO, None, r"2 boards: serial:E660583883200000 on COM3, serial:E6605838831F5B2C on COM10; name the one"),
+    ],
+)
+def test_what_cannot_be_chosen_is_said_with_what_is_there(entries, number, words: str) -> None:
+    with pytest.raises(biotac.PortError, match=words):
+        choose(number, entries)
+
+
+def test_open_without_a_port_opens_the_only_board(scripted_board, hello, plugged) -> None:
+    board = scripted_board(lambda i, p: hello(p) if i == wire.HelloRequest.ID else b"")
+    plugged([entry(board.path, "E6605838831F5B2C"), entry("/dev/ttyNOWHERE", ours=False)])
+    for port in (None, "serial:E6605838831F5B2C"):
+        with biotac.open(port) as hand:
+            assert hand.port == board.path
+
+
+def test_a_serial_number_in_a_hello_is_that_of_usb() -> None:
+    def text(raw: bytes) -> str:
+        facts = dict.fromkeys((field.name for field in dataclasses.fields(wire.Hello)), 0)
+        return serial_text(wire.Hello(**facts | {"board_serial": tuple(raw.ljust(12, b"\0"))}))
+
+    assert text(bytes.fromhex("E6605838831F5B2C")) == "E6605838831F5B2C"
+    assert text(bytes.fromhex("E660583883200000")) == "E660583883200000"  # its zeros are its own
+    assert text(b"posix-sim") == "posix-sim"
+    assert text(bytes(range(1, 13))) == "0102030405060708090A0B0C"
+
+
+def test_list_asks_boards_and_nobody_else(scripted_board, hello, plugged, capsys) -> None:
+    asked = {"board": 0, "other": 0}
+
+    def answer(name: str):
+        def say(message_id: int, payload: bytes) -> bytes:
+            asked[name] += 1
+            return hello(payload, fingers_present=0b101) if message_id == wire.HelloRequest.ID else b""
+
+        return say
+
+    board, other = scripted_board(answer("board")), scripted_board(answer("other"))
+    plugged([entry(board.path, "0102"), entry(other.path, "A5", ours=False)])
+    assert main(["list", "--json"]) == 0
+    ours, theirs = json.loads(capsys.readouterr().out)["ports"]
+    assert (ours["fingers"], ours["firmware"], ours["board"]) == ([0, 2], "0.1.0", "POSIX_SIM")
+    assert theirs["is_board"] is False
+    assert asked["board"] > 0
+    assert asked["other"] == 0
+    assert main(["list", "--all"]) == 0
+    assert asked["other"] > 0
+    assert capsys.readouterr().out.splitlines()[0].endswith("fingers 0, 2")
+
+
+# ---- who has it ----------------------------------------------------------------------------------
+
+
+@dataclass
+class Proc:
+    """A /proc of a test's own."""
+
+    root: Path
+
+    def add(self, pid: int, name: str, *opened: str) -> None:
+        fd = self.root / str(pid) / "fd"
+        fd.mkdir(parents=True)
+        (self.root / str(pid) / "comm").write_text(f"{name}\n")
+        for k, path in enumerate(opened):
+            (fd / str(k)).symlink_to(path)
+
+
+@pytest.fixture
+def proc(tmp_path: Path) -> Proc:
+    return Proc(tmp_path / "proc")
+
+
+def test_who_has_a_port_open_is_found_in_proc(proc: Proc, tmp_path: Path) -> None:
+    port = tmp_path / "ttyACM0"
+    port.touch()
+    link = tmp_path / "board"
+    link.symlink_to(port)
+    proc.add(71, "ModemManager", "/dev/null", str(port))
+    proc.add(72, "bash", "/dev/null")
+    (proc.root / "73").mkdir()  # another user's, or gone
+    assert holders(str(link), proc.root) == [Holder(71, "ModemManager")]
+    assert holders(str(tmp_path / "nobody"), proc.root) == []
+
+
+def test_a_busy_port_names_the_program(proc: Proc, monkeypatch) -> None:
+    proc.add(4242, "minicom", "/dev/ttyACM0")
+    monkeypatch.setattr("biotac.link.holders.PROC", proc.root)
+    monkeypatch.setattr("biotac.link.serial_port.holders", lambda path: holders(path, proc.root))
+    for error in (OSError(errno.EBUSY, "busy"), Exception("Could not exclusively lock port")):
+        text = describe_open_error("/dev/ttyACM0", error)
+        assert text == "/dev/ttyACM0 is in use by minicom (process 4242); close that program and try again"
+    assert "in use by another program" in describe_open_error("COM3", PermissionError(13, "Access is denied."))
+    assert "no permission" in describe_open_error("/dev/ttyACM0", PermissionError(13, "Permission denied"))
+
+
+def test_two_programs_that_want_one_port_are_told_apart(scripted_board, hello) -> None:
+    board = scripted_board(lambda i, p: hello(p) if i == wire.HelloRequest.ID else b"")
+    with biotac.open(board.path) as hand:
+        with pytest.raises(biotac.PortError, match="in use by this program itself"):
+            biotac.open(board.path)
+        assert not hand.warnings
+
+
+# ---- versions ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "cure"),
+    [
+        ({"wire_major": wire.WIRE_MAJOR + 1}, "pip install -U biotac-gateway"),
+        ({"wire_major": wire.WIRE_MAJOR - 1}, "biotac flash"),
+    ],
+)
+def test_another_major_names_the_command_that_cures_it(scripted_board, hello, changes, cure: str) -> None:
+    board = scripted_board(lambda i, p: hello(p, **changes) if i == wire.HelloRequest.ID else b"")
+    with pytest.raises(biotac.WireVersionError, match=cure):
+        biotac.open(board.path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "cure"),
+    [({}, "biotac flash"), ({"wire_minor": wire.WIRE_MINOR + 1}, "pip install -U biotac-gateway")],
+)
+def test_another_schema_is_a_warning_and_no_error(scripted_board, hello, capsys, changes, cure: str) -> None:
+    different = {"schema_hash": wire.SCHEMA_HASH ^ 1}
+    board = scripted_board(lambda i, p: hello(p, **different, **changes) if i == wire.HelloRequest.ID else b"")
+    with biotac.open(board.path) as hand:
+        (warning,) = hand.warnings
+    assert warning.code == "schema_differs"
+    assert f"{wire.SCHEMA_HASH:08x}" in warning.text
+    assert cure in warning.text
+    assert capsys.readouterr() == ("", "")

@@ -1,0 +1,415 @@
+"""The doctor: every finding from facts that a test makes up, from trees of files, and from simulated boards."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from serial.tools.list_ports_common import ListPortInfo
+
+import biotac
+from biotac import _wire as wire
+from biotac.cli.main import main
+from biotac.clock import Fit
+from biotac.discovery import SerialPort
+from biotac.doctor import CATALOGUE, BoardFacts, Facts, SystemFacts, judge, udev
+from biotac.doctor.system import look
+from biotac.errors import DeviceLostError, InputError, NotAGatewayError, PortError, WireVersionError
+from biotac.frames import FRAME_DTYPE, IDLE_DTYPE
+from biotac.hand import HandWarning
+from biotac.link.holders import Holder
+from biotac.stream import LinkStats
+
+ROOT = Path(__file__).resolve().parents[2]
+PORT = "/dev/ttyACM0"
+NOBODY = Holder(7, "minicom")
+
+
+def message(kind: Any, **values: Any) -> Any:
+    fields = {f.name: 0 for f in dataclasses.fields(kind)}
+    return kind(**fields | values)
+
+
+def info(finger: int, serial: str, flex: str = "20", software: str = "0210") -> wire.SensorInfo:
+    ascii_of = {"serial": serial, "flex_version": flex, "software_version": software}
+    return message(wire.SensorInfo, finger=finger, present=1, **{k: tuple(v.encode()) for k, v in ascii_of.items()})
+
+
+def rounds(fingers: tuple[int, ...] = (0, 1), n: int = 100, step_us: int = 10_000) -> np.ndarray:
+    frames = np.zeros(n * len(fingers), FRAME_DTYPE)
+    for k, finger in enumerate(fingers):
+        mine = slice(k, None, len(fingers))
+        frames["finger"][mine] = finger
+        frames["seq"][mine] = np.arange(n)
+        frames["t_us"][mine] = np.arange(n) * step_us
+    frames["counts"] = 3000
+    for name in ("pdc", "tac", "tdc"):
+        frames[name] = 2000
+    return frames
+
+
+def healthy(**changes: Any) -> BoardFacts:
+    """Two fingers, a second, nothing to complain of."""
+    states = [message(wire.SensorStatus, finger=f, tare_state=wire.TareState.REST, words_stuck=9) for f in range(5)]
+    after = [dataclasses.replace(s, words_good=4400) if s.finger < 2 else s for s in states]
+    after[3] = dataclasses.replace(after[3], words_stuck=4409)  # an open chip select: it reads so, and is no fault
+    facts = {
+        "hello": message(wire.Hello, slot_hz=4400, fingers_present=0b11),
+        "sensors": [info(0, "BT00001"), info(1, "BT00002")],
+        "before": message(wire.Status, uptime_s=10, fingers_present=0b11, slots_late=2**32 - 1),
+        "after": message(wire.Status, uptime_s=11, fingers_present=0b11, slots_late=2**32 - 1),
+        "sensors_before": states,
+        "sensors_after": after,
+        "frames": rounds(),
+        "idle": np.empty(0, IDLE_DTYPE),
+        "stats": LinkStats(1000, 200, 0, 0, 0, 0, 0),
+        "clock": Fit(0.0, 1.0, 0.001, -60.0, 30.0),
+        "clock_resets": 0,
+        "warnings": [],
+    }
+    return BoardFacts(**facts | changes)
+
+
+def board(**changes: Any) -> Facts:
+    return Facts(PORT, board=healthy(**changes))
+
+
+def grown(finger: int, **counters: int) -> Facts:
+    """Sensor counters that have wrapped on the way."""
+    facts = healthy()
+    before, after = list(facts.sensors_before), list(facts.sensors_after)
+    for name, more in counters.items():
+        before[finger] = dataclasses.replace(before[finger], **{name: 2**32 - 1})
+        after[finger] = dataclasses.replace(after[finger], **{name: more - 1})
+    return board(sensors_before=before, sensors_after=after)
+
+
+def state(**values: Any) -> Facts:
+    after = list(healthy().sensors_after)
+    after[1] = dataclasses.replace(after[1], **values)
+    return board(sensors_after=after)
+
+
+def frames(change: Callable[[np.ndarray], None]) -> Facts:
+    rows = rounds()
+    change(rows[1::2])
+    return board(frames=rows)
+
+
+def mark(name: str, value: int, column: int | None = None) -> Callable[[np.ndarray], None]:
+    def change(rows: np.ndarray) -> None:
+        if column is None:
+            rows[name] = value
+        else:
+            rows[name][:, column] = value
+
+    return change
+
+
+def port(device: str, number: str) -> SerialPort:
+    return SerialPort(device, "", number, wire.USB_VENDOR, wire.USB_PRODUCT)
+
+
+AFTER = {"uptime_s": 11, "fingers_present": 0b11, "slots_late": 2**32 - 1}
+STATS = LinkStats(1000, 200, 0, 0, 0, 0, 0)
+
+# What there is -> the one code that must come, and what its words must name.
+CASES: list[tuple[str, Facts, str]] = [
+    ("no_board", Facts(None), "no serial port"),
+    (
+        "several_boards",
+        Facts(None, SystemFacts(boards=[port("COM3", "A"), port("COM10", "B")])),
+        "serial:A on COM3, serial:B on COM10",
+    ),
+    ("no_serial_port", Facts(None, SystemFacts(usb_boards=1)), "no serial port"),
+    ("in_loader", Facts(None, SystemFacts(loaders=["USB 1-2"])), "USB 1-2"),
+    (
+        "no_permission",
+        Facts(PORT, SystemFacts(permitted=False, owner="root's"), PortError(f"no permission to open {PORT}")),
+        "root's",
+    ),
+    (
+        "port_busy",
+        Facts(PORT, SystemFacts(holders=[NOBODY]), PortError(f"{PORT} is in use by minicom")),
+        "minicom (process 7)",
+    ),
+    ("port_shared", Facts(PORT, SystemFacts(holders=[NOBODY]), board=healthy()), "minicom (process 7)"),
+    ("port_failed", Facts(PORT, error=PortError("no port here")), "no port here"),
+    ("modem_manager", Facts(PORT, SystemFacts(modem_manager=True), board=healthy()), "ID_MM_DEVICE_IGNORE"),
+    ("not_a_gateway", Facts(PORT, error=NotAGatewayError("nothing answers")), "nothing answers"),
+    ("board_lost", Facts(PORT, error=DeviceLostError("went away")), "went away"),
+    ("wire_version", Facts(PORT, error=WireVersionError("speaks wire 9.0")), "wire 9.0"),
+    ("schema_differs", board(warnings=[HandWarning("schema_differs", "other schema")]), "other schema"),
+    ("no_sensor", board(hello=message(wire.Hello, slot_hz=4400), sensors=[]), "no sensor answers"),
+    ("sensor_missing", dataclasses.replace(board(), expected_fingers=3), "2 of 3 sensors answer: finger 0, 1"),
+    ("sensor_lost", board(frames=rounds((0,))), "finger 1 sent no frame"),
+    ("sensor_lost", board(after=message(wire.Status, **AFTER | {"fingers_present": 1})), "finger 1 stopped"),
+    (
+        "same_serial",
+        board(sensors=[info(0, "BT00001"), info(1, "BT00001")]),
+        "fingers 0, 1 all call themselves BT00001",
+    ),
+    ("mixed_sensors", board(sensors=[info(0, "BT1"), info(1, "BT2", flex="21")]), "finger 1: flex 21, software 0210"),
+    ("mixed_sensors", board(sensors=[info(0, "BT1"), info(1, "BT2", software="0300")]), "software 0300"),
+    ("words_stuck", grown(1, words_stuck=44), "finger 1: 44 of 4444 words of 0x0000 or 0xFFFF"),
+    ("words_parity", grown(0, words_parity=1), "finger 0: 1 of 4401 words with bad parity"),
+    ("words_error", grown(0, words_error=5), "5 of 4405 words"),
+    ("board_restarted", board(after=message(wire.Status, **AFTER | {"uptime_s": 0})), "up for 0 s"),
+    ("board_restarted", board(stats=dataclasses.replace(STATS, disordered=2)), "up for"),
+    ("slots_late", board(after=message(wire.Status, **AFTER | {"slots_late": 2})), "3 slots"),
+    ("messages_dropped", board(after=message(wire.Status, **AFTER | {"messages_dropped": 4})), "4 messages"),
+    ("frames_lost", board(stats=dataclasses.replace(STATS, frames_lost=5)), "5 frames and 0 PAC"),
+    ("frames_lost", board(stats=dataclasses.replace(STATS, pac_lost=6)), "6 PAC"),
+    ("bytes_damaged", board(stats=dataclasses.replace(STATS, crc_errors=7)), "7 frames with a bad CRC"),
+    ("bytes_damaged", board(stats=dataclasses.replace(STATS, other_errors=8)), "8 otherwise"),
+    ("rate_wrong", board(frames=rounds((0, 1), step_us=10_200)), "finger 0: 4314 slots a second, expected 4400"),
+    ("clock_drift", board(clock=Fit(0.0, 1.0, 0.001, -180.0, 30.0)), "-180 ppm, sure to 30 ppm"),
+    ("clock_jumped", board(clock_resets=2), "2 times"),
+    ("no_tare", state(tare_state=wire.TareState.INIT), "finger 1"),
+    ("tare_fault", state(tare_state=wire.TareState.FAULT, tare_age_ms=90_000), "90 s old"),
+    ("base_old", frames(mark("flags", int(wire.FrameFlags.BASE_OLD))), "finger 1 is touched for over a minute"),
+    ("electrodes_railed", frames(mark("counts", 4090, 4)), "finger 1: E5"),
+    ("electrodes_railed", frames(mark("counts", 0, 18)), "finger 1: E19"),
+    ("channel_missing", frames(mark("counts", wire.INVALID_COUNT, 0)), "finger 1: E1"),
+    ("channel_missing", frames(mark("tdc", wire.INVALID_COUNT)), "finger 1: TDC"),
+]
+
+
+@pytest.mark.parametrize(("code", "facts", "words"), CASES, ids=[f"{c[0]}-{k}" for k, c in enumerate(CASES)])
+def test_one_fault_makes_one_finding(code: str, facts: Facts, words: str) -> None:
+    found = judge(facts)
+    assert {f.code for f in found} == {code}
+    assert words in found[0].seen
+
+
+def test_every_code_has_a_case_and_a_page() -> None:
+    assert {case[0] for case in CASES} == set(CATALOGUE)
+    page = (ROOT / "host/docs/doctor.md").read_text()
+    for code, entry in CATALOGUE.items():
+        assert f"## {code}\n" in page
+        assert entry.meaning in page
+        assert entry.cure in page
+    checked = [sys.executable, str(ROOT / "tools/make_doctor_page.py"), "--check"]
+    assert subprocess.run(checked, capture_output=True, text=True).stderr == ""
+
+
+def test_what_is_healthy_is_left_alone() -> None:
+    assert judge(board()) == []
+    # 180 ppm, but not sure: a short look says nothing of the crystal.
+    assert judge(board(clock=Fit(0.0, 1.0, 0.001, -180.0, 100.0))) == []
+    assert judge(board(clock=Fit(0.0))) == []
+    assert judge(board(clock=None, clock_resets=9)) == []  # a simulated board's time is no clock
+    assert judge(Facts(PORT, SystemFacts(modem_manager=True, left_alone=True), board=healthy())) == []
+    # Single bad words do not make a channel missing, nor single rails an electrode dead.
+    few = rounds()
+    few["counts"][:20, 3] = wire.INVALID_COUNT
+    few["counts"][20:40, 3] = 4095
+    assert judge(board(frames=few)) == []
+
+
+def test_an_error_word_is_explained() -> None:
+    facts = grown(0, words_error=1).board
+    assert facts is not None
+    facts.sensors_after[0] = dataclasses.replace(facts.sensors_after[0], last_error_word=0xA52D)
+    assert "0xA52D (read less than 50 us after the sample command)" in judge(Facts(PORT, board=facts))[0].seen
+
+
+# ---- this computer, from trees of files ----------------------------------------------------------
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    (tmp_path / "dev").mkdir()
+    (tmp_path / "dev/ttyACM0").touch()
+    (tmp_path / "proc").mkdir()
+    return tmp_path
+
+
+def write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+
+
+def usb_device(root: Path, name: str, vendor: int, product: int) -> None:
+    write(root / f"sys/bus/usb/devices/{name}/idVendor", f"{vendor:04x}\n")
+    write(root / f"sys/bus/usb/devices/{name}/idProduct", f"{product:04x}\n")
+
+
+def test_a_board_in_its_loader_is_seen_on_usb_and_as_a_drive(root: Path) -> None:
+    assert look(None, root=root, entries=[]).loaders == []
+    (root / "Volumes/RPI-RP2").mkdir(parents=True)
+    assert look(None, root=root, entries=[]).loaders == [str(root / "Volumes/RPI-RP2")]
+    usb_device(root, "1-1.2", 0x2E8A, 0x0003)
+    usb_device(root, "usb1", 0x1D6B, 0x0002)
+    write(root / "sys/bus/usb/devices/1-1:1.0/bInterfaceClass", "ff\n")
+    assert look(None, root=root, entries=[]).loaders == ["USB 1-1.2"]
+
+
+def test_a_board_without_a_port_is_seen_on_usb(root: Path) -> None:
+    usb_device(root, "1-3", wire.USB_VENDOR, wire.USB_PRODUCT)
+    facts = look(None, root=root, entries=[])
+    assert facts.usb_boards == 1
+    assert [f.code for f in judge(Facts(None, facts))] == ["no_serial_port"]
+
+
+def test_modem_manager_is_in_the_way_unless_udev_says_otherwise(root: Path) -> None:
+    write(root / "proc/71/comm", "ModemManager\n")
+    assert look(PORT, root=root, entries=[]).modem_manager
+    assert not look(PORT, root=root, entries=[]).left_alone
+    assert not look("/dev/ttyS0", root=root, entries=[]).modem_manager  # it asks USB modems only
+    write(root / "sys/class/tty/ttyACM0/dev", "166:0\n")
+    write(root / "run/udev/data/c166:0", "S:serial/by-id/x\nE:ID_MM_DEVICE_IGNORE=0\n")
+    assert not look(PORT, root=root, entries=[]).left_alone
+    write(root / "run/udev/data/c166:0", "S:serial/by-id/x\nE:ID_MM_DEVICE_IGNORE=1\nG:uaccess\n")
+    assert look(PORT, root=root, entries=[]).left_alone
+
+
+def test_permission_and_holders_are_those_of_the_only_board(root: Path, monkeypatch) -> None:
+    entry = ListPortInfo(PORT, skip_link_detection=True)
+    entry.vid, entry.pid, entry.serial_number = wire.USB_VENDOR, wire.USB_PRODUCT, "A"
+    (root / "proc/71/fd").mkdir(parents=True)
+    write(root / "proc/71/comm", "minicom\n")
+    (root / "proc/71/fd/3").symlink_to(PORT)
+    facts = look(None, root=root, entries=[entry])
+    assert facts.permitted
+    assert facts.holders == [Holder(71, "minicom")]
+    # Root may open everything, so the refusal is made up.
+    monkeypatch.setattr("biotac.doctor.system.os.access", lambda path, mode: False)
+    (root / "dev/ttyACM0").chmod(0o660)
+    facts = look(None, root=root, entries=[entry])
+    assert not facts.permitted
+    assert facts.owner.endswith("mode 660")
+
+
+# ---- the udev rule -------------------------------------------------------------------------------
+
+
+def test_the_rule_has_the_firmwares_ids_and_silences_modem_manager(tmp_path: Path) -> None:
+    path = tmp_path / "rules.d" / "70-biotac.rules"
+    with pytest.raises(InputError, match="has no udev"):
+        udev.install(path)
+    path.parent.mkdir()
+    udev.install(path)
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    assert f'ATTRS{{idVendor}}=="{wire.USB_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_PRODUCT:04x}"' in lines[0]
+    assert all('TAG+="uaccess"' in line for line in lines)
+    assert 'ENV{ID_MM_DEVICE_IGNORE}="1"' in lines[0]
+
+
+def test_udev_setup_prints_or_says_that_it_takes_root(tmp_path: Path, capsys, monkeypatch) -> None:
+    assert main(["udev-setup", "--print"]) == 0
+    assert capsys.readouterr().out == udev.rule()
+
+    def forbidden(self: Path, text: str) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("biotac.doctor.udev.RULES.__class__.write_text", forbidden)
+    with pytest.raises(PortError, match="it takes root: sudo biotac udev-setup"):
+        udev.install(tmp_path / "70-biotac.rules")
+
+
+# ---- simulated boards with faults ----------------------------------------------------------------
+
+SCENE = 'name = "scene"\nseed = 5\nfingers = {fingers}\n[[step]]\ndo = "rest"\nseconds = 4.0\n'
+FAULT = '[[fault]]\nat_s = {at_s}\nseconds = {seconds}\nfinger = 1\nkind = "{kind}"\n{more}\n'
+
+
+def diagnose(capsys, tmp_path: Path, text: str, *words: str) -> tuple[int, dict[str, Any]]:
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    code = main(["doctor", f"sim:{path}?pace=fast", "--seconds", "3", "--json", *words])
+    return code, json.loads(capsys.readouterr().out)
+
+
+def test_a_healthy_board_exits_0(capsys, tmp_path: Path) -> None:
+    code, out = diagnose(capsys, tmp_path, SCENE.format(fingers=3), "--fingers", "3")
+    assert (code, out["findings"]) == (0, [])
+    assert out["measured"]["fingers"] == [0, 1, 2]
+    assert out["measured"]["slots_per_s"] == {"0": 4400.0, "1": 4400.0, "2": 4400.0}
+
+
+@pytest.mark.parametrize(
+    ("kind", "code"),
+    [
+        ("stuck_low", "words_stuck"),
+        ("stuck_high", "words_stuck"),
+        ("bad_parity", "words_parity"),
+        ("error_word", "words_error"),
+        ("no_channel", "words_error"),
+    ],
+)
+def test_a_fault_on_the_bus_is_found_on_its_finger_only(capsys, tmp_path: Path, kind: str, code: str) -> None:
+    fault = FAULT.format(at_s=1.5, seconds=0.3, kind=kind, more="")
+    exit_code, out = diagnose(capsys, tmp_path, SCENE.format(fingers=3) + fault)
+    assert exit_code == 1
+    assert [f["code"] for f in out["findings"]] == [code]
+    assert out["findings"][0]["seen"].startswith(f"finger 1: {30 * 44} of ")
+
+
+def test_a_model_without_a_channel_is_told(capsys, tmp_path: Path) -> None:
+    fault = FAULT.format(at_s=0, seconds=4.0, kind="no_channel", more='channel = "TDC"')
+    _, out = diagnose(capsys, tmp_path, SCENE.format(fingers=2) + fault)
+    assert [f["code"] for f in out["findings"]] == ["words_error", "channel_missing"]
+    assert out["findings"][1]["seen"] == "finger 1: TDC"
+
+
+def test_a_sensor_that_is_not_there_is_missed_when_it_is_expected(capsys, tmp_path: Path) -> None:
+    code, out = diagnose(capsys, tmp_path, SCENE.format(fingers=2), "--fingers", "5")
+    assert code == 1
+    assert [f["code"] for f in out["findings"]] == ["sensor_missing"]
+
+
+def test_a_port_that_is_not_there_and_a_stranger_on_one(capsys, scripted_board, monkeypatch) -> None:
+    assert main(["doctor", "/dev/ttyNOWHERE7"]) == 1
+    assert capsys.readouterr().out.startswith("error port_failed: no port /dev/ttyNOWHERE7")
+    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.02)
+    stranger = scripted_board(lambda i, p: b"OK\r\n")
+    assert main(["doctor", stranger.path]) == 1
+    assert "error not_a_gateway" in capsys.readouterr().out
+
+
+def test_without_permission_the_rule_is_printed(capsys, monkeypatch) -> None:
+    facts = Facts(PORT, SystemFacts(permitted=False, owner="root's"), PortError("no permission"))
+    monkeypatch.setattr("biotac.cli.doctor.examine", lambda *a, **k: facts)
+    assert main(["doctor"]) == 1
+    assert udev.rule().splitlines()[2] in capsys.readouterr().out
+
+
+def test_a_serial_number_that_nobody_has_names_those_there(capsys, monkeypatch) -> None:
+    entry = ListPortInfo(PORT, skip_link_detection=True)
+    entry.vid, entry.pid, entry.serial_number = wire.USB_VENDOR, wire.USB_PRODUCT, "E6605838831F5B2C"
+    monkeypatch.setattr("biotac.discovery.list_ports.comports", lambda: [entry])
+    assert main(["doctor", "serial:0", "--json"]) == 1
+    (finding,) = json.loads(capsys.readouterr().out)["findings"]
+    assert finding["code"] == "port_failed"
+    assert "there is serial:E6605838831F5B2C" in finding["seen"]
+
+
+def test_the_doctor_leaves_the_stream_stopped() -> None:
+    from biotac.doctor.listening import listen
+
+    with biotac.open("sim:press.toml") as hand:
+        listen(hand, 0.5)
+        assert hand.status().streams == 0
+
+
+def test_a_program_on_a_pty_is_not_blamed_for_its_clock(tmp_path: Path, capsys) -> None:
+    words = [sys.executable, "-m", "biotac", "sim", "press.toml", "--json"]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    try:
+        port = json.loads(process.stdout.readline())["port"]
+        assert main(["doctor", port, "--seconds", "1.5", "--json"]) in (0, 1)
+        found = {f["code"] for f in json.loads(capsys.readouterr().out)["findings"]}
+        assert not found & {"clock_jumped", "clock_drift"}
+    finally:
+        process.terminate()
+        process.wait()
+        process.stdout.close()
