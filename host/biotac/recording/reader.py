@@ -24,9 +24,9 @@ class Recording:
     """A recording in memory.
 
     ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``wire`` the
-    FRAME messages as sent, ``messages`` the rest (tare changes, status). ``problems`` lists in words
-    what is missing or damaged; the rest is good. ``cut_off``: the file ends without its index;
-    ``damaged_chunks``: seconds that were left out. Raises RecordingError when nothing can be read.
+    FRAME messages as sent, ``idle`` the heartbeats (IDLE_DTYPE), ``messages`` the rest (tare changes,
+    status). ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the
+    file ends without its index; ``damaged_chunks``: seconds that were left out. Raises RecordingError when nothing can be read.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -53,6 +53,7 @@ class Recording:
         self.frames: StructArray = batch.frames
         self.wire: StructArray = batch.wire
         self.pac: StructArray = batch.pac
+        self.idle: StructArray = batch.idle
         self.messages: list[Any] = batch.messages
         self.counts = decoder.counts
         self.frames_lost = decoder.lost
