@@ -10,9 +10,9 @@ import threading
 from collections.abc import Sequence
 
 from ..errors import BiotacError, InputError
-from . import bench, check, demo, info, list_ports, record, sim, stream, version
+from . import bench, check, demo, info, list_ports, record, sim, stream, version, view
 
-VERBS = (demo, list_ports, info, stream, record, check, sim, bench, version)
+VERBS = (demo, list_ports, info, view, stream, record, check, sim, bench, version)
 
 EPILOG = """\
 A PORT is a device path (/dev/ttyACM0, COM3) or sim:SOURCE, a simulated board that plays a
