@@ -26,7 +26,8 @@ class Recording:
     ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``wire`` the
     FRAME messages as sent, ``idle`` the heartbeats (IDLE_DTYPE), ``messages`` the rest (tare changes,
     status). ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the
-    file ends without its index; ``damaged_chunks``: seconds that were left out. Raises RecordingError when nothing can be read.
+    file ends without its index; ``damaged_chunks``: seconds that were left out. Raises RecordingError
+    when nothing can be read.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:

@@ -31,6 +31,7 @@ class Reader:
         self._opener = opener
         self._state = state
         self._again = again
+        self._loss = ""  # how the board was lost, for as long as it is
         self._commands: queue.Queue[Command | None] = queue.Queue()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="biotac-view-reader", daemon=True)
@@ -79,8 +80,9 @@ class Reader:
         except InputError:
             raise  # no waiting mends a malformed source
         except BiotacError as error:
-            self._rest("lost", f"No board: {error}. Looking again every second.", RETRY_S)
+            self._rest("lost", f"{self._loss}No board: {error}. Looking again every second.", RETRY_S)
             return
+        self._loss = ""
         try:
             self._state.begin(player)
             ended = self._play(player)
@@ -88,8 +90,10 @@ class Reader:
             # OSError: a recording met a full disk.
             kept = player.recording()
             self._close(player)
-            words = f"Connection lost: {error}. Looking again every second."
-            self._rest("lost", f"{words} The recording {kept.path} is kept up to here." if kept else words, RETRY_S)
+            self._loss = f"Connection lost: {error}. "
+            if kept:
+                self._loss += f"The recording {kept.path} is kept up to there. "
+            self._rest("lost", f"{self._loss}Looking again every second.", RETRY_S)
             return
         self._close(player)
         if ended and not self._again:

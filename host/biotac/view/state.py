@@ -35,6 +35,15 @@ class Ring:
         self._texts.extend(texts)
         self.end += len(texts)
 
+    def clear(self) -> None:
+        """Forget the texts; the numbers go on."""
+        self._texts.clear()
+
+    @property
+    def begin(self) -> int:
+        """Number of the oldest that is still there."""
+        return self.end - len(self._texts)
+
     def since(self, begin: int) -> tuple[list[str], int]:
         """What came from number ``begin`` on and is still there, and how many of it are gone."""
         held = min(self.end - begin, len(self._texts))
@@ -100,6 +109,8 @@ class State:
         """A new playing: counters and tares of the one before are nobody's."""
         with self._news:
             self._health.epoch += 1
+            self._frames.clear()
+            self._pac.clear()
             self._health.board, self._health.live = player.board, player.live
             self._health.status, self._health.fingers = {}, {}
             self._arrived.clear()
@@ -172,9 +183,9 @@ class State:
         return self._closed
 
     def cursor(self) -> Cursor:
-        """Where a new browser starts: with what comes next."""
+        """Where a new browser starts: with the latest rows, so that it shows something even when nothing comes."""
         with self._news:
-            return Cursor(self._frames.end, self._pac.end)
+            return Cursor(self._frames.begin, self._pac.begin)
 
     def wait(self, cursor: Cursor, timeout_s: float) -> str:
         """Wait for news; return them as one JSON text and move ``cursor``. Empty after timeout_s without any."""

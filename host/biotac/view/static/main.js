@@ -130,7 +130,7 @@ class Page {
     byId("again").hidden = health?.link !== "over";
     byId("record").setAttribute("aria-pressed", String(Boolean(recording)));
     byId("record").title = recording ? recording.path : "";
-    byId("record-words").textContent = recording ? `Stop, ${number(recording.seconds, 0)} s` : "Record";
+    byId("record-words").textContent = recording ? `Stop, ${Math.floor(recording.seconds)} s` : "Record";
     byId("pause").setAttribute("aria-pressed", String(paused));
     byId("pause-words").textContent = paused ? "Go on" : "Pause";
   }
@@ -139,6 +139,8 @@ class Page {
     requestAnimationFrame((ms) => this.loop(ms));
     this.count(nowMs);
     if (!this.model) return;
+    const { fingers } = this.model;
+    if (!fingers.has(this.shown) && fingers.size) this.shown = Math.min(...fingers.keys());
     if (nowMs - this.readMs >= READ_MS) this.read(nowMs);
     if (!this.frozen) this.draw(nowMs);
   }
@@ -175,7 +177,6 @@ class Page {
     this.readMs = nowMs;
     const { fingers, about, health, dropped } = this.model;
     if (health) this.link.show(health, dropped, this.drawsPerS);
-    if (!fingers.has(this.shown) && fingers.size) this.shown = Math.min(...fingers.keys());
     if (this.frozen) return;
     byId("shown").textContent = String(this.shown);
     byId("scale-low").textContent = number(-this.limit.counts, 0);

@@ -34,7 +34,8 @@ export class Model {
       const frame = this.inUnits(row);
       this.finger(frame.finger).add(frame);
     }
-    for (const [finger, , tUs, pac] of news.pac) this.finger(finger).addPac(tUs, pac);
+    // A finger is there once it has sent a frame.
+    for (const [finger, , , pac] of news.pac) this.fingers.get(finger)?.addPac(pac);
     this.dropped = news.dropped;
   }
 
@@ -70,7 +71,7 @@ export class Finger {
     this.history = { t: ring(HISTORY_ROWS), x: ring(HISTORY_ROWS), y: ring(HISTORY_ROWS), z: ring(HISTORY_ROWS), pdc: ring(HISTORY_ROWS) };
     this.rows = 0; // ever added
     this.pac = new Float64Array(SPECTRUM_SAMPLES);
-    this.pacRows = 0;
+    this.pacSamples = 0;
     this.trail = [];
   }
 
@@ -84,7 +85,7 @@ export class Finger {
     if (this.trail.length > TRAIL_POINTS) this.trail.shift();
   }
 
-  addPac(tUs, samples) {
+  addPac(samples) {
     const n = samples.length;
     this.pac.copyWithin(0, n);
     for (let k = 0; k < n; k++) {
@@ -92,11 +93,11 @@ export class Finger {
       const at = SPECTRUM_SAMPLES - n + k;
       this.pac[at] = samples[k] ?? this.pac[at - 1];
     }
-    this.pacRows++;
+    this.pacSamples += n;
   }
 
   get pacIsFull() {
-    return this.pacRows * 22 >= SPECTRUM_SAMPLES;
+    return this.pacSamples >= SPECTRUM_SAMPLES;
   }
 
   // Indices of the history, oldest first.
