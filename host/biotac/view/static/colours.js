@@ -6,7 +6,7 @@ export function readTheme() {
   const style = getComputedStyle(document.documentElement);
   const theme = {};
   for (const name of NAMES) theme[name] = style.getPropertyValue(`--${name}`).trim();
-  theme.scale = [theme.compressed, theme.rest, theme.bulged].map(rgb);
+  theme.shades = table([theme.compressed, theme.rest, theme.bulged].map(rgb));
   return theme;
 }
 
@@ -14,12 +14,24 @@ function rgb(hex) {
   return [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 }
 
-// share: -1 fully compressed to 1 fully bulged. Writes three bytes into out.
-export function mix(scale, share, out, at) {
-  const [low, rest, high] = scale;
-  const end = share < 0 ? low : high;
-  const s = Math.min(Math.abs(share), 1);
-  for (let k = 0; k < 3; k++) out[at + k] = rest[k] + (end[k] - rest[k]) * s;
+// A theme's scale as a table of pixels (RGBA in memory's order), mixed once: half a million are looked up a second.
+const SHADES = 511; // odd: the middle one is rest
+
+function table([low, rest, high]) {
+  const bytes = new Uint8ClampedArray(SHADES * 4);
+  for (let k = 0; k < SHADES; k++) {
+    const share = (2 * k) / (SHADES - 1) - 1;
+    const end = share < 0 ? low : high;
+    for (let j = 0; j < 3; j++) bytes[4 * k + j] = rest[j] + (end[j] - rest[j]) * Math.abs(share);
+    bytes[4 * k + 3] = 255;
+  }
+  return { pixels: new Uint32Array(bytes.buffer), bytes };
+}
+
+// Index of a shade; share: -1 fully compressed to 1 fully bulged.
+export function shade(share) {
+  const index = ((share + 1) * (SHADES - 1)) / 2 + 0.5;
+  return index < 0 ? 0 : index >= SHADES ? SHADES - 1 : index | 0;
 }
 
 // The colour scale's end in counts: grows at once, shrinks only after a while, in steps that can be read.

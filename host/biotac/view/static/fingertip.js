@@ -1,6 +1,6 @@
 // One fingertip on a canvas: the skin laid flat, its electrodes, the point of contact and what acts there.
 
-import { mix } from "./colours.js";
+import { shade } from "./colours.js";
 
 // The picture's edges in mm; the canvas has the shape of their ratio (style.css).
 const LEFT = -9.5, RIGHT = 9.5, TOP = 9.8, BOTTOM = -17.2;
@@ -23,6 +23,7 @@ export class Fingertip {
     this.field.height = FIELD_H;
     this.fieldContext = this.field.getContext("2d");
     this.pixels = this.fieldContext.createImageData(FIELD_W, FIELD_H);
+    this.words = new Uint32Array(this.pixels.data.buffer);
     this.weights = weigh(electrodes);
   }
 
@@ -50,18 +51,18 @@ export class Fingertip {
   }
 
   drawField(signal, theme, limit) {
-    const { data } = this.pixels;
-    const n = this.electrodes.length;
-    for (let p = 0, at = 0; p < FIELD_W * FIELD_H; p++, at += 4) {
+    const { weights, words } = this;
+    const { pixels } = theme.shades;
+    const shares = this.electrodes.map((_, k) => (signal?.[k] || 0) / limit);
+    const n = shares.length;
+    for (let p = 0, at = 0; p < words.length; p++) {
       let sum = 0;
-      if (signal) for (let k = 0; k < n; k++) sum += this.weights[p * n + k] * (signal[k] || 0);
-      mix(theme.scale, sum / limit, data, at);
-      data[at + 3] = 255;
+      for (let k = 0; k < n; k++, at++) sum += weights[at] * shares[k];
+      words[p] = pixels[shade(sum)];
     }
     this.fieldContext.putImageData(this.pixels, 0, 0);
     const c = this.context;
     c.imageSmoothingEnabled = true;
-    c.imageSmoothingQuality = "high";
     c.save();
     c.translate(LEFT, TOP);
     c.scale(1, -1);
@@ -72,14 +73,14 @@ export class Fingertip {
   drawElectrodes(signal, theme, limit, scale) {
     const c = this.context;
     const radius = this.large ? 0.82 : 0.75;
-    const colour = [0, 0, 0];
     c.lineWidth = (this.large ? 1.4 : 1) / scale * devicePixelRatio;
     this.electrodes.forEach(({ across_mm: a, along_mm: b, name }, k) => {
       const value = signal ? signal[k] : NaN;
-      mix(theme.scale, Number.isNaN(value) ? 0 : value / limit, colour, 0);
+      const at = 4 * shade(Number.isNaN(value) ? 0 : value / limit);
+      const colour = theme.shades.bytes.subarray(at, at + 3);
       const dead = signal && Number.isNaN(value);
       disc(c, a, b, radius);
-      c.fillStyle = dead ? theme.card : `rgb(${colour.map(Math.round).join(",")})`;
+      c.fillStyle = dead ? theme.card : `rgb(${colour.join(",")})`;
       c.fill();
       c.strokeStyle = theme["skin-edge"];
       c.setLineDash(dead ? [0.3, 0.3] : []);

@@ -26,6 +26,8 @@ class Page {
     this.spectrum = new SpectrumPlot(byId("spectrum-plot"));
     this.link = new Link();
     this.readMs = 0;
+    this.lost = false;
+    this.turn = false;
     this.draws = 0;
     this.drawsPerS = NaN;
     this.drawsSinceMs = performance.now();
@@ -70,7 +72,11 @@ class Page {
     const { health } = this.model;
     if (!news.health) return;
     if (before && before.epoch !== health.epoch) this.hand.clear();
-    if (before && before.link !== health.link && health.link === "live") tell("The board is connected again.");
+    if (health.link === "lost") this.lost = true;
+    else if (this.lost && health.link === "live") {
+      this.lost = false;
+      tell("The board is connected again.");
+    }
     this.showState();
   }
 
@@ -166,10 +172,15 @@ class Page {
     this.limit.follow(largest, nowMs);
     const finger = fingers.get(this.shown);
     this.tip.draw(finger, this.theme, this.limit.counts);
-    this.hand.draw(fingers, this.theme, this.limit.counts);
-    for (const plot of this.plots) plot.draw(finger, this.theme);
-    const pascals = finger?.pacIsFull ? amplitudes(finger.pac).map((v) => v * about.pac_pa_per_count) : null;
-    this.spectrum.draw(pascals, about.pac_hz, this.theme);
+    // What is small or slow takes turns: drawn in every second picture, it leaves a weak computer its 60 a second.
+    this.turn = !this.turn;
+    if (this.turn) {
+      for (const plot of this.plots) plot.draw(finger, this.theme);
+    } else {
+      this.hand.draw(fingers, this.theme, this.limit.counts);
+      const pascals = finger?.pacIsFull ? amplitudes(finger.pac).map((v) => v * about.pac_pa_per_count) : null;
+      this.spectrum.draw(pascals, about.pac_hz, this.theme);
+    }
     this.draws++;
   }
 

@@ -111,7 +111,7 @@ export class TimePlot {
   }
 }
 
-const DECADES = [-1, 3]; // of the amplitude in Pa
+const DECADES = [-2, 3]; // of the amplitude in Pa
 
 export class SpectrumPlot {
   constructor(canvas) {
