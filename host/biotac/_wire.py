@@ -147,6 +147,78 @@ ERROR_DOC: dict[int, str] = {
 }
 
 
+TARE_STATE_DOC: dict[int, str] = {
+    0: "no tare yet: waiting for still frames",
+    1: "tared, nothing touches; the tare follows slow drift",
+    2: "touched; the tare is frozen",
+    3: "railed or dead electrodes; the tare is frozen and no new one is taken",
+}
+
+
+TARE_REASON_DOC: dict[int, str] = {
+    0: "never tared",
+    1: "first still frames after power-up or plug-in",
+    2: "contact ended: signals back at the tare",
+    3: "contact ended with skin hysteresis left over",
+    4: "contact began: tare taken from at least one second before",
+    5: "TARE_NOW command",
+    6: "TARE_SET command",
+}
+
+
+POC_WEIGHTS_DOC: dict[int, str] = {
+    0: "|e|^2, the paper's",
+    1: "max(-e, 0)",
+    2: "min(e, 0)^2",
+}
+
+
+BOARD_DOC: dict[int, str] = {
+    1: "a process on a pty with emulated sensors",
+    2: "Raspberry Pi Pico (RP2040)",
+    3: "a Linux computer with the sensors on its own SPI bus (spidev)",
+}
+
+
+FRAME_FLAG_DOC: dict[int, str] = {
+    1: "the finger is touched",
+    2: "no tare yet: PoC, force and torque are invalid",
+    4: "no weight on any electrode, or no tare: PoC and torque x are invalid",
+    8: "signal energy below four times the contact threshold: the PoC is noisy",
+    16: "an electrode had no good word in this frame and counts as zero signal",
+    32: "an electrode reads 0 or at least 4090",
+    64: "no good pressure word; contact rests on the electrodes alone",
+    128: "no good thermal flux word",
+    256: "no good temperature word",
+    512: "torque x is PoC x force, not measured: the electrodes hardly see it",
+    1024: "force x has two to three times the noise of y and z (always)",
+    2048: "PoC normal within 60 deg of -z, energy over the threshold, four electrodes active",
+    4096: "more than half the energy is bulge: the PoC is likely biased",
+    8192: "in contact for over 60 s: drift has gone untracked",
+    16384: "this frame is the first with a new tare (see the TARE message)",
+    32768: "more than two electrodes railed or missing: do not trust the results",
+    65536: "since the contact began the temperature has moved by over a degree: the tare is doubtful",
+    131072: "some quantity is not subscribed to and marked invalid (SUBSCRIBE)",
+}
+
+
+STREAM_FLAG_DOC: dict[int, str] = {
+    1: "FRAME messages",
+    2: "PAC messages",
+    4: "STATUS and SENSOR_STATUS once per status_period_ms",
+}
+
+
+QUANTITY_FLAG_DOC: dict[int, str] = {
+    1: "point of contact; without it TORSION_OK is never set",
+    2: "force",
+    4: "torque",
+    8: "one-sigma of point of contact and force",
+    16: "a FRAME in every round; without it an untouched finger sends IDLE heartbeats",
+    32: "TOUCH messages",
+}
+
+
 class Setting(IntEnum):
     """Ids of the settings; see SETTINGS for units and ranges."""
 

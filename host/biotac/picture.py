@@ -13,8 +13,8 @@ from . import _wire as wire
 from .frames import electrode_signals
 from .sim.source import Source
 from .stream import Batch
+from .unroll import unroll
 
-RADIUS_MM = sensor.CORE_RADIUS_UM / 1000
 AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")  # x, y, z: dark enough for white paper
 
 
@@ -33,14 +33,6 @@ def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], path: Pat
     draw_force(axes[1], source, frames, source_rows[mine])
     figure.savefig(path, dpi=110)
     plt.close(figure)
-
-
-def unroll(points_mm: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Surface points (n, 3) to arc lengths: across from the ventral line, along the finger, mm."""
-    x, y, z = points_mm.T
-    across = RADIUS_MM * np.arctan2(y, -z)
-    along = np.where(x > 0, RADIUS_MM * np.arcsin(np.clip(x / RADIUS_MM, 0, 1)), x)
-    return across, along
 
 
 def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from .schema import GENERATED, Contract, Field, Message
@@ -82,8 +83,11 @@ def wire(contract: Contract) -> str:
         out += enum_class(camel(name), "IntEnum", enum, "value", "{}")
     for name, flags in link["flags"].items():
         out += enum_class(camel(name) + "Flags", "IntFlag", flags, "bit", "1 << {}")
-    out += ["", "ERROR_DOC: dict[int, str] = {"]
-    out += [f'    {e["value"]}: "{e["doc"]}",' for k, e in link["enum"]["error"].items() if k != "doc"] + ["}", ""]
+    # What each value means, in the contract's words, for whoever shows one to a person.
+    for name, enum in link["enum"].items():
+        out += doc_table(f"{name.upper()}_DOC", ((e["value"], e) for k, e in enum.items() if k != "doc"))
+    for name, flags in link["flags"].items():
+        out += doc_table(f"{name.upper()}_FLAG_DOC", ((1 << e["bit"], e) for k, e in flags.items() if k != "doc"))
     out += ["", "class Setting(IntEnum):", '    """Ids of the settings; see SETTINGS for units and ranges."""', ""]
     out += [f"    {name.upper()} = {s['id']}" for name, s in link["setting"].items()]
     out += ["", "", "class SettingSpec(NamedTuple):", '    """Unit, range and default of one setting."""', ""]
@@ -124,6 +128,10 @@ def enum_class(name: str, base: str, entries: dict[str, Any], key: str, form: st
         if member != "doc":
             out.append(f"    {member} = {form.format(entry[key])}  # {entry['doc']}")
     return [*out, ""]
+
+
+def doc_table(name: str, entries: Iterable[tuple[int, dict[str, Any]]]) -> list[str]:
+    return ["", f"{name}: dict[int, str] = {{", *(f'    {value}: "{e["doc"]}",' for value, e in entries), "}", ""]
 
 
 def dtype_entry(field: Field) -> str:

@@ -10,13 +10,14 @@ import threading
 from collections.abc import Sequence
 
 from ..errors import BiotacError, InputError
-from . import bench, calibration, check, demo, doctor, flash, info, list_ports, record, sim, stream, udev_setup, version
+from . import bench, calibration, check, demo, doctor, flash, info, list_ports, record, sim, stream, udev_setup, version, view
 
 VERBS = (
     demo,
     list_ports,
     doctor,
     info,
+    view,
     stream,
     record,
     check,

@@ -27,7 +27,7 @@ class Recording:
     """A recording in memory.
 
     ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``wire`` the
-    FRAME messages as sent, ``messages`` the rest (tare changes, status). ``settings`` are the board's and
+    FRAME messages as sent, ``idle`` the heartbeats (IDLE_DTYPE), ``messages`` the rest (tare changes, status). ``settings`` are the board's and
     ``calibrations`` those in force, by finger, when it began. ``problems`` lists in words
     what is missing or damaged; the rest is good. ``cut_off``: the file ends without its index;
     ``damaged_chunks``: seconds that were left out. Raises RecordingError when nothing can be read.
@@ -62,6 +62,7 @@ class Recording:
         self.frames: StructArray = batch.frames
         self.wire: StructArray = batch.wire
         self.pac: StructArray = batch.pac
+        self.idle: StructArray = batch.idle
         self.messages: list[Any] = batch.messages
         self.counts = decoder.counts
         self.frames_lost = decoder.lost

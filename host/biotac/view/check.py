@@ -1,0 +1,161 @@
+"""The page asked for by a program in place of a browser: is everything there, and does it tell the truth?"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html.parser import HTMLParser
+from itertools import pairwise
+from typing import Any
+
+from .server import TOKEN_HEADER
+from .serving import Viewing
+
+SOURCE = "sim:press.toml?fingers=5&seconds=60"
+ROUNDS = 20
+PATIENCE_S = 30.0
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was seen. ``problems``: in words, empty when all is well."""
+
+    files: int
+    bytes: int
+    fingers: int
+    frames: int
+    problems: list[str]
+
+
+def check() -> Checked:
+    """Serve a simulated hand of five fingers, fetch the page with all its files, and the first rounds of frames."""
+    problems: list[str] = []
+    with Viewing(SOURCE, port=0) as viewing:
+        port = viewing.server.server_port
+        names = linked(get(port, "/").decode())
+        sizes = [len(get(port, "/"))] + [len(get(port, f"/{name}")) for name in names]
+        missing = sorted(set(viewing.server.files) - set(names) - {"index.html"} - imported(viewing.server.files))
+        problems += [f"nothing uses {name}" for name in missing]
+        about, frames = first_frames(port)
+        problems += judge(about, frames)
+        problems += judge_commands(port, about["token"])
+        seen = {row["finger"] for row in frames}
+        return Checked(len(viewing.server.files), sum(sizes), len(seen), len(frames), problems)
+
+
+def get(port: int, path: str) -> bytes:
+    """Body of a page that must be there."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
+    try:
+        connection.request("GET", path)
+        answer = connection.getresponse()
+        body = answer.read()
+        if answer.status != 200:
+            raise ConnectionError(f"{path} was answered with {answer.status}")
+        return body
+    finally:
+        connection.close()
+
+
+class _Links(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.names: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        wanted = {"script": "src", "link": "href", "img": "src"}.get(tag)
+        self.names += [value for key, value in attrs if key == wanted and value]
+
+
+def linked(html: str) -> list[str]:
+    """What a page loads."""
+    parser = _Links()
+    parser.feed(html)
+    return parser.names
+
+
+def imported(files: dict[str, bytes]) -> set[str]:
+    """Modules that another module names in an import."""
+    code = b"".join(body for name, body in files.items() if name.endswith(".js")).decode()
+    return {name for name in files if f'"./{name}"' in code}
+
+
+def first_frames(port: int) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """What the stream says first, and ROUNDS frames of every finger."""
+    about: dict[str, Any] = {}
+    rows: list[dict[str, Any]] = []
+    deadline_s = time.monotonic() + PATIENCE_S
+    for name, data in events(port):
+        if name == "about":
+            about = data
+        else:
+            rows += [dict(zip(about["frame_row"], row, strict=True)) for row in data["frames"]]
+        if len(rows) >= ROUNDS * about["fingers"] or time.monotonic() > deadline_s:
+            break
+    return about, rows
+
+
+def events(port: int) -> Iterator[tuple[str, Any]]:
+    """Name and JSON of server-sent events, as they come."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
+    try:
+        connection.request("GET", "/events", headers={"Accept": "text/event-stream"})
+        answer = connection.getresponse()
+        name = "message"
+        while line := answer.readline().decode().rstrip("\n"):
+            if line.startswith("event: "):
+                name = line.removeprefix("event: ")
+            elif line.startswith("data: "):
+                yield name, json.loads(line.removeprefix("data: "))
+                name = "message"
+                answer.readline()
+            elif line.startswith(":"):
+                answer.readline()
+    finally:
+        connection.close()
+
+
+def judge(about: dict[str, Any], frames: list[dict[str, Any]]) -> list[str]:
+    """What is wrong with the first frames."""
+    problems = []
+    electrodes = len(about["electrodes"])
+    for finger in range(about["fingers"]):
+        mine = [row for row in frames if row["finger"] == finger]
+        if not mine:
+            problems.append(f"finger {finger} sent nothing")
+        steps = {b["seq"] - a["seq"] for a, b in pairwise(mine)}
+        if steps - {1}:
+            problems.append(f"finger {finger}: sequence numbers step by {sorted(steps)}")
+        if any(len(row["signal_q4"]) != electrodes for row in mine):
+            problems.append(f"finger {finger}: a frame without its {electrodes} electrodes")
+    return problems
+
+
+def judge_commands(port: int, token: str) -> list[str]:
+    """A stranger's command must be refused, our own answered."""
+    problems = []
+    for what, headers, wanted in (
+        ("without the page's token", {}, {403}),
+        ("from another origin", {TOKEN_HEADER: token, "Origin": "http://example.org"}, {403}),
+        # refused (409) while the finger moves, which is for the board to say
+        ("of the page", {TOKEN_HEADER: token}, {200, 409}),
+    ):
+        status = post(port, {"do": "tare", "finger": 0}, headers)
+        if status not in wanted:
+            problems.append(f"a command {what} was answered with {status}")
+    return problems
+
+
+def post(port: int, wish: dict[str, Any], headers: dict[str, str]) -> int:
+    """Status of a command."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
+    try:
+        connection.request("POST", "/command", json.dumps(wish), {"Content-Type": "application/json"} | headers)
+        answer = connection.getresponse()
+        answer.read()
+        return answer.status
+    finally:
+        connection.close()

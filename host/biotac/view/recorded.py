@@ -1,0 +1,109 @@
+"""A recording for the page: the same batches, at the pace they were made."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..frames import StructArray
+from ..recording import Recording
+from ..stream import Batch, LinkStats
+from .live import describe
+from .player import Recorded
+
+TICK_S = 1 / 60
+
+
+class RecordedPlayer:
+    """Plays ``recording`` once at ``pace`` recorded seconds per second; 0 plays all of it at once."""
+
+    live = False
+
+    def __init__(self, recording: Recording, pace: float = 1.0) -> None:
+        self._recording = recording
+        self._pace = pace
+        self._tick = threading.Event()  # never set: its wait is a sleep that close() ends
+        self.paused = False
+        self.board = f"{describe(recording.info)}, recorded on {recording.metadata['port']}"
+        self._frames = 0
+        parts = [rows["t_us"] for rows in (recording.frames, recording.pac, recording.idle) if len(rows)]
+        if not parts:
+            raise InputError(f"{recording.path} holds no frames; record it again")
+        self._begin_us = min(int(t.min()) for t in parts)
+        # Messages carry 32 bits of the clock that rows carry unwrapped.
+        self._messages = sorted(
+            ((self._unwrap(m.t_us), k, m) for k, m in enumerate(recording.messages) if hasattr(m, "t_us")),
+            key=lambda item: item[:2],
+        )
+        self._end_us = max([int(t.max()) for t in parts] + [t_us for t_us, _, _ in self._messages]) + 1
+
+    def _unwrap(self, t_us: int) -> int:
+        return self._begin_us + (t_us - self._begin_us + 2**31) % 2**32 - 2**31
+
+    def batches(self) -> Iterator[Batch]:
+        """See Player."""
+        orders = [np.argsort(rows["t_us"], kind="stable") for rows in self._rows()]
+        done = [0] * len(orders)
+        said = 0
+        now_us = float(self._begin_us)
+        before_s = time.monotonic()
+        while now_us < self._end_us:
+            self._tick.wait(TICK_S if self._pace or self.paused else 0)
+            passed_s, before_s = time.monotonic() - before_s, time.monotonic()
+            if not self.paused:
+                now_us = now_us + passed_s * 1e6 * self._pace if self._pace else float(self._end_us)
+            picked: list[NDArray[Any]] = []
+            for k, (rows, order) in enumerate(zip(self._rows(), orders, strict=True)):
+                until = int(np.searchsorted(rows["t_us"][order], now_us))
+                picked.append(order[done[k] : until])
+                done[k] = until
+            begin = said
+            while said < len(self._messages) and self._messages[said][0] < now_us:
+                said += 1
+            self._frames += len(picked[0])
+            recording = self._recording
+            yield Batch(
+                recording.wire[picked[0]],
+                recording.frames[picked[0]],
+                recording.pac[picked[1]],
+                recording.idle[picked[2]],
+                [m for _, _, m in self._messages[begin:said]],
+            )
+
+    def _rows(self) -> tuple[StructArray, StructArray, StructArray]:
+        return self._recording.frames, self._recording.pac, self._recording.idle
+
+    def stats(self) -> LinkStats:
+        """See Player: what the whole recording says, with the frames shown so far."""
+        recording = self._recording
+        return LinkStats(
+            bytes_received=recording.path.stat().st_size,
+            frames=self._frames,
+            frames_lost=recording.frames_lost,
+            pac_lost=0,
+            disordered=0,
+            crc_errors=recording.counts.bad_crc,
+            other_errors=recording.counts.bad - recording.counts.bad_crc,
+        )
+
+    def recording(self) -> Recorded | None:
+        """See Player."""
+        return None
+
+    def do(self, command: str, finger: int | None) -> str:
+        """See Player."""
+        if command in ("pause", "resume"):
+            self.paused = command == "pause"
+            return "paused" if self.paused else "playing on"
+        what = {"tare": "tared", "record": "recorded again", "stop": "stopped"}.get(command, command)
+        raise InputError(f"a recording cannot be {what}; open a board for that")
+
+    def close(self) -> None:
+        """See Player."""
+        self._tick.set()

@@ -1,0 +1,147 @@
+"""Frames as compact JSON, in the wire's own integers: nothing is rounded on its way to the page.
+
+static/model.js reads these rows; ``FRAME_ROW`` names their columns and is sent to it first.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _sensor as sensor
+from .. import _wire as wire
+from ..frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, StructArray
+from ..stream import Batch
+from ..unroll import unroll
+
+TARE_Q4_PER_COUNT = 16
+
+#: ``signal_q4``: count - tare in 1/16 count (19), null where either is missing. ``map_um``: where the
+#: point of contact is on the unrolled skin, across and along; null where it is invalid.
+FRAME_ROW = (
+    "finger",
+    "seq",
+    "t_us",
+    "flags",
+    "tare_state",
+    "signal_q4",
+    "pdc",
+    "tac",
+    "tdc",
+    "poc_um",
+    "force_100un",
+    "torque_mnmm",
+    "map_um",
+)
+PAC_ROW = ("finger", "seq", "t_us", "pac")
+
+SCALES = {
+    "signal_q4": TARE_Q4_PER_COUNT,
+    "poc_um": UM_PER_MM,
+    "force_100un": FORCE_LSB_PER_N,
+    "torque_mnmm": MNMM_PER_NMM,
+}
+
+
+def frame_rows(batch: Batch) -> list[str]:
+    """One JSON text per FRAME and per heartbeat, oldest first."""
+    messages, frames, idle = batch.wire, batch.frames, batch.idle
+    signals = with_null(signal_q4(messages), wire.INVALID_I32)
+    columns = zip(
+        frames["finger"].tolist(),
+        frames["seq"].tolist(),
+        frames["t_us"].tolist(),
+        frames["flags"].tolist(),
+        messages["tare_state"].tolist(),
+        signals,
+        *(with_null(messages[name], wire.INVALID_COUNT) for name in ("pdc", "tac", "tdc")),
+        with_null(messages["poc_um"], wire.INVALID_I16),
+        with_null(messages["force_100un"], wire.INVALID_I32),
+        with_null(messages["torque_mnmm"], wire.INVALID_I32),
+        map_um(frames),
+        strict=True,
+    )
+    timed = [(row[2], compact(row)) for row in columns]
+    for row in idle:
+        values = {name: row[name].item() for name in ("finger", "seq", "t_us", "flags")}
+        values |= {name: with_null(row[name], wire.INVALID_COUNT) for name in ("pdc", "tdc")}
+        timed.append((values["t_us"], compact([values.get(name) for name in FRAME_ROW])))
+    return [text for _, text in sorted(timed, key=lambda item: item[0])]
+
+
+def pac_rows(batch: Batch) -> list[str]:
+    """One JSON text per PAC block."""
+    rows = batch.pac
+    columns = (rows["finger"].tolist(), rows["seq"].tolist(), rows["t_us"].tolist())
+    return [compact(row) for row in zip(*columns, with_null(rows["pac"], wire.INVALID_COUNT), strict=True)]
+
+
+def signal_q4(messages: StructArray) -> NDArray[np.int32]:
+    """e of FRAME messages in 1/16 count, (n, 19); INVALID_I32 where count or tare is missing."""
+    counts, tare_q4 = messages["counts"], messages["tare_q4"]
+    missing = (counts == wire.INVALID_COUNT) | (tare_q4 == wire.INVALID_COUNT)
+    signals: NDArray[np.int32] = counts.astype(np.int32) * TARE_Q4_PER_COUNT - tare_q4
+    signals[missing] = wire.INVALID_I32
+    return signals
+
+
+def map_um(frames: StructArray) -> list[list[int] | None]:
+    """The column of that name for FRAME_DTYPE rows."""
+    across, along = unroll(frames["poc_mm"])
+    places = np.stack([across, along], axis=1) * UM_PER_MM
+    good = np.isfinite(across + along)
+    whole = np.rint(np.where(good[:, None], places, 0.0)).astype(np.int64).tolist()
+    return [place if ok else None for place, ok in zip(whole, good.tolist(), strict=True)]
+
+
+def with_null(values: NDArray[Any], invalid: int) -> Any:
+    """Python lists of any depth, with None for ``invalid``; quick where nothing is."""
+    if not np.any(values == invalid):
+        return values.tolist()
+    out = values.astype(object)
+    out[values == invalid] = None
+    return out.tolist() if isinstance(out, np.ndarray) else out
+
+
+def compact(value: Any) -> str:
+    """JSON without spaces; NaN would be no JSON, and is a mistake."""
+    return json.dumps(value, separators=(",", ":"), allow_nan=False)
+
+
+def facts() -> dict[str, Any]:
+    """What the page has to know before its first row: geometry, scales, and the contract's words."""
+    electrodes = np.array(sensor.ELECTRODE_UM) / UM_PER_MM
+    across, along = unroll(electrodes)
+    return {
+        "frame_row": FRAME_ROW,
+        "pac_row": PAC_ROW,
+        "scales": SCALES,
+        "fingers": sensor.MAX_SENSORS,
+        "electrodes": [
+            {"name": name, "across_mm": a, "along_mm": b}
+            for name, a, b in zip(sensor.ELECTRODE_NAMES, across.tolist(), along.tolist(), strict=True)
+        ],
+        "frame_hz": sensor.SLOT_HZ / len(sensor.SLOTS),
+        "pac_hz": sensor.SLOT_HZ * sensor.SLOTS.count("PAC") / len(sensor.SLOTS),
+        "pac_pa_per_count": sensor.PAC_PA_PER_COUNT,
+        "flags": [
+            {"mask": int(flag), "name": flag.name, "words": wire.FRAME_FLAG_DOC[int(flag)], "warns": flag not in CALM}
+            for flag in wire.FrameFlags
+        ],
+        "tare_states": {int(s): {"name": s.name, "words": wire.TARE_STATE_DOC[s]} for s in wire.TareState},
+        "tare_reasons": {int(r): {"name": r.name, "words": wire.TARE_REASON_DOC[r]} for r in wire.TareReason},
+    }
+
+
+#: Flags that say how it is; every other one says that something is doubtful.
+CALM = (
+    wire.FrameFlags.CONTACT
+    | wire.FrameFlags.MX_DERIVED
+    | wire.FrameFlags.FX_WEAK
+    | wire.FrameFlags.TORSION_OK
+    | wire.FrameFlags.TARE_CHANGED
+    | wire.FrameFlags.NOT_ASKED
+)

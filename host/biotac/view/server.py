@@ -1,0 +1,178 @@
+"""HTTP on 127.0.0.1: static files, one stream of events, one address for commands.
+
+Any page that a browser shows can send requests here, so commands need a secret that only our own page can
+read (another origin's requests for it are answered, but not shown to it), and requests under a foreign
+name are refused: a name that its owner points at 127.0.0.1 would make our page his.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+import socket
+import sys
+import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib import resources
+from typing import Any
+
+from ..errors import BiotacError, PortError
+from .reader import Reader
+from .rows import compact, facts
+from .state import State
+
+HOST = "127.0.0.1"
+TOKEN_HEADER = "X-Biotac-Token"
+EVENT_S = 1 / 60  # no browser draws more often
+QUIET_S = 1.0  # then a comment is sent, which is how a browser that left is noticed
+# Small, so that a slow browser is late by a fraction of a second and then misses rows, not by megabytes.
+SEND_BUFFER_BYTES = 1 << 16
+SEND_TIMEOUT_S = 10.0
+MAX_BODY_BYTES = 1000
+TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+}
+GUARDS = {
+    "Content-Security-Policy": "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+
+
+class ViewServer(ThreadingHTTPServer):
+    """Serves ``state`` and takes commands to ``reader``. Raises PortError when ``port`` is taken."""
+
+    daemon_threads = True
+    block_on_close = False
+
+    def __init__(self, state: State, reader: Reader, port: int) -> None:
+        self.state = state
+        self.reader = reader
+        self.token = secrets.token_urlsafe(24)
+        self.files = static_files()
+        try:
+            super().__init__((HOST, port), Handler)
+        except OSError as error:
+            raise PortError(f"{HOST}:{port} cannot be served ({error.strerror}); --port 0 takes a free one") from error
+        self.names = {f"{name}:{self.server_port}" for name in (HOST, "localhost")}
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return f"http://{HOST}:{self.server_port}/"
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that goes away in the middle of an answer is nobody's error; anything else is ours."""
+        if not isinstance(sys.exc_info()[1], (ConnectionError, TimeoutError)):
+            super().handle_error(request, client_address)
+
+
+class Handler(BaseHTTPRequestHandler):
+    """One request."""
+
+    server: ViewServer
+    server_version = "biotac"
+    sys_version = ""
+    protocol_version = "HTTP/1.1"
+    timeout = SEND_TIMEOUT_S
+
+    def do_GET(self) -> None:
+        """Static files and events."""
+        if not self._known_name():
+            return
+        path = self.path.partition("?")[0]
+        name = "index.html" if path == "/" else path.removeprefix("/")
+        if path == "/events":
+            self._events()
+        elif name in self.server.files:
+            self._answer(200, TYPES[name[name.rindex(".") :]], self.server.files[name])
+        else:
+            self._words(404, f"nothing is at {path}")
+
+    def do_POST(self) -> None:
+        """Commands: ``{"do": "tare", "finger": 0}``, answered with ``{"words": ...}``."""
+        self.close_connection = True  # whatever of a refused body was not read ends with it
+        if not self._known_name():
+            return
+        if not secrets.compare_digest(self.headers.get(TOKEN_HEADER, "").encode(), self.server.token.encode()):
+            self._words(403, "this page is of another run of the program; reload it")
+            return
+        if self.path != "/command":
+            self._words(404, f"nothing is at {self.path}")
+            return
+        try:
+            name, finger = parse_command(self._body())
+            self._words(200, self.server.reader.ask(name, finger))
+        except ValueError as error:
+            self._words(400, str(error))
+        except (BiotacError, OSError) as error:
+            self._words(409, str(error))
+
+    def _body(self) -> bytes:
+        length = self.headers.get("Content-Length", "")
+        if not length.isascii() or not length.isdigit() or int(length) > MAX_BODY_BYTES:
+            raise ValueError(f"a body of {length or 'unknown'} bytes, expected at most {MAX_BODY_BYTES}")
+        return self.rfile.read(int(length))
+
+    def _known_name(self) -> bool:
+        origin = self.headers.get("Origin")
+        here = self.headers.get("Host", "") in self.server.names
+        if here and (origin is None or origin.removeprefix("http://") in self.server.names):
+            return True
+        self.close_connection = True
+        self._words(403, f"this page is only at {self.server.url}")
+        return False
+
+    def _events(self) -> None:
+        self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+        self.close_connection = True
+        self._head(200, "text/event-stream", {"Connection": "close"})
+        state = self.server.state
+        cursor = state.cursor()
+        about = facts() | {"token": self.server.token, "token_header": TOKEN_HEADER}
+        self._send(f"retry: 500\nevent: about\ndata: {compact(about)}\n\n")
+        while not state.closed:
+            begin_s = time.monotonic()
+            text = state.wait(cursor, QUIET_S)
+            self._send(f"data: {text}\n\n" if text else ": nothing new\n\n")
+            time.sleep(max(0.0, begin_s + EVENT_S - time.monotonic()))
+
+    def _send(self, text: str) -> None:
+        self.wfile.write(text.encode())
+
+    def _words(self, status: int, words: str) -> None:
+        self._answer(status, "application/json", compact({"words": words}).encode())
+
+    def _answer(self, status: int, kind: str, body: bytes) -> None:
+        self._head(status, kind, {"Content-Length": str(len(body))})
+        self.wfile.write(body)
+
+    def _head(self, status: int, kind: str, more: dict[str, str]) -> None:
+        self.send_response(status)
+        for name, value in ({"Content-Type": kind} | GUARDS | more).items():
+            self.send_header(name, value)
+        self.end_headers()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """A library does not print."""
+
+
+def parse_command(body: bytes) -> tuple[str, int | None]:
+    """Name and finger of a command's JSON; ValueError for anything else."""
+    wish = json.loads(body)
+    name = wish.get("do") if isinstance(wish, dict) else None
+    finger = wish.get("finger") if isinstance(wish, dict) else None
+    if not isinstance(name, str) or not (finger is None or type(finger) is int):
+        raise ValueError('expected {"do": NAME, "finger": NUMBER or null}')
+    return name, finger
+
+
+def static_files() -> dict[str, bytes]:
+    """Every file of the page by its name; nothing else can be asked for."""
+    folder = resources.files("biotac.view").joinpath("static")
+    return {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name.endswith(tuple(TYPES))}

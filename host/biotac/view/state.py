@@ -1,0 +1,216 @@
+"""What the page shows, between the one thread that reads and the many that serve.
+
+The reader never waits for a browser: rows go into rings, and whoever is too slow finds the oldest gone and
+is told how many.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from dataclasses import asdict, dataclass, field
+from itertools import islice
+from typing import Any
+
+from .. import _wire as wire
+from ..stream import Batch, LinkStats
+from .player import Player
+from .rows import compact, frame_rows, pac_rows
+
+KEPT_ROWS = 300  # of each kind: 0.6 s of five fingers, more than a picture is ever late
+HEALTH_S = 0.25
+RATE_S = 2.0
+
+
+class Ring:
+    """The latest texts, each with a running number."""
+
+    def __init__(self, kept: int) -> None:
+        self._texts: deque[str] = deque(maxlen=kept)
+        self.end = 0
+
+    def extend(self, texts: list[str]) -> None:
+        """Append; the oldest make room."""
+        self._texts.extend(texts)
+        self.end += len(texts)
+
+    def clear(self) -> None:
+        """Forget the texts; the numbers go on."""
+        self._texts.clear()
+
+    @property
+    def begin(self) -> int:
+        """Number of the oldest that is still there."""
+        return self.end - len(self._texts)
+
+    def since(self, begin: int) -> tuple[list[str], int]:
+        """What came from number ``begin`` on and is still there, and how many of it are gone."""
+        held = min(self.end - begin, len(self._texts))
+        return list(islice(self._texts, len(self._texts) - held, None)), self.end - begin - held
+
+
+@dataclass
+class Cursor:
+    """How far one browser has come."""
+
+    frames: int
+    pac: int
+    health: int = -1
+    dropped: int = 0  # frames it was too slow for
+
+
+@dataclass
+class Health:
+    """Everything but the rows. ``link``: opening, live, playing, paused, over or lost; ``words`` tells why."""
+
+    link: str = "opening"
+    words: str = ""
+    source: str = ""
+    board: str = ""
+    live: bool = True
+    epoch: int = 0  # of what plays: numbers and times start anew
+    frames_per_s: float = 0.0
+    stats: dict[str, int] = field(default_factory=dict)
+    status: dict[str, int] = field(default_factory=dict)
+    fingers: dict[int, dict[str, Any]] = field(default_factory=dict)
+    recording: dict[str, Any] | None = None
+
+
+class State:
+    """Written by the reader, read by anybody."""
+
+    def __init__(self, source: str) -> None:
+        self._news = threading.Condition()
+        self._frames = Ring(KEPT_ROWS)
+        self._pac = Ring(KEPT_ROWS)
+        self._health = Health(source=source, words=f"opening {source}")
+        self._health_text = ""
+        self._health_number = 0
+        self._health_due_s = 0.0
+        self._arrived: deque[tuple[float, int]] = deque()
+        self._closed = False
+        with self._news:
+            self._publish()
+
+    # ---- the reader's side ---------------------------------------------------------------------
+
+    def say(self, link: str, words: str) -> None:
+        """Change the link's state, and tell everybody at once."""
+        with self._news:
+            self._health.link, self._health.words = link, words
+            if link in ("lost", "opening"):
+                self._health.frames_per_s = 0.0
+                self._health.recording = None
+                self._arrived.clear()
+            self._publish()
+
+    def begin(self, player: Player) -> None:
+        """A new playing: counters and tares of the one before are nobody's."""
+        with self._news:
+            self._health.epoch += 1
+            self._frames.clear()
+            self._pac.clear()
+            self._health.board, self._health.live = player.board, player.live
+            self._health.status, self._health.fingers = {}, {}
+            self._arrived.clear()
+
+    def take(self, batch: Batch, player: Player) -> None:
+        """Add what came."""
+        frames, pac = frame_rows(batch), pac_rows(batch)
+        now_s = time.monotonic()
+        with self._news:
+            self._frames.extend(frames)
+            self._pac.extend(pac)
+            self._arrived.append((now_s, len(batch.frames)))
+            for message in batch.messages:
+                self._take_message(message)
+            for finger, t_us in zip(batch.frames["finger"].tolist(), batch.frames["t_us"].tolist(), strict=True):
+                self._finger(finger)["t_us"] = t_us
+            if now_s >= self._health_due_s:
+                self._measure(player.stats(), now_s)
+                recorded = player.recording()
+                self._health.recording = asdict(recorded) if recorded else None
+                self._publish()
+            elif frames or pac:
+                self._news.notify_all()
+
+    def _finger(self, finger: int) -> dict[str, Any]:
+        return self._health.fingers.setdefault(finger, {"present": 1})
+
+    def _take_message(self, message: Any) -> None:
+        if isinstance(message, wire.Status):
+            self._health.status = asdict(message)
+        elif isinstance(message, wire.SensorStatus):
+            self._finger(message.finger).update(
+                asdict(message),
+                status_t_us=message.t_us,
+                t_us=message.t_us,
+            )
+        elif isinstance(message, wire.Tare):
+            self._finger(message.finger).update(
+                tare_state=message.tare_state, tare_reason=message.reason, tare_age_ms=0, status_t_us=message.t_us
+            )
+
+    def _measure(self, stats: LinkStats, now_s: float) -> None:
+        while len(self._arrived) > 1 and now_s - self._arrived[0][0] > RATE_S:
+            self._arrived.popleft()
+        span_s = now_s - self._arrived[0][0]
+        # The first batch only says when counting began.
+        rate = sum(count for _, count in islice(self._arrived, 1, None)) / span_s if span_s > 0 else 0.0
+        self._health.frames_per_s = round(rate, 1)
+        self._health.stats = asdict(stats)
+
+    def _publish(self) -> None:
+        health = asdict(self._health)
+        health["fingers"] = [tared(finger, facts) for finger, facts in sorted(self._health.fingers.items())]
+        self._health_text = compact(health)
+        self._health_number += 1
+        self._health_due_s = time.monotonic() + HEALTH_S
+        self._news.notify_all()
+
+    def close(self) -> None:
+        """Let everybody who waits go."""
+        with self._news:
+            self._closed = True
+            self._news.notify_all()
+
+    # ---- the browsers' side --------------------------------------------------------------------
+
+    @property
+    def closed(self) -> bool:
+        """Nothing comes any more."""
+        return self._closed
+
+    def cursor(self) -> Cursor:
+        """Where a new browser starts: with the latest rows, so that it shows something even when nothing comes."""
+        with self._news:
+            return Cursor(self._frames.begin, self._pac.begin)
+
+    def wait(self, cursor: Cursor, timeout_s: float) -> str:
+        """Wait for news; return them as one JSON text and move ``cursor``. Empty after timeout_s without any."""
+        with self._news:
+            self._news.wait_for(lambda: self._closed or self._is_news(cursor), timeout_s)
+            if not self._is_news(cursor):
+                return ""
+            frames, lost = self._frames.since(cursor.frames)
+            pac, _ = self._pac.since(cursor.pac)
+            health = self._health_text if cursor.health != self._health_number else "null"
+            cursor.frames, cursor.pac, cursor.health = self._frames.end, self._pac.end, self._health_number
+        cursor.dropped += lost
+        parts = f'"frames":[{",".join(frames)}],"pac":[{",".join(pac)}]'
+        return f'{{{parts},"health":{health},"dropped":{cursor.dropped}}}'
+
+    def _is_news(self, cursor: Cursor) -> bool:
+        mine = (cursor.frames, cursor.pac, cursor.health)
+        return mine != (self._frames.end, self._pac.end, self._health_number)
+
+
+def tared(finger: int, facts: dict[str, Any]) -> dict[str, Any]:
+    """A finger's facts with the tare's age as of its latest frame; the board tells it only once a second."""
+    out = {"finger": finger} | {k: v for k, v in facts.items() if k not in ("t_us", "status_t_us", "req_id")}
+    if "tare_age_ms" in facts:
+        later_ms = (facts["t_us"] - facts["status_t_us"]) % 2**32 // 1000
+        # A frame older than the status makes the difference wrap: no age is that long.
+        out["tare_age_ms"] = facts["tare_age_ms"] + (later_ms if later_ms < 2**31 // 1000 else 0)
+    return out

@@ -1,0 +1,61 @@
+// Buttons and keys. A key does what its button does, and is refused when that is.
+
+const KEYS = [
+  ["T", "tare the finger that is shown"],
+  ["A", "tare all fingers"],
+  ["R", "start or stop a recording"],
+  ["P", "pause or go on"],
+  ["G", "play again, when it is over"],
+  ["0 … 4", "show that finger"],
+  ["← →", "show its neighbour"],
+  ["D", "theme: system, light, dark"],
+  ["?", "this list"],
+  ["Tab, Enter", "go to a button, press it"],
+];
+const BUTTONS = { t: "tare", a: "tare-all", r: "record", p: "pause", g: "again", d: "theme", "?": "help" };
+
+export function wireControls({ actions, pick, step }) {
+  const byId = (id) => document.getElementById(id);
+  for (const [id, act] of Object.entries(actions)) byId(id).addEventListener("click", act);
+  const keys = byId("keys");
+  byId("help").addEventListener("click", () => keys.showModal());
+  byId("key-list").replaceChildren(...KEYS.flatMap(([key, words]) => {
+    const term = document.createElement("dt");
+    const kbd = Object.assign(document.createElement("kbd"), { textContent: key });
+    term.append(kbd);
+    return [term, Object.assign(document.createElement("dd"), { textContent: words })];
+  }));
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || keys.open) return;
+    const button = byId(BUTTONS[event.key.toLowerCase()] ?? "");
+    if (button && !button.hidden) button.click();
+    else if (/^[0-9]$/.test(event.key)) pick(Number(event.key));
+    else if (event.key === "ArrowLeft") step(-1);
+    else if (event.key === "ArrowRight") step(1);
+    else return;
+    event.preventDefault();
+  });
+}
+
+const THEMES = ["system", "light", "dark"];
+
+export class ThemeSwitch {
+  constructor(changed) {
+    this.changed = changed;
+    this.set(localStorage.getItem("theme") ?? "system");
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", changed);
+  }
+
+  next() {
+    this.set(THEMES[(THEMES.indexOf(this.theme) + 1) % THEMES.length]);
+  }
+
+  set(theme) {
+    this.theme = THEMES.includes(theme) ? theme : "system";
+    localStorage.setItem("theme", this.theme);
+    if (this.theme === "system") delete document.documentElement.dataset.theme;
+    else document.documentElement.dataset.theme = this.theme;
+    document.getElementById("theme-words").textContent = this.theme;
+    this.changed();
+  }
+}

@@ -1,0 +1,53 @@
+// The fingers side by side, each a button that shows it large.
+
+import { Fingertip } from "./fingertip.js";
+import { number } from "./readout.js";
+
+export class HandRow {
+  constructor(place, about, pick) {
+    this.place = place;
+    this.about = about;
+    this.pick = pick;
+    this.clear();
+  }
+
+  clear() {
+    this.entries = new Map();
+    this.place.replaceChildren();
+  }
+
+  // Fingers appear when they first send, and stay.
+  sync(fingers) {
+    if (fingers.size === this.entries.size) return;
+    this.clear();
+    for (const index of [...fingers.keys()].sort((a, b) => a - b)) {
+      const button = Object.assign(document.createElement("button"), { type: "button", className: "finger" });
+      button.dataset.finger = index;
+      button.setAttribute("aria-keyshortcuts", String(index));
+      const canvas = document.createElement("canvas");
+      canvas.setAttribute("aria-hidden", "true");
+      const force = Object.assign(document.createElement("span"), { className: "force" });
+      const name = Object.assign(document.createElement("b"), { textContent: String(index) });
+      name.setAttribute("aria-label", `Finger ${index}`);
+      button.append(canvas, name, force);
+      button.addEventListener("click", () => this.pick(index));
+      this.place.append(button);
+      this.entries.set(index, { button, force, tip: new Fingertip(canvas, this.about.electrodes, { large: false }) });
+    }
+  }
+
+  mark(shown) {
+    for (const [index, { button }] of this.entries) button.setAttribute("aria-pressed", String(index === shown));
+  }
+
+  draw(fingers, theme, limit) {
+    for (const [index, { tip }] of this.entries) tip.draw(fingers.get(index), theme, limit);
+  }
+
+  read(fingers) {
+    for (const [index, { force }] of this.entries) {
+      const newtons = Math.hypot(...fingers.get(index).latest.forceN);
+      force.textContent = Number.isFinite(newtons) ? `${number(newtons, 1)} N` : "no tare";
+    }
+  }
+}

@@ -1,0 +1,207 @@
+// Puts the page together: the stream fills a model, one loop draws it, buttons send commands.
+
+import { Limit, readTheme } from "./colours.js";
+import { ThemeSwitch, wireControls } from "./controls.js";
+import { Fingertip } from "./fingertip.js";
+import { HandRow } from "./hand.js";
+import { Model, SPECTRUM_SAMPLES } from "./model.js";
+import { SpectrumPlot, TimePlot } from "./plots.js";
+import { Flags, Link, Results, number, showLink, showTare, tell } from "./readout.js";
+import { amplitudes } from "./spectrum.js";
+import { Stream } from "./stream.js";
+
+const READ_MS = 100; // numbers that change faster cannot be read
+
+const byId = (id) => document.getElementById(id);
+
+class Page {
+  constructor() {
+    this.shown = 0;
+    this.frozen = false; // pause of a board: only the picture stands still
+    this.limit = new Limit();
+    this.plots = [
+      new TimePlot(byId("force-plot"), ["x", "y", "z"], ["x", "y", "z"], { least: 1, digits: 1, zero: true }),
+      new TimePlot(byId("pdc-plot"), ["pdc"], ["text"], { least: 20, digits: 0, zero: false }),
+    ];
+    this.spectrum = new SpectrumPlot(byId("spectrum-plot"));
+    this.link = new Link();
+    this.readMs = 0;
+    this.lost = false;
+    this.turn = false;
+    this.draws = 0;
+    this.drawsPerS = NaN;
+    this.drawsSinceMs = performance.now();
+    this.themes = new ThemeSwitch(() => (this.theme = readTheme()));
+    this.stream = new Stream({
+      about: (facts) => this.meet(facts),
+      update: (news) => this.take(news),
+      gone: () => this.lose(),
+    });
+    wireControls({
+      actions: {
+        tare: () => this.command("tare", this.shown),
+        "tare-all": () => this.command("tare"),
+        record: () => this.command(this.model?.health?.recording ? "stop" : "record"),
+        pause: () => this.pause(),
+        again: () => this.command("again"),
+        theme: () => this.themes.next(),
+      },
+      pick: (index) => this.pick(index),
+      step: (by) => this.step(by),
+    });
+    requestAnimationFrame((ms) => this.loop(ms));
+  }
+
+  // ---- the stream --------------------------------------------------------------------------
+
+  meet(about) {
+    if (this.model) tell("Connected to the viewer program again.");
+    this.model = new Model(about);
+    this.tip = new Fingertip(byId("fingertip-canvas"), about.electrodes, { large: true });
+    this.hand = new HandRow(byId("fingers"), about, (index) => this.pick(index));
+    this.results = new Results(about);
+    this.flags = new Flags(about);
+    this.masks = Object.fromEntries(about.flags.map(({ name, mask }) => [name, mask]));
+    const hz = about.pac_hz / SPECTRUM_SAMPLES;
+    byId("spectrum-words").textContent = `${SPECTRUM_SAMPLES} samples, ${number(hz, 1)} Hz apart`;
+  }
+
+  take(news) {
+    const before = this.model.health;
+    this.model.take(news);
+    const { health } = this.model;
+    if (!news.health) return;
+    if (before && before.epoch !== health.epoch) this.hand.clear();
+    if (health.link === "lost") this.lost = true;
+    else if (this.lost && health.link === "live") {
+      this.lost = false;
+      tell("The board is connected again.");
+    }
+    this.showState();
+  }
+
+  lose() {
+    showLink("gone", "The viewer program does not answer. Trying again; is it still running?");
+    if (this.model) this.model.health = null;
+    this.showButtons();
+  }
+
+  async command(name, finger = null) {
+    const { good, words } = await this.stream.command(name, finger);
+    tell(words.charAt(0).toUpperCase() + words.slice(1) + (good ? "." : ""), good);
+  }
+
+  // ---- what the user does ------------------------------------------------------------------
+
+  pick(index) {
+    if (!this.model?.fingers.has(index)) return;
+    this.shown = index;
+    this.readMs = 0;
+  }
+
+  step(by) {
+    const all = [...(this.model?.fingers.keys() ?? [])].sort((a, b) => a - b);
+    if (all.length) this.pick(all[(all.indexOf(this.shown) + by + all.length) % all.length]);
+  }
+
+  pause() {
+    const { health } = this.model ?? {};
+    if (!health) return;
+    if (health.live) {
+      this.frozen = !this.frozen;
+      this.showState();
+    } else {
+      this.command(health.link === "paused" ? "resume" : "pause");
+    }
+  }
+
+  // ---- what it shows -----------------------------------------------------------------------
+
+  showState() {
+    const { health } = this.model;
+    if (!health) return;
+    if (this.frozen && health.link === "live") showLink("paused", "Paused: the picture stands still, the board and a recording go on.");
+    else showLink(health.link, health.words);
+    this.showButtons();
+  }
+
+  showButtons() {
+    const health = this.model?.health;
+    const board = health?.link === "live";
+    const playing = ["live", "playing", "paused"].includes(health?.link);
+    const recording = health?.recording;
+    const paused = this.frozen || health?.link === "paused";
+    for (const id of ["tare", "tare-all", "record"]) byId(id).disabled = !board;
+    byId("pause").disabled = !playing;
+    byId("again").hidden = health?.link !== "over";
+    byId("record").setAttribute("aria-pressed", String(Boolean(recording)));
+    byId("record").title = recording ? recording.path : "";
+    byId("record-words").textContent = recording ? `Stop, ${Math.floor(recording.seconds)} s` : "Record";
+    byId("pause").setAttribute("aria-pressed", String(paused));
+    byId("pause-words").textContent = paused ? "Go on" : "Pause";
+  }
+
+  loop(nowMs) {
+    requestAnimationFrame((ms) => this.loop(ms));
+    this.count(nowMs);
+    if (!this.model) return;
+    const { fingers } = this.model;
+    if (!fingers.has(this.shown) && fingers.size) this.shown = Math.min(...fingers.keys());
+    if (nowMs - this.readMs >= READ_MS) this.read(nowMs);
+    if (!this.frozen) this.draw(nowMs);
+  }
+
+  count(nowMs) {
+    const passedMs = nowMs - this.drawsSinceMs;
+    if (passedMs < 1000) return;
+    this.drawsPerS = (this.draws * 1000) / passedMs;
+    this.draws = 0;
+    this.drawsSinceMs = nowMs;
+  }
+
+  draw(nowMs) {
+    const { fingers, about } = this.model;
+    this.hand.sync(fingers);
+    this.hand.mark(this.shown);
+    let largest = 0;
+    for (const { latest } of fingers.values()) {
+      if (!latest) continue;
+      latest.touched = Boolean(latest.flags & this.masks.CONTACT);
+      for (const v of latest.signal ?? []) if (Math.abs(v) > largest) largest = Math.abs(v);
+    }
+    this.limit.follow(largest, nowMs);
+    const finger = fingers.get(this.shown);
+    this.tip.draw(finger, this.theme, this.limit.counts);
+    // What is small or slow takes turns: drawn in every second picture, it leaves a weak computer its 60 a second.
+    this.turn = !this.turn;
+    if (this.turn) {
+      for (const plot of this.plots) plot.draw(finger, this.theme);
+    } else {
+      this.hand.draw(fingers, this.theme, this.limit.counts);
+      const pascals = finger?.pacIsFull ? amplitudes(finger.pac).map((v) => v * about.pac_pa_per_count) : null;
+      this.spectrum.draw(pascals, about.pac_hz, this.theme);
+    }
+    this.draws++;
+  }
+
+  read(nowMs) {
+    this.readMs = nowMs;
+    const { fingers, about, health, dropped } = this.model;
+    if (health) this.link.show(health, dropped, this.drawsPerS);
+    if (this.frozen) return;
+    byId("shown").textContent = String(this.shown);
+    byId("scale-low").textContent = number(-this.limit.counts, 0);
+    byId("scale-high").textContent = `+${this.limit.counts}`;
+    showTare(about, health?.fingers.find(({ finger }) => finger === this.shown));
+    const frame = fingers.get(this.shown)?.latest;
+    if (!frame) return;
+    this.results.show(frame);
+    this.flags.show(frame.flags);
+    this.hand.read(fingers);
+    const touched = byId("touched");
+    touched.textContent = frame.flags & this.masks.CONTACT ? "contact" : "no contact";
+    touched.dataset.kind = frame.flags & this.masks.CONTACT ? "on" : "calm";
+  }
+}
+
+new Page();

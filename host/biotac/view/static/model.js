@@ -1,0 +1,111 @@
+// What came, finger by finger: the latest frame and ten seconds of history, in users' units.
+
+export const HISTORY_S = 10;
+export const SPECTRUM_SAMPLES = 1024;
+const HISTORY_ROWS = 1100; // a little more than HISTORY_S of frames
+const TRAIL_POINTS = 40;
+
+export class Model {
+  constructor(about) {
+    this.about = about;
+    this.column = Object.fromEntries(about.frame_row.map((name, k) => [name, k]));
+    this.fingers = new Map();
+    this.health = null;
+    this.dropped = 0;
+  }
+
+  // Forget what was: another playing has begun.
+  clear() {
+    this.fingers.clear();
+  }
+
+  finger(index) {
+    if (!this.fingers.has(index)) this.fingers.set(index, new Finger(index));
+    return this.fingers.get(index);
+  }
+
+  take(news) {
+    const health = news.health;
+    if (health) {
+      if (this.health && this.health.epoch !== health.epoch) this.clear();
+      this.health = health;
+    }
+    for (const row of news.frames) {
+      const frame = this.inUnits(row);
+      this.finger(frame.finger).add(frame);
+    }
+    // A finger is there once it has sent a frame.
+    for (const [finger, , , pac] of news.pac) this.fingers.get(finger)?.addPac(pac);
+    this.dropped = news.dropped;
+  }
+
+  inUnits(row) {
+    const { column, about } = this;
+    const scaled = (name) => {
+      const values = row[column[name]];
+      return values ? values.map((v) => (v === null ? NaN : v / about.scales[name])) : null;
+    };
+    const plain = (name) => row[column[name]] ?? NaN;
+    return {
+      finger: row[column.finger],
+      seq: row[column.seq],
+      tUs: row[column.t_us],
+      flags: row[column.flags],
+      tareState: row[column.tare_state],
+      signal: scaled("signal_q4"),
+      pdc: plain("pdc"),
+      tac: plain("tac"),
+      tdc: plain("tdc"),
+      pocMm: scaled("poc_um") ?? [NaN, NaN, NaN],
+      forceN: scaled("force_100un") ?? [NaN, NaN, NaN],
+      torqueNmm: scaled("torque_mnmm") ?? [NaN, NaN, NaN],
+      mapMm: row[column.map_um]?.map((um) => um / about.scales.poc_um) ?? null,
+    };
+  }
+}
+
+export class Finger {
+  constructor(index) {
+    this.index = index;
+    this.latest = null;
+    this.history = { t: ring(HISTORY_ROWS), x: ring(HISTORY_ROWS), y: ring(HISTORY_ROWS), z: ring(HISTORY_ROWS), pdc: ring(HISTORY_ROWS) };
+    this.rows = 0; // ever added
+    this.pac = new Float64Array(SPECTRUM_SAMPLES);
+    this.pacSamples = 0;
+    this.trail = [];
+  }
+
+  add(frame) {
+    this.latest = frame;
+    const at = this.rows++ % HISTORY_ROWS;
+    this.history.t[at] = frame.tUs / 1e6;
+    [this.history.x[at], this.history.y[at], this.history.z[at]] = frame.forceN;
+    this.history.pdc[at] = frame.pdc;
+    this.trail.push(frame.mapMm);
+    if (this.trail.length > TRAIL_POINTS) this.trail.shift();
+  }
+
+  addPac(samples) {
+    const n = samples.length;
+    this.pac.copyWithin(0, n);
+    for (let k = 0; k < n; k++) {
+      // A missing sample keeps the one before it: a hole would be a click at all frequencies.
+      const at = SPECTRUM_SAMPLES - n + k;
+      this.pac[at] = samples[k] ?? this.pac[at - 1];
+    }
+    this.pacSamples += n;
+  }
+
+  get pacIsFull() {
+    return this.pacSamples >= SPECTRUM_SAMPLES;
+  }
+
+  // Indices of the history, oldest first.
+  *order() {
+    for (let k = Math.max(0, this.rows - HISTORY_ROWS); k < this.rows; k++) yield k % HISTORY_ROWS;
+  }
+}
+
+function ring(length) {
+  return new Float64Array(length).fill(NaN);
+}

@@ -1,0 +1,151 @@
+// Plots over time and over frequency.
+
+import { fit } from "./fingertip.js";
+import { HISTORY_S } from "./model.js";
+
+const MARGIN = { left: 46, right: 10, top: 8, bottom: 22 };
+const GAP_S = 0.05; // a line breaks where frames are missing
+const FONT = '11px system-ui, "DejaVu Sans", sans-serif';
+
+// A plot's frame: where it is, and how values become pixels.
+class Area {
+  constructor(canvas) {
+    fit(canvas);
+    this.c = canvas.getContext("2d");
+    const ratio = devicePixelRatio;
+    this.c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.c.font = FONT;
+    this.c.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+    this.left = MARGIN.left;
+    this.right = canvas.clientWidth - MARGIN.right;
+    this.top = MARGIN.top;
+    this.bottom = canvas.clientHeight - MARGIN.bottom;
+  }
+
+  x(share) {
+    return this.left + share * (this.right - this.left);
+  }
+
+  y(share) {
+    return this.bottom - share * (this.bottom - this.top);
+  }
+
+  tick(theme, { x, y, text }) {
+    const { c } = this;
+    c.strokeStyle = theme.grid;
+    c.lineWidth = 1;
+    c.beginPath();
+    if (y !== undefined) {
+      c.moveTo(this.left, Math.round(y) + 0.5);
+      c.lineTo(this.right, Math.round(y) + 0.5);
+    } else {
+      c.moveTo(Math.round(x) + 0.5, this.top);
+      c.lineTo(Math.round(x) + 0.5, this.bottom);
+    }
+    c.stroke();
+    c.fillStyle = theme.quiet;
+    c.textAlign = y !== undefined ? "right" : "center";
+    c.textBaseline = y !== undefined ? "middle" : "top";
+    if (y !== undefined) c.fillText(text, this.left - 6, y);
+    else c.fillText(text, Math.min(Math.max(x, this.left + 10), this.right - 14), this.bottom + 6);
+  }
+}
+
+export class TimePlot {
+  // names: columns of Finger.history; colours: their names in the theme; least: the smallest span shown
+  constructor(canvas, names, colours, { least, digits, zero }) {
+    Object.assign(this, { canvas, names, colours, least, digits, zero });
+  }
+
+  draw(finger, theme) {
+    const area = new Area(this.canvas);
+    const { c } = area;
+    const order = finger ? [...finger.order()] : [];
+    const endS = finger && order.length ? finger.history.t[order.at(-1)] : 0;
+    const shown = order.filter((k) => endS - finger.history.t[k] <= HISTORY_S);
+    const [low, high] = this.span(finger, shown);
+    const step = niceStep((high - low) / 4);
+    for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
+      area.tick(theme, { y: area.y((v - low) / (high - low)), text: v.toFixed(step < 1 ? this.digits : 0).replace("-", "−") });
+    }
+    for (let s = -HISTORY_S; s <= 0; s += 2) {
+      area.tick(theme, { x: area.x(1 + s / HISTORY_S), text: s ? `−${-s}` : "0 s" });
+    }
+    c.lineWidth = 1.75;
+    c.lineJoin = "round";
+    this.names.forEach((name, line) => {
+      c.strokeStyle = theme[this.colours[line]];
+      c.beginPath();
+      let before = -Infinity;
+      for (const k of shown) {
+        const t = finger.history.t[k];
+        const v = finger.history[name][k];
+        if (Number.isNaN(v)) {
+          before = -Infinity;
+          continue;
+        }
+        const x = area.x(1 - (endS - t) / HISTORY_S);
+        const y = area.y((v - low) / (high - low));
+        if (t - before > GAP_S) c.moveTo(x, y);
+        else c.lineTo(x, y);
+        before = t;
+      }
+      c.stroke();
+    });
+  }
+
+  span(finger, shown) {
+    let low = Infinity, high = -Infinity;
+    for (const name of this.names) {
+      for (const k of shown) {
+        const v = finger.history[name][k];
+        if (v < low) low = v;
+        if (v > high) high = v;
+      }
+    }
+    if (low > high) return [-this.least / 2, this.least / 2];
+    if (this.zero) [low, high] = [Math.min(low, 0), Math.max(high, 0)];
+    const lack = Math.max(0, this.least - (high - low));
+    const air = (high - low) * 0.06;
+    return [low - lack / 2 - air, high + lack / 2 + air];
+  }
+}
+
+const DECADES = [-2, 3]; // of the amplitude in Pa
+
+export class SpectrumPlot {
+  constructor(canvas) {
+    this.canvas = canvas;
+  }
+
+  // values: amplitudes in Pa from 0 to half of rateHz, or null
+  draw(values, rateHz, theme) {
+    const area = new Area(this.canvas);
+    const { c } = area;
+    const [low, high] = DECADES;
+    const share = (v) => Math.max(0, Math.min(1, (Math.log10(v) - low) / (high - low)));
+    for (let d = low; d <= high; d++) {
+      area.tick(theme, { y: area.y((d - low) / (high - low)), text: d < 0 ? (10 ** d).toFixed(-d) : String(10 ** d) });
+    }
+    const top = rateHz / 2;
+    for (let hz = 0; hz <= top; hz += 200) area.tick(theme, { x: area.x(hz / top), text: hz ? String(hz) : "0 Hz" });
+    if (!values) return;
+    c.beginPath();
+    values.forEach((v, k) => c.lineTo(area.x(k / (values.length - 1)), area.y(share(v))));
+    c.strokeStyle = theme.accent;
+    c.lineWidth = 1.5;
+    c.stroke();
+    c.lineTo(area.right, area.bottom);
+    c.lineTo(area.left, area.bottom);
+    c.closePath();
+    c.globalAlpha = 0.18;
+    c.fillStyle = theme.accent;
+    c.fill();
+    c.globalAlpha = 1;
+  }
+}
+
+function niceStep(raw) {
+  const power = 10 ** Math.floor(Math.log10(raw));
+  return [1, 2, 5, 10].find((m) => m * power >= raw) * power;
+}

@@ -1,0 +1,174 @@
+// Numbers and words. Every number also stands unrounded in data-value, for tests and other programs.
+
+const MINUS = "−";
+const NONE = "–";
+
+export function number(value, digits) {
+  if (!Number.isFinite(value)) return NONE;
+  const text = value.toFixed(digits);
+  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", MINUS);
+}
+
+export function age(ms) {
+  const s = ms / 1000;
+  if (s < 120) return `${s.toFixed(1)} s ago`;
+  if (s < 7200) return `${Math.floor(s / 60)} min ago`;
+  return `${Math.floor(s / 3600)} h ago`;
+}
+
+const byId = (id) => document.getElementById(id);
+
+// Writing what stands there already costs a layout all the same.
+function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+function put(element, value, digits) {
+  write(element, number(value, digits));
+  element.dataset.value = String(value);
+}
+
+function make(tag, properties = {}, data = {}) {
+  const element = Object.assign(document.createElement(tag), properties);
+  Object.assign(element.dataset, data);
+  return element;
+}
+
+const VECTORS = [
+  { key: "forceN", name: "Force", unit: "N", digits: 2 },
+  { key: "torqueNmm", name: "Torque", unit: "N·mm", digits: 1 },
+  { key: "pocMm", name: "Contact", unit: "mm", digits: 2 },
+];
+const SCALARS = [
+  { key: "pdc", name: "Pressure, PDC" },
+  { key: "tac", name: "Thermal flux, TAC" },
+  { key: "tdc", name: "Temperature, TDC" },
+];
+
+export class Results {
+  constructor(about) {
+    const table = byId("results");
+    table.replaceChildren();
+    this.cells = VECTORS.map(({ key, name, unit }) => {
+      const row = make("tr");
+      const cells = ["x", "y", "z"].map((axis) => make("td", {}, { key, axis }));
+      row.append(make("th", { scope: "row", textContent: name }), ...cells, make("td", { textContent: unit }));
+      table.append(row);
+      return cells;
+    });
+    this.scalars = pairs(byId("scalars"), [...SCALARS, { key: "seq", name: "Frame" }]);
+    const list = byId("electrodes");
+    list.replaceChildren();
+    this.electrodes = about.electrodes.map(({ name }) => {
+      const item = make("li");
+      const value = make("span", {}, { electrode: name });
+      item.append(make("b", { textContent: name }), value);
+      list.append(item);
+      return value;
+    });
+  }
+
+  show(frame) {
+    const panel = byId("numbers");
+    panel.dataset.seq = frame.seq;
+    panel.dataset.finger = frame.finger;
+    panel.dataset.flags = frame.flags;
+    VECTORS.forEach(({ key, digits }, row) => frame[key].forEach((v, k) => put(this.cells[row][k], v, digits)));
+    for (const { key } of SCALARS) put(this.scalars[key], frame[key], 0);
+    put(this.scalars.seq, frame.seq, 0);
+    this.electrodes.forEach((cell, k) => put(cell, frame.signal ? frame.signal[k] : NaN, 0));
+  }
+}
+
+// A description list's values by their keys.
+function pairs(list, rows) {
+  list.replaceChildren();
+  return Object.fromEntries(rows.map(({ key, name }) => {
+    const value = make("dd", {}, { key });
+    list.append(make("dt", { textContent: name }), value);
+    return [key, value];
+  }));
+}
+
+export class Flags {
+  constructor(about) {
+    this.flags = about.flags;
+    this.shown = null;
+  }
+
+  show(flags) {
+    if (flags === this.shown) return;
+    this.shown = flags;
+    const active = this.flags.filter(({ mask }) => flags & mask);
+    active.sort((a, b) => b.warns - a.warns || a.mask - b.mask);
+    byId("flags").replaceChildren(...active.map(({ name, words, warns }) => {
+      const item = make("li", {}, { flag: name, kind: warns ? "warn" : "calm" });
+      item.append(make("b", { textContent: name.replaceAll("_", " ") }), words);
+      return item;
+    }));
+  }
+}
+
+export function showTare(about, facts) {
+  const state = about.tare_states[facts?.tare_state];
+  const reason = about.tare_reasons[facts?.tare_reason];
+  const chip = byId("tare-state");
+  write(chip, state?.name ?? "unknown");
+  chip.dataset.kind = !state || ["INIT", "FAULT"].includes(state.name) ? "warn" : "calm";
+  write(byId("tare-words"), state?.words ?? "the board has not said yet");
+  const known = facts && "tare_age_ms" in facts && facts.tare_reason !== undefined;
+  const tared = known && facts.tare_reason !== 0;
+  byId("tare-age").dataset.value = tared ? facts.tare_age_ms : "";
+  write(byId("tare-age"), tared ? `${age(facts.tare_age_ms)}:` : "");
+  write(byId("tare-reason"), reason?.words ?? "");
+}
+
+const HEALTH = [
+  { key: "framesPerS", name: "Frames per second", digits: 0 },
+  { key: "lost", name: "Frames lost", digits: 0, warns: true },
+  { key: "crc", name: "CRC errors", digits: 0, warns: true },
+  { key: "other", name: "Other wire errors", digits: 0, warns: true },
+  { key: "late", name: "Slots late on the board", digits: 0, warns: true },
+  { key: "boardDropped", name: "Messages dropped by the board", digits: 0, warns: true },
+  { key: "dropped", name: "Frames this page was too slow for", digits: 0, warns: true },
+  { key: "draws", name: "Pictures per second", digits: 0 },
+];
+
+export class Link {
+  constructor() {
+    this.values = pairs(byId("health"), HEALTH);
+  }
+
+  show(health, dropped, draws) {
+    const { stats, status } = health;
+    const values = {
+      framesPerS: health.frames_per_s,
+      lost: stats.frames_lost,
+      crc: stats.crc_errors,
+      other: stats.other_errors,
+      late: status.slots_late,
+      boardDropped: status.messages_dropped,
+      dropped,
+      draws,
+    };
+    for (const { key, digits, warns } of HEALTH) {
+      put(this.values[key], values[key], digits);
+      this.values[key].dataset.kind = warns && values[key] > 0 ? "warn" : "calm";
+    }
+    write(byId("board"), health.board);
+    write(byId("source"), health.source);
+  }
+}
+
+export function showLink(link, words) {
+  byId("link").dataset.link = link;
+  write(byId("link-words"), words);
+  const stale = !["live", "playing", "paused", "over"].includes(link);
+  document.body.toggleAttribute("data-stale", stale);
+}
+
+export function tell(words, good = true) {
+  const place = byId("told");
+  place.dataset.kind = good ? "good" : "bad";
+  write(place, words);
+}

@@ -1,0 +1,401 @@
+"""What a person sees and can do: the page in a browser."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomllib
+
+import biotac
+from biotac import _sensor as sensor
+from biotac import _wire as wire
+from biotac.frames import electrode_signals
+
+ROOT = Path(__file__).parents[2]
+FLAGS = tomllib.loads((ROOT / "protocol" / "link.toml").read_text(encoding="utf-8"))["flags"]["frame"]
+
+SNAPSHOT = """() => {
+  const panel = document.getElementById("numbers");
+  const cell = (key, axis) => panel.querySelector(`[data-key=${key}][data-axis=${axis}]`);
+  const vector = (key) => ["x", "y", "z"].map((axis) => cell(key, axis).dataset.value);
+  return {
+    seq: Number(panel.dataset.seq), finger: Number(panel.dataset.finger), flags: Number(panel.dataset.flags),
+    force_n: vector("forceN"), torque_nmm: vector("torqueNmm"), poc_mm: vector("pocMm"),
+    pdc: panel.querySelector("[data-key=pdc]").dataset.value,
+    signals: [...panel.querySelectorAll("[data-electrode]")].map((e) => [e.dataset.electrode, e.dataset.value]),
+  };
+}"""
+
+FIVE = "() => document.querySelectorAll('.finger').length === 5"
+
+
+def until(page: Any, condition: str, argument: Any = None) -> None:
+    page.wait_for_function(condition, arg=argument)
+
+
+def link_is(page: Any, link: str) -> None:
+    page.wait_for_selector(f'#link[data-link="{link}"]')
+
+
+def told(page: Any, words: str) -> None:
+    until(page, "w => told.textContent.includes(w)", words)
+
+
+def numbers(texts: list[str]) -> list[float]:
+    return [float(text) for text in texts]  # float() reads JavaScript's NaN
+
+
+def assert_shows(seen: dict[str, Any], frames: Any, signals: Any) -> None:
+    """Everything on the panel is that frame's, to the last bit."""
+    at = np.flatnonzero((frames["finger"] == seen["finger"]) & (frames["seq"] == seen["seq"]))
+    assert len(at) == 1
+    frame = frames[at[0]]
+    for name in ("force_n", "torque_nmm", "poc_mm"):
+        np.testing.assert_array_equal(numbers(seen[name]), frame[name])
+    assert float(seen["pdc"]) == frame["pdc"]
+    assert seen["flags"] == frame["flags"]
+    assert [name for name, _ in seen["signals"]] == list(sensor.ELECTRODE_NAMES)
+    np.testing.assert_array_equal(numbers([value for _, value in seen["signals"]]), signals[at[0]])
+
+
+def test_numbers_are_those_of_the_frame_with_that_number(view, open_page) -> None:
+    source = "sim:press.toml?fingers=2&seconds=30"
+    page = open_page(view(source))
+    with biotac.open(source) as hand:  # the same source gives the same bytes
+        truth = hand.read_batch(60)
+    signals = electrode_signals(truth.wire)
+    contact = int(wire.FrameFlags.CONTACT)
+    for finger in (0, 1):
+        page.keyboard.press(str(finger))
+        until(
+            page,
+            "([f, c]) => { const d = numbers.dataset; return d.finger === f && d.flags & c; }",
+            [str(finger), contact],
+        )
+        seen = page.evaluate(SNAPSHOT)
+        assert seen["finger"] == finger
+        assert_shows(seen, truth.frames, signals)
+    assert not np.isnan(numbers(seen["force_n"])).any()
+
+
+def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
+    path = tmp_path / "press.mcap"
+    with biotac.open("sim:press.toml?seconds=6") as hand:
+        recorder = hand.record(path)
+        hand.read(60)
+        recorder.close()
+    recording = biotac.Recording(path)
+    page = open_page(view(str(path), again=False))
+    link_is(page, "playing")
+    page.wait_for_selector("#fingers .finger")
+    until(page, "() => numbers.dataset.seq > 20")
+    assert_shows(page.evaluate(SNAPSHOT), recording.frames, electrode_signals(recording.wire))
+    assert page.is_disabled("#tare") and page.is_disabled("#tare-all") and page.is_disabled("#record")
+    page.click("#pause")
+    link_is(page, "paused")
+    page.keyboard.press("p")
+    link_is(page, "playing")
+    link_is(page, "over")
+    assert page.text_content("#link-words") == "It has played to its end."
+    assert page.evaluate(SNAPSHOT)["seq"] == recording.frames["seq"].max()
+    page.keyboard.press("g")
+    link_is(page, "playing")
+
+
+def test_five_fingers_are_a_hand_and_each_can_be_picked(view, open_page) -> None:
+    page = open_page(view("sim:drift.toml?fingers=5"))
+    until(page, FIVE)
+    pick = "() => [...document.querySelectorAll('.finger[aria-pressed=true]')].map(b => b.dataset.finger).join()"
+    shows = "f => [shown.textContent, numbers.dataset.finger].every((seen) => seen === f)"
+    for act, finger in (
+        (lambda: page.keyboard.press("3"), "3"),
+        (lambda: page.click(".finger[data-finger='4']"), "4"),
+        (lambda: page.keyboard.press("ArrowRight"), "0"),
+        (lambda: page.keyboard.press("ArrowLeft"), "4"),
+    ):
+        act()
+        until(page, shows, finger)
+        assert page.evaluate(pick) == finger
+    until(page, "() => Number(document.querySelector('[data-key=framesPerS]').dataset.value) > 0")
+
+
+def test_tare_by_button_and_by_key(view, open_page) -> None:
+    page = open_page(view("sim:drift.toml?fingers=2"))
+    page.wait_for_selector("#tare-state:text('REST')")
+    page.click("#tare")
+    told(page, "Tared finger 0.")
+    until(page, "w => document.getElementById('tare-reason').textContent === w", "TARE_NOW command")
+    assert float(page.get_attribute("#tare-age", "data-value")) < 10_000
+    page.keyboard.press("a")
+    told(page, "Tared fingers 0, 1.")
+
+
+def test_a_refused_command_says_why(make_player, view_of, open_page, touch) -> None:
+    player = make_player()
+    player.refusal = biotac.CommandRefusedError("the board refused TareNow: NOT_STILL (release the finger)")
+    player.script.put(touch)
+    page = open_page(view_of(lambda: player), expect="409")
+    link_is(page, "live")
+    page.wait_for_selector(".finger")
+    page.keyboard.press("1")
+    page.keyboard.press("t")
+    told(page, "NOT_STILL")
+    assert page.get_attribute("#told", "data-kind") == "bad"
+    assert player.commands == [("tare", 1)]
+
+
+def test_recording_starts_and_stops_by_key_and_is_whole(view, open_page, tmp_path) -> None:
+    page = open_page(view("sim:drift.toml?fingers=2"))
+    link_is(page, "live")
+    page.keyboard.press("r")
+    told(page, "Recording to ")
+    page.wait_for_selector("#record[aria-pressed=true]")
+    until(page, "() => parseFloat(document.getElementById('record-words').textContent.split(' ')[1]) >= 1")
+    page.click("#record")
+    told(page, "Recorded to ")
+    page.wait_for_selector("#record[aria-pressed=false]")
+    (path,) = tmp_path.glob("biotac-*.mcap")
+    assert path.name in page.text_content("#told")
+    recording = biotac.Recording(path)
+    assert recording.problems == []
+    assert np.ptp(recording.frames["t_us"]) > 0.9e6
+
+
+def test_pause_freezes_the_picture_and_nothing_else(view, open_page) -> None:
+    viewing = view("sim:drift.toml")
+    page = open_page(viewing)
+    until(page, "() => numbers.dataset.seq > 0")
+    page.keyboard.press("p")
+    page.wait_for_selector("#pause[aria-pressed=true]")
+    assert "the board and a recording go on" in page.text_content("#link-words")
+    before = page.evaluate(SNAPSHOT)["seq"]
+    cursor = viewing.state.cursor()
+    viewing.state.wait(cursor, 0)
+    until_frames = cursor.frames + 60
+    while cursor.frames < until_frames:
+        viewing.state.wait(cursor, 1.0)
+    assert page.evaluate(SNAPSHOT)["seq"] == before
+    page.click("#pause")
+    until(page, "b => numbers.dataset.seq > b + 50", before)
+
+
+def test_every_flag_is_told_in_the_contracts_words(make_player, view_of, open_page, touch) -> None:
+    player = make_player()
+    mask = sum(1 << flag["bit"] for name, flag in FLAGS.items() if name != "doc")
+    touch = replace(touch, frames=touch.frames.copy())
+    touch.frames["flags"] = mask
+    player.script.put(touch)
+    page = open_page(view_of(lambda: player))
+    page.wait_for_selector("#flags [data-flag=FAULT]")
+    shown = dict(page.eval_on_selector_all("#flags li", "all => all.map(e => [e.dataset.flag, e.textContent])"))
+    wanted = {k: k.replace("_", " ") + flag["doc"] for k, flag in FLAGS.items() if k != "doc"}
+    assert shown == wanted
+    assert page.get_attribute("#flags [data-flag=FAULT]", "data-kind") == "warn"
+    assert page.get_attribute("#flags [data-flag=CONTACT]", "data-kind") == "calm"
+
+
+def test_health_of_the_link(make_player, view_of, open_page, touch) -> None:
+    player = make_player()
+    status = replace(next(m for m in touch.messages if isinstance(m, wire.Status)), slots_late=11, messages_dropped=13)
+    player.script.put(replace(touch, messages=[status]))
+    page = open_page(view_of(lambda: player))
+    value = "k => Number(document.querySelector(`#health [data-key=${k}]`).dataset.value)"
+    until(page, "() => document.querySelector('#health [data-key=late]').dataset.value === '11'")
+    seen = {key: page.evaluate(value, key) for key in ("lost", "crc", "other", "boardDropped")}
+    assert seen == {"lost": 7, "crc": 3, "other": 0, "boardDropped": 13}
+    assert page.get_attribute("#health [data-key=crc]", "data-kind") == "warn"
+
+
+def test_a_missing_board_is_told_and_found_again(make_player, view_of, open_page, touch) -> None:
+    players = [make_player(), make_player()]
+    ready: list[Any] = []
+
+    def opener() -> Any:
+        if not ready:
+            raise biotac.PortError("no port /dev/ttyACM0; `biotac list` shows the ports of this machine")
+        return ready.pop()
+
+    page = open_page(view_of(opener), expect="409")
+    link_is(page, "lost")
+    assert page.text_content("#link-words").startswith("No board: no port /dev/ttyACM0; `biotac list`")
+    assert page.is_disabled("#tare")
+    players[0].script.put(touch)
+    ready.append(players[0])
+    link_is(page, "live")
+    page.wait_for_selector(".finger")
+    players[0].script.put(biotac.DeviceLostError("/dev/ttyACM0 went away while it was open"))
+    link_is(page, "lost")
+    assert "Connection lost: /dev/ttyACM0 went away" in page.text_content("#link-words")
+    assert page.evaluate("() => document.body.hasAttribute('data-stale')")
+    assert players[0].closed
+    players[1].script.put(touch)
+    ready.append(players[1])
+    link_is(page, "live")
+    told(page, "The board is connected again.")
+    page.keyboard.press("a")
+    told(page, "Done as told.")
+    assert players[1].commands == [("tare", None)]
+
+
+def test_the_page_finds_a_restarted_server(view, open_page) -> None:
+    first = view("sim:drift.toml")
+    page = open_page(first, expect="ERR_")
+    link_is(page, "live")
+    port = first.server.server_port
+    first.close()
+    link_is(page, "gone")
+    assert "does not answer" in page.text_content("#link-words")
+    view("sim:drift.toml", port=port)
+    link_is(page, "live")
+    page.wait_for_selector("#tare-state:text('REST')")
+    page.keyboard.press("t")  # with the new server's token
+    told(page, "Tared finger 0.")
+
+
+CONTRASTS = """() => {
+  const rgb = (text) => (text.match(/[0-9.]+/g) ?? []).map(Number);
+  const light = ([r, g, b]) => {
+    const [x, y, z] = [r, g, b].map((v) => v / 255).map((v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+    return 0.2126 * x + 0.7152 * y + 0.0722 * z;
+  };
+  const back = (e) => {
+    for (; e; e = e.parentElement) {
+      const c = rgb(getComputedStyle(e).backgroundColor);
+      if (c.length === 3 || c[3] === 1) return c;
+    }
+    return [255, 255, 255];
+  };
+  const out = [];
+  for (const e of document.querySelectorAll("body *")) {
+    const text = [...e.childNodes].filter((n) => n.nodeType === 3).map((n) => n.data).join("").trim();
+    if (!text || !e.checkVisibility()) continue;
+    const [a, b] = [light(rgb(getComputedStyle(e).color)), light(back(e))];
+    out.push([text, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05)]);
+  }
+  return out;
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_all_text_has_contrast(make_player, view_of, open_page, touch, scheme: str) -> None:
+    player = make_player()
+    touch = replace(touch, frames=touch.frames.copy())
+    touch.frames["flags"] = 0x3FFFF  # chips and warnings too
+    player.script.put(touch)
+    page = open_page(view_of(lambda: player), color_scheme=scheme)
+    page.wait_for_selector("#flags [data-flag=FAULT]")
+    page.click("summary")
+    page.click("#pause")
+    ratios = page.evaluate(CONTRASTS)
+    page.click("#help")
+    page.wait_for_selector("#keys[open]")
+    ratios += page.evaluate(CONTRASTS)
+    assert len(ratios) > 100
+    assert [(text, round(ratio, 2)) for text, ratio in ratios if ratio < 4.5] == []
+
+
+def test_the_theme_can_be_chosen_and_stays(view, open_page) -> None:
+    page = open_page(view("sim:drift.toml"), color_scheme="light")
+    back = "() => getComputedStyle(document.body).backgroundColor"
+    light = page.evaluate(back)
+    page.keyboard.press("d")
+    assert (page.text_content("#theme-words"), page.evaluate(back)) == ("light", light)
+    page.keyboard.press("d")
+    assert page.text_content("#theme-words") == "dark"
+    dark = page.evaluate(back)
+    assert dark != light
+    page.reload()
+    assert (page.text_content("#theme-words"), page.evaluate(back)) == ("dark", dark)
+
+
+def test_every_control_is_reached_by_tab_and_shows_it(view, open_page) -> None:
+    page = open_page(view("sim:drift.toml"))
+    link_is(page, "live")
+    page.wait_for_selector(".finger")
+    reached = {}
+    for _ in range(16):
+        page.keyboard.press("Tab")
+        element = page.evaluate(
+            "() => { const e = document.activeElement, s = getComputedStyle(e);"
+            " return [e.id || e.className || e.tagName, s.outlineStyle, parseFloat(s.outlineWidth)]; }"
+        )
+        reached[element[0]] = element[1:]
+    wanted = {"tare", "tare-all", "record", "pause", "theme", "help", "finger", "SUMMARY"}
+    assert wanted <= set(reached)
+    assert all(style == "solid" and width >= 2 for style, width in (reached[name] for name in wanted))
+
+
+def test_keys_are_listed_and_do_nothing_behind_the_list(make_player, view_of, open_page) -> None:
+    player = make_player()
+    page = open_page(view_of(lambda: player))
+    link_is(page, "live")
+    page.keyboard.press("?")
+    page.wait_for_selector("#keys[open]")
+    for key in ("T", "A", "R", "P", "D", "0 … 4"):
+        assert page.is_visible(f"#key-list kbd:text-is('{key}')")
+    page.keyboard.press("t")
+    page.keyboard.press("Escape")
+    page.wait_for_selector("#keys", state="hidden")
+    page.keyboard.press("a")
+    told(page, "Done as told.")
+    assert player.commands == [("tare", None)]
+
+
+def test_controls_have_names(view, open_page) -> None:
+    page = open_page(view("sim:drift.toml?fingers=2"))
+    until(page, "() => document.querySelectorAll('.finger').length === 2")
+    nameless = page.eval_on_selector_all(
+        "button, canvas[role=img], [role=group], section",
+        "all => all.filter(e => !(e.textContent.trim() || e.getAttribute('aria-label') ||"
+        " document.getElementById(e.getAttribute('aria-labelledby'))?.textContent)).map(e => e.outerHTML)",
+    )
+    assert nameless == []
+    assert page.get_by_role("button", name="Tare finger").is_enabled()
+    assert page.get_by_role("button", name="Finger 1").is_visible()
+
+
+def test_nothing_hangs_over_a_phones_edge(view, open_page) -> None:
+    page = open_page(view("sim:drift.toml?fingers=5"), viewport={"width": 360, "height": 740})
+    until(page, FIVE)
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= 360
+
+
+def test_the_spectrum_is_numpys(view, open_page) -> None:
+    page = open_page(view("sim:drift.toml"))
+    samples = np.random.default_rng(5).normal(2000, 30, 1024) + 40 * np.sin(np.arange(1024) * 0.9)
+    seen = page.evaluate("async (s) => [...(await import('./spectrum.js')).amplitudes(s)]", samples.tolist())
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(1024) / 1024)
+    truth = np.abs(np.fft.rfft((samples - samples.mean()) * window)) / window.sum()
+    truth[1:-1] *= 2
+    np.testing.assert_allclose(seen, truth, rtol=1e-9, atol=1e-9)
+
+
+def test_the_fingertip_is_drawn_in_the_scales_colours(make_player, view_of, open_page, touch) -> None:
+    player = make_player()
+    frames, messages = touch.frames[-1:].copy(), touch.wire[-1:].copy()
+    frames["flags"] = 0
+    messages["tare_q4"] = 2000 * 16
+    messages["counts"] = 2000
+    messages["counts"][0, 0] = 1500  # E1 compressed, E11 bulged, to the ends of the scale
+    messages["counts"][0, 10] = 2500
+    player.script.put(replace(touch, frames=frames, wire=messages, messages=[]))
+    page = open_page(view_of(lambda: player), expect="willReadFrequently", color_scheme="light")
+    until(page, "() => document.getElementById('scale-high').textContent === '+500'")
+    places = {e: tuple(v / 1000 for v in sensor.ELECTRODE_UM[e]) for e in (0, 10)}
+    pixel = """([a, b]) => {
+      const canvas = document.getElementById("fingertip-canvas");
+      const at = [(a + 9.5) / 19 * canvas.width, (9.8 - b) / 27 * canvas.height].map(Math.round);
+      return [...canvas.getContext("2d").getImageData(at[0], at[1], 1, 1).data.slice(0, 3)];
+    }"""
+    style = "n => getComputedStyle(document.documentElement).getPropertyValue(n)"
+    for electrode, name in ((0, "--compressed"), (10, "--bulged")):
+        x, y, z = places[electrode]
+        across = sensor.CORE_RADIUS_UM / 1000 * np.arctan2(y, -z)
+        along = sensor.CORE_RADIUS_UM / 1000 * np.arcsin(x / (sensor.CORE_RADIUS_UM / 1000))
+        colour = page.evaluate(style, name).strip()
+        # beside the electrode's number, inside its disc
+        assert page.evaluate(pixel, [across, along + 0.6]) == [int(colour[k : k + 2], 16) for k in (1, 3, 5)]

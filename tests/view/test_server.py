@@ -1,0 +1,233 @@
+"""The server without a browser: who may ask for what, and that nobody slows the board."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac import _wire as wire
+from biotac.cli.main import main
+from biotac.frames import electrode_signals
+from biotac.view import check as checking
+from biotac.view.recorded import RecordedPlayer
+from biotac.view.rows import FRAME_ROW, facts, frame_rows
+from biotac.view.server import TOKEN_HEADER
+from biotac.view.serving import lasting
+from biotac.view.state import KEPT_ROWS, State, tared
+
+
+def ask(viewing, method: str, path: str, body: object = None, **headers: str) -> tuple[int, bytes]:
+    connection = http.client.HTTPConnection("127.0.0.1", viewing.server.server_port, timeout=10)
+    text = body if isinstance(body, str) else json.dumps(body)
+    connection.request(
+        method, path, None if body is None else text, {k.replace("_", "-"): v for k, v in headers.items()}
+    )
+    answer = connection.getresponse()
+    got = answer.status, answer.read()
+    connection.close()
+    return got
+
+
+def test_commands_need_the_secret_the_origin_and_sense(make_player, view_of) -> None:
+    player = make_player()
+    viewing = view_of(lambda: player)
+    good = {TOKEN_HEADER.replace("-", "_"): viewing.server.token}
+    tare = {"do": "tare", "finger": 3}
+    assert ask(viewing, "POST", "/command", tare)[0] == 403
+    assert ask(viewing, "POST", "/command", tare, **good | {"X_Biotac_Token": "guess"})[0] == 403
+    assert ask(viewing, "POST", "/command", tare, **good, Origin="http://example.org")[0] == 403
+    assert ask(viewing, "POST", "/command", tare, **good, Host="example.org")[0] == 403
+    assert ask(viewing, "POST", "/elsewhere", tare, **good)[0] == 404
+    for nonsense in ("", "{", "[1]", '{"do": 1}', '{"do": "tare", "finger": "x"}', '{"do": "tare", "finger": true}'):
+        assert ask(viewing, "POST", "/command", nonsense, **good)[0] == 400
+    assert ask(viewing, "POST", "/command", {"do": "x" * 2000}, **good)[0] == 400
+    assert ask(viewing, "POST", "/command", {"do": "fly"}, **good)[0] == 409
+    assert player.commands == []
+    status, body = ask(viewing, "POST", "/command", tare, **good, Origin=viewing.url.rstrip("/"))
+    assert (status, json.loads(body)) == (200, {"words": "done as told"})
+    assert player.commands == [("tare", 3)]
+
+
+def test_only_this_computer_is_served_and_only_the_pages_files(make_player, view_of) -> None:
+    viewing = view_of(lambda: make_player())
+    assert viewing.server.server_address[0] == "127.0.0.1"
+    assert ask(viewing, "GET", "/")[0] == 200
+    assert ask(viewing, "GET", "/", Host="rebound.example.org")[0] == 403
+    assert ask(viewing, "GET", "/events", Host="rebound.example.org")[0] == 403
+    for path in ("/../server.py", "/%2e%2e/server.py", "//etc/passwd", "/nothing"):
+        assert ask(viewing, "GET", path)[0] == 404
+
+
+def test_a_page_that_is_too_slow_misses_frames_and_is_told_how_many(make_player, touch) -> None:
+    state = State("scripted")
+    player = make_player()
+    slow, quick = state.cursor(), state.cursor()
+    rounds, got = 0, 0
+    for _ in range(3):
+        state.take(touch, player)
+        rounds += len(touch.frames)
+        got += min(len(touch.frames), KEPT_ROWS)
+        state.wait(quick, 0)
+    news = json.loads(state.wait(slow, 0))
+    assert len(news["frames"]) == KEPT_ROWS
+    assert news["dropped"] == rounds - KEPT_ROWS
+    assert news["frames"][-1][FRAME_ROW.index("seq")] == touch.frames["seq"][-1]
+    assert quick.dropped == rounds - got
+    assert state.wait(slow, 0) == ""
+
+
+def test_a_browser_that_reads_nothing_does_not_hold_the_reader(make_player, view_of, touch) -> None:
+    player = make_player()
+    viewing = view_of(lambda: player)
+    stuck = socket.create_connection(("127.0.0.1", viewing.server.server_port))
+    stuck.sendall(f"GET /events HTTP/1.1\r\nHost: 127.0.0.1:{viewing.server.server_port}\r\n\r\n".encode())
+    cursor = viewing.state.cursor()
+    rounds = 60
+    for _ in range(rounds):
+        player.script.put(touch)
+    while cursor.frames < rounds * len(touch.frames):
+        assert viewing.state.wait(cursor, 10.0)  # empty: the reader stands still
+    stuck.close()
+
+
+def test_rows_hold_the_wires_own_numbers(touch) -> None:
+    touch = replace(touch, wire=touch.wire.copy())
+    touch.wire["counts"][5, 3] = wire.INVALID_COUNT
+    touch.wire["pdc"][5] = wire.INVALID_COUNT
+    rows = [dict(zip(FRAME_ROW, json.loads(text), strict=True)) for text in frame_rows(touch)]
+    signals = np.array([[np.nan if v is None else v / 16 for v in row["signal_q4"]] for row in rows])
+    np.testing.assert_array_equal(signals, electrode_signals(touch.wire))
+    assert rows[5]["signal_q4"][3] is None and rows[5]["pdc"] is None
+    assert rows[0]["force_100un"] == [None] * 3 and rows[0]["map_um"] is None
+    last = rows[-1]
+    assert last["poc_um"] == touch.wire["poc_um"][-1].tolist()
+    assert [r["seq"] for r in rows] == touch.frames["seq"].tolist()
+
+
+def test_heartbeats_are_frames_without_signals() -> None:
+    with biotac.open("sim:press.toml?seconds=3") as hand:
+        hand.subscribe(wire.QuantityFlags.FORCE)
+        batch = hand.read_batch(10)
+    assert len(batch.idle)
+    rows = [dict(zip(FRAME_ROW, json.loads(text), strict=True)) for text in frame_rows(batch)]
+    assert len(rows) == len(batch.frames) + len(batch.idle)
+    assert [r["t_us"] for r in rows] == sorted(r["t_us"] for r in rows)
+    assert {r["seq"] for r in rows if r["signal_q4"] is None} == set(batch.idle["seq"].tolist())
+
+
+def test_words_are_the_contracts() -> None:
+    told = facts()
+    assert [f["name"] for f in told["flags"]] == [f.name for f in biotac.FrameFlags]
+    assert (told["frame_hz"], told["pac_hz"]) == (100, 2200)
+    assert told["tare_reasons"][1]["words"] == "first still frames after power-up or plug-in"
+
+
+def test_a_tares_age_grows_between_two_status_messages() -> None:
+    facts_ = {"tare_age_ms": 500, "status_t_us": 2**32 - 1_000_000, "t_us": 2**32 + 2_000_000}
+    assert tared(2, facts_) == {"finger": 2, "tare_age_ms": 3500}
+    assert tared(2, facts_ | {"t_us": 2**32 - 1_010_000})["tare_age_ms"] == 500
+
+
+def test_a_recording_is_played_whole_and_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with biotac.open("sim:press.toml?fingers=2&seconds=4") as hand:
+        recorder = hand.record(path)
+        hand.read(10)
+        recorder.close()
+    recording = biotac.Recording(path)
+    for pace in (0.0, 40.0):
+        player = RecordedPlayer(recording, pace)
+        batches = list(player.batches())
+        frames = np.concatenate([b.frames for b in batches])
+        in_time = recording.frames[np.argsort(recording.frames["t_us"], kind="stable")]
+        assert frames.tobytes() == in_time.tobytes()  # NaN and all
+        assert sum(len(b.pac) for b in batches) == len(recording.pac)
+        timed = [m for m in recording.messages if hasattr(m, "t_us")]
+        assert sum(len(b.messages) for b in batches) == len(timed) > 0
+        assert player.stats().frames == len(frames)
+
+
+def test_a_paused_recording_stands_still(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with biotac.open("sim:drift.toml?fingers=1&seconds=2") as hand:
+        recorder = hand.record(path)
+        hand.read(10)
+        recorder.close()
+    player = RecordedPlayer(biotac.Recording(path), 100.0)
+    player.do("pause", None)
+    batches = player.batches()
+    assert not any(len(next(batches).frames) for _ in range(5))
+    player.do("resume", None)
+    assert sum(len(b.frames) for b in batches) == 200
+    with pytest.raises(biotac.InputError, match="a recording cannot be tared; open a board"):
+        player.do("tare", 0)
+
+
+def test_a_lost_board_refuses_commands_with_the_reason(view_of) -> None:
+    def opener() -> None:
+        raise biotac.PortError("no port /dev/ttyACM0")
+
+    viewing = view_of(opener)
+    with pytest.raises(biotac.InputError, match="No board: no port /dev/ttyACM0"):
+        viewing.reader.ask("tare", 0)
+
+
+def test_a_scenario_lasts_unless_it_says_how_long() -> None:
+    assert lasting("sim:press.toml") == "sim:press.toml?seconds=120"
+    assert lasting("sim:press.toml?fingers=2") == "sim:press.toml?fingers=2&seconds=120"
+    assert lasting("sim:press.toml?seconds=2") == "sim:press.toml?seconds=2"
+    assert lasting("sim:trial.npz") == "sim:trial.npz"
+    assert lasting("/dev/ttyACM0") == "/dev/ttyACM0"
+
+
+def test_check_runs_without_any_tool_on_the_path() -> None:
+    words = [sys.executable, "-m", "biotac", "view", "--check"]
+    done = subprocess.run(words, env=os.environ | {"PATH": "/nowhere"}, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.endswith(": good\n") and done.stdout.count("\n") == 1
+
+
+def test_check_finds_what_is_wrong(monkeypatch, capsys) -> None:
+    real = checking.judge
+    monkeypatch.setattr(checking, "judge", lambda about, frames: real(about, [f for f in frames if f["finger"] != 2]))
+    assert main(["view", "--check", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["problems"] == ["finger 2 sent nothing"]
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["nowhere.mcap"], 2, "nowhere.mcap cannot be read"),
+        (["sim:nowhere.toml"], 2, "no such file"),
+        (["sim:press.toml", "--folder", "/nowhere"], 2, "no folder to write to"),
+        (["sim:press.toml", "--port", "99999"], 2, "expected 0 to 65535"),
+    ],
+)
+def test_what_can_never_be_shown_ends_the_command(capsys, words: list[str], code: int, told: str) -> None:
+    assert main(["view", "--no-browser", *words]) == code
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert error.startswith("biotac: ") and told in error
+
+
+def test_a_taken_port_is_told(make_player, view_of, capsys) -> None:
+    taken = view_of(lambda: make_player()).server.server_port
+    assert main(["view", "sim:press.toml", "--no-browser", "--port", str(taken)]) == 3
+    assert "--port 0 takes a free one" in capsys.readouterr().err
+
+
+def test_closing_leaves_no_thread_behind(view) -> None:
+    before = set(threading.enumerate())
+    viewing = view("sim:drift.toml")
+    viewing.close()
+    assert not {t for t in set(threading.enumerate()) - before if not t.name.startswith("Thread-")}
