@@ -26,7 +26,7 @@ from .finger import FINGER_DTYPE, Finger
 from .frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
 from .hand import Hand
 from .opening import open
-from .recording import Recorder, Recording, load
+from .recording import Compact, Recorder, Recording, load, load_compact
 from .stream import LinkStats
 from .version import __version__
 
@@ -38,6 +38,7 @@ __all__ = [
     "RESULT_DTYPE",
     "BiotacError",
     "CommandRefusedError",
+    "Compact",
     "DeviceLostError",
     "Finger",
     "Frame",
@@ -60,5 +61,6 @@ __all__ = [
     "__version__",
     "compute",
     "load",
+    "load_compact",
     "open",
 ]

@@ -14,6 +14,7 @@ from . import _wire as wire
 
 CRC_BYTES = 4
 ENCODED_MAX_BYTES = wire.MAX_FRAME_BYTES + 1  # COBS adds exactly one byte to frames this short
+OVERHEAD_BYTES = 1 + CRC_BYTES + 1 + 1  # id, CRC, COBS, delimiter
 
 
 @dataclass

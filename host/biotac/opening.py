@@ -16,10 +16,13 @@ def open(port: str | os.PathLike[str], *, pace: float = 0.0) -> Hand:
     own SPI bus, one BUS.DEVICE a finger, or ``sim:SOURCE`` for a simulated board,
     where SOURCE is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``), or
     ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the same.
-    ``pace`` is for simulated and emulated boards: device seconds per second, 0 for as fast as this side reads.
+    ``replay:press.mcap?from=12.5&to=20`` plays a recording, or that part of it: the board's stream again, while
+    commands that would change a board raise CommandRefusedError.
+    ``pace`` is for simulated and emulated boards and recordings: device seconds per second, 0 for as fast as
+    this side reads.
 
-    Raises PortError, NotAGatewayError, WireVersionError, or InputError for a source that cannot be
-    played.
+    Raises PortError, NotAGatewayError, WireVersionError, or InputError for a source or a recording that
+    cannot be played.
     """
     return shake_hands(open_link(os.fspath(port), pace=pace))
 

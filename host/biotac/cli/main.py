@@ -10,14 +10,17 @@ import threading
 from collections.abc import Sequence
 
 from ..errors import BiotacError, InputError
-from . import bench, check, demo, info, list_ports, record, sim, stream, version
+from . import bench, check, demo, export, import_btd, info, list_ports, recompute, record, replay, sim, stream, version
 
-VERBS = (demo, list_ports, info, stream, record, check, sim, bench, version)
+VERBS = (
+    demo, list_ports, info, stream, record, check, replay, recompute, export, import_btd, sim, bench, version,
+)  # fmt: skip
 
 EPILOG = """\
 A PORT is a device path (/dev/ttyACM0, COM3) or sim:SOURCE, a simulated board that plays a
 scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), or
-emu:pico?source=SOURCE, a Pico's flash image in an emulator that plays the same.
+emu:pico?source=SOURCE, a Pico's flash image in an emulator that plays the same, or
+replay:REC, a recording that answers as its board did.
 
 exit codes: 0 done   1 check found a violation   2 unusable file or argument   3 port cannot be
 opened   4 no gateway on the port   5 firmware of another wire version   6 board lost
@@ -59,8 +62,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BiotacError as error:
         print(f"biotac: {one_line(error)}", file=sys.stderr)
         return error.exit_code
-    except KeyboardInterrupt:
-        print("biotac: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        # What became of a file that was being written.
+        print(f"biotac: interrupted{f'; {interrupt}' if interrupt.args else ''}", file=sys.stderr)
         return 130
     except BrokenPipeError:
         # Whoever read our output has had enough; keep Python from complaining while it shuts down.

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mcap.exceptions import InvalidMagic, McapError
 from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
@@ -23,10 +24,12 @@ from . import layout
 class Recording:
     """A recording in memory.
 
-    ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``wire`` the
-    FRAME messages as sent, ``messages`` the rest (tare changes, status). ``problems`` lists in words
-    what is missing or damaged; the rest is good. ``cut_off``: the file ends without its index;
-    ``damaged_chunks``: seconds that were left out. Raises RecordingError when nothing can be read.
+    ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``idle`` (IDLE_DTYPE)
+    heartbeats, ``wire`` the FRAME messages as sent, ``messages`` the rest (tare changes, status). ``problems``
+    lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its index;
+    ``damaged_chunks``: seconds that were left out. ``blocks`` are the wire's bytes as they came, about one a
+    second, and ``arrived_ns`` when each began, by the host's clock (Unix). Raises RecordingError when
+    nothing can be read.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -35,12 +38,14 @@ class Recording:
         self.cut_off = False
         self.damaged_chunks = 0
         metadata: dict[str, str] | None = None
-        blocks: list[bytes] = []
+        self.blocks: list[bytes] = []
+        self.arrived_ns: list[int] = []
         for record in self._records():
             if isinstance(record, Metadata) and record.name == layout.METADATA_NAME:
                 metadata = record.metadata
             elif isinstance(record, Message):
-                blocks.append(record.data)
+                self.blocks.append(record.data)
+                self.arrived_ns.append(record.publish_time)
         if metadata is None:
             raise RecordingError(self._without_metadata())
         try:
@@ -49,13 +54,15 @@ class Recording:
             raise RecordingError(f"{self.path} has damaged metadata ({error}); its frames cannot be judged") from error
         decoder = StreamDecoder()
         decoder.accept_newer_minor()
-        batch = join([decoder.feed(block) for block in blocks])
+        batch = join([decoder.feed(block) for block in self.blocks])
         self.frames: StructArray = batch.frames
         self.wire: StructArray = batch.wire
         self.pac: StructArray = batch.pac
+        self.idle: StructArray = batch.idle
         self.messages: list[Any] = batch.messages
         self.counts = decoder.counts
         self.frames_lost = decoder.lost
+        self.disordered = decoder.disordered
         if self.cut_off and not len(self.frames):
             raise RecordingError(f"{self.path} was cut off before its first second was whole; record it again")
         self._describe_losses(decoder)
@@ -79,7 +86,8 @@ class Recording:
             )
         self.metadata = metadata
         hello: dict[str, Any] = json.loads(metadata["hello"])
-        self.info = wire.Hello(**hello | {"board_serial": tuple(hello["board_serial"])})
+        self.info = wire.Hello(**_tuples(hello))
+        self.sensors = [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))]
         named = json.loads(metadata["settings"])
         # A setting that this recording's firmware did not have yet keeps its default.
         self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting}
@@ -130,6 +138,27 @@ class Recording:
             self.problems.append(f"one second of {self.path.name} is damaged and left out ({error})")
             return []
 
+    @property
+    def fingers(self) -> list[int]:
+        """Fingers of which there is a frame, a heartbeat or PAC."""
+        rows = (self.frames, self.idle, self.pac)
+        return sorted({int(finger) for table in rows for finger in np.unique(table["finger"])})
+
+    @property
+    def begin_us(self) -> int:
+        """Device time of the first frame or heartbeat; 0 without any."""
+        return min((int(rows["t_us"].min()) for rows in (self.frames, self.idle) if len(rows)), default=0)
+
+    @property
+    def end_us(self) -> int:
+        """Device time of the last frame or heartbeat; 0 without any."""
+        return max((int(rows["t_us"].max()) for rows in (self.frames, self.idle) if len(rows)), default=0)
+
+    @property
+    def begin_ns(self) -> int:
+        """``begin_us`` on the host's clock (Unix), as good as the link is prompt."""
+        return self.arrived_ns[0] if self.arrived_ns else 0
+
     def _describe_losses(self, decoder: StreamDecoder) -> None:
         for finger, seq, lost in decoder.lost_after[:10]:
             self.problems.append(f"finger {finger}: {lost} frame(s) missing after frame {seq}")
@@ -141,6 +170,11 @@ class Recording:
                 f"{counts.bad} wire frame(s) refused: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
                 f"{counts.bad_length} wrong length, {counts.too_long} too long"
             )
+
+
+def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
+    """A message's fields as JSON had them."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}
 
 
 def load(path: str | os.PathLike[str]) -> StructArray:
