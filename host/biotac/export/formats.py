@@ -33,7 +33,7 @@ FORMATS = {
     ".h5": Format("hdf5", "HDF5, a group a finger, a dataset a column", "hdf5"),
     ".npz": Format("npz", "NumPy arrays named finger0/force_n"),
     ".btc": Format("compact", "the wire's own integers, small and quick to load with biotac.load_compact"),
-    ".bag": Format("ros2", "folder of a ROS 2 bag (mcap): WrenchStamped, PointStamped, counts, PAC", "ros2"),
+    ".ros2": Format("ros2", "a ROS 2 bag, which is a folder: WrenchStamped, PointStamped, counts, PAC", "ros2"),
 }
 
 
