@@ -203,7 +203,7 @@ def test_an_interrupted_export_leaves_nothing_and_says_so(
 
     def interrupt(self: Any, text: str) -> None:
         nonlocal steps
-        steps += 1
+        steps += not text.startswith("reading")
         if steps == step:
             raise KeyboardInterrupt
 

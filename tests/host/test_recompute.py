@@ -101,7 +101,8 @@ def test_the_tare_machine_hears_its_settings(folder, recorded) -> None:
 def test_a_recording_that_began_in_mid_life_says_so(folder, capsys) -> None:
     path = folder / "mid.mcap"
     path.unlink(missing_ok=True)
-    with biotac.open("sim:press.toml?seconds=6") as hand:
+    # Long enough that most of it has not arrived when the recording begins.
+    with biotac.open("sim:press.toml?seconds=60") as hand:
         hand.read(3.0)
         hand.record(path)
         hand.read(100)
@@ -163,3 +164,23 @@ def test_a_finger_says_the_tare_message_that_a_board_sends(recorded) -> None:
     rows = slice(0, message.seq + 1)
     finger.feed(sent["counts"][rows], sent["pdc"][rows], sent["tac"][rows], sent["tdc"][rows], t_us=sent["t_us"][rows])
     assert finger.tare_message() == message
+
+
+@pytest.mark.parametrize("out", ["stopped.mcap", "stopped.csv"])
+@pytest.mark.parametrize("step", [1, 5])
+def test_an_interrupted_recomputation_leaves_nothing(
+    recorded, tmp_path, capsys, monkeypatch, out: str, step: int
+) -> None:
+    """Ctrl-C as Python delivers it, at the work's own steps."""
+    steps = 0
+
+    def interrupt(self: object, text: str) -> None:
+        nonlocal steps
+        steps += not text.startswith("reading")
+        if steps == step:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("biotac.cli.progress.Progress.show", interrupt)
+    assert main(["recompute", str(recorded.path), str(tmp_path / out)]) == 130
+    assert f"{out} was not written" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -163,3 +163,19 @@ def test_metadata_say_who_and_with_what(recorded: Path) -> None:
     assert recording.metadata["firmware"] == biotac.__version__
     assert [info.finger for info in recording.sensors] == [0, 1]
     assert recording.settings[biotac.Setting.POC_WEIGHTS] == json.loads(recording.metadata["settings"])["poc_weights"]
+
+
+def test_whatever_a_board_says_the_wire_is_kept(recorded: Path, tmp_path: Path) -> None:
+    """Random payloads under right CRCs: nothing that is derived from the wire may stop its recording."""
+    known = biotac.Recording(recorded)
+    rng = np.random.default_rng(7)
+    path = tmp_path / "wild.mcap"
+    recorder = writer.Recorder(path, known.info, known.settings, known.sensors, "test", clock_s=lambda: 0.0)
+    wild = b""
+    for message_id in (wire.Frame.ID, wire.Pac.ID, wire.Tare.ID, wire.Idle.ID, wire.Status.ID) * 60:
+        wild += encode(message_id, rng.bytes(wire.MESSAGES[message_id].STRUCT.size))
+    recorder.write(wild)
+    recorder.close()
+    recording = biotac.Recording(path)
+    assert b"".join(recording.blocks) == wild
+    assert len(recording.frames) == 60 and recording.problems != []

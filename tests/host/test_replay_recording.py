@@ -18,6 +18,7 @@ from biotac.cli.main import main
 from biotac.hand import Hand
 from biotac.link.ports import open_link
 from biotac.link.replay_link import ReplayLink, open_replay
+from biotac.recording.playback import Playback
 
 SECONDS = 4
 
@@ -172,8 +173,6 @@ def test_a_damaged_frame_is_damaged_in_the_replay_too(recorded, tmp_path) -> Non
     at = block.index(0, len(block) // 2) + 30
     block[at] = block[at] % 255 + 1  # another byte, and no delimiter
     damaged.blocks[1] = bytes(block)
-    from biotac.recording.playback import Playback
-
     with Hand(ReplayLink("replay:damaged", Playback(damaged))) as hand:
         frames = hand.read(100)
         assert hand.stats.crc_errors + hand.stats.other_errors == 1
@@ -216,3 +215,8 @@ def test_another_kind_of_file_is_refused(tmp_path) -> None:
     (tmp_path / "a.txt").write_text("hello, I am no recording")
     with pytest.raises(biotac.RecordingError, match="no MCAP file"):
         open_link(f"replay:{tmp_path / 'a.txt'}")
+
+
+def test_a_link_needs_a_pty(recorded, tmp_path, capsys) -> None:
+    assert main(["replay", str(recorded[0]), "--link", str(tmp_path / "x")]) == 2
+    assert "add --pty" in capsys.readouterr().err

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
 from ..export import FORMATS, export
-from ..recording import Recording
+from .loading import load
 from .progress import Progress
 
 NAME = "export"
@@ -26,10 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write OUT, or leave nothing behind; what the recording lacks is said on stderr."""
+    recording = load(args.recording)
     progress = Progress()
-    recording = Recording(args.recording)
-    for problem in recording.problems:
-        print(f"biotac: {problem}", file=sys.stderr)
     try:
         written = export(
             recording,

@@ -15,6 +15,7 @@ from ..export import export
 from ..export.partial import whole
 from ..recording import Recording
 from ..recording.recompute import recompute
+from .loading import load
 from .progress import Progress
 
 NAME = "recompute"
@@ -43,9 +44,7 @@ def run(args: argparse.Namespace) -> int:
     changes = read_settings(args.settings) if args.settings else {}
     if args.poc_weights:
         changes[wire.Setting.POC_WEIGHTS] = int(wire.PocWeights[args.poc_weights.upper()])
-    recording = Recording(args.recording)
-    for problem in recording.problems:
-        print(f"biotac: {problem}", file=sys.stderr)
+    recording = load(args.recording)
     options: dict[str, Any] = {"keep_tare": args.keep_tare}
     options["show"] = lambda share: progress.show(f"{args.out}: {share:.0%}, Ctrl-C stops and leaves nothing behind")
     try:
@@ -57,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
                 place = Path(folder) / "recomputed.mcap"
                 notes = recompute(recording, place, changes, **options)
                 export(Recording(place), args.out, overwrite=args.force)
+    except KeyboardInterrupt as interrupt:
+        raise KeyboardInterrupt(*interrupt.args or (f"{args.out} was not written",)) from None
     finally:
         progress.done()
     for note in notes:

@@ -8,9 +8,10 @@ import math
 import sys
 from pathlib import Path
 
-from ..recording import Recording
+from ..errors import InputError
 from ..recording.playback import Playback
 from . import stream, values
+from .loading import load
 from .sim import make_link
 
 NAME = "replay"
@@ -42,9 +43,9 @@ def moment(text: str) -> float:
 
 def run(args: argparse.Namespace) -> int:
     """Play to the end or Ctrl-C; what the recording lacks is said on stderr."""
-    recording = Recording(args.recording)
-    for problem in recording.problems:
-        print(f"biotac: {problem}", file=sys.stderr)
+    if args.link is not None and not args.pty:
+        raise InputError("--link is for a pty; add --pty")
+    recording = load(args.recording)
     playback = Playback(recording, from_s=args.from_s, to_s=args.to_s)
     return on_pty(args, playback) if args.pty else on_stdout(args, playback)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +29,10 @@ class Recording:
     lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its index;
     ``damaged_chunks``: seconds that were left out. ``blocks`` are the wire's bytes as they came, about one a
     second, and ``arrived_ns`` when each began, by the host's clock (Unix). Raises RecordingError when
-    nothing can be read.
+    nothing can be read. ``show`` is told the share of the work that is done.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] = lambda share: None) -> None:
         self.path = Path(path)
         self.problems: list[str] = []
         self.cut_off = False
@@ -54,7 +54,11 @@ class Recording:
             raise RecordingError(f"{self.path} has damaged metadata ({error}); its frames cannot be judged") from error
         decoder = StreamDecoder()
         decoder.accept_newer_minor()
-        batch = join([decoder.feed(block) for block in self.blocks])
+        parts = []
+        for k, block in enumerate(self.blocks):
+            parts.append(decoder.feed(block))
+            show((k + 1) / len(self.blocks))
+        batch = join(parts)
         self.frames: StructArray = batch.frames
         self.wire: StructArray = batch.wire
         self.pac: StructArray = batch.pac

@@ -63,6 +63,8 @@ def recompute(
             raise InputError(
                 f"{setting.name.lower()} is {value}, expected {spec.low} to {spec.high} {spec.unit}; choose another"
             )
+    if not len(recording.wire):
+        raise InputError(f"{recording.path} holds no frame; there is nothing to recompute")
     settings = recording.settings | changes
     notes: list[str] = []
     if keep_tare:
