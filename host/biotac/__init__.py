@@ -28,7 +28,7 @@ from .finger import FINGER_DTYPE, Finger
 from .frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
 from .hand import Hand, HandWarning
 from .opening import open
-from .recording import Recorder, Recording, load
+from .recording import Compact, Recorder, Recording, load, load_compact
 from .stream import LinkStats
 from .version import __version__
 
@@ -42,6 +42,7 @@ __all__ = [
     "Calibration",
     "CalibrationState",
     "CommandRefusedError",
+    "Compact",
     "DeviceLostError",
     "Finger",
     "FlashError",
@@ -66,5 +67,6 @@ __all__ = [
     "__version__",
     "compute",
     "load",
+    "load_compact",
     "open",
 ]

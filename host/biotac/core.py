@@ -51,7 +51,21 @@ def on_board(counts: Any, tare: Any, settings: Settings | None = None) -> Result
     shapes or ranges.
     """
     raw, tare_q4 = checked(counts, tare)
-    board = board_settings(settings or default_settings())
+    poc_um, force_100un, torque_mnmm, _ = on_board_q4(raw, tare_q4, settings or default_settings())
+    return Results(
+        to_units(poc_um, UM_PER_MM), to_units(force_100un, FORCE_LSB_PER_N), to_units(torque_mnmm, MNMM_PER_NMM)
+    )
+
+
+def on_board_q4(
+    counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settings: Settings
+) -> tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]:
+    """on_board() on the integers of FRAME messages, both (n, 19), to such integers and the kernel's flags.
+
+    Returns poc_um, force_100un, torque_mnmm, each (n, 3), and flags (n,).
+    """
+    raw, tare_q4 = np.ascontiguousarray(counts), np.ascontiguousarray(tare_q4)
+    board = board_settings(settings)
     kernel = ffi.new("bt_kernel_settings *", lib.bt_kernel_settings_from(board))
     n = len(raw)
     poc_um = np.empty((n, 3), np.int16)
@@ -68,9 +82,7 @@ def on_board(counts: Any, tare: Any, settings: Settings | None = None) -> Result
         ffi.from_buffer("int32_t[]", torque_mnmm),
         ffi.from_buffer("uint32_t[]", flags),
     )
-    return Results(
-        to_units(poc_um, UM_PER_MM), to_units(force_100un, FORCE_LSB_PER_N), to_units(torque_mnmm, MNMM_PER_NMM)
-    )
+    return poc_um, force_100un, torque_mnmm, flags
 
 
 def board_settings(settings: Settings) -> Any:

@@ -157,6 +157,20 @@ class Finger:
         base.pdc_q16 = TARE_UNKNOWN_Q16 if pdc is None else q16[_ELECTRODES]
         _accept("TARE_SET", lib.bt_tare_set(ffi.addressof(self._finger, "tare"), base))
 
+    def tare_message(self) -> wire.Tare:
+        """The TARE message a board sends when the latest round changed the tare; ``seq`` counts from reset."""
+        tare = self._finger.tare
+        return wire.Tare(
+            seq=(self._finger.seq - 1) % 2**16,
+            t_us=self._finger.frame.t_us,
+            finger=self._index,
+            tare_state=tare.state,
+            reason=tare.reason,
+            noise_count2=tare.noise.count2,
+            tare_q16=tuple(tare.base.electrode_q16),
+            pdc_tare_q16=tare.base.pdc_q16,
+        )
+
     @property
     def tare_counts(self) -> NDArray[np.float64]:
         """The tare in force (19,), in counts with the machine's own 1/65536; NaN where unknown."""

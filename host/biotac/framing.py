@@ -5,13 +5,16 @@ The judge of both is protocol/vectors/, which the C tests read too.
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass
 
 from . import _wire as wire
 from .core import ffi, lib
 
+CRC_BYTES = 4
+OVERHEAD_BYTES = 1 + CRC_BYTES + 1 + 1  # id, CRC, COBS, delimiter
 ENCODED_MAX_BYTES = wire.MAX_FRAME_BYTES + 2  # COBS and the delimiter add one each
-PAYLOAD_MAX_BYTES = wire.MAX_FRAME_BYTES - 5  # id and CRC
+PAYLOAD_MAX_BYTES = wire.MAX_FRAME_BYTES - 1 - CRC_BYTES
 
 
 @dataclass
@@ -36,3 +39,17 @@ def encode(message_id: int, payload: bytes) -> bytes:
         raise ValueError(f"a payload of {len(payload)} bytes, expected at most {PAYLOAD_MAX_BYTES}")
     out = ffi.new("uint8_t[]", ENCODED_MAX_BYTES)
     return bytes(ffi.buffer(out, lib.bt_frame_encode(message_id, payload, len(payload), out)))
+
+
+def open_frame(data: bytes) -> tuple[int, bytes] | None:
+    """Message id and payload of what stands between two delimiters; None when it is no good frame.
+
+    For looking at single frames, whatever their length; streams go through decode.py.
+    """
+    out = ffi.new("uint8_t[]", max(1, len(data)))
+    n = lib.bt_cobs_decode(data, len(data), out)
+    plain = bytes(ffi.buffer(out, max(0, n)))
+    covered = plain[:-CRC_BYTES]
+    if not covered or zlib.crc32(covered) != int.from_bytes(plain[-CRC_BYTES:], "little"):
+        return None
+    return covered[0], covered[1:]

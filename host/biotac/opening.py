@@ -21,10 +21,13 @@ def open(port: str | os.PathLike[str] | None = None, *, pace: float = 0.0) -> Ha
     (``?calibration=1:0x50:24c02``, one for each, loads what the EEPROMs on their harnesses hold); ``sim:SOURCE``
     for a simulated board, where SOURCE is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``); or
     ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the same.
-    ``pace`` is for simulated and emulated boards: device seconds per second, 0 for as fast as this side reads.
+    ``replay:press.mcap?from=12.5&to=20`` plays a recording, or that part of it: the board's stream again, while
+    commands that would change a board raise CommandRefusedError.
+    ``pace`` is for simulated and emulated boards and recordings: device seconds per second, 0 for as fast as
+    this side reads.
 
-    Raises PortError, NotAGatewayError, WireVersionError, InputError for a source that cannot be played or an
-    EEPROM without a calibration, or CommandRefusedError for another sensor's.
+    Raises PortError, NotAGatewayError, WireVersionError, InputError for a source or a recording that cannot be
+    played or an EEPROM without a calibration, or CommandRefusedError for another sensor's.
     """
     text = None if port is None else os.fspath(port)
     if text is None or text.startswith(SERIAL_PREFIX):

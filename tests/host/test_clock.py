@@ -311,18 +311,18 @@ def test_a_hand_asks_the_board_for_its_time(scripted_board, hello) -> None:
     assert unix_s - now.host_s == pytest.approx(time.time() - time.monotonic(), abs=0.1)
 
 
-def test_a_recording_has_a_clock_too(tmp_path: Path, monkeypatch) -> None:
+def test_a_recording_has_a_clock_too(tmp_path: Path) -> None:
     with biotac.open("sim:press.toml") as hand:
         hand.record(tmp_path / "fast.mcap")
         batch = hand.read_batch(5.0)
-        facts = (hand.info, hand.settings(), [hand.sensor_info(0)], "port")
+        facts = (hand.info, hand.settings(), {}, [hand.sensor_info(0)], "port")
     # Written again as if it had come from a board whose time 0 was at second 1000, through a jittery link.
     rng = np.random.default_rng(1)
-    recorder = Recorder(tmp_path / "real.mcap", *facts)
+    at_s = 1000.0
+    clocks = {"clock_s": lambda: at_s, "unix_ns": lambda: int(at_s * 1e9)}
+    recorder = Recorder(tmp_path / "real.mcap", *facts, **clocks)
     for row in batch.wire:
         at_s = 1000.0 + (int(row["t_us"]) + 10_000) / 1e6 + 0.0002 + 0.001 * rng.random()
-        monkeypatch.setattr("biotac.recording.writer.time.monotonic", lambda at_s=at_s: at_s)
-        monkeypatch.setattr("biotac.recording.writer.time.time_ns", lambda at_s=at_s: int(at_s * 1e9))
         recorder.write(encode(wire.Frame.ID, row.tobytes()))
     recorder.close()
     recording = biotac.Recording(tmp_path / "real.mcap")

@@ -14,11 +14,11 @@ import numpy as np
 import biotac
 
 from .. import _wire as wire
+from ..framing import OVERHEAD_BYTES
 from ..hand import RESULTS
 from ..stream import Batch
 
 FRAME_S = 0.01  # one round of slots
-OVERHEAD = 7  # id, CRC, COBS and delimiter (protocol/SPEC.md, Frames)
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,6 @@ def _share(batch: Batch, *, touched: bool) -> Share:
     beats = 0 if touched else len(batch.idle)
     rounds = frames + (0 if touched else int(batch.idle["frames"].sum()))
     sizes = ((frames, wire.Frame.ID), (tares, wire.Tare.ID), (beats, wire.Idle.ID))
-    total = sum(n * (wire.DTYPES[message_id].itemsize + OVERHEAD) for n, message_id in sizes)
+    total = sum(n * (wire.DTYPES[message_id].itemsize + OVERHEAD_BYTES) for n, message_id in sizes)
     seconds = rounds * FRAME_S
     return Share(seconds, frames, beats, total / seconds if seconds else 0.0)

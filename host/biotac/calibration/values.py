@@ -76,6 +76,11 @@ class Calibration:
         """The serial number as the messages and records hold it."""
         return tuple(self.serial.encode("ascii").ljust(SERIAL_BYTES, b"\0"))
 
+    def changed(self, changes: Mapping[wire.Setting, int]) -> Calibration:
+        """The same with other values for some settings; those that are not a finger's own are left out."""
+        own = {**self.settings(), **changes}
+        return self.from_wire(self.wire_serial(), self.made_s, [own[s] for s in wire.CALIBRATION_SETTINGS])
+
     @classmethod
     def from_wire(cls, serial: Sequence[int], made_s: int, value: Sequence[int]) -> Calibration:
         """Of what a message or a record holds; ValueError for what none may."""

@@ -7,13 +7,13 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from ..bench import batch, decode, front, front_picture, idle, kernels
+from ..bench import batch, decode, front, front_picture, idle, kernels, recording
 from ..errors import InputError
+from . import values
+from .progress import Progress
 
 NAME = "bench"
-HELP = (
-    "Measure: kernel variants' errors and cost, whole recordings against NumPy, decoding, an untouched finger's link."
-)
+HELP = "Measure: kernels, whole recordings against NumPy, decoding, an idle finger's link, recording sizes."
 EXAMPLE = "biotac bench kernels --counts counts.json --out front"
 BATCH_FRAMES = 200_000
 DECODE_FRAMES = 30_000  # a minute of five fingers
@@ -29,10 +29,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="WHAT",
         nargs="?",
         default="kernels",
-        choices=[*FRAMES, "idle"],
+        choices=[*FRAMES, "idle", "recording"],
         help="kernels (default): every variant's errors and cost; batch: whole recordings, biotac.compute; "
         "decode: the link's bytes to arrays, against pymavlink and Python; "
-        "idle: bytes on the link at rest and in contact",
+        "idle: bytes on the link at rest and in contact; recording: sizes and load times of recordings",
     )
     parser.add_argument(
         "--frames",
@@ -41,7 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"kernels: per class (default {effort.frames}); batch: recording length (default {BATCH_FRAMES}); "
         f"decode: of five fingers together (default {DECODE_FRAMES})",
     )
-    parser.add_argument("--source", default="press.toml", help="idle: what to play (default %(default)s)")
+    parser.add_argument("--source", default="press.toml", help="idle, recording: what to play (default %(default)s)")
+    parser.add_argument("--fingers", type=int, default=5, help="recording: how many (default %(default)s)")
+    parser.add_argument("--seconds", type=values.seconds, default=600.0, help="recording: device time (default 600)")
     climb = parser.add_argument_group("kernels")
     climb.add_argument("--restarts", type=_count, default=effort.restarts, metavar="N", help="of the hill climbing")
     climb.add_argument("--steps", type=_count, default=effort.steps, metavar="N", help="of each restart")
@@ -60,6 +62,8 @@ def run(args: argparse.Namespace) -> int:
     """Print and return 0, whatever the numbers are: they are for people to judge."""
     if args.what == "idle":
         return _idle(args)
+    if args.what == "recording":
+        return _recording(args)
     low, high = FRAMES[args.what]
     if args.frames is not None and not low <= args.frames <= high:
         raise InputError(f"--frames is {args.frames}, expected {low} to {high} for bench {args.what}")
@@ -145,6 +149,41 @@ def _rows(title: str, rows: list[batch.Row]) -> None:
 def _ratios(ratios: list[batch.Ratio]) -> None:
     for ratio in ratios:
         print(f"{ratio.ratio:5.1f}x  {ratio.faster} against {ratio.slower}{_verdict(ratio)}")
+
+
+def _recording(args: argparse.Namespace) -> int:
+    progress = Progress()
+    try:
+        outcome = recording.measure(args.source, fingers=args.fingers, seconds=args.seconds, show=progress.show)
+    finally:
+        progress.done()
+    if args.json:
+        print(json.dumps(asdict(outcome) | {"of_floor": outcome.of_floor, "faster": outcome.faster}))
+        return 0
+    parts = ", ".join(f"{name} {size / recording.MB:.1f}" for name, size in outcome.mcap_parts.items())
+    floor_mb = outcome.floor_bytes / recording.MB
+    print(f"{outcome.source}, {outcome.fingers} finger(s), {outcome.seconds:.1f} s, {outcome.frames} frames and PAC")
+    print(f"MB: wire {outcome.wire_bytes / recording.MB:.1f}")
+    print(
+        f"    MCAP {outcome.mcap_bytes / recording.MB:.1f} ({parts}){_asked_mb(outcome)}\n"
+        f"    MCAP with protobuf messages {outcome.protobuf_bytes / recording.MB:.1f}\n"
+        f"    compact {outcome.compact_bytes / recording.MB:.2f}, entropy floor {floor_mb:.2f}"
+    )
+    print(f"{outcome.of_floor:.3f}x its entropy floor{_met(outcome.of_floor <= recording.ASKED_OF_FLOOR, '<= 1.25x')}")
+    print("CPU s to load to NumPy: " + ", ".join(f"{name} {taken:.3f}" for name, taken in outcome.load_s.items()))
+    print(f"{outcome.faster:.1f}x  compact against protobuf{_met(outcome.faster >= recording.ASKED_LOAD, '>= 10x')}")
+    return 0
+
+
+def _asked_mb(outcome: recording.Outcome) -> str:
+    """The figure asked is for ten minutes of five fingers."""
+    if (outcome.fingers, round(outcome.seconds)) != (5, 600):
+        return ""
+    return _met(outcome.mcap_bytes <= recording.ASKED_MCAP_MB * recording.MB, "<= 40 MB")
+
+
+def _met(met: bool, asked: str) -> str:
+    return f" (asked {asked}: {'met' if met else 'NOT met'})"
 
 
 def _verdict(ratio: batch.Ratio) -> str:

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from ..crosscheck import CrossCheck
-from ..recording import Recording
+from .loading import load
 
 NAME = "check"
 HELP = "Check every on-board result of a recording against the float64 reference."
@@ -25,7 +25,7 @@ def run(args: argparse.Namespace) -> int:
 
     A recording that was merely cut off, as by a kill, is right as far as it goes; stderr says so.
     """
-    recording = Recording(args.recording)
+    recording = load(args.recording, quiet=True)
     outcome = CrossCheck()
     outcome.add(recording.wire, recording.settings, recording.finger_settings)
     damaged = recording.counts.bad + recording.damaged_chunks

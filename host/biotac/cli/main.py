@@ -10,34 +10,49 @@ import threading
 from collections.abc import Sequence
 
 from ..errors import BiotacError, InputError
-from . import bench, calibration, check, demo, doctor, flash, info, list_ports, record, sim, stream, udev_setup, version, view
-
-VERBS = (
-    demo,
-    list_ports,
-    doctor,
-    info,
-    view,
-    stream,
-    record,
-    check,
-    calibration,
-    sim,
-    flash,
+from . import (
     bench,
+    calibration,
+    check,
+    demo,
+    doctor,
+    export,
+    flash,
+    import_btd,
+    info,
+    list_ports,
+    recompute,
+    record,
+    replay,
+    sim,
+    stream,
     udev_setup,
     version,
+    view,
 )
+
+VERBS = (
+    demo, list_ports, doctor, info, view, stream, record, check, replay, recompute, export, import_btd, calibration,
+    sim, flash, bench, udev_setup, version,
+)  # fmt: skip
 
 EPILOG = """\
 A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, or sim:SOURCE, a simulated
 board that plays a scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), or
-emu:pico?source=SOURCE, a Pico's flash image in an emulator that plays the same.
+emu:pico?source=SOURCE, a Pico's flash image in an emulator that plays the same, or replay:REC,
+a recording that answers as its board did.
 
 exit codes: 0 done   1 check or doctor found something   2 unusable file or argument   3 port cannot be
 opened   4 no gateway on the port   5 firmware of another wire version   6 board lost
 7 command refused   8 flashing failed   130 interrupted
 """
+
+
+class OneLineEach(argparse.RawDescriptionHelpFormatter):
+    """Wide enough for a verb a line, so that all of them fit a screen."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=16, width=110)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -46,7 +61,7 @@ def parser() -> argparse.ArgumentParser:
         prog="biotac",
         description="BioTac fingertips over USB: forces, points of contact, torques.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=OneLineEach,
     )
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
     for module in VERBS:
@@ -74,8 +89,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BiotacError as error:
         print(f"biotac: {one_line(error)}", file=sys.stderr)
         return error.exit_code
-    except KeyboardInterrupt:
-        print("biotac: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        # What became of a file that was being written.
+        print(f"biotac: interrupted{f'; {interrupt}' if interrupt.args else ''}", file=sys.stderr)
         return 130
     except BrokenPipeError:
         # Whoever read our output has had enough; keep Python from complaining while it shuts down.

@@ -33,29 +33,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print until the time is over, the source ends or Ctrl-C."""
-    due_us: dict[int, int] = {}
-    step_us = int(1e6 / args.rate) if args.rate > 0 else 0
-    end_us: int | None = None
     # A person wants to see it happen: simulated boards run in real time here.
     with biotac.open(args.port, pace=1.0) as hand:
         for warning in hand.warnings:
             print(f"biotac: {warning.text}", file=sys.stderr)
         if args.touched:
             hand.subscribe(RESULTS)
-        for frame in hand.frames():
-            if end_us is None and args.seconds is not None:
-                end_us = frame.t_us + round(args.seconds * 1e6)
-            if end_us is not None and frame.t_us >= end_us:
-                break
-            if frame.t_us < due_us.get(frame.finger, frame.t_us):
-                continue
-            due_us[frame.finger] = frame.t_us + step_us
-            print(json.dumps(as_dict(frame)) if args.json else as_line(frame))
-            sys.stdout.flush()
-        lost = hand.stats.frames_lost
+        show(hand, rate=args.rate, seconds=args.seconds, as_json=args.json)
+    return 0
+
+
+def show(hand: biotac.Hand, *, rate: float, seconds: float | None = None, as_json: bool = False) -> None:
+    """Print ``rate`` frames a second and finger, and at the end how many were lost."""
+    due_us: dict[int, int] = {}
+    step_us = int(1e6 / rate) if rate > 0 else 0
+    end_us: int | None = None
+    for frame in hand.frames():
+        if end_us is None and seconds is not None:
+            end_us = frame.t_us + round(seconds * 1e6)
+        if end_us is not None and frame.t_us >= end_us:
+            break
+        if frame.t_us < due_us.get(frame.finger, frame.t_us):
+            continue
+        due_us[frame.finger] = frame.t_us + step_us
+        print(json.dumps(as_dict(frame)) if as_json else as_line(frame))
+        sys.stdout.flush()
+    lost = hand.stats.frames_lost
     if lost:
         print(f"biotac: {lost} frame(s) lost; close other programs, or use a faster computer", file=sys.stderr)
-    return 0
 
 
 def as_line(frame: Frame) -> str:

@@ -4,6 +4,7 @@
 ``spidev:0.0,0.1``           sensors on this computer's own SPI bus, one device a finger
 ``sim:SOURCE``               a simulated board playing a scenario or a recording
 ``emu:pico?source=SOURCE``   the same with a board's flash image in an emulator
+``replay:REC``               a recording, which answers as its board did
 """
 
 from __future__ import annotations

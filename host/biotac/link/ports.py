@@ -76,7 +76,7 @@ def parse_pace(text: str) -> float:
 
 
 def open_link(port: str, *, pace: float = 0.0) -> Link:
-    """Open a PORT. ``pace`` applies to simulated boards that do not name one.
+    """Open a PORT. ``pace`` applies to simulated boards and recordings that do not name one.
 
     Raises PortError for an unknown, missing, busy or forbidden port, InputError for a source that
     cannot be played.
@@ -90,6 +90,10 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
         sim = parse_sim(port, pace)
         source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
         return SimLink(port, start_board(sim.board, source, pace=sim.pace, image=sim.image))
+    if scheme == "replay" and colon:
+        from .replay_link import open_replay
+
+        return open_replay(port, pace)
     if scheme == "spidev" and colon:
         from .spidev_link import SpidevLink
 
@@ -97,7 +101,7 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
     if colon and os.sep not in port and not port.upper().startswith("COM") and len(scheme) > 1:
         raise PortError(
             f"no kind of port is called {scheme!r}; expected a device path, serial:NUMBER, "
-            "spidev:BUS.DEVICE, sim:SOURCE or emu:pico"
+            "spidev:BUS.DEVICE, sim:SOURCE, emu:pico or replay:REC"
         )
     return SerialLink(port)
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mcap.exceptions import InvalidMagic, McapError
 from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
@@ -26,27 +27,30 @@ from . import layout
 class Recording:
     """A recording in memory.
 
-    ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``wire`` the
-    FRAME messages as sent, ``idle`` the heartbeats (IDLE_DTYPE), ``messages`` the rest (tare changes, status). ``settings`` are the board's and
-    ``calibrations`` those in force, by finger, when it began. ``problems`` lists in words
-    what is missing or damaged; the rest is good. ``cut_off``: the file ends without its index;
-    ``damaged_chunks``: seconds that were left out. Raises RecordingError when nothing can be read.
+    ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``idle`` (IDLE_DTYPE)
+    heartbeats, ``wire`` the FRAME messages as sent, ``messages`` the rest (tare changes, status). ``settings`` are the
+    board's and ``calibrations`` those in force, by finger, when it began. ``problems`` lists in words what is missing
+    or damaged; the rest is good. ``cut_off``: the file ends without its index; ``damaged_chunks``: seconds that were
+    left out. ``blocks`` are the wire's bytes as they came, about one a second, and ``arrived_ns`` when each began, by
+    the host's clock (Unix). Raises RecordingError when nothing can be read. ``show`` is told the share of the work that is done.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] = lambda share: None) -> None:
         self.path = Path(path)
         self.problems: list[str] = []
         self.cut_off = False
         self.damaged_chunks = 0
         metadata: dict[str, str] | None = None
-        blocks: list[bytes] = []
-        written_s: list[float] = []
+        self.blocks: list[bytes] = []
+        self.arrived_ns: list[int] = []
+        all_here_s: list[float] = []
         for record in self._records():
             if isinstance(record, Metadata) and record.name == layout.METADATA_NAME:
                 metadata = record.metadata
             elif isinstance(record, Message):
-                blocks.append(record.data)
-                written_s.append(record.log_time / 1e9)
+                self.blocks.append(record.data)
+                self.arrived_ns.append(record.publish_time)
+                all_here_s.append(record.log_time / 1e9)
         if metadata is None:
             raise RecordingError(self._without_metadata())
         try:
@@ -55,10 +59,13 @@ class Recording:
             raise RecordingError(f"{self.path} has damaged metadata ({error}); its frames cannot be judged") from error
         decoder = StreamDecoder()
         decoder.accept_newer_minor()
-        batches = [decoder.feed(block) for block in blocks]
-        batch = join(batches)
-        ends_us = [b.last_t_us() for b in batches]
-        self._arrivals = [(t_us, at_s) for t_us, at_s in zip(ends_us, written_s, strict=True) if t_us is not None]
+        parts = []
+        for k, block in enumerate(self.blocks):
+            parts.append(decoder.feed(block))
+            show((k + 1) / len(self.blocks))
+        batch = join(parts)
+        ends_us = [part.last_t_us() for part in parts]
+        self._arrivals = [(t_us, at_s) for t_us, at_s in zip(ends_us, all_here_s, strict=True) if t_us is not None]
         self.frames: StructArray = batch.frames
         self.wire: StructArray = batch.wire
         self.pac: StructArray = batch.pac
@@ -66,6 +73,8 @@ class Recording:
         self.messages: list[Any] = batch.messages
         self.counts = decoder.counts
         self.frames_lost = decoder.lost
+        self.pac_lost = decoder.lost_pac
+        self.disordered = decoder.disordered
         if self.cut_off and not len(self.frames):
             raise RecordingError(f"{self.path} was cut off before its first second was whole; record it again")
         self._describe_losses(decoder)
@@ -101,7 +110,8 @@ class Recording:
             )
         self.metadata = metadata
         hello: dict[str, Any] = json.loads(metadata["hello"])
-        self.info = wire.Hello(**hello | {"board_serial": tuple(hello["board_serial"])})
+        self.info = wire.Hello(**_tuples(hello))
+        self.sensors = [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))]
         named = json.loads(metadata["settings"])
         own = json.loads(metadata.get("calibrations", "{}"))
         # A setting or a calibration that this recording's firmware did not have yet: the default, and none.
@@ -159,6 +169,27 @@ class Recording:
             self.problems.append(f"one second of {self.path.name} is damaged and left out ({error})")
             return []
 
+    @property
+    def fingers(self) -> list[int]:
+        """Fingers of which there is a frame, a heartbeat or PAC."""
+        rows = (self.frames, self.idle, self.pac)
+        return sorted({int(finger) for table in rows for finger in np.unique(table["finger"])})
+
+    @property
+    def begin_us(self) -> int:
+        """Device time of the first frame or heartbeat; 0 without any."""
+        return min((int(rows["t_us"].min()) for rows in (self.frames, self.idle) if len(rows)), default=0)
+
+    @property
+    def end_us(self) -> int:
+        """Device time of the last frame or heartbeat; 0 without any."""
+        return max((int(rows["t_us"].max()) for rows in (self.frames, self.idle) if len(rows)), default=0)
+
+    @property
+    def begin_ns(self) -> int:
+        """``begin_us`` on the host's clock (Unix), as good as the link is prompt."""
+        return self.arrived_ns[0] if self.arrived_ns else 0
+
     def _describe_losses(self, decoder: StreamDecoder) -> None:
         for finger, seq, lost in decoder.lost_after[:10]:
             self.problems.append(f"finger {finger}: {lost} frame(s) missing after frame {seq}")
@@ -170,6 +201,11 @@ class Recording:
                 f"{counts.bad} wire frame(s) refused: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
                 f"{counts.bad_length} wrong length, {counts.too_long} too long"
             )
+
+
+def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
+    """A message's fields as JSON had them."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}
 
 
 def load(path: str | os.PathLike[str]) -> StructArray:

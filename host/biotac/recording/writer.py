@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
 import time
-from importlib import resources
+from collections.abc import Callable
 from pathlib import Path
-
-from mcap.writer import CompressionType, Writer
+from typing import BinaryIO
 
 from .. import _wire as wire
 from ..calibration import Calibration
 from ..calibration.file import to_dict
 from ..errors import InputError
+from ..framing import OVERHEAD_BYTES
 from ..version import __version__
 from . import layout
+from .file import RecordingFile
 
-FLUSH_S = 1.0
-FLUSH_BYTES = 1 << 20
+# Less than the second that may be lost: some of it comes between the decision and the end of the write.
+FLUSH_S = 0.9
+# Of a full stream. A simulated board may live faster than the host's clock: then it is bytes that close a block.
+FINGER_BYTES_PER_S = 100 * sum(wire.DTYPES[m].itemsize + OVERHEAD_BYTES for m in (wire.Frame.ID, wire.Pac.ID))
 
 
 class Recorder:
-    """An open recording. Made by ``Hand.record``; every chunk from the link is handed to ``write``."""
+    """An open recording. Made by ``Hand.record``; every chunk from the link is handed to ``write``.
+
+    ``clock_s`` and ``unix_ns`` are the clocks that close a block and stamp it.
+    """
 
     def __init__(
         self,
@@ -36,40 +41,22 @@ class Recorder:
         *,
         overwrite: bool = False,
         mid_stream: bool = False,
+        clock_s: Callable[[], float] = time.monotonic,
+        unix_ns: Callable[[], int] = time.time_ns,
     ) -> None:
         self.path = path
+        self._clock_s = clock_s
+        self._unix_ns = unix_ns
         self._pending = bytearray()
         self._pending_since = 0.0
+        self._arrived_ns = 0
+        self._block_bytes = int(FLUSH_S * FINGER_BYTES_PER_S * max(1, hello.fingers_present.bit_count()))
         self._skip_to_delimiter = mid_stream
-        self._sequence = 0
-        if path.is_dir():
-            raise InputError(f"{path} is a folder; name a file in it")
-        try:
-            self._file = path.open("wb" if overwrite else "xb")
-        except FileExistsError as error:
-            raise InputError(f"{path} exists and would be overwritten; choose another name or say --force") from error
-        except OSError as error:
-            raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
-        try:
-            self._begin(describe(hello, settings, calibrations, sensors, port))
-        except OSError:
-            with contextlib.suppress(OSError):  # the disk is as full as it was
-                self._file.close()
-            raise
-
-    def _begin(self, metadata: dict[str, str]) -> None:
-        # A chunk size of one byte closes a chunk after every message, and each message is one
-        # second: what is on disk is whole up to a second ago.
-        self._writer = Writer(self._file, chunk_size=1, compression=CompressionType.ZSTD)
-        self._writer.start(profile="", library=f"biotac-gateway {__version__}")
-        schema = resources.files("biotac").joinpath("schema.json").read_bytes()
-        schema_id = self._writer.register_schema(layout.SCHEMA_NAME, layout.SCHEMA_ENCODING, schema)
-        self._channel = self._writer.register_channel(layout.TOPIC, layout.MESSAGE_ENCODING, schema_id)
-        self._writer.add_metadata(layout.METADATA_NAME, metadata)
-        self._file.flush()
+        metadata = describe(hello, settings, calibrations, sensors, port)
+        self._file = RecordingFile(create(path, overwrite=overwrite), metadata)
 
     def write(self, chunk: bytes) -> None:
-        """Take bytes as they came; an empty chunk only lets a second's worth out in time.
+        """Take bytes as they came; an empty chunk only lets a block out in time.
 
         Does nothing once closed: the stream may go on after its recording.
         """
@@ -78,22 +65,27 @@ class Recorder:
         if self._skip_to_delimiter:
             _, delimiter, chunk = chunk.partition(b"\0")
             self._skip_to_delimiter = not delimiter
-        now = time.monotonic()
+        now_s = self._clock_s()
         if chunk and not self._pending:
-            self._pending_since = now
+            self._begin_block(now_s)
         self._pending += chunk
-        if self._pending and (now - self._pending_since >= FLUSH_S or len(self._pending) >= FLUSH_BYTES):
+        while len(self._pending) >= self._block_bytes:
+            rest = self._pending[self._block_bytes :]
+            del self._pending[self._block_bytes :]
+            self.flush()
+            self._begin_block(now_s)
+            self._pending += rest
+        if self._pending and now_s - self._pending_since >= FLUSH_S:
             self.flush()
 
+    def _begin_block(self, now_s: float) -> None:
+        self._pending_since = now_s
+        self._arrived_ns = self._unix_ns()
+
     def flush(self) -> None:
-        """Close the current chunk and give it to the operating system."""
-        if not self._pending:
-            return
-        now_ns = time.time_ns()
-        self._writer.add_message(self._channel, now_ns, bytes(self._pending), now_ns, self._sequence)
-        self._sequence += 1
+        """Close the current block and give it to the operating system."""
+        self._file.add(bytes(self._pending), self._arrived_ns, self._unix_ns())
         self._pending.clear()
-        self._file.flush()
 
     @property
     def closed(self) -> bool:
@@ -106,9 +98,20 @@ class Recorder:
             return
         try:
             self.flush()
-            self._writer.finish()  # type: ignore[no-untyped-call]
         finally:
-            self._file.close()  # also on a full disk, or the interpreter would try once more at its end
+            self._file.close()
+
+
+def create(path: Path, *, overwrite: bool) -> BinaryIO:
+    """Open ``path`` for writing. Raises InputError when it is a folder, exists, or cannot be written."""
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; name a file in it")
+    try:
+        return path.open("wb" if overwrite else "xb")
+    except FileExistsError as error:
+        raise InputError(f"{path} exists and would be overwritten; choose another name or say --force") from error
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
 
 
 def describe(
@@ -124,6 +127,7 @@ def describe(
         "software": __version__,
         "port": port,
         "wire": f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}",
+        "firmware": f"{hello.firmware_major}.{hello.firmware_minor}.{hello.firmware_patch}",
         "hello": json.dumps(dataclasses.asdict(hello)),
         "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
         "calibrations": json.dumps({finger: to_dict(its) for finger, its in calibrations.items()}),

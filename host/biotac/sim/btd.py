@@ -29,11 +29,12 @@ _MAX_BYTES = 1 << 30  # a day of three sensors is larger; a compressed bomb is s
 class BtdFrames:
     """Complete frames of the sensors that were there.
 
-    ``samples`` uint16 (frames, sensors, 44) in our SLOTS order, with tape codes for bad parity;
-    ``skipped`` counts incomplete frames.
+    ``samples`` uint16 (frames, sensors, 44) in our SLOTS order, with tape codes for bad parity; ``t_s``
+    (frames,) the file's time of each; ``skipped`` counts incomplete frames.
     """
 
     samples: npt.NDArray[np.uint16]
+    t_s: npt.NDArray[np.float64]
     skipped: int
 
 
@@ -75,7 +76,7 @@ def read_btd(path: Path) -> BtdFrames:
     there = np.argsort(_slot_channels(), kind="stable")
     samples = np.empty((len(starts), words.shape[1], len(_sensor.SLOTS)), dtype=np.uint16)
     samples[:, :, there] = words[np.take_along_axis(rows, here, axis=1)].transpose(0, 2, 1)
-    return BtdFrames(samples=samples, skipped=skipped)
+    return BtdFrames(samples=samples, t_s=table[starts, 0], skipped=skipped)
 
 
 def _slot_channels() -> npt.NDArray[np.float64]:

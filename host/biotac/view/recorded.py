@@ -70,7 +70,8 @@ class RecordedPlayer:
             recording = self._recording
             yield Batch(
                 recording.wire[picked[0]],
-                recording.frames[picked[0]],
+                recording.frames["seq"][picked[0]].astype(np.int64),
+                recording.frames["t_us"][picked[0]],
                 recording.pac[picked[1]],
                 recording.idle[picked[2]],
                 [m for _, _, m in self._messages[begin:said]],
@@ -86,8 +87,8 @@ class RecordedPlayer:
             bytes_received=recording.path.stat().st_size,
             frames=self._frames,
             frames_lost=recording.frames_lost,
-            pac_lost=0,
-            disordered=0,
+            pac_lost=recording.pac_lost,
+            disordered=recording.disordered,
             crc_errors=recording.counts.bad_crc,
             other_errors=recording.counts.bad - recording.counts.bad_crc,
         )

@@ -1,0 +1,86 @@
+"""biotac replay REC"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+
+from ..errors import InputError
+from ..recording.playback import Playback
+from . import stream, values
+from .loading import load
+from .sim import make_link
+
+NAME = "replay"
+HELP = "Play a recording as the board that made it, here or on a pty."
+EXAMPLE = "biotac replay grasp.mcap --from 12.5 --pace 2"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Recording, which part of it, how fast and where to."""
+    parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record")
+    parser.add_argument("--from", dest="from_s", type=moment, default=0.0, help="seconds since its first frame")
+    parser.add_argument("--to", dest="to_s", type=moment, help="seconds since its first frame")
+    parser.add_argument("--pace", type=values.pace, default=1.0, help="real (default), fast, or seconds per second")
+    parser.add_argument("--rate", type=values.rate, default=10.0, help="lines per second and finger (0: all)")
+    parser.add_argument("--pty", action="store_true", help="be a board on a pty that any serial program can open")
+    parser.add_argument("--link", type=Path, help="with --pty: also make this path a symbolic link to the pty")
+
+
+def moment(text: str) -> float:
+    """Seconds, 0 or more."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is no time; expected seconds from 0 on")
+    return value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Play to the end or Ctrl-C; what the recording lacks is said on stderr."""
+    if args.link is not None and not args.pty:
+        raise InputError("--link is for a pty; add --pty")
+    recording = load(args.recording)
+    playback = Playback(recording, from_s=args.from_s, to_s=args.to_s)
+    return on_pty(args, playback) if args.pty else on_stdout(args, playback)
+
+
+def on_stdout(args: argparse.Namespace, playback: Playback) -> int:
+    """Print frames as biotac stream does."""
+    from ..link.replay_link import ReplayLink
+    from ..opening import shake_hands
+
+    with shake_hands(ReplayLink(f"replay:{args.recording}", playback, pace=args.pace)) as hand:
+        stream.show(hand, rate=args.rate, as_json=args.json)
+    return 0
+
+
+def on_pty(args: argparse.Namespace, playback: Playback) -> int:
+    """Be a board until Ctrl-C; it plays when somebody starts its stream."""
+    from ..link.replay_pty import ReplayPty
+
+    board = ReplayPty(playback, args.pace)
+    try:
+        if args.link is not None:
+            make_link(args.link, board.path)
+        facts = {"port": board.path, "recording": str(args.recording)}
+        print(json.dumps(facts) if args.json else f"{board.path} plays {args.recording}; Ctrl-C stops")
+        sys.stdout.flush()
+        said = False
+        while True:
+            board.turn(1.0)
+            if board.over and not said:
+                said = True
+                print(f"{args.recording} is over; the board stays until Ctrl-C", file=sys.stderr)
+    except KeyboardInterrupt:
+        pass  # the usual way to stop it
+    finally:
+        if args.link is not None and args.link.is_symlink():
+            args.link.unlink()
+        board.close()
+    return 0

@@ -1,0 +1,42 @@
+"""CSV: a header line, then the rows of all fingers in the order of time."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..recording.reader import Recording
+from .columns import Table
+from .formats import Show
+
+PAC_APART = True
+_ROWS = 10_000
+
+
+def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+    """Numbers in their shortest exact form, NaN as ``nan``."""
+    names = ["finger", "frame_id", *(name for name, _, _ in made[0].flat())]
+    stamps = np.concatenate([table.arrays["t_us"] for table in made])
+    of_table = np.repeat(np.arange(len(made)), [len(table) for table in made])
+    row_of = np.concatenate([np.arange(len(table)) for table in made])
+    order = np.lexsort((of_table, stamps))
+    with place.open("w", newline="", encoding="ascii") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(names)
+        for begin in range(0, len(order), _ROWS):
+            out.writerows(_rows(made, of_table, row_of, order[begin : begin + _ROWS]))
+            show(begin / len(order))
+
+
+def _rows(made: list[Table], of_table: Any, row_of: Any, chosen: Any) -> list[list[Any]]:
+    out: list[list[Any]] = [[]] * len(chosen)
+    for k, table in enumerate(made):
+        at = np.flatnonzero(of_table[chosen] == k)
+        rows = row_of[chosen[at]]
+        columns = [values[rows].tolist() for _, _, values in table.flat()]
+        for place, values in zip(at.tolist(), zip(*columns, strict=True), strict=True):
+            out[place] = [table.finger, table.frame_id, *values]
+    return out

@@ -1,0 +1,75 @@
+"""Formats by suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+from ..errors import InputError
+from ..recording.reader import Recording
+from .columns import Table, tables
+from .partial import whole
+
+#: Told a share 0..1 of the work that is done.
+Show = Callable[[float], None]
+#: Writes tables to a place; called by export() alone.
+Write = Callable[[Path, list[Table], Recording, Show], None]
+
+
+@dataclass(frozen=True)
+class Format:
+    """``module`` is one of this package, ``extra`` what has to be installed for it."""
+
+    module: str
+    what: str
+    extra: str | None = None
+
+
+FORMATS = {
+    ".csv": Format("csv_text", "text, one line a finger and round; PAC in a file of its own"),
+    ".parquet": Format("parquet", "columns for pandas and Arrow; PAC in a file of its own", "parquet"),
+    ".h5": Format("hdf5", "HDF5, a group a finger, a dataset a column", "hdf5"),
+    ".npz": Format("npz", "NumPy arrays named finger0/force_n"),
+    ".btc": Format("compact", "the wire's own integers, small and quick to load with biotac.load_compact"),
+    ".ros2": Format("ros2", "a ROS 2 bag, which is a folder: WrenchStamped, PointStamped, counts, PAC", "ros2"),
+}
+
+
+def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Show = lambda share: None) -> list[Path]:
+    """Write ``recording`` as the format of ``out``'s suffix; return what was written.
+
+    An interrupted or failed export leaves nothing behind. Raises InputError for an unknown suffix, an
+    extra that is not installed, or a place that exists or cannot be written.
+    """
+    kind = FORMATS.get(out.suffix.lower())
+    if kind is None:
+        raise InputError(f"{out}: no format has the suffix {out.suffix!r}; expected {', '.join(FORMATS)}")
+    try:
+        module = import_module(f".{kind.module}", __package__)
+    except ImportError as error:
+        raise InputError(
+            f"{out.suffix} needs {error.name}, which is not installed; pip install 'biotac-gateway[{kind.extra}]'"
+        ) from error
+    made = tables(recording)
+    if not any(len(table) for table in made):
+        raise InputError(f"{recording.path} holds no frame and no PAC; there is nothing to export")
+    written: list[Path] = []
+    for path, part in parts(out, made, apart=module.PAC_APART):
+        write: Write = module.write
+        with whole(path, overwrite=overwrite) as place:
+            write(place, part, recording, show)
+        written.append(path)
+    return written
+
+
+def parts(out: Path, made: list[Table], *, apart: bool) -> list[tuple[Path, list[Table]]]:
+    """Which tables go into which file: ``a.csv`` has the frames, ``a.pac.csv`` PAC, where formats are flat."""
+    if not apart:
+        return [(out, made)]
+    by_kind = {
+        out: [t for t in made if t.kind == "frames"],
+        out.with_suffix(f".pac{out.suffix}"): [t for t in made if t.kind == "pac"],
+    }
+    return [(path, of_kind) for path, of_kind in by_kind.items() if of_kind]

@@ -1,0 +1,31 @@
+"""HDF5: ``/finger0/frames/force_n`` and so on, a dataset a column; opens in h5py, MATLAB and Octave."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+
+from ..recording.reader import Recording
+from .columns import Table
+from .formats import Show
+
+PAC_APART = False
+
+
+def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+    """Units and meanings as attributes of the datasets, frame_id of the groups, metadata of the file."""
+    with h5py.File(place, "w") as file:
+        file.attrs.update(recording.metadata)
+        for k, table in enumerate(made):
+            group = file.create_group(f"finger{table.finger}/{table.kind}")
+            group.attrs["frame_id"] = table.frame_id
+            for column in table.columns:
+                data = group.create_dataset(
+                    column.name, data=table.arrays[column.name], compression="gzip", shuffle=True
+                )
+                data.attrs["unit"] = column.unit
+                data.attrs["what"] = column.what
+                if column.parts:
+                    data.attrs["parts"] = list(column.parts)
+            show((k + 1) / len(made))

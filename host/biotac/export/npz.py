@@ -1,0 +1,38 @@
+"""NPZ: arrays ``finger0/frames/force_n`` and so on, and ``columns``, JSON that says what they are."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..recording.reader import Recording
+from .columns import COLUMNS, PAC_COLUMNS, Table
+from .formats import Show
+
+PAC_APART = False
+
+
+def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+    """As numpy.savez_compressed, array by array so that it can say how far it is."""
+    about = {
+        "metadata": recording.metadata,
+        "frames": [asdict(column) for column in COLUMNS],
+        "pac": [asdict(column) for column in PAC_COLUMNS],
+        "frame_id": {f"finger{table.finger}": table.frame_id for table in made},
+    }
+    arrays: dict[str, NDArray[Any]] = {"columns": np.array(json.dumps(about))}
+    for table in made:
+        arrays |= {f"finger{table.finger}/{table.kind}/{name}": values for name, values in table.arrays.items()}
+    with zipfile.ZipFile(place, "w", zipfile.ZIP_DEFLATED) as archive:
+        for k, (name, values) in enumerate(arrays.items()):
+            buffer = io.BytesIO()
+            np.save(buffer, values)
+            archive.writestr(f"{name}.npy", buffer.getvalue())
+            show((k + 1) / len(arrays))

@@ -1,0 +1,90 @@
+"""ROS 2 bag (rosbag2, mcap storage): standard messages only, so that it plays without a package of ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from ..recording.reader import Recording
+from .columns import Table
+from .formats import Show
+
+PAC_APART = False
+_SHOW_ROWS = 1000
+
+
+def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+    """Topics ``/biotac/finger0/wrench``, ``poc``, ``flags``, ``counts`` (E1..E19, PDC, TAC, TDC) and ``pac``."""
+    total = sum(len(table) for table in made)
+    done = 0
+    with Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        for table in made:
+            topics = _Topics(bag, table)
+            for row in range(len(table)):
+                topics.add(row)
+                if row % _SHOW_ROWS == 0:
+                    show((done + row) / total)
+            done += len(table)
+
+
+class _Topics:
+    """One finger's connections."""
+
+    def __init__(self, bag: Any, table: Table) -> None:
+        self._bag = bag
+        self._table = table
+        self._store = get_typestore(Stores.ROS2_HUMBLE)
+        self._types = self._store.types
+        kinds = {
+            "frames": {
+                "wrench": "geometry_msgs/msg/WrenchStamped",
+                "poc": "geometry_msgs/msg/PointStamped",
+                "flags": "std_msgs/msg/UInt32",
+                "counts": "std_msgs/msg/UInt16MultiArray",
+            },
+            "pac": {"pac": "std_msgs/msg/UInt16MultiArray"},
+        }[table.kind]
+        self._connections = {
+            name: (bag.add_connection(f"/biotac/finger{table.finger}/{name}", kind, typestore=self._store), kind)
+            for name, kind in kinds.items()
+        }
+        columns = ("stamp_ns", *(("force_n", "torque_nm", "poc_m", "flags") if table.kind == "frames" else ()))
+        self._lists = {name: table.arrays[name].tolist() for name in columns}
+        slow = [table.arrays[name] for name in ("pdc", "tac", "tdc")] if table.kind == "frames" else []
+        self._counts = np.column_stack([table.arrays["counts" if slow else "pac"], *slow]).astype(np.uint16)
+
+    def add(self, row: int) -> None:
+        """Write all messages of one row."""
+        stamp_ns = self._lists["stamp_ns"][row]
+        if self._table.kind == "pac":
+            self._write("pac", stamp_ns, self._array(row))
+            return
+        header = self._make(
+            "std_msgs/msg/Header",
+            self._make("builtin_interfaces/msg/Time", stamp_ns // 10**9, stamp_ns % 10**9),
+            self._table.frame_id,
+        )
+        force, torque = (
+            self._make("geometry_msgs/msg/Vector3", *self._lists[n][row]) for n in ("force_n", "torque_nm")
+        )
+        wrench = self._make("geometry_msgs/msg/Wrench", force, torque)
+        self._write("wrench", stamp_ns, self._make("geometry_msgs/msg/WrenchStamped", header, wrench))
+        point = self._make("geometry_msgs/msg/Point", *self._lists["poc_m"][row])
+        self._write("poc", stamp_ns, self._make("geometry_msgs/msg/PointStamped", header, point))
+        self._write("flags", stamp_ns, self._make("std_msgs/msg/UInt32", self._lists["flags"][row]))
+        self._write("counts", stamp_ns, self._array(row))
+
+    def _make(self, name: str, *values: Any) -> Any:
+        return self._types[name](*values)
+
+    def _array(self, row: int) -> Any:
+        layout = self._make("std_msgs/msg/MultiArrayLayout", [], 0)
+        return self._make("std_msgs/msg/UInt16MultiArray", layout, self._counts[row])
+
+    def _write(self, name: str, stamp_ns: int, message: Any) -> None:
+        connection, kind = self._connections[name]
+        self._bag.write(connection, stamp_ns, self._store.serialize_cdr(message, kind))

@@ -1,0 +1,190 @@
+"""A recording that answers as the board did: commands in, its stream out. No I/O, no clock.
+
+It says HELLO, settings and sensors as they were recorded, and plays the wire byte for byte as far as START
+asks for it. What would change the board is refused: it has happened already.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import struct
+from collections.abc import Iterator
+from typing import Any
+
+from .. import _wire as wire
+from ..decode import Decoder
+from ..errors import InputError
+from ..framing import encode
+from .pieces import Piece, split
+from .reader import Recording
+
+_STREAM_OF = {
+    wire.Frame.ID: wire.StreamFlags.FRAMES,
+    wire.Idle.ID: wire.StreamFlags.FRAMES,
+    wire.Tare.ID: wire.StreamFlags.FRAMES,
+    wire.Touch.ID: wire.StreamFlags.FRAMES,
+    wire.Pac.ID: wire.StreamFlags.PAC,
+    wire.Status.ID: wire.StreamFlags.STATUS,
+    wire.SensorStatus.ID: wire.StreamFlags.STATUS,
+}
+_TIME = struct.Struct("<I")
+_TIME_AT = 2  # seq, then t_us: all stream messages begin so
+_FINGER_AT = 6
+_FINGER_AT_IN_STATUS = 7  # behind req_id
+_REQ_ID_AT = 6
+# Of these alone the order in time is that of arrival: a PAC begins after the FRAME that it precedes.
+_CLOCKS = (wire.Frame.ID, wire.Idle.ID)
+
+
+class Playback:
+    """The part of ``recording`` from ``from_s`` to ``to_s``, in device seconds since its first frame.
+
+    Raises InputError when nothing of it lies in there.
+    """
+
+    def __init__(self, recording: Recording, *, from_s: float = 0.0, to_s: float | None = None) -> None:
+        self.recording = recording
+        length_s = (recording.end_us - recording.begin_us) / 1e6
+        if not 0 <= from_s <= length_s or (to_s is not None and not from_s < to_s):
+            raise InputError(
+                f"{recording.path} has {length_s:.2f} s; expected 0 <= from < to within them, "
+                f"not from {from_s:g}{'' if to_s is None else f' to {to_s:g}'}"
+            )
+        self._from_us = recording.begin_us + round(from_s * 1e6)
+        self._to_us = None if to_s is None else recording.begin_us + round(to_s * 1e6)
+        self._decoder = Decoder()
+        self._stream = self._timed()
+        self._next: tuple[int, bytes] | None = None
+        self._asked: wire.Start | None = None
+        self.playing = False
+        self.over = False
+        # What GET_STATUS is answered with: the latest that was played, at first the earliest there is.
+        statuses = [m for m in recording.messages if isinstance(m, wire.Status)]
+        self._status: wire.Status | None = statuses[0] if statuses else None
+        sensors = [m for m in reversed(recording.messages) if isinstance(m, wire.SensorStatus)]
+        self._sensor_status: dict[int, wire.SensorStatus] = {m.finger: m for m in sensors}
+
+    # ---- what it plays -------------------------------------------------------------------------
+
+    def next_us(self) -> int | None:
+        """Device time since ``from_s`` at which the next bytes are due; None when it is over."""
+        while self._next is None and not self.over:
+            t_us, piece = next(self._stream, (0, None))
+            self.over = piece is None
+            data = None if piece is None else self._wanted(piece)
+            self._next = None if data is None else (t_us - self._from_us, data)
+        return None if self._next is None else self._next[0]
+
+    def take(self) -> bytes:
+        """The next bytes; none when it is over."""
+        self.next_us()
+        data = b"" if self._next is None else self._next[1]
+        self._next = None
+        return data
+
+    def _timed(self) -> Iterator[tuple[int, Piece]]:
+        """Pieces between from and to, with the device time at which each came."""
+        now_us = self.recording.begin_us
+        for piece in split(self.recording.blocks):
+            if piece.message_id in _CLOCKS:
+                (raw_us,) = _TIME.unpack_from(piece.payload, _TIME_AT)
+                now_us += (raw_us - now_us + 2**31) % 2**32 - 2**31  # unwrapped, nearest to the one before
+            if self._to_us is not None and now_us >= self._to_us:
+                return
+            if now_us >= self._from_us:
+                yield now_us, piece
+
+    def _wanted(self, piece: Piece) -> bytes | None:
+        """Its bytes as this session shall see them; None if it shall not."""
+        message_id, payload = piece.message_id, piece.payload
+        if message_id is None:
+            return piece.data  # damaged as it was, for the host to count
+        if self._asked is None:
+            return None
+        if message_id == wire.Reply.ID:
+            # A START in the middle: its reply tells a decoder that the gap before it is no loss. Request 0
+            # is nobody's.
+            reply = wire.Reply.unpack(payload[: wire.Reply.STRUCT.size])
+            again = reply.command == wire.Start.ID and reply.error == wire.Error.OK
+            return encode(wire.Reply.ID, dataclasses.replace(reply, req_id=0).pack()) if again else None
+        stream = _STREAM_OF.get(message_id)
+        if stream is None or not self._asked.streams & stream:
+            return None
+        if stream == wire.StreamFlags.STATUS and payload[_REQ_ID_AT]:
+            return None  # somebody had asked for it then
+        if message_id == wire.Status.ID:
+            self._status = wire.Status.unpack(payload[: wire.Status.STRUCT.size])
+            return piece.data
+        if message_id == wire.SensorStatus.ID:
+            status = wire.SensorStatus.unpack(payload[: wire.SensorStatus.STRUCT.size])
+            self._sensor_status[status.finger] = status
+        at = _FINGER_AT_IN_STATUS if message_id == wire.SensorStatus.ID else _FINGER_AT
+        return piece.data if self._asked.fingers >> payload[at] & 1 else None
+
+    # ---- what it answers -----------------------------------------------------------------------
+
+    def requests(self, data: bytes) -> list[tuple[int, bytes]]:
+        """The commands that these bytes of the host complete."""
+        return [request for request in self._decoder.feed(data).others if request[1]]
+
+    def answer(self, message_id: int, payload: bytes) -> bytes | None:
+        """Reply to one command; None if it makes no sense here (``refusal``)."""
+        req_id = payload[0]
+        known = wire.MESSAGES.get(message_id)
+        if message_id in (wire.Ping.ID, wire.Stop.ID):
+            self.playing = self.playing and message_id != wire.Stop.ID
+            return _ok(req_id, message_id)
+        if known is wire.HelloRequest:
+            hello = wire.HelloRequest.unpack(payload)
+            return _message(dataclasses.replace(self.recording.info, req_id=req_id, nonce=hello.nonce))
+        if known is wire.Start:
+            self._asked = wire.Start.unpack(payload)
+            self.playing = True
+            return _ok(req_id, message_id)
+        if known is wire.GetSetting:
+            return self._setting(wire.GetSetting.unpack(payload))
+        if known is wire.GetCalibration:
+            return self._calibration(req_id, payload[1])
+        if known is wire.GetSensorInfo:
+            infos = {info.finger: info for info in self.recording.sensors}
+            return _again(infos.get(payload[1]), req_id) or _reply(req_id, message_id, wire.Error.NO_SUCH_FINGER)
+        if known is wire.GetStatus:
+            return _again(self._status, req_id)
+        if known is wire.GetSensorStatus:
+            return _again(self._sensor_status.get(payload[1]), req_id)
+        return None
+
+    def refusal(self, message_id: int, payload: bytes) -> bytes:
+        """The reply to a command that has no answer."""
+        return _reply(payload[0], message_id, wire.Error.NOT_HERE)
+
+    def _setting(self, asked: wire.GetSetting) -> bytes:
+        if asked.setting not in list(wire.Setting):
+            return _reply(asked.req_id, wire.GetSetting.ID, wire.Error.UNKNOWN_SETTING)
+        value = self.recording.settings[wire.Setting(asked.setting)]
+        return _message(wire.SettingValue(asked.req_id, asked.setting, value))
+
+    def _calibration(self, req_id: int, finger: int) -> bytes:
+        its = self.recording.calibrations.get(finger)
+        if its is None:
+            values = tuple(self.recording.settings[setting] for setting in wire.CALIBRATION_SETTINGS)
+            return _message(wire.Calibration(req_id, finger, wire.CalibrationState.NONE, (0,) * 16, 0, values))
+        state = wire.CalibrationState.IN_FORCE
+        return _message(wire.Calibration(req_id, finger, state, its.wire_serial(), its.made_s, its.wire_values()))
+
+
+def _message(message: Any) -> bytes:
+    return encode(message.ID, message.pack())
+
+
+def _again(message: Any, req_id: int) -> bytes | None:
+    """A recorded message as the answer to this request; None if there is none."""
+    return None if message is None else _message(dataclasses.replace(message, req_id=req_id))
+
+
+def _ok(req_id: int, message_id: int) -> bytes:
+    return _reply(req_id, message_id, wire.Error.OK)
+
+
+def _reply(req_id: int, message_id: int, error: wire.Error) -> bytes:
+    return _message(wire.Reply(req_id, message_id, error))

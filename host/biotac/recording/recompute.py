@@ -1,0 +1,219 @@
+"""A recording's counts through the maths once more, with other settings: a new recording, the old untouched."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _sensor as sensor
+from .. import _wire as wire
+from ..calibration.file import to_dict
+from ..calibration.values import own_settings
+from ..core import on_board_q4
+from ..errors import InputError
+from ..frames import StructArray
+from ..framing import encode
+from ..hand import RESULTS
+from ..version import __version__
+from .file import RecordingFile
+from .pieces import split
+from .reader import Recording
+from .rounds import HostTare, Rounds, frames_and_tares
+
+Settings = dict[wire.Setting, int]
+Show = Callable[[float], None]
+
+#: What the maths after the tare uses; the others act on the tare machine and the stream.
+RESULT_SETTINGS = frozenset(
+    {
+        wire.Setting.POC_WEIGHTS,
+        wire.Setting.FORCE_GAIN_X_NN,
+        wire.Setting.FORCE_GAIN_Y_NN,
+        wire.Setting.FORCE_GAIN_Z_NN,
+        wire.Setting.TORQUE_GAIN_Y_NN,
+        wire.Setting.TORQUE_GAIN_Z_NN,
+    }
+)
+_HOST_REASONS = (wire.TareReason.HOST_NOW, wire.TareReason.HOST_SET)
+_UNKNOWN_Q16 = 0xFFFFFFFF
+_ACTIVE_COUNTS = 15
+_ACTIVE_FOR_TORSION = 4
+
+
+def recompute(
+    recording: Recording,
+    out: Path,
+    changes: Settings,
+    *,
+    keep_tare: bool = False,
+    show: Show = lambda share: None,
+) -> list[str]:
+    """Write ``recording`` to ``out`` with results recomputed under its settings and ``changes``.
+
+    The tare machine runs again over all counts, with the tares the host gave; ``keep_tare`` keeps each
+    frame's recorded tare and state instead and recomputes what follows from them. Returns notes in words.
+    Raises InputError when the recording cannot be run through the machine, or a setting is out of range.
+    """
+    for setting, value in changes.items():
+        spec = wire.SETTINGS[setting]
+        if not spec.low <= value <= spec.high:
+            raise InputError(
+                f"{setting.name.lower()} is {value}, expected {spec.low} to {spec.high} {spec.unit}; choose another"
+            )
+    if not len(recording.wire):
+        raise InputError(f"{recording.path} holds no frame; there is nothing to recompute")
+    settings = recording.settings | changes
+    calibrations = {finger: its.changed(changes) for finger, its in recording.calibrations.items()}
+    own = own_settings(settings, calibrations)
+    notes: list[str] = []
+    if keep_tare:
+        idle = sorted(s.name.lower() for s in set(changes) - RESULT_SETTINGS)
+        if idle:
+            raise InputError(f"{idle[0]} has no effect on tares that are kept; leave --keep-tare away")
+        new, tares = _with_kept_tares(recording, settings, own), None
+        show(0.5)
+    else:
+        new, tares = _through_the_machine(recording, settings, own, notes, lambda share: show(share / 2))
+    metadata = recording.metadata | {
+        "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
+        "calibrations": json.dumps({finger: to_dict(its) for finger, its in calibrations.items()}),
+        "recomputed": json.dumps(
+            {
+                "from": recording.path.name,
+                "software": __version__,
+                "keep_tare": keep_tare,
+                "changes": {s.name.lower(): value for s, value in changes.items()},
+            }
+        ),
+    }
+    _write(recording, out, metadata, new, tares, lambda share: show(0.5 + share / 2))
+    return notes
+
+
+def _with_kept_tares(recording: Recording, settings: Settings, own: Mapping[int, Settings]) -> StructArray:
+    """FRAME messages as recorded, with what the kernels make of their counts and tares now."""
+    new: StructArray = recording.wire.copy()
+    for finger in np.unique(new["finger"]):
+        at = np.flatnonzero((new["finger"] == finger) & ((new["flags"] & wire.FrameFlags.UNTARED) == 0))
+        new[at] = _recomputed(new[at], own.get(int(finger), settings))
+    # A standard deviation follows from the gains and the noise, which a frame does not hold.
+    for name in ("poc_sigma_um", "force_sigma_100un"):
+        new[name] = wire.INVALID_COUNT
+    return new
+
+
+def _recomputed(frames: StructArray, settings: Settings) -> StructArray:
+    poc_um, force_100un, torque_mnmm, kernel_flags = on_board_q4(frames["counts"], frames["tare_q4"], settings)
+    frames["poc_um"], frames["force_100un"], frames["torque_mnmm"] = poc_um, force_100un, torque_mnmm
+    flags = frames["flags"] & ~np.uint32(
+        wire.FrameFlags.POC_INVALID | wire.FrameFlags.TORSION_OK | wire.FrameFlags.NOT_ASKED
+    )
+    flags |= kernel_flags & np.uint32(wire.FrameFlags.POC_INVALID)
+    flags |= np.where(_torsion_ok(frames, poc_um), np.uint32(wire.FrameFlags.TORSION_OK), np.uint32(0))
+    frames["flags"] = flags
+    return frames
+
+
+def _torsion_ok(frames: StructArray, poc_um: NDArray[np.int16]) -> NDArray[np.bool_]:
+    """TORSION_OK of SPEC.md, as far as a frame tells: enough energy is known from the flags it had."""
+    down = (poc_um[:, 2] <= -sensor.CORE_RADIUS_UM // 2) & (poc_um[:, 2] != wire.INVALID_I16)
+    missing = (frames["counts"] == wire.INVALID_COUNT) | (frames["tare_q4"] == wire.INVALID_COUNT)
+    moved = np.abs(frames["counts"].astype(np.int32) * 16 - frames["tare_q4"]) >= 16 * _ACTIVE_COUNTS
+    active = (moved & ~missing).sum(axis=1) >= _ACTIVE_FOR_TORSION
+    trouble = (frames["flags"] & (wire.FrameFlags.ELECTRODE_MISSING | wire.FrameFlags.RAIL)) != 0
+    had = (frames["flags"] & wire.FrameFlags.TORSION_OK) != 0
+    strong = (frames["flags"] & wire.FrameFlags.POC_LOW) == 0
+    return np.asarray(down & active & ~trouble & (had | strong))
+
+
+def _through_the_machine(
+    recording: Recording, settings: Settings, own: Mapping[int, Settings], notes: list[str], show: Show
+) -> tuple[StructArray, dict[int, wire.Tare]]:
+    """FRAME messages in the order of arrival, and the TARE messages by the row they go before."""
+    if len(recording.idle) or recording.frames_lost or recording.disordered:
+        seen = "heartbeats" if len(recording.idle) else "lost frames" if recording.frames_lost else "a restart"
+        raise InputError(
+            f"{recording.path} has {seen}, and the tare machine needs the counts of every round; add --keep-tare to "
+            "recompute from the tares it recorded"
+        )
+    new = np.empty_like(recording.wire)
+    tares: dict[int, wire.Tare] = {}
+    ran = 0
+
+    def ran_rows(rows: int) -> None:
+        nonlocal ran
+        ran += rows
+        show(min(1.0, ran / (2 * len(new))))
+
+    for finger in np.unique(recording.wire["finger"]):
+        at = np.flatnonzero(recording.wire["finger"] == finger)
+        rounds = _rounds(recording, at, notes)
+        frames, changes = frames_and_tares(rounds, own.get(int(finger), settings), ran_rows)
+        if len(frames) != len(at):
+            raise InputError(f"{recording.path}: finger {finger} has frames without one good count; add --keep-tare")
+        frames["seq"] = recording.wire["seq"][at]
+        new[at] = frames
+        for row, message in changes.items():
+            tares[int(at[row])] = dataclasses.replace(message, seq=int(frames["seq"][row]))
+    return new, tares
+
+
+def _rounds(recording: Recording, at: NDArray[np.int64], notes: list[str]) -> Rounds:
+    sent = recording.wire[at]
+    finger = int(sent["finger"][0])
+    row_of = {int(seq): row for row, seq in reversed(list(enumerate(sent["seq"])))}
+    tares: dict[int, HostTare] = {}
+    for message in recording.messages:
+        if isinstance(message, wire.Tare) and message.finger == finger and message.reason in _HOST_REASONS:
+            q16 = np.array([*message.tare_q16, message.pdc_tare_q16])
+            counts = np.where(q16 == _UNKNOWN_Q16, np.nan, q16 / 65536)
+            _give(tares, row_of.get(message.seq), counts, message.reason == wire.TareReason.HOST_NOW)
+    if 0 not in tares and not int(sent["flags"][0]) & wire.FrameFlags.UNTARED:
+        q4 = np.append(sent["tare_q4"][0], sent["pdc_tare_q4"][0])
+        _give(tares, 0, np.where(q4 == wire.INVALID_COUNT, np.nan, q4 / 16), False)
+        notes.append(f"finger {finger} was tared before the recording began; it starts with its first frame's tare")
+    sigma = (sent["poc_sigma_um"] != wire.INVALID_COUNT).any()
+    quantities = RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags(wire.QuantityFlags.SIGMA if sigma else 0)
+    t_us = recording.frames["t_us"][at]
+    return Rounds(finger, sent["counts"], sent["pdc"], sent["tac"], sent["tdc"], t_us, tares, quantities)
+
+
+def _give(tares: dict[int, HostTare], row: int | None, values: NDArray[np.float64], now: bool) -> None:
+    """Note a tare of 19 electrodes and pressure; one that was never whole cannot be given again."""
+    if row is not None and not np.isnan(values[:-1]).any():
+        tares[row] = HostTare(values[:-1], None if np.isnan(values[-1]) else float(values[-1]), now)
+
+
+def _write(
+    recording: Recording,
+    out: Path,
+    metadata: dict[str, str],
+    new: StructArray,
+    tares: dict[int, wire.Tare] | None,
+    show: Show,
+) -> None:
+    """The wire as it was, FRAMEs replaced, and TAREs too unless they are kept (None)."""
+    blocks = [bytearray() for _ in recording.blocks]
+    row = 0
+    for piece in split(recording.blocks):
+        block = blocks[piece.block]
+        if piece.message_id == wire.Tare.ID and tares is not None:
+            continue
+        if piece.message_id != wire.Frame.ID:
+            block += piece.data
+            continue
+        if tares is not None and row in tares:
+            block += encode(wire.Tare.ID, tares[row].pack())
+        block += encode(wire.Frame.ID, new[row].tobytes())
+        row += 1
+    with out.open("xb") as stream:
+        file = RecordingFile(stream, metadata)
+        for k, block in enumerate(blocks):
+            file.add(bytes(block), recording.arrived_ns[k])
+            show((k + 1) / len(blocks))
+        file.close()

@@ -1,0 +1,97 @@
+"""Recorded counts through the board's own code: a finger's rounds in, the messages a board would send out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _wire as wire
+from ..errors import CommandRefusedError
+from ..finger import FINGER_DTYPE, Finger
+from ..frames import StructArray
+
+_FRAME_FIELDS = list(wire.DTYPES[wire.Frame.ID].names or ())
+_ROWS = 2000  # between two calls of show
+
+
+@dataclass(frozen=True)
+class HostTare:
+    """What the host told the board: ``counts`` (19,) and ``pdc``, or with ``now`` to take its own latest means."""
+
+    counts: NDArray[np.float64]
+    pdc: float | None
+    now: bool = False
+
+    def give(self, finger: Finger) -> None:
+        """Tell ``finger``; where it sees no means to take now, it gets those that the board took."""
+        try:
+            if self.now:
+                finger.tare_now()
+                return
+        except CommandRefusedError:
+            pass
+        finger.set_tare(self.counts, self.pdc)
+
+
+@dataclass(frozen=True)
+class Rounds:
+    """A finger's rounds: ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,), ``t_us`` (n,) device time.
+
+    ``tares``: by the round from which on each holds.
+    """
+
+    finger: int
+    counts: NDArray[np.uint16]
+    pdc: NDArray[np.uint16]
+    tac: NDArray[np.uint16]
+    tdc: NDArray[np.uint16]
+    t_us: NDArray[np.int64]
+    tares: dict[int, HostTare] = field(default_factory=dict)
+    quantities: wire.QuantityFlags | None = None
+
+
+def frames_and_tares(
+    rounds: Rounds, settings: dict[wire.Setting, int], show: Callable[[int], None] = lambda rows: None
+) -> tuple[StructArray, dict[int, wire.Tare]]:
+    """FRAME messages (m,) of the rounds in which a sensor answered, and TARE messages by row of those.
+
+    ``show`` is told how many rounds were run, of twice their number.
+    """
+    finger = Finger(settings, index=rounds.finger, quantities=rounds.quantities)
+    rows = np.concatenate(list(_run(rounds, finger, [], show)))
+    changed = np.flatnonzero((rows["flags"] & wire.FrameFlags.TARE_CHANGED).astype(bool) & (rows["present"] != 0))
+    # The tare's own 1/65536 count is in no row: a second run stops at each change to look.
+    finger.reset()
+    messages: dict[int, wire.Tare] = {}
+    ends = [int(k) + 1 for k in changed]
+    row = 0
+    order = np.cumsum(rows["present"] != 0) - 1
+    for part in _run(rounds, finger, ends, show) if ends else ():
+        row += len(part)
+        if row in ends:
+            messages[int(order[row - 1])] = finger.tare_message()
+    there = rows[rows["present"] != 0]
+    frames = np.empty(len(there), wire.DTYPES[wire.Frame.ID])
+    for name in _FRAME_FIELDS:
+        frames[name] = there[name]
+    return frames, messages
+
+
+def _run(rounds: Rounds, finger: Finger, ends: list[int], show: Callable[[int], None]) -> Iterator[StructArray]:
+    """Rows in parts, which end at ``ends``, before tares from the host, and every _ROWS rounds."""
+    n = len(rounds.counts)
+    cuts = sorted({0, n, *ends, *rounds.tares, *range(0, n, _ROWS)})
+    for begin, end in pairwise(cuts):
+        if begin in rounds.tares:
+            rounds.tares[begin].give(finger)
+        part = slice(begin, end)
+        yield finger.feed(
+            rounds.counts[part], rounds.pdc[part], rounds.tac[part], rounds.tdc[part], t_us=rounds.t_us[part]
+        )
+        show(end - begin)
+    if n == 0:
+        yield np.empty(0, FINGER_DTYPE)

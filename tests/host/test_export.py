@@ -1,0 +1,268 @@
+"""Exports, read back by the formats' own libraries: the same numbers in SI units, NaN where invalid, or nothing."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+import biotac
+from biotac import _wire as wire
+from biotac.cli.main import main
+from biotac.export import COLUMNS, FORMATS, PAC_COLUMNS
+from biotac.export.columns import flat_name
+
+FINGERS = 2
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory) -> biotac.Recording:
+    """With faults in it, so that there are missing words and invalid results."""
+    path = tmp_path_factory.mktemp("export") / "a.mcap"
+    with biotac.open(f"sim:faults.toml?fingers={FINGERS}") as hand:
+        hand.record(path)
+        hand.read_batch(100)
+    recording = biotac.Recording(path)
+    assert np.isnan(recording.frames["poc_mm"]).any() and (recording.frames["counts"] == 65535).any()
+    return recording
+
+
+def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
+    """SI columns from what biotac.load gives; the wire's integers and the stamps are the recording's."""
+    mine = recording.frames["finger"] == finger
+    frames, sent = recording.frames[mine], recording.wire[mine]
+    return {
+        "seq": frames["seq"],
+        "t_us": frames["t_us"],
+        "stamp_ns": recording.arrived_ns[0] + (frames["t_us"] - recording.frames["t_us"].min()) * 1000,
+        "force_n": frames["force_n"],
+        "torque_nm": frames["torque_nmm"] / 1000,
+        "poc_m": frames["poc_mm"] / 1000,
+        "force_sigma_n": frames["force_sigma_n"],
+        "poc_sigma_m": frames["poc_sigma_mm"] / 1000,
+        "flags": frames["flags"],
+        "tare_state": sent["tare_state"],
+        "counts": frames["counts"],
+        "tare": np.where(sent["tare_q4"] == 65535, np.nan, sent["tare_q4"] / 16),
+        "pdc": frames["pdc"],
+        "tac": frames["tac"],
+        "tdc": frames["tdc"],
+        "pdc_tare": np.where(sent["pdc_tare_q4"] == 65535, np.nan, sent["pdc_tare_q4"] / 16),
+    }
+
+
+def expected_pac(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
+    rows = recording.pac[recording.pac["finger"] == finger]
+    stamp_ns = recording.arrived_ns[0] + (rows["t_us"] - recording.frames["t_us"].min()) * 1000
+    return {"seq": rows["seq"], "t_us": rows["t_us"], "stamp_ns": stamp_ns, "pac": rows["pac"]}
+
+
+def same(got: Any, wanted: np.ndarray) -> bool:
+    """Equal, NaN at the same places; SI factors may differ in the last bit."""
+    got = np.asarray(got)
+    if wanted.dtype.kind != "f":
+        return bool(np.array_equal(got, wanted))
+    return got.shape == wanted.shape and np.allclose(got, wanted, rtol=1e-15, atol=0, equal_nan=True)
+
+
+def export(recording: biotac.Recording, out: Path, *options: str) -> int:
+    return main(["export", str(recording.path), str(out), *options])
+
+
+def test_every_column_is_documented_and_has_a_unit() -> None:
+    text = (Path(__file__).parents[2] / "host" / "docs" / "recording.md").read_text()
+    for column in (*COLUMNS, *PAC_COLUMNS):
+        assert column.unit and column.what
+        assert f"| `{column.name}` | {column.unit} |" in text, column.name
+    assert all(f"`{suffix}`" in text for suffix in FORMATS)
+
+
+def test_csv_has_every_number_of_every_frame(recorded, tmp_path, capsys) -> None:
+    assert export(recorded, tmp_path / "a.csv", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["written"] == [str(tmp_path / n) for n in ("a.csv", "a.pac.csv")]
+    for name, columns, wanted_of in (("a.csv", COLUMNS, expected), ("a.pac.csv", PAC_COLUMNS, expected_pac)):
+        with (tmp_path / name).open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        times = [int(row["t_us"]) for row in rows]
+        assert times == sorted(times)
+        for finger in range(FINGERS):
+            mine = [row for row in rows if row["frame_id"] == f"biotac_finger{finger}"]
+            assert {row["finger"] for row in mine} == {str(finger)}
+            for column in columns:
+                names = [flat_name(column, part) for part in column.parts] or [column.name]
+                wanted = wanted_of(recorded, finger)[column.name].reshape(len(mine), -1)
+                got = np.array([[float(row[n]) for n in names] for row in mine])
+                assert same(got, wanted.astype(float)), column.name
+
+
+def test_units_stand_at_the_end_of_flat_names(recorded, tmp_path) -> None:
+    export(recorded, tmp_path / "a.csv")
+    names = (tmp_path / "a.csv").read_text().partition("\n")[0].split(",")
+    assert {"force_x_n", "torque_z_nm", "poc_y_m", "force_sigma_z_n", "poc_sigma_m", "counts_E1", "tare_E19"} <= set(
+        names
+    )
+
+
+def test_parquet_says_units_and_frames(recorded, tmp_path) -> None:
+    assert export(recorded, tmp_path / "a.parquet") == 0
+    for name, columns, wanted_of in (("a.parquet", COLUMNS, expected), ("a.pac.parquet", PAC_COLUMNS, expected_pac)):
+        table = pq.read_table(tmp_path / name)
+        for finger in range(FINGERS):
+            mine = table.filter([i.as_py() == f"biotac_finger{finger}" for i in table["frame_id"]])
+            assert set(mine["finger"].to_pylist()) == {finger}
+            for column in columns:
+                wanted = wanted_of(recorded, finger)[column.name].reshape(len(mine), -1)
+                for k, flat in enumerate([flat_name(column, part) for part in column.parts] or [column.name]):
+                    assert same(mine[flat].to_numpy(), wanted[:, k]), flat
+                    assert table.schema.field(flat).metadata[b"unit"].decode() == column.unit
+
+
+def test_hdf5_has_a_dataset_a_column(recorded, tmp_path) -> None:
+    assert export(recorded, tmp_path / "a.h5") == 0
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert file.attrs["firmware"] == biotac.__version__
+        for finger in range(FINGERS):
+            for kind, columns, wanted_of in (("frames", COLUMNS, expected), ("pac", PAC_COLUMNS, expected_pac)):
+                group = file[f"finger{finger}/{kind}"]
+                assert group.attrs["frame_id"] == f"biotac_finger{finger}"
+                wanted = wanted_of(recorded, finger)
+                assert set(group) == set(wanted)
+                for column in columns:
+                    assert same(group[column.name][:], wanted[column.name]), column.name
+                    assert group[column.name].attrs["unit"] == column.unit
+
+
+def test_npz_says_what_its_columns_are(recorded, tmp_path) -> None:
+    assert export(recorded, tmp_path / "a.npz") == 0
+    with np.load(tmp_path / "a.npz") as arrays:
+        about = json.loads(str(arrays["columns"]))
+        assert about["frame_id"]["finger1"] == "biotac_finger1"
+        assert {c["name"]: c["unit"] for c in about["frames"]}["torque_nm"] == "N*m"
+        for finger in range(FINGERS):
+            for kind, wanted in (("frames", expected(recorded, finger)), ("pac", expected_pac(recorded, finger))):
+                for name, values in wanted.items():
+                    assert same(arrays[f"finger{finger}/{kind}/{name}"], values), name
+
+
+def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
+    assert export(recorded, tmp_path / "a.ros2") == 0
+    got: dict[str, list[tuple[int, Any]]] = {}
+    with AnyReader([tmp_path / "a.ros2"], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
+        for connection, stamp_ns, data in bag.messages():
+            got.setdefault(connection.topic, []).append((stamp_ns, bag.deserialize(data, connection.msgtype)))
+    for finger in range(FINGERS):
+        wanted, pac = expected(recorded, finger), expected_pac(recorded, finger)
+        topics = {name: got[f"/biotac/finger{finger}/{name}"] for name in ("wrench", "poc", "flags", "counts", "pac")}
+        for name, vectors in (
+            ("force_n", [m.wrench.force for _, m in topics["wrench"]]),
+            ("torque_nm", [m.wrench.torque for _, m in topics["wrench"]]),
+            ("poc_m", [m.point for _, m in topics["poc"]]),
+        ):
+            assert same([[v.x, v.y, v.z] for v in vectors], wanted[name]), name
+        for name in ("wrench", "poc"):
+            stamps = [stamp for stamp, _ in topics[name]]
+            assert stamps == wanted["stamp_ns"].tolist()
+            headers = [m.header for _, m in topics[name]]
+            assert [h.stamp.sec * 10**9 + h.stamp.nanosec for h in headers] == stamps
+            assert {h.frame_id for h in headers} == {f"biotac_finger{finger}"}
+        assert [m.data for _, m in topics["flags"]] == wanted["flags"].tolist()
+        slow = np.column_stack([wanted["counts"], wanted["pdc"], wanted["tac"], wanted["tdc"]])
+        assert np.array_equal([m.data for _, m in topics["counts"]], slow)
+        assert np.array_equal([m.data for _, m in topics["pac"]], pac["pac"])
+
+
+@pytest.mark.parametrize("suffix", list(FORMATS))
+def test_nothing_is_overwritten_unasked(recorded, tmp_path, capsys, suffix: str) -> None:
+    out = tmp_path / f"a{suffix}"
+    out.write_text("mine")
+    assert export(recorded, out) == 2
+    assert "--force" in capsys.readouterr().err
+    assert out.read_text() == "mine" and list(tmp_path.iterdir()) == [out]
+    assert export(recorded, out, "--force") == 0
+    assert export(recorded, out, "--force") == 0  # also a bag, which is a folder
+    assert out.is_dir() or out.read_bytes() != b"mine"
+
+
+@pytest.mark.parametrize("step", [1, 2])
+@pytest.mark.parametrize("suffix", list(FORMATS))
+def test_an_interrupted_export_leaves_nothing_and_says_so(
+    recorded, tmp_path, capsys, monkeypatch, suffix: str, step: int
+) -> None:
+    """Ctrl-C as Python delivers it, at the export's own steps."""
+    steps = 0
+
+    def interrupt(self: Any, text: str) -> None:
+        nonlocal steps
+        steps += not text.startswith("reading")
+        if steps == step:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("biotac.cli.progress.Progress.show", interrupt)
+    assert export(recorded, tmp_path / f"a{suffix}") == 130
+    error = capsys.readouterr().err
+    assert "interrupted" in error and "was not written, what there was of it is removed" in error
+    left = sorted(path.name for path in tmp_path.iterdir())
+    # A flat format's first file may be whole when the second, with PAC, is not.
+    assert left in ([], [f"a{suffix}"]) and not (step == 1 and left)
+
+
+def test_a_failing_disk_leaves_nothing(recorded, tmp_path, capsys, monkeypatch) -> None:
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("biotac.recording.compact.zstandard.ZstdCompressor", full)
+    assert export(recorded, tmp_path / "a.btc") == 2
+    assert "No space left" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_no_bag_is_never_replaced(recorded, tmp_path, capsys) -> None:
+    for suffix in FORMATS:
+        folder = tmp_path / f"mine{suffix}"
+        folder.mkdir()
+        (folder / "precious").write_text("x")
+        assert export(recorded, folder, "--force") == 2
+        assert "is a folder" in capsys.readouterr().err
+        assert (folder / "precious").read_text() == "x"
+
+
+def test_an_unknown_suffix_names_the_known_ones(recorded, tmp_path, capsys) -> None:
+    assert export(recorded, tmp_path / "a.xlsx") == 2
+    assert ".parquet" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("suffix", "module"), [(".parquet", "pyarrow"), (".h5", "h5py"), (".ros2", "rosbags")])
+def test_a_missing_extra_is_named(recorded, tmp_path, suffix: str, module: str) -> None:
+    program = (
+        f"import sys; sys.modules[{module!r}] = None\n"
+        "from biotac.cli import main\n"
+        f"sys.exit(main(['export', {str(recorded.path)!r}, {str(tmp_path / 'a')!r} + {suffix!r}]))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "pip install 'biotac-gateway[" in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_a_cut_recording_is_exported_as_far_as_it_goes(recorded, tmp_path, capsys) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(recorded.path.read_bytes()[:-200])
+    assert main(["export", str(cut), str(tmp_path / "a.npz")]) == 0
+    assert "ends without its index" in capsys.readouterr().err
+
+
+def test_flags_say_why_a_result_is_nan(recorded, tmp_path) -> None:
+    export(recorded, tmp_path / "a.npz", "--force")
+    with np.load(tmp_path / "a.npz") as arrays:
+        invalid = np.isnan(arrays["finger0/frames/poc_m"]).any(axis=1)
+        flagged = (arrays["finger0/frames/flags"] & int(wire.FrameFlags.POC_INVALID)) != 0
+    assert np.array_equal(invalid, flagged) and invalid.any()

@@ -1,0 +1,116 @@
+"""biotac import: a .btd's counts in a recording, with the results of the board's own code and the file's times."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac import _sensor as sensor
+from biotac import _wire as wire
+from biotac.cli.main import main
+from biotac.sim import load_source
+
+DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "btd_biotacsp" / "data.btd.gz"
+CHANNEL = {name: (sensor.CHANNEL_COMMAND[name] & 0x7E) >> 1 for name in sensor.SLOTS}
+SECOND_S = 0.5  # a gap of the logger's, behind the first half
+
+
+def write_btd(path: Path, samples: np.ndarray) -> np.ndarray:
+    """Samples (frames, sensors, 44) as text, a bad word in one of them; returns each frame's time, s."""
+    frames = len(samples)
+    times = np.arange(frames) * 0.01 + np.where(np.arange(frames) >= frames // 2, SECOND_S, 0.0)
+    lines = ["a header", "Begin File"]
+    for k in range(frames):
+        for slot, name in enumerate(sensor.SLOTS):
+            pairs = []
+            for finger in range(samples.shape[1]):
+                bad = (k, finger, slot) == (7, 0, sensor.SLOTS.index("E5"))
+                pairs.append(f"{samples[k, finger, slot]} {int(bad)}")
+            lines.append(f"{times[k] + slot / 4400:.6f} 1 {k} {CHANNEL[name]} {' '.join(pairs)}")
+    path.write_text("\n".join(lines) + "\n")
+    return times
+
+
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory) -> tuple[biotac.Recording, np.ndarray, np.ndarray]:
+    folder = tmp_path_factory.mktemp("btd")
+    samples = load_source("press.toml", fingers=2, seconds=3.0).samples
+    times = write_btd(folder / "a.btd", samples)
+    assert main(["import", str(folder / "a.btd"), str(folder / "a.mcap")]) == 0
+    return biotac.Recording(folder / "a.mcap"), samples, times
+
+
+def test_every_count_is_there_at_its_time(imported) -> None:
+    recording, samples, times = imported
+    assert recording.problems == [] and recording.fingers == [0, 1]
+    electrodes = [sensor.SLOTS.index(name) for name in sensor.ELECTRODE_NAMES]
+    for finger in (0, 1):
+        rows = recording.frames[recording.frames["finger"] == finger]
+        pac = recording.pac[recording.pac["finger"] == finger]
+        wanted = samples[:, finger, electrodes].copy()
+        if finger == 0:
+            wanted[7, 4] = 65535
+        assert np.array_equal(rows["counts"], wanted)
+        assert np.array_equal(rows["pdc"], samples[:, finger, sensor.SLOTS.index("PDC")])
+        assert np.array_equal(pac["pac"], samples[:, finger, np.array(sensor.SLOTS) == "PAC"])
+        assert np.array_equal(rows["t_us"], np.rint(times * 1e6))
+        assert np.array_equal(pac["seq"], rows["seq"])
+
+
+def test_results_are_those_of_the_boards_own_code(imported) -> None:
+    """The truth is a simulated board that plays the same samples."""
+    recording, _, _ = imported
+    with biotac.open("sim:press.toml?fingers=2&seconds=3") as hand:
+        for setting, value in recording.settings.items():
+            hand.set_setting(setting, value)  # the scenario brings gains of its own
+        sent = hand.read_batch(100)
+    mine = recording.wire["finger"] == 1  # without the bad word
+    theirs = sent.wire["finger"] == 1
+    for name in ("counts", "tare_q4", "poc_um", "force_100un", "torque_mnmm", "flags", "tare_state", "seq"):
+        assert np.array_equal(recording.wire[mine][name], sent.wire[theirs][name]), name
+    tares = [m for m in recording.messages if isinstance(m, wire.Tare) and m.finger == 1]
+    live = [m for m in sent.messages if isinstance(m, wire.Tare) and m.finger == 1]
+    assert [m.tare_q16 for m in tares] == [m.tare_q16 for m in live] != []
+
+
+def test_it_is_a_recording_as_any_other(imported, capsys) -> None:
+    recording, _, _ = imported
+    assert main(["check", str(recording.path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["frames"] == 600
+    with biotac.open(f"replay:{recording.path}") as hand:
+        assert hand.read(100).tobytes() == recording.frames.tobytes()
+    assert recording.metadata["port"] == "btd:a.btd"
+
+
+def test_an_interrupted_import_leaves_nothing(imported, tmp_path, capsys, monkeypatch) -> None:
+    def interrupt(self: object, text: str) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("biotac.cli.progress.Progress.show", interrupt)
+    source = imported[0].path.with_name("a.btd")
+    assert main(["import", str(source), str(tmp_path / "b.mcap")]) == 130
+    assert "was not written" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_no_btd_is_refused(tmp_path, capsys) -> None:
+    (tmp_path / "a.btd").write_text("nothing")
+    assert main(["import", str(tmp_path / "a.btd"), str(tmp_path / "b.mcap")]) == 2
+    assert "Begin File" in capsys.readouterr().err
+    assert not (tmp_path / "b.mcap").exists()
+
+
+def test_a_real_file_with_gaps(tmp_path) -> None:
+    if not DATA.exists():
+        pytest.skip(f"needs a recording whose licence keeps it out of this project; not at {DATA}")
+    assert main(["import", str(DATA), str(tmp_path / "b.mcap")]) == 0
+    recording = biotac.Recording(tmp_path / "b.mcap")
+    with np.load(DATA.with_name("btd.npz")) as truth:
+        assert np.array_equal(recording.frames["counts"], truth["E"])
+        assert np.array_equal(recording.pac["pac"], truth["PAC"])
+    gaps_s = np.diff(recording.frames["t_us"]) / 1e6
+    assert np.count_nonzero(gaps_s > 0.2) == 154

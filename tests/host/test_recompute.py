@@ -1,0 +1,186 @@
+"""biotac recompute: the board's results again from its counts, others with other settings, nothing overwritten."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac import _wire as wire
+from biotac.cli.main import main
+from biotac.core import reference_q4
+from biotac.hand import RESULTS
+
+
+def record(
+    path: Path, source: str, *, quantities: wire.QuantityFlags | None = None, **settings: int
+) -> biotac.Recording:
+    with biotac.open(source) as hand:
+        for name, value in settings.items():
+            hand.set_setting(wire.Setting[name.upper()], value)
+        if quantities is not None:
+            hand.subscribe(quantities)
+        hand.record(path)
+        hand.read_batch(100)
+    return biotac.Recording(path)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("recompute")
+
+
+@pytest.fixture(scope="module")
+def recorded(folder) -> biotac.Recording:
+    return record(folder / "a.mcap", "sim:press.toml?fingers=2")
+
+
+def tares(recording: biotac.Recording) -> list[wire.Tare]:
+    return [m for m in recording.messages if isinstance(m, wire.Tare)]
+
+
+@pytest.mark.parametrize("options", [[], ["--keep-tare"]])
+@pytest.mark.parametrize("source", ["press.toml?fingers=2", "shear.toml", "drift.toml?seconds=8"])
+def test_without_a_change_it_is_what_the_board_sent_bit_for_bit(folder, source: str, options: list[str]) -> None:
+    was = record(folder / "same.mcap", f"sim:{source}")
+    (folder / "again.mcap").unlink(missing_ok=True)
+    assert main(["recompute", str(folder / "same.mcap"), str(folder / "again.mcap"), *options]) == 0
+    again = biotac.Recording(folder / "again.mcap")
+    assert again.wire.tobytes() == was.wire.tobytes()
+    assert tares(again) == tares(was) != []
+    assert again.pac.tobytes() == was.pac.tobytes()
+    (folder / "same.mcap").unlink()
+
+
+@pytest.mark.parametrize("options", [[], ["--keep-tare"]])
+@pytest.mark.parametrize("weights", list(wire.PocWeights))
+def test_other_weights_give_what_a_board_with_them_sends(folder, recorded, weights, options: list[str]) -> None:
+    """The truth is another simulated board, which had the setting while it measured."""
+    expected = record(folder / "truth.mcap", "sim:press.toml?fingers=2", poc_weights=weights)
+    words = ["recompute", str(recorded.path), str(folder / "new.mcap"), "--force"]
+    assert main([*words, "--poc-weights", weights.name.lower(), *options]) == 0
+    (folder / "truth.mcap").unlink()
+    new = biotac.Recording(folder / "new.mcap")
+    assert np.array_equal(new.wire["poc_um"], expected.wire["poc_um"])
+    assert np.array_equal(new.wire["force_100un"], expected.wire["force_100un"])
+    # Energies between one and four thresholds are in no frame: there TORSION_OK stays off when tares are kept.
+    unsure = np.uint32(wire.FrameFlags.TORSION_OK if options else 0)
+    unsure = np.where(new.wire["flags"] & wire.FrameFlags.POC_LOW, unsure, 0)
+    assert np.array_equal(new.wire["flags"] & ~unsure, expected.wire["flags"] & ~unsure)
+    assert new.settings == expected.settings
+    assert main(["check", str(folder / "new.mcap")]) == 0
+
+
+def test_settings_come_from_a_file(folder, recorded, capsys) -> None:
+    (folder / "s.json").write_text(json.dumps({"settings": {"force_gain_z_nn": 4_524_468}}))
+    out = folder / "gain.mcap"
+    assert main(["recompute", str(recorded.path), str(out), "--settings", str(folder / "s.json"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["frames"] == len(recorded.frames)
+    new = biotac.Recording(out)
+    truth = reference_q4(new.wire["counts"], new.wire["tare_q4"], new.settings)
+    valid = ~np.isnan(new.frames["force_n"][:, 2])
+    assert np.abs(new.frames["force_n"][valid] - truth.force_n[valid]).max() <= 0.5e-4 + 1e-9
+    about = json.loads(new.metadata["recomputed"])
+    assert about["from"] == "a.mcap" and about["changes"] == {"force_gain_z_nn": 4_524_468}
+
+
+def test_the_tare_machine_hears_its_settings(folder, recorded) -> None:
+    """A threshold nothing reaches: no contact any more, as on a board with it."""
+    expected = record(folder / "deaf.mcap", "sim:press.toml?fingers=2", contact_energy_count2=1_000_000)
+    (folder / "deaf.json").write_text('{"contact_energy_count2": 1000000}')
+    words = ["recompute", str(recorded.path), str(folder / "new.mcap"), "--force"]
+    assert main([*words, "--settings", str(folder / "deaf.json")]) == 0
+    new = biotac.Recording(folder / "new.mcap")
+    assert new.wire.tobytes() == expected.wire.tobytes() != recorded.wire.tobytes()
+    assert main([*words, "--settings", str(folder / "deaf.json"), "--keep-tare"]) == 2
+
+
+def test_a_recording_that_began_in_mid_life_says_so(folder, capsys) -> None:
+    path = folder / "mid.mcap"
+    path.unlink(missing_ok=True)
+    # Long enough that most of it has not arrived when the recording begins.
+    with biotac.open("sim:press.toml?seconds=60") as hand:
+        hand.read(3.0)
+        hand.record(path)
+        hand.read(100)
+    assert main(["recompute", str(path), str(folder / "mid2.mcap"), "--force"]) == 0
+    assert "finger 0 was tared before the recording began" in capsys.readouterr().err
+    new, was = biotac.Recording(folder / "mid2.mcap"), biotac.Recording(path)
+    assert np.array_equal(new.wire["seq"], was.wire["seq"]) and int(was.wire["seq"][0]) > 200
+    assert np.array_equal(new.wire["tare_q4"][0], was.wire["tare_q4"][0])
+
+
+def test_heartbeats_need_kept_tares(folder, capsys) -> None:
+    path = folder / "quiet.mcap"
+    record(path, "sim:press.toml", quantities=RESULTS)
+    assert main(["recompute", str(path), str(folder / "q2.mcap")]) == 2
+    assert "heartbeats" in capsys.readouterr().err
+    assert not (folder / "q2.mcap").exists()
+    assert main(["recompute", str(path), str(folder / "q2.mcap"), "--keep-tare"]) == 0
+    assert biotac.Recording(folder / "q2.mcap").wire.tobytes() == biotac.Recording(path).wire.tobytes()
+
+
+def test_nothing_is_overwritten_unasked(folder, recorded, capsys) -> None:
+    before = recorded.path.read_bytes()
+    assert main(["recompute", str(recorded.path), str(recorded.path)]) == 2
+    assert "--force" in capsys.readouterr().err
+    assert recorded.path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("text", "seen"),
+    [
+        ("{", "JSON"),
+        ('{"nonsense": 1}', "nonsense"),
+        ('{"poc_weights": 1.5}', "whole"),
+        ('{"poc_weights": 7}', "0 to 2"),
+    ],
+)
+def test_settings_that_are_none_are_refused(folder, recorded, capsys, text: str, seen: str) -> None:
+    (folder / "bad.json").write_text(text)
+    assert main(["recompute", str(recorded.path), str(folder / "x.mcap"), "--settings", str(folder / "bad.json")]) == 2
+    error = capsys.readouterr().err
+    assert seen in error and error.count("\n") == 1
+    assert not (folder / "x.mcap").exists()
+
+
+def test_out_may_be_an_export(folder, recorded) -> None:
+    out = folder / "again.npz"
+    assert main(["recompute", str(recorded.path), str(out), "--poc-weights", "abs_n2"]) == 0
+    with np.load(out) as arrays:
+        about = json.loads(str(arrays["columns"]))
+        assert json.loads(about["metadata"]["settings"])["poc_weights"] == 0
+        assert len(arrays["finger1/frames/poc_m"]) == len(recorded.frames) // 2
+
+
+def test_a_finger_says_the_tare_message_that_a_board_sends(recorded) -> None:
+    mine = recorded.wire["finger"] == 0
+    sent = recorded.wire[mine]
+    message = next(m for m in tares(recorded) if m.finger == 0)
+    finger = biotac.Finger(recorded.settings)
+    rows = slice(0, message.seq + 1)
+    finger.feed(sent["counts"][rows], sent["pdc"][rows], sent["tac"][rows], sent["tdc"][rows], t_us=sent["t_us"][rows])
+    assert finger.tare_message() == message
+
+
+@pytest.mark.parametrize("out", ["stopped.mcap", "stopped.csv"])
+@pytest.mark.parametrize("step", [1, 5])
+def test_an_interrupted_recomputation_leaves_nothing(
+    recorded, tmp_path, capsys, monkeypatch, out: str, step: int
+) -> None:
+    """Ctrl-C as Python delivers it, at the work's own steps."""
+    steps = 0
+
+    def interrupt(self: object, text: str) -> None:
+        nonlocal steps
+        steps += not text.startswith("reading")
+        if steps == step:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("biotac.cli.progress.Progress.show", interrupt)
+    assert main(["recompute", str(recorded.path), str(tmp_path / out)]) == 130
+    assert f"{out} was not written" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,222 @@
+"""A recording as a board: the same stream, the same answers, its pace, its parts; no to what cannot be."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac import _wire as wire
+from biotac.cli.main import main
+from biotac.hand import Hand
+from biotac.link.ports import open_link
+from biotac.link.replay_link import ReplayLink, open_replay
+from biotac.recording.playback import Playback
+
+SECONDS = 4
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory) -> tuple[Path, biotac.Recording]:
+    path = tmp_path_factory.mktemp("replay") / "a.mcap"
+    with biotac.open(f"sim:press.toml?fingers=2&seconds={SECONDS}") as hand:
+        hand.record(path)
+        hand.read_batch(100)
+    return path, biotac.Recording(path)
+
+
+class FakeClock:
+    """Time passes only in sleep."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def now_s(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        assert seconds >= 0
+        self.now += max(seconds, 1e-6)
+
+
+def test_a_replay_is_the_live_stream_bit_for_bit(recorded) -> None:
+    path, recording = recorded
+    with biotac.open(f"replay:{path}") as hand:
+        batch = hand.read_batch(100)
+        assert hand.ended
+        assert hand.stats.frames_lost == hand.stats.crc_errors == hand.stats.disordered == 0
+    assert batch.frames.tobytes() == recording.frames.tobytes()
+    assert batch.wire.tobytes() == recording.wire.tobytes()
+    assert batch.pac.tobytes() == recording.pac.tobytes()
+    assert [m for m in batch.messages if isinstance(m, wire.Tare)] == [
+        m for m in recording.messages if isinstance(m, wire.Tare)
+    ]
+
+
+def test_it_answers_as_its_board_did(recorded, capsys) -> None:
+    path, _ = recorded
+    with biotac.open("sim:press.toml?fingers=2&seconds=1") as board, biotac.open(f"replay:{path}") as replay:
+        assert replay.fingers == board.fingers == [0, 1]
+        assert replay.settings() == board.settings()
+        assert replay.sensor_info(1).serial == board.sensor_info(1).serial
+        replay.ping()
+        assert replay.status().fingers_present == 0b11
+        assert replay.sensor_status(0).finger == 0
+    assert main(["info", f"replay:{path}", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["board"] == "POSIX_SIM"
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        (lambda hand: hand.tare(0), "TareNow"),
+        (lambda hand: hand.set_tare(0, np.full(19, 3000)), "TareSet"),
+        (lambda hand: hand.set_setting(wire.Setting.POC_WEIGHTS, 2), "SetSetting"),
+        (lambda hand: hand.subscribe(wire.QuantityFlags.POC), "Subscribe"),
+        (lambda hand: hand.point(0), "GetPoint"),
+        (lambda hand: hand.save_settings(), "SaveSettings"),
+        (lambda hand: hand.reboot_bootloader(), "RebootBootloader"),
+    ],
+)
+def test_what_would_change_a_board_is_refused_in_words(recorded, command, name: str) -> None:
+    path, recording = recorded
+    with biotac.open(f"replay:{path}") as hand:
+        with pytest.raises(biotac.CommandRefusedError, match=f"is a recording: {name}.*biotac recompute"):
+            command(hand)
+        assert len(hand.read(100)) == len(recording.frames)  # and it still plays
+
+
+def test_a_part_of_it_is_the_same_rows(recorded) -> None:
+    path, recording = recorded
+    elapsed = recording.frames["t_us"] - recording.begin_us
+    expected = recording.frames[(elapsed >= 1_250_000) & (elapsed < 2_500_000)]
+    with biotac.open(f"replay:{path}?from=1.25&to=2.5") as hand:
+        frames = hand.read(100)
+    assert len(frames) == 250 and np.array_equal(frames["seq"], expected["seq"])
+    assert np.array_equal(frames["counts"], expected["counts"])
+    assert hand.stats.frames_lost == 0
+
+
+@pytest.mark.parametrize("query", ["from=-1", "from=99", "from=3&to=2", "from=nan"])
+def test_parts_that_are_none_are_refused(recorded, query: str) -> None:
+    with pytest.raises(biotac.InputError, match=r"has 3\.99 s; expected 0 <= from < to"):
+        biotac.open(f"replay:{recorded[0]}?{query}")
+
+
+@pytest.mark.parametrize("query", ["from=x", "loop=1", "pace=-1"])
+def test_a_port_that_is_none_is_refused(recorded, query: str) -> None:
+    with pytest.raises(biotac.PortError, match="replay:"):
+        biotac.open(f"replay:{recorded[0]}?{query}")
+
+
+@pytest.mark.parametrize("pace", [0.5, 1.0, 4.0])
+def test_pace_is_kept_on_the_clock(recorded, pace: float) -> None:
+    """Each frame arrives when device time says, on a clock that only sleeping moves."""
+    path, _ = recorded
+    clock = FakeClock()
+    link = open_replay(f"replay:{path}", pace, clock=clock)
+    arrivals: list[tuple[float, int]] = []
+    with Hand(link) as hand:
+        for batch in hand.batches():
+            if len(batch.frames):
+                arrivals.append((clock.now, int(batch.frames["t_us"][-1])))
+    assert len(arrivals) >= 100 * SECONDS - 1  # round by round, not in blocks
+    start_s, first_us = arrivals[0]
+    for now_s, t_us in arrivals:
+        assert now_s - start_s == pytest.approx((t_us - first_us) / 1e6 / pace, abs=1e-4)
+    assert all(later[0] > sooner[0] for sooner, later in pairwise(arrivals))
+
+
+def test_only_what_start_asks_for_is_played(recorded) -> None:
+    path, recording = recorded
+    with biotac.open(f"replay:{path}") as hand:
+        hand.start(pac=False, fingers=0b10)
+        batch = hand.read_batch(100)
+    assert len(batch.pac) == 0
+    assert set(batch.frames["finger"]) == {1} and len(batch.frames) == len(recording.frames) // 2
+
+
+def test_it_can_be_recorded_again(recorded, tmp_path) -> None:
+    path, recording = recorded
+    with biotac.open(f"replay:{path}") as hand:
+        hand.record(tmp_path / "again.mcap")
+        hand.read(100)
+    again = biotac.Recording(tmp_path / "again.mcap")
+    assert again.frames.tobytes() == recording.frames.tobytes() and again.settings == recording.settings
+
+
+def test_a_restart_within_the_recording_is_no_loss(tmp_path) -> None:
+    path = tmp_path / "twice.mcap"
+    with biotac.open("sim:press.toml?seconds=3") as hand:
+        hand.record(path)
+        hand.read(1.0)
+        hand.stop()
+        hand.read(100)
+    recording = biotac.Recording(path)
+    assert recording.frames_lost == 0
+    with biotac.open(f"replay:{path}") as hand:
+        assert hand.read(100).tobytes() == recording.frames.tobytes()
+        assert hand.stats.frames_lost == 0
+
+
+def test_a_damaged_frame_is_damaged_in_the_replay_too(recorded, tmp_path) -> None:
+    _, recording = recorded
+    damaged = biotac.Recording(recorded[0])
+    block = bytearray(damaged.blocks[1])
+    at = block.index(0, len(block) // 2) + 30
+    block[at] = block[at] % 255 + 1  # another byte, and no delimiter
+    damaged.blocks[1] = bytes(block)
+    with Hand(ReplayLink("replay:damaged", Playback(damaged))) as hand:
+        frames = hand.read(100)
+        assert hand.stats.crc_errors + hand.stats.other_errors == 1
+    assert len(recording.frames) - len(frames) in (0, 1)  # 0 when it was a PAC
+
+
+def test_on_a_pty_it_is_a_board_for_any_serial_program(recorded, tmp_path) -> None:
+    path, recording = recorded
+    link = tmp_path / "board"
+    program = [sys.executable, "-m", "biotac", "replay", str(path), "--pty", "--pace", "fast", "--link", str(link)]
+    with subprocess.Popen([*program, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and process.stderr is not None
+        port = json.loads(process.stdout.readline())["port"]
+        assert os.path.realpath(link) == os.path.realpath(port)
+        frames = []
+        with biotac.open(str(link)) as hand:
+            with pytest.raises(biotac.CommandRefusedError, match="NOT_HERE"):
+                hand.tare(0)
+            for batch in hand.batches():
+                frames.append(batch.frames)
+                if sum(map(len, frames)) == len(recording.frames):
+                    break
+        process.terminate()
+        assert process.wait() == 0
+        assert "is over" in process.stderr.read()
+    assert np.concatenate(frames).tobytes() == recording.frames.tobytes()
+    assert not link.is_symlink()
+
+
+def test_the_command_prints_the_part_asked_for(recorded, capsys) -> None:
+    path, recording = recorded
+    words = ["replay", str(path), "--from", "1", "--to", "1.5", "--pace", "fast", "--rate", "0", "--json"]
+    assert main(words) == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    mine = recording.frames[(recording.frames["seq"] >= 100) & (recording.frames["seq"] < 150)]
+    assert [row["seq"] for row in rows] == mine["seq"].tolist()
+
+
+def test_another_kind_of_file_is_refused(tmp_path) -> None:
+    (tmp_path / "a.txt").write_text("hello, I am no recording")
+    with pytest.raises(biotac.RecordingError, match="no MCAP file"):
+        open_link(f"replay:{tmp_path / 'a.txt'}")
+
+
+def test_a_link_needs_a_pty(recorded, tmp_path, capsys) -> None:
+    assert main(["replay", str(recorded[0]), "--link", str(tmp_path / "x")]) == 2
+    assert "add --pty" in capsys.readouterr().err
