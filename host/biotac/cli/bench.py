@@ -13,7 +13,7 @@ from . import values
 from .progress import Progress
 
 NAME = "bench"
-HELP = "Measure: kernels, whole recordings against NumPy, decoding, an idle finger's link, recording sizes."
+HELP = "Measure kernels, batch maths, decoding, an idle link, recording sizes."
 EXAMPLE = "biotac bench kernels --counts counts.json --out front"
 BATCH_FRAMES = 200_000
 DECODE_FRAMES = 30_000  # a minute of five fingers
