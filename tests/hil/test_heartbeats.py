@@ -103,7 +103,7 @@ def test_a_point_inside_a_round_is_that_of_the_words_that_have_come(board, tmp_p
     sent = sent[sent["finger"] == 0]
     before = sent[sent["seq"] == point.seq - 1][0]
     under_way = sent[sent["seq"] == point.seq][0]
-    come = 2 * np.arange(19) < point.slot  # E1 PAC E2 PAC ...
+    come = 7 + 2 * np.arange(19) < point.slot  # PAC PDC PAC TAC PAC TDC PAC E1 PAC E2 ... PAC E19
     counts = np.where(come, under_way["counts"], before["counts"])
     board_computes = on_board(counts[None], before["tare_q4"] / 16.0, hand.settings())
     assert np.array_equal(board_computes.poc_mm[0], np.array(point.poc_um) / 1000)
