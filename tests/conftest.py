@@ -11,9 +11,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from deframer import Deframer
 
 from biotac import _wire as wire
-from biotac.framing import Deframer, encode
+from biotac.framing import encode
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 

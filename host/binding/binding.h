@@ -9,6 +9,7 @@
 #include "bounds.h"
 #include "cobs.h"
 #include "crc32.h"
+#include "decode.h"
 #include "device.h"
 #include "finger.h"
 #include "framing.h"

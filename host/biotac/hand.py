@@ -276,9 +276,9 @@ class Hand(Commands):
             return False
         self._bytes += len(chunk)
         batch = self._decoder.feed(chunk)
-        self._frames += len(batch.frames)
+        self._frames += len(batch.wire)
         self._replies.extend(batch.messages)
-        if len(batch.frames) or len(batch.pac) or len(batch.idle) or batch.messages:
+        if len(batch.wire) or len(batch.pac) or len(batch.idle) or batch.messages:
             self._batches.append(batch)
         return True
 

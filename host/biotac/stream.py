@@ -5,66 +5,50 @@ No I/O: the live link, the recorder's reader and the tests all feed the same cla
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _wire as wire
-from .frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, StructArray, frames_from_wire
-from .framing import Deframer, FramingCounts
-
-STREAMED = (wire.Frame.ID, wire.Pac.ID, wire.Idle.ID)
-
-# What numbers a stream: a row stands for `rounds` rounds, of which `seq` is the last.
-ROUND_DTYPE = np.dtype([("finger", "u1"), ("seq", "<u2"), ("t_us", "<u4"), ("rounds", "<u2")])
+from .decode import STREAMED, Buffer, Decoded, Decoder
+from .frames import IDLE_DTYPE, PAC_DTYPE, StructArray, frames_from_wire
+from .framing import FramingCounts
+from .numbering import Numbering, Unwrapper
 
 
 @dataclass
 class Batch:
     """What one chunk of bytes completed.
 
-    ``wire`` holds the FRAME messages as sent (wire.DTYPES), ``frames`` the same rows in user units;
+    ``wire`` holds the FRAME messages as sent (wire.DTYPES), ``seq`` and ``t_us`` (int64) their unwrapped
+    numbers and device times, ``frames`` the same rows in user units, converted when first asked for;
     ``pac`` is PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order.
     """
 
     wire: StructArray
-    frames: StructArray
+    seq: NDArray[np.int64]
+    t_us: NDArray[np.int64]
     pac: StructArray
     idle: StructArray
     messages: list[Any] = field(default_factory=list)
 
+    @cached_property
+    def frames(self) -> StructArray:
+        """The FRAMEs in user units, FRAME_DTYPE (n,)."""
+        return frames_from_wire(self.wire, self.seq, self.t_us)
+
     def last_t_us(self) -> int | None:
         """Device time of the latest frame or heartbeat; None without any."""
-        ends = [int(rows["t_us"].max()) for rows in (self.frames, self.idle) if len(rows)]
+        ends = [int(t_us.max()) for t_us in (self.t_us, self.idle["t_us"]) if len(t_us)]
         return max(ends, default=None)
 
     def first_t_us(self) -> int | None:
         """Device time of the earliest frame or heartbeat; None without any."""
-        begins = [int(rows["t_us"].min()) for rows in (self.frames, self.idle) if len(rows)]
+        begins = [int(t_us.min()) for t_us in (self.t_us, self.idle["t_us"]) if len(t_us)]
         return min(begins, default=None)
-
-
-class Unwrapper:
-    """Extends a wrapping counter to int64, each value to the nearest after the one before."""
-
-    def __init__(self, bits: int) -> None:
-        self._modulus = 1 << bits
-        self._last: int | None = None
-
-    def extend(self, values: NDArray[Any]) -> NDArray[np.int64]:
-        """Return the unwrapped values; steps back stay steps back."""
-        raw = values.astype(np.int64)
-        if not len(raw):
-            return raw
-        first = int(raw[0]) if self._last is None else self._last
-        half = self._modulus // 2
-        steps = (np.diff(raw, prepend=first % self._modulus) + half) % self._modulus - half
-        out: NDArray[np.int64] = first + np.cumsum(steps)
-        self._last = int(out[-1])
-        return out
 
 
 @dataclass(frozen=True)
@@ -81,162 +65,139 @@ class LinkStats:
 
 
 class StreamDecoder:
-    """Chunks of bytes in, batches of arrays out.
-
-    ``lost`` counts the frames, ``lost_pac`` the PAC blocks, that the sequence numbers say were made
-    but never came; ``disordered`` counts numbers that repeat or step back, as after a reboot.
-    """
+    """Chunks of bytes in, batches of arrays out; what is lost is known by the sequence numbers."""
 
     def __init__(self) -> None:
-        self._deframer = Deframer()
-        self._seq: dict[tuple[int, int], Unwrapper] = defaultdict(lambda: Unwrapper(16))
+        self._decoder = Decoder()
+        self._rounds = Numbering()  # FRAMEs and IDLEs share one numbering: together they account for every round
+        self._pacs = Numbering()
         self._time = Unwrapper(32)  # one clock for all: a finger plugged in late is not early
-        self._next_seq: dict[tuple[int, int], int] = {}
-        self.lost = 0
-        self.lost_pac = 0
-        self.disordered = 0
-        self.lost_after: list[tuple[int, int, int]] = []  # finger, seq before the gap, frames lost
+
+    @property
+    def lost(self) -> int:
+        """Frames that were made and never came."""
+        return self._rounds.lost
+
+    @property
+    def lost_pac(self) -> int:
+        """PAC blocks that were made and never came."""
+        return self._pacs.lost
+
+    @property
+    def disordered(self) -> int:
+        """Numbers that repeat or step back, as after a reboot."""
+        return self._rounds.disordered + self._pacs.disordered
+
+    @property
+    def lost_after(self) -> list[tuple[int, int, int]]:
+        """(finger, seq before the gap, frames lost) of every gap so far."""
+        return self._rounds.gaps
 
     @property
     def counts(self) -> FramingCounts:
         """What became of the bytes so far."""
-        return self._deframer.counts
+        return self._decoder.counts
 
     def stats(self, bytes_received: int, frames: int) -> LinkStats:
         """All counts, with what the caller has counted."""
+        counts = self.counts
         return LinkStats(
             bytes_received=bytes_received,
             frames=frames,
             frames_lost=self.lost,
             pac_lost=self.lost_pac,
             disordered=self.disordered,
-            crc_errors=self.counts.bad_crc,
-            other_errors=self.counts.bad - self.counts.bad_crc,
+            crc_errors=counts.bad_crc,
+            other_errors=counts.bad - counts.bad_crc,
         )
 
     def accept_newer_minor(self) -> None:
         """The peer's wire minor is newer: its messages may be longer than known here."""
-        self._deframer.allow_longer = True
+        self._decoder.allow_longer = True
 
-    def feed(self, chunk: bytes) -> Batch:
+    def feed(self, chunk: Buffer) -> Batch:
         """Take any number of bytes; return what they complete."""
-        streamed = Arrivals()
-        others: list[Any] = []
+        decoded = self._decoder.feed(chunk)
+        if not decoded.others:
+            return self._convert(decoded)
         parts: list[Batch] = []
-        for message_id, payload in self._deframer.feed(chunk):
-            if message_id in STREAMED:
-                streamed.add(message_id, payload)
-            elif message_id in wire.MESSAGES:
-                others.append(wire.MESSAGES[message_id].unpack(payload))
-                if is_start(others[-1]):
-                    # What the board made before it was asked to stream was never sent: no loss.
-                    parts.append(self._convert(streamed, others))
-                    streamed, others = Arrivals(), []
-                    self._next_seq.clear()
-        return join([*parts, self._convert(streamed, others)]) if parts else self._convert(streamed, others)
+        for piece in split_at_starts(decoded):
+            if parts:
+                # What the board made before it was asked to stream was never sent: no loss.
+                self._rounds.rejoin()
+                self._pacs.rejoin()
+            parts.append(self._convert(piece))
+        return parts[0] if len(parts) == 1 else join(parts)
 
-    def _convert(self, streamed: Arrivals, others: list[Any]) -> Batch:
-        frame_wire, idle_wire, pac_wire = (streamed.rows(m) for m in (wire.Frame.ID, wire.Idle.ID, wire.Pac.ID))
-        n = len(frame_wire)
-        # FRAMEs and IDLEs share one numbering: together they account for every round.
-        both = np.concatenate([numbered(frame_wire, 1), numbered(idle_wire, idle_wire["frames"])])
-        order = np.argsort(streamed.order(wire.Frame.ID) + streamed.order(wire.Idle.ID))
-        seq, t_us = np.empty((2, len(both)), np.int64)
-        seq[order], t_us[order] = self._extend(wire.Frame.ID, both[order])
-        frames = frames_from_wire(frame_wire, seq[:n], t_us[:n])
-        idle = np.empty(len(idle_wire), IDLE_DTYPE)
-        idle["seq"], idle["t_us"] = seq[n:], t_us[n:]
-        for name in ("finger", "frames", "energy_count2", "pdc", "tdc", "flags"):
-            idle[name] = idle_wire[name]
-        pac = np.empty(len(pac_wire), PAC_DTYPE)
-        pac["seq"], pac["t_us"] = self._extend(wire.Pac.ID, numbered(pac_wire, 1))
-        pac["finger"] = pac_wire["finger"]
-        pac["pac"] = pac_wire["pac"]
-        return Batch(frame_wire, frames, pac, idle, others)
-
-    def _extend(self, message_id: int, rows: StructArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        seq = np.zeros(len(rows), np.int64)
-        for finger in np.unique(rows["finger"]):
-            mine = rows["finger"] == finger
-            key = (message_id, int(finger))
-            seq[mine] = self._seq[key].extend(rows["seq"][mine])
-            self._count_gaps(key, seq[mine], rows["rounds"][mine])
-        return seq, self._time.extend(rows["t_us"])
-
-    def _count_gaps(self, key: tuple[int, int], seq: NDArray[np.int64], rounds: NDArray[Any]) -> None:
-        first = seq - rounds.astype(np.int64) + 1
-        expected = np.concatenate(([self._next_seq.get(key, int(first[0]))], seq[:-1] + 1))
-        gaps = first - expected
-        self.disordered += int(np.count_nonzero(gaps < 0))
-        for at in np.flatnonzero(gaps > 0):
-            if key[0] == wire.Pac.ID:
-                self.lost_pac += int(gaps[at])
-            else:
-                self.lost += int(gaps[at])
-                self.lost_after.append((key[1], int(expected[at]) - 1, int(gaps[at])))
-        self._next_seq[key] = int(seq[-1]) + 1
+    def _convert(self, decoded: Decoded) -> Batch:
+        frames, idles, pacs = decoded.frames, decoded.idles, decoded.pacs
+        n = len(frames)
+        if len(idles):
+            order = np.argsort(np.concatenate([decoded.order(wire.Frame.ID), decoded.order(wire.Idle.ID)]))
+            finger, seq, t_us = (np.concatenate([frames[k], idles[k]])[order] for k in ("finger", "seq", "t_us"))
+            rounds = np.concatenate([np.ones(n, np.int64), idles["frames"]])[order]
+            numbers, times = np.empty((2, len(order)), np.int64)
+            numbers[order] = self._rounds.extend(finger, seq, rounds)
+            times[order] = self._time.extend(t_us)
+        else:
+            numbers = self._rounds.extend(frames["finger"], frames["seq"], 1)
+            times = self._time.extend(frames["t_us"])
+        idle = np.empty(len(idles), IDLE_DTYPE)
+        if len(idles):
+            idle["seq"], idle["t_us"] = numbers[n:], times[n:]
+            for name in ("finger", "frames", "energy_count2", "pdc", "tdc", "flags"):
+                idle[name] = idles[name]
+        pac = np.empty(len(pacs), PAC_DTYPE)
+        if len(pacs):
+            pac["finger"], pac["pac"] = pacs["finger"], pacs["pac"]
+            pac["seq"] = self._pacs.extend(pacs["finger"], pacs["seq"], 1)
+            pac["t_us"] = self._time.extend(pacs["t_us"])
+        return Batch(frames, numbers[:n], times[:n], pac, idle, known(decoded.others))
 
 
-class Arrivals:
-    """Payloads by message id, with the order in which they came."""
-
-    def __init__(self) -> None:
-        self._payloads: dict[int, list[bytes]] = {message_id: [] for message_id in STREAMED}
-        self._order: dict[int, list[int]] = {message_id: [] for message_id in STREAMED}
-        self._count = 0
-
-    def add(self, message_id: int, payload: bytes) -> None:
-        """Take the next one."""
-        self._payloads[message_id].append(payload)
-        self._order[message_id].append(self._count)
-        self._count += 1
-
-    def rows(self, message_id: int) -> StructArray:
-        """All of one id as an array of wire.DTYPES."""
-        return np.frombuffer(b"".join(self._payloads[message_id]), wire.DTYPES[message_id])
-
-    def order(self, message_id: int) -> list[int]:
-        """When each came."""
-        return self._order[message_id]
+def known(others: list[tuple[int, bytes]]) -> list[Any]:
+    """Messages of known ids; the others are a newer peer's."""
+    return [wire.MESSAGES[message_id].unpack(payload) for message_id, payload in others if message_id in wire.MESSAGES]
 
 
-def numbered(messages: StructArray, rounds: Any) -> StructArray:
-    """What ROUND_DTYPE wants of stream messages (n,) that stand for ``rounds`` rounds each."""
-    out = np.empty(len(messages), ROUND_DTYPE)
-    for name in ("finger", "seq", "t_us"):
-        out[name] = messages[name]
-    out["rounds"] = rounds
-    return out
+def split_at_starts(decoded: Decoded) -> list[Decoded]:
+    """In pieces, each but the last with the board's yes to a START as its last message."""
+    starts = [k for k, other in enumerate(decoded.others) if is_start(*other)]
+    if not starts:
+        return [decoded]
+    others_at = [at for at, message_id in enumerate(decoded.ids) if message_id not in STREAMED]
+    ends = [others_at[k] + 1 for k in starts]
+    return [decoded.between(begin, end) for begin, end in zip([0, *ends], [*ends, len(decoded.ids)], strict=True)]
 
 
-def is_start(message: Any) -> bool:
+def is_start(message_id: int, payload: bytes) -> bool:
     """The board's yes to START."""
-    return isinstance(message, wire.Reply) and message.command == wire.Start.ID and message.error == wire.Error.OK
+    if message_id != wire.Reply.ID:
+        return False
+    reply = wire.Reply.unpack(payload)
+    return reply.command == wire.Start.ID and reply.error == wire.Error.OK
 
 
 def split(batch: Batch, end_us: int) -> tuple[Batch, Batch]:
     """Rows before device time ``end_us``, and the rest."""
-    now = batch.frames["t_us"] < end_us
+    now = batch.t_us < end_us
     pac_now = batch.pac["t_us"] < end_us
     idle_now = batch.idle["t_us"] < end_us
-    return (
-        Batch(batch.wire[now], batch.frames[now], batch.pac[pac_now], batch.idle[idle_now], batch.messages),
-        Batch(batch.wire[~now], batch.frames[~now], batch.pac[~pac_now], batch.idle[~idle_now], []),
-    )
+
+    def rows(mine: Any, pac: Any, idle: Any, messages: list[Any]) -> Batch:
+        return Batch(batch.wire[mine], batch.seq[mine], batch.t_us[mine], batch.pac[pac], batch.idle[idle], messages)
+
+    return rows(now, pac_now, idle_now, batch.messages), rows(~now, ~pac_now, ~idle_now, [])
 
 
 def join(batches: list[Batch]) -> Batch:
     """One batch of all rows, in order."""
     if not batches:
-        return Batch(
-            np.empty(0, wire.DTYPES[wire.Frame.ID]),
-            np.empty(0, FRAME_DTYPE),
-            np.empty(0, PAC_DTYPE),
-            np.empty(0, IDLE_DTYPE),
-        )
+        return StreamDecoder().feed(b"")
     return Batch(
         np.concatenate([b.wire for b in batches]),
-        np.concatenate([b.frames for b in batches]),
+        np.concatenate([b.seq for b in batches]),
+        np.concatenate([b.t_us for b in batches]),
         np.concatenate([b.pac for b in batches]),
         np.concatenate([b.idle for b in batches]),
         [m for b in batches for m in b.messages],

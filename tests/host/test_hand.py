@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from deframer import Deframer
 
 import biotac
 from biotac import _wire as wire
-from biotac.framing import Deframer, encode
+from biotac.framing import encode
 
 
 def test_nothing_answers_is_no_gateway(scripted_board, monkeypatch) -> None:

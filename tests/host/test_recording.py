@@ -11,13 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from deframer import Deframer
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 import biotac
 from biotac import _wire as wire
-from biotac.framing import Deframer, encode
+from biotac.framing import encode
 
 SOURCE = "sim:press.toml?fingers=2&seconds=4"
 

@@ -1,13 +1,20 @@
-"""The firmware's byte-wise deframer against the host's chunk-wise one: same bytes, same outcome."""
+"""The firmware's byte-wise deframer and the host's compiled one against the reference: same bytes, same outcome."""
 
 from __future__ import annotations
 
+import zlib
+
+import pytest
 from biotac._core import ffi, lib
+from cobs import cobs
+from deframer import Deframer
+from deframer import encode as reference_encode
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from biotac import _wire as wire
-from biotac.framing import Deframer, encode
+from biotac.decode import Decoder
+from biotac.framing import FramingCounts, encode
 
 OUTCOMES = {2: "too_long", 3: "bad_cobs", 4: "bad_crc", 5: "bad_length"}
 
@@ -27,10 +34,20 @@ def deframe_in_c(stream: bytes) -> tuple[list[tuple[int, bytes]], dict[str, int]
     return frames, counts
 
 
+def refusals(counts: FramingCounts) -> dict[str, int]:
+    return {name: getattr(counts, name) for name in OUTCOMES.values()}
+
+
 def deframe_in_python(chunks: list[bytes]) -> tuple[list[tuple[int, bytes]], dict[str, int]]:
     deframer = Deframer()
     frames = [frame for chunk in chunks for frame in deframer.feed(chunk)]
-    return frames, {name: getattr(deframer.counts, name) for name in OUTCOMES.values()}
+    return frames, refusals(deframer.counts)
+
+
+def decode_in_c(chunks: list[bytes]) -> tuple[list[tuple[int, bytes]], dict[str, int]]:
+    decoder = Decoder()
+    frames = [frame for chunk in chunks for frame in decoder.feed(chunk).messages()]
+    return frames, refusals(decoder.counts)
 
 
 known_payload = st.sampled_from(sorted(wire.MESSAGES)).flatmap(
@@ -53,42 +70,37 @@ streams = st.lists(st.one_of(good_frame, damaged_frame, cut_frame, junk), max_si
 
 @settings(max_examples=400, deadline=None)
 @given(streams, st.lists(st.integers(1, 300), min_size=1, max_size=20))
-def test_both_deframers_accept_the_same_frames_for_the_same_reasons(stream: bytes, cuts: list[int]) -> None:
+def test_all_deframers_accept_the_same_frames_for_the_same_reasons(stream: bytes, cuts: list[int]) -> None:
     chunks = []
     at = 0
     while at < len(stream):
         step = cuts[len(chunks) % len(cuts)]
         chunks.append(stream[at : at + step])
         at += step
-    assert deframe_in_python(chunks) == deframe_in_c(stream)
+    assert decode_in_c(chunks) == deframe_in_python(chunks) == deframe_in_c(stream)
 
 
 @settings(max_examples=200, deadline=None)
 @given(any_payload)
-def test_both_encoders_write_the_same_bytes(message: tuple[int, bytes]) -> None:
-    message_id, payload = message
-    out = ffi.new("uint8_t[]", 300)
-    n = lib.bt_frame_encode(message_id, payload, len(payload), out)
-    assert bytes(ffi.buffer(out, n)) == encode(message_id, payload)
+def test_the_encoder_writes_what_the_libraries_would(message: tuple[int, bytes]) -> None:
+    assert encode(*message) == reference_encode(*message)
+
+
+def test_a_payload_that_fits_no_frame_is_refused() -> None:
+    with pytest.raises(ValueError, match="250 bytes, expected at most 249"):
+        encode(0x55, bytes(250))
 
 
 @settings(max_examples=200, deadline=None)
 @given(st.binary(max_size=300), st.binary(max_size=300))
 def test_cobs_and_crc_agree_with_the_libraries(data: bytes, noise: bytes) -> None:
-    import zlib
-
-    from cobs import cobs
-
     out = ffi.new("uint8_t[]", 700)
-    encoded = cobs.encode(data)
-    n = lib.bt_cobs_decode(encoded, len(encoded), out)
-    assert bytes(ffi.buffer(out, n)) == data
     assert lib.bt_crc32(data, len(data)) == zlib.crc32(data)
-    stuffed = noise.replace(b"\0", b"\1")
-    m = lib.bt_cobs_decode(stuffed, len(stuffed), out)
-    try:
-        want = cobs.decode(stuffed)
-    except cobs.DecodeError:
-        assert m == -1
-    else:
-        assert bytes(ffi.buffer(out, m)) == want
+    for stuffed in (cobs.encode(data), noise.replace(b"\0", b"\1")):
+        n = lib.bt_cobs_decode(stuffed, len(stuffed), out)
+        try:
+            want = cobs.decode(stuffed)
+        except cobs.DecodeError:
+            assert n == -1
+        else:
+            assert bytes(ffi.buffer(out, n)) == want

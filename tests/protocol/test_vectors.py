@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cobs import cobs
+from deframer import Deframer
 
 from biotac import _wire as wire
-from biotac.framing import Deframer, encode
+from biotac.decode import Decoder
+from biotac.framing import FramingCounts, encode
 
 VECTORS = Path(__file__).resolve().parents[2] / "protocol" / "vectors"
 CHUNK_BYTES = (1, 2, 3, 5, 7, 13, 63, 64, 65, 255, 10_000)
@@ -82,18 +84,39 @@ def chunks(data: bytes, size: int) -> list[bytes]:
     return [data[k : k + size] for k in range(0, len(data), size)]
 
 
+class Compiled:
+    """The library's decoder, with the messages as the reference gives them."""
+
+    def __init__(self) -> None:
+        self._decoder = Decoder()
+
+    @property
+    def counts(self) -> FramingCounts:
+        return self._decoder.counts
+
+    def feed(self, chunk: bytes) -> list[tuple[int, bytes]]:
+        return self._decoder.feed(chunk).messages()
+
+
+both = pytest.mark.parametrize("kind", [Compiled, Deframer], ids=["library", "reference"])
+
+
+@both
 @each_case
 @pytest.mark.parametrize("size", CHUNK_BYTES)
-def test_every_case_gives_its_frames_and_counts_in_chunks_of_any_size(case: FramingCase, size: int) -> None:
-    deframer = Deframer()
+def test_every_case_gives_its_frames_and_counts_in_chunks_of_any_size(
+    case: FramingCase, size: int, kind: type[Compiled | Deframer]
+) -> None:
+    deframer = kind()
     frames = [frame for chunk in chunks(case.wire, size) for frame in deframer.feed(chunk)]
     assert frames == case.frames
     assert {name: getattr(deframer.counts, name) for name in case.counts} == case.counts
     assert deframer.counts.good == len(case.frames)
 
 
-def test_one_deframer_takes_all_cases_in_a_row() -> None:
-    deframer = Deframer()
+@both
+def test_one_deframer_takes_all_cases_in_a_row(kind: type[Compiled | Deframer]) -> None:
+    deframer = kind()
     frames = []
     for case in FRAMING:
         frames += deframer.feed(case.wire + b"\0")

@@ -7,14 +7,18 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from ..bench import batch, front, front_picture, idle, kernels
+from ..bench import batch, decode, front, front_picture, idle, kernels
 from ..errors import InputError
 
 NAME = "bench"
-HELP = "Measure: the kernel variants' errors and cost, whole recordings against NumPy, the link of an untouched finger."
+HELP = (
+    "Measure: kernel variants' errors and cost, whole recordings against NumPy, decoding, an untouched finger's link."
+)
 EXAMPLE = "biotac bench kernels --counts counts.json --out front"
 BATCH_FRAMES = 200_000
-FRAMES = {"kernels": (100, 1_000_000), "batch": (batch.SINGLE_FRAMES, 10_000_000)}  # memory bounds both
+DECODE_FRAMES = 30_000  # a minute of five fingers
+# Memory bounds all.
+FRAMES = {"kernels": (100, 1_000_000), "batch": (batch.SINGLE_FRAMES, 10_000_000), "decode": (500, 1_000_000)}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,13 +31,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="kernels",
         choices=[*FRAMES, "idle"],
         help="kernels (default): every variant's errors and cost; batch: whole recordings, biotac.compute; "
+        "decode: the link's bytes to arrays, against pymavlink and Python; "
         "idle: bytes on the link at rest and in contact",
     )
     parser.add_argument(
         "--frames",
         type=int,
         metavar="N",
-        help=f"kernels: per class (default {effort.frames}); batch: recording length (default {BATCH_FRAMES})",
+        help=f"kernels: per class (default {effort.frames}); batch: recording length (default {BATCH_FRAMES}); "
+        f"decode: of five fingers together (default {DECODE_FRAMES})",
     )
     parser.add_argument("--source", default="press.toml", help="idle: what to play (default %(default)s)")
     climb = parser.add_argument_group("kernels")
@@ -57,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     low, high = FRAMES[args.what]
     if args.frames is not None and not low <= args.frames <= high:
         raise InputError(f"--frames is {args.frames}, expected {low} to {high} for bench {args.what}")
-    return _batch(args) if args.what == "batch" else _kernels(args)
+    return {"kernels": _kernels, "batch": _batch, "decode": _decode}[args.what](args)
 
 
 def _kernels(args: argparse.Namespace) -> int:
@@ -104,16 +110,41 @@ def _batch(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(asdict(outcome)))
         return 0
-    width = max(len(row.name) for row in outcome.rows)
-    print(f"{'ns per frame':{width}}  {'median':>9} {'min':>9} {'max':>9}")
-    for row in outcome.rows:
-        print(f"{row.name:{width}}  {row.median_ns:9.1f} {row.min_ns:9.1f} {row.max_ns:9.1f}")
+    _rows("ns per frame", outcome.rows)
     print(
         f"{outcome.frames} frames, {batch.ROUNDS} interleaved rounds; NumPy's best block here: {outcome.block} frames"
     )
-    for ratio in outcome.ratios:
-        print(f"{ratio.ratio:5.1f}x  {ratio.faster} against {ratio.slower}{_verdict(ratio)}")
+    _ratios(outcome.ratios)
     return 0
+
+
+def _decode(args: argparse.Namespace) -> int:
+    outcome = decode.measure(args.frames or DECODE_FRAMES)
+    if args.json:
+        print(json.dumps(asdict(outcome)))
+        return 0
+    print(
+        f"{outcome.seconds:g} s of {decode.FINGERS} fingers, {outcome.messages} FRAMEs and PACs of "
+        f"{outcome.bytes_per_message:.0f} bytes each, pymavlink's {outcome.mavlink_bytes_per_message:.0f}; CPU time, "
+        f"{decode.ROUNDS} interleaved rounds;\nratios are against the other's better chunk size"
+    )
+    for result in outcome.results:
+        print()
+        _rows(f"ns per message, chunks of {result.chunk_bytes} bytes", result.rows)
+        _ratios(result.ratios)
+    return 0
+
+
+def _rows(title: str, rows: list[batch.Row]) -> None:
+    width = max(len(title), *(len(row.name) for row in rows))
+    print(f"{title:{width}}  {'median':>9} {'min':>9} {'max':>9}")
+    for row in rows:
+        print(f"{row.name:{width}}  {row.median_ns:9.1f} {row.min_ns:9.1f} {row.max_ns:9.1f}")
+
+
+def _ratios(ratios: list[batch.Ratio]) -> None:
+    for ratio in ratios:
+        print(f"{ratio.ratio:5.1f}x  {ratio.faster} against {ratio.slower}{_verdict(ratio)}")
 
 
 def _verdict(ratio: batch.Ratio) -> str:

@@ -1,0 +1,56 @@
+// The link's bytes to rows of wire messages, many at once, for the host: the same outcome as
+// bt_deframer_push() byte by byte.
+//
+// It rests on what framing.h asserts: a frame fits one COBS block. So COBS has put one byte in front and only
+// replaced zeros, and undoing it is one copy and a walk from zero to zero.
+#ifndef BIOTAC_DECODE_H
+#define BIOTAC_DECODE_H
+
+#include "framing.h"
+
+#define BT_DECODE_BYTES    65536                   // what one call takes
+#define BT_DECODE_ROOM     (BT_DECODE_BYTES + 256) // the call's bytes and the rest of the call before
+#define BT_DECODE_OUTCOMES 6                       // enum bt_deframed
+#define BT_CRC_SLICES      8
+#define BT_UNKNOWN_ID      (-1)
+
+// What a call gives out. FRAME, PAC, IDLE: payloads back to back, rows of wire.DTYPES. OTHER: u8 id, u8
+// length, payload of all other messages. IDS: of every message, in the order in which they came.
+enum bt_decoded {
+    BT_DECODED_FRAME,
+    BT_DECODED_PAC,
+    BT_DECODED_IDLE,
+    BT_DECODED_OTHER,
+    BT_DECODED_IDS,
+    BT_DECODED_KINDS
+};
+
+typedef struct {
+    uint8_t allow_longer; // known ids may have longer payloads, of which the known bytes are kept
+    uint64_t outcomes[BT_DECODE_OUTCOMES]; // by enum bt_deframed, since the last reset
+
+    // What the last call completed, by enum bt_decoded.
+    uint32_t filled[BT_DECODED_KINDS]; // bytes
+    uint8_t data[BT_DECODED_KINDS][BT_DECODE_ROOM];
+
+    // Kept from call to call.
+    uint8_t overlong;
+    uint16_t rest_bytes;
+    uint8_t rest[BT_FRAME_MAX_BYTES + 2];
+
+    // Set up by the reset, from what is generated.
+    int16_t payload_bytes[256];              // by id, or BT_UNKNOWN_ID
+    uint8_t kind[256];                       // by id, enum bt_decoded
+    uint32_t crc_slices[BT_CRC_SLICES][256]; // k: what a byte does to the CRC by the end of k more zeros
+    uint32_t crc_over_lane[2][4][256];       // what zeros do to a CRC, by its bytes: decode.c, crc_of()
+} bt_decoder;
+
+// To be called first; nothing of the struct needs a value before.
+void bt_decoder_reset(bt_decoder *decoder);
+
+size_t bt_decode_bytes(void); // BT_DECODE_BYTES
+
+// Takes at most that many and returns how many. What the call before completed is gone.
+size_t bt_decode(bt_decoder *decoder, const uint8_t *data, size_t bytes);
+
+#endif
