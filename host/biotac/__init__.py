@@ -14,6 +14,7 @@ from .batch import RESULT_DTYPE, compute
 from .calibration import Calibration
 from .errors import (
     BiotacError,
+    CallbackError,
     CommandRefusedError,
     DeviceLostError,
     FlashError,
@@ -27,6 +28,7 @@ from .errors import (
 from .finger import FINGER_DTYPE, Finger
 from .frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
 from .hand import Hand
+from .live import FingerView, Gap
 from .opening import open
 from .recording import Recorder, Recording, load
 from .stream import LinkStats
@@ -41,12 +43,15 @@ __all__ = [
     "BiotacError",
     "Calibration",
     "CalibrationState",
+    "CallbackError",
     "CommandRefusedError",
     "DeviceLostError",
     "Finger",
+    "FingerView",
     "FlashError",
     "Frame",
     "FrameFlags",
+    "Gap",
     "Hand",
     "InputError",
     "LinkStats",

@@ -97,7 +97,8 @@ def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:
     hand.link.release()
     frames = 0
     while hand._pump(1.0) and not hand.link.ended:
-        frames += sum(len(hand._batches.popleft().frames) for _ in range(len(hand._batches)))
+        while (batch := hand._batches.take()) is not None:
+            frames += len(batch.frames)
     assert 18 <= frames <= 22  # 200 ms of 10 ms rounds, and what was under way
     assert hand.status().streams == 0
 

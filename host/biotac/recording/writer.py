@@ -85,6 +85,14 @@ class Recorder:
         if self._pending and (now - self._pending_since >= FLUSH_S or len(self._pending) >= FLUSH_BYTES):
             self.flush()
 
+    def mark(self, what: str, facts: dict[str, str]) -> None:
+        """Note that something happened here: a metadata record ``biotac.WHAT`` behind what came so far."""
+        if self._file.closed:
+            return
+        self.flush()
+        self._writer.add_metadata(f"{layout.METADATA_NAME}.{what}", facts)
+        self._file.flush()
+
     def flush(self) -> None:
         """Close the current chunk and give it to the operating system."""
         if not self._pending:
