@@ -111,8 +111,7 @@ class Hand(Conversation):
             return
         self.closing.set()
         self.timing.wake()
-        with self._changed:
-            self._changed.notify_all()
+        self._tell()
         try:
             if self._streaming and self.connected:
                 self._streaming = False
@@ -165,8 +164,7 @@ class Hand(Conversation):
         self._command(wire.Stop(self._next_req_id()))
         self._streaming = False
         self._started = None
-        with self._changed:
-            self._changed.notify_all()
+        self._tell()
 
     def subscribe(self, quantities: wire.QuantityFlags, *, fingers: int = ALL_FINGERS) -> None:
         """See Commands.subscribe."""
@@ -353,9 +351,7 @@ class Hand(Conversation):
         with self._changed:
             self._failure = self._failure or error
             self._streaming = False
-            self._changed.notify_all()
-        for queue in self._queues:
-            queue.wake()
+        self._tell()
 
     def _finish(self) -> None:
         """A simulated source is over."""
@@ -363,6 +359,11 @@ class Hand(Conversation):
         with self._changed:
             self._ended = True
             self._streaming = False
+        self._tell()
+
+    def _tell(self) -> None:
+        """Whoever waits is to look again."""
+        with self._changed:
             self._changed.notify_all()
         for queue in self._queues:
             queue.wake()
@@ -383,6 +384,11 @@ class Hand(Conversation):
             batches_skipped=sum(queue.batches_skipped for queue in queues),
             frames_skipped=sum(queue.frames_skipped for queue in queues),
         )
+
+    @property
+    def streaming(self) -> bool:
+        """The board was told to stream, and has not ended or been stopped."""
+        return self._streaming
 
     @property
     def ended(self) -> bool:
