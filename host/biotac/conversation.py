@@ -313,13 +313,15 @@ class Conversation(Commands):
                 self._past.append(self._decoder.stats(0, 0))
                 self._decoder = StreamDecoder()
                 self._checked(self.info)
+            # Before START: rows may come with its reply. Two losses without a row between them are one gap.
+            gap = self._gap or Gap(reason, self._last_t_us, None, lost_at_ns, 0, 0)
+            if gap.reason == "rebooted":
+                reason = "rebooted"
+            self._gap = replace(gap, reason=reason, back_at_ns=self.timing.unix_ns(), boot_id=self.info.boot_id)
             for request in [*self._session.requests(), *([self._started] if self._started else [])]:
                 self._ask(replace(request, req_id=self._next_req_id()), _KINDS.get(type(request), wire.Reply))
         except DeviceLostError:
             return False  # gone again
-        # Two losses without a row between them are one gap.
-        gap = self._gap or Gap(reason, self._last_t_us, None, lost_at_ns, 0, 0)
-        self._gap = replace(gap, reason=reason, back_at_ns=self.timing.unix_ns(), boot_id=self.info.boot_id)
         return True
 
     def _found(self, before: wire.Hello) -> bool:
