@@ -9,6 +9,7 @@ import secrets
 import struct
 import threading
 import time
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
@@ -65,7 +66,6 @@ class Conversation(Commands):
         self._frames = 0
         self._gaps = 0
         self._gap: Gap | None = None  # to go with the next rows
-        self._last_t_us: int | None = None
         self._failure: BaseException | None = None
         self._trouble: OSError | None = None
         self._reading = threading.RLock()  # whose holder reads the link
@@ -148,9 +148,13 @@ class Conversation(Commands):
 
     # ---- reading -------------------------------------------------------------------------------
 
+    @abstractmethod
     def _arrived(self, batch: Batch) -> None:
         """Something has come; called by whoever reads."""
-        raise NotImplementedError
+
+    @abstractmethod
+    def _last_t_us(self) -> int | None:
+        """Device time of the latest row; None before any."""
 
     def _pump(self, timeout_s: float) -> bool:
         """Read once; False when nothing came within timeout_s. Not while a Reader does."""
@@ -173,11 +177,10 @@ class Conversation(Commands):
         self._frames += len(batch.wire)
         if not (len(batch.wire) or len(batch.pac) or len(batch.idle) or batch.messages):
             return
-        first_us = batch.first_t_us()
-        if first_us is not None:
-            if self._gap is not None:
+        if self._gap is not None:
+            first_us = batch.first_t_us()
+            if first_us is not None:
                 self._mark(replace(self._gap, next_t_us=first_us), batch)
-            self._last_t_us = batch.last_t_us()
         with self._changed:
             if self._awaiting:
                 self._replies.extend(batch.messages)
@@ -314,7 +317,7 @@ class Conversation(Commands):
                 self._decoder = StreamDecoder()
                 self._checked(self.info)
             # Before START: rows may come with its reply. Two losses without a row between them are one gap.
-            gap = self._gap or Gap(reason, self._last_t_us, None, lost_at_ns, 0, 0)
+            gap = self._gap or Gap(reason, self._last_t_us(), None, lost_at_ns, 0, 0)
             if gap.reason == "rebooted":
                 reason = "rebooted"
             self._gap = replace(gap, reason=reason, back_at_ns=self.timing.unix_ns(), boot_id=self.info.boot_id)

@@ -294,6 +294,9 @@ class Hand(Conversation):
         for queue in self._queues:
             queue.put(batch)
 
+    def _last_t_us(self) -> int | None:
+        return self._latest.last_t_us()
+
     def read_once(self, timeout_s: float) -> None:
         """See live.reader.Read."""
         if self._pump(timeout_s):

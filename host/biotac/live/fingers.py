@@ -75,6 +75,11 @@ class Latest:
             if finger not in rows or batch.idle["t_us"][row] > batch.t_us[rows[finger]]:
                 self._entries[finger] = (batch, row, True, now_s)
 
+    def last_t_us(self) -> int | None:
+        """Device time of the latest of all; None before any."""
+        rows = [self.row(finger)["t_us"][0] for finger in list(self._entries)]
+        return int(max(rows)) if rows else None
+
     def row(self, finger: int) -> StructArray:
         """FRAME_DTYPE (1,): the frame, or what a heartbeat says, or nothing: all invalid, t_us -1."""
         entry = self._entries.get(finger)
