@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import threading
+from collections import deque
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -52,37 +54,52 @@ def finger_index(names: Mapping[str, int], key: str | int) -> int:
     raise KeyError(f"no finger {key!r}; expected one of {', '.join(map(repr, names))}, or 0 to {MAX_SENSORS - 1}")
 
 
+# Batches that wait until somebody looks, or there are so many.
+UNSEEN_BATCHES = 64
+
+
 class Latest:
-    """The newest frame or heartbeat of each finger, and when it came. Written by whoever reads the link."""
+    """The newest frame or heartbeat of each finger, and when it came.
+
+    Whoever reads the link only notes the batch: to look into each costs as much as to decode it, and most are never
+    looked at.
+    """
 
     def __init__(self, timing: Timing) -> None:
         self.timing = timing
-        # finger: (batch, row, row is a heartbeat, arrival in s); replaced whole, so that readers need no lock
+        self._now = timing.monotonic_s
+        self._unseen: deque[tuple[Batch, float]] = deque()
+        # finger: (batch, row, row is a heartbeat, arrival in s)
         self._entries: dict[int, tuple[Batch, int, bool, float]] = {}
+        self._looking = threading.Lock()
 
     def update(self, batch: Batch) -> None:
-        """Take the last row of each finger."""
-        if not len(batch.wire) and not len(batch.idle):
-            return
-        now_s = self.timing.monotonic_s()
-        rows = _last_rows(batch.wire)
-        for finger, row in rows.items():
-            self._entries[finger] = (batch, row, False, now_s)
-        if not len(batch.idle):
-            return
-        for finger, row in _last_rows(batch.idle).items():
-            # A batch can hold both: what is later in device time is the latest.
-            if finger not in rows or batch.idle["t_us"][row] > batch.t_us[rows[finger]]:
-                self._entries[finger] = (batch, row, True, now_s)
+        """Take note of it. One thread at a time."""
+        self._unseen.append((batch, self._now()))
+        if len(self._unseen) >= UNSEEN_BATCHES:
+            self._look()
+
+    def _look(self) -> dict[int, tuple[Batch, int, bool, float]]:
+        with self._looking:
+            while self._unseen:
+                batch, when_s = self._unseen.popleft()
+                rows = _last_rows(batch.wire)
+                for finger, row in rows.items():
+                    self._entries[finger] = (batch, row, False, when_s)
+                for finger, row in _last_rows(batch.idle).items() if len(batch.idle) else ():
+                    # A batch can hold both: what is later in device time is the latest.
+                    if finger not in rows or batch.idle["t_us"][row] > batch.t_us[rows[finger]]:
+                        self._entries[finger] = (batch, row, True, when_s)
+            return self._entries
 
     def last_t_us(self) -> int | None:
         """Device time of the latest of all; None before any."""
-        rows = [self.row(finger)["t_us"][0] for finger in list(self._entries)]
+        rows = [self.row(finger)["t_us"][0] for finger in list(self._look())]
         return int(max(rows)) if rows else None
 
     def row(self, finger: int) -> StructArray:
         """FRAME_DTYPE (1,): the frame, or what a heartbeat says, or nothing: all invalid, t_us -1."""
-        entry = self._entries.get(finger)
+        entry = self._look().get(finger)
         if entry is None:
             return _empty(finger, -1, 0, NOTHING_YET)
         batch, row, idle, _ = entry
@@ -97,7 +114,7 @@ class Latest:
 
     def age_s(self, finger: int) -> float:
         """Since the row came; inf before any."""
-        entry = self._entries.get(finger)
+        entry = self._look().get(finger)
         return math.inf if entry is None else self.timing.monotonic_s() - entry[3]
 
 

@@ -59,6 +59,8 @@ class BatchQueue:
 
     def take(self) -> Batch | None:
         """The oldest; None when there is none."""
+        if not self._batches:
+            return None
         with self._lock:
             if not self._batches:
                 return None
@@ -69,4 +71,4 @@ class BatchQueue:
 
 def weight(batch: Batch) -> int:
     """Rows of a batch, at least one."""
-    return max(1, len(batch.wire) + len(batch.pac) + len(batch.idle))
+    return len(batch.wire) + len(batch.pac) + len(batch.idle) or 1
