@@ -58,7 +58,8 @@ class Hand(Conversation):
         self._names = checked_names(fingers)
         timing = timing or RealTiming()
         self._batches = BatchQueue()  # for whoever pulls
-        self._pulled = True
+        self._pulled = True  # new batches are kept for them; without threads always
+        self._has_pulled = False
         self._queues: list[BatchQueue] = []  # for others, such as biotac.aio
         self._callbacks = Callbacks()
         self._for_callbacks = BatchQueue()
@@ -210,7 +211,10 @@ class Hand(Conversation):
             raise DeviceLostError(f"this Hand on {self.port} was closed; open the port again")
         if self._reader is not None:
             return
-        self._pulled = pulled or self._batches.rows > 0
+        if not (pulled or self._has_pulled):
+            # Nobody takes them: kept, they would be stale later, or hold up a board that waits for room.
+            self._pulled = False
+            self._batches = BatchQueue()
         limit = LIMIT_ROWS if self.link.pace else None
         for one in (self._batches, self._for_callbacks, *self._queues):
             one.bound(limit)
@@ -403,7 +407,7 @@ class Hand(Conversation):
 
         Ends with a simulated source, and when ``stop`` is called.
         """
-        self._pulled = True
+        self._pulled = self._has_pulled = True
         if not self._streaming and not self._ended:
             self.check()
             self.start()
