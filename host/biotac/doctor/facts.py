@@ -9,7 +9,7 @@ from ..clock import Fit
 from ..discovery import SerialPort
 from ..errors import BiotacError
 from ..frames import StructArray
-from ..hand import HandWarning
+from ..compatibility import HandWarning
 from ..link.holders import Holder
 from ..stream import LinkStats
 
