@@ -115,7 +115,7 @@ def test_a_board_that_dies_in_mid_stream_is_named(monkeypatch) -> None:
 
 
 def test_a_silent_board_is_a_lost_board(scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.SILENCE_S", 0.05)
+    monkeypatch.setattr("biotac.streaming.SILENCE_S", 0.05)
 
     def answer(message_id: int, payload: bytes) -> bytes:
         if message_id == wire.HelloRequest.ID:

@@ -202,7 +202,7 @@ def test_a_callback_may_give_commands(live: Live) -> None:
 
 
 def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.LIMIT_ROWS", 100)
+    monkeypatch.setattr("biotac.streaming.LIMIT_ROWS", 100)
     live.hand.run(queue=True)
     for seq in range(1000):
         live.send(frame(seq))

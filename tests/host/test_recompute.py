@@ -12,7 +12,7 @@ import biotac
 from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.core import reference_q4
-from biotac.hand import RESULTS
+from biotac.streaming import RESULTS
 
 
 def record(

@@ -15,8 +15,8 @@ import biotac
 
 from .. import _wire as wire
 from ..framing import OVERHEAD_BYTES
-from ..hand import RESULTS
 from ..stream import Batch
+from ..streaming import RESULTS
 
 FRAME_S = 0.01  # one round of slots
 

@@ -11,7 +11,7 @@ import biotac
 
 from .._wire import FrameFlags
 from ..frames import Frame
-from ..hand import RESULTS
+from ..streaming import RESULTS
 from . import values
 
 NAME = "stream"

@@ -18,7 +18,7 @@ from ..core import on_board_q4
 from ..errors import InputError
 from ..frames import StructArray
 from ..framing import encode
-from ..hand import RESULTS
+from ..streaming import RESULTS
 from ..version import __version__
 from .file import RecordingFile
 from .pieces import split

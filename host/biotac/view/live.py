@@ -9,10 +9,10 @@ from pathlib import Path
 
 from .. import _wire as wire
 from ..errors import CommandRefusedError, InputError
-from ..hand import RESULTS
 from ..opening import open as open_hand
 from ..recording import Recorder
 from ..stream import Batch, LinkStats
+from ..streaming import RESULTS
 from .player import Recorded
 
 
