@@ -180,6 +180,13 @@ BOARD_DOC: dict[int, str] = {
 }
 
 
+CALIBRATION_STATE_DOC: dict[int, str] = {
+    0: "there is none: the board's settings hold",
+    1: "it holds in place of the settings",
+    2: "kept, but made for another sensor than the one read at start and there since: the settings hold",
+}
+
+
 FRAME_FLAG_DOC: dict[int, str] = {
     1: "the finger is touched",
     2: "no tare yet: PoC, force and torque are invalid",
