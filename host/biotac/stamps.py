@@ -41,8 +41,9 @@ class Stamps:
         before_s = time.monotonic()
         now_s = self._now_s()
         offset_s = now_s - (before_s + time.monotonic()) / 2
-        stamps_s = self._hand.clock.host_time_s(t_us) + offset_s
+        stamps_s: NDArray[np.float64] = self._hand.clock.host_time_s(t_us) + offset_s
         if np.isfinite(stamps_s).all():
             return stamps_s
         self.by_arrival += len(t_us)
-        return now_s + (t_us - t_us[-1]) / 1e6
+        by_arrival: NDArray[np.float64] = now_s + (t_us - t_us[-1]) / 1e6
+        return by_arrival
