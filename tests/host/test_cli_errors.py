@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import json
 import os
+import pty
 import sys
+import tty
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,6 +22,7 @@ from biotac import _wire as wire
 from biotac import errors
 from biotac.cli.main import VERBS, main
 from biotac.framing import encode
+from biotac.link.serial_port import SerialLink
 
 NO_PORT = "/dev/ttyNOWHERE7"
 #: Verbs with no BiotacError of their own, and why.
@@ -245,6 +248,18 @@ def test_a_board_that_falls_silent_in_its_stream_is_6(capsys, scripted_board, he
         return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.OK).pack())
 
     assert "silent for" in line_of(capsys, 6, ["stream", scripted_board(answer).path])
+
+
+def test_a_board_whose_cable_is_pulled_is_6() -> None:
+    board, cable = pty.openpty()
+    tty.setraw(cable)
+    link = SerialLink(os.ttyname(cable))
+    os.close(cable)
+    os.close(board)
+    with pytest.raises(biotac.DeviceLostError, match=r"went away.*plug the board in and open it again") as lost:
+        link.read(1.0)
+    assert lost.value.exit_code == 6
+    link.close()
 
 
 @pytest.mark.parametrize("command", OPENERS)

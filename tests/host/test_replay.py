@@ -193,6 +193,12 @@ def test_every_sensor_that_was_there_is_a_finger(tmp_path: Path) -> None:
     np.testing.assert_array_equal(three[:, 2], three[:, 0])
 
 
+def test_more_sensors_than_a_board_has_are_refused(tmp_path: Path) -> None:
+    lines = [[*line[:4], *[7, 0] * 6] for line in btd_lines()]
+    with pytest.raises(RecordingError, match="6 sensors: expected at most 5"):
+        load_source(write_btd(tmp_path / "a.btd", lines))
+
+
 def test_bad_parity_becomes_its_code_whatever_was_read(tmp_path: Path) -> None:
     lines = btd_lines()
     lines[44 + 3][6:8] = [65535, 1]  # frame 1, place 3: E2
