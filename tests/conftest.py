@@ -31,6 +31,7 @@ class ScriptedBoard:
     """The far end of a pty: hands every good frame to a function and writes what that returns."""
 
     def __init__(self, answer: Answer, greeting: bytes = b"") -> None:
+        self._master: int | None
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         self.path = os.ttyname(self._slave)
@@ -52,11 +53,17 @@ class ScriptedBoard:
                 if reply:
                     os.write(self._master, reply)
 
+    def hang_up(self) -> None:
+        """The far end goes away, as with a cable that is pulled."""
+        if self._master is not None:
+            os.write(self._stop_write, b"x")
+            self._thread.join()
+            for fd in (self._master, self._slave, self._stop_read, self._stop_write):
+                os.close(fd)
+        self._master = None
+
     def close(self) -> None:
-        os.write(self._stop_write, b"x")
-        self._thread.join()
-        for fd in (self._master, self._slave, self._stop_read, self._stop_write):
-            os.close(fd)
+        self.hang_up()
 
 
 def hello_for(request: bytes, **changes: int) -> bytes:

@@ -6,12 +6,12 @@
 #ifndef BIOTAC_DECODE_H
 #define BIOTAC_DECODE_H
 
+#include "crc_fast.h"
 #include "framing.h"
 
 #define BT_DECODE_BYTES    65536                   // what one call takes
 #define BT_DECODE_ROOM     (BT_DECODE_BYTES + 256) // the call's bytes and the rest of the call before
 #define BT_DECODE_OUTCOMES 6                       // enum bt_deframed
-#define BT_CRC_SLICES      8
 #define BT_UNKNOWN_ID      (-1)
 
 // What a call gives out. FRAME, PAC, IDLE: payloads back to back, rows of wire.DTYPES. OTHER: u8 id, u8
@@ -39,10 +39,9 @@ typedef struct {
     uint8_t rest[BT_FRAME_MAX_BYTES + 2];
 
     // Set up by the reset, from what is generated.
-    int16_t payload_bytes[256];              // by id, or BT_UNKNOWN_ID
-    uint8_t kind[256];                       // by id, enum bt_decoded
-    uint32_t crc_slices[BT_CRC_SLICES][256]; // k: what a byte does to the CRC by the end of k more zeros
-    uint32_t crc_over_lane[2][4][256];       // what zeros do to a CRC, by its bytes: decode.c, crc_of()
+    int16_t payload_bytes[256]; // by id, or BT_UNKNOWN_ID
+    uint8_t kind[256];          // by id, enum bt_decoded
+    bt_crc_fast crc;
 } bt_decoder;
 
 // To be called first; nothing of the struct needs a value before.

@@ -12,8 +12,10 @@ from __future__ import annotations
 from ._wire import CalibrationState, FrameFlags, PocWeights, QuantityFlags, Setting, TareReason, TareState
 from .batch import RESULT_DTYPE, compute
 from .calibration import Calibration
+from .compatibility import HandWarning
 from .errors import (
     BiotacError,
+    CallbackError,
     CommandRefusedError,
     DeviceLostError,
     FlashError,
@@ -26,7 +28,8 @@ from .errors import (
 )
 from .finger import FINGER_DTYPE, Finger
 from .frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
-from .hand import Hand, HandWarning
+from .hand import Hand
+from .live import FingerView, Gap
 from .opening import open
 from .recording import Compact, Recorder, Recording, load, load_compact
 from .stream import LinkStats
@@ -41,13 +44,16 @@ __all__ = [
     "BiotacError",
     "Calibration",
     "CalibrationState",
+    "CallbackError",
     "CommandRefusedError",
     "Compact",
     "DeviceLostError",
     "Finger",
+    "FingerView",
     "FlashError",
     "Frame",
     "FrameFlags",
+    "Gap",
     "Hand",
     "HandWarning",
     "InputError",

@@ -61,6 +61,10 @@ class CommandRefusedError(BiotacError):
         self.error = error
 
 
+class CallbackError(BiotacError):
+    """A function given to ``Hand.on_...`` raised; its own error is the cause."""
+
+
 class FlashError(BiotacError):
     """Writing an image to a board did not come to its end; the message says where the settings are."""
 

@@ -1,96 +1,87 @@
-"""One board with its fingers: handshake, streams, frames. Its commands are in commands.py."""
+"""One board with its fingers: its life, its streams, its frames; commands.py has the commands.
+
+Two ways to read. Pull: ``batches``, ``frames`` and ``read`` read the link when asked, one thread, the same every time;
+a slow caller makes the operating system's buffer fill and then the board drop whole frames. Live: after ``run``, or
+with callbacks or biotac.aio, threads of this package read always (live/reader.py), and a slow caller loses the
+oldest batches on this side.
+"""
 
 from __future__ import annotations
 
 import os
-import secrets
-import struct
-import time
-from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from . import _wire as wire
 from ._sensor import MAX_SENSORS
-from .clock import LAST_SAMPLE_US, DeviceClock
-from .commands import ALL_FINGERS, Commands, Reply
-from .errors import CommandRefusedError, DeviceLostError, InputError, NotAGatewayError, WireVersionError
+from .commands import ALL_FINGERS
+from .conversation import Conversation
+from .errors import DeviceLostError, InputError
 from .frames import Frame, StructArray
-from .framing import encode
 from .link import Link
-from .stream import Batch, LinkStats, StreamDecoder, join, split
+from .live.callbacks import MESSAGES, Callbacks, Unsubscribe
+from .live.fingers import FingerView, Latest, checked_names, finger_index
+from .live.gap import Gap
+from .live.queue import LIMIT_ROWS, BatchQueue
+from .live.reader import Reader
+from .live.timing import RealTiming, Timing
+from .live.wants import Wants
+from .stream import Batch, LinkStats, join, split
 
 if TYPE_CHECKING:
     from .recording.writer import Recorder
 
 #: What a FRAME can say of a contact, for Hand.subscribe.
 RESULTS = wire.QuantityFlags.POC | wire.QuantityFlags.FORCE | wire.QuantityFlags.TORQUE
-REPLY_TIMEOUT_S = 1.0
-REPLY_TRIES = 3
+AT_FIRST = RESULTS | wire.QuantityFlags.REST_FRAMES
 # A streaming board sends a status every second by default; three missing ones are a dead link.
 SILENCE_S = 3.0
+# A board whose live host has died stops streaming after this long.
+KEEPALIVE_S = 1.0
+PINGS_PER_KEEPALIVE = 3
 
 
-@dataclass(frozen=True)
-class HandWarning:
-    """Something about a board that works, but not as well as it could."""
+class Hand(Conversation):
+    """A board. Use as a context manager; made by ``biotac.open``."""
 
-    code: str
-    text: str  # one line with the cure
-
-
-class Hand(Commands):
-    """A board. Use as a context manager; made by ``biotac.open``.
-
-    This class reads only when asked: a slow caller makes the operating system's buffer fill and then
-    the board drop whole frames, which ``stats.frames_lost`` counts.
-    """
-
-    def __init__(self, link: Link) -> None:
-        self.link = link
-        self._decoder = StreamDecoder()
-        self._batches: deque[Batch] = deque()
-        self._replies: deque[Any] = deque()
-        self._recorder: Recorder | None = None
-        self._req_id = 0
-        self._bytes = 0
-        self._frames = 0
-        self._streaming = False
+    def __init__(
+        self,
+        link: Link,
+        *,
+        reconnect: bool = False,
+        fingers: Mapping[str, int] | None = None,
+        timing: Timing | None = None,
+    ) -> None:
+        self._names = checked_names(fingers)
+        timing = timing or RealTiming()
+        self._batches = BatchQueue()  # for whoever pulls
+        self._pulled = True  # new batches are kept for them; without threads always
+        self._has_pulled = False
+        self._queues: list[BatchQueue] = []  # for others, such as biotac.aio
+        self._callbacks = Callbacks()
+        self._for_callbacks = BatchQueue()
+        self._latest = Latest(timing)
+        self._wants: Wants | None = None
+        self._quantities = dict.fromkeys(range(MAX_SENSORS), AT_FIRST)
+        self._heard_s = self._ping_due_s = timing.monotonic_s()
         self._ended = False
-        self._closed = False
-        #: Device time as host time, fed by whatever is read; known after a first ``status`` or ``sync``.
-        #: A simulated board's time is no clock: it waits for the computer, which shows as ``resets``.
-        self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
-        try:
-            self.info = self._handshake()
-        except BaseException:
-            link.close()
-            raise
+        super().__init__(link, reconnect=reconnect, timing=timing)
 
     # ---- life ----------------------------------------------------------------------------------
-
-    @property
-    def port(self) -> str:
-        """The PORT this was opened as."""
-        return self.link.port
-
-    @property
-    def warnings(self) -> list[HandWarning]:
-        """What speaks against this board and this library together, in words; empty when nothing does."""
-        if self.info.schema_hash == wire.SCHEMA_HASH:
-            return []
-        text = (
-            f"the firmware on {self.port} has schema {self.info.schema_hash:08x}, this library {wire.SCHEMA_HASH:08x}"
-        )
-        return [HandWarning("schema_differs", f"{text}; what only one side knows is left out: {cure(self.info)}")]
 
     @property
     def fingers(self) -> list[int]:
         """Indices of the fingers whose sensor answered when this was opened."""
         return [f for f in range(MAX_SENSORS) if self.info.fingers_present >> f & 1]
+
+    def __getitem__(self, finger: str | int) -> FingerView:
+        """The latest of one finger, by name or chip select; KeyError in words. Follows what is read: see ``run``."""
+        index = finger_index(self._names, finger)
+        names = {number: name for name, number in self._names.items()}
+        return FingerView(names.get(index, str(index)), index, self._latest)
 
     def __repr__(self) -> str:
         return f"<biotac.Hand on {self.port}, fingers {self.fingers}{', closed' if self._closed else ''}>"
@@ -104,19 +95,33 @@ class Hand(Commands):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        self._end()
+        if error is None:
+            self._report()
 
     def close(self) -> None:
-        """Stop the stream, finish a recording, give the port back. Safe to call twice."""
+        """Stop the stream, finish a recording, give the port back. Safe to call twice.
+
+        Raises CallbackError, after all that, for what a callback has raised and nobody was told yet.
+        """
+        self._end()
+        self._report()
+
+    def _end(self) -> None:
         if self._closed:
             return
+        self.closing.set()
+        self.timing.wake()
+        self._tell()
         try:
-            if self._streaming:
+            if self._streaming and self.connected:
                 self._streaming = False
                 self._send(wire.Stop(self._next_req_id()))
         except DeviceLostError:
             pass  # it is gone already, which is what closing wants
         finally:
+            if self._reader is not None:
+                self._reader.join()
             self._closed = True
             try:
                 if self._recorder is not None:
@@ -124,83 +129,273 @@ class Hand(Commands):
             finally:
                 self.link.close()
 
-    def _handshake(self) -> wire.Hello:
-        # A board may still be streaming to whoever was here before: stop it, then look for the one
-        # HELLO that carries our nonce and let everything else pass.
-        nonce = secrets.randbits(32)
-        self._decoder = StreamDecoder()
-        # The known fields of HELLO never change place, so that any peer can be told its version.
-        self._decoder.accept_newer_minor()
-        for _ in range(REPLY_TRIES):
-            self.link.write(b"\0")  # ends whatever half frame a former program left behind
-            self._send(wire.Stop(self._next_req_id()))
-            self._send(wire.HelloRequest(self._next_req_id(), nonce))
-            hello: wire.Hello | None = self._await(lambda m: isinstance(m, wire.Hello) and m.nonce == nonce)
-            if hello is not None:
-                break
-        else:
-            raise NotAGatewayError(self._describe_stranger())
-        if hello.wire_major != wire.WIRE_MAJOR:
-            raise WireVersionError(f"the firmware on {self.port} speaks {describe_mismatch(hello)}")
-        # What streamed before this handshake is nobody's: counting starts here.
-        self._decoder = StreamDecoder()
-        self._batches.clear()
-        self._replies.clear()
-        self._bytes = 0
-        self._frames = 0
-        if hello.wire_minor > wire.WIRE_MINOR:
-            self._decoder.accept_newer_minor()
-        return hello
+    def _report(self) -> None:
+        trouble, self._trouble = self._trouble, None
+        if trouble is not None:
+            raise trouble
+        self._callbacks.report()
 
-    def _describe_stranger(self) -> str:
-        counts = self._decoder.counts
-        if self._bytes == 0:
-            seen = "nothing answers"
-        elif counts.good:
-            seen = f"{counts.good} frames of this protocol came, but no HELLO"
-        else:
-            seen = f"{self._bytes} bytes came that are no frames of this protocol"
-        return (
-            f"no gateway on {self.port}: {seen}; expected a HELLO within "
-            f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check that this is the board's port and that it runs our firmware"
-        )
-
-    # ---- streams (further commands: commands.py) -----------------------------------------------
+    # ---- streams -------------------------------------------------------------------------------
 
     def start(self, *, pac: bool = True, fingers: int = ALL_FINGERS) -> None:
         """Start streaming frames, status and, unless told otherwise, PAC; ``fingers`` is a bit mask."""
         streams = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
         if pac:
             streams |= wire.StreamFlags.PAC
-        # Keep-alive stays off: this class reads, and so could ping, only when its caller asks.
-        self._command(wire.Start(self._next_req_id(), int(streams), fingers, 0))
+        self._start(self._wants.streams if self._wants else streams, fingers)
+
+    def _start(self, streams: wire.StreamFlags, fingers: int) -> None:
+        # Pull alone has no keep-alive: it reads, and so could ping, only when its caller asks.
+        request = wire.Start(self._next_req_id(), int(streams), fingers, self._keepalive_ms())
+        self._command(request)
+        self._heard_s = self.timing.monotonic_s()
+        self._ping_due_s = self._heard_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
+        self._started = request
         self._streaming = True
         self.link.release()
+
+    def _keepalive_ms(self) -> int:
+        # In device time, which a simulated board can let run fast; one that waits for its reader knows no dead host.
+        if self._reader is None or self.link.pace == 0:
+            return 0
+        return min(0xFFFF, round(1000 * KEEPALIVE_S * max(1.0, self.link.pace)))
 
     def stop(self) -> None:
         """Stop streaming. Frames already on their way are still delivered."""
         self._command(wire.Stop(self._next_req_id()))
         self._streaming = False
+        self._started = None
+        self._tell()
 
-    def status(self) -> wire.Status:
-        """Counters of the board and its link. Its time of answering also feeds ``clock``."""
-        # Of several tries the first one's time holds: whichever was answered had left by then, or later.
-        sent_s = time.monotonic()
-        status = super().status()
-        self.clock.round_trip(sent_s, self._decoder.unwrap_t_us(status.t_us), time.monotonic())
-        return status
+    def subscribe(self, quantities: wire.QuantityFlags, *, fingers: int = ALL_FINGERS) -> None:
+        """See Commands.subscribe."""
+        super().subscribe(quantities, fingers=fingers)
+        self._quantities.update({f: quantities for f in range(MAX_SENSORS) if fingers >> f & 1})
 
-    def sync(self, round_trips: int = 5) -> None:
-        """Ask for the board's time: ``clock`` gets its bound from round trips, and the drift from later ones."""
-        for _ in range(round_trips):
-            self.status()
+    def want(self, *names: str, rest: bool = True, rate_hz: float | None = None) -> None:
+        """Choose what the board computes and sends: force, poc, torque, sigma, touch, raw, pdc, temperature, pac.
+
+        Electrodes' raw counts, pdc and temperature travel in every FRAME, so each of them asks for frames and no
+        more. Status always comes, it is the link's sign of life, whether ``status`` is named or not. With
+        ``rest=False`` an untouched finger sends heartbeats in place of frames. ``rate_hz``, above 0 to 100, takes
+        every n-th frame with n = 100 / rate_hz rounded, by seq: on this side only, for boards cannot leave frames
+        out; a recording has them all, and PAC and messages are not thinned. Holds for all fingers until the next
+        ``want``. Raises InputError for a name or rate that there is not.
+        """
+        wants = Wants.of(names, rest=rest, rate_hz=rate_hz)
+        self.subscribe(wants.quantities)
+        self._wants = wants
+        if self._streaming and self._started is not None:
+            self._start(wants.streams, self._started.fingers)
+
+    # ---- live ----------------------------------------------------------------------------------
+
+    def run(self, *, queue: bool = False) -> Hand:
+        """Have threads read the board from now on, and let it stream; returns this hand.
+
+        ``hand["index"]`` and callbacks then follow by themselves, the board stops within a second of this
+        process's death, and with ``reconnect`` its return is noticed by itself. Batches are kept for ``batches``,
+        ``frames`` and ``read`` from their first call on, or from now on with ``queue``; a caller that is slow
+        loses the oldest (``stats.batches_skipped``). A simulated board that is not paced waits instead.
+        """
+        if queue:
+            self._pulled = True
+        self._begin(pulled=queue)
+        if not self._streaming and not self._ended:
+            self.start()
+        return self
+
+    def _begin(self, *, pulled: bool) -> None:
+        self._report()
+        if self._closed:
+            raise DeviceLostError(f"this Hand on {self.port} was closed; open the port again")
+        if self._reader is not None:
+            return
+        if not (pulled or self._has_pulled):
+            # Nobody takes them: kept, they would be stale later, or hold up a board that waits for room.
+            self._pulled = False
+            self._batches = BatchQueue()
+        limit = LIMIT_ROWS if self.link.pace else None
+        for one in (self._batches, self._for_callbacks, *self._queues):
+            one.bound(limit)
+        self._reader = Reader(self, self.port)
+        self._heard_s = self.timing.monotonic_s()
+        self._reader.start()
+        if self._streaming and self._started is not None:
+            self._start(wire.StreamFlags(self._started.streams), self._started.fingers)  # now with keep-alive
+
+    def on_batch(self, fn: Callable[[Batch], Any]) -> Unsubscribe:
+        """Call ``fn`` with every batch, on the reading thread; returns what ends that.
+
+        As with all ``on_...``: this starts the reading threads, the stream starts with ``run`` or ``start``. ``fn``
+        may give commands. While it is slow the link is read all the same, and callbacks lose the oldest batches.
+        What it raises comes up as CallbackError at the next call or at ``close``.
+        """
+        return self._subscribed(self._callbacks.on_batch(fn))
+
+    def on_touch(self, fn: Callable[[wire.Touch], Any]) -> Unsubscribe:
+        """Call ``fn`` as soon as a resting finger's signals move, inside the round: a hint, CONTACT may follow.
+
+        Subscribes every finger to TOUCH besides what it is subscribed to.
+        """
+        touch = wire.QuantityFlags.TOUCH
+        for quantities in {q for q in self._quantities.values() if touch not in q}:
+            mask = sum(1 << f for f, q in self._quantities.items() if q == quantities)
+            self.subscribe(quantities | touch, fingers=mask)
+        return self._subscribed(self._callbacks.on_message(MESSAGES["touch"], fn))
+
+    def on_tare(self, fn: Callable[[wire.Tare], Any]) -> Unsubscribe:
+        """Call ``fn`` with every change of a tare."""
+        return self._subscribed(self._callbacks.on_message(MESSAGES["tare"], fn))
+
+    def on_status(self, fn: Callable[[wire.Status], Any]) -> Unsubscribe:
+        """Call ``fn`` with the board's counters, every second."""
+        return self._subscribed(self._callbacks.on_message(MESSAGES["status"], fn))
+
+    def on_gap(self, fn: Callable[[Gap], Any]) -> Unsubscribe:
+        """Call ``fn`` when the board has come back and sends again."""
+        return self._subscribed(self._callbacks.on_message(MESSAGES["gap"], fn))
+
+    def _subscribed(self, unsubscribe: Unsubscribe) -> Unsubscribe:
+        self._begin(pulled=False)
+        return unsubscribe
+
+    def open_queue(self, wake: Callable[[], None] | None = None) -> BatchQueue:
+        """A queue of one's own for what arrives from now on; ``wake`` is called on the reading thread."""
+        self._begin(pulled=False)
+        queue = BatchQueue(wake)
+        queue.bound(LIMIT_ROWS if self.link.pace else None)
+        self._queues = [*self._queues, queue]
+        return queue
+
+    def close_queue(self, queue: BatchQueue) -> None:
+        """End what open_queue began."""
+        self._queues = [one for one in self._queues if one is not queue]
+        self.took()
+
+    def took(self) -> None:
+        """Something was taken from a queue: a board that waits for room may go on."""
+        if self.link.pace == 0:
+            with self._changed:
+                self._changed.notify_all()
+
+    def check(self) -> None:
+        """Raise what the reading threads or callbacks have come to, if anything."""
+        if self._failure is not None:
+            raise self._failure
+        self._report()
+
+    # ---- the reading threads' side (live/reader.py) ------------------------------------------------
+
+    def _arrived(self, batch: Batch) -> None:
+        if self._wants is not None:
+            batch = self._wants.thin(batch)
+        self._latest.update(batch)
+        if self._pulled:
+            self._batches.put(batch)
+        if self._callbacks:
+            self._for_callbacks.put(batch)
+        for queue in self._queues:
+            queue.put(batch)
+
+    def _last_t_us(self) -> int | None:
+        return self._latest.last_t_us()
+
+    def read_once(self, timeout_s: float) -> None:
+        """See live.reader.Read."""
+        if self._pump(timeout_s):
+            self._heard_s = self.timing.monotonic_s()
+
+    def keep_up(self) -> float:
+        """See live.reader.Read."""
+        if not self._streaming:
+            return SILENCE_S
+        if self.link.ended:
+            self._finish()
+            return SILENCE_S
+        now_s = self.timing.monotonic_s()
+        if now_s - self._heard_s >= SILENCE_S:
+            self._lost(self._silent(), "silence")
+            self._heard_s = now_s = self.timing.monotonic_s()
+        if not self._keepalive_ms():
+            return SILENCE_S
+        if now_s >= self._ping_due_s:
+            self._ping_due_s = now_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
+            try:
+                self._send(wire.Ping(self._next_req_id()))
+            except DeviceLostError as error:
+                self._lost(error, "unplugged")
+        return self._ping_due_s - now_s
+
+    def wait_for_room(self) -> None:
+        """See live.reader.Read."""
+        if self.link.pace:
+            return
+        with self._changed:
+            full = self._is_full()
+            self._changed.wait_for(lambda: self._awaiting or self.closing.is_set() or not self._is_full())
+        if full:
+            self._heard_s = self.timing.monotonic_s()  # it was not the board that was silent
+
+    def _is_full(self) -> bool:
+        return any(one.rows >= LIMIT_ROWS for one in (self._batches, *self._queues))
+
+    def dispatch(self) -> bool:
+        """See live.reader.Read."""
+        batch = self._for_callbacks.take()
+        if batch is not None:
+            self._callbacks.call(batch)
+        return batch is not None
+
+    def may_relieve(self) -> bool:
+        """See live.reader.Read."""
+        return bool(self.link.pace or self._awaiting)
+
+    def fail(self, error: BaseException) -> None:
+        """See live.reader.Read."""
+        if self.closing.is_set():
+            return
+        with self._changed:
+            self._failure = self._failure or error
+            self._streaming = False
+        self._tell()
+
+    def _finish(self) -> None:
+        """A simulated source is over."""
+        self.ping()  # a barrier: its reply comes behind the last frame
+        with self._changed:
+            self._ended = True
+            self._streaming = False
+        self._tell()
+
+    def _tell(self) -> None:
+        """Whoever waits is to look again."""
+        with self._changed:
+            self._changed.notify_all()
+        for queue in self._queues:
+            queue.wake()
+
+    def _silent(self) -> DeviceLostError:
+        return DeviceLostError(
+            f"{self.port} has been silent for {SILENCE_S:.0f} s while streaming; check the cable and open it again"
+        )
 
     # ---- frames --------------------------------------------------------------------------------
 
     @property
     def stats(self) -> LinkStats:
-        """Counts since the handshake."""
-        return self._decoder.stats(self._bytes, self._frames)
+        """Counts since the handshake, over reboots too."""
+        queues = (self._batches, self._for_callbacks, *self._queues)
+        return replace(
+            super().stats,
+            batches_skipped=sum(queue.batches_skipped for queue in queues),
+            frames_skipped=sum(queue.frames_skipped for queue in queues),
+        )
+
+    @property
+    def streaming(self) -> bool:
+        """The board was told to stream, and has not ended or been stopped."""
+        return self._streaming
 
     @property
     def ended(self) -> bool:
@@ -212,14 +407,30 @@ class Hand(Commands):
 
         Ends with a simulated source, and when ``stop`` is called.
         """
+        self._pulled = self._has_pulled = True
         if not self._streaming and not self._ended:
+            self.check()
             self.start()
         while True:
-            while self._batches:
-                yield self._batches.popleft()
+            while (batch := self._batches.take()) is not None:
+                self.took()
+                yield batch
+            self.check()
             if self._ended or not self._streaming:
                 return
             self._pump_stream()
+
+    def _pump_stream(self) -> None:
+        """Wait until there may be a batch."""
+        if self._reader is not None and not self._reader.is_here():
+            with self._changed:
+                self._changed.wait_for(
+                    lambda: self._batches.rows or not self._streaming or self._failure or self.closing.is_set(), 1.0
+                )
+        elif self.link.ended:
+            self._finish()
+        elif not self._pump(SILENCE_S) and not self.link.ended:
+            self._lost(self._silent(), "silence")
 
     def frames(self) -> Iterator[Frame]:
         """Yield typed frames as they arrive; ends only with a simulated source."""
@@ -255,7 +466,7 @@ class Hand(Commands):
                 continue
             now, later = split(batch, end_us)
             taken.append(now)
-            self._batches.appendleft(later)
+            self._batches.put_back(later)
             break
         return join(taken)
 
@@ -284,99 +495,3 @@ class Hand(Commands):
             mid_stream=self._streaming,
         )
         return self._recorder
-
-    # ---- plumbing ------------------------------------------------------------------------------
-
-    def _next_req_id(self) -> int:
-        self._req_id = self._req_id % 255 + 1
-        return self._req_id
-
-    def _send(self, message: Any) -> None:
-        if self._closed:
-            raise DeviceLostError(f"this Hand on {self.port} was closed; open the port again")
-        try:
-            payload = message.pack()
-        except struct.error as error:
-            name = type(message).__name__
-            raise InputError(f"{name} cannot hold these values ({error}); see its ranges in MESSAGES.md") from error
-        self.link.write(encode(message.ID, payload))
-
-    def _pump(self, timeout_s: float) -> bool:
-        chunk = self.link.read(timeout_s)
-        if self._recorder is not None:
-            self._recorder.write(chunk)
-        if not chunk:
-            return False
-        self._bytes += len(chunk)
-        arrived_s = time.monotonic()
-        batch = self._decoder.feed(chunk)
-        last_us = batch.last_t_us()
-        if last_us is not None:
-            self.clock.arrived(last_us + LAST_SAMPLE_US, arrived_s)
-        self._frames += len(batch.wire)
-        self._replies.extend(batch.messages)
-        if len(batch.wire) or len(batch.pac) or len(batch.idle) or batch.messages:
-            self._batches.append(batch)
-        return True
-
-    def _pump_stream(self) -> None:
-        if self.link.ended:
-            self.ping()  # a barrier: its reply comes behind the last frame
-            self._ended = True
-            self._streaming = False
-            return
-        self._replies.clear()
-        if not self._pump(SILENCE_S) and not self.link.ended:
-            raise DeviceLostError(
-                f"{self.port} has been silent for {SILENCE_S:.0f} s while streaming; check the cable and open it again"
-            )
-
-    def _await(self, wanted: Any) -> Any:
-        """Pump until a message passes ``wanted``; None after a second without it."""
-        deadline = time.monotonic() + REPLY_TIMEOUT_S
-        while True:
-            while self._replies:
-                message = self._replies.popleft()
-                if wanted(message):
-                    return message
-            left = deadline - time.monotonic()
-            if left <= 0:
-                return None
-            self._pump(left)
-
-    def _ask(self, request: Any, kind: type[Reply]) -> Reply:
-        """Send a command, retry it, return its reply; CommandRefusedError when the board says no."""
-
-        def answers(m: Any) -> bool:
-            return isinstance(m, (kind, wire.Reply)) and bool(getattr(m, "req_id", 0) == request.req_id)
-
-        for _ in range(REPLY_TRIES):
-            self._send(request)
-            answer = self._await(answers)
-            if isinstance(answer, kind) and not (isinstance(answer, wire.Reply) and answer.error):
-                return answer
-            if answer is not None:
-                raise CommandRefusedError(describe_refusal(request, answer), answer.error)
-        raise DeviceLostError(
-            f"{self.port} did not answer {type(request).__name__} within "
-            f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check the cable and open it again"
-        )
-
-
-def describe_refusal(request: Any, reply: wire.Reply) -> str:
-    """One line naming the command and the board's reason."""
-    name = wire.Error(reply.error).name if reply.error in list(wire.Error) else f"error {reply.error}"
-    return f"the board refused {type(request).__name__}: {name} ({wire.ERROR_DOC.get(reply.error, 'unknown')})"
-
-
-def describe_mismatch(hello: wire.Hello) -> str:
-    """Both wire versions, and the command that brings them together."""
-    mine = f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}"
-    return f"wire {hello.wire_major}.{hello.wire_minor}, this library {mine}; {cure(hello)}"
-
-
-def cure(hello: wire.Hello) -> str:
-    """The command that updates the older side; of one wire version the firmware, which is told from this library."""
-    if (hello.wire_major, hello.wire_minor) > (wire.WIRE_MAJOR, wire.WIRE_MINOR):
-        return "update this library: pip install -U biotac-gateway"
-    return "update the firmware: biotac flash"

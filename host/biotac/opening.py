@@ -12,7 +12,13 @@ from .hand import Hand
 from .link import Link, open_link
 
 
-def open(port: str | os.PathLike[str] | None = None, *, pace: float = 0.0) -> Hand:
+def open(
+    port: str | os.PathLike[str] | None = None,
+    *,
+    pace: float = 0.0,
+    reconnect: bool = False,
+    fingers: Mapping[str, int] | None = None,
+) -> Hand:
     """Open a board and shake hands.
 
     Without ``port`` it is the only board on USB, found by its USB ids; nothing else is opened. ``port`` is
@@ -26,6 +32,11 @@ def open(port: str | os.PathLike[str] | None = None, *, pace: float = 0.0) -> Ha
     ``pace`` is for simulated and emulated boards and recordings: device seconds per second, 0 for as fast as
     this side reads.
 
+    ``reconnect`` has a board that went away looked for until it is back, by its serial number; what this session
+    changed (settings, calibrations, subscriptions) and the stream are put back, and the first batch has a
+    ``biotac.live.Gap`` in its messages. Without it, and for spidev, DeviceLostError is raised. ``fingers`` names
+    chip selects 0..4 for ``hand["thumb"]``; by default index, middle, ring, little, thumb.
+
     Raises PortError, NotAGatewayError, WireVersionError, InputError for a source or a recording that cannot be
     played or an EEPROM without a calibration, or CommandRefusedError for another sensor's.
     """
@@ -34,8 +45,8 @@ def open(port: str | os.PathLike[str] | None = None, *, pace: float = 0.0) -> Ha
         text = choose(text and text.removeprefix(SERIAL_PREFIX))
     if text.startswith("spidev:"):
         bare, own = harness.load(text)
-        return calibrated(shake_hands(open_link(bare, pace=pace)), own)
-    return shake_hands(open_link(text, pace=pace))
+        return calibrated(shake_hands(open_link(bare, pace=pace), fingers=fingers), own)
+    return shake_hands(open_link(text, pace=pace), reconnect=reconnect, fingers=fingers)
 
 
 def calibrated(hand: Hand, own: Mapping[int, Calibration]) -> Hand:
@@ -49,13 +60,13 @@ def calibrated(hand: Hand, own: Mapping[int, Calibration]) -> Hand:
     return hand
 
 
-def shake_hands(link: Link) -> Hand:
+def shake_hands(link: Link, *, reconnect: bool = False, fingers: Mapping[str, int] | None = None) -> Hand:
     """Make a Hand of an open link.
 
     A simulated board gets its source's settings (an emulated finger's own gains) and stored tare
     first, as a real one would from its user. Closes the link when that fails.
     """
-    hand = Hand(link)
+    hand = Hand(link, reconnect=reconnect, fingers=fingers)
     source = link.source
     if source is None:
         return hand

@@ -62,6 +62,9 @@ class LinkStats:
     disordered: int  # sequence numbers that repeat or step back, as after a reboot
     crc_errors: int
     other_errors: int
+    batches_skipped: int = 0  # came, and were let go for a consumer that was too slow
+    frames_skipped: int = 0
+    gaps: int = 0  # times in which the board was away
 
 
 class StreamDecoder:

@@ -106,7 +106,7 @@ def test_an_unknown_port_exits_3(capsys, verb: str) -> None:
 
 
 def test_a_port_that_is_no_gateway_exits_4(capsys, scripted_board, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
     board = scripted_board(lambda i, p: b"OK\r\n")
     assert "no gateway" in fails(capsys, 4, "info", board.path)
 

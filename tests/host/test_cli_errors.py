@@ -214,7 +214,7 @@ def opened(command: str, port: str, files: dict[str, Path]) -> list[str]:
 @pytest.mark.parametrize("command", OPENERS)
 def test_a_stranger_on_the_port_is_4(capsys, scripted_board, files, tmp_path, monkeypatch, command: str) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
     board = scripted_board(lambda i, p: b"OK\r\n")
     assert "check that this is the board's port" in line_of(capsys, 4, opened(command, board.path, files))
     assert not list(tmp_path.iterdir())
@@ -234,7 +234,7 @@ def test_another_wire_is_5(
 @pytest.mark.parametrize("command", OPENERS)
 def test_a_board_that_falls_silent_is_6(capsys, scripted_board, hello, files, tmp_path, monkeypatch, command) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
     board = scripted_board(lambda i, p: hello(p) if i == wire.HelloRequest.ID else b"")
     assert "check the cable and open it again" in line_of(capsys, 6, opened(command, board.path, files))
 

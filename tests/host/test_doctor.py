@@ -15,6 +15,7 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 import biotac
+from biotac import HandWarning
 from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.clock import Fit
@@ -23,7 +24,6 @@ from biotac.doctor import CATALOGUE, BoardFacts, Facts, SystemFacts, judge, udev
 from biotac.doctor.system import look
 from biotac.errors import DeviceLostError, InputError, NotAGatewayError, PortError, WireVersionError
 from biotac.frames import FRAME_DTYPE, IDLE_DTYPE
-from biotac.hand import HandWarning
 from biotac.link.holders import Holder
 from biotac.stream import LinkStats
 
@@ -369,7 +369,7 @@ def test_a_sensor_that_is_not_there_is_missed_when_it_is_expected(capsys, tmp_pa
 def test_a_port_that_is_not_there_and_a_stranger_on_one(capsys, scripted_board, monkeypatch) -> None:
     assert main(["doctor", "/dev/ttyNOWHERE7"]) == 1
     assert capsys.readouterr().out.startswith("error port_failed: no port /dev/ttyNOWHERE7")
-    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
     stranger = scripted_board(lambda i, p: b"OK\r\n")
     assert main(["doctor", stranger.path]) == 1
     assert "error not_a_gateway" in capsys.readouterr().out

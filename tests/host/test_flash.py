@@ -24,7 +24,7 @@ from fake_flash_board import FakeBoard, make_drive, make_image, no_waiting, note
 @pytest.fixture
 def fake(scripted_board, hello, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> FakeBoard:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.5)
+    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.5)
     no_waiting(monkeypatch)
     return FakeBoard(scripted_board, hello)
 
@@ -219,7 +219,7 @@ def test_a_board_without_a_loader_is_not_flashed(fake: FakeBoard, tmp_path: Path
 def test_firmware_that_does_not_answer_is_touched_only_when_told(
     fake: FakeBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.05)
+    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.05)
     fake.answers = False
     assert "--no-backup" in fails(fake, tmp_path, NotAGatewayError)
     assert fake.events == []

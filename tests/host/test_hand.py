@@ -16,14 +16,14 @@ from biotac.framing import encode
 
 
 def test_nothing_answers_is_no_gateway(scripted_board, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
     board = scripted_board(lambda message_id, payload: b"")
     with pytest.raises(biotac.NotAGatewayError, match=r"nothing answers.*expected a HELLO.*check that this is"):
         biotac.open(board.path)
 
 
 def test_another_kind_of_device_is_no_gateway(scripted_board, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.REPLY_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
     board = scripted_board(lambda message_id, payload: b"$GPGGA,123519,4807.038,N*47\r\n")
     with pytest.raises(biotac.NotAGatewayError, match="bytes came that are no frames"):
         biotac.open(board.path)

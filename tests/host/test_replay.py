@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from biotac import _sensor
-from biotac.errors import InputError
+from biotac.errors import InputError, RecordingError
 from biotac.sim import load_source, sampling, tape
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"

@@ -186,8 +186,8 @@ def test_pause_freezes_the_picture_and_nothing_else(view, open_page) -> None:
 def test_every_flag_is_told_in_the_contracts_words(make_player, view_of, open_page, touch) -> None:
     player = make_player()
     mask = sum(1 << flag["bit"] for name, flag in FLAGS.items() if name != "doc")
-    touch = replace(touch, frames=touch.frames.copy())
-    touch.frames["flags"] = mask
+    touch = replace(touch, wire=touch.wire.copy())
+    touch.wire["flags"] = mask
     player.script.put(touch)
     page = open_page(view_of(lambda: player))
     page.wait_for_selector("#flags [data-flag=FAULT]")
@@ -283,8 +283,8 @@ CONTRASTS = """() => {
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_all_text_has_contrast(make_player, view_of, open_page, touch, scheme: str) -> None:
     player = make_player()
-    touch = replace(touch, frames=touch.frames.copy())
-    touch.frames["flags"] = 0x3FFFF  # chips and warnings too
+    touch = replace(touch, wire=touch.wire.copy())
+    touch.wire["flags"] = 0x3FFFF  # chips and warnings too
     player.script.put(touch)
     page = open_page(view_of(lambda: player), color_scheme=scheme)
     page.wait_for_selector("#flags [data-flag=FAULT]")
@@ -376,13 +376,13 @@ def test_the_spectrum_is_numpys(view, open_page) -> None:
 
 def test_the_fingertip_is_drawn_in_the_scales_colours(make_player, view_of, open_page, touch) -> None:
     player = make_player()
-    frames, messages = touch.frames[-1:].copy(), touch.wire[-1:].copy()
-    frames["flags"] = 0
+    messages = touch.wire[-1:].copy()
+    messages["flags"] = 0
     messages["tare_q4"] = 2000 * 16
     messages["counts"] = 2000
     messages["counts"][0, 0] = 1500  # E1 compressed, E11 bulged, to the ends of the scale
     messages["counts"][0, 10] = 2500
-    player.script.put(replace(touch, frames=frames, wire=messages, messages=[]))
+    player.script.put(replace(touch, wire=messages, seq=touch.seq[-1:], t_us=touch.t_us[-1:], messages=[]))
     page = open_page(view_of(lambda: player), expect="willReadFrequently", color_scheme="light")
     until(page, "() => document.getElementById('scale-high').textContent === '+500'")
     places = {e: tuple(v / 1000 for v in sensor.ELECTRODE_UM[e]) for e in (0, 10)}

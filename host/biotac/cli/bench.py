@@ -7,13 +7,13 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from ..bench import batch, decode, front, front_picture, idle, kernels, recording
+from ..bench import batch, decode, front, front_picture, idle, kernels, live, recording
 from ..errors import InputError
 from . import values
 from .progress import Progress
 
 NAME = "bench"
-HELP = "Measure kernels, batch maths, decoding, an idle link, recording sizes."
+HELP = "Measure kernels, batch maths, decoding, the live path, an idle link, recording sizes."
 EXAMPLE = "biotac bench kernels --counts counts.json --out front"
 BATCH_FRAMES = 200_000
 DECODE_FRAMES = 30_000  # a minute of five fingers
@@ -29,10 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="WHAT",
         nargs="?",
         default="kernels",
-        choices=[*FRAMES, "idle", "recording"],
+        choices=[*FRAMES, "idle", "live", "recording"],
         help="kernels (default): every variant's errors and cost; batch: whole recordings, biotac.compute; "
         "decode: the link's bytes to arrays, against pymavlink and Python; "
-        "idle: bytes on the link at rest and in contact; recording: sizes and load times of recordings",
+        "idle: bytes on the link at rest and in contact; live: reading thread to callback, against a pyserial "
+        "thread; recording: sizes and load times of recordings",
     )
     parser.add_argument(
         "--frames",
@@ -44,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--source", default="press.toml", help="idle, recording: what to play (default %(default)s)")
     parser.add_argument("--fingers", type=int, default=5, help="recording: how many (default %(default)s)")
     parser.add_argument("--seconds", type=values.seconds, default=600.0, help="recording: device time (default 600)")
+    parser.add_argument("--rounds", type=_count, default=5, metavar="N", help="live: of each reader (default 5)")
     climb = parser.add_argument_group("kernels")
     climb.add_argument("--restarts", type=_count, default=effort.restarts, metavar="N", help="of the hill climbing")
     climb.add_argument("--steps", type=_count, default=effort.steps, metavar="N", help="of each restart")
@@ -64,6 +66,8 @@ def run(args: argparse.Namespace) -> int:
         return _idle(args)
     if args.what == "recording":
         return _recording(args)
+    if args.what == "live":
+        return _live(args)
     low, high = FRAMES[args.what]
     if args.frames is not None and not low <= args.frames <= high:
         raise InputError(f"--frames is {args.frames}, expected {low} to {high} for bench {args.what}")
@@ -106,6 +110,24 @@ def _idle(args: argparse.Namespace) -> int:
         print(f"{name:22}{share.seconds:6.2f} s {share.frames:8} {share.heartbeats:11} {share.bytes_per_s:9.0f}")
     print(f"at rest {outcome.saved_percent:.1f} % fewer bytes per second than in contact")
     print("skipped: " + ", ".join(f"{name} {count}" for name, count in outcome.skipped.items()))
+    return 0
+
+
+def _live(args: argparse.Namespace) -> int:
+    outcome = live.measure(rounds=args.rounds)
+    if args.json:
+        print(json.dumps(asdict(outcome)))
+        return 0
+    width = max(len(row.name) for row in outcome.rows)
+    print(f"{'frames/s':>8} {'reader':{width}} {'loss':>8} {'worst':>8} {'median us':>10} {'p99 us':>8} {'CPU %':>7}")
+    for row in outcome.rows:
+        print(
+            f"{row.rate:8} {row.name:{width}} {row.loss:8.4%} {row.worst_loss:8.4%} {row.median_us:10.1f} "
+            f"{row.p99_us:8.0f} {row.cpu_percent:7.1f}"
+        )
+    print(f"{outcome.rounds} rounds of {outcome.seconds:g} s in turns, a board with a ring of 16 KiB on a pty")
+    for asked in live.asked(outcome):
+        print(f"{asked.what}: {asked.seen} (asked {asked.wanted}: {'met' if asked.met else 'NOT met'})")
     return 0
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 from .. import _wire as wire
 from ..clock import Fit
+from ..compatibility import HandWarning
 from ..discovery import SerialPort
 from ..errors import BiotacError
 from ..frames import StructArray
-from ..hand import HandWarning
 from ..link.holders import Holder
 from ..stream import LinkStats
 

@@ -20,6 +20,9 @@ class Link(Protocol):
     #: The source is over: nothing new will come until a command asks for it.
     ended: bool
 
+    #: Device seconds per second here. 0: device time waits for whoever reads, and nothing need be dropped.
+    pace: float
+
     def read(self, timeout_s: float) -> bytes:
         """Return all bytes that are there, waiting up to timeout_s for the first; may be empty."""
 
@@ -28,6 +31,12 @@ class Link(Protocol):
 
     def release(self) -> None:
         """Let device time run, if it was held until the host was ready."""
+
+    def places(self) -> list[str]:
+        """Where the board may be found after it went away, likeliest first; nowhere when it cannot come back."""
+
+    def reopen(self, place: str) -> None:
+        """Open one of ``places`` in place of the lost port. Raises PortError."""
 
     def close(self) -> None:
         """Give the port back. Safe to call twice."""

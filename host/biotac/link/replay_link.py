@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
@@ -115,9 +116,11 @@ class ReplayLink:
         self.port = port
         self.source: Source | None = None
         self.ended = False
+        self.pace = pace
         self._clock = clock or SystemClock()
         self._pacer = Pacer(playback, pace, self._clock)
         self._answers = b""
+        self._answering = threading.Lock()  # commands may come from another thread than the reading one
         self._closed = False
 
     @property
@@ -127,7 +130,8 @@ class ReplayLink:
 
     def read(self, timeout_s: float) -> bytes:
         """See Link.read."""
-        answers, self._answers = self._answers, b""
+        with self._answering:
+            answers, self._answers = self._answers, b""
         if answers:
             return answers
         wait_s = self._pacer.wait_s()
@@ -139,6 +143,14 @@ class ReplayLink:
         if wait_s > 0:
             self._clock.sleep(min(wait_s, timeout_s))
         return self._pacer.due()
+
+    def places(self) -> list[str]:
+        """None: a recording does not come back from anywhere."""
+        return []
+
+    def reopen(self, place: str) -> None:
+        """Never asked for: there are no places."""
+        raise PortError(f"{self.port} cannot be opened again; make a new one")
 
     def write(self, data: bytes) -> None:
         """See Link.write."""
@@ -152,7 +164,8 @@ class ReplayLink:
                     f"{self.port} is a recording: {command_name(message_id)} asks for what a board alone can do; "
                     "`biotac recompute` runs its counts with other settings"
                 )
-            self._answers += answer
+            with self._answering:
+                self._answers += answer
 
     def release(self) -> None:
         """See Link.release."""

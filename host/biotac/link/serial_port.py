@@ -5,9 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import select
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import serial
+from serial.tools.list_ports import comports
 
 from ..errors import DeviceLostError, PortError
 from .holders import holders, in_words
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from ..sim.source import Source
 
 READ_BYTES = 65536
+TTY_BYTES = 4000  # nearly what one tty read gives at most
+ONE_READ_BYTES = 8192  # more would be allocated for nothing, thousands of times a second
 
 
 class SerialLink:
@@ -25,33 +28,70 @@ class SerialLink:
         self.port = path
         self.source: Source | None = None
         self.ended = False
+        self.pace = 1.0
+        self._path = path
+        self._serial: Any = None
+        self._poll: Any = None
+        self.reopen(path)
+        self._usb_serial = usb_serial(path)
+
+    def places(self) -> list[str]:
+        """The same path, and wherever a USB device with the same serial number is now. Strangers are left alone."""
+        moved = [p.device for p in comports() if self._usb_serial and p.serial_number == self._usb_serial]
+        return [self._path, *(path for path in moved if path != self._path)]
+
+    def reopen(self, place: str) -> None:
+        """See Link.reopen."""
+        self._close_port()
         try:
-            self._serial = serial.Serial(path, 115200, timeout=0, write_timeout=2, exclusive=exclusive())
+            self._serial = serial.Serial(place, 115200, timeout=0, write_timeout=2, exclusive=exclusive())
         except (serial.SerialException, OSError, ValueError) as error:
-            raise PortError(describe_open_error(path, error)) from error
+            raise PortError(describe_open_error(place, error)) from error
+        if hasattr(select, "poll"):
+            self._poll = select.poll()
+            self._poll.register(self._serial.fileno(), select.POLLIN)
 
     def read(self, timeout_s: float) -> bytes:
         """See Link.read."""
         try:
-            first = self.wait(timeout_s)
-            # With timeout 0 this drains: one tty read gives 4 KiB at most, and a reader that takes
-            # only one per wake-up loses data at high rates.
-            return first + bytes(self._serial.read(READ_BYTES))
+            if os.name != "posix":
+                return self._read_blocking(timeout_s)
+            return self._drain() if self.wait(timeout_s) else b""
         except (serial.SerialException, OSError) as error:
             raise DeviceLostError(
                 f"{self.port} went away while it was open ({error}); plug the board in and open it again"
             ) from error
 
-    def wait(self, timeout_s: float) -> bytes:
-        """Wait until something can be read; return what the waiting itself took in."""
-        if os.name == "posix":
-            select.select([self._serial.fileno()], [], [], timeout_s)
-            return b""
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until something can be read."""
+        # One object for all waits where there is poll(): select() builds and takes apart three lists for each.
+        if self._poll is None:
+            return bool(select.select([self._serial.fileno()], [], [], timeout_s)[0])
+        return bool(self._poll.poll(1000 * timeout_s))
+
+    def _drain(self) -> bytes:
+        # The descriptor itself: pyserial's read() and in_waiting cost as much again as all decoding.
+        fd = self._serial.fileno()
+        first = os.read(fd, ONE_READ_BYTES)
+        if not first:
+            raise OSError("it hung up")
+        if len(first) < TTY_BYTES:
+            return first
+        # One tty read gives 4 KiB at most, and a reader that takes only one per wake-up loses data at high rates.
+        pieces = [first]
+        while len(pieces[-1]) >= TTY_BYTES and len(pieces) < READ_BYTES // TTY_BYTES:
+            try:
+                pieces.append(os.read(fd, ONE_READ_BYTES))
+            except BlockingIOError:
+                break
+        return b"".join(pieces)
+
+    def _read_blocking(self, timeout_s: float) -> bytes:
         # No select() on serial handles there: block on the first byte instead.
         self._serial.timeout = timeout_s
         first = bytes(self._serial.read(1))
         self._serial.timeout = 0
-        return first
+        return first + bytes(self._serial.read(READ_BYTES))
 
     def write(self, data: bytes) -> None:
         """See Link.write."""
@@ -67,7 +107,17 @@ class SerialLink:
 
     def close(self) -> None:
         """See Link.close."""
-        self._serial.close()
+        self._close_port()
+
+    def _close_port(self) -> None:
+        if self._serial is not None:
+            self._serial.close()
+
+
+def usb_serial(path: str) -> str | None:
+    """Serial number of the USB device behind a port; None when there is none."""
+    real = os.path.realpath(path)
+    return next((p.serial_number for p in comports() if os.path.realpath(p.device) == real), None)
 
 
 def exclusive() -> bool | None:

@@ -33,6 +33,7 @@ class SimBoard:
 
     def __init__(self, source: Source, *, pace: float, hold: bool) -> None:
         self.source = source
+        self.pace = pace
         self.over = False  # the tape is played, and everything of it handed over
         self._heard = b""
         self._answers: list[str] = []
@@ -124,15 +125,20 @@ class SimLink(SerialLink):
             raise
         self.port = port
         self.source = board.source
+        self.pace = board.pace
 
-    def wait(self, timeout_s: float) -> bytes:
+    def places(self) -> list[str]:
+        """The same pty: it stays while its board is unplugged or without power."""
+        return [self.board.path]
+
+    def wait(self, timeout_s: float) -> bool:
         """Wait for bytes, or for word that the source is over."""
         watched = [self._serial.fileno()] + ([] if self.board.over else [self.board.stdout_fd()])
         ready, _, _ = select.select(watched, [], [], timeout_s)
         if len(watched) > 1 and watched[1] in ready:
             self.board.hear()
         self.ended = self.board.over
-        return b""
+        return self._serial.fileno() in ready
 
     def release(self) -> None:
         """See Link.release."""

@@ -126,6 +126,7 @@ class SpidevLink:
         self.port = port
         self.source: Source | None = None
         self.ended = False
+        self.pace = 1.0
         self._devices = open_devices(port)
         self._clock: Clock = clock or MonotonicClock()
         self._start_ns = self._clock.now_ns()
@@ -162,6 +163,14 @@ class SpidevLink:
 
     def release(self) -> None:
         """A real bus's time always runs."""
+
+    def places(self) -> list[str]:
+        """None: the bus is this computer's own, and nobody unplugs it."""
+        return []
+
+    def reopen(self, place: str) -> None:
+        """Never asked for: there are no places."""
+        raise PortError(f"{self.port} cannot be opened again; make a new one")
 
     def close(self) -> None:
         """See Link.close."""

@@ -58,6 +58,11 @@ class RecordingFile:
         if self._plots.add(block, arrived_ns):
             self._writer.flush()  # type: ignore[no-untyped-call]
 
+    def mark(self, what: str, facts: dict[str, str]) -> None:
+        """Append a metadata record ``biotac.WHAT``."""
+        self._writer.add_metadata(f"{layout.METADATA_NAME}.{what}", facts)
+        self._writer.flush()  # type: ignore[no-untyped-call]
+
     @property
     def closed(self) -> bool:
         """Nothing is written any more."""

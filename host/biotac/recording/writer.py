@@ -82,6 +82,13 @@ class Recorder:
         self._pending_since = now_s
         self._arrived_ns = self._unix_ns()
 
+    def mark(self, what: str, facts: dict[str, str]) -> None:
+        """Note that something happened here: a metadata record ``biotac.WHAT`` behind what came so far."""
+        if self._file.closed:
+            return
+        self.flush()
+        self._file.mark(what, facts)
+
     def flush(self) -> None:
         """Close the current block and give it to the operating system."""
         self._file.add(bytes(self._pending), self._arrived_ns, self._unix_ns())

@@ -1,0 +1,382 @@
+"""The conversation with one board: handshake, commands and their replies, and coming back after a lost link.
+
+Bytes are read by whoever waits for something, or, once there is one, by a Reader's threads (live/reader.py).
+"""
+
+from __future__ import annotations
+
+import secrets
+import struct
+import threading
+import time
+from abc import abstractmethod
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from . import _wire as wire
+from . import compatibility
+from .clock import LAST_SAMPLE_US, DeviceClock
+from .commands import Commands, Reply
+from .compatibility import HandWarning, describe_mismatch
+from .errors import (
+    CommandRefusedError,
+    DeviceLostError,
+    InputError,
+    NotAGatewayError,
+    PortError,
+    WireVersionError,
+)
+from .framing import encode
+from .link import Link
+from .live.gap import Gap, Reason
+from .live.session import Session
+from .live.timing import Timing
+from .stream import Batch, LinkStats, StreamDecoder
+
+if TYPE_CHECKING:
+    from .live.reader import Reader
+    from .recording.writer import Recorder
+
+REPLY_TIMEOUT_S = 1.0
+REPLY_TRIES = 3
+RETRY_S = 0.25
+
+Got = TypeVar("Got")
+
+
+class Conversation(Commands):
+    """What a Hand needs of its link. Closes the link when the handshake fails."""
+
+    def __init__(self, link: Link, *, reconnect: bool, timing: Timing) -> None:
+        self.link = link
+        self.timing = timing
+        #: The board can be talked to; false while it is looked for.
+        self.connected = True
+        self.closing = threading.Event()
+        self._reconnect = reconnect
+        self._decoder = StreamDecoder()
+        self._past: list[LinkStats] = []  # of decoders before a reboot
+        self._replies: deque[Any] = deque()
+        self._reader: Reader | None = None
+        self._recorder: Recorder | None = None
+        self._session = Session()
+        self._started: wire.Start | None = None
+        self._streaming = False
+        self._req_id = 0
+        self._bytes = 0
+        self._frames = 0
+        self._gaps = 0
+        self._gap: Gap | None = None  # to go with the next rows
+        self._failure: BaseException | None = None
+        self._trouble: OSError | None = None
+        self._reading = threading.RLock()  # whose holder reads the link
+        self._writing = threading.Lock()
+        self._asking = threading.RLock()  # one command at a time
+        self._awaiting = 0
+        self._changed = threading.Condition()
+        self._closed = False
+        #: Device time as host time, fed by whatever is read; known after a first ``status`` or ``sync``.
+        #: A simulated board's time is no clock: it waits for the computer, which shows as ``resets``.
+        self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
+        try:
+            self.info = self._handshake()
+        except BaseException:
+            link.close()
+            raise
+
+    @property
+    def port(self) -> str:
+        """The PORT this was opened as."""
+        return self.link.port
+
+    @property
+    def warnings(self) -> list[HandWarning]:
+        """What speaks against this board and this library together, in words; empty when nothing does."""
+        return compatibility.warnings(self.info, self.port)
+
+    @property
+    def stats(self) -> LinkStats:
+        """Counts since the handshake, over reboots too."""
+        now = self._decoder.stats(self._bytes, self._frames)
+        lost = {
+            name: sum(getattr(stats, name) for stats in (*self._past, now))
+            for name in ("frames_lost", "pac_lost", "disordered", "crc_errors", "other_errors")
+        }
+        return replace(now, gaps=self._gaps, **lost)
+
+    # ---- handshake -----------------------------------------------------------------------------
+
+    def _handshake(self) -> wire.Hello:
+        # A board may still be streaming to whoever was here before: stop it, then look for the one
+        # HELLO that carries our nonce and let everything else pass.
+        nonce = secrets.randbits(32)
+        decoder = StreamDecoder()
+        # The known fields of HELLO never change place, so that any peer can be told its version.
+        decoder.accept_newer_minor()
+        seen = 0
+
+        def hello() -> wire.Hello | None:
+            nonlocal seen
+            chunk = self.link.read(max(0.0, deadline - time.monotonic()))
+            seen += len(chunk)
+            messages = decoder.feed(chunk).messages
+            return next((m for m in messages if isinstance(m, wire.Hello) and m.nonce == nonce), None)
+
+        for _ in range(REPLY_TRIES):
+            self.link.write(b"\0")  # ends whatever half frame a former program left behind
+            self._send(wire.Stop(self._next_req_id()))
+            self._send(wire.HelloRequest(self._next_req_id(), nonce))
+            deadline = time.monotonic() + REPLY_TIMEOUT_S
+            while time.monotonic() < deadline:
+                told = hello()
+                if told is not None:
+                    return self._checked(told)
+        raise NotAGatewayError(self._describe_stranger(decoder.counts.good, seen))
+
+    def _checked(self, hello: wire.Hello) -> wire.Hello:
+        if hello.wire_major != wire.WIRE_MAJOR:
+            raise WireVersionError(f"the firmware on {self.port} speaks {describe_mismatch(hello)}")
+        if hello.wire_minor > wire.WIRE_MINOR:
+            self._decoder.accept_newer_minor()
+        return hello
+
+    def _describe_stranger(self, good: int, count: int) -> str:
+        if count == 0:
+            seen = "nothing answers"
+        elif good:
+            seen = f"{good} frames of this protocol came, but no HELLO"
+        else:
+            seen = f"{count} bytes came that are no frames of this protocol"
+        return (
+            f"no gateway on {self.port}: {seen}; expected a HELLO within "
+            f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check that this is the board's port and that it runs our firmware"
+        )
+
+    # ---- reading -------------------------------------------------------------------------------
+
+    @abstractmethod
+    def _arrived(self, batch: Batch) -> None:
+        """Something has come; called by whoever reads."""
+
+    @abstractmethod
+    def _last_t_us(self) -> int | None:
+        """Device time of the latest row; None before any."""
+
+    def _pump(self, timeout_s: float) -> bool:
+        """Read once; False when nothing came within timeout_s. Not while a Reader does."""
+        with self._reading:
+            try:
+                chunk = self.link.read(timeout_s)
+            except DeviceLostError as error:
+                self._lost(error, "unplugged")
+                return True
+            self._take(chunk)
+            return bool(chunk)
+
+    def _take(self, chunk: bytes) -> None:
+        if self._recorder is not None:
+            self._record(self._recorder, chunk)
+        if not chunk:
+            return
+        self._bytes += len(chunk)
+        arrived_s = time.monotonic()
+        batch = self._decoder.feed(chunk)
+        last_us = batch.last_t_us()
+        if last_us is not None:
+            self.clock.arrived(last_us + LAST_SAMPLE_US, arrived_s)
+        self._frames += len(batch.wire)
+        if not (len(batch.wire) or len(batch.pac) or len(batch.idle) or batch.messages):
+            return
+        if self._gap is not None:
+            first_us = batch.first_t_us()
+            if first_us is not None:
+                self._mark(replace(self._gap, next_t_us=first_us), batch)
+        with self._changed:
+            if self._awaiting:
+                self._replies.extend(batch.messages)
+            self._arrived(batch)
+            self._changed.notify_all()
+
+    def _record(self, recorder: Recorder, chunk: bytes) -> None:
+        try:
+            recorder.write(chunk)
+        except OSError as error:
+            if self._reader is None:
+                raise
+            # A full disk ends the recording, not the reading; the next call says so.
+            self._recorder = None
+            self._trouble = error
+
+    def _until(self, done: Callable[[], Got | None], timeout_s: float) -> Got | None:
+        """Read, or wait for whoever reads, until ``done`` gives something; None after timeout_s without it."""
+        if self._reader is None or self._reader.is_here():
+            deadline = time.monotonic() + timeout_s
+            while True:
+                got = done()
+                left = deadline - time.monotonic()
+                if got is not None or left <= 0:
+                    return got
+                self._pump(left)
+        found: list[Got] = []
+
+        def so() -> bool:
+            got = done()
+            if got is not None:
+                found.append(got)
+            return bool(found) or self._failure is not None or not self.connected or self.closing.is_set()
+
+        with self._changed:
+            self._changed.wait_for(so, timeout_s)
+        if not found and self._failure is not None:
+            raise self._failure
+        return found[0] if found else None
+
+    # ---- commands ------------------------------------------------------------------------------
+
+    def _next_req_id(self) -> int:
+        self._req_id = self._req_id % 255 + 1
+        return self._req_id
+
+    def _send(self, message: Any) -> None:
+        if self._closed:
+            raise DeviceLostError(f"this Hand on {self.port} was closed; open the port again")
+        try:
+            payload = message.pack()
+        except struct.error as error:
+            name = type(message).__name__
+            raise InputError(f"{name} cannot hold these values ({error}); see its ranges in MESSAGES.md") from error
+        with self._writing:
+            self.link.write(encode(message.ID, payload))
+
+    def status(self) -> wire.Status:
+        """Counters of the board and its link. Its time of answering also feeds ``clock``."""
+        # Of several tries the first one's time holds: whichever was answered had left by then, or later.
+        sent_s = time.monotonic()
+        status = super().status()
+        self.clock.round_trip(sent_s, self._decoder.unwrap_t_us(status.t_us), time.monotonic())
+        return status
+
+    def sync(self, round_trips: int = 5) -> None:
+        """Ask for the board's time: ``clock`` gets its bound from round trips, and the drift from later ones."""
+        for _ in range(round_trips):
+            self.status()
+
+    def _await(self, wanted: Callable[[Any], bool]) -> Any:
+        """A message that passes ``wanted``; None after a second without it."""
+
+        def found() -> Any:
+            while self._replies:
+                message = self._replies.popleft()
+                if wanted(message):
+                    return message
+            return None
+
+        self._awaiting += 1
+        try:
+            return self._until(found, REPLY_TIMEOUT_S)
+        finally:
+            self._awaiting -= 1
+
+    def _ask(self, request: Any, kind: type[Reply]) -> Reply:
+        """Send a command, retry it, return its reply; CommandRefusedError when the board says no."""
+
+        def answers(m: Any) -> bool:
+            return isinstance(m, (kind, wire.Reply)) and bool(getattr(m, "req_id", 0) == request.req_id)
+
+        with self._asking:
+            self._replies.clear()
+            self._awaiting += 1
+            try:
+                for _ in range(REPLY_TRIES):
+                    if not self.connected and not self._is_bringing_back():
+                        raise DeviceLostError(f"{self.port} is away and looked for; wait for its return")
+                    self._send(request)
+                    answer = self._await(answers)
+                    if isinstance(answer, kind) and not (isinstance(answer, wire.Reply) and answer.error):
+                        self._session.note(request)
+                        return answer
+                    if answer is not None:
+                        raise CommandRefusedError(describe_refusal(request, answer), answer.error)
+            finally:
+                self._awaiting -= 1
+        raise DeviceLostError(
+            f"{self.port} did not answer {type(request).__name__} within "
+            f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check the cable and open it again"
+        )
+
+    # ---- lost and found ------------------------------------------------------------------------
+
+    def _is_bringing_back(self) -> bool:
+        return self._reader is None or self._reader.is_here()
+
+    def _lost(self, error: DeviceLostError, reason: Reason) -> None:
+        """The link is gone: raise, or return once the board is back as it was."""
+        if not (self._reconnect and self.connected) or self._closed:
+            raise error
+        lost_at_ns = self.timing.unix_ns()
+        with self._changed:
+            self.connected = False
+            self._changed.notify_all()
+        try:
+            self._take(b"\0")  # ends the half frame that was on its way, here and in a recording
+            before = self.info
+            while not self._bring_back(before, reason, lost_at_ns):
+                if self.closing.is_set():
+                    raise error
+                self.timing.pause(RETRY_S)
+        finally:
+            with self._changed:
+                self.connected = True
+                self._changed.notify_all()
+
+    def _bring_back(self, before: wire.Hello, reason: Reason, lost_at_ns: int) -> bool:
+        """One try: find the board, tell it what it was told before, and let it stream."""
+        try:
+            if not self._found(before):
+                return False
+            if self.info.boot_id != before.boot_id:
+                reason = "rebooted"
+                self._past.append(self._decoder.stats(0, 0))
+                self._decoder = StreamDecoder()
+                self.clock.restart()
+                self._checked(self.info)
+            # Before START: rows may come with its reply. Two losses without a row between them are one gap.
+            gap = self._gap or Gap(reason, self._last_t_us(), None, lost_at_ns, 0, 0)
+            if gap.reason == "rebooted":
+                reason = "rebooted"
+            self._gap = replace(gap, reason=reason, back_at_ns=self.timing.unix_ns(), boot_id=self.info.boot_id)
+            for request in [*self._session.requests(), *([self._started] if self._started else [])]:
+                self._ask(replace(request, req_id=self._next_req_id()), _KINDS.get(type(request), wire.Reply))
+        except DeviceLostError:
+            return False  # gone again
+        return True
+
+    def _found(self, before: wire.Hello) -> bool:
+        for place in self.link.places():
+            try:
+                self.link.reopen(place)
+                hello = self._handshake()
+            except (PortError, DeviceLostError, NotAGatewayError):
+                continue
+            if hello.board_serial == before.board_serial:
+                self.info = hello
+                return True
+        return False
+
+    def _mark(self, gap: Gap, batch: Batch) -> None:
+        self._gap = None
+        self._gaps += 1
+        batch.messages.insert(0, gap)
+        if self._recorder is not None:
+            self._recorder.mark("gap", gap.as_text())
+
+
+_KINDS: dict[type[Any], type[Any]] = {wire.SetSetting: wire.SettingValue, wire.SetCalibration: wire.Calibration}
+
+
+def describe_refusal(request: Any, reply: wire.Reply) -> str:
+    """One line naming the command and the board's reason."""
+    name = wire.Error(reply.error).name if reply.error in list(wire.Error) else f"error {reply.error}"
+    return f"the board refused {type(request).__name__}: {name} ({wire.ERROR_DOC.get(reply.error, 'unknown')})"

@@ -1,0 +1,42 @@
+"""What this session has told the board, for a board that comes back without knowing it."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from .. import _wire as wire
+
+_KEYS = {
+    wire.SetSetting: "setting",
+    wire.Subscribe: "fingers",
+    wire.SetCalibration: "finger",
+    wire.ClearCalibration: "finger",
+}
+
+
+class Session:
+    """The latest of each thing that was changed: settings, calibrations and subscriptions.
+
+    Tares are left out: after a reboot the board takes its own, and a former one may be wrong by then.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._told: dict[tuple[str, int], Any] = {}
+
+    def note(self, request: Any) -> None:
+        """The board has accepted this."""
+        name = _KEYS.get(type(request))
+        if name is None:
+            return
+        family = "calibration" if name == "finger" else type(request).__name__
+        key = (family, int(getattr(request, name)))
+        with self._lock:
+            self._told.pop(key, None)  # to the end: of overlapping subscriptions the latest holds
+            self._told[key] = request
+
+    def requests(self) -> list[Any]:
+        """What to say again, in this order."""
+        with self._lock:
+            return list(self._told.values())

@@ -1,0 +1,93 @@
+"""biotac.aio: batches in an event loop that stays free; and the examples of host/docs, run as they stand."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import biotac
+import biotac.aio
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "host" / "docs" / "examples"
+SAYS = {
+    "pull.py": "300 frames",
+    "latest.py": "FrameFlags.CONTACT",
+    "callbacks.py": "finger 0 may be touched",
+    "loop.py": ", 0 lost",
+    "subscription.py": "the thumb was at rest",
+}
+
+
+def test_all_of_a_simulated_source_arrives_and_the_loop_goes_on() -> None:
+    async def main() -> tuple[int, int, bool]:
+        turns, frames, over = 0, 0, False
+
+        async def others() -> None:
+            nonlocal turns
+            while not over:
+                turns += 1
+                await asyncio.sleep(0)
+
+        other = asyncio.create_task(others())
+        async with biotac.aio.open("sim:press.toml?fingers=5&seconds=20") as hand:
+            async for batch in hand.batches():
+                frames += len(batch.wire)
+                await asyncio.sleep(0)
+            lost = hand.stats.frames_lost + hand.stats.batches_skipped
+            touched = hand["index"].t_us > 0
+        over = True
+        await other
+        assert turns > 10
+        return frames, lost, touched
+
+    assert asyncio.run(main()) == (5 * 2000, 0, True)
+
+
+def test_two_loops_over_one_hand_each_get_all() -> None:
+    async def main() -> list[int]:
+        async with biotac.aio.open("sim:press.toml?seconds=1000") as hand:
+
+            async def first(count: int) -> int:
+                seen = []
+                async for frame in hand.frames():
+                    seen.append(frame.seq)
+                    if len(seen) == count:
+                        break
+                return seen[-1] - seen[0] + 1
+
+            return await asyncio.gather(first(200), first(300))
+
+    assert asyncio.run(main()) == [200, 300]
+
+
+def test_commands_are_awaited_and_errors_come_up() -> None:
+    async def main() -> int:
+        async with biotac.aio.open("sim:drift.toml?seconds=5") as hand:
+            with pytest.raises(biotac.CommandRefusedError, match="NO_SUCH_FINGER"):
+                await hand.ask(lambda h: h.sensor_status(5))
+            return await hand.ask(lambda h: h.setting(biotac.Setting.POC_WEIGHTS))
+
+    assert asyncio.run(main()) == 1
+    with pytest.raises(biotac.DeviceLostError, match="not open yet"):
+        _ = biotac.aio.open("sim:drift.toml").hand
+
+
+def test_a_lost_board_ends_the_iteration_in_words() -> None:
+    async def main() -> None:
+        async with biotac.aio.open("sim:drift.toml?seconds=1000") as hand:
+            with pytest.raises(biotac.DeviceLostError):
+                async for _ in hand.batches():
+                    hand.hand.link.board._process.kill()
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.py")))
+def test_an_example_runs_and_says_what_it_should(name: str, tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, str(EXAMPLES / name)], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert SAYS[name] in done.stdout
