@@ -15,6 +15,7 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 import biotac
+from biotac import HandWarning
 from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.clock import Fit

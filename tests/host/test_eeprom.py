@@ -215,6 +215,20 @@ def test_a_bus_that_fails(monkeypatch) -> None:
         load("24c02")
 
 
+def test_a_bus_that_fails_while_the_chip_writes(monkeypatch) -> None:
+    wires, made = wired(monkeypatch, "24c02")
+
+    def acknowledge() -> bool:
+        if made.bytes_kept:
+            raise OSError(errno.ETIMEDOUT, "Connection timed out")
+        return True
+
+    monkeypatch.setattr(made, "acknowledge", acknowledge)
+    with pytest.raises(PortError, match=r"the bus failed .*timed out.*check its wires"):
+        store("24c02", NEW)
+    assert wires.open_buses == 0
+
+
 def test_without_smbus2_the_cure_is_named(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "smbus2", None)
     with pytest.raises(PortError, match=r"needs smbus2 .*pip install 'biotac-gateway\[i2c\]'"):

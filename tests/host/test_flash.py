@@ -236,6 +236,11 @@ def test_a_backup_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
         read_backup(path)
 
 
+def test_a_backup_that_is_not_there_is_asked_for_by_what_writes_it(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"No such file.*expected a file written by biotac flash"):
+        read_backup(tmp_path / "no.json")
+
+
 # ---- the command -----------------------------------------------------------------------------------------
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from biotac import _sensor
-from biotac.errors import InputError
+from biotac.errors import InputError, RecordingError
 from biotac.sim import load_source, sampling, tape
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
@@ -191,6 +191,12 @@ def test_every_sensor_that_was_there_is_a_finger(tmp_path: Path) -> None:
     assert load_source(tmp_path / "a.btd", fingers=1).samples.shape == (3, 1, 44)
     three = load_source(tmp_path / "a.btd", fingers=3).samples
     np.testing.assert_array_equal(three[:, 2], three[:, 0])
+
+
+def test_more_sensors_than_a_board_has_are_refused(tmp_path: Path) -> None:
+    lines = [[*line[:4], *[7, 0] * 6] for line in btd_lines()]
+    with pytest.raises(RecordingError, match="6 sensors: expected at most 5"):
+        load_source(write_btd(tmp_path / "a.btd", lines))
 
 
 def test_bad_parity_becomes_its_code_whatever_was_read(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from . import (
     import_btd,
     info,
     list_ports,
+    lsl,
     recompute,
     record,
     replay,
@@ -32,8 +33,8 @@ from . import (
 )
 
 VERBS = (
-    demo, list_ports, doctor, info, view, stream, record, check, replay, recompute, export, import_btd, calibration,
-    sim, flash, bench, udev_setup, version,
+    demo, list_ports, doctor, info, view, stream, lsl, record, check, replay, recompute, export, import_btd,
+    calibration, sim, flash, bench, udev_setup, version,
 )  # fmt: skip
 
 EPILOG = """\

@@ -108,7 +108,9 @@ def _bytes(path: Path) -> bytes:
             with path.open("rb") as plain:
                 data = plain.read(_MAX_BYTES + 1)
     except (OSError, EOFError, zlib.error) as error:
-        raise RecordingError(f"{path}: cannot be read ({error}): expected a .btd; copy it again") from None
+        seen = getattr(error, "strerror", None)  # of the system; what damage raises has none
+        cure = "check the path" if seen else "copy it again"
+        raise RecordingError(f"{path}: cannot be read ({seen or error}): expected a .btd; {cure}") from None
     if len(data) > _MAX_BYTES:
         raise RecordingError(f"{path}: more than {_MAX_BYTES >> 20} MB of text: expected less; split it")
     return data

@@ -1,0 +1,1 @@
+"""BioTac fingertips in ROS 2."""

@@ -1,0 +1,118 @@
+"""A board's fingers as topics: wrench, point of contact and flags of each, in SI units.
+
+ros2 run biotac_ros2 node --ros-args -p port:=/dev/ttyACM0
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PointStamped, WrenchStamped
+from rclpy.node import Node
+from std_msgs.msg import UInt32
+from std_srvs.srv import Trigger
+
+import biotac
+from biotac.recording.layout import frame_id
+from biotac.stamps import Stamps
+
+#: Reliable, so that every subscriber's quality of service fits; half a second of rounds.
+DEPTH = 50
+
+
+class Fingers(Node):
+    """Opens the board of the parameter ``port`` (as biotac.open; empty: the only one on USB) and publishes it.
+
+    Names, frames and values are those of `biotac export REC OUT.ros2`.
+
+    ``biotac/finger0/wrench`` WrenchStamped in N and N*m, on the finger, about the origin of ``biotac_finger0``;
+    ``biotac/finger0/poc`` PointStamped in m; ``biotac/finger0/flags`` UInt32 (flags frame of MESSAGES.md). What is
+    invalid is NaN, never an old value: look at it before a controller does. Stamps are the begin of the round on this
+    node's clock. Service ``biotac/tare``, a Trigger: tares every finger now.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("biotac")
+        self.declare_parameter("port", "")
+        # A simulated board in real time; others have no pace.
+        self.hand = hand = biotac.open(self.get_parameter("port").value or None, pace=1.0)
+        self._stamps = Stamps(hand, lambda: self.get_clock().now().nanoseconds / 1e9)
+        kinds = {"wrench": WrenchStamped, "poc": PointStamped, "flags": UInt32}
+        self._topics = {
+            (finger, name): self.create_publisher(kind, f"biotac/finger{finger}/{name}", DEPTH)
+            for finger in hand.fingers
+            for name, kind in kinds.items()
+        }
+        self.create_service(Trigger, "biotac/tare", self.tare)
+
+    def publish(self, batch: Any) -> None:
+        """All frames of a batch. Raises DeviceLostError when the board no longer answers."""
+        self._stamps.keep()
+        if not len(batch.frames):
+            return
+        first = self._stamps.by_arrival == 0
+        stamps_s = self._stamps.of(batch.frames["t_us"].astype(np.float64))
+        if first and self._stamps.by_arrival:
+            self.get_logger().warning("the board's clock is not known (yet): frames are stamped by their arrival")
+        for row, stamp_s in zip(batch.frames, stamps_s.tolist(), strict=True):
+            self._publish(row, round(stamp_s * 1e9))
+
+    def _publish(self, row: Any, stamp_ns: int) -> None:
+        finger = int(row["finger"])
+        wrench, point = WrenchStamped(), PointStamped()
+        for header in (wrench.header, point.header):
+            header.stamp.sec, header.stamp.nanosec = divmod(stamp_ns, 10**9)
+            header.frame_id = frame_id(finger)
+        fill(wrench.wrench.force, row["force_n"])
+        fill(wrench.wrench.torque, row["torque_nmm"] / 1000.0)
+        fill(point.point, row["poc_mm"] / 1000.0)
+        self._topics[finger, "wrench"].publish(wrench)
+        self._topics[finger, "poc"].publish(point)
+        self._topics[finger, "flags"].publish(UInt32(data=int(row["flags"])))
+
+    def tare(self, request: Any, response: Any) -> Any:
+        """Tare every finger; the message names those that could not be tared, and why."""
+        refused = []
+        for finger in self.hand.fingers:
+            try:
+                self.hand.tare(finger)
+            except biotac.CommandRefusedError as error:
+                refused.append(f"finger {finger}: {error}")
+        response.success = not refused
+        response.message = "; ".join(refused) or "tared"
+        return response
+
+
+def fill(vector: Any, values: Any) -> None:
+    """Three numbers into x, y and z; ROS wants Python's own floats."""
+    vector.x, vector.y, vector.z = (float(value) for value in values)
+
+
+def spin(node: Fingers) -> None:
+    """Publish until the source ends or ROS shuts down. One thread has board and node: a Hand is for one."""
+    for batch in node.hand.batches():
+        node.publish(batch)
+        rclpy.spin_once(node, timeout_sec=0.0)
+        if not rclpy.ok():
+            return
+
+
+def main() -> None:
+    """The node, until Ctrl-C. Without a board it ends with one line and the exit code of the command line."""
+    rclpy.init()
+    node = None
+    try:
+        node = Fingers()
+        spin(node)
+    except KeyboardInterrupt:
+        pass  # the usual way to stop it
+    except biotac.BiotacError as error:
+        print(f"biotac: {error}", file=sys.stderr)
+        raise SystemExit(error.exit_code) from None
+    finally:
+        if node is not None:
+            node.hand.close()
+        rclpy.try_shutdown()

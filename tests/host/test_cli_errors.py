@@ -1,0 +1,325 @@
+"""Each verb's ways to fail, one a line: the fixed exit code, one line on stderr, and the cure in it.
+
+What takes a staged device stands with that device (test_flash.py, test_eeprom.py, test_emulated.py, test_doctor.py),
+what argparse refuses in test_cli.py.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import sys
+import tty
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import biotac
+from biotac import _wire as wire
+from biotac import errors
+from biotac.cli.main import VERBS, main
+from biotac.framing import encode
+from biotac.link.serial_port import SerialLink
+
+NO_PORT = "/dev/ttyNOWHERE7"
+#: Verbs with no BiotacError of their own, and why.
+NEVER = {
+    "list": "a port that fails is a fact of its own line",
+    "doctor": "what fails is a finding",
+    "version": "asks nobody",
+}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Files and folders by the names that the cases use."""
+    folder = tmp_path_factory.mktemp("errors")
+    names = {name: folder / name for name in ("rec.mcap", "empty.mcap", "cut.mcap", "text.mcap", "dead.mcap", "dir")}
+    with biotac.open("sim:press.toml?seconds=1") as hand:
+        hand.record(names["rec.mcap"])
+        hand.read(2.0)
+    with biotac.open("sim:press.toml?seconds=1") as hand:
+        hand.record(names["empty.mcap"])
+    names["cut.mcap"].write_bytes(names["rec.mcap"].read_bytes()[:100])
+    names["text.mcap"].write_text("no recording\n")
+    names["dir"].mkdir()
+    for name, text in {
+        "bad.toml": "name = 'x'\n",
+        "list.json": "[]",
+        "none.json": '{"no_such_setting": 1}',
+        "broken.json": "{",
+        "none.btd": "no such file",
+        "text.uf2": "none",
+        "settings.json": '{"format": "another"}',
+        "counts.json": '{"format": "another"}',
+        "other.json": json.dumps(calibration("BT999")),
+    }.items():
+        names[name] = folder / name
+        names[name].write_text(text)
+    return names
+
+
+def calibration(serial: str) -> dict[str, object]:
+    """A calibration file of the sensor with this serial number."""
+    from biotac.calibration import file
+
+    return json.loads(file.dumps(biotac.Calibration(serial=serial), {}))
+
+
+# "@name" is a file of the fixture, "+name" one that is not there, in a folder of the case's own.
+CASES: list[tuple[int, str, str]] = [
+    (2, "expected a scenario's path or one of", "demo nowhere.toml --out +out"),
+    (2, "expected 1 to 5", "demo press.toml --fingers 9 --out +out"),
+    (2, "expected a recording", "demo +no.npz --out +out"),
+    (2, "choose another --out", "demo press.toml --seconds 1 --out @list.json"),
+    (2, "add one", "demo @bad.toml --out +out"),
+    (3, "`biotac list`", f"info {NO_PORT}"),
+    (3, "plug one in", "info serial:FFFF"),
+    (3, "expected a device path", "info telnet:1"),
+    (3, "expected BUS.DEVICE", "info spidev:zero"),
+    (3, "there is one: emu:pico", "info emu:teensy?source=press.toml"),
+    (3, "expected sim:SOURCE?pace=X&fingers=N", "info sim:press.toml?finger=2"),
+    (3, "an example is replay:", "info replay:@rec.mcap?pace=quick"),
+    (2, "expected a scenario's path or one of", "info sim:nowhere.toml"),
+    (2, "check the path", "info replay:+no.mcap"),
+    (2, "expected 0 <= from", "info replay:@rec.mcap?from=99"),
+    (2, "expected 0 to 65535", "view sim:press.toml --port 70000"),
+    (2, "record it again", "view @empty.mcap --no-browser --json"),
+    (2, "name another with --folder", "view sim:press.toml --no-browser --folder +no/where"),
+    (3, "`biotac list`", f"stream {NO_PORT}"),
+    (3, "an example is sim:", "stream sim:press.toml?pace=quick"),
+    (3, "`biotac list`", f"lsl {NO_PORT}"),
+    (3, "`biotac list`", f"record {NO_PORT} +out.mcap"),
+    (2, "say --force", "record sim:press.toml @rec.mcap"),
+    (2, "name a file in it", "record sim:press.toml @dir"),
+    (2, "choose another folder", "record sim:press.toml +no/where.mcap"),
+    (2, "check the path", "check +no.mcap"),
+    (2, "expected", "check @text.mcap"),
+    (2, "record it again", "check @cut.mcap"),
+    (2, "check the path", "replay +no.mcap"),
+    (2, "expected 0 <= from", "replay @rec.mcap --from 99"),
+    (2, "expected 0 <= from", "replay @rec.mcap --from 0.5 --to 0.2"),
+    (2, "add --pty", "replay @rec.mcap --link +link"),
+    (3, "choose another path", "replay @rec.mcap --pty --link @dir"),
+    (2, "check the path", "recompute +no.mcap +out.mcap"),
+    (2, "nothing to recompute", "recompute @empty.mcap +out.mcap"),
+    (2, "say --force", "recompute @rec.mcap @text.mcap"),
+    (2, "expected .csv", "recompute @rec.mcap +out.xyz"),
+    (2, "expected an object", "recompute @rec.mcap +out.mcap --settings @broken.json"),
+    (2, "expected one such as", "recompute @rec.mcap +out.mcap --settings @list.json"),
+    (2, "expected poc_weights", "recompute @rec.mcap +out.mcap --settings @none.json"),
+    (2, "expected an object", "recompute @rec.mcap +out.mcap --settings +no.json"),
+    (2, "check the path", "export +no.mcap +out.csv"),
+    (2, "nothing to export", "export @empty.mcap +out.csv"),
+    (2, "expected .csv", "export @rec.mcap +out.xyz"),
+    (2, "say --force", "export @rec.mcap @list.json.csv"),
+    (2, "choose another place", "export @rec.mcap +no/where.csv"),
+    (2, "check the path", "import +no.btd +out.mcap"),
+    (2, "expected a SynTouch .btd", "import @none.btd +out.mcap"),
+    (2, "say --force", "import @none.btd @rec.mcap"),
+    (2, "--help` has an example", "calibration show"),
+    (2, "expected one of 24c01", "calibration show --i2c 1:0x50"),
+    (2, "check the path", "calibration show +no.json"),
+    (2, "`biotac calibration get` writes one", "calibration show @list.json"),
+    (3, "`biotac list`", f"calibration show {NO_PORT}"),
+    (2, "`put` gives it one", "calibration get sim:drift.toml +out.json --finger 0"),
+    (3, "`biotac list`", f"calibration get {NO_PORT} +out.json --finger 0"),
+    (7, "or send no serial number to force it", "calibration put sim:press.toml @other.json --finger 0"),
+    (2, "check the path", "calibration put sim:press.toml +no.json --finger 0"),
+    (3, "expected BUS:ADDRESS", "calibration store --i2c here --chip 24c02 @other.json"),
+    (3, "check its address pins", "calibration load --i2c 1:0x20 --chip 24c02 +out.json"),
+    (2, "use a 24c02", "calibration load --i2c 1:0x50 --chip 24c01 +out.json"),
+    (2, "expected a scenario's path or one of", "sim nowhere.toml"),
+    (2, "expected 1 to 5", "sim press.toml --fingers 0"),
+    (2, "pace above 0", "sim press.toml --pace fast"),
+    (2, "add --board pico", "sim press.toml --image @text.uf2"),
+    (3, "choose another path", "sim press.toml --link @dir"),
+    (2, "leave one out", "flash --backup +out.json --no-backup"),
+    (2, "leave one out", f"flash --emulated {NO_PORT} @text.uf2"),
+    (2, "expected an image, .uf2", f"flash {NO_PORT} +no.uf2"),
+    (2, "take the build's .uf2", f"flash {NO_PORT} @text.uf2"),
+    (2, "name the IMAGE", "flash"),
+    (2, "expected 500 to", "bench decode --frames 1"),
+    (2, "write it with tools/bench/run", "bench kernels --counts +no.json"),
+    (2, "write it again with", "bench kernels --counts @counts.json"),
+    (2, "expected a scenario's path or one of", "bench idle --source nowhere.toml"),
+]
+
+
+def line_of(capsys: pytest.CaptureFixture[str], code: int, words: list[str]) -> str:
+    """Run a command that has to fail with this code and say so in one line."""
+    assert main(words) == code
+    lines = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("\r")]
+    assert len(lines) == 1
+    assert lines[0].startswith("biotac: ")
+    return lines[0]
+
+
+def placed(command: str, files: dict[str, Path], folder: Path) -> list[str]:
+    """The words of a case with its files in place."""
+    words = []
+    for word in command.split():
+        for mark in ("@", "+"):
+            head, found, rest = word.partition(mark)
+            if found:
+                name, question, query = rest.partition("?")
+                place = files.get(name, folder / name) if mark == "@" else folder / name
+                word = f"{head}{place}{question}{query}"
+        words.append(word)
+    return words
+
+
+@pytest.mark.parametrize(("code", "cure", "command"), CASES, ids=[command for _, _, command in CASES])
+def test_it_fails_with_its_code_and_the_cure(
+    capsys, tmp_path: Path, files: dict[str, Path], monkeypatch, code: int, cure: str, command: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "list.json.csv").write_text("precious")
+    assert cure in line_of(capsys, code, placed(command, files, tmp_path))
+    assert (tmp_path / "list.json.csv").read_text() == "precious"
+    assert sorted(os.listdir(tmp_path)) == ["list.json.csv"]  # a command that fails leaves nothing behind
+
+
+def test_every_verb_and_every_code_has_a_case() -> None:
+    assert {command.split()[0] for _, _, command in CASES} | {"udev-setup"} == {v.NAME for v in VERBS} - set(NEVER)
+    codes = {c.exit_code for c in vars(errors).values() if isinstance(c, type) and issubclass(c, errors.BiotacError)}
+    staged = {4, 5, 6}  # below
+    with_device = {8}  # test_flash.py
+    unfit = {errors.BiotacError.exit_code}  # of the base, which nobody raises
+    assert codes - staged - with_device - unfit == {code for code, _, _ in CASES}
+
+
+# ---- what takes a board on the port --------------------------------------------------------------
+
+OPENERS = [
+    "info PORT",
+    "stream PORT",
+    "lsl PORT",
+    "record PORT out.mcap",
+    "calibration show PORT",
+    "calibration get PORT out.json --finger 0",
+    "calibration put PORT OTHER --finger 0",
+    "calibration clear PORT --finger 0",
+]
+Make = Callable[..., object]
+
+
+def opened(command: str, port: str, files: dict[str, Path]) -> list[str]:
+    return command.replace("PORT", port).replace("OTHER", str(files["other.json"])).split()
+
+
+@pytest.mark.parametrize("command", OPENERS)
+def test_a_stranger_on_the_port_is_4(capsys, scripted_board, files, tmp_path, monkeypatch, command: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
+    board = scripted_board(lambda i, p: b"OK\r\n")
+    assert "check that this is the board's port" in line_of(capsys, 4, opened(command, board.path, files))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", OPENERS)
+@pytest.mark.parametrize(("major", "cure"), [(wire.WIRE_MAJOR + 1, "pip install -U"), (0, "biotac flash")])
+def test_another_wire_is_5(
+    capsys, scripted_board, hello, files, tmp_path, monkeypatch, command: str, major: int, cure: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    board = scripted_board(lambda i, p: hello(p, wire_major=major) if i == wire.HelloRequest.ID else b"")
+    assert cure in line_of(capsys, 5, opened(command, board.path, files))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", OPENERS)
+def test_a_board_that_falls_silent_is_6(capsys, scripted_board, hello, files, tmp_path, monkeypatch, command) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
+    board = scripted_board(lambda i, p: hello(p) if i == wire.HelloRequest.ID else b"")
+    assert "check the cable and open it again" in line_of(capsys, 6, opened(command, board.path, files))
+
+
+def test_a_board_that_falls_silent_in_its_stream_is_6(capsys, scripted_board, hello, monkeypatch) -> None:
+    monkeypatch.setattr("biotac.hand.SILENCE_S", 0.05)
+
+    def answer(message_id: int, payload: bytes) -> bytes:
+        if message_id == wire.HelloRequest.ID:
+            return hello(payload)
+        return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.OK).pack())
+
+    assert "silent for" in line_of(capsys, 6, ["stream", scripted_board(answer).path])
+
+
+def test_a_board_whose_cable_is_pulled_is_6() -> None:
+    board, cable = pty.openpty()
+    tty.setraw(cable)
+    link = SerialLink(os.ttyname(cable))
+    os.close(cable)
+    os.close(board)
+    with pytest.raises(biotac.DeviceLostError, match=r"went away.*plug the board in and open it again") as lost:
+        link.read(1.0)
+    assert lost.value.exit_code == 6
+    link.close()
+
+
+@pytest.mark.parametrize("command", OPENERS)
+def test_a_refusal_is_7(capsys, scripted_board, hello, files, tmp_path, monkeypatch, command: str) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    def answer(message_id: int, payload: bytes) -> bytes:
+        if message_id == wire.HelloRequest.ID:
+            return hello(payload)
+        return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.UNKNOWN_COMMAND).pack())
+
+    said = line_of(capsys, 7, opened(command, scripted_board(answer).path, files))
+    assert "update it" in said
+
+
+# ---- what takes another computer -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("ports", "cure"), [([], "try a simulated one"), (["/dev/ttyACM0", "/dev/ttyACM1"], "name one")]
+)
+def test_view_without_a_port_needs_exactly_one(capsys, monkeypatch, ports: list[str], cure: str) -> None:
+    found = [SimpleNamespace(device=device) for device in ports]
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: found)
+    assert cure in line_of(capsys, 3, ["view", "--no-browser"])
+
+
+def test_udev_setup_where_there_is_no_udev(capsys, monkeypatch, tmp_path) -> None:
+    monkeypatch.setattr("biotac.doctor.udev.install.__defaults__", (tmp_path / "no/where.rules",))
+    assert "rules are for Linux" in line_of(capsys, 2, ["udev-setup"])
+
+
+def test_a_recording_on_a_pty_needs_ptys(capsys, files, monkeypatch) -> None:
+    def none_left() -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.openpty", none_left)
+    assert "use replay:" in line_of(capsys, 3, ["replay", str(files["rec.mcap"]), "--pty"])
+
+
+def test_a_package_without_its_simulator(capsys, monkeypatch, tmp_path) -> None:
+    monkeypatch.setenv("BIOTAC_SIM", str(tmp_path / "none"))
+    assert "install the package again" in line_of(capsys, 3, ["info", "sim:press.toml"])
+
+
+def test_a_simulator_that_does_not_start(capsys, monkeypatch, tmp_path) -> None:
+    broken = tmp_path / "broken"
+    broken.write_text("#!/bin/sh\necho it is broken >&2\n")
+    broken.chmod(0o755)
+    monkeypatch.setenv("BIOTAC_SIM", str(broken))
+    assert "it is broken" in line_of(capsys, 3, ["info", "sim:press.toml"])
+
+
+def test_bench_recording_without_its_extra(capsys, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "biotac.bench.protobuf_mcap", None)
+    monkeypatch.delattr("biotac.bench.protobuf_mcap", raising=False)
+    assert "pip install 'biotac-gateway[bench]'" in line_of(capsys, 2, ["bench", "recording"])
+
+
+def test_a_btd_without_end(capsys, monkeypatch, tmp_path) -> None:
+    monkeypatch.setattr("biotac.sim.btd._MAX_BYTES", 4)
+    (tmp_path / "long.btd").write_text("Begin File\n" + "0\n" * 10)
+    assert "split it" in line_of(capsys, 2, ["import", str(tmp_path / "long.btd"), str(tmp_path / "a.mcap")])

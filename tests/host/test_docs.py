@@ -1,0 +1,151 @@
+"""The pages of host/docs: what they tell people to type works, and what is generated is up to date.
+
+tools/docs builds them with warnings as errors and checks their links; tools/test runs it.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac.cli.main import parser
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted((ROOT / "host/docs").glob("*.md"))
+BLOCKS = [
+    pytest.param(page.name, code, id=f"{page.stem}-{k}")
+    for page in PAGES
+    for k, code in enumerate(re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL))
+]
+COMMANDS = [
+    (page.name, command)
+    for page in PAGES
+    for command in re.findall(
+        r"^    (?:sudo )?biotac (\S.*?)(?:\s+#.*)?$", page.read_text(encoding="utf-8"), flags=re.M
+    )
+]
+
+
+def tool(name: str, monkeypatch) -> ModuleType:
+    """A script of tools/ as a module."""
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    spec = importlib.util.spec_from_file_location(name, ROOT / f"tools/{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(("page", "code"), BLOCKS)
+def test_a_pages_python_runs(page: str, code: str, tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, page, "exec"), {"__name__": "__main__"})
+    assert "print(" not in code or capsys.readouterr().out
+
+
+def test_there_is_python_to_run_and_commands_to_parse() -> None:
+    assert len(BLOCKS) >= 8
+    assert {page for page, _ in COMMANDS} >= {"quickstart.md", "recording.md", "live_view.md", "robots.md", "cli.md"}
+
+
+@pytest.mark.parametrize(("page", "command"), COMMANDS)
+def test_a_pages_command_is_one(page: str, command: str) -> None:
+    parser().parse_args(shlex.split(command))  # leaves with SystemExit when it is none
+
+
+@pytest.mark.parametrize("name", ["make_cli_page", "make_frames_drawing"])
+def test_generated_pages_are_up_to_date(name: str) -> None:
+    done = subprocess.run([sys.executable, ROOT / f"tools/{name}.py", "--check"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_command_lines_page_has_every_option(monkeypatch) -> None:
+    text = tool("make_cli_page", monkeypatch).page()
+    for verb in parser()._subparsers._group_actions[0].choices:
+        usage = subprocess.run([sys.executable, "-m", "biotac", verb, "--help"], capture_output=True, text=True).stdout
+        section = text.split(f"\n## biotac {verb}\n")[1].split("\n## ")[0]
+        for option in set(re.findall(r"--[a-z][a-z0-9-]+", usage.split("options:")[1].split("example:")[0])):
+            assert option in section or option in ("--json", "--help"), (verb, option)
+
+
+def test_the_reference_has_every_public_name() -> None:
+    reference = (ROOT / "host/docs/api.md").read_text(encoding="utf-8")
+    missing = [name for name in biotac.__all__ if not re.search(rf":: biotac\.{name}$", reference, flags=re.M)]
+    assert not missing
+
+
+SCENARIO = """
+name = "press"
+seed = 1
+gains = "fit"
+[[step]]
+do = "rest"
+seconds = 2.0
+[[step]]
+do = "press"
+seconds = 0.5
+at = "{at}"
+force_n = 5.0
+[[step]]
+do = "hold"
+seconds = 1.0
+"""
+
+
+def test_the_drawings_signs_are_what_a_board_measures(tmp_path: Path, monkeypatch) -> None:
+    drawing = tool("make_frames_drawing", monkeypatch)
+    checked = 0
+    for name in drawing.PRESSED:
+        (tmp_path / "press.toml").write_text(SCENARIO.format(at=name))
+        with biotac.open(f"sim:{tmp_path / 'press.toml'}") as hand:
+            frames = hand.read(10.0)
+        held = frames[-50:]
+        measured = {"F": held["force_n"].mean(axis=0), "M": held["torque_nmm"].mean(axis=0)}
+        for letter, axis, sign in re.findall(r"([FM])([xyz]) ([<>]) 0", drawing.readings(name)):
+            value = measured[letter]["xyz".index(axis)]
+            assert np.sign(value) == (1 if sign == ">" else -1), (name, letter, axis, value)
+            checked += 1
+    assert checked >= 8
+
+
+def test_the_drawing_has_every_electrode_and_both_palmar_sides(monkeypatch) -> None:
+    drawing = tool("make_frames_drawing", monkeypatch)
+    palmar = "".join(drawing.electrodes(drawing.PALMAR))
+    assert [int(n) for n in re.findall(r">(\d+)</text>", palmar)] == list(range(1, 20))
+    # Seen from below with the tip up, E11's side is on the right, and the tip's electrode on top.
+    x, y = drawing.PALMAR.px((0.0, 4.8, 0.0))
+    assert (x > drawing.PALMAR.at[0], y) == (True, drawing.PALMAR.at[1])
+    assert drawing.PALMAR.px((4.8, 0.0, 0.0))[1] < drawing.PALMAR.at[1]
+    assert (drawing.SIDE.toward, drawing.PALMAR.toward, drawing.TIP.toward) == ("-y", "-z", "+x")
+
+
+@pytest.mark.parametrize(
+    ("link", "words"),
+    [
+        ("b.html", None),
+        ("b.html#here", None),
+        ("https://example.org", None),
+        ("c.html", "no file"),
+        ("b.html#there", "no anchor"),
+        ("#nowhere", "no anchor"),
+        ("http://example.org", "https"),
+    ],
+)
+def test_links_are_checked(tmp_path: Path, link: str, words: str | None) -> None:
+    (tmp_path / "a.html").write_text(f'<p id="top"><a href="{link}">x</a>')
+    (tmp_path / "b.html").write_text('<h1 id="here">x</h1>')
+    done = subprocess.run(
+        [sys.executable, ROOT / "tools/check_links.py", tmp_path], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr.count("\n")) == ((0, 0) if words is None else (1, 1))
+    assert words is None or words in done.stderr

@@ -1,0 +1,150 @@
+"""LSL streams, received by pylsl itself over this computer's network."""
+
+from __future__ import annotations
+
+import sys
+import types
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pylsl
+import pytest
+
+import biotac
+from biotac.cli.main import main
+from biotac.clock import DeviceClock, pac_t_us
+from biotac.lsl import Outlet, samples
+
+PATIENCE_S = 10.0
+
+
+@pytest.fixture
+def inlet() -> Iterator[Callable[[Any], Any]]:
+    """Makes an inlet of an outlet's stream, found as any program would find it."""
+    made: list[Any] = []
+
+    def make(info: Any) -> Any:
+        found = pylsl.resolve_byprop("source_id", info.source_id(), timeout=PATIENCE_S)
+        assert len(found) == 1
+        made.append(pylsl.StreamInlet(found[0]))
+        made[-1].open_stream(timeout=PATIENCE_S)
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close_stream()
+
+
+def pull(stream: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """The first n samples, and their stamps."""
+    pulled = [stream.pull_sample(timeout=PATIENCE_S) for _ in range(n)]
+    return np.array([p[0] for p in pulled]), np.array([p[1] for p in pulled])
+
+
+def test_every_sample_arrives_at_its_device_time_on_lsls_clock(inlet) -> None:
+    with biotac.open("sim:shear.toml?fingers=2&seconds=3") as hand, Outlet(hand) as outlet:
+        names = [info.name() for info in outlet.infos]
+        assert names == ["BioTac finger0", "BioTac finger0 PAC", "BioTac finger1", "BioTac finger1 PAC"]
+        frames_in, pac_in = inlet(outlet.infos[2]), inlet(outlet.infos[3])
+        batch = hand.read_batch(10.0)
+        frames = batch.frames[batch.frames["finger"] == 1]
+        pac = batch.pac[batch.pac["finger"] == 1]
+        # Device second k was second 50 + k of a clock that differs from LSL's by what both say now.
+        clock = hand.clock = DeviceClock()
+        for k in range(20):
+            clock.round_trip(50.0 + k, 1_000_000 * k, 50.0 + k)
+        apart_s = pylsl.local_clock() - biotac.stamps.time.monotonic()
+        outlet.push(batch)
+        assert (outlet.pushed, outlet.by_arrival) == (600, 0)
+        values, stamps_s = pull(frames_in, 300)
+        pac_values, pac_stamps_s = pull(pac_in, 22 * 300)
+    np.testing.assert_array_equal(values, samples(frames))
+    np.testing.assert_array_equal(pac_values.ravel(), pac["pac"].ravel())
+    # The clocks are read one after the other, microseconds apart.
+    np.testing.assert_allclose(stamps_s, 50.0 + frames["t_us"] / 1e6 + apart_s, rtol=0, atol=5e-4)
+    np.testing.assert_allclose(np.diff(stamps_s), 0.01, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(pac_stamps_s, 50.0 + pac_t_us(pac["t_us"]).ravel() / 1e6 + apart_s, rtol=0, atol=5e-4)
+
+
+def test_the_description_names_channels_units_and_rate(inlet) -> None:
+    with biotac.open("sim:press.toml?seconds=1") as hand, Outlet(hand) as outlet:
+        info, pac = (inlet(i).info(timeout=PATIENCE_S) for i in outlet.infos)
+        batch = hand.read_batch(10.0)
+    listed, channel = [], info.desc().child("channels").child("channel")
+    while channel.e and channel.name():
+        listed.append((channel.child_value("label"), channel.child_value("unit")))
+        channel = channel.next_sibling("channel")
+    assert len(listed) == info.channel_count() == samples(batch.frames).shape[1]
+    assert listed[:9] == [
+        *((f"force_n_{axis}", "N") for axis in "xyz"),
+        *((f"torque_nm_{axis}", "N*m") for axis in "xyz"),
+        *((f"poc_m_{axis}", "m") for axis in "xyz"),
+    ]
+    units = dict(listed)
+    assert units["counts_E19"] == units["pdc"] == "count"
+    assert info.nominal_srate() == 100.0
+    assert pac.nominal_srate() == 2200.0
+    assert info.type() == "Tactile"
+    assert "tip" in info.desc().child_value("axes")
+    assert info.desc().child_value("finger") == "0"
+
+
+def test_columns_are_si() -> None:
+    row = np.zeros(1, biotac.FRAME_DTYPE)
+    row["force_n"], row["torque_nmm"], row["poc_mm"] = (1, 2, 3), (4000, 5000, 6000), (7000, 8000, 9000)
+    row["flags"], row["counts"], row["pdc"], row["tac"], row["tdc"] = 10, np.arange(11, 30), 30, 31, 32
+    np.testing.assert_array_equal(samples(row), [np.arange(1, 33)])
+
+
+def test_invalid_stays_nan_on_the_way(inlet) -> None:
+    with biotac.open("sim:press.toml?seconds=0.1") as hand, Outlet(hand) as outlet:
+        stream = inlet(outlet.infos[0])
+        batch = hand.read_batch(1.0)
+        outlet.push(batch)
+        values, _ = pull(stream, len(batch.frames))
+    assert np.isnan(batch.frames["force_n"][0]).all()
+    assert np.isnan(values[0, :9]).all()
+
+
+def test_a_simulated_boards_frames_are_stamped_by_arrival_and_counted(inlet) -> None:
+    with biotac.open("sim:press.toml?seconds=0.5") as hand, Outlet(hand) as outlet:
+        stream = inlet(outlet.infos[0])
+        hand.clock = DeviceClock()
+        batch = hand.read_batch(1.0)
+        hand.clock = DeviceClock()
+        before_s = pylsl.local_clock()
+        outlet.push(batch)
+        after_s = pylsl.local_clock()
+        _, stamps_s = pull(stream, 50)
+    assert outlet.by_arrival == 50 * 23
+    assert before_s <= stamps_s[-1] <= after_s
+    np.testing.assert_allclose(np.diff(stamps_s), 0.01, rtol=0, atol=1e-6)
+
+
+def test_the_verb_ends_with_its_source_and_says_how_it_stamped(capsys) -> None:
+    assert main(["lsl", "sim:press.toml?seconds=0.3&pace=fast", "--json"]) == 0
+    said = capsys.readouterr()
+    assert '{"name": "BioTac finger0", "rate_hz": 100.0}' in said.out
+    assert "stamped by arrival" in said.err
+
+
+def test_without_pylsl_the_extra_is_named(capsys, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "pylsl", None)
+    assert main(["lsl", "sim:press.toml"]) == biotac.InputError.exit_code
+    assert "pip install 'biotac-gateway[lsl]'" in capsys.readouterr().err
+
+
+def test_without_liblsl_so_too(capsys, monkeypatch) -> None:
+    class Broken:
+        """Finds pylsl, and fails as it does without its library."""
+
+        def find_spec(self, name: str, path: object, target: object = None) -> types.ModuleType | None:
+            if name == "pylsl":
+                raise RuntimeError("LSL binary library file was not found.\nPlease make sure ...")
+            return None
+
+    monkeypatch.delitem(sys.modules, "pylsl")
+    monkeypatch.setattr(sys, "meta_path", [Broken(), *sys.meta_path])
+    assert main(["lsl", "sim:press.toml"]) == 2
+    assert "liblsl" in capsys.readouterr().err

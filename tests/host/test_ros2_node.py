@@ -1,0 +1,183 @@
+"""The ROS 2 node against ROS' message definitions and a fake rclpy, whose limits tests/support/fake_ros.py tells."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import math
+import sys
+import types
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import fake_ros
+import numpy as np
+import pytest
+
+import biotac
+from biotac.clock import DeviceClock
+from biotac.export import export
+
+PACKAGE = Path(__file__).parents[2] / "host/ros2/biotac_ros2"
+
+
+@pytest.fixture
+def ros(monkeypatch) -> fake_ros.Ros:
+    ros = fake_ros.Ros()
+    fake_ros.install(monkeypatch, ros)
+    monkeypatch.syspath_prepend(str(PACKAGE))
+    for name in ("biotac_ros2", "biotac_ros2.node"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    return ros
+
+
+def node() -> types.ModuleType:
+    return importlib.import_module("biotac_ros2.node")
+
+
+def unpaced(monkeypatch) -> None:
+    """The node asks for real time; a test does not wait for it."""
+    true_open = biotac.open
+    monkeypatch.setattr(biotac, "open", lambda port, pace: true_open(port))
+
+
+def test_what_it_publishes_is_what_the_bag_of_a_recording_holds(ros, monkeypatch, tmp_path) -> None:
+    from rosbags.rosbag2 import Reader
+
+    unpaced(monkeypatch)
+    source = "sim:shear.toml?fingers=2&seconds=3"
+    with biotac.open(source, pace=0) as hand:
+        hand.record(tmp_path / "a.mcap")
+        hand.read(10.0)
+    export(biotac.Recording(tmp_path / "a.mcap"), tmp_path / "a.ros2")
+    bag: dict[str, list[object]] = {}
+    with Reader(tmp_path / "a.ros2") as reader:
+        for connection, _, raw in reader.messages():
+            topic = connection.topic.removeprefix("/")
+            bag.setdefault(topic, []).append(fake_ros.STORE.deserialize_cdr(raw, connection.msgtype))
+
+    ros.parameters["port"] = source
+    node().main()
+
+    topics = {topic for topic, _ in ros.published}
+    assert topics == {f"biotac/finger{f}/{name}" for f in (0, 1) for name in ("wrench", "poc", "flags")}
+    for topic in topics:
+        mine = [values(message) for name, message in ros.published if name == topic]
+        assert len(mine) == 300
+        # The bag's numbers come from um and mN, these from mm: each is rounded once more or less, in the last bit.
+        np.testing.assert_allclose(mine, [values(message) for message in bag[topic]], rtol=4e-16)
+    forces = np.array([values(m) for t, m in ros.published if t == "biotac/finger0/wrench"])
+    assert np.nanmax(forces[:, 2]) > 1.0
+    assert not ros.up
+
+
+def values(message: object) -> list[float]:
+    """All numbers but the stamp; the frame is asserted."""
+    if hasattr(message, "header"):
+        assert message.header.frame_id.startswith("biotac_finger")
+    if hasattr(message, "wrench"):
+        return [getattr(v, axis) for v in (message.wrench.force, message.wrench.torque) for axis in "xyz"]
+    if hasattr(message, "point"):
+        return [getattr(message.point, axis) for axis in "xyz"]
+    return [float(message.data)]
+
+
+def test_stamps_are_the_rounds_begin_on_the_nodes_clock(ros, monkeypatch) -> None:
+    unpaced(monkeypatch)
+    ros.up = True
+    ros.parameters["port"] = "sim:press.toml?seconds=0.5"
+    # Monotonic time stands still at 70 s, the node's clock says 1000 s: 930 s between them.
+    monkeypatch.setattr("biotac.stamps.time", types.SimpleNamespace(monotonic=lambda: 70.0))
+    ros.now_ns = 1000 * 10**9
+    fingers = node().Fingers()
+    clock = DeviceClock()
+    for k in range(20):
+        clock.round_trip(50.0 + k, 1_000_000 * k, 50.0 + k)
+    with fingers.hand as hand:
+        batch = hand.read_batch(0.2)
+        batch.t_us[:] += 5_000_000
+        hand.clock = clock
+        fingers.publish(batch)
+    stamps = [m.header.stamp for topic, m in ros.published if topic.endswith("wrench")]
+    # Device second 5 was monotonic second 55.
+    want_s = 930 + 50 + batch.t_us / 1e6
+    np.testing.assert_allclose([s.sec + s.nanosec / 1e9 for s in stamps], want_s, rtol=0, atol=1e-6)
+    assert all(0 <= s.nanosec < 10**9 for s in stamps)
+    assert ros.warnings == []
+
+
+def test_without_a_clock_arrival_is_the_stamp_and_that_is_said_once(ros, monkeypatch) -> None:
+    unpaced(monkeypatch)
+    ros.up = True
+    ros.parameters["port"] = "sim:press.toml?seconds=0.5"
+    ros.now_ns = 1000 * 10**9
+    fingers = node().Fingers()
+    with fingers.hand as hand:
+        batches = [hand.read_batch(0.2), hand.read_batch(0.2)]
+        hand.clock = DeviceClock()
+        for batch in batches:
+            fingers.publish(batch)
+    newest = [m.header.stamp for topic, m in ros.published if topic.endswith("wrench")][-1]
+    assert newest.sec + newest.nanosec / 1e9 == pytest.approx(1000.0, abs=1e-6)
+    assert len(ros.warnings) == 1
+
+
+def test_invalid_is_nan_and_never_the_last_good_value(ros, monkeypatch) -> None:
+    unpaced(monkeypatch)
+    ros.parameters["port"] = "sim:press.toml?seconds=0.3"
+    node().main()
+    points = [m.point for topic, m in ros.published if topic.endswith("poc")]
+    flags = [m.data for topic, m in ros.published if topic.endswith("flags")]
+    invalid = [bool(value & biotac.FrameFlags.POC_INVALID) for value in flags]
+    assert any(invalid)
+    assert not all(invalid)
+    assert [math.isnan(p.x) for p in points] == invalid
+
+
+def test_tare_says_which_finger_refused(ros, monkeypatch) -> None:
+    unpaced(monkeypatch)
+    ros.up = True
+    ros.parameters["port"] = "sim:press.toml?seconds=4"
+    fingers = node().Fingers()
+    tare = ros.services["biotac/tare"]
+    with fingers.hand as hand:
+        blank = types.SimpleNamespace
+        hand.read(0.2)
+        early = tare(None, blank(success=None, message=None))
+
+        def refuse(finger: int) -> None:
+            raise biotac.CommandRefusedError("it moves")
+
+        monkeypatch.setattr(hand, "tare", refuse)
+        refused = tare(None, blank(success=None, message=None))
+    assert isinstance(early.success, bool)
+    assert (refused.success, refused.message) == (False, "finger 0: it moves")
+
+
+def test_a_port_that_is_not_there_ends_it_with_a_line_and_the_code(ros, capsys) -> None:
+    ros.parameters["port"] = "/dev/ttyNOWHERE7"
+    with pytest.raises(SystemExit) as end:
+        node().main()
+    assert end.value.code == biotac.PortError.exit_code
+    assert "biotac list" in capsys.readouterr().err
+    assert not ros.up
+
+
+def test_it_ends_when_ros_does(ros, monkeypatch) -> None:
+    unpaced(monkeypatch)
+    ros.parameters["port"] = "sim:press.toml"
+    ros.ok_for_spins = 1
+    node().main()
+    assert ros.spins == 1
+
+
+def test_the_package_declares_what_it_imports() -> None:
+    tree = ET.parse(PACKAGE / "package.xml").getroot()
+    declared = {e.text for e in tree.findall("exec_depend")}
+    code = ast.parse((PACKAGE / "biotac_ros2/node.py").read_text())
+    modules = {n.module.split(".")[0] for n in ast.walk(code) if isinstance(n, ast.ImportFrom) and n.module}
+    modules |= {a.name for n in ast.walk(code) if isinstance(n, ast.Import) for a in n.names}
+    from_ros = modules - set(sys.stdlib_module_names) - {"numpy", "biotac"}
+    assert from_ros == declared
+    assert f'version="{tree.findtext("version")}"' in (PACKAGE / "setup.py").read_text()
+    assert tree.findtext("version") == biotac.__version__
