@@ -19,7 +19,6 @@ from biotac import HandWarning
 from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.clock import Fit
-from biotac.compatibility import HandWarning
 from biotac.discovery import SerialPort
 from biotac.doctor import CATALOGUE, BoardFacts, Facts, SystemFacts, judge, udev
 from biotac.doctor.system import look
