@@ -134,6 +134,8 @@ def summary(validation: Validation) -> dict[str, Any]:
     }
     if len(run.axes) > 3:
         result["rmse_nmm"] = _list(of[0][3:])
+        # numerics.md 4: two electrodes at the tip see it, by a millimetre and a half of lever
+        result["notes"].append("Mx cannot be measured with this electrode layout: its figures are of what goes with it")
     return result
 
 

@@ -57,15 +57,11 @@ def markdown(validation: Validation, picture: str) -> str:
         f"* force and counts: counts come {facts['lag_rows']} rows later, {facts['lag_corrected_rows']} corrected "
         f"(at most {MAX_LAG_ROWS} are); an affine map explains R2 {facts['affine_r2']:.2f} held out",
         f"* counts are the mean of {facts['window_rows']} rows",
-        *[f"* {note}" for note in run.notes],
+        *[f"* {note}" for note in facts["notes"]],
         *(
             [f"* block edges that lie in a rest, so that no contact is in two blocks: {facts['contact_edges']}"]
             if run.rest.any()
             else ["* the run never rests: blocks are cut anywhere, a long contact may lie in two neighbours"]
-        ),
-        *(
-            ["* Mx cannot be measured with this electrode layout; its figures are of what goes with it"]
-            * (len(run.axes) > 3)
         ),
         "",
         f"![truth against prediction, held out]({picture})",
