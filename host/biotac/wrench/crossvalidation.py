@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from threadpoolctl import threadpool_limits
 
 from . import features
 from .alignment import best_lag, check, lag_moments
@@ -166,8 +167,15 @@ def validate(
 ) -> Validation:
     """Hold every block out once, then train on all. ``align`` False takes rows as they stand, lag 0.
 
-    Raises RecordingError when force and counts do not follow each other.
+    BLAS runs on one thread meanwhile, in the whole process. Raises RecordingError when force and counts
+    do not follow each other.
     """
+    # Thousands of small systems: OpenBLAS's threads wait for each other, and on a busy computer for much longer.
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _validate(run, align, windows, show)
+
+
+def _validate(run: Run, align: bool, windows: tuple[int, ...], show: Show | None) -> Validation:
     blocks = Blocks(run.rest)
     axes = run.truth.shape[1]
     at_lags = lag_moments(run, blocks)
