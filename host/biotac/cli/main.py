@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from ..errors import BiotacError, InputError
 from . import (
     bench,
+    calibrate,
     calibration,
     check,
     demo,
@@ -33,7 +34,7 @@ from . import (
 )
 
 VERBS = (
-    demo, list_ports, doctor, info, view, stream, lsl, record, check, replay, recompute, export, import_btd,
+    demo, list_ports, doctor, info, view, stream, lsl, record, check, replay, recompute, export, import_btd, calibrate,
     calibration, sim, flash, bench, udev_setup, version,
 )  # fmt: skip
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 import zipfile
 import zlib
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -40,20 +41,20 @@ def load_npz(path: Path, *, fingers: int | None = None, seconds: float | None = 
     frame; ``E_base`` (m, 19), the same finger in free air, whose mean becomes the stored tare.
     Others are ignored. Raises RecordingError naming the field.
     """
-    fields = _read_npz(path)
+    fields = read_npz(path, (*_SLOTS_OF, "F", "E_base"))
     if "E" not in fields:
         seen = ", ".join(fields) or "none of the known fields"
         raise RecordingError(f"{path}: holds {seen}: expected a field E of shape (n, 19); save it as E")
-    electrodes = _counts(path, "E", fields["E"], None, len(sampling.ELECTRODE_SLOT))
+    electrodes = counts_field(path, "E", fields["E"], None, len(sampling.ELECTRODE_SLOT))
     frames = len(electrodes)
     samples = np.full((frames, 1, sampling.SLOTS_PER_FRAME), tape.NO_CHANNEL, dtype=np.uint16)
     for name, slots in _SLOTS_OF.items():
         if name in fields:
             columns = None if name in ("PDC", "TAC", "TDC") else len(slots)
-            samples[:, 0, slots] = _counts(path, name, fields[name], frames, columns).reshape(frames, -1)
+            samples[:, 0, slots] = counts_field(path, name, fields[name], frames, columns).reshape(frames, -1)
     tare_q4 = None
     if "E_base" in fields:
-        base = _counts(path, "E_base", fields["E_base"], None, len(sampling.ELECTRODE_SLOT))
+        base = counts_field(path, "E_base", fields["E_base"], None, len(sampling.ELECTRODE_SLOT))
         tare_q4 = np.rint(base.mean(axis=0) * _TARE_FRACTION).astype(np.uint16)[None, :]
     force_n = _force(path, fields["F"], frames)[:, None, :] if "F" in fields else None
     return _source(path, samples, fingers, seconds, tare_q4=tare_q4, force_n=force_n)
@@ -68,8 +69,8 @@ def load_btd(path: Path, *, fingers: int | None = None, seconds: float | None = 
     return _source(path, read.samples, fingers, seconds, skipped=read.skipped)
 
 
-def _read_npz(path: Path) -> dict[str, npt.NDArray[Any]]:
-    wanted = (*_SLOTS_OF, "F", "E_base")
+def read_npz(path: Path, wanted: Collection[str]) -> dict[str, npt.NDArray[Any]]:
+    """Those of the ``wanted`` arrays that the file has. Raises RecordingError for what is no .npz."""
     try:
         # opened here because np.load leaves a file it cannot read open
         with path.open("rb") as file:
@@ -87,10 +88,13 @@ def _read_npz(path: Path) -> dict[str, npt.NDArray[Any]]:
         ) from None
 
 
-def _counts(
+def counts_field(
     path: Path, name: str, array: npt.NDArray[Any], rows: int | None, columns: int | None
 ) -> npt.NDArray[np.uint16]:
-    """``array`` as counts; ``rows`` None: any number but 0; ``columns`` None: one-dimensional."""
+    """``array`` as counts; ``rows`` None: any number but 0; ``columns`` None: one-dimensional.
+
+    Raises RecordingError naming file, field and row.
+    """
     wanted = f"({rows if rows is not None else 'n'}{f', {columns}' if columns is not None else ','})"
     shape: tuple[int, ...] = array.shape
     good = len(shape) == (1 if columns is None else 2) and shape[0] > 0
@@ -115,8 +119,16 @@ def _force(path: Path, array: npt.NDArray[Any], rows: int) -> npt.NDArray[np.flo
         raise RecordingError(
             f"{path}: field F is {array.dtype} {array.shape}: expected finite numbers ({rows}, 3) in N"
         )
-    force = array.astype(np.float64)
-    return np.column_stack([force[:, 1], force[:, 0], -force[:, 2]])
+    return to_lin_frame(array)
+
+
+def to_lin_frame(vectors: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Recorded vectors (n, 3), X lateral, Y to the tip, Z out of the pad, in Lin's frame: x = Y, y = X, z = -Z.
+
+    That is a rotation, so torques turn as forces do.
+    """
+    recorded = vectors.astype(np.float64)
+    return np.column_stack([recorded[:, 1], recorded[:, 0], -recorded[:, 2]])
 
 
 def _source(

@@ -1,0 +1,144 @@
+"""What a validation is worth, in figures; everything here is of held-out rows."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .crossvalidation import SHIFTS_COUNTS, Validation
+from .features import centroid_mm
+from .models import LIN
+from .moments import aligned
+from .recorded import Floats
+
+ANGLE_MIN_N = 0.5  # a smaller force has a direction only on paper
+THIRDS = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Region:
+    """Rows whose compression's centroid lies in a rectangle, and the length of their error."""
+
+    x_mm: tuple[float, float]
+    y_mm: tuple[float, float]
+    rows: int
+    rmse_n: float
+
+
+def rmse(predicted: Floats, truth: Floats) -> Floats:
+    """Per axis (axes,), in the truth's unit."""
+    result: Floats = np.sqrt(((predicted - truth) ** 2).mean(axis=0))
+    return result
+
+
+def r2(predicted: Floats, truth: Floats) -> Floats:
+    """Per axis (axes,): 1 is perfect, 0 no better than the mean; NaN where the truth never changes."""
+    variance = truth.var(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        result: Floats = np.where(variance > 0.0, 1.0 - ((predicted - truth) ** 2).mean(axis=0) / variance, np.nan)
+    return result
+
+
+def median_angle_deg(predicted: Floats, truth: Floats) -> float:
+    """Between predicted and true force, over rows with at least ANGLE_MIN_N; NaN when there are none."""
+    size = np.linalg.norm(truth[:, :3], axis=1)
+    firm = size >= ANGLE_MIN_N
+    if not firm.any():
+        return float("nan")
+    a, b = predicted[firm, :3], truth[firm, :3]
+    # atan2 keeps small angles that acos rounds to nothing
+    angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
+    return float(np.degrees(np.median(angle)))
+
+
+def confusion(predicted: Floats, truth: Floats) -> Floats:
+    """(axes, axes): how much of true axis j appears on predicted axis i; the identity is perfect.
+
+    Least squares of the prediction on all true axes and an offset, so that axes which merely go
+    together in this run are not blamed.
+    """
+    basis = np.column_stack([truth, np.ones(len(truth))])
+    found: Floats = np.linalg.lstsq(basis, predicted, rcond=None)[0][:-1].T
+    return found
+
+
+def regions(validation: Validation) -> list[Region]:
+    """Thirds along times thirds across of the run's own contacts, the worst first."""
+    run, final = validation.run, validation.final
+    centre = centroid_mm(aligned(run, final.window_rows, final.lag_rows).e)
+    error = ((validation.predicted[0][:, :3] - run.truth[:, :3]) ** 2).sum(axis=1)
+    touched = ~run.rest
+    result = []
+    x_edges, y_edges = (np.quantile(centre[touched, axis], THIRDS) for axis in (0, 1))
+    for i in range(3):
+        for j in range(3):
+            here = touched & _within(centre[:, 0], x_edges, i) & _within(centre[:, 1], y_edges, j)
+            if here.sum() >= 0.01 * touched.sum():
+                bounds = [(float(e[k]), float(e[k + 1])) for e, k in ((x_edges, i), (y_edges, j))]
+                result.append(Region(bounds[0], bounds[1], int(here.sum()), float(np.sqrt(error[here].mean()))))
+    return sorted(result, key=lambda region: -region.rmse_n)
+
+
+def _within(values: Floats, edges: Floats, k: int) -> npt.NDArray[np.bool_]:
+    low, high = edges[k], edges[k + 1]
+    inside: npt.NDArray[np.bool_] = (values >= low) & ((values <= high) if k == 2 else (values < high))
+    return inside
+
+
+def votes(validation: Validation) -> list[dict[str, int]]:
+    """Per axis: model -> how many of the folds chose it, the most first."""
+    axes = range(len(validation.run.axes))
+    return [dict(Counter(fit.best[axis].model for fit in validation.folds).most_common()) for axis in axes]
+
+
+def model_name(validation: Validation) -> str:
+    """The chosen model, or one an axis where they differ."""
+    names = [choice.model for choice in validation.final.best]
+    if len(set(names)) == 1:
+        return names[0]
+    return ", ".join(f"{axis} {name}" for axis, name in zip(validation.run.axes, names, strict=True))
+
+
+def summary(validation: Validation) -> dict[str, Any]:
+    """All figures as JSON types; forces in N, torques in N mm, axes as in ``axes``."""
+    run, truth, predicted = validation.run, validation.run.truth, validation.predicted
+    lin = validation.by_model[LIN.name][0]
+    worst = regions(validation)[0]
+    of = [rmse(p, truth) for p in predicted]
+    result: dict[str, Any] = {
+        "file": run.name,
+        "rows": len(truth),
+        "model": model_name(validation),
+        "axes": list(run.axes),
+        "rmse_n": _list(of[0][:3]),
+        "r2": _list(r2(predicted[0], truth)),
+        "median_angle_deg": median_angle_deg(predicted[0], truth),
+        "drift_counts": list(SHIFTS_COUNTS[1:]),
+        "drift_rmse_n": [_list(shifted[:3]) for shifted in of[1:]],
+        "better_than_lin": _list(lin / np.maximum(of[0], 1e-12)),
+        "lag_rows": validation.lag_rows,
+        "lag_corrected_rows": validation.final.lag_rows,
+        "window_rows": validation.final.window_rows,
+        "affine_r2": validation.affine_r2,
+        "folds_chose": dict(zip(run.axes, votes(validation), strict=True)),
+        "models": {name: _list(errors[0]) for name, errors in validation.by_model.items()},
+        "models_drifted": {name: _list(errors[1:].max(axis=0)) for name, errors in validation.by_model.items()},
+        "confusion": [_list(row) for row in confusion(predicted[0], truth)],
+        "worst_region": {"x_mm": worst.x_mm, "y_mm": worst.y_mm, "rows": worst.rows, "rmse_n": worst.rmse_n},
+        "contact_edges": validation.blocks.whole_contacts,
+        "notes": list(run.notes),
+    }
+    if len(run.axes) > 3:
+        result["rmse_nmm"] = _list(of[0][3:])
+        # numerics.md 4: two electrodes at the tip see it, by a millimetre and a half of lever
+        result["notes"].append("Mx cannot be measured with this electrode layout: its figures are of what goes with it")
+    return result
+
+
+def _list(values: Floats) -> list[float | None]:
+    # JSON has no NaN
+    return [float(value) if np.isfinite(value) else None for value in values]

@@ -1,0 +1,194 @@
+"""A validation as a page of markdown and a picture; every figure in it is computed from the validation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import figures
+from .alignment import MAX_LAG_ROWS
+from .blocks import BLOCKS, GUARD_ROWS
+from .crossvalidation import INNER_FOLDS, SHIFTS_COUNTS, Validation
+from .models import MODELS, POOLED, POOLED_WORDS
+from .recorded import Floats
+
+AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")
+MAX_DOTS = 4000  # an axis; more only make the picture larger
+
+
+def markdown(validation: Validation, picture: str) -> str:
+    """The page; ``picture`` is the file name it shows."""
+    facts = figures.summary(validation)
+    run = validation.run
+    lines = [
+        f"# Wrench calibration of {run.name}",
+        "",
+        f"{facts['rows']} rows, {BLOCKS} contiguous blocks, each held out once with {GUARD_ROWS} rows of guard on "
+        f"both sides; lag, smoothing, lambda and model are chosen inside the other blocks ({INNER_FOLDS} folds of "
+        "whole blocks). "
+        "Frame: x to the tip, y to E11's side, z dorsal; force on the finger.",
+        "",
+        f"Chosen on the whole run: **{facts['model']}**, median angle {facts['median_angle_deg']:.2f} deg.",
+        "",
+        *_axes(validation),
+        "",
+        "## Models",
+        "",
+        "RMSE held out; in brackets the worse of "
+        + " and ".join(f"{c:+.0f}" for c in SHIFTS_COUNTS[1:])
+        + " counts of drift that nobody tared away.",
+        "",
+        *_models(validation),
+        "",
+        "## Weak places",
+        "",
+        *_weak(validation, facts),
+        "",
+        "## Confusion of axes",
+        "",
+        "How much of each true axis appears on each predicted one; 1 on the diagonal and 0 beside it would be perfect.",
+        "",
+        *_confusion(validation),
+        "",
+        "## Taken for granted",
+        "",
+        f"* force and counts: counts come {facts['lag_rows']} rows later, {facts['lag_corrected_rows']} corrected "
+        f"(at most {MAX_LAG_ROWS} are); an affine map explains R2 {facts['affine_r2']:.2f} held out",
+        f"* counts are the mean of {facts['window_rows']} rows",
+        *[f"* {note}" for note in facts["notes"]],
+        *(
+            [f"* block edges that lie in a rest, so that no contact is in two blocks: {facts['contact_edges']}"]
+            if run.rest.any()
+            else ["* the run never rests: blocks are cut anywhere, a long contact may lie in two neighbours"]
+        ),
+        "",
+        f"![truth against prediction, held out]({picture})",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def draw(validation: Validation, path: Path) -> None:
+    """Write a PNG: prediction against truth per force axis, and the models' errors."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, 4, figsize=(16, 4.4), layout="constrained")
+    figure.suptitle(f"{validation.run.name}: {figures.model_name(validation)}, held out")
+    for axis in range(3):
+        _draw_axis(axes[axis], validation, axis)
+    _draw_models(axes[3], validation)
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def _table(head: list[str], rows: list[list[str]]) -> list[str]:
+    return ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]]
+
+
+def _unit(axis: str) -> str:
+    return "N" if axis.startswith("F") else "N mm"
+
+
+def _axes(validation: Validation) -> list[str]:
+    truth = validation.run.truth
+    errors = [figures.rmse(predicted, truth) for predicted in validation.predicted]
+    explained = figures.r2(validation.predicted[0], truth)
+    head = [
+        "axis",
+        "RMSE",
+        *[f"at {c:+.0f} counts" for c in SHIFTS_COUNTS[1:]],
+        "R2",
+        "spread of the truth",
+        "chosen by",
+    ]
+    rows = []
+    for k, (name, votes) in enumerate(zip(validation.run.axes, figures.votes(validation), strict=True)):
+        chosen = ", ".join(f"{model} {folds}" for model, folds in votes.items())
+        figures_here = [f"{e[k]:.3f} {_unit(name)}" for e in errors]
+        rows.append([name, *figures_here, f"{explained[k]:.3f}", f"{truth[:, k].std():.3f} {_unit(name)}", chosen])
+    return _table([*head[:-1], f"chosen by (of {BLOCKS} folds)"], rows)
+
+
+def _models(validation: Validation) -> list[str]:
+    words = {model.name: model.words for model in MODELS} | {POOLED: POOLED_WORDS}
+    rows = []
+    for name, errors in validation.by_model.items():
+        drifted = errors[1:].max(axis=0)
+        rows.append([name, *[f"{a:.3f} ({b:.3f})" for a, b in zip(errors[0], drifted, strict=True)], words[name]])
+    return _table(["model", *[f"{axis} [{_unit(axis)}]" for axis in validation.run.axes], ""], rows)
+
+
+def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
+    found = figures.regions(validation)
+    worst, best = found[0], found[-1]
+    gain = ", ".join(f"{axis} {g:.1f}" for axis, g in zip(validation.run.axes, facts["better_than_lin"], strict=True))
+    r2 = facts["r2"]
+    axis = min(range(len(r2)), key=lambda k: np.inf if r2[k] is None else r2[k])
+    lines = [
+        f"* weakest axis: {validation.run.axes[axis]}" + ("" if r2[axis] is None else f", R2 {r2[axis]:.3f}"),
+        f"* worst region: compression centred at x {worst.x_mm[0]:.1f} to {worst.x_mm[1]:.1f} mm, "
+        f"y {worst.y_mm[0]:.1f} to {worst.y_mm[1]:.1f} mm ({worst.rows} rows): RMS length of the error "
+        f"{worst.rmse_n:.3f} N; best region {best.rmse_n:.3f} N",
+        f"* times better than Lin's three scales: {gain}",
+    ]
+    for name, block, error in _worst_blocks(validation):
+        lines.append(f"* {name}: worst block {block + 1} of {BLOCKS}, RMSE {error:.3f} {_unit(name)}")
+    return lines
+
+
+def _worst_blocks(validation: Validation) -> list[tuple[str, int, float]]:
+    result = []
+    rows = [validation.blocks.rows(k) for k in range(BLOCKS)]
+    errors = np.array([figures.rmse(validation.predicted[0][r], validation.run.truth[r]) for r in rows])
+    for axis, name in enumerate(validation.run.axes):
+        block = int(np.argmax(errors[:, axis]))
+        result.append((name, block, float(errors[block, axis])))
+    return result
+
+
+def _confusion(validation: Validation) -> list[str]:
+    matrix = figures.confusion(validation.predicted[0], validation.run.truth)
+    names = validation.run.axes
+    rows = [[f"predicted {name}", *[f"{value:+.3f}" for value in row]] for name, row in zip(names, matrix, strict=True)]
+    return _table(["", *[f"true {name}" for name in names]], rows)
+
+
+def _draw_axis(axes: Any, validation: Validation, axis: int) -> None:
+    truth: Floats = validation.run.truth[:, axis]
+    step = max(1, len(truth) // MAX_DOTS)
+    name = validation.run.axes[axis]
+    guess = validation.predicted[0][:, axis]
+    axes.plot(truth[::step], guess[::step], ".", color=AXIS_COLORS[axis], markersize=2, alpha=0.5)
+    ends = [float(truth.min()), float(truth.max())]
+    axes.plot(ends, ends, color="#444444", linewidth=1)
+    error = figures.rmse(guess[:, None], truth[:, None])[0]
+    axes.set(xlabel=f"true {name} [N]", ylabel=f"predicted {name} [N]")
+    axes.set_title(f"{name}: RMSE {error:.3f} N", fontsize=10)
+    axes.grid(alpha=0.3)
+
+
+def _draw_models(axes: Any, validation: Validation) -> None:
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+    names = list(validation.by_model)
+    place = np.arange(len(names))
+    for axis in range(3):
+        errors = [validation.by_model[name][0][axis] for name in names]
+        drifted = [validation.by_model[name][1:, axis].max() for name in names]
+        at = place + (axis - 1) * 0.26
+        axes.barh(at, errors, height=0.24, color=AXIS_COLORS[axis], label=validation.run.axes[axis])
+        axes.plot(drifted, at, "|", color="#111111", markersize=6, label="drifted" if axis == 2 else None)
+    axes.set_yticks(place, names, fontsize=8)
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set(xlabel="RMSE held out [N]")
+    axes.invert_yaxis()
+    axes.grid(alpha=0.3, axis="x")
+    axes.legend(fontsize=8)
