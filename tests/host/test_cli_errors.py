@@ -99,6 +99,8 @@ CASES: list[tuple[int, str, str]] = [
     (2, "check the path", "check +no.mcap"),
     (2, "expected", "check @text.mcap"),
     (2, "record it again", "check @cut.mcap"),
+    (2, "expected an .npz of number arrays", "calibrate wrench +no.npz"),
+    (2, "expected an .npz of number arrays", "calibrate wrench @text.mcap"),
     (2, "check the path", "replay +no.mcap"),
     (2, "expected 0 <= from", "replay @rec.mcap --from 99"),
     (2, "expected 0 <= from", "replay @rec.mcap --from 0.5 --to 0.2"),
