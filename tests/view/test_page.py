@@ -101,7 +101,8 @@ def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
     link_is(page, "playing")
     link_is(page, "over")
     assert page.text_content("#link-words") == "It has played to its end."
-    until(page, "n => numbers.dataset.seq === n", str(recording.frames["seq"].max()))  # its picture comes after the word
+    # Its last picture comes after the word.
+    until(page, "n => numbers.dataset.seq === n", str(recording.frames["seq"].max()))
     page.keyboard.press("g")
     link_is(page, "playing")
 
