@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
-import sys
 from pathlib import Path
 
 from ..errors import InputError
 from ..recording.playback import Playback
 from . import stream, values
+from .board_on_pty import tell, tell_over, until_ctrl_c
 from .loading import load
-from .sim import make_link
 
 NAME = "replay"
 HELP = "Play a recording as the board that made it, here or on a pty."
@@ -65,22 +63,13 @@ def on_pty(args: argparse.Namespace, playback: Playback) -> int:
     from ..link.replay_pty import ReplayPty
 
     board = ReplayPty(playback, args.pace)
-    try:
-        if args.link is not None:
-            make_link(args.link, board.path)
-        facts = {"port": board.path, "recording": str(args.recording)}
-        print(json.dumps(facts) if args.json else f"{board.path} plays {args.recording}; Ctrl-C stops")
-        sys.stdout.flush()
+    name = str(args.recording)
+    with until_ctrl_c(board, args.link):
+        tell(board, args.link, name, {"recording": name}, as_json=args.json)
         said = False
         while True:
             board.turn(1.0)
             if board.over and not said:
                 said = True
-                print(f"{args.recording} is over; the board stays until Ctrl-C", file=sys.stderr)
-    except KeyboardInterrupt:
-        pass  # the usual way to stop it
-    finally:
-        if args.link is not None and args.link.is_symlink():
-            args.link.unlink()
-        board.close()
+                tell_over(name)
     return 0

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import signal
-import sys
 from pathlib import Path
 
-from ..errors import InputError, PortError
+from ..errors import InputError
 from ..link.ports import start_board
 from ..link.serial_port import SerialLink
 from ..link.sim_process import SimBoard
 from ..opening import shake_hands
 from ..sim.source import load_source
 from . import values
+from .board_on_pty import tell, tell_over, until_ctrl_c
 
 NAME = "sim"
 HELP = "Run a simulated or emulated board on a pty that any serial program can open."
@@ -53,24 +51,14 @@ def run(args: argparse.Namespace) -> int:
     seconds = args.seconds or (SCENARIO_S if name.endswith(".toml") else None)
     source = load_source(name, fingers=args.fingers, seconds=seconds)
     board = start_board(args.board, source, pace=args.pace, image=args.image)
-    try:
+    with until_ctrl_c(board, args.link):
         prepare(board)
-        if args.link is not None:
-            make_link(args.link, board.path)
-        facts = {"port": board.path, "source": source.name, "fingers": source.samples.shape[1]}
-        print(json.dumps(facts) if args.json else f"{board.path} plays {source.name}; Ctrl-C stops")
-        sys.stdout.flush()
+        facts = {"source": source.name, "fingers": source.samples.shape[1]}
+        tell(board, args.link, source.name, facts, as_json=args.json)
         while not board.wait():
             pass
-        # A board does not vanish when nothing more happens to its fingers: it goes on answering.
-        print(f"{source.name} is over; the board stays until Ctrl-C", file=sys.stderr)
+        tell_over(source.name)
         signal.pause()
-    except KeyboardInterrupt:
-        pass  # the usual way to stop it
-    finally:
-        if args.link is not None and args.link.is_symlink():
-            args.link.unlink()
-        board.close()
     return 0
 
 
@@ -80,13 +68,3 @@ def prepare(board: SimBoard) -> None:
     link.source = board.source
     shake_hands(link).close()
     board.release()
-
-
-def make_link(link: Path, target: str) -> None:
-    """Replace a link left over from before; never anything else."""
-    if link.is_symlink():
-        link.unlink()
-    try:
-        os.symlink(target, link)
-    except OSError as error:
-        raise PortError(f"{link} cannot be made a link ({error.strerror}); choose another path") from error
