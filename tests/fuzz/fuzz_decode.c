@@ -34,24 +34,6 @@ static void add(const uint8_t *bytes, size_t count)
     }
 }
 
-static void add_message(fuzz_input *in, int damage)
-{
-    uint8_t payload[BT_FRAME_MAX_BYTES] = {0};
-    uint8_t encoded[BT_ENCODED_MAX_BYTES];
-    uint8_t id = take_u8(in);
-    uint8_t odd = take_u8(in); // 0: the length that belongs to the id
-    int known = bt_wire_payload_bytes(id);
-    size_t bytes = odd == 0 && known >= 0 ? (size_t)known : odd % (BT_FRAME_MAX_BYTES - BT_CRC_BYTES);
-    for (size_t k = 0; k < bytes; k++) {
-        payload[k] = take_u8(in);
-    }
-    size_t wire_bytes = bt_frame_encode(id, payload, bytes, encoded);
-    if (damage) {
-        encoded[take_u8(in) % wire_bytes] ^= take_u8(in);
-    }
-    add(encoded, wire_bytes);
-}
-
 static void read_steps(fuzz_input *in)
 {
     while (in->left > 0) {
@@ -71,7 +53,9 @@ static void read_steps(fuzz_input *in)
             bytes = bytes < filled ? bytes : filled;
             add(stream + filled - bytes, bytes);
         } else {
-            add_message(in, what == DAMAGED);
+            uint8_t encoded[BT_ENCODED_MAX_BYTES];
+            fuzz_message message = take_message(in, what == DAMAGED, encoded);
+            add(encoded, message.wire_bytes);
         }
     }
 }

@@ -40,27 +40,16 @@ static bool host_write(const uint8_t *data, size_t bytes)
 
 static void give_frame(bt_session *session, fuzz_input *in, bool damage, uint32_t now_us)
 {
-    uint8_t payload[BT_FRAME_MAX_BYTES] = {0};
     uint8_t encoded[BT_ENCODED_MAX_BYTES];
-    uint8_t id = take_u8(in);
-    uint8_t odd = take_u8(in); // 0: the length that belongs to the id
-    int known = bt_wire_payload_bytes(id);
-    size_t bytes = odd == 0 && known >= 0 ? (size_t)known : odd % (BT_FRAME_MAX_BYTES - BT_CRC_BYTES);
-    for (size_t k = 0; k < bytes; k++) {
-        payload[k] = take_u8(in);
-    }
-    size_t wire_bytes = bt_frame_encode(id, payload, bytes, encoded);
-    if (damage) {
-        encoded[take_u8(in) % wire_bytes] ^= take_u8(in);
-    }
+    fuzz_message message = take_message(in, damage, encoded);
     uint8_t nothing = 0;
     bt_session_receive(session, &nothing, 1, now_us); // whatever came before ends here
     int before = host.messages;
     uint32_t dropped = session->messages_dropped;
-    bt_session_receive(session, encoded, wire_bytes, now_us);
+    bt_session_receive(session, encoded, message.wire_bytes, now_us);
     int answers = host.messages - before + (int)(session->messages_dropped - dropped);
-    if (!damage && answers != (id >= 0x80)) {
-        FAIL("command %02x with %zu bytes is answered %d times", id, bytes, answers);
+    if (!damage && answers != (message.id >= 0x80)) {
+        FAIL("command %02x with %zu bytes is answered %d times", message.id, message.payload_bytes, answers);
     }
 }
 

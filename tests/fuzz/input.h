@@ -2,6 +2,9 @@
 #ifndef BIOTAC_FUZZ_INPUT_H
 #define BIOTAC_FUZZ_INPUT_H
 
+#include "framing.h"
+
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -37,6 +40,30 @@ static inline int32_t take_within(fuzz_input *in, int32_t limit)
     uint32_t sign = value >> 31;
     uint32_t magnitude = (sign ? 0 - value : value) % ((uint32_t)limit + 1);
     return sign ? -(int32_t)magnitude : (int32_t)magnitude;
+}
+
+// A framed message of the input's choice, of an odd length or damaged too; out has BT_ENCODED_MAX_BYTES.
+typedef struct {
+    uint8_t id;
+    size_t payload_bytes;
+    size_t wire_bytes;
+} fuzz_message;
+
+static inline fuzz_message take_message(fuzz_input *in, bool damage, uint8_t *out)
+{
+    uint8_t payload[BT_FRAME_MAX_BYTES] = {0};
+    uint8_t id = take_u8(in);
+    uint8_t odd = take_u8(in); // 0: the length that belongs to the id
+    int known = bt_wire_payload_bytes(id);
+    size_t bytes = odd == 0 && known >= 0 ? (size_t)known : odd % (BT_FRAME_MAX_BYTES - BT_CRC_BYTES);
+    for (size_t k = 0; k < bytes; k++) {
+        payload[k] = take_u8(in);
+    }
+    size_t wire_bytes = bt_frame_encode(id, payload, bytes, out);
+    if (damage) {
+        out[take_u8(in) % wire_bytes] ^= take_u8(in);
+    }
+    return (fuzz_message){id, bytes, wire_bytes};
 }
 
 // Says what is wrong and gives the fuzzer its crash.
