@@ -23,13 +23,16 @@ static const bt_flash flash = {
     .read = port_flash_read,
 };
 
+static uint8_t store(uint16_t id, uint16_t version, const uint8_t *record, size_t bytes)
+{
+    return bt_storage_write(&flash, id, version, record, bytes) ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
+}
+
 static uint8_t save_settings(const bt_settings *settings)
 {
     uint8_t record[BT_SETTINGS_RECORD_BYTES];
     bt_settings_pack(settings, record);
-    return bt_storage_write(&flash, BT_RECORD_SETTINGS, BT_SETTINGS_RECORD_VERSION, record, sizeof record)
-               ? BT_ERROR_OK
-               : BT_ERROR_NOT_STORED;
+    return store(BT_RECORD_SETTINGS, BT_SETTINGS_RECORD_VERSION, record, sizeof record);
 }
 
 static uint16_t calibration_id(uint8_t finger)
@@ -41,9 +44,7 @@ static uint8_t save_calibration(uint8_t finger, const bt_calibration *calibratio
 {
     uint8_t record[BT_CALIBRATION_RECORD_BYTES];
     size_t bytes = bt_calibration_pack(calibration, record);
-    return bt_storage_write(&flash, calibration_id(finger), BT_CALIBRATION_RECORD_VERSION, record, bytes)
-               ? BT_ERROR_OK
-               : BT_ERROR_NOT_STORED;
+    return store(calibration_id(finger), BT_CALIBRATION_RECORD_VERSION, record, bytes);
 }
 
 static uint8_t reboot_bootloader(void)

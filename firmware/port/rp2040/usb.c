@@ -143,8 +143,7 @@ static void received(void)
     receive_next();
 }
 
-// ---- what usb_control.c tells
-// ------------------------------------------------------------------------------
+// ---- what usb_control.c tells --------------------------------------------------------------------
 
 void usb_data_line_state(bool now_dtr)
 {
@@ -190,8 +189,7 @@ void usb_data_reset_toggle(uint8_t endpoint_address)
     }
 }
 
-// ---- the controller
-// ------------------------------------------------------------------------------------------
+// ---- the controller ------------------------------------------------------------------------------
 
 static void buffers_done(void)
 {
@@ -273,8 +271,7 @@ bool usb_touched(void)
     return touched;
 }
 
-// ---- port.h, main loop
-// ----------------------------------------------------------------------------------------
+// ---- port.h, main loop ---------------------------------------------------------------------------
 
 // The main loop's turn at what the interrupt does: only this interrupt is held off, sampling is not.
 static void hold_off(void)

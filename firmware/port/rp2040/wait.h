@@ -1,5 +1,5 @@
 // The only waits of this port. A device that never becomes ready must not hang the board: every loop on a
-// register is here, with a bound, and tools/image_check.py refuses one anywhere else.
+// register is here, with a bound, and tools/image/waits.py refuses one anywhere else.
 #ifndef BIOTAC_RP2040_WAIT_H
 #define BIOTAC_RP2040_WAIT_H
 
