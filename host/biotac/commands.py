@@ -1,4 +1,4 @@
-"""What a board can be asked and told, a method each; streams are hand.py's."""
+"""What a board can be asked and told, a method each; streams are streaming.py's."""
 
 from __future__ import annotations
 
