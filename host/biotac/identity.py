@@ -1,6 +1,8 @@
-"""What a board says of itself, as text."""
+"""What boards and sensors say of themselves, as text."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 from . import _wire as wire
 
@@ -25,3 +27,8 @@ def serial_text(hello: wire.Hello) -> str:
     if text and all(0x20 <= b < 0x7F for b in text):
         return text.decode()
     return raw[: max(len(text), SERIAL_BYTES)].hex().upper()
+
+
+def ascii_text(values: Iterable[int]) -> str:
+    """A sensor's zero-padded ASCII, such as its serial number."""
+    return bytes(values).rstrip(b"\0").decode("ascii", errors="replace")

@@ -12,6 +12,12 @@ FINGERS = 256  # what a message's finger byte can say, sensible or not
 FEW = 24
 
 
+def nearest(raw: int, near: int, bits: int = 32) -> int:
+    """The value that a wrapping counter shows as ``raw``, of all such the one nearest to ``near``."""
+    half, mask = 1 << (bits - 1), (1 << bits) - 1
+    return near + ((raw - near + half) & mask) - half
+
+
 class Unwrapper:
     """Extends a wrapping counter to int64, each value to the nearest after the one before."""
 

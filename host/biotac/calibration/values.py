@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from .. import _wire as wire
+from ..identity import ascii_text
 
 SERIAL_BYTES = 16
 _DEFAULT = {setting: spec.default for setting, spec in wire.SETTINGS.items()}
@@ -94,7 +95,7 @@ class Calibration:
             ),
             (own[wire.Setting.TORQUE_GAIN_Y_NN], own[wire.Setting.TORQUE_GAIN_Z_NN]),
             own[wire.Setting.THERMAL_GAIN_MILLI],
-            bytes(serial).rstrip(b"\0").decode("ascii", errors="replace"),
+            ascii_text(serial),
             made_s,
         )
 

@@ -11,7 +11,7 @@ import biotac
 
 from .. import _wire as wire
 from ..calibration.file import to_dict, when
-from ..identity import board_text, serial_text, version_text
+from ..identity import ascii_text, board_text, serial_text, version_text
 from . import values
 
 NAME = "info"
@@ -44,7 +44,8 @@ def run(args: argparse.Namespace) -> int:
             "serial_number": serial_text(hello),
             "boot_id": hello.boot_id,
             "sensors": [
-                {"finger": s.finger, "serial": text(s.serial), "software": text(s.software_version)} for s in sensors
+                {"finger": s.finger, "serial": ascii_text(s.serial), "software": ascii_text(s.software_version)}
+                for s in sensors
             ],
             "calibrations": {finger: to_dict(its) for finger, its in calibrations.items()},
             "settings": {s.name.lower(): value for s, value in settings.items()},
@@ -58,12 +59,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"warning: {warning.text}")
     for s in sensors:
         own = f", calibration {when(calibrations[s.finger].made_s)}" if s.finger in calibrations else ""
-        print(f"finger {s.finger}: BioTac {text(s.serial)}, software {text(s.software_version)}{own}")
+        print(f"finger {s.finger}: BioTac {ascii_text(s.serial)}, software {ascii_text(s.software_version)}{own}")
     for setting, value in settings.items():
         print(f"{setting.name.lower()} = {value} {wire.SETTINGS[setting].unit}")
     return 0
-
-
-def text(values: tuple[int, ...]) -> str:
-    """Zero-padded ASCII to str."""
-    return bytes(values).rstrip(b"\0").decode("ascii", errors="replace")

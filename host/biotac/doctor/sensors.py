@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..identity import ascii_text
 from .catalogue import Finding
 from .facts import BoardFacts, Facts
 
@@ -46,8 +47,3 @@ def _serials(board: BoardFacts) -> Iterator[Finding]:
     if len(kinds) > 1:
         words = [f"finger {', '.join(map(str, f))}: flex {flex}, software {sw}" for (flex, sw), f in kinds.items()]
         yield Finding("mixed_sensors", "; ".join(words))
-
-
-def ascii_text(values: tuple[int, ...]) -> str:
-    """Zero-padded ASCII to str."""
-    return bytes(values).rstrip(b"\0").decode("ascii", errors="replace")

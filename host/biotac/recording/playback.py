@@ -15,6 +15,7 @@ from .. import _wire as wire
 from ..decode import Decoder
 from ..errors import InputError
 from ..framing import encode
+from ..numbering import nearest
 from .pieces import Piece, split
 from .reader import Recording
 
@@ -88,7 +89,7 @@ class Playback:
         for piece in split(self.recording.blocks):
             if piece.message_id in _CLOCKS:
                 (raw_us,) = _TIME.unpack_from(piece.payload, _TIME_AT)
-                now_us += (raw_us - now_us + 2**31) % 2**32 - 2**31  # unwrapped, nearest to the one before
+                now_us = nearest(raw_us, now_us)
             if self._to_us is not None and now_us >= self._to_us:
                 return
             if now_us >= self._from_us:

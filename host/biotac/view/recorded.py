@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..frames import StructArray
+from ..numbering import nearest
 from ..recording import Recording
 from ..stream import Batch, LinkStats
 from .live import describe
@@ -38,13 +39,10 @@ class RecordedPlayer:
         self._begin_us = min(int(t.min()) for t in parts)
         # Messages carry 32 bits of the clock that rows carry unwrapped.
         self._messages = sorted(
-            ((self._unwrap(m.t_us), k, m) for k, m in enumerate(recording.messages) if hasattr(m, "t_us")),
+            ((nearest(m.t_us, self._begin_us), k, m) for k, m in enumerate(recording.messages) if hasattr(m, "t_us")),
             key=lambda item: item[:2],
         )
         self._end_us = max([int(t.max()) for t in parts] + [t_us for t_us, _, _ in self._messages]) + 1
-
-    def _unwrap(self, t_us: int) -> int:
-        return self._begin_us + (t_us - self._begin_us + 2**31) % 2**32 - 2**31
 
     def batches(self) -> Iterator[Batch]:
         """See Player."""
