@@ -1,6 +1,7 @@
 // What an image says of itself, for whoever flashes it: a block of constants that is found by its first 12
 // bytes, anywhere in the image at a multiple of 4. `biotac flash` refuses an image that has not exactly one,
-// or one for another board; tools/image/note.py refuses to build it.
+// or one for another board; tools/image/note.py refuses to build it,
+// by the same code (host/biotac/flash/note.py).
 #ifndef BIOTAC_IMAGE_NOTE_H
 #define BIOTAC_IMAGE_NOTE_H
 

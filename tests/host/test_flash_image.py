@@ -12,7 +12,7 @@ import pytest
 from biotac import _wire as wire
 from biotac.errors import InputError
 from biotac.flash import read_image
-from biotac.flash.image import BLOCK_BYTES, FLASH_BYTES, SETTINGS_BYTES
+from biotac.flash.image import BLOCK_BYTES, FLASH_BYTES, SETTINGS_BYTES, note_text
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
@@ -45,7 +45,7 @@ def swapped(data: bytes) -> bytes:
 
 def test_an_image_says_what_it_is(tmp_path: Path) -> None:
     image = read_image(make_image(tmp_path))
-    assert str(image.note) == f"PICO, firmware 0.2.0, wire {wire.WIRE_MAJOR}.0"
+    assert note_text(image.note) == f"PICO, firmware 0.2.0, wire {wire.WIRE_MAJOR}.0"
     assert len(image.blocks) == 20
     assert image.boot_last() == (*image.blocks[1:], image.blocks[0])
 

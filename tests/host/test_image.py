@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import subprocess
 import sys
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
-from image import boot2, note, stack, symbols, uf2, waits  # noqa: E402
+from image import boot2, stack, symbols, uf2, waits  # noqa: E402
 
 PORT = ROOT / "firmware/port/rp2040"
 
@@ -49,24 +50,33 @@ def test_uf2_refuses_an_image_that_the_chip_would_not_start() -> None:
 NOTE = b"BIOTAC image" + struct.pack("<HH3BBB3x", 1, 2, 3, 4, 5, 6, 7)
 
 
-def test_the_note_of_an_image_is_found() -> None:
-    found = note.read(bytes(320) + NOTE + b"program")
-    assert (found.board, found.firmware, found.wire) == (2, (3, 4, 5), (6, 7))
+def told_by_the_build(folder: Path, image: bytes) -> subprocess.CompletedProcess[str]:
+    path = folder / "image.bin"
+    path.write_bytes(image)
+    # -I: as in a build, where the package is not to be found
+    command = [sys.executable, "-I", str(ROOT / "tools/image/note.py"), str(path)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_the_note_of_an_image_is_told(tmp_path: Path) -> None:
+    told = told_by_the_build(tmp_path, bytes(320) + NOTE + b"program")
+    assert (told.returncode, told.stdout) == (0, "note  board 2, firmware 3.4.5, wire 6.7\n")
 
 
 @pytest.mark.parametrize(
     ("image", "why"),
     [
-        (bytes(320), "0 image notes"),
-        (bytes(321) + NOTE, "0 image notes"),  # not where a linker puts it: somebody's text
-        (NOTE + NOTE, "2 image notes"),
-        (NOTE[:-1], "0 image notes"),
+        (bytes(320), "says 0 times"),
+        (bytes(321) + NOTE, "says 0 times"),  # not where a linker puts it: somebody's text
+        (NOTE + NOTE, "says 2 times"),
+        (NOTE[:-1], "says 0 times"),
         (NOTE[:12] + b"\2" + NOTE[13:], "layout 2"),
     ],
 )
-def test_an_image_that_does_not_say_what_it_is_is_not_built(image: bytes, why: str) -> None:
-    with pytest.raises(ValueError, match=why):
-        note.read(image)
+def test_an_image_that_does_not_say_what_it_is_is_not_built(tmp_path: Path, image: bytes, why: str) -> None:
+    told = told_by_the_build(tmp_path, image)
+    assert told.returncode == 1
+    assert why in told.stderr
 
 
 LISTING = """

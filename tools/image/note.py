@@ -3,53 +3,31 @@
 
     note.py IMAGE.bin
 
-Refuses an image without that note, with two of them, or with one of a layout that this tool does not know:
-`biotac flash` would refuse it too, but later.
+Refuses an image that `biotac flash` would refuse for its note, by the same code, but before anybody has it.
 """
 
 from __future__ import annotations
 
-import struct
+import importlib.util
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
-MAGIC = b"BIOTAC image"
-LAYOUT = 1
-FIELDS = struct.Struct("<12sHH3BBB3x")
-ALIGNMENT = 4
-
-
-@dataclass(frozen=True)
-class Note:
-    """Which board an image is for, and what it will answer in its HELLO."""
-
-    board: int
-    firmware: tuple[int, int, int]
-    wire: tuple[int, int]
-
-
-def read(image: bytes) -> Note:
-    """Raises ValueError for an image that has not exactly one note."""
-    places = range(0, len(image) - FIELDS.size + 1, ALIGNMENT)
-    notes = [at for at in places if image.startswith(MAGIC, at)]
-    if len(notes) != 1:
-        raise ValueError(f"{len(notes)} image notes; expected one (firmware/app/image_note.h)")
-    _, layout, board, *numbers = FIELDS.unpack_from(image, notes[0])
-    if layout != LAYOUT:
-        raise ValueError(f"an image note of layout {layout}; expected {LAYOUT}")
-    return Note(board, (numbers[0], numbers[1], numbers[2]), (numbers[3], numbers[4]))
+READER = Path(__file__).resolve().parents[2] / "host/biotac/flash/note.py"
 
 
 def main() -> int:
     if len(sys.argv) != 2:
         sys.exit((__doc__ or "").strip())
+    spec = importlib.util.spec_from_file_location("biotac_image_note", READER)
+    assert spec is not None and spec.loader is not None
+    reader = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = reader  # dataclasses look their module up
+    spec.loader.exec_module(reader)
     try:
-        note = read(Path(sys.argv[1]).read_bytes())
+        note = reader.find(Path(sys.argv[1]).read_bytes())
     except ValueError as error:
-        sys.exit(f"note.py: {error}")
-    firmware, wire = (".".join(map(str, numbers)) for numbers in (note.firmware, note.wire))
-    print(f"note  board {note.board}, firmware {firmware}, wire {wire}")
+        sys.exit(f"note.py: {sys.argv[1]}: {error}")
+    print(f"note  board {note.board}, firmware {note.version}, wire {'.'.join(map(str, note.wire))}")
     return 0
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import InputError, PortError
 from ..flash import Image, Loader, Outcome, Target, flash, read_backup, read_image
+from ..flash.image import note_text
 from ..identity import serial_text, version_text
 from .progress import Progress
 
@@ -48,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     port, path = sort_out(args.port, args.image, emulated=args.emulated)
     image = read_image(path or find_image())
     kept = None if args.restore is None else read_backup(args.restore)
-    say(f"{image.path}: {image.note}")
+    say(f"{image.path}: {note_text(image.note)}")
     progress = Progress()
     target, loaders = find_board(port)
     try:

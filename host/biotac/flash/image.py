@@ -11,6 +11,8 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..identity import board_text
+from . import note
+from .note import Note
 
 BLOCK_BYTES = 512
 HEAD = struct.Struct("<8I")
@@ -24,29 +26,6 @@ FLASH_AT = 0x10000000
 FLASH_BYTES = 2 * 1024 * 1024  # of a Pico
 SETTINGS_BYTES = 2 * 4096  # at the flash's end: firmware/core/storage.h
 BOOT2_BYTES = 252  # and its CRC behind it
-
-# firmware/app/image_note.h
-NOTE = struct.Struct("<12sHH3BBB3x")
-NOTE_MAGIC = b"BIOTAC image"
-NOTE_LAYOUT = 1
-NOTE_ALIGNMENT = 4
-
-
-@dataclass(frozen=True)
-class Note:
-    """What an image says of itself."""
-
-    board: int
-    firmware: tuple[int, int, int]
-    wire: tuple[int, int]
-
-    @property
-    def version(self) -> str:
-        """Firmware release."""
-        return ".".join(map(str, self.firmware))
-
-    def __str__(self) -> str:
-        return f"{board_text(self.board)}, firmware {self.version}, wire {'.'.join(map(str, self.wire))}"
 
 
 @dataclass(frozen=True)
@@ -76,7 +55,7 @@ def read_image(path: Path) -> Image:
         blocks = split(data)
         payload = join_payloads(blocks)
         check_boot2(payload)
-        return Image(path, blocks, find_note(payload))
+        return Image(path, blocks, note.find(payload))
     except ValueError as error:
         raise InputError(f"{path} is not flashed: {error}") from error
 
@@ -126,13 +105,6 @@ def check_boot2(payload: bytes) -> None:
         raise ValueError(f"its second-stage boot has CRC 0x{stored:08X}; the chip would want 0x{crc:08X}")
 
 
-def find_note(payload: bytes) -> Note:
-    """What the image says of itself."""
-    last = len(payload) - NOTE.size
-    notes = [at for at in range(0, last + 1, NOTE_ALIGNMENT) if payload.startswith(NOTE_MAGIC, at)]
-    if len(notes) != 1:
-        raise ValueError(f"it says {len(notes)} times which board it is for; expected once: is it this gateway's?")
-    _, layout, board, *numbers = NOTE.unpack_from(payload, notes[0])
-    if layout != NOTE_LAYOUT:
-        raise ValueError(f"its note has layout {layout}, this library knows {NOTE_LAYOUT}; update biotac-gateway")
-    return Note(board, (numbers[0], numbers[1], numbers[2]), (numbers[3], numbers[4]))
+def note_text(its: Note) -> str:
+    """A note for people."""
+    return f"{board_text(its.board)}, firmware {its.version}, wire {'.'.join(map(str, its.wire))}"

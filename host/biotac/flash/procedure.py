@@ -12,7 +12,7 @@ from ..errors import BiotacError, CommandRefusedError, FlashError, InputError, N
 from ..hand import Hand
 from ..identity import board_text, serial_text, version_text
 from .backup import Backup, Restored, default_path, read_settings, restore, write_backup
-from .image import Image
+from .image import Image, note_text
 from .loader import Loader
 from .loader import Show as ShowBlocks
 from .target import Target
@@ -145,7 +145,7 @@ def check(image: Image, before: wire.Hello | None, after: wire.Hello) -> None:
     if (after.board, version) != (image.note.board, image.note.firmware):
         raise FlashError(
             f"the board that came back is {board_text(after.board)}, firmware {version_text(after)}; expected "
-            f"{image.note}: the image was not taken, flash again"
+            f"{note_text(image.note)}: the image was not taken, flash again"
         )
     if before is not None and after.boot_id == before.boot_id:
         raise FlashError(f"the board still has boot id {after.boot_id:08x}: it has not restarted; plug it in again")
