@@ -1,7 +1,6 @@
 // What an image says of itself, for whoever flashes it: a block of constants that is found by its first 12
 // bytes, anywhere in the image at a multiple of 4. `biotac flash` refuses an image that has not exactly one,
-// or one for another board; tools/image/note.py refuses to build it,
-// by the same code (host/biotac/flash/note.py).
+// or one for another board, and by the same code (host/biotac/flash/note.py) the build refuses to make it.
 #ifndef BIOTAC_IMAGE_NOTE_H
 #define BIOTAC_IMAGE_NOTE_H
 
