@@ -166,6 +166,11 @@ void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
     memcpy(data, fake.flash + offset, bytes);
 }
 
+const uint8_t *port_flash_maps(void)
+{
+    return fake.flash + BT_STORAGE_BYTES;
+}
+
 bool port_reboot_bootloader(void)
 {
     fake.reboots++;

@@ -4,8 +4,8 @@
 #define BIOTAC_TEST_FAKE_PORT_H
 
 #include "device.h"
+#include "port.h"
 #include "sensor_gen.h"
-#include "storage.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -31,7 +31,7 @@ typedef struct {
 
     bool link_up;
 
-    uint8_t flash[BT_STORAGE_BYTES];
+    uint8_t flash[BT_FLASH_BYTES];
     bool flash_broken; // programs nothing
     bool has_loader;
     int reboots; // how often the loader was asked for

@@ -74,6 +74,7 @@ def wire(contract: Contract) -> str:
         f"MAX_FRAME_BYTES = {link['wire']['max_frame_bytes']}",
         f"INVALID_COUNT = 0x{link['wire']['invalid_count']:04X}",
         f"BOOTLOADER_MAGIC = 0x{link['wire']['bootloader_magic']:08X}",
+        f"MAP_MAX_BYTES = {link['wire']['map_max_bytes']}",
         *(f"USB_{name.upper()} = 0x{value:04X}" for name, value in link["usb"].items()),
         "INVALID_I16 = -(2**15)",
         "INVALID_I32 = -(2**31)",
