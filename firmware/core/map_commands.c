@@ -105,11 +105,11 @@ static uint8_t end_map(bt_session *session, const uint8_t *payload)
         return BT_ERROR_NOT_WHOLE;
     }
     bt_map map;
-    error = bt_map_open(&map, bt_map_bytes(session->board.maps, &upload->place), upload->place.bytes);
-    if (error != BT_ERROR_OK) {
-        return error;
+    const uint8_t *blob = bt_map_bytes(session->board.maps, &upload->place);
+    if (bt_map_open(&map, blob, upload->place.bytes) != BT_ERROR_OK) {
+        return BT_ERROR_OUT_OF_RANGE; // whatever is wrong with it: the command's own length is right
     }
-    if (!bt_serial_fits(map.serial, session->info[msg.finger].serial)) {
+    if (!bt_map_fits(&map, session->info[msg.finger].serial)) {
         return BT_ERROR_OTHER_SENSOR;
     }
     its->map = map;
@@ -125,6 +125,7 @@ static uint8_t clear_map(bt_session *session, uint8_t finger)
     uint8_t error = may_change(session, finger);
     if (error == BT_ERROR_OK) {
         session->map[finger].place.bytes = 0;
+        bt_map_close(&session->map[finger].map);
         session->map[finger].unsaved = true;
         bt_session_use_settings(session);
     }

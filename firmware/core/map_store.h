@@ -10,7 +10,7 @@
 #include "storage.h"
 #include "wire_gen.h"
 
-#define BT_MAP_SLOT_BYTES BT_MAP_MAX_BYTES
+#define BT_MAP_SLOT_BYTES BT_MAP_MAX_BYTES // a multiple of the sector
 #define BT_MAP_SLOTS      (2 * BT_MAX_FINGERS + 1)
 #define BT_MAPS_BYTES     (BT_MAP_SLOTS * BT_MAP_SLOT_BYTES)
 

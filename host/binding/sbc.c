@@ -26,7 +26,7 @@ struct bt_sbc {
     uint8_t taken; // words of `ahead` that were given out
     uint8_t ahead_words;
     uint8_t ahead[PROPERTY_BYTES];
-    uint8_t maps[BT_MAPS_BYTES];
+    _Alignas(4) uint8_t maps[BT_MAPS_BYTES];
 };
 
 // port.h has no argument for the board: this is the one that the running call is for.

@@ -166,7 +166,7 @@ class Commands(ABC):
         Refused while streaming, and for another sensor's serial number than the one that answered there when the
         board started; with ``force`` it goes there without its serial number, which is for any sensor, and is read
         back so. What the finger had is in force until all of the new one is there. Raises ValueError for more bytes
-        than a board takes (wire.MAP_MAX_BYTES), and PortError when other bytes come back.
+        than a board takes (20 KiB), and PortError when other bytes come back.
         """
         blob = maps.as_blob(its)
         transfer.write(self._ask_for, finger, maps.for_any_sensor(blob) if force else blob)

@@ -31,7 +31,7 @@ typedef struct {
 
     bool link_up;
 
-    uint8_t flash[BT_FLASH_BYTES];
+    _Alignas(4) uint8_t flash[BT_FLASH_BYTES];
     bool flash_broken; // programs nothing
     bool has_loader;
     int reboots; // how often the loader was asked for

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import FrameFlags, Setting, TareReason, TareState
+from biotac import FrameFlags, Setting, TareReason, TareState, _map
 from biotac import _wire as wire
 from biotac.framing import encode
 
@@ -58,7 +58,7 @@ REFUSED = [
     (wire.ReadMap, (0, 0), wire.Error.OUT_OF_RANGE),
     (wire.BeginMap, (NO_FINGER, 24, 0), wire.Error.NO_SUCH_FINGER),
     (wire.BeginMap, (0, 0, 0), wire.Error.OUT_OF_RANGE),
-    (wire.BeginMap, (0, wire.MAP_MAX_BYTES + 1, 0), wire.Error.OUT_OF_RANGE),
+    (wire.BeginMap, (0, _map.MAX_BYTES + 1, 0), wire.Error.OUT_OF_RANGE),
     (wire.WriteMap, (0, 0, (0,) * 128), wire.Error.NOT_BEGUN),
     (wire.EndMap, (0, 0), wire.Error.NOT_BEGUN),
     (wire.ClearMap, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),

@@ -34,7 +34,6 @@ def header(contract: Contract) -> str:
         f"#define BT_FRAME_MAX_BYTES {wire['max_frame_bytes']} // id + payload + CRC",
         f"#define BT_INVALID_COUNT 0x{wire['invalid_count']:04X}",
         f"#define BT_BOOTLOADER_MAGIC 0x{wire['bootloader_magic']:08X}u // of REBOOT_BOOTLOADER",
-        f"#define BT_MAP_MAX_BYTES {wire['map_max_bytes']} // of a wrench map",
         f"#define BT_USB_VENDOR 0x{contract.link['usb']['vendor']:04X}",
         f"#define BT_USB_PRODUCT 0x{contract.link['usb']['product']:04X}",
         "#define BT_INVALID_I16 INT16_MIN",

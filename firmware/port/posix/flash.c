@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static uint8_t memory[BT_FLASH_BYTES];
+static _Alignas(4) uint8_t memory[BT_FLASH_BYTES];
 static uint8_t *flash = memory;
 
 const char *flash_open(const char *path)

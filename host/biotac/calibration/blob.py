@@ -5,12 +5,12 @@ from __future__ import annotations
 import zlib
 from typing import Protocol, runtime_checkable
 
+from .. import _map
 from .. import _wire as wire
 from ..identity import ascii_text
 
-SERIAL_AT, SERIAL_BYTES = 4, 16
-MADE_AT = 20
-HEADER_BYTES = 24
+SERIAL_AT = 4
+MADE_AT = SERIAL_AT + _map.SERIAL_BYTES
 
 
 @runtime_checkable
@@ -25,14 +25,14 @@ class HasBlob(Protocol):
 def as_blob(its: bytes | HasBlob) -> bytes:
     """The bytes of a map. ValueError for what cannot be one by its size."""
     blob = its.blob if isinstance(its, HasBlob) else bytes(its)
-    if not HEADER_BYTES <= len(blob) <= wire.MAP_MAX_BYTES:
-        raise ValueError(f"the map has {len(blob)} bytes, expected {HEADER_BYTES} to {wire.MAP_MAX_BYTES}")
+    if not _map.HEADER_BYTES <= len(blob) <= _map.MAX_BYTES:
+        raise ValueError(f"the map has {len(blob)} bytes, expected {_map.HEADER_BYTES} to {_map.MAX_BYTES}")
     return blob
 
 
 def serial(blob: bytes) -> str:
     """Of the sensor that it was made for; "" for any."""
-    return ascii_text(blob[SERIAL_AT : SERIAL_AT + SERIAL_BYTES])
+    return ascii_text(blob[SERIAL_AT : SERIAL_AT + _map.SERIAL_BYTES])
 
 
 def made_s(blob: bytes) -> int:
@@ -42,12 +42,12 @@ def made_s(blob: bytes) -> int:
 
 def for_any_sensor(blob: bytes) -> bytes:
     """The same map without a serial number."""
-    return blob[:SERIAL_AT] + bytes(SERIAL_BYTES) + blob[SERIAL_AT + SERIAL_BYTES :]
+    return blob[:SERIAL_AT] + bytes(_map.SERIAL_BYTES) + blob[SERIAL_AT + _map.SERIAL_BYTES :]
 
 
 def info(blob: bytes, req_id: int, finger: int) -> wire.MapInfo:
     """What a board says of such a map in force."""
-    told = tuple(blob[SERIAL_AT : SERIAL_AT + SERIAL_BYTES])
+    told = tuple(blob[SERIAL_AT : SERIAL_AT + _map.SERIAL_BYTES])
     return wire.MapInfo(req_id, finger, wire.CalibrationState.IN_FORCE, told, made_s(blob), len(blob), zlib.crc32(blob))
 
 
