@@ -51,7 +51,6 @@ static uint8_t start(bt_session *session, const uint8_t *payload)
     if (msg.streams == 0) {
         bt_session_stop(session);
     }
-    session->upload.open = false; // whoever was uploading is gone, or will be told
     session->streams = msg.streams;
     session->fingers = msg.fingers;
     session->keepalive_ms = msg.keepalive_ms;

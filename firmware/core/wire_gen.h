@@ -31,7 +31,7 @@ enum bt_error {
     BT_ERROR_NOT_HERE = 9, // this kind of board cannot do that
     BT_ERROR_NOT_STORED = 10, // the flash did not take it; what was stored before still stands
     BT_ERROR_OTHER_SENSOR = 11, // made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it
-    BT_ERROR_NOT_BEGUN = 12, // no upload of this finger's map is under way: begin it; another beginning, START, STOP and a closed port end one
+    BT_ERROR_NOT_BEGUN = 12, // no upload of this finger's map is under way: begin it; another beginning, STOP and a closed port end one
     BT_ERROR_NOT_WHOLE = 13, // bytes of the map are missing or differ from its CRC-32: send it again
 };
 

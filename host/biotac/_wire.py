@@ -42,7 +42,7 @@ class Error(IntEnum):
     NOT_HERE = 9  # this kind of board cannot do that
     NOT_STORED = 10  # the flash did not take it; what was stored before still stands
     OTHER_SENSOR = 11  # made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it
-    NOT_BEGUN = 12  # no upload of this finger's map is under way: begin it; another beginning, START, STOP and a closed port end one
+    NOT_BEGUN = 12  # no upload of this finger's map is under way: begin it; another beginning, STOP and a closed port end one
     NOT_WHOLE = 13  # bytes of the map are missing or differ from its CRC-32: send it again
 
 
@@ -147,7 +147,7 @@ ERROR_DOC: dict[int, str] = {
     9: "this kind of board cannot do that",
     10: "the flash did not take it; what was stored before still stands",
     11: "made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it",
-    12: "no upload of this finger's map is under way: begin it; another beginning, START, STOP and a closed port end one",
+    12: "no upload of this finger's map is under way: begin it; another beginning, STOP and a closed port end one",
     13: "bytes of the map are missing or differ from its CRC-32: send it again",
 }
 

@@ -506,6 +506,24 @@ static void flash_that_takes_nothing_is_told_and_passed_by(void **state)
     assert_has(0, other, more, BT_CALIBRATION_STATE_IN_FORCE);
 }
 
+static void there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored(void **state)
+{
+    (void)state;
+    for (uint32_t turn = 0; turn < 4; turn++) {
+        for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+            size_t bytes = make_map(blob, 10 * turn + f, 2, "");
+            assert_int_equal(upload(f, blob, bytes), BT_ERROR_OK);
+            assert_has(f, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
+        }
+        assert_int_equal(turn == 0 ? save() : BT_ERROR_OK, BT_ERROR_OK);
+    }
+    power_on();
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        size_t bytes = make_map(blob, f, 2, "");
+        assert_has(f, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
+    }
+}
+
 // Uploads, broken off or not, clears, saves and boots at random: what is in force and what is stored is what
 // it should be, byte for byte, every time. numbers: of the map that a finger has and has stored; 0: none.
 static void whatever_happens_nothing_that_is_kept_is_written_to(void **state)
@@ -563,6 +581,7 @@ int main(void)
         T(what_was_not_saved_is_gone_at_the_next_boot),
         T(a_record_that_cannot_be_is_no_map),
         T(flash_that_takes_nothing_is_told_and_passed_by),
+        T(there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored),
         T(whatever_happens_nothing_that_is_kept_is_written_to),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

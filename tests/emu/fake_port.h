@@ -7,6 +7,7 @@
 #include "port.h"
 #include "sensor_gen.h"
 
+#include <setjmp.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -33,6 +34,10 @@ typedef struct {
 
     _Alignas(4) uint8_t flash[BT_FLASH_BYTES];
     bool flash_broken; // programs nothing
+    long flash_left;   // bytes that are still erased or programmed before power fails; -1: it holds
+    bool flash_ragged; // of the byte at which it fails some bits are done
+    int erases;
+    jmp_buf power_fails; // where to go then
     bool has_loader;
     int reboots; // how often the loader was asked for
 } fake_port;
