@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from .. import _wire as wire
 from ..core import Settings
-from ..finger import Finger, to_frames
-from ..frames import StructArray
+from ..finger import TARE_UNKNOWN_Q16, Finger, to_frames
+from ..frames import StructArray, to_units
 from ..sim import physics, sampling, surface
 from ..sim.physics import Profile, States
 from ..sim.surface import Floats
@@ -24,6 +24,8 @@ from ..sim.timeline import Pose, Track
 Bools = npt.NDArray[np.bool_]
 Words = npt.NDArray[np.uint16]
 
+_TAKE_SEED_STEP = 100_003
+TARE_Q4_PER_COUNT = 16
 SETTLE_S = 0.3  # after a ramp: what is averaged over a phase begins this late
 
 
@@ -41,10 +43,11 @@ class Trial:
     """n frames of one finger, 10 ms each.
 
     ``counts`` uint16 (n, 19) and ``pdc`` uint16 (n,), 0xFFFF where missing; ``rows`` FINGER_DTYPE (n,), the
-    board's; ``tare`` (n, 19) counts and ``pdc_rest`` (n,) counts, the board's tare in force at each frame, NaN
+    board's; ``tare`` (n, 19) counts in 1/16 and ``pdc_rest`` (n,) counts, the board's tare at each frame, NaN
     until there is one. ``force_n`` (n, 3) on the finger and ``torque_nmm`` (n, 3) about Lin's origin are the
     truth; ``torsion_nmm`` (n,) is about the outward normal of the contact, ``at_mm`` (n, 3) the true contact,
-    NaN without one. What a recording does not hold is None. ``states`` are those of an emulated trial.
+    NaN without one. What a recording does not hold is None. ``states`` are those of an emulated trial;
+    ``given`` (19,) is a tare that the board was told at the start.
     """
 
     name: str
@@ -60,6 +63,7 @@ class Trial:
     torsion_nmm: Floats | None = None
     at_mm: Floats | None = None
     states: States | None = None
+    given: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.counts)
@@ -91,9 +95,8 @@ class Trial:
         return (self.time_s >= phase.begin_s + SETTLE_S) & (self.time_s < phase.end_s)
 
     def again(self, settings: Settings) -> Trial:
-        """The same counts through a board with other settings."""
-        rows, tare, pdc_rest = on_board(self.counts, self.pdc, settings)
-        return replace(self, rows=rows, tare=tare, pdc_rest=pdc_rest)
+        """The same counts through a board with other weights and gains, which the tare does not depend on."""
+        return replace(self, rows=_board(settings, self.given).feed(self.counts, self.pdc))
 
 
 class Script:
@@ -117,16 +120,18 @@ def play(
     *,
     seed: int,
     profile: Profile = "new",
-    settings: Settings | None = None,
+    take: int = 0,
     noiseless: bool = False,
     mirrored: bool = False,
 ) -> Trial:
     """An emulated finger goes through ``script`` and a board reads it.
 
+    ``take`` counts how often the same finger was used before: noise differs, the sensor does not.
     ``noiseless`` leaves out noise, glitches, drift and creep. ``mirrored`` swaps the two sides of the sensor
     (E1 and E11, ...), as a finger of the other hand: with the mirrored script, results mirror.
     """
     finger = physics.Finger(seed, profile)
+    finger.seed += _TAKE_SEED_STEP * take  # by now it only seeds the noise
     if noiseless:
         finger.noise_counts = finger.glitch_share = finger.creep_share = 0.0
         finger.drift_per_min = np.zeros_like(finger.drift_per_min)
@@ -139,7 +144,7 @@ def play(
     time_s: Floats = boundary_s[:-1] + sampling.FRAME_S / 2.0
     states = script.track.states(time_s)
     counts, pdc = words[:, sampling.ELECTRODE_SLOT], words[:, sampling.PDC_SLOT]
-    rows, tare, pdc_rest = on_board(counts, pdc, settings)
+    rows, tare, pdc_rest = on_board(counts, pdc)
     force, torque = states.wrench()
     touched = states.force_n > 0.0
     return Trial(
@@ -159,18 +164,28 @@ def play(
     )
 
 
-def on_board(counts: Words, pdc: Words, settings: Settings | None = None) -> tuple[StructArray, Floats, Floats]:
-    """The board's rows (n,), its electrode tare (n, 19) and its PDC tare (n,), in counts, NaN while unknown."""
-    board = Finger(settings)
-    unknown = 0xFFFFFFFF
-    rows, q16 = [], np.empty((len(counts), counts.shape[1] + 1), np.uint32)
+def on_board(counts: Words, pdc: Words, *, given: Floats | None = None) -> tuple[StructArray, Floats, Floats]:
+    """A board's rows (n,), its electrode tare (n, 19) and its PDC tare (n,), in counts, NaN while unknown.
+
+    ``given`` (19,) counts is the tare it is told before the first round; by default it finds its own.
+    """
+    board = _board(None, given)
+    rows, pdc_rest = [], np.full(len(counts), np.nan)
     for k in range(len(counts)):
-        # one round at a time: a FRAME has the electrodes' tare in 1/16 count and PDC's not at all
+        # one round at a time, because a FRAME does not have PDC's tare
         rows.append(board.feed(counts[k : k + 1], pdc[k : k + 1]))
-        message = board.tare_message()
-        q16[k] = (*message.tare_q16, message.pdc_tare_q16)
-    tare = np.where(q16 == unknown, np.nan, q16 / 65536.0)
-    return np.concatenate(rows), tare[:, :-1], tare[:, -1]
+        q16 = board.tare_message().pdc_tare_q16
+        if q16 != TARE_UNKNOWN_Q16:
+            pdc_rest[k] = q16 / 65536.0
+    joined = np.concatenate(rows)
+    return joined, to_units(joined["tare_q4"], TARE_Q4_PER_COUNT), pdc_rest
+
+
+def _board(settings: Settings | None, given: Floats | None) -> Finger:
+    board = Finger(settings)
+    if given is not None:
+        board.set_tare(given)
+    return board
 
 
 def _mirror() -> npt.NDArray[np.intp]:
