@@ -15,6 +15,7 @@ NAMES = {
     "shear": "a weight pushed sideways (Lin 2013, figure 3)",
     "torsion": "a weight turned both ways (Lin 2013, figure 9)",
     "torsion-shear": "a weight turned while it is pushed (Lin 2013, figure 10)",
+    "shear-torsion": "shear and torsion at once on held-out places, calibrated against the paper's model",
     "navarro": "pressure calibration and its verification press (Navarro et al.)",
 }
 
