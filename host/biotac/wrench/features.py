@@ -98,21 +98,23 @@ class Family:
 
 def columns(signals: Signals) -> Floats:
     """All features (n, 532), or (n, 535) with PDC, in the order of blocks()."""
-    kinds, gates = _kinds(signals), _gates(signals.e)
+    found, at = kinds(signals), gates(signals.e)
     parts = []
     for block in blocks(with_pdc=signals.pdc is not None):
-        kind = kinds[block.kind]
-        parts.append(kind if block.gate == Gate.ONE else kind * gates[block.gate])
+        kind = found[block.kind]
+        parts.append(kind if block.gate == Gate.ONE else kind * at[block.gate])
     return np.concatenate(parts, axis=1)
 
 
-def _kinds(signals: Signals) -> dict[Kind, Floats]:
+def kinds(signals: Signals) -> dict[Kind, Floats]:
+    """Each kind's columns (n, width); PRESSURE only where there is one."""
     e = signals.e / SIGNAL_COUNTS
     count = np.clip(signals.e + signals.tare, _map.COUNT_MIN, _map.COUNT_MAX)
     at_rest = np.clip(signals.tare, _map.COUNT_MIN, _map.COUNT_MAX)
     # a wet or shorted electrode must not square to anything
     conductance = np.clip(_conductance(count) / _conductance(at_rest) - 1.0, -1.0, _map.RATIO_MAX)
-    kinds = {
+    result = {
+        Kind.OFFSET: np.ones((len(e), 1)),
         Kind.SIGNAL: e,
         Kind.SIGNAL_PAIRS: _products(e),
         Kind.CONDUCTANCE: conductance,
@@ -121,13 +123,15 @@ def _kinds(signals: Signals) -> dict[Kind, Floats]:
         Kind.BULGE: np.maximum(e, 0.0),
     }
     if signals.pdc is not None:
-        kinds[Kind.PRESSURE] = signals.pdc[:, None] / PRESSURE_COUNTS
-    return kinds
+        result[Kind.PRESSURE] = signals.pdc[:, None] / PRESSURE_COUNTS
+    return result
 
 
-def _gates(e: Floats) -> dict[Gate, Floats]:
+def gates(e: Floats) -> dict[Gate, Floats]:
+    """Each gate (n, 1)."""
     centre = centroid_mm(e)
-    return {Gate.X: centre[:, :1] / REACH_MM[0], Gate.Y: centre[:, 1:2] / REACH_MM[1]}
+    x, y = centre[:, :1] / REACH_MM[0], centre[:, 1:2] / REACH_MM[1]
+    return {Gate.ONE: np.ones_like(x), Gate.X: x, Gate.Y: y, Gate.XX: x * x, Gate.XY: x * y, Gate.YY: y * y}
 
 
 def centroid_mm(e: Floats) -> Floats:
