@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 #define BT_WIRE_MAJOR 1
-#define BT_WIRE_MINOR 3
-#define BT_SCHEMA_HASH 0x16E934A8u
+#define BT_WIRE_MINOR 4
+#define BT_SCHEMA_HASH 0xF7E285C9u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -92,7 +92,8 @@ enum bt_calibration_state {
 #define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes railed or missing: do not trust the results
 #define BT_FRAME_FLAG_TEMP (1u << 16) // since the contact began the temperature has moved by over a degree: the tare is doubtful
 #define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to and marked invalid (SUBSCRIBE)
-#define BT_FRAME_FLAGS 0x3FFFFu // all there are
+#define BT_FRAME_FLAG_MAPPED (1u << 18) // force, and torque where it has six axes, come from the finger's wrench map
+#define BT_FRAME_FLAGS 0x7FFFFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME messages

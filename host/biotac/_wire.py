@@ -14,8 +14,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 WIRE_MAJOR = 1
-WIRE_MINOR = 3
-SCHEMA_HASH = 0x16E934A8
+WIRE_MINOR = 4
+SCHEMA_HASH = 0xF7E285C9
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -110,6 +110,7 @@ class FrameFlags(IntFlag):
     FAULT = 1 << 15  # more than two electrodes railed or missing: do not trust the results
     TEMP = 1 << 16  # since the contact began the temperature has moved by over a degree: the tare is doubtful
     NOT_ASKED = 1 << 17  # some quantity is not subscribed to and marked invalid (SUBSCRIBE)
+    MAPPED = 1 << 18  # force, and torque where it has six axes, come from the finger's wrench map
 
 
 class StreamFlags(IntFlag):
@@ -206,6 +207,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     32768: "more than two electrodes railed or missing: do not trust the results",
     65536: "since the contact began the temperature has moved by over a degree: the tare is doubtful",
     131072: "some quantity is not subscribed to and marked invalid (SUBSCRIBE)",
+    262144: "force, and torque where it has six axes, come from the finger's wrench map",
 }
 
 

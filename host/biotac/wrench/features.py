@@ -1,48 +1,32 @@
 """What the models are linear in: one row of features a frame, block by block.
 
 A block is a kind of column times a gate, e.g. the compressions times how far along the finger the contact
-lies. Every model is a choice of blocks, and a board's map is a list of them. Features are functions of one
-frame's tared counts alone (and of PDC where there is one), so a frame can be checked by itself and at any
-drift. Columns are scaled to be of the order of one; none is centred or standardised by the run itself,
-because a fitted map has to mean the same on the next run.
+lies (protocol/map.toml). Every model is a choice of blocks, and a board's map is a list of them. Features are
+functions of one frame's tared counts alone (and of PDC where there is one), so a frame can be checked by itself
+and at any drift. Columns are scaled to be of the order of one; none is centred or standardised by the run
+itself, because a fitted map has to mean the same on the next run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from .. import _sensor
+from .. import _map, _sensor
+from .._map import Gate, Kind
 from ..sim import surface
 from .recorded import Floats
 
 ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 SIGNAL_COUNTS = 500.0  # a firm press; only sets the columns' size
 PRESSURE_COUNTS = 100.0
-GATE_FLOOR_COUNTS = 5.0  # per electrode: noise must not throw the centroid about when nothing is compressed
-GATE_MM = (8.0, 4.0)  # half the pad along and across
-MIN_COUNT, MAX_COUNT = 1.0, 4090.0  # numerics.md 1.3: 0 is taken for 10 MOhm
-MIN_CONDUCTANCE, MAX_CONDUCTANCE = -1.0, 3.0  # change over rest; a wet or shorted electrode must not square to anything
-
-Kind = Literal["SIGNAL", "COMPRESSION", "BULGE", "SIGNAL_PAIRS", "CONDUCTANCE", "CONDUCTANCE_PAIRS", "PRESSURE"]
-Gate = Literal["ONE", "X", "Y", "XX", "XY", "YY"]
+REACH_MM = (_map.REACH_X_UM / 1000, _map.REACH_Y_UM / 1000)
+STRAIGHT = (Gate.ONE, Gate.X, Gate.Y)
 
 _UPPER = np.triu_indices(ELECTRODES)
-WIDTHS: dict[Kind, int] = {
-    "SIGNAL": ELECTRODES,
-    "COMPRESSION": ELECTRODES,
-    "BULGE": ELECTRODES,
-    "SIGNAL_PAIRS": len(_UPPER[0]),
-    "CONDUCTANCE": ELECTRODES,
-    "CONDUCTANCE_PAIRS": len(_UPPER[0]),
-    "PRESSURE": 1,
-}
-STRAIGHT: tuple[Gate, ...] = ("ONE", "X", "Y")
-GATES: tuple[Gate, ...] = (*STRAIGHT, "XX", "XY", "YY")
 
 
 @dataclass(frozen=True)
@@ -55,24 +39,28 @@ class Block:
     @property
     def width(self) -> int:
         """Columns."""
-        return WIDTHS[self.kind]
+        return _map.KINDS[self.kind].columns
 
 
-def _blocks(kinds: tuple[Kind, ...], gates: tuple[Gate, ...] = ("ONE",)) -> tuple[Block, ...]:
-    return tuple(Block(kind, gate) for gate in gates for kind in kinds)
+def _blocks(kinds: Iterable[Kind], gates: Iterable[Gate] = (Gate.ONE,)) -> tuple[Block, ...]:
+    several = tuple(kinds)
+    return tuple(Block(kind, gate) for gate in gates for kind in several)
 
+
+_SIGNAL = _blocks([Kind.SIGNAL])
+_SIGNAL_PAIRS = _blocks([Kind.SIGNAL_PAIRS])
+_CONDUCTANCE = _blocks([Kind.CONDUCTANCE])
+_CONDUCTANCE_PAIRS = _blocks([Kind.CONDUCTANCE_PAIRS])
+_SPLIT = (Kind.COMPRESSION, Kind.BULGE)  # different physics (biotac.md finding 4)
+_PRESSURE = _blocks([Kind.PRESSURE], Gate)
 
 # PRESSURE last: a run without PDC has the columns before it
-BLOCKS: tuple[Block, ...] = (
-    *_blocks(("SIGNAL", "SIGNAL_PAIRS", "CONDUCTANCE", "CONDUCTANCE_PAIRS")),
-    *_blocks(("COMPRESSION", "BULGE"), GATES),
-    *_blocks(("PRESSURE",), GATES),
-)
+BLOCKS = (*_SIGNAL, *_SIGNAL_PAIRS, *_CONDUCTANCE, *_CONDUCTANCE_PAIRS, *_blocks(_SPLIT, Gate), *_PRESSURE)
 
 
 def blocks(*, with_pdc: bool) -> tuple[Block, ...]:
     """The blocks of columns(), in their order."""
-    return BLOCKS if with_pdc else tuple(block for block in BLOCKS if block.kind != "PRESSURE")
+    return BLOCKS if with_pdc else BLOCKS[: -len(_PRESSURE)]
 
 
 def width(*, with_pdc: bool) -> int:
@@ -125,48 +113,47 @@ class Family:
 
 def columns(signals: Signals) -> Floats:
     """All features (n, 646), or (n, 652) with PDC, in the order of blocks()."""
-    kinds, gates = _kinds(signals), _gates(signals.e)
+    found, at = kinds(signals), gates(signals.e)
     parts = []
     for block in blocks(with_pdc=signals.pdc is not None):
-        kind = kinds[block.kind]
-        parts.append(kind if block.gate == "ONE" else kind * gates[block.gate])
+        kind = found[block.kind]
+        parts.append(kind if block.gate == Gate.ONE else kind * at[block.gate])
     return np.concatenate(parts, axis=1)
+
+
+def kinds(signals: Signals) -> dict[Kind, Floats]:
+    """Each kind's columns (n, width); PRESSURE only where there is one."""
+    e = signals.e / SIGNAL_COUNTS
+    count = np.clip(signals.e + signals.tare, _map.COUNT_MIN, _map.COUNT_MAX)
+    at_rest = np.clip(signals.tare, _map.COUNT_MIN, _map.COUNT_MAX)
+    # a wet or shorted electrode must not square to anything
+    conductance = np.clip(_conductance(count) / _conductance(at_rest) - 1.0, -1.0, _map.RATIO_MAX)
+    result = {
+        Kind.OFFSET: np.ones((len(e), 1)),
+        Kind.SIGNAL: e,
+        Kind.SIGNAL_PAIRS: _products(e),
+        Kind.CONDUCTANCE: conductance,
+        Kind.CONDUCTANCE_PAIRS: _products(conductance),
+        Kind.COMPRESSION: np.minimum(e, 0.0),
+        Kind.BULGE: np.maximum(e, 0.0),
+    }
+    if signals.pdc is not None:
+        result[Kind.PRESSURE] = signals.pdc[:, None] / PRESSURE_COUNTS
+    return result
+
+
+def gates(e: Floats) -> dict[Gate, Floats]:
+    """Each gate (n, 1)."""
+    centre = centroid_mm(e)
+    x, y = centre[:, :1] / REACH_MM[0], centre[:, 1:2] / REACH_MM[1]
+    return {Gate.ONE: np.ones_like(x), Gate.X: x, Gate.Y: y, Gate.XX: x * x, Gate.XY: x * y, Gate.YY: y * y}
 
 
 def centroid_mm(e: Floats) -> Floats:
     """Centroid (n, 3) of the compressed electrodes in mm; the middle of all when none is compressed."""
-    weights = np.maximum(-e, 0.0) + GATE_FLOOR_COUNTS
+    weights = np.maximum(-e, 0.0) + _map.FLOOR_COUNTS
     centre: Floats = weights @ surface.ELECTRODE_MM / weights.sum(axis=1, keepdims=True)
     return centre
-
-
-def conductance_change(e: Floats, tare: Floats) -> Floats:
-    """Electrodes' conductance (n, 19) over that at rest, less one."""
-    change = _conductance(np.clip(e + tare, MIN_COUNT, MAX_COUNT)) / _conductance(np.clip(tare, MIN_COUNT, MAX_COUNT))
-    return np.clip(change - 1.0, MIN_CONDUCTANCE, MAX_CONDUCTANCE)
-
-
-def _kinds(signals: Signals) -> dict[Kind, Floats]:
-    e = signals.e / SIGNAL_COUNTS
-    conductance = conductance_change(signals.e, signals.tare)
-    kinds: dict[Kind, Floats] = {
-        "SIGNAL": e,
-        # compression and bulge are different physics (biotac.md finding 4)
-        "COMPRESSION": np.minimum(e, 0.0),
-        "BULGE": np.maximum(e, 0.0),
-        "SIGNAL_PAIRS": _products(e),
-        "CONDUCTANCE": conductance,
-        "CONDUCTANCE_PAIRS": _products(conductance),
-    }
-    if signals.pdc is not None:
-        kinds["PRESSURE"] = signals.pdc[:, None] / PRESSURE_COUNTS
-    return kinds
-
-
-def _gates(e: Floats) -> dict[Gate, Floats]:
-    centre = centroid_mm(e)
-    x, y = centre[:, :1] / GATE_MM[0], centre[:, 1:2] / GATE_MM[1]
-    return {"X": x, "Y": y, "XX": x * x, "XY": x * y, "YY": y * y}
 
 
 def _place(block: Block) -> npt.NDArray[np.intp]:
@@ -188,19 +175,15 @@ def _counts_scale(tare: Floats) -> Floats:
 
 
 def _conductance_scale(tare: Floats) -> Floats:
-    # d ln(c / (4095 - c)) / dc, turned over
-    return np.clip(tare, MIN_COUNT, MAX_COUNT) * (1.0 - np.clip(tare, MIN_COUNT, MAX_COUNT) / _sensor.FULL_SCALE_COUNT)
+    at_rest = np.clip(tare, _map.COUNT_MIN, _map.COUNT_MAX)
+    scale: Floats = at_rest * (1.0 - at_rest / _sensor.FULL_SCALE_COUNT)  # d ln(c / (4095 - c)) / dc, turned over
+    return scale
 
-
-_SIGNAL = _blocks(("SIGNAL",))
-_SPLIT = _blocks(("COMPRESSION", "BULGE"))
-_CONDUCTANCE = _blocks(("CONDUCTANCE",))
-_CONDUCTANCE_PAIRS = _blocks(("CONDUCTANCE", "CONDUCTANCE_PAIRS"))
 
 LINEAR = Family(_SIGNAL, _SIGNAL, _counts_scale)
-SIGN_SPLIT = Family(_SPLIT, _SPLIT, _counts_scale)
-GATED = Family(_blocks(("COMPRESSION", "BULGE", "PRESSURE"), STRAIGHT), _SPLIT, _counts_scale)
-GATED_TWICE = Family(_blocks(("COMPRESSION", "BULGE", "PRESSURE"), GATES), _SPLIT, _counts_scale)
-QUADRATIC = Family((*_SIGNAL, *_blocks(("SIGNAL_PAIRS",)), *_blocks(("PRESSURE",), GATES)), _SIGNAL, _counts_scale)
-CONDUCTANCE_QUADRATIC = Family((*_CONDUCTANCE_PAIRS, *_blocks(("PRESSURE",), GATES)), _CONDUCTANCE, _conductance_scale)
-JOINED = Family((*GATED_TWICE.blocks, *_CONDUCTANCE_PAIRS), _SPLIT, _counts_scale)
+SIGN_SPLIT = Family(_blocks(_SPLIT), _blocks(_SPLIT), _counts_scale)
+GATED = Family(_blocks((*_SPLIT, Kind.PRESSURE), STRAIGHT), _blocks(_SPLIT), _counts_scale)
+GATED_TWICE = Family(_blocks((*_SPLIT, Kind.PRESSURE), Gate), _blocks(_SPLIT), _counts_scale)
+QUADRATIC = Family((*_SIGNAL, *_SIGNAL_PAIRS, *_PRESSURE), _SIGNAL, _counts_scale)
+CONDUCTANCE_QUADRATIC = Family((*_CONDUCTANCE, *_CONDUCTANCE_PAIRS, *_PRESSURE), _CONDUCTANCE, _conductance_scale)
+JOINED = Family((*GATED_TWICE.blocks, *_CONDUCTANCE, *_CONDUCTANCE_PAIRS), _blocks(_SPLIT), _counts_scale)
