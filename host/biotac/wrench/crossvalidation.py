@@ -18,7 +18,7 @@ from . import features
 from .alignment import best_lag, check, lag_moments
 from .blocks import BLOCKS, Blocks
 from .models import AFFINE, LAMBDAS, MODELS, POOL, POOLED, solve, squared_errors, truth_variance, used
-from .moments import aligned, linear_columns, moments, with_one
+from .moments import Rows, air_moments, drifted, linear_columns, moments, smoothed, with_one
 from .recorded import Floats, Run
 
 INNER_FOLDS = 5
@@ -87,6 +87,7 @@ class _Trainer:
         self.axes = run.truth.shape[1]
         self._full: dict[tuple[int, int], Floats] = {}
         self._linear: dict[tuple[int, int], Floats] = {}
+        self._air = air_moments(run)
 
     def train(self, lag_rows: int, of: list[int], strips: Strips) -> Fit:
         """Fit all models on ``strips``, with inner folds over the blocks ``of``."""
@@ -98,6 +99,9 @@ class _Trainer:
         size = sums.shape[1]
         folds = self._folds(of, strips)
         total = sums[strips].sum(axis=0)
+        if self._air is not None:
+            # another recording than the run: it is in every training and in no test
+            total = total + self._air
         kept = [total - sums[gone].sum(axis=0) for gone, _ in folds]
         tested = [sums[out].sum(axis=0) for _, out in folds]
         rows = sum(float(test[-self.axes - 1, -self.axes - 1]) for test in tested)
@@ -176,7 +180,7 @@ def validate(
 
 
 def _validate(run: Run, align: bool, windows: tuple[int, ...], show: Show | None) -> Validation:
-    blocks = Blocks(run.rest)
+    blocks = Blocks(run.rest, run.contact)
     axes = run.truth.shape[1]
     at_lags = lag_moments(run, blocks)
     lag_rows, affine_r2 = check(run, blocks, at_lags)
@@ -202,8 +206,16 @@ def _validate(run: Run, align: bool, windows: tuple[int, ...], show: Show | None
     return Validation(run, blocks, predicted, by_model, tuple(folds), final, lag_rows, affine_r2)
 
 
-def predict(run: Run, fit: Fit, choices: tuple[Choice, ...], rows: slice = slice(None)) -> Floats:
+def predict(run: Run, fit: Fit, choices: tuple[Choice, ...], rows: Rows | None = None) -> Floats:
     """What ``choices`` make of the run's ``rows`` at every drift of SHIFTS_COUNTS: (3, n, axes)."""
     coefficients = np.column_stack([choice.coefficients for choice in choices])
-    signals = aligned(run, fit.window_rows, fit.lag_rows, rows)
-    return np.array([with_one(features.columns(signals.drifted(c * run.drift))) @ coefficients for c in SHIFTS_COUNTS])
+    index = np.arange(len(run.counts)) if rows is None else rows
+
+    def mapped(signals: features.Signals) -> Floats:
+        wrench: Floats = with_one(features.columns(signals)) @ coefficients
+        return wrench
+
+    at_shifts = [
+        smoothed(run, fit.window_rows, fit.lag_rows, index, drifted(run, counts, mapped)) for counts in SHIFTS_COUNTS
+    ]
+    return np.array(at_shifts)
