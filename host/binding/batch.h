@@ -4,6 +4,7 @@
 
 #include "kernel.h"
 #include "map.h"
+#include "pressure.h"
 
 // counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). flags: (n,), POC_INVALID
 // only. Every row goes through bt_signals_q4 and bt_kernel as on the board.
@@ -15,5 +16,13 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
 // marked invalid where the map has no torque.
 void bt_map_frames(int64_t n, const bt_map *map, const uint16_t *counts, const uint16_t *tare_q4,
                    const int32_t *pdc_above_rest_q4, int32_t *force_100un, int32_t *torque_mnmm);
+// The same of pressure. filtered_q4, tare_q4, force_100un: (n,).
+void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *tare_q4, int32_t gain_nn,
+                        int32_t *force_100un);
+
+// The words of n rounds through the filter, from its beginning. pdc, filtered_q4: (n,).
+void bt_pressure_filter(int64_t n, const uint16_t *pdc, int32_t filter_milli, uint16_t *filtered_q4);
+
+int bt_rail_count(void); // BT_RAIL_COUNT
 
 #endif

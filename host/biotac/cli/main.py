@@ -17,6 +17,7 @@ from . import (
     check,
     demo,
     doctor,
+    experiment,
     export,
     flash,
     import_btd,
@@ -35,7 +36,7 @@ from . import (
 
 VERBS = (
     demo, list_ports, doctor, info, view, stream, lsl, record, check, replay, recompute, export, import_btd, calibrate,
-    calibration, sim, flash, bench, udev_setup, version,
+    calibration, experiment, sim, flash, bench, udev_setup, version,
 )  # fmt: skip
 
 EPILOG = """\
@@ -44,8 +45,8 @@ board that plays a scenario (sim:press.toml) or recorded counts (sim:trial.npz, 
 emu:pico?source=SOURCE, a Pico's flash image in an emulator that plays the same, or replay:REC,
 a recording that answers as its board did.
 
-exit codes: 0 done   1 check or doctor found something   2 unusable file or argument   3 port cannot be
-opened   4 no gateway on the port   5 firmware of another wire version   6 board lost
+exit codes: 0 done   1 check, doctor or experiment --check found something   2 unusable file or argument
+3 port cannot be opened   4 no gateway on the port   5 firmware of another wire version   6 board lost
 7 command refused   8 flashing failed   130 interrupted
 """
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import _wire as wire
 from ..core import Settings
+from ..errors import InputError
 from ..sim import surface
 from ..sim.gains import fit_gains
 from ..sim.surface import Floats
@@ -69,7 +70,14 @@ def by_paper(trial: Trial, settings: Settings, name: str = PAPER) -> tuple[Trial
 
 
 def by_map(trial: Trial, its: WrenchMap, name: str) -> Estimate:
-    """A fitted map on the trial's counts, with the board's tare of each frame in place of the map's own."""
+    """A fitted map on the trial's counts, with the board's tare of each frame in place of the map's own.
+
+    Raises InputError when the map needs PDC and the trial has none.
+    """
+    if its.with_pdc and not np.isfinite(trial.pressure).any():
+        raise InputError(
+            f"map {name} was trained with PDC, and {trial.name} has none: expected PDC; choose another map"
+        )
     counts = np.where(trial.counts == wire.INVALID_COUNT, np.nan, trial.counts)
     wrench = replace(its, tare=trial.tare).predict(counts, trial.pressure)
     columns = {axis: k for k, axis in enumerate(its.axes)}
@@ -78,9 +86,15 @@ def by_map(trial: Trial, its: WrenchMap, name: str) -> Estimate:
     return Estimate(name, force, torque)
 
 
-def load_maps(paths: Sequence[Path]) -> dict[str, WrenchMap]:
-    """Maps by the name of their file, its endings left out. Raises InputError."""
-    return {path.name.removesuffix(".json").removesuffix(".wrench"): fitted.load(path) for path in paths}
+def load_maps(paths: Sequence[Path]) -> dict[str, tuple[Path, WrenchMap]]:
+    """Maps and where they are from, by the name of their file, its endings left out. Raises InputError."""
+    maps: dict[str, tuple[Path, WrenchMap]] = {}
+    for path in paths:
+        name = path.name.removesuffix(".json").removesuffix(".wrench")
+        if name in maps or name.startswith(PAPER):
+            raise InputError(f"{path}: another model is called {name} too: expected names that differ; rename the file")
+        maps[name] = path, fitted.load(path)
+    return maps
 
 
 def rmse(estimate: Floats | None, truth: Floats | None, rows: Bools) -> Floats:

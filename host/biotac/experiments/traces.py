@@ -117,11 +117,12 @@ def _legend(axes: Any) -> None:
 
 
 def _phases(axes: Any, trial: Trial, *, named: bool) -> None:
-    starts = [0.0, *[phase.end_s for phase in trial.phases[:-1]]]
-    for k, (start, phase) in enumerate(zip(starts, trial.phases, strict=True)):
+    start = 0.0
+    for k, phase in enumerate(trial.phases):
         if k % 2:
             axes.axvspan(start, phase.end_s, color="#0f172a", alpha=0.05, linewidth=0)
         if named:
             axes.annotate(phase.name.replace(" ", "\n"), (np.mean([start, phase.end_s]), 1.0),
                           xycoords=("data", "axes fraction"), xytext=(0, 3), textcoords="offset points", ha="center",
                           fontsize=8 if len(trial.phases) < 10 else 6.5)  # fmt: skip
+        start = phase.end_s

@@ -63,21 +63,23 @@ def estimated(
     scaled, own = by_paper(trial, on_this, PAPER)
     scales = {PAPER: on_this}
     estimates = [own]
-    notes = [*notes, f"{PAPER}: one scale an axis, least squares on this very trial, which is the best they can do"]
+    notes = [
+        *notes,
+        f"{PAPER}: one scale an axis, least squares on this very trial, which is the best they can do; an axis without "
+        "load keeps the board's default",
+    ]
+    if trial.torque_nmm is not None:
+        notes.append("the board has no scale for Mx, which the electrodes hardly see: it publishes the force's lever")
     if before:
         name = f"{PAPER}, scaled before"
         scales[name] = paper_scales(before)
         estimates.append(by_paper(trial, scales[name], name)[1])
         notes.append(f"{name}: the same fitted on {' and '.join(t.name for t in before)} of the same finger instead")
-    notes += [f"{name}: {its.model}, {options_path(options, name)}" for name, its in maps.items()]
-    estimates += [by_map(scaled, its, name) for name, its in maps.items()]
+    for name, (path, its) in maps.items():
+        estimates.append(by_map(scaled, its, name))
+        notes.append(f"{name}: {its.model}, {path}")
     named = {name: {setting.name.lower(): value for setting, value in these.items()} for name, these in scales.items()}
     return Result(source, scaled, estimates, named, notes, is_recorded)
-
-
-def options_path(options: Options, name: str) -> str:
-    """The file a map of this name came from."""
-    return str(next(path for path in options.maps if path.name.startswith(name)))
 
 
 def loaded(trial: Trial) -> Bools:
