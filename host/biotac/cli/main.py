@@ -23,6 +23,7 @@ from . import (
     info,
     list_ports,
     lsl,
+    map,
     recompute,
     record,
     replay,
@@ -35,7 +36,7 @@ from . import (
 
 VERBS = (
     demo, list_ports, doctor, info, view, stream, lsl, record, check, replay, recompute, export, import_btd, calibrate,
-    calibration, sim, flash, bench, udev_setup, version,
+    calibration, map, sim, flash, bench, udev_setup, version,
 )  # fmt: skip
 
 EPILOG = """\
