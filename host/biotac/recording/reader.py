@@ -33,9 +33,9 @@ class Recording:
     heartbeats, ``wire`` the FRAME messages as sent, ``messages`` the rest (tare changes, status). ``settings`` are the
     board's, ``calibrations`` and ``maps`` (bytes, as the board holds them) those in force, by finger, when it began.
     ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its
-    index; ``damaged_chunks``: seconds that were left out. ``blocks`` are the wire's bytes as they came, about one a second, and ``arrived_ns`` when each began, by
-    the host's clock (Unix). Raises RecordingError when nothing can be read. ``show`` is told the share of the
-    work that is done.
+    index; ``damaged_chunks``: seconds that were left out. ``blocks`` are the wire's bytes as they came, about one a
+    second, and ``arrived_ns`` when each began, by the host's clock (Unix). Raises RecordingError when nothing can be
+    read. ``show`` is told the share of the work that is done.
     """
 
     def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] = lambda share: None) -> None:
