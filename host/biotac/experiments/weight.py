@@ -161,7 +161,10 @@ def errors_table(facts: Facts) -> list[str]:
             values = [*its.get("rmse_nmm", [None] * 3), its.get("torsion_rmse_nmm"), its.get("torsion_at_poc_rmse_nmm")]
             row += [text(value, 2) for value in values]
         rows.append(row)
-    lines = [f"RMSE over {facts['loaded_frames']} loaded frames (true force above {LOADED_N:g} N)."]
+    lines = [
+        "The paper draws this trial and gives no numbers, so what stands against it is its model on the same counts.",
+        f"RMSE over {facts['loaded_frames']} loaded frames (true force above {LOADED_N:g} N).",
+    ]
     if torque:
         lines.append(
             "Torsion is about the contact's normal, (M - c x F) . n: at the true contact, and at the point of contact "
