@@ -211,9 +211,15 @@ def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tm
     np.testing.assert_allclose(mean, predict(run, final, final.best, rows)[0], atol=1e-9)
     assert np.isnan(again.predict(np.full((1, 19), np.nan))).all()
     facts = json.loads(place.read_text())
-    for change in ({"format": "other"}, {"tare_counts": [1.0]}, {"coefficients": [[1.0, 2.0, 3.0]]}, {"axes": None}):
+    for change in (
+        {"format": "other"},
+        {"tare_counts": [1.0]},
+        {"coefficients": [[1.0, 2.0, 3.0]]},
+        {"axes": None},
+        {"blocks": []},
+    ):
         place.write_text(json.dumps(facts | change))
-        with pytest.raises(InputError, match="expected a biotac-wrench-map/1"):
+        with pytest.raises(InputError, match="expected a biotac-wrench-map/2"):
             fitted.load(place)
 
 

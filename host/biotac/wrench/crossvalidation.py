@@ -17,12 +17,17 @@ from threadpoolctl import threadpool_limits
 from . import features
 from .alignment import best_lag, check, lag_moments
 from .blocks import BLOCKS, Blocks
-from .models import AFFINE, LAMBDAS, MODELS, POOL, POOLED, solve, squared_errors, truth_variance, used
+from .models import AFFINE, GATED, LAMBDAS, MODELS, POOL, POOLED, solve, squared_errors, truth_variance, used
 from .moments import Rows, air_moments, drifted, linear_columns, moments, smoothed, with_one
 from .recorded import Floats, Run
 
 INNER_FOLDS = 5
 WINDOWS_ROWS = (1, 5)  # as recorded, or the mean of five: half the noise for 20 ms of delay at 100 Hz
+# What the frames in free air weigh against the run's. A finger that never rests leaves the map free to say half a
+# newton in air; but where light presses are scarce, holding it at zero bends the map in contact. So: the most that
+# costs no force axis more than a twentieth of its error.
+AIR_SHARES = (0.05, 0.01, 0.003)
+AIR_COST = 1.1  # in squared error
 SHIFTS_COUNTS = (0.0, 100.0, -100.0)  # un-tared drift the result is tried with
 
 Show = Callable[[str], None]
@@ -45,10 +50,14 @@ class Choice:
 
 @dataclass(frozen=True)
 class Fit:
-    """One training: the choice per axis for every model by name, and ``best`` of them per axis."""
+    """One training: the choice per axis for every model by name, and ``best`` of them per axis.
+
+    ``air_share`` is the weight of the frames in free air, of the run's; 0 without any.
+    """
 
     lag_rows: int
     window_rows: int
+    air_share: float
     by_model: dict[str, tuple[Choice, ...]]
 
     @property
@@ -99,9 +108,10 @@ class _Trainer:
         size = sums.shape[1]
         folds = self._folds(of, strips)
         total = sums[strips].sum(axis=0)
+        air_share = self._air_share(sums, total, folds)
         if self._air is not None:
             # another recording than the run: it is in every training and in no test
-            total = total + self._air
+            total = total + air_share * self._air
         kept = [total - sums[gone].sum(axis=0) for gone, _ in folds]
         tested = [sums[out].sum(axis=0) for _, out in folds]
         rows = sum(float(test[-self.axes - 1, -self.axes - 1]) for test in tested)
@@ -132,7 +142,7 @@ class _Trainer:
             )
             for a in range(self.axes)
         )
-        return Fit(lag_rows, window, by_model)
+        return Fit(lag_rows, window, air_share, by_model)
 
     def _folds(self, of: list[int], strips: Strips) -> list[tuple[Strips, Strips]]:
         """Per inner fold the strips that are not trained on and those that are tested."""
@@ -148,6 +158,25 @@ class _Trainer:
         for axis, k in enumerate(best):
             whole[index[: -self.axes], axis] = fits[k, :, axis]
         return whole
+
+    def _air_share(self, sums: Floats, total: Floats, folds: list[tuple[Strips, Strips]]) -> float:
+        """By a model that bends as the chosen one will, and costs a tenth."""
+        if self._air is None:
+            return 0.0
+        index = used(GATED, sums.shape[1], self.axes)
+        grid = np.ix_(index, index)
+        air = self._air[grid]
+        kept = [(total - sums[gone].sum(axis=0))[grid] for gone, _ in folds]
+        tested = [sums[out].sum(axis=0)[grid] for _, out in folds]
+
+        def error(share: float) -> Floats:
+            fits = [solve(GATED, part + share * air, self.axes, self.run.tare) for part in kept]
+            errors = sum(squared_errors(f, test, self.axes) for f, test in zip(fits, tested, strict=True))
+            forces: Floats = np.asarray(errors).min(axis=0)[:3]
+            return forces
+
+        without = error(0.0)
+        return next((share for share in AIR_SHARES if (error(share) <= AIR_COST * without).all()), 0.0)
 
     def _window(self, lag_rows: int, of: list[int], strips: Strips) -> int:
         """By the affine model, which costs little: noise is noise whatever is fitted to it."""

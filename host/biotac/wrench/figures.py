@@ -121,6 +121,7 @@ def summary(validation: Validation) -> dict[str, Any]:
         "drift_rmse_n": [_list(shifted[:3]) for shifted in of[1:]],
         "better_than_lin": _list(lin / np.maximum(of[0], 1e-12)),
         "rest_n": rest_n(validation),
+        "air_share": validation.final.air_share,
         "lag_rows": validation.lag_rows,
         "lag_corrected_rows": validation.final.lag_rows,
         "window_rows": validation.final.window_rows,
@@ -131,6 +132,7 @@ def summary(validation: Validation) -> dict[str, Any]:
         "confusion": [_list(row) for row in confusion(predicted[0], truth)],
         "worst_region": {"x_mm": worst.x_mm, "y_mm": worst.y_mm, "rows": worst.rows, "rmse_n": worst.rmse_n},
         "contact_edges": validation.blocks.whole_contacts,
+        "contacts": validation.blocks.contacts,
         "notes": list(run.notes),
     }
     if len(run.axes) > 3:

@@ -44,7 +44,7 @@ MODELS = (
     Model("conductance-quadratic", features.CONDUCTANCE_QUADRATIC, "ridge", "all products of two conductances, PDC"),
     Model("joined", features.JOINED, "ridge", "gated-twice and conductance-quadratic in one"),
 )
-LIN, AFFINE = MODELS[0], MODELS[2]
+LIN, AFFINE, GATED = MODELS[0], MODELS[2], MODELS[4]
 
 # Which of the three is best changes from axis to axis and from block to block by less than what their mean gains.
 POOLED = "pooled"

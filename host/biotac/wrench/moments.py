@@ -21,7 +21,6 @@ from .recorded import Floats, Run
 DRIFT_SIGMA_COUNTS = 100.0  # what a finger drifts by in about two minutes of warm-up (biotac.md finding 6)
 DRIFT_NODES = ((0.0, 2.0 / 3.0), (-np.sqrt(3.0), 1.0 / 6.0), (np.sqrt(3.0), 1.0 / 6.0))
 NO_DRIFT = ((0.0, 1.0),)
-AIR_SHARE = 0.05  # of the run's rows: what the frames of E_base weigh together
 
 Nodes = tuple[tuple[float, float], ...]
 Columns = Callable[[Signals], Floats]
@@ -82,14 +81,14 @@ def moments(
 
 
 def air_moments(run: Run, columns: Columns = features.columns, nodes: Nodes = DRIFT_NODES) -> Floats | None:
-    """Z'Z (q, q) of the frames in free air, whose truth is 0, weighing AIR_SHARE of the run's rows; None without."""
+    """Z'Z (q, q) of the frames in free air, whose truth is 0, weighing as much as all of the run; None without."""
     if run.air is None:
         return None
     pdc = None if run.pdc is None else np.zeros(len(run.air))
     signals = Signals(run.air - run.tare, run.tare, pdc)
     drifting = ((weight, drifted(run, at * DRIFT_SIGMA_COUNTS, columns)(signals)) for at, weight in nodes)
     sums = _products(drifting, np.zeros((len(run.air), run.truth.shape[1])))
-    return sums * (AIR_SHARE * len(run.truth) / len(run.air))
+    return sums * (len(run.truth) / len(run.air))
 
 
 def drifted(run: Run, mean_counts: float, of: Columns) -> Columns:

@@ -19,6 +19,7 @@ from .contact import locate, locate_on_mesh
 
 LIGHT_N = 0.5  # a lighter contact holds no torsion to speak of: friction times force times half its width
 MAX_NOWHERE_SHARE = 0.01
+MAX_OFF_MM = 2.0  # how far beside the core a line of action may pass and still be a touch of the skin over it
 
 
 def truth(
@@ -43,7 +44,7 @@ def truth(
     found = locate(force_n[firm], moment_nmm[firm])
     torsion[firm] = found.torsion_nmm
     missed = firm.copy()
-    missed[firm] = found.missed | ~np.isfinite(found.torsion_nmm)
+    missed[firm] = found.missed | ~found.on_skin
     torsion[missed] = _on_mesh(force_n[missed], moment_nmm[missed])
     nowhere = ~np.isfinite(torsion)
     note = f"torsion: from F and M of point contacts; the line of action misses the finger in {missed.sum()} rows"
@@ -54,6 +55,9 @@ def truth(
 
 
 def _on_mesh(force_n: Floats, moment_nmm: Floats) -> Floats:
+    """Torsion (n,) at the mesh point that fits best; NaN where none explains the moment to MAX_OFF_MM."""
     point = locate_on_mesh(force_n, moment_nmm)
-    torsion: Floats = ((moment_nmm - np.cross(point, force_n)) * surface.normals_at(point)).sum(axis=1)
-    return torsion
+    normal = surface.normals_at(point)
+    about = moment_nmm - np.cross(point, force_n)
+    off_mm = np.linalg.norm(np.cross(normal, about), axis=1) / np.linalg.norm(force_n, axis=1)
+    return np.where(off_mm <= MAX_OFF_MM, (about * normal).sum(axis=1), np.nan)
