@@ -51,7 +51,7 @@ Show = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Hands:
-    """One emulated hand of five fingers, calibrated and verified. ``fits`` and ``verified`` are in FINGERS' order."""
+    """One emulated hand of five fingers, calibrated and verified. ``fits`` and ``verified`` are in the fingers' order."""
 
     profile: Profile
     seeds: tuple[int, ...]
@@ -92,26 +92,31 @@ def run(options: Options) -> Result:
 
 
 def calibrate(
-    seed: int, profile: Profile = "new", show: Show = lambda words: None, *, board: str = "posix", at: str = PLACE
+    seed: int,
+    profile: Profile = "new",
+    show: Show = lambda words: None,
+    *,
+    board: str = "posix",
+    fingers: Sequence[int] = FINGERS,
 ) -> Hands:
-    """Calibrate and verify a hand of five emulated fingers on an emulated ``board`` (posix or pico).
+    """Calibrate and verify an emulated hand, of five fingers or some of them, on an emulated ``board`` (posix or pico).
 
     The source is played twice: a board takes no calibration while it streams, and emulated time does not wait for
     commands. The second time K is in force from the start, and only the last press of each finger is looked at.
     """
-    seeds = tuple(seed + k for k in FINGERS)
+    seeds = tuple(seed + k for k in range(len(fingers)))
     forces = CALIBRATION_FORCES_N, VERIFICATION_FORCES_N
-    series = [script.presses(FINGERS, its, [at] * len(its)) for its in forces]
+    series = [script.presses(fingers, its, [PLACE] * len(its)) for its in forces]
     source = script.source("navarro", seeds, profile, [*series[0], *series[1]])
     verify_s = script.seconds(series[0])  # a rest before the first of these presses: the one before it all, REST_S
 
-    first = Procedure(FINGERS, CALIBRATION_FORCES_N)
+    first = Procedure(fingers, CALIBRATION_FORCES_N)
     show(f"{profile}: three presses a finger")
     with _open(source, board) as hand:
         driving.drive(hand, first, Truth(source))
     fits = {f: fit(first.rests[f], presses) for f, presses in first.presses.items()}
 
-    second = Procedure(FINGERS, VERIFICATION_FORCES_N)
+    second = Procedure(fingers, VERIFICATION_FORCES_N)
     outcome, truth, apart = CrossCheck(), Truth(source), 0
     show(f"{profile}: a verification press a finger")
     with _open(source, board) as hand:
@@ -124,13 +129,13 @@ def calibrate(
             rows = rows_of(batch.wire, batch.t_us, truth.at(batch.wire["finger"], batch.t_us))
             second.feed(rows[rows["t_us"] - truth.first_us >= verify_s * 1e6])
     second.finish()
-    verification = [second.presses[f][0] for f in FINGERS]
+    verification = [second.presses[f][0] for f in fingers]
     return Hands(
         profile=profile,
         seeds=seeds,
-        fits=tuple(fits[f] for f in FINGERS),
-        presses=tuple(tuple(first.presses[f]) for f in FINGERS),
-        verified=tuple(verify(fits[f], press) for f, press in zip(FINGERS, verification, strict=True)),
+        fits=tuple(fits[f] for f in fingers),
+        presses=tuple(tuple(first.presses[f]) for f in fingers),
+        verified=tuple(verify(fits[f], press) for f, press in zip(fingers, verification, strict=True)),
         verification=tuple(verification),
         frames_checked=outcome.frames,
         violations=outcome.violations,
