@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 
-from . import calibrate_wrench
+from . import calibrate_pressure, calibrate_wrench
 
 NAME = "calibrate"
-HELP = "Fit a finger's wrench to a force plate, and measure it held out."
+HELP = "Fit a finger's wrench, or its pressure, to a force plate, and measure it held out."
 EXAMPLE = calibrate_wrench.EXAMPLE
 
-WHATS = (calibrate_wrench,)
+WHATS = (calibrate_wrench, calibrate_pressure)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -75,10 +75,14 @@ class Procedure:
         Raises InputError when a finger has waited for a minute of rows in vain, with what was seen.
         """
         for machine in self._machines:
-            if machine.phase is not Phase.DONE:
-                machine.feed(rows[rows["finger"] == machine.finger])
-            if machine.phase is not Phase.DONE:
+            if machine.phase is Phase.DONE:
+                continue
+            mine = rows[rows["finger"] == machine.finger]
+            taken = machine.feed(mine)
+            if not machine.done:
                 return
+            # The next one begins here, however many rows come at once.
+            rows = rows[rows["t_us"] > mine["t_us"][taken - 1]] if taken else rows
 
     def finish(self) -> None:
         """No more rows come. InputError unless all is done."""

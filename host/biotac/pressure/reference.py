@@ -53,6 +53,11 @@ class Truth:
         self._first_row = int(np.argmax(np.any(source.samples <= 4095, axis=(1, 2))))
         self._first_us: int | None = None
 
+    @property
+    def first_us(self) -> int:
+        """Device time of the source's first row; 0 before anything was asked."""
+        return self._first_us or 0
+
     def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
         """See Reference.at."""
         if not len(t_us):
