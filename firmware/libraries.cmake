@@ -8,7 +8,7 @@ add_library(biotac_core STATIC
   ${fw}/core/cobs.c ${fw}/core/commands.c ${fw}/core/crc32.c
   ${fw}/core/crc32_gen.c
   ${fw}/core/finger.c ${fw}/core/fold_gen.c ${fw}/core/framing.c ${fw}/core/gate.c ${fw}/core/kernel.c
-  ${fw}/core/noise.c ${fw}/core/poc.c ${fw}/core/release.c ${fw}/core/results.c ${fw}/core/root_gen.c
+  ${fw}/core/noise.c ${fw}/core/poc.c ${fw}/core/pressure.c ${fw}/core/release.c ${fw}/core/results.c ${fw}/core/root_gen.c
   ${fw}/core/running.c ${fw}/core/sensor_gen.c ${fw}/core/session.c ${fw}/core/settings.c ${fw}/core/sigma.c
   ${fw}/core/storage.c ${fw}/core/sweep.c ${fw}/core/tare.c
   ${fw}/core/thermal.c ${fw}/core/wire_gen.c ${fw}/core/wrench.c)

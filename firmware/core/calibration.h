@@ -24,15 +24,16 @@ bool bt_calibration_fits(const bt_calibration *calibration, const uint8_t serial
 // OUT_OF_RANGE.
 uint8_t bt_calibration_apply(const bt_calibration *calibration, bt_settings *settings);
 
-// As a stored record, little-endian: u8 serial[16], u32 made_s, i32 value[7]. A cleared one is a record of no
-// bytes. A model with more to it becomes another version.
-#define BT_CALIBRATION_RECORD_VERSION 1
+// As a stored record, little-endian: u8 serial[16], u32 made_s, i32 value[8]. A cleared one is a record of no
+// bytes. A model with more to it becomes another version: 1 ended before pressure_gain_nn, which then is not
+// calibrated.
+#define BT_CALIBRATION_RECORD_VERSION 2
 #define BT_CALIBRATION_RECORD_BYTES   (BT_SERIAL_BYTES + 4 + 4 * BT_CALIBRATION_VALUES)
 
 // Returns the record's size.
 size_t bt_calibration_pack(const bt_calibration *calibration, uint8_t record[BT_CALIBRATION_RECORD_BYTES]);
 
-// A record of another version, of another size or with a value out of its range leaves none.
+// A record of an unknown version, of another size or with a value out of its range leaves none.
 void bt_calibration_unpack(bt_calibration *calibration, uint16_t version, const uint8_t *record,
                            size_t bytes);
 

@@ -5,14 +5,18 @@
 #include <string.h>
 
 #define SUBSCRIBED_AT_FIRST                                                                                  \
-    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_REST_FRAMES)
+    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_PRESSURE     \
+     | BT_QUANTITY_FLAG_REST_FRAMES)
 
 void bt_finger_reset(bt_finger *finger, uint8_t index)
 {
+    bt_settings initial;
     memset(finger, 0, sizeof *finger);
     finger->index = index;
     finger->quantities = SUBSCRIBED_AT_FIRST;
     bt_tare_reset(&finger->tare);
+    bt_settings_reset(&initial);
+    bt_pressure_use(&finger->pressure, &initial);
     bt_frame_clear(&finger->frame);
 }
 
@@ -87,6 +91,7 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
     if (finger->next_slot < BT_SLOTS) {
         (void)fill(finger, BT_SLOTS);
     }
+    bt_pressure_add(&finger->pressure, finger->frame.pdc);
     if (finger->frame.good_words == 0) {
         fall_silent(finger);
         return false;
@@ -127,6 +132,14 @@ static uint16_t seq_of(const bt_finger *finger)
     return (uint16_t)(finger->seq - 1);
 }
 
+static void tell_pressure(const bt_finger *finger, bt_msg_frame *msg)
+{
+    const bt_pressure *pressure = &finger->pressure;
+    bool asked = finger->quantities & BT_QUANTITY_FLAG_PRESSURE;
+    msg->pdc_filtered_q4 = asked ? bt_pressure_filtered_q4(pressure) : BT_INVALID_COUNT;
+    msg->pressure_force_100un = bt_pressure_force(msg->pdc_filtered_q4, msg->pdc_tare_q4, pressure->gain_nn);
+}
+
 void bt_finger_frame(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_frame *msg)
 {
     const bt_frame *frame = &finger->frame;
@@ -141,6 +154,7 @@ void bt_finger_frame(bt_finger *finger, const bt_kernel_settings *settings, bt_m
     memcpy(msg->counts, frame->electrode, sizeof msg->counts);
     memcpy(msg->tare_q4, finger->tare.electrode_q4, sizeof msg->tare_q4);
     bt_results(frame, &finger->tare, settings, finger->quantities, msg);
+    tell_pressure(finger, msg);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
     finger->sent = finger->tare.gate.smooth;
 }

@@ -4,6 +4,7 @@
 #define BIOTAC_FINGER_H
 
 #include "assembly.h"
+#include "pressure.h"
 #include "results.h"
 #include "running.h"
 #include "tare.h"
@@ -30,6 +31,7 @@ typedef struct {
     bool tare_unsent;   // the tare changed in the latest round
     bt_frame frame;     // of the latest round, or being assembled
     bt_tare tare;
+    bt_pressure pressure;
     bt_running running; // of the latest GET_POINT
     bt_lanes sent;      // filtered counts when the last FRAME was sent
     bt_word_counts words;

@@ -117,7 +117,8 @@ void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_sett
                 uint32_t quantities, bt_msg_frame *msg)
 {
     uint32_t flags = bt_channel_flags(frame, tare);
-    flags |= (quantities & BT_WANT_ALL) != BT_WANT_ALL ? BT_FRAME_FLAG_NOT_ASKED : 0;
+    uint32_t every = BT_WANT_ALL | BT_QUANTITY_FLAG_PRESSURE; // sigma is asked for by few
+    flags |= (quantities & every) != every ? BT_FRAME_FLAG_NOT_ASKED : 0;
     bt_sigma_unknown(msg);
     if (flags & BT_FRAME_FLAG_UNTARED) {
         msg->flags = flags;

@@ -9,12 +9,12 @@ void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_w
     session->write = write;
     session->status_us = now_us;
     session->second_us = now_us;
-    bt_settings_reset(&session->settings);
-    bt_session_use_settings(session);
-    bt_deframer_reset(&session->deframer);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         bt_finger_reset(&session->finger[f], f);
     }
+    bt_settings_reset(&session->settings);
+    bt_session_use_settings(session);
+    bt_deframer_reset(&session->deframer);
 }
 
 void bt_session_use_board(bt_session *session, const bt_board_actions *actions)
@@ -40,6 +40,7 @@ static void use_finger_settings(bt_session *session, int f)
     }
     session->kernel[f] = bt_kernel_settings_from(&own);
     session->tare[f] = bt_tare_settings_from(&own);
+    bt_pressure_use(&session->finger[f].pressure, &own);
 }
 
 void bt_session_use_settings(bt_session *session)

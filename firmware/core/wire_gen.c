@@ -212,7 +212,7 @@ void bt_msg_calibration_pack(const bt_msg_calibration *msg, uint8_t out[BT_CALIB
         at = put(at, (uint32_t)msg->serial[k], 1);
     }
     at = put(at, (uint32_t)msg->made_s, 4);
-    for (int k = 0; k < 7; k++) {
+    for (int k = 0; k < 8; k++) {
         at = put(at, (uint32_t)msg->value[k], 4);
     }
     (void)at;
@@ -234,7 +234,7 @@ void bt_msg_calibration_unpack(bt_msg_calibration *msg, const uint8_t in[BT_CALI
     }
     at = get(at, &value, 4);
     msg->made_s = (uint32_t)value;
-    for (int k = 0; k < 7; k++) {
+    for (int k = 0; k < 8; k++) {
         at = get(at, &value, 4);
         msg->value[k] = (int32_t)value;
     }
@@ -272,6 +272,8 @@ void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
     for (int k = 0; k < 3; k++) {
         at = put(at, (uint32_t)msg->force_sigma_100un[k], 2);
     }
+    at = put(at, (uint32_t)msg->pdc_filtered_q4, 2);
+    at = put(at, (uint32_t)msg->pressure_force_100un, 4);
     (void)at;
 }
 
@@ -323,6 +325,10 @@ void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
         at = get(at, &value, 2);
         msg->force_sigma_100un[k] = (uint16_t)value;
     }
+    at = get(at, &value, 2);
+    msg->pdc_filtered_q4 = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->pressure_force_100un = (int32_t)value;
     (void)at;
 }
 
@@ -903,7 +909,7 @@ void bt_msg_set_calibration_pack(const bt_msg_set_calibration *msg, uint8_t out[
         at = put(at, (uint32_t)msg->serial[k], 1);
     }
     at = put(at, (uint32_t)msg->made_s, 4);
-    for (int k = 0; k < 7; k++) {
+    for (int k = 0; k < 8; k++) {
         at = put(at, (uint32_t)msg->value[k], 4);
     }
     (void)at;
@@ -923,7 +929,7 @@ void bt_msg_set_calibration_unpack(bt_msg_set_calibration *msg, const uint8_t in
     }
     at = get(at, &value, 4);
     msg->made_s = (uint32_t)value;
-    for (int k = 0; k < 7; k++) {
+    for (int k = 0; k < 8; k++) {
         at = get(at, &value, 4);
         msg->value[k] = (int32_t)value;
     }
@@ -1030,6 +1036,8 @@ const bt_setting_spec bt_setting_specs[BT_SETTINGS] = {
     {BT_SETTING_STATUS_PERIOD_MS, 100, 60000, 1000},
     {BT_SETTING_IDLE_PERIOD_MS, 20, 60000, 100},
     {BT_SETTING_THERMAL_GAIN_MILLI, -5000, 5000, 500},
+    {BT_SETTING_PRESSURE_GAIN_NN, 0, 100000000, 0},
+    {BT_SETTING_PRESSURE_FILTER_MILLI, 10, 1000, 500},
 };
 
 const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES] = {
@@ -1040,4 +1048,5 @@ const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES] = {
     BT_SETTING_TORQUE_GAIN_Y_NN,
     BT_SETTING_TORQUE_GAIN_Z_NN,
     BT_SETTING_THERMAL_GAIN_MILLI,
+    BT_SETTING_PRESSURE_GAIN_NN,
 };

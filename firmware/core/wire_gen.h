@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 #define BT_WIRE_MAJOR 1
-#define BT_WIRE_MINOR 3
-#define BT_SCHEMA_HASH 0x16E934A8u
+#define BT_WIRE_MINOR 4
+#define BT_SCHEMA_HASH 0xE81537CFu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -107,7 +107,8 @@ enum bt_calibration_state {
 #define BT_QUANTITY_FLAG_SIGMA (1u << 3) // one-sigma of point of contact and force
 #define BT_QUANTITY_FLAG_REST_FRAMES (1u << 4) // a FRAME in every round; without it an untouched finger sends IDLE heartbeats
 #define BT_QUANTITY_FLAG_TOUCH (1u << 5) // TOUCH messages
-#define BT_QUANTITY_FLAGS 0x3Fu // all there are
+#define BT_QUANTITY_FLAG_PRESSURE (1u << 6) // filtered static pressure, and the force that it tells of a calibrated finger
+#define BT_QUANTITY_FLAGS 0x7Fu // all there are
 
 enum bt_setting {
     BT_SETTING_POC_WEIGHTS = 1, // [enum poc_weights]
@@ -120,8 +121,10 @@ enum bt_setting {
     BT_SETTING_STATUS_PERIOD_MS = 8, // [ms]
     BT_SETTING_IDLE_PERIOD_MS = 9, // [ms]
     BT_SETTING_THERMAL_GAIN_MILLI = 10, // [count/1000 per TDC count]
+    BT_SETTING_PRESSURE_GAIN_NN = 11, // [nN/count]
+    BT_SETTING_PRESSURE_FILTER_MILLI = 12, // [1/1000]
 };
-#define BT_SETTINGS 10
+#define BT_SETTINGS 12
 
 // Ranges, for the bounds that the core asserts.
 #define BT_SETTING_POC_WEIGHTS_MIN (0)
@@ -144,6 +147,10 @@ enum bt_setting {
 #define BT_SETTING_IDLE_PERIOD_MS_MAX 60000
 #define BT_SETTING_THERMAL_GAIN_MILLI_MIN (-5000)
 #define BT_SETTING_THERMAL_GAIN_MILLI_MAX 5000
+#define BT_SETTING_PRESSURE_GAIN_NN_MIN (0)
+#define BT_SETTING_PRESSURE_GAIN_NN_MAX 100000000
+#define BT_SETTING_PRESSURE_FILTER_MILLI_MIN (10)
+#define BT_SETTING_PRESSURE_FILTER_MILLI_MAX 1000
 
 typedef struct {
     uint8_t id;
@@ -153,7 +160,7 @@ typedef struct {
 } bt_setting_spec;
 extern const bt_setting_spec bt_setting_specs[BT_SETTINGS];
 
-#define BT_CALIBRATION_VALUES 7
+#define BT_CALIBRATION_VALUES 8
 extern const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES]; // enum bt_setting of each value
 
 // Who is there. Reply to HELLO_REQUEST.
@@ -231,21 +238,21 @@ void bt_msg_point_unpack(bt_msg_point *msg, const uint8_t in[BT_POINT_BYTES]);
 
 // Calibration of one finger. Reply to GET_CALIBRATION and SET_CALIBRATION.
 #define BT_CALIBRATION_ID 0x06
-#define BT_CALIBRATION_BYTES 51
+#define BT_CALIBRATION_BYTES 55
 typedef struct {
     uint8_t req_id; // [1] of the command
     uint8_t finger; // [1] chip select index
     uint8_t state; // [enum calibration_state] whether it is in force; never changes while streaming
     uint8_t serial[16]; // [ASCII] of the sensor it was made for; all zero: any sensor, or none is there
     uint32_t made_s; // [s] when it was made, since 1970 UTC; 0: unknown
-    int32_t value[7]; // [the per-finger settings'] one for each, by id; with NONE the board's own
+    int32_t value[8]; // [the per-finger settings'] one for each, by id; with NONE the board's own
 } bt_msg_calibration;
 void bt_msg_calibration_pack(const bt_msg_calibration *msg, uint8_t out[BT_CALIBRATION_BYTES]);
 void bt_msg_calibration_unpack(bt_msg_calibration *msg, const uint8_t in[BT_CALIBRATION_BYTES]);
 
 // One finger, one round of slots: counts, the tare that was subtracted, and the results.
 #define BT_FRAME_ID 0x10
-#define BT_FRAME_BYTES 134
+#define BT_FRAME_BYTES 140
 typedef struct {
     uint16_t seq; // [1] counts this finger's frames, sent or not
     uint32_t t_us; // [us] device time at which slot 0 was sampled; slot k is k/4400 s later
@@ -263,6 +270,8 @@ typedef struct {
     uint16_t pdc_tare_q4; // [count q4] pressure at rest; 0xFFFF when never read
     uint16_t poc_sigma_um; // [um] one standard deviation of the PoC from the measured noise, saturating; 0xFFFF when not computed or not measured yet
     uint16_t force_sigma_100un[3]; // [100 uN] one standard deviation of the force, likewise
+    uint16_t pdc_filtered_q4; // [count q4] static pressure through the filter of pressure_filter_milli; 0xFFFF without a good word or when not asked for
+    int32_t pressure_force_100un; // [100 uN] magnitude of the force from pdc_filtered_q4 - pdc_tare_q4, negative below rest; invalid when either is, or without pressure_gain_nn
 } bt_msg_frame;
 void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES]);
 void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES]);
@@ -411,7 +420,7 @@ typedef struct {
 void bt_msg_ping_pack(const bt_msg_ping *msg, uint8_t out[BT_PING_BYTES]);
 void bt_msg_ping_unpack(bt_msg_ping *msg, const uint8_t in[BT_PING_BYTES]);
 
-// What FRAMEs hold from the next round on; until then POC, FORCE, TORQUE and REST_FRAMES. Kept until the next reboot.
+// What FRAMEs hold from the next round on; until then POC, FORCE, TORQUE, PRESSURE and REST_FRAMES. Kept until the next reboot.
 #define BT_SUBSCRIBE_ID 0x8B
 #define BT_SUBSCRIBE_BYTES 3
 typedef struct {
@@ -535,13 +544,13 @@ void bt_msg_get_calibration_unpack(bt_msg_get_calibration *msg, const uint8_t in
 
 // Give a finger values of its own in place of the per-finger settings, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming.
 #define BT_SET_CALIBRATION_ID 0x90
-#define BT_SET_CALIBRATION_BYTES 50
+#define BT_SET_CALIBRATION_BYTES 54
 typedef struct {
     uint8_t req_id; // [1] any but 0
     uint8_t finger; // [1] which finger
     uint8_t serial[16]; // [ASCII] of the sensor it was made for, which must be the one there (OTHER_SENSOR); all zero: any sensor
     uint32_t made_s; // [s] when it was made, since 1970 UTC; 0: unknown
-    int32_t value[7]; // [the per-finger settings'] one for each, by id and in its range
+    int32_t value[8]; // [the per-finger settings'] one for each, by id and in its range
 } bt_msg_set_calibration;
 void bt_msg_set_calibration_pack(const bt_msg_set_calibration *msg, uint8_t out[BT_SET_CALIBRATION_BYTES]);
 void bt_msg_set_calibration_unpack(bt_msg_set_calibration *msg, const uint8_t in[BT_SET_CALIBRATION_BYTES]);
@@ -566,8 +575,8 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
 #define BT_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(flex_version, u8, 2) X(software_version, u8, 4) X(serial, u8, 16) X(cpu_khz, u16, 1) X(sampling_hz, u16, 1)
 #define BT_POINT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(seq, u16, 1) X(slot, u8, 1) X(tare_state, u8, 1) X(poc_um, i16, 3)
-#define BT_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 7)
-#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3)
+#define BT_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 8)
+#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
 #define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
 #define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1)
@@ -590,7 +599,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_REBOOT_BOOTLOADER_FIELDS(X) X(req_id, u8, 1) X(magic, u32, 1)
 #define BT_SAVE_SETTINGS_FIELDS(X) X(req_id, u8, 1)
 #define BT_GET_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_SET_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 7)
+#define BT_SET_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 8)
 #define BT_CLEAR_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration)
 #endif

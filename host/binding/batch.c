@@ -12,6 +12,28 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
     }
 }
 
+void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *tare_q4, int32_t gain_nn,
+                        int32_t *force_100un)
+{
+    for (int64_t k = 0; k < n; k++) {
+        force_100un[k] = bt_pressure_force(filtered_q4[k], tare_q4[k], gain_nn);
+    }
+}
+
+void bt_pressure_filter(int64_t n, const uint16_t *pdc, int32_t filter_milli, uint16_t *filtered_q4)
+{
+    bt_pressure pressure = {.filter_milli = filter_milli};
+    for (int64_t k = 0; k < n; k++) {
+        bt_pressure_add(&pressure, pdc[k]);
+        filtered_q4[k] = bt_pressure_filtered_q4(&pressure);
+    }
+}
+
+int bt_rail_count(void)
+{
+    return BT_RAIL_COUNT;
+}
+
 uint32_t bt_binding_schema_hash(void)
 {
     return BT_SCHEMA_HASH;

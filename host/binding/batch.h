@@ -3,11 +3,21 @@
 #define BIOTAC_BATCH_H
 
 #include "kernel.h"
+#include "pressure.h"
 
 // counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). flags: (n,), POC_INVALID
 // only. Every row goes through bt_signals_q4 and bt_kernel as on the board.
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                       const bt_kernel_settings *settings, int16_t *poc_um, int32_t *force_100un,
                       int32_t *torque_mnmm, uint32_t *flags);
+
+// The same of pressure. filtered_q4, tare_q4, force_100un: (n,).
+void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *tare_q4, int32_t gain_nn,
+                        int32_t *force_100un);
+
+// The words of n rounds through the filter, from its beginning. pdc, filtered_q4: (n,).
+void bt_pressure_filter(int64_t n, const uint16_t *pdc, int32_t filter_milli, uint16_t *filtered_q4);
+
+int bt_rail_count(void); // BT_RAIL_COUNT
 
 #endif

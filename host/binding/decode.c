@@ -12,6 +12,19 @@ _Static_assert(BT_DECODE_ROOM >= BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1, "the 
 
 #define COBS_MAX_BYTES (BT_FRAME_MAX_BYTES + 1)
 
+// What an older peer's message lacks at its end, and stands there then.
+#define LACKS_MAX_BYTES 6
+static const struct {
+    uint8_t id;
+    uint8_t bytes;
+    uint8_t fill[LACKS_MAX_BYTES];
+} lacks[] = {
+    {BT_FRAME_ID, 6, {0xFF, 0xFF, 0, 0, 0, 0x80}}, // pdc_filtered_q4, pressure_force_100un
+    {BT_CALIBRATION_ID, 4, {0}},                   // pressure_gain_nn: not calibrated
+};
+_Static_assert(LACKS_MAX_BYTES <= 1 + BT_CRC_BYTES + 1, "a row filled up must fit the room of what came");
+_Static_assert(BT_FRAME_BYTES == 134 + 6 && BT_CALIBRATION_BYTES == 51 + 4, "who appends more says so above");
+
 void bt_decoder_reset(bt_decoder *decoder)
 {
     decoder->allow_longer = 0;
@@ -56,10 +69,22 @@ static void keep(bt_decoder *decoder, uint8_t id, const uint8_t *payload, size_t
     append(decoder, BT_DECODED_IDS, &id, 1);
 }
 
+// Fills payload, with room for the whole message, up where an older peer's ends. False when it is none.
+static int fill_up(uint8_t id, uint8_t *payload, int payload_bytes, int expected)
+{
+    for (size_t k = 0; k < sizeof lacks / sizeof *lacks; k++) {
+        if (lacks[k].id == id && payload_bytes == expected - lacks[k].bytes) {
+            memcpy(payload + payload_bytes, lacks[k].fill, lacks[k].bytes);
+            return 1;
+        }
+    }
+    return 0;
+}
+
 // What stood between two delimiters.
 static enum bt_deframed finish(bt_decoder *decoder, const uint8_t *in, size_t bytes)
 {
-    uint8_t zeros_and_plain[BT_CRC_PAD_BYTES + COBS_MAX_BYTES];
+    uint8_t zeros_and_plain[BT_CRC_PAD_BYTES + COBS_MAX_BYTES + LACKS_MAX_BYTES];
     uint8_t *plain = zeros_and_plain + BT_CRC_PAD_BYTES;
     if (bytes == 0) {
         return BT_DEFRAMED_NOTHING;
@@ -81,7 +106,8 @@ static enum bt_deframed finish(bt_decoder *decoder, const uint8_t *in, size_t by
     int payload_bytes = (int)covered - 1;
     int expected = decoder->payload_bytes[plain[0]];
     if (expected != BT_UNKNOWN_ID && payload_bytes != expected) {
-        if (!decoder->allow_longer || payload_bytes < expected) {
+        int longer = decoder->allow_longer && payload_bytes > expected;
+        if (!longer && !fill_up(plain[0], plain + 1, payload_bytes, expected)) {
             return BT_DEFRAMED_BAD_LENGTH;
         }
         payload_bytes = expected;

@@ -3,6 +3,10 @@
 //
 // It rests on what framing.h asserts: a frame fits one COBS block. So COBS has put one byte in front and only
 // replaced zeros, and undoing it is one copy and a walk from zero to zero.
+//
+// One thing more than a board's own: a FRAME or a CALIBRATION of wire 1.3 ends before what 1.4 has appended,
+// and is filled up with the mark for invalid or the default. So a board that was not updated, and every
+// recording that was made with one, is still read.
 #ifndef BIOTAC_DECODE_H
 #define BIOTAC_DECODE_H
 

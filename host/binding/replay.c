@@ -12,7 +12,9 @@ static void mark_absent(const bt_finger *finger, bt_msg_frame *msg)
     memset(msg->counts, 0xFF, sizeof msg->counts);
     memset(msg->tare_q4, 0xFF, sizeof msg->tare_q4);
     memset(msg->force_sigma_100un, 0xFF, sizeof msg->force_sigma_100un);
-    msg->pdc = msg->tac = msg->tdc = msg->pdc_tare_q4 = msg->poc_sigma_um = BT_INVALID_COUNT;
+    msg->pdc = msg->tac = msg->tdc = msg->pdc_tare_q4 = BT_INVALID_COUNT;
+    msg->poc_sigma_um = msg->pdc_filtered_q4 = BT_INVALID_COUNT;
+    msg->pressure_force_100un = BT_INVALID_I32;
     for (int d = 0; d < 3; d++) {
         msg->poc_um[d] = BT_INVALID_I16;
         msg->force_100un[d] = msg->torque_mnmm[d] = BT_INVALID_I32;
@@ -35,6 +37,7 @@ void bt_replay(bt_finger *finger, const bt_settings *settings, int64_t n, const 
 {
     bt_tare_settings tare_settings = bt_tare_settings_from(settings);
     bt_kernel_settings kernel_settings = bt_kernel_settings_from(settings);
+    bt_pressure_use(&finger->pressure, settings);
     for (int64_t k = 0; k < n; k++, words += BT_SLOTS, rows += BT_REPLAY_BYTES) {
         uint8_t touch_slot = BT_REPLAY_NO_TOUCH;
         bt_msg_frame msg;

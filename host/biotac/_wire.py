@@ -14,8 +14,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 WIRE_MAJOR = 1
-WIRE_MINOR = 3
-SCHEMA_HASH = 0x16E934A8
+WIRE_MINOR = 4
+SCHEMA_HASH = 0xE81537CF
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -129,6 +129,7 @@ class QuantityFlags(IntFlag):
     SIGMA = 1 << 3  # one-sigma of point of contact and force
     REST_FRAMES = 1 << 4  # a FRAME in every round; without it an untouched finger sends IDLE heartbeats
     TOUCH = 1 << 5  # TOUCH messages
+    PRESSURE = 1 << 6  # filtered static pressure, and the force that it tells of a calibrated finger
 
 
 ERROR_DOC: dict[int, str] = {
@@ -223,6 +224,7 @@ QUANTITY_FLAG_DOC: dict[int, str] = {
     8: "one-sigma of point of contact and force",
     16: "a FRAME in every round; without it an untouched finger sends IDLE heartbeats",
     32: "TOUCH messages",
+    64: "filtered static pressure, and the force that it tells of a calibrated finger",
 }
 
 
@@ -239,6 +241,8 @@ class Setting(IntEnum):
     STATUS_PERIOD_MS = 8
     IDLE_PERIOD_MS = 9
     THERMAL_GAIN_MILLI = 10
+    PRESSURE_GAIN_NN = 11
+    PRESSURE_FILTER_MILLI = 12
 
 
 class SettingSpec(NamedTuple):
@@ -292,6 +296,14 @@ SETTINGS: dict[Setting, SettingSpec] = {
         "count/1000 per TDC count", -5000, 5000, 500,
         "how much a resting electrode gains per count of temperature: the tare follows it in contact; 700 to 970 seen on real fingers, where TDC alone does not tell all",
     ),
+    Setting.PRESSURE_GAIN_NN: SettingSpec(
+        "nN/count", 0, 100000000, 0,
+        "K of Navarro 2015 Eq 1, force per count of static pressure; 0: not calibrated, and no force is told. 9 to 16 million there; `biotac calibrate pressure` finds yours",
+    ),
+    Setting.PRESSURE_FILTER_MILLI: SettingSpec(
+        "1/1000", 10, 1000, 500,
+        "alpha of Navarro 2015 Eq 3, the weight of a new pressure word in the filter; 1000: no filter",
+    ),
 }
 
 # What each value of a calibration stands for.
@@ -303,6 +315,7 @@ CALIBRATION_SETTINGS: tuple[Setting, ...] = (
     Setting.TORQUE_GAIN_Y_NN,
     Setting.TORQUE_GAIN_Z_NN,
     Setting.THERMAL_GAIN_MILLI,
+    Setting.PRESSURE_GAIN_NN,
 )
 
 
@@ -522,10 +535,10 @@ class Calibration:
     value: tuple[int, ...]
 
     ID: ClassVar[int] = 0x06
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBB16BI7i")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBB16BI8i")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 51 bytes."""
+        """Payload without id and CRC, 55 bytes."""
         return self.STRUCT.pack(
             self.req_id,
             self.finger,
@@ -545,7 +558,7 @@ class Calibration:
             v[2],
             v[3 : 19],
             v[19],
-            v[20 : 27],
+            v[20 : 28],
         )
 
 
@@ -569,12 +582,14 @@ class Frame:
     pdc_tare_q4: int
     poc_sigma_um: int
     force_sigma_100un: tuple[int, ...]
+    pdc_filtered_q4: int
+    pressure_force_100un: int
 
     ID: ClassVar[int] = 0x10
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3H")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHi")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 134 bytes."""
+        """Payload without id and CRC, 140 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -592,6 +607,8 @@ class Frame:
             self.pdc_tare_q4,
             self.poc_sigma_um,
             *self.force_sigma_100un,
+            self.pdc_filtered_q4,
+            self.pressure_force_100un,
         )
 
     @classmethod
@@ -615,6 +632,8 @@ class Frame:
             v[55],
             v[56],
             v[57 : 60],
+            v[60],
+            v[61],
         )
 
 
@@ -1022,7 +1041,7 @@ class Ping:
 
 @dataclass(frozen=True, slots=True)
 class Subscribe:
-    """What FRAMEs hold from the next round on; until then POC, FORCE, TORQUE and REST_FRAMES. Kept until the next reboot."""
+    """What FRAMEs hold from the next round on; until then POC, FORCE, TORQUE, PRESSURE and REST_FRAMES. Kept until the next reboot."""
 
     req_id: int
     fingers: int
@@ -1361,10 +1380,10 @@ class SetCalibration:
     value: tuple[int, ...]
 
     ID: ClassVar[int] = 0x90
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB16BI7i")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB16BI8i")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 50 bytes."""
+        """Payload without id and CRC, 54 bytes."""
         return self.STRUCT.pack(
             self.req_id,
             self.finger,
@@ -1382,7 +1401,7 @@ class SetCalibration:
             v[1],
             v[2 : 18],
             v[18],
-            v[19 : 26],
+            v[19 : 27],
         )
 
 
@@ -1511,7 +1530,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("state", "u1"),
             ("serial", "u1", (16,)),
             ("made_s", "<u4"),
-            ("value", "<i4", (7,)),
+            ("value", "<i4", (8,)),
         ]
     ),
     Frame.ID: np.dtype(
@@ -1532,6 +1551,8 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("pdc_tare_q4", "<u2"),
             ("poc_sigma_um", "<u2"),
             ("force_sigma_100un", "<u2", (3,)),
+            ("pdc_filtered_q4", "<u2"),
+            ("pressure_force_100un", "<i4"),
         ]
     ),
     Pac.ID: np.dtype(
@@ -1718,7 +1739,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("finger", "u1"),
             ("serial", "u1", (16,)),
             ("made_s", "<u4"),
-            ("value", "<i4", (7,)),
+            ("value", "<i4", (8,)),
         ]
     ),
     ClearCalibration.ID: np.dtype(

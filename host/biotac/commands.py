@@ -10,11 +10,12 @@ import numpy as np
 from . import _wire as wire
 from ._sensor import MAX_SENSORS
 from .calibration.values import Calibration, own_settings
-from .errors import WireVersionError
+from .errors import CommandRefusedError, WireVersionError
 from .frames import tare_to_q4
 
 ALL_FINGERS = (1 << MAX_SENSORS) - 1
 CALIBRATION_SINCE_MINOR = 3  # of wire 1.x
+PRESSURE_SINCE_MINOR = 4
 
 Reply = TypeVar("Reply")
 
@@ -39,9 +40,11 @@ class Commands(ABC):
 
         What is left out is not computed; it arrives as NaN, under the flag NOT_ASKED. Without REST_FRAMES
         an untouched finger sends heartbeats (``Batch.idle``) in place of frames, without loss of a touch:
-        a frame comes as soon as the signals move. At first it is POC | FORCE | TORQUE | REST_FRAMES; the
-        choice lasts until the board restarts.
+        a frame comes as soon as the signals move. At first it is POC | FORCE | TORQUE | PRESSURE | REST_FRAMES;
+        the choice lasts until the board restarts. A board that knows no PRESSURE is not asked for it.
         """
+        if self.info.wire_minor < PRESSURE_SINCE_MINOR:
+            quantities &= ~wire.QuantityFlags.PRESSURE
         self._command(wire.Subscribe(self._next_req_id(), fingers, int(quantities)))
 
     def ping(self) -> None:
@@ -100,8 +103,16 @@ class Commands(ABC):
         self._command(wire.RebootBootloader(self._next_req_id(), wire.BOOTLOADER_MAGIC))
 
     def settings(self) -> dict[wire.Setting, int]:
-        """All settings."""
-        return {setting: self.setting(setting) for setting in wire.Setting}
+        """All settings; of one that the board's firmware does not have yet, the default, which is what it does."""
+        return {setting: self._known_setting(setting) for setting in wire.Setting}
+
+    def _known_setting(self, setting: wire.Setting) -> int:
+        try:
+            return self.setting(setting)
+        except CommandRefusedError as error:
+            if error.error != wire.Error.UNKNOWN_SETTING:
+                raise
+            return wire.SETTINGS[setting].default
 
     # ---- calibrations --------------------------------------------------------------------------
 
@@ -118,9 +129,15 @@ class Commands(ABC):
         """Give a finger values of its own until the next reboot, or for good with save_settings.
 
         Refused while streaming, and for another sensor's serial number than the one that answered there when
-        the board started; ``serial=""`` is for any.
+        the board started; ``serial=""`` is for any. Raises WireVersionError for a pressure gain on a board whose
+        firmware knows of none.
         """
         its = calibration
+        if its.pressure_gain_nn and self.info.wire_minor < PRESSURE_SINCE_MINOR:
+            raise WireVersionError(
+                "the board's firmware knows no pressure_gain_nn, expected wire "
+                f"1.{PRESSURE_SINCE_MINOR}; update it: biotac flash"
+            )
         request = wire.SetCalibration(self._next_req_id(), finger, its.wire_serial(), its.made_s, its.wire_values())
         self._ask(request, wire.Calibration)
 

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from . import _wire as wire
 
+#: Commands that have grown: the wire minor that did it, and how many bytes the one before knows.
+APPENDED = {wire.SetCalibration.ID: ((4, 50),)}
+
 
 @dataclass(frozen=True)
 class HandWarning:
@@ -27,6 +30,14 @@ def describe_mismatch(hello: wire.Hello) -> str:
     """Both wire versions, and the command that brings them together."""
     mine = f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}"
     return f"wire {hello.wire_major}.{hello.wire_minor}, this library {mine}; {cure(hello)}"
+
+
+def cut(message_id: int, payload: bytes, minor: int) -> bytes:
+    """``payload`` as a board of this wire minor knows it: without what was appended to a command since."""
+    for since, known_bytes in APPENDED.get(message_id, ()):
+        if minor < since:
+            return payload[:known_bytes]
+    return payload
 
 
 def cure(hello: wire.Hello) -> str:

@@ -85,6 +85,31 @@ def on_board_q4(
     return poc_um, force_100un, torque_mnmm, flags
 
 
+def pressure_force_100un(
+    filtered_q4: NDArray[np.uint16], tare_q4: NDArray[np.uint16], gain_nn: int
+) -> NDArray[np.int32]:
+    """The board's force from pressure, of the integers of FRAME messages, all (n,); see firmware/core/pressure.h."""
+    filtered_q4, tare_q4 = np.ascontiguousarray(filtered_q4), np.ascontiguousarray(tare_q4)
+    out = np.empty(len(filtered_q4), np.int32)
+    lib.bt_pressure_forces(
+        len(out),
+        ffi.from_buffer("uint16_t[]", filtered_q4),
+        ffi.from_buffer("uint16_t[]", tare_q4),
+        gain_nn,
+        ffi.from_buffer("int32_t[]", out),
+    )
+    return out
+
+
+def pressure_filtered_q4(pdc: NDArray[np.uint16], filter_milli: int) -> NDArray[np.uint16]:
+    """The board's filter over the PDC words (n,) of consecutive rounds, from its beginning; 1/16 count."""
+    pdc = np.ascontiguousarray(pdc, np.uint16)
+    out = np.empty(len(pdc), np.uint16)
+    pointers = ffi.from_buffer("uint16_t[]", pdc), ffi.from_buffer("uint16_t[]", out)
+    lib.bt_pressure_filter(len(out), pointers[0], filter_milli, pointers[1])
+    return out
+
+
 def board_settings(settings: Settings) -> Any:
     """The C struct bt_settings with these values; what they do not name has its default.
 

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _wire as wire
+from .commands import PRESSURE_SINCE_MINOR
 from .core import TORQUE_GAINS, Results, Settings, ffi, lib, reference_q4
 from .frames import StructArray, electrode_signals, to_units
+from .pressure.check import FORCE_BOUND_N, PressureCheck
 
 #: The PoC's distance and the force of each axis, see firmware/reference/kernel_bounds.h.
 POC_BOUND_UM: float = lib.bt_poc_bound_um()
@@ -51,6 +53,8 @@ class CrossCheck:
     force_mn_max: float = 0.0
     torque_nmm_max: float = 0.0
     torque_nmm_bound: float = 0.0  # the largest that any frame was held to
+    wire_minor: int = wire.WIRE_MINOR  # of the board: before 1.4 none told a force from pressure
+    pressure: PressureCheck = field(default_factory=PressureCheck)
     findings: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
@@ -64,6 +68,11 @@ class CrossCheck:
             "force_mn_bound": FORCE_BOUND_MN,
             "torque_nmm_max": self.torque_nmm_max,
             "torque_nmm_bound": self.torque_nmm_bound,
+            "pressure_mn_max": self.pressure.force_n_max * 1e3,
+            "pressure_mn_bound": FORCE_BOUND_N * 1e3,
+            "pdc_filtered_max": self.pressure.filter_max,
+            "pdc_filtered_bound": self.pressure.filter_bound,
+            "pdc_filter_starts": self.pressure.starts,
             "findings": self.findings,
         }
 
@@ -107,6 +116,9 @@ class CrossCheck:
         self._judge("force", "mN", messages, messages["force_100un"], truth.force_n, force_mn, FORCE_BOUND_MN)
         self._judge("torque", "N*mm", messages, messages["torque_mnmm"], truth.torque_nmm, torque_nmm, torque_bound)
         self._judge_flag(messages)
+        if self.wire_minor >= PRESSURE_SINCE_MINOR:
+            for finding in self.pressure.add(messages, settings):
+                self._find(messages, finding.row, finding.what)
         self.frames += len(messages)
 
     def _judge_flag(self, messages: StructArray) -> None:

@@ -5,6 +5,7 @@ Wire integers become mm, N and N*mm here and nowhere else.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +17,15 @@ from ._wire import INVALID_COUNT, INVALID_I16, INVALID_I32, FrameFlags
 UM_PER_MM = 1_000
 FORCE_LSB_PER_N = 10_000  # force_100un
 MNMM_PER_NMM = 1_000
+Q4_PER_COUNT = 16
 
 #: One row per finger and round of slots. ``counts``, ``pdc``, ``tac`` and ``tdc`` are raw counts
 #: 0..4095, 0xFFFF where no good word came. ``poc_mm``, ``force_n`` and ``torque_nmm`` are NaN where
 #: invalid; ``flags`` (FrameFlags) says why. ``t_us`` is device time, unwrapped from the first value seen
 #: (a board that was up for over 71.6 minutes by then began earlier). ``poc_sigma_mm`` and
 #: ``force_sigma_n`` are one standard deviation, from the noise measured at rest; NaN unless subscribed to.
+#: ``pdc_filtered`` is pressure in counts through the board's filter, NaN without a good word; ``pressure_force_n``
+#: the magnitude of the force it tells of, negative below rest, NaN for a finger without a pressure calibration.
 FRAME_DTYPE = np.dtype(
     [
         ("finger", "u1"),
@@ -36,6 +40,8 @@ FRAME_DTYPE = np.dtype(
         ("torque_nmm", "<f8", (3,)),
         ("poc_sigma_mm", "<f8"),
         ("force_sigma_n", "<f8", (3,)),
+        ("pdc_filtered", "<f8"),
+        ("pressure_force_n", "<f8"),
         ("flags", "<u4"),
     ]
 )
@@ -65,8 +71,8 @@ StructArray = NDArray[np.void]
 class Frame:
     """One finger, one round of slots (10 ms).
 
-    Shapes: counts (19,) uint16; poc_mm, force_n, torque_nmm (3,) float64. Units and invalid marks as
-    in FRAME_DTYPE. Force and torque act on the finger; x to the tip, y to E11's side, z dorsal.
+    Shapes: counts (19,) uint16; poc_mm, force_n, torque_nmm (3,) float64; the rest are numbers. Units and
+    invalid marks as in FRAME_DTYPE. Force and torque act on the finger; x to the tip, y to E11's side, z dorsal.
     """
 
     finger: int
@@ -80,6 +86,7 @@ class Frame:
     force_n: NDArray[np.float64]
     torque_nmm: NDArray[np.float64]
     flags: FrameFlags
+    pressure_force_n: float = math.nan
 
     @classmethod
     def from_row(cls, row: Any) -> Frame:
@@ -96,6 +103,7 @@ class Frame:
             force_n=row["force_n"].copy(),
             torque_nmm=row["torque_nmm"].copy(),
             flags=FrameFlags(int(row["flags"])),
+            pressure_force_n=float(row["pressure_force_n"]),
         )
 
 
@@ -119,6 +127,8 @@ def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any
     out["torque_nmm"] = to_units(messages["torque_mnmm"], MNMM_PER_NMM)
     out["poc_sigma_mm"] = to_units(messages["poc_sigma_um"], UM_PER_MM)
     out["force_sigma_n"] = to_units(messages["force_sigma_100un"], FORCE_LSB_PER_N)
+    out["pdc_filtered"] = to_units(messages["pdc_filtered_q4"], Q4_PER_COUNT)
+    out["pressure_force_n"] = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
     return out
 
 

@@ -28,7 +28,7 @@ from .live.wants import Wants
 from .stream import Batch, LinkStats
 
 #: What a FRAME can say of a contact, for Hand.subscribe.
-RESULTS = wire.QuantityFlags.POC | wire.QuantityFlags.FORCE | wire.QuantityFlags.TORQUE
+RESULTS = wire.QuantityFlags.POC | wire.QuantityFlags.FORCE | wire.QuantityFlags.TORQUE | wire.QuantityFlags.PRESSURE
 AT_FIRST = RESULTS | wire.QuantityFlags.REST_FRAMES
 # A streaming board sends a status every second by default; three missing ones are a dead link.
 SILENCE_S = 3.0
@@ -130,14 +130,15 @@ class Streaming(Conversation):
         self._quantities.update({f: quantities for f in range(MAX_SENSORS) if fingers >> f & 1})
 
     def want(self, *names: str, rest: bool = True, rate_hz: float | None = None) -> None:
-        """Choose what the board computes and sends: force, poc, torque, sigma, touch, raw, pdc, temperature, pac.
+        """Choose what the board computes and sends.
 
-        Electrodes' raw counts, pdc and temperature travel in every FRAME, so each of them asks for frames and no
-        more. Status always comes, it is the link's sign of life, whether ``status`` is named or not. With
-        ``rest=False`` an untouched finger sends heartbeats in place of frames. ``rate_hz``, above 0 to 100, takes
-        every n-th frame with n = 100 / rate_hz rounded, by seq: on this side only, for boards cannot leave frames
-        out; a recording has them all, and PAC and messages are not thinned. Holds for all fingers until the next
-        ``want``. Raises InputError for a name or rate that there is not.
+        Names are force, poc, torque, pressure, sigma, touch, raw, pdc, temperature and pac. Electrodes' raw counts,
+        pdc and temperature travel in every FRAME, so each of them asks for frames and no more. Status always comes,
+        it is the link's sign of life, whether ``status`` is named or not. With ``rest=False`` an untouched finger
+        sends heartbeats in place of frames. ``rate_hz``, above 0 to 100, takes every n-th frame with n = 100 /
+        rate_hz rounded, by seq: on this side only, for boards cannot leave frames out; a recording has them all, and
+        PAC and messages are not thinned. Holds for all fingers until the next ``want``. Raises InputError for a name
+        or rate that there is not.
         """
         wants = Wants.of(names, rest=rest, rate_hz=rate_hz)
         self.subscribe(wants.quantities)

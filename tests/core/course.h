@@ -12,7 +12,7 @@
 #define FIRST_FINGER  1
 #define SECOND_FINGER 4
 #define BOTH_FINGERS  (1 << FIRST_FINGER | 1 << SECOND_FINGER)
-#define EVERYTHING    0x3F // every quantity there is
+#define EVERYTHING    0x7F // every quantity there is
 
 typedef struct {
     received_message message[MAX_RECEIVED];
@@ -115,6 +115,8 @@ static inline void run_course(uint8_t quantities, uint64_t seed, course_log *log
 {
     static emulated_finger finger[BT_MAX_FINGERS];
     (void)new_session(NULL);
+    assert_int_equal(bt_settings_set(&session.settings, BT_SETTING_PRESSURE_GAIN_NN, 10000000), BT_ERROR_OK);
+    bt_session_use_settings(&session);
     for (int f = FIRST_FINGER; f <= SECOND_FINGER; f += SECOND_FINGER - FIRST_FINGER) {
         finger_init(&finger[f]);
         finger[f].seed = seed * 0x9E3779B97F4A7C15u + (unsigned)f;

@@ -3,7 +3,7 @@
 
 #define SENSOR "BTEMU00000000042" // 16 bytes, as the sensor says it
 
-static const int32_t values[BT_CALIBRATION_VALUES] = {BT_POC_WEIGHTS_ABS_N2, 1, -2, 3, -4, 5, -600};
+static const int32_t values[BT_CALIBRATION_VALUES] = {BT_POC_WEIGHTS_ABS_N2, 1, -2, 3, -4, 5, -600, 9500000};
 
 static void plug(uint8_t finger, const char *serial)
 {
@@ -267,24 +267,38 @@ static void a_record_is_read_back_and_a_strange_one_passed_over(void **state)
     uint8_t record[BT_CALIBRATION_RECORD_BYTES + 1];
     memcpy(out.serial, SENSOR, sizeof out.serial);
     memcpy(out.value, values, sizeof values);
-    assert_int_equal(bt_calibration_pack(&out, record), 48);
+    assert_int_equal(bt_calibration_pack(&out, record), 52);
     // The layout that calibration.h states: serial, made_s, values, little-endian.
     assert_memory_equal(record, SENSOR "\x98\xBA\xDC\xFE\0\0\0\0\1\0\0\0\xFE\xFF\xFF\xFF", 32);
-    bt_calibration_unpack(&back, 1, record, 48);
+    assert_memory_equal(record + 44, "\xA8\xFD\xFF\xFF\x60\xF5\x90\0", 8); // -600, 9500000
+    bt_calibration_unpack(&back, 2, record, 52);
     assert_memory_equal(&back, &out, sizeof out);
-    bt_calibration_unpack(&back, 2, record, 48);
-    assert_false(back.present);
-    bt_calibration_unpack(&back, 1, record, 47);
-    assert_false(back.present);
-    bt_calibration_unpack(&back, 1, record, 49);
-    assert_false(back.present);
-    bt_calibration_unpack(&back, 1, record, 0); // a cleared one
-    assert_false(back.present);
+    static const struct {
+        uint16_t version;
+        size_t bytes; // 0: a cleared one
+    } strange[] = {{0, 52}, {3, 52}, {2, 51}, {2, 53}, {2, 48}, {2, 0}, {1, 52}, {1, 47}, {1, 49}, {1, 0}};
+    for (size_t k = 0; k < sizeof strange / sizeof *strange; k++) {
+        bt_calibration_unpack(&back, strange[k].version, record, strange[k].bytes);
+        assert_false(back.present);
+    }
     record[20] = 3; // no such weights
-    bt_calibration_unpack(&back, 1, record, 48);
+    bt_calibration_unpack(&back, 2, record, 52);
     assert_false(back.present);
     out.present = false;
     assert_int_equal(bt_calibration_pack(&out, record), 0);
+}
+
+static void a_record_of_a_firmware_before_pressure_keeps_all_that_it_has(void **state)
+{
+    (void)state;
+    bt_calibration out = {.present = true, .made_s = 7}, back;
+    uint8_t record[BT_CALIBRATION_RECORD_BYTES];
+    memcpy(out.serial, SENSOR, sizeof out.serial);
+    memcpy(out.value, values, sizeof values);
+    (void)bt_calibration_pack(&out, record);
+    bt_calibration_unpack(&back, 1, record, 48); // seven values, then nothing
+    out.value[7] = 0;                            // not calibrated
+    assert_memory_equal(&back, &out, sizeof out);
 }
 
 #define T(name) cmocka_unit_test_setup(name, new_session)
@@ -300,6 +314,7 @@ int main(void)
         T(every_end_of_a_stream_counts),
         T(only_what_has_changed_is_stored),
         T(a_record_is_read_back_and_a_strange_one_passed_over),
+        T(a_record_of_a_firmware_before_pressure_keeps_all_that_it_has),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -235,7 +235,7 @@ static void unknown_quantities_and_fingers_are_refused_and_change_nothing(void *
     for (int fingers = 0; fingers < 256; fingers++) {
         for (int quantities = 0; quantities < 256; quantities++) {
             uint8_t before[BT_MAX_FINGERS];
-            uint8_t error = quantities >> 6 ? BT_ERROR_OUT_OF_RANGE
+            uint8_t error = quantities >> 7 ? BT_ERROR_OUT_OF_RANGE
                             : fingers >> 5  ? BT_ERROR_NO_SUCH_FINGER
                                             : BT_ERROR_OK;
             for (int f = 0; f < BT_MAX_FINGERS; f++) {

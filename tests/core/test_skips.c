@@ -4,7 +4,8 @@
 
 static course_log full, lean, short_of_room;
 
-#define WANTED_AT_ALL (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE)
+#define WANTED_AT_ALL                                                                                        \
+    (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_PRESSURE)
 
 static const uint8_t subscriptions[] = {
     0,
@@ -13,6 +14,7 @@ static const uint8_t subscriptions[] = {
     BT_QUANTITY_FLAG_TORQUE,
     BT_QUANTITY_FLAG_SIGMA,
     BT_QUANTITY_FLAG_TOUCH,
+    BT_QUANTITY_FLAG_PRESSURE,
     BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_SIGMA,
     BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_SIGMA,
     BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE,
@@ -46,11 +48,14 @@ static void as_subscribed(bt_msg_frame *frame, uint8_t quantities)
 {
     bool poc = quantities & BT_QUANTITY_FLAG_POC, force = quantities & BT_QUANTITY_FLAG_FORCE;
     bool torque = quantities & BT_QUANTITY_FLAG_TORQUE, sigma = quantities & BT_QUANTITY_FLAG_SIGMA;
-    frame->flags |= poc && force && torque ? 0 : BT_FRAME_FLAG_NOT_ASKED;
+    bool pressure = quantities & BT_QUANTITY_FLAG_PRESSURE;
+    frame->flags |= poc && force && torque && pressure ? 0 : BT_FRAME_FLAG_NOT_ASKED;
     frame->flags &= poc ? ~0u : ~(uint32_t)BT_FRAME_FLAG_TORSION_OK;
     if (!poc && !torque && !(frame->flags & BT_FRAME_FLAG_UNTARED)) {
         frame->flags &= ~(uint32_t)BT_FRAME_FLAG_POC_INVALID;
     }
+    frame->pdc_filtered_q4 = pressure ? frame->pdc_filtered_q4 : 0xFFFF;
+    frame->pressure_force_100un = pressure ? frame->pressure_force_100un : INT32_MIN;
     frame->poc_sigma_um = sigma && poc ? frame->poc_sigma_um : 0xFFFF;
     for (int d = 0; d < 3; d++) {
         frame->poc_um[d] = poc ? frame->poc_um[d] : INT16_MIN;
@@ -101,7 +106,7 @@ static void the_course_has_everything_in_it(void **state)
 {
     (void)state;
     uint32_t seen = 0, never = ~0u;
-    int states[4] = {0}, sigmas = 0;
+    int states[4] = {0}, sigmas = 0, pressures = 0;
     for (int k = 0; k < full.count; k++) {
         bt_msg_frame frame;
         if (full.message[k].id != BT_FRAME_ID) {
@@ -111,6 +116,7 @@ static void the_course_has_everything_in_it(void **state)
         seen |= frame.flags;
         never &= frame.flags;
         states[frame.tare_state]++;
+        pressures += frame.pressure_force_100un != INT32_MIN;
         sigmas += frame.poc_sigma_um != 0xFFFF;
     }
     // All but a railed electrode, a minute of contact and a degree.
@@ -123,6 +129,7 @@ static void the_course_has_everything_in_it(void **state)
         assert_true(states[s] > 10);
     }
     assert_true(sigmas > 100);
+    assert_true(pressures > 100);
     assert_true(messages_of(&full, BT_TOUCH_ID, FIRST_FINGER) >= 4);
     assert_true(messages_of(&full, BT_TARE_ID, FIRST_FINGER) >= 8);
 }

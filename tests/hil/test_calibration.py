@@ -16,7 +16,9 @@ from biotac.crosscheck import CrossCheck
 from biotac.errors import CommandRefusedError
 from biotac.recording import Recording
 
-OWN = Calibration(PocWeights.COMPRESS_N2, (900_000, -800_000, 700_000), (600_000, -500_000), 300, "", 1_763_731_310)
+OWN = Calibration(
+    PocWeights.COMPRESS_N2, (900_000, -800_000, 700_000), (600_000, -500_000), 300, "", 1_763_731_310, 9_500_000
+)
 BOOT_S = 60  # of wall clock
 
 

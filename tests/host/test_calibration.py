@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cobs import cobs
 
 import biotac
 from biotac import Calibration, CalibrationState, PocWeights, Setting
@@ -25,23 +26,23 @@ from biotac.recording import Recording
 from biotac.sim.source import load_source
 
 SERIAL = "BTEMU00000000042"
-ODD = Calibration(PocWeights.ABS_N2, (1, -2, 3), (-4, 5), -600, SERIAL, 1_763_731_310)
+ODD = Calibration(PocWeights.ABS_N2, (1, -2, 3), (-4, 5), -600, SERIAL, 1_763_731_310, 9_500_000)
 
 
 # ---- values ------------------------------------------------------------------------------------
 
 
 def test_the_values_are_the_per_finger_settings_by_id() -> None:
-    # By hand from link.toml: ids 1 to 6 and 10.
-    assert ODD.wire_values() == (0, 1, -2, 3, -4, 5, -600)
-    assert [int(s) for s in ODD.settings()] == [1, 2, 3, 4, 5, 6, 10]
+    # By hand from link.toml: ids 1 to 6, 10 and 11.
+    assert ODD.wire_values() == (0, 1, -2, 3, -4, 5, -600, 9_500_000)
+    assert [int(s) for s in ODD.settings()] == [1, 2, 3, 4, 5, 6, 10, 11]
     assert Calibration.from_wire(ODD.wire_serial(), ODD.made_s, ODD.wire_values()) == ODD
     assert bytes(replace(ODD, serial="BT1").wire_serial()) == b"BT1" + bytes(13)
     defaults = {s: wire.SETTINGS[s].default for s in wire.CALIBRATION_SETTINGS}
     assert Calibration().settings() == defaults
 
 
-@pytest.mark.parametrize("k", range(7))
+@pytest.mark.parametrize("k", range(8))
 def test_a_value_keeps_its_settings_range(k: int) -> None:
     spec = wire.SETTINGS[wire.CALIBRATION_SETTINGS[k]]
     for value, good in ((spec.low, True), (spec.low - 1, False), (spec.high, True), (spec.high + 1, False)):
@@ -97,7 +98,7 @@ def test_a_file_is_read_back_and_tells_where_it_comes_from(tmp_path: Path) -> No
     ("change", "words"),
     [
         ({"format": "biotac"}, 'it has no "format": "biotac-calibration"'),
-        ({"version": 2}, "its version is 2, expected 1; a newer biotac-gateway"),
+        ({"version": 3}, "its version is 3, expected 1 to 2; a newer biotac-gateway"),
         ({"gain": 1}, "key 'gain' is unknown; expected"),
         ({"made_s": None}, "made_s is None, expected a whole number"),
         ({"poc_weights": 1}, "poc_weights is 1, expected ABS_N2, COMPRESS_N1, COMPRESS_N2"),
@@ -106,6 +107,8 @@ def test_a_file_is_read_back_and_tells_where_it_comes_from(tmp_path: Path) -> No
         ({"torque_gain_nn": [1, 2]}, "expected an object with y, z"),
         ({"force_gain_nn": {"x": 1, "y": 2, "z": 100_000_001}}, "force_gain_z_nn is 100000001, expected -100000000"),
         ({"thermal_gain_milli": 0.5}, "thermal_gain_milli is 0.5, expected a whole"),
+        ({"pressure_gain_nn": -1}, "pressure_gain_nn is -1, expected 0 to 100000000"),
+        ({"version": True}, "its version is True"),
         ({"provenance": "hand"}, "provenance is no object"),
     ],
 )
@@ -115,6 +118,12 @@ def test_a_file_that_cannot_be_used_says_why(tmp_path: Path, change: dict[str, o
     with pytest.raises(biotac.InputError, match=words) as refusal:
         file.load(path)
     assert str(refusal.value).startswith(f"{path} is no calibration")
+
+
+def test_a_file_from_before_pressure_is_read_as_not_calibrated_by_it(tmp_path: Path) -> None:
+    tree = file.to_dict(ODD) | {"version": 1}
+    del tree["pressure_gain_nn"]
+    assert file.from_dict(tree) == replace(ODD, pressure_gain_nn=0)
 
 
 @pytest.mark.parametrize("key", [key for key in file.KEYS if key != "provenance"])
@@ -145,8 +154,8 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
 
 
 def test_a_record_is_that_of_the_specification() -> None:
-    data = SERIAL.encode() + struct.pack("<I7i", 1_763_731_310, 0, 1, -2, 3, -4, 5, -600)
-    header = struct.pack("<IHHI", 0x52544F42, 2, 1, 48)
+    data = SERIAL.encode() + struct.pack("<I8i", 1_763_731_310, 0, 1, -2, 3, -4, 5, -600, 9_500_000)
+    header = struct.pack("<IHHI", 0x52544F42, 2, 2, 52)
     crc = zlib.crc32((header + b"\xff" * 4 + data).ljust(256, b"\xff"))
     assert record.pack(ODD) == header + struct.pack("<I", crc) + data
     assert record.unpack(record.pack(ODD), "it") == ODD
@@ -170,10 +179,11 @@ GOOD = record.pack(ODD)[16:]
         (record.pack(ODD) + b"\0", "no whole record"),
         (sealed(1, 1, GOOD), "something else than a calibration"),
         (sealed(7, 1, GOOD), "something else than a calibration"),
-        (sealed(2, 2, GOOD), "newer version"),
-        (sealed(2, 1, b""), "was cleared"),
-        (sealed(2, 1, GOOD[:20] + b"\7" + GOOD[21:]), "out of its range"),
-        (sealed(2, 1, b"B\xe4" + GOOD[2:]), "cannot be"),
+        (sealed(2, 3, GOOD), "newer version"),
+        (sealed(2, 1, GOOD), "out of its range"),
+        (sealed(2, 2, b""), "was cleared"),
+        (sealed(2, 2, GOOD[:20] + b"\7" + GOOD[21:]), "out of its range"),
+        (sealed(2, 2, b"B\xe4" + GOOD[2:]), "cannot be"),
     ],
 )
 def test_a_record_that_is_none_says_why(data: bytes, words: str) -> None:
@@ -181,7 +191,12 @@ def test_a_record_that_is_none_says_why(data: bytes, words: str) -> None:
         record.unpack(data, "it")
 
 
-@pytest.mark.parametrize("at", range(64))
+def test_a_record_from_before_pressure_keeps_all_that_it_has() -> None:
+    old = sealed(2, 1, GOOD[:-4])
+    assert record.unpack(old, "it") == replace(ODD, pressure_gain_nn=0)
+
+
+@pytest.mark.parametrize("at", range(68))
 def test_no_byte_of_a_record_may_change(at: int) -> None:
     data = bytearray(record.pack(ODD))
     data[at] ^= 0x20
@@ -247,6 +262,51 @@ def test_a_board_that_knows_of_no_calibrations_is_not_asked(scripted_board, hell
     assert wire.GetCalibration.ID not in asked
 
 
+def test_a_board_of_before_pressure_is_spoken_to_in_its_own_words(scripted_board, hello) -> None:
+    """Wire 1.3: seven values, no PRESSURE, ten settings."""
+    told: list[tuple[int, bytes]] = []
+
+    def answer(message_id: int, payload: bytes) -> bytes:
+        told.append((message_id, payload))
+        if message_id == wire.HelloRequest.ID:
+            return hello(payload, wire_minor=3)
+        if message_id in (wire.SetCalibration.ID, wire.GetCalibration.ID):
+            whole = wire.Calibration(payload[0], payload[1], 1, (66, 84) + (0,) * 14, 5, (0, 1, 2, 3, 4, 5, 6, 99))
+            return encode(wire.Calibration.ID, whole.pack()[:51])
+        if message_id == wire.GetSetting.ID and payload[1] > 10:
+            return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.UNKNOWN_SETTING).pack())
+        if message_id == wire.GetSetting.ID:
+            return encode(wire.SettingValue.ID, wire.SettingValue(payload[0], payload[1], 7).pack())
+        return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.OK).pack())
+
+    set_calibration: list[bytes] = []
+
+    with biotac.open(scripted_board(answer).path) as hand:
+        write = hand.link.write
+
+        def write_as_heard(data: bytes) -> None:
+            plain = cobs.decode(data[:-1])
+            if plain[0] == wire.SetCalibration.ID:  # the scripted board splits by today's lengths
+                set_calibration.append(plain[1:-4])
+                data = encode(wire.SetCalibration.ID, plain[1:-4] + bytes(4))
+            write(data)
+
+        hand.link.write = write_as_heard  # type: ignore[method-assign]
+        hand.set_calibration(0, replace(ODD, pressure_gain_nn=0))
+        (sent,) = set_calibration
+        assert sent == wire.SetCalibration(sent[0], 0, ODD.wire_serial(), ODD.made_s, ODD.wire_values()).pack()[:50]
+        with pytest.raises(biotac.WireVersionError, match=r"no pressure_gain_nn, expected wire 1\.4.*biotac flash"):
+            hand.set_calibration(0, ODD)
+        back = hand.calibration(0)
+        assert back is not None and (back.thermal_gain_milli, back.pressure_gain_nn) == (6, 0)
+        settings = hand.settings()
+        assert settings[wire.Setting.THERMAL_GAIN_MILLI] == 7
+        assert (settings[wire.Setting.PRESSURE_GAIN_NN], settings[wire.Setting.PRESSURE_FILTER_MILLI]) == (0, 500)
+        hand.subscribe(biotac.QuantityFlags.FORCE | biotac.QuantityFlags.PRESSURE)
+        (asked,) = (payload for message_id, payload in told if message_id == wire.Subscribe.ID)
+        assert asked[2] == biotac.QuantityFlags.FORCE
+
+
 def test_another_sensors_calibration_is_refused_in_words() -> None:
     with biotac.open("sim:press.toml") as hand:
         with pytest.raises(biotac.CommandRefusedError, match=r"SetCalibration: OTHER_SENSOR .*restart the board"):
@@ -309,7 +369,7 @@ def test_a_recording_with_a_broken_calibration_is_refused(monkeypatch, tmp_path:
 def test_a_calibration_that_a_newer_board_tells_out_of_range_is_no_crash(scripted_board, hello) -> None:
     def answer(message_id: int, payload: bytes) -> bytes:
         if message_id == wire.GetCalibration.ID:
-            told = wire.Calibration(payload[0], payload[1], 1, (66, 84) + (0,) * 14, 0, (9, 0, 0, 0, 0, 0, 0))
+            told = wire.Calibration(payload[0], payload[1], 1, (66, 84) + (0,) * 14, 0, (9, 0, 0, 0, 0, 0, 0, 0))
             return encode(wire.Calibration.ID, told.pack())
         return hello(payload) if message_id == wire.HelloRequest.ID else b""
 

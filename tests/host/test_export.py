@@ -50,6 +50,9 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
         "poc_m": frames["poc_mm"] / 1000,
         "force_sigma_n": frames["force_sigma_n"],
         "poc_sigma_m": frames["poc_sigma_mm"] / 1000,
+        "pressure_force_n": np.where(
+            sent["pressure_force_100un"] == -(2**31), np.nan, sent["pressure_force_100un"] / 1e4
+        ),
         "flags": frames["flags"],
         "tare_state": sent["tare_state"],
         "counts": frames["counts"],
@@ -58,6 +61,7 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
         "tac": frames["tac"],
         "tdc": frames["tdc"],
         "pdc_tare": np.where(sent["pdc_tare_q4"] == 65535, np.nan, sent["pdc_tare_q4"] / 16),
+        "pdc_filtered": np.where(sent["pdc_filtered_q4"] == 65535, np.nan, sent["pdc_filtered_q4"] / 16),
     }
 
 

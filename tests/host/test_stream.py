@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.support.deframer import Deframer
 
 from biotac import _wire as wire
 from biotac.framing import encode
@@ -28,6 +29,8 @@ def frame(finger: int, seq: int, t_us: int, **changes: object) -> bytes:
         "pdc_tare_q4": 2400 * 16,
         "poc_sigma_um": wire.INVALID_COUNT,
         "force_sigma_100un": (20, 30, 40),
+        "pdc_filtered_q4": 2412 * 16 + 8,
+        "pressure_force_100un": -1250,
     }
     return encode(wire.Frame.ID, wire.Frame(**(facts | changes)).pack())  # type: ignore[arg-type]
 
@@ -42,12 +45,23 @@ def test_integers_become_mm_n_and_nmm() -> None:
     assert row["poc_mm"].tolist() == [1.0, -2.0, -5.08]
     assert row["force_n"].tolist() == [1.0, -2.0, 5.0]
     assert row["torque_nmm"].tolist() == [1.0, 2.0, -3.0]
+    assert (row["pdc_filtered"], row["pressure_force_n"]) == (2412.5, -0.125)
 
 
 def test_an_invalid_result_is_nan_and_never_zero() -> None:
     row = (
         StreamDecoder()
-        .feed(frame(0, 0, 0, poc_um=(wire.INVALID_I16,) * 3, torque_mnmm=(wire.INVALID_I32, 0, 5)))
+        .feed(
+            frame(
+                0,
+                0,
+                0,
+                poc_um=(wire.INVALID_I16,) * 3,
+                torque_mnmm=(wire.INVALID_I32, 0, 5),
+                pdc_filtered_q4=wire.INVALID_COUNT,
+                pressure_force_100un=wire.INVALID_I32,
+            )
+        )
         .frames[0]
     )
     assert np.isnan(row["poc_mm"]).all()
@@ -55,6 +69,7 @@ def test_an_invalid_result_is_nan_and_never_zero() -> None:
     assert row["torque_nmm"][1:].tolist() == [0.0, 0.005]
     assert not np.isnan(row["force_n"]).any()
     assert np.isnan(row["poc_sigma_mm"])
+    assert np.isnan(row["pdc_filtered"]) and np.isnan(row["pressure_force_n"])
     assert row["force_sigma_n"].tolist() == [0.002, 0.003, 0.004]
 
 
@@ -135,6 +150,19 @@ def test_a_newer_minor_may_append_fields_and_an_older_may_not_drop_them() -> Non
     assert lenient.feed(longer).messages == [wire.Reply(7, 0x81, 0)]
     assert lenient.feed(shorter).messages == []
     assert (strict.counts.bad_length, lenient.counts.bad_length) == (1, 1)
+
+
+def test_a_frame_of_wire_1_3_is_read_without_a_force_from_pressure() -> None:
+    whole = frame(0, 7, 0)
+    ((_, payload),) = Deframer().feed(whole)
+    decoder = StreamDecoder()
+    row = decoder.feed(encode(wire.Frame.ID, payload[:134])).frames[0]
+    assert (row["seq"], row["force_sigma_n"][2]) == (7, 0.004)
+    assert np.isnan(row["pdc_filtered"]) and np.isnan(row["pressure_force_n"])
+    assert decoder.counts.bad == 0
+    for wrong in (*range(128, 134), *range(135, 140)):
+        assert not len(decoder.feed(encode(wire.Frame.ID, payload[:wrong])).frames)
+    assert decoder.counts.bad_length == 11
 
 
 def test_frames_made_while_nobody_listened_are_not_lost() -> None:

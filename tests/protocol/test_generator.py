@@ -100,7 +100,7 @@ REFUSED = [
     ("link.toml", "range = [50, 1_000_000]\ndefault = 1_000", "range = [50, 1_000_000]\ndefault = 49",
      "default of contact_energy_count2 is outside its range"),
     ("link.toml", "[setting.thermal_gain_milli]\nid = 10\nper_finger = true", "[setting.thermal_gain_milli]\nid = 10",
-     "CALIBRATION has 7 values of 6 per-finger settings"),
+     "CALIBRATION has 8 values of 7 per-finger settings"),
     ("link.toml", 'reply = "HELLO"', 'reply = "HALLO"', "HELLO_REQUEST is answered by unknown HALLO"),
     ("link.toml", '{ name = "seq", type = "u16", unit = "1", doc = "counts STATUS messages" },', "",
      "stream message STATUS must start with seq, t_us"),

@@ -12,6 +12,8 @@ from biotac import _wire as wire
 from biotac.framing import FramingCounts
 
 CRC_BYTES = 4
+# What an older peer's message lacks at its end, and is filled up with (host/binding/decode.h).
+LACKS = {wire.Frame.ID: b"\xff\xff\0\0\0\x80", wire.Calibration.ID: bytes(4)}
 ENCODED_MAX_BYTES = wire.MAX_FRAME_BYTES + 1  # COBS adds exactly one byte to frames this short
 
 
@@ -68,7 +70,10 @@ class Deframer:
         message_id, payload = covered[0], covered[1:]
         known = wire.MESSAGES.get(message_id)
         if known is not None and len(payload) != known.STRUCT.size:
-            if not (self.allow_longer and len(payload) > known.STRUCT.size):
+            lacks = LACKS.get(message_id, b"")
+            if lacks and len(payload) + len(lacks) == known.STRUCT.size:
+                payload += lacks
+            elif not (self.allow_longer and len(payload) > known.STRUCT.size):
                 self.counts.bad_length += 1
                 return None
             payload = payload[: known.STRUCT.size]

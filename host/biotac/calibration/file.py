@@ -12,7 +12,7 @@ from ..errors import InputError
 from .values import Calibration
 
 FORMAT = "biotac-calibration"
-VERSION = 1
+VERSION = 2  # 1 had no pressure_gain_nn
 KEYS = (
     "format",
     "version",
@@ -22,6 +22,7 @@ KEYS = (
     "force_gain_nn",
     "torque_gain_nn",
     "thermal_gain_milli",
+    "pressure_gain_nn",
     "provenance",
 )
 AXES = {"force_gain_nn": "xyz", "torque_gain_nn": "yz"}
@@ -41,6 +42,7 @@ def to_dict(calibration: Calibration, provenance: Provenance | None = None) -> d
         "force_gain_nn": dict(zip("xyz", calibration.force_gain_nn, strict=True)),
         "torque_gain_nn": dict(zip("yz", calibration.torque_gain_nn, strict=True)),
         "thermal_gain_milli": calibration.thermal_gain_milli,
+        "pressure_gain_nn": calibration.pressure_gain_nn,
         "provenance": provenance or {},
     }
 
@@ -49,10 +51,12 @@ def from_dict(tree: Any) -> Calibration:
     """Inverse of to_dict, provenance left out. ValueError says which key is wrong, and why."""
     if not isinstance(tree, dict) or tree.get("format") != FORMAT:
         raise ValueError(f'it has no "format": "{FORMAT}"')
-    if tree.get("version") != VERSION:
+    if type(tree.get("version")) is not int or not 1 <= tree["version"] <= VERSION:
         raise ValueError(
-            f"its version is {tree.get('version')!r}, expected {VERSION}; a newer biotac-gateway may read it"
+            f"its version is {tree.get('version')!r}, expected 1 to {VERSION}; a newer biotac-gateway may read it"
         )
+    if tree["version"] == 1:
+        tree = {"pressure_gain_nn": 0, **tree}
     for key in tree:
         if key not in KEYS:
             raise ValueError(f"key {key!r} is unknown; expected {', '.join(KEYS)}")
@@ -73,6 +77,7 @@ def from_dict(tree: Any) -> Calibration:
         tree["thermal_gain_milli"],
         tree["serial"],
         tree["made_s"],
+        tree["pressure_gain_nn"],
     )
 
 

@@ -17,7 +17,8 @@ _DEFAULT = {setting: spec.default for setting, spec in wire.SETTINGS.items()}
 class Calibration:
     """Values of one finger's own in place of the board's settings, for one sensor.
 
-    ``force_gain_nn`` is x, y, z and ``torque_gain_nn`` y, z, in nN per count. ``serial`` is the number of the
+    ``force_gain_nn`` is x, y, z and ``torque_gain_nn`` y, z, in nN per count; ``pressure_gain_nn`` in nN per count of
+    pressure, 0 for a finger that is not calibrated by pressure. ``serial`` is the number of the
     sensor it was made for, "" for any sensor; ``made_s`` when, in seconds since 1970 UTC, 0 when unknown. Raises
     ValueError for a value out of its setting's range (wire.SETTINGS).
     """
@@ -35,6 +36,7 @@ class Calibration:
     thermal_gain_milli: int = _DEFAULT[wire.Setting.THERMAL_GAIN_MILLI]
     serial: str = ""
     made_s: int = 0
+    pressure_gain_nn: int = _DEFAULT[wire.Setting.PRESSURE_GAIN_NN]
 
     def __post_init__(self) -> None:
         for name, count in (("force_gain_nn", 3), ("torque_gain_nn", 2)):
@@ -42,7 +44,7 @@ class Calibration:
             if len(gains) != count:
                 raise ValueError(f"{name} has {len(gains)} values, expected {count}")
             object.__setattr__(self, name, gains)
-        for name in ("poc_weights", "thermal_gain_milli", "made_s"):
+        for name in ("poc_weights", "thermal_gain_milli", "pressure_gain_nn", "made_s"):
             object.__setattr__(self, name, _whole(name, getattr(self, name)))
         for setting, value in self.settings().items():
             spec = wire.SETTINGS[setting]
@@ -66,6 +68,7 @@ class Calibration:
             wire.Setting.TORQUE_GAIN_Y_NN: torque_y,
             wire.Setting.TORQUE_GAIN_Z_NN: torque_z,
             wire.Setting.THERMAL_GAIN_MILLI: self.thermal_gain_milli,
+            wire.Setting.PRESSURE_GAIN_NN: self.pressure_gain_nn,
         }
 
     def wire_values(self) -> tuple[int, ...]:
@@ -97,6 +100,7 @@ class Calibration:
             own[wire.Setting.THERMAL_GAIN_MILLI],
             ascii_text(serial),
             made_s,
+            own[wire.Setting.PRESSURE_GAIN_NN],
         )
 
 

@@ -26,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
     A recording that was merely cut off, as by a kill, is right as far as it goes; stderr says so.
     """
     recording = load(args.recording, quiet=True)
-    outcome = CrossCheck()
+    outcome = CrossCheck(wire_minor=recording.info.wire_minor)
     outcome.add(recording.wire, recording.settings, recording.finger_settings)
     damaged = recording.counts.bad + recording.damaged_chunks
     good = outcome.violations == 0 and damaged == 0 and len(recording.frames) > 0
@@ -51,6 +51,8 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"{args.recording}: {len(recording.frames)} frames, {recording.frames_lost} lost, {verdict}; largest error "
         f"PoC {outcome.poc_um_max:.3f} um, force {outcome.force_mn_max:.4f} mN, "
-        f"torque {outcome.torque_nmm_max:.5f} N*mm"
+        f"torque {outcome.torque_nmm_max:.5f} N*mm, pressure {outcome.pressure.force_n_max * 1e3:.4f} mN"
     )
+    if outcome.pressure.starts:
+        print(f"  of {outcome.pressure.starts} frames, with none before them, the pressure's filter is taken as told")
     return 0 if good else 1

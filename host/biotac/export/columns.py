@@ -42,6 +42,7 @@ COLUMNS = (
     Column("poc_m", "m", "point of contact on the core's surface; NaN where invalid", AXES),
     Column("force_sigma_n", "N", "one standard deviation; NaN unless subscribed to", AXES),
     Column("poc_sigma_m", "m", "one standard deviation; NaN unless subscribed to"),
+    Column("pressure_force_n", "N", "magnitude of the force from static pressure; NaN unless calibrated"),
     Column("flags", "1", "bits of flags frame in MESSAGES.md; say why a result is NaN"),
     Column("tare_state", "1", "enum tare_state in MESSAGES.md"),
     Column("counts", "count", "electrodes as read, 0..4095; 65535 where missing", tuple(sensor.ELECTRODE_NAMES)),
@@ -50,6 +51,7 @@ COLUMNS = (
     Column("tac", "count", "thermal flux, 0..4095; 65535 where missing"),
     Column("tdc", "count", "temperature, 0..4095; 65535 where missing"),
     Column("pdc_tare", "count", "pressure at rest; NaN where unknown"),
+    Column("pdc_filtered", "count", "pressure through the board's filter; NaN where missing"),
 )
 #: One row a finger and round: 22 samples, the k-th k/2200 s after t_us.
 PAC_COLUMNS = (*_TIME, Column("pac", "count", "dynamic pressure, 0..4095; 65535 where missing", PAC_SAMPLES))
@@ -110,6 +112,7 @@ def _frames(recording: Recording, finger: int) -> dict[str, NDArray[Any]]:
         "poc_m": to_units(sent["poc_um"], 1_000_000),
         "force_sigma_n": frames["force_sigma_n"],
         "poc_sigma_m": to_units(sent["poc_sigma_um"], 1_000_000),
+        "pressure_force_n": frames["pressure_force_n"],
         "flags": frames["flags"],
         "tare_state": sent["tare_state"],
         "counts": frames["counts"],
@@ -118,6 +121,7 @@ def _frames(recording: Recording, finger: int) -> dict[str, NDArray[Any]]:
         "tac": frames["tac"],
         "tdc": frames["tdc"],
         "pdc_tare": _q4(sent["pdc_tare_q4"]),
+        "pdc_filtered": frames["pdc_filtered"],
     }
 
 

@@ -129,6 +129,7 @@ def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
         out[name] = INVALID_COUNT
     for name in ("poc_mm", "force_n", "torque_nmm", "poc_sigma_mm", "force_sigma_n"):
         out[name] = np.nan
+    out["pdc_filtered"] = out["pressure_force_n"] = np.nan
     out["finger"], out["t_us"], out["seq"], out["flags"] = finger, t_us, seq, int(flags)
     return out
 
@@ -161,6 +162,11 @@ class FingerView:
     def force_n(self) -> NDArray[np.float64]:
         """Force on the finger, (3,) in N."""
         return self._results("force_n")
+
+    @property
+    def pressure_force_n(self) -> float:
+        """Magnitude of the force that static pressure tells of, in N; NaN without a pressure calibration."""
+        return float(self._row()["pressure_force_n"])
 
     @property
     def poc_mm(self) -> NDArray[np.float64]:

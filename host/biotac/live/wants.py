@@ -13,6 +13,7 @@ QUANTITIES = {
     "force": QuantityFlags.FORCE,
     "poc": QuantityFlags.POC,
     "torque": QuantityFlags.TORQUE,
+    "pressure": QuantityFlags.PRESSURE,
     "sigma": QuantityFlags.SIGMA,
     "touch": QuantityFlags.TOUCH,
 }

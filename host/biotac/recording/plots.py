@@ -49,6 +49,7 @@ RESULTS_SCHEMA = {
         "force_n": _vector("N"),
         "torque_nm": _vector("N*m, about the origin; x is derived"),
         "poc_m": _vector("m, point of contact"),
+        "pressure_force_n": _number("magnitude of the force from static pressure, N; left out unless calibrated"),
         "contact": {"type": "boolean"},
         "flags": {"type": "integer", "description": "flags frame in MESSAGES.md"},
     },
@@ -189,6 +190,8 @@ def results(row: Any) -> dict[str, Any]:
         }
         if values:
             body[name] = values
+    if row["pressure_force_100un"] != wire.INVALID_I32:
+        body["pressure_force_n"] = int(row["pressure_force_100un"]) / 10_000
     flags = int(row["flags"])
     return body | {"contact": bool(flags & wire.FrameFlags.CONTACT), "flags": flags}
 

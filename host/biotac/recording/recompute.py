@@ -14,7 +14,7 @@ from .. import _sensor as sensor
 from .. import _wire as wire
 from ..calibration.file import to_dict
 from ..calibration.values import own_settings
-from ..core import on_board_q4
+from ..core import on_board_q4, pressure_force_100un
 from ..errors import InputError
 from ..frames import StructArray
 from ..framing import encode
@@ -37,6 +37,7 @@ RESULT_SETTINGS = frozenset(
         wire.Setting.FORCE_GAIN_Z_NN,
         wire.Setting.TORQUE_GAIN_Y_NN,
         wire.Setting.TORQUE_GAIN_Z_NN,
+        wire.Setting.PRESSURE_GAIN_NN,
     }
 )
 _HOST_REASONS = (wire.TareReason.HOST_NOW, wire.TareReason.HOST_SET)
@@ -110,6 +111,9 @@ def _with_kept_tares(recording: Recording, settings: Settings, own: Mapping[int,
 def _recomputed(frames: StructArray, settings: Settings) -> StructArray:
     poc_um, force_100un, torque_mnmm, kernel_flags = on_board_q4(frames["counts"], frames["tare_q4"], settings)
     frames["poc_um"], frames["force_100un"], frames["torque_mnmm"] = poc_um, force_100un, torque_mnmm
+    frames["pressure_force_100un"] = pressure_force_100un(
+        frames["pdc_filtered_q4"], frames["pdc_tare_q4"], settings[wire.Setting.PRESSURE_GAIN_NN]
+    )
     flags = frames["flags"] & ~np.uint32(
         wire.FrameFlags.POC_INVALID | wire.FrameFlags.TORSION_OK | wire.FrameFlags.NOT_ASKED
     )

@@ -1,0 +1,339 @@
+"""Pressure calibration: formulas, plateaus, K, the guided sequence, and what is refused with which number.
+
+Truth is made here: pressures are F / K + P0 with noise and ramps, times are counted and never waited for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from biotac import InputError
+from biotac.pressure import formulas, report
+from biotac.pressure.fit import Fit, fit, told_by, verify
+from biotac.pressure.plateaus import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Rest
+from biotac.pressure.procedure import Procedure, Step
+from biotac.pressure.reference import MAX_LAG_ROWS, Series, check_alignment, lag_rows
+from biotac.pressure.rows import ROW_DTYPE
+
+K = 0.0125  # N per count
+REST = 1300.0
+ROUND_US = 10_000
+
+
+def course(
+    force_n: Any, *, finger: int = 0, k: float = K, noise: float = 0.0, alpha: float = 0.5, seed: int = 1
+) -> Any:
+    """Rows of a finger under these forces (n,), its pressure exactly linear, filtered as the paper has it."""
+    force = np.asarray(force_n, np.float64)
+    words = REST + force / k + np.random.default_rng(seed).normal(0.0, 1.0, len(force)) * noise
+    rows = np.zeros(len(force), ROW_DTYPE)
+    rows["finger"], rows["t_us"] = finger, np.arange(len(force)) * ROUND_US
+    rows["pressure"], rows["rest"] = formulas.filtered(words, alpha), REST
+    rows["told_n"], rows["force_n"] = np.nan, force
+    rows["touched"] = force > 0.05
+    return rows
+
+
+def press(force_n: float, *, ramp: int = 40, hold: int = 140, rest: int = 120) -> list[float]:
+    return [*np.linspace(0, force_n, ramp), *[force_n] * hold, *np.linspace(force_n, 0, ramp), *[0.0] * rest]
+
+
+def presses(*forces_n: float, **how: int) -> list[float]:
+    return [0.0] * 150 + [f for force_n in forces_n for f in press(force_n, **how)]
+
+
+def ran(rows: Any, count: int = 3) -> Presses:
+    machine = Presses(0, count)
+    machine.feed(rows)
+    machine.finish()
+    return machine
+
+
+def its_fit(rows: Any) -> Fit:
+    machine = ran(rows)
+    assert machine.rest is not None
+    return fit(machine.rest, machine.presses)
+
+
+# ---- formulas ----------------------------------------------------------------------------------
+
+
+def test_the_filter_is_the_papers_by_hand() -> None:
+    assert formulas.filtered([100, 200, 200, 0], 0.5).tolist() == [100, 150, 175, 87.5]
+    assert formulas.filtered([100, 200], 1.0).tolist() == [100, 200]
+    broken = formulas.filtered([100, np.nan, 300, 400], 0.5)
+    assert np.isnan(broken[1]) and broken[[0, 2, 3]].tolist() == [100, 300, 350]
+
+
+def test_k_is_the_pseudo_inverse() -> None:
+    above, force = np.array([100.0, 200.0, 300.0]), np.array([1.0, 2.2, 2.9])
+    # By hand: sum P F / sum P^2 = (100 + 440 + 870) / (1 + 4 + 9) / 1e4
+    assert formulas.gain(above, force) == pytest.approx(1410 / 140_000, rel=1e-12)
+    assert formulas.magnitude([[3.0, 0.0, 4.0]]).tolist() == [5.0]
+    assert formulas.relative_error([3.0, 4.4], [3.0, 4.0]) == pytest.approx(0.4 / 5.0)
+
+
+# ---- plateaus ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0, 3.0])
+@pytest.mark.parametrize("k", [0.009, 0.016])
+def test_three_presses_give_k(noise: float, k: float) -> None:
+    its = its_fit(course(presses(2, 3.5, 5), k=k, noise=noise))
+    # A mean of n noisy counts: 3 sigma of 3 * 50 rows of filtered noise, against the rms of what was pressed.
+    allowed = 3 * noise / np.sqrt(its.rows) / (3.7 / k) + 1e-9
+    assert its.gain_n == pytest.approx(k, rel=allowed)
+    assert its.rows == 3 * HOLD_ROWS
+    assert its.rest.counts == pytest.approx(REST, abs=3 * noise / np.sqrt(50) + 1e-9)
+
+
+def test_ramps_are_left_out_and_would_bias_k() -> None:
+    rows = course(presses(2, 3.5, 5, ramp=30), alpha=0.1)
+    assert its_fit(rows).gain_n == pytest.approx(K, rel=1e-3)
+    rising = rows[np.gradient(rows["force_n"]) > 0]
+    biased = formulas.gain(rising["pressure"] - rising["rest"], rising["force_n"])
+    assert biased > 1.03 * K  # what the course is made of shows it
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 300, 10_000])
+def test_how_rows_are_cut_makes_no_difference(chunk: int) -> None:
+    rows = np.concatenate([course(presses(2, 3.5, 5), finger=f, noise=1.0, seed=f) for f in range(2)])
+    rows["t_us"][len(rows) // 2 :] += len(rows) // 2 * ROUND_US
+    whole, cut = Procedure([0, 1], [2, 3.5, 5]), Procedure([0, 1], [2, 3.5, 5])
+    whole.feed(rows)
+    for at in range(0, len(rows), chunk):
+        cut.feed(rows[at : at + chunk])
+    assert whole.done and cut.done
+    assert whole.rests == cut.rests
+    for finger in range(2):
+        for a, b in zip(whole.presses[finger], cut.presses[finger], strict=True):
+            assert a.rows.tobytes() == b.rows.tobytes()
+
+
+def changed(rows: Any, change: Callable[[Any], None]) -> Any:
+    out = rows.copy()
+    change(out)
+    return out
+
+
+def noisy(rows: Any) -> None:
+    rows["pressure"] += 30 * np.sin(np.arange(len(rows)) / 12)
+
+
+def untared(rows: Any) -> None:
+    rows["rest"] = np.nan
+
+
+def touched(rows: Any) -> None:
+    rows["touched"] = True
+
+
+def railed(rows: Any) -> None:
+    high = rows["force_n"] > 1
+    rows["pressure"][high], rows["railed"][high] = np.nan, True
+
+
+def without_force(rows: Any) -> None:
+    rows["force_n"] = np.nan
+
+
+GOOD = course(presses(2, 3.5, 5), noise=1.0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        (GOOD[:30], r"finger 0, 30 rows: never at rest: 30 untouched rows in a row at most.*expected 50"),
+        (changed(GOOD, noisy), r"never at rest.*the steadiest moved by \d+\.\d+ counts \(limit"),
+        (changed(GOOD, untared), r"never at rest: 0 untouched rows"),
+        (changed(GOOD, touched), r"never at rest: 0 untouched rows"),
+        (
+            course([0.0] * 900),
+            r"press 1 of 3 never came: pressure rose by 0\.0 counts at most, expected 20; press harder",
+        ),
+        (course(presses(0.1, 0.1, 0.1)), r"press 1 of 3 never came: pressure rose by 8\.0 counts"),
+        (course(presses(2, 3.5)), r"press 3 of 3 never came"),
+        (course(presses(2, 3.5, 5, hold=20)), r"press 1 of 3 has no plateau: \d+ held rows in a row at most"),
+        (course([0.0] * 150 + list(np.linspace(0, 20, 900))), r"has no plateau: 0 held.*moved by \d+\.\d+ counts"),
+        (changed(GOOD, railed), r"at the end of its range in \d+ rows; expected none; press less"),
+        (changed(GOOD, without_force), r"press 1 of 3 has no reference: in \d+ held rows it told no force"),
+        (course([0.0] * 150 + [3.0] * 300), r"press 1 was not let go of"),
+    ],
+)
+def test_presses_that_cannot_be_used_are_refused_with_a_number(rows: Any, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        ran(rows, 2 if "let go of" in words else 3)
+
+
+def test_a_minute_in_vain_is_enough() -> None:
+    machine = Presses(0, 3)
+    machine.feed(course([0.0] * 150))
+    assert machine.phase is Phase.PRESS
+    with pytest.raises(InputError, match=r"press 1 of 3 never came"):
+        machine.feed(course([0.0] * GIVE_UP_ROWS))
+
+
+# ---- the sequence --------------------------------------------------------------------------------
+
+
+def test_the_steps_name_finger_press_and_force_in_turn() -> None:
+    procedure = Procedure([3, 1], [2.0, 4.0])
+    seen: list[Step | None] = [procedure.step]
+    at_us = 0
+    for finger in (3, 1):
+        rows = course(presses(2, 4), finger=finger)
+        rows["t_us"] += at_us
+        at_us = int(rows["t_us"][-1]) + ROUND_US
+        for k in range(len(rows)):
+            procedure.feed(rows[k : k + 1])
+            if procedure.step != seen[-1]:
+                seen.append(procedure.step)
+    wanted = [
+        (finger, phase, number, force)
+        for finger in (3, 1)
+        for phase, number, force in (
+            (Phase.REST, 1, 2.0),
+            (Phase.PRESS, 1, 2.0),
+            (Phase.RELEASE, 1, 2.0),
+            (Phase.PRESS, 2, 4.0),
+            (Phase.RELEASE, 2, 4.0),
+        )
+    ]
+    assert seen[-1] is None and procedure.done
+    assert [(s.finger, s.phase, s.press, s.force_n) for s in seen[:-1] if s] == wanted
+
+
+def test_another_fingers_press_is_not_taken_for_this_ones() -> None:
+    procedure = Procedure([0], [2.0, 3.5, 5.0])
+    mine, other = course([0.0] * 2000), course(presses(2, 3.5, 5), finger=1)
+    procedure.feed(np.concatenate([mine, other]))
+    assert procedure.step is not None and procedure.step.press == 1
+    with pytest.raises(InputError, match=r"finger 0, \d+ rows: press 1 of 3 never came"):
+        procedure.finish()
+
+
+@pytest.mark.parametrize(("fingers", "forces"), [([], [2.0]), ([1, 1], [2.0]), ([0], []), ([0], [0.0]), ([0], [500.0])])
+def test_no_sequence_without_fingers_or_forces(fingers: list[int], forces: list[float]) -> None:
+    with pytest.raises(InputError, match="expected"):
+        Procedure(fingers, forces)
+
+
+# ---- fit -----------------------------------------------------------------------------------------
+
+
+def held(force_n: float, counts: float, number: int = 1, rows: int = HOLD_ROWS) -> Press:
+    out = np.zeros(rows, ROW_DTYPE)
+    out["pressure"], out["rest"], out["force_n"] = REST + counts, REST, force_n
+    out["told_n"] = np.nan
+    return Press(0, number, out)
+
+
+STILL = Rest(REST, 0.6, 50)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ([held(2, 200), held(3, 300)], "finger 0: 2 presses, expected 3"),
+        ([held(2, 200), held(3, 300), held(4, 400, 3, 10)], "press 3: 10 held rows, expected 50"),
+        ([held(2, 200), held(np.nan, 300, 2), held(4, 400)], "press 2: the reference is NaN in 50 of 50 rows"),
+        ([held(2000, 200), held(3000, 300), held(4000, 400)], r"K is 10 N/count.*is the reference in newtons\?"),
+        ([held(0.002, 200), held(0.003, 300), held(0.004, 400)], r"K is 1e-05 N/count, expected 0.0009 to 0.1"),
+        ([held(-2, 200), held(3, 300), held(4, 400)], "the reference is -2 N while pressure is 200 counts above rest"),
+        ([held(0, 200), held(3, 300), held(4, 400)], "the reference is 0 N while"),
+        ([held(1, 200), held(3, 300), held(6, 400)], r"0.005 to 0.015 N/count, \d+% apart, expected 50%"),
+    ],
+)
+def test_a_fit_that_would_be_wrong_is_refused_with_a_number(given: list[Press], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        fit(STILL, given)
+
+
+def test_presses_that_disagree_a_little_are_noted() -> None:
+    its = fit(STILL, [held(2.0, 200), held(3.3, 300), held(4.8, 400)])
+    assert len(its.notes) == 1 and "18% apart" in its.notes[0]
+    assert not fit(STILL, [held(2.0, 200), held(3.0, 300), held(4.1, 400)]).notes
+
+
+def test_the_verification_counts_scatter_as_well_as_offset() -> None:
+    its = fit(STILL, [held(2, 200), held(3, 300), held(4, 400)])
+    assert (its.gain_n, its.gain_nn) == (pytest.approx(0.01), 10_000_000)
+    wrong = told_by(held(3.0, 330), its.gain_nn)
+    seen = verify(its, wrong)
+    assert (seen.board_error, seen.float_error) == (pytest.approx(0.1), pytest.approx(0.1))
+    rows = wrong.rows.copy()
+    rows["told_n"] = np.tile([2.7, 3.3], HOLD_ROWS // 2)  # right in the mean
+    assert verify(its, Press(0, 1, rows)).board_error == pytest.approx(0.1)
+    with pytest.raises(InputError, match="the board told no force from pressure in 50 of 50 held rows"):
+        verify(its, held(3.0, 300))
+
+
+def test_the_boards_own_code_tells_the_force_within_its_rounding() -> None:
+    its = its_fit(course(presses(2, 3.5, 5), noise=1.0))
+    rows = course([4.0] * HOLD_ROWS, noise=1.0, seed=9)
+    rows["pressure"] = np.rint(rows["pressure"] * 16) / 16  # as published
+    seen = verify(its, told_by(Press(0, 4, rows), its.gain_nn))
+    assert 0 < seen.apart_n <= 0.5e-4 + 1e-9
+    assert abs(seen.board_error - seen.float_error) < 1e-4
+
+
+# ---- reference -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("t_s", "force_n", "words"),
+    [
+        ([0.0], [1.0], "has 1 rows; expected two"),
+        ([0.0, 1.0], [1.0, np.nan], "1 of 2 rows with NaN"),
+        ([0.0, 2.0, 1.0], [1.0, 1.0, 1.0], "time steps back or stands in row 3"),
+        ([0.0, 1.0], [1.0, 3500.0], "forces up to 3500, expected newtons, 200 at most"),
+    ],
+)
+def test_a_series_that_is_none_is_refused(t_s: list[float], force_n: list[float], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Series("plate.csv", np.array(t_s), np.array(force_n))
+
+
+def test_a_series_is_straight_between_and_unknown_outside() -> None:
+    got = Series("plate.csv", np.array([1.0, 2.0]), np.array([0.0, 4.0])).at(
+        np.zeros(4, np.uint8), np.array([990_000, 1_000_000, 1_250_000, 2_010_000])
+    )
+    assert np.isnan(got[[0, 3]]).all() and got[1:3].tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize("lag", [-12, 0, 5, 20])
+def test_the_lag_is_found(lag: int) -> None:
+    force = np.array(presses(2, 3.5, 5))
+    above = np.roll(force, lag) / K
+    assert lag_rows(above, force)[0] == lag
+    assert check_alignment("it", above, force) == lag
+
+
+def test_forces_of_another_run_or_clock_are_refused_with_their_lag_or_correlation() -> None:
+    force = np.array(presses(2, 3.5, 5))
+    with pytest.raises(InputError, match=rf"pressure 60 rows after the force.*at most {MAX_LAG_ROWS} rows"):
+        check_alignment("it", np.roll(force, 60) / K, force)
+    with pytest.raises(InputError, match=r"correlation 0\.\d+; expected"):
+        check_alignment("it", np.random.default_rng(1).normal(0, 100, len(force)), force)
+
+
+# ---- report --------------------------------------------------------------------------------------
+
+
+def test_the_table_has_k_and_p0_and_the_errors() -> None:
+    its = fit(STILL, [held(2, 200), held(3, 300), held(4, 400)])
+    from biotac import Calibration
+
+    outcome = report.Outcome(
+        {0: its}, {0: Calibration(serial="BTX")}, {0: {}}, {0: verify(its, told_by(held(3.0, 303), its.gain_nn))}
+    )
+    head, line = report.lines(outcome)
+    assert head.split() == ["finger", "sensor", "K", "N/count", "P0", "count", "fit", "force", "N", "told", "N",
+                            "error", "float64"]  # fmt: skip
+    assert line.split() == ["0", "BTX", "0.010000", "1300.0", "0.00%", "3.000", "3.030", "1.00%", "1.00%"]
+    (facts,) = report.facts(outcome)
+    assert (facts["pressure_gain_nn"], facts["verification"]["board_error"]) == (10_000_000, 0.01)
