@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cobs import cobs
 
 import biotac
 from biotac import Calibration, CalibrationState, PocWeights, Setting
@@ -259,6 +260,51 @@ def test_a_board_that_knows_of_no_calibrations_is_not_asked(scripted_board, hell
     with biotac.open(scripted_board(answer).path) as hand:
         assert hand.calibrations() == {}
     assert wire.GetCalibration.ID not in asked
+
+
+def test_a_board_of_before_pressure_is_spoken_to_in_its_own_words(scripted_board, hello) -> None:
+    """Wire 1.3: seven values, no PRESSURE, ten settings."""
+    told: list[tuple[int, bytes]] = []
+
+    def answer(message_id: int, payload: bytes) -> bytes:
+        told.append((message_id, payload))
+        if message_id == wire.HelloRequest.ID:
+            return hello(payload, wire_minor=3)
+        if message_id in (wire.SetCalibration.ID, wire.GetCalibration.ID):
+            whole = wire.Calibration(payload[0], payload[1], 1, (66, 84) + (0,) * 14, 5, (0, 1, 2, 3, 4, 5, 6, 99))
+            return encode(wire.Calibration.ID, whole.pack()[:51])
+        if message_id == wire.GetSetting.ID and payload[1] > 10:
+            return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.UNKNOWN_SETTING).pack())
+        if message_id == wire.GetSetting.ID:
+            return encode(wire.SettingValue.ID, wire.SettingValue(payload[0], payload[1], 7).pack())
+        return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.OK).pack())
+
+    set_calibration: list[bytes] = []
+
+    with biotac.open(scripted_board(answer).path) as hand:
+        write = hand.link.write
+
+        def write_as_heard(data: bytes) -> None:
+            plain = cobs.decode(data[:-1])
+            if plain[0] == wire.SetCalibration.ID:  # the scripted board splits by today's lengths
+                set_calibration.append(plain[1:-4])
+                data = encode(wire.SetCalibration.ID, plain[1:-4] + bytes(4))
+            write(data)
+
+        hand.link.write = write_as_heard  # type: ignore[method-assign]
+        hand.set_calibration(0, replace(ODD, pressure_gain_nn=0))
+        (sent,) = set_calibration
+        assert sent == wire.SetCalibration(sent[0], 0, ODD.wire_serial(), ODD.made_s, ODD.wire_values()).pack()[:50]
+        with pytest.raises(biotac.WireVersionError, match=r"no pressure_gain_nn, expected wire 1\.4.*biotac flash"):
+            hand.set_calibration(0, ODD)
+        back = hand.calibration(0)
+        assert back is not None and (back.thermal_gain_milli, back.pressure_gain_nn) == (6, 0)
+        settings = hand.settings()
+        assert settings[wire.Setting.THERMAL_GAIN_MILLI] == 7
+        assert (settings[wire.Setting.PRESSURE_GAIN_NN], settings[wire.Setting.PRESSURE_FILTER_MILLI]) == (0, 500)
+        hand.subscribe(biotac.QuantityFlags.FORCE | biotac.QuantityFlags.PRESSURE)
+        (asked,) = (payload for message_id, payload in told if message_id == wire.Subscribe.ID)
+        assert asked[2] == biotac.QuantityFlags.FORCE
 
 
 def test_another_sensors_calibration_is_refused_in_words() -> None:

@@ -54,6 +54,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     (names["done"] / "shear.md").write_text("precious")
     names["rest.npz"] = folder / "rest.npz"
     np.savez(names["rest.npz"], E=np.full((40, 19), 3000), F=np.zeros((40, 3)))
+    names["brief.npz"] = folder / "brief.npz"
+    np.savez(names["brief.npz"], E=np.full((5, 19), 3000), F=np.ones((5, 3)))
     for name, text in {
         "bad.toml": "name = 'x'\n",
         "list.json": "[]",
@@ -116,6 +118,8 @@ CASES: list[tuple[int, str, str]] = [
     (2, "name another with --finger", "experiment poke @rec.mcap --finger 4"),
     (2, "0 contacts above 1 N: expected 19", "experiment poke @rest.npz --out +out"),
     (2, "save M too", "experiment torsion @rest.npz"),
+    (2, "never loaded, the most is 0.00 N", "experiment shear @rest.npz"),
+    (2, "add E_base", "experiment shear @brief.npz"),
     (2, "leave one out", "experiment shear @rest.npz --seed 2"),
     (2, "leave --map out", "experiment poke --map +no.wrench.json"),
     (2, "as `biotac calibrate wrench --out` writes it", "experiment shear --map +no.wrench.json"),

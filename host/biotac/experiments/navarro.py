@@ -51,7 +51,7 @@ Show = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Hands:
-    """One emulated hand of five fingers, calibrated and verified. ``fits`` and ``verified`` are in the fingers' order."""
+    """One emulated hand, calibrated and verified; ``fits`` and ``verified`` are in the fingers' order."""
 
     profile: Profile
     seeds: tuple[int, ...]

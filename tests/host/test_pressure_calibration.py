@@ -1,0 +1,255 @@
+"""`biotac calibrate pressure` and Navarro's experiment: on the emulated hand, on recordings, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac.calibration import file
+from biotac.cli.main import main
+from biotac.experiments import navarro, navarro_script
+from biotac.experiments.outcome import Options
+from biotac.pressure import guided
+from biotac.pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
+from biotac.recording import Recording
+from biotac.sim.source import load_source
+
+FORCES = (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)
+FINGERS = range(5)
+
+
+class Silent:
+    """Nobody is there; the steps are kept."""
+
+    def __init__(self) -> None:
+        self.steps: list[Step | None] = []
+
+    def show(self, step: Step | None) -> None:
+        self.steps.append(step)
+
+    def force_n(self, step: Step) -> float:
+        raise AssertionError("the scenario knows the force")
+
+
+# ---- emulated hand -------------------------------------------------------------------------------
+
+
+def test_the_bundled_scenario_is_the_experiments() -> None:
+    steps = [
+        *navarro_script.presses(FINGERS, CALIBRATION_FORCES_N, [navarro.PLACE] * 3),
+        *navarro_script.presses(FINGERS, VERIFICATION_FORCES_N, [navarro.PLACE]),
+    ]
+    wanted = navarro_script.source("fingers", [1, 2, 3, 4, 5], "new", steps)
+    np.testing.assert_array_equal(load_source("fingers.toml").samples, wanted.samples)
+
+
+def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
+    assert main(["calibrate", "pressure", "sim:fingers.toml", "--json", "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr()
+    facts = json.loads(said.out)
+    assert [one["finger"] for one in facts["fingers"]] == [0, 1, 2, 3, 4]
+    for one in facts["fingers"]:
+        # The emulated sensor's law at E17, x = -2.8 mm: 100 (1 + 0.15 tanh(x / 8)) counts per N.
+        assert one["gain_n"] == pytest.approx(0.01 / (1 + 0.15 * np.tanh(-2.8 / 8)), rel=0.005)
+        assert one["rest_counts"] == pytest.approx(1326, abs=1)
+        assert one["verification"]["board_error"] <= 0.059
+        assert one["verification"]["board_error"] == pytest.approx(one["verification"]["float_error"], abs=1e-4)
+        its = file.load(tmp_path / f"finger{one['finger']}.json")
+        assert (its.pressure_gain_nn, its.serial) == (one["pressure_gain_nn"], one["serial"])
+        assert its.serial == f"BTSIM{one['finger'] + 1:011d}"
+        provenance = json.loads((tmp_path / f"finger{one['finger']}.json").read_text())["provenance"]
+        assert provenance["from"] == "sim:fingers.toml" and provenance["rows"] == 150
+    assert said.err.splitlines()[:3] == [
+        "let go of finger 0",
+        "press 1 of 3: finger 0 with about 2 N, and hold still",
+        "held; let go of finger 0",
+    ]
+
+
+def test_a_board_whose_time_passes_is_calibrated_in_one_session() -> None:
+    """As a real one: stopped, set and started again, with what each finger has of its own left as it was."""
+    opened = []
+
+    def opened_once() -> biotac.Hand:
+        hand = biotac.open("sim:fingers.toml?fingers=1&pace=40")
+        opened.append(hand)
+        hand.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
+        return hand
+
+    # One finger's script: three presses, half a minute of nothing, and the verification press.
+    outcome = guided.calibrate(opened_once, guided.Plan((0,)), Silent(), made_s=77)
+    assert len(opened) == 1
+    its = outcome.calibrations[0]
+    assert (its.thermal_gain_milli, its.made_s, its.serial) == (321, 77, "BTSIM00000000001")
+    assert outcome.verified[0].board_error <= 0.059
+
+
+def test_a_sensor_that_is_not_there_is_said_at_once() -> None:
+    with pytest.raises(biotac.InputError, match="no sensor answers as finger 3: there are 0, 1"):
+        guided.calibrate(lambda: biotac.open("sim:fingers.toml?fingers=2"), guided.Plan((0, 3)), Silent(), made_s=0)
+
+
+def test_a_source_that_ends_too_early_says_what_is_missing() -> None:
+    with pytest.raises(biotac.InputError, match=r"finger 0, \d+ rows: press 3 of 3 has no plateau"):
+        guided.calibrate(
+            lambda: biotac.open("sim:fingers.toml?fingers=1&seconds=9"), guided.Plan((0,)), Silent(), made_s=0
+        )
+
+
+# ---- recordings ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two fingers through all presses, recorded, and the plate beside it."""
+    folder = tmp_path_factory.mktemp("pressed")
+    steps = [
+        *navarro_script.presses([0, 1], CALIBRATION_FORCES_N, ["E17"] * 3),
+        *navarro_script.presses([0, 1], VERIFICATION_FORCES_N, ["E17"]),
+    ]
+    (folder / "two.toml").write_text(navarro_script.scenario("two", [11, 12], "worn", steps))
+    with biotac.open(f"sim:{folder / 'two.toml'}") as hand:
+        hand.record(folder / "two.mcap")
+        hand.read_batch(1000)
+    source = load_source(folder / "two.toml")
+    assert source.truth is not None
+    with (folder / "plate.csv").open("w", newline="") as out:
+        writer = csv.writer(out)
+        writer.writerow(["t_s", "fx_n", "fy_n", "fz_n"])
+        first_us = int(Recording(folder / "two.mcap").frames["t_us"][0])
+        for k, force in enumerate(source.truth.force_n.sum(axis=1)):  # one plate for both
+            writer.writerow([(first_us + 10_000 * k) / 1e6, *force])
+    return folder
+
+
+def run(pressed: Path, *options: str) -> int:
+    return main(["calibrate", "pressure", str(pressed / "two.mcap"), *options])
+
+
+def test_a_recording_with_a_plate(pressed: Path, tmp_path: Path, capsys) -> None:
+    assert run(pressed, "--reference", str(pressed / "plate.csv"), "--json", "--out", str(tmp_path)) == 0
+    (zero, one) = json.loads(capsys.readouterr().out)["fingers"]
+    for facts in (zero, one):
+        assert facts["gain_n"] == pytest.approx(0.01 / (1 + 0.15 * np.tanh(-2.8 / 8)), rel=0.005)
+        assert facts["verification"]["board_error"] <= 0.059
+        assert abs(facts["lag_rows"]) <= 1
+    assert file.load(tmp_path / "two-finger1.json").serial == "BTSIM00000000012"
+
+
+def test_a_recording_with_a_scale_that_was_read(pressed: Path, capsys) -> None:
+    typed = ",".join(f"{force:g}" for force in FORCES)
+    assert run(pressed, "--forces", typed, "--fingers", "1", "--json") == 0
+    (one,) = json.loads(capsys.readouterr().out)["fingers"]
+    assert one["finger"] == 1 and one["verification"]["board_error"] <= 0.059
+    assert run(pressed, "--forces", typed) == 0
+    table = capsys.readouterr().out.splitlines()
+    assert len(table) == 4 and "BTSIM00000000011" in table[2]
+
+
+def changed_csv(pressed: Path, tmp_path: Path, change: str) -> Path:
+    with (pressed / "plate.csv").open(newline="") as f:
+        head, *rows = list(csv.reader(f))
+    values = np.array(rows, np.float64)
+    if change == "mN":
+        values[:, 1:] *= 1000
+    elif change == "grams":
+        values[:, 1:] *= 20
+    elif change == "late":
+        values[:, 0] += 0.6
+    elif change == "elsewhere":
+        values[:, 0] += 1e4
+    elif change == "nan":
+        values[100, 2] = np.nan
+    elif change == "noise":
+        values[:, 1:] = np.random.default_rng(1).normal(0, 1, values[:, 1:].shape)
+    elif change == "short":
+        values = values[:900]
+    out = tmp_path / f"{change}.csv"
+    with out.open("w", newline="") as f:
+        csv.writer(f).writerows([["t_ms", *head[1:]] if change == "columns" else head, *values.tolist()])
+    return out
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("mN", "forces up to 5000, expected newtons, 200 at most"),
+        ("grams", "K is 0.211 N/count, expected 0.0009 to 0.1; is the reference in newtons?"),
+        ("late", "they agree best with pressure -59 rows after the force"),
+        ("elsewhere", "covers none of"),
+        ("nan", "1 of 3110 rows with NaN"),
+        ("noise", "correlation 0."),
+        ("short", "has no reference: in "),
+        ("columns", "has columns t_ms, fx_n, fy_n, fz_n; expected t_s and force_n"),
+    ],
+)
+def test_a_reference_that_is_none_is_refused_with_its_number(
+    pressed: Path, tmp_path: Path, capsys, change: str, words: str
+) -> None:
+    place = changed_csv(pressed, tmp_path, change)
+    assert run(pressed, "--reference", str(place), "--out", str(tmp_path / "out")) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_another_fingers_file_is_refused_by_the_board(pressed: Path, tmp_path: Path, capsys) -> None:
+    assert run(pressed, "--reference", str(pressed / "plate.csv"), "--out", str(tmp_path)) == 0
+    assert main(["calibration", "put", "sim:fingers.toml", str(tmp_path / "two-finger0.json"), "--finger", "0"]) == 7
+    assert "OTHER_SENSOR" in capsys.readouterr().err
+
+
+def test_the_gain_of_a_file_recomputes_a_recording(pressed: Path, tmp_path: Path) -> None:
+    """With the recorded tares kept, and through the whole machine: the same forces."""
+    (tmp_path / "gain.json").write_text(json.dumps({"pressure_gain_nn": 10_500_000}))
+    for name, options in (("kept", ["--keep-tare"]), ("run", [])):
+        out = tmp_path / f"{name}.mcap"
+        settings = str(tmp_path / "gain.json")
+        assert main(["recompute", str(pressed / "two.mcap"), str(out), "--settings", settings, *options]) == 0
+    kept, ran = (Recording(tmp_path / f"{name}.mcap") for name in ("kept", "run"))
+    assert np.nanmax(kept.frames["pressure_force_n"]) == pytest.approx(5.0, rel=0.02)
+    np.testing.assert_array_equal(kept.frames["pressure_force_n"], ran.frames["pressure_force_n"])
+    np.testing.assert_array_equal(kept.frames["pdc_filtered"], ran.frames["pdc_filtered"])
+    assert main(["check", str(tmp_path / "run.mcap")]) == 0
+
+
+# ---- experiment ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def result() -> navarro.Result:
+    return navarro.run(Options(seed=21))
+
+
+def test_the_verification_press_is_within_what_is_asked_on_both_profiles(result: navarro.Result) -> None:
+    facts = json.loads(json.dumps(navarro.facts(result)))
+    assert len(facts["checks"]) == 4 and all(check["met"] for check in facts["checks"])
+    assert [its.seeds for its in result.hands] == [tuple(range(21, 26)), tuple(range(26, 31))]
+    page = "\n".join(navarro.page(facts))
+    assert "| thumb | 10." in page and "5.91 %" in page
+
+
+def test_a_board_that_is_off_by_a_millinewton_is_seen(result: navarro.Result) -> None:
+    (first, second) = result.hands
+    facts = navarro.facts(replace(result, hands=(replace(first, one_mn_apart=1), replace(second, violations=1))))
+    assert [check["met"] for check in facts["checks"]] == [True, False, True, False]
+
+
+def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law(result: navarro.Result) -> None:
+    """The law is physics' own: what a K is worth at another place follows from it without the code under test."""
+    places = result.places
+    law = 1 + 0.15 * np.tanh(np.array(places.x_mm) / 8)
+    np.testing.assert_allclose(np.array(places.gains_n) * 100 * law, 1.0, rtol=0.01)
+    wanted = np.abs(law[None, :] / law[:, None] - 1)
+    np.testing.assert_allclose(places.errors, wanted, atol=0.01)
+    assert np.diag(places.errors).max() < 0.01 < 0.2 < places.errors.max()
+
+
+def test_the_picture_is_drawn(result: navarro.Result, tmp_path: Path) -> None:
+    navarro.draw(result, tmp_path / "navarro.png")
+    assert (tmp_path / "navarro.png").read_bytes()[:4] == b"\x89PNG"
