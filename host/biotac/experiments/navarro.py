@@ -29,6 +29,7 @@ from ..pressure.fit import Fit, Verification, fit, told_by, verify
 from ..pressure.plateaus import Press
 from ..pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure
 from ..pressure.reference import Truth
+from ..pressure.report import PAPER_ERROR
 from ..pressure.rows import rows_of
 from ..sim.physics import Profile
 from ..sim.source import Source
@@ -42,7 +43,6 @@ MAPS = False
 NAMES = ("thumb", "fore", "middle", "ring", "little")
 PAPER_GAIN_N = (0.016, 0.010, 0.013, 0.009, 0.009)  # Table I
 PAPER_REST_COUNTS = (85.0, 86.0, 106.0, 57.0, 70.0)
-PAPER_ERROR = 0.0591  # of the fore finger, the one that is given
 FINGERS = tuple(range(len(NAMES)))
 PLACE = "E17"
 PLACES = ("E7", "E10", "E17", "E18", "E16")  # from the tip backwards
