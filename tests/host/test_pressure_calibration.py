@@ -78,7 +78,7 @@ def test_a_board_whose_time_passes_is_calibrated_in_one_session() -> None:
     opened = []
 
     def opened_once() -> biotac.Hand:
-        hand = biotac.open("sim:fingers.toml?fingers=1&pace=40")
+        hand = biotac.open("sim:fingers.toml?fingers=1&pace=15")
         opened.append(hand)
         hand.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
         return hand
@@ -100,7 +100,7 @@ class Scale(Silent):
 
 def test_a_board_that_tells_no_force_is_calibrated_to_a_scale(tmp_path: Path) -> None:
     """As on a real port: nothing behind it that knows a truth."""
-    board = SimBoard(load_source("fingers.toml", fingers=1), pace=40, hold=True)
+    board = SimBoard(load_source("fingers.toml", fingers=1), pace=15, hold=True)
 
     def opened() -> biotac.Hand:
         hand = biotac.open(board.path)
