@@ -15,6 +15,7 @@ from biotac.calibration import file
 from biotac.cli.main import main
 from biotac.experiments import navarro, navarro_script
 from biotac.experiments.outcome import Options
+from biotac.link.sim_process import SimBoard
 from biotac.pressure import guided
 from biotac.pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
 from biotac.recording import Recording
@@ -77,7 +78,7 @@ def test_a_board_whose_time_passes_is_calibrated_in_one_session() -> None:
     opened = []
 
     def opened_once() -> biotac.Hand:
-        hand = biotac.open("sim:fingers.toml?fingers=1&pace=40")
+        hand = biotac.open("sim:fingers.toml?fingers=1&pace=15")
         opened.append(hand)
         hand.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
         return hand
@@ -88,6 +89,51 @@ def test_a_board_whose_time_passes_is_calibrated_in_one_session() -> None:
     its = outcome.calibrations[0]
     assert (its.thermal_gain_milli, its.made_s, its.serial) == (321, 77, "BTSIM00000000001")
     assert outcome.verified[0].board_error <= 0.059
+
+
+class Scale(Silent):
+    """Somebody reads a scale, whose newtons are the ones that were asked for."""
+
+    def force_n(self, step: Step) -> float:
+        return step.force_n
+
+
+def test_a_board_that_tells_no_force_is_calibrated_to_a_scale(tmp_path: Path) -> None:
+    """As on a real port: nothing behind it that knows a truth."""
+    board = SimBoard(load_source("fingers.toml", fingers=1), pace=15, hold=True)
+
+    def opened() -> biotac.Hand:
+        hand = biotac.open(board.path)
+        board.release()
+        return hand
+
+    try:
+        face = Scale()
+        outcome = guided.calibrate(opened, guided.Plan((0,)), face, made_s=1, save=True)
+    finally:
+        board.close()
+    assert outcome.verified[0].board_error <= 0.059
+    assert outcome.fits[0].press_forces_n == CALIBRATION_FORCES_N
+    assert outcome.not_saved is None
+
+
+def test_what_was_pressed_is_not_lost_when_the_board_cannot_keep_it(tmp_path: Path, capsys, monkeypatch) -> None:
+    def refuse(self: biotac.Hand) -> None:
+        raise biotac.CommandRefusedError("SaveSettings: NOT_STORED", 10)
+
+    monkeypatch.setattr(biotac.Hand, "save_settings", refuse)
+    port = "sim:fingers.toml?fingers=1"
+    assert main(["calibrate", "pressure", port, "--save", "--out", str(tmp_path)]) == 7
+    said = capsys.readouterr()
+    assert "NOT_STORED" in said.err and "in force until the next reboot" in said.out
+    assert file.load(tmp_path / "finger0.json").pressure_gain_nn > 10_000_000
+
+
+def test_files_that_are_there_are_seen_before_anybody_presses(tmp_path: Path, capsys) -> None:
+    (tmp_path / "finger3.json").write_text("mine")
+    assert main(["calibrate", "pressure", "sim:fingers.toml", "--out", str(tmp_path)]) == 2
+    assert "finger3.json exists and would be overwritten" in capsys.readouterr().err
+    assert (tmp_path / "finger3.json").read_text() == "mine" and len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_sensor_that_is_not_there_is_said_at_once() -> None:

@@ -62,13 +62,18 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{len(args.where)} boards are named; expected one")
     if recordings and args.save:
         raise InputError("--save is for boards; `biotac calibration put --save` brings a file to one")
+    if args.out is not None:
+        _check_out(args, recordings)
     if not recordings:
         if args.reference is not None:
             raise InputError(
                 "--reference is for recordings; a board's presses are typed in, as a scale shows them: leave it out, "
                 "or record them together with the plate"
             )
-        _tell(args, _on_board(args), None)
+        outcome = _on_board(args)
+        _tell(args, outcome, None)
+        if outcome.not_saved is not None:
+            raise outcome.not_saved
         return 0
     reference = load_csv(args.reference) if args.reference is not None else None
     for place in recordings:
@@ -131,8 +136,27 @@ def _tell(args: argparse.Namespace, outcome: report.Outcome, name: str | None) -
         print(json.dumps({"fingers": report.facts(outcome), "written": written}))
         return
     print("\n".join([*([f"{name}:"] if name else []), *report.lines(outcome), *(f"  written: {w}" for w in written)]))
-    if name is None and not args.save:
+    if name is None and (not args.save or outcome.not_saved is not None):
         print("in force until the next reboot (--save keeps it)")
+
+
+def _place(args: argparse.Namespace, name: str | None, finger: int) -> Path:
+    stem = f"{Path(name).stem}-" if name else ""
+    return Path(args.out) / f"{stem}finger{finger}.json"
+
+
+def _check_out(args: argparse.Namespace, recordings: list[str]) -> None:
+    """Before anybody presses anything, and not after it."""
+    names: list[str | None] = [*recordings] or [None]
+    places = [_place(args, name, finger) for name in names for finger in args.fingers or range(MAX_SENSORS)]
+    twice = {place for place in places if places.count(place) > 1}
+    if twice:
+        raise InputError(f"{min(twice)} would be written twice; give recordings of the same name a folder each")
+    there = [place for place in places if place.exists()]
+    if there and not args.force:
+        raise InputError(f"{there[0]} exists and would be overwritten; choose another folder or say --force")
+    if args.out.exists() and not args.out.is_dir():
+        raise InputError(f"{args.out} is no folder; choose another name")
 
 
 def _write(args: argparse.Namespace, outcome: report.Outcome, name: str | None) -> list[str]:
@@ -140,10 +164,9 @@ def _write(args: argparse.Namespace, outcome: report.Outcome, name: str | None) 
         args.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{args.out} is no folder ({error.strerror}); choose another name") from error
-    stem = f"{Path(name).stem}-" if name else ""
     written = []
     for finger, its in outcome.calibrations.items():
-        place = args.out / f"{stem}finger{finger}.json"
+        place = _place(args, name, finger)
         file.save(place, its, outcome.provenance[finger], overwrite=args.force)
         written.append(str(place))
     return written

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..calibration.file import Provenance
-from ..errors import InputError
+from ..errors import CommandRefusedError, InputError
 from ..hand import Hand
 from ..identity import ascii_text, serial_text
 from ..version import __version__
@@ -47,9 +47,9 @@ class Plan:
 def calibrate(open_hand: Callable[[], Hand], plan: Plan, face: Face, *, made_s: int, save: bool = False) -> Outcome:
     """Run ``plan`` on the board that ``open_hand`` opens; the reference is its scenario's force, or ``face``'s word.
 
-    ``save`` keeps the result over reboots once every finger is verified. Raises InputError for presses that cannot be
-    used, for a finger without a sensor, and for a sensor that was changed under way; nothing is on the board then,
-    or until the next reboot at most.
+    ``save`` keeps the result over reboots once every finger is verified (Outcome.not_saved). Raises InputError for
+    presses that cannot be used, for a finger without a sensor, and for a sensor that was changed under way; nothing is
+    on the board then, or until the next reboot at most.
     """
     with open_hand() as hand:
         fingers = _fingers(hand, plan)
@@ -125,9 +125,13 @@ def _on_board(
         held = _run(hand, procedure, reference, face, after_us=after_us)
         verified = {finger: verify(fits[finger], presses[-1]) for finger, presses in held.presses.items()}
         hand.stop()
+    not_saved = None
     if save:
-        hand.save_settings()
-    return Outcome(fits, calibrations, provenance, verified)
+        try:
+            hand.save_settings()
+        except CommandRefusedError as error:
+            not_saved = error  # no reason to lose all that was pressed
+    return Outcome(fits, calibrations, provenance, verified, not_saved=not_saved)
 
 
 def _known(reference: Reference) -> bool:

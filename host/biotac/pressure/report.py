@@ -7,7 +7,10 @@ from typing import Any
 
 from ..calibration import Calibration
 from ..calibration.file import Provenance
+from ..errors import CommandRefusedError
 from .fit import Fit, Verification
+
+PAPER_ERROR = 0.0591  # relative error of the fore finger's verification press
 
 
 @dataclass(frozen=True)
@@ -15,7 +18,7 @@ class Outcome:
     """By finger: K, the calibration with it, where it comes from, and the verification press.
 
     ``verified`` is empty when no verification was asked for; ``lag_rows`` is how late pressure came after a reference
-    with times of its own.
+    with times of its own; ``not_saved`` is why the board did not keep what it was asked to keep.
     """
 
     fits: dict[int, Fit]
@@ -23,6 +26,7 @@ class Outcome:
     provenance: dict[int, Provenance]
     verified: dict[int, Verification]
     lag_rows: dict[int, int] = field(default_factory=dict)
+    not_saved: CommandRefusedError | None = None
 
 
 def facts_of(its: Fit) -> Provenance:
@@ -75,5 +79,11 @@ def lines(outcome: Outcome) -> list[str]:
             line += f"  {seen.force_n:>7.3f}  {seen.told_n:>7.3f}  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
         out.append(line)
     notes = [note for its in outcome.fits.values() for note in its.notes]
+    notes += [
+        f"finger {f}: verified {seen.board_error:.1%} off, the paper's finger was {PAPER_ERROR:.2%}: another place or "
+        "another way of pressing than before?"
+        for f, seen in outcome.verified.items()
+        if seen.board_error > PAPER_ERROR
+    ]
     lags = [f"finger {f}: pressure comes {lag} rows after the force" for f, lag in outcome.lag_rows.items() if lag]
     return [*out, *(f"  {note}" for note in (*notes, *lags))]
