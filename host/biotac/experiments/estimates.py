@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import _wire as wire
 from ..core import Settings
+from ..errors import InputError
 from ..sim import surface
 from ..sim.gains import fit_gains
 from ..sim.surface import Floats
@@ -28,14 +29,20 @@ PAPER = "paper"
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a model makes of a trial: ``force_n`` (n, 3), ``torque_nmm`` (n, 3) about the origin or None."""
+    """What a model makes of a trial: ``force_n`` (n, 3), ``torque_nmm`` (n, 3) about the origin or None.
+
+    ``own_torsion_nmm`` (n,) is that of a map that was fitted to torsion itself.
+    """
 
     name: str
     force_n: Floats
     torque_nmm: Floats | None
+    own_torsion_nmm: Floats | None = None
 
     def torsion_nmm(self, at_mm: Floats) -> Floats | None:
-        """Torque (n,) about the outward normal at contacts (n, 3): (M - c x F) . n; NaN without a contact."""
+        """Torque (n,) about the outward normal at contacts (n, 3), NaN without one: its own or (M - c x F) . n."""
+        if self.own_torsion_nmm is not None:
+            return np.where(np.isfinite(at_mm).all(axis=1), self.own_torsion_nmm, np.nan)
         if self.torque_nmm is None:
             return None
         return torsion(self.force_n, self.torque_nmm, at_mm)
@@ -69,18 +76,32 @@ def by_paper(trial: Trial, settings: Settings, name: str = PAPER) -> tuple[Trial
 
 
 def by_map(trial: Trial, its: WrenchMap, name: str) -> Estimate:
-    """A fitted map on the trial's counts, with the board's tare of each frame in place of the map's own."""
+    """A fitted map on the trial's counts, with the board's tare of each frame in place of the map's own.
+
+    Raises InputError when the map needs PDC and the trial has none.
+    """
+    if its.with_pdc and not np.isfinite(trial.pressure).any():
+        raise InputError(
+            f"map {name} was trained with PDC, and {trial.name} has none: expected PDC; choose another map"
+        )
     counts = np.where(trial.counts == wire.INVALID_COUNT, np.nan, trial.counts)
     wrench = replace(its, tare=trial.tare).predict(counts, trial.pressure)
     columns = {axis: k for k, axis in enumerate(its.axes)}
     force = wrench[:, [columns[axis] for axis in ("Fx", "Fy", "Fz")]]
     torque = wrench[:, [columns[axis] for axis in ("Mx", "My", "Mz")]] if "Mz" in columns else None
-    return Estimate(name, force, torque)
+    own = wrench[:, columns["torsion"]] if "torsion" in columns else None
+    return Estimate(name, force, torque, own)
 
 
-def load_maps(paths: Sequence[Path]) -> dict[str, WrenchMap]:
-    """Maps by the name of their file, its endings left out. Raises InputError."""
-    return {path.name.removesuffix(".json").removesuffix(".wrench"): fitted.load(path) for path in paths}
+def load_maps(paths: Sequence[Path]) -> dict[str, tuple[Path, WrenchMap]]:
+    """Maps and where they are from, by the name of their file, its endings left out. Raises InputError."""
+    maps: dict[str, tuple[Path, WrenchMap]] = {}
+    for path in paths:
+        name = path.name.removesuffix(".json").removesuffix(".wrench")
+        if name in maps or name.startswith(PAPER):
+            raise InputError(f"{path}: another model is called {name} too: expected names that differ; rename the file")
+        maps[name] = path, fitted.load(path)
+    return maps
 
 
 def rmse(estimate: Floats | None, truth: Floats | None, rows: Bools) -> Floats:

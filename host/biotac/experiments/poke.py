@@ -30,7 +30,7 @@ from . import recorded
 from .outcome import Facts, Options, check, number, numbers, table, text
 from .trial import Bools, Script, Trial, play
 
-RECORDING = "E and F: 19 contacts above 1 N in the order of the electrodes"
+RECORDING = "E and F, or an .mcap with good scales: 19 contacts above 1 N in the order of the electrodes"
 MAPS = False
 
 PROBE_MM = 2.0
@@ -152,7 +152,7 @@ def contacts(trial: Trial, low_n: float = FLOOR_N, high_n: float = np.inf) -> li
 def run(options: Options) -> Result:
     """On an emulated finger, new and worn, twice each; or on a recording."""
     if options.recording is not None:
-        theirs = recorded.load(options.recording, options.finger, needs=("F",))
+        theirs = recorded.load(options.recording, options.finger, needs=("F",), own_force=True)
         firm = contacts(theirs.trial)
         banded = [contacts(theirs.trial, *band) for band in BANDS_N]
         cases = [_case("recorded", weights, [theirs.trial], theirs.trial, [firm], banded) for weights in WEIGHTS]
@@ -273,7 +273,7 @@ def page(facts: Facts) -> list[str]:
     rows += [["paper", "BioTac", str(k + 1), text(paper[k]), "", ""] for k in (0, 1)]
     rows += [["paper", "Nano17", str(k + 1), text(paper[k + 2]), "", ""] for k in (0, 1)]
     lines = [
-        "Standard deviation of the point of contact, sqrt(var x + var y + var z), over every frame with a true force",
+        "Standard deviation of the point of contact, sqrt(var x + var y + var z), over every frame with a force",
         f"above {FLOOR_N:g} N, mean over the 19 electrodes. Bias: from the electrode to the mean point.",
         "",
         *table(["sensor", "weights", "trial", "std [mm]", "one coordinate [mm]", "bias [mm]"], rows),
@@ -343,8 +343,8 @@ def _draw_bands(axes: Any, result: Result) -> None:
         axes.plot(range(len(BANDS_N)), [_mean(band.std_mm) for band in case.bands], styles[case.profile], marker="o",
                   markersize=4, color=colors[case.weights], label=f"{case.profile}: {WORDS[case.weights]}")  # fmt: skip
     axes.axhline(LIMIT_MM, color="#111111", linewidth=1, linestyle=":")
-    axes.annotate(f"{LIMIT_MM} mm", (1, LIMIT_MM), xycoords=("axes fraction", "data"), xytext=(-3, 3),
-                  textcoords="offset points", ha="right", fontsize=8)  # fmt: skip
+    axes.annotate(f"{LIMIT_MM} mm", (0, LIMIT_MM), xycoords=("axes fraction", "data"), xytext=(3, 3),
+                  textcoords="offset points", fontsize=8)  # fmt: skip
     axes.set_xticks(range(len(BANDS_N)), [f"{low:g} to {high:g}" for low, high in BANDS_N])
     axes.set(xlabel="force [N]", ylabel="std of the point of contact [mm]", yscale="log")
     axes.set_title("by force, mean of 19 electrodes", fontsize=10)

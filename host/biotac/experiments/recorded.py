@@ -33,8 +33,10 @@ class Recorded:
     notes: tuple[str, ...]
 
 
-def load(path: Path, finger: int = 0, needs: tuple[str, ...] = ()) -> Recorded:
+def load(path: Path, finger: int = 0, needs: tuple[str, ...] = (), *, own_force: bool = False) -> Recorded:
     """An .npz of one finger, or a recording of `biotac record`, of which ``finger`` is taken.
+
+    The latter has no truth; ``own_force`` takes the force that its board published, by its own scales, for F.
 
     Fields of an .npz: ``E`` (n, 19) counts; optionally ``PDC`` (n,) counts, ``F`` (n, 3) N and ``M`` (n, 3)
     N mm about Lin's origin in the recorded axes (X lateral, Y to the tip, Z out of the pad), ``t`` (n,) s,
@@ -43,7 +45,7 @@ def load(path: Path, finger: int = 0, needs: tuple[str, ...] = ()) -> Recorded:
     RecordingError naming the field.
     """
     if path.suffix.lower() != ".npz":
-        return _of_recording(path, finger, needs)
+        return _of_recording(path, finger, needs, own_force)
     fields = read_npz(path, FIELDS)
     _require(path, ("E", *needs), tuple(fields))
     counts = counts_field(path, "E", fields["E"], None, _ELECTRODES)
@@ -59,6 +61,11 @@ def load(path: Path, finger: int = 0, needs: tuple[str, ...] = ()) -> Recorded:
     time_s = np.arange(n, dtype=np.float64) * ROW_S
     if "t" in fields:
         time_s = _numbers(path, "t", fields["t"], (n,), "s")
+        back = np.flatnonzero(np.diff(time_s) < 0.0)
+        if len(back):
+            raise RecordingError(
+                f"{path}: field t goes back in row {back[0] + 1}: expected times in order; sort the rows"
+            )
     force, torque = (
         to_lin_frame(_numbers(path, name, fields[name], (n, 3), unit)) if name in fields else None
         for name, unit in (("F", "N"), ("M", "N mm"))
@@ -67,19 +74,20 @@ def load(path: Path, finger: int = 0, needs: tuple[str, ...] = ()) -> Recorded:
     return Recorded(_trial(path, time_s, counts, pdc, force, torque, base), normal, tuple(notes))
 
 
-def _of_recording(path: Path, finger: int, needs: tuple[str, ...]) -> Recorded:
+def _of_recording(path: Path, finger: int, needs: tuple[str, ...], own_force: bool) -> Recorded:
     recording = Recording(path)
-    _require(path, needs, ("E", "PDC"))
+    _require(path, needs, ("E", "PDC", "F") if own_force else ("E", "PDC"))
     mine = recording.frames[recording.frames["finger"] == finger]
     if not len(mine):
-        raise RecordingError(
-            f"{path}: finger {finger} sent no frames: expected one of "
-            f"{', '.join(str(k) for k in np.unique(recording.frames['finger'])) or 'none'}; name another with --finger"
-        )
-    time_s = mine["t_us"] / 1e6
-    notes = ("tare: the board's own, from the recorded counts", *recording.problems)
-    trial = _trial(path, time_s - time_s[0], mine["counts"].copy(), mine["pdc"].copy(), None, None, None)
-    return Recorded(trial, None, notes)
+        there = ", ".join(str(k) for k in np.unique(recording.frames["finger"])) or "none"
+        raise RecordingError(f"{path}: finger {finger} sent no frames: expected {there}; name another with --finger")
+    notes = ["tare: the board's own, from the recorded counts", *recording.problems]
+    if own_force:
+        notes.append("force: what the board published, by its own scales; no plate was there")
+    force = np.nan_to_num(mine["force_n"]) if own_force else None
+    time_s = (mine["t_us"] - mine["t_us"][0]) / 1e6
+    trial = _trial(path, time_s, mine["counts"].copy(), mine["pdc"].copy(), force, None, None)
+    return Recorded(trial, None, tuple(notes))
 
 
 def _trial(

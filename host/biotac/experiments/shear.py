@@ -87,5 +87,6 @@ def page(facts: Facts) -> list[str]:
 
 def draw(result: Result, path: Path) -> None:
     """Figure 3, and the forces below it."""
-    below = traces.panels(result.trial, result.estimates, ("Fx", "Fy", "Fz"))
+    axes = ("Fx", "Fy", "Fz") if result.is_recorded else ("Fy", "Fz")
+    below = traces.panels(result.trial, result.estimates, axes)
     traces.draw(result.trial, below, f"Shear trial (Lin 2013, figure 3): {result.source}", path, MARKED)

@@ -105,8 +105,10 @@ def _panel(axes: Any, trial: Trial, panel: Panel) -> None:
     colors = iter(MAP_COLORS)
     papers = iter((PAPER_COLOR, OTHER_PAPER_COLOR))
     for name, line in panel.lines.items():
-        color = next(papers, PAPER_COLOR) if name.startswith(PAPER) else next(colors, MAP_COLORS[-1])
-        axes.plot(trial.time_s[::step], line[::step], color=color, linewidth=1.0, label=name)
+        of_paper = name.startswith(PAPER)
+        color = next(papers, PAPER_COLOR) if of_paper else next(colors, MAP_COLORS[-1])
+        # a map follows every count's noise: drawn last, its line would hide the others
+        axes.plot(trial.time_s[::step], line[::step], color=color, linewidth=1.0, label=name, zorder=3 + of_paper)
     axes.axhline(0.0, color="#111111", linewidth=0.6)
     axes.set_ylabel(panel.label)
     _legend(axes)
@@ -117,11 +119,12 @@ def _legend(axes: Any) -> None:
 
 
 def _phases(axes: Any, trial: Trial, *, named: bool) -> None:
-    starts = [0.0, *[phase.end_s for phase in trial.phases[:-1]]]
-    for k, (start, phase) in enumerate(zip(starts, trial.phases, strict=True)):
+    start = 0.0
+    for k, phase in enumerate(trial.phases):
         if k % 2:
             axes.axvspan(start, phase.end_s, color="#0f172a", alpha=0.05, linewidth=0)
         if named:
             axes.annotate(phase.name.replace(" ", "\n"), (np.mean([start, phase.end_s]), 1.0),
                           xycoords=("data", "axes fraction"), xytext=(0, 3), textcoords="offset points", ha="center",
                           fontsize=8 if len(trial.phases) < 10 else 6.5)  # fmt: skip
+        start = phase.end_s
