@@ -16,7 +16,7 @@ from biotac.experiments import random_loads, shear_torsion
 from biotac.experiments.outcome import Options
 from biotac.sim import surface
 from biotac.sim.physics import Finger
-from biotac.wrench import contact, features, figures, moments
+from biotac.wrench import contact, features, figures, moments, template
 from biotac.wrench.blocks import BLOCKS, Blocks
 from biotac.wrench.crossvalidation import AIR_SHARES, validate
 from biotac.wrench.recorded import Run, load_run
@@ -197,6 +197,48 @@ def test_air_weighs_as_much_as_the_run_before_its_share(run: Run) -> None:
     count = -1 - run.truth.shape[1]
     assert sums[count, count] == pytest.approx(FRAMES)
     assert not sums[:, count + 1 :].any()  # the truth is 0
+
+
+# ---- template ----------------------------------------------------------------------------------
+
+
+def test_a_signal_made_of_the_shapes_gives_their_sizes_back() -> None:
+    tare = np.full(19, 3000.0)
+    # a light press over E18, so that the point of contact does not move with what is added
+    point = surface.project(surface.ELECTRODE_MM[[17]])
+    normal = surface.normals_at(point)
+    shapes = template._shapes(point, normal, *surface.tangents_at(normal))[0]
+    sizes = np.array([0.3, 0.02, 0.01, -0.02, 0.005])
+    found = template.solve(features.Signals(counts_of(shapes @ sizes, tare) - tare, tare))
+    # it looks where the compression's centre is, which is not quite where it was made
+    np.testing.assert_allclose(found.size[0], sizes, atol=0.02)
+    assert np.linalg.norm(found.point_mm - point) < 1.0
+    assert found.size[0, template.PRESS] == pytest.approx(0.3, rel=0.1)
+
+
+def counts_of(log_conductance: np.ndarray, tare: np.ndarray) -> np.ndarray:
+    """Counts (1, 19) whose conductance over that at rest has this logarithm."""
+    conductance = tare / (4095.0 - tare) * np.exp(log_conductance)
+    return (4095.0 * conductance / (1.0 + conductance))[None]
+
+
+def test_a_touch_turned_and_pushed_the_other_way_changes_signs(run: Run) -> None:
+    for change, which in (("shear_n", template.ACROSS), ("torsion_nmm", template.TURN)):
+        loads = random_loads.states(2, 1)[0]
+        contact_mm = surface.on_surface(np.array([[-6.0, 0.0]] * 2))
+        push = {"shear_n": np.zeros((2, 3)), "torsion_nmm": np.zeros(2)}
+        push[change] = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]) if change == "shear_n" else np.array([4.0, -4.0])
+        its = replace(loads, contact_mm=contact_mm, force_n=np.full(2, 5.0), tip_radius_mm=np.full(2, 1.8), **push)
+        finger = Finger(2)
+        tare = finger.rest_counts(np.zeros(1))[0]
+        size = template.solve(features.Signals(finger.counts(its) - tare, tare)).size
+        assert size[0, which] > 0.0 > size[1, which]
+
+
+def test_the_template_knows_more_than_the_papers_formulas_and_less_than_a_map(result: shear_torsion.Result) -> None:
+    by_model = {name: errors[0] for name, errors in result.validation.by_model.items()}
+    for axis in (1, 2, 6):
+        assert by_model["joined"][axis] < by_model["template"][axis] < by_model["lin-scales"][axis]
 
 
 # ---- blocks of columns -------------------------------------------------------------------------

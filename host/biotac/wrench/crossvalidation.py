@@ -17,9 +17,10 @@ from threadpoolctl import threadpool_limits
 from . import features
 from .alignment import best_lag, check, lag_moments
 from .blocks import BLOCKS, Blocks
-from .models import AFFINE, GATED, LAMBDAS, MODELS, POOL, POOLED, solve, squared_errors, truth_variance, used
+from .models import AFFINE, GATED, LAMBDAS, MODELS, POOL, POOLED, TEMPLATE, solve, squared_errors, truth_variance, used
 from .moments import Rows, air_moments, drifted, linear_columns, moments, smoothed, with_one
 from .recorded import Floats, Run
+from .template import Template
 
 INNER_FOLDS = 5
 WINDOWS_ROWS = (1, 5)  # as recorded, or the mean of five: half the noise for 20 ms of delay at 100 Hz
@@ -73,9 +74,9 @@ class Validation:
     """Everything held out; ``axes`` columns throughout.
 
     ``predicted`` (3, n, axes) at SHIFTS_COUNTS by the best choice of each row's own fold; ``by_model``
-    name -> RMSE (3, axes), each with its own nested lambda; ``folds`` the 20 trainings; ``final`` the
-    training on the whole run; ``lag_rows`` of the whole run before any correction; ``affine_r2``
-    held-out R2 of the affine model there.
+    name -> RMSE (3, axes), each with its own nested lambda, and TEMPLATE's; ``folds`` the 20 trainings;
+    ``final`` the training on the whole run; ``lag_rows`` of the whole run before any correction;
+    ``affine_r2`` held-out R2 of the affine model there.
     """
 
     run: Run
@@ -214,6 +215,7 @@ def _validate(run: Run, align: bool, windows: tuple[int, ...], show: Show | None
     at_lags = lag_moments(run, blocks)
     lag_rows, affine_r2 = check(run, blocks, at_lags)
     trainer = _Trainer(run, blocks, windows)
+    template = Template(run)
     predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
     errors: dict[str, Floats] = {}
     folds: list[Fit] = []
@@ -226,6 +228,9 @@ def _validate(run: Run, align: bool, windows: tuple[int, ...], show: Show | None
         folds.append(fit)
         rows = blocks.rows(block)
         predicted[:, rows] = predict(run, fit, fit.best, rows)
+        trained = np.concatenate([blocks.strips[k] for k in np.flatnonzero(strips)])
+        guess = template.held_out(fit.window_rows, fit.lag_rows, trained, rows, SHIFTS_COUNTS)
+        errors[TEMPLATE] = errors.get(TEMPLATE, 0.0) + ((guess - run.truth[rows]) ** 2).sum(axis=1)
         for name, choices in fit.by_model.items():
             wrong = ((predict(run, fit, choices, rows) - run.truth[rows]) ** 2).sum(axis=1)
             errors[name] = errors.get(name, 0.0) + wrong

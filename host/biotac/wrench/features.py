@@ -124,10 +124,7 @@ def columns(signals: Signals) -> Floats:
 def kinds(signals: Signals) -> dict[Kind, Floats]:
     """Each kind's columns (n, width); PRESSURE only where there is one."""
     e = signals.e / SIGNAL_COUNTS
-    count = np.clip(signals.e + signals.tare, _map.COUNT_MIN, _map.COUNT_MAX)
-    at_rest = np.clip(signals.tare, _map.COUNT_MIN, _map.COUNT_MAX)
-    # a wet or shorted electrode must not square to anything
-    conductance = np.clip(_conductance(count) / _conductance(at_rest) - 1.0, -1.0, _map.RATIO_MAX)
+    conductance = conductance_change(signals.e, signals.tare)
     result = {
         Kind.OFFSET: np.ones((len(e), 1)),
         Kind.SIGNAL: e,
@@ -147,6 +144,14 @@ def gates(e: Floats) -> dict[Gate, Floats]:
     centre = centroid_mm(e)
     x, y = centre[:, :1] / REACH_MM[0], centre[:, 1:2] / REACH_MM[1]
     return {Gate.ONE: np.ones_like(x), Gate.X: x, Gate.Y: y, Gate.XX: x * x, Gate.XY: x * y, Gate.YY: y * y}
+
+
+def conductance_change(e: Floats, tare: Floats) -> Floats:
+    """Electrodes' conductance (n, 19) over that at rest, less one."""
+    count = np.clip(e + tare, _map.COUNT_MIN, _map.COUNT_MAX)
+    at_rest = np.clip(tare, _map.COUNT_MIN, _map.COUNT_MAX)
+    # a wet or shorted electrode must not square to anything
+    return np.clip(_conductance(count) / _conductance(at_rest) - 1.0, -1.0, _map.RATIO_MAX)
 
 
 def centroid_mm(e: Floats) -> Floats:

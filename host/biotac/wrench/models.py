@@ -49,6 +49,8 @@ LIN, AFFINE, GATED = MODELS[0], MODELS[2], MODELS[4]
 # Which of the three is best changes from axis to axis and from block to block by less than what their mean gains.
 POOLED = "pooled"
 POOLED_WORDS = "mean of gated-sign-split, quadratic and conductance-quadratic"
+TEMPLATE = "template"
+TEMPLATE_WORDS = "five shapes around the contact, a 5x5 solve a frame; host only, for comparison"
 POOL = ("gated-sign-split", "quadratic", "conductance-quadratic")
 
 

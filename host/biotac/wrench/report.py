@@ -11,7 +11,7 @@ from . import figures
 from .alignment import MAX_LAG_ROWS
 from .blocks import BLOCKS, GUARD_ROWS
 from .crossvalidation import INNER_FOLDS, SHIFTS_COUNTS, Validation
-from .models import MODELS, POOLED, POOLED_WORDS
+from .models import MODELS, POOLED, POOLED_WORDS, TEMPLATE, TEMPLATE_WORDS
 from .recorded import Floats
 
 AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")
@@ -136,7 +136,7 @@ def _axes(validation: Validation) -> list[str]:
 
 
 def _models(validation: Validation) -> list[str]:
-    words = {model.name: model.words for model in MODELS} | {POOLED: POOLED_WORDS}
+    words = {model.name: model.words for model in MODELS} | {POOLED: POOLED_WORDS, TEMPLATE: TEMPLATE_WORDS}
     rows = []
     for name, errors in validation.by_model.items():
         drifted = errors[1:].max(axis=0)
