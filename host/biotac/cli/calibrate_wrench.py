@@ -5,26 +5,40 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import time
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
 from ..export.partial import whole
-from ..wrench import figures, fitted, report
+from ..live.fingers import checked_names, finger_index
+from ..reference.files import read_reference
+from ..reference.mounting import read_mounting
+from ..wrench import figures, fitted, provenance, report
 from ..wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
-from ..wrench.recorded import load_run
+from ..wrench.sources import Loaded, load
 from .progress import Progress
 
 NAME = "wrench"
-HELP = "Counts to force, from .npz recordings with E, F (N), E_base and E_idle; M (N mm) and PDC if there."
-EXAMPLE = "biotac calibrate wrench thumb.npz --out calibrated/"
+HELP = (
+    "Counts to force: from a board's recordings with a force/torque sensor's file beside each, or from .npz with E, "
+    "F (N), E_base and E_idle; M (N mm) and PDC if there."
+)
+EXAMPLE = "biotac calibrate wrench thumb.mcap --reference thumb.csv --finger thumb --out calibrated/"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to fit, and from which files."""
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="one finger each, fitted on its own")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="report (.md, .png) and map (.wrench.json) go here")
-    parser.add_argument("--force", action="store_true", help="overwrite what is there")
+    parser.add_argument(
+        "--reference", metavar="REF", action="append", default=[],
+        help="force of the .mcap at the same place: .csv, or .mcap with WrenchStamped (:TOPIC if many)",
+    )  # fmt: skip
+    parser.add_argument("--mounting", metavar="M", help="how its sensor is fixed: a .toml, or lin (axes are Lin's)")
+    parser.add_argument("--finger", metavar="NAME", help="of a recording with several: name or chip select")
+    parser.add_argument("--serial", metavar="BT...", default="", help="refuse data of another sensor than this")
+    parser.add_argument("--force", action="store_true", help="overwrite what is there; take another sensor's data")
     parser.add_argument(
         "--as-recorded", action="store_true", help="do not correct the lag of counts after force, do not smooth counts"
     )
@@ -34,22 +48,48 @@ def run(args: argparse.Namespace) -> int:
     """Calibrate every file."""
     if args.out is not None:
         _check_out(args.out, args.files, overwrite=args.force)
+    references = _references(args.files, args.reference)
+    mounting = None if args.mounting is None else read_mounting(args.mounting)
+    finger = None if args.finger is None else finger_number(args.finger)
     for path in args.files:
-        _calibrate(args, path)
+        its = references.get(path)
+        beside = None if its is None else (Path(its), read_reference(its, mounting))
+        calibrate(args, load(path, beside, finger=finger, serial=args.serial, force=args.force))
     return 0
 
 
-def _calibrate(args: argparse.Namespace, path: Path) -> None:
+def finger_number(text: str) -> int:
+    """Chip select of a finger by name or number. Raises InputError."""
+    try:
+        return finger_index(checked_names(None), int(text) if text.isdigit() else text)
+    except KeyError as error:
+        raise InputError(str(error.args[0])) from None
+
+
+def _references(files: list[Path], references: list[str]) -> dict[Path, str]:
+    recordings = [path for path in files if path.suffix.lower() == ".mcap"]
+    if references and len(references) != len(recordings):
+        raise InputError(
+            f"{len(references)} --reference for {len(recordings)} .mcap recordings: expected one for each, in order"
+        )
+    return dict(zip(recordings, references, strict=False))
+
+
+def calibrate(args: argparse.Namespace, loaded: Loaded) -> Validation:
+    """Fit, tell, and write what was asked for."""
     progress = Progress()
     try:
         windows = (1,) if args.as_recorded else WINDOWS_ROWS
-        validation = validate(load_run(path), align=not args.as_recorded, windows=windows, show=progress.show)
+        validation = validate(loaded.run, align=not args.as_recorded, windows=windows, show=progress.show)
     finally:
         progress.done()
-    facts = figures.summary(validation)
+    its = loaded.provenance(int(time.time()))
+    facts = figures.summary(validation) | loaded.facts() | {"serial": its.serial, "data_sha256": its.data_sha256}
     if args.out is not None:
-        facts["written"] = [str(place) for place in _write(validation, path, args.out, overwrite=args.force)]
+        places = _write(validation, its, loaded.files[0], args.out, overwrite=args.force)
+        facts["written"] = [str(place) for place in places]
     print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
+    return validation
 
 
 def _places(folder: Path, path: Path) -> tuple[Path, Path, Path]:
@@ -71,14 +111,26 @@ def _check_out(folder: Path, files: list[Path], *, overwrite: bool) -> None:
         raise InputError(f"{folder} is no folder ({error.strerror}); choose another name") from error
 
 
-def _write(validation: Validation, path: Path, folder: Path, *, overwrite: bool) -> tuple[Path, ...]:
+def _write(
+    validation: Validation, its: provenance.Provenance, path: Path, folder: Path, *, overwrite: bool
+) -> tuple[Path, ...]:
     page, picture, its_map = places = _places(folder, path)
     with contextlib.ExitStack() as stack:
         parts = [stack.enter_context(whole(place, overwrite=overwrite)) for place in (page, picture, its_map)]
-        parts[0].write_text(report.markdown(validation, picture.name), encoding="utf-8")
+        parts[0].write_text(report.markdown(validation, picture.name) + _origin(its), encoding="utf-8")
         report.draw(validation, parts[1])
-        parts[2].write_text(fitted.dumps(fitted.of(validation)), encoding="utf-8")
+        parts[2].write_text(provenance.embed(fitted.dumps(fitted.of(validation)), its), encoding="utf-8")
     return places
+
+
+def _origin(its: provenance.Provenance) -> str:
+    rows = [
+        ("sensor", its.serial or "not said by the recording"),
+        ("made", f"{its.made}, {its.software}"),
+        ("data", f"{', '.join(its.files)}, SHA-256 {its.data_sha256}"),
+        ("reference", its.reference),
+    ]
+    return "\n".join(["", "## Provenance", "", *[f"* {name}: {what}" for name, what in rows], ""])
 
 
 def _lines(facts: dict[str, Any]) -> list[str]:
