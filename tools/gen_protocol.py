@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write everything that is derived from protocol/sensor.toml and protocol/link.toml.
+"""Write everything that is derived from protocol/sensor.toml, link.toml and map.toml.
 
 tools/gen_protocol.py           write the generated files
 tools/gen_protocol.py --check   exit 1, naming the files, when any of them has drifted
@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
 from committed import write_or_check  # noqa: E402
-from protogen import c_crc, c_fold, c_root, c_sensor, c_variants, c_wire, docs, python_code, schema  # noqa: E402
+from protogen import c_crc, c_fold, c_map, c_root, c_sensor, c_variants, c_wire, docs, python_code, schema  # noqa: E402
 
 
 def outputs(root: Path) -> dict[Path, str]:
@@ -28,6 +28,7 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "firmware/core/fold_gen.c": c_fold.source(contract),
         root / "firmware/core/root_gen.h": c_root.header(contract),
         root / "firmware/core/root_gen.c": c_root.source(contract),
+        root / "firmware/core/map_gen.h": c_map.header(contract),
         root / "firmware/variants/fold_f32_gen.h": c_variants.folded(contract, c_variants.F32),
         root / "firmware/variants/fold_i64_gen.h": c_variants.folded(contract, c_variants.I64),
         root / "firmware/variants/tables_gen.h": c_variants.tables(contract),
@@ -35,6 +36,7 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "firmware/core/wire_gen.c": c_wire.source(contract),
         root / "host/biotac/_sensor.py": python_code.sensor(contract),
         root / "host/biotac/_wire.py": python_code.wire(contract),
+        root / "host/biotac/_map.py": python_code.wrench_map(contract),
         root / "protocol/MESSAGES.md": docs.messages(contract),
         root / "protocol/schema.json": schema.canonical(contract, with_docs=True),
     }

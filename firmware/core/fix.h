@@ -59,6 +59,13 @@ static inline int32_t bt_shift_down(int32_t value, int bits)
     return value >> bits;
 }
 
+// value / 2^bits, for bits > 0 and |value| < 2^62.
+static inline int64_t bt_shift_round(int64_t value, int bits)
+{
+    uint64_t magnitude = (bt_abs(value) + ((uint64_t)1 << (bits - 1))) >> bits;
+    return value < 0 ? -(int64_t)magnitude : (int64_t)magnitude;
+}
+
 // Without a branch. magnitude < 2^31.
 static inline int32_t bt_with_sign(uint32_t magnitude, int32_t sign)
 {

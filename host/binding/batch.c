@@ -12,6 +12,16 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
     }
 }
 
+void bt_map_frames(int64_t n, const bt_map *map, const uint16_t *counts, const uint16_t *tare_q4,
+                   const int32_t *pdc_above_rest_q4, int32_t *force_100un, int32_t *torque_mnmm)
+{
+    for (int64_t k = 0; k < n; k++) {
+        torque_mnmm[3 * k] = torque_mnmm[3 * k + 1] = torque_mnmm[3 * k + 2] = BT_INVALID_I32;
+        bt_map_wrench(map, counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, pdc_above_rest_q4[k],
+                      force_100un + 3 * k, torque_mnmm + 3 * k);
+    }
+}
+
 uint32_t bt_binding_schema_hash(void)
 {
     return BT_SCHEMA_HASH;

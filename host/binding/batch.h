@@ -3,11 +3,17 @@
 #define BIOTAC_BATCH_H
 
 #include "kernel.h"
+#include "map.h"
 
 // counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). flags: (n,), POC_INVALID
 // only. Every row goes through bt_signals_q4 and bt_kernel as on the board.
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                       const bt_kernel_settings *settings, int16_t *poc_um, int32_t *force_100un,
                       int32_t *torque_mnmm, uint32_t *flags);
+
+// A finger's wrench map over frames: pdc_above_rest_q4 (n,), force_100un and torque_mnmm (n, 3), the last
+// marked invalid where the map has no torque.
+void bt_map_frames(int64_t n, const bt_map *map, const uint16_t *counts, const uint16_t *tare_q4,
+                   const int32_t *pdc_above_rest_q4, int32_t *force_100un, int32_t *torque_mnmm);
 
 #endif

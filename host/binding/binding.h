@@ -15,6 +15,7 @@
 #include "framing.h"
 #include "kernel.h"
 #include "lin2013.h"
+#include "map.h"
 #include "record.h"
 #include "replay.h"
 #include "sbc.h"

@@ -5,6 +5,7 @@
 
 #include "crc32.h"
 #include "kernel.h"
+#include "maps.h"
 
 #define BITS_FRAMES 100000
 
@@ -14,10 +15,39 @@ static inline uint32_t bits_step(uint32_t *seed)
     return *seed >> 8;
 }
 
+#define BITS_MAP_FRAMES 2000
+
+// Wrench maps of six axes, over counts and tares of the whole range, missing ones among them.
+static inline uint32_t bits_map_hash(void)
+{
+    static bench_map whole;
+    uint32_t seed = 11;
+    uint32_t chain[7] = {0};
+    if (!BENCH_MAP_MAKE(&whole, bench_map_pooled, 6)) {
+        return 0;
+    }
+    for (int k = 0; k < BITS_MAP_FRAMES; k++) {
+        uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
+        uint32_t spread = 65521u >> (k % 12);
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            tare_q4[i] = (uint16_t)(65520 - bits_step(&seed) % (k % 3 == 0 ? 65521u : 30000u));
+            uint32_t moved = (uint32_t)tare_q4[i] + bits_step(&seed) % spread;
+            counts[i] = (uint16_t)((moved > spread / 2 ? moved - spread / 2 : 0) / 16 % 4096);
+            if (bits_step(&seed) % 64 == 0) {
+                counts[i] = BT_INVALID_COUNT;
+            }
+        }
+        int32_t pdc_q4 = (int32_t)(bits_step(&seed) % 65521u) - 20000;
+        bt_map_wrench(&whole.map, counts, tare_q4, pdc_q4, (int32_t *)chain + 1, (int32_t *)chain + 4);
+        chain[0] = bt_crc32((const uint8_t *)chain, sizeof chain);
+    }
+    return chain[0];
+}
+
 static inline uint32_t bits_hash(void)
 {
     uint32_t seed = 7;
-    uint32_t chain[8] = {0};
+    uint32_t chain[8] = {bits_map_hash()};
     bt_settings all;
     bt_settings_reset(&all);
     bt_kernel_settings settings = bt_kernel_settings_from(&all);

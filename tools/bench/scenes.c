@@ -4,6 +4,7 @@
 
 #include "finger.h"
 #include "framing.h"
+#include "maps.h"
 
 #define LANES BT_LANES // a round's words that the front end looks at: electrodes, then pressure
 
@@ -13,6 +14,7 @@ static bt_tare_settings tare_settings;
 static bt_gate gate;
 static bt_finger rest_front, press_front, rest_whole, press_whole, press_force, press_poc, press_sigma;
 static bt_finger rest_five[BT_MAX_FINGERS], press_five[BT_MAX_FINGERS], rest_words, press_sent;
+static bench_map pooled, pooled_6, affine;
 static bt_msg_frame message;
 static uint8_t payload[BT_FRAME_BYTES], encoded[BT_ENCODED_MAX_BYTES];
 
@@ -127,6 +129,39 @@ static void sent(const bt_kernel_settings *settings)
     sink = (uint32_t)bt_frame_encode(BT_FRAME_ID, payload, sizeof payload, encoded);
 }
 
+static void mapped(const bt_map *map)
+{
+    int32_t force_100un[3], torque_mnmm[3];
+    bt_map_wrench(map, press_whole.frame.electrode, press_whole.tare.electrode_q4, 400, force_100un,
+                  torque_mnmm);
+    sink = (uint32_t)force_100un[0];
+}
+
+static void map_affine(const bt_kernel_settings *settings)
+{
+    (void)settings;
+    mapped(&affine.map);
+}
+
+static void map_pooled(const bt_kernel_settings *settings)
+{
+    (void)settings;
+    mapped(&pooled.map);
+}
+
+static void map_pooled_6(const bt_kernel_settings *settings)
+{
+    (void)settings;
+    mapped(&pooled_6.map);
+}
+
+static void map_opened(const bt_kernel_settings *settings)
+{
+    (void)settings;
+    bt_map map;
+    sink = bt_map_open(&map, (const uint8_t *)pooled.blob, pooled.bytes);
+}
+
 const bench_scene bench_scenes[BENCH_SCENES] = {
     {"gate", "one word", one_word},
     {"front end", "at rest", front_at_rest},
@@ -138,6 +173,10 @@ const bench_scene bench_scenes[BENCH_SCENES] = {
     {"whole frame", "in contact, with sigma", with_sigma},
     {"five fingers", "at rest", five_at_rest},
     {"five fingers", "in contact", five_in_contact},
+    {"wrench map", "signals and offset, 3 axes", map_affine},
+    {"wrench map", "pooled, 3 axes", map_pooled},
+    {"wrench map", "pooled, 6 axes", map_pooled_6},
+    {"wrench map", "pooled, 3 axes, judged", map_opened},
     {"link", "44 words taken in, at rest", all_words},
     {"link", "FRAME computed, packed, framed", sent},
 };
@@ -153,6 +192,8 @@ static void run(bt_finger *finger, const uint16_t count[BT_SLOTS], int rounds)
 void bench_scenes_init(void)
 {
     bt_settings all;
+    (void)(BENCH_MAP_MAKE(&affine, bench_map_affine, 3) && BENCH_MAP_MAKE(&pooled, bench_map_pooled, 3)
+           && BENCH_MAP_MAKE(&pooled_6, bench_map_pooled, 6));
     bt_settings_reset(&all);
     tare_settings = bt_tare_settings_from(&all);
     for (int s = 0; s < BT_SLOTS; s++) {

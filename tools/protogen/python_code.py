@@ -1,10 +1,11 @@
-"""The host's generated modules: _sensor.py (tables) and _wire.py (messages)."""
+"""The host's generated modules: _sensor.py (tables), _wire.py (messages) and _map.py (wrench maps)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import Any
 
+from .c_map import AXES_MAX, BLOCK_BYTES, HEADER_BYTES, columns
 from .schema import GENERATED, Contract, Field, Message
 
 STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
@@ -40,6 +41,35 @@ def sensor(contract: Contract) -> str:
     for key, value in s["conversion"].items():
         out.append(f"{key.upper()} = {value}")
     return "\n".join(out) + "\n"
+
+
+def wrench_map(contract: Contract) -> str:
+    its = contract.map
+    out = [
+        f'"""{GENERATED}',
+        "",
+        "The wrench map on the board: kinds and gates of its blocks, formats of its numbers (SPEC.md, Wrench maps).",
+        '"""',
+        "",
+        "from enum import IntEnum",
+        "from typing import Literal, NamedTuple",
+        "",
+        f"AXES_MAX = {AXES_MAX}",
+        f"HEADER_BYTES = {HEADER_BYTES}",
+        f"BLOCK_BYTES = {BLOCK_BYTES}",
+    ]
+    for name in ("blob", "centroid", "conductance", "fixed"):
+        out += [f"{key.upper()} = {value}" for key, value in its[name].items()]
+    for table_name, title in (("kind", "A block's columns."), ("gate", "What a block's columns are multiplied by.")):
+        out += ["", "", f"class {table_name.capitalize()}(IntEnum):", f'    """{title}"""', ""]
+        out += [f"    {name} = {entry['value']}  # {entry['doc']}" for name, entry in its[table_name].items()]
+    out += ["", "", "class KindSpec(NamedTuple):", '    """How many columns, in what shape, of what."""', ""]
+    out += ["    columns: int", '    shape: Literal["one", "electrodes", "pairs"]']
+    out += ['    of: Literal["one", "signal", "conductance", "pressure"]', "", "", "KINDS: dict[Kind, KindSpec] = {"]
+    for name, kind in its["kind"].items():
+        spec = f'{columns(contract, kind)}, "{kind["columns"]}", "{kind["of"]}"'
+        out.append(f"    Kind.{name}: KindSpec({spec}),")
+    return "\n".join([*out, "}"]) + "\n"
 
 
 def triple(values: list[int]) -> str:

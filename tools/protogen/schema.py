@@ -1,4 +1,4 @@
-"""Read and check the two TOML files; everything downstream works on what this returns."""
+"""Read and check the TOML files; everything downstream works on what this returns."""
 
 from __future__ import annotations
 
@@ -59,6 +59,7 @@ class Message:
 class Contract:
     sensor: dict[str, Any]
     link: dict[str, Any]
+    map: dict[str, Any]
     messages: tuple[Message, ...]
 
     @property
@@ -78,7 +79,9 @@ def load(folder: Path) -> Contract:
     check_sensor(sensor)
     messages = tuple(parse_message(name, raw) for name, raw in link["message"].items())
     check_link(link, messages)
-    return Contract(sensor, link, messages)
+    wrench_map = tomllib.loads((folder / "map.toml").read_text(encoding="utf-8"))
+    check_map(wrench_map)
+    return Contract(sensor, link, wrench_map, messages)
 
 
 def parse_message(name: str, raw: dict[str, Any]) -> Message:
@@ -142,10 +145,20 @@ def check_link(link: dict[str, Any], messages: tuple[Message, ...]) -> None:
             raise ValueError(f"link.toml: stream message {message.name} must start with seq, t_us")
 
 
+def check_map(wrench_map: dict[str, Any]) -> None:
+    for table in ("kind", "gate"):
+        values = [entry["value"] for entry in wrench_map[table].values()]
+        if values != list(range(len(values))):
+            raise ValueError(f"map.toml: values of [{table}] must be 0, 1, 2 ... in their order, they index tables")
+    for name, kind in wrench_map["kind"].items():
+        if kind["columns"] not in ("one", "electrodes", "pairs"):
+            raise ValueError(f"map.toml: {name} has unknown columns {kind['columns']}")
+
+
 def canonical(contract: Contract, *, with_docs: bool) -> str:
-    """Both files as one JSON text in a fixed order; without docs it is what schema_hash covers."""
+    """All files as one JSON text in a fixed order; without docs it is what schema_hash covers."""
     link = {name: part for name, part in contract.link.items() if name != "usb"}
-    tree: dict[str, Any] = {"link": link, "sensor": contract.sensor}
+    tree: dict[str, Any] = {"link": link, "map": contract.map, "sensor": contract.sensor}
     if with_docs:
         return json.dumps({**tree, "schema_hash": contract.hash}, indent=1, sort_keys=True) + "\n"
     return json.dumps(strip_docs(tree), sort_keys=True, separators=(",", ":"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import struct
@@ -15,6 +16,7 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from .. import _wire as wire
+from ..calibration.blob import as_blob
 from ..calibration.file import from_dict
 from ..calibration.values import own_settings
 from ..clock import LAST_SAMPLE_US, DeviceClock
@@ -29,7 +31,8 @@ class Recording:
 
     ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``idle`` (IDLE_DTYPE)
     heartbeats, ``wire`` the FRAME messages as sent, ``messages`` the rest (tare changes, status). ``settings`` are the
-    board's and ``calibrations`` those in force, by finger, when it began. ``problems`` lists in words what is missing
+    board's, ``calibrations`` and ``maps`` (bytes, as the board holds them) those in force, by finger, when it began.
+    ``problems`` lists in words what is missing
     or damaged; the rest is good. ``cut_off``: the file ends without its index; ``damaged_chunks``: seconds that were
     left out. ``blocks`` are the wire's bytes as they came, about one a second, and ``arrived_ns`` when each began, by
     the host's clock (Unix). Raises RecordingError when nothing can be read. ``show`` is told the share of the
@@ -117,6 +120,8 @@ class Recording:
         own = json.loads(metadata.get("calibrations", "{}"))
         # A setting or a calibration that this recording's firmware did not have yet: the default, and none.
         self.calibrations = {int(finger): from_dict(its) for finger, its in own.items()}
+        blobs = json.loads(metadata.get("maps", "{}"))
+        self.maps = {int(finger): as_blob(base64.b64decode(text, validate=True)) for finger, text in blobs.items()}
         self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting}
 
     @property

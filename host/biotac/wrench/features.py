@@ -12,18 +12,55 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import _sensor
+from .. import _map, _sensor
+from .._map import Gate, Kind
 from ..sim import surface
 from .recorded import Floats
 
 ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 SIGNAL_COUNTS = 500.0  # a firm press; only sets the columns' size
 PRESSURE_COUNTS = 100.0
-GATE_FLOOR_COUNTS = 5.0  # per electrode: noise must not throw the centroid about when nothing is compressed
-GATE_MM = (8.0, 4.0)  # half the pad along and across
-MIN_COUNT, MAX_COUNT = 1.0, 4090.0  # numerics.md 1.3: 0 is taken for 10 MOhm
+REACH_MM = (_map.REACH_X_UM / 1000, _map.REACH_Y_UM / 1000)
 
 _UPPER = np.triu_indices(ELECTRODES)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A range of columns: those of ``kind``, each times the scalar ``gate``."""
+
+    kind: Kind
+    gate: Gate
+
+    @property
+    def width(self) -> int:
+        """Columns."""
+        return _map.KINDS[self.kind].columns
+
+
+_PRESSURE = tuple(Block(Kind.PRESSURE, gate) for gate in (Gate.ONE, Gate.X, Gate.Y))
+# PRESSURE last: a run without PDC has the columns before it
+BLOCKS: tuple[Block, ...] = (
+    Block(Kind.SIGNAL, Gate.ONE),
+    Block(Kind.SIGNAL_PAIRS, Gate.ONE),
+    Block(Kind.CONDUCTANCE, Gate.ONE),
+    Block(Kind.CONDUCTANCE_PAIRS, Gate.ONE),
+    # compression and bulge are different physics (biotac.md finding 4)
+    *(Block(kind, gate) for gate in (Gate.ONE, Gate.X, Gate.Y) for kind in (Kind.COMPRESSION, Kind.BULGE)),
+    *_PRESSURE,
+)
+
+
+def blocks(*, with_pdc: bool) -> tuple[Block, ...]:
+    """The blocks of columns(), in their order."""
+    return BLOCKS if with_pdc else BLOCKS[: -len(_PRESSURE)]
+
+
+def width(*, with_pdc: bool) -> int:
+    """Columns of columns()."""
+    return sum(block.width for block in blocks(with_pdc=with_pdc))
+
+
 _QUADRATIC = ELECTRODES + len(_UPPER[0])
 
 
@@ -60,25 +97,46 @@ class Family:
 
 
 def columns(signals: Signals) -> Floats:
-    """All features (n, 532), or (n, 535) with PDC: what QUADRATIC, CONDUCTANCE_QUADRATIC and GATED name."""
+    """All features (n, 532), or (n, 535) with PDC, in the order of blocks()."""
+    found, at = kinds(signals), gates(signals.e)
+    parts = []
+    for block in blocks(with_pdc=signals.pdc is not None):
+        kind = found[block.kind]
+        parts.append(kind if block.gate == Gate.ONE else kind * at[block.gate])
+    return np.concatenate(parts, axis=1)
+
+
+def kinds(signals: Signals) -> dict[Kind, Floats]:
+    """Each kind's columns (n, width); PRESSURE only where there is one."""
     e = signals.e / SIGNAL_COUNTS
-    count = np.clip(signals.e + signals.tare, MIN_COUNT, MAX_COUNT)
-    at_rest = np.clip(signals.tare, MIN_COUNT, MAX_COUNT)
-    conductance = _conductance(count) / _conductance(at_rest) - 1.0
-    # compression and bulge are different physics (biotac.md finding 4)
-    split = np.concatenate([np.minimum(e, 0.0), np.maximum(e, 0.0)], axis=1)
-    centre = centroid_mm(signals.e)
-    along, across = centre[:, :1] / GATE_MM[0], centre[:, 1:2] / GATE_MM[1]
-    blocks = [e, _products(e), conductance, _products(conductance), split, split * along, split * across]
+    count = np.clip(signals.e + signals.tare, _map.COUNT_MIN, _map.COUNT_MAX)
+    at_rest = np.clip(signals.tare, _map.COUNT_MIN, _map.COUNT_MAX)
+    # a wet or shorted electrode must not square to anything
+    conductance = np.clip(_conductance(count) / _conductance(at_rest) - 1.0, -1.0, _map.RATIO_MAX)
+    result = {
+        Kind.OFFSET: np.ones((len(e), 1)),
+        Kind.SIGNAL: e,
+        Kind.SIGNAL_PAIRS: _products(e),
+        Kind.CONDUCTANCE: conductance,
+        Kind.CONDUCTANCE_PAIRS: _products(conductance),
+        Kind.COMPRESSION: np.minimum(e, 0.0),
+        Kind.BULGE: np.maximum(e, 0.0),
+    }
     if signals.pdc is not None:
-        pressure = signals.pdc[:, None] / PRESSURE_COUNTS
-        blocks += [pressure, pressure * along, pressure * across]
-    return np.concatenate(blocks, axis=1)
+        result[Kind.PRESSURE] = signals.pdc[:, None] / PRESSURE_COUNTS
+    return result
+
+
+def gates(e: Floats) -> dict[Gate, Floats]:
+    """Each gate (n, 1)."""
+    centre = centroid_mm(e)
+    x, y = centre[:, :1] / REACH_MM[0], centre[:, 1:2] / REACH_MM[1]
+    return {Gate.ONE: np.ones_like(x), Gate.X: x, Gate.Y: y, Gate.XX: x * x, Gate.XY: x * y, Gate.YY: y * y}
 
 
 def centroid_mm(e: Floats) -> Floats:
     """Centroid (n, 3) of the compressed electrodes in mm; the middle of all when none is compressed."""
-    weights = np.maximum(-e, 0.0) + GATE_FLOOR_COUNTS
+    weights = np.maximum(-e, 0.0) + _map.FLOOR_COUNTS
     centre: Floats = weights @ surface.ELECTRODE_MM / weights.sum(axis=1, keepdims=True)
     return centre
 
@@ -97,10 +155,12 @@ def _counts_scale(tare: Floats) -> Floats:
 
 
 def _conductance_scale(tare: Floats) -> Floats:
-    # d ln(c / (4095 - c)) / dc, turned over
-    return np.clip(tare, MIN_COUNT, MAX_COUNT) * (1.0 - np.clip(tare, MIN_COUNT, MAX_COUNT) / _sensor.FULL_SCALE_COUNT)
+    at_rest = np.clip(tare, _map.COUNT_MIN, _map.COUNT_MAX)
+    scale: Floats = at_rest * (1.0 - at_rest / _sensor.FULL_SCALE_COUNT)  # d ln(c / (4095 - c)) / dc, turned over
+    return scale
 
 
+_QUADRATIC = ELECTRODES + len(_UPPER[0])
 LINEAR = Family(slice(0, ELECTRODES), 1, _counts_scale)
 QUADRATIC = Family(slice(0, _QUADRATIC), 1, _counts_scale)
 CONDUCTANCE_QUADRATIC = Family(slice(_QUADRATIC, 2 * _QUADRATIC), 1, _conductance_scale)

@@ -37,7 +37,7 @@ class WrenchMap:
     @property
     def with_pdc(self) -> bool:
         """Whether it was trained with PDC, and so needs it."""
-        return len(self.coefficients) - 1 == _columns(with_pdc=True)
+        return len(self.coefficients) - 1 == features.width(with_pdc=True)
 
     def predict(self, counts: Floats, pdc: Floats | None = None) -> Floats:
         """Wrench (n, axes) in N and N mm of ``counts`` (n, 19), NaN where a count is; smoothing is the caller's.
@@ -86,7 +86,7 @@ def load(path: Path) -> WrenchMap:
             int(facts["lag_rows"]),
             np.array(facts["coefficients"], dtype=np.float64),
         )
-        shapes = [(_columns(with_pdc=pdc) + 1, len(its.axes)) for pdc in (False, True)]
+        shapes = [(features.width(with_pdc=pdc) + 1, len(its.axes)) for pdc in (False, True)]
         if its.coefficients.shape not in shapes or its.tare.shape != (ELECTRODES,):
             raise ValueError(f"coefficients {its.coefficients.shape}, tare {its.tare.shape}")
         if not np.isfinite(its.coefficients).all() or not np.isfinite(its.tare).all():
@@ -95,8 +95,3 @@ def load(path: Path) -> WrenchMap:
         seen = str(error) or type(error).__name__
         raise InputError(f"{path}: {seen}: expected a {FORMAT} as `biotac calibrate wrench --out` writes it") from None
     return its
-
-
-def _columns(*, with_pdc: bool) -> int:
-    empty = np.zeros((1, ELECTRODES))
-    return int(features.columns(Signals(empty, empty[0] + 3000.0, np.zeros(1) if with_pdc else None)).shape[1])

@@ -1,0 +1,146 @@
+"""A wrench map as a board keeps it: its blob, and the board's own code on it.
+
+The blob's layout and the meaning of its integers are in protocol/SPEC.md, Wrench maps. Where a map comes
+from is ``biotac.wrench``.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _map
+from . import _wire as wire
+from ._map import Gate, Kind
+from .core import ffi, lib
+from .errors import InputError
+from .frames import StructArray
+
+Integers = NDArray[np.int64]
+
+_HEADER = struct.Struct(f"<BBBB{_map.SERIAL_BYTES}sI")
+_BLOCK = struct.Struct(f"<BB{_map.AXES_MAX}B")
+
+
+@dataclass(frozen=True)
+class BoardBlock:
+    """``coefficients`` (columns, axes) of ``kind``'s columns, times 2^``exponent`` of each axis (axes,)."""
+
+    kind: Kind
+    gate: Gate
+    exponent: tuple[int, ...]
+    coefficients: Integers
+
+
+@dataclass(frozen=True)
+class BoardMap:
+    """``axes`` is 3 (force) or 6 (and torque). ``serial`` is of the sensor it was made for, "": any.
+
+    ``made_s`` counts from 1970 UTC, 0: unknown.
+    """
+
+    axes: int
+    blocks: tuple[BoardBlock, ...]
+    serial: str = ""
+    made_s: int = 0
+
+    @cached_property
+    def blob(self) -> bytes:
+        """What a board stores. Raises InputError when the board would refuse it."""
+        serial = self.serial.encode("ascii")
+        head = _HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s)
+        blocks, coefficients = b"", b""
+        for block in self.blocks:
+            unused = (0,) * (_map.AXES_MAX - self.axes)
+            blocks += _BLOCK.pack(block.kind, block.gate, *block.exponent, *unused)
+            coefficients += b"".join(
+                np.ascontiguousarray(_words(block.coefficients[:, axis : axis + 3])).tobytes()
+                for axis in range(0, self.axes, 3)
+            )
+        blob = head + blocks + coefficients
+        _judged(blob)
+        return blob
+
+    @property
+    def with_pdc(self) -> bool:
+        """Whether its results need PDC."""
+        return any(block.kind == Kind.PRESSURE for block in self.blocks)
+
+    @property
+    def handle(self) -> Any:
+        """The C struct bt_map, good for as long as this object lives."""
+        return self._opened[0]
+
+    @cached_property
+    def _opened(self) -> tuple[Any, Any]:
+        return _judged(self.blob)
+
+    def results(
+        self, counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], pdc_above_rest_q4: NDArray[np.int32]
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """force_100un and torque_mnmm (n, 3) as the board computes them of counts and tare_q4 (n, 19), pressure (n,).
+
+        -2^31 where invalid: torque of a map without, and all where pressure, -2^31 itself, is needed and missing.
+        """
+        raw, tare = (np.ascontiguousarray(a, dtype=np.uint16) for a in (counts, tare_q4))
+        pdc = np.ascontiguousarray(pdc_above_rest_q4, dtype=np.int32)
+        force = np.empty((len(raw), 3), np.int32)
+        torque = np.empty((len(raw), 3), np.int32)
+        lib.bt_map_frames(
+            len(raw),
+            self.handle,
+            ffi.from_buffer("uint16_t[]", raw),
+            ffi.from_buffer("uint16_t[]", tare),
+            ffi.from_buffer("int32_t[]", pdc),
+            ffi.from_buffer("int32_t[]", force),
+            ffi.from_buffer("int32_t[]", torque),
+        )
+        return force, torque
+
+
+def from_blob(blob: bytes) -> BoardMap:
+    """Inverse of BoardMap.blob, to the bit. Raises InputError when a board would refuse it."""
+    _judged(blob)
+    _, axes, count, _, serial, made_s = _HEADER.unpack_from(blob)
+    heads = [_BLOCK.unpack_from(blob, _map.HEADER_BYTES + k * _map.BLOCK_BYTES) for k in range(count)]
+    at = _map.HEADER_BYTES + count * _map.BLOCK_BYTES
+    blocks = []
+    for kind, gate, *exponent in heads:
+        columns = _map.KINDS[Kind(kind)].columns
+        words = np.frombuffer(blob, "<i2", 2 * columns * axes, at).astype(np.int64).reshape(axes // 3, columns, 3, 2)
+        values = np.concatenate(list(words[..., 1] * 65536 + words[..., 0]), axis=1)
+        blocks.append(BoardBlock(Kind(kind), Gate(gate), tuple(exponent[:axes]), values))
+        at += 4 * columns * axes
+    return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s)
+
+
+def pdc_above_rest_q4(frames: StructArray) -> NDArray[np.int32]:
+    """Of FRAME messages (n,): PDC above its tare in 1/16 count, -2^31 where either is missing."""
+    missing = (frames["pdc"] == wire.INVALID_COUNT) | (frames["pdc_tare_q4"] == wire.INVALID_COUNT)
+    above = 16 * frames["pdc"].astype(np.int32) - frames["pdc_tare_q4"]
+    return np.where(missing, wire.INVALID_I32, above).astype(np.int32)
+
+
+def _words(values: Integers) -> NDArray[Any]:
+    """i16 low, i16 high of each value, so that high * 2^16 + low is it."""
+    low = (values + 0x8000) % 0x10000 - 0x8000
+    return np.stack([low, (values - low) // 0x10000], axis=-1).astype("<i2")
+
+
+def _judged(blob: bytes) -> tuple[Any, Any]:
+    """The board's own judgement: a bt_map into a copy of the blob, and that copy."""
+    room = ffi.new("uint32_t[]", len(blob) // 4 + 1)  # words, so that it is aligned
+    ffi.memmove(room, blob, len(blob))
+    handle = ffi.new("bt_map *")
+    error = lib.bt_map_open(handle, ffi.cast("uint8_t *", room), len(blob))
+    if error != wire.Error.OK:
+        raise InputError(
+            f"a wrench map of {len(blob)} bytes is refused as {wire.Error(error).name}: expected at most "
+            f"{_map.MAX_BYTES} bytes as protocol/SPEC.md lays them out, of version {_map.VERSION}; make the map again"
+        )
+    return handle, room
