@@ -31,8 +31,11 @@ class Reader(Protocol):
     def stats(self) -> ReaderStats:
         """Counts so far."""
 
-    def read(self) -> Samples:
-        """Samples since the last call, six axes, in order. Raises DeviceLostError when the sensor has gone."""
+    def read(self, board_s: float) -> Samples:
+        """Samples since the last call, six axes, in order. Raises DeviceLostError when the sensor has gone.
+
+        ``board_s`` is how long the board has streamed by its own clock: what an emulated sensor goes by.
+        """
 
     def close(self) -> None:
         """Safe to call twice."""

@@ -143,7 +143,7 @@ class NetFtReader:
         its = self._decoder
         return ReaderStats(its.lost, its.late, its.bad + its.refused)
 
-    def read(self) -> Samples:
+    def read(self, board_s: float = 0.0) -> Samples:
         """What has come. Raises DeviceLostError after SILENCE_S without a datagram."""
         heard = False
         with contextlib.suppress(BlockingIOError):

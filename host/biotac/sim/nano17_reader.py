@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from ..reference.live import ReaderStats
 from ..reference.rdt import RdtDecoder
 from ..reference.samples import Samples
@@ -14,13 +12,12 @@ _DATAGRAM_RECORDS = 20
 
 
 class Nano17Reader:
-    """``now_s`` says how far the board is, in its own seconds; what the sensor has measured by then can be read."""
+    """What the sensor has measured of ``source`` can be read once the board has come as far."""
 
-    def __init__(self, source: Source, finger: int, now_s: Callable[[], float], nano17: Nano17 | None = None) -> None:
+    def __init__(self, source: Source, finger: int, nano17: Nano17 | None = None) -> None:
         self.nano17 = nano17 or Nano17()
         self._at_s, self._records = self.nano17.records(source, finger)
         self._decoder = RdtDecoder(self.nano17.scale)
-        self._now_s = now_s
         self._next = 0
 
     @property
@@ -34,9 +31,9 @@ class Nano17Reader:
         its = self._decoder
         return ReaderStats(its.lost, its.late, its.bad + its.refused)
 
-    def read(self) -> Samples:
+    def read(self, board_s: float) -> Samples:
         """What was measured since the last call."""
-        end = int(self._at_s.searchsorted(self._now_s()))
+        end = int(self._at_s.searchsorted(board_s))
         for begin in range(self._next, end, _DATAGRAM_RECORDS):
             self._decoder.feed(self._records[begin : min(begin + _DATAGRAM_RECORDS, end)].tobytes())
         self._next = max(self._next, end)

@@ -18,8 +18,6 @@ from .recorded import Floats, Run
 SEARCH_ROWS = 50
 MAX_LAG_ROWS = 20  # 0.2 s at 100 Hz: more is no transport delay but another clock
 MIN_R2 = 0.3  # held out; the weakest real finger has 0.5 to 0.9 (biotac.md 5), unrelated files have less than 0
-MIN_R2_BY_CLOCKS = 0.0
-
 LAGS: npt.NDArray[np.int64] = np.arange(-SEARCH_ROWS, SEARCH_ROWS + 1)
 _WEAKEST = slice(0, 1)  # least ridge
 
@@ -39,12 +37,13 @@ def check(run: Run, blocks: Blocks, at_lags: Floats) -> tuple[int, float]:
     lag = best_lag(run, at_lags, blocks.own(range(BLOCKS)))
     r2 = _held_out_r2(run, blocks, at_lags[lag + SEARCH_ROWS])
     where = f"{run.name}: force and counts"
-    # what joined two clocks had a clear peak already, and small tips in far places leave an affine map little
-    least = MIN_R2_BY_CLOCKS if run.by_clocks else MIN_R2
-    if r2 < least:
+    if run.by_clocks:
+        # their correlation had a clear peak, and small tips in places held out leave an affine map nothing to say
+        return lag, r2
+    if r2 < MIN_R2:
         raise RecordingError(
             f"{where} are not aligned: they agree best at a lag of {lag} rows, and there an affine map explains "
-            f"R2 {r2:.2f} held out: expected at least {least:g}; are both of the same run and finger, row by row?"
+            f"R2 {r2:.2f} held out: expected at least {MIN_R2:g}; are both of the same run and finger, row by row?"
         )
     if abs(lag) > MAX_LAG_ROWS:
         raise RecordingError(
