@@ -11,6 +11,7 @@ import numpy as np
 
 from . import _wire as wire
 from ._sensor import MAX_SENSORS
+from .board_map import BoardMap
 from .calibration import blob as maps
 from .calibration import transfer
 from .calibration.values import Calibration, own_settings
@@ -160,12 +161,12 @@ class Commands(ABC):
         """Whether the finger's force comes from its map, or the sensor is another than its own."""
         return wire.CalibrationState(transfer.info(self._ask_for, finger).state)
 
-    def set_map(self, finger: int, its: bytes | maps.HasBlob, *, force: bool = False) -> None:
+    def set_map(self, finger: int, its: bytes | BoardMap, *, force: bool = False) -> None:
         """Upload a wrench map and read it back; it is in force until the next reboot, or for good with save_settings.
 
         Refused while streaming, and for another sensor's serial number than the one that answered there when the
         board started; with ``force`` it goes there without its serial number, which is for any sensor, and is read
-        back so. What the finger had is in force until all of the new one is there. Raises ValueError for more bytes
+        back so. What the finger had is in force until all of the new one is there. Raises InputError for more bytes
         than a board takes (20 KiB), and PortError when other bytes come back.
         """
         blob = maps.as_blob(its)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from maps import BIG, make_map
 from rig import ROOT, Rig
 
 from biotac import Setting
@@ -110,6 +111,17 @@ def test_a_board_comes_back_with_its_settings(bench: Bench) -> None:
     blocks = len(read_image(BUILT).blocks)
     assert after["flash"]["programs"] - before["flash"]["programs"] == blocks + 1  # and one record of settings
     assert after["flash"]["erases"] - before["flash"]["erases"] == -(-blocks * PAGE // SECTOR)
+
+
+def test_saved_maps_outlive_another_image(bench: Bench, next_release: Image) -> None:
+    blob = make_map(1, blocks=BIG)
+    with bench.target.open() as hand:
+        for _ in range(3):  # so that it lies somewhere else than in the first slot
+            hand.set_map(0, blob)
+        hand.save_settings()
+    bench.flash(next_release)
+    with bench.target.open() as hand:
+        assert hand.maps() == {0: blob}
 
 
 def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_release: Image) -> None:

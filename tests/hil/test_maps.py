@@ -177,6 +177,20 @@ def test_a_power_cut_in_the_middle_leaves_the_old_map_or_the_new(rig: Rig) -> No
     assert hand.link.board.counters()["flash"]["wrong"] == []  # type: ignore[attr-defined]
 
 
+def test_the_slowest_flash_loses_neither_link_nor_sensors(rig: Rig) -> None:
+    hand = opened(rig)
+    board = hand.link.board  # type: ignore[attr-defined]
+    board.say("wear the flash out")  # 0.4 s for an erase, in which nothing else runs
+    blob = make_map(1, serial=serial_of(hand, 1), blocks=BIG)
+    hand.set_map(1, blob)
+    hand.save_settings()
+    facts = board.counters()
+    assert (facts["boots"], facts["watchdog_resets"], facts["flash"]["wrong"]) == (1, 0, [])
+    assert facts["flash"]["erases"] == 5 + 1  # the slot's, and the settings' first
+    assert hand.maps() == {1: blob}  # in force: its sensor counts as there
+    assert set(hand.read(0.3)["finger"]) == {0, 1}
+
+
 def upload_in_vain(hand: biotac.Hand, blob: bytes) -> None:
     """Say all of it and the save, without waiting for any answer: the board goes away in the middle."""
     messages = [wire.BeginMap(1, 0, len(blob), zlib.crc32(blob))]

@@ -16,10 +16,12 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from maps import make_map
 
 import biotac
 from biotac import _wire as wire
 from biotac import errors
+from biotac.calibration import map_file
 from biotac.cli.main import VERBS, main
 from biotac.framing import encode
 from biotac.link.serial_port import SerialLink
@@ -56,6 +58,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "settings.json": '{"format": "another"}',
         "counts.json": '{"format": "another"}',
         "other.json": json.dumps(calibration("BT999")),
+        "map.json": json.dumps(map_file.to_dict(make_map(1, serial="BT999"))),
     }.items():
         names[name] = folder / name
         names[name].write_text(text)
@@ -139,6 +142,11 @@ CASES: list[tuple[int, str, str]] = [
     (3, "expected BUS:ADDRESS", "calibration store --i2c here --chip 24c02 @other.json"),
     (3, "check its address pins", "calibration load --i2c 1:0x20 --chip 24c02 +out.json"),
     (2, "use a 24c02", "calibration load --i2c 1:0x50 --chip 24c01 +out.json"),
+    (2, "check the path", "map show +no.json"),
+    (2, "`biotac map get` writes one", "map show @list.json"),
+    (2, "`put` gives it one", "map get sim:drift.toml +out.json --finger 0"),
+    (2, "check the path", "map put sim:press.toml +no.json --finger 0"),
+    (7, "or send no serial number to force it", "map put sim:press.toml @map.json --finger 0"),
     (2, "expected a scenario's path or one of", "sim nowhere.toml"),
     (2, "expected 1 to 5", "sim press.toml --fingers 0"),
     (2, "pace above 0", "sim press.toml --pace fast"),
@@ -210,12 +218,21 @@ OPENERS = [
     "calibration get PORT out.json --finger 0",
     "calibration put PORT OTHER --finger 0",
     "calibration clear PORT --finger 0",
+    "map show PORT",
+    "map get PORT out.json --finger 0",
+    "map put PORT MAP --finger 0",
+    "map clear PORT --finger 0",
 ]
 Make = Callable[..., object]
 
 
 def opened(command: str, port: str, files: dict[str, Path]) -> list[str]:
-    return command.replace("PORT", port).replace("OTHER", str(files["other.json"])).split()
+    return (
+        command.replace("PORT", port)
+        .replace("OTHER", str(files["other.json"]))
+        .replace("MAP", str(files["map.json"]))
+        .split()
+    )
 
 
 @pytest.mark.parametrize("command", OPENERS)

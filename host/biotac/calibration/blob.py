@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 import zlib
-from typing import Protocol, runtime_checkable
 
 from .. import _map
 from .. import _wire as wire
+from ..board_map import BoardMap
+from ..errors import InputError
 from ..identity import ascii_text
 
 SERIAL_AT = 4
 MADE_AT = SERIAL_AT + _map.SERIAL_BYTES
 
 
-@runtime_checkable
-class HasBlob(Protocol):
-    """A map of this library's, which knows its bytes."""
-
-    @property
-    def blob(self) -> bytes:
-        """As the board holds it."""
-
-
-def as_blob(its: bytes | HasBlob) -> bytes:
-    """The bytes of a map. ValueError for what cannot be one by its size."""
-    blob = its.blob if isinstance(its, HasBlob) else bytes(its)
+def as_blob(its: bytes | BoardMap) -> bytes:
+    """The bytes of a map. InputError for what cannot be one by its size; the board judges the rest."""
+    blob = its.blob if isinstance(its, BoardMap) else bytes(its)
     if not _map.HEADER_BYTES <= len(blob) <= _map.MAX_BYTES:
-        raise ValueError(f"the map has {len(blob)} bytes, expected {_map.HEADER_BYTES} to {_map.MAX_BYTES}")
+        raise InputError(
+            f"the map has {len(blob)} bytes, expected {_map.HEADER_BYTES} to {_map.MAX_BYTES}; is it a map's file?"
+        )
     return blob
 
 
