@@ -45,6 +45,7 @@ static void use_finger_settings(bt_session *session, int f)
         (void)bt_calibration_apply(calibration, &own); // its ranges were seen to when it came
     }
     session->kernel[f] = bt_kernel_settings_from(&own);
+    session->kernel[f].map = session->map_state[f] == BT_CALIBRATION_STATE_IN_FORCE ? &map->map : NULL;
     session->tare[f] = bt_tare_settings_from(&own);
 }
 

@@ -15,6 +15,8 @@ import biotac
 from biotac import CalibrationState
 from biotac import _wire as wire
 from biotac.calibration.blob import PART_BYTES, for_any_sensor, part
+from biotac.cli.main import main
+from biotac.crosscheck import CrossCheck
 from biotac.errors import CommandRefusedError
 from biotac.recording import Recording
 
@@ -125,6 +127,39 @@ def test_a_recording_holds_the_maps_in_force(board: Callable[[str], biotac.Hand]
     hand.read(0.5)
     hand.close()
     assert Recording(tmp_path / "one.mcap").maps == {1: blob}
+
+
+def test_a_mapped_fingers_frames_come_from_its_map_and_the_others_from_the_gains(
+    board: Callable[[str], biotac.Hand], tmp_path: Path
+) -> None:
+    hand = board("shear.toml?fingers=2&seconds=3")
+    hand.set_map(1, make_map(1, serial=serial_of(hand, 1)))
+    settings, maps = hand.settings(), hand.maps()
+    hand.record(tmp_path / "two.mcap")
+    messages = hand.read_batch(2.5).wire
+    hand.close()
+    tared = (messages["flags"] & biotac.FrameFlags.UNTARED) == 0
+    mapped = (messages["flags"] & biotac.FrameFlags.MAPPED) != 0
+    assert tared.sum() > 400
+    assert (mapped == (tared & (messages["finger"] == 1))).all()
+    right = CrossCheck()
+    right.add(messages, settings, maps=maps)
+    assert (right.violations, right.frames) == (0, len(messages))
+    other = CrossCheck()
+    other.add(messages, settings, maps={1: make_map(2)})
+    assert other.violations > 100
+    assert main(["check", str(tmp_path / "two.mcap")]) == 0
+
+
+def test_a_cleared_map_publishes_no_more(board: Callable[[str], biotac.Hand]) -> None:
+    hand = board("press.toml")
+    hand.set_map(0, make_map(1))
+    before = hand.read_batch(0.5).wire
+    hand.stop()
+    hand.clear_map(0)
+    after = hand.read_batch(1.0).wire[-20:]  # the first ones had come before the stop
+    assert [((rows["flags"] & biotac.FrameFlags.MAPPED) != 0).any() for rows in (before, after)] == [True, False]
+    assert ((after["flags"] & biotac.FrameFlags.UNTARED) == 0).all()
 
 
 # ---- power -------------------------------------------------------------------------------------

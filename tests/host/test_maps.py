@@ -24,6 +24,7 @@ from biotac.framing import encode
 from biotac.hand import Hand
 from biotac.link.sim_process import SimBoard, SimLink
 from biotac.recording import Recording
+from biotac.recording.recompute import recompute
 from biotac.sim.source import load_source
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -304,8 +305,23 @@ def test_a_recording_has_the_maps_and_answers_with_them(recorded: Path) -> None:
 
 def test_a_recording_made_of_one_has_them_too(recorded: Path, tmp_path: Path) -> None:
     again = tmp_path / "again.mcap"
+    assert main(["check", str(recorded)]) == 0
     assert main(["recompute", str(recorded), str(again)]) == 0
-    assert Recording(again).maps == Recording(recorded).maps
+    old, new = Recording(recorded), Recording(again)
+    assert new.maps == old.maps
+    assert new.wire.tobytes() == old.wire.tobytes()
+    assert {int(f) for f in new.wire["finger"][(new.wire["flags"] & biotac.FrameFlags.MAPPED) != 0]} == {1}
+    # With another map in force it says so, and is right by that one.
+    recompute(old, tmp_path / "other.mcap", {}, maps={1: make_map(8)})
+    assert Recording(tmp_path / "other.mcap").maps == {1: make_map(8)}
+    assert main(["check", str(tmp_path / "other.mcap")]) == 0
+
+
+def test_info_tells_of_a_map_in_force(recorded: Path, capsys) -> None:
+    assert main(["info", f"replay:{recorded}"]) == 0
+    assert "wrench map made 1970-01-01" in capsys.readouterr().out
+    assert main(["info", f"replay:{recorded}", "--json"]) == 0
+    assert list(json.loads(capsys.readouterr().out)["maps"]) == ["1"]
 
 
 def test_a_recording_of_before_there_were_any_and_a_damaged_one(tmp_path: Path, monkeypatch) -> None:

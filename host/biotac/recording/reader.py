@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 import struct
@@ -210,7 +209,7 @@ class Recording:
 def _maps(text: str) -> dict[int, bytes]:
     """Maps as JSON had them; ValueError for what is none."""
     try:
-        return {int(f): as_blob(base64.b64decode(its, validate=True)) for f, its in json.loads(text).items()}
+        return {finger: as_blob(its) for finger, its in layout.maps_of(text).items()}
     except InputError as error:
         raise ValueError(error) from error
 

@@ -23,6 +23,7 @@ from ..framing import encode
 from ..streaming import RESULTS
 from ..version import __version__
 from .file import RecordingFile
+from .layout import maps_text
 from .pieces import split
 from .reader import Recording
 from .rounds import HostTare, Rounds, frames_and_tares
@@ -60,8 +61,8 @@ def recompute(
 
     The tare machine runs again over all counts, with the tares the host gave; ``keep_tare`` keeps each
     frame's recorded tare and state instead and recomputes what follows from them. ``maps`` are the wrench
-    maps in force, or their blobs, by finger. Returns notes in words. Raises InputError when the recording
-    cannot be run through the machine, or a setting is out of range.
+    maps in force, or their blobs, by finger; None: the recording's own. Returns notes in words. Raises InputError
+    when the recording cannot be run through the machine, or a setting is out of range.
     """
     for setting, value in changes.items():
         spec = wire.SETTINGS[setting]
@@ -74,7 +75,7 @@ def recompute(
     settings = recording.settings | changes
     calibrations = {finger: its.changed(changes) for finger, its in recording.calibrations.items()}
     own = own_settings(settings, calibrations)
-    in_force = {finger: board_map.opened(its) for finger, its in (maps or {}).items()}
+    in_force = {f: board_map.opened(its) for f, its in (recording.maps if maps is None else maps).items()}
     _check_maps(recording, in_force)
     notes: list[str] = []
     if keep_tare:
@@ -88,6 +89,7 @@ def recompute(
     metadata = recording.metadata | {
         "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
         "calibrations": json.dumps({finger: to_dict(its) for finger, its in calibrations.items()}),
+        "maps": maps_text({finger: its.blob for finger, its in in_force.items()}),
         "recomputed": json.dumps(
             {
                 "from": recording.path.name,

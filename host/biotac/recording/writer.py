@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import dataclasses
 import json
 import time
@@ -142,6 +141,6 @@ def describe(
         "hello": json.dumps(dataclasses.asdict(hello)),
         "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
         "calibrations": json.dumps({finger: to_dict(its) for finger, its in calibrations.items()}),
-        "maps": json.dumps({finger: base64.b64encode(blob).decode() for finger, blob in maps.items()}),
+        "maps": layout.maps_text(maps),
         "sensors": json.dumps([dataclasses.asdict(s) for s in sensors]),
     }
