@@ -17,7 +17,7 @@ from ..errors import InputError, RecordingError
 from ..frames import electrode_signals
 from ..reference.samples import Reference
 from ..reference.timing import STEP_S, Alignment, align
-from . import contact
+from . import contact, torsion
 from .recorded import (
     MIN_REST_ROWS,
     REST_N,
@@ -126,7 +126,12 @@ def _run(
     tare = np.median(counts - e, axis=0)
     moved = float(np.abs(counts - e - tare).max())
     check_units(where, e, truth[:, :3])
-    on_skin = _on_skin(where, truth) if truth.shape[1] == 6 else float("nan")
+    on_skin = float("nan")
+    about_torsion: tuple[str, ...] = ()
+    if truth.shape[1] == 6:
+        on_skin = _on_skin(where, truth)
+        about_normal, about_torsion = torsion.truth(where, None, truth[:, :3], truth[:, 3:])
+        truth = np.column_stack([truth, about_normal])
     resting = counts[quiet]
     whole = len(resting) // IDLE_MEAN_ROWS * IDLE_MEAN_ROWS
     drift, drift_note = drift_of("rest", resting[:whole].reshape(-1, IDLE_MEAN_ROWS, counts.shape[1]).mean(axis=1))
@@ -144,6 +149,7 @@ def _run(
             * (on_skin == on_skin)
         ),
         drift_note,
+        *about_torsion,
     )
     run = Run(
         name=where,

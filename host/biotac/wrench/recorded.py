@@ -98,7 +98,7 @@ def load_run(path: Path) -> Run:
     about_torsion: tuple[str, ...] = ()
     if "M" in fields:
         moment = _truth(path, "M", "N mm", fields["M"], rows)
-        about_normal, about_torsion = torsion.truth(path, fields.get("torsion"), force, moment)
+        about_normal, about_torsion = torsion.truth(str(path), fields.get("torsion"), force, moment)
         truth = np.column_stack([force, moment, about_normal])
     check_rails(path, counts)
     rest: npt.NDArray[np.bool_] = np.linalg.norm(force, axis=1) < REST_N

@@ -79,7 +79,7 @@ def upload(
 
 def _mapped_frames(hand: Hand, finger: int) -> StructArray:
     """Whole FRAME messages of the finger whose force is its map's."""
-    parts = []
+    parts: list[StructArray] = []
     # what arrived before the map did may still wait to be read
     for _ in range(TRIES):
         frames = hand.read_batch(STREAM_S).wire
