@@ -22,6 +22,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
 from image import boot2, uf2
 
+NEW_SETTING = max(wire.Setting) + 1  # one that this library does not know yet
+
 
 def note(
     board: int = wire.Board.PICO, version: tuple[int, int, int] = (0, 2, 0), major: int = wire.WIRE_MAJOR
@@ -51,7 +53,7 @@ class FakeBoard:
         self.board = int(wire.Board.PICO)
         self.version = (0, 1, 0)
         self.boot_id = 7
-        self.settings = {int(s): spec.default for s, spec in wire.SETTINGS.items()} | {11: 42}  # one that is new to us
+        self.settings = {int(s): spec.default for s, spec in wire.SETTINGS.items()} | {NEW_SETTING: 42}
         self.stored = dict(self.settings)
         self.in_loader = False
         self.answers = True

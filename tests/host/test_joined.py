@@ -14,6 +14,7 @@ from biotac.recording import Recording
 from biotac.reference import Mounting, Reference, Samples
 from biotac.reference.rdt import RdtDecoder
 from biotac.reference.timing import align
+from biotac.sim import surface
 from biotac.sim.nano17 import MOUNTING, Nano17
 from biotac.sim.source import Source
 from biotac.wrench.joined import Board, board_of, choose_finger, join
@@ -51,11 +52,16 @@ def reference(recorded: tuple[Recording, Source]) -> Reference:
 
 
 def truth_of(recorded: tuple[Recording, Source], board: Board) -> np.ndarray:
-    """What the scenario applied in each of the board's frames; the first is the source's first row."""
+    """What the scenario applied in each of the board's frames (n, 7); the first is the source's first row."""
     recording, source = recorded
     assert source.truth is not None
     row = np.rint((board.t_s - recording.frames["t_us"][0] / 1e6) * 100.0).astype(np.int64)
-    return np.column_stack([source.truth.force_n[row, 0], source.truth.torque_nmm[row, 0]])
+    force, torque, poc = (its[row, 0] for its in (source.truth.force_n, source.truth.torque_nmm, source.truth.poc_mm))
+    touched = source.truth.contact[row, 0]
+    torsion = np.zeros(len(row))
+    about_poc = torque[touched] - np.cross(poc[touched], force[touched])
+    torsion[touched] = (about_poc * surface.normals_at(poc[touched])).sum(axis=1)
+    return np.column_stack([force, torque, torsion])
 
 
 def test_the_truth_of_every_row(recorded: tuple[Recording, Source], board: Board, reference: Reference) -> None:
