@@ -315,3 +315,26 @@ def test_a_fitted_maps_file_makes_the_same_blob(tmp_path: Path) -> None:
     path = tmp_path / "thumb.wrench.json"
     path.write_text(fitted.dumps(model), encoding="utf-8")
     assert board.quantise(fitted.load(path)).blob == board.quantise(model).blob
+
+
+@pytest.mark.parametrize("axes", [3, 6])
+def test_compute_agrees_with_the_boards_frames(axes: int) -> None:
+    its = board.quantise(random_map(16, axes))
+    frames = mapped_frames(its, pdc=2100)
+    frames = frames[(frames["flags"] & wire.FrameFlags.MAPPED) != 0][50:]
+    pressure = board_map.pdc_above_rest_q4(frames) / 16
+    tare = frames["tare_q4"] / 16
+    results = biotac.compute(frames["counts"], tare, wrench_map=its.blob, pdc_above_rest=pressure)
+    np.testing.assert_allclose(results["force_n"], frames["force_100un"] / 1e4, atol=5e-4)
+    np.testing.assert_allclose(results["torque_nmm"], frames["torque_mnmm"] / 1e3, atol=1e-2)
+    plain = biotac.compute(frames["counts"], tare)
+    np.testing.assert_array_equal(results["poc_mm"], plain["poc_mm"])
+    if axes == 3:
+        np.testing.assert_array_equal(results["torque_nmm"][:, 1:], plain["torque_nmm"][:, 1:])
+    one = biotac.compute(frames["counts"][7], tare[7], wrench_map=its, pdc_above_rest=pressure[7])
+    assert one.shape == ()
+    np.testing.assert_allclose(one["force_n"], results["force_n"][7], rtol=1e-12)  # NumPy sums in another order
+    missing = biotac.compute(frames["counts"], tare, wrench_map=its)
+    assert np.isnan(missing["force_n"]).all() and not np.isnan(missing["poc_mm"]).any()
+    with pytest.raises(ValueError, match=r"pdc_above_rest has shape \(3,\), expected"):
+        biotac.compute(frames["counts"], tare, wrench_map=its, pdc_above_rest=pressure[:3])
