@@ -144,6 +144,16 @@ def test_the_integers_mean_the_fitted_map() -> None:
     assert np.abs(board.exact(its, counts, tare_q4, pdc_q4) - truth).max() < 5e-3
 
 
+def test_torsion_stays_on_the_host() -> None:
+    model = random_map(5, 6)
+    with_torsion = dataclasses.replace(
+        model,
+        axes=(*model.axes, "torsion"),
+        coefficients=np.column_stack([model.coefficients, np.ones(len(model.coefficients))]),
+    )
+    assert board.quantise(with_torsion).blob == board.quantise(model).blob
+
+
 def spec_sum(f: list[int], c: list[int]) -> int:
     """SPEC.md's s(f, c) for factors without fine bits; Python's >> is floor."""
     total = len(f) >> 1

@@ -41,7 +41,7 @@ def loaded(tmp_path: Path, arrays: dict[str, Any]) -> Run:
 
 def test_training_keeps_the_guard_away_from_a_held_out_block() -> None:
     blocks = Blocks(np.zeros(6000, dtype=np.bool_))
-    rows_of = np.repeat(np.arange(3 * BLOCKS), np.diff(blocks.strips))
+    rows_of = np.repeat(np.arange(3 * BLOCKS), [len(strip) for strip in blocks.strips])
     for block in range(BLOCKS):
         kept = blocks.kept_from([block])[rows_of]
         tested = np.zeros(6000, dtype=np.bool_)
@@ -57,12 +57,12 @@ def test_a_contact_is_in_one_block_where_the_run_rests() -> None:
     rest[np.arange(12000) % 250 < 30] = True
     blocks = Blocks(rest)
     assert blocks.whole_contacts == BLOCKS - 1
-    assert rest[blocks.edges[1:-1]].all()
-    assert (np.diff(blocks.strips) >= 0).all()
-    assert np.diff(blocks.edges).min() >= 2 * GUARD_ROWS
+    assert rest[[blocks.rows(k)[0] for k in range(1, BLOCKS)]].all()
+    assert np.array_equal(np.concatenate(blocks.strips), np.arange(12000))
+    assert min(len(blocks.rows(k)) for k in range(BLOCKS)) >= 2 * GUARD_ROWS
     # a run as short as may be has no room: its blocks are all guard and stay where they are
     short = Blocks(rest[:MIN_ROWS])
-    assert np.diff(short.edges).tolist() == [2 * GUARD_ROWS] * BLOCKS
+    assert [len(short.rows(k)) for k in range(BLOCKS)] == [2 * GUARD_ROWS] * BLOCKS
 
 
 def test_nothing_of_a_held_out_block_reaches_its_own_prediction(finger: Path, validation: Validation) -> None:
@@ -100,14 +100,22 @@ def test_sums_are_those_of_the_rows(finger: Path) -> None:
     np.testing.assert_allclose(rows, ((z[:, :20] @ plain - run.truth) ** 2).sum(axis=0), rtol=1e-3)
 
 
-def test_the_mean_window_is_centred_on_the_late_counts(finger: Path) -> None:
+def test_the_mean_window_is_of_outputs_and_centred_on_the_late_counts(finger: Path) -> None:
     run = load_run(finger)
-    signals = moments.aligned(run, 5, 3, slice(100, 102))
+
+    def squared(signals: features.Signals) -> np.ndarray:
+        return signals.e**2
+
+    mean = moments.smoothed(run, 5, 3, np.arange(100, 102), squared)
     for k in range(2):
-        np.testing.assert_allclose(signals.e[k], run.counts[101 + k : 106 + k].mean(axis=0) - run.tare, atol=1e-9)
+        frames = (run.counts[101 + k : 106 + k] - run.tare) ** 2
+        np.testing.assert_allclose(mean[k], frames.mean(axis=0), rtol=1e-12)
+    # beyond the ends are the ends
+    first = (run.counts[[0, 0, 0, 1, 2]] - run.tare) ** 2
+    np.testing.assert_allclose(moments.smoothed(run, 5, -3, np.array([3]), squared)[0], first.mean(axis=0), rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["affine", "sign-split", "quadratic", "conductance-quadratic", "gated-sign-split"])
+@pytest.mark.parametrize("name", [m.name for m in models.MODELS if m.how == "ridge"])
 def test_ridge_shrinks_toward_lins_geometry(name: str, finger: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = load_run(finger)
     model = next(model for model in models.MODELS if model.name == name)
@@ -118,7 +126,8 @@ def test_ridge_shrinks_toward_lins_geometry(name: str, finger: Path, monkeypatch
     # a small signal through the map: proportional to the electrodes' normals, per axis
     small = np.vstack([np.zeros(19), np.eye(19)])
     signals = features.Signals(small, run.tare)
-    response = moments.with_one(features.columns(signals)[:, model.family.columns]) @ found
+    own = model.family.index(features.width(with_pdc=False))
+    response = moments.with_one(features.columns(signals)[:, own]) @ found
     slope = response[1:] - response[0]
     for axis in range(3):
         normal = surface.ELECTRODE_NORMAL[:, axis]
@@ -193,25 +202,35 @@ def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tm
     place = tmp_path / "map.json"
     place.write_text(fitted.dumps(its), encoding="utf-8")
     again = fitted.load(place)
-    smooth = moments.aligned(run, final.window_rows, final.lag_rows).e + run.tare
-    np.testing.assert_array_equal(again.predict(smooth), its.predict(smooth))
-    np.testing.assert_allclose(again.predict(smooth), predict(run, final, final.best)[0], atol=1e-9)
+    frames = again.predict(run.counts)
+    np.testing.assert_array_equal(frames, its.predict(run.counts))
+    # a map sees one frame; who reads takes the mean
+    rows = np.arange(100, 200)
+    around = rows[:, None] + final.lag_rows + np.arange(final.window_rows) - final.window_rows // 2
+    mean = frames[around].mean(axis=1)
+    np.testing.assert_allclose(mean, predict(run, final, final.best, rows)[0], atol=1e-9)
     assert np.isnan(again.predict(np.full((1, 19), np.nan))).all()
     facts = json.loads(place.read_text())
-    for change in ({"format": "other"}, {"tare_counts": [1.0]}, {"coefficients": [[1.0, 2.0, 3.0]]}, {"axes": None}):
+    for change in (
+        {"format": "other"},
+        {"tare_counts": [1.0]},
+        {"coefficients": [[1.0, 2.0, 3.0]]},
+        {"axes": None},
+        {"blocks": []},
+    ):
         place.write_text(json.dumps(facts | change))
-        with pytest.raises(InputError, match="expected a biotac-wrench-map/1"):
+        with pytest.raises(InputError, match="expected a biotac-wrench-map/2"):
             fitted.load(place)
 
 
 def test_torque_and_pressure_are_used_where_recorded(tmp_path: Path) -> None:
     run = loaded(tmp_path, wrench_run.fields(4000, seed=3, moment=True, pdc=True))
     truth = wrench_run.states(4000, 3, rests=True).wrench()
-    np.testing.assert_allclose(run.truth[:, 3:], truth[1], atol=1e-9)
+    np.testing.assert_allclose(run.truth[:, 3:6], truth[1], atol=1e-9)
     np.testing.assert_allclose(run.truth[:, :3], truth[0], atol=0.1)
     validation = validate(run)
     facts = figures.summary(validation)
-    assert facts["axes"] == ["Fx", "Fy", "Fz", "Mx", "My", "Mz"]
+    assert facts["axes"] == ["Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion"]
     assert len(facts["rmse_nmm"]) == 3
     assert "Mx cannot be measured" in facts["notes"][-1]
     # pressure follows the normal force: the gated model has it, the plain sign-split has not
@@ -220,7 +239,7 @@ def test_torque_and_pressure_are_used_where_recorded(tmp_path: Path) -> None:
     assert its.with_pdc
     with pytest.raises(InputError, match="trained with PDC"):
         its.predict(run.counts)
-    assert its.predict(run.counts, run.pdc).shape == (4000, 6)
+    assert its.predict(run.counts, run.pdc).shape == (4000, 7)
 
 
 def test_the_real_finger(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
@@ -17,12 +18,18 @@ from threadpoolctl import threadpool_limits
 from . import features
 from .alignment import best_lag, check, lag_moments
 from .blocks import BLOCKS, Blocks
-from .models import AFFINE, LAMBDAS, MODELS, POOL, POOLED, solve, squared_errors, truth_variance, used
-from .moments import aligned, linear_columns, moments, with_one
+from .models import AFFINE, GATED, LAMBDAS, MODELS, POOL, POOLED, TEMPLATE, solve, squared_errors, truth_variance, used
+from .moments import Rows, air_moments, drifted, linear_columns, moments, smoothed, with_one
 from .recorded import Floats, Run
+from .template import Template
 
 INNER_FOLDS = 5
 WINDOWS_ROWS = (1, 5)  # as recorded, or the mean of five: half the noise for 20 ms of delay at 100 Hz
+# What the frames in free air weigh against the run's. A finger that never rests leaves the map free to say half a
+# newton in air; but where light presses are scarce, holding it at zero bends the map in contact. So: the most that
+# costs no force axis more than a twentieth of its error.
+AIR_SHARES = (0.05, 0.01, 0.003)
+AIR_COST = 1.1  # in squared error
 SHIFTS_COUNTS = (0.0, 100.0, -100.0)  # un-tared drift the result is tried with
 
 Show = Callable[[str], None]
@@ -45,10 +52,14 @@ class Choice:
 
 @dataclass(frozen=True)
 class Fit:
-    """One training: the choice per axis for every model by name, and ``best`` of them per axis."""
+    """One training: the choice per axis for every model by name, and ``best`` of them per axis.
+
+    ``air_share`` is the weight of the frames in free air, of the run's; 0 without any.
+    """
 
     lag_rows: int
     window_rows: int
+    air_share: float
     by_model: dict[str, tuple[Choice, ...]]
 
     @property
@@ -64,9 +75,9 @@ class Validation:
     """Everything held out; ``axes`` columns throughout.
 
     ``predicted`` (3, n, axes) at SHIFTS_COUNTS by the best choice of each row's own fold; ``by_model``
-    name -> RMSE (3, axes), each with its own nested lambda; ``folds`` the 20 trainings; ``final`` the
-    training on the whole run; ``lag_rows`` of the whole run before any correction; ``affine_r2``
-    held-out R2 of the affine model there.
+    name -> RMSE (3, axes), each with its own nested lambda, and TEMPLATE's; ``folds`` the 20 trainings;
+    ``final`` the training on the whole run; ``lag_rows`` of the whole run before any correction;
+    ``affine_r2`` held-out R2 of the affine model there.
     """
 
     run: Run
@@ -87,6 +98,7 @@ class _Trainer:
         self.axes = run.truth.shape[1]
         self._full: dict[tuple[int, int], Floats] = {}
         self._linear: dict[tuple[int, int], Floats] = {}
+        self._air = air_moments(run)
 
     def train(self, lag_rows: int, of: list[int], strips: Strips) -> Fit:
         """Fit all models on ``strips``, with inner folds over the blocks ``of``."""
@@ -98,6 +110,10 @@ class _Trainer:
         size = sums.shape[1]
         folds = self._folds(of, strips)
         total = sums[strips].sum(axis=0)
+        air_share = self._air_share(sums, total, folds)
+        if self._air is not None:
+            # another recording than the run: it is in every training and in no test
+            total = total + air_share * self._air
         kept = [total - sums[gone].sum(axis=0) for gone, _ in folds]
         tested = [sums[out].sum(axis=0) for _, out in folds]
         rows = sum(float(test[-self.axes - 1, -self.axes - 1]) for test in tested)
@@ -128,7 +144,7 @@ class _Trainer:
             )
             for a in range(self.axes)
         )
-        return Fit(lag_rows, window, by_model)
+        return Fit(lag_rows, window, air_share, by_model)
 
     def _folds(self, of: list[int], strips: Strips) -> list[tuple[Strips, Strips]]:
         """Per inner fold the strips that are not trained on and those that are tested."""
@@ -144,6 +160,25 @@ class _Trainer:
         for axis, k in enumerate(best):
             whole[index[: -self.axes], axis] = fits[k, :, axis]
         return whole
+
+    def _air_share(self, sums: Floats, total: Floats, folds: list[tuple[Strips, Strips]]) -> float:
+        """By a model that bends as the chosen one will, and costs a tenth."""
+        if self._air is None:
+            return 0.0
+        index = used(GATED, sums.shape[1], self.axes)
+        grid = np.ix_(index, index)
+        air = self._air[grid]
+        kept = [(total - sums[gone].sum(axis=0))[grid] for gone, _ in folds]
+        tested = [sums[out].sum(axis=0)[grid] for _, out in folds]
+
+        def error(share: float) -> Floats:
+            fits = [solve(GATED, part + share * air, self.axes, self.run.tare) for part in kept]
+            errors = sum(squared_errors(f, test, self.axes) for f, test in zip(fits, tested, strict=True))
+            forces: Floats = np.asarray(errors).min(axis=0)[:3]
+            return forces
+
+        without = error(0.0)
+        return next((share for share in AIR_SHARES if (error(share) <= AIR_COST * without).all()), 0.0)
 
     def _window(self, lag_rows: int, of: list[int], strips: Strips) -> int:
         """By the affine model, which costs little: noise is noise whatever is fitted to it."""
@@ -176,11 +211,12 @@ def validate(
 
 
 def _validate(run: Run, align: bool, windows: tuple[int, ...], show: Show | None) -> Validation:
-    blocks = Blocks(run.rest)
+    blocks = Blocks(run.rest, run.contact)
     axes = run.truth.shape[1]
     at_lags = lag_moments(run, blocks)
     lag_rows, affine_r2 = check(run, blocks, at_lags)
     trainer = _Trainer(run, blocks, windows)
+    template = Template(run)
     predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
     errors: dict[str, Floats] = {}
     folds: list[Fit] = []
@@ -192,18 +228,31 @@ def _validate(run: Run, align: bool, windows: tuple[int, ...], show: Show | None
         fit = trainer.train(best_lag(run, at_lags, strips) if align else 0, others, strips)
         folds.append(fit)
         rows = blocks.rows(block)
-        predicted[:, rows] = predict(run, fit, fit.best, rows)
-        for name, choices in fit.by_model.items():
-            wrong = ((predict(run, fit, choices, rows) - run.truth[rows]) ** 2).sum(axis=1)
-            errors[name] = errors.get(name, 0.0) + wrong
+        every_choice = [fit.best, *fit.by_model.values()]
+        # side by side: their columns cost more than their sums
+        said = np.split(predict(run, fit, tuple(chain(*every_choice)), rows), len(every_choice), axis=2)
+        predicted[:, rows] = said[0]
+        for name, guess in zip(fit.by_model, said[1:], strict=True):
+            errors[name] = errors.get(name, 0.0) + ((guess - run.truth[rows]) ** 2).sum(axis=1)
+        trained = np.concatenate([blocks.strips[k] for k in np.flatnonzero(strips)])
+        guess = template.held_out(fit.window_rows, fit.lag_rows, trained, rows, SHIFTS_COUNTS)
+        errors[TEMPLATE] = errors.get(TEMPLATE, 0.0) + ((guess - run.truth[rows]) ** 2).sum(axis=1)
     every = list(range(BLOCKS))
     final = trainer.train(lag_rows if align else 0, every, blocks.own(every))
     by_model = {name: np.sqrt(total / len(run.truth)) for name, total in errors.items()}
     return Validation(run, blocks, predicted, by_model, tuple(folds), final, lag_rows, affine_r2)
 
 
-def predict(run: Run, fit: Fit, choices: tuple[Choice, ...], rows: slice = slice(None)) -> Floats:
-    """What ``choices`` make of the run's ``rows`` at every drift of SHIFTS_COUNTS: (3, n, axes)."""
+def predict(run: Run, fit: Fit, choices: tuple[Choice, ...], rows: Rows | None = None) -> Floats:
+    """What ``choices`` make of the run's ``rows`` at every drift of SHIFTS_COUNTS: (3, n, choices)."""
     coefficients = np.column_stack([choice.coefficients for choice in choices])
-    signals = aligned(run, fit.window_rows, fit.lag_rows, rows)
-    return np.array([with_one(features.columns(signals.drifted(c * run.drift))) @ coefficients for c in SHIFTS_COUNTS])
+    index = np.arange(len(run.counts)) if rows is None else rows
+
+    def mapped(signals: features.Signals) -> Floats:
+        wrench: Floats = with_one(features.columns(signals)) @ coefficients
+        return wrench
+
+    at_shifts = [
+        smoothed(run, fit.window_rows, fit.lag_rows, index, drifted(run, counts, mapped)) for counts in SHIFTS_COUNTS
+    ]
+    return np.array(at_shifts)

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from .crossvalidation import SHIFTS_COUNTS, Validation
-from .features import centroid_mm
+from .features import Signals, centroid_mm, columns
 from .models import LIN
-from .moments import aligned
+from .moments import aligned, with_one
 from .recorded import Floats
 
 ANGLE_MIN_N = 0.5  # a smaller force has a direction only on paper
@@ -69,7 +69,7 @@ def confusion(predicted: Floats, truth: Floats) -> Floats:
 def regions(validation: Validation) -> list[Region]:
     """Thirds along times thirds across of the run's own contacts, the worst first."""
     run, final = validation.run, validation.final
-    centre = centroid_mm(aligned(run, final.window_rows, final.lag_rows).e)
+    centre = centroid_mm(aligned(run, final.lag_rows).e)
     error = ((validation.predicted[0][:, :3] - run.truth[:, :3]) ** 2).sum(axis=1)
     touched = ~run.rest
     result = []
@@ -120,6 +120,8 @@ def summary(validation: Validation) -> dict[str, Any]:
         "drift_counts": list(SHIFTS_COUNTS[1:]),
         "drift_rmse_n": [_list(shifted[:3]) for shifted in of[1:]],
         "better_than_lin": _list(lin / np.maximum(of[0], 1e-12)),
+        "rest_n": rest_n(validation),
+        "air_share": validation.final.air_share,
         "lag_rows": validation.lag_rows,
         "lag_corrected_rows": validation.final.lag_rows,
         "window_rows": validation.final.window_rows,
@@ -130,13 +132,28 @@ def summary(validation: Validation) -> dict[str, Any]:
         "confusion": [_list(row) for row in confusion(predicted[0], truth)],
         "worst_region": {"x_mm": worst.x_mm, "y_mm": worst.y_mm, "rows": worst.rows, "rmse_n": worst.rmse_n},
         "contact_edges": validation.blocks.whole_contacts,
+        "contacts": validation.blocks.contacts,
         "notes": list(run.notes),
     }
     if len(run.axes) > 3:
-        result["rmse_nmm"] = _list(of[0][3:])
+        result["rmse_nmm"] = _list(of[0][3:6])
         # numerics.md 4: two electrodes at the tip see it, by a millimetre and a half of lever
         result["notes"].append("Mx cannot be measured with this electrode layout: its figures are of what goes with it")
+    if len(run.axes) > 6:
+        result["torsion_rmse_nmm"] = float(of[0][6])
     return result
+
+
+def rest_n(validation: Validation) -> list[float]:
+    """Length of the force in N that the final map says where nothing touches: e = 0, then at SHIFTS_COUNTS[1:]."""
+    run, final = validation.run, validation.final
+    still = np.zeros((1, len(run.tare)))
+    pdc = None if run.pdc is None else np.zeros(1)
+    coefficients = np.column_stack([choice.coefficients for choice in final.best])
+    said = [
+        with_one(columns(Signals(still + counts * run.drift, run.tare, pdc))) @ coefficients for counts in SHIFTS_COUNTS
+    ]
+    return [float(np.linalg.norm(wrench[0, :3])) for wrench in said]
 
 
 def _list(values: Floats) -> list[float | None]:

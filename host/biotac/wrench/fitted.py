@@ -16,15 +16,16 @@ from .figures import model_name
 from .moments import with_one
 from .recorded import Floats
 
-FORMAT = "biotac-wrench-map/1"
+FORMAT = "biotac-wrench-map/2"
 
 
 @dataclass(frozen=True)
 class WrenchMap:
-    """Counts to force on the finger (and torque about Lin's origin, where it was calibrated).
+    """One frame's counts to force on the finger; where calibrated, torque about Lin's origin and torsion.
 
-    ``coefficients`` (p + 1, axes) of features.columns, the offset last; ``tare`` (19,) counts;
-    ``window_rows`` is the mean it was trained on, ``lag_rows`` how much later counts come than force.
+    ``coefficients`` (p + 1, axes) of features.columns, block by block, the offset last; ``tare`` (19,)
+    counts. It was trained for the mean of its results to ``window_rows`` frames, counts coming ``lag_rows``
+    later than force.
     """
 
     model: str
@@ -40,7 +41,7 @@ class WrenchMap:
         return len(self.coefficients) - 1 == features.width(with_pdc=True)
 
     def predict(self, counts: Floats, pdc: Floats | None = None) -> Floats:
-        """Wrench (n, axes) in N and N mm of ``counts`` (n, 19), NaN where a count is; smoothing is the caller's.
+        """Wrench (n, axes) in N and N mm of each of ``counts`` (n, 19), NaN where a count is; the mean is the caller's.
 
         ``pdc`` (n,) counts above rest. Raises InputError when it was trained with PDC and there is none.
         """
@@ -67,6 +68,7 @@ def dumps(its: WrenchMap) -> str:
         "tare_counts": its.tare.tolist(),
         "window_rows": its.window_rows,
         "lag_rows": its.lag_rows,
+        "blocks": _block_names(with_pdc=its.with_pdc),
         "coefficients": its.coefficients.tolist(),
     }
     return json.dumps(facts) + "\n"
@@ -89,9 +91,15 @@ def load(path: Path) -> WrenchMap:
         shapes = [(features.width(with_pdc=pdc) + 1, len(its.axes)) for pdc in (False, True)]
         if its.coefficients.shape not in shapes or its.tare.shape != (ELECTRODES,):
             raise ValueError(f"coefficients {its.coefficients.shape}, tare {its.tare.shape}")
+        if facts["blocks"] != _block_names(with_pdc=its.with_pdc):
+            raise ValueError(f"blocks {facts['blocks']}")
         if not np.isfinite(its.coefficients).all() or not np.isfinite(its.tare).all():
             raise ValueError("a coefficient that is no number")
     except (OSError, ValueError, KeyError, TypeError) as error:
         seen = str(error) or type(error).__name__
         raise InputError(f"{path}: {seen}: expected a {FORMAT} as `biotac calibrate wrench --out` writes it") from None
     return its
+
+
+def _block_names(*, with_pdc: bool) -> list[list[str]]:
+    return [[block.kind.name, block.gate.name] for block in features.blocks(with_pdc=with_pdc)]

@@ -39,27 +39,36 @@ MODELS = (
     Model("affine", features.LINEAR, "ridge", "every electrode to every axis"),
     Model("sign-split", features.SIGN_SPLIT, "ridge", "compression and bulge apart"),
     Model("gated-sign-split", features.GATED, "ridge", "sign-split, gains following the contact, PDC where recorded"),
-    Model("quadratic", features.QUADRATIC, "ridge", "all products of two electrodes"),
-    Model("conductance-quadratic", features.CONDUCTANCE_QUADRATIC, "ridge", "all products of two conductances"),
+    Model("gated-twice", features.GATED_TWICE, "ridge", "the same, gains quadratic in the contact's place"),
+    Model("quadratic", features.QUADRATIC, "ridge", "all products of two electrodes, PDC where recorded"),
+    Model("conductance-quadratic", features.CONDUCTANCE_QUADRATIC, "ridge", "all products of two conductances, PDC"),
+    Model("joined", features.JOINED, "ridge", "gated-twice and conductance-quadratic in one"),
 )
-LIN, AFFINE = MODELS[0], MODELS[2]
+LIN, AFFINE, GATED = MODELS[0], MODELS[2], MODELS[4]
 
 # Which of the three is best changes from axis to axis and from block to block by less than what their mean gains.
 POOLED = "pooled"
 POOLED_WORDS = "mean of gated-sign-split, quadratic and conductance-quadratic"
+TEMPLATE = "template"
+TEMPLATE_WORDS = "five shapes around the contact, a 5x5 solve a frame; host only, for comparison"
 POOL = ("gated-sign-split", "quadratic", "conductance-quadratic")
 
 
 def lin_directions(axes: int) -> Floats:
-    """Lin's Eq 3 and 4: what a count on each electrode (19, axes) is in [1] and, beyond three, in mm."""
+    """Lin's Eq 3 and 4: what a count on each electrode (19, axes) is in [1] and, beyond three, in mm.
+
+    The seventh is Eq 4 about the middle of the pad and its outward normal, -z: torsion as long as the contact is there.
+    """
     arms = np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL)
-    return np.concatenate([surface.ELECTRODE_NORMAL, arms], axis=1)[:, :axes]
+    middle = surface.ELECTRODE_MM.mean(axis=0)
+    torsion = -np.cross(surface.ELECTRODE_MM - middle, surface.ELECTRODE_NORMAL)[:, 2:]
+    return np.concatenate([surface.ELECTRODE_NORMAL, arms, torsion], axis=1)[:, :axes]
 
 
 def used(model: Model, size: int, axes: int) -> npt.NDArray[np.intp]:
     """Rows of the sums (of ``size``) that the model is about: its columns, the offset, the truth."""
-    index = np.arange(size)
-    return np.concatenate([index[: size - axes - 1][model.family.columns], index[size - axes - 1 :]])
+    columns = size - axes - 1
+    return np.concatenate([model.family.index(columns), np.arange(columns, size)])
 
 
 def solve(model: Model, sums: Floats, axes: int, tare: Floats) -> Floats:

@@ -8,9 +8,10 @@ and the same run gives the same coefficients every time.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
+import numpy.typing as npt
 
 from . import features
 from .blocks import Blocks
@@ -23,23 +24,31 @@ NO_DRIFT = ((0.0, 1.0),)
 
 Nodes = tuple[tuple[float, float], ...]
 Columns = Callable[[Signals], Floats]
+Rows = npt.NDArray[np.intp]
 
 
-def aligned(run: Run, window_rows: int, lag_rows: int, rows: slice = slice(None)) -> Signals:
-    """Signals that go with the truth's ``rows``: counts ``lag_rows`` later, mean over ``window_rows``.
+def aligned(run: Run, lag_rows: int, rows: Rows | None = None) -> Signals:
+    """Signals that go with the truth's ``rows``: counts ``lag_rows`` later. Beyond the run's ends are its last ones."""
+    index = np.arange(len(run.counts)) if rows is None else rows
+    at = np.clip(index + lag_rows, 0, len(run.counts) - 1)
+    return Signals(run.counts[at] - run.tare, run.tare, None if run.pdc is None else run.pdc[at])
 
-    ``window_rows`` is odd and centred. Rows beyond the run's ends are its last ones.
+
+def smoothed(run: Run, window_rows: int, lag_rows: int, rows: Rows, of: Columns) -> Floats:
+    """Mean of ``of`` (n, q) over ``window_rows`` frames around those that go with the truth's ``rows``.
+
+    ``window_rows`` is odd. The mean is of what each frame gives, because a board maps frame by frame and its
+    reader takes the mean afterwards; the mean of counts is another thing wherever the map is not linear.
     """
-    index = np.arange(len(run.counts))[rows] + lag_rows
     half = window_rows // 2
-    e = np.zeros((len(index), run.counts.shape[1]))
-    pdc = None if run.pdc is None else np.zeros(len(index))
-    for shift in range(-half, half + 1):
-        at = np.clip(index + shift, 0, len(run.counts) - 1)
-        e += run.counts[at]
-        if pdc is not None and run.pdc is not None:
-            pdc += run.pdc[at]
-    return Signals(e / window_rows - run.tare, run.tare, None if pdc is None else pdc / window_rows)
+    wanted = np.clip(rows[:, None] + np.arange(-half, half + 1), -lag_rows, len(run.counts) - 1 - lag_rows)
+    needed, place = np.unique(wanted, return_inverse=True)
+    each = of(aligned(run, lag_rows, needed))
+    mean: Floats = each[place.reshape(wanted.shape)[:, 0]]
+    for k in range(1, window_rows):
+        mean += each[place.reshape(wanted.shape)[:, k]]
+    mean /= window_rows
+    return mean
 
 
 def linear_columns(signals: Signals) -> Floats:
@@ -61,16 +70,36 @@ def moments(
     nodes: Nodes = DRIFT_NODES,
 ) -> Floats:
     """Z'Z of every strip (60, q, q), Z = [features, 1, truth]."""
-    result: list[Floats] = []
-    for start, stop in zip(blocks.strips[:-1], blocks.strips[1:], strict=True):
-        rows = slice(int(start), int(stop))
-        signals = aligned(run, window_rows, lag_rows, rows)
-        total: Floats | None = None
-        for at, weight in nodes:
-            shifted = columns(signals.drifted(at * DRIFT_SIGMA_COUNTS * run.drift))
-            z = np.concatenate([with_one(shifted), run.truth[rows]], axis=1)
-            part = weight * (z.T @ z)
-            total = part if total is None else total + part
-        assert total is not None
-        result.append(total)
+    result = []
+    for rows in blocks.strips:
+        drifting = (
+            (weight, smoothed(run, window_rows, lag_rows, rows, drifted(run, at * DRIFT_SIGMA_COUNTS, columns)))
+            for at, weight in nodes
+        )
+        result.append(_products(drifting, run.truth[rows]))
     return np.array(result)
+
+
+def air_moments(run: Run, columns: Columns = features.columns, nodes: Nodes = DRIFT_NODES) -> Floats | None:
+    """Z'Z (q, q) of the frames in free air, whose truth is 0, weighing as much as all of the run; None without."""
+    if run.air is None:
+        return None
+    pdc = None if run.pdc is None else np.zeros(len(run.air))
+    signals = Signals(run.air - run.tare, run.tare, pdc)
+    drifting = ((weight, drifted(run, at * DRIFT_SIGMA_COUNTS, columns)(signals)) for at, weight in nodes)
+    sums = _products(drifting, np.zeros((len(run.air), run.truth.shape[1])))
+    return sums * (len(run.truth) / len(run.air))
+
+
+def drifted(run: Run, mean_counts: float, of: Columns) -> Columns:
+    """``of`` signals that have drifted by ``mean_counts`` on average."""
+    return lambda signals: of(signals.drifted(mean_counts * run.drift))
+
+
+def _products(drifting: Iterable[tuple[float, Floats]], truth: Floats) -> Floats:
+    """Z'Z, the weighted mean over drift of features (n, p)."""
+    total = np.zeros(())
+    for weight, shifted in drifting:
+        z = np.concatenate([with_one(shifted), truth], axis=1)
+        total = total + weight * (z.T @ z)
+    return total

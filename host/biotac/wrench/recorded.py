@@ -16,7 +16,8 @@ import numpy.typing as npt
 from .. import _sensor
 from ..errors import RecordingError
 from ..sim.replay import counts_field, read_npz, to_lin_frame
-from .blocks import BLOCKS, GUARD_ROWS
+from . import torsion
+from .blocks import BLOCKS, GUARD_ROWS, contacts
 
 Floats = npt.NDArray[np.float64]
 
@@ -32,16 +33,18 @@ MAX_CLIPPED_SHARE = 0.005
 NEWTON_PER_COUNT = (0.002, 0.5)
 MIN_DRIFT_SHARE = 0.5  # of the idle recording's variance: less is noise, and noise has no direction
 
-FIELDS = ("E", "F", "M", "PDC", "E_base", "E_idle")
+FIELDS = ("E", "F", "M", "PDC", "E_base", "E_idle", "torsion", "contact")
 
 
 @dataclass(frozen=True)
 class Run:
     """Counts with the force that made them; frame, signs and origin are Lin's (force on the finger).
 
-    ``counts`` (n, 19), ``tare`` (19,) counts; ``truth`` (n, 3) N, or (n, 6) with N mm about the origin;
+    ``counts`` (n, 19), ``tare`` (19,) counts; ``truth`` (n, 3) N, or (n, 7) with N mm about the origin and about
+    the outward normal at the contact;
     ``pdc`` (n,) counts above rest, or None; ``drift`` (19,) what one count of mean drift does to each
-    electrode; ``rest`` bool (n,), rows without contact; ``notes`` say what was assumed.
+    electrode; ``rest`` bool (n,), rows without contact; ``notes`` say what was assumed; ``air`` (m, 19) the
+    counts of E_base, or None; ``contact`` (n,) which contact each row belongs to, or None: rows in time.
     """
 
     name: str
@@ -52,11 +55,13 @@ class Run:
     drift: Floats
     rest: npt.NDArray[np.bool_]
     notes: tuple[str, ...]
+    air: Floats | None = None
+    contact: npt.NDArray[np.int64] | None = None
 
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the truth's columns."""
-        return ("Fx", "Fy", "Fz", "Mx", "My", "Mz")[: self.truth.shape[1]]
+        return ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")[: self.truth.shape[1]]
 
 
 def load_run(path: Path) -> Run:
@@ -65,8 +70,9 @@ def load_run(path: Path) -> Run:
     Fields: ``E`` (n, 19) raw counts and ``F`` (n, 3) N, required; ``M`` (n, 3) N mm about Lin's origin,
     both in the recorded axes (X lateral, Y to the tip, Z out of the pad); ``PDC`` (n,) counts;
     ``E_base`` (m, 19) the finger in free air, needed where the run itself never rests; ``E_idle``
-    (k, 19) an untouched finger, whose first principal component is the drift. Raises RecordingError
-    with what was seen, in numbers.
+    (k, 19) an untouched finger, whose first principal component is the drift; ``torsion`` (n,) N mm about
+    the outward normal at the contact (with M; else it is computed); ``contact`` (n,) integers, which
+    contact a row belongs to, where rows are not in time. Raises RecordingError with what was seen, in numbers.
     """
     fields = read_npz(path, FIELDS)
     missing = [name for name in ("E", "F") if name not in fields]
@@ -85,8 +91,11 @@ def load_run(path: Path) -> Run:
     force = _truth(path, "F", "N", fields["F"], rows)
     _check_clipping(path, "F", force)
     truth = force
+    about_torsion: tuple[str, ...] = ()
     if "M" in fields:
-        truth = np.column_stack([force, _truth(path, "M", "N mm", fields["M"], rows)])
+        moment = _truth(path, "M", "N mm", fields["M"], rows)
+        about_normal, about_torsion = torsion.truth(path, fields.get("torsion"), force, moment)
+        truth = np.column_stack([force, moment, about_normal])
     _check_rails(path, counts)
     rest: npt.NDArray[np.bool_] = np.linalg.norm(force, axis=1) < REST_N
     tare, notes = _tare(path, fields, counts, force, rest)
@@ -97,7 +106,9 @@ def load_run(path: Path) -> Run:
         # without a rest in the run the lowest percent stands for it; an offset does no harm to a linear model
         pdc = raw - (np.median(raw[rest]) if rest.sum() >= MIN_REST_ROWS else np.percentile(raw, 1))
     drift, note = _drift(path, fields)
-    return Run(path.name, counts, tare, truth, pdc, drift, rest, (*notes, note))
+    air = _counts(path, "E_base", fields["E_base"], None) if "E_base" in fields else None
+    contact = contacts(path, fields["contact"], rows) if "contact" in fields else None
+    return Run(path.name, counts, tare, truth, pdc, drift, rest, (*notes, note, *about_torsion), air, contact)
 
 
 def _counts(path: Path, name: str, array: npt.NDArray[Any], rows: int | None) -> Floats:

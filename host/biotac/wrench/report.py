@@ -11,7 +11,7 @@ from . import figures
 from .alignment import MAX_LAG_ROWS
 from .blocks import BLOCKS, GUARD_ROWS
 from .crossvalidation import INNER_FOLDS, SHIFTS_COUNTS, Validation
-from .models import MODELS, POOLED, POOLED_WORDS
+from .models import MODELS, POOLED, POOLED_WORDS, TEMPLATE, TEMPLATE_WORDS
 from .recorded import Floats
 
 AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")
@@ -25,9 +25,8 @@ def markdown(validation: Validation, picture: str) -> str:
     lines = [
         f"# Wrench calibration of {run.name}",
         "",
-        f"{facts['rows']} rows, {BLOCKS} contiguous blocks, each held out once with {GUARD_ROWS} rows of guard on "
-        f"both sides; lag, smoothing, lambda and model are chosen inside the other blocks ({INNER_FOLDS} folds of "
-        "whole blocks). "
+        f"{facts['rows']} rows, {_cut(validation)}; lag, smoothing, lambda and model are chosen inside the other "
+        f"blocks ({INNER_FOLDS} folds of whole blocks). "
         "Frame: x to the tip, y to E11's side, z dorsal; force on the finger.",
         "",
         f"Chosen on the whole run: **{facts['model']}**, median angle {facts['median_angle_deg']:.2f} deg.",
@@ -56,13 +55,10 @@ def markdown(validation: Validation, picture: str) -> str:
         "",
         f"* force and counts: counts come {facts['lag_rows']} rows later, {facts['lag_corrected_rows']} corrected "
         f"(at most {MAX_LAG_ROWS} are); an affine map explains R2 {facts['affine_r2']:.2f} held out",
-        f"* counts are the mean of {facts['window_rows']} rows",
+        f"* forces are the mean of what the map says to {facts['window_rows']} frames",
+        *_rest(validation, facts),
         *[f"* {note}" for note in facts["notes"]],
-        *(
-            [f"* block edges that lie in a rest, so that no contact is in two blocks: {facts['contact_edges']}"]
-            if run.rest.any()
-            else ["* the run never rests: blocks are cut anywhere, a long contact may lie in two neighbours"]
-        ),
+        *_contacts(validation),
         "",
         f"![truth against prediction, held out]({picture})",
         "",
@@ -84,6 +80,31 @@ def draw(validation: Validation, path: Path) -> None:
     _draw_models(axes[3], validation)
     figure.savefig(path, dpi=100)
     plt.close(figure)
+
+
+def _cut(validation: Validation) -> str:
+    if validation.blocks.by_contact:
+        return f"{validation.blocks.contacts} contacts dealt out to {BLOCKS} blocks, each held out once"
+    return f"{BLOCKS} contiguous blocks, each held out once with {GUARD_ROWS} rows of guard on both sides"
+
+
+def _contacts(validation: Validation) -> list[str]:
+    if validation.blocks.by_contact:
+        return []
+    if not validation.run.rest.any():
+        return ["* the run never rests: blocks are cut anywhere, a long contact may lie in two neighbours"]
+    whole = validation.blocks.whole_contacts
+    return [f"* block edges that lie in a rest, so that no contact is in two blocks: {whole}"]
+
+
+def _rest(validation: Validation, facts: dict[str, Any]) -> list[str]:
+    still, *drifted = (f"{newton:.3f} N" for newton in facts["rest_n"])
+    line = f"* where nothing touches the map says {still}, and {' and '.join(drifted)} at " + " and ".join(
+        f"{counts:+.0f}" for counts in SHIFTS_COUNTS[1:]
+    )
+    if validation.run.air is None:
+        return [line + " counts of drift; there is no E_base, so nothing but the run itself says what no contact is"]
+    return [line + f" counts of drift; E_base is trained in with force 0, {facts['air_share']:.1%} of the run's weight"]
 
 
 def _table(head: list[str], rows: list[list[str]]) -> list[str]:
@@ -115,7 +136,7 @@ def _axes(validation: Validation) -> list[str]:
 
 
 def _models(validation: Validation) -> list[str]:
-    words = {model.name: model.words for model in MODELS} | {POOLED: POOLED_WORDS}
+    words = {model.name: model.words for model in MODELS} | {POOLED: POOLED_WORDS, TEMPLATE: TEMPLATE_WORDS}
     rows = []
     for name, errors in validation.by_model.items():
         drifted = errors[1:].max(axis=0)

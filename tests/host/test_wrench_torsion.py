@@ -1,0 +1,266 @@
+"""Torsion, contacts as groups, the finger in air and in warmth: what a map is trained with beside force."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import wrench_run
+
+from biotac.errors import RecordingError
+from biotac.experiments import random_loads, shear_torsion
+from biotac.experiments.outcome import Options
+from biotac.sim import surface
+from biotac.sim.physics import Finger
+from biotac.wrench import contact, features, figures, moments, template
+from biotac.wrench.blocks import BLOCKS, Blocks
+from biotac.wrench.crossvalidation import AIR_SHARES, validate
+from biotac.wrench.recorded import Run, load_run
+
+FRAMES = 4000
+
+
+@pytest.fixture(scope="module")
+def arrays() -> dict[str, Any]:
+    """A calibration recording of random loads."""
+    return random_loads.recording(Finger(2), *random_loads.states(FRAMES, 2), 2)
+
+
+@pytest.fixture(scope="module")
+def run(arrays: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return load_run(wrench_run.save(tmp_path_factory.mktemp("loads") / "loads.npz", arrays))
+
+
+@pytest.fixture(scope="module")
+def result() -> shear_torsion.Result:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(shear_torsion, "FRAMES", FRAMES)
+        return shear_torsion.run(Options(seed=3))
+
+
+def loaded(folder: Path, arrays: dict[str, Any]) -> Run:
+    return load_run(wrench_run.save(folder / "run.npz", arrays))
+
+
+# ---- contacts ----------------------------------------------------------------------------------
+
+
+def test_a_contact_is_held_out_whole(run: Run) -> None:
+    assert run.contact is not None
+    blocks = Blocks(run.rest, run.contact)
+    every = np.concatenate([blocks.rows(k) for k in range(BLOCKS)])
+    assert np.array_equal(np.sort(every), np.arange(FRAMES))
+    of_strip = np.empty(FRAMES, dtype=int)
+    for k, strip in enumerate(blocks.strips):
+        of_strip[strip] = k
+    for block in range(BLOCKS):
+        own = set(run.contact[blocks.rows(block)].tolist())
+        trained = blocks.kept_from([block])[of_strip]
+        assert own and not own & set(run.contact[trained].tolist())
+        # nothing else is left out: contacts need no guard
+        assert trained.sum() == FRAMES - len(blocks.rows(block))
+
+
+def test_blocks_are_not_regions_of_the_finger(run: Run, arrays: dict[str, Any]) -> None:
+    along = random_loads.states(FRAMES, 2)[0].contact_mm[:, 0]
+    blocks = Blocks(run.rest, run.contact)
+    middles = [along[blocks.rows(k)].mean() for k in range(BLOCKS)]
+    # a cut by place alone would spread them over the pad's 16 mm
+    assert np.ptp(along) > 15.0
+    assert np.std(middles) < 3.0
+
+
+@pytest.mark.parametrize(
+    ("field", "words"),
+    [
+        (np.arange(FRAMES) % 19, r"field contact names 19 contacts: expected at least 20"),
+        (np.arange(FRAMES) / 2.0, r"field contact is float64 \(4000,\): expected \(4000,\) integers"),
+        (np.arange(FRAMES - 1), r"field contact is int64 \(3999,\)"),
+    ],
+)
+def test_contacts_that_cannot_be_cut_by_are_refused(
+    field: np.ndarray, words: str, arrays: dict[str, Any], tmp_path: Path
+) -> None:
+    with pytest.raises(RecordingError, match=words):
+        loaded(tmp_path, arrays | {"contact": field})
+
+
+# ---- torsion -----------------------------------------------------------------------------------
+
+
+def test_torsion_follows_from_force_and_moment(arrays: dict[str, Any], tmp_path: Path) -> None:
+    given = arrays["torsion"]
+    without = {name: array for name, array in arrays.items() if name != "torsion"}
+    run = loaded(tmp_path, without)
+    assert run.axes[-1] == "torsion"
+    np.testing.assert_allclose(run.truth[:, 6], given, atol=1e-6)
+    assert any("misses the finger in 0 rows" in note for note in run.notes)
+
+
+def test_a_line_of_action_beside_the_finger_takes_the_nearest_place(arrays: dict[str, Any], tmp_path: Path) -> None:
+    moment = arrays["M"].copy()
+    force = np.linalg.norm(arrays["F"], axis=1)
+    # Mx in Lin's frame is Y recorded: a fifth more than any lever on the cylinder gives
+    moment[:20, 1] = 1.2 * surface.RADIUS_MM * force[:20]
+    run = loaded(tmp_path, {k: v for k, v in arrays.items() if k != "torsion"} | {"M": moment})
+    assert contact.locate(run.truth[:20, :3], run.truth[:20, 3:6]).missed.any()
+    assert np.isfinite(run.truth).all()
+    note = next(note for note in run.notes if note.startswith("torsion"))
+    assert "misses the finger in 0 rows" not in note
+
+
+def test_wrenches_that_press_nowhere_leave_torsion_out(arrays: dict[str, Any], tmp_path: Path) -> None:
+    # pulled, not pressed: no point of the ventral surface has the force going in
+    pulled = arrays["F"].copy()
+    pulled[: FRAMES // 10] *= -1.0
+    run = loaded(tmp_path, {k: v for k, v in arrays.items() if k != "torsion"} | {"F": pulled})
+    assert run.axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+    assert any("torsion is left out" in note for note in run.notes)
+
+
+@pytest.mark.parametrize("bad", [np.full(FRAMES, np.nan), np.zeros((FRAMES, 1)), np.zeros(FRAMES, dtype=bool)])
+def test_torsion_that_is_no_number_a_row_is_refused(bad: np.ndarray, arrays: dict[str, Any], tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"field torsion is .* finite numbers in N mm about the outward normal"):
+        loaded(tmp_path, arrays | {"torsion": bad})
+
+
+def test_a_row_of_its_own_beats_taking_the_lever_away(result: shear_torsion.Result) -> None:
+    its, both = result.validation.predicted[0], result.both
+    truth = result.validation.run.truth
+    own = figures.rmse(its[both, 6:], truth[both, 6:])[0]
+    # even at the true contact, which no map knows
+    states = random_loads.states(FRAMES, 3)[0]
+    normal = surface.normals_at(states.contact_mm)
+    lever = ((its[:, 3:6] - np.cross(states.contact_mm, its[:, :3])) * normal).sum(axis=1)
+    assert own < 0.5 * figures.rmse(lever[both, None], truth[both, 6:])[0]
+
+
+def test_shear_and_torsion_at_once(result: shear_torsion.Result, tmp_path: Path) -> None:
+    facts = shear_torsion.facts(result)
+    assert json.loads(json.dumps(facts)) == facts
+    assert len(facts["checks"]) == 5
+    assert all(check["met"] for check in facts["checks"]), facts["checks"]
+    page = "\n".join(shear_torsion.page(facts))
+    assert f"{facts['rmse']['calibrated'][1]:.2f}" in page
+    shear_torsion.draw(result, tmp_path / "its.png")
+    assert (tmp_path / "its.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_papers_model_is_given_its_due(result: shear_torsion.Result) -> None:
+    run = result.validation.run
+    # no scale could be better in sample, and held out it is hardly worse
+    sums = (run.counts - run.tare) @ surface.ELECTRODE_NORMAL
+    best = (sums * run.truth[:, :3]).sum(axis=0) / (sums**2).sum(axis=0)
+    in_sample = figures.rmse(sums * best, run.truth[:, :3])
+    held_out = figures.rmse(result.paper[:, :3], run.truth[:, :3])
+    assert (held_out >= in_sample).all()
+    np.testing.assert_allclose(held_out, in_sample, rtol=0.02)
+
+
+# ---- warmth ------------------------------------------------------------------------------------
+
+
+def test_a_tare_that_follows_the_thermometer_is_all_a_map_needs(result: shear_torsion.Result) -> None:
+    ways = list(result.warm.values())
+    still, stays, default, own, tared = (way[[1, 2, 6]] for way in ways)
+    # Fx: without it, eight degrees are seen as force
+    assert (stays > 1.05 * still).all()
+    # tared at each temperature nothing is left of it, so no term in the map could gain more
+    np.testing.assert_allclose(tared, still, rtol=0.05)
+    assert (default < 1.15 * still).all()
+    assert (own < 1.15 * still).all()
+
+
+# ---- air ---------------------------------------------------------------------------------------
+
+
+def test_the_finger_in_air_is_trained_in_where_contact_does_not_pay_for_it(tmp_path: Path) -> None:
+    run = loaded(tmp_path, wrench_run.fields(4000, rests=False))
+    assert run.air is not None
+    with_air = validate(run, windows=(1,))
+    without = validate(replace(run, air=None), windows=(1,))
+    assert with_air.final.air_share in AIR_SHARES
+    assert without.final.air_share == 0.0
+    rest, bare = figures.rest_n(with_air), figures.rest_n(without)
+    assert max(rest) < 0.9 * max(bare), (rest, bare)
+    errors = [figures.rmse(v.predicted[0], run.truth) for v in (with_air, without)]
+    assert (errors[0] < 1.05 * errors[1]).all(), errors
+
+
+def test_air_weighs_as_much_as_the_run_before_its_share(run: Run) -> None:
+    sums = moments.air_moments(run)
+    assert sums is not None
+    count = -1 - run.truth.shape[1]
+    assert sums[count, count] == pytest.approx(FRAMES)
+    assert not sums[:, count + 1 :].any()  # the truth is 0
+
+
+# ---- template ----------------------------------------------------------------------------------
+
+
+def test_a_signal_made_of_the_shapes_gives_their_sizes_back() -> None:
+    tare = np.full(19, 3000.0)
+    # a light press over E18, so that the point of contact does not move with what is added
+    point = surface.project(surface.ELECTRODE_MM[[17]])
+    normal = surface.normals_at(point)
+    shapes = template._shapes(point, normal, *surface.tangents_at(normal))[0]
+    sizes = np.array([0.3, 0.02, 0.01, -0.02, 0.005])
+    found = template.solve(features.Signals(counts_of(shapes @ sizes, tare) - tare, tare))
+    # it looks where the compression's centre is, which is not quite where it was made
+    np.testing.assert_allclose(found.size[0], sizes, atol=0.02)
+    assert np.linalg.norm(found.point_mm - point) < 1.0
+    assert found.size[0, template.PRESS] == pytest.approx(0.3, rel=0.1)
+
+
+def counts_of(log_conductance: np.ndarray, tare: np.ndarray) -> np.ndarray:
+    """Counts (1, 19) whose conductance over that at rest has this logarithm."""
+    conductance = tare / (4095.0 - tare) * np.exp(log_conductance)
+    return (4095.0 * conductance / (1.0 + conductance))[None]
+
+
+def test_a_touch_turned_and_pushed_the_other_way_changes_signs(run: Run) -> None:
+    for change, which in (("shear_n", template.ACROSS), ("torsion_nmm", template.TURN)):
+        loads = random_loads.states(2, 1)[0]
+        contact_mm = surface.on_surface(np.array([[-6.0, 0.0]] * 2))
+        push = {"shear_n": np.zeros((2, 3)), "torsion_nmm": np.zeros(2)}
+        push[change] = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]) if change == "shear_n" else np.array([4.0, -4.0])
+        its = replace(loads, contact_mm=contact_mm, force_n=np.full(2, 5.0), tip_radius_mm=np.full(2, 1.8), **push)
+        finger = Finger(2)
+        tare = finger.rest_counts(np.zeros(1))[0]
+        size = template.solve(features.Signals(finger.counts(its) - tare, tare)).size
+        assert size[0, which] > 0.0 > size[1, which]
+
+
+def test_the_template_knows_more_than_the_papers_formulas_and_less_than_a_map(result: shear_torsion.Result) -> None:
+    by_model = {name: errors[0] for name, errors in result.validation.by_model.items()}
+    for axis in (1, 2, 6):
+        assert by_model["joined"][axis] < by_model["template"][axis] < by_model["lin-scales"][axis]
+
+
+# ---- blocks of columns -------------------------------------------------------------------------
+
+
+def test_a_block_is_its_kind_times_its_gate(run: Run) -> None:
+    assert run.pdc is not None
+    signals = features.Signals(run.counts[:50] - run.tare, run.tare, run.pdc[:50])
+    found = features.columns(signals)
+    assert found.shape == (50, features.width(with_pdc=True))
+    at = 0
+    plain: dict[Any, np.ndarray] = {}
+    weights = np.maximum(-signals.e, 0.0) + 5.0
+    centre = weights @ surface.ELECTRODE_MM / weights.sum(axis=1, keepdims=True)
+    x, y = centre[:, 0] / 8.0, centre[:, 1] / 4.0
+    factor = {"ONE": x**0, "X": x, "Y": y, "XX": x**2, "XY": x * y, "YY": y**2}
+    for block in features.blocks(with_pdc=True):
+        columns = found[:, at : at + block.width]
+        plain.setdefault(block.kind, columns)
+        np.testing.assert_allclose(columns, plain[block.kind] * factor[block.gate.name][:, None], rtol=1e-12)
+        at += block.width
+    assert at == found.shape[1]
+    # without PDC the columns are the first of them
+    dry = features.columns(features.Signals(signals.e, run.tare))
+    np.testing.assert_array_equal(dry, found[:, : dry.shape[1]])
