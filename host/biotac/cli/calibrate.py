@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..export.partial import whole
-from ..wrench import figures, fitted, report
+from ..wrench import board, figures, fitted, report
 from ..wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
 from ..wrench.recorded import load_run
 from .progress import Progress
@@ -57,6 +57,7 @@ def _calibrate(args: argparse.Namespace, path: Path) -> None:
     finally:
         progress.done()
     facts = figures.summary(validation)
+    facts["fixed_point"] = board.summary(fitted.of(validation), validation.run)
     if args.out is not None:
         facts["written"] = [str(place) for place in _write(validation, path, args.out, overwrite=args.force)]
     print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
@@ -106,6 +107,7 @@ def _lines(facts: dict[str, Any]) -> list[str]:
         f"  Lin's three scales:     RMSE {numbers(facts['models']['lin-scales'][:3])} N",
         f"  counts {facts['lag_rows']} rows after the force, {facts['lag_corrected_rows']} corrected; "
         f"mean of {facts['window_rows']} rows",
+        f"  {board.words(facts['fixed_point'])}",
         *[f"  {note}" for note in facts["notes"]],
         *[f"  written: {place}" for place in facts.get("written", [])],
     ]
