@@ -39,6 +39,8 @@ def make_image(folder: Path, said: bytes | None = None, name: str = "new.uf2") -
     path.write_bytes(uf2.uf2(program(note() if said is None else said)))
     return path
 
+NEW_SETTING = max(wire.Setting) + 1  # to this library
+
 
 class FakeBoard:
     """Answers on a pty while it runs; takes an image while it is in its loader. What happens is listed in order."""
@@ -51,7 +53,7 @@ class FakeBoard:
         self.board = int(wire.Board.PICO)
         self.version = (0, 1, 0)
         self.boot_id = 7
-        self.settings = {int(s): spec.default for s, spec in wire.SETTINGS.items()} | {11: 42}  # one that is new to us
+        self.settings = {int(s): spec.default for s, spec in wire.SETTINGS.items()} | {NEW_SETTING: 42}
         self.stored = dict(self.settings)
         self.in_loader = False
         self.answers = True

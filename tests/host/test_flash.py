@@ -50,7 +50,7 @@ def test_settings_are_in_a_file_before_anything_is_touched(fake: FakeBoard, tmp_
     assert outcome.settings is not None
     assert outcome.settings.changed == ()
     facts = json.loads(outcome.backup.path.read_text())
-    assert facts["settings"][-1] == {"id": 11, "name": "setting 11", "value": 42}
+    assert facts["settings"][-1] == {"id": NEW_SETTING, "name": f"setting {NEW_SETTING}", "value": 42}
     assert facts["firmware"] == "0.1.0"
 
 
@@ -75,10 +75,10 @@ def test_what_differs_afterwards_is_restored_and_saved(fake: FakeBoard, tmp_path
 
 
 def test_a_setting_that_the_new_firmware_has_not_is_named(fake: FakeBoard, tmp_path: Path) -> None:
-    del fake.stored[11]
+    del fake.stored[NEW_SETTING]
     outcome = flash(read_image(make_image(tmp_path)), fake, [fake])
     assert outcome.settings is not None
-    assert outcome.settings.unknown == ("setting 11",)
+    assert outcome.settings.unknown == (f"setting {NEW_SETTING}",)
 
 
 def fails(fake: FakeBoard, folder: Path, kind: type[BiotacError] = FlashError, **options: object) -> str:
@@ -191,7 +191,7 @@ def test_a_setting_that_a_board_never_had_hides_none_behind_it(fake: FakeBoard, 
     del fake.settings[3], fake.stored[3]
     outcome = flash(read_image(make_image(tmp_path)), fake, [fake])
     assert outcome.backup is not None
-    assert sorted(outcome.backup.values) == [1, 2, *range(4, 12)]
+    assert sorted(outcome.backup.values) == [1, 2, *range(4, NEW_SETTING + 1)]
 
 
 def test_two_boards_are_not_mixed_up(fake: FakeBoard, tmp_path: Path) -> None:
