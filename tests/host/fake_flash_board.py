@@ -39,6 +39,7 @@ def make_image(folder: Path, said: bytes | None = None, name: str = "new.uf2") -
     path.write_bytes(uf2.uf2(program(note() if said is None else said)))
     return path
 
+
 NEW_SETTING = max(wire.Setting) + 1  # to this library
 
 

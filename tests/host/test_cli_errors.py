@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import biotac
@@ -46,6 +47,13 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     names["cut.mcap"].write_bytes(names["rec.mcap"].read_bytes()[:100])
     names["text.mcap"].write_text("no recording\n")
     names["dir"].mkdir()
+    names["done"] = folder / "done"
+    names["done"].mkdir()
+    (names["done"] / "shear.md").write_text("precious")
+    names["rest.npz"] = folder / "rest.npz"
+    np.savez(names["rest.npz"], E=np.full((40, 19), 3000), F=np.zeros((40, 3)))
+    names["brief.npz"] = folder / "brief.npz"
+    np.savez(names["brief.npz"], E=np.full((5, 19), 3000), F=np.ones((5, 3)))
     for name, text in {
         "bad.toml": "name = 'x'\n",
         "list.json": "[]",
@@ -115,6 +123,21 @@ CASES: list[tuple[int, str, str]] = [
     (2, "--save is for boards", "calibrate pressure @rec.mcap --save"),
     (2, "there are 0", "calibrate pressure sim:press.toml --fingers 4"),
     (2, "is no folder", "calibrate pressure sim:fingers.toml --out @list.json"),
+    (2, "expected 0 to 2147483647", "experiment poke --seed -1"),
+    (2, "expected an .npz of number arrays", "experiment poke +no.npz"),
+    (2, "save z_dir too", "experiment plate-normal @rec.mcap"),
+    (2, "name another with --finger", "experiment poke @rec.mcap --finger 4"),
+    (2, "0 contacts above 1 N: expected 19", "experiment poke @rest.npz --out +out"),
+    (2, "save M too", "experiment torsion @rest.npz"),
+    (2, "never loaded, the most is 0.00 N", "experiment shear @rest.npz"),
+    (2, "add E_base", "experiment shear @brief.npz"),
+    (2, "leave one out", "experiment shear @rest.npz --seed 2"),
+    (2, "leave --map out", "experiment poke --map +no.wrench.json"),
+    (2, "as `biotac calibrate wrench --out` writes it", "experiment shear --map +no.wrench.json"),
+    (2, "rename the file", "experiment shear --map +paper.wrench.json"),
+    (2, "give --map FILE", "experiment torsion-shear --check --out +out"),
+    (2, "say --force", "experiment shear --out @done"),
+    (2, "choose another name", "experiment shear --out @list.json"),
     (2, "check the path", "replay +no.mcap"),
     (2, "expected 0 <= from", "replay @rec.mcap --from 99"),
     (2, "expected 0 <= from", "replay @rec.mcap --from 0.5 --to 0.2"),

@@ -18,7 +18,7 @@ from biotac.flash.loader_drive import linux_folders
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from fake_flash_board import FakeBoard, make_drive, make_image, no_waiting, note, plug_in
+from fake_flash_board import NEW_SETTING, FakeBoard, make_drive, make_image, no_waiting, note, plug_in
 
 
 @pytest.fixture

@@ -40,12 +40,11 @@ VERBS = (
 )  # fmt: skip
 
 EPILOG = """\
-A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, or sim:SOURCE, a simulated
-board that plays a scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), or
-emu:pico?source=SOURCE, a Pico's flash image in an emulator that plays the same, or replay:REC,
-a recording that answers as its board did.
+A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, or sim:SOURCE, a simulated board that
+plays a scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), or emu:pico?source=SOURCE,
+a Pico's flash image in an emulator that plays the same, or replay:REC, a recording as its board.
 
-exit codes: 0 done   1 check, doctor or experiment --check found something   2 unusable file or argument
+exit codes: 0 done   1 check, doctor or experiment found something   2 unusable file or argument
 3 port cannot be opened   4 no gateway on the port   5 firmware of another wire version   6 board lost
 7 command refused   8 flashing failed   130 interrupted
 """
@@ -55,7 +54,9 @@ class OneLineEach(argparse.RawDescriptionHelpFormatter):
     """Wide enough for a verb a line, so that all of them fit a screen."""
 
     def __init__(self, prog: str) -> None:
-        super().__init__(prog, max_help_position=16, width=110)
+        super().__init__(prog, max_help_position=18, width=110)
+        # argparse measures verbs without their indent, and then breaks the line after the longest ones
+        self._action_max_length = 16
 
 
 def parser() -> argparse.ArgumentParser:

@@ -29,14 +29,20 @@ PAPER = "paper"
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a model makes of a trial: ``force_n`` (n, 3), ``torque_nmm`` (n, 3) about the origin or None."""
+    """What a model makes of a trial: ``force_n`` (n, 3), ``torque_nmm`` (n, 3) about the origin or None.
+
+    ``own_torsion_nmm`` (n,) is that of a map that was fitted to torsion itself.
+    """
 
     name: str
     force_n: Floats
     torque_nmm: Floats | None
+    own_torsion_nmm: Floats | None = None
 
     def torsion_nmm(self, at_mm: Floats) -> Floats | None:
-        """Torque (n,) about the outward normal at contacts (n, 3): (M - c x F) . n; NaN without a contact."""
+        """Torque (n,) about the outward normal at contacts (n, 3), NaN without one: its own or (M - c x F) . n."""
+        if self.own_torsion_nmm is not None:
+            return np.where(np.isfinite(at_mm).all(axis=1), self.own_torsion_nmm, np.nan)
         if self.torque_nmm is None:
             return None
         return torsion(self.force_n, self.torque_nmm, at_mm)
@@ -83,7 +89,8 @@ def by_map(trial: Trial, its: WrenchMap, name: str) -> Estimate:
     columns = {axis: k for k, axis in enumerate(its.axes)}
     force = wrench[:, [columns[axis] for axis in ("Fx", "Fy", "Fz")]]
     torque = wrench[:, [columns[axis] for axis in ("Mx", "My", "Mz")]] if "Mz" in columns else None
-    return Estimate(name, force, torque)
+    own = wrench[:, columns["torsion"]] if "torsion" in columns else None
+    return Estimate(name, force, torque, own)
 
 
 def load_maps(paths: Sequence[Path]) -> dict[str, tuple[Path, WrenchMap]]:

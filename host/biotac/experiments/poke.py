@@ -273,7 +273,7 @@ def page(facts: Facts) -> list[str]:
     rows += [["paper", "BioTac", str(k + 1), text(paper[k]), "", ""] for k in (0, 1)]
     rows += [["paper", "Nano17", str(k + 1), text(paper[k + 2]), "", ""] for k in (0, 1)]
     lines = [
-        "Standard deviation of the point of contact, sqrt(var x + var y + var z), over every frame with a true force",
+        "Standard deviation of the point of contact, sqrt(var x + var y + var z), over every frame with a force",
         f"above {FLOOR_N:g} N, mean over the 19 electrodes. Bias: from the electrode to the mean point.",
         "",
         *table(["sensor", "weights", "trial", "std [mm]", "one coordinate [mm]", "bias [mm]"], rows),

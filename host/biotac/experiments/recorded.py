@@ -61,6 +61,11 @@ def load(path: Path, finger: int = 0, needs: tuple[str, ...] = (), *, own_force:
     time_s = np.arange(n, dtype=np.float64) * ROW_S
     if "t" in fields:
         time_s = _numbers(path, "t", fields["t"], (n,), "s")
+        back = np.flatnonzero(np.diff(time_s) < 0.0)
+        if len(back):
+            raise RecordingError(
+                f"{path}: field t goes back in row {back[0] + 1}: expected times in order; sort the rows"
+            )
     force, torque = (
         to_lin_frame(_numbers(path, name, fields[name], (n, 3), unit)) if name in fields else None
         for name, unit in (("F", "N"), ("M", "N mm"))

@@ -15,7 +15,7 @@ import numpy as np
 from ..sim.physics import Profile
 from ..sim.surface import Floats
 from . import shear, torsion, traces, weight
-from .estimates import PAPER, Estimate
+from .estimates import PAPER, Estimate, rmse
 from .outcome import Facts, Options, claim, number, table, text
 from .torsion import TORSION_NMM
 from .trial import Bools, Script, Trial, play
@@ -89,6 +89,16 @@ def leakage(trial: Trial, its: Estimate) -> float:
     return abs(float(leaked / (torsion_nmm[other].mean() - torsion_nmm[one].mean())))
 
 
+def together(trial: Trial, its: Estimate) -> dict[str, float | None]:
+    """RMSE of Fy and of the torsion at the true contact while shear and torsion are both there, all ramps included."""
+    assert trial.states is not None and trial.at_mm is not None
+    pushed = np.linalg.norm(trial.states.shear_n, axis=1) > 0.0
+    rows = np.asarray(pushed & (trial.states.torsion_nmm != 0.0))
+    lateral = rmse(its.force_n, trial.force_n, rows)
+    turned = rmse(its.torsion_nmm(trial.at_mm), trial.torsion_nmm, rows)
+    return {"fy_rmse_n": number(float(lateral[1])), "torsion_rmse_nmm": number(float(turned[0]))}
+
+
 def _rows(trial: Trial, name: str) -> Bools:
     return trial.during(next(phase for phase in trial.phases if phase.name == name))
 
@@ -116,6 +126,7 @@ def facts(result: Result) -> Facts:
         assert result.trial.at_mm is not None
         one["sign_right"] = signs(result.trial, estimate, result.trial.at_mm)
         one["sign_right_at_poc"] = signs(result.trial, estimate, weight.poc_mm(result.trial))
+        one["together"] = together(result.trial, estimate)
         one["leak_n_per_nmm"] = number(leakage(result.trial, estimate))
     paper = its["models"][PAPER]
     for name in list(its["models"])[len(its["scales_nn_per_count"]) :]:
@@ -137,13 +148,14 @@ def page(facts: Facts) -> list[str]:
     rows = []
     for name, one in facts["models"].items():
         marks = [words[one[key].get(region)] for key in ("sign_right", "sign_right_at_poc") for region in REGIONS]
-        rows.append([name, *marks, text(one["leak_n_per_nmm"])])
+        both = [text(value) for value in one["together"].values()]
+        rows.append([name, *marks, text(one["leak_n_per_nmm"]), *both])
     head = ["model", *[f"sign in {region}" for region in REGIONS], *[f"{region}, board's point" for region in REGIONS]]
     return [
         "Sign of the torsion in both turns of each region, at the true contact and at the point of contact the board",
-        "publishes; how much of region II's pure torsion appears as Fy.",
+        "publishes; how much of region II's pure torsion appears as Fy; RMSE while there is shear and torsion at once.",
         "",
-        *table([*head, "leak [N per N mm]"], rows),
+        *table([*head, "leak [N per N mm]", "Fy at once [N]", "torsion at once [N mm]"], rows),
         *weight.errors_table(facts),
         *weight.phases_table(facts, ("Fy", "torsion")),
     ]

@@ -105,8 +105,10 @@ def _panel(axes: Any, trial: Trial, panel: Panel) -> None:
     colors = iter(MAP_COLORS)
     papers = iter((PAPER_COLOR, OTHER_PAPER_COLOR))
     for name, line in panel.lines.items():
-        color = next(papers, PAPER_COLOR) if name.startswith(PAPER) else next(colors, MAP_COLORS[-1])
-        axes.plot(trial.time_s[::step], line[::step], color=color, linewidth=1.0, label=name)
+        of_paper = name.startswith(PAPER)
+        color = next(papers, PAPER_COLOR) if of_paper else next(colors, MAP_COLORS[-1])
+        # a map follows every count's noise: drawn last, its line would hide the others
+        axes.plot(trial.time_s[::step], line[::step], color=color, linewidth=1.0, label=name, zorder=3 + of_paper)
     axes.axhline(0.0, color="#111111", linewidth=0.6)
     axes.set_ylabel(panel.label)
     _legend(axes)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _sensor
+from ..errors import RecordingError
 from ..sim import surface
 from ..sim.surface import Floats
 from ..sim.timeline import Pose
@@ -50,6 +51,17 @@ def of_recording(options: Options, *, torque: bool) -> Result:
     """A laboratory's trial with F, and M where ``torque`` is what it is about."""
     assert options.recording is not None
     theirs = recorded.load(options.recording, options.finger, needs=("F", "M") if torque else ("F",))
+    assert theirs.trial.force_n is not None
+    if not np.isfinite(theirs.trial.tare).any():
+        raise RecordingError(
+            f"{options.recording}: the board never finds a tare in it: expected the finger still and untouched at the "
+            f"start; add E_base"
+        )
+    if not loaded(theirs.trial).any():
+        most = np.linalg.norm(theirs.trial.force_n, axis=1).max()
+        raise RecordingError(
+            f"{options.recording}: never loaded, the most is {most:.2f} N: expected over {LOADED_N:g} N; is F in N?"
+        )
     notes = [*theirs.notes, "phases are not looked for in a recording: its errors are over all loaded frames"]
     return estimated(str(options.recording), theirs.trial, options, notes, is_recorded=True)
 
@@ -77,7 +89,8 @@ def estimated(
         notes.append(f"{name}: the same fitted on {' and '.join(t.name for t in before)} of the same finger instead")
     for name, (path, its) in maps.items():
         estimates.append(by_map(scaled, its, name))
-        notes.append(f"{name}: {its.model}, {path}")
+        more = "; torsion is an axis of its own" if "torsion" in its.axes else ""
+        notes.append(f"{name}: {its.model}, {path}{more}")
     named = {name: {setting.name.lower(): value for setting, value in these.items()} for name, these in scales.items()}
     return Result(source, scaled, estimates, named, notes, is_recorded)
 
@@ -161,7 +174,10 @@ def errors_table(facts: Facts) -> list[str]:
             values = [*its.get("rmse_nmm", [None] * 3), its.get("torsion_rmse_nmm"), its.get("torsion_at_poc_rmse_nmm")]
             row += [text(value, 2) for value in values]
         rows.append(row)
-    lines = [f"RMSE over {facts['loaded_frames']} loaded frames (true force above {LOADED_N:g} N)."]
+    lines = [
+        "The paper draws this trial and gives no numbers, so what stands against it is its model on the same counts.",
+        f"RMSE over {facts['loaded_frames']} loaded frames (true force above {LOADED_N:g} N).",
+    ]
     if torque:
         lines.append(
             "Torsion is about the contact's normal, (M - c x F) . n: at the true contact, and at the point of contact "
