@@ -42,6 +42,9 @@ def make_image(folder: Path, said: bytes | None = None, name: str = "new.uf2") -
     return path
 
 
+NEW_SETTING = max(wire.Setting) + 1  # to this library
+
+
 class FakeBoard:
     """Answers on a pty while it runs; takes an image while it is in its loader. What happens is listed in order."""
 

@@ -132,6 +132,8 @@ CASES: list[tuple[int, str, str]] = [
     (2, "expected CSV with t_s and force_n", "calibrate pressure @rec.mcap --reference +no.csv"),
     (2, "t_s and force_n, or", "calibrate pressure @rec.mcap --reference @list.json"),
     (2, "press harder", "calibrate pressure @rec.mcap --forces 2,3,4,3"),
+    (2, "expected 4 or more", "calibrate pressure @rec.mcap --forces 2,3,4"),
+    (2, "expected 3 or more", "calibrate pressure sim:fingers.toml --forces 2,3"),
     (2, "and not both", "calibrate pressure @rec.mcap sim:fingers.toml"),
     (2, "expected one", "calibrate pressure sim:fingers.toml sim:press.toml"),
     (2, "--reference is for recordings", "calibrate pressure sim:fingers.toml --reference @list.json"),

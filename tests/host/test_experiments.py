@@ -83,16 +83,27 @@ def test_the_paper_s_columns_average_to_the_paper_s_averages() -> None:
         assert np.mean(column) == pytest.approx(average, abs=1.01e-4)
 
 
+def test_a_poke_s_frames_are_those_above_one_newton() -> None:
+    trial = poke.emulated(1, "new")
+    rows = poke.contacts(trial)
+    firm = trial.states.force_n > 1.0
+    assert (np.sum(rows, axis=0) == firm).all()
+    for k, mine in enumerate(rows):
+        assert trial.at_mm[mine] == pytest.approx(np.tile(poke._TRUE_MM[k], (mine.sum(), 1)))
+    band = poke.contacts(trial, 1.5, 2.0)
+    assert (np.sum(band, axis=0) == (trial.states.force_n > 1.5) & (trial.states.force_n <= 2.0)).all()
+
+
 def test_a_recorded_poke_has_the_figures_of_the_emulated_one(tmp_path: Path) -> None:
     trial = poke.emulated(2, "new")
-    path = save(tmp_path / "poke.npz", trial)
-    theirs = poke.facts(poke.run(Options(recording=path)))
-    own = poke.facts(poke.run(Options(seed=2)))
-    for case in theirs["cases"]:
-        mine = next(c for c in own["cases"] if (c["profile"], c["weights"]) == ("new", case["weights"]))
-        assert case["std_mm"] == mine["std_mm"][:1]
-        assert case["bias_mm"] == mine["bias_mm"][:1]
-        assert case["mean_std_mm"] == [pytest.approx(np.mean(case["std_mm"][0]), abs=1e-4)]
+    theirs = poke.run(Options(recording=save(tmp_path / "poke.npz", trial)))
+    for case in theirs.cases:
+        points = trial.again({wire.Setting.POC_WEIGHTS: int(case.weights)}).frames["poc_mm"]
+        own = poke.spread(points, poke.contacts(trial))
+        assert (case.trials[0].std_mm == own.std_mm).all()
+        assert (case.trials[0].bias_mm == own.bias_mm).all()
+        mean = poke.facts(theirs)["cases"][theirs.cases.index(case)]["mean_std_mm"]
+        assert mean == [pytest.approx(own.std_mm.mean(), abs=5.1e-5)]
 
 
 def test_a_recording_with_another_number_of_contacts_is_refused(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from biotac import InputError
-from biotac.pressure import formulas, report
+from biotac.pressure import formulas, guided, report
 from biotac.pressure.fit import Fit, fit, told_by, verify
 from biotac.pressure.plateaus import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Rest
 from biotac.pressure.procedure import Procedure, Step
@@ -214,6 +214,27 @@ def test_another_fingers_press_is_not_taken_for_this_ones() -> None:
     assert procedure.step is not None and procedure.step.press == 1
     with pytest.raises(InputError, match=r"finger 0, \d+ rows: press 1 of 3 never came"):
         procedure.finish()
+
+
+def test_who_presses_faster_than_they_type_is_asked_for_every_press_once() -> None:
+    """All rows come at once, as after a long wait for a number."""
+    asked: list[tuple[int, int, float]] = []
+
+    class Slow:
+        def show(self, step: Step | None) -> None: ...
+
+        def force_n(self, step: Step) -> float:
+            asked.append((step.finger, step.press, step.force_n))
+            return 10.0 * step.press
+
+    procedure = Procedure([0], [2.0, 3.5, 5.0], needs_force=False)
+    typed: dict[tuple[int, int], float] = {}
+    procedure.feed(changed(GOOD, without_force))
+    for _ in range(2):
+        guided.ask_forces(procedure, typed, Slow())
+    assert procedure.done
+    assert asked == [(0, 1, 2.0), (0, 2, 3.5), (0, 3, 5.0)]
+    assert typed == {(0, 1): 10.0, (0, 2): 20.0, (0, 3): 30.0}
 
 
 @pytest.mark.parametrize(("fingers", "forces"), [([], [2.0]), ([1, 1], [2.0]), ([0], []), ([0], [0.0]), ([0], [500.0])])

@@ -7,7 +7,7 @@ import argparse
 from . import calibrate_pressure, calibrate_wrench
 
 NAME = "calibrate"
-HELP = "Fit a finger's wrench, or its pressure, to a force plate, and measure it held out."
+HELP = "Fit a finger's wrench, or its pressure, to a force plate."
 EXAMPLE = calibrate_wrench.EXAMPLE
 
 WHATS = (calibrate_wrench, calibrate_pressure)

@@ -18,8 +18,8 @@ from ..identity import ascii_text, serial_text
 from ..version import __version__
 from . import report
 from .driving import drive, fits_of, put, with_gain
-from .fit import Fit, verify
-from .plateaus import Press
+from .fit import MIN_PRESSES, Fit, verify
+from .plateaus import Phase, Press
 from .procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure, Step
 from .reference import Reference, Truth, Unknown
 from .report import Outcome
@@ -51,6 +51,8 @@ def calibrate(open_hand: Callable[[], Hand], plan: Plan, face: Face, *, made_s: 
     presses that cannot be used, for a finger without a sensor, and for a sensor that was changed under way; nothing is
     on the board then, or until the next reboot at most.
     """
+    if len(plan.forces_n) < MIN_PRESSES:
+        raise InputError(f"{len(plan.forces_n)} presses are planned, expected {MIN_PRESSES} or more; name more forces")
     with open_hand() as hand:
         fingers = _fingers(hand, plan)
         serials = {finger: _serial(hand, finger) for finger in fingers}
@@ -76,15 +78,11 @@ class _Held:
 
 def _run(hand: Hand, procedure: Procedure, reference: Reference, face: Face, *, after_us: int = 0) -> _Held:
     typed: dict[tuple[int, int], float] = {}
-    before: list[Step | None] = [None]
 
     def show(step: Step | None) -> None:
-        held = before[0]
-        if not _known(reference) and step is not None and step.phase.value == "release":
-            typed[step.finger, step.press] = face.force_n(step)
-        if step != held:
-            face.show(step)
-        before[0] = step
+        if not _known(reference):
+            ask_forces(procedure, typed, face)
+        face.show(step)
 
     drive(hand, procedure, reference, show, after_us=after_us)
     presses = {
@@ -94,6 +92,16 @@ def _run(hand: Hand, procedure: Procedure, reference: Reference, face: Face, *, 
     last_us = max(int(press.rows["t_us"][-1]) for held in presses.values() for press in held)
     first_us = reference.first_us if isinstance(reference, Truth) else 0
     return _Held(procedure, presses, last_us - first_us)
+
+
+def ask_forces(procedure: Procedure, typed: dict[tuple[int, int], float], face: Face) -> None:
+    """The force of every press that has none yet: more than one, when somebody presses faster than they type."""
+    for finger, presses in procedure.presses.items():
+        for press in presses:
+            if (finger, press.number) not in typed:
+                asked = procedure.forces_n[press.number - 1]
+                step = Step(finger, Phase.RELEASE, press.number, len(procedure.forces_n), asked)
+                typed[finger, press.number] = face.force_n(step)
 
 
 def _on_board(

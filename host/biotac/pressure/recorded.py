@@ -17,7 +17,7 @@ from ..identity import ascii_text
 from ..recording import Recording
 from ..version import __version__
 from . import report
-from .fit import fit, told_by, verify
+from .fit import MIN_PRESSES, fit, told_by, verify
 from .procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure
 from .reference import Series, Unknown, check_alignment
 from .report import Outcome
@@ -44,6 +44,11 @@ def calibrate(
         raise InputError(
             f"{recording.path}: no force to calibrate to; expected a reference file, or the force of each press"
         )
+    asked = tuple(forces_n) or (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)
+    if len(asked) < MIN_PRESSES + 1:
+        raise InputError(
+            f"{len(asked)} forces are named, expected {MIN_PRESSES + 1} or more: one a press, the last for verification"
+        )
     rows = recorded_rows(recording, reference)
     there = [int(f) for f in np.unique(rows["finger"])]
     absent = sorted(set(fingers) - set(there))
@@ -52,7 +57,6 @@ def calibrate(
             f"{recording.path} has no frames of finger {absent[0] if absent else 0}; it has "
             f"{', '.join(map(str, there)) or 'none at all'}"
         )
-    asked = tuple(forces_n) or (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)
     outcome = Outcome({}, {}, {}, {}, {})
     for finger in fingers or there:
         mine = rows[rows["finger"] == finger]
