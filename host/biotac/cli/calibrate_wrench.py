@@ -241,8 +241,11 @@ def _lines(facts: dict[str, Any]) -> list[str]:
 def _board_lines(board: dict[str, Any]) -> list[str]:
     torque = "" if board["torque_nmm_max"] is None else f", {board['torque_nmm_max']:.4f} N mm"
     kept = "kept over a restart" if board["saved"] else "until it restarts; --save keeps it"
+    sent = f"{board['frames_bit_for_bit']} frames it then sent are bit for bit what its map says"
+    if not board["frames_bit_for_bit"]:
+        sent = "it sent no frame to compare, its simulated finger's script was over"
     return [
-        f"  on the board, {kept}: {board['bytes']} bytes, read back alike; within {board['force_mn_max']:.3f} mN"
-        f"{torque} of the float model on {board['rows']} recorded rows; {board['frames_bit_for_bit']} frames it sent "
-        "are bit for bit what its map says",
+        f"  on the board, {kept}: {board['bytes']} bytes, read back alike",
+        f"  its code on {board['rows']} recorded rows: within {board['force_mn_max']:.3f} mN{torque} of the float model",
+        f"  {sent}",
     ]
