@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 
-from . import calibrate_wrench
+from . import calibrate_contact, calibrate_wrench
 
 NAME = "calibrate"
-HELP = "Fit a finger's wrench to a force plate, and measure it held out."
+HELP = "Fit a finger's wrench to a force/torque sensor, measure it held out, give it to the board."
 EXAMPLE = calibrate_wrench.EXAMPLE
 
-WHATS = (calibrate_wrench,)
+WHATS = (calibrate_wrench, calibrate_contact)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

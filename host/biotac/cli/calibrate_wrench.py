@@ -189,10 +189,7 @@ def _check_out(folder: Path, files: list[Path], *, overwrite: bool) -> None:
     for place in places:
         if place.exists() and not overwrite:
             raise InputError(f"{place} exists and would be overwritten; choose another folder or say --force")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder} is no folder ({error.strerror}); choose another name") from error
+    calibrate_live.make_folder(folder)
 
 
 def _write(
@@ -246,6 +243,7 @@ def _board_lines(board: dict[str, Any]) -> list[str]:
         sent = "it sent no frame to compare, its simulated finger's script was over"
     return [
         f"  on the board, {kept}: {board['bytes']} bytes, read back alike",
-        f"  its code on {board['rows']} recorded rows: within {board['force_mn_max']:.3f} mN{torque} of the float model",
+        f"  its code on {board['rows']} recorded rows: within {board['force_mn_max']:.3f} mN{torque} of the float "
+        "model",
         f"  {sent}",
     ]
