@@ -237,7 +237,7 @@ static void parts_may_come_in_any_order_and_more_than_once(void **state)
     assert_int_equal(begin(3, (uint16_t)bytes, crc32), BT_ERROR_OK);
     assert_int_equal(begin(3, (uint16_t)bytes, crc32), BT_ERROR_OK); // its reply was lost
     for (size_t k = 0; k < 20 * parts; k++) {
-        assert_int_equal(write_part(3, blob, bytes, random_u64(&seed) % parts), BT_ERROR_OK);
+        assert_int_equal(write_part(3, blob, bytes, (size_t)(random_u64(&seed) % parts)), BT_ERROR_OK);
     }
     for (size_t part = parts; part-- > 0;) { // whatever chance left out
         assert_int_equal(write_part(3, blob, bytes, part), BT_ERROR_OK);

@@ -21,7 +21,7 @@ from biotac import Setting
 from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.errors import FlashError, InputError, NotAGatewayError
-from biotac.flash import Image, Outcome, flash, read_image
+from biotac.flash import Image, Outcome, flash, read_backup, read_image
 from biotac.flash.loader_emulated import EmulatedLoader
 from biotac.flash.target_emulated import EmulatedTarget
 
@@ -122,6 +122,22 @@ def test_saved_maps_outlive_another_image(bench: Bench, next_release: Image) -> 
     bench.flash(next_release)
     with bench.target.open() as hand:
         assert hand.maps() == {0: blob}
+
+
+def test_a_map_that_was_in_force_and_not_saved_is_put_back_and_saved(bench: Bench) -> None:
+    kept, new = make_map(1), make_map(2, blocks=BIG)
+    with bench.target.open() as hand:
+        hand.set_map(0, kept)
+        hand.set_map(1, kept, force=True)
+        hand.save_settings()
+        hand.set_map(0, new)
+    outcome = bench.flash(read_image(BUILT))
+    assert outcome.settings is not None and outcome.backup is not None
+    assert outcome.settings.changed == ("wrench map of finger 0",)
+    assert read_backup(outcome.backup.path).maps == {0: new, 1: kept}
+    bench.setting_after_a_power_cut(Setting.IDLE_PERIOD_MS)
+    with bench.target.open() as hand:
+        assert hand.maps() == {0: new, 1: kept}
 
 
 def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_release: Image) -> None:
