@@ -295,7 +295,8 @@ def test_ctrl_c_ends_it_and_keeps_everything(at_s: float, tmp_path: Path) -> Non
     assert (procedure.zero is None) == (at_s < 100.0)
     recording = Recording(places.recording)
     assert not recording.problems
-    assert (recording.end_us - recording.begin_us) / 1e6 == pytest.approx(at_s, abs=3.0)
+    # to the last byte that came: some seconds come at once where no time passes
+    assert at_s <= (recording.end_us - recording.begin_us) / 1e6 < at_s + 15.0
     reference = read_csv(places.reference) if at_s > 100.0 else None
     if reference is not None:
         # but for the datagrams held back for those that might have been overtaken

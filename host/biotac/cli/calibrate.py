@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 
-from . import calibrate_pressure, calibrate_wrench
+from . import calibrate_contact, calibrate_pressure, calibrate_wrench
 
 NAME = "calibrate"
-HELP = "Fit a finger's wrench, or its pressure, to a force plate."
+HELP = "Fit a finger's wrench, or its pressure, to a reference, measure it held out, give it to the board."
 EXAMPLE = calibrate_wrench.EXAMPLE
 
-WHATS = (calibrate_wrench, calibrate_pressure)
+WHATS = (calibrate_wrench, calibrate_pressure, calibrate_contact)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import biotac
 
@@ -31,13 +32,8 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
     """
     serial = ascii_text(hand.sensor_info(finger).serial)
     check_serial(f"finger {finger}", serial, args.serial, force=args.force)
-    folder = args.out
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder} is no folder ({error.strerror}); choose another name") from error
     name = serial or f"finger{finger}"
-    places = Places(folder / f"{name}.mcap", folder / f"{name}.csv")
+    places = Places(args.out / f"{name}.mcap", args.out / f"{name}.csv")
     progress = Progress()
 
     def show(event: Event) -> None:
@@ -45,6 +41,7 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
         print(f"biotac: {event.words}", file=sys.stderr)
 
     with _reader(args, hand, finger) as (reader, mounting):
+        make_folder(args.out)
         procedure = Procedure(finger, mounting)
         try:
             walk(hand, reader, procedure, places, overwrite=args.force, show=show, progress=progress.show)
@@ -63,6 +60,14 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
             f"and {places.reference}"
         )
     return places, procedure.coverage.missing()
+
+
+def make_folder(folder: Path) -> None:
+    """With those above it. Raises InputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder} is no folder ({error.strerror}); choose another name") from error
 
 
 def open_board(args: argparse.Namespace) -> biotac.Hand:

@@ -32,7 +32,8 @@ TIP_UP_DEG = 32.0  # half of what a flat plate reaches of the tip
 class Demands:
     """When a place, a direction or a force counts as seen, and when that is enough.
 
-    ``seconds`` of it in a cell, and in each region for a direction; ``cells`` of the 8 of each region.
+    ``seconds`` of it in a cell, and in each region for a direction; ``cells`` of the 8 of each region, and
+    ``force_cells`` of them with a light press and with a firm one.
     """
 
     touch_n: float = 1.0
@@ -42,16 +43,17 @@ class Demands:
     twist_nmm: float = 1.5
     seconds: float = 0.25
     cells: int = 6
+    force_cells: int = 4
 
 
 @dataclass
 class Coverage:
-    """Seconds seen of every cell (4 regions, 8 cells), way (4, 6) and force (4, 2)."""
+    """Seconds seen of every cell (4 regions, 8 cells), way (4, 6) and force in a cell (4, 8, 2)."""
 
     demands: Demands = field(default_factory=Demands)
     cells_s: Floats = field(default_factory=lambda: np.zeros((len(REGIONS), CELLS_PER_REGION)))
     ways_s: Floats = field(default_factory=lambda: np.zeros((len(REGIONS), len(WAYS))))
-    forces_s: Floats = field(default_factory=lambda: np.zeros((len(REGIONS), len(FORCES))))
+    forces_s: Floats = field(default_factory=lambda: np.zeros((len(REGIONS), CELLS_PER_REGION, len(FORCES))))
 
     def add(self, wrench: Floats, step_s: float) -> None:
         """Take wrenches (n, 6) on the finger in Lin's frame, each of which lasted ``step_s``."""
@@ -76,7 +78,7 @@ class Coverage:
         for way, hit in enumerate(seen):
             np.add.at(self.ways_s[:, way], region[hit], step_s)
         for force, hit in enumerate((pressed < its.light_n, pressed > its.firm_n)):
-            np.add.at(self.forces_s[:, force], region[hit], step_s)
+            np.add.at(self.forces_s[:, :, force], (region[hit], cell[hit]), step_s)
 
     @property
     def cells(self) -> npt.NDArray[np.int64]:
@@ -97,9 +99,12 @@ class Coverage:
             have = int(self.cells[region])
             parts = [f"{have} of {CELLS_PER_REGION} cells"] if have < its.cells else []
             if have:  # of an untouched region there is no more to say
-                named = ((FORCES, self.forces_s), (WAYS, self.ways_s))
-                lacking = [w for words, s in named for w, t in zip(words, s[region], strict=True) if t < its.seconds]
-                parts += [f"no {word}" for word in lacking]
+                pressed = (self.forces_s[region] >= its.seconds).sum(axis=0).tolist()
+                for word, count in zip(FORCES, pressed, strict=True):
+                    if count < its.force_cells:
+                        parts.append(f"{word} in {count} of {its.force_cells} cells" if count else f"no {word}")
+                seen = zip(WAYS, self.ways_s[region], strict=True)
+                parts += [f"no {word}" for word, seconds in seen if seconds < its.seconds]
             if parts:
                 lines.append((have, f"{name}: {'; '.join(parts)}"))
         return [line for _, line in sorted(lines, key=lambda entry: entry[0])]
