@@ -245,7 +245,6 @@ def _board_lines(its: dict[str, Any]) -> list[str]:
         sent = "it sent no frame to compare, its simulated finger's script was over"
     return [
         f"  on the board, {kept}: {its['bytes']} bytes, read back alike",
-        f"  its code on {its['rows']} recorded rows: within {its['force_mn_max']:.3f} mN{torque} of the float "
-        "model",
+        f"  its code on {its['rows']} recorded rows: within {its['force_mn_max']:.3f} mN{torque} of the float model",
         f"  {sent}",
     ]
