@@ -434,7 +434,7 @@ static bt_msg_frame published(emulated_finger *finger, const bt_map *map, uint16
     bt_settings all;
     bt_settings_reset(&all);
     bt_kernel_settings settings = bt_kernel_settings_from(&all);
-    assert_null(settings.map);
+    assert_true(settings.map == NULL);
     settings.map = map;
     bt_frame frame = next_frame(finger);
     frame.pdc = pdc;
