@@ -13,10 +13,12 @@ from rig import Rig
 import biotac
 from biotac import Calibration, QuantityFlags, Setting
 from biotac import _wire as wire
+from biotac.core import default_settings
 from biotac.crosscheck import CrossCheck
 from biotac.experiments import navarro
 from biotac.recording import Recording
 from biotac.sim.physics import Profile
+from biotac.stream import Batch
 
 GAIN_NN = 12_345_678
 
@@ -63,22 +65,33 @@ def test_the_force_is_the_gain_times_pressure_above_rest_and_right_in_every_fram
 def test_what_is_not_asked_for_is_invalid_and_leaves_no_trace_in_what_is(
     board: Callable[[str], biotac.Hand],
 ) -> None:
-    hand = board("press.toml")
-    hand.set_calibration(0, replace(Calibration(), pressure_gain_nn=GAIN_NN))
-    settings, own = hand.settings(), hand.finger_settings()
-    hand.subscribe(QuantityFlags.FORCE | QuantityFlags.REST_FRAMES)
-    first = hand.read_batch(1.0)
-    hand.subscribe(QuantityFlags.PRESSURE)  # with heartbeats in place of frames at rest
-    second = hand.read_batch(2.0)
-    assert np.isnan(first.frames["pdc_filtered"]).all() and np.isnan(first.frames["pressure_force_n"]).all()
-    asked = np.isfinite(second.frames["pdc_filtered"])
-    assert asked.sum() > 50 and np.isnan(second.frames["force_n"][asked]).all()
-    check = CrossCheck()
-    for batch in (first, second):
-        check.add(batch.wire, settings, own)
-    assert check.violations == 0
+    """The same source three times: everything, force alone, and pressure alone with heartbeats at rest."""
+
+    def played(quantities: QuantityFlags | None) -> Batch:
+        hand = board("press.toml")
+        hand.set_calibration(0, replace(Calibration(), pressure_gain_nn=GAIN_NN))
+        if quantities is not None:
+            hand.subscribe(quantities)
+        return hand.read_batch(2.5)
+
+    full = played(None)
+    force = played(QuantityFlags.FORCE | QuantityFlags.REST_FRAMES)
+    pressure = played(QuantityFlags.PRESSURE)
+    assert np.isnan(force.frames["pdc_filtered"]).all() and np.isnan(force.frames["pressure_force_n"]).all()
+    frames = pressure.frames
+    assert 50 < len(frames) < len(full.frames) and np.isnan(frames["force_n"]).all()
+    same = full.frames[np.searchsorted(full.frames["seq"], frames["seq"])]
+    for name in ("pdc_filtered", "pressure_force_n"):
+        np.testing.assert_array_equal(frames[name], same[name])
+    assert (np.isfinite(frames["pressure_force_n"]).sum()) > 50
+    settings = default_settings() | {Setting.PRESSURE_GAIN_NN: GAIN_NN}
+    for batch, starts in ((full, 1), (force, 0), (pressure, None)):
+        check = CrossCheck()
+        check.add(batch.wire, settings)
+        assert check.violations == 0
+        assert starts is None or check.pressure.starts == starts
     # Of the frames there are, only those that follow none are taken as told.
-    assert 1 <= check.pressure.starts <= 3
+    assert 1 <= check.pressure.starts <= 1 + len(pressure.idle)
 
 
 @pytest.mark.parametrize(("seed", "profile"), [(1, "new"), (6, "worn")])
