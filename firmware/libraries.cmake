@@ -8,11 +8,11 @@ add_library(biotac_core STATIC
   ${fw}/core/cobs.c ${fw}/core/commands.c ${fw}/core/crc32.c
   ${fw}/core/crc32_gen.c
   ${fw}/core/finger.c ${fw}/core/fold_gen.c ${fw}/core/framing.c ${fw}/core/gate.c ${fw}/core/kernel.c
-  ${fw}/core/map.c ${fw}/core/map_wrench.c
+  ${fw}/core/map.c ${fw}/core/map_commands.c ${fw}/core/map_store.c ${fw}/core/map_wrench.c
   ${fw}/core/noise.c ${fw}/core/poc.c ${fw}/core/release.c ${fw}/core/results.c ${fw}/core/root_gen.c
   ${fw}/core/running.c ${fw}/core/sensor_gen.c ${fw}/core/session.c ${fw}/core/settings.c ${fw}/core/sigma.c
   ${fw}/core/storage.c ${fw}/core/sweep.c ${fw}/core/tare.c
-  ${fw}/core/thermal.c ${fw}/core/wire_gen.c ${fw}/core/wrench.c)
+  ${fw}/core/thermal.c ${fw}/core/upload.c ${fw}/core/wire_gen.c ${fw}/core/wrench.c)
 target_include_directories(biotac_core PUBLIC ${fw}/core)
 
 # The same maths in double, from the papers. Never linked into a board image.

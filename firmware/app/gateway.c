@@ -10,6 +10,10 @@
 _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS
                    && BT_CALIBRATION_RECORD_BYTES <= BT_STORAGE_MAX_BYTES,
                "every finger's calibration must have a record of its own, and fit it");
+_Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS <= BT_RECORD_MAP
+                   && BT_RECORD_MAP + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS,
+               "every finger's map must have a record of its own");
+_Static_assert(BT_STORAGE_BYTES + BT_MAPS_BYTES == BT_FLASH_BYTES, "port.h says where they lie");
 
 #define ALL_FINGERS ((1u << BT_MAX_FINGERS) - 1)
 
@@ -22,6 +26,17 @@ static const bt_flash flash = {
     .program = port_flash_program,
     .read = port_flash_read,
 };
+
+// Maps lie behind the settings.
+static bool erase_map_sector(uint32_t sector_offset)
+{
+    return port_flash_erase(BT_STORAGE_BYTES + sector_offset);
+}
+
+static bool program_map_page(uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES])
+{
+    return port_flash_program(BT_STORAGE_BYTES + page_offset, page);
+}
 
 static uint8_t store(uint16_t id, uint16_t version, const uint8_t *record, size_t bytes)
 {
@@ -47,6 +62,18 @@ static uint8_t save_calibration(uint8_t finger, const bt_calibration *calibratio
     return store(calibration_id(finger), BT_CALIBRATION_RECORD_VERSION, record, bytes);
 }
 
+static uint16_t map_id(uint8_t finger)
+{
+    return (uint16_t)(BT_RECORD_MAP + finger);
+}
+
+static uint8_t save_map(uint8_t finger, const bt_map_place *place)
+{
+    uint8_t record[BT_MAP_RECORD_BYTES];
+    size_t bytes = bt_map_place_pack(place, record);
+    return store(map_id(finger), BT_MAP_RECORD_VERSION, record, bytes);
+}
+
 static uint8_t reboot_bootloader(void)
 {
     return port_reboot_bootloader() ? BT_ERROR_OK : BT_ERROR_NOT_HERE;
@@ -65,17 +92,24 @@ static void load_settings(bt_session *session)
         if (bytes > 0) {
             bt_calibration_unpack(&session->calibration[f], version, record, (size_t)bytes);
         }
+        bytes = bt_storage_read(&flash, map_id(f), &version, record, sizeof record);
+        if (bytes > 0) {
+            bt_finger_map_load(&session->map[f], session->board.maps, version, record, (size_t)bytes);
+        }
     }
     bt_session_use_settings(session);
 }
 
 void bt_gateway_init(bt_gateway *gateway)
 {
-    static const bt_board_actions actions = {
+    const bt_board_actions actions = {
         .save_settings = save_settings,
         .save_calibration = save_calibration,
+        .save_map = save_map,
         .reboot_bootloader = reboot_bootloader,
+        .maps = &gateway->map_flash,
     };
+    gateway->map_flash = (bt_map_flash){erase_map_sector, program_map_page, port_flash_maps()};
     bt_identity identity = {
         .board = port_board(),
         .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},

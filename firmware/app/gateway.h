@@ -8,6 +8,7 @@
 typedef struct {
     bt_sampler sampler;
     bt_session session;
+    bt_map_flash map_flash;
     uint32_t round; // that the fingers are assembling
     bool round_open;
     bool link_was_up;

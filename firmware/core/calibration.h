@@ -17,8 +17,9 @@ typedef struct {
     int32_t value[BT_CALIBRATION_VALUES];
 } bt_calibration;
 
-// Whether it may hold for the sensor that told this serial number; all zero when none has.
-bool bt_calibration_fits(const bt_calibration *calibration, const uint8_t serial[BT_SERIAL_BYTES]);
+// Whether what was made for one sensor, all zero: for any, may hold for the one that told `there`; all zero
+// when none has.
+bool bt_serial_fits(const uint8_t made_for[BT_SERIAL_BYTES], const uint8_t there[BT_SERIAL_BYTES]);
 
 // Its values in place of the settings'. Returns an enum bt_error: OK or, with the rest left as it was,
 // OUT_OF_RANGE.

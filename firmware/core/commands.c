@@ -186,7 +186,7 @@ static uint8_t set_calibration(bt_session *session, const uint8_t *payload)
     bt_calibration its = {.present = true, .unsaved = true, .made_s = msg.made_s};
     memcpy(its.serial, msg.serial, sizeof its.serial);
     memcpy(its.value, msg.value, sizeof its.value);
-    if (!bt_calibration_fits(&its, session->info[msg.finger].serial)) {
+    if (!bt_serial_fits(its.serial, session->info[msg.finger].serial)) {
         return BT_ERROR_OTHER_SENSOR;
     }
     uint8_t error = bt_calibration_apply(&its, &trial);
@@ -231,11 +231,15 @@ static uint8_t save(bt_session *session)
     if (session->streams != 0) {
         return BT_ERROR_BUSY; // sampling stands still while flash is written
     }
-    if (session->board.save_settings == NULL || session->board.save_calibration == NULL) {
+    const bt_board_actions *board = &session->board;
+    if (board->save_settings == NULL || board->save_calibration == NULL || board->save_map == NULL) {
         return BT_ERROR_NOT_HERE;
     }
-    uint8_t error = session->board.save_settings(&session->settings);
-    return error == BT_ERROR_OK ? save_calibrations(session) : error;
+    uint8_t error = board->save_settings(&session->settings);
+    if (error == BT_ERROR_OK) {
+        error = save_calibrations(session);
+    }
+    return error == BT_ERROR_OK ? bt_save_maps(session) : error;
 }
 
 static uint8_t reboot_bootloader(const bt_session *session, const uint8_t *payload)
@@ -262,6 +266,7 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
     }
     uint8_t req_id = payload[0];
     uint8_t error = BT_ERROR_OK;
+    bool answered;
     switch (id) {
     case BT_HELLO_REQUEST_ID:
         hello(session, payload);
@@ -343,7 +348,10 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         error = save(session);
         break;
     default:
-        error = BT_ERROR_UNKNOWN_COMMAND;
+        error = bt_map_command(session, id, payload, &answered);
+        if (answered) {
+            return;
+        }
         break;
     }
     reply(session, req_id, id, error);

@@ -53,19 +53,24 @@ static void mark(int32_t result[3])
     result[2] = BT_INVALID_I32;
 }
 
+static inline void give_poc(bool valid, const bt_point *point, int16_t poc_um[3])
+{
+    if (valid) {
+        poc_um[0] = point->um[0];
+        poc_um[1] = point->um[1];
+        poc_um[2] = point->um[2];
+    } else {
+        mark_poc(poc_um);
+    }
+}
+
 uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *settings, uint32_t wanted,
                    int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
 {
     bt_point point;
     bool asked = wanted & (BT_WANT_POC | BT_WANT_TORQUE);
     bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
-    if (located && wanted & BT_WANT_POC) {
-        poc_um[0] = point.um[0];
-        poc_um[1] = point.um[1];
-        poc_um[2] = point.um[2];
-    } else {
-        mark_poc(poc_um);
-    }
+    give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
         bt_force(e_q4, &settings->gains, force_100un);
     }
@@ -79,4 +84,36 @@ uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *
         mark(force_100un);
     }
     return asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0;
+}
+
+uint32_t bt_kernel_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
+                          const bt_kernel_settings *settings, uint32_t wanted, int16_t poc_um[3],
+                          int32_t force_100un[3], int32_t torque_mnmm[3])
+{
+    bt_point point;
+    bool derived = wanted & BT_WANT_TORQUE && settings->map->axes < BT_MAP_AXES_MAX;
+    bool asked = wanted & BT_WANT_POC || derived;
+    bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
+    give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
+    if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
+        bt_map_wrench(settings->map, frame->counts, frame->tare_q4, frame->pdc_above_rest_q4, force_100un,
+                      wanted & BT_WANT_TORQUE ? torque_mnmm : NULL);
+    }
+    if (derived) {
+        bool possible = located && force_100un[0] != BT_INVALID_I32;
+        bt_torque_yz(e_q4, &settings->gains, torque_mnmm + 1);
+        torque_mnmm[0] = possible ? bt_torque_x_derived(point.lever_yz, force_100un) : BT_INVALID_I32;
+    } else if (!(wanted & BT_WANT_TORQUE)) {
+        mark(torque_mnmm);
+    }
+    if (!(wanted & BT_WANT_FORCE)) {
+        mark(force_100un);
+    }
+    return asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0;
+}
+
+int32_t bt_pdc_above_rest_q4(uint16_t pdc, uint16_t pdc_tare_q4)
+{
+    bool missing = pdc == BT_INVALID_COUNT || pdc_tare_q4 == BT_INVALID_COUNT;
+    return missing ? BT_INVALID_I32 : 16 * (int32_t)pdc - pdc_tare_q4;
 }

@@ -4,6 +4,7 @@
 #ifndef BIOTAC_KERNEL_H
 #define BIOTAC_KERNEL_H
 
+#include "map.h"
 #include "sensor_gen.h"
 #include "settings.h"
 #include "wrench.h"
@@ -15,8 +16,10 @@ typedef struct {
     int poc_weights;
     bt_gains gains;
     uint32_t force_per_count_100un_q16[3]; // by which one count of noise on every electrode moves the force
+    const bt_map *map;                     // in force instead of the gains; NULL: none
 } bt_kernel_settings;
 
+// Without a map: that is the caller's to set.
 bt_kernel_settings bt_kernel_settings_from(const bt_settings *settings);
 
 // The signals the results rest on: e = count - tare in 1/16 count; an electrode without
@@ -35,5 +38,19 @@ void bt_signals_q4(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[
 // neither PoC nor torque is wanted. The host runs recorded counts through this same function.
 uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *settings, uint32_t wanted,
                    int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3]);
+
+// The same where settings->map is in force, of a frame whose signals are e_q4: force, and torque where the
+// map has it, come from the map; else torque y and z are Eq 4's, and x is derived from the map's force.
+typedef struct {
+    const uint16_t *counts;    // [BT_ELECTRODES]
+    const uint16_t *tare_q4;   // [BT_ELECTRODES]
+    int32_t pdc_above_rest_q4; // BT_INVALID_I32: unknown
+} bt_map_input;
+uint32_t bt_kernel_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
+                          const bt_kernel_settings *settings, uint32_t wanted, int16_t poc_um[3],
+                          int32_t force_100un[3], int32_t torque_mnmm[3]);
+
+// PDC above its tare, BT_INVALID_I32 where either is missing.
+int32_t bt_pdc_above_rest_q4(uint16_t pdc, uint16_t pdc_tare_q4);
 
 #endif

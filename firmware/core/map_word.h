@@ -28,6 +28,13 @@ static inline int32_t bt_map_low(uint32_t word)
     return (int16_t)(uint16_t)word;
 }
 
+// value < 2^31 - 2^15.
+static inline uint32_t bt_map_word_of(int32_t value)
+{
+    int32_t low = (int16_t)(uint16_t)value;
+    return (uint32_t)(value - low) | (uint16_t)low;
+}
+
 static inline int64_t bt_map_value(uint32_t word)
 {
     return (int64_t)bt_map_high(word) * 65536 + bt_map_low(word);

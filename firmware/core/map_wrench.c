@@ -19,25 +19,28 @@ _Static_assert(BT_E_MAX_Q4 <= BT_MAP_FEATURE_MAX && 1 << BT_MAP_ONE_Q <= BT_MAP_
 #define BLOCK_MAX  (BT_ELECTRODES * (ROW_MAX * BT_MAP_FEATURE_MAX / 65536 + 2))
 #define GATED_MAX  (BLOCK_MAX * BT_MAP_GATE_MAX / (1 << BT_MAP_GATE_Q) + 2)
 #define RESULT_MAX ((int64_t)BT_MAP_RESULT_MAX << BT_MAP_RESULT_Q)
+_Static_assert((int64_t)BT_ELECTRODES << (BT_MAP_FINE_BITS + 15) <= INT32_MAX, "fine sums must fit int32");
 _Static_assert(ROW_MAX <= INT32_MAX - 32768, "a row must fit int32, and its halves int16");
 _Static_assert(BLOCK_MAX < ((int64_t)1 << 62) / BT_MAP_GATE_MAX, "a block times its gate must fit int64");
 _Static_assert(GATED_MAX < ((int64_t)1 << 62 >> BT_MAP_EXPONENT_MAX) / (BT_MAP_KINDS * BT_MAP_GATES),
                "the blocks' sum must fit int64");
 _Static_assert(BT_MAP_RESULT_MAX < INT32_MAX, "a result must fit the message");
 
-// high * 2^FINE_BITS + fine
+// high, or high * 2^FINE_BITS + fine.
 typedef struct {
-    int32_t high[BT_ELECTRODES];
-    int32_t fine[BT_ELECTRODES];
-} fine_factors;
+    const int32_t *high;
+    const int32_t *fine; // NULL: none
+} factors;
 
 // What the blocks are made of, as far as the map needs it.
 typedef struct {
     int32_t signal[BT_ELECTRODES];
     int32_t compression[BT_ELECTRODES];
     int32_t bulge[BT_ELECTRODES];
-    fine_factors conductance;
-    int32_t pressure;
+    int32_t conductance[BT_ELECTRODES];
+    int32_t conductance_fine[BT_ELECTRODES];
+    factors factors[BT_MAP_KINDS]; // of each kind
+    int32_t single[BT_MAP_KINDS];  // the factor of a kind of one column
     int32_t gate[BT_MAP_GATES];
 } features;
 
@@ -92,15 +95,15 @@ static int32_t conductance_q22(int32_t count, int32_t tare_q4)
 }
 
 static void conductances(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
-                         fine_factors *out)
+                         int32_t high[BT_ELECTRODES], int32_t fine[BT_ELECTRODES])
 {
     for (int i = 0; i < BT_ELECTRODES; i++) {
         int32_t u = 0;
         if (counts[i] != BT_INVALID_COUNT && tare_q4[i] != BT_INVALID_COUNT) {
             u = conductance_q22(counts[i], tare_q4[i]);
         }
-        out->high[i] = bt_shift_down(u, BT_MAP_FINE_BITS);
-        out->fine[i] = u & ((1 << BT_MAP_FINE_BITS) - 1);
+        high[i] = bt_shift_down(u, BT_MAP_FINE_BITS);
+        fine[i] = u & ((1 << BT_MAP_FINE_BITS) - 1);
     }
 }
 
@@ -160,15 +163,11 @@ static inline int32_t product(int32_t factor, uint32_t word)
     return factor * bt_map_high(word) + bt_shift_down(factor * bt_map_low(word), 16);
 }
 
-static inline int32_t fine_product(int32_t high, int32_t fine, uint32_t word)
-{
-    return product(high, word) + bt_shift_down(fine * bt_map_high(word), BT_MAP_FINE_BITS);
-}
-
-// Sums of columns [from, BT_ELECTRODES) times three axes' coefficients, in 2^-16 of their products; behind
-// the coefficients. Each product is cut downwards, so that the sums begin at what that takes on average.
-static BT_NOINLINE const bt_map_word *row(const int32_t f[BT_ELECTRODES], int from, const bt_map_word *word,
-                                          int32_t sum[3])
+// Sums over columns [from, BT_ELECTRODES) of factors times three axes' coefficients, in 2^-16 of their
+// products. Each product is cut downwards, so that the sums begin at what that takes on average. Returns what
+// is behind the coefficients. What is 0 costs little: of compression and bulge it is half.
+static BT_NOINLINE const bt_map_word *high_row(const int32_t f[BT_ELECTRODES], int from,
+                                               const bt_map_word *word, int32_t sum[3])
 {
     int32_t x = (BT_ELECTRODES - from) / 2, y = x, z = x;
     for (int i = from; i < BT_ELECTRODES; i++, word += 3) {
@@ -184,72 +183,61 @@ static BT_NOINLINE const bt_map_word *row(const int32_t f[BT_ELECTRODES], int fr
     return word;
 }
 
-static BT_NOINLINE const bt_map_word *fine_row(const fine_factors *f, int from, const bt_map_word *word,
-                                               int32_t sum[3])
+// What the fine bits add: times the high halves alone, the rest being below half a unit each.
+static BT_NOINLINE void add_fine(const int32_t fine[BT_ELECTRODES], int from, const bt_map_word *word,
+                                 int32_t sum[3])
 {
-    int32_t x = BT_ELECTRODES - from, y = x, z = x;
+    int32_t x = 0, y = 0, z = 0;
     for (int i = from; i < BT_ELECTRODES; i++, word += 3) {
-        x += fine_product(f->high[i], f->fine[i], word[0]);
-        y += fine_product(f->high[i], f->fine[i], word[1]);
-        z += fine_product(f->high[i], f->fine[i], word[2]);
+        x += fine[i] * bt_map_high(word[0]);
+        y += fine[i] * bt_map_high(word[1]);
+        z += fine[i] * bt_map_high(word[2]);
     }
-    sum[0] = x;
-    sum[1] = y;
-    sum[2] = z;
-    return word;
+    sum[0] += bt_shift_down(x, BT_MAP_FINE_BITS);
+    sum[1] += bt_shift_down(y, BT_MAP_FINE_BITS);
+    sum[2] += bt_shift_down(z, BT_MAP_FINE_BITS);
 }
 
-// a * b, exactly, for a factor and a row's sum: two 16-bit products where a core has no long one.
-static inline int64_t wide(int32_t a, int32_t b)
+static const bt_map_word *row(const factors *f, int from, const bt_map_word *word, int32_t sum[3])
 {
-    int32_t low = (int16_t)(uint16_t)b;
-    return (int64_t)(a * bt_shift_down(b - low, 16)) * 65536 + a * low;
+    const bt_map_word *behind = high_row(f->high, from, word, sum);
+    if (f->fine != NULL) {
+        add_fine(f->fine, from, word, sum);
+    }
+    return behind;
 }
 
-static const bt_map_word *pairs(const int32_t f[BT_ELECTRODES], const bt_map_word *word, int64_t block[3])
+// The first factors of pairs times their rows' sums, by the same products: a sum is split as a coefficient
+// is.
+static BT_NOINLINE int64_t column(const factors *f, const int32_t (*sum)[3])
 {
-    int64_t sum[3] = {0, 0, 0};
+    int64_t high = 0;
+    int32_t low = BT_ELECTRODES / 2;
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        int32_t inner[3];
-        if (f[i] == 0) {
-            word += 3 * (BT_ELECTRODES - i);
-            continue;
-        }
-        word = row(f, i, word, inner);
-        for (int d = 0; d < 3; d++) {
-            sum[d] += wide(f[i], inner[d]);
-        }
+        uint32_t its = bt_map_word_of(sum[i][0]);
+        high += f->high[i] * bt_map_high(its);
+        low += bt_shift_down(f->high[i] * bt_map_low(its), 16);
     }
-    for (int d = 0; d < 3; d++) {
-        block[d] = bt_shift_round(sum[d], 16);
+    if (f->fine != NULL) {
+        int32_t fine = 0;
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            fine += f->fine[i] * bt_map_high(bt_map_word_of(sum[i][0]));
+        }
+        low += bt_shift_down(fine, BT_MAP_FINE_BITS);
     }
-    return word;
+    return high + low;
 }
 
-static const bt_map_word *fine_pairs(const fine_factors *f, const bt_map_word *word, int64_t block[3])
+static const bt_map_word *pairs(const factors *f, const bt_map_word *word, int64_t block[3])
 {
-    int64_t sum[3] = {0, 0, 0};
-    int64_t fine[3] = {0, 0, 0};
+    int32_t sum[BT_ELECTRODES][3];
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        int32_t inner[3];
-        word = fine_row(f, i, word, inner);
-        for (int d = 0; d < 3; d++) {
-            sum[d] += wide(f->high[i], inner[d]);
-            fine[d] += wide(f->fine[i], inner[d]);
-        }
+        word = row(f, i, word, sum[i]);
     }
     for (int d = 0; d < 3; d++) {
-        block[d] = bt_shift_round(sum[d] + bt_shift_round(fine[d], BT_MAP_FINE_BITS), 16);
+        block[d] = column(f, (const int32_t (*)[3]) & sum[0][d]);
     }
     return word;
-}
-
-static const bt_map_word *single(int32_t factor, const bt_map_word *word, int64_t block[3])
-{
-    for (int d = 0; d < 3; d++) {
-        block[d] = bt_shift_round(factor * bt_map_value(word[d]), 16);
-    }
-    return word + 3;
 }
 
 // A block's sums over three axes, in 2^-16 of its columns' and coefficients' products; behind its
@@ -258,26 +246,16 @@ static const bt_map_word *block_sums(uint8_t kind, const features *of, const bt_
                                      int64_t block[3])
 {
     int32_t sum[3];
-    switch (kind) {
-    case BT_MAP_KIND_OFFSET:
-        return single(1 << BT_MAP_ONE_Q, word, block);
-    case BT_MAP_KIND_PRESSURE:
-        return single(of->pressure, word, block);
-    case BT_MAP_KIND_SIGNAL_PAIRS:
-        return pairs(of->signal, word, block);
-    case BT_MAP_KIND_CONDUCTANCE_PAIRS:
-        return fine_pairs(&of->conductance, word, block);
-    case BT_MAP_KIND_CONDUCTANCE:
-        word = fine_row(&of->conductance, 0, word, sum);
-        break;
-    case BT_MAP_KIND_COMPRESSION:
-        word = row(of->compression, 0, word, sum);
-        break;
-    case BT_MAP_KIND_BULGE:
-        word = row(of->bulge, 0, word, sum);
+    switch (bt_map_columns[kind]) {
+    case BT_MAP_PAIRS:
+        return pairs(&of->factors[kind], word, block);
+    case BT_ELECTRODES:
+        word = row(&of->factors[kind], 0, word, sum);
         break;
     default:
-        word = row(of->signal, 0, word, sum);
+        for (int d = 0; d < 3; d++) {
+            sum[d] = product(of->single[kind], *word++);
+        }
         break;
     }
     for (int d = 0; d < 3; d++) {
@@ -303,12 +281,18 @@ static void prepare(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
         }
     }
     if (map->kinds & (1u << BT_MAP_KIND_CONDUCTANCE | 1u << BT_MAP_KIND_CONDUCTANCE_PAIRS)) {
-        conductances(counts, tare_q4, &of->conductance);
+        conductances(counts, tare_q4, of->conductance, of->conductance_fine);
     }
     if (map->gates & ~(1u << BT_MAP_GATE_ONE)) {
         gates(of->signal, of->gate);
     }
-    of->pressure = limited(pdc_above_rest_q4, -BT_MAP_FEATURE_MAX, BT_MAP_FEATURE_MAX);
+    of->factors[BT_MAP_KIND_SIGNAL] = of->factors[BT_MAP_KIND_SIGNAL_PAIRS] = (factors){of->signal, NULL};
+    of->factors[BT_MAP_KIND_COMPRESSION] = (factors){of->compression, NULL};
+    of->factors[BT_MAP_KIND_BULGE] = (factors){of->bulge, NULL};
+    of->factors[BT_MAP_KIND_CONDUCTANCE] = of->factors[BT_MAP_KIND_CONDUCTANCE_PAIRS] =
+        (factors){of->conductance, of->conductance_fine};
+    of->single[BT_MAP_KIND_OFFSET] = 1 << BT_MAP_ONE_Q;
+    of->single[BT_MAP_KIND_PRESSURE] = limited(pdc_above_rest_q4, -BT_MAP_FEATURE_MAX, BT_MAP_FEATURE_MAX);
 }
 
 void bt_map_wrench(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
@@ -336,7 +320,7 @@ void bt_map_wrench(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
                 if (head[1] != BT_MAP_GATE_ONE) {
                     block[d] = bt_shift_round(block[d] * of.gate[head[1]], BT_MAP_GATE_Q);
                 }
-                total[axis + d] += block[d] * (1 << head[2 + axis + d]);
+                total[axis + d] += (int64_t)((uint64_t)block[d] << head[2 + axis + d]);
             }
         }
     }

@@ -113,6 +113,19 @@ static bool enough_active(const int32_t e_q4[BT_ELECTRODES])
     return false;
 }
 
+static uint32_t mapped(const bt_frame *frame, const bt_tare *tare, const int32_t e_q4[BT_ELECTRODES],
+                       const bt_kernel_settings *settings, uint32_t quantities, bt_msg_frame *msg)
+{
+    bt_map_input input = {
+        .counts = frame->electrode,
+        .tare_q4 = tare->electrode_q4,
+        .pdc_above_rest_q4 = bt_pdc_above_rest_q4(frame->pdc, bt_tare_q4(tare->base.pdc_q16)),
+    };
+    return BT_FRAME_FLAG_MAPPED
+           | bt_kernel_mapped(e_q4, &input, settings, quantities, msg->poc_um, msg->force_100un,
+                              msg->torque_mnmm);
+}
+
 void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_settings *settings,
                 uint32_t quantities, bt_msg_frame *msg)
 {
@@ -127,7 +140,11 @@ void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_sett
     }
     int32_t e_q4[BT_ELECTRODES];
     signal_shape shape = signals(frame, tare, e_q4);
-    flags |= bt_kernel(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
+    if (settings->map != NULL) {
+        flags |= mapped(frame, tare, e_q4, settings, quantities, msg);
+    } else {
+        flags |= bt_kernel(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
+    }
     flags |= shape.energy < POC_LOW * tare->threshold_count2 ? BT_FRAME_FLAG_POC_LOW : 0;
     flags |= shape.bulge > shape.energy - shape.bulge ? BT_FRAME_FLAG_SHEAR_MIX : 0;
     bool complete = !(flags & (BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_RAIL));

@@ -14,6 +14,7 @@ void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_w
     bt_deframer_reset(&session->deframer);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         bt_finger_reset(&session->finger[f], f);
+        bt_finger_map_reset(&session->map[f]);
     }
 }
 
@@ -22,23 +23,29 @@ void bt_session_use_board(bt_session *session, const bt_board_actions *actions)
     session->board = *actions;
 }
 
-static uint8_t calibration_state(const bt_calibration *calibration, const bt_sensor_info *info)
+// Of what was made for the sensor of this serial number; NULL: there is nothing.
+static uint8_t state_of(const uint8_t *made_for, const bt_sensor_info *info)
 {
-    if (!calibration->present) {
+    if (made_for == NULL) {
         return BT_CALIBRATION_STATE_NONE;
     }
-    return bt_calibration_fits(calibration, info->serial) ? BT_CALIBRATION_STATE_IN_FORCE
-                                                          : BT_CALIBRATION_STATE_OTHER_SENSOR;
+    return bt_serial_fits(made_for, info->serial) ? BT_CALIBRATION_STATE_IN_FORCE
+                                                  : BT_CALIBRATION_STATE_OTHER_SENSOR;
 }
 
 static void use_finger_settings(bt_session *session, int f)
 {
     bt_settings own = session->settings;
-    session->calibration_state[f] = calibration_state(&session->calibration[f], &session->info[f]);
+    const bt_calibration *calibration = &session->calibration[f];
+    const bt_finger_map *map = &session->map[f];
+    session->calibration_state[f] =
+        state_of(calibration->present ? calibration->serial : NULL, &session->info[f]);
+    session->map_state[f] = state_of(map->place.bytes != 0 ? map->map.serial : NULL, &session->info[f]);
     if (session->calibration_state[f] == BT_CALIBRATION_STATE_IN_FORCE) {
-        (void)bt_calibration_apply(&session->calibration[f], &own); // its ranges were seen to when it came
+        (void)bt_calibration_apply(calibration, &own); // its ranges were seen to when it came
     }
     session->kernel[f] = bt_kernel_settings_from(&own);
+    session->kernel[f].map = session->map_state[f] == BT_CALIBRATION_STATE_IN_FORCE ? &map->map : NULL;
     session->tare[f] = bt_tare_settings_from(&own);
 }
 
@@ -314,6 +321,7 @@ void bt_session_stop(bt_session *session)
 {
     session->streams = 0;
     session->keepalive_ms = 0;
+    session->upload.open = false;
     bt_session_use_settings(session);
 }
 

@@ -8,6 +8,7 @@
 #include "finger.h"
 #include "framing.h"
 #include "settings.h"
+#include "upload.h"
 
 typedef struct {
     uint16_t board; // enum bt_board
@@ -26,7 +27,9 @@ typedef bool (*bt_link_write)(const uint8_t *data, size_t bytes);
 typedef struct {
     uint8_t (*save_settings)(const bt_settings *settings);
     uint8_t (*save_calibration)(uint8_t finger, const bt_calibration *calibration);
+    uint8_t (*save_map)(uint8_t finger, const bt_map_place *place);
     uint8_t (*reboot_bootloader)(void); // OK: it happens once the reply is out
+    const bt_map_flash *maps;           // where wrench maps are kept; NULL: nowhere
 } bt_board_actions;
 
 // Finger-rounds of a FRAME stream in which something was not done because nobody needed it; wrap at 2^32.
@@ -44,6 +47,9 @@ typedef struct {
     bt_settings settings;
     bt_calibration calibration[BT_MAX_FINGERS];
     uint8_t calibration_state[BT_MAX_FINGERS]; // enum; these follow from what is above, once per change
+    bt_finger_map map[BT_MAX_FINGERS];
+    uint8_t map_state[BT_MAX_FINGERS]; // enum bt_calibration_state, likewise
+    bt_upload upload;
     bt_kernel_settings kernel[BT_MAX_FINGERS];
     bt_tare_settings tare[BT_MAX_FINGERS];
     uint32_t status_period_us;
@@ -107,5 +113,10 @@ void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t 
 
 // commands.c: one good frame from the host.
 void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_t now_us);
+
+// map_commands.c: the commands for wrench maps, and their part of SAVE_SETTINGS. Both return an enum
+// bt_error; *answered tells whether a message of the command's own has gone out in place of a REPLY.
+uint8_t bt_map_command(bt_session *session, uint8_t id, const uint8_t *payload, bool *answered);
+uint8_t bt_save_maps(bt_session *session);
 
 #endif

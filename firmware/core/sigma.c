@@ -95,7 +95,8 @@ void bt_sigma(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *setti
     if (msg->poc_um[0] != BT_INVALID_I16) {
         msg->poc_sigma_um = poc_sigma_um(e_q4, settings->poc_weights, msg->poc_um, sigma_q8);
     }
-    if (msg->force_100un[0] != BT_INVALID_I32) {
+    if (msg->force_100un[0] != BT_INVALID_I32
+        && settings->map == NULL) { // a map's depends on where it is touched
         for (int d = 0; d < 3; d++) {
             uint64_t sigma = (uint64_t)settings->force_per_count_100un_q16[d] * sigma_q8;
             msg->force_sigma_100un[d] = saturate((sigma + (1 << 23)) >> 24);

@@ -19,10 +19,11 @@
 #define BT_STORAGE_MAX_BYTES    (BT_FLASH_PAGE_BYTES - BT_STORAGE_HEADER_BYTES) // of one record's data
 
 // What the ids stand for; they are 1..BT_STORAGE_IDS and never reused.
-#define BT_STORAGE_IDS 7
+#define BT_STORAGE_IDS 12
 enum bt_record {
     BT_RECORD_SETTINGS = 1,
     BT_RECORD_CALIBRATION = 2, // of finger 0; the next four are of fingers 1 to 4
+    BT_RECORD_MAP = 8,         // likewise
 };
 
 // Offsets count bytes from the beginning of the two sectors. erase and program return false when the flash

@@ -241,6 +241,73 @@ void bt_msg_calibration_unpack(bt_msg_calibration *msg, const uint8_t in[BT_CALI
     (void)at;
 }
 
+void bt_msg_map_info_pack(const bt_msg_map_info *msg, uint8_t out[BT_MAP_INFO_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->state, 1);
+    for (int k = 0; k < 16; k++) {
+        at = put(at, (uint32_t)msg->serial[k], 1);
+    }
+    at = put(at, (uint32_t)msg->made_s, 4);
+    at = put(at, (uint32_t)msg->size_bytes, 2);
+    at = put(at, (uint32_t)msg->crc32, 4);
+    (void)at;
+}
+
+void bt_msg_map_info_unpack(bt_msg_map_info *msg, const uint8_t in[BT_MAP_INFO_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->state = (uint8_t)value;
+    for (int k = 0; k < 16; k++) {
+        at = get(at, &value, 1);
+        msg->serial[k] = (uint8_t)value;
+    }
+    at = get(at, &value, 4);
+    msg->made_s = (uint32_t)value;
+    at = get(at, &value, 2);
+    msg->size_bytes = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->crc32 = (uint32_t)value;
+    (void)at;
+}
+
+void bt_msg_map_data_pack(const bt_msg_map_data *msg, uint8_t out[BT_MAP_DATA_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->offset, 2);
+    for (int k = 0; k < 128; k++) {
+        at = put(at, (uint32_t)msg->data[k], 1);
+    }
+    (void)at;
+}
+
+void bt_msg_map_data_unpack(bt_msg_map_data *msg, const uint8_t in[BT_MAP_DATA_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 2);
+    msg->offset = (uint16_t)value;
+    for (int k = 0; k < 128; k++) {
+        at = get(at, &value, 1);
+        msg->data[k] = (uint8_t)value;
+    }
+    (void)at;
+}
+
 void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
 {
     uint8_t *at = out;
@@ -949,6 +1016,142 @@ void bt_msg_clear_calibration_unpack(bt_msg_clear_calibration *msg, const uint8_
     (void)at;
 }
 
+void bt_msg_get_map_pack(const bt_msg_get_map *msg, uint8_t out[BT_GET_MAP_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    (void)at;
+}
+
+void bt_msg_get_map_unpack(bt_msg_get_map *msg, const uint8_t in[BT_GET_MAP_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    (void)at;
+}
+
+void bt_msg_read_map_pack(const bt_msg_read_map *msg, uint8_t out[BT_READ_MAP_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->offset, 2);
+    (void)at;
+}
+
+void bt_msg_read_map_unpack(bt_msg_read_map *msg, const uint8_t in[BT_READ_MAP_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 2);
+    msg->offset = (uint16_t)value;
+    (void)at;
+}
+
+void bt_msg_begin_map_pack(const bt_msg_begin_map *msg, uint8_t out[BT_BEGIN_MAP_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->size_bytes, 2);
+    at = put(at, (uint32_t)msg->crc32, 4);
+    (void)at;
+}
+
+void bt_msg_begin_map_unpack(bt_msg_begin_map *msg, const uint8_t in[BT_BEGIN_MAP_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 2);
+    msg->size_bytes = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->crc32 = (uint32_t)value;
+    (void)at;
+}
+
+void bt_msg_write_map_pack(const bt_msg_write_map *msg, uint8_t out[BT_WRITE_MAP_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->offset, 2);
+    for (int k = 0; k < 128; k++) {
+        at = put(at, (uint32_t)msg->data[k], 1);
+    }
+    (void)at;
+}
+
+void bt_msg_write_map_unpack(bt_msg_write_map *msg, const uint8_t in[BT_WRITE_MAP_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 2);
+    msg->offset = (uint16_t)value;
+    for (int k = 0; k < 128; k++) {
+        at = get(at, &value, 1);
+        msg->data[k] = (uint8_t)value;
+    }
+    (void)at;
+}
+
+void bt_msg_end_map_pack(const bt_msg_end_map *msg, uint8_t out[BT_END_MAP_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->crc32, 4);
+    (void)at;
+}
+
+void bt_msg_end_map_unpack(bt_msg_end_map *msg, const uint8_t in[BT_END_MAP_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->crc32 = (uint32_t)value;
+    (void)at;
+}
+
+void bt_msg_clear_map_pack(const bt_msg_clear_map *msg, uint8_t out[BT_CLEAR_MAP_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    (void)at;
+}
+
+void bt_msg_clear_map_unpack(bt_msg_clear_map *msg, const uint8_t in[BT_CLEAR_MAP_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    (void)at;
+}
+
 int bt_wire_payload_bytes(uint8_t id)
 {
     switch (id) {
@@ -964,6 +1167,10 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_POINT_BYTES;
     case BT_CALIBRATION_ID:
         return BT_CALIBRATION_BYTES;
+    case BT_MAP_INFO_ID:
+        return BT_MAP_INFO_BYTES;
+    case BT_MAP_DATA_ID:
+        return BT_MAP_DATA_BYTES;
     case BT_FRAME_ID:
         return BT_FRAME_BYTES;
     case BT_PAC_ID:
@@ -1014,6 +1221,18 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_SET_CALIBRATION_BYTES;
     case BT_CLEAR_CALIBRATION_ID:
         return BT_CLEAR_CALIBRATION_BYTES;
+    case BT_GET_MAP_ID:
+        return BT_GET_MAP_BYTES;
+    case BT_READ_MAP_ID:
+        return BT_READ_MAP_BYTES;
+    case BT_BEGIN_MAP_ID:
+        return BT_BEGIN_MAP_BYTES;
+    case BT_WRITE_MAP_ID:
+        return BT_WRITE_MAP_BYTES;
+    case BT_END_MAP_ID:
+        return BT_END_MAP_BYTES;
+    case BT_CLEAR_MAP_ID:
+        return BT_CLEAR_MAP_BYTES;
     default:
         return -1;
     }

@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 4
-#define BT_SCHEMA_HASH 0xF7E285C9u
+#define BT_SCHEMA_HASH 0xDA1C4B82u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -31,6 +31,8 @@ enum bt_error {
     BT_ERROR_NOT_HERE = 9, // this kind of board cannot do that
     BT_ERROR_NOT_STORED = 10, // the flash did not take it; what was stored before still stands
     BT_ERROR_OTHER_SENSOR = 11, // made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it
+    BT_ERROR_NOT_BEGUN = 12, // no upload of this finger's map is under way: begin it; another beginning, STOP and a closed port end one
+    BT_ERROR_NOT_WHOLE = 13, // bytes of the map are missing or differ from its CRC-32: send it again
 };
 
 // Where a finger's tare machine is (SPEC.md, Tare).
@@ -66,11 +68,11 @@ enum bt_board {
     BT_BOARD_LINUX_SBC = 3, // a Linux computer with the sensors on its own SPI bus (spidev)
 };
 
-// Whether a finger's calibration is what its results come from.
+// Whether a finger's calibration, or map, is what its results come from.
 enum bt_calibration_state {
-    BT_CALIBRATION_STATE_NONE = 0, // there is none: the board's settings hold
-    BT_CALIBRATION_STATE_IN_FORCE = 1, // it holds in place of the settings
-    BT_CALIBRATION_STATE_OTHER_SENSOR = 2, // kept, but made for another sensor than the one read at start and there since: the settings hold
+    BT_CALIBRATION_STATE_NONE = 0, // there is none: the board's settings hold; for a map: the gains
+    BT_CALIBRATION_STATE_IN_FORCE = 1, // it holds in place of the settings, or gains
+    BT_CALIBRATION_STATE_OTHER_SENSOR = 2, // kept, but made for another sensor than the one read at start and there since: the settings, or gains, hold
 };
 
 // State of one frame's results.
@@ -243,6 +245,33 @@ typedef struct {
 } bt_msg_calibration;
 void bt_msg_calibration_pack(const bt_msg_calibration *msg, uint8_t out[BT_CALIBRATION_BYTES]);
 void bt_msg_calibration_unpack(bt_msg_calibration *msg, const uint8_t in[BT_CALIBRATION_BYTES]);
+
+// Which wrench map a finger has. Reply to GET_MAP and END_MAP.
+#define BT_MAP_INFO_ID 0x07
+#define BT_MAP_INFO_BYTES 29
+typedef struct {
+    uint8_t req_id; // [1] of the command
+    uint8_t finger; // [1] chip select index
+    uint8_t state; // [enum calibration_state] whether it is in force; never changes while streaming
+    uint8_t serial[16]; // [ASCII] of the sensor it was made for; all zero: any sensor, or none is there
+    uint32_t made_s; // [s] when it was made, since 1970 UTC; 0: unknown
+    uint16_t size_bytes; // [byte] its size; 0 with NONE
+    uint32_t crc32; // [1] over all of them, as zlib's; 0 with NONE
+} bt_msg_map_info;
+void bt_msg_map_info_pack(const bt_msg_map_info *msg, uint8_t out[BT_MAP_INFO_BYTES]);
+void bt_msg_map_info_unpack(bt_msg_map_info *msg, const uint8_t in[BT_MAP_INFO_BYTES]);
+
+// Part of a finger's wrench map. Reply to READ_MAP.
+#define BT_MAP_DATA_ID 0x08
+#define BT_MAP_DATA_BYTES 132
+typedef struct {
+    uint8_t req_id; // [1] of the command
+    uint8_t finger; // [1] chip select index
+    uint16_t offset; // [byte] of the first byte
+    uint8_t data[128]; // [1] the map's bytes; 0xFF behind its end
+} bt_msg_map_data;
+void bt_msg_map_data_pack(const bt_msg_map_data *msg, uint8_t out[BT_MAP_DATA_BYTES]);
+void bt_msg_map_data_unpack(bt_msg_map_data *msg, const uint8_t in[BT_MAP_DATA_BYTES]);
 
 // One finger, one round of slots: counts, the tare that was subtracted, and the results.
 #define BT_FRAME_ID 0x10
@@ -515,7 +544,7 @@ typedef struct {
 void bt_msg_reboot_bootloader_pack(const bt_msg_reboot_bootloader *msg, uint8_t out[BT_REBOOT_BOOTLOADER_BYTES]);
 void bt_msg_reboot_bootloader_unpack(bt_msg_reboot_bootloader *msg, const uint8_t in[BT_REBOOT_BOOTLOADER_BYTES]);
 
-// Keep the settings and calibrations over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves what was stored before, or this, whole: of the settings and of each finger's calibration.
+// Keep the settings, calibrations and maps over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves what was stored before, or this, whole: of the settings, of each finger's calibration and of each finger's map.
 #define BT_SAVE_SETTINGS_ID 0x8E
 #define BT_SAVE_SETTINGS_BYTES 1
 typedef struct {
@@ -557,6 +586,72 @@ typedef struct {
 void bt_msg_clear_calibration_pack(const bt_msg_clear_calibration *msg, uint8_t out[BT_CLEAR_CALIBRATION_BYTES]);
 void bt_msg_clear_calibration_unpack(bt_msg_clear_calibration *msg, const uint8_t in[BT_CLEAR_CALIBRATION_BYTES]);
 
+// Ask for MAP_INFO.
+#define BT_GET_MAP_ID 0x92
+#define BT_GET_MAP_BYTES 2
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] which finger
+} bt_msg_get_map;
+void bt_msg_get_map_pack(const bt_msg_get_map *msg, uint8_t out[BT_GET_MAP_BYTES]);
+void bt_msg_get_map_unpack(bt_msg_get_map *msg, const uint8_t in[BT_GET_MAP_BYTES]);
+
+// Ask for a part of the map that MAP_INFO tells of, in force or not.
+#define BT_READ_MAP_ID 0x93
+#define BT_READ_MAP_BYTES 4
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] which finger
+    uint16_t offset; // [byte] of the first byte; below the map's size
+} bt_msg_read_map;
+void bt_msg_read_map_pack(const bt_msg_read_map *msg, uint8_t out[BT_READ_MAP_BYTES]);
+void bt_msg_read_map_unpack(bt_msg_read_map *msg, const uint8_t in[BT_READ_MAP_BYTES]);
+
+// Begin to upload a wrench map; what is in force and what is stored stays until END_MAP. One upload at a time: an earlier one ends. Refused while streaming.
+#define BT_BEGIN_MAP_ID 0x94
+#define BT_BEGIN_MAP_BYTES 8
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] for which finger
+    uint16_t size_bytes; // [byte] the map's size
+    uint32_t crc32; // [1] over all its bytes, as zlib's
+} bt_msg_begin_map;
+void bt_msg_begin_map_pack(const bt_msg_begin_map *msg, uint8_t out[BT_BEGIN_MAP_BYTES]);
+void bt_msg_begin_map_unpack(bt_msg_begin_map *msg, const uint8_t in[BT_BEGIN_MAP_BYTES]);
+
+// Write a part of the map that is being uploaded, in any order; the same part again is harmless. It may take as long as the flash takes to erase a sector, 0.4 s. Refused while streaming.
+#define BT_WRITE_MAP_ID 0x95
+#define BT_WRITE_MAP_BYTES 132
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] for which finger
+    uint16_t offset; // [byte] of the first byte: a multiple of 128 below the map's size
+    uint8_t data[128]; // [1] the map's bytes; what lies behind its end is ignored
+} bt_msg_write_map;
+void bt_msg_write_map_pack(const bt_msg_write_map *msg, uint8_t out[BT_WRITE_MAP_BYTES]);
+void bt_msg_write_map_unpack(bt_msg_write_map *msg, const uint8_t in[BT_WRITE_MAP_BYTES]);
+
+// Put the uploaded map into force, until the next reboot, or for good with SAVE_SETTINGS. Every part must be there and the CRC right (NOT_WHOLE), the map one that this firmware can compute (OUT_OF_RANGE), and its sensor the one there (OTHER_SENSOR); a map with an all-zero serial number is for any. Refused while streaming.
+#define BT_END_MAP_ID 0x96
+#define BT_END_MAP_BYTES 6
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] for which finger
+    uint32_t crc32; // [1] BEGIN_MAP's; where the finger's map has it already, that is the answer
+} bt_msg_end_map;
+void bt_msg_end_map_pack(const bt_msg_end_map *msg, uint8_t out[BT_END_MAP_BYTES]);
+void bt_msg_end_map_unpack(bt_msg_end_map *msg, const uint8_t in[BT_END_MAP_BYTES]);
+
+// Return a finger to its gains, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming.
+#define BT_CLEAR_MAP_ID 0x97
+#define BT_CLEAR_MAP_BYTES 2
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] which finger
+} bt_msg_clear_map;
+void bt_msg_clear_map_pack(const bt_msg_clear_map *msg, uint8_t out[BT_CLEAR_MAP_BYTES]);
+void bt_msg_clear_map_unpack(bt_msg_clear_map *msg, const uint8_t in[BT_CLEAR_MAP_BYTES]);
+
 // Payload length of a message id, without id and CRC; -1 when the id is unknown.
 int bt_wire_payload_bytes(uint8_t id);
 
@@ -568,6 +663,8 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(flex_version, u8, 2) X(software_version, u8, 4) X(serial, u8, 16) X(cpu_khz, u16, 1) X(sampling_hz, u16, 1)
 #define BT_POINT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(seq, u16, 1) X(slot, u8, 1) X(tare_state, u8, 1) X(poc_um, i16, 3)
 #define BT_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 7)
+#define BT_MAP_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(size_bytes, u16, 1) X(crc32, u32, 1)
+#define BT_MAP_DATA_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1) X(data, u8, 128)
 #define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
 #define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
@@ -593,7 +690,13 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_GET_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_SET_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 7)
 #define BT_CLEAR_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration)
+#define BT_GET_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
+#define BT_READ_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1)
+#define BT_BEGIN_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(size_bytes, u16, 1) X(crc32, u32, 1)
+#define BT_WRITE_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1) X(data, u8, 128)
+#define BT_END_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(crc32, u32, 1)
+#define BT_CLEAR_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map)
 #endif
 
 #endif

@@ -2,6 +2,7 @@
 
 #include "fix.h"
 #include "fold_gen.h"
+#include "map_gen.h"
 
 // sum * gain / FORCE_DIVISOR is 100 uN: 1/16 count * 1/1000 * nN. sum * gain / TORQUE_DIVISOR is mN*mm:
 // 1/16 count * BT_FOLD_TORQUE_UNIT_NM * nN. Multiplying by 2^bits / divisor and shifting replaces both
@@ -40,6 +41,8 @@ _Static_assert((int64_t)BT_E_MAX_Q4 *(BT_FOLD_LINE_PARTS_MAX + BT_ELECTRODES) <=
                "a torque sum's fractions must fit int32");
 _Static_assert(2 * LEVER_MAX * ((FORCE_MAX_100UN >> LEVER_SPLIT_BITS) + 2) < INT32_MAX,
                "the lever's high products and what the low ones add to them must fit int32");
+_Static_assert(BT_MAP_RESULT_MAX <= FORCE_MAX_100UN,
+               "a map's force must not be more than the gains can make");
 _Static_assert(2 * LEVER_MAX << LEVER_SPLIT_BITS < INT32_MAX, "the lever's low products must fit int32");
 
 static bt_gain multiplier(int32_t gain_nn, int bits, int64_t divisor)

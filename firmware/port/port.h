@@ -3,6 +3,8 @@
 #ifndef BIOTAC_PORT_H
 #define BIOTAC_PORT_H
 
+#include "map_store.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -42,12 +44,16 @@ size_t port_link_read(uint8_t *data, size_t bytes);
 // A host has the port open (DTR).
 bool port_link_up(void);
 
-// ---- flash for settings ---------------------------------------------------------------------
-// Two sectors; sizes and offsets as in storage.h. Interrupts may be held off while erasing and programming,
-// for up to 0.4 s. False when the flash did not do it.
+// ---- flash for settings and maps ------------------------------------------------------------
+// Two sectors for settings (storage.h), behind them the slots for maps (map_store.h). Interrupts may be held
+// off while erasing and programming, for up to 0.4 s. False when the flash did not do it.
+#define BT_FLASH_BYTES (BT_STORAGE_BYTES + BT_MAPS_BYTES)
 bool port_flash_erase(uint32_t sector_offset);
 bool port_flash_program(uint32_t page_offset, const uint8_t *page);
 void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes);
+
+// The slots for maps as memory, which changes as they are erased and programmed. Aligned to 4 bytes.
+const uint8_t *port_flash_maps(void);
 
 // Leave for the loader as soon as what was written to the link is out, or after a short while. False when
 // this board has none.

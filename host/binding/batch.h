@@ -11,8 +11,13 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
                       const bt_kernel_settings *settings, int16_t *poc_um, int32_t *force_100un,
                       int32_t *torque_mnmm, uint32_t *flags);
 
-// A finger's wrench map over frames: pdc_above_rest_q4 (n,), force_100un and torque_mnmm (n, 3), the last
-// marked invalid where the map has no torque.
+// The same with the settings' map in force, through bt_kernel_mapped; pdc, pdc_tare_q4: (n,).
+void bt_mapped_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4, const uint16_t *pdc,
+                      const uint16_t *pdc_tare_q4, const bt_kernel_settings *settings, int16_t *poc_um,
+                      int32_t *force_100un, int32_t *torque_mnmm, uint32_t *flags);
+
+// A map alone: pdc_above_rest_q4 (n,), force_100un and torque_mnmm (n, 3), the last marked invalid where the
+// map has no torque.
 void bt_map_frames(int64_t n, const bt_map *map, const uint16_t *counts, const uint16_t *tare_q4,
                    const int32_t *pdc_above_rest_q4, int32_t *force_100un, int32_t *torque_mnmm);
 

@@ -30,11 +30,12 @@ int64_t bt_replay_row_bytes(void)
     return BT_REPLAY_BYTES;
 }
 
-void bt_replay(bt_finger *finger, const bt_settings *settings, int64_t n, const uint16_t *words,
-               const uint32_t *t_us, uint8_t *rows)
+void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map, int64_t n,
+               const uint16_t *words, const uint32_t *t_us, uint8_t *rows)
 {
     bt_tare_settings tare_settings = bt_tare_settings_from(settings);
     bt_kernel_settings kernel_settings = bt_kernel_settings_from(settings);
+    kernel_settings.map = map;
     for (int64_t k = 0; k < n; k++, words += BT_SLOTS, rows += BT_REPLAY_BYTES) {
         uint8_t touch_slot = BT_REPLAY_NO_TOUCH;
         bt_msg_frame msg;

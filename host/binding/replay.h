@@ -13,7 +13,8 @@
 // this machine's byte order, u32 energy_count2, noise_count2, threshold_count2. Of a round without one good
 // word the board sends nothing: present is 0 and the row holds invalid marks.
 int64_t bt_replay_row_bytes(void); // compared with the Python side's row when it is imported
-void bt_replay(bt_finger *finger, const bt_settings *settings, int64_t n, const uint16_t *words,
-               const uint32_t *t_us, uint8_t *rows);
+// map: in force, or NULL.
+void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map, int64_t n,
+               const uint16_t *words, const uint32_t *t_us, uint8_t *rows);
 
 #endif

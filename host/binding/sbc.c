@@ -26,6 +26,7 @@ struct bt_sbc {
     uint8_t taken; // words of `ahead` that were given out
     uint8_t ahead_words;
     uint8_t ahead[PROPERTY_BYTES];
+    _Alignas(4) uint8_t maps[BT_MAPS_BYTES];
 };
 
 // port.h has no argument for the board: this is the one that the running call is for.
@@ -157,19 +158,32 @@ bool port_link_up(void)
     return true; // the host is this process
 }
 
-// ---- flash: none, so settings last as long as the process ---------------------------------------
+// ---- flash: none, so settings and maps last as long as the process; maps are kept in memory ------
 
 bool port_flash_erase(uint32_t sector_offset)
 {
-    (void)sector_offset;
-    return false;
+    if (sector_offset < BT_STORAGE_BYTES) {
+        return false;
+    }
+    memset(board->maps + (sector_offset - BT_STORAGE_BYTES), 0xFF, BT_FLASH_SECTOR_BYTES);
+    return true;
 }
 
 bool port_flash_program(uint32_t page_offset, const uint8_t *page)
 {
-    (void)page_offset;
-    (void)page;
-    return false;
+    if (page_offset < BT_STORAGE_BYTES) {
+        return false;
+    }
+    for (int k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
+        board->maps[page_offset - BT_STORAGE_BYTES + (uint32_t)k] &=
+            page[k]; // as flash does: a page comes in parts
+    }
+    return true;
+}
+
+const uint8_t *port_flash_maps(void)
+{
+    return board->maps;
 }
 
 void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)

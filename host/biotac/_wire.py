@@ -15,7 +15,7 @@ import numpy as np
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 4
-SCHEMA_HASH = 0xF7E285C9
+SCHEMA_HASH = 0xDA1C4B82
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -42,6 +42,8 @@ class Error(IntEnum):
     NOT_HERE = 9  # this kind of board cannot do that
     NOT_STORED = 10  # the flash did not take it; what was stored before still stands
     OTHER_SENSOR = 11  # made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it
+    NOT_BEGUN = 12  # no upload of this finger's map is under way: begin it; another beginning, STOP and a closed port end one
+    NOT_WHOLE = 13  # bytes of the map are missing or differ from its CRC-32: send it again
 
 
 class TareState(IntEnum):
@@ -82,11 +84,11 @@ class Board(IntEnum):
 
 
 class CalibrationState(IntEnum):
-    """Whether a finger's calibration is what its results come from."""
+    """Whether a finger's calibration, or map, is what its results come from."""
 
-    NONE = 0  # there is none: the board's settings hold
-    IN_FORCE = 1  # it holds in place of the settings
-    OTHER_SENSOR = 2  # kept, but made for another sensor than the one read at start and there since: the settings hold
+    NONE = 0  # there is none: the board's settings hold; for a map: the gains
+    IN_FORCE = 1  # it holds in place of the settings, or gains
+    OTHER_SENSOR = 2  # kept, but made for another sensor than the one read at start and there since: the settings, or gains, hold
 
 
 class FrameFlags(IntFlag):
@@ -145,6 +147,8 @@ ERROR_DOC: dict[int, str] = {
     9: "this kind of board cannot do that",
     10: "the flash did not take it; what was stored before still stands",
     11: "made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it",
+    12: "no upload of this finger's map is under way: begin it; another beginning, STOP and a closed port end one",
+    13: "bytes of the map are missing or differ from its CRC-32: send it again",
 }
 
 
@@ -182,9 +186,9 @@ BOARD_DOC: dict[int, str] = {
 
 
 CALIBRATION_STATE_DOC: dict[int, str] = {
-    0: "there is none: the board's settings hold",
-    1: "it holds in place of the settings",
-    2: "kept, but made for another sensor than the one read at start and there since: the settings hold",
+    0: "there is none: the board's settings hold; for a map: the gains",
+    1: "it holds in place of the settings, or gains",
+    2: "kept, but made for another sensor than the one read at start and there since: the settings, or gains, hold",
 }
 
 
@@ -548,6 +552,81 @@ class Calibration:
             v[3 : 19],
             v[19],
             v[20 : 27],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class MapInfo:
+    """Which wrench map a finger has. Reply to GET_MAP and END_MAP."""
+
+    req_id: int
+    finger: int
+    state: int
+    serial: tuple[int, ...]
+    made_s: int
+    size_bytes: int
+    crc32: int
+
+    ID: ClassVar[int] = 0x07
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBB16BIHI")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 29 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.state,
+            *self.serial,
+            self.made_s,
+            self.size_bytes,
+            self.crc32,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> MapInfo:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3 : 19],
+            v[19],
+            v[20],
+            v[21],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class MapData:
+    """Part of a finger's wrench map. Reply to READ_MAP."""
+
+    req_id: int
+    finger: int
+    offset: int
+    data: tuple[int, ...]
+
+    ID: ClassVar[int] = 0x08
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBH128B")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 132 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.offset,
+            *self.data,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> MapData:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3 : 131],
         )
 
 
@@ -1303,7 +1382,7 @@ class RebootBootloader:
 
 @dataclass(frozen=True, slots=True)
 class SaveSettings:
-    """Keep the settings and calibrations over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves what was stored before, or this, whole: of the settings and of each finger's calibration."""
+    """Keep the settings, calibrations and maps over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves what was stored before, or this, whole: of the settings, of each finger's calibration and of each finger's map."""
 
     req_id: int
 
@@ -1415,7 +1494,187 @@ class ClearCalibration:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration
+@dataclass(frozen=True, slots=True)
+class GetMap:
+    """Ask for MAP_INFO."""
+
+    req_id: int
+    finger: int
+
+    ID: ClassVar[int] = 0x92
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 2 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> GetMap:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ReadMap:
+    """Ask for a part of the map that MAP_INFO tells of, in force or not."""
+
+    req_id: int
+    finger: int
+    offset: int
+
+    ID: ClassVar[int] = 0x93
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBH")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 4 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.offset,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> ReadMap:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class BeginMap:
+    """Begin to upload a wrench map; what is in force and what is stored stays until END_MAP. One upload at a time: an earlier one ends. Refused while streaming."""
+
+    req_id: int
+    finger: int
+    size_bytes: int
+    crc32: int
+
+    ID: ClassVar[int] = 0x94
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBHI")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 8 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.size_bytes,
+            self.crc32,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> BeginMap:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class WriteMap:
+    """Write a part of the map that is being uploaded, in any order; the same part again is harmless. It may take as long as the flash takes to erase a sector, 0.4 s. Refused while streaming."""
+
+    req_id: int
+    finger: int
+    offset: int
+    data: tuple[int, ...]
+
+    ID: ClassVar[int] = 0x95
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBH128B")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 132 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.offset,
+            *self.data,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> WriteMap:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3 : 131],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EndMap:
+    """Put the uploaded map into force, until the next reboot, or for good with SAVE_SETTINGS. Every part must be there and the CRC right (NOT_WHOLE), the map one that this firmware can compute (OUT_OF_RANGE), and its sensor the one there (OTHER_SENSOR); a map with an all-zero serial number is for any. Refused while streaming."""
+
+    req_id: int
+    finger: int
+    crc32: int
+
+    ID: ClassVar[int] = 0x96
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBI")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 6 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.crc32,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EndMap:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ClearMap:
+    """Return a finger to its gains, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming."""
+
+    req_id: int
+    finger: int
+
+    ID: ClassVar[int] = 0x97
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 2 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> ClearMap:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+        )
+
+
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -1424,6 +1683,8 @@ MESSAGES: dict[int, type[Any]] = {
     SensorInfo.ID: SensorInfo,
     Point.ID: Point,
     Calibration.ID: Calibration,
+    MapInfo.ID: MapInfo,
+    MapData.ID: MapData,
     Frame.ID: Frame,
     Pac.ID: Pac,
     Tare.ID: Tare,
@@ -1449,6 +1710,12 @@ MESSAGES: dict[int, type[Any]] = {
     GetCalibration.ID: GetCalibration,
     SetCalibration.ID: SetCalibration,
     ClearCalibration.ID: ClearCalibration,
+    GetMap.ID: GetMap,
+    ReadMap.ID: ReadMap,
+    BeginMap.ID: BeginMap,
+    WriteMap.ID: WriteMap,
+    EndMap.ID: EndMap,
+    ClearMap.ID: ClearMap,
 }
 
 # One array type per message id, for decoding many payloads at once.
@@ -1514,6 +1781,25 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("serial", "u1", (16,)),
             ("made_s", "<u4"),
             ("value", "<i4", (7,)),
+        ]
+    ),
+    MapInfo.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+            ("state", "u1"),
+            ("serial", "u1", (16,)),
+            ("made_s", "<u4"),
+            ("size_bytes", "<u2"),
+            ("crc32", "<u4"),
+        ]
+    ),
+    MapData.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+            ("offset", "<u2"),
+            ("data", "u1", (128,)),
         ]
     ),
     Frame.ID: np.dtype(
@@ -1724,6 +2010,48 @@ DTYPES: dict[int, np.dtype[Any]] = {
         ]
     ),
     ClearCalibration.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+        ]
+    ),
+    GetMap.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+        ]
+    ),
+    ReadMap.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+            ("offset", "<u2"),
+        ]
+    ),
+    BeginMap.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+            ("size_bytes", "<u2"),
+            ("crc32", "<u4"),
+        ]
+    ),
+    WriteMap.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+            ("offset", "<u2"),
+            ("data", "u1", (128,)),
+        ]
+    ),
+    EndMap.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+            ("crc32", "<u4"),
+        ]
+    ),
+    ClearMap.ID: np.dtype(
         [
             ("req_id", "u1"),
             ("finger", "u1"),

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from . import _map
 from . import _wire as wire
 from ._map import Gate, Kind
-from .core import ffi, lib
+from .core import Settings, board_settings, ffi, lib
 from .errors import InputError
 from .frames import StructArray
 
 Integers = NDArray[np.int64]
+BoardResults = tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]
 
 _HEADER = struct.Struct(f"<BBBB{_map.SERIAL_BYTES}sI")
 _BLOCK = struct.Struct(f"<BB{_map.AXES_MAX}B")
@@ -103,6 +104,11 @@ class BoardMap:
         return force, torque
 
 
+def opened(its: BoardMap | bytes) -> BoardMap:
+    """A map, or the one that a blob holds. Raises InputError when a board would refuse it."""
+    return its if isinstance(its, BoardMap) else from_blob(its)
+
+
 def from_blob(blob: bytes) -> BoardMap:
     """Inverse of BoardMap.blob, to the bit. Raises InputError when a board would refuse it."""
     _judged(blob)
@@ -117,6 +123,28 @@ def from_blob(blob: bytes) -> BoardMap:
         blocks.append(BoardBlock(Kind(kind), Gate(gate), tuple(exponent[:axes]), values))
         at += 4 * columns * axes
     return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s)
+
+
+def on_board_q4(frames: StructArray, settings: Settings, its: BoardMap) -> BoardResults:
+    """core.on_board_q4() with a map in force, on FRAME messages (n,), whose PDC it may need."""
+    raw, tare_q4, pdc, pdc_tare_q4 = (
+        np.ascontiguousarray(frames[name]) for name in ("counts", "tare_q4", "pdc", "pdc_tare_q4")
+    )
+    kernel = ffi.new("bt_kernel_settings *", lib.bt_kernel_settings_from(board_settings(settings)))
+    kernel.map = its.handle
+    n = len(frames)
+    poc_um, flags = np.empty((n, 3), np.int16), np.empty(n, np.uint32)
+    force_100un, torque_mnmm = np.empty((n, 3), np.int32), np.empty((n, 3), np.int32)
+    lib.bt_mapped_frames(
+        n,
+        *(ffi.from_buffer("uint16_t[]", array) for array in (raw, tare_q4, pdc, pdc_tare_q4)),
+        kernel,
+        ffi.from_buffer("int16_t[]", poc_um),
+        ffi.from_buffer("int32_t[]", force_100un),
+        ffi.from_buffer("int32_t[]", torque_mnmm),
+        ffi.from_buffer("uint32_t[]", flags),
+    )
+    return poc_um, force_100un, torque_mnmm, flags
 
 
 def pdc_above_rest_q4(frames: StructArray) -> NDArray[np.int32]:

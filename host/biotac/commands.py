@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import zlib
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
 
 from . import _wire as wire
 from ._sensor import MAX_SENSORS
+from .board_map import BoardMap
+from .calibration import blob as maps
+from .calibration import transfer
 from .calibration.values import Calibration, own_settings
 from .errors import WireVersionError
 from .frames import tare_to_q4
 
 ALL_FINGERS = (1 << MAX_SENSORS) - 1
 CALIBRATION_SINCE_MINOR = 3  # of wire 1.x
+MAP_SINCE_MINOR = 4
 
 Reply = TypeVar("Reply")
 
@@ -92,7 +98,10 @@ class Commands(ABC):
         self._ask(wire.SetSetting(self._next_req_id(), setting, value), wire.SettingValue)
 
     def save_settings(self) -> None:
-        """Keep the settings in force over reboots. Not while streaming: the board loses slots meanwhile."""
+        """Keep the settings, calibrations and maps in force over reboots.
+
+        Not while streaming: the board loses slots meanwhile.
+        """
         self._command(wire.SaveSettings(self._next_req_id()))
 
     def reboot_bootloader(self) -> None:
@@ -138,6 +147,53 @@ class Commands(ABC):
     def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
         """All settings that a finger's results come from, for the fingers with a calibration in force."""
         return own_settings(self.settings(), self.calibrations())
+
+    # ---- wrench maps ---------------------------------------------------------------------------
+
+    def get_map(self, finger: int) -> bytes | None:
+        """The finger's wrench map as the board holds it, None without; see map_state.
+
+        Raises PortError when its bytes do not come whole.
+        """
+        return transfer.read(self._ask_for, finger)
+
+    def map_state(self, finger: int) -> wire.CalibrationState:
+        """Whether the finger's force comes from its map, or the sensor is another than its own."""
+        return wire.CalibrationState(transfer.info(self._ask_for, finger).state)
+
+    def set_map(self, finger: int, its: bytes | BoardMap, *, force: bool = False) -> None:
+        """Upload a wrench map and read it back; it is in force until the next reboot, or for good with save_settings.
+
+        Refused while streaming, and for another sensor's serial number than the one that answered there when the
+        board started; with ``force`` it goes there without its serial number, which is for any sensor, and is read
+        back so. What the finger had is in force until all of the new one is there. Raises InputError for more bytes
+        than a board takes (20 KiB), and PortError when other bytes come back.
+        """
+        blob = maps.as_blob(its)
+        transfer.write(self._ask_for, finger, maps.for_any_sensor(blob) if force else blob)
+
+    def clear_map(self, finger: int) -> None:
+        """Return a finger to its gains, until the next reboot or, with save_settings, for good."""
+        self._command(wire.ClearMap(self._next_req_id(), finger))
+
+    def maps(self) -> dict[int, bytes]:
+        """The maps in force, by finger; none on a board whose firmware knows of none."""
+        if self.info.wire_minor < MAP_SINCE_MINOR:
+            return {}
+        told = [transfer.info(self._ask_for, finger) for finger in range(MAX_SENSORS)]
+        held = {m.finger: self.get_map(m.finger) for m in told if m.state == wire.CalibrationState.IN_FORCE}
+        return {finger: blob for finger, blob in held.items() if blob is not None}
+
+    def _tell_map(self, finger: int, blob: bytes | None) -> None:
+        """Have the finger have this map, which it may have already; None: no map."""
+        told = transfer.info(self._ask_for, finger)
+        if blob is None:
+            self.clear_map(finger)
+        elif (told.size_bytes, told.crc32) != (len(blob), zlib.crc32(blob)):
+            transfer.write(self._ask_for, finger, blob)
+
+    def _ask_for(self, make: Callable[[int], Any], reply: type[Reply]) -> Reply:
+        return self._ask(make(self._next_req_id()), reply)
 
     def _calibration(self, finger: int) -> wire.Calibration:
         return self._ask(wire.GetCalibration(self._next_req_id(), finger), wire.Calibration)

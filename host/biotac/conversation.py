@@ -347,11 +347,18 @@ class Conversation(Commands):
             if gap.reason == "rebooted":
                 reason = "rebooted"
             self._gap = replace(gap, reason=reason, back_at_ns=self.timing.unix_ns(), boot_id=self.info.boot_id)
-            for request in [*self._session.requests(), *([self._started] if self._started else [])]:
-                self._ask(replace(request, req_id=self._next_req_id()), _KINDS.get(type(request), wire.Reply))
+            for request in self._session.requests():
+                self._again(request)
+            for finger, blob in self._session.maps().items():
+                self._tell_map(finger, blob)
+            if self._started:
+                self._again(self._started)
         except DeviceLostError:
             return False  # gone again
         return True
+
+    def _again(self, request: Any) -> None:
+        self._ask(replace(request, req_id=self._next_req_id()), _KINDS.get(type(request), wire.Reply))
 
     def _found(self, before: wire.Hello) -> bool:
         for place in self.link.places():

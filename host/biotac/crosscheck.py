@@ -14,8 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _wire as wire
+from ._sensor import CORE_RADIUS_UM
+from .board_map import BoardMap, opened, pdc_above_rest_q4
 from .core import TORQUE_GAINS, Results, Settings, ffi, lib, reference_q4
-from .frames import StructArray, electrode_signals, to_units
+from .frames import UM_PER_MM, StructArray, electrode_signals, to_units
+from .wrench import board
 
 #: The PoC's distance and the force of each axis, see firmware/reference/kernel_bounds.h.
 POC_BOUND_UM: float = lib.bt_poc_bound_um()
@@ -51,6 +54,8 @@ class CrossCheck:
     force_mn_max: float = 0.0
     torque_nmm_max: float = 0.0
     torque_nmm_bound: float = 0.0  # the largest that any frame was held to
+    mapped: int = 0  # frames by a wrench map, whose force has a bound of its own
+    mapped_force_mn_bound: float = 0.0  # the largest of those
     findings: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
@@ -61,29 +66,54 @@ class CrossCheck:
             "poc_um_max": self.poc_um_max,
             "poc_um_bound": POC_BOUND_UM,
             "force_mn_max": self.force_mn_max,
-            "force_mn_bound": FORCE_BOUND_MN,
+            "force_mn_bound": max(FORCE_BOUND_MN, self.mapped_force_mn_bound),
             "torque_nmm_max": self.torque_nmm_max,
             "torque_nmm_bound": self.torque_nmm_bound,
+            "mapped": self.mapped,
             "findings": self.findings,
         }
 
-    def add(self, messages: StructArray, settings: Settings, own: Mapping[int, Settings] | None = None) -> None:
+    def add(
+        self,
+        messages: StructArray,
+        settings: Settings,
+        own: Mapping[int, Settings] | None = None,
+        maps: Mapping[int, BoardMap | bytes] | None = None,
+    ) -> None:
         """Check FRAME messages (n,) as they came over the wire; live or from a file.
 
-        ``own`` has the settings of the fingers with a calibration (Hand.finger_settings, Recording.finger_settings).
+        ``own`` has the settings of the fingers with a calibration (Hand.finger_settings, Recording.finger_settings),
+        ``maps`` the wrench maps in force or their blobs (Hand.maps, Recording.maps). Raises InputError for a map that
+        a board would refuse.
         """
-        shared = np.ones(len(messages), bool)
-        for finger, its in (own or {}).items():
-            of_finger = messages["finger"] == finger
-            self._add(messages[of_finger], its)
+        own, maps = own or {}, maps or {}
+        mapped = (messages["flags"] & wire.FrameFlags.MAPPED) != 0
+        for finger in np.unique(messages["finger"][mapped]).tolist():
+            its = messages[mapped & (messages["finger"] == finger)]
+            if finger not in maps:
+                for k in range(len(its)):
+                    self._find(its, k, "MAPPED, by a wrench map that is not known here")
+                continue
+            self._add(its, own.get(finger, settings), opened(maps[finger]))
+        shared = ~mapped
+        for finger, its_own in own.items():
+            of_finger = ~mapped & (messages["finger"] == finger)
+            self._add(messages[of_finger], its_own)
             shared &= ~of_finger
         self._add(messages[shared], settings)
 
-    def _add(self, messages: StructArray, settings: Settings) -> None:
+    def _add(self, messages: StructArray, settings: Settings, its: BoardMap | None = None) -> None:
         if not len(messages):
             return
         untared = (messages["flags"] & wire.FrameFlags.UNTARED) != 0
         truth = reference_q4(messages["counts"], messages["tare_q4"], settings)
+        force_bound: NDArray[np.float64] | float = FORCE_BOUND_MN
+        if its is None:
+            torque_bound = torque_bound_nmm(messages, truth, settings)
+        else:
+            force_bound, torque_bound = _by_map(messages, its, truth, settings)
+            self.mapped += len(messages)
+            self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
         for values in (truth.poc_mm, truth.force_n, truth.torque_nmm):
             values[untared] = np.nan  # without a tare there is nothing to be right about
         for values, sent in (
@@ -92,7 +122,6 @@ class CrossCheck:
             (truth.torque_nmm, messages["torque_mnmm"]),
         ):
             values[not_asked(messages, sent)] = np.nan
-        torque_bound = torque_bound_nmm(messages, truth, settings)
         self.torque_nmm_bound = max(self.torque_nmm_bound, float(torque_bound[~untared].max(initial=0.0)))
 
         # The PoC is one point: its error is a distance. Force and torque count per axis.
@@ -104,7 +133,7 @@ class CrossCheck:
         self.force_mn_max = max(self.force_mn_max, worst(force_mn))
         self.torque_nmm_max = max(self.torque_nmm_max, worst(torque_nmm))
         self._judge("PoC", "um", messages, messages["poc_um"], truth.poc_mm, distance_um, POC_BOUND_UM)
-        self._judge("force", "mN", messages, messages["force_100un"], truth.force_n, force_mn, FORCE_BOUND_MN)
+        self._judge("force", "mN", messages, messages["force_100un"], truth.force_n, force_mn, force_bound)
         self._judge("torque", "N*mm", messages, messages["torque_mnmm"], truth.torque_nmm, torque_nmm, torque_bound)
         self._judge_flag(messages)
         self.frames += len(messages)
@@ -144,6 +173,25 @@ class CrossCheck:
             place = f" {'xyz'[axis]}" if error.shape[1] == 3 else ""
             off = f"off by {error[k, axis]:.4g} {unit}, bound {limits[axis]:.4g} {unit}"
             self._find(messages, int(k), f"{name}{place} {off}")
+
+
+def _by_map(
+    messages: StructArray, its: BoardMap, truth: Results, settings: Settings
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Put what the map's integers mean into ``truth``; the bounds of force, mN, and torque, N*mm, each (n, 3)."""
+    frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
+    wrench, off = board.exact(its, *frames), board.bound(its, None, *frames)
+    truth.force_n[:] = wrench[:, :3]
+    force_off = np.nan_to_num(off[:, :3])
+    if its.axes > 3:
+        truth.torque_nmm[:] = wrench[:, 3:]
+        return 1e3 * force_off, np.nan_to_num(off[:, 3:])
+    # x is derived from this force, by a lever of the core's radius at most
+    y, z = truth.poc_mm[:, 1], truth.poc_mm[:, 2]
+    truth.torque_nmm[:, 0] = y * truth.force_n[:, 2] - z * truth.force_n[:, 1]
+    out = torque_bound_nmm(messages, truth, settings)
+    out[:, 0] += CORE_RADIUS_UM / UM_PER_MM * force_off[:, 1:].sum(axis=1)
+    return 1e3 * force_off, out
 
 
 def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from . import _sensor as sensor
 from . import _wire as wire
+from .board_map import BoardMap, opened
 from .core import Settings, board_settings, default_settings, ffi, lib
 from .errors import CommandRefusedError
 from .frames import StructArray, frames_from_wire, tare_to_q4
@@ -54,7 +55,8 @@ class Finger:
 
     ``settings`` are the board's; what they do not name has its default. ``index`` (0..4) is the finger's
     number in the rows. ``quantities`` is the subscription, by default the board's own; QuantityFlags.SIGMA adds
-    standard deviations. Raises ValueError for a setting or an index out of range.
+    standard deviations. ``wrench_map``, or its blob, is in force in place of the gains. Raises ValueError for a
+    setting or an index out of range, InputError for a blob that a board would refuse.
 
     >>> finger = Finger()
     >>> rows = finger.feed(np.full((30, 19), 3000))
@@ -68,6 +70,7 @@ class Finger:
         *,
         index: int = 0,
         quantities: wire.QuantityFlags | None = None,
+        wrench_map: BoardMap | bytes | None = None,
     ) -> None:
         if not 0 <= index < sensor.MAX_SENSORS:
             raise ValueError(f"index is {index}, expected 0 to {sensor.MAX_SENSORS - 1}")
@@ -76,6 +79,7 @@ class Finger:
         self._finger = ffi.new("bt_finger *")
         self._index = index
         self._quantities = quantities
+        self._map = None if wrench_map is None else opened(wrench_map)
         self.reset()
 
     def reset(self) -> None:
@@ -128,6 +132,7 @@ class Finger:
             lib.bt_replay(
                 self._finger,
                 self._settings,
+                ffi.NULL if self._map is None else self._map.handle,
                 len(words),
                 ffi.from_buffer("uint16_t[]", words),
                 ffi.from_buffer("uint32_t[]", times),

@@ -173,6 +173,7 @@ class Hand(Streaming):
             self.calibrations(),
             sensors,
             self.port,
+            maps=self.maps(),
             overwrite=overwrite,
             mid_stream=self._streaming,
         )

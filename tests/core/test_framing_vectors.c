@@ -6,8 +6,8 @@
 #include "session.h"
 
 #define MAX_CASES  64
-#define MAX_FRAMES 32
-#define MAX_WIRE   2048
+#define MAX_FRAMES 64
+#define MAX_WIRE   4096
 
 typedef struct {
     uint8_t id;

@@ -82,6 +82,12 @@ static void every_command_gets_exactly_one_reply_with_its_req_id(void **state)
         {BT_GET_CALIBRATION_ID, BT_CALIBRATION_ID, 0, 26},
         {BT_SET_CALIBRATION_ID, BT_CALIBRATION_ID, 0, 27},
         {BT_CLEAR_CALIBRATION_ID, BT_REPLY_ID, 0, 28},
+        {BT_GET_MAP_ID, BT_MAP_INFO_ID, 0, 29},
+        {BT_READ_MAP_ID, BT_REPLY_ID, 0, 30}, // there is none
+        {BT_BEGIN_MAP_ID, BT_REPLY_ID, 0, 31},
+        {BT_WRITE_MAP_ID, BT_REPLY_ID, 0, 32},
+        {BT_END_MAP_ID, BT_REPLY_ID, 0, 33},
+        {BT_CLEAR_MAP_ID, BT_REPLY_ID, 0, 34},
     };
     for (int id = 0x80; id < 0x100; id++) { // the table holds every command there is
         int listed = 0;
@@ -155,6 +161,13 @@ static uint8_t save_calibration(uint8_t finger, const bt_calibration *calibratio
     return BT_ERROR_OK;
 }
 
+static uint8_t save_map(uint8_t finger, const bt_map_place *place)
+{
+    (void)finger;
+    (void)place;
+    return BT_ERROR_NOT_STORED; // there is nothing to store
+}
+
 static uint8_t reboot(void)
 {
     reboots++;
@@ -173,7 +186,12 @@ static void saving_and_leaving_are_the_boards_to_do(void **state)
 {
     (void)state;
     static const uint8_t req_id = 9;
-    static const bt_board_actions actions = {save, save_calibration, reboot};
+    static const bt_board_actions actions = {
+        .save_settings = save,
+        .save_calibration = save_calibration,
+        .save_map = save_map,
+        .reboot_bootloader = reboot,
+    };
     assert_int_equal(host_error(&session, BT_SAVE_SETTINGS_ID, &req_id, 1), BT_ERROR_NOT_HERE);
     assert_int_equal(reboot_error(0xB0071DE5), BT_ERROR_NOT_HERE);
     bt_session_use_board(&session, &actions);

@@ -23,6 +23,7 @@ void fake_reset(bt_emu_source source, uint64_t start_ns)
 {
     memset(&fake, 0, sizeof fake);
     memset(fake.flash, 0xFF, sizeof fake.flash);
+    fake.flash_left = -1;
     fake.now_ns = start_ns;
     fake.shortest_gap_ns = UINT64_MAX;
     fake.link_up = true;
@@ -144,9 +145,23 @@ bool port_link_up(void)
     return fake.link_up;
 }
 
+static void change(uint32_t at, uint8_t value)
+{
+    if (fake.flash_left == 0) {
+        uint8_t changing = (uint8_t)(fake.flash[at] ^ value);
+        fake.flash[at] ^= fake.flash_ragged ? changing & 0x5A : 0;
+        longjmp(fake.power_fails, 1);
+    }
+    fake.flash_left -= fake.flash_left > 0;
+    fake.flash[at] = value;
+}
+
 bool port_flash_erase(uint32_t sector_offset)
 {
-    memset(fake.flash + sector_offset, 0xFF, BT_FLASH_SECTOR_BYTES);
+    fake.erases++;
+    for (uint32_t k = 0; k < BT_FLASH_SECTOR_BYTES; k++) {
+        change(sector_offset + k, 0xFF);
+    }
     return true;
 }
 
@@ -155,8 +170,8 @@ bool port_flash_program(uint32_t page_offset, const uint8_t *page)
     if (fake.flash_broken) {
         return false;
     }
-    for (int k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
-        fake.flash[page_offset + (uint32_t)k] &= page[k];
+    for (uint32_t k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
+        change(page_offset + k, fake.flash[page_offset + k] & page[k]);
     }
     return true;
 }
@@ -164,6 +179,11 @@ bool port_flash_program(uint32_t page_offset, const uint8_t *page)
 void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
 {
     memcpy(data, fake.flash + offset, bytes);
+}
+
+const uint8_t *port_flash_maps(void)
+{
+    return fake.flash + BT_STORAGE_BYTES;
 }
 
 bool port_reboot_bootloader(void)

@@ -4,9 +4,10 @@
 #define BIOTAC_TEST_FAKE_PORT_H
 
 #include "device.h"
+#include "port.h"
 #include "sensor_gen.h"
-#include "storage.h"
 
+#include <setjmp.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -31,8 +32,12 @@ typedef struct {
 
     bool link_up;
 
-    uint8_t flash[BT_STORAGE_BYTES];
+    _Alignas(4) uint8_t flash[BT_FLASH_BYTES];
     bool flash_broken; // programs nothing
+    long flash_left;   // bytes that are still erased or programmed before power fails; -1: it holds
+    bool flash_ragged; // of the byte at which it fails some bits are done
+    int erases;
+    jmp_buf power_fails; // where to go then
     bool has_loader;
     int reboots; // how often the loader was asked for
 } fake_port;

@@ -1,17 +1,71 @@
 // The byte-facing surface under hostile input: deframer, commands, rounds and ticks in any order.
 // Input: steps of one byte that says what happens, then what that needs. Commands are framed here, with
-// their CRC, because no fuzzer guesses one.
+// their CRC, because no fuzzer guesses one; and so are whole uploads of maps, in an order of the input's
+// choice.
 //
 // What must hold: the session writes only whole frames that decode to a message of its own; a good
-// command is answered exactly once; settings and calibrations stay in their ranges. The rest is the
-// sanitizers'.
+// command is answered exactly once; settings and calibrations stay in their ranges; a map that a finger has
+// is one that the firmware takes, byte for byte as it was sent, and no command erases two sectors. The rest
+// is the sanitizers'.
 #include "input.h"
 
+#include "crc32.h"
 #include "session.h"
 
 #include <string.h>
 
-enum step { RAW, COMMAND, DAMAGED, ROUND, TICK, UNPLUG, LINK_ROOM, STEPS };
+enum step { RAW, COMMAND, DAMAGED, ROUND, TICK, UNPLUG, LINK_ROOM, UPLOAD, STEPS };
+
+// ---- flash for maps --------------------------------------------------------------------------------
+// Left as it is from one input to the next: what is read of it was written before, or this finds out.
+
+static _Alignas(4) uint8_t slots[BT_MAPS_BYTES];
+static int erases;
+
+static bool erase(uint32_t offset)
+{
+    if (offset % BT_FLASH_SECTOR_BYTES != 0 || offset >= BT_MAPS_BYTES) {
+        FAIL("erases at %u", offset);
+    }
+    erases++;
+    memset(slots + offset, 0xFF, BT_FLASH_SECTOR_BYTES);
+    return true;
+}
+
+static bool program(uint32_t offset, const uint8_t *page)
+{
+    if (offset % BT_FLASH_PAGE_BYTES != 0 || offset >= BT_MAPS_BYTES) {
+        FAIL("programs at %u", offset);
+    }
+    for (int k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
+        slots[offset + (uint32_t)k] &= page[k];
+    }
+    return true;
+}
+
+static uint8_t save_settings(const bt_settings *settings)
+{
+    (void)settings;
+    return BT_ERROR_OK;
+}
+
+static uint8_t save_calibration(uint8_t finger, const bt_calibration *calibration)
+{
+    (void)finger;
+    (void)calibration;
+    return BT_ERROR_OK;
+}
+
+static uint8_t save_map(uint8_t finger, const bt_map_place *place)
+{
+    return finger < BT_MAX_FINGERS && place->slot < BT_MAP_SLOTS ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
+}
+
+static const bt_map_flash map_flash = {erase, program, slots};
+static const bt_board_actions actions = {.save_settings = save_settings,
+                                         .save_calibration = save_calibration,
+                                         .save_map = save_map,
+                                         .maps = &map_flash};
 
 static struct {
     bt_deframer deframer;
@@ -44,13 +98,66 @@ static void give_frame(bt_session *session, fuzz_input *in, bool damage, uint32_
     fuzz_message message = take_message(in, damage, encoded);
     uint8_t nothing = 0;
     bt_session_receive(session, &nothing, 1, now_us); // whatever came before ends here
-    int before = host.messages;
+    int before = host.messages, erases_before = erases;
     uint32_t dropped = session->messages_dropped;
     bt_session_receive(session, encoded, message.wire_bytes, now_us);
     int answers = host.messages - before + (int)(session->messages_dropped - dropped);
     if (!damage && answers != (message.id >= 0x80)) {
         FAIL("command %02x with %zu bytes is answered %d times", message.id, message.payload_bytes, answers);
     }
+    if (erases - erases_before > 1) {
+        FAIL("command %02x erases %d sectors", message.id, erases - erases_before);
+    }
+}
+
+static void give(bt_session *session, uint8_t id, const uint8_t *payload, uint32_t now_us)
+{
+    uint8_t encoded[BT_ENCODED_MAX_BYTES];
+    size_t bytes = bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), encoded);
+    bt_session_receive(session, encoded, bytes, now_us);
+}
+
+// A map of a few blocks with coefficients of the input's, its parts in any order, some of them not at all.
+// The input may spoil a byte of its own map too.
+static void give_upload(bt_session *session, fuzz_input *in, uint32_t now_us)
+{
+    static const uint8_t columns[BT_MAP_KINDS] = BT_MAP_KIND_COLUMNS;
+    static uint8_t blob[BT_MAP_MAX_BYTES];
+    uint8_t payload[BT_FRAME_MAX_BYTES];
+    uint8_t finger = (uint8_t)(take_u8(in) % (BT_MAX_FINGERS + 1));
+    size_t blocks = 1 + take_u8(in) % 3, at = BT_MAP_HEADER_BYTES, count = 0;
+    memset(blob, 0, sizeof blob);
+    blob[0] = BT_MAP_VERSION;
+    blob[1] = take_u8(in) & 1 ? 3 : 6;
+    blob[2] = (uint8_t)blocks;
+    blob[4] = take_u8(in) & 1; // a serial number that no sensor has, or none
+    for (size_t k = 0; k < blocks; k++, at += BT_MAP_BLOCK_BYTES) {
+        blob[at] = (uint8_t)(take_u8(in) % BT_MAP_KINDS);
+        blob[at + 1] = (uint8_t)k;
+        count += (size_t)columns[blob[at]] * blob[1];
+    }
+    for (size_t k = 0; k < count && at + 4 <= sizeof blob; k++, at += 4) {
+        blob[at] = take_u8(in);
+    }
+    if (take_u8(in) & 1) {
+        blob[take_u32(in) % at] ^= take_u8(in);
+    }
+    bt_msg_begin_map begin = {1, finger, (uint16_t)at, bt_crc32(blob, at)};
+    bt_msg_begin_map_pack(&begin, payload);
+    give(session, BT_BEGIN_MAP_ID, payload, now_us);
+    size_t parts = (at + BT_MAP_PART_BYTES - 1) / BT_MAP_PART_BYTES;
+    size_t step = 1 + take_u8(in) % 7, written = parts + take_u8(in) % 4;
+    for (size_t k = 0; k + 1 < written; k++) {
+        size_t offset = k * step % parts * BT_MAP_PART_BYTES;
+        bt_msg_write_map write = {.req_id = 2, .finger = finger, .offset = (uint16_t)offset};
+        size_t left = at - offset;
+        memcpy(write.data, blob + offset, left < BT_MAP_PART_BYTES ? left : BT_MAP_PART_BYTES);
+        bt_msg_write_map_pack(&write, payload);
+        give(session, BT_WRITE_MAP_ID, payload, now_us);
+    }
+    bt_msg_end_map end = {3, finger, begin.crc32};
+    bt_msg_end_map_pack(&end, payload);
+    give(session, BT_END_MAP_ID, payload, now_us);
 }
 
 static void give_raw(bt_session *session, fuzz_input *in, uint32_t now_us)
@@ -111,6 +218,23 @@ static void check_calibrations(const bt_session *session)
     }
 }
 
+static void check_maps(const bt_session *session)
+{
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        const bt_finger_map *its = &session->map[f];
+        const uint8_t *blob = slots + its->place.slot * (size_t)BT_MAP_SLOT_BYTES;
+        bt_map map;
+        if (its->place.bytes == 0) {
+            if (session->map_state[f] != BT_CALIBRATION_STATE_NONE) {
+                FAIL("finger %d is said to have a map", f);
+            }
+        } else if (bt_crc32(blob, its->place.bytes) != its->place.crc32
+                   || bt_map_open(&map, blob, its->place.bytes) != BT_ERROR_OK) {
+            FAIL("finger %d has a map that cannot be", f);
+        }
+    }
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
@@ -121,6 +245,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
     uint32_t now_us = take_u32(&in);
     memset(&host, 0, sizeof host);
     bt_session_init(&session, &identity, host_write, now_us);
+    bt_session_use_board(&session, &actions);
     while (in.left > 0) {
         uint8_t what = take_u8(&in);
         switch (what % STEPS) {
@@ -141,12 +266,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
         case UNPLUG:
             bt_session_link_down(&session);
             break;
+        case UPLOAD:
+            give_upload(&session, &in, now_us);
+            break;
         default:
             host.full = take_u8(&in) & 1;
             break;
         }
         check_settings(&session);
         check_calibrations(&session);
+        check_maps(&session);
     }
     return 0;
 }

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import FrameFlags, Setting, TareReason, TareState
+from biotac import FrameFlags, Setting, TareReason, TareState, _map
 from biotac import _wire as wire
 from biotac.framing import encode
 
@@ -32,6 +32,12 @@ COMMANDS = {
     wire.GetCalibration: ((0,), wire.Calibration),
     wire.SetCalibration: ((0, ANY_SENSOR, 0, tuple(biotac.Calibration().settings().values())), wire.Calibration),
     wire.ClearCalibration: ((0,), wire.Reply),
+    wire.GetMap: ((0,), wire.MapInfo),
+    wire.ReadMap: ((0, 0), wire.Reply),  # refused: there is none
+    wire.BeginMap: ((0, 24, 0), wire.Reply),
+    wire.WriteMap: ((0, 0, (0,) * 128), wire.Reply),
+    wire.EndMap: ((0, 1), wire.Reply),  # refused: not what was begun
+    wire.ClearMap: ((0,), wire.Reply),
     wire.SaveSettings: ((), wire.Reply),
     wire.RebootBootloader: ((1,), wire.Reply),  # not the magic number: refused, and it stays
 }
@@ -47,6 +53,15 @@ REFUSED = [
     (wire.Start, (0x80, 1, 0), wire.Error.OUT_OF_RANGE),
     (wire.Subscribe, (1, 0x80), wire.Error.OUT_OF_RANGE),
     (wire.RebootBootloader, (1,), wire.Error.OUT_OF_RANGE),
+    (wire.GetMap, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
+    (wire.ReadMap, (NO_FINGER, 0), wire.Error.NO_SUCH_FINGER),
+    (wire.ReadMap, (0, 0), wire.Error.OUT_OF_RANGE),
+    (wire.BeginMap, (NO_FINGER, 24, 0), wire.Error.NO_SUCH_FINGER),
+    (wire.BeginMap, (0, 0, 0), wire.Error.OUT_OF_RANGE),
+    (wire.BeginMap, (0, _map.MAX_BYTES + 1, 0), wire.Error.OUT_OF_RANGE),
+    (wire.WriteMap, (0, 0, (0,) * 128), wire.Error.NOT_BEGUN),
+    (wire.EndMap, (0, 0), wire.Error.NOT_BEGUN),
+    (wire.ClearMap, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
 ]
 
 

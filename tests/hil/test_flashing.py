@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from maps import BIG, make_map
 from rig import ROOT, Rig
 
 from biotac import Setting
 from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.errors import FlashError, InputError, NotAGatewayError
-from biotac.flash import Image, Outcome, flash, read_image
+from biotac.flash import Image, Outcome, flash, read_backup, read_image
 from biotac.flash.loader_emulated import EmulatedLoader
 from biotac.flash.target_emulated import EmulatedTarget
 
@@ -110,6 +111,33 @@ def test_a_board_comes_back_with_its_settings(bench: Bench) -> None:
     blocks = len(read_image(BUILT).blocks)
     assert after["flash"]["programs"] - before["flash"]["programs"] == blocks + 1  # and one record of settings
     assert after["flash"]["erases"] - before["flash"]["erases"] == -(-blocks * PAGE // SECTOR)
+
+
+def test_saved_maps_outlive_another_image(bench: Bench, next_release: Image) -> None:
+    blob = make_map(1, blocks=BIG)
+    with bench.target.open() as hand:
+        for _ in range(3):  # so that it lies somewhere else than in the first slot
+            hand.set_map(0, blob)
+        hand.save_settings()
+    bench.flash(next_release)
+    with bench.target.open() as hand:
+        assert hand.maps() == {0: blob}
+
+
+def test_a_map_that_was_in_force_and_not_saved_is_put_back_and_saved(bench: Bench) -> None:
+    kept, new = make_map(1), make_map(2, blocks=BIG)
+    with bench.target.open() as hand:
+        hand.set_map(0, kept)
+        hand.set_map(1, kept, force=True)
+        hand.save_settings()
+        hand.set_map(0, new)
+    outcome = bench.flash(read_image(BUILT))
+    assert outcome.settings is not None and outcome.backup is not None
+    assert outcome.settings.changed == ("wrench map of finger 0",)
+    assert read_backup(outcome.backup.path).maps == {0: new, 1: kept}
+    bench.setting_after_a_power_cut(Setting.IDLE_PERIOD_MS)
+    with bench.target.open() as hand:
+        assert hand.maps() == {0: new, 1: kept}
 
 
 def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_release: Image) -> None:

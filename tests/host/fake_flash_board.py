@@ -72,6 +72,8 @@ class FakeBoard:
             return self._hello(payload, board=self.board, boot_id=self.boot_id, board_serial=self.serial, **version)
         if message_id in (wire.GetSetting.ID, wire.SetSetting.ID):
             return self._setting(message_id, payload)
+        if message_id == wire.GetMap.ID:
+            return encode(wire.MapInfo.ID, wire.MapInfo(payload[0], payload[1], 0, (0,) * 16, 0, 0, 0).pack())
         if message_id == wire.SaveSettings.ID:
             self.events.append("save")
             self.stored = dict(self.settings)

@@ -17,10 +17,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from maps import make_map
 
 import biotac
 from biotac import _wire as wire
 from biotac import errors
+from biotac.calibration import map_file
 from biotac.cli.main import VERBS, main
 from biotac.framing import encode
 from biotac.link.serial_port import SerialLink
@@ -64,6 +66,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "settings.json": '{"format": "another"}',
         "counts.json": '{"format": "another"}',
         "other.json": json.dumps(calibration("BT999")),
+        "map.json": json.dumps(map_file.to_dict(make_map(1, serial="BT999"))),
     }.items():
         names[name] = folder / name
         names[name].write_text(text)
@@ -108,7 +111,6 @@ CASES: list[tuple[int, str, str]] = [
     (2, "expected", "check @text.mcap"),
     (2, "record it again", "check @cut.mcap"),
     (2, "expected an .npz of number arrays", "calibrate wrench +no.npz"),
-    (2, "expected an .npz of number arrays", "calibrate wrench @text.mcap"),
     (2, "expected 0 to 2147483647", "experiment poke --seed -1"),
     (2, "expected an .npz of number arrays", "experiment poke +no.npz"),
     (2, "save z_dir too", "experiment plate-normal @rec.mcap"),
@@ -124,6 +126,31 @@ CASES: list[tuple[int, str, str]] = [
     (2, "give --map FILE", "experiment torsion-shear --check --out +out"),
     (2, "say --force", "experiment shear --out @done"),
     (2, "choose another name", "experiment shear --out @list.json"),
+    (2, "expected --reference FILE beside it", "calibrate wrench @text.mcap"),
+    (2, "expected a CSV file of a force/torque sensor", "calibrate wrench @rec.mcap --reference +no.csv"),
+    (2, "expected one topic of geometry_msgs", "calibrate wrench @rec.mcap --reference @rec.mcap --mounting lin"),
+    (2, "expected one for each", "calibrate wrench +no.npz --reference +no.csv"),
+    (2, "expected a mounting in TOML", "calibrate wrench @rec.mcap --reference +no.csv --mounting +no.toml"),
+    (2, "expected FILE..., or --live PORT", "calibrate wrench"),
+    (2, "expected FILE..., or --live PORT", "calibrate wrench +no.npz --live sim:press.toml"),
+    (2, "expected --finger NAME", "calibrate wrench --live sim:press.toml"),
+    (2, "expected --out FOLDER", "calibrate wrench --live sim:press.toml --finger 0"),
+    (2, "see to its cable", "calibrate wrench --live sim:press.toml --finger thumb --out +o"),
+    (2, "expected one, netft:HOST", "calibrate wrench --live sim:press.toml --finger 0 --out +o"),
+    (2, "expected --mounting", "calibrate wrench --live sim:press.toml --finger 0 --out +o --reference netft:a"),
+    (2, "or nano17", "calibrate wrench --live sim:press.toml --finger 0 --out +o --reference /dev/null"),
+    (
+        2,
+        "expected netft:",
+        "calibrate wrench --live sim:press.toml --finger 0 --out +o --reference netft: --mounting lin",
+    ),
+    (3, "`biotac list`", f"calibrate wrench --live {NO_PORT} --finger 0 --out +o --reference netft:a"),
+    (
+        2,
+        "take that sensor's own",
+        "calibrate wrench --live sim:press.toml --finger 0 --out +o --reference nano17 --serial BTX",
+    ),
+    (2, "expected one of 'index'", "calibrate wrench @rec.mcap --reference +no.csv --finger nose"),
     (2, "check the path", "replay +no.mcap"),
     (2, "expected 0 <= from", "replay @rec.mcap --from 99"),
     (2, "expected 0 <= from", "replay @rec.mcap --from 0.5 --to 0.2"),
@@ -157,6 +184,11 @@ CASES: list[tuple[int, str, str]] = [
     (3, "expected BUS:ADDRESS", "calibration store --i2c here --chip 24c02 @other.json"),
     (3, "check its address pins", "calibration load --i2c 1:0x20 --chip 24c02 +out.json"),
     (2, "use a 24c02", "calibration load --i2c 1:0x50 --chip 24c01 +out.json"),
+    (2, "check the path", "map show +no.json"),
+    (2, "`biotac map get` writes one", "map show @list.json"),
+    (2, "`put` gives it one", "map get sim:drift.toml +out.json --finger 0"),
+    (2, "check the path", "map put sim:press.toml +no.json --finger 0"),
+    (7, "or send no serial number to force it", "map put sim:press.toml @map.json --finger 0"),
     (2, "expected a scenario's path or one of", "sim nowhere.toml"),
     (2, "expected 1 to 5", "sim press.toml --fingers 0"),
     (2, "pace above 0", "sim press.toml --pace fast"),
@@ -228,12 +260,21 @@ OPENERS = [
     "calibration get PORT out.json --finger 0",
     "calibration put PORT OTHER --finger 0",
     "calibration clear PORT --finger 0",
+    "map show PORT",
+    "map get PORT out.json --finger 0",
+    "map put PORT MAP --finger 0",
+    "map clear PORT --finger 0",
 ]
 Make = Callable[..., object]
 
 
 def opened(command: str, port: str, files: dict[str, Path]) -> list[str]:
-    return command.replace("PORT", port).replace("OTHER", str(files["other.json"])).split()
+    return (
+        command.replace("PORT", port)
+        .replace("OTHER", str(files["other.json"]))
+        .replace("MAP", str(files["map.json"]))
+        .split()
+    )
 
 
 @pytest.mark.parametrize("command", OPENERS)

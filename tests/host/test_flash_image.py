@@ -12,7 +12,7 @@ import pytest
 from biotac import _wire as wire
 from biotac.errors import InputError
 from biotac.flash import read_image
-from biotac.flash.image import BLOCK_BYTES, FLASH_BYTES, SETTINGS_BYTES
+from biotac.flash.image import BLOCK_BYTES, FLASH_BYTES, MAPS_BYTES, SETTINGS_BYTES
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
@@ -20,6 +20,7 @@ from fake_flash_board import make_image, note
 
 ROOT = Path(__file__).resolve().parents[2]
 FLASH = 0x10000000
+KEPT = FLASH + FLASH_BYTES - SETTINGS_BYTES - MAPS_BYTES  # from here on
 
 
 def changed(at: int, format_: str, value: int, block: int = 3) -> Callable[[bytes], bytes]:
@@ -66,9 +67,9 @@ def test_an_image_says_what_it_is(tmp_path: Path) -> None:
         (swapped, "block 4 of 20 says it is 5 of 20"),
         (changed(12, "<I", 0x20000000), "0x20000000, which is no flash"),
         (changed(12, "<I", FLASH + FLASH_BYTES), "no flash of this board"),
-        (changed(12, "<I", FLASH + FLASH_BYTES - SETTINGS_BYTES), "where the settings are"),
-        (changed(12, "<I", FLASH + FLASH_BYTES - 256), "where the settings are"),
-        (changed(12, "<I", FLASH + FLASH_BYTES - SETTINGS_BYTES - 256), "expected 0x10000300, no gaps"),
+        (changed(12, "<I", KEPT), "where maps and settings are"),
+        (changed(12, "<I", FLASH + FLASH_BYTES - 256), "where maps and settings are"),
+        (changed(12, "<I", KEPT - 256), "expected 0x10000300, no gaps"),
         (changed(32, "<B", 1, block=0), "second-stage boot has CRC"),
     ],
 )
@@ -95,9 +96,18 @@ def test_an_image_that_does_not_say_its_board_is_refused(tmp_path: Path, said: b
         read_image(make_image(tmp_path, said))
 
 
-def test_the_settings_sectors_are_where_the_firmware_has_them() -> None:
+def test_settings_and_maps_are_where_the_firmware_has_them() -> None:
     storage = (ROOT / "firmware/core/storage.h").read_text()
     assert "#define BT_FLASH_SECTOR_BYTES   4096" in storage
     assert "#define BT_STORAGE_BYTES        (2 * BT_FLASH_SECTOR_BYTES)" in storage
-    assert "#define FLASH_BYTES    (2u * 1024 * 1024)" in (ROOT / "firmware/port/rp2040/flash.c").read_text()
-    assert (FLASH_BYTES, SETTINGS_BYTES) == (2 * 1024 * 1024, 2 * 4096)
+    slots = (ROOT / "firmware/core/map_store.h").read_text()
+    assert "#define BT_MAP_SLOT_BYTES BT_MAP_MAX_BYTES" in slots
+    assert "#define BT_MAP_SLOTS      (2 * BT_MAX_FINGERS + 1)" in slots
+    port = (ROOT / "firmware/port/rp2040/flash.c").read_text()
+    assert "#define FLASH_BYTES    (2u * 1024 * 1024)" in port
+    assert "#define MAPS_OFFSET    (STORAGE_OFFSET - BT_MAPS_BYTES)" in port
+    assert (FLASH_BYTES, SETTINGS_BYTES, MAPS_BYTES) == (2 * 1024 * 1024, 2 * 4096, 11 * 20480)
+    assert (
+        f"LENGTH = 2M - 256 - {(SETTINGS_BYTES + MAPS_BYTES) // 1024}K"
+        in (ROOT / "firmware/boards/pico/pico.ld").read_text()
+    )

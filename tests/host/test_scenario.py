@@ -203,7 +203,8 @@ def test_no_gains_unless_asked(tmp_path: Path) -> None:
 
 
 def test_the_bundled_scenarios_are_these() -> None:
-    assert bundled_scenarios() == ["drift.toml", "faults.toml", "poke.toml", "press.toml", "shear.toml"]
+    made = ["calibrate.toml", "calibrate_gaps.toml"]
+    assert bundled_scenarios() == [*made, "drift.toml", "faults.toml", "poke.toml", "press.toml", "shear.toml"]
 
 
 @pytest.mark.parametrize("name", bundled_scenarios())
@@ -263,7 +264,9 @@ def test_faults_shows_each_kind_once_on_one_of_three_fingers() -> None:
 
 def test_a_missing_scenario_lists_the_bundled_ones(tmp_path: Path) -> None:
     for path in ("no_such.toml", tmp_path / "press.toml"):
-        with pytest.raises(InputError, match=r"or one of drift\.toml, faults\.toml, poke\.toml"):
+        with pytest.raises(
+            InputError, match=r"or one of calibrate\.toml, calibrate_gaps\.toml, drift\.toml, faults\.toml, poke\.toml"
+        ):
             load_source(path)
 
 

@@ -297,6 +297,18 @@ def _spoil(arrays: dict[str, Any], how: str) -> None:
         arrays["F"] = wrench_run.fields(len(force), seed=9, rests=False)["F"]
     elif how == "zero":
         force[:] = 0.0
+    elif how == "nan counts":
+        arrays["E"] = counts.astype(np.float32)
+        arrays["E"][40, 3] = np.nan
+    elif how == "other finger's base":
+        its = wrench_run.fields(len(force))
+        arrays |= its | {"E_base": wrench_run.fields(len(force), seed=9)["E_base"]}
+    elif how == "strange serial":
+        arrays["serial"] = np.array([1, 2])
+    elif how == "torque rows differ":
+        arrays["M"] = force[:-1]
+    elif how == "fractions of counts":
+        arrays["E"] = counts + 0.5
     elif how == "rows differ":
         arrays["F"] = force[:-1]
 
@@ -315,6 +327,11 @@ def _spoil(arrays: dict[str, Any], how: str) -> None:
         ("clipped", r"read exactly 1 N along [xyz], the most of all: .* saturated"),
         ("other file", r"not aligned: .* lag of -?\d+ rows, .* R2 -?\d\.\d\d held out"),
         ("zero", r"F is 0 in every row"),
+        ("nan counts", r"field E row 40 holds nan: expected whole counts"),
+        ("fractions of counts", r"field E row 0 holds \d+\.5: expected whole counts"),
+        ("other finger's base", r"E at rest and E_base do not belong together: .* differ by \d\d+ RMS \(E\d+ by"),
+        ("strange serial", r"field serial is int64: expected one text"),
+        ("torque rows differ", r"field M is float32 \(3999, 3\): expected \(4000, 3\) in N mm"),
         ("rows differ", r"field F is float32 \(3999, 3\): expected \(4000, 3\)"),
     ],
 )
@@ -336,6 +353,20 @@ def test_a_lag_of_another_clock_is_refused(late_rows: int, tmp_path: Path) -> No
     arrays["F"] = np.roll(arrays["F"], -late_rows, axis=0)
     with pytest.raises(RecordingError, match=rf"counts come {late_rows} rows after the force .* at most 20"):
         validate(loaded(tmp_path, arrays))
+
+
+def test_another_fingers_recording_is_refused_unless_forced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arrays = wrench_run.fields(4000) | {"serial": np.array("BTA")}
+    path = wrench_run.save(tmp_path / "a.npz", arrays)
+    assert load_run(path).serial == "BTA"
+    assert main(["calibrate", "wrench", str(path), "--serial", "BTB"]) == 2
+    assert "is of sensor BTA, and this is BTB: expected the same" in capsys.readouterr().err
+
+
+def test_one_fingers_rests_belong_together_however_warm(tmp_path: Path) -> None:
+    arrays = wrench_run.fields(4000)
+    warm = np.rint(arrays["E_base"] + 300.0 * wrench_run.DRIFT)
+    assert loaded(tmp_path, arrays | {"E_base": warm.astype(np.uint16)}).rest.any()
 
 
 def test_rest_is_taken_from_the_run_when_there_is_no_base(tmp_path: Path) -> None:

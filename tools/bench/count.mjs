@@ -29,7 +29,8 @@ const rows = []
 const results = []
 let names = null
 let open = null
-for (let instructions = 0; instructions < LIMIT; instructions++) {
+let done = false
+for (let instructions = 0; instructions < LIMIT && !done; instructions++) {
   const at = mcu.core.PC
   if (at === mark) {
     if (open === null) {
@@ -43,10 +44,14 @@ for (let instructions = 0; instructions < LIMIT; instructions++) {
   } else if (at === result) {
     results.push(mcu.core.registers[0] >>> 0)
   } else if (at === end) {
-    console.log(JSON.stringify({ rows, results }))
-    process.exit(0)
+    done = true
   }
   mcu.core.executeInstruction()
 }
-console.error('the image did not reach its end')
-process.exit(1)
+if (done) {
+  // leaving by process.exit would cut off what a pipe has not taken yet, all beyond 64 KiB
+  process.stdout.write(JSON.stringify({ rows, results }))
+} else {
+  console.error('the image did not reach its end')
+  process.exitCode = 1
+}

@@ -75,6 +75,7 @@ export class Rig {
       // A main loop that nothing wakes any more: the watchdog's business.
       'lose interrupts': () => (this.machine.mcu.core.enabledInterrupts = 0),
       'touch at 1200 baud': () => this.usb.touch(1200),
+      'wear the flash out': () => (this.board.worn = true),
       unplug: () => this.#cable(false),
       plug: () => this.#cable(true),
       'cut power': () => {

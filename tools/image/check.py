@@ -43,6 +43,9 @@ FLASH_CALLS = ("port_flash_erase", "port_flash_program", "port_flash_read")
 POINTERS = {
     **dict.fromkeys(SENDERS, ("port_link_write",)),
     "bt_command": ("port_link_write", "save_settings", "save_calibration", "reboot_bootloader"),
+    "bt_map_command": ("port_link_write", "erase_map_sector", "program_map_page"),
+    "bt_upload_write": ("erase_map_sector", "program_map_page"),
+    "bt_save_maps": ("save_map",),
     "sector_in_use": FLASH_CALLS,
     "latest": FLASH_CALLS,
     "first_free": FLASH_CALLS,

@@ -81,6 +81,7 @@ def load(folder: Path) -> Contract:
     check_link(link, messages)
     wrench_map = tomllib.loads((folder / "map.toml").read_text(encoding="utf-8"))
     check_map(wrench_map)
+    check_map_sizes(messages, wrench_map)
     return Contract(sensor, link, wrench_map, messages)
 
 
@@ -153,6 +154,13 @@ def check_map(wrench_map: dict[str, Any]) -> None:
     for name, kind in wrench_map["kind"].items():
         if kind["columns"] not in ("one", "electrodes", "pairs"):
             raise ValueError(f"map.toml: {name} has unknown columns {kind['columns']}")
+
+
+def check_map_sizes(messages: tuple[Message, ...], wrench_map: dict[str, Any]) -> None:
+    for message in messages:
+        for field in message.fields:
+            if field.name == "size_bytes" and (field.range or (0, 0))[1] != wrench_map["blob"]["max_bytes"]:
+                raise ValueError(f"link.toml: {message.name} has another largest map than map.toml")
 
 
 def canonical(contract: Contract, *, with_docs: bool) -> str:

@@ -5,7 +5,7 @@
 //
 // Writes "pty PATH" to stdout, and "end" once the tape is played and all of it handed over.
 // --pace: device seconds per second, 0 for as fast as the host reads (nothing is then dropped).
-// --flash: where saved settings are kept; without it they are gone with the process.
+// --flash: where saved settings and maps are kept; without it they are gone with the process.
 // --hold: device time stands still until "run" comes on stdin. End of stdin ends the process.
 #define _DEFAULT_SOURCE
 #include "port.h"

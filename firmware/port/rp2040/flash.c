@@ -1,17 +1,18 @@
-// The flash chip itself: settings in its last two sectors, and its unique number.
+// The flash chip itself: settings in its last two sectors, wrench maps before them, and its unique number.
 // While it erases, programs or answers commands, no program can be read from it. So that code is in SRAM,
 // calls nothing but the chip's ROM, and runs with interrupts off.
 #include "port.h"
 
-#include "storage.h"
 #include "system.h"
 
 #include "rp2040_regs.h"
 
 #include <string.h>
 
+// boards/pico/pico.ld keeps the image off both.
 #define FLASH_BYTES    (2u * 1024 * 1024)
-#define STORAGE_OFFSET (FLASH_BYTES - BT_STORAGE_BYTES) // boards/pico/pico.ld keeps the image off it
+#define STORAGE_OFFSET (FLASH_BYTES - BT_STORAGE_BYTES) // where it was before there were maps
+#define MAPS_OFFSET    (STORAGE_OFFSET - BT_MAPS_BYTES)
 
 #define BOOT2_WORDS  64
 #define SECTOR_ERASE 0x20 // the flash's command for BT_FLASH_SECTOR_BYTES
@@ -81,28 +82,39 @@ IN_SRAM static void program_page(uint32_t offset, const uint8_t *page)
     back_to_xip(primask);
 }
 
+// Where the chip has what port.h counts from the settings' first byte.
+static uint32_t on_chip(uint32_t offset)
+{
+    return offset < BT_STORAGE_BYTES ? STORAGE_OFFSET + offset : MAPS_OFFSET + (offset - BT_STORAGE_BYTES);
+}
+
 bool port_flash_erase(uint32_t sector_offset)
 {
-    if (!usable || sector_offset >= BT_STORAGE_BYTES) {
+    if (!usable || sector_offset >= BT_FLASH_BYTES) {
         return false;
     }
     watchdog_feed(); // at the beginning of 0.4 s in which the main loop cannot
-    erase_sector(STORAGE_OFFSET + sector_offset);
+    erase_sector(on_chip(sector_offset));
     return true;
 }
 
 bool port_flash_program(uint32_t page_offset, const uint8_t *page)
 {
-    if (!usable || page_offset >= BT_STORAGE_BYTES) {
+    if (!usable || page_offset >= BT_FLASH_BYTES) {
         return false;
     }
-    program_page(STORAGE_OFFSET + page_offset, page);
+    program_page(on_chip(page_offset), page);
     return true;
 }
 
 void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
 {
-    memcpy(data, (const uint8_t *)(uintptr_t)(XIP_BASE + STORAGE_OFFSET) + offset, bytes);
+    memcpy(data, (const uint8_t *)(uintptr_t)(XIP_BASE + on_chip(offset)), bytes);
+}
+
+const uint8_t *port_flash_maps(void)
+{
+    return (const uint8_t *)(uintptr_t)(XIP_BASE + MAPS_OFFSET);
 }
 
 // Sends a command and takes as many bytes as it sends, chip select held low throughout. False when the

@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
     """
     recording = load(args.recording, quiet=True)
     outcome = CrossCheck()
-    outcome.add(recording.wire, recording.settings, recording.finger_settings)
+    outcome.add(recording.wire, recording.settings, recording.finger_settings, recording.maps)
     damaged = recording.counts.bad + recording.damaged_chunks
     good = outcome.violations == 0 and damaged == 0 and len(recording.frames) > 0
     if args.json:

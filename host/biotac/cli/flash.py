@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, PortError
-from ..flash import Image, Loader, Outcome, Target, flash, read_backup, read_image
+from ..flash import Backup, Image, Loader, Outcome, Restored, Target, flash, read_backup, read_image
 from ..identity import serial_text, version_text
 from .progress import Progress
 
@@ -129,6 +129,12 @@ def facts(image: Image, outcome: Outcome) -> dict[str, Any]:
     }
 
 
+def known(backup: Backup, settings: Restored) -> str:
+    """How many of a backup's settings and maps the firmware has."""
+    count = len(backup.values) + len(backup.maps) - len(settings.unknown)
+    return f"{count} settings{' and wrench maps' if backup.maps else ''}"
+
+
 def summary(outcome: Outcome) -> str:
     """For people."""
     after, settings = outcome.after, outcome.settings
@@ -139,9 +145,7 @@ def summary(outcome: Outcome) -> str:
         lines.append("its settings are those in its flash; none were read before, none were restored")
     else:
         changed = ", ".join(settings.changed)
-        lines.append(
-            f"all {len(outcome.backup.values) - len(settings.unknown)} settings are as in {outcome.backup.path}"
-        )
+        lines.append(f"all {known(outcome.backup, settings)} are as in {outcome.backup.path}")
         lines[-1] += f"; restored and saved: {changed}" if changed else ", none had to be restored"
         if settings.unknown:
             lines.append(f"this firmware does not know {', '.join(settings.unknown)}; see {outcome.backup.path}")

@@ -10,6 +10,8 @@ from typing import Any
 import biotac
 
 from .. import _wire as wire
+from ..calibration import map_file
+from ..calibration.blob import made_s
 from ..calibration.file import to_dict, when
 from ..identity import ascii_text, board_text, serial_text, version_text
 from . import values
@@ -31,6 +33,7 @@ def run(args: argparse.Namespace) -> int:
         sensors = [hand.sensor_info(f) for f in hand.fingers]
         settings = hand.settings()
         calibrations = hand.calibrations()
+        maps = hand.maps()
         status = hand.status()
         warnings = hand.warnings
     if args.json:
@@ -48,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
                 for s in sensors
             ],
             "calibrations": {finger: to_dict(its) for finger, its in calibrations.items()},
+            "maps": {finger: map_file.to_dict(blob) for finger, blob in maps.items()},
             "settings": {s.name.lower(): value for s, value in settings.items()},
             "status": dataclasses.asdict(status),
         }
@@ -59,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"warning: {warning.text}")
     for s in sensors:
         own = f", calibration {when(calibrations[s.finger].made_s)}" if s.finger in calibrations else ""
+        own += f", wrench map {when(made_s(maps[s.finger]))}" if s.finger in maps else ""
         print(f"finger {s.finger}: BioTac {ascii_text(s.serial)}, software {ascii_text(s.software_version)}{own}")
     for setting, value in settings.items():
         print(f"{setting.name.lower()} = {value} {wire.SETTINGS[setting].unit}")

@@ -24,6 +24,7 @@ from . import (
     info,
     list_ports,
     lsl,
+    map,
     recompute,
     record,
     replay,
@@ -36,13 +37,13 @@ from . import (
 
 VERBS = (
     demo, list_ports, doctor, info, view, stream, lsl, record, check, replay, recompute, export, import_btd, calibrate,
-    calibration, experiment, sim, flash, bench, udev_setup, version,
+    calibration, map, experiment, sim, flash, bench, udev_setup, version,
 )  # fmt: skip
 
 EPILOG = """\
-A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, or sim:SOURCE, a simulated board that
-plays a scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), or emu:pico?source=SOURCE,
-a Pico's flash image in an emulator that plays the same, or replay:REC, a recording as its board.
+A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, sim:SOURCE, a simulated board that plays
+a scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), emu:pico?source=SOURCE, a Pico's
+flash image in an emulator that plays the same, or replay:REC, a recording that answers as its board did.
 
 exit codes: 0 done   1 check, doctor or experiment found something   2 unusable file or argument
 3 port cannot be opened   4 no gateway on the port   5 firmware of another wire version   6 board lost

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from .backup import Backup, read_backup
+from .backup import Backup, Restored, read_backup
 from .image import Image, read_image
 from .loader import Loader
 from .procedure import Outcome, flash
 from .target import Target
 
-__all__ = ["Backup", "Image", "Loader", "Outcome", "Target", "flash", "read_backup", "read_image"]
+__all__ = ["Backup", "Image", "Loader", "Outcome", "Restored", "Target", "flash", "read_backup", "read_image"]

@@ -1,13 +1,19 @@
-"""A board's settings: read over the wire, kept in a file, put back."""
+"""A board's settings and the wrench maps in force: read over the wire, kept in a file, put back.
+
+What was saved outlives flashing by itself; what is in force and was not saved needs this.
+"""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
 from .. import _wire as wire
+from ..calibration import map_file
+from ..commands import MAP_SINCE_MINOR
 from ..errors import CommandRefusedError, InputError
 from ..hand import Hand
 from ..identity import board_text, serial_text, version_text
@@ -22,6 +28,7 @@ class Backup:
 
     path: Path
     values: dict[int, int]
+    maps: dict[int, bytes] = field(default_factory=dict)  # by finger
 
 
 @dataclass(frozen=True)
@@ -56,7 +63,7 @@ def default_path(hello: wire.Hello) -> Path:
     return Path(f"biotac-settings-{serial_text(hello)}-{datetime.now():%Y%m%d-%H%M%S}.json")
 
 
-def write_backup(path: Path, hello: wire.Hello, values: dict[int, int]) -> Backup:
+def write_backup(path: Path, hello: wire.Hello, values: dict[int, int], maps: dict[int, bytes]) -> Backup:
     """Write what was read; never over an existing file."""
     facts = {
         "format": FORMAT,
@@ -65,6 +72,7 @@ def write_backup(path: Path, hello: wire.Hello, values: dict[int, int]) -> Backu
         "firmware": version_text(hello),
         "boot_id": hello.boot_id,
         "settings": [{"id": key, "name": setting_name(key), "value": value} for key, value in values.items()],
+        "maps": {finger: map_file.to_dict(blob) for finger, blob in maps.items()},
     }
     try:
         with open(path, "x", encoding="utf-8") as file:
@@ -73,7 +81,7 @@ def write_backup(path: Path, hello: wire.Hello, values: dict[int, int]) -> Backu
         raise InputError(f"{path} exists and may hold other settings; choose another --backup") from error
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); choose another --backup") from error
-    return Backup(path.resolve(), values)
+    return Backup(path.resolve(), values, maps)
 
 
 def read_backup(path: Path) -> Backup:
@@ -83,30 +91,41 @@ def read_backup(path: Path) -> Backup:
         if facts["format"] != FORMAT:
             raise ValueError(f"its format is {facts['format']!r}")
         values = {int(one["id"]): int(one["value"]) for one in facts["settings"]}
+        maps = {int(finger): map_file.from_dict(its) for finger, its in facts.get("maps", {}).items()}
     except OSError as error:
         raise InputError(
             f"{path} cannot be read ({error.strerror}); expected a file written by biotac flash"
         ) from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path} holds no settings ({error}); expected a file written by biotac flash") from error
-    return Backup(path.resolve(), values)
+    return Backup(path.resolve(), values, maps)
 
 
-def restore(hand: Hand, wanted: dict[int, int]) -> Restored:
+def restore(hand: Hand, wanted: Mapping[int, int], maps: Mapping[int, bytes]) -> Restored:
     """Set and save what differs, and read all back.
 
-    Settings that the firmware does not know are left out. Raises CommandRefusedError for a value that it does not
-    take, and InputError when a value does not read back.
+    Settings that the firmware does not know are left out, and so are maps. Raises CommandRefusedError for a value
+    that it does not take, and InputError when a value does not read back.
     """
     found = read_settings(hand)
     changed = [key for key, value in wanted.items() if key in found and found[key] != value]
     for key in changed:
         hand.set_setting(key, wanted[key])
-    if changed:
+    knows_maps = hand.info.wire_minor >= MAP_SINCE_MINOR
+    uploaded = [finger for finger, blob in maps.items() if knows_maps and hand.get_map(finger) != blob]
+    for finger in uploaded:
+        hand.set_map(finger, maps[finger])  # which reads it back
+    if changed or uploaded:
         hand.save_settings()
         found = read_settings(hand)
     for key, value in wanted.items():
         if found.get(key, value) != value:
             raise InputError(f"{setting_name(key)} reads {found[key]} after {value} was restored; set it by hand")
     unknown = [setting_name(key) for key in wanted if key not in found]
-    return Restored(tuple(map(setting_name, changed)), tuple(unknown))
+    unknown += [] if knows_maps else map(map_name, maps)
+    return Restored((*map(setting_name, changed), *map(map_name, uploaded)), tuple(unknown))
+
+
+def map_name(finger: int) -> str:
+    """As it is called where settings are listed."""
+    return f"wrench map of finger {finger}"

@@ -9,6 +9,8 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
+from .. import _map
+from .._sensor import MAX_SENSORS
 from ..errors import InputError
 from ..identity import board_text
 
@@ -23,6 +25,7 @@ FAMILY_RP2040 = 0xE48BFF56
 FLASH_AT = 0x10000000
 FLASH_BYTES = 2 * 1024 * 1024  # of a Pico
 SETTINGS_BYTES = 2 * 4096  # at the flash's end: firmware/core/storage.h
+MAPS_BYTES = (2 * MAX_SENSORS + 1) * _map.MAX_BYTES  # before them: firmware/core/map_store.h
 BOOT2_BYTES = 252  # and its CRC behind it
 
 # firmware/app/image_note.h
@@ -90,7 +93,7 @@ def split(data: bytes) -> tuple[bytes, ...]:
 
 def join_payloads(blocks: tuple[bytes, ...]) -> bytes:
     """The flash's bytes from its first on."""
-    end = FLASH_AT + FLASH_BYTES - SETTINGS_BYTES
+    end = FLASH_AT + FLASH_BYTES - SETTINGS_BYTES - MAPS_BYTES
     pages = []
     for k, block in enumerate(blocks):
         first, second, flags, address, size, number, count, family = HEAD.unpack_from(block)
@@ -106,7 +109,7 @@ def join_payloads(blocks: tuple[bytes, ...]) -> bytes:
         if not FLASH_AT <= address <= FLASH_AT + FLASH_BYTES - PAGE_BYTES:
             raise ValueError(f"block {k} goes to 0x{address:08X}, which is no flash of this board")
         if address + PAGE_BYTES > end:
-            raise ValueError(f"block {k} goes to 0x{address:08X}, where the settings are (from 0x{end:08X})")
+            raise ValueError(f"block {k} goes to 0x{address:08X}, where maps and settings are (from 0x{end:08X})")
         if address != FLASH_AT + k * PAGE_BYTES:
             # A gap would be legal UF2, but RP2040-E14 makes the boot ROM erase sectors wrongly around it.
             raise ValueError(f"block {k} goes to 0x{address:08X}; expected 0x{FLASH_AT + k * PAGE_BYTES:08X}, no gaps")

@@ -80,7 +80,7 @@ def flash(
         say("waiting for the board to come back")
         with target.reopen() as hand:
             check(image, before, hand.info)
-            settings = None if backup is None else restore(hand, backup.values)
+            settings = None if backup is None else restore(hand, backup.values, backup.maps)
             return Outcome(target.port, loader.name, before, hand.info, backup, settings)
 
 
@@ -131,8 +131,8 @@ def command_loader(hand: Hand) -> bool:
 
 
 def save(hand: Hand, path: Path | None) -> Backup:
-    """All of the board's settings into a new file."""
-    return write_backup(path or default_path(hand.info), hand.info, read_settings(hand))
+    """All of the board's settings, and the maps in force, into a new file."""
+    return write_backup(path or default_path(hand.info), hand.info, read_settings(hand), hand.maps())
 
 
 def check(image: Image, before: wire.Hello | None, after: wire.Hello) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from .. import _wire as wire
+from ..calibration import blob as maps
 from ..decode import Decoder
 from ..errors import InputError
 from ..framing import encode
@@ -146,6 +147,10 @@ class Playback:
             return self._setting(wire.GetSetting.unpack(payload))
         if known is wire.GetCalibration:
             return self._calibration(req_id, payload[1])
+        if known is wire.GetMap:
+            return self._map(req_id, payload[1])
+        if known is wire.ReadMap:
+            return self._map_part(wire.ReadMap.unpack(payload))
         if known is wire.GetSensorInfo:
             infos = {info.finger: info for info in self.recording.sensors}
             return _again(infos.get(payload[1]), req_id) or _reply(req_id, message_id, wire.Error.NO_SUCH_FINGER)
@@ -172,6 +177,18 @@ class Playback:
             return _message(wire.Calibration(req_id, finger, wire.CalibrationState.NONE, (0,) * 16, 0, values))
         state = wire.CalibrationState.IN_FORCE
         return _message(wire.Calibration(req_id, finger, state, its.wire_serial(), its.made_s, its.wire_values()))
+
+    def _map(self, req_id: int, finger: int) -> bytes:
+        its = self.recording.maps.get(finger)
+        if its is None:
+            return _message(wire.MapInfo(req_id, finger, wire.CalibrationState.NONE, (0,) * 16, 0, 0, 0))
+        return _message(maps.info(its, req_id, finger))
+
+    def _map_part(self, asked: wire.ReadMap) -> bytes:
+        its = self.recording.maps.get(asked.finger, b"")
+        if asked.offset >= len(its):
+            return _reply(asked.req_id, wire.ReadMap.ID, wire.Error.OUT_OF_RANGE)
+        return _message(wire.MapData(asked.req_id, asked.finger, asked.offset, maps.part(its, asked.offset)))
 
 
 def _message(message: Any) -> bytes:

@@ -15,10 +15,11 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from .. import _wire as wire
+from ..calibration.blob import as_blob
 from ..calibration.file import from_dict
 from ..calibration.values import own_settings
 from ..clock import LAST_SAMPLE_US, DeviceClock
-from ..errors import RecordingError
+from ..errors import InputError, RecordingError
 from ..frames import StructArray
 from ..stream import StreamDecoder, join
 from . import layout
@@ -29,11 +30,11 @@ class Recording:
 
     ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``idle`` (IDLE_DTYPE)
     heartbeats, ``wire`` the FRAME messages as sent, ``messages`` the rest (tare changes, status). ``settings`` are the
-    board's and ``calibrations`` those in force, by finger, when it began. ``problems`` lists in words what is missing
-    or damaged; the rest is good. ``cut_off``: the file ends without its index; ``damaged_chunks``: seconds that were
-    left out. ``blocks`` are the wire's bytes as they came, about one a second, and ``arrived_ns`` when each began, by
-    the host's clock (Unix). Raises RecordingError when nothing can be read. ``show`` is told the share of the
-    work that is done.
+    board's, ``calibrations`` and ``maps`` (bytes, as the board holds them) those in force, by finger, when it began.
+    ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its
+    index; ``damaged_chunks``: seconds that were left out. ``blocks`` are the wire's bytes as they came, about one a
+    second, and ``arrived_ns`` when each began, by the host's clock (Unix). Raises RecordingError when nothing can be
+    read. ``show`` is told the share of the work that is done.
     """
 
     def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] = lambda share: None) -> None:
@@ -117,6 +118,7 @@ class Recording:
         own = json.loads(metadata.get("calibrations", "{}"))
         # A setting or a calibration that this recording's firmware did not have yet: the default, and none.
         self.calibrations = {int(finger): from_dict(its) for finger, its in own.items()}
+        self.maps = _maps(metadata.get("maps", "{}"))
         self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting}
 
     @property
@@ -202,6 +204,14 @@ class Recording:
                 f"{counts.bad} wire frame(s) refused: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
                 f"{counts.bad_length} wrong length, {counts.too_long} too long"
             )
+
+
+def _maps(text: str) -> dict[int, bytes]:
+    """Maps as JSON had them; ValueError for what is none."""
+    try:
+        return {finger: as_blob(its) for finger, its in layout.maps_of(text).items()}
+    except InputError as error:
+        raise ValueError(error) from error
 
 
 def _tuples(fields: dict[str, Any]) -> dict[str, Any]:

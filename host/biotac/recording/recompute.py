@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from .. import _sensor as sensor
 from .. import _wire as wire
+from .. import board_map
+from ..board_map import BoardMap
 from ..calibration.file import to_dict
 from ..calibration.values import own_settings
 from ..core import on_board_q4
@@ -21,6 +23,7 @@ from ..framing import encode
 from ..streaming import RESULTS
 from ..version import __version__
 from .file import RecordingFile
+from .layout import maps_text
 from .pieces import split
 from .reader import Recording
 from .rounds import HostTare, Rounds, frames_and_tares
@@ -51,13 +54,15 @@ def recompute(
     changes: Settings,
     *,
     keep_tare: bool = False,
+    maps: Mapping[int, BoardMap | bytes] | None = None,
     show: Show = lambda share: None,
 ) -> list[str]:
     """Write ``recording`` to ``out`` with results recomputed under its settings and ``changes``.
 
     The tare machine runs again over all counts, with the tares the host gave; ``keep_tare`` keeps each
-    frame's recorded tare and state instead and recomputes what follows from them. Returns notes in words.
-    Raises InputError when the recording cannot be run through the machine, or a setting is out of range.
+    frame's recorded tare and state instead and recomputes what follows from them. ``maps`` are the wrench
+    maps in force, or their blobs, by finger; None: the recording's own. Returns notes in words. Raises InputError
+    when the recording cannot be run through the machine, or a setting is out of range.
     """
     for setting, value in changes.items():
         spec = wire.SETTINGS[setting]
@@ -70,18 +75,21 @@ def recompute(
     settings = recording.settings | changes
     calibrations = {finger: its.changed(changes) for finger, its in recording.calibrations.items()}
     own = own_settings(settings, calibrations)
+    in_force = {f: board_map.opened(its) for f, its in (recording.maps if maps is None else maps).items()}
+    _check_maps(recording, in_force)
     notes: list[str] = []
     if keep_tare:
         idle = sorted(s.name.lower() for s in set(changes) - RESULT_SETTINGS)
         if idle:
             raise InputError(f"{idle[0]} has no effect on tares that are kept; leave --keep-tare away")
-        new, tares = _with_kept_tares(recording, settings, own), None
+        new, tares = _with_kept_tares(recording, settings, own, in_force), None
         show(0.5)
     else:
-        new, tares = _through_the_machine(recording, settings, own, notes, lambda share: show(share / 2))
+        new, tares = _through_the_machine(recording, settings, own, in_force, notes, lambda share: show(share / 2))
     metadata = recording.metadata | {
         "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
         "calibrations": json.dumps({finger: to_dict(its) for finger, its in calibrations.items()}),
+        "maps": maps_text({finger: its.blob for finger, its in in_force.items()}),
         "recomputed": json.dumps(
             {
                 "from": recording.path.name,
@@ -95,24 +103,40 @@ def recompute(
     return notes
 
 
-def _with_kept_tares(recording: Recording, settings: Settings, own: Mapping[int, Settings]) -> StructArray:
+def _check_maps(recording: Recording, maps: Mapping[int, BoardMap]) -> None:
+    mapped = np.unique(recording.wire["finger"][(recording.wire["flags"] & wire.FrameFlags.MAPPED) != 0])
+    missing = [int(finger) for finger in mapped if int(finger) not in maps]
+    if missing:
+        raise InputError(
+            f"finger {missing[0]} of {recording.path} published by a wrench map that is not known: expected its map; "
+            "record it with the board that has it"
+        )
+
+
+def _with_kept_tares(
+    recording: Recording, settings: Settings, own: Mapping[int, Settings], maps: Mapping[int, BoardMap]
+) -> StructArray:
     """FRAME messages as recorded, with what the kernels make of their counts and tares now."""
     new: StructArray = recording.wire.copy()
     for finger in np.unique(new["finger"]):
         at = np.flatnonzero((new["finger"] == finger) & ((new["flags"] & wire.FrameFlags.UNTARED) == 0))
-        new[at] = _recomputed(new[at], own.get(int(finger), settings))
+        new[at] = _recomputed(new[at], own.get(int(finger), settings), maps.get(int(finger)))
     # A standard deviation follows from the gains and the noise, which a frame does not hold.
     for name in ("poc_sigma_um", "force_sigma_100un"):
         new[name] = wire.INVALID_COUNT
     return new
 
 
-def _recomputed(frames: StructArray, settings: Settings) -> StructArray:
-    poc_um, force_100un, torque_mnmm, kernel_flags = on_board_q4(frames["counts"], frames["tare_q4"], settings)
+def _recomputed(frames: StructArray, settings: Settings, its: BoardMap | None) -> StructArray:
+    if its is None:
+        poc_um, force_100un, torque_mnmm, kernel_flags = on_board_q4(frames["counts"], frames["tare_q4"], settings)
+    else:
+        poc_um, force_100un, torque_mnmm, kernel_flags = board_map.on_board_q4(frames, settings, its)
     frames["poc_um"], frames["force_100un"], frames["torque_mnmm"] = poc_um, force_100un, torque_mnmm
     flags = frames["flags"] & ~np.uint32(
-        wire.FrameFlags.POC_INVALID | wire.FrameFlags.TORSION_OK | wire.FrameFlags.NOT_ASKED
+        wire.FrameFlags.POC_INVALID | wire.FrameFlags.TORSION_OK | wire.FrameFlags.NOT_ASKED | wire.FrameFlags.MAPPED
     )
+    flags |= np.uint32(0 if its is None else wire.FrameFlags.MAPPED)
     flags |= kernel_flags & np.uint32(wire.FrameFlags.POC_INVALID)
     flags |= np.where(_torsion_ok(frames, poc_um), np.uint32(wire.FrameFlags.TORSION_OK), np.uint32(0))
     frames["flags"] = flags
@@ -132,7 +156,12 @@ def _torsion_ok(frames: StructArray, poc_um: NDArray[np.int16]) -> NDArray[np.bo
 
 
 def _through_the_machine(
-    recording: Recording, settings: Settings, own: Mapping[int, Settings], notes: list[str], show: Show
+    recording: Recording,
+    settings: Settings,
+    own: Mapping[int, Settings],
+    maps: Mapping[int, BoardMap],
+    notes: list[str],
+    show: Show,
 ) -> tuple[StructArray, dict[int, wire.Tare]]:
     """FRAME messages in the order of arrival, and the TARE messages by the row they go before."""
     if len(recording.idle) or recording.frames_lost or recording.disordered:
@@ -152,7 +181,7 @@ def _through_the_machine(
 
     for finger in np.unique(recording.wire["finger"]):
         at = np.flatnonzero(recording.wire["finger"] == finger)
-        rounds = _rounds(recording, at, notes)
+        rounds = _rounds(recording, at, maps.get(int(finger)), notes)
         frames, changes = frames_and_tares(rounds, own.get(int(finger), settings), ran_rows)
         if len(frames) != len(at):
             raise InputError(f"{recording.path}: finger {finger} has frames without one good count; add --keep-tare")
@@ -163,7 +192,7 @@ def _through_the_machine(
     return new, tares
 
 
-def _rounds(recording: Recording, at: NDArray[np.int64], notes: list[str]) -> Rounds:
+def _rounds(recording: Recording, at: NDArray[np.int64], its: BoardMap | None, notes: list[str]) -> Rounds:
     sent = recording.wire[at]
     finger = int(sent["finger"][0])
     row_of = {int(seq): row for row, seq in reversed(list(enumerate(sent["seq"])))}
@@ -180,7 +209,7 @@ def _rounds(recording: Recording, at: NDArray[np.int64], notes: list[str]) -> Ro
     sigma = (sent["poc_sigma_um"] != wire.INVALID_COUNT).any()
     quantities = RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags(wire.QuantityFlags.SIGMA if sigma else 0)
     t_us = recording.frames["t_us"][at]
-    return Rounds(finger, sent["counts"], sent["pdc"], sent["tac"], sent["tdc"], t_us, tares, quantities)
+    return Rounds(finger, sent["counts"], sent["pdc"], sent["tac"], sent["tdc"], t_us, tares, quantities, its)
 
 
 def _give(tares: dict[int, HostTare], row: int | None, values: NDArray[np.float64], now: bool) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _wire as wire
+from ..board_map import BoardMap
 from ..errors import CommandRefusedError
 from ..finger import FINGER_DTYPE, Finger
 from ..frames import StructArray
@@ -41,7 +42,7 @@ class HostTare:
 class Rounds:
     """A finger's rounds: ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,), ``t_us`` (n,) device time.
 
-    ``tares``: by the round from which on each holds.
+    ``tares``: by the round from which on each holds. ``wrench_map``: in force all along.
     """
 
     finger: int
@@ -52,6 +53,7 @@ class Rounds:
     t_us: NDArray[np.int64]
     tares: dict[int, HostTare] = field(default_factory=dict)
     quantities: wire.QuantityFlags | None = None
+    wrench_map: BoardMap | None = None
 
 
 def frames_and_tares(
@@ -61,7 +63,7 @@ def frames_and_tares(
 
     ``show`` is told how many rounds were run, of twice their number.
     """
-    finger = Finger(settings, index=rounds.finger, quantities=rounds.quantities)
+    finger = Finger(settings, index=rounds.finger, quantities=rounds.quantities, wrench_map=rounds.wrench_map)
     rows = np.concatenate(list(_run(rounds, finger, [], show)))
     changed = np.flatnonzero((rows["flags"] & wire.FrameFlags.TARE_CHANGED).astype(bool) & (rows["present"] != 0))
     # The tare's own 1/65536 count is in no row: a second run stops at each change to look.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -22,6 +22,7 @@ from .file import RecordingFile
 FLUSH_S = 0.9
 # Of a full stream. A simulated board may live faster than the host's clock: then it is bytes that close a block.
 FINGER_BYTES_PER_S = 100 * sum(wire.DTYPES[m].itemsize + OVERHEAD_BYTES for m in (wire.Frame.ID, wire.Pac.ID))
+NO_MAPS: Mapping[int, bytes] = {}
 
 
 class Recorder:
@@ -39,6 +40,7 @@ class Recorder:
         sensors: list[wire.SensorInfo],
         port: str,
         *,
+        maps: Mapping[int, bytes] = NO_MAPS,
         overwrite: bool = False,
         mid_stream: bool = False,
         clock_s: Callable[[], float] = time.monotonic,
@@ -52,7 +54,7 @@ class Recorder:
         self._arrived_ns = 0
         self._block_bytes = int(FLUSH_S * FINGER_BYTES_PER_S * max(1, hello.fingers_present.bit_count()))
         self._skip_to_delimiter = mid_stream
-        metadata = describe(hello, settings, calibrations, sensors, port)
+        metadata = describe(hello, settings, calibrations, sensors, port, maps)
         self._file = RecordingFile(create(path, overwrite=overwrite), metadata)
 
     def write(self, chunk: bytes) -> None:
@@ -127,6 +129,7 @@ def describe(
     calibrations: dict[int, Calibration],
     sensors: list[wire.SensorInfo],
     port: str,
+    maps: Mapping[int, bytes] = NO_MAPS,
 ) -> dict[str, str]:
     """The metadata record: everything needed to read and judge the wire later."""
     return {
@@ -138,5 +141,6 @@ def describe(
         "hello": json.dumps(dataclasses.asdict(hello)),
         "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
         "calibrations": json.dumps({finger: to_dict(its) for finger, its in calibrations.items()}),
+        "maps": layout.maps_text(maps),
         "sensors": json.dumps([dataclasses.asdict(s) for s in sensors]),
     }

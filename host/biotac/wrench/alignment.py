@@ -18,7 +18,6 @@ from .recorded import Floats, Run
 SEARCH_ROWS = 50
 MAX_LAG_ROWS = 20  # 0.2 s at 100 Hz: more is no transport delay but another clock
 MIN_R2 = 0.3  # held out; the weakest real finger has 0.5 to 0.9 (biotac.md 5), unrelated files have less than 0
-
 LAGS: npt.NDArray[np.int64] = np.arange(-SEARCH_ROWS, SEARCH_ROWS + 1)
 _WEAKEST = slice(0, 1)  # least ridge
 
@@ -38,6 +37,9 @@ def check(run: Run, blocks: Blocks, at_lags: Floats) -> tuple[int, float]:
     lag = best_lag(run, at_lags, blocks.own(range(BLOCKS)))
     r2 = _held_out_r2(run, blocks, at_lags[lag + SEARCH_ROWS])
     where = f"{run.name}: force and counts"
+    if run.by_clocks:
+        # their correlation had a clear peak, and small tips in places held out leave an affine map nothing to say
+        return lag, r2
     if r2 < MIN_R2:
         raise RecordingError(
             f"{where} are not aligned: they agree best at a lag of {lag} rows, and there an affine map explains "

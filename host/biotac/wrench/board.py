@@ -178,8 +178,6 @@ def _evaluated(its: BoardMap, signals: Signals) -> Iterator[tuple[BoardBlock, Fl
 
 # ---- what the board's rounding can cost --------------------------------------------------------
 
-CUT = 0.5  # a product cut downwards, less what its row begins with
-FINE_CUT = 1.5  # three cuts of a conductance's product
 GATE_OFF = {Gate.ONE: 0.0, Gate.X: 0.6, Gate.Y: 0.6, Gate.XX: 2.6, Gate.XY: 2.6, Gate.YY: 2.6}  # in 2^-19
 RATIO_OFF = 2.0 ** -(_map.CONDUCTANCE_FINE_BITS + 16)  # a unit of 2^-22 in a factor, per unit of a coefficient
 
@@ -215,20 +213,29 @@ def _bound(its: BoardMap, wanted: dict[tuple[Kind, Gate], Floats], signals: Sign
     return total
 
 
+def _sum_off(columns: npt.ArrayLike, *, fine: bool) -> Floats:
+    """Of a sum over so many columns: products cut downwards, which half of their number makes up for on average.
+
+    With fine bits, what they leave away (half a unit each) and the cut of their sum.
+    """
+    n = np.asarray(columns, dtype=np.float64)
+    off: Floats = n + 2.0 if fine else (n + 1.0) / 2.0
+    return off
+
+
 def _block_off(block: BoardBlock, kinds: dict[Kind, Floats]) -> Floats:
     """By how much a block's integer may be off (n, axes) with the coefficients it has."""
     spec, n = _map.KINDS[block.kind], len(kinds[Kind.SIGNAL])
     fine = spec.of == "conductance"
-    cut = FINE_CUT if fine else CUT
     size = np.abs(block.coefficients).astype(np.float64)
     if spec.shape == "one":
-        return np.full((n, size.shape[1]), 0.5)
+        return np.ones((n, size.shape[1]))
     if spec.shape == "electrodes":
-        off = cut * ELECTRODES + 0.5 + fine * RATIO_OFF * size.sum(axis=0)
+        off = _sum_off(ELECTRODES, fine=fine) + fine * RATIO_OFF * size.sum(axis=0)
         return np.broadcast_to(off, (n, len(off)))
     factors = np.abs(kinds[Kind.CONDUCTANCE if fine else Kind.SIGNAL]) * FACTOR[spec.of] / 2.0**16
-    row_off = (cut * _ROW_COLUMNS + 0.5)[:, None] + fine * RATIO_OFF * _row_sums(block.kind, size)
-    sums: Floats = factors @ row_off + 1.0
+    row_off = _sum_off(_ROW_COLUMNS, fine=fine)[:, None] + fine * RATIO_OFF * _row_sums(block.kind, size)
+    sums: Floats = factors @ row_off + _sum_off(ELECTRODES, fine=fine)
     if fine:
         for axis in range(size.shape[1]):
             square = np.zeros((ELECTRODES, ELECTRODES))

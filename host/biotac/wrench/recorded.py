@@ -32,8 +32,11 @@ MAX_CLIPPED_SHARE = 0.005
 # 0.01 (median rows). Grams (x 102) and millinewtons (x 1000) fall outside however the finger is pressed.
 NEWTON_PER_COUNT = (0.002, 0.5)
 MIN_DRIFT_SHARE = 0.5  # of the idle recording's variance: less is noise, and noise has no direction
+# Of the differences between two rests about their mean, which is drift: one finger's rests differ by its loadings'
+# spread (10 % of some hundred counts), two fingers' by how their electrodes are made (86 to 170 counts).
+MAX_OTHER_REST_COUNTS = 60.0
 
-FIELDS = ("E", "F", "M", "PDC", "E_base", "E_idle", "torsion", "contact")
+FIELDS = ("E", "F", "M", "PDC", "E_base", "E_idle", "torsion", "contact", "serial")
 
 
 @dataclass(frozen=True)
@@ -43,8 +46,10 @@ class Run:
     ``counts`` (n, 19), ``tare`` (19,) counts; ``truth`` (n, 3) N, or (n, 7) with N mm about the origin and about
     the outward normal at the contact;
     ``pdc`` (n,) counts above rest, or None; ``drift`` (19,) what one count of mean drift does to each
-    electrode; ``rest`` bool (n,), rows without contact; ``notes`` say what was assumed; ``air`` (m, 19) the
-    counts of E_base, or None; ``contact`` (n,) which contact each row belongs to, or None: rows in time.
+    electrode; ``rest`` bool (n,), rows without contact; ``notes`` say what was assumed; ``serial`` is the sensor's
+    number, "" where the recording does not say. ``by_clocks``: force and counts were aligned by their own times.
+    ``air`` (m, 19) are the counts of E_base, or None; ``contact`` (n,) is which contact each row belongs to, or
+    None: rows in time.
     """
 
     name: str
@@ -55,6 +60,8 @@ class Run:
     drift: Floats
     rest: npt.NDArray[np.bool_]
     notes: tuple[str, ...]
+    serial: str = ""
+    by_clocks: bool = False
     air: Floats | None = None
     contact: npt.NDArray[np.int64] | None = None
 
@@ -72,7 +79,8 @@ def load_run(path: Path) -> Run:
     ``E_base`` (m, 19) the finger in free air, needed where the run itself never rests; ``E_idle``
     (k, 19) an untouched finger, whose first principal component is the drift; ``torsion`` (n,) N mm about
     the outward normal at the contact (with M; else it is computed); ``contact`` (n,) integers, which
-    contact a row belongs to, where rows are not in time. Raises RecordingError with what was seen, in numbers.
+    contact a row belongs to, where rows are not in time; ``serial``, the sensor's number as text. Raises
+    RecordingError with what was seen, in numbers.
     """
     fields = read_npz(path, FIELDS)
     missing = [name for name in ("E", "F") if name not in fields]
@@ -83,32 +91,40 @@ def load_run(path: Path) -> Run:
         )
     counts = _counts(path, "E", fields["E"], None)
     rows = len(counts)
-    if rows < MIN_ROWS:
-        raise RecordingError(
-            f"{path}: {rows} rows: expected at least {MIN_ROWS}, {BLOCKS} blocks of twice the guard of "
-            f"{GUARD_ROWS} rows; record longer"
-        )
+    check_rows(path, rows)
     force = _truth(path, "F", "N", fields["F"], rows)
-    _check_clipping(path, "F", force)
+    check_clipping(path, "F", force)
     truth = force
     about_torsion: tuple[str, ...] = ()
     if "M" in fields:
         moment = _truth(path, "M", "N mm", fields["M"], rows)
         about_normal, about_torsion = torsion.truth(path, fields.get("torsion"), force, moment)
         truth = np.column_stack([force, moment, about_normal])
-    _check_rails(path, counts)
+    check_rails(path, counts)
     rest: npt.NDArray[np.bool_] = np.linalg.norm(force, axis=1) < REST_N
     tare, notes = _tare(path, fields, counts, force, rest)
-    _check_units(path, counts - tare, force)
+    check_units(path, counts - tare, force)
     pdc = None
     if "PDC" in fields:
         raw = counts_field(path, "PDC", fields["PDC"], rows, None).astype(np.float64)
         # without a rest in the run the lowest percent stands for it; an offset does no harm to a linear model
         pdc = raw - (np.median(raw[rest]) if rest.sum() >= MIN_REST_ROWS else np.percentile(raw, 1))
-    drift, note = _drift(path, fields)
-    air = _counts(path, "E_base", fields["E_base"], None) if "E_base" in fields else None
-    contact = contacts(path, fields["contact"], rows) if "contact" in fields else None
-    return Run(path.name, counts, tare, truth, pdc, drift, rest, (*notes, note, *about_torsion), air, contact)
+    drift, note = np.ones(len(_sensor.ELECTRODE_NAMES)), "drift: no E_idle, all electrodes taken to drift alike"
+    if "E_idle" in fields:
+        drift, note = drift_of("E_idle", _counts(path, "E_idle", fields["E_idle"], None))
+    return Run(
+        path.name,
+        counts,
+        tare,
+        truth,
+        pdc,
+        drift,
+        rest,
+        (*notes, note, *about_torsion),
+        serial=_serial(path, fields),
+        air=_counts(path, "E_base", fields["E_base"], None) if "E_base" in fields else None,
+        contact=contacts(path, fields["contact"], rows) if "contact" in fields else None,
+    )
 
 
 def _counts(path: Path, name: str, array: npt.NDArray[Any], rows: int | None) -> Floats:
@@ -129,7 +145,24 @@ def _truth(path: Path, name: str, unit: str, array: npt.NDArray[Any], rows: int)
     return to_lin_frame(array)
 
 
-def _check_clipping(path: Path, name: str, force: Floats) -> None:
+def check_rows(where: object, rows: int) -> None:
+    """Refuse a run that is too short to be held out block by block."""
+    if rows < MIN_ROWS:
+        raise RecordingError(
+            f"{where}: {rows} rows: expected at least {MIN_ROWS}, {BLOCKS} blocks of twice the guard of "
+            f"{GUARD_ROWS} rows; record longer"
+        )
+
+
+def _serial(path: Path, fields: dict[str, npt.NDArray[Any]]) -> str:
+    if "serial" not in fields:
+        return ""
+    if fields["serial"].dtype.kind != "U" or fields["serial"].size != 1:
+        raise RecordingError(f"{path}: field serial is {fields['serial'].dtype}: expected one text; save it as str")
+    return str(fields["serial"].reshape(()))
+
+
+def check_clipping(path: object, name: str, force: Floats) -> None:
     """A plate at the end of its range repeats its last value; no measured force does."""
     for axis in range(3):
         column = force[:, axis]
@@ -142,7 +175,7 @@ def _check_clipping(path: Path, name: str, force: Floats) -> None:
                 )
 
 
-def _check_rails(path: Path, counts: Floats) -> None:
+def check_rails(path: object, counts: Floats) -> None:
     share = ((counts <= RAIL_LOW) | (counts >= RAIL_HIGH)).mean(axis=0)
     worst = int(np.argmax(share))
     if share[worst] > MAX_RAILED_SHARE:
@@ -165,6 +198,8 @@ def _tare(
                 f"{path}: E_base is not at rest: {_sensor.ELECTRODE_NAMES[worst]} swings over "
                 f"{high[worst] - low[worst]:.0f} counts: expected at most {MAX_REST_SWING_COUNTS:.0f}; record it in air"
             )
+        if rest.sum() >= MIN_REST_ROWS:
+            _check_same_finger(path, median, np.median(counts[rest], axis=0))
         # the median, because a brief touch in the recording must not become the rest
         return median, (f"tare: median of {len(base)} rows of E_base",)
     if rest.sum() < MIN_REST_ROWS:
@@ -177,7 +212,7 @@ def _tare(
     return resting, (f"tare: median of {rest.sum()} rows below {REST_N} N",)
 
 
-def _check_units(path: Path, signal: Floats, force: Floats) -> None:
+def check_units(path: object, signal: Floats, force: Floats) -> None:
     size = np.linalg.norm(force, axis=1)
     touched = size >= 0.25 * np.percentile(size, 90)
     if not touched.any() or size.max() == 0.0:
@@ -192,12 +227,22 @@ def _check_units(path: Path, signal: Floats, force: Floats) -> None:
         )
 
 
-def _drift(path: Path, fields: dict[str, npt.NDArray[Any]]) -> tuple[Floats, str]:
-    """What drift does to the electrodes for one count on average, and where that is known from."""
+def _check_same_finger(path: Path, base: Floats, resting: Floats) -> None:
+    """Rests of one finger differ by its drift, all electrodes alike; another finger's has another pattern."""
+    apart = resting - base
+    spread = float(apart.std())
+    if spread > MAX_OTHER_REST_COUNTS:
+        worst = int(np.argmax(np.abs(apart - apart.mean())))
+        raise RecordingError(
+            f"{path}: E at rest and E_base do not belong together: beside a common {apart.mean():+.0f} counts they "
+            f"differ by {spread:.0f} RMS ({_sensor.ELECTRODE_NAMES[worst]} by {apart[worst]:+.0f}): expected at most "
+            f"{MAX_OTHER_REST_COUNTS:.0f}; is E_base another finger's?"
+        )
+
+
+def drift_of(name: str, idle: Floats) -> tuple[Floats, str]:
+    """What drift does to the electrodes (19,) for one count on average, from an untouched finger, and words for it."""
     common: Floats = np.ones(len(_sensor.ELECTRODE_NAMES))
-    if "E_idle" not in fields:
-        return common, "drift: no E_idle, all electrodes taken to drift alike"
-    idle = _counts(path, "E_idle", fields["E_idle"], None)
     variance, direction = (
         np.linalg.eigh(np.cov(idle, rowvar=False)) if len(idle) > 1 else (np.zeros(1), common[:, None])
     )
@@ -206,5 +251,5 @@ def _drift(path: Path, fields: dict[str, npt.NDArray[Any]]) -> tuple[Floats, str
     mean = float(first.mean())
     # loadings of both signs are a touch or a broken electrode, and dividing by their mean would blow them up
     if share < MIN_DRIFT_SHARE or mean < 0.5 * float(np.abs(first).mean()):
-        return common, f"drift: E_idle's first component holds {share:.0%} of its variance, all electrodes taken alike"
-    return first / mean, f"drift: first component of E_idle, {share:.1%} of its variance"
+        return common, f"drift: {name}'s first component holds {share:.0%} of its variance, all electrodes taken alike"
+    return first / mean, f"drift: first component of {name}, {share:.1%} of its variance"

@@ -6,7 +6,6 @@ taking c x F away again is the point of contact's error times the force (three t
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ MAX_OFF_MM = 2.0  # how far beside the core a line of action may pass and still 
 
 
 def truth(
-    path: Path, given: npt.NDArray[Any] | None, force_n: Floats, moment_nmm: Floats
+    where: object, given: npt.NDArray[Any] | None, force_n: Floats, moment_nmm: Floats
 ) -> tuple[Floats, tuple[str, ...]]:
     """Torsion (n, 1) in N mm about the outward normal, or (n, 0) where there is none to be had, and notes.
 
@@ -34,7 +33,7 @@ def truth(
     if given is not None:
         if given.shape != (rows,) or given.dtype.kind not in "iuf" or not np.isfinite(given).all():
             raise RecordingError(
-                f"{path}: field torsion is {given.dtype} {given.shape}: expected ({rows},) finite numbers in N mm "
+                f"{where}: field torsion is {given.dtype} {given.shape}: expected ({rows},) finite numbers in N mm "
                 f"about the outward normal, a row a frame; leave it out to have it computed from F and M"
             )
         return given.astype(np.float64)[:, None], ()

@@ -1,0 +1,70 @@
+"""An emulated ATI Nano17 under a finger: what a scenario applies, as the sensor's own counts.
+
+It has the real one's resolution and range (SI-12-0.12: 1/320 N, 1/64 N mm; 12 and 17 N, 120 N mm), noise, a zero
+that is not zero, axes and an origin of its own, and a clock that neither starts with the board's nor keeps pace.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from ..reference.mounting import Mounting
+from ..reference.rdt import ERROR_BIT, NMM_PER_NM, RECORD_DTYPE, Scale
+from .sampling import FRAME_S
+from .source import Source
+from .surface import Floats
+
+RESOLUTION: Floats = np.array([1 / 320] * 3 + [1 / 64] * 3)  # N, N mm
+RANGE: Floats = np.array([12.0, 12.0, 17.0, 120.0, 120.0, 120.0])
+COUNTS_PER_N = 1_000_000.0
+COUNTS_PER_NM = 1_000_000.0
+NOISE_STEPS = 0.7  # standard deviation, in steps of the resolution
+SENSOR = "emulated Nano17"
+
+#: The sensor carries the finger from above, turned: no axis of its is one of Lin's. Were it behind the finger, a
+#: firm press on the tip would be more than its 120 N mm.
+MOUNTING = Mounting(np.array([[0.0, 0.0, 1.0], [0.6, 0.8, 0.0], [-0.8, 0.6, 0.0]]), np.array([-5.0, 1.5, 10.0]))
+
+
+@dataclass(frozen=True)
+class Nano17:
+    """``offset_s`` is its time when the board's is 0; it then gains ``drift_ppm``. ``zero`` (6,) N and N mm."""
+
+    mounting: Mounting = MOUNTING
+    rate_hz: float = 500.0
+    offset_s: float = 417.3
+    drift_ppm: float = 60.0
+    zero: Floats = field(default_factory=lambda: np.array([0.4, -1.1, 0.7, 12.0, -7.0, 3.0]))
+    seed: int = 17
+
+    @property
+    def scale(self) -> Scale:
+        """As its box is configured."""
+        return Scale(COUNTS_PER_N, COUNTS_PER_NM / NMM_PER_NM, self.rate_hz)
+
+    def records(self, source: Source, finger: int) -> tuple[Floats, npt.NDArray[np.void]]:
+        """Board times (m,) s and RDT records (m,) while ``source`` plays. Raises InputError without a truth."""
+        if source.truth is None:
+            raise InputError(f"{source.name} says nothing of the forces: expected a scenario (.toml)")
+        lin = np.column_stack([source.truth.force_n[:, finger], source.truth.torque_nmm[:, finger]])
+        at_s = (np.arange(len(lin)) + 0.5) * FRAME_S
+        first = int(np.ceil(self.offset_s * self.rate_hz))
+        last = int((self.offset_s + len(lin) * FRAME_S * (1.0 + 1e-6 * self.drift_ppm)) * self.rate_hz)
+        number = np.arange(first, last)
+        board_s = (number / self.rate_hz - self.offset_s) / (1.0 + 1e-6 * self.drift_ppm)
+        own = self.mounting.to_sensor(lin)
+        wrench = np.column_stack([np.interp(board_s, at_s, column) for column in own.T]) + self.zero
+        wrench += np.random.default_rng(self.seed).normal(0.0, NOISE_STEPS, wrench.shape) * RESOLUTION
+        beyond = (np.abs(wrench) > RANGE).any(axis=1)
+        wrench = np.clip(np.rint(wrench / RESOLUTION) * RESOLUTION, -RANGE, RANGE)
+        records = np.zeros(len(number), RECORD_DTYPE)
+        records["rdt_sequence"] = number % 2**32
+        records["ft_sequence"] = number * 7 % 2**32  # the box samples faster than it sends
+        records["status"] = np.where(beyond, ERROR_BIT, 0)
+        per_unit = np.array([self.scale.counts_per_n] * 3 + [self.scale.counts_per_nmm] * 3)
+        records["counts"] = np.rint(wrench * per_unit).astype(np.int32)
+        return board_s, records

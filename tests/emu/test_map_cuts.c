@@ -1,0 +1,204 @@
+// A map's way through the whole firmware into flash, with power cut at every byte of every erase and program:
+// at the next boot each finger has its old map or its new one, whole, and the next upload goes as if nothing
+// had been.
+#include "map_blob.h"
+#include "rig.h"
+
+#define PART BT_MAP_PART_BYTES
+
+static uint8_t answer_id;
+static uint8_t answer[BT_FRAME_MAX_BYTES];
+
+static bool take_answer(const uint8_t *data, size_t bytes)
+{
+    for (size_t k = 0; k < bytes; k++) {
+        if (bt_deframer_push(&host.deframer, data[k]) == BT_DEFRAMED_GOOD) {
+            answer_id = host.deframer.id;
+            memcpy(answer, host.deframer.buffer + 1, host.deframer.payload_bytes);
+        }
+    }
+    return true;
+}
+
+static void ask(uint8_t id, const void *payload)
+{
+    uint8_t encoded[BT_ENCODED_MAX_BYTES];
+    size_t bytes = bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), encoded);
+    answer_id = 0;
+    fake_host_sends(encoded, bytes);
+    for (size_t taken = 0; taken < bytes; taken += 64) { // of which the gateway takes so many in a turn
+        bt_gateway_poll(&gateway);
+    }
+}
+
+static void command(uint8_t id, const void *payload)
+{
+    ask(id, payload);
+    assert_int_equal(answer_id, BT_REPLY_ID);
+    assert_int_equal(answer[2], BT_ERROR_OK);
+}
+
+static void power_on(void)
+{
+    memset(&gateway, 0, sizeof gateway);
+    bt_deframer_reset(&host.deframer);
+    bt_gateway_init(&gateway);
+    command(BT_STOP_ID, "\1");
+}
+
+static uint8_t blob[BT_MAP_MAX_BYTES];
+
+static void upload(uint8_t finger, size_t bytes)
+{
+    uint8_t payload[BT_FRAME_MAX_BYTES];
+    uint32_t crc32 = bt_crc32(blob, bytes);
+    bt_msg_begin_map begin = {.req_id = 1, .finger = finger, .size_bytes = (uint16_t)bytes, .crc32 = crc32};
+    bt_msg_begin_map_pack(&begin, payload);
+    command(BT_BEGIN_MAP_ID, payload);
+    for (size_t at = 0; at < bytes; at += PART) {
+        bt_msg_write_map write = {.req_id = 2, .finger = finger, .offset = (uint16_t)at};
+        memcpy(write.data, blob + at, bytes - at < PART ? bytes - at : PART);
+        bt_msg_write_map_pack(&write, payload);
+        command(BT_WRITE_MAP_ID, payload);
+    }
+    bt_msg_end_map end = {.req_id = 3, .finger = finger, .crc32 = crc32};
+    bt_msg_end_map_pack(&end, payload);
+    ask(BT_END_MAP_ID, payload);
+    assert_int_equal(answer_id, BT_MAP_INFO_ID);
+}
+
+static void upload_and_save(uint8_t finger, uint32_t number, int blocks)
+{
+    upload(finger, make_map(blob, number, blocks, ""));
+    command(BT_SAVE_SETTINGS_ID, "\4");
+}
+
+// Which one a finger has, after looking at all of its bytes; 0: none.
+static uint32_t has(uint8_t finger, int blocks)
+{
+    static _Alignas(4) uint8_t want[BT_MAP_MAX_BYTES];
+    const bt_finger_map *its = &gateway.session.map[finger];
+    if (gateway.session.map_state[finger] == BT_CALIBRATION_STATE_NONE) {
+        return 0;
+    }
+    assert_int_equal(its->place.bytes, make_map(want, its->map.made_s, blocks, ""));
+    assert_memory_equal(bt_map_bytes(&gateway.map_flash, &its->place), want, its->place.bytes);
+    return its->map.made_s;
+}
+
+static bool upload_and_save_with_cut(uint32_t number, int blocks, long cut)
+{
+    fake.flash_left = cut;
+    if (setjmp(fake.power_fails) != 0) {
+        fake.flash_left = -1;
+        return false;
+    }
+    upload_and_save(0, number, blocks);
+    fake.flash_left = -1;
+    return true;
+}
+
+// Finger 0 has this map and gets the next ones, all of this size; finger 1 keeps its own.
+static void cut_everywhere(int blocks, uint32_t first, uint32_t saves, long at_least)
+{
+    static uint8_t before[BT_FLASH_BYTES];
+    long cuts = 0;
+    for (uint32_t number = first + 1; number <= first + saves; number++) {
+        memcpy(before, fake.flash, sizeof before);
+        long cut = 0;
+        for (; !upload_and_save_with_cut(number, blocks, cut); cut++) {
+            power_on();
+            uint32_t found = has(0, blocks);
+            assert_true(found == number - 1 || found == number);
+            assert_int_equal(has(1, 3), 77);
+            if (cut % 17 == 0) { // what the cut left behind is no obstacle
+                upload_and_save(0, 500, blocks);
+                power_on();
+                assert_int_equal(has(0, blocks), 500);
+                assert_int_equal(has(1, 3), 77);
+            }
+            memcpy(fake.flash, before, sizeof before);
+            power_on();
+        }
+        cuts += cut;
+        power_on();
+        assert_int_equal(has(0, blocks), number);
+    }
+    assert_true(cuts >= at_least);
+}
+
+static int powered(void **state)
+{
+    (void)no_trouble(state);
+    boot(START_NS);
+    fake_host_takes = take_answer;
+    power_on();
+    upload_and_save(1, 77, 3);
+    return 0;
+}
+
+static void a_cut_at_any_byte_leaves_the_old_map_or_the_new(void **state)
+{
+    (void)state;
+    upload_and_save(0, 1, 2);
+    cut_everywhere(2, 1, 2, 2 * (BT_FLASH_SECTOR_BYTES + 3 * BT_FLASH_PAGE_BYTES));
+}
+
+static void nor_do_half_done_bytes_matter(void **state)
+{
+    (void)state;
+    fake.flash_ragged = true;
+    upload_and_save(0, 1, 3);
+    cut_everywhere(3, 1, 2, 2 * (BT_FLASH_SECTOR_BYTES + 5 * BT_FLASH_PAGE_BYTES));
+}
+
+static void nor_while_the_records_sector_changes(void **state)
+{
+    (void)state;
+    static uint8_t before[BT_FLASH_BYTES];
+    uint32_t number = 1;
+    int erases;
+    upload_and_save(0, number, 1);
+    do { // until the save after this one needs the other sector too, beside the map's
+        memcpy(before, fake.flash, sizeof before);
+        erases = fake.erases;
+        upload_and_save(0, ++number, 1);
+    } while (fake.erases - erases == 1);
+    memcpy(fake.flash, before, sizeof before);
+    power_on();
+    cut_everywhere(1, number - 1, 1, 2 * BT_FLASH_SECTOR_BYTES + 5 * BT_FLASH_PAGE_BYTES);
+}
+
+static void saved_maps_hold_for_their_own_sensors_alone(void **state)
+{
+    (void)state;
+    char serial[17] = {0};
+    const bt_session *session = &gateway.session;
+    memcpy(serial, session->info[3].serial, 16);
+    upload(3, make_map(blob, 5, 4, serial));
+    upload(4, make_big_map(blob, 6));
+    command(BT_SAVE_SETTINGS_ID, "\4");
+    power_on();
+    assert_int_equal(session->map_state[3], BT_CALIBRATION_STATE_IN_FORCE);
+    assert_int_equal(session->map_state[4], BT_CALIBRATION_STATE_IN_FORCE);
+    fake.sensor[3].serial[15] ^= 3;
+    power_on();
+    assert_int_equal(session->map_state[3], BT_CALIBRATION_STATE_OTHER_SENSOR);
+    assert_int_equal(session->map[3].map.made_s, 5); // kept
+    fake.sensor[3].serial[15] ^= 3;
+    power_on();
+    assert_int_equal(session->map_state[3], BT_CALIBRATION_STATE_IN_FORCE);
+}
+
+#define T(test) cmocka_unit_test_setup(test, powered)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(a_cut_at_any_byte_leaves_the_old_map_or_the_new),
+        T(nor_do_half_done_bytes_matter),
+        T(nor_while_the_records_sector_changes),
+        T(saved_maps_hold_for_their_own_sensors_alone),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,211 @@
+"""A board's recording and an emulated Nano17's, joined by their own clocks: truth per row, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac.errors import InputError, RecordingError
+from biotac.recording import Recording
+from biotac.reference import Mounting, Reference, Samples
+from biotac.reference.rdt import RdtDecoder
+from biotac.reference.timing import align
+from biotac.sim.nano17 import MOUNTING, Nano17
+from biotac.sim.source import Source
+from biotac.wrench.joined import Board, board_of, choose_finger, join
+from biotac.wrench.provenance import check_serial
+
+FROM_S, TO_S = 105.0, 175.0  # of calibrate.toml: the end of its rest, then a dozen places
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, Source]:
+    """The first three minutes of the calibration scenario, as a board recorded it."""
+    path = tmp_path_factory.mktemp("joined") / "board.mcap"
+    with biotac.open("sim:calibrate.toml") as hand:
+        hand.record(path)
+        hand.read(TO_S)
+        source = hand.link.source
+    assert source is not None
+    return Recording(path), source
+
+
+@pytest.fixture(scope="module")
+def board(recorded: tuple[Recording, Source]) -> Board:
+    recording, _ = recorded
+    its = board_of(recording.wire, recording.frames["t_us"], 0, "BTSIM00000000006")
+    return its.only(its.t_s >= FROM_S)
+
+
+@pytest.fixture(scope="module")
+def reference(recorded: tuple[Recording, Source]) -> Reference:
+    nano17 = Nano17()
+    decoder = RdtDecoder(nano17.scale)
+    at_s, records = nano17.records(recorded[1], 0)
+    decoder.feed(records[at_s < TO_S + 5.0].tobytes())
+    return Reference("nano17.csv", decoder.take(all_of_them=True), nano17.mounting)
+
+
+def truth_of(recorded: tuple[Recording, Source], board: Board) -> np.ndarray:
+    """What the scenario applied in each of the board's frames; the first is the source's first row."""
+    recording, source = recorded
+    assert source.truth is not None
+    row = np.rint((board.t_s - recording.frames["t_us"][0] / 1e6) * 100.0).astype(np.int64)
+    return np.column_stack([source.truth.force_n[row, 0], source.truth.torque_nmm[row, 0]])
+
+
+def test_the_truth_of_every_row(recorded: tuple[Recording, Source], board: Board, reference: Reference) -> None:
+    its = join("board.mcap", board, reference)
+    first_s = recorded[0].frames["t_us"][0] / 1e6
+    # by the emulated clock: 417.3 s when the board's source begins, 60 ppm from then on
+    expected_s = 417.3 + (its.alignment.middle_s - first_s) * (1.0 + 60e-6) - its.alignment.middle_s
+    assert its.alignment.offset_s == pytest.approx(expected_s, abs=0.002)
+    assert its.alignment.peak > 0.9
+    assert its.alignment.runner_up < 0.5
+    np.testing.assert_allclose(its.zero, Nano17().zero, atol=0.02)
+    truth = truth_of(recorded, board)
+    error = its.run.truth - truth[: len(its.run.truth)]
+    # a contact's corners are 0.2 s long; a millisecond off them is what the clocks are known to
+    assert np.sqrt((error[:, :3] ** 2).mean(axis=0)).max() < 0.05
+    assert np.sqrt((error[:, 3:] ** 2).mean(axis=0)).max() < 0.5
+    assert its.on_skin_share > 0.99
+    assert its.run.serial == "BTSIM00000000006"
+    # the board's own signals, to the last bit
+    np.testing.assert_allclose(its.run.counts - its.run.tare, board.e[: len(its.run.counts)], atol=1e-9)
+
+
+def test_three_axes_are_enough_for_force(board: Board, reference: Reference) -> None:
+    samples = replace(reference.samples, torque_nmm=None)
+    its = join("board.mcap", board, replace(reference, samples=samples))
+    assert its.run.truth.shape[1] == 3
+    assert np.isnan(its.on_skin_share)
+
+
+def test_a_reference_of_a_tenth_of_the_rate(
+    recorded: tuple[Recording, Source], board: Board, reference: Reference
+) -> None:
+    its = reference.samples
+    thin = Samples(its.t_s[::10], its.force_n[::10], None)
+    found = join("board.mcap", board, replace(reference, samples=thin)).run.truth
+    truth = truth_of(recorded, board)[: len(found), :3]
+    assert np.sqrt(((found - truth) ** 2).mean(axis=0)).max() < 0.1
+
+
+def test_a_gap_of_the_reference_is_left_out_and_not_bridged(board: Board, reference: Reference) -> None:
+    whole = join("board.mcap", board, reference)
+    its = reference.samples
+    gone = (its.t_s > its.t_s[0] + 135.0) & (its.t_s < its.t_s[0] + 137.0)
+    found = join("board.mcap", board, replace(reference, samples=Samples(its.t_s[~gone], its.force_n[~gone], None)))
+    assert len(whole.run.truth) - len(found.run.truth) == pytest.approx(200, abs=10)
+
+
+def spoilt(reference: Reference, how: str) -> Reference:
+    its = reference.samples
+    t_s, force, torque = its.t_s.copy(), its.force_n.copy(), np.array(its.torque_nmm)
+    mounting = reference.mounting
+    if how == "another run":
+        order = np.argsort((t_s // 1.7 * 0.61803) % 1.0, kind="stable")
+        force, torque = force[order], torque[order]
+    elif how == "jumping clock":
+        t_s[len(t_s) * 4 // 5 :] += 0.08
+    elif how == "newton metres":
+        torque, zero = torque / 1000.0, np.array([0.0])
+        mounting = Mounting(MOUNTING.rotation, zero.repeat(3))
+    elif how == "wrong sign":
+        mounting = Mounting(MOUNTING.rotation, MOUNTING.offset_mm, -1.0)
+    elif how == "wrong offset":
+        mounting = Mounting(MOUNTING.rotation, MOUNTING.offset_mm + np.array([0.0, 25.0, 0.0]))
+    elif how == "grams":
+        force = force * 101.97
+        torque = torque * 101.97
+    elif how == "saturated":
+        force = np.clip(force, None, Nano17().zero[0] + 1.0)
+    elif how == "wandering zero":
+        force = force + np.sin(t_s / 11.0)[:, None]
+    return replace(reference, samples=Samples(t_s, force, torque), mounting=mounting)
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ("another run", r"not aligned: they agree best .* correlate with 0\.\d\d: expected at least 0\.4"),
+        ("jumping clock", r"not aligned: over the run the clocks drift by -?\d+ ppm, and pieces of it lie \d+ ms off"),
+        ("newton metres", r"torque over force is 0\.\d+ mm about the fingertip's centre"),
+        ("wrong sign", r"in 4% of the rows above 1 N the force's line meets the finger's skin"),
+        ("wrong offset", r"in \d+% of the rows above 1 N the force's line meets the finger's skin"),
+        ("grams", r"units of F per RMS count .* gf or mN"),
+        ("saturated", r"read exactly [\d.]+ N along [xyz], the most of all: .* saturated"),
+        ("wandering zero", r"where the board felt nothing the reference says up to \d\.\d\d N"),
+    ],
+)
+def test_a_reference_that_does_not_belong_is_refused(how: str, words: str, board: Board, reference: Reference) -> None:
+    with pytest.raises(RecordingError, match=words):
+        join("board.mcap", board, spoilt(reference, how))
+
+
+def test_a_board_that_says_too_little_is_refused(board: Board, reference: Reference) -> None:
+    with pytest.raises(RecordingError, match="3900 rows: expected at least 4000"):
+        join("board.mcap", board.only(np.arange(len(board.t_s)) < 3900), reference)
+    with pytest.raises(RecordingError, match="never at rest: in 0 frames"):
+        join("board.mcap", replace(board, quiet=np.zeros_like(board.quiet)), reference)
+    missing = board.e.copy()
+    missing[:500, 3] = np.nan
+    with pytest.raises(RecordingError, match=r"500 of \d+ frames have no tare or miss an electrode"):
+        join("board.mcap", replace(board, e=missing), reference)
+    railed = board.counts.copy()
+    railed[::50, 5] = 4095
+    with pytest.raises(RecordingError, match="E6 is saturated"):
+        join("board.mcap", replace(board, counts=railed), reference)
+
+
+def test_a_repeated_press_is_not_a_clear_peak() -> None:
+    t_s = np.arange(6000) * 0.01
+    load = np.maximum(np.sin(t_s * np.pi), 0.0)  # every two seconds the same
+    with pytest.raises(RecordingError, match=r"best agreement \(1\.00\) is not clear, another shift has 1\.00"):
+        align("x", t_s, load, t_s[:5000] + 3.0, load[:5000])
+
+
+def test_fingers_and_serials() -> None:
+    assert choose_finger("rec", [2], None) == 2
+    with pytest.raises(InputError, match="holds fingers 0, 2: expected one; say which with --finger"):
+        choose_finger("rec", [0, 2], None)
+    with pytest.raises(InputError, match="holds fingers 0, 2, not 1"):
+        choose_finger("rec", [0, 2], 1)
+    check_serial("rec", "BTA", "BTA")
+    check_serial("rec", "", "BTA")
+    check_serial("rec", "BTB", "BTA", force=True)
+    with pytest.raises(InputError, match="rec is of sensor BTB, and this is BTA: expected the same"):
+        check_serial("rec", "BTB", "BTA")
+
+
+def test_the_clocks_of_unequal_rates_to_a_fraction_of_a_step() -> None:
+    rng = np.random.default_rng(0)
+    true_s = np.arange(0.0, 120.0, 1e-3)
+    keys = rng.uniform(0.0, 5.0, 400) * (rng.random(400) < 0.6)
+    load = np.interp(true_s, np.cumsum(rng.uniform(0.15, 0.6, 400)), keys)
+    board_s = true_s[::10] + 7.0
+    counts = load[::10] ** 1.3 * 40.0 + rng.normal(0.0, 1.0, len(board_s))
+    reference_s = true_s * (1.0 - 120e-6) - 55.1234
+    its = align("x", board_s, counts, reference_s, load + rng.normal(0.0, 0.02, len(load)))
+    wrong_s = its.to_reference_s(board_s) - ((board_s - 7.0) * (1.0 - 120e-6) - 55.1234)
+    # a fraction of a step, though counts grow faster than force; without the drift the ends would be 7 ms off
+    assert np.abs(wrong_s).max() < 2e-3
+    assert its.drift_ppm == pytest.approx(-120.0, abs=15.0)
+
+
+def test_the_hash_is_of_the_data(tmp_path: Path) -> None:
+    from biotac.wrench.provenance import of_files
+
+    a, b = tmp_path / "a", tmp_path / "b"
+    a.write_bytes(b"counts")
+    b.write_bytes(b"force")
+    its = of_files("BTA", [a, b], "plate", made_s=86_400)
+    # sha256sum of "countsforce"
+    assert its.data_sha256 == __import__("hashlib").sha256(b"countsforce").hexdigest()
+    assert its.made == "1970-01-02 00:00 UTC"
+    b.write_bytes(b"forcf")
+    assert of_files("BTA", [a, b], "plate", made_s=0).data_sha256 != its.data_sha256

@@ -1,0 +1,409 @@
+"""A finger's wrench map on this side of the link: to a board and back, over bad links, in files and recordings."""
+
+from __future__ import annotations
+
+import base64
+import json
+import sys
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from maps import BIG, make_map
+
+import biotac
+from biotac import CalibrationState, _map
+from biotac import _wire as wire
+from biotac.board_map import from_blob
+from biotac.calibration import map_file
+from biotac.calibration.blob import PART_BYTES, for_any_sensor, made_s, serial
+from biotac.cli.main import main
+from biotac.framing import encode
+from biotac.hand import Hand
+from biotac.link.sim_process import SimBoard, SimLink
+from biotac.recording import Recording
+from biotac.recording.recompute import recompute
+from biotac.sim.source import load_source
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import fake_spidev
+from live_board import Clock, point
+
+from biotac.link import spidev_link
+from biotac.link.ports import start_board
+from biotac.link.serial_port import SerialLink
+
+
+def serial_of(hand: biotac.Hand, finger: int) -> str:
+    return bytes(hand.sensor_info(finger).serial).rstrip(b"\0").decode()
+
+
+# ---- the header ------------------------------------------------------------------------------------
+
+
+def test_the_header_is_read_as_the_boards_own_code_reads_it() -> None:
+    blob = make_map(1_763_731_310, serial="BT123")
+    its = from_blob(blob)
+    assert (serial(blob), made_s(blob)) == (its.serial, its.made_s) == ("BT123", 1_763_731_310)
+    assert from_blob(for_any_sensor(blob)).serial == ""
+    assert from_blob(for_any_sensor(blob)).blob == replace(its, serial="").blob
+
+
+@pytest.mark.parametrize("size", [0, _map.HEADER_BYTES - 1, _map.MAX_BYTES + 1])
+def test_what_cannot_be_a_map_by_its_size_is_not_sent(size: int) -> None:
+    with biotac.open("sim:press.toml") as hand:
+        with pytest.raises(biotac.InputError, match=f"has {size} bytes, expected 24 to 20480"):
+            hand.set_map(0, bytes(size))
+        assert hand.status().rx_frames < 10
+
+
+def test_a_map_of_the_librarys_own_goes_as_it_is() -> None:
+    its = from_blob(make_map(3))
+    with biotac.open("sim:press.toml") as hand:
+        hand.set_map(0, its)
+        assert hand.get_map(0) == its.blob
+
+
+def test_another_sensors_is_refused_in_words() -> None:
+    with biotac.open("sim:press.toml") as hand:
+        with pytest.raises(biotac.CommandRefusedError, match=r"EndMap: OTHER_SENSOR .*no serial number to force it"):
+            hand.set_map(0, make_map(1, serial="BTOTHER"))
+        hand.set_map(0, make_map(1, serial="BTOTHER"), force=True)
+        assert serial(hand.get_map(0) or b"") == ""
+
+
+# ---- over bad links --------------------------------------------------------------------------------
+
+
+class Upload:
+    """A board that keeps one finger's map, and spoils what it is told to."""
+
+    def __init__(self, hello: Callable[..., bytes]) -> None:
+        self._hello = hello
+        self.kept = b""
+        self.coming = bytearray()
+        self.begun = False
+        self.told: list[type] = []
+        self.silent: set[int] = set()  # of the commands for maps, by number: done, but not answered
+        self.forgets: set[int] = set()  # restarts before this one
+        self.reads_wrong = False
+
+    def __call__(self, message_id: int, payload: bytes) -> bytes:
+        if message_id == wire.HelloRequest.ID:
+            return self._hello(payload)
+        if wire.MESSAGES[message_id] in (wire.Stop, wire.Ping):
+            return b""
+        number = len(self.told)
+        self.told.append(wire.MESSAGES[message_id])
+        if number in self.forgets:
+            self.begun = False
+        answer = self._answer(wire.MESSAGES[message_id].unpack(payload))
+        return b"" if number in self.silent else encode(answer.ID, answer.pack())
+
+    def _answer(self, asked: object) -> object:
+        if isinstance(asked, wire.GetMap):
+            state = CalibrationState.IN_FORCE if self.kept else CalibrationState.NONE
+            return wire.MapInfo(asked.req_id, 0, state, (0,) * 16, 0, len(self.kept), zlib.crc32(self.kept))
+        if isinstance(asked, wire.ReadMap):
+            data = self.kept[asked.offset : asked.offset + PART_BYTES].ljust(PART_BYTES, b"\xff")
+            data = bytes([data[0] ^ self.reads_wrong]) + data[1:]
+            return wire.MapData(asked.req_id, 0, asked.offset, tuple(data))
+        error = wire.Error.OK
+        if isinstance(asked, wire.BeginMap):
+            self.coming, self.begun = bytearray(asked.size_bytes), True
+        elif isinstance(asked, wire.WriteMap):
+            error = wire.Error.OK if self.begun else wire.Error.NOT_BEGUN
+            data = bytes(asked.data)[: len(self.coming) - asked.offset]
+            self.coming[asked.offset : asked.offset + len(data)] = data
+        elif isinstance(asked, wire.EndMap):
+            if self.begun and zlib.crc32(self.coming) == asked.crc32:
+                self.kept, self.begun = bytes(self.coming), False
+            if zlib.crc32(self.kept) == asked.crc32:
+                return self._answer(wire.GetMap(asked.req_id, 0))
+            error = wire.Error.NOT_BEGUN
+        return wire.Reply(asked.req_id, asked.ID, error)  # type: ignore[attr-defined]
+
+
+@pytest.fixture
+def board(scripted_board, hello, monkeypatch) -> Iterator[tuple[Upload, biotac.Hand]]:
+    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.05)
+    upload = Upload(hello)
+    with biotac.open(scripted_board(upload).path) as hand:
+        yield upload, hand
+
+
+def test_a_lost_reply_is_asked_for_again_at_every_step(board: tuple[Upload, biotac.Hand]) -> None:
+    upload, hand = board
+    blob = make_map(1, blocks=2)
+    steps = 3 + -(-len(blob) // PART_BYTES)  # begin, parts, end, and the question what is there
+    for step in range(steps):
+        upload.told.clear()
+        upload.silent = {step}
+        upload.kept = b""
+        hand.set_map(0, blob)
+        assert upload.kept == blob
+        assert upload.told[step] == upload.told[step + 1]
+
+
+def test_a_board_that_restarts_in_the_middle_is_told_all_of_it_again(board: tuple[Upload, biotac.Hand]) -> None:
+    upload, hand = board
+    blob = make_map(1, blocks=2)
+    last = 1 + -(-len(blob) // PART_BYTES)
+    for step in (1, 2, last):  # a part, another one, the end
+        upload.told.clear()
+        upload.forgets = {step}
+        upload.kept = b""
+        hand.set_map(0, blob)
+        assert (upload.kept, upload.told.count(wire.BeginMap)) == (blob, 2)
+    upload.told.clear()
+    upload.forgets = set(range(100))
+    with pytest.raises(biotac.CommandRefusedError, match="NOT_BEGUN"):
+        hand.set_map(0, blob)
+    assert upload.told.count(wire.BeginMap) == 3
+
+
+def test_a_map_that_comes_back_otherwise_is_an_error(board: tuple[Upload, biotac.Hand]) -> None:
+    upload, hand = board
+    upload.reads_wrong = True
+    with pytest.raises(biotac.PortError, match="does not come whole"):
+        hand.set_map(0, make_map(1, blocks=2))
+
+
+def test_a_board_that_knows_of_no_maps_is_not_asked(scripted_board, hello) -> None:
+    asked: list[int] = []
+
+    def answer(message_id: int, payload: bytes) -> bytes:
+        asked.append(message_id)
+        return hello(payload, wire_minor=3) if message_id == wire.HelloRequest.ID else b""
+
+    with biotac.open(scripted_board(answer).path) as hand:
+        assert hand.maps() == {}
+    assert wire.GetMap.ID not in asked
+
+
+def test_a_board_that_rebooted_gets_its_maps_again(tmp_path: Path) -> None:
+    """The real firmware: a process that dies, and another one of the same serial number behind the same name."""
+    path = tmp_path / "ttyBOARD"
+    boards: list[SimBoard] = []
+
+    def boot(pauses: int) -> None:
+        if not boards or pauses == 2:
+            boards.append(start_board("posix", load_source("press.toml", fingers=2, seconds=60), pace=0.0))
+            boards[-1].release()
+            point(path, boards[-1].path)
+
+    clock = Clock()
+    clock.while_away = boot
+    boot(0)
+    with Hand(SerialLink(str(path)), reconnect=True, timing=clock) as hand:
+        blob = make_map(1, blocks=BIG)
+        hand.set_map(1, make_map(2))
+        hand.set_map(1, blob)
+        hand.set_map(0, blob)
+        hand.clear_map(0)
+        batches = hand.batches()
+        next(batches)
+        boards[0].close()
+        point(path, "")
+        assert any(isinstance(m, biotac.Gap) for batch in batches for m in batch.messages)
+        assert hand.maps() == {1: blob}
+    boards[1].close()
+
+
+# ---- what keeps maps -------------------------------------------------------------------------------
+
+
+class FlashBoard(SimBoard):
+    """A simulated board that keeps its flash in a file."""
+
+    flash: Path
+
+    def _start(self, options: list[str]):
+        return super()._start([*options, "--flash", str(self.flash)])
+
+
+def boot(flash: Path, serials: list[str] | None = None) -> biotac.Hand:
+    source = load_source("press.toml", fingers=2, seconds=1)
+    FlashBoard.flash = flash
+    board = FlashBoard(replace(source, serials=serials) if serials else source, pace=0.0, hold=True)
+    return biotac.Hand(SimLink("sim:flash", board))
+
+
+def test_a_saved_map_holds_after_the_next_boot(tmp_path: Path) -> None:
+    flash = tmp_path / "flash"
+    with boot(flash) as hand:
+        mine, anyones = make_map(1, serial=serial_of(hand, 0), blocks=BIG), make_map(2)
+        hand.set_map(0, mine)
+        hand.set_map(1, anyones)
+        hand.save_settings()
+        hand.clear_map(1)  # not saved
+    with boot(flash) as hand:
+        assert hand.maps() == {0: mine, 1: anyones}
+        hand.clear_map(1)
+        hand.save_settings()
+    with boot(flash, ["BTOTHER", "BTANOTHER"]) as hand:
+        assert hand.map_state(0) == CalibrationState.OTHER_SENSOR
+        assert hand.get_map(0) == mine
+        assert (hand.get_map(1), hand.map_state(1)) == (None, CalibrationState.NONE)
+        assert hand.maps() == {}
+
+
+def test_the_flash_of_a_release_before_there_were_maps_is_taken_over(tmp_path: Path) -> None:
+    flash = tmp_path / "flash"
+    with boot(flash) as hand:
+        hand.set_setting(biotac.Setting.IDLE_PERIOD_MS, 250)
+        hand.save_settings()
+    flash.write_bytes(flash.read_bytes()[:8192])
+    with boot(flash) as hand:
+        assert hand.setting(biotac.Setting.IDLE_PERIOD_MS) == 250
+        assert hand.maps() == {}
+        hand.set_map(1, make_map(1))
+        hand.save_settings()
+    with boot(flash) as hand:
+        assert hand.maps() == {1: make_map(1)}
+
+
+def test_a_computer_with_sensors_of_its_own_keeps_maps_until_it_is_closed(tmp_path: Path, monkeypatch) -> None:
+    bus = fake_spidev.Bus(load_source("press.toml", fingers=2, seconds=1), tmp_path, frozenset())
+    monkeypatch.setitem(sys.modules, "spidev", bus.module())
+    monkeypatch.setattr(spidev_link, "MonotonicClock", lambda: bus.clock)
+    with biotac.open("spidev:0.0,0.1") as hand:
+        maps = {f: make_map(f, serial=serial_of(hand, f), blocks=BIG) for f in range(2)}
+        for finger, blob in maps.items():
+            hand.set_map(finger, blob)
+        hand.set_map(1, maps[1])
+        assert hand.maps() == maps
+    with biotac.open("spidev:0.0,0.1") as hand:
+        assert hand.maps() == {}
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Path:
+    """A recording of two fingers, the second with a map."""
+    path = tmp_path / "two.mcap"
+    with biotac.open("sim:press.toml?fingers=2&seconds=1") as hand:
+        hand.set_map(1, make_map(5, serial=serial_of(hand, 1), blocks=BIG))
+        hand.record(path)
+        hand.read(0.5)
+    return path
+
+
+def test_a_recording_has_the_maps_and_answers_with_them(recorded: Path) -> None:
+    maps = Recording(recorded).maps
+    assert list(maps) == [1]
+    assert from_blob(maps[1]).made_s == 5
+    with biotac.open(f"replay:{recorded}") as hand:
+        assert hand.maps() == maps
+        assert (hand.get_map(0), hand.map_state(0)) == (None, CalibrationState.NONE)
+        assert hand.map_state(1) == CalibrationState.IN_FORCE
+        with pytest.raises(biotac.CommandRefusedError, match="is a recording: BeginMap"):
+            hand.set_map(0, maps[1])
+
+
+def test_a_recording_made_of_one_has_them_too(recorded: Path, tmp_path: Path) -> None:
+    again = tmp_path / "again.mcap"
+    assert main(["check", str(recorded)]) == 0
+    assert main(["recompute", str(recorded), str(again)]) == 0
+    old, new = Recording(recorded), Recording(again)
+    assert new.maps == old.maps
+    assert new.wire.tobytes() == old.wire.tobytes()
+    assert {int(f) for f in new.wire["finger"][(new.wire["flags"] & biotac.FrameFlags.MAPPED) != 0]} == {1}
+    # With another map in force it says so, and is right by that one.
+    recompute(old, tmp_path / "other.mcap", {}, maps={1: make_map(8)})
+    assert Recording(tmp_path / "other.mcap").maps == {1: make_map(8)}
+    assert main(["check", str(tmp_path / "other.mcap")]) == 0
+
+
+def test_info_tells_of_a_map_in_force(recorded: Path, capsys) -> None:
+    assert main(["info", f"replay:{recorded}"]) == 0
+    assert "wrench map made 1970-01-01" in capsys.readouterr().out
+    assert main(["info", f"replay:{recorded}", "--json"]) == 0
+    assert list(json.loads(capsys.readouterr().out)["maps"]) == ["1"]
+
+
+def test_a_recording_of_before_there_were_any_and_a_damaged_one(tmp_path: Path, monkeypatch) -> None:
+    from biotac.recording import writer
+
+    now = writer.describe
+    for name, text in (("old", None), ("short", base64.b64encode(bytes(5)).decode()), ("no", "!")):
+        maps = {} if text is None else {"maps": json.dumps({"0": text})}
+        monkeypatch.setattr(
+            writer, "describe", lambda *a, m=maps: {k: v for k, v in now(*a).items() if k != "maps"} | m
+        )
+        path = tmp_path / f"{name}.mcap"
+        assert main(["record", "sim:press.toml", str(path), "--seconds", "0.3"]) == 0
+        if text is None:
+            assert Recording(path).maps == {}
+        else:
+            with pytest.raises(biotac.RecordingError, match="damaged metadata"):
+                Recording(path)
+
+
+# ---- files and the command line --------------------------------------------------------------------
+
+
+def test_a_file_is_read_back_and_one_that_was_changed_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "thumb.json"
+    blob = make_map(7, serial="BT7")
+    map_file.save(path, blob, {"rmse_n": 0.2})
+    assert map_file.load(path) == blob
+    tree = json.loads(path.read_text())
+    assert (tree["serial"], tree["made_s"], tree["provenance"]) == ("BT7", 7, {"rmse_n": 0.2})
+    worse = bytes([9]) + blob[1:]
+    wrong = {
+        "serial is 'BT8', but its map's is 'BT7'": tree | {"serial": "BT8"},
+        "was changed or cut": tree | {"map": base64.b64encode(blob[:-3]).decode()},
+        "is refused as OUT_OF_RANGE": map_file.to_dict(worse),
+        "no base64": tree | {"map": "?"},
+        "its version is 2": tree | {"version": 2},
+        'no "format"': [],
+    }
+    for words, changed in wrong.items():
+        path.write_text(json.dumps(changed))
+        with pytest.raises(biotac.InputError, match=f"is no wrench map that can be used: .*{words}.*map get"):
+            map_file.load(path)
+
+
+@pytest.fixture
+def port() -> Iterator[str]:
+    board = SimBoard(load_source("press.toml", fingers=2, seconds=60), pace=1.0, hold=True)
+    board.release()
+    yield board.path
+    board.close()
+
+
+def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) -> None:
+    mine, back = tmp_path / "mine.json", tmp_path / "back.json"
+    blob = make_map(1_763_731_310)
+    map_file.save(mine, blob)
+    assert main(["map", "put", port, str(mine), "--finger", "1", "--save"]) == 0
+    said = capsys.readouterr().out
+    assert "finger 1: in force, saved; force and torque, 3 block(s), 984 bytes, for any sensor" in said
+    assert main(["map", "show", port]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert shown[0] == "finger 0: none, the gains hold"
+    assert shown[1].startswith("finger 1: in force; force and torque") and "made 2025-11-21" in shown[1]
+    assert main(["map", "get", port, str(back), "--finger", "1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["crc32"] == f"{zlib.crc32(blob):08x}"
+    assert map_file.load(back) == blob
+    assert main(["map", "clear", port, "--finger", "1"]) == 0
+    assert "the gains hold, until the next reboot" in capsys.readouterr().out
+    assert main(["map", "show", port, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["1"] == {"state": "NONE"}
+
+
+def test_the_verb_forces_another_sensors_map(port: str, tmp_path: Path, capsys) -> None:
+    other = tmp_path / "other.json"
+    map_file.save(other, make_map(1, serial="BTOTHER"))
+    assert main(["map", "put", port, str(other), "--finger", "0"]) == 7
+    assert "OTHER_SENSOR" in capsys.readouterr().err
+    assert main(["map", "put", port, str(other), "--finger", "0", "--force"]) == 0
+    assert "for any sensor" in capsys.readouterr().out
+
+
+def test_the_verb_shows_a_recordings_maps(recorded: Path, capsys) -> None:
+    assert main(["map", "show", str(recorded)]) == 0
+    assert "finger 1: in force; force and torque, 8 block(s)" in capsys.readouterr().out

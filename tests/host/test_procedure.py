@@ -1,0 +1,313 @@
+"""The guided calibration: when a finger is warm, what has been covered, and that nothing recorded is lost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac._wire import FrameFlags
+from biotac.errors import DeviceLostError, InputError
+from biotac.frames import FRAME_DTYPE
+from biotac.recording import Recording
+from biotac.reference import LIN, Samples
+from biotac.reference.csv_file import read_csv
+from biotac.reference.samples import Reference
+from biotac.sim.nano17 import Nano17
+from biotac.sim.nano17_reader import Nano17Reader
+from biotac.sim.source import load_source
+from biotac.wrench.coverage import CELLS_PER_REGION, REGIONS, Coverage, cell_of
+from biotac.wrench.procedure import MAX_WARM_UP_S, TARE_FRAMES, Plan, Procedure, Step
+from biotac.wrench.sources import load
+from biotac.wrench.walk import Places, walk
+
+R = 5.08  # mm, Lin 2013
+
+
+def frames(begin: int, count: int, counts_per_min: float = 0.0, *, finger: int = 0, flags: int = 0) -> np.ndarray:
+    """Rows of one finger, 10 ms apart from ``begin``, that drift."""
+    rows = np.zeros(count, FRAME_DTYPE)
+    k = begin + np.arange(count)
+    rows["finger"], rows["seq"], rows["t_us"], rows["flags"] = finger, k, k * 10_000, flags
+    rows["counts"] = np.rint(3000.0 + counts_per_min / 6000.0 * k)[:, None]
+    return rows
+
+
+def still(seconds: float, begin_s: float = 0.0, force_n: float = 0.0) -> Samples:
+    t_s = begin_s + np.arange(0.0, seconds, 0.002)
+    return Samples(t_s, np.full((len(t_s), 3), force_n), np.zeros((len(t_s), 3)))
+
+
+def press(point: tuple[float, float, float], wrench: np.ndarray | None = None, seconds: float = 1.0) -> Samples:
+    """3 N into the surface at ``point``, and ``wrench`` on top."""
+    at = np.array(point)
+    normal = at * [point[0] > 0, 1.0, 1.0] / np.linalg.norm(at * [point[0] > 0, 1.0, 1.0])
+    force = -3.0 * normal
+    one = np.concatenate([force, np.cross(at, force)]) + (0.0 if wrench is None else wrench)
+    t_s = np.arange(0.0, seconds, 0.002)
+    return Samples(t_s, np.tile(one[:3], (len(t_s), 1)), np.tile(one[3:], (len(t_s), 1)))
+
+
+# ---- warm-up and tare --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("counts_per_min", "warm"), [(0.0, True), (19.0, True), (-19.0, True), (21.0, False), (-40.0, False)]
+)
+def test_a_finger_is_warm_below_the_limit(counts_per_min: float, warm: bool) -> None:
+    its = Procedure(0, LIN)
+    its.frames(frames(0, 5900, counts_per_min))
+    assert its.step is Step.WARM_UP  # a minute is a minute
+    its.frames(frames(5900, 600, counts_per_min))
+    assert (its.step is Step.TARE) == warm
+    assert its.drift_counts_per_min == pytest.approx(counts_per_min, abs=0.5)
+    words = [event.words for event in its.take_events()]
+    assert words[0] == "warming up: leave the finger alone"
+    assert (words[1:] == [f"warm: {its.drift_counts_per_min:+.1f} counts/min over the last minute"]) == warm
+    assert its.take_events() == []
+
+
+def test_the_drift_is_the_last_minutes() -> None:
+    its = Procedure(0, LIN, Plan(max_drift_counts_per_min=5.0))
+    its.frames(frames(0, 12_000, 60.0))
+    assert its.step is Step.WARM_UP
+    rest = frames(12_000, 3_000)
+    rest["counts"] = 3120
+    its.frames(rest)
+    assert its.step is Step.WARM_UP
+    rest = frames(15_000, 3_200)
+    rest["counts"] = 3120
+    its.frames(rest)
+    assert its.step is Step.TARE
+
+
+def test_other_fingers_and_touches_do_not_warm_it_up() -> None:
+    its = Procedure(0, LIN)
+    its.frames(frames(0, 12_000, finger=1))
+    assert its.take_events() == []
+    its.frames(frames(0, 12_000, flags=FrameFlags.CONTACT))
+    assert its.step is Step.WARM_UP
+
+
+def test_a_finger_that_never_gets_warm_is_given_up() -> None:
+    its = Procedure(0, LIN)
+    its.frames(frames(0, 100, 100.0))
+    with pytest.raises(InputError, match=r"after 60 minutes the finger still drifts by .* expected at most 20"):
+        its.frames(frames(round(MAX_WARM_UP_S * 100) + 1, 100, 100.0))
+
+
+def tare(its: Procedure, at: int, *, force_n: float = 0.4) -> int:
+    """Feed until the board is to tare; the next frame's number."""
+    while its.step is Step.WARM_UP:
+        its.frames(frames(at, 500))
+        at += 500
+    its.samples(still(3.0, force_n=force_n))
+    its.frames(frames(at, TARE_FRAMES))
+    assert its.wants_tare
+    return at + TARE_FRAMES
+
+
+def test_the_board_is_asked_again_after_a_refusal_and_quiet() -> None:
+    its = Procedure(0, LIN)
+    at = tare(its, 0)
+    its.tared(accepted=False)
+    assert not its.wants_tare
+    its.frames(frames(at, TARE_FRAMES - 1))
+    assert not its.wants_tare
+    its.frames(frames(at, 1, flags=FrameFlags.CONTACT))
+    its.frames(frames(at, TARE_FRAMES))
+    assert its.wants_tare
+    its.tared(accepted=True)
+    assert not its.wants_tare and its.step is Step.TARE
+    its.frames(frames(at, TARE_FRAMES, flags=FrameFlags.UNTARED))
+    assert its.step is Step.TARE
+    its.frames(frames(at, 1))
+    assert its.step is Step.LOADS
+    assert its.zero is not None
+    np.testing.assert_allclose(its.zero, [0.4, 0.4, 0.4, 0.0, 0.0, 0.0])
+
+
+def test_a_reference_that_moves_is_not_zeroed() -> None:
+    its = Procedure(0, LIN)
+    at = tare(its, 0)
+    moving = still(1.0, 3.0)
+    its.samples(Samples(moving.t_s, moving.force_n + np.linspace(0.0, 1.0, 500)[:, None], moving.torque_nmm))
+    its.tared(accepted=True)
+    its.frames(frames(at, TARE_FRAMES))
+    assert its.step is Step.TARE and its.zero is None
+    assert "the reference moves by 0." in its.take_events()[-1].words
+    its.samples(still(3.0, 5.0))
+    its.frames(frames(at, TARE_FRAMES))
+    assert its.step is Step.LOADS
+    with pytest.raises(InputError, match="no torque: expected six axes"):
+        its.samples(Samples(moving.t_s, moving.force_n, None))
+
+
+# ---- coverage ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("point", "region"),
+    [
+        ((R, 0.0, 0.0), "tip"),
+        ((3.0, 0.0, -np.sqrt(R**2 - 9.0)), "tip"),
+        ((-8.0, 0.0, -R), "pad"),
+        ((-8.0, R * np.sin(0.5), -R * np.cos(0.5)), "pad"),
+        ((-2.0, R * np.sin(0.9), -R * np.cos(0.9)), "side of E11"),
+        ((-15.0, -R * np.sin(0.9), -R * np.cos(0.9)), "side of E1"),
+    ],
+)
+def test_regions(point: tuple[float, float, float], region: str) -> None:
+    its = Coverage()
+    its.add(press(point).wrench(), 0.002)
+    touched = [name for name, cells in zip(REGIONS, its.cells, strict=True) if cells]
+    assert touched == [region]
+    assert its.cells.sum() == 1
+
+
+def test_every_cell_can_be_reached_and_no_other_is_named() -> None:
+    x, angle = np.meshgrid(np.linspace(-15.9, 5.0, 200), np.linspace(-1.5, 1.5, 200))
+    radius = np.sqrt(R**2 - np.maximum(x, 0.0) ** 2)
+    point = np.column_stack([x.ravel(), (radius * np.sin(angle)).ravel(), (-radius * np.cos(angle)).ravel()])
+    normal = point * np.column_stack([point[:, 0] > 0, np.ones((len(point), 2))]) / R
+    region, cell = cell_of(point, normal)
+    assert set(zip(region.tolist(), cell.tolist(), strict=True)) == {
+        (r, c) for r in range(len(REGIONS)) for c in range(CELLS_PER_REGION)
+    }
+
+
+def test_ways_and_forces_by_hand() -> None:
+    its = Coverage()
+    # at the pad's middle: 1 N to the tip, and -4 N mm about z, which is +4 about the outward normal
+    at = np.array([-8.0, 0.0, -R])
+    shear, twist = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -4.0])
+    extra = np.concatenate([shear, np.cross(at, shear) + twist])
+    its.add(press((-8.0, 0.0, -R), extra).wrench(), 0.002)
+    (line,) = [line for line in its.missing() if line.startswith("pad")]
+    # 3 N exactly is neither light nor firm
+    assert line == (
+        "pad: 1 of 8 cells; no light press; no firm press; no shear from the tip; no shear to E11's side; "
+        "no shear to E1's side; no twist the other way"
+    )
+    assert its.missing()[0] == "tip: 0 of 8 cells"
+
+
+def test_too_short_or_too_light_is_not_covered() -> None:
+    its = Coverage()
+    its.add(press((-8.0, 0.0, -R), seconds=0.2).wrench(), 0.002)
+    its.add(0.3 * press((-8.0, 0.0, -R)).wrench(), 0.002)
+    its.add(np.full((500, 6), np.nan), 0.002)
+    assert its.cells.sum() == 0
+    its.add(press((-8.0, 0.0, -R), seconds=0.1).wrench(), 0.002)
+    assert its.cells.sum() == 1
+
+
+# ---- on a simulated board with an emulated Nano17 ----------------------------------------------
+
+
+class Interrupting(Nano17Reader):
+    """Ctrl-C, or a cable that comes out, once the board is at ``at_s``."""
+
+    at_s = 0.0
+    error: type[BaseException] = KeyboardInterrupt
+
+    def read(self, board_s: float) -> Samples:
+        if board_s > self.at_s:
+            raise self.error("pulled out")
+        return super().read(board_s)
+
+
+def walked(
+    folder: Path, scenario: str, at_s: float | None = None, error: type[BaseException] = KeyboardInterrupt
+) -> tuple[Procedure, list[str], Places]:
+    places = Places(folder / "walk.mcap", folder / "walk.csv")
+    words: list[str] = []
+    with biotac.open(f"sim:{scenario}") as hand:
+        assert hand.link.source is not None
+        reader = Interrupting(hand.link.source, 0)
+        reader.at_s, reader.error = (1e9 if at_s is None else at_s), error
+        procedure = Procedure(0, reader.nano17.mounting)
+        walk(hand, reader, procedure, places, show=lambda event: words.append(event.words))
+        assert not hand.streaming
+        hand.set_setting(biotac.Setting.POC_WEIGHTS, 0)  # refused while streaming
+    return procedure, words, places
+
+
+@pytest.fixture(scope="module")
+def everywhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Procedure, list[str], Places]:
+    return walked(tmp_path_factory.mktemp("walk"), "calibrate.toml")
+
+
+def test_a_finger_is_walked_through(everywhere: tuple[Procedure, list[str], Places]) -> None:
+    procedure, words, places = everywhere
+    assert procedure.step is Step.DONE
+    assert procedure.coverage.complete and procedure.coverage.missing() == []
+    assert words[0] == "warming up: leave the finger alone"
+    assert words[1].startswith("warm: ")
+    assert words[2] == Step.LOADS.value
+    assert words[-1] == "covered: tip 8/8, pad 8/8, side of E11 8/8, side of E1 8/8"
+    assert procedure.zero is not None
+    np.testing.assert_allclose(procedure.zero[:3], Nano17().zero[:3], atol=0.01)
+    np.testing.assert_allclose(procedure.zero[3:], Nano17().zero[3:], atol=0.05)
+    recording = Recording(places.recording)
+    assert not recording.problems
+    # it ended by itself, before the script did
+    assert (recording.end_us - recording.begin_us) / 1e6 < 0.9 * len(load_source("calibrate.toml").samples) / 100.0
+
+
+def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedure, list[str], Places]) -> None:
+    _, _, places = everywhere
+    reference = read_csv(places.reference)
+    loaded = load(places.recording, (places.reference, reference), serial="BTSIM00000000006")
+    assert loaded.joined is not None and loaded.joined.on_skin_share > 0.99
+    assert loaded.run.axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+    origin = loaded.provenance(1_700_000_000)
+    assert origin.serial == "BTSIM00000000006"
+    assert origin.files == ("walk.mcap", "walk.csv")
+    assert origin.reference == "walk.csv emulated Nano17"
+    assert origin.mounting is not None and origin.mounting["offset_mm"] == [-5.0, 1.5, 10.0]
+    assert origin.alignment is not None and origin.alignment["peak"] > 0.9
+    with pytest.raises(InputError, match="is of sensor BTSIM00000000006, and this is BT0000000000000A"):
+        load(places.recording, (places.reference, reference), serial="BT0000000000000A")
+    assert load(places.recording, (places.reference, reference), serial="BT0000000000000A", force=True).run.serial
+    with pytest.raises(InputError, match="without a force: expected --reference"):
+        load(places.recording)
+
+
+def test_what_was_left_out_is_said_in_words(tmp_path: Path) -> None:
+    procedure, words, _ = walked(tmp_path, "calibrate_gaps.toml")
+    assert words[-1] == "the simulated finger's script is over"
+    assert procedure.coverage.missing() == [
+        "side of E11: 0 of 8 cells",
+        "tip: no shear to the tip",
+        "pad: no shear to the tip",
+        "side of E1: no shear to the tip",
+    ]
+    assert "missing: side of E11: 0 of 8 cells" in words[-2]
+
+
+@pytest.mark.parametrize("at_s", [20.0, 150.0])
+def test_ctrl_c_ends_it_and_keeps_everything(at_s: float, tmp_path: Path) -> None:
+    procedure, words, places = walked(tmp_path, "calibrate.toml", at_s)
+    assert procedure.step is Step.DONE and words[-1] == "ended on your word"
+    assert (procedure.zero is None) == (at_s < 100.0)
+    recording = Recording(places.recording)
+    assert not recording.problems
+    # to the last byte that came: some seconds come at once where no time passes
+    assert at_s <= (recording.end_us - recording.begin_us) / 1e6 < at_s + 15.0
+    reference = read_csv(places.reference) if at_s > 100.0 else None
+    if reference is not None:
+        # but for the datagrams held back for those that might have been overtaken
+        assert np.ptp(reference.samples.t_s) == pytest.approx(at_s, abs=3.0)
+
+
+def test_a_reference_that_goes_away_leaves_the_files(tmp_path: Path) -> None:
+    with pytest.raises(DeviceLostError):
+        walked(tmp_path, "calibrate.toml", 150.0, DeviceLostError)
+    its = Reference("again", read_csv(tmp_path / "walk.csv").samples, LIN)
+    assert len(its.samples) > 140 * 500
+    assert not Recording(tmp_path / "walk.mcap").problems
+    with pytest.raises(InputError, match="would be overwritten"):
+        walked(tmp_path, "calibrate.toml")

@@ -1,0 +1,404 @@
+"""Force/torque references: what a file must say, what a mounting does, and what a Net F/T box sends."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.writer import Writer
+
+from biotac.errors import DeviceLostError, InputError, RecordingError
+from biotac.reference import LIN, Mounting, Samples
+from biotac.reference.csv_file import CsvWriter
+from biotac.reference.files import read_reference
+from biotac.reference.mounting import read_mounting
+from biotac.reference.net_ft import parse_address, read_configuration
+from biotac.reference.rdt import HOLD_RECORDS, RdtDecoder, Scale, request
+from biotac.sim.nano17 import MOUNTING, RESOLUTION, Nano17
+from biotac.sim.source import load_source
+
+N = 2000
+
+
+def wrench(n: int = N) -> np.ndarray:
+    """Something that presses now and then, with every axis different."""
+    t = np.arange(n) / 100.0
+    return np.column_stack([np.sin(t * (k + 1)) * (k + 1) for k in range(6)])
+
+
+def written(tmp_path: Path, header: str, rows: np.ndarray, comment: str = "") -> Path:
+    path = tmp_path / "plate.csv"
+    lines = [",".join(f"{v:.9g}" for v in row) for row in rows]
+    path.write_text("\n".join([*([comment] if comment else []), header, *lines]) + "\n")
+    return path
+
+
+# ---- mounting ----------------------------------------------------------------------------------
+
+
+def test_a_mounting_turns_by_hand() -> None:
+    # the sensor's z is Lin's x, its x is Lin's y, its y is Lin's z; its origin 10 mm behind Lin's
+    its = Mounting(np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([-10.0, 0.0, 0.0]))
+    # 2 N dorsal through Lin's origin: seen from 10 mm behind it has a moment of -20 N mm about y
+    lin = np.array([[0.0, 0.0, 2.0, 0.0, 0.0, 0.0]])
+    sensor = its.to_sensor(lin)
+    # lin (0, 0, 2) is the sensor's y; the moment (10, 0, 0) x (0, 0, 2) = (0, -20, 0), the sensor's x
+    np.testing.assert_allclose(sensor, [[0.0, 2.0, 0.0, -20.0, 0.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(its.to_finger(sensor), lin, atol=1e-12)
+    on_itself = Mounting(its.rotation, its.offset_mm, -1.0)
+    np.testing.assert_allclose(on_itself.to_finger(-sensor), lin, atol=1e-12)
+    np.testing.assert_allclose(its.to_finger(sensor[:, :3]), lin[:, :3], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('rotation = [[1,0,0],[0,1,0],[0,0,0.9]]\noffset_mm = [0,0,0]\nreads = "force on finger"',
+         r"not orthonormal, R R' is off by 0\.19"),
+        ('rotation = [[1,0,0],[0,1,0],[0,0,-1]]\noffset_mm = [0,0,0]\nreads = "force on finger"', "mirrors"),
+        ('rotation = [[1,0,0],[0,1,0]]\noffset_mm = [0,0,0]\nreads = "force on finger"', r"shape \(2, 3\)"),
+        ('rotation = [[1,0,0],[0,1,0],[0,0,1]]\noffset_mm = [0,0,9e9]\nreads = "force on finger"', "up to 500 mm"),
+        ('rotation = [[1,0,0],[0,1,0],[0,0,1]]\noffset_mm = [0,0,0]\nreads = "both"', "reads is 'both'"),
+        ('rotation = [[1,0,0],[0,1,0],[0,0,1]]\nreads = "force on finger"', "offset_mm is missing"),
+        ('rotation = [["a",0,0],[0,1,0],[0,0,1]]\noffset_mm = [0,0,0]\nreads = "force on finger"', "no numbers"),
+        ("rotation = [", "expected a mounting in TOML"),
+    ],
+)  # fmt: skip
+def test_a_wrong_mounting_is_refused(text: str, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "mounting.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_mounting(str(path))
+
+
+def test_a_mounting_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "mounting.toml"
+    path.write_text('rotation = [[0,1,0],[1,0,0],[0,0,-1]]\noffset_mm = [1,2,3]\nreads = "force on sensor"\n')
+    its = read_mounting(str(path))
+    assert its.rotation.tolist() == [[0, 1, 0], [1, 0, 0], [0, 0, -1]]
+    assert its.offset_mm.tolist() == [1, 2, 3]
+    assert its.sign == -1.0
+    assert read_mounting("lin") is LIN
+
+
+# ---- CSV ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("header", "torque_factor"),
+    [
+        ("t_s,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm", 1.0),
+        ("time [s],Fx [N],Fy [N],Fz [N],Tx [N m],Ty [N m],Tz [N m]", 1000.0),
+        ("t (s),FX (N),FY (N),FZ (N),TX (N*mm),TY (N·mm),TZ (N-mm)", 1.0),
+    ],
+)
+def test_units_of_a_csv_are_read(header: str, torque_factor: float, tmp_path: Path) -> None:
+    its = wrench()
+    rows = np.column_stack([5.0 + np.arange(N) * 0.002, its])
+    found = read_reference(str(written(tmp_path, header, rows)), LIN).samples
+    np.testing.assert_allclose(found.t_s, rows[:, 0], rtol=1e-8)
+    np.testing.assert_allclose(found.force_n, its[:, :3], rtol=1e-8)
+    assert found.torque_nmm is not None
+    np.testing.assert_allclose(found.torque_nmm, its[:, 3:] * torque_factor, rtol=1e-8)
+
+
+def test_a_csv_may_have_three_axes_semicolons_and_other_columns(tmp_path: Path) -> None:
+    path = tmp_path / "plate.csv"
+    its = wrench()
+    lines = [f"{k};{v[2]};{v[0]};{v[1]};{k * 0.01}" for k, v in enumerate(its)]
+    path.write_text("\n".join(["sample;Fz [N];Fx [N];Fy [N];t [s]", *lines]))
+    found = read_reference(str(path), LIN).samples
+    np.testing.assert_allclose(found.force_n, its[:, :3])
+    assert found.torque_nmm is None
+
+
+GOOD = "t_s,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm"
+
+
+@pytest.mark.parametrize(
+    ("header", "change", "words"),
+    [
+        ("t_s,Fx,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm", "", "column 'Fx' has no unit"),
+        ("t_s,Fx_N,Fy_N,Fz_N,Mx,My,Mz", "", "column 'Mx' has no unit"),
+        ("t_ms,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm", "", "'t_ms' is in 'ms': expected t in s"),
+        ("t_s,Fx_gf,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm", "", "is in 'gf'"),
+        ("t_s,Fx_N,Fy_N,a,Mx_Nmm,My_Nmm,Mz_Nmm", "", "no column Fz_N"),
+        ("t_s,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,b", "", "no column Mz_Nmm"),
+        ("t_s,Fx_N,Fx_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm", "", "is there twice"),
+        (GOOD, "milliseconds", "0.5 samples a second: expected 20 to 20000; is t in ms"),
+        (GOOD, "backward", r"time goes from 2\.000000 to 1\.990000 s after sample 1000"),
+        (GOOD, "millinewton", r"force changes by \d+ N .* is it in mN"),
+        (GOOD, "kilonewton", r"force changes by 0\.00\d+ N .* kN"),
+        (GOOD, "nan", "1000 of 2000 samples are not finite, first sample 500"),
+        (GOOD, "words", "at row 2000, column 7.: expected a number in every column"),
+        (GOOD, "one", "1 samples: expected a recording"),
+    ],
+)
+def test_a_csv_that_cannot_be_believed_is_refused(header: str, change: str, words: str, tmp_path: Path) -> None:
+    rows = np.column_stack([np.arange(N) * 0.002, wrench()])
+    if change == "milliseconds":
+        rows[:, 0] *= 1000.0
+    elif change == "backward":
+        rows[1001:, 0] -= 0.012
+    elif change == "millinewton":
+        rows[:, 1:4] *= 1000.0
+    elif change == "kilonewton":
+        rows[:, 1:4] *= 0.001
+    elif change == "nan":
+        rows[500:1500, 2] = np.nan
+    elif change == "one":
+        rows = rows[:1]
+    path = written(tmp_path, header, rows)
+    if change == "words":
+        path.write_text(path.read_text() + "1,2,3,4,5,6,x\n")
+    with pytest.raises(RecordingError, match=words):
+        read_reference(str(path), LIN)
+
+
+def test_a_csv_of_ours_has_its_mounting_and_others_must_be_told(tmp_path: Path) -> None:
+    path = tmp_path / "ours.csv"
+    writer = CsvWriter(path, MOUNTING, "some\nsensor")
+    its = wrench()
+    for begin in (0, 700):
+        part = slice(begin, begin + 700)
+        writer.add(Samples(np.arange(N)[part] * 0.002, its[part, :3], its[part, 3:]))
+    # a kill here loses nothing: what was added can be read before the file is closed
+    found = read_reference(str(path))
+    assert len(found.samples) == 1400
+    writer.close()
+    assert found.sensor == "some sensor"
+    np.testing.assert_array_equal(found.mounting.rotation, MOUNTING.rotation)
+    np.testing.assert_array_equal(found.mounting.offset_mm, MOUNTING.offset_mm)
+    assert read_reference(str(path), LIN).mounting is LIN
+    with pytest.raises(InputError, match="would be overwritten"):
+        CsvWriter(path, MOUNTING, "")
+    bare = written(tmp_path, GOOD, np.column_stack([np.arange(N) * 0.002, its]))
+    with pytest.raises(RecordingError, match="how the sensor is fixed to the finger: expected --mounting"):
+        read_reference(str(bare))
+
+
+# ---- MCAP --------------------------------------------------------------------------------------
+
+
+def mcap_json(path: Path, topics: tuple[str, ...] = ("/ft",), schema: str = "geometry_msgs/WrenchStamped") -> Path:
+    its = wrench()
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        number = writer.register_schema(schema, "jsonschema", b"{}")
+        for topic in topics:
+            channel = writer.register_channel(topic, "json", number)
+            for k, row in enumerate(its.tolist()):
+                message: dict[str, Any] = {
+                    "header": {"stamp": {"sec": 5 + k // 500, "nanosec": k % 500 * 2_000_000}, "frame_id": "ft"},
+                    "wrench": {
+                        "force": dict(zip("xyz", row[:3], strict=True)),
+                        "torque": dict(zip("xyz", [v / 1000.0 for v in row[3:]], strict=True)),
+                    },
+                }
+                writer.add_message(channel, k, json.dumps(message).encode(), k)
+        writer.finish()
+    return path
+
+
+def test_json_wrenches_in_an_mcap_file(tmp_path: Path) -> None:
+    its = wrench()
+    found = read_reference(str(mcap_json(tmp_path / "ft.mcap")), MOUNTING)
+    np.testing.assert_allclose(found.samples.t_s, 5.0 + np.arange(N) * 0.002)
+    np.testing.assert_allclose(found.samples.wrench(), its, atol=1e-12)
+    assert found.mounting is MOUNTING
+    two = mcap_json(tmp_path / "two.mcap", ("/a", "/b"))
+    with pytest.raises(RecordingError, match=r"holds /a, /b: expected one topic .* FILE:TOPIC"):
+        read_reference(str(two), LIN)
+    assert len(read_reference(f"{two}:/b", LIN).samples) == N
+    with pytest.raises(RecordingError, match=r"holds /ft \(other\): expected one topic"):
+        read_reference(str(mcap_json(tmp_path / "other.mcap", schema="other")), LIN)
+    with pytest.raises(RecordingError, match="expected --mounting"):
+        read_reference(str(two))
+    (tmp_path / "no.mcap").write_bytes(b"no")
+    with pytest.raises(RecordingError, match="expected an MCAP file"):
+        read_reference(str(tmp_path / "no.mcap"), LIN)
+    with pytest.raises(InputError, match="unknown kind of reference"):
+        read_reference("plate.xlsx", LIN)
+
+
+def test_wrenches_of_a_ros_2_bag(tmp_path: Path) -> None:
+    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import Writer as Bag
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    make = store.types
+    kind = "geometry_msgs/msg/WrenchStamped"
+    its = wrench(200)
+    with Bag(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        connection = bag.add_connection("/ft", kind, typestore=store)
+        for k, row in enumerate(its):
+            vector = make["geometry_msgs/msg/Vector3"]
+            message = make[kind](
+                make["std_msgs/msg/Header"](
+                    make["builtin_interfaces/msg/Time"](7, k * 2_000_000), "frame of the sensor"
+                ),
+                make["geometry_msgs/msg/Wrench"](vector(*row[:3]), vector(*(row[3:] / 1000.0))),
+            )
+            bag.write(connection, k, store.serialize_cdr(message, kind))
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    found = read_reference(str(file), LIN).samples
+    np.testing.assert_allclose(found.wrench(), its, atol=1e-9)
+    np.testing.assert_allclose(found.t_s, 7.0 + np.arange(200) * 0.002)
+
+
+# ---- RDT ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def sent() -> np.ndarray:
+    """The records of some seconds of an emulated Nano17."""
+    return Nano17().records(load_source("press.toml", seconds=4.0), 0)[1]
+
+
+def test_requests_are_the_manuals_bytes() -> None:
+    assert request(0x0002).hex() == "1234000200000000"
+    assert request(0x0003, 5).hex() == "1234000300000005"
+    assert request(0x0000).hex() == "1234000000000000"
+
+
+def test_a_record_by_hand() -> None:
+    decoder = RdtDecoder(Scale(1_000_000.0, 1000.0, 1000.0))
+    words = [2500, 17500, 0, 1_500_000, -2_000_000, 3_250_000, 4_000, -5_500, 6_000]
+    decoder.feed(b"".join((w % 2**32).to_bytes(4, "big") for w in words))
+    its = decoder.take(all_of_them=True)
+    assert its.t_s.tolist() == [2.5]
+    assert its.wrench().tolist() == [[1.5, -2.0, 3.25, 4.0, -5.5, 6.0]]
+
+
+def test_lost_doubled_and_reordered_datagrams(sent: np.ndarray) -> None:
+    rng = np.random.default_rng(3)
+    lost = set(rng.choice(np.arange(1, len(sent) - 1), 40, replace=False).tolist())
+    kept = [k for k in range(len(sent)) if k not in lost]
+    # up to twenty places out of order, and every hundredth twice
+    order = np.argsort(np.array(kept) + rng.uniform(0.0, 20.0, len(kept)), kind="stable")
+    decoder = RdtDecoder(Nano17().scale)
+    parts = []
+    for count, at in enumerate(order):
+        for _ in range(2 if count % 100 == 0 else 1):
+            decoder.feed(sent[kept[at]].tobytes())
+        if count % 37 == 0:
+            parts.append(decoder.take())
+    parts.append(decoder.take(all_of_them=True))
+    t_s = np.concatenate([part.t_s for part in parts])
+    force = np.concatenate([part.force_n for part in parts])
+    np.testing.assert_allclose(t_s, sent["rdt_sequence"][kept] / 500.0)
+    np.testing.assert_allclose(force, sent["counts"][kept, :3] / 1e6)
+    assert (decoder.lost, decoder.late) == (40, -(-len(order) // 100))
+
+
+def test_what_comes_after_its_turn_is_late_and_lost(sent: np.ndarray) -> None:
+    decoder = RdtDecoder(Nano17().scale)
+    for k in range(200):
+        if k != 50:
+            decoder.feed(sent[k].tobytes())
+    assert len(decoder.take()) == 200 - HOLD_RECORDS - 1
+    decoder.feed(sent[50].tobytes())
+    assert len(decoder.take(all_of_them=True)) == HOLD_RECORDS
+    assert (decoder.lost, decoder.late) == (1, 1)
+
+
+def test_the_sequence_wraps_and_a_restart_is_noticed(sent: np.ndarray) -> None:
+    decoder = RdtDecoder(Scale(1e6, 1e3, 100.0))
+    records = sent[:300].copy()
+    records["rdt_sequence"] = (2**32 - 150 + np.arange(300)) % 2**32
+    decoder.feed(records.tobytes())
+    its = decoder.take(all_of_them=True)
+    np.testing.assert_allclose(np.diff(its.t_s), 0.01, rtol=1e-4)
+    assert decoder.lost == 0
+    decoder = RdtDecoder(Nano17().scale)
+    decoder.feed(sent[:300].tobytes())
+    records["rdt_sequence"] = 1 + np.arange(300)
+    with pytest.raises(DeviceLostError, match="records went from"):
+        decoder.feed(records.tobytes())
+
+
+def test_a_reading_with_the_error_bit_is_nan_and_a_strange_datagram_is_counted(sent: np.ndarray) -> None:
+    records = sent[:100].copy()
+    records["status"][10:13] = 0x8000_0004
+    records["status"][20] = 0x0000_0004  # a word without the summary bit
+    decoder = RdtDecoder(Nano17().scale)
+    decoder.feed(records.tobytes())
+    decoder.feed(b"")
+    decoder.feed(b"x" * 35)
+    its = decoder.take(all_of_them=True)
+    assert np.flatnonzero(np.isnan(its.force_n).any(axis=1)).tolist() == [10, 11, 12]
+    assert (decoder.bad, decoder.refused) == (3, 2)
+
+
+# ---- the emulated Nano17 and the box's configuration -------------------------------------------
+
+
+def test_the_nano17_reads_the_scenario_in_its_own_steps(sent: np.ndarray) -> None:
+    source = load_source("press.toml", seconds=4.0)
+    nano17 = Nano17()
+    board_s, records = nano17.records(source, 0)
+    assert source.truth is not None
+    reading = records["counts"] / np.array([1e6] * 3 + [1e3] * 3)
+    steps = reading / RESOLUTION
+    # a step of torque is 15.625 counts of the box
+    np.testing.assert_allclose(steps, np.rint(steps), atol=0.5 / 15.625 + 1e-9)
+    lin = nano17.mounting.to_finger(reading - nano17.zero)
+    truth = np.column_stack([source.truth.force_n[:, 0], source.truth.torque_nmm[:, 0]])
+    at_s = (np.arange(len(truth)) + 0.5) / 100.0
+    expected = np.column_stack([np.interp(board_s, at_s, column) for column in truth.T])
+    error = lin - expected
+    # a step and its noise: 0.7 and 0.29 steps; the offset's lever turns force noise into moment
+    assert (error[:, :3].std(axis=0) < 1.0 / 320).all()
+    assert (error[:, 3:].std(axis=0) < 12.0 / 320).all()
+    assert np.abs(error.mean(axis=0)).max() < 0.01
+    # its own clock: 60 ppm more samples than the board's time would give
+    assert np.diff(board_s).mean() == pytest.approx(1.0 / 500.0 / (1.0 + 60e-6), rel=1e-9)
+
+
+CONFIGURATION = (
+    "<netft><cfgcpf>1000000</cfgcpf><cfgcpt>1000000</cfgcpt><scfgfu>N</scfgfu><scfgtu>{unit}</scfgtu>"
+    "<comrdte>{rdt}</comrdte><comrdtrate>1000</comrdtrate><cfgcalsn>FT12345</cfgcalsn></netft>"
+)
+
+
+@pytest.mark.parametrize(("unit", "per_nmm"), [("N-m", 1000.0), ("Nm", 1000.0), ("N-mm", 1e6), ("Nmm", 1e6)])
+def test_a_boxs_configuration(unit: str, per_nmm: float) -> None:
+    scale, number = read_configuration(CONFIGURATION.format(unit=unit, rdt="Enabled").encode(), "box")
+    assert (scale.counts_per_n, scale.counts_per_nmm, scale.rate_hz) == (1e6, per_nmm, 1000.0)
+    assert number == "FT12345"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (CONFIGURATION.format(unit="lbf-in", rdt="Enabled"), "counts in 'lbf-in': expected N"),
+        (CONFIGURATION.format(unit="N-m", rdt="Disabled"), "RDT is Disabled"),
+        ("<netft></netft>", "no <comrdte>"),
+        ("<html>", "expected the XML of a Net F/T box"),
+        (CONFIGURATION.format(unit="N-m", rdt="Enabled").replace("1000000", "0"), "expected a number above 0"),
+    ],
+)
+def test_a_configuration_that_cannot_be_used(text: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        read_configuration(text.encode(), "box")
+
+
+def test_addresses() -> None:
+    its = parse_address("netft:192.168.1.1")
+    assert (its.host, its.port, its.scale) == ("192.168.1.1", 49152, None)
+    its = parse_address("netft:box:5000?cpf=2000&cpt=5000&rate=7000")
+    assert its.port == 5000
+    assert its.scale == Scale(2000.0, 5.0, 7000.0)
+    for text, words in (
+        ("netft:", "is unknown: expected netft:HOST"),
+        ("netft:a?speed=1", "option 'speed' is unknown"),
+        ("netft:a?cpf=1", "cpf alone: expected cpf, cpt and rate together"),
+        ("netft:a?cpf=x&cpt=1&rate=1", "an option is no number"),
+    ):
+        with pytest.raises(InputError, match=words):
+            parse_address(text)
