@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +24,7 @@ from ..frames import FORCE_LSB_PER_N, MNMM_PER_NMM, tare_to_q4
 from . import features
 from .features import ELECTRODES, Signals
 from .fitted import WrenchMap
-from .recorded import Floats
+from .recorded import Floats, Run
 
 Q4 = 16
 # What 1 in a column of features is as the board's factor, of which 2^16 is a coefficient's unit.
@@ -62,7 +63,10 @@ class Comparison:
 
 
 def quantise(its: WrenchMap, *, serial: str = "", made_s: int = 0) -> BoardMap:
-    """The map for a board. Raises InputError, naming the block, when a coefficient is beyond its formats."""
+    """The map for a board, without the torsion it may have. Raises InputError, naming the block, when a coefficient is
+    beyond the board's formats.
+    """
+    its = published(its)
     axes = len(its.axes)
     found = _merged(its)
     blocks = tuple(
@@ -77,6 +81,12 @@ def quantise(its: WrenchMap, *, serial: str = "", made_s: int = 0) -> BoardMap:
             f"the map takes {size} bytes: expected at most {_map.MAX_BYTES}, a board's room; choose a smaller model"
         )
     return result
+
+
+def published(its: WrenchMap) -> WrenchMap:
+    """The axes of a map that a FRAME has: force, and torque about Lin's origin."""
+    axes = _map.AXES_MAX if len(its.axes) >= _map.AXES_MAX else 3
+    return dataclasses.replace(its, axes=its.axes[:axes], coefficients=its.coefficients[:, :axes])
 
 
 def _merged(its: WrenchMap) -> dict[tuple[Kind, Gate], Floats]:
@@ -179,7 +189,7 @@ def _evaluated(its: BoardMap, signals: Signals) -> Iterator[tuple[BoardBlock, Fl
 # ---- what the board's rounding can cost --------------------------------------------------------
 
 GATE_OFF = {Gate.ONE: 0.0, Gate.X: 0.6, Gate.Y: 0.6, Gate.XX: 2.6, Gate.XY: 2.6, Gate.YY: 2.6}  # in 2^-19
-RATIO_OFF = 2.0 ** -(_map.CONDUCTANCE_FINE_BITS + 16)  # a unit of 2^-22 in a factor, per unit of a coefficient
+RATIO_OFF = 1.15 * 2.0 ** -(_map.CONDUCTANCE_FINE_BITS + 16)  # 1.15 units of 2^-24, per unit of a coefficient
 
 
 def bound(
@@ -190,7 +200,7 @@ def bound(
     pdc_q4: npt.NDArray[np.int32],
 ) -> Floats:
     """How far the board's result may be off (n, axes) in N and N mm: from ``model``, or without one from exact()."""
-    wanted = _merged(model) if model is not None else {}
+    wanted = _merged(published(model)) if model is not None else {}
     off = np.concatenate([_bound(its, wanted, s) for s in _signals(its, counts, tare_q4, pdc_q4)])
     result: Floats = off / result_units(its.axes)
     return result
@@ -256,7 +266,7 @@ def compare(model: WrenchMap, its: BoardMap, counts: Floats, pdc: Floats | None 
     raw = np.rint(counts).astype(np.uint16)
     tare_q4 = tare_to_q4(np.broadcast_to(model.tare, raw.shape))
     pdc_q4 = np.zeros(len(raw), np.int32) if pdc is None else np.rint(pdc * Q4).astype(np.int32)
-    on_frames = dataclasses.replace(model, tare=tare_q4[0] / Q4)
+    on_frames = dataclasses.replace(published(model), tare=tare_q4[0] / Q4)
     truth = on_frames.predict(raw.astype(np.float64), pdc_q4 / Q4 if model.with_pdc else None)
     force, torque = its.results(raw, tare_q4, pdc_q4)
     got = np.concatenate([force, torque], axis=1)[:, : its.axes] / result_units(its.axes)
@@ -271,4 +281,23 @@ def compare(model: WrenchMap, its: BoardMap, counts: Floats, pdc: Floats | None 
         torque_nmm_max=float(off[:, 3:].max()) if with_torque else None,
         torque_nmm_bound=float(limit[:, 3:].max()) if with_torque else None,
         outside=int((off > limit).sum()),
+    )
+
+
+def summary(model: WrenchMap, run: Run) -> dict[str, Any]:
+    """compare() over a run as JSON; {"refused": in words} for a map that no board can hold."""
+    try:
+        return compare(model, quantise(model), run.counts, run.pdc).as_dict()
+    except InputError as error:
+        return {"refused": str(error)}
+
+
+def words(facts: dict[str, Any]) -> str:
+    """summary() as a line."""
+    if "refused" in facts:
+        return f"on a board: {facts['refused']}"
+    torque = f" and {facts['torque_nmm_max']:.5f} N mm" if facts["torque_nmm_max"] is not None else ""
+    return (
+        f"on a board: {facts['bytes']} bytes, within {facts['force_mn_max']:.3f} mN{torque} of the float model "
+        f"on all {facts['rows']} rows"
     )
