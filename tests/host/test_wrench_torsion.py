@@ -16,7 +16,7 @@ from biotac.experiments import random_loads, shear_torsion
 from biotac.experiments.outcome import Options
 from biotac.sim import surface
 from biotac.sim.physics import Finger
-from biotac.wrench import contact, features, figures, moments, template
+from biotac.wrench import contact, features, figures, models, moments, template
 from biotac.wrench.blocks import BLOCKS, Blocks
 from biotac.wrench.crossvalidation import AIR_SHARES, validate
 from biotac.wrench.recorded import Run, load_run
@@ -197,6 +197,45 @@ def test_air_weighs_as_much_as_the_run_before_its_share(run: Run) -> None:
     count = -1 - run.truth.shape[1]
     assert sums[count, count] == pytest.approx(FRAMES)
     assert not sums[:, count + 1 :].any()  # the truth is 0
+
+
+# ---- ridge, with torque and pressure -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [model.name for model in models.MODELS if model.how == "ridge"])
+def test_ridge_shrinks_toward_lins_geometry_on_all_axes(name: str, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = next(model for model in models.MODELS if model.name == name)
+    sums = moments.moments(run, Blocks(run.rest, run.contact), 1, 0).sum(axis=0)
+    index = models.used(model, len(sums), 7)
+    monkeypatch.setattr(models, "LAMBDAS", np.array([1e12]))
+    found = models.solve(model, sums[np.ix_(index, index)], 7, run.tare)[0]
+    small = features.Signals(np.vstack([np.zeros(19), np.eye(19)]), run.tare, np.zeros(20))
+    own = model.family.index(features.width(with_pdc=True))
+    response = moments.with_one(features.columns(small)[:, own]) @ found
+    slope = response[1:] - response[0]
+    arms = np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL)
+    # about the middle of the pad, where the outward normal is -z
+    turn = -np.cross(surface.ELECTRODE_MM - surface.ELECTRODE_MM.mean(axis=0), surface.ELECTRODE_NORMAL)[:, 2]
+    for axis, lin in enumerate([*surface.ELECTRODE_NORMAL.T, *arms.T, turn]):
+        likeness = abs(slope[:, axis] @ lin) / np.linalg.norm(slope[:, axis]) / np.linalg.norm(lin)
+        assert likeness > 0.999, f"axis {axis}"
+    # pressure says nothing until a run says so
+    pressed = features.Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 100.0]))
+    said = moments.with_one(features.columns(pressed)[:, own]) @ found
+    np.testing.assert_allclose(said[1], said[0], atol=1e-6)
+
+
+def test_pressure_that_never_moved_in_training_goes_nowhere_when_it_does(run: Run) -> None:
+    assert run.pdc is not None
+    still = replace(run, pdc=np.full(FRAMES, 1e-9))
+    model = models.GATED
+    sums = moments.moments(still, Blocks(run.rest, run.contact), 1, 0).sum(axis=0)
+    index = models.used(model, len(sums), 7)
+    found = models.solve(model, sums[np.ix_(index, index)], 7, run.tare)
+    own = model.family.index(features.width(with_pdc=True))
+    pressed = features.Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 500.0]))
+    said = moments.with_one(features.columns(pressed)[:, own]) @ found
+    assert np.abs(said[:, 1] - said[:, 0]).max() < 1e-3
 
 
 # ---- template ----------------------------------------------------------------------------------

@@ -168,7 +168,7 @@ def fit(args: argparse.Namespace, loaded: Loaded, put: Put, more: dict[str, Any]
         progress.done()
     its = loaded.provenance(int(time.time()))
     facts = figures.summary(validation) | loaded.facts() | {"serial": its.serial, "data_sha256": its.data_sha256}
-    facts["fixed_point"] = board.summary(fitted.of(validation), loaded.run)
+    facts["fixed_point"] = board.summary(fitted.of(validation), validation.run)
     if args.out is not None:
         places = _write(validation, its, loaded.files[0], args.out, overwrite=args.force)
         facts["written"] = [str(place) for place in places]
@@ -227,9 +227,15 @@ def _lines(facts: dict[str, Any]) -> list[str]:
         f"  drifted {up} counts:    RMSE {numbers(facts['drift_rmse_n'][0])} N",
         f"  drifted {down} counts:    RMSE {numbers(facts['drift_rmse_n'][1])} N",
         *([f"  torque, x y z:          RMSE {numbers(facts['rmse_nmm'])} N mm"] if "rmse_nmm" in facts else []),
+        *(
+            [f"  torsion:                RMSE {facts['torsion_rmse_nmm']:5.3f} N mm"]
+            if "torsion_rmse_nmm" in facts
+            else []
+        ),
         f"  Lin's three scales:     RMSE {numbers(facts['models']['lin-scales'][:3])} N",
         f"  counts {facts['lag_rows']} rows after the force, {facts['lag_corrected_rows']} corrected; "
         f"mean of {facts['window_rows']} rows",
+        f"  where nothing touches:  {numbers(facts['rest_n'][:1])} N",
         f"  {board.words(facts['fixed_point'])}",
         *[f"  {note}" for note in facts["notes"]],
         *[f"  written: {place}" for place in facts.get("written", [])],

@@ -126,10 +126,9 @@ def _run(
     tare = np.median(counts - e, axis=0)
     moved = float(np.abs(counts - e - tare).max())
     check_units(where, e, truth[:, :3])
-    on_skin = float("nan")
+    on_skin = _on_skin(where, truth) if truth.shape[1] == 6 else float("nan")
     about_torsion: tuple[str, ...] = ()
     if truth.shape[1] == 6:
-        on_skin = _on_skin(where, truth)
         about_normal, about_torsion = torsion.truth(where, None, truth[:, :3], truth[:, 3:])
         truth = np.column_stack([truth, about_normal])
     resting = counts[quiet]

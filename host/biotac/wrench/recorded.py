@@ -46,10 +46,10 @@ class Run:
     ``counts`` (n, 19), ``tare`` (19,) counts; ``truth`` (n, 3) N, or (n, 7) with N mm about the origin and about
     the outward normal at the contact;
     ``pdc`` (n,) counts above rest, or None; ``drift`` (19,) what one count of mean drift does to each
-    electrode; ``rest`` bool (n,), rows without contact; ``notes`` say what was assumed; ``air`` (m, 19) the
-    counts of E_base, or None; ``contact`` (n,) which contact each row belongs to, or None: rows in time; ``serial``
-    is the sensor's number, "" where the recording does not say. ``by_clocks``: force and counts were aligned by
-    their own times.
+    electrode; ``rest`` bool (n,), rows without contact; ``notes`` say what was assumed; ``serial`` is the sensor's
+    number, "" where the recording does not say. ``by_clocks``: force and counts were aligned by their own times.
+    ``air`` (m, 19) are the counts of E_base, or None; ``contact`` (n,) is which contact each row belongs to, or
+    None: rows in time.
     """
 
     name: str
@@ -60,10 +60,10 @@ class Run:
     drift: Floats
     rest: npt.NDArray[np.bool_]
     notes: tuple[str, ...]
-    air: Floats | None = None
-    contact: npt.NDArray[np.int64] | None = None
     serial: str = ""
     by_clocks: bool = False
+    air: Floats | None = None
+    contact: npt.NDArray[np.int64] | None = None
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -98,7 +98,7 @@ def load_run(path: Path) -> Run:
     about_torsion: tuple[str, ...] = ()
     if "M" in fields:
         moment = _truth(path, "M", "N mm", fields["M"], rows)
-        about_normal, about_torsion = torsion.truth(str(path), fields.get("torsion"), force, moment)
+        about_normal, about_torsion = torsion.truth(path, fields.get("torsion"), force, moment)
         truth = np.column_stack([force, moment, about_normal])
     check_rails(path, counts)
     rest: npt.NDArray[np.bool_] = np.linalg.norm(force, axis=1) < REST_N
@@ -112,10 +112,19 @@ def load_run(path: Path) -> Run:
     drift, note = np.ones(len(_sensor.ELECTRODE_NAMES)), "drift: no E_idle, all electrodes taken to drift alike"
     if "E_idle" in fields:
         drift, note = drift_of("E_idle", _counts(path, "E_idle", fields["E_idle"], None))
-    air = _counts(path, "E_base", fields["E_base"], None) if "E_base" in fields else None
-    contact = contacts(path, fields["contact"], rows) if "contact" in fields else None
-    notes = (*notes, note, *about_torsion)
-    return Run(path.name, counts, tare, truth, pdc, drift, rest, notes, air, contact, _serial(path, fields))
+    return Run(
+        path.name,
+        counts,
+        tare,
+        truth,
+        pdc,
+        drift,
+        rest,
+        (*notes, note, *about_torsion),
+        serial=_serial(path, fields),
+        air=_counts(path, "E_base", fields["E_base"], None) if "E_base" in fields else None,
+        contact=contacts(path, fields["contact"], rows) if "contact" in fields else None,
+    )
 
 
 def _counts(path: Path, name: str, array: npt.NDArray[Any], rows: int | None) -> Floats:

@@ -22,7 +22,7 @@ MAX_OFF_MM = 2.0  # how far beside the core a line of action may pass and still 
 
 
 def truth(
-    where: str, given: npt.NDArray[Any] | None, force_n: Floats, moment_nmm: Floats
+    where: object, given: npt.NDArray[Any] | None, force_n: Floats, moment_nmm: Floats
 ) -> tuple[Floats, tuple[str, ...]]:
     """Torsion (n, 1) in N mm about the outward normal, or (n, 0) where there is none to be had, and notes.
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import _wire as wire
+from .._map import HEADER_BYTES
 from ..board_map import from_blob, pdc_above_rest_q4
 from ..errors import InputError, PortError
 from ..frames import StructArray
@@ -55,10 +56,15 @@ def upload(
             f"the board speaks wire {hand.info.wire_major}.{hand.info.wire_minor}: expected 1.{MAP_SINCE_MINOR}, which "
             "has wrench maps; write newer firmware with `biotac flash`"
         )
-    hand.set_map(finger, board.quantise(its, serial=serial, made_s=made_s).blob, force=force)
+    sent = board.quantise(its, serial=serial, made_s=made_s).blob
+    hand.set_map(finger, sent, force=force)
     blob = hand.get_map(finger)
-    if blob is None:
-        raise PortError("the board took the map and has none: expected it back; upload it again")
+    # a forced map's header has no serial number; blocks and coefficients are the same
+    if blob is None or blob[HEADER_BYTES:] != sent[HEADER_BYTES:]:
+        seen = "none" if blob is None else f"another one of {len(blob)} bytes"
+        raise PortError(
+            f"the board took the map of {len(sent)} bytes and has {seen}: expected it back; upload it again"
+        )
     on_board = from_blob(blob)
     comparison = board.compare(its, on_board, np.rint(run.counts), run.pdc if its.with_pdc else None)
     if comparison.outside:

@@ -1,0 +1,90 @@
+"""The whole command: a simulated finger calibrated on an emulated Nano17, its map on a board, proved there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac.board_map import from_blob
+from biotac.cli.main import main
+from biotac.errors import PortError
+from biotac.wrench import fitted, provenance, upload
+from biotac.wrench.sources import load
+
+SERIAL = "BTSIM00000000006"
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder as the command leaves it."""
+    out = tmp_path_factory.mktemp("live") / "calibrated"
+    words = ["--finger", "index", "--reference", "nano17", "--out", str(out)]
+    assert main(["calibrate", "wrench", "--live", "sim:calibrate.toml", *words, "--no-upload"]) == 0
+    return out
+
+
+def fit_again(calibrated: Path, *words: str) -> list[str]:
+    files = [str(calibrated / f"{SERIAL}.mcap"), "--reference", str(calibrated / f"{SERIAL}.csv")]
+    return ["calibrate", "wrench", *files, *words]
+
+
+def test_it_leaves_recording_reference_report_picture_and_map(calibrated: Path) -> None:
+    names = sorted(path.name for path in calibrated.iterdir())
+    assert names == [f"{SERIAL}.{end}" for end in ("csv", "mcap", "md", "png", "wrench.json")]
+    its = provenance.read(calibrated / f"{SERIAL}.wrench.json")
+    assert its is not None
+    assert (its.serial, its.files) == (SERIAL, (f"{SERIAL}.mcap", f"{SERIAL}.csv"))
+    assert its.software.startswith("biotac-gateway ")
+    assert its.alignment is not None and its.alignment["clear"] > 5.0
+    page = (calibrated / f"{SERIAL}.md").read_text(encoding="utf-8")
+    assert its.data_sha256 in page and SERIAL in page
+    assert fitted.load(calibrated / f"{SERIAL}.wrench.json").axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+
+
+def test_the_map_is_on_the_board_and_does_there_what_was_fitted(
+    calibrated: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(fit_again(calibrated, "--upload", "sim:calibrate.toml", "--save", "--json")) == 0
+    facts: dict[str, Any] = json.loads(capsys.readouterr().out)
+    board = facts["board"]
+    # asked for: 1 mN and 0.01 N mm on every row
+    assert board["force_mn_max"] <= 1.0 and board["torque_nmm_max"] <= 0.01
+    assert board["outside"] == 0 and board["rows"] == facts["rows"]
+    assert board["frames_bit_for_bit"] > 0 and board["saved"]
+    assert facts["serial"] == SERIAL
+    # better than Lin's scales on every force, or the procedure recorded the wrong things
+    assert min(facts["better_than_lin"][:3]) > 1.0
+    again = provenance.read(calibrated / f"{SERIAL}.wrench.json")
+    assert again is not None and facts["data_sha256"] == again.data_sha256
+
+
+def test_another_fingers_board_is_refused(calibrated: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(fit_again(calibrated, "--upload", "sim:press.toml")) == 2
+    assert f"is of sensor {SERIAL}, and this is BTSIM00000000001: expected the same" in capsys.readouterr().err
+
+
+def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A board that keeps another map than it was given, by one coefficient."""
+    from biotac.reference.csv_file import read_csv
+
+    reference = calibrated / f"{SERIAL}.csv"
+    loaded = load(calibrated / f"{SERIAL}.mcap", (reference, read_csv(reference)))
+    its = fitted.load(calibrated / f"{SERIAL}.wrench.json")
+    with biotac.open("sim:calibrate.toml") as hand:
+        real = hand.get_map
+
+        def spoilt(finger: int) -> bytes | None:
+            blob = real(finger)
+            assert blob is not None
+            held = from_blob(blob)
+            held.blocks[0].coefficients[0, 2] += np.int64(1)
+            return type(held)(held.axes, held.blocks, held.serial, held.made_s).blob
+
+        monkeypatch.setattr(hand, "get_map", spoilt)
+        with pytest.raises(PortError, match=r"the board took the map of \d+ bytes and has another one of \d+ bytes"):
+            upload.upload(hand, 0, its, loaded.run, serial=SERIAL, made_s=1)
