@@ -43,8 +43,8 @@ enum bt_map_gate {
 #define BT_MAP_RATIO_MAX 3
 
 #define BT_MAP_ONE_Q 15
-#define BT_MAP_CONDUCTANCE_Q 22
-#define BT_MAP_FINE_BITS 8
+#define BT_MAP_CONDUCTANCE_Q 24
+#define BT_MAP_FINE_BITS 10
 #define BT_MAP_GATE_Q 19
 #define BT_MAP_RESULT_Q 16
 #define BT_MAP_EXPONENT_MAX 16

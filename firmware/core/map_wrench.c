@@ -1,5 +1,5 @@
-// A map's sums, in 32-bit products. A column's value is a factor of 16 bits and a sign (conductances: and 8
-// finer bits); times a coefficient it is one or two products more than its high halves', cut to 2^-16 of the
+// A map's sums, in 32-bit products. A column's value is a factor of 16 bits and a sign (conductances have 10
+// finer bits besides); times a coefficient it is two products, one with either half, cut to 2^-16 of the
 // whole.
 #include "map.h"
 
@@ -56,12 +56,12 @@ static int32_t limited(int32_t value, int32_t low, int32_t high)
 #define DIGIT_BITS   12
 
 _Static_assert((int64_t)COUNT_MAX_Q4 *BT_FULL_SCALE_COUNT < 1 << 28, "both terms must have 28 bits");
-_Static_assert(BT_MAP_RATIO_MAX < 4 && 2 * DIGIT_BITS - 2 == BT_MAP_CONDUCTANCE_Q, "two digits must do");
+_Static_assert(BT_MAP_RATIO_MAX < 4 && 2 * DIGIT_BITS == BT_MAP_CONDUCTANCE_Q, "two digits must do");
 
-// num / den in 2^-22, within one unit, for num < 4 den, both below 2^28. Two digits of a quotient by a
-// divisor that is at most 2^-15 too large: each is at most two too small, and what is left over goes into the
-// next one.
-static uint32_t ratio_q22(uint32_t num, uint32_t den)
+// num / den in 2^-24, at most 1.15 units too small, for num < 4 den, both below 2^28. Two digits of a
+// quotient by a divisor that is at most 2^-15 too large: each is at most 1 + 2^12 2^-15 too small, and what
+// the first one leaves over goes into the second.
+static uint32_t ratio_q24(uint32_t num, uint32_t den)
 {
     uint32_t quotient = 0;
     while (den < 1u << 27) {
@@ -77,11 +77,11 @@ static uint32_t ratio_q22(uint32_t num, uint32_t den)
     num = (num << DIGIT_BITS) - digit * den; // modulo 2^32, and below 2^29
     quotient += digit << DIGIT_BITS;
     quotient += BT_DIVIDE_U32(num, divisor);
-    return (quotient + 2) >> 2;
+    return quotient;
 }
 
 // G(count) / G(tare) - 1 = e 4095 / ((4095 - count) tare), e = count - tare; tare in 1/16 count.
-static int32_t conductance_q22(int32_t count, int32_t tare_q4)
+static int32_t conductance_q24(int32_t count, int32_t tare_q4)
 {
     int32_t at_rest_q4 = limited(tare_q4, COUNT_MIN_Q4, COUNT_MAX_Q4);
     int32_t now = limited(count, BT_MAP_COUNT_MIN, BT_MAP_COUNT_MAX);
@@ -91,7 +91,7 @@ static int32_t conductance_q22(int32_t count, int32_t tare_q4)
     if (num >= BT_MAP_RATIO_MAX * den) {
         return BT_MAP_RATIO_MAX << BT_MAP_CONDUCTANCE_Q; // a loss of conductance is never more than all of it
     }
-    return bt_with_sign(ratio_q22(num, den), e_q4);
+    return bt_with_sign(ratio_q24(num, den), e_q4);
 }
 
 static void conductances(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
@@ -100,7 +100,7 @@ static void conductances(const uint16_t counts[BT_ELECTRODES], const uint16_t ta
     for (int i = 0; i < BT_ELECTRODES; i++) {
         int32_t u = 0;
         if (counts[i] != BT_INVALID_COUNT && tare_q4[i] != BT_INVALID_COUNT) {
-            u = conductance_q22(counts[i], tare_q4[i]);
+            u = conductance_q24(counts[i], tare_q4[i]);
         }
         high[i] = bt_shift_down(u, BT_MAP_FINE_BITS);
         fine[i] = u & ((1 << BT_MAP_FINE_BITS) - 1);

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from . import _sensor as sensor
 from . import _wire as wire
+from .board_map import BoardMap, opened
 from .core import FORCE_GAINS, TORQUE_GAINS, Settings, default_settings, ffi, formula_settings, lib
 from .frames import StructArray
+from .wrench.applied import by_map
 
 #: poc_mm, force_n and torque_nmm of one frame, named, in units and with axes as in FRAME_DTYPE.
 RESULT_DTYPE = np.dtype([("poc_mm", "<f8", (3,)), ("force_n", "<f8", (3,)), ("torque_nmm", "<f8", (3,))])
@@ -32,7 +34,15 @@ _buffer = ffi.from_buffer
 _one_frame = lib.bt_one_frame
 
 
-def compute(counts: Any, tare: Any, settings: Settings | None = None, out: StructArray | None = None) -> StructArray:
+def compute(
+    counts: Any,
+    tare: Any,
+    settings: Settings | None = None,
+    out: StructArray | None = None,
+    *,
+    wrench_map: BoardMap | bytes | None = None,
+    pdc_above_rest: Any = None,
+) -> StructArray:
     """Results of recorded counts, as RESULT_DTYPE: shape (n,) for counts (n, 19), () for counts (19,).
 
     ``counts`` are integers 0..4095, 0xFFFF where missing, which weighs nothing; uint16 is read in place,
@@ -41,10 +51,16 @@ def compute(counts: Any, tare: Any, settings: Settings | None = None, out: Struc
     name has its default. ``out``, a contiguous RESULT_DTYPE array of the result's shape, is filled and
     returned: a buffer that was used before spares the page faults of a new one.
 
+    ``wrench_map``, or its blob, gives the force in place of the gains, and the torque where it has six
+    axes; else torque x is made of its force. ``pdc_above_rest`` (n,) or one number, in counts, NaN where
+    missing, is what it may need. Raises InputError for a blob that a board would refuse.
+
     NaN where there is no answer: poc_mm and torque_nmm x if nothing weighs. Where the board rounds to
     its wire units this does not, and it never saturates. Raises ValueError for other shapes, types and
     ranges, with the first bad row, what was seen and what was expected; ``out`` then holds no results.
     """
+    if wrench_map is not None:
+        return by_map(compute(counts, tare, settings, out), opened(wrench_map), counts, tare, pdc_above_rest)
     plan = _DEFAULT_PLAN if settings is None else _plan(settings)
     # One frame in the types that frames have, as on the live path, where the checks would take longer
     # than the maths. Copying 38 and 152 bytes is faster than borrowing two buffers.

@@ -258,7 +258,8 @@ static void an_offset_and_pressure_stand_alone(void **state)
     assert_force(&map, counts, tare_q4, BT_INVALID_I32, BT_INVALID_I32, BT_INVALID_I32, BT_INVALID_I32);
 }
 
-// u = G(c)/G(t) - 1 of every count at some tares, against the real number: within a unit of 2^-22.
+// u = G(c)/G(t) - 1 of every count at some tares, against the real number: at most 1.15 units of 2^-24 too
+// small.
 static void conductance_is_right_at_every_count(void **state)
 {
     (void)state;
@@ -282,9 +283,51 @@ static void conductance_is_right_at_every_count(void **state)
             counts[0] = (uint16_t)c;
             tare_q4[0] = tares[t];
             bt_map_wrench(&map, counts, tare_q4, 0, force, NULL);
-            // A unit of u is 2^-8 of a factor, here 128 of the sum; that begins with 9 and is cut once.
-            assert_true(fabs(force[0] - wanted * scale) < 0.5 + (128 + 10) * scale);
+            // A unit of u is 2^-10 of a factor, here 32 of the sum; that begins with 9 and is cut once.
+            assert_true(fabs(force[0] - wanted * scale) < 0.5 + (1.15 * 32 + 10) * scale);
         }
+    }
+}
+
+// A block of 2^19 times its gate is the gate, in 2^-19; against the real centroid.
+static void gates_are_the_compressions_centroid(void **state)
+{
+    (void)state;
+    static blob its;
+    static const double off[BT_MAP_GATES] = {0, 0.6, 0.6, 2.6, 2.6, 2.6}; // SPEC.md
+    uint64_t seed = 12;
+    double reached[BT_MAP_GATES] = {0};
+    for (int frame = 0; frame < 20000; frame++) {
+        uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
+        double weight = 0, x = 0, y = 0;
+        int alone = frame < 2 * BT_ELECTRODES ? frame / 2 : -1;
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            int64_t size = frame % 4 == 0 ? 65520 : 4000;
+            int64_t e_q4 = alone >= 0 ? (i == alone ? -65520 : 0) : random_range(&seed, -size, size / 4);
+            tare_q4[i] = (uint16_t)(e_q4 < 0 ? -e_q4 : 0);
+            counts[i] = (uint16_t)(e_q4 < 0 ? 0 : e_q4 / 16);
+            double w = (e_q4 < 0 ? (double)-e_q4 : 0) / 16 + 5;
+            weight += w;
+            x += w * bt_electrode_um[i][0] / 8000;
+            y += w * bt_electrode_um[i][1] / 4000;
+        }
+        x /= weight;
+        y /= weight;
+        const double wanted[BT_MAP_GATES] = {1, x, y, x * x, x * y, y * y};
+        for (uint32_t gate = 0; gate < BT_MAP_GATES; gate++) {
+            bt_map map;
+            int32_t force[3];
+            one_block(&its, 3, BT_MAP_KIND_OFFSET, gate, 16, WORD(16, 0));
+            assert_int_equal(opened(&its, &map), BT_ERROR_OK);
+            bt_map_wrench(&map, counts, tare_q4, 0, force, NULL);
+            double error = fabs(force[0] - wanted[gate] * (1 << BT_MAP_GATE_Q));
+            assert_true(error <= off[gate]);
+            assert_true(abs(force[0]) <= BT_MAP_GATE_MAX);
+            reached[gate] = error > reached[gate] ? error : reached[gate];
+        }
+    }
+    for (int gate = 1; gate < BT_MAP_GATES; gate++) {
+        assert_true(reached[gate] > 0.25 * off[gate]); // the bound is about something
     }
 }
 
@@ -533,6 +576,7 @@ int main(void)
         T(a_sum_worked_by_hand),
         T(an_offset_and_pressure_stand_alone),
         T(conductance_is_right_at_every_count),
+        T(gates_are_the_compressions_centroid),
         T(no_count_overflows_a_map_at_its_bounds),
         T(results_saturate_with_their_sign),
         T(torque_is_the_second_three_and_only_where_there_is_one),

@@ -81,6 +81,14 @@ CLAIMS = {
         ("value < 0 ? 0 - (uint32_t)value", "value < 0 ? (uint32_t)-value"),  # undefined for the smallest number
     ),
 }
+for _bits in (16, 19):
+    CLAIMS[f"shift_round_{_bits}"] = Claim(
+        "bt_shift_round",
+        [("value", INT64), _bits],
+        lambda value: z3.And(value > -(2**62), value < 2**62),
+        lambda result, value, bits=_bits: rounded_half_away(result, value, 1 << bits),
+        ("(uint64_t)1 << (bits - 1)", "(uint64_t)1 << (bits - 2)"),
+    )
 # The magnitude, the multiplier and the bits as fix.h states them.
 for _bits in range(1, 8):
     CLAIMS[f"scale_{_bits}"] = Claim(

@@ -20,7 +20,7 @@ from ..identity import ascii_text
 from ..live.fingers import checked_names, finger_index
 from ..reference.files import read_reference
 from ..reference.mounting import read_mounting
-from ..wrench import figures, fitted, provenance, report
+from ..wrench import board, figures, fitted, provenance, report
 from ..wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
 from ..wrench.joined import choose_finger
 from ..wrench.sources import Loaded, load
@@ -167,7 +167,13 @@ def fit(args: argparse.Namespace, loaded: Loaded, put: Put, more: dict[str, Any]
     finally:
         progress.done()
     its = loaded.provenance(int(time.time()))
-    facts = figures.summary(validation) | loaded.facts() | {"serial": its.serial, "data_sha256": its.data_sha256}
+    fixed_point = board.summary(fitted.of(validation), validation.run)
+    facts = (
+        figures.summary(validation)
+        | loaded.facts()
+        | {"fixed_point": fixed_point}
+        | {"serial": its.serial, "data_sha256": its.data_sha256}
+    )
     if args.out is not None:
         places = _write(validation, its, loaded.files[0], args.out, overwrite=args.force)
         facts["written"] = [str(place) for place in places]
@@ -229,21 +235,21 @@ def _lines(facts: dict[str, Any]) -> list[str]:
         f"  Lin's three scales:     RMSE {numbers(facts['models']['lin-scales'][:3])} N",
         f"  counts {facts['lag_rows']} rows after the force, {facts['lag_corrected_rows']} corrected; "
         f"mean of {facts['window_rows']} rows",
+        f"  {board.words(facts['fixed_point'])}",
         *[f"  {note}" for note in facts["notes"]],
         *[f"  written: {place}" for place in facts.get("written", [])],
         *(_board_lines(facts["board"]) if "board" in facts else []),
     ]
 
 
-def _board_lines(board: dict[str, Any]) -> list[str]:
-    torque = "" if board["torque_nmm_max"] is None else f", {board['torque_nmm_max']:.4f} N mm"
-    kept = "kept over a restart" if board["saved"] else "until it restarts; --save keeps it"
-    sent = f"{board['frames_bit_for_bit']} frames it then sent are bit for bit what its map says"
-    if not board["frames_bit_for_bit"]:
+def _board_lines(its: dict[str, Any]) -> list[str]:
+    torque = "" if its["torque_nmm_max"] is None else f", {its['torque_nmm_max']:.4f} N mm"
+    kept = "kept over a restart" if its["saved"] else "until it restarts; --save keeps it"
+    sent = f"{its['frames_bit_for_bit']} frames it then sent are bit for bit what its map says"
+    if not its["frames_bit_for_bit"]:
         sent = "it sent no frame to compare, its simulated finger's script was over"
     return [
-        f"  on the board, {kept}: {board['bytes']} bytes, read back alike",
-        f"  its code on {board['rows']} recorded rows: within {board['force_mn_max']:.3f} mN{torque} of the float "
-        "model",
+        f"  on the board, {kept}: {its['bytes']} bytes, read back alike",
+        f"  its code on {its['rows']} recorded rows: within {its['force_mn_max']:.3f} mN{torque} of the float model",
         f"  {sent}",
     ]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +24,7 @@ from ..frames import FORCE_LSB_PER_N, MNMM_PER_NMM, tare_to_q4
 from . import features
 from .features import ELECTRODES, Signals
 from .fitted import WrenchMap
-from .recorded import Floats
+from .recorded import Floats, Run
 
 Q4 = 16
 # What 1 in a column of features is as the board's factor, of which 2^16 is a coefficient's unit.
@@ -179,7 +180,7 @@ def _evaluated(its: BoardMap, signals: Signals) -> Iterator[tuple[BoardBlock, Fl
 # ---- what the board's rounding can cost --------------------------------------------------------
 
 GATE_OFF = {Gate.ONE: 0.0, Gate.X: 0.6, Gate.Y: 0.6, Gate.XX: 2.6, Gate.XY: 2.6, Gate.YY: 2.6}  # in 2^-19
-RATIO_OFF = 2.0 ** -(_map.CONDUCTANCE_FINE_BITS + 16)  # a unit of 2^-22 in a factor, per unit of a coefficient
+RATIO_OFF = 1.15 * 2.0 ** -(_map.CONDUCTANCE_FINE_BITS + 16)  # 1.15 units of 2^-24, per unit of a coefficient
 
 
 def bound(
@@ -271,4 +272,23 @@ def compare(model: WrenchMap, its: BoardMap, counts: Floats, pdc: Floats | None 
         torque_nmm_max=float(off[:, 3:].max()) if with_torque else None,
         torque_nmm_bound=float(limit[:, 3:].max()) if with_torque else None,
         outside=int((off > limit).sum()),
+    )
+
+
+def summary(model: WrenchMap, run: Run) -> dict[str, Any]:
+    """compare() over a run as JSON; {"refused": in words} for a map that no board can hold."""
+    try:
+        return compare(model, quantise(model), run.counts, run.pdc).as_dict()
+    except InputError as error:
+        return {"refused": str(error)}
+
+
+def words(facts: dict[str, Any]) -> str:
+    """summary() as a line."""
+    if "refused" in facts:
+        return f"on a board: {facts['refused']}"
+    torque = f" and {facts['torque_nmm_max']:.5f} N mm" if facts["torque_nmm_max"] is not None else ""
+    return (
+        f"on a board: {facts['bytes']} bytes, within {facts['force_mn_max']:.3f} mN{torque} of the float model "
+        f"on all {facts['rows']} rows"
     )

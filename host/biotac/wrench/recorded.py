@@ -101,7 +101,7 @@ def load_run(path: Path) -> Run:
     drift, note = np.ones(len(_sensor.ELECTRODE_NAMES)), "drift: no E_idle, all electrodes taken to drift alike"
     if "E_idle" in fields:
         drift, note = drift_of("E_idle", _counts(path, "E_idle", fields["E_idle"], None))
-    return Run(path.name, counts, tare, truth, pdc, drift, rest, (*notes, note), _serial(path, fields))
+    return Run(path.name, counts, tare, truth, pdc, drift, rest, (*notes, note), serial=_serial(path, fields))
 
 
 def _counts(path: Path, name: str, array: npt.NDArray[Any], rows: int | None) -> Floats:

@@ -1,0 +1,36 @@
+"""A board's map over recorded counts in float64, beside the results that need none."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _wire as wire
+from ..board_map import BoardMap
+from ..frames import StructArray, tare_to_q4
+from . import board
+
+
+def by_map(results: StructArray, its: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
+    """``results`` of biotac.compute, with force and torque of a map in place of the gains'; the same array.
+
+    Shapes as there; ``pdc_above_rest`` in counts, (n,), one number, or None: missing. Raises ValueError for
+    a pressure of another shape.
+    """
+    rows = results.reshape(-1)
+    raw = np.asarray(counts).reshape(len(rows), -1).astype(np.uint16)
+    tare_q4 = tare_to_q4(np.broadcast_to(np.asarray(tare, dtype=np.float64), raw.shape))
+    pressure = np.asarray(np.nan if pdc_above_rest is None else pdc_above_rest, dtype=np.float64)
+    if pressure.shape not in ((), (len(rows),)):
+        raise ValueError(f"pdc_above_rest has shape {pressure.shape}, expected ({len(rows)},) or one number")
+    known = np.rint(16 * np.nan_to_num(np.broadcast_to(pressure, len(rows))))
+    pdc_q4 = np.where(np.isnan(pressure), wire.INVALID_I32, known).astype(np.int32)
+    wrench = board.exact(its, raw, tare_q4, pdc_q4)
+    rows["force_n"] = wrench[:, :3]
+    if its.axes > 3:
+        rows["torque_nmm"] = wrench[:, 3:]
+    else:
+        y, z = rows["poc_mm"][:, 1], rows["poc_mm"][:, 2]
+        rows["torque_nmm"][:, 0] = y * wrench[:, 2] - z * wrench[:, 1]
+    return results
