@@ -30,6 +30,7 @@ from .errors import (
 )
 from .framing import encode
 from .link import Link
+from .link.serial_port import went_away
 from .live.gap import Gap, Reason
 from .live.session import Session
 from .live.timing import Timing
@@ -168,22 +169,40 @@ class Conversation(Commands):
         """Read once; False when nothing came within timeout_s. Not while a Reader does."""
         with self._reading:
             try:
-                chunk = self.link.read(timeout_s)
+                return self._receive(timeout_s)
             except DeviceLostError as error:
                 self._lost(error, "unplugged")
                 return True
+
+    def _receive(self, timeout_s: float) -> bool:
+        fd = self.link.fd
+        if fd is None:
+            chunk = self.link.read(timeout_s)
             self._take(chunk)
             return bool(chunk)
+        decoder = self._decoder
+        try:
+            batch = decoder.read(fd, timeout_s)
+        except OSError as error:
+            raise went_away(self.port, error) from error
+        if self._recorder is not None:
+            self._record(self._recorder, b"" if batch is None else decoder.chunk())
+        if batch is None:
+            return False
+        self._hand_out(batch, decoder.arrived_s)
+        return True
 
     def _take(self, chunk: bytes) -> None:
         if self._recorder is not None:
             self._record(self._recorder, chunk)
-        if not chunk:
-            return
-        self._bytes += len(chunk)
-        arrived_s = time.monotonic()
-        batch = self._decoder.feed(chunk)
-        last_us = batch.last_t_us()
+        if chunk:
+            arrived_s = time.monotonic()
+            self._hand_out(self._decoder.feed(chunk), arrived_s)
+
+    def _hand_out(self, batch: Batch, arrived_s: float) -> None:
+        decoder = self._decoder
+        self._bytes += decoder.taken
+        last_us = decoder.last_t_us
         if last_us is not None:
             self.clock.arrived(last_us + LAST_SAMPLE_US, arrived_s)
         self._frames += len(batch.wire)
