@@ -6,7 +6,8 @@
 #include <string.h>
 
 // Rows take their bytes and 16 more; a row took at least its bytes from the input.
-_Static_assert(BT_PAC_BYTES >= 16 && BT_IDLE_BYTES >= 16 && BT_FRAME_BYTES >= 16, "two of their own size suffice");
+_Static_assert(BT_PAC_BYTES >= 16 && BT_IDLE_BYTES >= 16 && BT_FRAME_BYTES >= 16,
+               "two of their own size suffice");
 _Static_assert(BT_IDLE_BYTES > 16 && BT_FRAME_BYTES > 16, "each row may have a gap before it");
 _Static_assert(BT_DECODED_FRAME == 0 && BT_DECODED_PAC == 1 && BT_DECODED_IDLE == 2, "rows come first");
 
@@ -21,7 +22,8 @@ void bt_intake_reset(bt_intake *intake)
     intake->t_us = (bt_unwrapper){0, 0};
 }
 
-// The three kinds of rows begin alike: u16 seq, u32 t_us, u8 finger (test_stream.py holds it against the schema).
+// The three kinds of rows begin alike: u16 seq, u32 t_us, u8 finger (test_stream.py holds it against the
+// schema).
 static uint16_t seq_of(const uint8_t *row)
 {
     return bt_get_u16(row);
@@ -69,6 +71,7 @@ static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t
     const uint8_t *other = decoder->data[BT_DECODED_OTHER];
     int64_t found = 0;
     int64_t last_us = INT64_MIN;
+    int64_t fingers = 0;
     for (uint32_t k = 0; k < decoder->filled[BT_DECODED_IDS]; k++) {
         int kind = decoder->kind[decoder->data[BT_DECODED_IDS][k]];
         if (kind == BT_DECODED_OTHER) {
@@ -97,9 +100,11 @@ static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t
         *seq[kind]++ = bt_number(&intake->rounds, finger_of(row), seq_of(row), rounds_of(kind, row), gap);
         found += gap->missing > 0;
         last_us = now_us > last_us ? now_us : last_us;
+        fingers |= finger_of(row) < 63 ? INT64_C(1) << finger_of(row) : -1;
     }
     intake->facts[BT_INTAKE_GAPS_FOUND] = found;
     intake->facts[BT_INTAKE_LAST_T_US] = last_us;
+    intake->facts[BT_INTAKE_FINGERS] = fingers;
 }
 
 size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes)
@@ -129,10 +134,10 @@ size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes)
     return (size_t)facts[BT_INTAKE_TAKEN];
 }
 
-int64_t bt_intake_read(bt_intake *intake, int fd, int wake_fd, int timeout_ms)
+int64_t bt_intake_read(bt_intake *intake, int fd, double timeout_s)
 {
     int64_t arrived_ns = 0;
-    int64_t got = bt_port_read(fd, wake_fd, timeout_ms, intake->in, sizeof intake->in, &arrived_ns);
+    int64_t got = bt_port_read(fd, timeout_s, intake->in, sizeof intake->in, &arrived_ns);
     if (got > 0) {
         bt_intake_feed(intake, intake->in, (size_t)got);
         intake->facts[BT_INTAKE_ARRIVED_NS] = arrived_ns;

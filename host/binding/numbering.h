@@ -33,8 +33,8 @@ void bt_numbering_reset(bt_numbering *numbering);
 // Whatever numbers come next, nothing was lost before them.
 void bt_numbering_rejoin(bt_numbering *numbering);
 
-// Returns ``seq`` unwrapped, the nearest to this finger's last. The message stands for ``rounds`` numbers up to its
-// own. gap->missing is 0 when there is none; NULL if nobody asks where.
+// Returns ``seq`` unwrapped, the nearest to this finger's last. The message stands for ``rounds`` numbers up
+// to its own. gap->missing is 0 when there is none; NULL if nobody asks where.
 int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_t rounds, bt_gap *gap);
 
 // The value that a counter shows as ``raw``, of all such the one nearest to the last.

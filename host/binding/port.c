@@ -5,9 +5,9 @@
 
 #if defined(_WIN32)
 
-int64_t bt_port_read(int fd, int wake_fd, int timeout_ms, uint8_t *into, size_t room, int64_t *arrived_ns)
+int64_t bt_port_read(int fd, double timeout_s, uint8_t *into, size_t room, int64_t *arrived_ns)
 {
-    (void)fd, (void)wake_fd, (void)timeout_ms, (void)into, (void)room, (void)arrived_ns;
+    (void)fd, (void)timeout_s, (void)into, (void)room, (void)arrived_ns;
     return BT_PORT_ABSENT;
 }
 
@@ -19,6 +19,19 @@ int64_t bt_port_read(int fd, int wake_fd, int timeout_ms, uint8_t *into, size_t 
 #include <unistd.h>
 
 #define TTY_BYTES 4000 // nearly what one tty read gives at most
+#define MOST_MS   3600000
+
+// Rounded up, and never below zero, which poll() takes for ever.
+static int whole_ms(double timeout_s)
+{
+    double ms = timeout_s * 1e3;
+    return ms > 0 ? (ms < MOST_MS ? (int)ms + 1 : MOST_MS) : 0;
+}
+
+static int64_t failure(void)
+{
+    return errno == EINTR || errno == EAGAIN || errno == EWOULDBLOCK ? BT_PORT_AGAIN : -errno;
+}
 
 static int64_t monotonic_ns(void)
 {
@@ -31,17 +44,14 @@ static int64_t monotonic_ns(void)
 #endif
 }
 
-int64_t bt_port_read(int fd, int wake_fd, int timeout_ms, uint8_t *into, size_t room, int64_t *arrived_ns)
+int64_t bt_port_read(int fd, double timeout_s, uint8_t *into, size_t room, int64_t *arrived_ns)
 {
-    struct pollfd watched[] = {{.fd = fd, .events = POLLIN}, {.fd = wake_fd, .events = POLLIN}};
-    int ready = poll(watched, wake_fd < 0 ? 1 : 2, timeout_ms);
+    struct pollfd watched = {.fd = fd, .events = POLLIN};
+    int ready = poll(&watched, 1, whole_ms(timeout_s));
     if (ready <= 0) {
-        return ready == 0 ? BT_PORT_NOTHING : -errno;
+        return ready == 0 ? BT_PORT_NOTHING : failure();
     }
-    if (watched[0].revents == 0) {
-        return BT_PORT_WOKEN;
-    }
-    // One tty read gives 4 KiB at most, and a reader that takes only one per wake-up loses data at high rates.
+    // One tty read gives 4 KiB at most: a reader that takes only one per wake-up loses data at high rates.
     size_t filled = 0;
     ssize_t got;
     do {
@@ -50,10 +60,7 @@ int64_t bt_port_read(int fd, int wake_fd, int timeout_ms, uint8_t *into, size_t 
     } while (got >= TTY_BYTES && room - filled >= TTY_BYTES);
     // What came before the port went is not lost; the next call will see that it went.
     if (filled == 0) {
-        if (got == 0) {
-            return BT_PORT_HUNG_UP;
-        }
-        return errno == EAGAIN || errno == EWOULDBLOCK ? BT_PORT_NOTHING : -errno;
+        return got == 0 ? BT_PORT_HUNG_UP : failure();
     }
     *arrived_ns = monotonic_ns();
     return (int64_t)filled;

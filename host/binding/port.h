@@ -9,13 +9,13 @@
 enum bt_port_outcome {
     BT_PORT_NOTHING = 0,
     BT_PORT_HUNG_UP = -100001,
-    BT_PORT_WOKEN = -100002,
+    BT_PORT_AGAIN =
+        -100002, // a signal came in between, or somebody else took the bytes: the time is not over
     BT_PORT_ABSENT = -100003 // this system has no such ports
 };
 
-// Waits up to timeout_ms for bytes on ``fd``, which does not block, then takes all that are there, at most ``room``,
-// and notes when: arrived_ns is of time.monotonic()'s clock. Comes back without any when wake_fd, unless it is -1, can
-// be read. A signal ends it with -EINTR.
-int64_t bt_port_read(int fd, int wake_fd, int timeout_ms, uint8_t *into, size_t room, int64_t *arrived_ns);
+// Waits up to timeout_s for bytes on ``fd``, which does not block, then takes all that are there, at most
+// ``room``, and notes when: arrived_ns is of time.monotonic()'s clock.
+int64_t bt_port_read(int fd, double timeout_s, uint8_t *into, size_t room, int64_t *arrived_ns);
 
 #endif

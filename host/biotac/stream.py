@@ -6,13 +6,12 @@ so is waiting for a port and reading it (host/binding/port.c).
 
 from __future__ import annotations
 
-import errno
 import os
 import struct
 import time
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,8 @@ from .framing import FramingCounts
 _feed = lib.bt_intake_feed
 _read = lib.bt_intake_read
 _frombuffer = np.frombuffer
-_NOTHING, _WOKEN, _HUNG_UP = (int(value) for value in (lib.BT_PORT_NOTHING, lib.BT_PORT_WOKEN, lib.BT_PORT_HUNG_UP))
+_blank = object.__new__
+_NOTHING, _AGAIN, _HUNG_UP = (int(value) for value in (lib.BT_PORT_NOTHING, lib.BT_PORT_AGAIN, lib.BT_PORT_HUNG_UP))
 _FACTS = struct.Struct(f"={int(lib.BT_INTAKE_FACTS)}q").unpack_from
 _INT64 = np.dtype(np.int64)
 _NO_INT64 = np.frombuffer(b"", _INT64)
@@ -40,7 +40,8 @@ class Batch:
 
     ``wire`` holds the FRAME messages as sent (wire.DTYPES), ``seq`` and ``t_us`` (int64) their unwrapped
     numbers and device times, ``frames`` the same rows in user units, converted when first asked for;
-    ``pac`` is PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order.
+    ``pac`` is PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order. ``fingers`` is a bit mask:
+    others have no row in ``wire`` and ``idle``; -1 where it was not looked at.
     """
 
     wire: StructArray
@@ -49,11 +50,24 @@ class Batch:
     pac: StructArray
     idle: StructArray
     messages: list[Any] = field(default_factory=list)
+    fingers: int = field(default=-1, repr=False)
+    _numbers: bytes = field(default=b"", init=False, repr=False, compare=False)  # begins with seq, then t_us
 
     @cached_property
     def frames(self) -> StructArray:
         """The FRAMEs in user units, FRAME_DTYPE (n,)."""
         return frames_from_wire(self.wire, self.seq, self.t_us)
+
+    if not TYPE_CHECKING:  # for which it would be any attribute
+
+        def __getattr__(self, name: str) -> NDArray[np.int64]:
+            # Two columns of what StreamDecoder makes, when first asked for: most live programs never do.
+            if name not in ("seq", "t_us") or "wire" not in self.__dict__:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            n = len(self.wire)
+            column = _frombuffer(self._numbers, _INT64, n, 8 * n * (name == "t_us")) if n else _NO_INT64
+            setattr(self, name, column)
+            return column
 
     def last_t_us(self) -> int | None:
         """Device time of the latest frame or heartbeat; None without any."""
@@ -159,20 +173,20 @@ class StreamDecoder:
         self.taken, self.last_t_us = size, batch.last_t_us()
         return batch
 
-    def read(self, fd: int, timeout_s: float, wake_fd: int = -1) -> Batch | None:
+    def read(self, fd: int, timeout_s: float) -> Batch | None:
         """Wait for bytes of a port and return what they complete, like ``feed``: all in C, other threads run on.
 
-        None when nothing comes within timeout_s, or ``wake_fd`` can be read first. OSError when the port is gone.
+        None when nothing comes within timeout_s. OSError when the port is gone. POSIX only.
         """
-        got = _read(self._state, fd, wake_fd, int(1000 * timeout_s) + 1)
-        if got == -errno.EINTR:
-            # Python's own handler of the signal runs between these lines.
+        got = _read(self._state, fd, timeout_s)
+        if got == _AGAIN:
+            # Python's own handler of a signal runs between these lines.
             deadline_s = time.monotonic() + timeout_s
-            while got == -errno.EINTR:
-                got = _read(self._state, fd, wake_fd, int(1000 * max(0.0, deadline_s - time.monotonic())) + 1)
+            while got == _AGAIN:
+                got = _read(self._state, fd, deadline_s - time.monotonic())
         if got > 0:
             return self._batch()
-        if got in (_NOTHING, _WOKEN):
+        if got == _NOTHING:
             return None
         raise OSError("it hung up") if got == _HUNG_UP else OSError(-got, os.strerror(-got))
 
@@ -182,20 +196,20 @@ class StreamDecoder:
 
     def _batch(self) -> Batch:
         # What the state has is copied out: the next call writes over it.
-        self.taken, arrived_ns, size, n, pacs, idles, others, gaps, last_us = _FACTS(self._facts)
+        self.taken, arrived_ns, size, n, pacs, idles, others, gaps, last_us, fingers = _FACTS(self._facts)
         self.arrived_s = arrived_ns * 1e-9
         self.last_t_us = last_us if n or idles else None
         raw = self._out[:size]
         at = 16 * (n + pacs + idles)
         if gaps:
             self.lost_after += [(gap.finger, gap.before, gap.missing) for gap in self._state.gaps[0:gaps]]
-        batch = Batch(
-            _frombuffer(raw, FRAME, n, at) if n else NO_FRAME,
-            _frombuffer(raw, _INT64, n) if n else _NO_INT64,
-            _frombuffer(raw, _INT64, n, 8 * n) if n else _NO_INT64,
-            _NO_PAC,
-            _NO_IDLE,
-        )
+        batch = _blank(Batch)
+        batch.wire = _frombuffer(raw, FRAME, n, at) if n else NO_FRAME
+        batch._numbers = raw
+        batch.pac = _NO_PAC
+        batch.idle = _NO_IDLE
+        batch.messages = []
+        batch.fingers = fingers
         if not (pacs or idles or others):
             return batch
         at += n * FRAME.itemsize

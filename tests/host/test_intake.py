@@ -194,30 +194,6 @@ def test_nothing_within_the_time_is_no_batch(port: Port) -> None:
 
 
 @posix
-def test_another_descriptor_ends_the_wait(port: Port) -> None:
-    hear, say = os.pipe()
-    got = []
-    thread = threading.Thread(target=lambda: got.append(port.decoder.read(port.near, 600.0, hear)))
-    thread.start()
-    os.write(say, b"!")
-    thread.join(60)
-    os.close(hear)
-    os.close(say)
-    assert got == [None]
-
-
-@posix
-def test_bytes_go_before_being_woken(port: Port) -> None:
-    hear, say = os.pipe()
-    os.write(say, b"!")
-    os.write(port.far, encode(*START))
-    batch = port.decoder.read(port.near, 60.0, hear)
-    os.close(hear)
-    os.close(say)
-    assert batch is not None and len(batch.messages) == 1
-
-
-@posix
 def test_a_port_that_hangs_up_is_an_error(port: Port) -> None:
     os.close(port.far)
     port.far = -1
