@@ -220,12 +220,12 @@ class Conversation(Commands):
             with self._changed:
                 self._changed.notify_all()
 
-    def _wait_for(self, so: Callable[[], Any], timeout_s: float | None = None) -> None:
-        """Until ``so``, as a reading thread makes it."""
+    def _wait_for(self, so: Callable[[], Any], timeout_s: float | None = None) -> bool:
+        """Until ``so``, as a reading thread makes it; false after timeout_s without it."""
         with self._changed:
             self._waiters += 1
             try:
-                self._changed.wait_for(so, timeout_s)
+                return bool(self._changed.wait_for(so, timeout_s))
             finally:
                 self._waiters -= 1
 
