@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from . import _wire as wire
 from . import compatibility
-from .clock import LAST_SAMPLE_US, DeviceClock
+from .clock import LAST_SAMPLE_US, Arrivals, DeviceClock
 from .commands import Commands, Reply
 from .compatibility import HandWarning, describe_mismatch
 from .errors import (
@@ -30,6 +30,7 @@ from .errors import (
 )
 from .framing import encode
 from .link import Link
+from .link.serial_port import went_away
 from .live.gap import Gap, Reason
 from .live.session import Session
 from .live.timing import Timing
@@ -76,10 +77,12 @@ class Conversation(Commands):
         self._asking = threading.RLock()  # one command at a time
         self._awaiting = 0
         self._changed = threading.Condition()
+        self._waiters = 0  # for _changed
         self._closed = False
         #: Device time as host time, fed by whatever is read; known after a first ``status`` or ``sync``.
         #: A simulated board's time is no clock: it waits for the computer, which shows as ``resets``.
         self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
+        self._arrivals = Arrivals(self.clock)
         try:
             self.info = self._handshake()
         except BaseException:
@@ -167,37 +170,64 @@ class Conversation(Commands):
     def _pump(self, timeout_s: float) -> bool:
         """Read once; False when nothing came within timeout_s. Not while a Reader does."""
         with self._reading:
+            fd = self.link.fd
             try:
-                chunk = self.link.read(timeout_s)
+                if fd is None:
+                    chunk = self.link.read(timeout_s)
+                else:
+                    batch = self._decoder.read(fd, timeout_s)
             except DeviceLostError as error:
                 self._lost(error, "unplugged")
                 return True
-            self._take(chunk)
-            return bool(chunk)
+            except OSError as error:
+                self._lost(went_away(self.port, error), "unplugged")
+                return True
+            if fd is None:
+                self._take(chunk)
+                return bool(chunk)
+            if self._recorder is not None:
+                self._record(self._recorder, b"" if batch is None else self._decoder.chunk())
+            if batch is None:
+                return False
+            self._hand_out(batch, self._decoder.arrived_s)
+            return True
 
     def _take(self, chunk: bytes) -> None:
         if self._recorder is not None:
             self._record(self._recorder, chunk)
-        if not chunk:
-            return
-        self._bytes += len(chunk)
-        arrived_s = time.monotonic()
-        batch = self._decoder.feed(chunk)
-        last_us = batch.last_t_us()
+        if chunk:
+            arrived_s = time.monotonic()
+            self._hand_out(self._decoder.feed(chunk), arrived_s)
+
+    def _hand_out(self, batch: Batch, arrived_s: float) -> None:
+        decoder = self._decoder
+        self._bytes += decoder.taken
+        last_us = decoder.last_t_us
         if last_us is not None:
-            self.clock.arrived(last_us + LAST_SAMPLE_US, arrived_s)
-        self._frames += len(batch.wire)
-        if not (len(batch.wire) or len(batch.pac) or len(batch.idle) or batch.messages):
+            self._arrivals.note(last_us + LAST_SAMPLE_US, arrived_s)
+            self._frames += len(batch.wire)
+        elif not (len(batch.pac) or batch.messages):
             return
         if self._gap is not None:
             first_us = batch.first_t_us()
             if first_us is not None:
                 self._mark(replace(self._gap, next_t_us=first_us), batch)
+        if self._awaiting:
+            self._replies.extend(batch.messages)
+        self._arrived(batch)
+        # Without a lock where nobody waits: whoever comes to wait after this looks first.
+        if self._waiters:
+            with self._changed:
+                self._changed.notify_all()
+
+    def _wait_for(self, so: Callable[[], Any], timeout_s: float | None = None) -> bool:
+        """Until ``so``, as a reading thread makes it; false after timeout_s without it."""
         with self._changed:
-            if self._awaiting:
-                self._replies.extend(batch.messages)
-            self._arrived(batch)
-            self._changed.notify_all()
+            self._waiters += 1
+            try:
+                return bool(self._changed.wait_for(so, timeout_s))
+            finally:
+                self._waiters -= 1
 
     def _record(self, recorder: Recorder, chunk: bytes) -> None:
         try:
@@ -227,8 +257,7 @@ class Conversation(Commands):
                 found.append(got)
             return bool(found) or self._failure is not None or not self.connected or self.closing.is_set()
 
-        with self._changed:
-            self._changed.wait_for(so, timeout_s)
+        self._wait_for(so, timeout_s)
         if not found and self._failure is not None:
             raise self._failure
         return found[0] if found else None
@@ -343,6 +372,7 @@ class Conversation(Commands):
                 self._past.append(self._decoder.stats(0, 0))
                 self._decoder = StreamDecoder()
                 self.clock.restart()
+                self._arrivals.forget()
                 self._checked(self.info)
             # Before START: rows may come with its reply. Two losses without a row between them are one gap.
             gap = self._gap or Gap(reason, self._last_t_us(), None, lost_at_ns, 0, 0)

@@ -22,13 +22,13 @@ _decode = lib.bt_decode
 _from_buffer = ffi.from_buffer
 _unpack = ffi.unpack
 _frombuffer = np.frombuffer
-_FRAME, _PAC, _IDLE = (wire.DTYPES[message_id] for message_id in STREAMED)
-_NO_FRAME, _NO_PAC, _NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (_FRAME, _PAC, _IDLE))
+FRAME, PAC, IDLE = (wire.DTYPES[message_id] for message_id in STREAMED)
+NO_FRAME, NO_PAC, NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (FRAME, PAC, IDLE))
 _KINDS = int(lib.BT_DECODED_KINDS)
-_ONE_STEP_BYTES = int(lib.bt_decode_bytes())
+ONE_STEP_BYTES = int(lib.bt_decode_bytes())
 
 # Not cleared, the reset sets what is read: most of it is room that a short connection never touches.
-_new = ffi.new_allocator(should_clear_after_alloc=False)
+new = ffi.new_allocator(should_clear_after_alloc=False)
 
 
 @dataclass(slots=True)
@@ -45,21 +45,6 @@ class Decoded:
     idles: StructArray
     others: list[tuple[int, bytes]]
     ids: bytes
-
-    def between(self, begin: int, end: int) -> Decoded:
-        """Only the messages from number ``begin`` to before ``end``, counted over all of them from 0."""
-        (frame, pac, idle, other), ends = self._before(begin), self._before(end)
-        return Decoded(
-            self.frames[frame : ends[0]],
-            self.pacs[pac : ends[1]],
-            self.idles[idle : ends[2]],
-            self.others[other : ends[3]],
-            self.ids[begin:end],
-        )
-
-    def _before(self, at: int) -> tuple[int, int, int, int]:
-        frames, pacs, idles = (self.ids.count(message_id, 0, at) for message_id in STREAMED)
-        return frames, pacs, idles, at - frames - pacs - idles
 
     def order(self, message_id: int) -> NDArray[np.intp]:
         """Where among all messages those of ``message_id`` came, counted from 0."""
@@ -84,7 +69,7 @@ class Decoder:
     """
 
     def __init__(self) -> None:
-        self._state: Any = _new("bt_decoder *")
+        self._state: Any = new("bt_decoder *")
         lib.bt_decoder_reset(self._state)
         # Views of the state; they do not keep it alive, self._state does.
         self._filled = self._state.filled
@@ -94,16 +79,16 @@ class Decoder:
     def feed(self, chunk: Buffer) -> Decoded:
         """Take any number of bytes; return what they complete."""
         size = len(chunk)
-        if type(chunk) is bytes and size <= _ONE_STEP_BYTES:
+        if type(chunk) is bytes and size <= ONE_STEP_BYTES:
             # cffi hands the bytes' address over, which is faster than to borrow a buffer. All in one place: to
             # call for the parts is a quarter of the time of a chunk of 4096 bytes.
             _decode(self._state, chunk, size)
             n_frames, n_pacs, n_idles, n_others, n_ids = _unpack(self._filled, _KINDS)
             return Decoded(
-                _frombuffer(self._frames[:n_frames], _FRAME) if n_frames else _NO_FRAME,
-                _frombuffer(self._pacs[:n_pacs], _PAC) if n_pacs else _NO_PAC,
-                _frombuffer(self._idles[:n_idles], _IDLE) if n_idles else _NO_IDLE,
-                _pairs(self._others[:n_others]) if n_others else [],
+                _frombuffer(self._frames[:n_frames], FRAME) if n_frames else NO_FRAME,
+                _frombuffer(self._pacs[:n_pacs], PAC) if n_pacs else NO_PAC,
+                _frombuffer(self._idles[:n_idles], IDLE) if n_idles else NO_IDLE,
+                pairs(self._others[:n_others]) if n_others else [],
                 self._ids[:n_ids],
             )
         steps = [(b"",) * _KINDS]
@@ -115,15 +100,12 @@ class Decoder:
                 # Copies: the next call writes over what this one completed.
                 steps.append(tuple(rows[:n] for rows, n in zip(self._data, _unpack(self._filled, _KINDS), strict=True)))
         frames, pacs, idles, others, ids = (b"".join(parts) for parts in zip(*steps, strict=True))
-        return Decoded(
-            _frombuffer(frames, _FRAME), _frombuffer(pacs, _PAC), _frombuffer(idles, _IDLE), _pairs(others), ids
-        )
+        return Decoded(_frombuffer(frames, FRAME), _frombuffer(pacs, PAC), _frombuffer(idles, IDLE), pairs(others), ids)
 
     @property
     def counts(self) -> FramingCounts:
         """What became of the bytes so far."""
-        _, *outcomes = self._state.outcomes
-        return FramingCounts(*map(int, outcomes))
+        return counts_of(self._state)
 
     @property
     def allow_longer(self) -> bool:
@@ -138,12 +120,18 @@ class Decoder:
         self._state.allow_longer = allow
 
 
-def _pairs(others: bytes) -> list[tuple[int, bytes]]:
+def counts_of(decoder: Any) -> FramingCounts:
+    """What became of the bytes that a C struct bt_decoder was given."""
+    _, *outcomes = decoder.outcomes
+    return FramingCounts(*map(int, outcomes))
+
+
+def pairs(others: bytes) -> list[tuple[int, bytes]]:
     """(message id, payload) of BT_DECODED_OTHER."""
-    pairs = []
+    out = []
     at = 0
     while at < len(others):
         end = at + 2 + others[at + 1]
-        pairs.append((others[at], others[at + 2 : end]))
+        out.append((others[at], others[at + 2 : end]))
         at = end
-    return pairs
+    return out

@@ -105,10 +105,9 @@ class Hand(Streaming):
     def _pump_stream(self) -> None:
         """Wait until there may be a batch."""
         if self._reader is not None and not self._reader.is_here():
-            with self._changed:
-                self._changed.wait_for(
-                    lambda: self._batches.rows or not self._streaming or self._failure or self.closing.is_set(), 1.0
-                )
+            self._wait_for(
+                lambda: self._batches.rows or not self._streaming or self._failure or self.closing.is_set(), 1.0
+            )
         elif self.link.ended:
             self._finish()
         elif not self._pump(SILENCE_S) and not self.link.ended:

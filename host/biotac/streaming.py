@@ -8,8 +8,10 @@ side.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from threading import get_ident
 from typing import Any, TypeVar
 
 from . import _wire as wire
@@ -61,7 +63,10 @@ class Streaming(Conversation):
         self._latest = Latest(timing)
         self._wants: Wants | None = None
         self._quantities = dict.fromkeys(range(MAX_SENSORS), AT_FIRST)
+        self._next: Batch | None = None  # for callbacks, before all that waits in _for_callbacks
+        self._monotonic_s = timing.monotonic_s
         self._heard_s = self._ping_due_s = timing.monotonic_s()
+        self._due_s = -math.inf  # until when keep_up has nothing to do while it streams
         self._ended = False
         super().__init__(link, reconnect=reconnect, timing=timing)
 
@@ -106,7 +111,7 @@ class Streaming(Conversation):
         request = wire.Start(self._next_req_id(), int(streams), fingers, self._keepalive_ms())
         self._command(request)
         self._heard_s = self.timing.monotonic_s()
-        self._ping_due_s = self._heard_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
+        self._due_s = self._ping_due_s = self._heard_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
         self._started = request
         self._streaming = True
         self.link.release()
@@ -248,11 +253,15 @@ class Streaming(Conversation):
     def _arrived(self, batch: Batch) -> None:
         if self._wants is not None:
             batch = self._wants.thin(batch)
-        self._latest.update(batch)
+        self._latest.update(batch, self._monotonic_s())
         if self._pulled:
             self._batches.put(batch)
-        if self._callbacks:
-            self._for_callbacks.put(batch)
+        if self._callbacks.wanted:
+            reader = self._reader
+            if self._next is None and not self._for_callbacks.rows and reader and reader.dispatcher == get_ident():
+                self._next = batch  # it is this thread's turn to hand it out, as the next thing it does
+            else:
+                self._for_callbacks.put(batch)
         for queue in self._queues:
             queue.put(batch)
 
@@ -262,7 +271,7 @@ class Streaming(Conversation):
     def read_once(self, timeout_s: float) -> None:
         """See live.reader.Read."""
         if self._pump(timeout_s):
-            self._heard_s = self.timing.monotonic_s()
+            self._heard_s = self._monotonic_s()
 
     def keep_up(self) -> float:
         """See live.reader.Read."""
@@ -271,27 +280,31 @@ class Streaming(Conversation):
         if self.link.ended:
             self._finish()
             return SILENCE_S
-        now_s = self.timing.monotonic_s()
+        now_s = self._monotonic_s()
+        if now_s < self._due_s:
+            return self._due_s - now_s
         if now_s - self._heard_s >= SILENCE_S:
             self._lost(self._silent(), "silence")
             self._heard_s = now_s = self.timing.monotonic_s()
+        silent_s = self._heard_s + SILENCE_S
         if not self._keepalive_ms():
-            return SILENCE_S
+            self._due_s = silent_s
+            return silent_s - now_s
         if now_s >= self._ping_due_s:
             self._ping_due_s = now_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
             try:
                 self._send(wire.Ping(self._next_req_id()))
             except DeviceLostError as error:
                 self._lost(error, "unplugged")
-        return self._ping_due_s - now_s
+        self._due_s = min(self._ping_due_s, silent_s)
+        return self._due_s - now_s
 
     def wait_for_room(self) -> None:
         """See live.reader.Read."""
         if self.link.pace:
             return
-        with self._changed:
-            full = self._is_full()
-            self._changed.wait_for(lambda: self._awaiting or self.closing.is_set() or not self._is_full())
+        full = self._is_full()
+        self._wait_for(lambda: self._awaiting or self.closing.is_set() or not self._is_full())
         if full:
             self._heard_s = self.timing.monotonic_s()  # it was not the board that was silent
 
@@ -300,10 +313,13 @@ class Streaming(Conversation):
 
     def dispatch(self) -> bool:
         """See live.reader.Read."""
-        batch = self._for_callbacks.take()
+        batch = self._next
         if batch is not None:
-            self._callbacks.call(batch)
-        return batch is not None
+            self._next = None
+        elif (batch := self._for_callbacks.take()) is None:
+            return False
+        self._callbacks.call(batch)
+        return True
 
     def may_relieve(self) -> bool:
         """See live.reader.Read."""

@@ -4,7 +4,7 @@
 // guesses a CRC.
 #include "input.h"
 
-#include "decode.h"
+#include "intake.h"
 
 #include <string.h>
 
@@ -19,6 +19,7 @@ static size_t cuts[MAX_CUTS];
 static size_t cut_count;
 
 static bt_decoder decoder;
+static bt_intake intake; // the same stream, numbered
 static struct {
     bt_deframer deframer;
     uint64_t outcomes[BT_DECODE_OUTCOMES];
@@ -94,6 +95,24 @@ static void expect(const uint8_t *bytes, size_t count)
     }
 }
 
+// The intake's rows are the decoder's, behind two numbers for each.
+static void check_rows(void)
+{
+    const uint8_t *at = (const uint8_t *)intake.out;
+    for (int k = BT_INTAKE_FRAMES; k <= BT_INTAKE_IDLES; k++) {
+        at += 16 * intake.facts[k];
+    }
+    for (int kind = 0; kind <= BT_DECODED_OTHER; kind++) {
+        if (memcmp(at, want.data[kind], want.filled[kind]) != 0) {
+            FAIL("rows of kind %d differ", kind);
+        }
+        at += want.filled[kind];
+    }
+    if (at - (const uint8_t *)intake.out != intake.facts[BT_INTAKE_OUT_BYTES]) {
+        FAIL("%d bytes are handed out", (int)intake.facts[BT_INTAKE_OUT_BYTES]);
+    }
+}
+
 static void check_chunk(const uint8_t *bytes, size_t count)
 {
     uint8_t *chunk = malloc(count + !count); // exactly as long, so that the sanitizer sees what reads past it
@@ -104,6 +123,10 @@ static void check_chunk(const uint8_t *bytes, size_t count)
             FAIL("of %zu bytes %zu are taken", count - at, taken);
         }
         expect(chunk + at, taken);
+        if (bt_intake_feed(&intake, chunk + at, taken) != taken) {
+            FAIL("of %zu bytes not all are numbered", taken);
+        }
+        check_rows();
         at += taken;
         for (int kind = 0; kind < BT_DECODED_KINDS; kind++) {
             if (decoder.filled[kind] != want.filled[kind]
@@ -128,7 +151,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
     filled = cut_count = 0;
     memset(&want, 0, sizeof want);
     bt_decoder_reset(&decoder);
-    decoder.allow_longer = take_u8(&in) & 1;
+    bt_intake_reset(&intake);
+    decoder.allow_longer = intake.decoder.allow_longer = take_u8(&in) & 1;
     read_steps(&in);
     size_t begin = 0;
     for (size_t k = 0; k < cut_count; k++) {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from biotac import _wire as wire
 from biotac.bench import flood, live
 from biotac.cli.main import main
 from biotac.decode import Decoder
+from biotac.framing import encode
 
 
 def test_the_flood_is_good_frames_of_five_fingers() -> None:
@@ -50,3 +52,16 @@ def test_without_cobs_it_says_what_to_install(monkeypatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "cobs", None)
     with pytest.raises(live.InputError, match="biotac-gateway"):
         live.measure()
+
+
+def test_answers_wait_their_turn_behind_a_frame_that_is_half_sent() -> None:
+    near, far = os.pipe()
+    board = flood.Board.__new__(flood.Board)
+    board._master, board._decoder = near, Decoder()
+    os.write(far, encode(wire.Ping.ID, wire.Ping(9).pack()))
+    half = flood.frames(1)[0][50:]
+    ring = bytearray(half)
+    assert board.serve(ring) is False
+    os.close(near)
+    os.close(far)
+    assert ring == half + encode(wire.Reply.ID, wire.Reply(9, wire.Ping.ID, 0).pack())

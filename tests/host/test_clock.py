@@ -17,7 +17,7 @@ import biotac
 import biotac.clock
 from biotac import _sensor as sensor
 from biotac import _wire as wire
-from biotac.clock import LAST_SAMPLE_US, DeviceClock, channel_t_us, electrode_t_us, pac_t_us
+from biotac.clock import LAST_SAMPLE_US, Arrivals, DeviceClock, channel_t_us, electrode_t_us, pac_t_us
 from biotac.clock.band import between
 from biotac.clock.segment import WANDER_PER_S
 from biotac.framing import encode
@@ -332,3 +332,35 @@ def test_a_recording_has_a_clock_too(tmp_path: Path) -> None:
     bound_s = clock.uncertainty_s(t_us)
     assert (np.abs(error_s) <= bound_s).all()
     assert np.median(bound_s) < 0.003
+
+
+class Heard:
+    """In place of a DeviceClock: what it was told."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[int, float]] = []
+
+    def arrived(self, t_us: int, host_s: float) -> None:
+        self.told.append((t_us, host_s))
+
+
+def test_of_a_fast_link_the_clock_is_told_the_quickest_of_every_20_ms() -> None:
+    clock = Heard()
+    arrivals = Arrivals(clock)  # type: ignore[arg-type]
+    delays_us = [900, 500, 100, 700, 800, 300, 600, 200]
+    for k in range(400):  # a message each 5 ms
+        delay_us = delays_us[k % 8]
+        arrivals.note(5_000 * k, 5.0 + (5_000 * k + delay_us) / 1e6)
+    assert clock.told[0] == (0, pytest.approx(5.0009))
+    lags_us = [round((host_s - 5.0) * 1e6) - t_us for t_us, host_s in clock.told[1:]]
+    assert set(lags_us) <= {100, 200, 300} and len(lags_us) >= 79
+
+
+def test_what_came_before_a_restart_is_not_told_after_it() -> None:
+    clock = Heard()
+    arrivals = Arrivals(clock)  # type: ignore[arg-type]
+    arrivals.note(10**9, 50.0)
+    arrivals.note(10**9 + 5_000, 50.005)
+    arrivals.forget()
+    arrivals.note(1_000, 50.03)
+    assert clock.told == [(10**9, 50.0), (1_000, 50.03)]

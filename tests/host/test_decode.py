@@ -150,15 +150,6 @@ def test_a_reused_read_buffer_is_taken_and_let_go() -> None:
     assert [m for decoded in got for m in decoded.messages()] == sent
 
 
-def test_a_part_of_a_chunk_has_the_messages_of_that_part() -> None:
-    sent = messages(np.random.default_rng(10), 60)
-    decoded = Decoder().feed(b"".join(encode(*m) for m in sent))
-    for begin, end in ((0, 60), (0, 0), (13, 47), (59, 60), (60, 60)):
-        part = decoded.between(begin, end)
-        assert part.messages() == sent[begin:end]
-        assert_rows_are_those_of(part, sent[begin:end])
-
-
 def test_a_delimiter_that_never_comes_fills_no_memory_and_costs_one_frame() -> None:
     decoder = Decoder()
     for _ in range(100):

@@ -54,8 +54,7 @@ def send(there: SimpleNamespace, *frames: bytes) -> None:
 
 
 def until(hand: Hand, so) -> None:
-    with hand._changed:
-        assert hand._changed.wait_for(so, WAIT_S)
+    assert hand._wait_for(so, WAIT_S)
 
 
 def test_without_reconnect_a_pulled_cable_is_an_error(world) -> None:

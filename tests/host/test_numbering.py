@@ -1,15 +1,14 @@
-"""Unwrapped numbers and counted gaps, against a plain loop over one message at a time."""
+"""Unwrapped numbers and counted gaps (host/binding/numbering.c), against a plain loop over one message at a time."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from biotac.numbering import Numbering, Unwrapper
+from biotac.core import ffi, lib
 
 
 class Loop:
-    """What Numbering answers to: one number at a time, in Python's whole numbers."""
+    """What the compiled numbering answers to: one number at a time, in Python's whole numbers."""
 
     def __init__(self) -> None:
         self.last: dict[int, int] = {}
@@ -43,43 +42,31 @@ def numbers(random: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray
     return finger, seq, rounds
 
 
-@pytest.mark.parametrize("longest", [1, 7, 400])
-def test_any_batches_number_and_count_as_one_message_at_a_time(longest: int) -> None:
-    random = np.random.default_rng(longest)
-    finger, seq, rounds = numbers(random, 4000)
-    many, one = Numbering(), Loop()
-    at = 0
-    while at < len(seq):
-        part = slice(at, at + int(random.integers(1, longest + 1)))
-        got = many.extend(finger[part], seq[part], rounds[part])
-        want = [one.extend(*map(int, each)) for each in zip(finger[part], seq[part], rounds[part], strict=True)]
-        assert got.tolist() == want
-        at = part.stop
+def test_numbers_go_on_and_gaps_are_found_as_in_whole_numbers() -> None:
+    random = np.random.default_rng(1)
+    compiled, loop = ffi.new("bt_numbering *"), Loop()
+    lib.bt_numbering_reset(compiled)
+    gap, gaps = ffi.new("bt_gap *"), []
+    for finger, seq, rounds in zip(*(column.tolist() for column in numbers(random, 12_000)), strict=True):
+        assert lib.bt_number(compiled, finger, seq, rounds, gap) == loop.extend(finger, seq, rounds)
+        if gap.missing:
+            gaps.append((gap.finger, gap.before, gap.missing))
         if random.random() < 0.05:
-            many.rejoin()
-            one.joined.clear()
-    assert sorted(many.gaps) == sorted(one.gaps)
-    assert many.lost == sum(lost for *_, lost in one.gaps)
-    assert many.disordered == one.disordered
-    assert len(one.gaps) > 100 and one.disordered > 100
+            lib.bt_numbering_rejoin(compiled)
+            loop.joined.clear()
+    assert gaps == loop.gaps
+    assert compiled.lost == sum(lost for *_, lost in loop.gaps)
+    assert compiled.disordered == loop.disordered
+    assert len(gaps) > 100 and loop.disordered > 100
 
 
-def test_without_messages_nothing_happens() -> None:
-    numbering = Numbering()
-    empty = np.empty(0, np.uint8)
-    assert len(numbering.extend(empty, empty, 1)) == 0
-    assert (numbering.lost, numbering.disordered, numbering.gaps) == (0, 0, [])
-
-
-@pytest.mark.parametrize("longest", [1, 5, 1000])
-def test_device_time_goes_on_over_its_wraps_in_any_batches(longest: int) -> None:
-    random = np.random.default_rng(longest)
-    truth = 2**32 - 10**6 + np.cumsum(random.integers(-1000, 2**30, 1000))
-    clock = Unwrapper(32)
-    at, got = 0, []
-    while at < len(truth):
-        size = int(random.integers(0, longest + 1))
-        got += clock.extend((truth[at : at + size] % 2**32).astype("<u4")).tolist()
-        at += size
+def test_device_time_goes_on_over_its_wraps() -> None:
+    truth = 2**32 - 10**6 + np.cumsum(np.random.default_rng(2).integers(-1000, 2**30, 1000))
+    clock = ffi.new("bt_unwrapper *")
+    got = []
+    for raw in (truth % 2**32).tolist():
+        peeked = lib.bt_unwrapped(clock, raw)
+        got.append(lib.bt_unwrap(clock, raw))
+        assert peeked == got[-1]
     assert (np.array(got) - got[0]).tolist() == (truth - truth[0]).tolist()
     assert got[0] == truth[0] % 2**32

@@ -7,6 +7,7 @@ import pytest
 from tests.support.deframer import Deframer
 
 from biotac import _wire as wire
+from biotac.decode import STREAMED
 from biotac.framing import encode
 from biotac.stream import StreamDecoder
 
@@ -198,3 +199,22 @@ def test_lost_pac_blocks_are_counted_apart() -> None:
     blocks = [wire.Pac(seq, 10_000 * seq, 0, (2000,) * 22) for seq in (0, 1, 4)]
     decoder.feed(b"".join(encode(wire.Pac.ID, b.pack()) for b in blocks) + frame(0, 0, 0))
     assert (decoder.lost, decoder.lost_pac) == (0, 2)
+
+
+def test_rows_begin_as_the_compiled_numbering_reads_them() -> None:
+    for message_id in STREAMED:
+        fields = wire.DTYPES[message_id].fields
+        assert fields is not None
+        begin = {name: (fields[name][0].str, fields[name][1]) for name in ("seq", "t_us", "finger")}
+        assert begin == {"seq": ("<u2", 0), "t_us": ("<u4", 2), "finger": ("|u1", 6)}
+
+
+def test_a_status_keeps_device_time_when_nothing_streams() -> None:
+    decoder = StreamDecoder()
+    decoder.feed(frame(0, 0, 0))
+    half_hour_us = 30 * 60 * 10**6
+    for k in range(1, 10):
+        status = wire.Status(k, k * half_hour_us % 2**32, *[0] * 14)
+        decoder.feed(encode(wire.Status.ID, status.pack()))
+    assert decoder.unwrap_t_us(9 * half_hour_us % 2**32) == 9 * half_hour_us
+    assert decoder.unwrap_t_us((9 * half_hour_us + 5) % 2**32) == 9 * half_hour_us + 5

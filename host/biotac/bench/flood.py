@@ -59,8 +59,11 @@ class Board:
         self._decoder = Decoder()
         os.set_blocking(master, False)
 
-    def serve(self) -> bool:
-        """Answer what has come; true when START was among it."""
+    def serve(self, ring: bytearray) -> bool:
+        """Put answers to what has come in the ring; true when START was among it.
+
+        Written beside the ring they would end up amid a frame, or, when the pty is full, end the flood.
+        """
         try:
             heard = self._decoder.feed(os.read(self._master, 4096))
         except BlockingIOError:
@@ -69,7 +72,7 @@ class Board:
         for message_id, payload in heard.others:
             message = wire.MESSAGES[message_id].unpack(payload)
             started |= isinstance(message, wire.Start)
-            os.write(self._master, answer(message))
+            ring += answer(message)
         return started
 
     def send(self, ring: bytearray) -> None:
@@ -91,10 +94,9 @@ def answer(message: Any) -> bytes:
     return encode(wire.Reply.ID, wire.Reply(message.req_id, message.ID, 0).pack())
 
 
-def flood(board: Board, packets: list[bytes], rate: int, times: Any) -> dict[str, int]:
+def flood(board: Board, packets: list[bytes], rate: int, times: Any, ring: bytearray) -> dict[str, int]:
     """Send them all in time, or drop them."""
     burst = burst_frames(rate)
-    ring = bytearray()
     dropped = 0
     worst_ns = 0
     begin_ns = time.monotonic_ns() + 10_000_000
@@ -112,7 +114,7 @@ def flood(board: Board, packets: list[bytes], rate: int, times: Any) -> dict[str
                 ring += packet
         board.send(ring)
         if number % 512 == 0:
-            board.serve()
+            board.serve(ring)
     while ring:
         board.send(ring)
     return {"offered": len(packets), "dropped": dropped, "late_us": worst_ns // 1000}
@@ -127,13 +129,17 @@ def main() -> None:
         file.truncate(8 * bursts)
         times = memoryview(mmap.mmap(file.fileno(), 8 * bursts)).cast("q")
     board = Board(master)
+    ring = bytearray()
     print("ready", flush=True)
     while True:
         board.wait()
         try:
-            if board.serve():
-                print(json.dumps(flood(board, packets, rate, times)), flush=True)
+            started = board.serve(ring)
+            board.send(ring)
+            if started:
+                print(json.dumps(flood(board, packets, rate, times, ring)), flush=True)
         except OSError:  # nobody has the port open for a while: between two rounds
+            ring.clear()
             time.sleep(0.001)
 
 

@@ -13,12 +13,14 @@ True
 
 from __future__ import annotations
 
+from .arrivals import Arrivals
 from .device_clock import DeviceClock
 from .sample_times import LAST_SAMPLE_US, channel_t_us, electrode_t_us, pac_t_us
 from .segment import Fit, Segment
 
 __all__ = [
     "LAST_SAMPLE_US",
+    "Arrivals",
     "DeviceClock",
     "Fit",
     "Segment",

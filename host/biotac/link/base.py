@@ -23,6 +23,10 @@ class Link(Protocol):
     #: Device seconds per second here. 0: device time waits for whoever reads, and nothing need be dropped.
     pace: float
 
+    #: What can be read in place of ``read``: a file descriptor that gives the same bytes, and OSError when the board
+    #: goes away. None where there is none, or ``read`` does more.
+    fd: int | None
+
     def read(self, timeout_s: float) -> bytes:
         """Return all bytes that are there, waiting up to timeout_s for the first; may be empty."""
 

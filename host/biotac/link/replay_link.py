@@ -116,6 +116,7 @@ class ReplayLink:
         self.port = port
         self.source: Source | None = None
         self.ended = False
+        self.fd: int | None = None
         self.pace = pace
         self._clock = clock or SystemClock()
         self._pacer = Pacer(playback, pace, self._clock)

@@ -29,6 +29,7 @@ class SerialLink:
         self.source: Source | None = None
         self.ended = False
         self.pace = 1.0
+        self.fd: int | None = None
         self._path = path
         self._serial: Any = None
         self._poll: Any = None
@@ -47,6 +48,8 @@ class SerialLink:
             self._serial = serial.Serial(place, 115200, timeout=0, write_timeout=2, exclusive=exclusive())
         except (serial.SerialException, OSError, ValueError) as error:
             raise PortError(describe_open_error(place, error)) from error
+        if os.name == "posix":
+            self.fd = self._serial.fileno()
         if hasattr(select, "poll"):
             self._poll = select.poll()
             self._poll.register(self._serial.fileno(), select.POLLIN)
@@ -58,9 +61,7 @@ class SerialLink:
                 return self._read_blocking(timeout_s)
             return self._drain() if self.wait(timeout_s) else b""
         except (serial.SerialException, OSError) as error:
-            raise DeviceLostError(
-                f"{self.port} went away while it was open ({error}); plug the board in and open it again"
-            ) from error
+            raise went_away(self.port, error) from error
 
     def wait(self, timeout_s: float) -> bool:
         """Wait until something can be read."""
@@ -112,6 +113,11 @@ class SerialLink:
     def _close_port(self) -> None:
         if self._serial is not None:
             self._serial.close()
+
+
+def went_away(port: str, error: Exception) -> DeviceLostError:
+    """What to raise for what reading an open port has come to."""
+    return DeviceLostError(f"{port} went away while it was open ({error}); plug the board in and open it again")
 
 
 def usb_serial(path: str) -> str | None:

@@ -131,6 +131,11 @@ class SimLink(SerialLink):
         """The same pty: it stays while its board is unplugged or without power."""
         return [self.board.path]
 
+    def reopen(self, place: str) -> None:
+        """See Link.reopen."""
+        super().reopen(place)
+        self.fd = None  # the process is to be listened to as well
+
     def wait(self, timeout_s: float) -> bool:
         """Wait for bytes, or for word that the source is over."""
         watched = [self._serial.fileno()] + ([] if self.board.over else [self.board.stdout_fd()])

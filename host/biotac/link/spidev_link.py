@@ -126,6 +126,7 @@ class SpidevLink:
         self.port = port
         self.source: Source | None = None
         self.ended = False
+        self.fd: int | None = None
         self.pace = 1.0
         self._devices = open_devices(port)
         self._clock: Clock = clock or MonotonicClock()

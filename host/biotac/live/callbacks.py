@@ -25,12 +25,10 @@ class Callbacks:
         self._lock = threading.Lock()
         self._on_batch: list[Callable[[Batch], Any]] = []
         self._on_message: dict[type[Any], list[Callable[[Any], Any]]] = {}
+        self.wanted = False  #: somebody wants something
         self._error: Exception | None = None
         self._culprit = ""
         self._more = 0
-
-    def __bool__(self) -> bool:
-        return bool(self._on_batch or self._on_message)
 
     def on_batch(self, fn: Callable[[Batch], Any]) -> Unsubscribe:
         """Call ``fn`` with every batch."""
@@ -49,6 +47,7 @@ class Callbacks:
         # Lists are replaced and never changed: the reader may be walking through one.
         with self._lock:
             change([*now(), fn])
+            self.wanted = True
         done = False
 
         def unsubscribe() -> None:
@@ -58,6 +57,7 @@ class Callbacks:
                     left = now().copy()
                     left.remove(fn)
                     change(left)
+                    self.wanted = bool(self._on_batch or self._on_message)
                 done = True
 
         return unsubscribe
@@ -65,22 +65,25 @@ class Callbacks:
     def call(self, batch: Batch) -> None:
         """Hand a batch around."""
         for fn in self._on_batch:
-            self._call(fn, batch)
+            try:
+                fn(batch)
+            except Exception as error:
+                self._keep(fn, error)
         if not (batch.messages and self._on_message):
             return
         for message in batch.messages:
             for fn in self._on_message.get(type(message), ()):
-                self._call(fn, message)
+                try:
+                    fn(message)
+                except Exception as error:
+                    self._keep(fn, error)
 
-    def _call(self, fn: Callable[[Any], Any], argument: Any) -> None:
-        try:
-            fn(argument)
-        except Exception as error:
-            with self._lock:
-                if self._error is None:
-                    self._error, self._culprit = error, getattr(fn, "__qualname__", repr(fn))
-                else:
-                    self._more += 1
+    def _keep(self, fn: Callable[[Any], Any], error: Exception) -> None:
+        with self._lock:
+            if self._error is None:
+                self._error, self._culprit = error, getattr(fn, "__qualname__", repr(fn))
+            else:
+                self._more += 1
 
     def report(self) -> None:
         """Raise CallbackError once for what callbacks have raised since the last report."""

@@ -6,6 +6,7 @@ import math
 import threading
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -55,7 +56,7 @@ def finger_index(names: Mapping[str, int], key: str | int) -> int:
 
 
 # Batches that wait until somebody looks, or there are so many.
-UNSEEN_BATCHES = 64
+UNSEEN_BATCHES = 16
 
 
 class Latest:
@@ -67,29 +68,38 @@ class Latest:
 
     def __init__(self, timing: Timing) -> None:
         self.timing = timing
-        self._now = timing.monotonic_s
         self._unseen: deque[tuple[Batch, float]] = deque()
+        self._unseen_fingers = 0  # bit mask
         # finger: (batch, row, row is a heartbeat, arrival in s)
         self._entries: dict[int, tuple[Batch, int, bool, float]] = {}
         self._looking = threading.Lock()
 
-    def update(self, batch: Batch) -> None:
+    def update(self, batch: Batch, when_s: float) -> None:
         """Take note of it. One thread at a time."""
-        self._unseen.append((batch, self._now()))
-        if len(self._unseen) >= UNSEEN_BATCHES:
+        unseen, fingers = self._unseen, batch.fingers
+        if not unseen or (fingers >= 0 and not self._unseen_fingers & ~fingers):
+            unseen.clear()  # nobody will look at those: all their fingers are in this one
+            self._unseen_fingers = fingers
+        else:
+            self._unseen_fingers |= fingers
+        unseen.append((batch, when_s))
+        if len(unseen) >= UNSEEN_BATCHES:
             self._look()
 
     def _look(self) -> dict[int, tuple[Batch, int, bool, float]]:
         with self._looking:
+            batches = []
             while self._unseen:
-                batch, when_s = self._unseen.popleft()
-                rows = _last_rows(batch.wire)
-                for finger, row in rows.items():
-                    self._entries[finger] = (batch, row, False, when_s)
-                for finger, row in _last_rows(batch.idle).items() if len(batch.idle) else ():
-                    # A batch can hold both: what is later in device time is the latest.
-                    if finger not in rows or batch.idle["t_us"][row] > batch.t_us[rows[finger]]:
-                        self._entries[finger] = (batch, row, True, when_s)
+                with suppress(IndexError):  # the reader may clear it at the same time
+                    batches.append(self._unseen.popleft())
+            seen = 0
+            for batch, when_s in reversed(batches):
+                if not batch.fingers & ~seen:
+                    continue  # later ones had all of these
+                for finger, (row, idle) in _last_of(batch).items():
+                    if not seen >> finger & 1:
+                        self._entries[finger] = (batch, row, idle, when_s)
+                        seen |= 1 << finger
             return self._entries
 
     def last_t_us(self) -> int | None:
@@ -116,6 +126,17 @@ class Latest:
         """Since the row came; inf before any."""
         entry = self._look().get(finger)
         return math.inf if entry is None else self.timing.monotonic_s() - entry[3]
+
+
+def _last_of(batch: Batch) -> dict[int, tuple[int, bool]]:
+    """Finger to its latest row, and whether that is a heartbeat's."""
+    rows = _last_rows(batch.wire)
+    out = {finger: (row, False) for finger, row in rows.items()}
+    for finger, row in _last_rows(batch.idle).items() if len(batch.idle) else ():
+        # A batch can hold both: what is later in device time is the latest.
+        if finger not in rows or batch.idle["t_us"][row] > batch.t_us[rows[finger]]:
+            out[finger] = (row, True)
+    return out
 
 
 def _last_rows(messages: StructArray) -> dict[int, int]:

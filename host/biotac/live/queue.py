@@ -19,7 +19,8 @@ class BatchQueue:
         self._wake = wake
         self._limit_rows: int | None = None
         self._batches: deque[Batch] = deque()
-        self._rows = 0
+        #: How much waits; a batch of messages alone counts as one.
+        self.rows = 0
         self._lock = threading.Lock()
         self.batches_skipped = 0
         self.frames_skipped = 0
@@ -28,20 +29,15 @@ class BatchQueue:
         """Let go of the oldest above so many frames, PAC blocks and heartbeats; None: keep all."""
         self._limit_rows = limit_rows
 
-    @property
-    def rows(self) -> int:
-        """How much waits; a batch of messages alone counts as one."""
-        return self._rows
-
     def put(self, batch: Batch) -> None:
         """Add the newest."""
         with self._lock:
             self._batches.append(batch)
-            self._rows += weight(batch)
+            self.rows += weight(batch)
             # The newest stays, however large it is.
-            while self._limit_rows is not None and self._rows > self._limit_rows and len(self._batches) > 1:
+            while self._limit_rows is not None and self.rows > self._limit_rows and len(self._batches) > 1:
                 oldest = self._batches.popleft()
-                self._rows -= weight(oldest)
+                self.rows -= weight(oldest)
                 self.batches_skipped += 1
                 self.frames_skipped += len(oldest.wire)
         self.wake()
@@ -55,7 +51,7 @@ class BatchQueue:
         """Return what was taken and not used."""
         with self._lock:
             self._batches.appendleft(batch)
-            self._rows += weight(batch)
+            self.rows += weight(batch)
 
     def take(self) -> Batch | None:
         """The oldest; None when there is none."""
@@ -65,7 +61,7 @@ class BatchQueue:
             if not self._batches:
                 return None
             batch = self._batches.popleft()
-            self._rows -= weight(batch)
+            self.rows -= weight(batch)
             return batch
 
 

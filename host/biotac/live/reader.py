@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from threading import get_ident
 from typing import Protocol
 
 # How long a link is waited for at most before other things are looked at.
 POLL_S = 0.2
 # A callback that runs for two of these is relieved. The Pico's ring holds 16 KiB, of five fingers 0.2 s.
-RELIEF_S = 0.02
+RELIEF_S = 0.04
 
 
 class Read(Protocol):
@@ -48,6 +49,7 @@ class Reader:
         self._hand = hand
         self._thread = threading.Thread(target=self._guarded(self._run), name=f"biotac {name}", daemon=True)
         self._relief = threading.Thread(target=self._guarded(self._relieve), name=f"biotac relief {name}", daemon=True)
+        self.dispatcher = 0  #: the thread that calls ``dispatch``, by threading.get_ident()
         self._dispatched = 0
         self._dispatching = False
 
@@ -77,7 +79,9 @@ class Reader:
 
     def _run(self) -> None:
         hand = self._hand
-        while not hand.closing.is_set():
+        is_closing = hand.closing.is_set
+        self.dispatcher = get_ident()
+        while not is_closing():
             hand.wait_for_room()
             hand.read_once(min(POLL_S, hand.keep_up()))
             self._dispatching = True

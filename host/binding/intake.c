@@ -1,0 +1,146 @@
+#include "intake.h"
+
+#include "little_endian.h"
+#include "port.h"
+
+#include <string.h>
+
+// Rows take their bytes and 16 more; a row took at least its bytes from the input.
+_Static_assert(BT_PAC_BYTES >= 16 && BT_IDLE_BYTES >= 16 && BT_FRAME_BYTES >= 16,
+               "two of their own size suffice");
+_Static_assert(BT_IDLE_BYTES > 16 && BT_FRAME_BYTES > 16, "each row may have a gap before it");
+_Static_assert(BT_DECODED_FRAME == 0 && BT_DECODED_PAC == 1 && BT_DECODED_IDLE == 2, "rows come first");
+
+static const uint32_t row_bytes[BT_INTAKE_ROW_KINDS] = {BT_FRAME_BYTES, BT_PAC_BYTES, BT_IDLE_BYTES};
+
+void bt_intake_reset(bt_intake *intake)
+{
+    memset(intake->facts, 0, sizeof intake->facts);
+    bt_decoder_reset(&intake->decoder);
+    bt_numbering_reset(&intake->rounds);
+    bt_numbering_reset(&intake->pacs);
+    intake->t_us = (bt_unwrapper){0, 0};
+}
+
+// The three kinds of rows begin alike: u16 seq, u32 t_us, u8 finger (test_stream.py holds it against the
+// schema).
+static uint16_t seq_of(const uint8_t *row)
+{
+    return bt_get_u16(row);
+}
+
+static uint32_t t_us_of(const uint8_t *row)
+{
+    return bt_get_u32(row + 2);
+}
+
+static uint8_t finger_of(const uint8_t *row)
+{
+    return row[6];
+}
+
+static uint16_t rounds_of(int kind, const uint8_t *row)
+{
+    if (kind != BT_DECODED_IDLE) {
+        return 1;
+    }
+    bt_msg_idle idle;
+    bt_msg_idle_unpack(&idle, row);
+    return idle.frames;
+}
+
+// The board's yes to a START, as in BT_DECODED_OTHER.
+static int is_start(const uint8_t *other)
+{
+    if (other[0] != BT_REPLY_ID) {
+        return 0;
+    }
+    bt_msg_reply reply;
+    bt_msg_reply_unpack(&reply, other + 2);
+    return reply.command == BT_START_ID && reply.error == BT_ERROR_OK;
+}
+
+// Message by message in the order of arrival; seq and t_us have room for the rows of their kind.
+static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t *t_us[BT_INTAKE_ROW_KINDS])
+{
+    const bt_decoder *decoder = &intake->decoder;
+    const uint8_t *rows[BT_INTAKE_ROW_KINDS];
+    for (int kind = 0; kind < BT_INTAKE_ROW_KINDS; kind++) {
+        rows[kind] = decoder->data[kind];
+    }
+    const uint8_t *other = decoder->data[BT_DECODED_OTHER];
+    int64_t found = 0;
+    int64_t last_us = INT64_MIN;
+    int64_t fingers = 0;
+    for (uint32_t k = 0; k < decoder->filled[BT_DECODED_IDS]; k++) {
+        int kind = decoder->kind[decoder->data[BT_DECODED_IDS][k]];
+        if (kind == BT_DECODED_OTHER) {
+            if (is_start(other)) {
+                // What the board made before it was asked to stream was never sent: no loss.
+                bt_numbering_rejoin(&intake->rounds);
+                bt_numbering_rejoin(&intake->pacs);
+            }
+            if (other[0] == BT_STATUS_ID) {
+                bt_msg_status status;
+                bt_msg_status_unpack(&status, other + 2);
+                bt_unwrap(&intake->t_us, status.t_us);
+            }
+            other += 2 + other[1];
+            continue;
+        }
+        const uint8_t *row = rows[kind];
+        rows[kind] += row_bytes[kind];
+        int64_t now_us = bt_unwrap(&intake->t_us, t_us_of(row));
+        *t_us[kind]++ = now_us;
+        if (kind == BT_DECODED_PAC) {
+            *seq[kind]++ = bt_number(&intake->pacs, finger_of(row), seq_of(row), 1, NULL);
+            continue;
+        }
+        bt_gap *gap = &intake->gaps[found];
+        *seq[kind]++ = bt_number(&intake->rounds, finger_of(row), seq_of(row), rounds_of(kind, row), gap);
+        found += gap->missing > 0;
+        last_us = now_us > last_us ? now_us : last_us;
+        fingers |= finger_of(row) < 63 ? INT64_C(1) << finger_of(row) : -1;
+    }
+    intake->facts[BT_INTAKE_GAPS_FOUND] = found;
+    intake->facts[BT_INTAKE_LAST_T_US] = last_us;
+    intake->facts[BT_INTAKE_FINGERS] = fingers;
+}
+
+size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes)
+{
+    bt_decoder *decoder = &intake->decoder;
+    int64_t *facts = intake->facts;
+    facts[BT_INTAKE_TAKEN] = (int64_t)bt_decode(decoder, data, bytes);
+
+    int64_t *seq[BT_INTAKE_ROW_KINDS];
+    int64_t *t_us[BT_INTAKE_ROW_KINDS];
+    int64_t *numbers = intake->out;
+    for (int kind = 0; kind < BT_INTAKE_ROW_KINDS; kind++) {
+        uint32_t rows = decoder->filled[kind] / row_bytes[kind];
+        facts[BT_INTAKE_FRAMES + kind] = rows;
+        seq[kind] = numbers;
+        t_us[kind] = numbers + rows;
+        numbers += 2 * rows;
+    }
+    uint8_t *at = (uint8_t *)numbers;
+    for (int kind = 0; kind <= BT_DECODED_OTHER; kind++) {
+        memcpy(at, decoder->data[kind], decoder->filled[kind]);
+        at += decoder->filled[kind];
+    }
+    number(intake, seq, t_us);
+    facts[BT_INTAKE_OTHER_BYTES] = decoder->filled[BT_DECODED_OTHER];
+    facts[BT_INTAKE_OUT_BYTES] = at - (uint8_t *)intake->out;
+    return (size_t)facts[BT_INTAKE_TAKEN];
+}
+
+int64_t bt_intake_read(bt_intake *intake, int fd, double timeout_s)
+{
+    int64_t arrived_ns = 0;
+    int64_t got = bt_port_read(fd, timeout_s, intake->in, sizeof intake->in, &arrived_ns);
+    if (got > 0) {
+        bt_intake_feed(intake, intake->in, (size_t)got);
+        intake->facts[BT_INTAKE_ARRIVED_NS] = arrived_ns;
+    }
+    return got;
+}

@@ -1,0 +1,51 @@
+// From the link's bytes to numbered rows, a chunk at a time: decode.h, then numbering.h over what it
+// completed.
+#ifndef BIOTAC_INTAKE_H
+#define BIOTAC_INTAKE_H
+
+#include "decode.h"
+#include "numbering.h"
+
+#define BT_INTAKE_GAPS      (BT_DECODE_ROOM / 16) // no message is as short on the wire
+#define BT_INTAKE_OUT       (2 * BT_DECODE_ROOM / 8)
+#define BT_INTAKE_ROW_KINDS 3 // the first of enum bt_decoded: FRAME, PAC, IDLE
+
+// What a call completed, as numbers. Int64, so that one read in Python gets them all.
+enum bt_intake_fact {
+    BT_INTAKE_TAKEN,      // bytes of input
+    BT_INTAKE_ARRIVED_NS, // when they were read, by the clock of time.monotonic(); bt_intake_read() only
+    BT_INTAKE_OUT_BYTES,
+    BT_INTAKE_FRAMES, // rows, as the next two
+    BT_INTAKE_PACS,
+    BT_INTAKE_IDLES,
+    BT_INTAKE_OTHER_BYTES,
+    BT_INTAKE_GAPS_FOUND,
+    BT_INTAKE_LAST_T_US, // latest of FRAMEs and IDLEs, if there are any
+    BT_INTAKE_FINGERS,   // of FRAMEs and IDLEs, a bit each; all bits where one has no bit of its own
+    BT_INTAKE_FACTS
+};
+
+typedef struct {
+    int64_t facts[BT_INTAKE_FACTS];
+    // What the last call completed, back to back: FRAMEs' seq and t_us, PACs' seq and t_us, IDLEs' seq and
+    // t_us; then bytes, as in bt_decoder.data: FRAMEs, PACs, IDLEs, others.
+    int64_t out[BT_INTAKE_OUT];
+    bt_gap gaps[BT_INTAKE_GAPS]; // of FRAMEs and IDLEs
+
+    bt_decoder decoder;
+    bt_numbering rounds; // FRAMEs and IDLEs share one numbering: together they account for every round
+    bt_numbering pacs;
+    bt_unwrapper t_us; // one clock for all, STATUS too: a finger plugged in late is not early
+    uint8_t in[BT_DECODE_BYTES];
+} bt_intake;
+
+void bt_intake_reset(bt_intake *intake);
+
+// Takes at most bt_decode_bytes() and returns how many. What the call before completed is gone.
+size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes);
+
+// Waits for bytes of a port and takes what is there: returns as bt_port_read(), after bytes with all facts
+// set. What came is in ``in``.
+int64_t bt_intake_read(bt_intake *intake, int fd, double timeout_s);
+
+#endif

@@ -1,0 +1,46 @@
+// Counters of the wire as int64: wraps undone, gaps found.
+#ifndef BIOTAC_NUMBERING_H
+#define BIOTAC_NUMBERING_H
+
+#include <stdint.h>
+
+#define BT_FINGERS_ON_WIRE 256 // what a message's finger byte can say, sensible or not
+
+// Sequence numbers of one kind of message, 16 bits on the wire, each finger for itself.
+typedef struct {
+    int64_t lost;                       // what the numbers say was made and never came
+    int64_t disordered;                 // numbers that repeat or step back
+    int64_t last[BT_FINGERS_ON_WIRE];   // unwrapped
+    uint8_t seen[BT_FINGERS_ON_WIRE];   // last has a value
+    uint8_t joined[BT_FINGERS_ON_WIRE]; // the next number is expected to follow the last
+} bt_numbering;
+
+// Of ``finger``, ``missing`` messages after number ``before``.
+typedef struct {
+    int64_t finger;
+    int64_t before;
+    int64_t missing;
+} bt_gap;
+
+// A 32-bit clock.
+typedef struct {
+    int64_t last;
+    uint8_t seen;
+} bt_unwrapper;
+
+void bt_numbering_reset(bt_numbering *numbering);
+
+// Whatever numbers come next, nothing was lost before them.
+void bt_numbering_rejoin(bt_numbering *numbering);
+
+// Returns ``seq`` unwrapped, the nearest to this finger's last. The message stands for ``rounds`` numbers up
+// to its own. gap->missing is 0 when there is none; NULL if nobody asks where.
+int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_t rounds, bt_gap *gap);
+
+// The value that a counter shows as ``raw``, of all such the one nearest to the last.
+int64_t bt_unwrapped(const bt_unwrapper *unwrapper, uint32_t raw);
+
+// The same, and it is the last from now on.
+int64_t bt_unwrap(bt_unwrapper *unwrapper, uint32_t raw);
+
+#endif
