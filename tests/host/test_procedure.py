@@ -262,7 +262,7 @@ def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedur
     reference = read_csv(places.reference)
     loaded = load(places.recording, (places.reference, reference), serial="BTSIM00000000006")
     assert loaded.joined is not None and loaded.joined.on_skin_share > 0.99
-    assert loaded.run.axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+    assert loaded.run.axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")
     origin = loaded.provenance(1_700_000_000)
     assert origin.serial == "BTSIM00000000006"
     assert origin.files == ("walk.mcap", "walk.csv")
