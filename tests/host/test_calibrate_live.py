@@ -43,7 +43,7 @@ def test_it_leaves_recording_reference_report_picture_and_map(calibrated: Path) 
     assert its.alignment is not None and its.alignment["clear"] > 5.0
     page = (calibrated / f"{SERIAL}.md").read_text(encoding="utf-8")
     assert its.data_sha256 in page and SERIAL in page
-    assert fitted.load(calibrated / f"{SERIAL}.wrench.json").axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+    assert fitted.load(calibrated / f"{SERIAL}.wrench.json").axes == ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")
 
 
 def test_the_map_is_on_the_board_and_does_there_what_was_fitted(
