@@ -1,7 +1,7 @@
 #include "intake.h"
 
+#include "descriptor.h"
 #include "little_endian.h"
-#include "port.h"
 
 #include <string.h>
 
@@ -137,7 +137,7 @@ size_t bt_intake_feed(bt_intake *intake, const uint8_t *data, size_t bytes)
 int64_t bt_intake_read(bt_intake *intake, int fd, double timeout_s)
 {
     int64_t arrived_ns = 0;
-    int64_t got = bt_port_read(fd, timeout_s, intake->in, sizeof intake->in, &arrived_ns);
+    int64_t got = bt_descriptor_read(fd, timeout_s, intake->in, sizeof intake->in, &arrived_ns);
     if (got > 0) {
         bt_intake_feed(intake, intake->in, (size_t)got);
         intake->facts[BT_INTAKE_ARRIVED_NS] = arrived_ns;

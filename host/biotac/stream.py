@@ -1,7 +1,7 @@
 """From checked messages to arrays, with sequence numbers and device time unwrapped and losses counted.
 
 The live link, the recorder's reader and the tests all feed the same class. The work is C (host/binding/intake.c), and
-so is waiting for a port and reading it (host/binding/port.c).
+so is waiting for a port and reading it (host/binding/descriptor.c).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _feed = lib.bt_intake_feed
 _read = lib.bt_intake_read
 _frombuffer = np.frombuffer
 _blank = object.__new__
-_NOTHING, _AGAIN, _HUNG_UP = (int(value) for value in (lib.BT_PORT_NOTHING, lib.BT_PORT_AGAIN, lib.BT_PORT_HUNG_UP))
+_NOTHING, _AGAIN, _HUNG_UP = (int(value) for value in (lib.BT_DESCRIPTOR_NOTHING, lib.BT_DESCRIPTOR_AGAIN, lib.BT_DESCRIPTOR_HUNG_UP))
 _FACTS = struct.Struct(f"={int(lib.BT_INTAKE_FACTS)}q").unpack_from
 _INT64 = np.dtype(np.int64)
 _NO_INT64 = np.frombuffer(b"", _INT64)

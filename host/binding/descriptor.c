@@ -1,14 +1,14 @@
 #if !defined(_WIN32)
 #define _DEFAULT_SOURCE
 #endif
-#include "port.h"
+#include "descriptor.h"
 
 #if defined(_WIN32)
 
-int64_t bt_port_read(int fd, double timeout_s, uint8_t *into, size_t room, int64_t *arrived_ns)
+int64_t bt_descriptor_read(int fd, double timeout_s, uint8_t *into, size_t room, int64_t *arrived_ns)
 {
     (void)fd, (void)timeout_s, (void)into, (void)room, (void)arrived_ns;
-    return BT_PORT_ABSENT;
+    return BT_DESCRIPTOR_ABSENT;
 }
 
 #else
@@ -30,7 +30,7 @@ static int whole_ms(double timeout_s)
 
 static int64_t failure(void)
 {
-    return errno == EINTR || errno == EAGAIN || errno == EWOULDBLOCK ? BT_PORT_AGAIN : -errno;
+    return errno == EINTR || errno == EAGAIN || errno == EWOULDBLOCK ? BT_DESCRIPTOR_AGAIN : -errno;
 }
 
 static int64_t monotonic_ns(void)
@@ -44,12 +44,12 @@ static int64_t monotonic_ns(void)
 #endif
 }
 
-int64_t bt_port_read(int fd, double timeout_s, uint8_t *into, size_t room, int64_t *arrived_ns)
+int64_t bt_descriptor_read(int fd, double timeout_s, uint8_t *into, size_t room, int64_t *arrived_ns)
 {
     struct pollfd watched = {.fd = fd, .events = POLLIN};
     int ready = poll(&watched, 1, whole_ms(timeout_s));
     if (ready <= 0) {
-        return ready == 0 ? BT_PORT_NOTHING : failure();
+        return ready == 0 ? BT_DESCRIPTOR_NOTHING : failure();
     }
     // One tty read gives 4 KiB at most: a reader that takes only one per wake-up loses data at high rates.
     size_t filled = 0;
@@ -60,7 +60,7 @@ int64_t bt_port_read(int fd, double timeout_s, uint8_t *into, size_t room, int64
     } while (got >= TTY_BYTES && room - filled >= TTY_BYTES);
     // What came before the port went is not lost; the next call will see that it went.
     if (filled == 0) {
-        return got == 0 ? BT_PORT_HUNG_UP : failure();
+        return got == 0 ? BT_DESCRIPTOR_HUNG_UP : failure();
     }
     *arrived_ns = monotonic_ns();
     return (int64_t)filled;
