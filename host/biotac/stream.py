@@ -27,7 +27,8 @@ _feed = lib.bt_intake_feed
 _read = lib.bt_intake_read
 _frombuffer = np.frombuffer
 _blank = object.__new__
-_NOTHING, _AGAIN, _HUNG_UP = (int(value) for value in (lib.BT_DESCRIPTOR_NOTHING, lib.BT_DESCRIPTOR_AGAIN, lib.BT_DESCRIPTOR_HUNG_UP))
+_NOTHING, _AGAIN = int(lib.BT_DESCRIPTOR_NOTHING), int(lib.BT_DESCRIPTOR_AGAIN)
+_HUNG_UP = int(lib.BT_DESCRIPTOR_HUNG_UP)
 _FACTS = struct.Struct(f"={int(lib.BT_INTAKE_FACTS)}q").unpack_from
 _INT64 = np.dtype(np.int64)
 _NO_INT64 = np.frombuffer(b"", _INT64)
