@@ -88,16 +88,17 @@ uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *
 
 uint32_t bt_kernel_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
                           const bt_kernel_settings *settings, uint32_t wanted, int16_t poc_um[3],
-                          int32_t force_100un[3], int32_t torque_mnmm[3])
+                          int32_t force_100un[3], int32_t torque_mnmm[3], int32_t *torsion_mnmm)
 {
     bt_point point;
-    bool derived = wanted & BT_WANT_TORQUE && settings->map->axes < BT_MAP_AXES_MAX;
+    bool derived = wanted & BT_WANT_TORQUE && settings->map->axes == BT_MAP_AXES_FORCE;
     bool asked = wanted & BT_WANT_POC || derived;
     bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
     give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
+    *torsion_mnmm = BT_INVALID_I32;
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
         bt_map_wrench(settings->map, frame->counts, frame->tare_q4, frame->pdc_above_rest_q4, force_100un,
-                      wanted & BT_WANT_TORQUE ? torque_mnmm : NULL);
+                      wanted & BT_WANT_TORQUE ? torque_mnmm : NULL, torsion_mnmm);
     }
     if (derived) {
         bool possible = located && force_100un[0] != BT_INVALID_I32;

@@ -41,6 +41,7 @@ uint32_t bt_kernel(const int32_t e_q4[BT_ELECTRODES], const bt_kernel_settings *
 
 // The same where settings->map is in force, of a frame whose signals are e_q4: force, and torque where the
 // map has it, come from the map; else torque y and z are Eq 4's, and x is derived from the map's force.
+// Torsion is of the map alone, and wanted with torque.
 typedef struct {
     const uint16_t *counts;    // [BT_ELECTRODES]
     const uint16_t *tare_q4;   // [BT_ELECTRODES]
@@ -48,7 +49,7 @@ typedef struct {
 } bt_map_input;
 uint32_t bt_kernel_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
                           const bt_kernel_settings *settings, uint32_t wanted, int16_t poc_um[3],
-                          int32_t force_100un[3], int32_t torque_mnmm[3]);
+                          int32_t force_100un[3], int32_t torque_mnmm[3], int32_t *torsion_mnmm);
 
 // PDC above its tare, BT_INVALID_I32 where either is missing.
 int32_t bt_pdc_above_rest_q4(uint16_t pdc, uint16_t pdc_tare_q4);

@@ -7,7 +7,8 @@
 
 _Static_assert(BT_MAP_HEADER_BYTES == 8 + BT_MAP_SERIAL_BYTES && BT_MAP_HEADER_BYTES % 4 == 0,
                "the header is four bytes, the serial number and a u32, and keeps what follows aligned");
-_Static_assert(BT_MAP_BLOCK_BYTES == 2 + BT_MAP_AXES_MAX && BT_MAP_BLOCK_BYTES % 4 == 0,
+_Static_assert(BT_MAP_BLOCK_BYTES == 2 + BT_MAP_EXPONENTS && BT_MAP_BLOCK_BYTES % 4 == 0
+                   && BT_MAP_EXPONENTS >= BT_MAP_AXES_MAX,
                "a block is its kind, its gate and an exponent for each axis");
 
 void bt_map_close(bt_map *map)
@@ -30,7 +31,7 @@ static size_t judge_blocks(bt_map *map)
         seen[kind] = (uint8_t)(seen[kind] | 1u << gate);
         map->kinds = (uint16_t)(map->kinds | 1u << kind);
         map->gates = (uint16_t)(map->gates | 1u << gate);
-        for (int a = 0; a < BT_MAP_AXES_MAX; a++) {
+        for (int a = 0; a < BT_MAP_EXPONENTS; a++) {
             if (block[2 + a] > (a < map->axes ? BT_MAP_EXPONENT_MAX : 0)) {
                 return 0;
             }
@@ -40,13 +41,13 @@ static size_t judge_blocks(bt_map *map)
     return 4 * columns * map->axes;
 }
 
-// Whether in each axis of so many columns the magnitudes' sum stays in bounds.
-static bool bounded(const bt_map_word *words, int columns)
+// Whether in each axis of so many columns, width axes side by side, the magnitudes' sum stays in bounds.
+static bool bounded(const bt_map_word *words, int columns, int width)
 {
-    for (int a = 0; a < 3; a++) {
+    for (int a = 0; a < width; a++) {
         uint32_t sum = 0;
         for (int k = 0; k < columns; k++) {
-            int64_t value = bt_map_value(words[3 * k + a]);
+            int64_t value = bt_map_value(words[width * k + a]);
             uint64_t magnitude = (uint64_t)(value < 0 ? -value : value);
             if (magnitude > BT_MAP_COEFFICIENT_SUM_MAX - sum) {
                 return false;
@@ -62,19 +63,25 @@ static bool coefficients_bounded(const bt_map *map)
     const bt_map_word *words = bt_map_words(map);
     for (int b = 0; b < map->block_count; b++) {
         uint8_t kind = map->blocks[b * BT_MAP_BLOCK_BYTES];
-        for (int group = 0; group < map->axes / 3; group++) {
+        for (int axis = 0; axis < map->axes; axis += 3) {
+            int width = bt_map_group_width(map, axis);
             // Pairs are summed row by row, so that each row has bounds of its own.
             int columns = bt_map_columns[kind] == BT_MAP_PAIRS ? BT_ELECTRODES : bt_map_columns[kind];
             int last = bt_map_columns[kind] == BT_MAP_PAIRS ? 1 : columns;
             for (; columns >= last; columns--) {
-                if (!bounded(words, columns)) {
+                if (!bounded(words, columns, width)) {
                     return false;
                 }
-                words += 3 * columns;
+                words += width * columns;
             }
         }
     }
     return true;
+}
+
+static bool axes_known(uint8_t axes)
+{
+    return axes == BT_MAP_AXES_FORCE || axes == BT_MAP_AXES_TORQUE || axes == BT_MAP_AXES_TORSION;
 }
 
 static uint8_t judge(bt_map *map, const uint8_t *blob, size_t bytes)
@@ -82,8 +89,7 @@ static uint8_t judge(bt_map *map, const uint8_t *blob, size_t bytes)
     if (bytes < BT_MAP_HEADER_BYTES || bytes > BT_MAP_MAX_BYTES) {
         return BT_ERROR_BAD_LENGTH;
     }
-    if (blob[0] != BT_MAP_VERSION || (blob[1] != 3 && blob[1] != 6) || blob[3] != 0
-        || (uintptr_t)blob % 4 != 0) {
+    if (blob[0] != BT_MAP_VERSION || !axes_known(blob[1]) || blob[3] != 0 || (uintptr_t)blob % 4 != 0) {
         return BT_ERROR_OUT_OF_RANGE;
     }
     map->axes = blob[1];

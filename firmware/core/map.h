@@ -17,7 +17,7 @@
 #include <stdint.h>
 
 typedef struct {
-    uint8_t axes;        // 3: force; 6: and torque; 0: there is no map
+    uint8_t axes;        // BT_MAP_AXES_FORCE, _TORQUE: that too, _TORSION: all; 0: there is no map
     uint8_t block_count; // the rest points into the blob
     uint16_t kinds;      // bit mask of the kinds that its blocks are of: what no block needs is not computed
     uint16_t gates;      // likewise
@@ -43,10 +43,10 @@ bool bt_map_needs_pdc(const bt_map *map);
 
 // One frame's results. counts: 0..4095 or BT_INVALID_COUNT; an electrode without a count or without a tare
 // counts as signal 0. pdc_above_rest_q4: BT_INVALID_I32 where it is unknown; then a map that needs it gives
-// BT_INVALID_I32. torque_mnmm, about the centre of the tip sphere, is written by a map of six axes; NULL: not
-// wanted.
+// BT_INVALID_I32. torque_mnmm, about the centre of the tip sphere, and torsion_mnmm, about the outward normal
+// at the contact, are written by a map that has them. torque_mnmm NULL: neither is wanted.
 void bt_map_wrench(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
                    const uint16_t tare_q4[BT_ELECTRODES], int32_t pdc_above_rest_q4, int32_t force_100un[3],
-                   int32_t *torque_mnmm);
+                   int32_t *torque_mnmm, int32_t *torsion_mnmm);
 
 #endif

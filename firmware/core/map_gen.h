@@ -6,9 +6,15 @@
 #define BT_MAP_VERSION 1
 #define BT_MAP_MAX_BYTES 20480
 #define BT_MAP_HEADER_BYTES 24
-#define BT_MAP_BLOCK_BYTES 8
+#define BT_MAP_BLOCK_BYTES 12
 #define BT_MAP_SERIAL_BYTES 16
-#define BT_MAP_AXES_MAX 6
+
+// How many axes a map has.
+#define BT_MAP_AXES_FORCE 3
+#define BT_MAP_AXES_TORQUE 6
+#define BT_MAP_AXES_TORSION 7
+#define BT_MAP_AXES_MAX 7
+#define BT_MAP_EXPONENTS 10
 #define BT_MAP_PAIRS 190
 
 enum bt_map_kind {

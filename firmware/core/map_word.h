@@ -18,6 +18,13 @@ static inline const bt_map_word *bt_map_words(const bt_map *map)
     return (const bt_map_word *)(const void *)map->coefficients;
 }
 
+// Axes whose coefficients lie side by side, from the given one on: three of force, three of torque, torsion
+// alone.
+static inline int bt_map_group_width(const bt_map *map, int axis)
+{
+    return map->axes - axis < 3 ? map->axes - axis : 3;
+}
+
 static inline int32_t bt_map_high(uint32_t word)
 {
     return bt_shift_down((int32_t)word, 16);

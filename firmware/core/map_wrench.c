@@ -207,21 +207,21 @@ static const bt_map_word *row(const factors *f, int from, const bt_map_word *wor
     return behind;
 }
 
-// The first factors of pairs times their rows' sums, by the same products: a sum is split as a coefficient
-// is.
-static BT_NOINLINE int64_t column(const factors *f, const int32_t (*sum)[3])
+// The same of one axis, whose words lie stride apart. So are torsion's rows summed, and the first factors of
+// pairs times their rows' sums, which are split as a coefficient is and of which 64 bits come.
+static BT_NOINLINE int64_t column(const factors *f, int from, const bt_map_word *word, int stride)
 {
     int64_t high = 0;
-    int32_t low = BT_ELECTRODES / 2;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        uint32_t its = bt_map_word_of(sum[i][0]);
-        high += f->high[i] * bt_map_high(its);
-        low += bt_shift_down(f->high[i] * bt_map_low(its), 16);
+    int32_t low = (BT_ELECTRODES - from) / 2;
+    const bt_map_word *its = word;
+    for (int i = from; i < BT_ELECTRODES; i++, its += stride) {
+        high += f->high[i] * bt_map_high(*its);
+        low += bt_shift_down(f->high[i] * bt_map_low(*its), 16);
     }
     if (f->fine != NULL) {
         int32_t fine = 0;
-        for (int i = 0; i < BT_ELECTRODES; i++) {
-            fine += f->fine[i] * bt_map_high(bt_map_word_of(sum[i][0]));
+        for (int i = from; i < BT_ELECTRODES; i++, word += stride) {
+            fine += f->fine[i] * bt_map_high(*word);
         }
         low += bt_shift_down(fine, BT_MAP_FINE_BITS);
     }
@@ -230,12 +230,16 @@ static BT_NOINLINE int64_t column(const factors *f, const int32_t (*sum)[3])
 
 static const bt_map_word *pairs(const factors *f, const bt_map_word *word, int64_t block[3])
 {
-    int32_t sum[BT_ELECTRODES][3];
+    bt_map_word split[BT_ELECTRODES][3];
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        word = row(f, i, word, sum[i]);
+        int32_t sum[3];
+        word = row(f, i, word, sum);
+        split[i][0] = bt_map_word_of(sum[0]);
+        split[i][1] = bt_map_word_of(sum[1]);
+        split[i][2] = bt_map_word_of(sum[2]);
     }
     for (int d = 0; d < 3; d++) {
-        block[d] = column(f, (const int32_t (*)[3]) & sum[0][d]);
+        block[d] = column(f, 0, &split[0][d], 3);
     }
     return word;
 }
@@ -264,7 +268,7 @@ static const bt_map_word *block_sums(uint8_t kind, const features *of, const bt_
     return word;
 }
 
-static int32_t result_of(int64_t total)
+static BT_NOINLINE int32_t result_of(int64_t total)
 {
     total = total > RESULT_MAX ? RESULT_MAX : total < -RESULT_MAX ? -RESULT_MAX : total;
     return (int32_t)bt_shift_round(total, BT_MAP_RESULT_Q);
@@ -295,12 +299,55 @@ static void prepare(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
     of->single[BT_MAP_KIND_PRESSURE] = limited(pdc_above_rest_q4, -BT_MAP_FEATURE_MAX, BT_MAP_FEATURE_MAX);
 }
 
+// A block's sum of torsion, which is alone.
+static int64_t torsion_sum(uint8_t kind, const features *of, const bt_map_word *word)
+{
+    bt_map_word split[BT_ELECTRODES];
+    const factors *f = &of->factors[kind];
+    switch (bt_map_columns[kind]) {
+    case BT_MAP_PAIRS:
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            split[i] = bt_map_word_of((int32_t)column(f, i, word, 1));
+            word += BT_ELECTRODES - i;
+        }
+        return column(f, 0, split, 1);
+    case BT_ELECTRODES:
+        return column(f, 0, word, 1);
+    default:
+        return product(of->single[kind], *word);
+    }
+}
+
+static int64_t weighted(int64_t block, const uint8_t *head, int axis, const features *of)
+{
+    if (head[1] != BT_MAP_GATE_ONE) {
+        block = bt_shift_round(block * of->gate[head[1]], BT_MAP_GATE_Q);
+    }
+    return (int64_t)((uint64_t)block << head[2 + axis]);
+}
+
+// In a pass of its own, so that maps without it do not pay for it.
+static BT_NOINLINE int32_t torsion(const bt_map *map, const features *of)
+{
+    int64_t total = 0;
+    const bt_map_word *word = bt_map_words(map);
+    for (int b = 0; b < map->block_count; b++) {
+        const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;
+        word += BT_MAP_AXES_TORQUE * bt_map_columns[head[0]];
+        total += weighted(torsion_sum(head[0], of, word), head, BT_MAP_AXES_TORQUE, of);
+        word += bt_map_columns[head[0]];
+    }
+    return result_of(total);
+}
+
 void bt_map_wrench(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
                    const uint16_t tare_q4[BT_ELECTRODES], int32_t pdc_above_rest_q4, int32_t force_100un[3],
-                   int32_t *torque_mnmm)
+                   int32_t *torque_mnmm, int32_t *torsion_mnmm)
 {
-    bool with_torque = map->axes == BT_MAP_AXES_MAX && torque_mnmm != NULL;
-    int64_t total[BT_MAP_AXES_MAX] = {0, 0, 0, 0, 0, 0};
+    bool with_torque = map->axes > BT_MAP_AXES_FORCE && torque_mnmm != NULL;
+    int axes = with_torque ? BT_MAP_AXES_TORQUE : BT_MAP_AXES_FORCE;
+    int others = map->axes - axes;
+    int64_t total[BT_MAP_AXES_TORQUE] = {0, 0, 0, 0, 0, 0};
     features of;
     bool possible = pdc_above_rest_q4 != BT_INVALID_I32 || !bt_map_needs_pdc(map);
     const bt_map_word *word = bt_map_words(map);
@@ -309,19 +356,15 @@ void bt_map_wrench(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
     }
     for (int b = 0; possible && b < map->block_count; b++) {
         const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;
-        for (int axis = 0; axis < map->axes; axis += 3) {
+        for (int axis = 0; axis < axes; axis += 3) {
             int64_t block[3];
-            if (axis > 0 && !with_torque) {
-                word += 3 * bt_map_columns[head[0]];
-                continue;
-            }
             word = block_sums(head[0], &of, word, block);
             for (int d = 0; d < 3; d++) {
-                if (head[1] != BT_MAP_GATE_ONE) {
-                    block[d] = bt_shift_round(block[d] * of.gate[head[1]], BT_MAP_GATE_Q);
-                }
-                total[axis + d] += (int64_t)((uint64_t)block[d] << head[2 + axis + d]);
+                total[axis + d] += weighted(block[d], head, axis + d, &of);
             }
+        }
+        if (others > 0) {
+            word += others * bt_map_columns[head[0]];
         }
     }
     for (int d = 0; d < 3; d++) {
@@ -329,5 +372,8 @@ void bt_map_wrench(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
         if (with_torque) {
             torque_mnmm[d] = possible ? result_of(total[3 + d]) : BT_INVALID_I32;
         }
+    }
+    if (with_torque && map->axes == BT_MAP_AXES_TORSION) {
+        *torsion_mnmm = possible ? torsion(map, &of) : BT_INVALID_I32;
     }
 }

@@ -123,7 +123,7 @@ static uint32_t mapped(const bt_frame *frame, const bt_tare *tare, const int32_t
     };
     return BT_FRAME_FLAG_MAPPED
            | bt_kernel_mapped(e_q4, &input, settings, quantities, msg->poc_um, msg->force_100un,
-                              msg->torque_mnmm);
+                              msg->torque_mnmm, &msg->torsion_mnmm);
 }
 
 void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_settings *settings,
@@ -133,6 +133,7 @@ void bt_results(const bt_frame *frame, const bt_tare *tare, const bt_kernel_sett
     uint32_t every = BT_WANT_ALL | BT_QUANTITY_FLAG_PRESSURE; // sigma is asked for by few
     flags |= (quantities & every) != every ? BT_FRAME_FLAG_NOT_ASKED : 0;
     bt_sigma_unknown(msg);
+    msg->torsion_mnmm = BT_INVALID_I32; // but by a map
     if (flags & BT_FRAME_FLAG_UNTARED) {
         msg->flags = flags;
         // Asked for nothing, the kernel marks everything and looks at no signal.

@@ -341,6 +341,7 @@ void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
     }
     at = put(at, (uint32_t)msg->pdc_filtered_q4, 2);
     at = put(at, (uint32_t)msg->pressure_force_100un, 4);
+    at = put(at, (uint32_t)msg->torsion_mnmm, 4);
     (void)at;
 }
 
@@ -396,6 +397,8 @@ void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
     msg->pdc_filtered_q4 = (uint16_t)value;
     at = get(at, &value, 4);
     msg->pressure_force_100un = (int32_t)value;
+    at = get(at, &value, 4);
+    msg->torsion_mnmm = (int32_t)value;
     (void)at;
 }
 

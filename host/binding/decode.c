@@ -7,23 +7,31 @@
 _Static_assert(BT_FRAME_MAX_BYTES <= BT_COBS_BLOCK_BYTES, "undo_cobs() knows one block");
 _Static_assert(BT_DEFRAMED_BAD_LENGTH + 1 == BT_DECODE_OUTCOMES, "every outcome is counted");
 // A message takes its payload, id, CRC, COBS byte and delimiter from the input, more than it takes of any
-// row.
+// row but one that is filled up.
 _Static_assert(BT_DECODE_ROOM >= BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1, "the rest may complete too");
 
 #define COBS_MAX_BYTES (BT_FRAME_MAX_BYTES + 1)
 
 // What an older peer's message lacks at its end, and stands there then.
-#define LACKS_MAX_BYTES 6
+#define FRAME_1_3_BYTES 134
+#define AROUND          (1 + BT_CRC_BYTES + 2) // id, CRC, COBS byte, delimiter
+#define LACKS_MAX_BYTES 10
 static const struct {
     uint8_t id;
     uint8_t bytes;
     uint8_t fill[LACKS_MAX_BYTES];
 } lacks[] = {
-    {BT_FRAME_ID, 6, {0xFF, 0xFF, 0, 0, 0, 0x80}}, // pdc_filtered_q4, pressure_force_100un
-    {BT_CALIBRATION_ID, 4, {0}},                   // pressure_gain_nn: not calibrated
+    {BT_FRAME_ID, 10, {0xFF, 0xFF, 0, 0, 0, 0x80, 0, 0, 0, 0x80}}, // pdc_filtered_q4, pressure_force_100un,
+                                                                   // torsion_mnmm
+    {BT_CALIBRATION_ID, 4, {0}},                                   // pressure_gain_nn: not calibrated
 };
-_Static_assert(LACKS_MAX_BYTES <= 1 + BT_CRC_BYTES + 1, "a row filled up must fit the room of what came");
-_Static_assert(BT_FRAME_BYTES == 134 + 6 && BT_CALIBRATION_BYTES == 51 + 4, "who appends more says so above");
+_Static_assert(BT_FRAME_BYTES == FRAME_1_3_BYTES + 10 && BT_CALIBRATION_BYTES == 51 + 4,
+               "who appends more says so above");
+// A FRAME filled up is a little longer than what came.
+_Static_assert((int64_t)(BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1) * BT_FRAME_BYTES
+                   <= (int64_t)BT_DECODE_ROOM * (FRAME_1_3_BYTES + AROUND),
+               "rows filled up must fit");
+_Static_assert(2 + BT_CALIBRATION_BYTES <= 51 + AROUND, "and nothing else may be longer than what came");
 
 void bt_decoder_reset(bt_decoder *decoder)
 {

@@ -13,9 +13,10 @@
 #include "crc_fast.h"
 #include "framing.h"
 
-#define BT_DECODE_BYTES    65536                   // what one call takes
-#define BT_DECODE_ROOM     (BT_DECODE_BYTES + 256) // the call's bytes and the rest of the call before
-#define BT_DECODE_OUTCOMES 6                       // enum bt_deframed
+#define BT_DECODE_BYTES    65536 // what one call takes
+// The call's bytes and the rest of the call before; a 32nd more where messages are filled up.
+#define BT_DECODE_ROOM     (BT_DECODE_BYTES + BT_DECODE_BYTES / 32 + 512)
+#define BT_DECODE_OUTCOMES 6 // enum bt_deframed
 #define BT_UNKNOWN_ID      (-1)
 
 // What a call gives out. FRAME, PAC, IDLE: payloads back to back, rows of wire.DTYPES. OTHER: u8 id, u8

@@ -14,7 +14,7 @@ static void mark_absent(const bt_finger *finger, bt_msg_frame *msg)
     memset(msg->force_sigma_100un, 0xFF, sizeof msg->force_sigma_100un);
     msg->pdc = msg->tac = msg->tdc = msg->pdc_tare_q4 = BT_INVALID_COUNT;
     msg->poc_sigma_um = msg->pdc_filtered_q4 = BT_INVALID_COUNT;
-    msg->pressure_force_100un = BT_INVALID_I32;
+    msg->pressure_force_100un = msg->torsion_mnmm = BT_INVALID_I32;
     for (int d = 0; d < 3; d++) {
         msg->poc_um[d] = BT_INVALID_I16;
         msg->force_100un[d] = msg->torque_mnmm[d] = BT_INVALID_I32;

@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 from ._wire import CalibrationState, FrameFlags, PocWeights, QuantityFlags, Setting, TareReason, TareState
-from .batch import RESULT_DTYPE, compute
+from .batch import MAPPED_RESULT_DTYPE, RESULT_DTYPE, compute
 from .calibration import Calibration
 from .compatibility import HandWarning
 from .errors import (
@@ -39,6 +39,7 @@ __all__ = [
     "FINGER_DTYPE",
     "FRAME_DTYPE",
     "IDLE_DTYPE",
+    "MAPPED_RESULT_DTYPE",
     "PAC_DTYPE",
     "RESULT_DTYPE",
     "BiotacError",

@@ -6,9 +6,12 @@ The wrench map on the board: kinds and gates of its blocks, formats of its numbe
 from enum import IntEnum
 from typing import Literal, NamedTuple
 
-AXES_MAX = 6
+AXES_FORCE = 3
+AXES_TORQUE = 6
+AXES_TORSION = 7
+EXPONENTS = 10
 HEADER_BYTES = 24
-BLOCK_BYTES = 8
+BLOCK_BYTES = 12
 VERSION = 1
 MAX_BYTES = 20480
 SERIAL_BYTES = 16

@@ -15,7 +15,7 @@ import numpy as np
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 4
-SCHEMA_HASH = 0x2F5F36A9
+SCHEMA_HASH = 0xE209A07F
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -112,7 +112,7 @@ class FrameFlags(IntFlag):
     FAULT = 1 << 15  # more than two electrodes railed or missing: do not trust the results
     TEMP = 1 << 16  # since the contact began the temperature has moved by over a degree: the tare is doubtful
     NOT_ASKED = 1 << 17  # some quantity is not subscribed to and marked invalid (SUBSCRIBE)
-    MAPPED = 1 << 18  # force, and torque where it has six axes, come from the finger's wrench map
+    MAPPED = 1 << 18  # force, and torque and torsion where it has them, come from the finger's wrench map
 
 
 class StreamFlags(IntFlag):
@@ -128,7 +128,7 @@ class QuantityFlags(IntFlag):
 
     POC = 1 << 0  # point of contact; without it TORSION_OK is never set
     FORCE = 1 << 1  # force
-    TORQUE = 1 << 2  # torque
+    TORQUE = 1 << 2  # torque and torsion
     SIGMA = 1 << 3  # one-sigma of point of contact and force
     REST_FRAMES = 1 << 4  # a FRAME in every round; without it an untouched finger sends IDLE heartbeats
     TOUCH = 1 << 5  # TOUCH messages
@@ -212,7 +212,7 @@ FRAME_FLAG_DOC: dict[int, str] = {
     32768: "more than two electrodes railed or missing: do not trust the results",
     65536: "since the contact began the temperature has moved by over a degree: the tare is doubtful",
     131072: "some quantity is not subscribed to and marked invalid (SUBSCRIBE)",
-    262144: "force, and torque where it has six axes, come from the finger's wrench map",
+    262144: "force, and torque and torsion where it has them, come from the finger's wrench map",
 }
 
 
@@ -226,7 +226,7 @@ STREAM_FLAG_DOC: dict[int, str] = {
 QUANTITY_FLAG_DOC: dict[int, str] = {
     1: "point of contact; without it TORSION_OK is never set",
     2: "force",
-    4: "torque",
+    4: "torque and torsion",
     8: "one-sigma of point of contact and force",
     16: "a FRAME in every round; without it an untouched finger sends IDLE heartbeats",
     32: "TOUCH messages",
@@ -665,12 +665,13 @@ class Frame:
     force_sigma_100un: tuple[int, ...]
     pdc_filtered_q4: int
     pressure_force_100un: int
+    torsion_mnmm: int
 
     ID: ClassVar[int] = 0x10
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHi")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHii")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 140 bytes."""
+        """Payload without id and CRC, 144 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -690,6 +691,7 @@ class Frame:
             *self.force_sigma_100un,
             self.pdc_filtered_q4,
             self.pressure_force_100un,
+            self.torsion_mnmm,
         )
 
     @classmethod
@@ -715,6 +717,7 @@ class Frame:
             v[57 : 60],
             v[60],
             v[61],
+            v[62],
         )
 
 
@@ -1841,6 +1844,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("force_sigma_100un", "<u2", (3,)),
             ("pdc_filtered_q4", "<u2"),
             ("pressure_force_100un", "<i4"),
+            ("torsion_mnmm", "<i4"),
         ]
     ),
     Pac.ID: np.dtype(

@@ -21,6 +21,8 @@ from .wrench.applied import by_map
 
 #: poc_mm, force_n and torque_nmm of one frame, named, in units and with axes as in FRAME_DTYPE.
 RESULT_DTYPE = np.dtype([("poc_mm", "<f8", (3,)), ("force_n", "<f8", (3,)), ("torque_nmm", "<f8", (3,))])
+#: The same and ``torsion_nmm``, which a wrench map may have.
+MAPPED_RESULT_DTYPE = np.dtype([*RESULT_DTYPE.descr, ("torsion_nmm", "<f8")])
 
 _COUNT = np.dtype(np.uint16)
 _TARE = np.dtype(np.float64)
@@ -52,15 +54,22 @@ def compute(
     returned: a buffer that was used before spares the page faults of a new one.
 
     ``wrench_map``, or its blob, gives the force in place of the gains, and the torque where it has six
-    axes; else torque x is made of its force. ``pdc_above_rest`` (n,) or one number, in counts, NaN where
-    missing, is what it may need. Raises InputError for a blob that a board would refuse.
+    axes; else torque x is made of its force. The result, and ``out``, are MAPPED_RESULT_DTYPE then: with
+    torsion about the outward normal at the contact, NaN unless the map has it. ``pdc_above_rest`` (n,) or
+    one number, in counts, NaN where missing, is what it may need. Raises InputError for a blob that a board
+    would refuse.
 
     NaN where there is no answer: poc_mm and torque_nmm x if nothing weighs. Where the board rounds to
     its wire units this does not, and it never saturates. Raises ValueError for other shapes, types and
     ranges, with the first bad row, what was seen and what was expected; ``out`` then holds no results.
     """
     if wrench_map is not None:
-        return by_map(compute(counts, tare, settings, out), opened(wrench_map), counts, tare, pdc_above_rest)
+        plain = compute(counts, tare, settings)
+        shape = plain.shape
+        out = np.empty(shape, MAPPED_RESULT_DTYPE) if out is None else _checked_out(out, shape, MAPPED_RESULT_DTYPE)
+        for name in RESULT_DTYPE.names or ():
+            out[name] = plain[name]
+        return by_map(out, opened(wrench_map), counts, tare, pdc_above_rest)
     plan = _DEFAULT_PLAN if settings is None else _plan(settings)
     # One frame in the types that frames have, as on the live path, where the checks would take longer
     # than the maths. Copying 38 and 152 bytes is faster than borrowing two buffers.
@@ -163,10 +172,11 @@ def _checked_tare(tare: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     return base if base.strides[-1] == _TARE.itemsize else np.ascontiguousarray(base)
 
 
-def _checked_out(out: StructArray, shape: tuple[int, ...]) -> StructArray:
-    if not (isinstance(out, np.ndarray) and out.dtype == RESULT_DTYPE and out.shape == shape and out.flags.carray):
+def _checked_out(out: StructArray, shape: tuple[int, ...], dtype: np.dtype[np.void] = RESULT_DTYPE) -> StructArray:
+    if not (isinstance(out, np.ndarray) and out.dtype == dtype and out.shape == shape and out.flags.carray):
         seen = f"{out.dtype} of shape {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
-        raise ValueError(f"out is {seen}, expected a contiguous, writeable RESULT_DTYPE of shape {shape}")
+        name = "RESULT_DTYPE" if dtype == RESULT_DTYPE else "MAPPED_RESULT_DTYPE"
+        raise ValueError(f"out is {seen}, expected a contiguous, writeable {name} of shape {shape}")
     # The dtype has no alignment of its own, and C stores doubles.
     if out.size and out.ctypes.data % 8:
         raise ValueError("out begins at an odd address, expected one that float64 can be stored at")

@@ -22,10 +22,10 @@ from .errors import InputError
 from .frames import StructArray
 
 Integers = NDArray[np.int64]
-BoardResults = tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]
+BoardResults = tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]
 
 _HEADER = struct.Struct(f"<BBBB{_map.SERIAL_BYTES}sI")
-_BLOCK = struct.Struct(f"<BB{_map.AXES_MAX}B")
+_BLOCK = struct.Struct(f"<BB{_map.EXPONENTS}B")
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class BoardBlock:
 
 @dataclass(frozen=True)
 class BoardMap:
-    """``axes`` is 3 (force) or 6 (and torque). ``serial`` is of the sensor it was made for, "": any.
+    """``axes`` is 3 (force), 6 (and torque) or 7 (and torsion). ``serial`` is of the sensor it was made for, "": any.
 
     ``made_s`` counts from 1970 UTC, 0: unknown.
     """
@@ -57,7 +57,7 @@ class BoardMap:
         head = _HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s)
         blocks, coefficients = b"", b""
         for block in self.blocks:
-            unused = (0,) * (_map.AXES_MAX - self.axes)
+            unused = (0,) * (_map.EXPONENTS - self.axes)
             blocks += _BLOCK.pack(block.kind, block.gate, *block.exponent, *unused)
             coefficients += b"".join(
                 np.ascontiguousarray(_words(block.coefficients[:, axis : axis + 3])).tobytes()
@@ -83,15 +83,16 @@ class BoardMap:
 
     def results(
         self, counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], pdc_above_rest_q4: NDArray[np.int32]
-    ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """force_100un and torque_mnmm (n, 3) as the board computes them of counts and tare_q4 (n, 19), pressure (n,).
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+        """force_100un, torque_mnmm (n, 3), torsion_mnmm (n,) as on the board; counts, tare_q4 (n, 19), pressure (n,).
 
-        -2^31 where invalid: torque of a map without, and all where pressure, -2^31 itself, is needed and missing.
+        -2^31 where invalid: what the map does not have, and all where pressure, -2^31 itself, is needed and missing.
         """
         raw, tare = (np.ascontiguousarray(a, dtype=np.uint16) for a in (counts, tare_q4))
         pdc = np.ascontiguousarray(pdc_above_rest_q4, dtype=np.int32)
         force = np.empty((len(raw), 3), np.int32)
         torque = np.empty((len(raw), 3), np.int32)
+        torsion = np.empty(len(raw), np.int32)
         lib.bt_map_frames(
             len(raw),
             self.handle,
@@ -100,8 +101,9 @@ class BoardMap:
             ffi.from_buffer("int32_t[]", pdc),
             ffi.from_buffer("int32_t[]", force),
             ffi.from_buffer("int32_t[]", torque),
+            ffi.from_buffer("int32_t[]", torsion),
         )
-        return force, torque
+        return force, torque, torsion
 
 
 def opened(its: BoardMap | bytes) -> BoardMap:
@@ -118,15 +120,16 @@ def from_blob(blob: bytes) -> BoardMap:
     blocks = []
     for kind, gate, *exponent in heads:
         columns = _map.KINDS[Kind(kind)].columns
-        words = np.frombuffer(blob, "<i2", 2 * columns * axes, at).astype(np.int64).reshape(axes // 3, columns, 3, 2)
-        values = np.concatenate(list(words[..., 1] * 65536 + words[..., 0]), axis=1)
+        words = np.frombuffer(blob, "<i2", 2 * columns * axes, at).astype(np.int64).reshape(-1, 2)
+        groups = np.split(words[:, 1] * 65536 + words[:, 0], [3 * columns * k for k in range(1, axes // 3 + axes % 3)])
+        values = np.concatenate([group.reshape(columns, -1) for group in groups], axis=1)
         blocks.append(BoardBlock(Kind(kind), Gate(gate), tuple(exponent[:axes]), values))
         at += 4 * columns * axes
     return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s)
 
 
 def on_board_q4(frames: StructArray, settings: Settings, its: BoardMap) -> BoardResults:
-    """core.on_board_q4() with a map in force, on FRAME messages (n,), whose PDC it may need."""
+    """core.on_board_q4() with a map in force, on FRAME messages (n,), whose PDC it may need; and torsion_mnmm (n,)."""
     raw, tare_q4, pdc, pdc_tare_q4 = (
         np.ascontiguousarray(frames[name]) for name in ("counts", "tare_q4", "pdc", "pdc_tare_q4")
     )
@@ -134,7 +137,7 @@ def on_board_q4(frames: StructArray, settings: Settings, its: BoardMap) -> Board
     kernel.map = its.handle
     n = len(frames)
     poc_um, flags = np.empty((n, 3), np.int16), np.empty(n, np.uint32)
-    force_100un, torque_mnmm = np.empty((n, 3), np.int32), np.empty((n, 3), np.int32)
+    force_100un, torque_mnmm, torsion_mnmm = (np.empty(shape, np.int32) for shape in ((n, 3), (n, 3), n))
     lib.bt_mapped_frames(
         n,
         *(ffi.from_buffer("uint16_t[]", array) for array in (raw, tare_q4, pdc, pdc_tare_q4)),
@@ -142,9 +145,10 @@ def on_board_q4(frames: StructArray, settings: Settings, its: BoardMap) -> Board
         ffi.from_buffer("int16_t[]", poc_um),
         ffi.from_buffer("int32_t[]", force_100un),
         ffi.from_buffer("int32_t[]", torque_mnmm),
+        ffi.from_buffer("int32_t[]", torsion_mnmm),
         ffi.from_buffer("uint32_t[]", flags),
     )
-    return poc_um, force_100un, torque_mnmm, flags
+    return poc_um, force_100un, torque_mnmm, torsion_mnmm, flags
 
 
 def pdc_above_rest_q4(frames: StructArray) -> NDArray[np.int32]:

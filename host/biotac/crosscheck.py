@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _map
 from . import _wire as wire
 from ._sensor import CORE_RADIUS_UM
 from .board_map import BoardMap, opened, pdc_above_rest_q4
@@ -117,21 +118,25 @@ class CrossCheck:
         untared = (messages["flags"] & wire.FrameFlags.UNTARED) != 0
         truth = reference_q4(messages["counts"], messages["tare_q4"], settings)
         force_bound: NDArray[np.float64] | float = FORCE_BOUND_MN
+        torsion, torsion_bound = (np.full((len(messages), 1), value) for value in (np.nan, 0.0))
         if its is None:
             torque_bound = torque_bound_nmm(messages, truth, settings)
         else:
-            force_bound, torque_bound = _by_map(messages, its, truth, settings)
+            force_bound, torque_bound, torsion, torsion_bound = _by_map(messages, its, truth, settings)
             self.mapped += len(messages)
             self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
-        for values in (truth.poc_mm, truth.force_n, truth.torque_nmm):
+        sent_torsion = messages["torsion_mnmm"][:, None]
+        for values in (truth.poc_mm, truth.force_n, truth.torque_nmm, torsion):
             values[untared] = np.nan  # without a tare there is nothing to be right about
         for values, sent in (
             (truth.poc_mm, messages["poc_um"]),
             (truth.force_n, messages["force_100un"]),
             (truth.torque_nmm, messages["torque_mnmm"]),
+            (torsion, sent_torsion),
         ):
             values[not_asked(messages, sent)] = np.nan
-        self.torque_nmm_bound = max(self.torque_nmm_bound, float(torque_bound[~untared].max(initial=0.0)))
+        for bound in (torque_bound, torsion_bound):
+            self.torque_nmm_bound = max(self.torque_nmm_bound, float(bound[~untared].max(initial=0.0)))
 
         # The PoC is one point: its error is a distance. Force and torque count per axis.
         poc_um = to_units(messages["poc_um"], 1) - truth.poc_mm * 1e3
@@ -140,10 +145,12 @@ class CrossCheck:
         torque_nmm = np.abs(to_units(messages["torque_mnmm"], 1000) - truth.torque_nmm)
         self.poc_um_max = max(self.poc_um_max, worst(distance_um))
         self.force_mn_max = max(self.force_mn_max, worst(force_mn))
-        self.torque_nmm_max = max(self.torque_nmm_max, worst(torque_nmm))
+        torsion_nmm = np.abs(to_units(sent_torsion, 1000) - torsion)
+        self.torque_nmm_max = max(self.torque_nmm_max, worst(torque_nmm), worst(torsion_nmm))
         self._judge("PoC", "um", messages, messages["poc_um"], truth.poc_mm, distance_um, POC_BOUND_UM)
         self._judge("force", "mN", messages, messages["force_100un"], truth.force_n, force_mn, force_bound)
         self._judge("torque", "N*mm", messages, messages["torque_mnmm"], truth.torque_nmm, torque_nmm, torque_bound)
+        self._judge("torsion", "N*mm", messages, sent_torsion, torsion, torsion_nmm, torsion_bound)
         self._judge_flag(messages)
         if self.wire_minor >= PRESSURE_SINCE_MINOR:
             for finding in self.pressure.add(messages, settings):
@@ -189,25 +196,30 @@ class CrossCheck:
 
 def _by_map(
     messages: StructArray, its: BoardMap, truth: Results, settings: Settings
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Put what the map's integers mean into ``truth``; the bounds of force, mN, and torque, N*mm, each (n, 3)."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Put what the map's integers mean into ``truth``. Bounds of force, mN, and torque, N*mm, (n, 3); torsion and its
+    bound, N*mm, (n, 1), NaN and 0 without.
+    """
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
     wrench, off = board.exact(its, *frames), board.bound(its, None, *frames)
     truth.force_n[:] = wrench[:, :3]
     force_off = np.nan_to_num(off[:, :3])
+    torsion, torsion_off = (np.full((len(messages), 1), value) for value in (np.nan, 0.0))
     if its.axes > 3:
-        truth.torque_nmm[:] = wrench[:, 3:]
-        return 1e3 * force_off, np.nan_to_num(off[:, 3:])
+        truth.torque_nmm[:] = wrench[:, 3:6]
+        if its.axes == _map.AXES_TORSION:
+            torsion, torsion_off = wrench[:, 6:], np.nan_to_num(off[:, 6:])
+        return 1e3 * force_off, np.nan_to_num(off[:, 3:6]), torsion, torsion_off
     # x is derived from this force, by a lever of the core's radius at most
     y, z = truth.poc_mm[:, 1], truth.poc_mm[:, 2]
     truth.torque_nmm[:, 0] = y * truth.force_n[:, 2] - z * truth.force_n[:, 1]
     out = torque_bound_nmm(messages, truth, settings)
     out[:, 0] += CORE_RADIUS_UM / UM_PER_MM * force_off[:, 1:].sum(axis=1)
-    return 1e3 * force_off, out
+    return 1e3 * force_off, out, torsion, torsion_off
 
 
 def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:
-    """Frames (n,) whose result ``sent`` (n, 3) nobody subscribed to: it is marked invalid altogether."""
+    """Frames (n,) whose result ``sent`` (n, k) nobody subscribed to: it is marked invalid altogether."""
     asked_for_all = (messages["flags"] & wire.FrameFlags.NOT_ASKED) == 0
     return np.asarray(~asked_for_all & np.isnan(to_units(sent, 1)).all(axis=1))
 

@@ -26,6 +26,7 @@ Q4_PER_COUNT = 16
 #: ``force_sigma_n`` are one standard deviation, from the noise measured at rest; NaN unless subscribed to.
 #: ``pdc_filtered`` is pressure in counts through the board's filter, NaN without a good word; ``pressure_force_n``
 #: the magnitude of the force it tells of, negative below rest, NaN for a finger without a pressure calibration.
+#: ``torsion_nmm`` is torque about the outward normal at the contact, NaN for a finger without a wrench map that has it.
 FRAME_DTYPE = np.dtype(
     [
         ("finger", "u1"),
@@ -42,6 +43,7 @@ FRAME_DTYPE = np.dtype(
         ("force_sigma_n", "<f8", (3,)),
         ("pdc_filtered", "<f8"),
         ("pressure_force_n", "<f8"),
+        ("torsion_nmm", "<f8"),
         ("flags", "<u4"),
     ]
 )
@@ -87,6 +89,7 @@ class Frame:
     torque_nmm: NDArray[np.float64]
     flags: FrameFlags
     pressure_force_n: float = math.nan
+    torsion_nmm: float = math.nan
 
     @classmethod
     def from_row(cls, row: Any) -> Frame:
@@ -104,6 +107,7 @@ class Frame:
             torque_nmm=row["torque_nmm"].copy(),
             flags=FrameFlags(int(row["flags"])),
             pressure_force_n=float(row["pressure_force_n"]),
+            torsion_nmm=float(row["torsion_nmm"]),
         )
 
 
@@ -129,6 +133,7 @@ def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any
     out["force_sigma_n"] = to_units(messages["force_sigma_100un"], FORCE_LSB_PER_N)
     out["pdc_filtered"] = to_units(messages["pdc_filtered_q4"], Q4_PER_COUNT)
     out["pressure_force_n"] = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
+    out["torsion_nmm"] = to_units(messages["torsion_mnmm"], MNMM_PER_NMM)
     return out
 
 

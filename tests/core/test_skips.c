@@ -56,6 +56,7 @@ static void as_subscribed(bt_msg_frame *frame, uint8_t quantities)
     }
     frame->pdc_filtered_q4 = pressure ? frame->pdc_filtered_q4 : 0xFFFF;
     frame->pressure_force_100un = pressure ? frame->pressure_force_100un : INT32_MIN;
+    frame->torsion_mnmm = torque ? frame->torsion_mnmm : INT32_MIN;
     frame->poc_sigma_um = sigma && poc ? frame->poc_sigma_um : 0xFFFF;
     for (int d = 0; d < 3; d++) {
         frame->poc_um[d] = poc ? frame->poc_um[d] : INT16_MIN;

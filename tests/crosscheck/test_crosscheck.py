@@ -30,7 +30,7 @@ def frames(n: int, settings: dict[Setting, int], seed: int = 1) -> np.ndarray:
     ):
         out[field] = np.where(np.isnan(values), invalid, np.rint(np.nan_to_num(values) * scale))
     out["pdc"] = out["pdc_filtered_q4"] = wire.INVALID_COUNT
-    out["pressure_force_100un"] = wire.INVALID_I32
+    out["pressure_force_100un"] = out["torsion_mnmm"] = wire.INVALID_I32
     out["flags"] = np.where(np.isnan(board.poc_mm[:, 0]), int(FrameFlags.POC_INVALID), 0)
     return out
 

@@ -70,10 +70,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     fuzz_input in = {data, size};
     uint8_t *bytes = (uint8_t *)blob;
-    int axes = take_u8(&in) & 1 ? 6 : 3;
+    static const int some[] = {BT_MAP_AXES_FORCE, BT_MAP_AXES_TORQUE, BT_MAP_AXES_TORSION};
+    int axes = some[take_u8(&in) % 3];
     int count = 1 + take_u8(&in) % BLOCKS_MAX;
     bool plain = true; // only what is summed once more below
-    uint32_t words = BT_MAP_HEADER_BYTES / 4 + 2 * (uint32_t)count;
+    uint32_t words = (BT_MAP_HEADER_BYTES + BT_MAP_BLOCK_BYTES * (uint32_t)count) / 4;
     memset(blob, 0, 4 * words);
     blob[0] = BT_MAP_VERSION | (uint32_t)axes << 8 | (uint32_t)count << 16;
     for (int b = 0; b < count; b++) {
@@ -98,7 +99,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     size_t length = 4 * words;
     uint8_t spoil = take_u8(&in);
     if (spoil & 1) {
-        bytes[take_u8(&in) % (BT_MAP_HEADER_BYTES + 8 * BLOCKS_MAX)] = take_u8(&in);
+        bytes[take_u8(&in) % (BT_MAP_HEADER_BYTES + BT_MAP_BLOCK_BYTES * BLOCKS_MAX)] = take_u8(&in);
         length -= take_u8(&in) % 8;
         plain = false;
     }
@@ -116,9 +117,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         bool missing = counts[i] == BT_INVALID_COUNT || tare_q4[i] == BT_INVALID_COUNT;
         e[i] = missing ? 0 : 16 * (int64_t)counts[i] - tare_q4[i];
     }
-    int32_t result[6] = {0}, force[3];
-    bt_map_wrench(&map, counts, tare_q4, pdc_q4, result, result + 3);
-    bt_map_wrench(&map, counts, tare_q4, pdc_q4, force, NULL);
+    int32_t result[BT_MAP_AXES_MAX] = {0}, force[3];
+    bt_map_wrench(&map, counts, tare_q4, pdc_q4, result, result + 3, result + 6);
+    bt_map_wrench(&map, counts, tare_q4, pdc_q4, force, NULL, NULL);
     if (memcmp(force, result, sizeof force) != 0) {
         fail("force depends on whether torque is wanted");
     }
@@ -127,11 +128,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             fail("a result beyond its limit");
         }
         int64_t total = 0;
-        uint32_t at = BT_MAP_HEADER_BYTES / 4 + 2 * (uint32_t)map.block_count;
+        uint32_t at = (BT_MAP_HEADER_BYTES + BT_MAP_BLOCK_BYTES * (uint32_t)map.block_count) / 4;
         for (int b = 0; plain && b < map.block_count; b++) {
             const uint8_t *head = map.blocks + b * BT_MAP_BLOCK_BYTES;
-            uint32_t group = at + (a < 3 ? 0 : 3 * columns_of[head[0]]);
-            total += block_of(head[0], e, pdc_q4, values + group + a % 3, 3) * ((int64_t)1 << head[2 + a]);
+            uint32_t group = at + (uint32_t)(a / 3 * 3) * columns_of[head[0]];
+            int width = a < 6 ? 3 : 1;
+            total +=
+                block_of(head[0], e, pdc_q4, values + group + a % 3, width) * ((int64_t)1 << head[2 + a]);
             at += columns_of[head[0]] * (uint32_t)map.axes;
         }
         int64_t limit = (int64_t)BT_MAP_RESULT_MAX << BT_MAP_RESULT_Q;

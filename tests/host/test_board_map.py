@@ -41,7 +41,7 @@ def random_map(seed: int, axes: int = 3, *, pdc: bool = True, unused: tuple[Kind
         rng.normal(0.0, 4.0, (block.width, axes)) * 10.0 ** rng.uniform(-3.0, 0.0) * (block.kind not in unused)
         for block in blocks
     ]
-    names = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")[:axes]
+    names = ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")[:axes]
     coefficients = np.concatenate([*parts, rng.normal(0.0, 2.0, (1, axes))])
     return WrenchMap("random", names, TARE, 1, 0, coefficients)
 
@@ -61,15 +61,15 @@ def frames_of(seed: int, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def got(its: BoardMap, *frames: np.ndarray) -> np.ndarray:
-    force, torque = its.results(*frames)
-    return np.concatenate([force, torque], axis=1)[:, : its.axes] / board.result_units(its.axes)
+    force, torque, torsion = its.results(*frames)
+    return np.column_stack([force, torque, torsion])[:, : its.axes] / board.result_units(its.axes)
 
 
 # ---- bytes -------------------------------------------------------------------------------------
 
 
 def test_a_blob_comes_back_to_the_bit() -> None:
-    for axes in (3, 6):
+    for axes in (3, 6, 7):
         its = board.quantise(random_map(1, axes), serial="BTEMU00000000042", made_s=1763731310)
         back = from_blob(its.blob)
         assert (back.axes, back.serial, back.made_s) == (axes, "BTEMU00000000042", 1763731310)
@@ -84,8 +84,18 @@ def test_the_layout_is_what_the_specification_says() -> None:
     its = BoardMap(6, (BoardBlock(Kind.PRESSURE, Gate.YY, (0, 1, 2, 3, 4, 16), coefficients),), "A", 7)
     words = [(1, 0), (-1, -1 + 1), (-0x8000, 1), (0x7FFF, -1), (0x5678, 0x1234), (-0x5678, -0x1234)]
     assert its.blob == (
-        bytes([1, 6, 1, 0]) + b"A" + bytes(15) + struct.pack("<I", 7) + bytes([7, 5, 0, 1, 2, 3, 4, 16])
+        bytes([1, 6, 1, 0]) + b"A" + bytes(15) + struct.pack("<I", 7) + bytes([7, 5, 0, 1, 2, 3, 4, 16, 0, 0, 0, 0])
     ) + b"".join(struct.pack("<hh", *word) for word in words)
+
+
+def test_torsion_stands_behind_the_triples_of_its_block() -> None:
+    coefficients = np.arange(1, 134).reshape(19, 7)
+    one = BoardBlock(Kind.BULGE, Gate.X, (1, 2, 3, 4, 5, 6, 7), coefficients)
+    its = BoardMap(7, (one, BoardBlock(Kind.OFFSET, Gate.ONE, (0,) * 7, np.arange(200, 207)[None])))
+    words = [*coefficients[:, :3].ravel(), *coefficients[:, 3:6].ravel(), *coefficients[:, 6], *range(200, 207)]
+    heads = bytes([3, 1, 1, 2, 3, 4, 5, 6, 7, 0, 0, 0]) + bytes(12)
+    assert its.blob == bytes([1, 7, 2]) + bytes(21) + heads + struct.pack(f"<{len(words)}i", *words)
+    np.testing.assert_array_equal(from_blob(its.blob).blocks[0].coefficients, coefficients)
 
 
 def test_what_a_board_would_refuse_is_refused_in_words() -> None:
@@ -116,10 +126,10 @@ def test_blocks_that_are_all_zero_are_left_away_and_signals_go_into_the_split() 
     split = (Kind.COMPRESSION, Kind.BULGE, Kind.SIGNAL_PAIRS, Kind.CONDUCTANCE, Kind.CONDUCTANCE_PAIRS)
     affine = board.quantise(random_map(4, pdc=False, unused=split))
     assert [(b.kind, b.gate) for b in affine.blocks] == [(Kind.SIGNAL, Gate.ONE), (Kind.OFFSET, Gate.ONE)]
-    assert len(affine.blob) == 24 + 2 * 8 + 20 * 12
+    assert len(affine.blob) == 24 + 2 * 12 + 20 * 12
 
 
-@pytest.mark.parametrize("axes", [3, 6])
+@pytest.mark.parametrize("axes", [3, 6, 7])
 @pytest.mark.parametrize("seed", range(4))
 def test_any_frame_is_within_the_proved_bound_of_float64(seed: int, axes: int) -> None:
     model = random_map(seed, axes)
@@ -133,7 +143,7 @@ def test_any_frame_is_within_the_proved_bound_of_float64(seed: int, axes: int) -
 
 
 def test_the_integers_mean_the_fitted_map() -> None:
-    model = random_map(5, 6)
+    model = random_map(5, 7)
     its = board.quantise(model)
     counts, _, pdc_q4 = frames_of(5, 2000)
     counts = np.minimum(counts, 4095).astype(np.uint16)
@@ -144,14 +154,27 @@ def test_the_integers_mean_the_fitted_map() -> None:
     assert np.abs(board.exact(its, counts, tare_q4, pdc_q4) - truth).max() < 5e-3
 
 
-def test_torsion_stays_on_the_host() -> None:
-    model = random_map(5, 6)
-    with_torsion = dataclasses.replace(
-        model,
-        axes=(*model.axes, "torsion"),
-        coefficients=np.column_stack([model.coefficients, np.ones(len(model.coefficients))]),
-    )
-    assert board.quantise(with_torsion).blob == board.quantise(model).blob
+def test_a_whole_model_of_seven_axes_has_room_on_a_board() -> None:
+    its = board.quantise(random_map(5, 7))
+    columns = features.width(with_pdc=True) + 1 - 19  # SIGNAL goes into the split
+    assert len(its.blob) == 24 + 12 * len(its.blocks) + 28 * columns <= _map.MAX_BYTES
+
+
+def test_a_map_without_room_on_a_board_is_refused_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    its = random_map(5, 7)
+    size = len(board.quantise(its).blob)
+    monkeypatch.setattr(_map, "MAX_BYTES", size - 1)
+    with pytest.raises(InputError, match=f"takes {size} bytes: expected at most {size - 1}, a board's room"):
+        board.quantise(its)
+
+
+def test_a_row_of_torsion_changes_nothing_of_the_other_six() -> None:
+    model, frames = random_map(5, 7), frames_of(5, 500)
+    six = dataclasses.replace(model, axes=model.axes[:6], coefficients=model.coefficients[:, :6])
+    with_torsion, without = board.quantise(model).results(*frames), board.quantise(six).results(*frames)
+    np.testing.assert_array_equal(with_torsion[0], without[0])
+    np.testing.assert_array_equal(with_torsion[1], without[1])
+    assert (with_torsion[2] != wire.INVALID_I32).all() and (without[2] == wire.INVALID_I32).all()
 
 
 def spec_sum(f: list[int], c: list[int]) -> int:
@@ -172,11 +195,13 @@ def test_the_specification_written_once_more_gives_the_same_bits() -> None:
     rng = np.random.default_rng(6)
     kinds = (Kind.OFFSET, Kind.SIGNAL, Kind.COMPRESSION, Kind.BULGE, Kind.SIGNAL_PAIRS, Kind.PRESSURE)
     blocks = tuple(
-        BoardBlock(k, Gate.ONE, (6, 0, 9), rng.integers(-(2**26), 2**26, (_map.KINDS[k].columns, 3))) for k in kinds
+        BoardBlock(k, Gate.ONE, (6, 0, 9, 3, 1, 4, 8), rng.integers(-(2**26), 2**26, (_map.KINDS[k].columns, 7)))
+        for k in kinds
     )
-    its = BoardMap(3, blocks)
+    its = BoardMap(7, blocks)
     counts, tare_q4, pdc_q4 = frames_of(6, 200)
-    force, _ = its.results(counts, tare_q4, pdc_q4)
+    force, torque, torsion = its.results(counts, tare_q4, pdc_q4)
+    got_q = np.column_stack([force, torque, torsion])
     for row in range(200):
         e = [
             0 if wire.INVALID_COUNT in (c, t) else 16 * c - t
@@ -189,7 +214,7 @@ def test_the_specification_written_once_more_gives_the_same_bits() -> None:
             Kind.COMPRESSION: [min(x, 0) for x in e],
             Kind.BULGE: [max(x, 0) for x in e],
         }
-        for axis in range(3):
+        for axis in range(7):
             total = 0
             for block in blocks:
                 c = block.coefficients[:, axis].tolist()
@@ -201,17 +226,19 @@ def test_the_specification_written_once_more_gives_the_same_bits() -> None:
                 total += value << block.exponent[axis]
             wanted = max(-_map.RESULT_MAX, min(_map.RESULT_MAX, spec_round(total, 16)))
             # what is 0 is passed over: its product is 0 all the same
-            assert force[row, axis] == wanted
+            assert got_q[row, axis] == wanted
 
 
 def test_pressure_that_is_missing_makes_results_nan_only_where_it_is_needed() -> None:
     counts, tare_q4, pdc_q4 = frames_of(7, 4)
     pdc_q4[1] = wire.INVALID_I32
-    force, torque = board.quantise(random_map(7, 6)).results(counts, tare_q4, pdc_q4)
+    force, torque, torsion = board.quantise(random_map(7, 7)).results(counts, tare_q4, pdc_q4)
+    np.testing.assert_array_equal(torsion == wire.INVALID_I32, [False, True, False, False])
     assert (force[1] == wire.INVALID_I32).all() and (torque[1] == wire.INVALID_I32).all()
     assert (force[[0, 2, 3]] != wire.INVALID_I32).all() and (torque[[0, 2, 3]] != wire.INVALID_I32).all()
-    without, torque = board.quantise(random_map(7, pdc=False)).results(counts, tare_q4, pdc_q4)
+    without, torque, torsion = board.quantise(random_map(7, pdc=False)).results(counts, tare_q4, pdc_q4)
     assert (without != wire.INVALID_I32).all() and (torque == wire.INVALID_I32).all()
+    assert (torsion == wire.INVALID_I32).all()
 
 
 # ---- on real and emulated fingers --------------------------------------------------------------
@@ -269,7 +296,7 @@ def mapped_frames(its: BoardMap | None, *, pdc: int = 2000) -> np.ndarray:
     return frames_and_tares(rounds, default_settings())[0]
 
 
-@pytest.mark.parametrize("axes", [3, 6])
+@pytest.mark.parametrize("axes", [3, 6, 7])
 def test_a_finger_with_a_map_publishes_it_and_the_check_agrees(axes: int) -> None:
     its = board.quantise(random_map(11, axes))
     frames = mapped_frames(its, pdc=2120)
@@ -279,9 +306,11 @@ def test_a_finger_with_a_map_publishes_it_and_the_check_agrees(axes: int) -> Non
     np.testing.assert_array_equal(mapped, tared)
     assert not (plain["flags"] & wire.FrameFlags.MAPPED).any() and tared.sum() > 200
     pressure = board_map.pdc_above_rest_q4(frames)
-    force, torque = its.results(frames["counts"], frames["tare_q4"], pressure)
+    force, torque, torsion = its.results(frames["counts"], frames["tare_q4"], pressure)
     np.testing.assert_array_equal(frames["force_100un"][mapped], force[mapped])
-    published = torque if axes == 6 else plain["torque_mnmm"]
+    published = torque if axes > 3 else plain["torque_mnmm"]
+    np.testing.assert_array_equal(frames["torsion_mnmm"][mapped], torsion[mapped])
+    np.testing.assert_array_equal(frames["torsion_mnmm"] != wire.INVALID_I32, mapped & (axes == 7))
     np.testing.assert_array_equal(frames["torque_mnmm"][mapped, 1:], published[mapped, 1:])
     np.testing.assert_array_equal(frames["poc_um"], plain["poc_um"])
     outcome = CrossCheck()
@@ -308,15 +337,35 @@ def test_the_check_finds_a_wrong_force_another_map_and_no_map() -> None:
     assert "not known here" in none.findings[0]
 
 
-@pytest.mark.parametrize("axes", [3, 6])
+def test_the_check_finds_a_wrong_torsion_and_one_that_no_map_gives() -> None:
+    its = board.quantise(random_map(17, 7))
+    frames = mapped_frames(its)
+    for value, seen in (
+        (frames["torsion_mnmm"][100] + 9, "torsion off by 0.009"),
+        (wire.INVALID_I32, "torsion is valid"),
+    ):
+        wrong = frames.copy()
+        wrong["torsion_mnmm"][100] = value
+        outcome = CrossCheck()
+        outcome.add(wrong, default_settings(), maps={3: its})
+        assert outcome.violations == 1 and seen in outcome.findings[0]
+    plain = mapped_frames(None)
+    plain["torsion_mnmm"][100] = 0
+    outcome = CrossCheck()
+    outcome.add(plain, default_settings())
+    assert outcome.violations == 1 and "torsion is valid on one side only" in outcome.findings[0]
+
+
+@pytest.mark.parametrize("axes", [3, 6, 7])
 def test_kernels_over_recorded_frames_give_the_same_frames(axes: int) -> None:
     its = board.quantise(random_map(14, axes))
     frames = mapped_frames(its)
     frames = frames[(frames["flags"] & wire.FrameFlags.MAPPED) != 0]
-    poc, force, torque, flags = board_map.on_board_q4(frames, default_settings(), its)
+    poc, force, torque, torsion, flags = board_map.on_board_q4(frames, default_settings(), its)
     np.testing.assert_array_equal(poc, frames["poc_um"])
     np.testing.assert_array_equal(force, frames["force_100un"])
     np.testing.assert_array_equal(torque, frames["torque_mnmm"])
+    np.testing.assert_array_equal(torsion, frames["torsion_mnmm"])
     np.testing.assert_array_equal(flags, frames["flags"] & wire.FrameFlags.POC_INVALID)
 
 
@@ -327,7 +376,7 @@ def test_a_fitted_maps_file_makes_the_same_blob(tmp_path: Path) -> None:
     assert board.quantise(fitted.load(path)).blob == board.quantise(model).blob
 
 
-@pytest.mark.parametrize("axes", [3, 6])
+@pytest.mark.parametrize("axes", [3, 6, 7])
 def test_compute_agrees_with_the_boards_frames(axes: int) -> None:
     its = board.quantise(random_map(16, axes))
     frames = mapped_frames(its, pdc=2100)
@@ -337,6 +386,9 @@ def test_compute_agrees_with_the_boards_frames(axes: int) -> None:
     results = biotac.compute(frames["counts"], tare, wrench_map=its.blob, pdc_above_rest=pressure)
     np.testing.assert_allclose(results["force_n"], frames["force_100un"] / 1e4, atol=5e-4)
     np.testing.assert_allclose(results["torque_nmm"], frames["torque_mnmm"] / 1e3, atol=1e-2)
+    assert results.dtype == biotac.MAPPED_RESULT_DTYPE and np.isnan(results["torsion_nmm"]).all() == (axes < 7)
+    if axes == 7:
+        np.testing.assert_allclose(results["torsion_nmm"], frames["torsion_mnmm"] / 1e3, atol=1e-2)
     plain = biotac.compute(frames["counts"], tare)
     np.testing.assert_array_equal(results["poc_mm"], plain["poc_mm"])
     if axes == 3:
@@ -344,6 +396,11 @@ def test_compute_agrees_with_the_boards_frames(axes: int) -> None:
     one = biotac.compute(frames["counts"][7], tare[7], wrench_map=its, pdc_above_rest=pressure[7])
     assert one.shape == ()
     np.testing.assert_allclose(one["force_n"], results["force_n"][7], rtol=1e-12)  # NumPy sums in another order
+    again = np.zeros(len(frames), biotac.MAPPED_RESULT_DTYPE)
+    assert biotac.compute(frames["counts"], tare, out=again, wrench_map=its, pdc_above_rest=pressure) is again
+    assert again.tobytes() == results.tobytes()
+    with pytest.raises(ValueError, match="expected a contiguous, writeable MAPPED_RESULT_DTYPE of shape"):
+        biotac.compute(frames["counts"], tare, out=plain, wrench_map=its, pdc_above_rest=pressure)
     missing = biotac.compute(frames["counts"], tare, wrench_map=its)
     assert np.isnan(missing["force_n"]).all() and not np.isnan(missing["poc_mm"]).any()
     with pytest.raises(ValueError, match=r"pdc_above_rest has shape \(3,\), expected"):

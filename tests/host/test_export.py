@@ -53,6 +53,7 @@ def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
         "pressure_force_n": np.where(
             sent["pressure_force_100un"] == -(2**31), np.nan, sent["pressure_force_100un"] / 1e4
         ),
+        "torsion_nm": np.where(sent["torsion_mnmm"] == -(2**31), np.nan, sent["torsion_mnmm"] / 1e6),
         "flags": frames["flags"],
         "tare_state": sent["tare_state"],
         "counts": frames["counts"],

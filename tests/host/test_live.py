@@ -76,13 +76,14 @@ def test_a_batch_larger_than_the_limit_is_kept_as_long_as_it_is_the_newest() -> 
 def test_the_latest_of_a_finger_is_there_by_name_number_and_not_otherwise(live: Live) -> None:
     hand = live.hand
     assert hand["index"].age_s == math.inf
-    assert np.isnan(hand["index"].force_n).all()
+    assert np.isnan(hand["index"].force_n).all() and np.isnan(hand["index"].torsion_nmm)
     assert biotac.FrameFlags.UNTARED in hand["index"].flags and hand["index"].t_us == -1
     hand.run()
     live.send(frame(7, finger=1, force_z_n=1.25), frame(8, finger=0), frame(8, finger=1, force_z_n=2.5))
     live.until(lambda: hand["middle"].t_us == 80_000)
     assert hand["middle"].force_n.tolist() == hand[1].force_n.tolist() == [0, 0, 2.5]
     assert hand["middle"].counts.tolist() == [2000] * 19
+    assert hand["middle"].torsion_nmm == hand["middle"].frame.torsion_nmm == 0.25
     assert hand["middle"].frame.seq == 8
     assert hand["thumb"].age_s == math.inf
     live.clock.now_s += 0.75

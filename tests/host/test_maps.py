@@ -10,16 +10,19 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from maps import BIG, make_map
+from mcap.reader import make_reader
 
 import biotac
 from biotac import CalibrationState, _map
 from biotac import _wire as wire
-from biotac.board_map import from_blob
+from biotac.board_map import BoardBlock, BoardMap, from_blob
 from biotac.calibration import map_file
 from biotac.calibration.blob import PART_BYTES, for_any_sensor, made_s, serial
 from biotac.cli.main import main
+from biotac.export.columns import tables
 from biotac.framing import encode
 from biotac.hand import Hand
 from biotac.link.sim_process import SimBoard, SimLink
@@ -375,7 +378,7 @@ def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) 
     map_file.save(mine, blob)
     assert main(["map", "put", port, str(mine), "--finger", "1", "--save"]) == 0
     said = capsys.readouterr().out
-    assert "finger 1: in force, saved; force and torque, 3 block(s), 984 bytes, for any sensor" in said
+    assert "finger 1: in force, saved; force and torque, 3 block(s), 996 bytes, for any sensor" in said
     assert main(["map", "show", port]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert shown[0] == "finger 0: none, the gains hold"
@@ -411,3 +414,36 @@ def test_info_tells_of_a_map_in_force(port: str, tmp_path: Path, capsys) -> None
     assert "wrench map made 2025-11-21" in capsys.readouterr().out
     assert main(["info", port, "--json"]) == 0
     assert list(json.loads(capsys.readouterr().out)["maps"]) == ["1"]
+
+
+def test_torsion_goes_wherever_results_go(tmp_path: Path) -> None:
+    coefficients = np.random.default_rng(4).integers(-(2**20), 2**20, (19, 7))
+    turning = BoardBlock(_map.Kind.SIGNAL, _map.Gate.ONE, (8,) * 7, coefficients)
+    blob = BoardMap(7, (turning,)).blob
+    path = tmp_path / "turned.mcap"
+    with biotac.open("sim:press.toml?seconds=6") as hand:
+        hand.set_map(0, blob)
+        hand.record(path)
+        hand.read_batch(100)
+    assert map_file.title(blob).startswith("force, torque and torsion, 1 block(s), 568 bytes")
+    recording = Recording(path)
+    sent = recording.wire["torsion_mnmm"]
+    mapped = (recording.wire["flags"] & biotac.FrameFlags.MAPPED) != 0
+    told = {int(seq): value for seq, value in zip(recording.wire["seq"], sent, strict=True)}
+    assert mapped.sum() > 100 and len(np.unique(sent[mapped])) > 10
+    np.testing.assert_array_equal(sent != wire.INVALID_I32, mapped)
+    np.testing.assert_array_equal(recording.frames["torsion_nmm"], np.where(mapped, sent / 1e3, np.nan))
+    np.testing.assert_array_equal(tables(recording)[0].arrays["torsion_nm"], np.where(mapped, sent / 1e6, np.nan))
+    bodies = 0
+    with path.open("rb") as stream:
+        for _, _, message in make_reader(stream).iter_messages(["/biotac/finger0/results"]):
+            body = json.loads(message.data)
+            bodies += "torsion_nm" in body
+            assert body.get("torsion_nm", wire.INVALID_I32 / 1e6) == told[body["seq"]] / 1e6
+    assert bodies > 20
+    for keep_tare in (True, False):
+        again = tmp_path / f"again{keep_tare}.mcap"
+        recompute(recording, again, {}, keep_tare=keep_tare)
+        np.testing.assert_array_equal(Recording(again).wire["torsion_mnmm"], sent)
+    recompute(recording, tmp_path / "plain.mcap", {}, keep_tare=True, maps={0: make_map(4, axes=6)})
+    assert (Recording(tmp_path / "plain.mcap").wire["torsion_mnmm"] == wire.INVALID_I32).all()

@@ -97,7 +97,7 @@ def frames_equal(a: np.ndarray, b: np.ndarray) -> bool:
 def test_load_has_the_documented_fields(recorded) -> None:
     frames = biotac.load(recorded[0])
     names = "finger seq t_us counts pdc tac tdc poc_mm force_n torque_nmm poc_sigma_mm force_sigma_n"
-    names += " pdc_filtered pressure_force_n flags"
+    names += " pdc_filtered pressure_force_n torsion_nmm flags"
     assert list(frames.dtype.names) == names.split()
     assert frames["counts"].shape == (800, 19)
     assert frames["poc_mm"].shape == frames["force_n"].shape == frames["torque_nmm"].shape == (800, 3)

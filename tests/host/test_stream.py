@@ -32,6 +32,7 @@ def frame(finger: int, seq: int, t_us: int, **changes: object) -> bytes:
         "force_sigma_100un": (20, 30, 40),
         "pdc_filtered_q4": 2412 * 16 + 8,
         "pressure_force_100un": -1250,
+        "torsion_mnmm": -4750,
     }
     return encode(wire.Frame.ID, wire.Frame(**(facts | changes)).pack())  # type: ignore[arg-type]
 
@@ -47,6 +48,7 @@ def test_integers_become_mm_n_and_nmm() -> None:
     assert row["force_n"].tolist() == [1.0, -2.0, 5.0]
     assert row["torque_nmm"].tolist() == [1.0, 2.0, -3.0]
     assert (row["pdc_filtered"], row["pressure_force_n"]) == (2412.5, -0.125)
+    assert row["torsion_nmm"] == -4.75
 
 
 def test_an_invalid_result_is_nan_and_never_zero() -> None:
@@ -61,6 +63,7 @@ def test_an_invalid_result_is_nan_and_never_zero() -> None:
                 torque_mnmm=(wire.INVALID_I32, 0, 5),
                 pdc_filtered_q4=wire.INVALID_COUNT,
                 pressure_force_100un=wire.INVALID_I32,
+                torsion_mnmm=wire.INVALID_I32,
             )
         )
         .frames[0]
@@ -70,7 +73,7 @@ def test_an_invalid_result_is_nan_and_never_zero() -> None:
     assert row["torque_nmm"][1:].tolist() == [0.0, 0.005]
     assert not np.isnan(row["force_n"]).any()
     assert np.isnan(row["poc_sigma_mm"])
-    assert np.isnan(row["pdc_filtered"]) and np.isnan(row["pressure_force_n"])
+    assert np.isnan(row["pdc_filtered"]) and np.isnan(row["pressure_force_n"]) and np.isnan(row["torsion_nmm"])
     assert row["force_sigma_n"].tolist() == [0.002, 0.003, 0.004]
 
 
@@ -153,17 +156,29 @@ def test_a_newer_minor_may_append_fields_and_an_older_may_not_drop_them() -> Non
     assert (strict.counts.bad_length, lenient.counts.bad_length) == (1, 1)
 
 
-def test_a_frame_of_wire_1_3_is_read_without_a_force_from_pressure() -> None:
+def test_a_frame_of_wire_1_3_is_read_without_a_force_from_pressure_and_torsion() -> None:
     whole = frame(0, 7, 0)
     ((_, payload),) = Deframer().feed(whole)
     decoder = StreamDecoder()
     row = decoder.feed(encode(wire.Frame.ID, payload[:134])).frames[0]
     assert (row["seq"], row["force_sigma_n"][2]) == (7, 0.004)
-    assert np.isnan(row["pdc_filtered"]) and np.isnan(row["pressure_force_n"])
+    assert np.isnan(row["pdc_filtered"]) and np.isnan(row["pressure_force_n"]) and np.isnan(row["torsion_nmm"])
     assert decoder.counts.bad == 0
-    for wrong in (*range(128, 134), *range(135, 140)):
+    for wrong in (*range(128, 134), *range(135, 144)):
         assert not len(decoder.feed(encode(wire.Frame.ID, payload[:wrong])).frames)
-    assert decoder.counts.bad_length == 11
+    assert decoder.counts.bad_length == 15
+
+
+def test_a_whole_chunk_of_wire_1_3_fills_up_in_its_own_room() -> None:
+    ((_, payload),) = Deframer().feed(frame(0, 7, 0))
+    old = encode(wire.Frame.ID, payload[:134])
+    pac = encode(wire.Pac.ID, wire.Pac(8, 0, 0, (0xABC,) * 22).pack())  # lies behind the frames
+    count = (65536 - 10 * len(pac)) // len(old)
+    got = StreamDecoder().feed(count * old + 10 * pac)
+    assert (len(got.wire), len(got.pac)) == (count, 10)
+    for name in ("torsion_mnmm", "pressure_force_100un"):
+        assert (got.wire[name] == wire.INVALID_I32).all()
+    assert (got.wire["counts"] == np.arange(100, 119)).all()
 
 
 def test_frames_made_while_nobody_listened_are_not_lost() -> None:

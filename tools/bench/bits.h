@@ -17,13 +17,13 @@ static inline uint32_t bits_step(uint32_t *seed)
 
 #define BITS_MAP_FRAMES 2000
 
-// Wrench maps of six axes, over counts and tares of the whole range, missing ones among them.
+// A wrench map of all seven axes, over counts and tares of the whole range, missing ones among them.
 static inline uint32_t bits_map_hash(void)
 {
     static bench_map whole;
     uint32_t seed = 11;
-    uint32_t chain[7] = {0};
-    if (!BENCH_MAP_MAKE(&whole, bench_map_pooled, 6)) {
+    uint32_t chain[8] = {0};
+    if (!BENCH_MAP_MAKE(&whole, bench_map_pooled, BT_MAP_AXES_MAX)) {
         return 0;
     }
     for (int k = 0; k < BITS_MAP_FRAMES; k++) {
@@ -38,7 +38,8 @@ static inline uint32_t bits_map_hash(void)
             }
         }
         int32_t pdc_q4 = (int32_t)(bits_step(&seed) % 65521u) - 20000;
-        bt_map_wrench(&whole.map, counts, tare_q4, pdc_q4, (int32_t *)chain + 1, (int32_t *)chain + 4);
+        bt_map_wrench(&whole.map, counts, tare_q4, pdc_q4, (int32_t *)chain + 1, (int32_t *)chain + 4,
+                      (int32_t *)chain + 7);
         chain[0] = bt_crc32((const uint8_t *)chain, sizeof chain);
     }
     return chain[0];

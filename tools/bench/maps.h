@@ -44,7 +44,8 @@ static inline bool bench_map_make(bench_map *out, const uint8_t (*blocks)[2], ui
     for (uint32_t b = 0; b < count; b++) { // both builds are little-endian
         uint32_t exponents = bench_map_step(&seed) & 0x07070707;
         out->blob[words++] = blocks[b][0] | (uint32_t)blocks[b][1] << 8 | exponents << 16;
-        out->blob[words++] = axes == 6 ? exponents : exponents & 0xFF;
+        out->blob[words++] = axes >= 6 ? exponents : exponents & 0xFF;
+        out->blob[words++] = axes == 7 ? exponents & 0xFF : 0;
     }
     for (uint32_t b = 0; b < count; b++) {
         for (uint32_t k = 0; k < columns[blocks[b][0]] * axes; k++) {

@@ -14,7 +14,7 @@ static bt_tare_settings tare_settings;
 static bt_gate gate;
 static bt_finger rest_front, press_front, rest_whole, press_whole, press_force, press_poc, press_sigma;
 static bt_finger rest_five[BT_MAX_FINGERS], press_five[BT_MAX_FINGERS], rest_words, press_sent;
-static bench_map pooled, pooled_6, affine;
+static bench_map pooled, pooled_6, pooled_7, affine;
 static bt_msg_frame message;
 static uint8_t payload[BT_FRAME_BYTES], encoded[BT_ENCODED_MAX_BYTES];
 
@@ -131,9 +131,9 @@ static void sent(const bt_kernel_settings *settings)
 
 static void mapped(const bt_map *map)
 {
-    int32_t force_100un[3], torque_mnmm[3];
+    int32_t force_100un[3], torque_mnmm[3], torsion_mnmm;
     bt_map_wrench(map, press_whole.frame.electrode, press_whole.tare.electrode_q4, 400, force_100un,
-                  torque_mnmm);
+                  torque_mnmm, &torsion_mnmm);
     sink = (uint32_t)force_100un[0];
 }
 
@@ -153,6 +153,12 @@ static void map_pooled_6(const bt_kernel_settings *settings)
 {
     (void)settings;
     mapped(&pooled_6.map);
+}
+
+static void map_pooled_7(const bt_kernel_settings *settings)
+{
+    (void)settings;
+    mapped(&pooled_7.map);
 }
 
 static void map_opened(const bt_kernel_settings *settings)
@@ -176,6 +182,7 @@ const bench_scene bench_scenes[BENCH_SCENES] = {
     {"wrench map", "signals and offset, 3 axes", map_affine},
     {"wrench map", "pooled, 3 axes", map_pooled},
     {"wrench map", "pooled, 6 axes", map_pooled_6},
+    {"wrench map", "pooled, 7 axes", map_pooled_7},
     {"wrench map", "pooled, 3 axes, judged", map_opened},
     {"link", "44 words taken in, at rest", all_words},
     {"link", "FRAME computed, packed, framed", sent},
@@ -193,7 +200,8 @@ void bench_scenes_init(void)
 {
     bt_settings all;
     (void)(BENCH_MAP_MAKE(&affine, bench_map_affine, 3) && BENCH_MAP_MAKE(&pooled, bench_map_pooled, 3)
-           && BENCH_MAP_MAKE(&pooled_6, bench_map_pooled, 6));
+           && BENCH_MAP_MAKE(&pooled_6, bench_map_pooled, 6)
+           && BENCH_MAP_MAKE(&pooled_7, bench_map_pooled, 7));
     bt_settings_reset(&all);
     tare_settings = bt_tare_settings_from(&all);
     for (int s = 0; s < BT_SLOTS; s++) {

@@ -8,9 +8,9 @@ from typing import Any
 from .c_sensor import E_MAX_Q4, electrodes
 from .schema import GENERATED, Contract
 
-AXES_MAX = 6
 HEADER_BYTES = 24  # u8 version, axes, blocks, 0; serial; u32 made_s
-BLOCK_BYTES = 8  # u8 kind, gate, exponent[6]
+EXPONENTS = 10  # room for those of all axes, so that what follows is aligned
+BLOCK_BYTES = 2 + EXPONENTS  # u8 kind, gate, exponents
 
 
 def columns(contract: Contract, kind: dict[str, Any]) -> int:
@@ -42,7 +42,11 @@ def header(contract: Contract) -> str:
         f"#define BT_MAP_HEADER_BYTES {HEADER_BYTES}",
         f"#define BT_MAP_BLOCK_BYTES {BLOCK_BYTES}",
         f"#define BT_MAP_SERIAL_BYTES {blob['serial_bytes']}",
-        f"#define BT_MAP_AXES_MAX {AXES_MAX}",
+        "",
+        "// How many axes a map has.",
+        *(f"#define BT_MAP_AXES_{name} {count}" for name, count in its["axes"].items()),
+        f"#define BT_MAP_AXES_MAX {max(its['axes'].values())}",
+        f"#define BT_MAP_EXPONENTS {EXPONENTS}",
         f"#define BT_MAP_PAIRS {pairs}",
         "",
         "enum bt_map_kind {",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from .c_map import AXES_MAX, BLOCK_BYTES, HEADER_BYTES, columns
+from .c_map import BLOCK_BYTES, EXPONENTS, HEADER_BYTES, columns
 from .schema import GENERATED, Contract, Field, Message
 
 STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
@@ -54,7 +54,8 @@ def wrench_map(contract: Contract) -> str:
         "from enum import IntEnum",
         "from typing import Literal, NamedTuple",
         "",
-        f"AXES_MAX = {AXES_MAX}",
+        *(f"AXES_{name} = {count}" for name, count in its["axes"].items()),
+        f"EXPONENTS = {EXPONENTS}",
         f"HEADER_BYTES = {HEADER_BYTES}",
         f"BLOCK_BYTES = {BLOCK_BYTES}",
     ]

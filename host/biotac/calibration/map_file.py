@@ -82,5 +82,5 @@ def title(blob: bytes) -> str:
     """Whose it is, for people."""
     whose = f"sensor {of.serial(blob)}" if of.serial(blob) else "any sensor"
     its = from_blob(blob)
-    what = "force" if its.axes == 3 else "force and torque"
+    what = {3: "force", 6: "force and torque", 7: "force, torque and torsion"}[its.axes]
     return f"{what}, {len(its.blocks)} block(s), {len(blob)} bytes, for {whose}, {when(of.made_s(blob))}"

@@ -150,7 +150,7 @@ def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
         out[name] = INVALID_COUNT
     for name in ("poc_mm", "force_n", "torque_nmm", "poc_sigma_mm", "force_sigma_n"):
         out[name] = np.nan
-    out["pdc_filtered"] = out["pressure_force_n"] = np.nan
+    out["pdc_filtered"] = out["pressure_force_n"] = out["torsion_nmm"] = np.nan
     out["finger"], out["t_us"], out["seq"], out["flags"] = finger, t_us, seq, int(flags)
     return out
 
@@ -198,6 +198,11 @@ class FingerView:
     def torque_nmm(self) -> NDArray[np.float64]:
         """Torque on the finger, (3,) in N*mm."""
         return self._results("torque_nmm")
+
+    @property
+    def torsion_nmm(self) -> float:
+        """Torque about the outward normal at the contact, in N*mm; NaN without a wrench map that has it."""
+        return float(self._row()["torsion_nmm"])
 
     @property
     def force_sigma_n(self) -> NDArray[np.float64]:

@@ -50,6 +50,9 @@ RESULTS_SCHEMA = {
         "torque_nm": _vector("N*m, about the origin; x is derived"),
         "poc_m": _vector("m, point of contact"),
         "pressure_force_n": _number("magnitude of the force from static pressure, N; left out unless calibrated"),
+        "torsion_nm": _number(
+            "torque about the outward normal at the contact, N*m; left out unless a wrench map has it"
+        ),
         "contact": {"type": "boolean"},
         "flags": {"type": "integer", "description": "flags frame in MESSAGES.md"},
     },
@@ -192,6 +195,8 @@ def results(row: Any) -> dict[str, Any]:
             body[name] = values
     if row["pressure_force_100un"] != wire.INVALID_I32:
         body["pressure_force_n"] = int(row["pressure_force_100un"]) / 10_000
+    if row["torsion_mnmm"] != wire.INVALID_I32:
+        body["torsion_nm"] = int(row["torsion_mnmm"]) / 1_000_000
     flags = int(row["flags"])
     return body | {"contact": bool(flags & wire.FrameFlags.CONTACT), "flags": flags}
 

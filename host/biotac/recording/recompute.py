@@ -131,8 +131,10 @@ def _with_kept_tares(
 def _recomputed(frames: StructArray, settings: Settings, its: BoardMap | None) -> StructArray:
     if its is None:
         poc_um, force_100un, torque_mnmm, kernel_flags = on_board_q4(frames["counts"], frames["tare_q4"], settings)
+        frames["torsion_mnmm"] = wire.INVALID_I32
     else:
-        poc_um, force_100un, torque_mnmm, kernel_flags = board_map.on_board_q4(frames, settings, its)
+        poc_um, force_100un, torque_mnmm, torsion_mnmm, kernel_flags = board_map.on_board_q4(frames, settings, its)
+        frames["torsion_mnmm"] = torsion_mnmm
     frames["poc_um"], frames["force_100un"], frames["torque_mnmm"] = poc_um, force_100un, torque_mnmm
     frames["pressure_force_100un"] = pressure_force_100un(
         frames["pdc_filtered_q4"], frames["pdc_tare_q4"], settings[wire.Setting.PRESSURE_GAIN_NN]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import _map
 from .. import _wire as wire
 from ..board_map import BoardMap
 from ..frames import StructArray, tare_to_q4
@@ -13,7 +14,7 @@ from . import board
 
 
 def by_map(results: StructArray, its: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
-    """``results`` of biotac.compute, with force and torque of a map in place of the gains'; the same array.
+    """``results`` of biotac.compute, MAPPED_RESULT_DTYPE, with what a map has in place of the gains'; the same array.
 
     Shapes as there; ``pdc_above_rest`` in counts, (n,), one number, or None: missing. Raises ValueError for
     a pressure of another shape.
@@ -29,8 +30,9 @@ def by_map(results: StructArray, its: BoardMap, counts: Any, tare: Any, pdc_abov
     wrench = board.exact(its, raw, tare_q4, pdc_q4)
     rows["force_n"] = wrench[:, :3]
     if its.axes > 3:
-        rows["torque_nmm"] = wrench[:, 3:]
+        rows["torque_nmm"] = wrench[:, 3:6]
     else:
         y, z = rows["poc_mm"][:, 1], rows["poc_mm"][:, 2]
         rows["torque_nmm"][:, 0] = y * wrench[:, 2] - z * wrench[:, 1]
+    rows["torsion_nmm"] = wrench[:, 6] if its.axes == _map.AXES_TORSION else np.nan
     return results

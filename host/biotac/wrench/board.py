@@ -43,7 +43,8 @@ _CHUNK_ROWS = 4096
 class Comparison:
     """Greatest differences of the board's results from the float model's over ``rows``, and what was proved of them.
 
-    ``force_mn_bound`` and ``torque_nmm_bound`` are the largest over the rows. Torque is None with three axes.
+    ``force_mn_bound`` and ``torque_nmm_bound`` are the largest over the rows. Torque is None with three axes, and
+    torsion counts as torque.
     """
 
     rows: int
@@ -63,10 +64,9 @@ class Comparison:
 
 
 def quantise(its: WrenchMap, *, serial: str = "", made_s: int = 0) -> BoardMap:
-    """The map for a board, without the torsion it may have. Raises InputError, naming the block, when a coefficient is
-    beyond the board's formats.
+    """The map for a board. Raises InputError, naming the block, when a coefficient is beyond the board's formats, and
+    when there is no room for all of them.
     """
-    its = published(its)
     axes = len(its.axes)
     found = _merged(its)
     blocks = tuple(
@@ -81,12 +81,6 @@ def quantise(its: WrenchMap, *, serial: str = "", made_s: int = 0) -> BoardMap:
             f"the map takes {size} bytes: expected at most {_map.MAX_BYTES}, a board's room; choose a smaller model"
         )
     return result
-
-
-def published(its: WrenchMap) -> WrenchMap:
-    """The axes of a map that a FRAME has: force, and torque about Lin's origin."""
-    axes = _map.AXES_MAX if len(its.axes) >= _map.AXES_MAX else 3
-    return dataclasses.replace(its, axes=its.axes[:axes], coefficients=its.coefficients[:, :axes])
 
 
 def _merged(its: WrenchMap) -> dict[tuple[Kind, Gate], Floats]:
@@ -111,7 +105,7 @@ def _merged(its: WrenchMap) -> dict[tuple[Kind, Gate], Floats]:
 
 def result_units(axes: int) -> Floats:
     """The board's units of a result (axes,) in 1 N and 1 N mm."""
-    units: Floats = np.array([FORCE_LSB_PER_N] * 3 + [MNMM_PER_NMM] * 3, dtype=np.float64)
+    units: Floats = np.array([FORCE_LSB_PER_N] * 3 + [MNMM_PER_NMM] * 4, dtype=np.float64)
     return units[:axes]
 
 
@@ -200,7 +194,7 @@ def bound(
     pdc_q4: npt.NDArray[np.int32],
 ) -> Floats:
     """How far the board's result may be off (n, axes) in N and N mm: from ``model``, or without one from exact()."""
-    wanted = _merged(published(model)) if model is not None else {}
+    wanted = _merged(model) if model is not None else {}
     off = np.concatenate([_bound(its, wanted, s) for s in _signals(its, counts, tare_q4, pdc_q4)])
     result: Floats = off / result_units(its.axes)
     return result
@@ -266,10 +260,10 @@ def compare(model: WrenchMap, its: BoardMap, counts: Floats, pdc: Floats | None 
     raw = np.rint(counts).astype(np.uint16)
     tare_q4 = tare_to_q4(np.broadcast_to(model.tare, raw.shape))
     pdc_q4 = np.zeros(len(raw), np.int32) if pdc is None else np.rint(pdc * Q4).astype(np.int32)
-    on_frames = dataclasses.replace(published(model), tare=tare_q4[0] / Q4)
+    on_frames = dataclasses.replace(model, tare=tare_q4[0] / Q4)
     truth = on_frames.predict(raw.astype(np.float64), pdc_q4 / Q4 if model.with_pdc else None)
-    force, torque = its.results(raw, tare_q4, pdc_q4)
-    got = np.concatenate([force, torque], axis=1)[:, : its.axes] / result_units(its.axes)
+    force, torque, torsion = its.results(raw, tare_q4, pdc_q4)
+    got = np.column_stack([force, torque, torsion])[:, : its.axes] / result_units(its.axes)
     off = np.abs(got - truth)
     limit = bound(its, model, raw, tare_q4, pdc_q4)
     with_torque = its.axes > 3

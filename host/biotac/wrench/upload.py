@@ -75,8 +75,9 @@ def upload(
     frames = _mapped_frames(hand, finger)
     if hand.ended and not len(frames):
         return Verified(comparison, 0)
-    force_100un, _ = on_board.results(frames["counts"], frames["tare_q4"], pdc_above_rest_q4(frames))
-    wrong = int((force_100un != frames["force_100un"]).any(axis=1).sum())
+    force_100un, _, torsion_mnmm = on_board.results(frames["counts"], frames["tare_q4"], pdc_above_rest_q4(frames))
+    differs = (force_100un != frames["force_100un"]).any(axis=1) | (torsion_mnmm != frames["torsion_mnmm"])
+    wrong = int(differs.sum())
     if wrong or not len(frames):
         seen = f"{wrong} of {len(frames)} frames are not what its map says" if len(frames) else "no frame uses the map"
         raise PortError(f"the board has the map, and {seen}: expected all; restart the board and upload again")
