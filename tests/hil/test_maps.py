@@ -207,7 +207,7 @@ def test_a_power_cut_in_the_middle_leaves_the_old_map_or_the_new(rig: Rig) -> No
     for cut in (0, SECTOR - 1, SECTOR, SECTOR + 100, written - 1, written, written + 20, written + PAGE - 1):
         new = make_map(100 + cut)
         assert len(new) == size
-        hand.link.board.say(f"cut power after {cut} flash bytes")  # type: ignore[attr-defined]
+        hand.link.board.do(f"cut power after {cut} flash bytes")  # type: ignore[attr-defined]
         upload_in_vain(hand, new)
         boots += 1
         hand.link.board.until(PATIENCE_S, boots=boots, usb={"state": "configured"})  # type: ignore[attr-defined]
@@ -222,7 +222,7 @@ def test_a_power_cut_in_the_middle_leaves_the_old_map_or_the_new(rig: Rig) -> No
 def test_the_slowest_flash_loses_neither_link_nor_sensors(rig: Rig) -> None:
     hand = opened(rig)
     board = hand.link.board  # type: ignore[attr-defined]
-    board.say("wear the flash out")  # 0.4 s for an erase, in which nothing else runs
+    board.do("wear the flash out")  # 0.4 s for an erase, in which nothing else runs
     blob = make_map(1, serial=serial_of(hand, 1), blocks=BIG)
     hand.set_map(1, blob)
     hand.save_settings()
