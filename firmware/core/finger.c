@@ -91,6 +91,7 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
     if (finger->next_slot < BT_SLOTS) {
         (void)fill(finger, BT_SLOTS);
     }
+    finger->next_slot = 0; // POINT between two rounds is of the coming one, of which nothing has come yet
     bt_pressure_add(&finger->pressure, finger->frame.pdc);
     if (finger->frame.good_words == 0) {
         fall_silent(finger);

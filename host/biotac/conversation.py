@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from . import _wire as wire
 from . import compatibility
+from ._sensor import MAX_SENSORS
 from .clock import LAST_SAMPLE_US, Arrivals, DeviceClock
 from .commands import Commands, Reply
 from .compatibility import HandWarning, describe_mismatch
@@ -31,7 +32,7 @@ from .errors import (
 from .framing import encode
 from .link import Link
 from .link.serial_port import went_away
-from .live.gap import Gap, Reason
+from .live.gap import GAP, Gap, Reason
 from .live.session import Session
 from .live.timing import Timing
 from .stream import Batch, LinkStats, StreamDecoder
@@ -71,7 +72,7 @@ class Conversation(Commands):
         self._gaps = 0
         self._gap: Gap | None = None  # to go with the next rows
         self._failure: BaseException | None = None
-        self._trouble: OSError | None = None
+        self._trouble: OSError | InputError | None = None
         self._reading = threading.RLock()  # whose holder reads the link
         self._writing = threading.Lock()
         self._asking = threading.RLock()  # one command at a time
@@ -383,11 +384,29 @@ class Conversation(Commands):
                 self._again(request)
             for finger, blob in self._session.maps().items():
                 self._tell_map(finger, blob)
+            if reason == "rebooted":
+                self._record_on()
             if self._started:
                 self._again(self._started)
         except DeviceLostError:
             return False  # gone again
         return True
+
+    def _record_on(self) -> None:
+        """A restarted board's rows go into a file of their own."""
+        if self._recorder is None or self._recorder.closed:
+            return
+        try:
+            self._recorder.go_on(self.info, *self._to_be_recorded())
+        except (OSError, InputError) as error:
+            self._recorder = None
+            self._trouble = error
+
+    def _to_be_recorded(self) -> tuple[Any, Any, Any, Any]:
+        """Settings, calibrations, sensors and maps: what a recording's results rest on."""
+        present = self.info.fingers_present
+        sensors = [self.sensor_info(finger) for finger in range(MAX_SENSORS) if present >> finger & 1]
+        return self.settings(), self.calibrations(), sensors, self.maps()
 
     def _again(self, request: Any) -> None:
         self._ask(replace(request, req_id=self._next_req_id()), _KINDS.get(type(request), wire.Reply))
@@ -409,7 +428,7 @@ class Conversation(Commands):
         self._gaps += 1
         batch.messages.insert(0, gap)
         if self._recorder is not None:
-            self._recorder.mark("gap", gap.as_text())
+            self._recorder.mark(GAP, gap.as_text())
 
 
 _KINDS: dict[type[Any], type[Any]] = {wire.SetSetting: wire.SettingValue, wire.SetCalibration: wire.Calibration}

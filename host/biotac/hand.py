@@ -155,7 +155,7 @@ class Hand(Streaming):
         """Write everything that arrives from now on to an MCAP file, until close or the recorder's close.
 
         Frames that have arrived already and wait to be read are not in it; call it before ``start`` or
-        the first read to have all.
+        the first read to have all. A board that restarts (reconnect) begins a further file (Recorder.paths).
 
         Raises InputError when the file exists and may not be overwritten, cannot be written, or when
         another recording of this hand is still open.
@@ -164,15 +164,15 @@ class Hand(Streaming):
 
         if self._recorder is not None and not self._recorder.closed:
             raise InputError(f"this hand is being recorded to {self._recorder.path}; close that recorder first")
-        sensors = [self.sensor_info(f) for f in self.fingers]
+        settings, calibrations, sensors, maps = self._to_be_recorded()
         self._recorder = Recorder(
             Path(path),
             self.info,
-            self.settings(),
-            self.calibrations(),
+            settings,
+            calibrations,
             sensors,
             self.port,
-            maps=self.maps(),
+            maps=maps,
             overwrite=overwrite,
             mid_stream=self._streaming,
         )

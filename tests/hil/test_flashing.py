@@ -17,7 +17,7 @@ import pytest
 from maps import BIG, make_map
 from rig import ROOT, Rig
 
-from biotac import Setting
+from biotac import Calibration, Setting
 from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.errors import FlashError, InputError, NotAGatewayError
@@ -140,6 +140,22 @@ def test_a_map_that_was_in_force_and_not_saved_is_put_back_and_saved(bench: Benc
         assert hand.maps() == {0: new, 1: kept}
 
 
+def test_a_calibration_that_was_in_force_and_not_saved_is_put_back_and_saved(bench: Bench) -> None:
+    kept, new = Calibration(thermal_gain_milli=700), Calibration(force_gain_nn=(1, 2, -3), made_s=1_700_000_000)
+    with bench.target.open() as hand:
+        hand.set_calibration(0, kept)
+        hand.set_calibration(1, kept)
+        hand.save_settings()
+        hand.set_calibration(0, new)
+    outcome = bench.flash(read_image(BUILT))
+    assert outcome.settings is not None and outcome.backup is not None
+    assert outcome.settings.changed == ("calibration of finger 0",)
+    assert read_backup(outcome.backup.path).calibrations == {0: new, 1: kept}
+    bench.setting_after_a_power_cut(Setting.IDLE_PERIOD_MS)
+    with bench.target.open() as hand:
+        assert hand.calibrations() == {0: new, 1: kept}
+
+
 def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_release: Image) -> None:
     bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)
     outcome = bench.flash(next_release)
@@ -187,7 +203,7 @@ def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path:
     blocks = len(image.blocks)
     total = -(-blocks * PAGE // SECTOR) * SECTOR + blocks * PAGE
     bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)
-    bench.target.board.say(f"cut power after {cut if cut >= 0 else total + cut} flash bytes")
+    bench.target.board.do(f"cut power after {cut if cut >= 0 else total + cut} flash bytes")
     with pytest.raises(FlashError, match=r"emulated board came to .*backup1.json, for --restore"):
         bench.flash(image)
     facts = bench.counters()
@@ -200,7 +216,7 @@ def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path:
 
 
 def test_a_power_cut_before_the_first_byte_leaves_the_old_firmware(bench: Bench, next_release: Image) -> None:
-    bench.target.board.say("cut power after 0 flash bytes")
+    bench.target.board.do("cut power after 0 flash bytes")
     with pytest.raises(FlashError, match="the settings are in"):
         bench.flash(next_release)
     outcome = bench.flash(next_release)

@@ -49,7 +49,7 @@ class Pico:
     def save_with_cut(self, value: int, cut: int) -> None:
         """Power fails once so many bytes of flash were erased or programmed."""
         self.hand.set_setting(Setting.IDLE_PERIOD_MS, value)
-        self.board.say(f"cut power after {cut} flash bytes")
+        self.board.do(f"cut power after {cut} flash bytes")
         self.hand._send(wire.SaveSettings(self.hand._next_req_id()))
 
 

@@ -9,10 +9,12 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from serial.tools.list_ports_common import ListPortInfo
 
 from biotac import _wire as wire
+from biotac import discovery
 from biotac.errors import DeviceLostError, PortError
-from biotac.flash import target_serial, waiting
+from biotac.flash import waiting
 from biotac.flash.image import Image
 from biotac.framing import encode
 from biotac.hand import Hand
@@ -77,6 +79,10 @@ class FakeBoard:
             return self._hello(payload, board=self.board, boot_id=self.boot_id, board_serial=self.serial, **version)
         if message_id in (wire.GetSetting.ID, wire.SetSetting.ID):
             return self._setting(message_id, payload)
+        if message_id == wire.GetCalibration.ID:
+            values = tuple(wire.SETTINGS[setting].default for setting in wire.CALIBRATION_SETTINGS)
+            none = wire.Calibration(payload[0], payload[1], wire.CalibrationState.NONE, (0,) * 16, 0, values)
+            return encode(wire.Calibration.ID, none.pack())
         if message_id == wire.GetMap.ID:
             return encode(wire.MapInfo.ID, wire.MapInfo(payload[0], payload[1], 0, (0,) * 16, 0, 0, 0).pack())
         if message_id == wire.SaveSettings.ID:
@@ -149,15 +155,21 @@ def no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(waiting, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
 
 
+def _entry(device: str, number: str | None, vendor: int) -> ListPortInfo:
+    info = ListPortInfo(device, skip_link_detection=True)
+    info.serial_number, info.vid, info.pid = number, vendor, wire.USB_PRODUCT
+    return info
+
+
 def plug_in(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
     """Device: serial number, of the gateways that are plugged in; change it as you like."""
     plugged: dict[str, str] = {}
 
-    def comports() -> list[SimpleNamespace]:
-        ours = [SimpleNamespace(device=d, serial_number=n, vid=0x1209, pid=1) for d, n in plugged.items()]
-        return [SimpleNamespace(device="/dev/ttyUSB7", serial_number=None, vid=0x0403, pid=0x6001), *ours]
+    def comports() -> list[ListPortInfo]:
+        ours = [_entry(device, number, wire.USB_VENDOR) for device, number in plugged.items()]
+        return [_entry("/dev/ttyUSB7", None, 0x0403), *ours]
 
-    monkeypatch.setattr(target_serial.list_ports, "comports", comports)
+    monkeypatch.setattr(discovery.list_ports, "comports", comports)
     no_waiting(monkeypatch)
     return plugged
 

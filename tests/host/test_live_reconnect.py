@@ -194,6 +194,10 @@ def test_a_recording_goes_on_and_holds_the_gap(world, tmp_path) -> None:
     with (tmp_path / "a.mcap").open("rb") as stream:
         marks = [m for m in make_reader(stream).iter_metadata() if m.name == "biotac.gap"]
     assert [(m.metadata["reason"], m.metadata["next_t_us"]) for m in marks] == [("unplugged", "400000")]
+    recording = biotac.recording.Recording(tmp_path / "a.mcap")
+    (gap,) = recording.gaps
+    assert gap == biotac.Gap("unplugged", 110_000, 400_000, gap.lost_at_ns, gap.back_at_ns, 1)
+    assert gap.words() in recording.problems
     assert biotac.load(tmp_path / "a.mcap")["seq"].tolist() == [10, 11, 40, 41]
 
 
@@ -228,7 +232,8 @@ def test_the_simulated_board_reboots_and_is_found_again(tmp_path) -> None:
         hand.set_setting(wire.Setting.IDLE_PERIOD_MS, 70)
         hand.subscribe(wire.QuantityFlags.FORCE | wire.QuantityFlags.REST_FRAMES)
         batches = hand.batches()
-        assert sum(len(next(batches).wire) for _ in range(20)) > 0
+        recorder = hand.record(tmp_path / "press.mcap")
+        assert len(next(batch.wire for batch in batches if len(batch.wire)))
         boards[0].close()
         point(path, "")
         for batch in batches:
@@ -241,3 +246,11 @@ def test_the_simulated_board_reboots_and_is_found_again(tmp_path) -> None:
         assert hand.setting(wire.Setting.IDLE_PERIOD_MS) == 70
         assert (batch.frames["flags"] & biotac.FrameFlags.NOT_ASKED != 0).all()
     boards[1].close()
+    before, after = (biotac.recording.Recording(path) for path in recorder.paths)
+    assert [path.name for path in recorder.paths] == ["press.mcap", "press.2.mcap"]
+    assert before.info.boot_id != after.info.boot_id == gaps[0].boot_id
+    assert before.disordered == after.disordered == before.frames_lost == after.frames_lost == 0
+    assert after.metadata["continues"] == "press.mcap"
+    assert after.gaps == gaps and not before.gaps
+    assert after.settings[wire.Setting.IDLE_PERIOD_MS] == 70
+    assert after.begin_us == gaps[0].next_t_us

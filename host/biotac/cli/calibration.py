@@ -6,8 +6,8 @@ import argparse
 import json
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import biotac
 
@@ -18,10 +18,13 @@ from ..calibration.chip import KINDS, Chip
 from ..errors import InputError
 from ..identity import serial_text
 from ..version import __version__
+from . import subverbs
 
 NAME = "calibration"
 HELP = "Show, get, put or store a finger's calibration."
 EXAMPLE = "biotac calibration put /dev/ttyACM0 thumb.json --finger 0 --save"
+
+run = subverbs.run
 
 State = biotac.CalibrationState
 
@@ -29,69 +32,43 @@ State = biotac.CalibrationState
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to do, each with its own arguments."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
+    add = partial(subverbs.add, what, NAME)
 
-    show = _add(what, "show", _show, "What a board, a file or an EEPROM holds.", "show thumb.json")
+    show = add("show", _show, "What a board, a file or an EEPROM holds.", "show thumb.json")
     show.add_argument("where", metavar="PORT|FILE", nargs="?", help="left out with --i2c")
     _add_eeprom(show, required=False)
 
-    get = _add(what, "get", _get, "From a board into a file.", "get /dev/ttyACM0 --finger 0 thumb.json")
+    get = add("get", _get, "From a board into a file.", "get /dev/ttyACM0 --finger 0 thumb.json")
     get.add_argument("port", metavar="PORT")
     get.add_argument("file", metavar="FILE", type=Path)
     get.add_argument("--force", action="store_true", help="overwrite FILE")
-    _add_finger(get)
+    subverbs.add_finger(get)
 
-    put = _add(what, "put", _put, "From a file to a board.", "put /dev/ttyACM0 thumb.json --finger 0 --save")
+    put = add("put", _put, "From a file to a board.", "put /dev/ttyACM0 thumb.json --finger 0 --save")
     put.add_argument("port", metavar="PORT")
     put.add_argument("file", metavar="FILE", type=Path)
     put.add_argument("--force", action="store_true", help="for whatever sensor is there, not its own alone")
-    _add_finger(put)
-    _add_save(put)
+    subverbs.add_finger(put)
+    subverbs.add_save(put)
 
-    clear = _add(what, "clear", _clear, "Back to the board's settings.", "clear /dev/ttyACM0 --finger 0 --save")
+    clear = add("clear", _clear, "Back to the board's settings.", "clear /dev/ttyACM0 --finger 0 --save")
     clear.add_argument("port", metavar="PORT")
-    _add_finger(clear)
-    _add_save(clear)
+    subverbs.add_finger(clear)
+    subverbs.add_save(clear)
 
-    store = _add(what, "store", _store, "Into an EEPROM.", "store --i2c 1:0x50 --chip 24c32 thumb.json")
+    store = add("store", _store, "Into an EEPROM.", "store --i2c 1:0x50 --chip 24c32 thumb.json")
     store.add_argument("file", metavar="FILE", nargs="?", type=Path, help="left out: standard input")
     _add_eeprom(store, required=True)
 
-    load = _add(what, "load", _load, "From an EEPROM.", "load --i2c 1:0x50 --chip 24c32 thumb.json")
+    load = add("load", _load, "From an EEPROM.", "load --i2c 1:0x50 --chip 24c32 thumb.json")
     load.add_argument("file", metavar="FILE", nargs="?", type=Path, help="left out: standard output")
     load.add_argument("--force", action="store_true", help="overwrite FILE")
     _add_eeprom(load, required=True)
 
 
-def _add(what: Any, name: str, action: Any, text: str, example: str) -> argparse.ArgumentParser:
-    parser: argparse.ArgumentParser = what.add_parser(
-        name,
-        help=text,
-        description=text,
-        epilog=f"example: biotac calibration {example}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print JSON for machines")
-    parser.set_defaults(action=action)
-    return parser
-
-
-def _add_finger(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--finger", type=int, choices=range(MAX_SENSORS), required=True, metavar="N")
-
-
-def _add_save(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--save", action="store_true", help="keep it over reboots, with all settings in force")
-
-
 def _add_eeprom(parser: argparse.ArgumentParser, *, required: bool) -> None:
     parser.add_argument("--i2c", metavar="BUS:ADDRESS", required=required, help="where the EEPROM is, such as 1:0x50")
     parser.add_argument("--chip", choices=KINDS, required=required, metavar="KIND", help=f"{', '.join(KINDS)}")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Do what was asked for."""
-    args.action(args)
-    return 0
 
 
 # ---- board -------------------------------------------------------------------------------------

@@ -131,9 +131,10 @@ def facts(image: Image, outcome: Outcome) -> dict[str, Any]:
 
 
 def known(backup: Backup, settings: Restored) -> str:
-    """How many of a backup's settings and maps the firmware has."""
-    count = len(backup.values) + len(backup.maps) - len(settings.unknown)
-    return f"{count} settings{' and wrench maps' if backup.maps else ''}"
+    """How many of a backup's settings, calibrations and maps the firmware has."""
+    more = {"calibrations": len(backup.calibrations), "wrench maps": len(backup.maps)}
+    count = len(backup.values) + sum(more.values()) - len(settings.unknown)
+    return f"{count} {', '.join(['settings', *(name for name, its in more.items() if its)])}"
 
 
 def summary(outcome: Outcome) -> str:

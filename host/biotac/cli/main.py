@@ -24,7 +24,6 @@ from . import (
     info,
     list_ports,
     lsl,
-    map,
     recompute,
     record,
     replay,
@@ -33,11 +32,12 @@ from . import (
     udev_setup,
     version,
     view,
+    wrench_map,
 )
 
 VERBS = (
     demo, list_ports, doctor, info, view, stream, lsl, record, check, replay, recompute, export, import_btd, calibrate,
-    calibration, map, experiment, sim, flash, bench, udev_setup, version,
+    calibration, wrench_map, experiment, sim, flash, bench, udev_setup, version,
 )  # fmt: skip
 
 EPILOG = """\

@@ -1,4 +1,4 @@
-"""A board's settings and the wrench maps in force: read over the wire, kept in a file, put back.
+"""A board's settings, and the calibrations and wrench maps in force: read over the wire, kept in a file, put back.
 
 What was saved outlives flashing by itself; what is in force and was not saved needs this.
 """
@@ -6,14 +6,14 @@ What was saved outlives flashing by itself; what is in force and was not saved n
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
 from .. import _wire as wire
-from ..calibration import map_file
-from ..commands import MAP_SINCE_MINOR
+from ..calibration import Calibration, map_file
+from ..calibration.file import from_dict, to_dict
+from ..commands import CALIBRATION_SINCE_MINOR, MAP_SINCE_MINOR
 from ..errors import CommandRefusedError, InputError
 from ..hand import Hand
 from ..identity import board_text, serial_text, version_text
@@ -24,11 +24,12 @@ LAST_ID = 255
 
 @dataclass(frozen=True)
 class Backup:
-    """Values by setting id: a board may have settings that this library does not know."""
+    """Values by setting id: a board may have settings that this library does not know. The rest by finger."""
 
     path: Path
     values: dict[int, int]
-    maps: dict[int, bytes] = field(default_factory=dict)  # by finger
+    calibrations: dict[int, Calibration] = field(default_factory=dict)
+    maps: dict[int, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -63,34 +64,38 @@ def default_path(hello: wire.Hello) -> Path:
     return Path(f"biotac-settings-{serial_text(hello)}-{datetime.now():%Y%m%d-%H%M%S}.json")
 
 
-def write_backup(path: Path, hello: wire.Hello, values: dict[int, int], maps: dict[int, bytes]) -> Backup:
-    """Write what was read; never over an existing file."""
+def save(hand: Hand, path: Path | None) -> Backup:
+    """All of the board's settings, and the calibrations and maps in force, into a new file; never over another."""
+    hello = hand.info
+    its = Backup((path or default_path(hello)).resolve(), read_settings(hand), hand.calibrations(), hand.maps())
     facts = {
         "format": FORMAT,
         "board": board_text(hello.board),
         "serial_number": serial_text(hello),
         "firmware": version_text(hello),
         "boot_id": hello.boot_id,
-        "settings": [{"id": key, "name": setting_name(key), "value": value} for key, value in values.items()],
-        "maps": {finger: map_file.to_dict(blob) for finger, blob in maps.items()},
+        "settings": [{"id": key, "name": setting_name(key), "value": value} for key, value in its.values.items()],
+        "calibrations": {finger: to_dict(calibration) for finger, calibration in its.calibrations.items()},
+        "maps": {finger: map_file.to_dict(blob) for finger, blob in its.maps.items()},
     }
     try:
-        with open(path, "x", encoding="utf-8") as file:
+        with its.path.open("x", encoding="utf-8") as file:
             file.write(json.dumps(facts, indent=1) + "\n")
     except FileExistsError as error:
-        raise InputError(f"{path} exists and may hold other settings; choose another --backup") from error
+        raise InputError(f"{its.path} exists and may hold other settings; choose another --backup") from error
     except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}); choose another --backup") from error
-    return Backup(path.resolve(), values, maps)
+        raise InputError(f"{its.path} cannot be written ({error.strerror}); choose another --backup") from error
+    return its
 
 
 def read_backup(path: Path) -> Backup:
-    """Read what write_backup wrote."""
+    """Read what save() wrote."""
     try:
         facts = json.loads(path.read_text(encoding="utf-8"))
         if facts["format"] != FORMAT:
             raise ValueError(f"its format is {facts['format']!r}")
         values = {int(one["id"]): int(one["value"]) for one in facts["settings"]}
+        calibrations = {int(finger): from_dict(its) for finger, its in facts.get("calibrations", {}).items()}
         maps = {int(finger): map_file.from_dict(its) for finger, its in facts.get("maps", {}).items()}
     except OSError as error:
         raise InputError(
@@ -98,32 +103,47 @@ def read_backup(path: Path) -> Backup:
         ) from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path} holds no settings ({error}); expected a file written by biotac flash") from error
-    return Backup(path.resolve(), values, maps)
+    return Backup(path.resolve(), values, calibrations, maps)
 
 
-def restore(hand: Hand, wanted: Mapping[int, int], maps: Mapping[int, bytes]) -> Restored:
+def restore(hand: Hand, wanted: Backup) -> Restored:
     """Set and save what differs, and read all back.
 
-    Settings that the firmware does not know are left out, and so are maps. Raises CommandRefusedError for a value
+    What the firmware does not know is left out. Raises CommandRefusedError for a value
     that it does not take, and InputError when a value does not read back.
     """
     found = read_settings(hand)
-    changed = [key for key, value in wanted.items() if key in found and found[key] != value]
+    changed = [key for key, value in wanted.values.items() if key in found and found[key] != value]
     for key in changed:
-        hand.set_setting(key, wanted[key])
+        hand.set_setting(key, wanted.values[key])
+    knows_calibrations = hand.info.wire_minor >= CALIBRATION_SINCE_MINOR
     knows_maps = hand.info.wire_minor >= MAP_SINCE_MINOR
-    uploaded = [finger for finger, blob in maps.items() if knows_maps and hand.get_map(finger) != blob]
+    calibrations = wanted.calibrations if knows_calibrations else {}
+    given = [finger for finger, its in calibrations.items() if hand.calibration(finger) != its]
+    for finger in given:
+        hand.set_calibration(finger, calibrations[finger])
+        if hand.calibration(finger) != calibrations[finger]:
+            raise InputError(f"{calibration_name(finger)} reads otherwise after it was restored; set it by hand")
+    maps = wanted.maps if knows_maps else {}
+    uploaded = [finger for finger, blob in maps.items() if hand.get_map(finger) != blob]
     for finger in uploaded:
         hand.set_map(finger, maps[finger])  # which reads it back
-    if changed or uploaded:
+    if changed or given or uploaded:
         hand.save_settings()
         found = read_settings(hand)
-    for key, value in wanted.items():
+    for key, value in wanted.values.items():
         if found.get(key, value) != value:
             raise InputError(f"{setting_name(key)} reads {found[key]} after {value} was restored; set it by hand")
-    unknown = [setting_name(key) for key in wanted if key not in found]
-    unknown += [] if knows_maps else map(map_name, maps)
-    return Restored((*map(setting_name, changed), *map(map_name, uploaded)), tuple(unknown))
+    unknown = [setting_name(key) for key in wanted.values if key not in found]
+    unknown += [] if knows_calibrations else map(calibration_name, wanted.calibrations)
+    unknown += [] if knows_maps else map(map_name, wanted.maps)
+    put_back = (*map(setting_name, changed), *map(calibration_name, given), *map(map_name, uploaded))
+    return Restored(put_back, tuple(unknown))
+
+
+def calibration_name(finger: int) -> str:
+    """As it is called where settings are listed."""
+    return f"calibration of finger {finger}"
 
 
 def map_name(finger: int) -> str:

@@ -11,7 +11,7 @@ from .. import _wire as wire
 from ..errors import BiotacError, CommandRefusedError, FlashError, InputError, NotAGatewayError, WireVersionError
 from ..hand import Hand
 from ..identity import board_text, serial_text, version_text
-from .backup import Backup, Restored, default_path, read_settings, restore, write_backup
+from .backup import Backup, Restored, restore, save
 from .image import Image, note_text
 from .loader import Loader
 from .loader import Show as ShowBlocks
@@ -80,7 +80,7 @@ def flash(
         say("waiting for the board to come back")
         with target.reopen() as hand:
             check(image, before, hand.info)
-            settings = None if backup is None else restore(hand, backup.values, backup.maps)
+            settings = None if backup is None else restore(hand, backup)
             return Outcome(target.port, loader.name, before, hand.info, backup, settings)
 
 
@@ -128,11 +128,6 @@ def command_loader(hand: Hand) -> bool:
             raise
         return False
     return True
-
-
-def save(hand: Hand, path: Path | None) -> Backup:
-    """All of the board's settings, and the maps in force, into a new file."""
-    return write_backup(path or default_path(hand.info), hand.info, read_settings(hand), hand.maps())
 
 
 def check(image: Image, before: wire.Hello | None, after: wire.Hello) -> None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import serial
-from serial.tools import list_ports
 
+from ..discovery import boards
 from ..errors import BiotacError, DeviceLostError, PortError
 from ..hand import Hand
 from ..link.serial_port import SerialLink, describe_open_error
 from .waiting import wait_for
 
-USB_IDS = (0x1209, 0x0001)  # firmware/port/rp2040/usb_descriptors.c
 BACK_S = 20.0
 TOUCH_BAUD = 1200
 
@@ -81,7 +80,7 @@ class SerialTarget:
 
 def gateway_ports() -> dict[str, str | None]:
     """Ports of boards with our USB ids, and their serial numbers."""
-    return {port.device: port.serial_number for port in list_ports.comports() if (port.vid, port.pid) == USB_IDS}
+    return {port.device: port.serial_number for port in boards()}
 
 
 def only_port() -> str | None:

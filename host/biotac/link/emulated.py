@@ -60,6 +60,14 @@ class EmulatedBoard(SimBoard):
         """Have something happen to the board once its sensors have lived for ``seconds``; see main.mjs."""
         self.say(f"@{seconds:.9f} {verb}")
 
+    def do(self, verb: str) -> None:
+        """Have something happen to the board before whatever is written to its link from now on; see main.mjs.
+
+        Verbs and link are two pipes: without an answer on the one, the other may overtake it.
+        """
+        self.say(verb)
+        self.counters()
+
     def counters(self) -> dict[str, Any]:
         """What the emulator counted: time, resets, transfers, USB packets, breaches of the rules."""
         self.say("counters")

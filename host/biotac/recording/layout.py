@@ -13,6 +13,7 @@ MESSAGE_ENCODING = "biotac-wire"
 SCHEMA_NAME = "biotac.link"
 SCHEMA_ENCODING = "biotac-schema"
 METADATA_NAME = "biotac"
+CONTINUES = "continues"  # metadata key: the file that ended when the board restarted
 
 
 def frame_id(finger: int) -> str:

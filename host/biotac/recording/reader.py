@@ -21,6 +21,7 @@ from ..calibration.values import own_settings
 from ..clock import LAST_SAMPLE_US, DeviceClock
 from ..errors import InputError, RecordingError
 from ..frames import StructArray
+from ..live.gap import GAP, Gap
 from ..stream import StreamDecoder, join
 from . import layout
 
@@ -32,9 +33,9 @@ class Recording:
     heartbeats, ``wire`` the FRAME messages as sent, ``messages`` the rest (tare changes, status). ``settings`` are the
     board's, ``calibrations`` and ``maps`` (bytes, as the board holds them) those in force, by finger, when it began.
     ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its
-    index; ``damaged_chunks``: seconds that were left out. ``blocks`` are the wire's bytes as they came, about one a
-    second, and ``arrived_ns`` when each began, by the host's clock (Unix). Raises RecordingError when nothing can be
-    read. ``show`` is told the share of the work that is done.
+    index; ``damaged_chunks``: seconds that were left out; ``gaps``: times in which the board was away. ``blocks`` are
+    the wire's bytes as they came, about one a second, and ``arrived_ns`` when each began, by the host's clock (Unix).
+    Raises RecordingError when nothing can be read. ``show`` is told the share of the work that is done.
     """
 
     def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] = lambda share: None) -> None:
@@ -42,6 +43,7 @@ class Recording:
         self.problems: list[str] = []
         self.cut_off = False
         self.damaged_chunks = 0
+        self.gaps: list[Gap] = []
         metadata: dict[str, str] | None = None
         self.blocks: list[bytes] = []
         self.arrived_ns: list[int] = []
@@ -49,6 +51,8 @@ class Recording:
         for record in self._records():
             if isinstance(record, Metadata) and record.name == layout.METADATA_NAME:
                 metadata = record.metadata
+            elif isinstance(record, Metadata) and record.name == f"{layout.METADATA_NAME}.{GAP}":
+                self._take_gap(record.metadata)
             elif isinstance(record, Message):
                 self.blocks.append(record.data)
                 self.arrived_ns.append(record.publish_time)
@@ -92,6 +96,15 @@ class Recording:
         for t_us, at_s in self._arrivals:
             clock.arrived(t_us + LAST_SAMPLE_US, at_s)
         return clock
+
+    def _take_gap(self, text: dict[str, str]) -> None:
+        try:
+            gap = Gap.from_text(text)
+        except (KeyError, ValueError) as error:
+            self.problems.append(f"a gap is marked in {self.path.name}, in words that are damaged ({error})")
+            return
+        self.gaps.append(gap)
+        self.problems.append(gap.words())
 
     def _without_metadata(self) -> str:
         if self.problems:

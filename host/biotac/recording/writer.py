@@ -28,6 +28,8 @@ NO_MAPS: Mapping[int, bytes] = {}
 class Recorder:
     """An open recording. Made by ``Hand.record``; every chunk from the link is handed to ``write``.
 
+    ``path`` is the file being written, ``paths`` all of them: when the board restarts its clock and numbers begin
+    anew, and maybe its sensors are others, so that a further file begins.
     ``clock_s`` and ``unix_ns`` are the clocks that close a block and stamp it.
     """
 
@@ -47,6 +49,9 @@ class Recorder:
         unix_ns: Callable[[], int] = time.time_ns,
     ) -> None:
         self.path = path
+        self.paths = [path]
+        self._port = port
+        self._overwrite = overwrite
         self._clock_s = clock_s
         self._unix_ns = unix_ns
         self._pending = bytearray()
@@ -56,6 +61,28 @@ class Recorder:
         self._skip_to_delimiter = mid_stream
         metadata = describe(hello, settings, calibrations, sensors, port, maps)
         self._file = RecordingFile(create(path, overwrite=overwrite), metadata)
+
+    def go_on(
+        self,
+        hello: wire.Hello,
+        settings: dict[wire.Setting, int],
+        calibrations: dict[int, Calibration],
+        sensors: list[wire.SensorInfo],
+        maps: Mapping[int, bytes],
+    ) -> None:
+        """The board restarted: end this file and begin PATH.2.mcap, then PATH.3.mcap and so on.
+
+        Raises InputError when that exists and may not be overwritten, or cannot be written; nothing is recorded then.
+        """
+        self.close()
+        first = self.paths[0]
+        path = first.with_name(f"{first.stem}.{len(self.paths) + 1}{first.suffix}")
+        metadata = describe(hello, settings, calibrations, sensors, self._port, maps)
+        metadata[layout.CONTINUES] = self.path.name
+        self._file = RecordingFile(create(path, overwrite=self._overwrite), metadata)
+        self._skip_to_delimiter = False
+        self.path = path
+        self.paths.append(path)
 
     def write(self, chunk: bytes) -> None:
         """Take bytes as they came; an empty chunk only lets a block out in time.

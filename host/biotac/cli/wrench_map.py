@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import biotac
 
@@ -14,10 +14,13 @@ from ..calibration import map_file as file
 from ..errors import InputError
 from ..identity import serial_text
 from ..version import __version__
+from . import subverbs
 
 NAME = "map"
 HELP = "Show, get, put or clear the wrench map that a board computes a finger's force by."
 EXAMPLE = "biotac map put /dev/ttyACM0 thumb.json --finger 0 --save"
+
+run = subverbs.run
 
 State = biotac.CalibrationState
 
@@ -25,54 +28,28 @@ State = biotac.CalibrationState
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to do, each with its own arguments."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
+    add = partial(subverbs.add, what, NAME)
 
-    show = _add(what, "show", _show, "What a board, a recording or a file holds.", "show /dev/ttyACM0")
+    show = add("show", _show, "What a board, a recording or a file holds.", "show /dev/ttyACM0")
     show.add_argument("where", metavar="PORT|FILE")
 
-    get = _add(what, "get", _get, "From a board into a file.", "get /dev/ttyACM0 --finger 0 thumb.json")
+    get = add("get", _get, "From a board into a file.", "get /dev/ttyACM0 --finger 0 thumb.json")
     get.add_argument("port", metavar="PORT", help="replay:REC gets what a recording was made with")
     get.add_argument("file", metavar="FILE", type=Path)
     get.add_argument("--force", action="store_true", help="overwrite FILE")
-    _add_finger(get)
+    subverbs.add_finger(get)
 
-    put = _add(what, "put", _put, "From a file to a board.", "put /dev/ttyACM0 thumb.json --finger 0 --save")
+    put = add("put", _put, "From a file to a board.", "put /dev/ttyACM0 thumb.json --finger 0 --save")
     put.add_argument("port", metavar="PORT")
     put.add_argument("file", metavar="FILE", type=Path)
     put.add_argument("--force", action="store_true", help="for whatever sensor is there, not its own alone")
-    _add_finger(put)
-    _add_save(put)
+    subverbs.add_finger(put)
+    subverbs.add_save(put)
 
-    clear = _add(what, "clear", _clear, "Back to the gains.", "clear /dev/ttyACM0 --finger 0 --save")
+    clear = add("clear", _clear, "Back to the gains.", "clear /dev/ttyACM0 --finger 0 --save")
     clear.add_argument("port", metavar="PORT")
-    _add_finger(clear)
-    _add_save(clear)
-
-
-def _add(what: Any, name: str, action: Any, text: str, example: str) -> argparse.ArgumentParser:
-    parser: argparse.ArgumentParser = what.add_parser(
-        name,
-        help=text,
-        description=text,
-        epilog=f"example: biotac map {example}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print JSON for machines")
-    parser.set_defaults(action=action)
-    return parser
-
-
-def _add_finger(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--finger", type=int, choices=range(MAX_SENSORS), required=True, metavar="N")
-
-
-def _add_save(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--save", action="store_true", help="keep it over reboots, with all settings in force")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Do what was asked for."""
-    args.action(args)
-    return 0
+    subverbs.add_finger(clear)
+    subverbs.add_save(clear)
 
 
 def _get(args: argparse.Namespace) -> None:
