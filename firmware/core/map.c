@@ -122,12 +122,6 @@ uint8_t bt_map_open(bt_map *map, const uint8_t *blob, size_t bytes)
     return error;
 }
 
-bool bt_map_fits(const bt_map *map, const uint8_t serial[BT_MAP_SERIAL_BYTES])
-{
-    static const uint8_t any[BT_MAP_SERIAL_BYTES];
-    return memcmp(map->serial, any, sizeof any) == 0 || memcmp(map->serial, serial, sizeof any) == 0;
-}
-
 bool bt_map_needs_pdc(const bt_map *map)
 {
     return map->kinds >> BT_MAP_KIND_PRESSURE & 1;

@@ -35,9 +35,6 @@ void bt_map_close(bt_map *map);
 // axes, kind, gate, exponent, a block twice, coefficients that could overflow, an odd address).
 uint8_t bt_map_open(bt_map *map, const uint8_t *blob, size_t bytes);
 
-// Whether it may hold for the sensor that told this serial number; all zero when none has.
-bool bt_map_fits(const bt_map *map, const uint8_t serial[BT_MAP_SERIAL_BYTES]);
-
 // Whether results need PDC.
 bool bt_map_needs_pdc(const bt_map *map);
 

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+_Static_assert(BT_SERIAL_BYTES == BT_MAP_SERIAL_BYTES, "a map's serial number is a sensor's");
+
 static void send_info(bt_session *session, uint8_t req_id, uint8_t finger)
 {
     uint8_t payload[BT_MAP_INFO_BYTES];
@@ -109,7 +111,7 @@ static uint8_t end_map(bt_session *session, const uint8_t *payload)
     if (bt_map_open(&map, blob, upload->place.bytes) != BT_ERROR_OK) {
         return BT_ERROR_OUT_OF_RANGE; // whatever is wrong with it: the command's own length is right
     }
-    if (!bt_map_fits(&map, session->info[msg.finger].serial)) {
+    if (!bt_serial_fits(map.serial, session->info[msg.finger].serial)) {
         return BT_ERROR_OTHER_SENSOR;
     }
     its->map = map;

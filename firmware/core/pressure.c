@@ -37,7 +37,7 @@ void bt_pressure_add(bt_pressure *pressure, uint16_t pdc)
 
 uint16_t bt_pressure_filtered_q4(const bt_pressure *pressure)
 {
-    return pressure->known ? (uint16_t)((pressure->filtered_q8 + 8) >> 4) : BT_INVALID_COUNT;
+    return pressure->known ? (uint16_t)bt_shift_round(pressure->filtered_q8, 4) : BT_INVALID_COUNT;
 }
 
 int32_t bt_pressure_force(uint16_t filtered_q4, uint16_t tare_q4, int32_t gain_nn)

@@ -79,10 +79,6 @@ static void a_blob_is_read_where_it_lies(void **state)
     assert_ptr_equal(map.serial, bytes_of(&its) + 4);
     assert_ptr_equal(map.coefficients, bytes_of(&its) + 36);
     assert_false(bt_map_needs_pdc(&map));
-    assert_true(bt_map_fits(&map, (const uint8_t *)"BTEMU00000000042"));
-    assert_false(bt_map_fits(&map, (const uint8_t *)"BTEMU00000000043"));
-    memset(bytes_of(&its) + 4, 0, 16);
-    assert_true(bt_map_fits(&map, (const uint8_t *)"BTEMU00000000043")); // for any
 }
 
 static void assert_refused(blob *its, uint8_t error)

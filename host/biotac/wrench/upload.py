@@ -15,6 +15,7 @@ import numpy as np
 from .. import _wire as wire
 from .._map import HEADER_BYTES
 from ..board_map import from_blob, pdc_above_rest_q4
+from ..commands import MAP_SINCE_MINOR
 from ..errors import InputError, PortError
 from ..frames import StructArray
 from ..hand import Hand
@@ -23,7 +24,6 @@ from .board import Comparison
 from .fitted import WrenchMap
 from .recorded import Run
 
-MAP_SINCE_MINOR = 4  # of wire 1.x
 STREAM_S = 0.5
 TRIES = 60  # a simulated board that runs ahead leaves some seconds of frames unread
 
