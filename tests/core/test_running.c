@@ -58,7 +58,7 @@ static void a_touch_shows_as_soon_as_its_electrodes_slots_have_passed(void **sta
     }
     bt_msg_point before = ask();
     assert_int_equal(before.poc_um[0], BT_INVALID_I16); // tared, nothing weighs
-    assert_int_equal(before.slot, 0); // of the round that comes
+    assert_int_equal(before.slot, 0);                   // of the round that comes
     // A touch on E3 alone begins in this round: before its slot nothing, after it E3's own projection.
     int32_t e_q4[BT_ELECTRODES] = {0};
     bt_point want;
