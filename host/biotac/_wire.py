@@ -1740,6 +1740,34 @@ MESSAGES: dict[int, type[Any]] = {
     ClearMap.ID: ClearMap,
 }
 
+# What each command is answered by.
+ANSWERS: dict[type[Any], type[Any]] = {
+    HelloRequest: Hello,
+    Start: Reply,
+    Stop: Reply,
+    Ping: Reply,
+    Subscribe: Reply,
+    GetPoint: Point,
+    TareNow: Reply,
+    TareSet: Reply,
+    GetStatus: Status,
+    GetSensorStatus: SensorStatus,
+    GetSensorInfo: SensorInfo,
+    GetSetting: SettingValue,
+    SetSetting: SettingValue,
+    RebootBootloader: Reply,
+    SaveSettings: Reply,
+    GetCalibration: Calibration,
+    SetCalibration: Calibration,
+    ClearCalibration: Reply,
+    GetMap: MapInfo,
+    ReadMap: MapData,
+    BeginMap: Reply,
+    WriteMap: Reply,
+    EndMap: MapInfo,
+    ClearMap: Reply,
+}
+
 # One array type per message id, for decoding many payloads at once.
 DTYPES: dict[int, np.dtype[Any]] = {
     Hello.ID: np.dtype(

@@ -409,7 +409,7 @@ class Conversation(Commands):
         return self.settings(), self.calibrations(), sensors, self.maps()
 
     def _again(self, request: Any) -> None:
-        self._ask(replace(request, req_id=self._next_req_id()), _KINDS.get(type(request), wire.Reply))
+        self._ask(replace(request, req_id=self._next_req_id()), wire.ANSWERS[type(request)])
 
     def _found(self, before: wire.Hello) -> bool:
         for place in self.link.places():
@@ -429,9 +429,6 @@ class Conversation(Commands):
         batch.messages.insert(0, gap)
         if self._recorder is not None:
             self._recorder.mark(GAP, gap.as_text())
-
-
-_KINDS: dict[type[Any], type[Any]] = {wire.SetSetting: wire.SettingValue, wire.SetCalibration: wire.Calibration}
 
 
 def describe_refusal(request: Any, reply: wire.Reply) -> str:

@@ -136,6 +136,9 @@ def wire(contract: Contract) -> str:
     names = [class_name(m) for m in contract.messages]
     out += ["", f"Message = {' | '.join(names)}", "", "MESSAGES: dict[int, type[Any]] = {"]
     out += [f"    {name}.ID: {name}," for name in names] + ["}", ""]
+    class_of = {message.name: class_name(message) for message in contract.messages}
+    out += ["# What each command is answered by.", "ANSWERS: dict[type[Any], type[Any]] = {"]
+    out += [f"    {class_name(m)}: {class_of[m.reply]}," for m in contract.messages if m.reply] + ["}", ""]
     out += ["# One array type per message id, for decoding many payloads at once."]
     out += ["DTYPES: dict[int, np.dtype[Any]] = {"]
     for message in contract.messages:
