@@ -9,8 +9,8 @@
 enum bt_descriptor_outcome {
     BT_DESCRIPTOR_NOTHING = 0,
     BT_DESCRIPTOR_HUNG_UP = -100001,
-    BT_DESCRIPTOR_AGAIN =
-        -100002, // a signal came in between, or somebody else took the bytes: the time is not over
+    // A signal came in between, or somebody else took the bytes: the time is not over.
+    BT_DESCRIPTOR_AGAIN = -100002,
     BT_DESCRIPTOR_ABSENT = -100003 // this system has no such ports
 };
 
