@@ -1,4 +1,4 @@
-"""The conversation with one board: handshake, commands and their replies, and coming back after a lost link.
+"""The conversation with one board: handshake, commands and their replies.
 
 Bytes are read by whoever waits for something, or, once there is one, by a Reader's threads (live/reader.py).
 """
@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from . import _wire as wire
 from . import compatibility
-from ._sensor import MAX_SENSORS
 from .clock import LAST_SAMPLE_US, Arrivals, DeviceClock
 from .commands import Commands, Reply
 from .compatibility import HandWarning, describe_mismatch
@@ -26,13 +25,12 @@ from .errors import (
     DeviceLostError,
     InputError,
     NotAGatewayError,
-    PortError,
     WireVersionError,
 )
 from .framing import encode
 from .link import Link
 from .link.serial_port import went_away
-from .live.gap import GAP, Gap, Reason
+from .live.gap import Gap, Reason
 from .live.session import Session
 from .live.timing import Timing
 from .stream import Batch, LinkStats, StreamDecoder
@@ -43,7 +41,6 @@ if TYPE_CHECKING:
 
 REPLY_TIMEOUT_S = 1.0
 REPLY_TRIES = 3
-RETRY_S = 0.25
 
 Got = TypeVar("Got")
 
@@ -338,97 +335,16 @@ class Conversation(Commands):
             f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check the cable and open it again"
         )
 
-    # ---- lost and found ------------------------------------------------------------------------
-
     def _is_bringing_back(self) -> bool:
         return self._reader is None or self._reader.is_here()
 
+    @abstractmethod
     def _lost(self, error: DeviceLostError, reason: Reason) -> None:
         """The link is gone: raise, or return once the board is back as it was."""
-        if not (self._reconnect and self.connected) or self._closed:
-            raise error
-        lost_at_ns = self.timing.unix_ns()
-        with self._changed:
-            self.connected = False
-            self._changed.notify_all()
-        try:
-            self._take(b"\0")  # ends the half frame that was on its way, here and in a recording
-            before = self.info
-            while not self._bring_back(before, reason, lost_at_ns):
-                if self.closing.is_set():
-                    raise error
-                self.timing.pause(RETRY_S)
-        finally:
-            with self._changed:
-                self.connected = True
-                self._changed.notify_all()
 
-    def _bring_back(self, before: wire.Hello, reason: Reason, lost_at_ns: int) -> bool:
-        """One try: find the board, tell it what it was told before, and let it stream."""
-        try:
-            if not self._found(before):
-                return False
-            if self.info.boot_id != before.boot_id:
-                reason = "rebooted"
-                self._past.append(self._decoder.stats(0, 0))
-                self._decoder = StreamDecoder()
-                self.clock.restart()
-                self._arrivals.forget()
-                self._checked(self.info)
-            # Before START: rows may come with its reply. Two losses without a row between them are one gap.
-            gap = self._gap or Gap(reason, self._last_t_us(), None, lost_at_ns, 0, 0)
-            if gap.reason == "rebooted":
-                reason = "rebooted"
-            self._gap = replace(gap, reason=reason, back_at_ns=self.timing.unix_ns(), boot_id=self.info.boot_id)
-            for request in self._session.requests():
-                self._again(request)
-            for finger, blob in self._session.maps().items():
-                self._tell_map(finger, blob)
-            if reason == "rebooted":
-                self._record_on()
-            if self._started:
-                self._again(self._started)
-        except DeviceLostError:
-            return False  # gone again
-        return True
-
-    def _record_on(self) -> None:
-        """A restarted board's rows go into a file of their own."""
-        if self._recorder is None or self._recorder.closed:
-            return
-        try:
-            self._recorder.go_on(self.info, *self._to_be_recorded())
-        except (OSError, InputError) as error:
-            self._recorder = None
-            self._trouble = error
-
-    def _to_be_recorded(self) -> tuple[Any, Any, Any, Any]:
-        """Settings, calibrations, sensors and maps: what a recording's results rest on."""
-        present = self.info.fingers_present
-        sensors = [self.sensor_info(finger) for finger in range(MAX_SENSORS) if present >> finger & 1]
-        return self.settings(), self.calibrations(), sensors, self.maps()
-
-    def _again(self, request: Any) -> None:
-        self._ask(replace(request, req_id=self._next_req_id()), wire.ANSWERS[type(request)])
-
-    def _found(self, before: wire.Hello) -> bool:
-        for place in self.link.places():
-            try:
-                self.link.reopen(place)
-                hello = self._handshake()
-            except (PortError, DeviceLostError, NotAGatewayError):
-                continue
-            if hello.board_serial == before.board_serial:
-                self.info = hello
-                return True
-        return False
-
+    @abstractmethod
     def _mark(self, gap: Gap, batch: Batch) -> None:
-        self._gap = None
-        self._gaps += 1
-        batch.messages.insert(0, gap)
-        if self._recorder is not None:
-            self._recorder.mark(GAP, gap.as_text())
+        """``batch`` has the first rows after the gap."""
 
 
 def describe_refusal(request: Any, reply: wire.Reply) -> str:

@@ -16,8 +16,8 @@ from typing import Any, TypeVar
 
 from . import _wire as wire
 from ._sensor import MAX_SENSORS
+from .coming_back import ComingBack
 from .commands import ALL_FINGERS
-from .conversation import Conversation
 from .errors import DeviceLostError
 from .link import Link
 from .live.callbacks import MESSAGES, Callbacks, Unsubscribe
@@ -41,7 +41,7 @@ PINGS_PER_KEEPALIVE = 3
 Self = TypeVar("Self", bound="Streaming")
 
 
-class Streaming(Conversation):
+class Streaming(ComingBack):
     """What a Hand sends and reads."""
 
     def __init__(
