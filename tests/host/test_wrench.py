@@ -289,6 +289,8 @@ def _spoil(arrays: dict[str, Any], how: str) -> None:
         force *= 101.97
     elif how == "millinewton":
         force *= 1000.0
+    elif how == "kilonewton":
+        force /= 1000.0
     elif how == "railed":
         counts[:200, 16] = 0
     elif how == "clipped":
@@ -323,6 +325,7 @@ def _spoil(arrays: dict[str, Any], how: str) -> None:
         ("base touched", r"E_base is not at rest: E\d+ swings over \d{3,4} counts"),
         ("grams", r"units of F per RMS count .* gf or mN"),
         ("millinewton", r"units of F per RMS count .* gf or mN"),
+        ("kilonewton", r"units of F per RMS count .* kN or kgf"),
         ("railed", r"E17 is saturated .* 5\.0% of the rows"),
         ("clipped", r"read exactly 1 N along [xyz], the most of all: .* saturated"),
         ("other file", r"not aligned: .* lag of -?\d+ rows, .* R2 -?\d\.\d\d held out"),

@@ -104,6 +104,9 @@ def load_run(path: Path) -> Run:
     rest: npt.NDArray[np.bool_] = np.linalg.norm(force, axis=1) < REST_N
     tare, notes = _tare(path, fields, counts, force, rest)
     check_units(path, counts - tare, force)
+    # only now: in other units a press is a rest
+    if "E_base" in fields and rest.sum() >= MIN_REST_ROWS:
+        _check_same_finger(path, tare, np.median(counts[rest], axis=0))
     pdc = None
     if "PDC" in fields:
         raw = counts_field(path, "PDC", fields["PDC"], rows, None).astype(np.float64)
@@ -198,8 +201,6 @@ def _tare(
                 f"{path}: E_base is not at rest: {_sensor.ELECTRODE_NAMES[worst]} swings over "
                 f"{high[worst] - low[worst]:.0f} counts: expected at most {MAX_REST_SWING_COUNTS:.0f}; record it in air"
             )
-        if rest.sum() >= MIN_REST_ROWS:
-            _check_same_finger(path, median, np.median(counts[rest], axis=0))
         # the median, because a brief touch in the recording must not become the rest
         return median, (f"tare: median of {len(base)} rows of E_base",)
     if rest.sum() < MIN_REST_ROWS:
