@@ -22,6 +22,7 @@ from .core import TORQUE_GAINS, Results, Settings, ffi, lib, reference_q4
 from .frames import UM_PER_MM, StructArray, electrode_signals, to_units
 from .pressure.check import FORCE_BOUND_N, PressureCheck
 from .wrench import board
+from .wrench.applied import replace_gains
 
 #: The PoC's distance and the force of each axis, see firmware/reference/kernel_bounds.h.
 POC_BOUND_UM: float = lib.bt_poc_bound_um()
@@ -202,20 +203,16 @@ def _by_map(
     """
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
     wrench, off = board.exact(its, *frames), board.bound(its, None, *frames)
-    truth.force_n[:] = wrench[:, :3]
-    force_off = np.nan_to_num(off[:, :3])
-    torsion, torsion_off = (np.full((len(messages), 1), value) for value in (np.nan, 0.0))
-    if its.axes > 3:
-        truth.torque_nmm[:] = wrench[:, 3:6]
-        if its.axes == _map.AXES_TORSION:
-            torsion, torsion_off = wrench[:, 6:], np.nan_to_num(off[:, 6:])
-        return 1e3 * force_off, np.nan_to_num(off[:, 3:6]), torsion, torsion_off
-    # x is derived from this force, by a lever of the core's radius at most
-    y, z = truth.poc_mm[:, 1], truth.poc_mm[:, 2]
-    truth.torque_nmm[:, 0] = y * truth.force_n[:, 2] - z * truth.force_n[:, 1]
-    out = torque_bound_nmm(messages, truth, settings)
-    out[:, 0] += CORE_RADIUS_UM / UM_PER_MM * force_off[:, 1:].sum(axis=1)
-    return 1e3 * force_off, out, torsion, torsion_off
+    torsion = np.empty((len(messages), 1))
+    replace_gains(its, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
+    force_off, torque_off, torsion_off = np.split(np.nan_to_num(off), (3, 6), axis=1)
+    if its.axes < _map.AXES_TORSION:
+        torsion_off = np.zeros_like(torsion)
+    if its.axes == 3:
+        # x is derived from this force, by a lever of the core's radius at most
+        torque_off = torque_bound_nmm(messages, truth, settings)
+        torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * force_off[:, 1:].sum(axis=1)
+    return 1e3 * force_off, torque_off, torsion, torsion_off
 
 
 def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:

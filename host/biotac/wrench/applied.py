@@ -1,4 +1,4 @@
-"""A board's map over recorded counts in float64, beside the results that need none."""
+"""A board's map over recorded counts in float64, in place of what the gains give."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from .. import _map
 from .. import _wire as wire
 from ..board_map import BoardMap
 from ..frames import StructArray, tare_to_q4
+from ..sim.surface import Floats
 from . import board
 
 
@@ -28,11 +29,21 @@ def by_map(results: StructArray, its: BoardMap, counts: Any, tare: Any, pdc_abov
     known = np.rint(16 * np.nan_to_num(np.broadcast_to(pressure, len(rows))))
     pdc_q4 = np.where(np.isnan(pressure), wire.INVALID_I32, known).astype(np.int32)
     wrench = board.exact(its, raw, tare_q4, pdc_q4)
-    rows["force_n"] = wrench[:, :3]
-    if its.axes > 3:
-        rows["torque_nmm"] = wrench[:, 3:6]
-    else:
-        y, z = rows["poc_mm"][:, 1], rows["poc_mm"][:, 2]
-        rows["torque_nmm"][:, 0] = y * wrench[:, 2] - z * wrench[:, 1]
-    rows["torsion_nmm"] = wrench[:, 6] if its.axes == _map.AXES_TORSION else np.nan
+    replace_gains(its, wrench, rows["poc_mm"], rows["force_n"], rows["torque_nmm"], rows["torsion_nmm"])
     return results
+
+
+def replace_gains(
+    its: BoardMap, wrench: Floats, poc_mm: Floats, force_n: Floats, torque_nmm: Floats, torsion_nmm: Floats
+) -> None:
+    """Put a map's ``wrench`` (n, axes), as of board.exact, into the gains' results: (n, 3) each, torsion (n,).
+
+    Without torque of its own the map's force makes torque x, by the lever to ``poc_mm`` (n, 3), and the rest of the
+    torque stays; without torsion there is none, NaN.
+    """
+    force_n[:] = wrench[:, :3]
+    if its.axes > 3:
+        torque_nmm[:] = wrench[:, 3:6]
+    else:
+        torque_nmm[:, 0] = poc_mm[:, 1] * wrench[:, 2] - poc_mm[:, 2] * wrench[:, 1]
+    torsion_nmm[:] = wrench[:, 6] if its.axes == _map.AXES_TORSION else np.nan
