@@ -17,7 +17,6 @@ from . import _wire as wire
 from .board_map import BoardMap, opened
 from .core import FORCE_GAINS, TORQUE_GAINS, Settings, default_settings, ffi, formula_settings, lib
 from .frames import StructArray
-from .wrench.applied import by_map
 
 #: poc_mm, force_n and torque_nmm of one frame, named, in units and with axes as in FRAME_DTYPE.
 RESULT_DTYPE = np.dtype([("poc_mm", "<f8", (3,)), ("force_n", "<f8", (3,)), ("torque_nmm", "<f8", (3,))])
@@ -64,6 +63,8 @@ def compute(
     ranges, with the first bad row, what was seen and what was expected; ``out`` then holds no results.
     """
     if wrench_map is not None:
+        from .wrench.applied import by_map  # here: everybody would wait for it at `import biotac`
+
         plain = compute(counts, tare, settings)
         shape = plain.shape
         out = np.empty(shape, MAPPED_RESULT_DTYPE) if out is None else _checked_out(out, shape, MAPPED_RESULT_DTYPE)
