@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from .. import _wire as wire
 from ..core import Settings
-from ..finger import TARE_UNKNOWN_Q16, Finger, to_frames
+from ..finger import Finger, to_frames
 from ..frames import StructArray, to_units
 from ..sim import physics, sampling, surface
 from ..sim.physics import Profile, States
@@ -169,16 +169,9 @@ def on_board(counts: Words, pdc: Words, *, given: Floats | None = None) -> tuple
 
     ``given`` (19,) counts is the tare it is told before the first round; by default it finds its own.
     """
-    board = _board(None, given)
-    rows, pdc_rest = [], np.full(len(counts), np.nan)
-    for k in range(len(counts)):
-        # one round at a time, because a FRAME does not have PDC's tare
-        rows.append(board.feed(counts[k : k + 1], pdc[k : k + 1]))
-        q16 = board.tare_message().pdc_tare_q16
-        if q16 != TARE_UNKNOWN_Q16:
-            pdc_rest[k] = q16 / 65536.0
-    joined = np.concatenate(rows)
-    return joined, to_units(joined["tare_q4"], TARE_Q4_PER_COUNT), pdc_rest
+    rows = _board(None, given).feed(counts, pdc)
+    tare, pdc_rest = (to_units(rows[name], TARE_Q4_PER_COUNT) for name in ("tare_q4", "pdc_tare_q4"))
+    return rows, tare, pdc_rest
 
 
 def _board(settings: Settings | None, given: Floats | None) -> Finger:
