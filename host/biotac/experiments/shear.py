@@ -11,14 +11,14 @@ from pathlib import Path
 from ..sim.physics import Profile
 from . import traces, weight
 from .outcome import Facts, Options, claim, table, text
-from .trial import Script, Trial, play
+from .trial import Trial, play
 from .weight import Result
 
 RECORDING = "E and F"
 MAPS = True
 
 SHEAR_N = 3.0
-RAMP_S, HOLD_S = 0.5, 2.5
+HOLD_S = 2.5
 LATERAL = ("E1", "E4", "E11", "E14")
 MARKED = (*LATERAL, "E17")
 # phase, weight, push to +y
@@ -30,11 +30,11 @@ def emulated(
 ) -> Trial:
     """Figure 3 on an emulated finger; ``mirrored`` is the same trial as its mirror image sees it."""
     side = -1.0 if mirrored else 1.0
-    script = Script()
-    script.phase("A", 0.1, 1.9, weight.pose(), weight.pose())
-    for name, load, push in PHASES:
-        end = weight.pose(force_n=load * weight.WEIGHT_N, shear_y_n=side * push * SHEAR_N)
-        script.phase(name, RAMP_S, HOLD_S, end)
+    steps = [
+        (name, weight.pose(force_n=load * weight.WEIGHT_N, shear_y_n=side * push * SHEAR_N))
+        for name, load, push in PHASES
+    ]
+    script = weight.script(weight.pose(), steps, HOLD_S)
     return play("figure 3", script, seed=seed, profile=profile, take=take, noiseless=noiseless, mirrored=mirrored)
 
 

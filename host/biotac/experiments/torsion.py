@@ -13,14 +13,14 @@ from ..sim.physics import Profile
 from . import traces, weight
 from .estimates import PAPER
 from .outcome import Facts, Options, claim
-from .trial import Script, Trial, play
+from .trial import Trial, play
 from .weight import Result
 
 RECORDING = "E, F and M"
 MAPS = True
 
 TORSION_NMM = 6.0  # the paper gives none: as much as such a flat under 5 N holds at moderate friction
-RAMP_S, HOLD_S = 0.5, 4.5
+HOLD_S = 4.5
 MARKED = ("E2", "E3", "E12", "E13", "E17")
 # phase, weight, turn. The finger lies pad up and is turned as seen from above, looking along the inward normal,
 # so clockwise is negative about the outward one.
@@ -32,11 +32,11 @@ def emulated(
 ) -> Trial:
     """Figure 9 on an emulated finger; ``mirrored`` is the same trial as its mirror image sees it."""
     side = -1.0 if mirrored else 1.0
-    script = Script()
-    script.phase("A", 0.1, 1.9, weight.pose(), weight.pose())
-    for name, load, turn in PHASES:
-        end = weight.pose(force_n=load * weight.WEIGHT_N, torsion_nmm=side * turn * TORSION_NMM)
-        script.phase(name, RAMP_S, HOLD_S, end)
+    steps = [
+        (name, weight.pose(force_n=load * weight.WEIGHT_N, torsion_nmm=side * turn * TORSION_NMM))
+        for name, load, turn in PHASES
+    ]
+    script = weight.script(weight.pose(), steps, HOLD_S)
     return play("figure 9", script, seed=seed, profile=profile, take=take, noiseless=noiseless, mirrored=mirrored)
 
 

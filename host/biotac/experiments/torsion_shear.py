@@ -18,7 +18,7 @@ from . import shear, torsion, traces, weight
 from .estimates import PAPER, Estimate, rmse
 from .outcome import Facts, Options, claim, number, table, text
 from .torsion import TORSION_NMM
-from .trial import Bools, Script, Trial, play
+from .trial import Bools, Trial, play
 from .weight import E17_MM, FLAT_MM, WEIGHT_N, Result
 
 RECORDING = "E, F and M"
@@ -26,7 +26,7 @@ MAPS = True
 
 SHEAR_N = 1.5  # the paper gives none; numerics.md 3.4 replays the figure with this
 REGIONS = {"I": 1.0, "II": 0.0, "III": -1.0}  # push along +y
-RAMP_S, HOLD_S = 0.5, 2.5
+HOLD_S = 2.5
 # clockwise is negative about the outward normal, see torsion.py
 TURNS = (("rest", 0.0), ("clockwise", -1.0), ("between", 0.0), ("counter", 1.0), ("after", 0.0))
 
@@ -52,18 +52,16 @@ def replay(
     """
     side = -1.0 if mirrored else 1.0
     at = (at_mm[0], side * at_mm[1])
-    script = Script()
     bare = weight.pose(at, tip_mm=tip_mm)
-    script.phase("A", 0.1, 1.9, bare, bare)
-    script.phase("B", RAMP_S, HOLD_S, weight.pose(at, force_n=force_n, tip_mm=tip_mm))
+    steps = [("B", weight.pose(at, force_n=force_n, tip_mm=tip_mm))]
     for region, push in REGIONS.items():
         for turn, sign in TURNS:
             end = weight.pose(
                 at, force_n=force_n, shear_y_n=side * push * shear_n, torsion_nmm=side * sign * torsion_nmm,
                 tip_mm=tip_mm,
             )  # fmt: skip
-            script.phase(f"{region} {turn}", RAMP_S, HOLD_S, end)
-    script.phase("G", RAMP_S, HOLD_S, bare)
+            steps.append((f"{region} {turn}", end))
+    script = weight.script(bare, [*steps, ("G", bare)], HOLD_S)
     return play("figure 10", script, seed=seed, profile=profile, take=take, noiseless=noiseless, mirrored=mirrored)
 
 

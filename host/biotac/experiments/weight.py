@@ -6,7 +6,7 @@ fitted maps; its figures are errors over the loaded frames and means over the ph
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,11 +19,12 @@ from ..sim.timeline import Pose
 from . import recorded
 from .estimates import PAPER, Estimate, by_map, by_paper, load_maps, paper_scales, rmse
 from .outcome import Facts, Options, number, numbers, table, text
-from .trial import Bools, Trial
+from .trial import Bools, Script, Trial
 
 WEIGHT_N = 4.905  # 500 g
 FLAT_MM = 7.0  # numerics.md 3.1: a flat surface leaves a footprint of 3.5 mm radius
 LOADED_N = 0.5
+RAMP_S = 0.5
 _E17 = surface.ELECTRODE_MM[_sensor.ELECTRODE_NAMES.index("E17")]
 E17_MM = (float(_E17[0]), float(_E17[1]))  # the paper does not say where the weight lies; figure 3 has it over E17
 FORCES, TORQUES = ("Fx", "Fy", "Fz"), ("Mx", "My", "Mz")
@@ -45,6 +46,15 @@ def pose(at_mm: tuple[float, float] = E17_MM, *, force_n: float = 0.0, shear_y_n
          torsion_nmm: float = 0.0, tip_mm: float = FLAT_MM) -> Pose:  # fmt: skip
     """The weight on the pad at x, y."""
     return Pose(*at_mm, force_n, shear_y_n=shear_y_n, torsion_nmm=torsion_nmm, tip_mm=tip_mm)
+
+
+def script(bare: Pose, steps: Iterable[tuple[str, Pose]], hold_s: float) -> Script:
+    """Two seconds at rest (A), then each phase's pose, reached in RAMP_S and held; ``bare`` is where nothing loads."""
+    its = Script()
+    its.phase("A", 0.1, 1.9, bare, bare)
+    for name, end in steps:
+        its.phase(name, RAMP_S, hold_s, end)
+    return its
 
 
 def of_recording(options: Options, *, torque: bool) -> Result:
