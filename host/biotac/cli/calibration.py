@@ -16,7 +16,6 @@ from .._sensor import MAX_SENSORS
 from ..calibration import Calibration, eeprom, file
 from ..calibration.chip import KINDS, Chip
 from ..errors import InputError
-from ..identity import serial_text
 from ..version import __version__
 from . import subverbs
 
@@ -25,8 +24,6 @@ HELP = "Show, get, put or store a finger's calibration."
 EXAMPLE = "biotac calibration put /dev/ttyACM0 thumb.json --finger 0 --save"
 
 run = subverbs.run
-
-State = biotac.CalibrationState
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,23 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     show.add_argument("where", metavar="PORT|FILE", nargs="?", help="left out with --i2c")
     _add_eeprom(show, required=False)
 
-    get = add("get", _get, "From a board into a file.", "get /dev/ttyACM0 --finger 0 thumb.json")
-    get.add_argument("port", metavar="PORT")
-    get.add_argument("file", metavar="FILE", type=Path)
-    get.add_argument("--force", action="store_true", help="overwrite FILE")
-    subverbs.add_finger(get)
-
-    put = add("put", _put, "From a file to a board.", "put /dev/ttyACM0 thumb.json --finger 0 --save")
-    put.add_argument("port", metavar="PORT")
-    put.add_argument("file", metavar="FILE", type=Path)
-    put.add_argument("--force", action="store_true", help="for whatever sensor is there, not its own alone")
-    subverbs.add_finger(put)
-    subverbs.add_save(put)
-
-    clear = add("clear", _clear, "Back to the board's settings.", "clear /dev/ttyACM0 --finger 0 --save")
-    clear.add_argument("port", metavar="PORT")
-    subverbs.add_finger(clear)
-    subverbs.add_save(clear)
+    subverbs.add_get_put_clear(add, _get, _put, _clear, "Back to the board's settings.")
 
     store = add("store", _store, "Into an EEPROM.", "store --i2c 1:0x50 --chip 24c32 thumb.json")
     store.add_argument("file", metavar="FILE", nargs="?", type=Path, help="left out: standard input")
@@ -79,8 +60,8 @@ def _get(args: argparse.Namespace) -> None:
         its = hand.calibration(args.finger)
         if its is None:
             raise InputError(f"finger {args.finger} on {args.port} has no calibration; `put` gives it one")
-        provenance = {"from": args.port, "board_serial": serial_text(hand.info), "finger": args.finger}
-    file.save(args.file, its, {"software": f"biotac-gateway {__version__}", **provenance}, overwrite=args.force)
+        provenance = subverbs.provenance(args, hand)
+    file.save(args.file, its, provenance, overwrite=args.force)
     _say(args, f"{args.file}: {_title(its)}", its)
 
 
@@ -91,17 +72,11 @@ def _put(args: argparse.Namespace) -> None:
         its = hand.calibration(args.finger) or its
         if args.save:
             hand.save_settings()
-    kept = "saved" if args.save else "until the next reboot (--save keeps it)"
-    _say(args, f"finger {args.finger}: in force, {kept}; {_title(its)}", its)
+    _say(args, subverbs.put_line(args, _title(its)), its)
 
 
 def _clear(args: argparse.Namespace) -> None:
-    with biotac.open(args.port) as hand:
-        hand.clear_calibration(args.finger)
-        if args.save:
-            hand.save_settings()
-    kept = "saved" if args.save else "until the next reboot (--save keeps it so)"
-    print(json.dumps({"finger": args.finger}) if args.json else f"finger {args.finger}: the settings hold, {kept}")
+    subverbs.clear(args, lambda hand: hand.clear_calibration(args.finger), "the settings")
 
 
 # ---- EEPROM ------------------------------------------------------------------------------------
@@ -155,8 +130,7 @@ def _show_board(args: argparse.Namespace) -> None:
         return
     for finger, (state, its) in fingers.items():
         if its is not None:
-            holds = "in force" if state == State.IN_FORCE else "not in force, another sensor is there"
-            print("\n".join([f"finger {finger}: {holds}; {_title(its)}", *_lines(its)]))
+            print("\n".join([f"finger {finger}: {subverbs.state_words(state)}; {_title(its)}", *_lines(its)]))
         elif finger in present:
             print(f"finger {finger}: none, the settings hold")
 

@@ -12,8 +12,6 @@ import biotac
 from .._sensor import MAX_SENSORS
 from ..calibration import map_file as file
 from ..errors import InputError
-from ..identity import serial_text
-from ..version import __version__
 from . import subverbs
 
 NAME = "map"
@@ -21,8 +19,6 @@ HELP = "Show, get, put or clear the wrench map that a board computes a finger's 
 EXAMPLE = "biotac map put /dev/ttyACM0 thumb.json --finger 0 --save"
 
 run = subverbs.run
-
-State = biotac.CalibrationState
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,23 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     show = add("show", _show, "What a board, a recording or a file holds.", "show /dev/ttyACM0")
     show.add_argument("where", metavar="PORT|FILE")
 
-    get = add("get", _get, "From a board into a file.", "get /dev/ttyACM0 --finger 0 thumb.json")
-    get.add_argument("port", metavar="PORT", help="replay:REC gets what a recording was made with")
-    get.add_argument("file", metavar="FILE", type=Path)
-    get.add_argument("--force", action="store_true", help="overwrite FILE")
-    subverbs.add_finger(get)
-
-    put = add("put", _put, "From a file to a board.", "put /dev/ttyACM0 thumb.json --finger 0 --save")
-    put.add_argument("port", metavar="PORT")
-    put.add_argument("file", metavar="FILE", type=Path)
-    put.add_argument("--force", action="store_true", help="for whatever sensor is there, not its own alone")
-    subverbs.add_finger(put)
-    subverbs.add_save(put)
-
-    clear = add("clear", _clear, "Back to the gains.", "clear /dev/ttyACM0 --finger 0 --save")
-    clear.add_argument("port", metavar="PORT")
-    subverbs.add_finger(clear)
-    subverbs.add_save(clear)
+    recorded = "replay:REC gets what a recording was made with"
+    subverbs.add_get_put_clear(add, _get, _put, _clear, "Back to the gains.", get_port_help=recorded)
 
 
 def _get(args: argparse.Namespace) -> None:
@@ -57,8 +38,8 @@ def _get(args: argparse.Namespace) -> None:
         blob = hand.get_map(args.finger)
         if blob is None:
             raise InputError(f"finger {args.finger} on {args.port} has no wrench map; `put` gives it one")
-        provenance = {"from": args.port, "board_serial": serial_text(hand.info), "finger": args.finger}
-    file.save(args.file, blob, {"software": f"biotac-gateway {__version__}", **provenance}, overwrite=args.force)
+        provenance = subverbs.provenance(args, hand)
+    file.save(args.file, blob, provenance, overwrite=args.force)
     _say(args, f"{args.file}: {file.title(blob)}", blob)
 
 
@@ -69,17 +50,11 @@ def _put(args: argparse.Namespace) -> None:
         blob = hand.get_map(args.finger) or blob
         if args.save:
             hand.save_settings()
-    kept = "saved" if args.save else "until the next reboot (--save keeps it)"
-    _say(args, f"finger {args.finger}: in force, {kept}; {file.title(blob)}", blob)
+    _say(args, subverbs.put_line(args, file.title(blob)), blob)
 
 
 def _clear(args: argparse.Namespace) -> None:
-    with biotac.open(args.port) as hand:
-        hand.clear_map(args.finger)
-        if args.save:
-            hand.save_settings()
-    kept = "saved" if args.save else "until the next reboot (--save keeps it so)"
-    print(json.dumps({"finger": args.finger}) if args.json else f"finger {args.finger}: the gains hold, {kept}")
+    subverbs.clear(args, lambda hand: hand.clear_map(args.finger), "the gains")
 
 
 def _show(args: argparse.Namespace) -> None:
@@ -97,8 +72,7 @@ def _show(args: argparse.Namespace) -> None:
         return
     for finger, (state, its) in fingers.items():
         if its is not None:
-            holds = "in force" if state == State.IN_FORCE else "not in force, another sensor is there"
-            print(f"finger {finger}: {holds}; {file.title(its)}")
+            print(f"finger {finger}: {subverbs.state_words(state)}; {file.title(its)}")
         elif finger in present:
             print(f"finger {finger}: none, the gains hold")
 
