@@ -1,4 +1,5 @@
 // The conversation: every command gets exactly one reply.
+#include "fake_board.h"
 #include "fake_host.h"
 
 static const received_message *set(uint8_t setting, int32_t value)
@@ -154,20 +155,6 @@ static uint8_t save(const bt_settings *settings)
     return BT_ERROR_OK;
 }
 
-static uint8_t save_calibration(uint8_t finger, const bt_calibration *calibration)
-{
-    (void)finger;
-    (void)calibration;
-    return BT_ERROR_OK;
-}
-
-static uint8_t save_map(uint8_t finger, const bt_map_place *place)
-{
-    (void)finger;
-    (void)place;
-    return BT_ERROR_NOT_STORED; // there is nothing to store
-}
-
 static uint8_t reboot(void)
 {
     reboots++;
@@ -188,8 +175,8 @@ static void saving_and_leaving_are_the_boards_to_do(void **state)
     static const uint8_t req_id = 9;
     static const bt_board_actions actions = {
         .save_settings = save,
-        .save_calibration = save_calibration,
-        .save_map = save_map,
+        .save_calibration = keep_calibration,
+        .save_map = keep_no_map,
         .reboot_bootloader = reboot,
     };
     assert_int_equal(host_error(&session, BT_SAVE_SETTINGS_ID, &req_id, 1), BT_ERROR_NOT_HERE);

@@ -10,6 +10,7 @@
 #include "input.h"
 
 #include "crc32.h"
+#include "fake_board.h"
 #include "session.h"
 
 #include <string.h>
@@ -43,27 +44,14 @@ static bool program(uint32_t offset, const uint8_t *page)
     return true;
 }
 
-static uint8_t save_settings(const bt_settings *settings)
-{
-    (void)settings;
-    return BT_ERROR_OK;
-}
-
-static uint8_t save_calibration(uint8_t finger, const bt_calibration *calibration)
-{
-    (void)finger;
-    (void)calibration;
-    return BT_ERROR_OK;
-}
-
 static uint8_t save_map(uint8_t finger, const bt_map_place *place)
 {
     return finger < BT_MAX_FINGERS && place->slot < BT_MAP_SLOTS ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
 }
 
 static const bt_map_flash map_flash = {erase, program, slots};
-static const bt_board_actions actions = {.save_settings = save_settings,
-                                         .save_calibration = save_calibration,
+static const bt_board_actions actions = {.save_settings = keep_settings,
+                                         .save_calibration = keep_calibration,
                                          .save_map = save_map,
                                          .maps = &map_flash};
 

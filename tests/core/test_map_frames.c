@@ -1,0 +1,159 @@
+// What a frame publishes that a wrench map is in force for.
+#include "emulated_finger.h"
+#include "map_words.h"
+#include "results.h"
+
+static bt_msg_frame published(emulated_finger *finger, const bt_map *map, uint16_t pdc, uint32_t quantities)
+{
+    bt_settings all;
+    bt_settings_reset(&all);
+    bt_kernel_settings settings = bt_kernel_settings_from(&all);
+    assert_true(settings.map == NULL);
+    settings.map = map;
+    bt_frame frame = next_frame(finger);
+    frame.pdc = pdc;
+    finger->tare.noise.count2 = 400;
+    bt_msg_frame msg;
+    memset(&msg, 0, sizeof msg);
+    bt_results(&frame, &finger->tare, &settings, quantities, &msg);
+    memcpy(msg.counts, frame.electrode, sizeof msg.counts);
+    return msg;
+}
+
+static emulated_finger pressed(void)
+{
+    emulated_finger finger;
+    finger_init(&finger);
+    finger.sigma = 0;
+    finger.has_pdc = true;
+    run_seconds(&finger, 5);
+    finger.load = 400;
+    finger.pdc_load = 50;
+    (void)run_until(&finger, BT_TARE_STATE_CONTACT, 10);
+    return finger;
+}
+
+static void mixed_map(blob *its, bt_map *map, uint32_t axes)
+{
+    begin(its, axes, 2);
+    block(its, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, 6);
+    block(its, BT_MAP_KIND_PRESSURE, BT_MAP_GATE_X, 4);
+    for (uint32_t k = 0; k < columns_of[BT_MAP_KIND_SIGNAL] * axes; k++) {
+        its->word[its->words++] = WORD(40 + 13 * (k % 7) - (k % axes == 1 ? 400 : 0), 77 * k);
+    }
+    for (uint32_t k = 0; k < axes; k++) {
+        its->word[its->words++] = WORD(100 + k, 3);
+    }
+    assert_int_equal(opened(its, map), BT_ERROR_OK);
+}
+
+static void a_mapped_frame_has_the_maps_force_and_says_so(void **state)
+{
+    (void)state;
+    static blob its;
+    bt_map map;
+    emulated_finger finger = pressed();
+    uint32_t rest_q4 = (finger.tare.base.pdc_q16 + (1 << 11)) >> 12;
+    for (size_t k = 0; k < SOME_AXES; k++) {
+        uint32_t axes = axes_of[k];
+        mixed_map(&its, &map, axes);
+        bt_msg_frame plain = published(&finger, NULL, 1400, BT_WANT_ALL | BT_QUANTITY_FLAG_SIGMA);
+        bt_msg_frame msg = published(&finger, &map, 1400, BT_WANT_ALL | BT_QUANTITY_FLAG_SIGMA);
+        assert_memory_equal(plain.counts, msg.counts, sizeof msg.counts);
+        assert_int_equal(msg.flags, plain.flags | BT_FRAME_FLAG_MAPPED);
+        assert_memory_equal(msg.poc_um, plain.poc_um, sizeof msg.poc_um);
+        assert_true(msg.poc_sigma_um == plain.poc_sigma_um && msg.poc_sigma_um != 0xFFFF);
+        int32_t force[3], torque[3], torsion = BT_INVALID_I32;
+        bt_map_wrench(&map, msg.counts, finger.tare.electrode_q4, 16 * 1400 - (int32_t)rest_q4, force, torque,
+                      &torsion);
+        assert_int_equal(plain.torsion_mnmm, BT_INVALID_I32);
+        assert_int_equal(msg.torsion_mnmm, torsion);
+        assert_true((torsion != BT_INVALID_I32) == (axes == 7));
+        assert_memory_equal(msg.force_100un, force, sizeof force);
+        for (int d = 0; d < 3; d++) {
+            assert_int_not_equal(force[d], plain.force_100un[d]);
+            assert_int_equal(msg.force_sigma_100un[d], 0xFFFF);
+            assert_int_not_equal(plain.force_sigma_100un[d], 0xFFFF);
+        }
+        if (axes > 3) {
+            assert_memory_equal(msg.torque_mnmm, torque, sizeof torque);
+            continue;
+        }
+        assert_memory_equal(msg.torque_mnmm + 1, plain.torque_mnmm + 1, 2 * sizeof *torque);
+        // x is the published point times the published force, within what rounding the point to um leaves.
+        double y_mn = force[1] / 10.0, z_mn = force[2] / 10.0;
+        double x = (msg.poc_um[1] * z_mn - msg.poc_um[2] * y_mn) / 1000;
+        assert_true(fabs(msg.torque_mnmm[0] - x) < 0.6 + 0.0006 * (fabs(y_mn) + fabs(z_mn)));
+        assert_int_not_equal(msg.torque_mnmm[0], plain.torque_mnmm[0]);
+    }
+}
+
+static void without_pressure_a_map_that_needs_it_gives_nothing(void **state)
+{
+    (void)state;
+    static blob its;
+    bt_map map;
+    emulated_finger finger = pressed();
+    for (size_t k = 0; k < SOME_AXES; k++) {
+        uint32_t axes = axes_of[k];
+        mixed_map(&its, &map, axes);
+        bt_msg_frame plain = published(&finger, NULL, BT_INVALID_COUNT, BT_WANT_ALL);
+        bt_msg_frame msg = published(&finger, &map, BT_INVALID_COUNT, BT_WANT_ALL);
+        assert_int_equal(msg.flags, plain.flags | BT_FRAME_FLAG_MAPPED);
+        assert_int_equal(msg.torsion_mnmm, BT_INVALID_I32);
+        assert_true(msg.flags & BT_FRAME_FLAG_PDC_MISSING);
+        for (int d = 0; d < 3; d++) {
+            assert_int_equal(msg.force_100un[d], BT_INVALID_I32);
+            bool by_gains = axes == 3 && d > 0;
+            assert_int_equal(msg.torque_mnmm[d], by_gains ? plain.torque_mnmm[d] : BT_INVALID_I32);
+        }
+        uint32_t known = finger.tare.base.pdc_q16;
+        finger.tare.base.pdc_q16 = BT_TARE_UNKNOWN; // a pressure, but nothing to compare it with
+        msg = published(&finger, &map, 1400, BT_WANT_ALL);
+        assert_int_equal(msg.force_100un[0], BT_INVALID_I32);
+        finger.tare.base.pdc_q16 = known;
+    }
+    one_block(&its, 3, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, 6, WORD(30, 0)); // needs none
+    assert_int_equal(opened(&its, &map), BT_ERROR_OK);
+    assert_int_not_equal(published(&finger, &map, BT_INVALID_COUNT, BT_WANT_ALL).force_100un[0],
+                         BT_INVALID_I32);
+}
+
+static void what_is_not_asked_for_changes_nothing_that_is(void **state)
+{
+    (void)state;
+    static blob its;
+    bt_map map;
+    emulated_finger finger = pressed();
+    for (size_t k = 0; k < SOME_AXES; k++) {
+        uint32_t axes = axes_of[k];
+        mixed_map(&its, &map, axes);
+        bt_msg_frame all = published(&finger, &map, 1400, BT_WANT_ALL);
+        for (uint32_t wanted = 0; wanted <= BT_WANT_ALL; wanted++) {
+            bt_msg_frame msg = published(&finger, &map, 1400, wanted);
+            bool force = wanted & BT_WANT_FORCE, torque = wanted & BT_WANT_TORQUE, poc = wanted & BT_WANT_POC;
+            assert_int_equal(msg.torsion_mnmm, torque ? all.torsion_mnmm : BT_INVALID_I32);
+            for (int d = 0; d < 3; d++) {
+                assert_int_equal(msg.force_100un[d], force ? all.force_100un[d] : BT_INVALID_I32);
+                assert_int_equal(msg.torque_mnmm[d], torque ? all.torque_mnmm[d] : BT_INVALID_I32);
+                assert_int_equal(msg.poc_um[d], poc ? all.poc_um[d] : BT_INVALID_I16);
+            }
+        }
+    }
+    finger.tare.reason = BT_TARE_REASON_NONE;
+    bt_msg_frame msg = published(&finger, &map, 1400, BT_WANT_ALL);
+    assert_true(msg.flags & BT_FRAME_FLAG_UNTARED && !(msg.flags & BT_FRAME_FLAG_MAPPED));
+    assert_int_equal(msg.force_100un[2], BT_INVALID_I32);
+    assert_int_equal(msg.torsion_mnmm, BT_INVALID_I32);
+}
+
+#define T(name) cmocka_unit_test(name)
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(a_mapped_frame_has_the_maps_force_and_says_so),
+        T(without_pressure_a_map_that_needs_it_gives_nothing),
+        T(what_is_not_asked_for_changes_nothing_that_is),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,152 @@
+// What is kept of wrench maps, over the slots of a small flash.
+#include "map_board.h"
+
+static void what_was_not_saved_is_gone_at_the_next_boot(void **state)
+{
+    (void)state;
+    size_t bytes = make_map(blob, 1, 2, ""), more = make_map(other, 2, 5, "");
+    assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
+    assert_int_equal(save(), BT_ERROR_OK);
+    assert_int_equal(upload(0, other, more), BT_ERROR_OK);
+    assert_int_equal(upload(1, other, more), BT_ERROR_OK);
+    power_on();
+    assert_has(0, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
+    assert_has(1, NULL, 0, BT_CALIBRATION_STATE_NONE);
+    assert_int_equal(clear(0), BT_ERROR_OK);
+    power_on();
+    assert_has(0, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
+    assert_int_equal(clear(0), BT_ERROR_OK);
+    assert_int_equal(save(), BT_ERROR_OK);
+    power_on();
+    assert_has(0, NULL, 0, BT_CALIBRATION_STATE_NONE);
+}
+
+static void a_record_that_cannot_be_is_no_map(void **state)
+{
+    (void)state;
+    size_t bytes = make_map(blob, 1, 2, "");
+    assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
+    assert_int_equal(save(), BT_ERROR_OK);
+    const bt_map_place good = record[0];
+    const bt_map_place bad[] = {
+        {good.slot, good.bytes, good.crc32 ^ 1},
+        {good.slot, (uint16_t)(good.bytes - 1), good.crc32},
+        {BT_MAP_SLOTS, good.bytes, good.crc32},
+        {good.slot, BT_MAP_MAX_BYTES + 1, good.crc32},
+        {(uint8_t)(good.slot - 1), good.bytes, good.crc32},
+    };
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+        record[0] = bad[k];
+        power_on();
+        assert_has(0, NULL, 0, BT_CALIBRATION_STATE_NONE);
+    }
+    // A record of a later version is not understood, but its slot is not written to either.
+    uint8_t packed[BT_MAP_RECORD_BYTES + 4] = {0};
+    (void)bt_map_place_pack(&good, packed);
+    record[0] = (bt_map_place){0};
+    power_on();
+    bt_finger_map_load(&session.map[0], &map_flash, BT_MAP_RECORD_VERSION + 1, packed, sizeof packed);
+    for (int k = 0; k < 3 * BT_MAP_SLOTS; k++) {
+        size_t more = make_map(other, (uint32_t)k, 2, "");
+        assert_int_equal(upload(1, other, more), BT_ERROR_OK);
+        assert_int_equal(save(), BT_ERROR_OK);
+    }
+    record[0] = good;
+    power_on();
+    assert_has(0, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
+}
+
+static void flash_that_takes_nothing_is_told_and_passed_by(void **state)
+{
+    (void)state;
+    size_t bytes = make_map(blob, 1, 3, ""), more = make_map(other, 2, 3, "");
+    assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
+    uint8_t before = session.map[0].place.slot;
+    worn = true;
+    assert_int_equal(begin(0, (uint16_t)more, bt_crc32(other, more)), BT_ERROR_OK);
+    assert_int_equal(write_part(0, other, more, 0), BT_ERROR_NOT_STORED);
+    assert_int_equal(write_part(0, other, more, 0), BT_ERROR_NOT_STORED);
+    uint8_t tried = session.upload.place.slot;
+    worn = false;
+    assert_has(0, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
+    assert_int_equal(upload(0, other, more), BT_ERROR_OK);
+    assert_true(session.map[0].place.slot != tried && session.map[0].place.slot != before);
+    // A record that is not kept leaves the stored map where it is, and the new one is tried again.
+    assert_int_equal(save(), BT_ERROR_OK);
+    assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
+    refused_finger = 0;
+    assert_int_equal(save(), BT_ERROR_NOT_STORED);
+    assert_int_equal(save(), BT_ERROR_NOT_STORED);
+    power_on();
+    assert_has(0, other, more, BT_CALIBRATION_STATE_IN_FORCE);
+}
+
+static void there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored(void **state)
+{
+    (void)state;
+    for (uint32_t turn = 0; turn < 4; turn++) {
+        for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+            size_t bytes = make_map(blob, 10 * turn + f, 2, "");
+            assert_int_equal(upload(f, blob, bytes), BT_ERROR_OK);
+            assert_has(f, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
+        }
+        assert_int_equal(turn == 0 ? save() : BT_ERROR_OK, BT_ERROR_OK);
+    }
+    power_on();
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        size_t bytes = make_map(blob, f, 2, "");
+        assert_has(f, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
+    }
+}
+
+// Uploads, broken off or not, clears, saves and boots at random: what is in force and what is stored is what
+// it should be, byte for byte, every time. numbers: of the map that a finger has and has stored; 0: none.
+static void whatever_happens_nothing_that_is_kept_is_written_to(void **state)
+{
+    (void)state;
+    uint64_t seed = 7;
+    uint32_t has[BT_MAX_FINGERS] = {0}, stored[BT_MAX_FINGERS] = {0};
+    for (uint32_t number = 1; number < 3000; number++) {
+        uint8_t finger = (uint8_t)random_range(&seed, 0, BT_MAX_FINGERS - 1);
+        size_t bytes = make_map(blob, number, 1 + (int)(number % 7), "");
+        switch (random_u64(&seed) % 8) {
+        case 0:
+            assert_int_equal(save(), BT_ERROR_OK);
+            memcpy(stored, has, sizeof has);
+            break;
+        case 1:
+            power_on();
+            memcpy(has, stored, sizeof has);
+            break;
+        case 2:
+            assert_int_equal(clear(finger), BT_ERROR_OK);
+            has[finger] = 0;
+            break;
+        case 3: // given up in the middle
+            assert_int_equal(begin(finger, (uint16_t)bytes, bt_crc32(blob, bytes)), BT_ERROR_OK);
+            assert_int_equal(write_part(finger, blob, bytes, 0), BT_ERROR_OK);
+            break;
+        default:
+            assert_int_equal(upload(finger, blob, bytes), BT_ERROR_OK);
+            has[finger] = number;
+            break;
+        }
+        for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+            size_t size = has[f] == 0 ? 0 : make_map(other, has[f], 1 + (int)(has[f] % 7), "");
+            assert_has(f, has[f] == 0 ? NULL : other, size, has[f] == 0 ? 0 : BT_CALIBRATION_STATE_IN_FORCE);
+        }
+    }
+}
+
+#define T(name) cmocka_unit_test_setup(name, new_board)
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(what_was_not_saved_is_gone_at_the_next_boot),
+        T(a_record_that_cannot_be_is_no_map),
+        T(flash_that_takes_nothing_is_told_and_passed_by),
+        T(there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored),
+        T(whatever_happens_nothing_that_is_kept_is_written_to),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
