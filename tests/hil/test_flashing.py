@@ -9,7 +9,7 @@ import json
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ import pytest
 from maps import BIG, make_map
 from rig import ROOT, Rig
 
-from biotac import Calibration, Setting
+from biotac import Calibration, Hand, Setting
 from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.errors import FlashError, InputError, NotAGatewayError
@@ -124,36 +124,38 @@ def test_saved_maps_outlive_another_image(bench: Bench, next_release: Image) -> 
         assert hand.maps() == {0: blob}
 
 
-def test_a_map_that_was_in_force_and_not_saved_is_put_back_and_saved(bench: Bench) -> None:
-    kept, new = make_map(1), make_map(2, blocks=BIG)
-    with bench.target.open() as hand:
-        hand.set_map(0, kept)
-        hand.set_map(1, kept, force=True)
-        hand.save_settings()
-        hand.set_map(0, new)
-    outcome = bench.flash(read_image(BUILT))
-    assert outcome.settings is not None and outcome.backup is not None
-    assert outcome.settings.changed == ("wrench map of finger 0",)
-    assert read_backup(outcome.backup.path).maps == {0: new, 1: kept}
-    bench.setting_after_a_power_cut(Setting.IDLE_PERIOD_MS)
-    with bench.target.open() as hand:
-        assert hand.maps() == {0: new, 1: kept}
+def give_map(hand: Hand, finger: int, its: bytes) -> None:
+    hand.set_map(finger, its, force=finger == 1)
 
 
-def test_a_calibration_that_was_in_force_and_not_saved_is_put_back_and_saved(bench: Bench) -> None:
-    kept, new = Calibration(thermal_gain_milli=700), Calibration(force_gain_nn=(1, 2, -3), made_s=1_700_000_000)
+@pytest.mark.parametrize(
+    ("give", "name", "what", "kept", "new"),
+    [
+        (give_map, "wrench map", "maps", make_map(1), make_map(2, blocks=BIG)),
+        (
+            Hand.set_calibration,
+            "calibration",
+            "calibrations",
+            Calibration(thermal_gain_milli=700),
+            Calibration(force_gain_nn=(1, 2, -3), made_s=1_700_000_000),
+        ),
+    ],
+)
+def test_what_was_in_force_and_not_saved_is_put_back_and_saved(
+    bench: Bench, give: Callable[[Hand, int, Any], None], name: str, what: str, kept: object, new: object
+) -> None:
     with bench.target.open() as hand:
-        hand.set_calibration(0, kept)
-        hand.set_calibration(1, kept)
+        give(hand, 0, kept)
+        give(hand, 1, kept)
         hand.save_settings()
-        hand.set_calibration(0, new)
+        give(hand, 0, new)
     outcome = bench.flash(read_image(BUILT))
     assert outcome.settings is not None and outcome.backup is not None
-    assert outcome.settings.changed == ("calibration of finger 0",)
-    assert read_backup(outcome.backup.path).calibrations == {0: new, 1: kept}
+    assert outcome.settings.changed == (f"{name} of finger 0",)
+    assert getattr(read_backup(outcome.backup.path), what) == {0: new, 1: kept}
     bench.setting_after_a_power_cut(Setting.IDLE_PERIOD_MS)
     with bench.target.open() as hand:
-        assert hand.calibrations() == {0: new, 1: kept}
+        assert getattr(hand, what)() == {0: new, 1: kept}
 
 
 def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_release: Image) -> None:

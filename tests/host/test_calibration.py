@@ -250,16 +250,19 @@ def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_pat
 # ---- boards, recordings ------------------------------------------------------------------------
 
 
-def test_a_board_that_knows_of_no_calibrations_is_not_asked(scripted_board, hello) -> None:
+@pytest.mark.parametrize(
+    ("minor", "what", "question"), [(2, "calibrations", wire.GetCalibration), (3, "maps", wire.GetMap)]
+)
+def test_a_board_that_knows_of_no_such_thing_is_not_asked(scripted_board, hello, minor, what, question) -> None:
     asked: list[int] = []
 
     def answer(message_id: int, payload: bytes) -> bytes:
         asked.append(message_id)
-        return hello(payload, wire_minor=2) if message_id == wire.HelloRequest.ID else b""
+        return hello(payload, wire_minor=minor) if message_id == wire.HelloRequest.ID else b""
 
     with biotac.open(scripted_board(answer).path) as hand:
-        assert hand.calibrations() == {}
-    assert wire.GetCalibration.ID not in asked
+        assert getattr(hand, what)() == {}
+    assert question.ID not in asked
 
 
 def test_a_board_of_before_pressure_is_spoken_to_in_its_own_words(scripted_board, hello) -> None:

@@ -175,18 +175,6 @@ def test_a_map_that_comes_back_otherwise_is_an_error(board: tuple[Upload, biotac
         hand.set_map(0, make_map(1, blocks=2))
 
 
-def test_a_board_that_knows_of_no_maps_is_not_asked(scripted_board, hello) -> None:
-    asked: list[int] = []
-
-    def answer(message_id: int, payload: bytes) -> bytes:
-        asked.append(message_id)
-        return hello(payload, wire_minor=3) if message_id == wire.HelloRequest.ID else b""
-
-    with biotac.open(scripted_board(answer).path) as hand:
-        assert hand.maps() == {}
-    assert wire.GetMap.ID not in asked
-
-
 def test_a_board_that_rebooted_gets_its_maps_again(tmp_path: Path) -> None:
     """The real firmware: a process that dies, and another one of the same serial number behind the same name."""
     path = tmp_path / "ttyBOARD"
