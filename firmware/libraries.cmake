@@ -3,17 +3,8 @@
 set(fw ${CMAKE_CURRENT_LIST_DIR})
 
 # Pure integer C: the same files on every board, in the simulator and under the Python tests.
-add_library(biotac_core STATIC
-  ${fw}/core/assembly.c ${fw}/core/baseline.c ${fw}/core/calibration.c
-  ${fw}/core/cobs.c ${fw}/core/commands.c ${fw}/core/crc32.c
-  ${fw}/core/crc32_gen.c
-  ${fw}/core/finger.c ${fw}/core/fold_gen.c ${fw}/core/framing.c ${fw}/core/gate.c ${fw}/core/kernel.c
-  ${fw}/core/map.c ${fw}/core/map_commands.c ${fw}/core/map_store.c ${fw}/core/map_wrench.c
-  ${fw}/core/noise.c ${fw}/core/poc.c ${fw}/core/pressure.c ${fw}/core/release.c ${fw}/core/results.c
-  ${fw}/core/root_gen.c
-  ${fw}/core/running.c ${fw}/core/sensor_gen.c ${fw}/core/session.c ${fw}/core/settings.c ${fw}/core/sigma.c
-  ${fw}/core/storage.c ${fw}/core/sweep.c ${fw}/core/tare.c
-  ${fw}/core/thermal.c ${fw}/core/upload.c ${fw}/core/wire_gen.c ${fw}/core/wrench.c)
+file(GLOB core CONFIGURE_DEPENDS ${fw}/core/*.c ${fw}/core/*/*.c)
+add_library(biotac_core STATIC ${core})
 target_include_directories(biotac_core PUBLIC ${fw}/core)
 
 # The same maths in double, from the papers. Never linked into a board image.
@@ -23,9 +14,9 @@ target_link_libraries(biotac_reference PUBLIC biotac_core m)
 
 # Kernels that do not ship, for the benchmark. Products are not fused into sums: no two compilers agree
 # on where, and the errors are to be the kernels' own.
-file(GLOB variants CONFIGURE_DEPENDS ${fw}/variants/*.c)
+file(GLOB variants CONFIGURE_DEPENDS ${fw}/../tools/bench/variants/*.c)
 add_library(biotac_variants STATIC ${variants})
-target_include_directories(biotac_variants PUBLIC ${fw}/variants)
+target_include_directories(biotac_variants PUBLIC ${fw}/../tools/bench/variants)
 target_compile_options(biotac_variants PRIVATE -ffp-contract=off -fno-math-errno)
 target_link_libraries(biotac_variants PUBLIC biotac_reference)
 

@@ -14,26 +14,26 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
 from committed import write_or_check  # noqa: E402
-from protogen import c_crc, c_fold, c_map, c_root, c_sensor, c_variants, c_wire, docs, python_code, schema  # noqa: E402
+from protogen import c_crc, c_map, c_rsqrt, c_sensor, c_sums, c_variants, c_wire, docs, python_code, schema  # noqa: E402
 
 
 def outputs(root: Path) -> dict[Path, str]:
     """Map every generated path to the text it must have."""
     contract = schema.load(root / "protocol")
     return {
-        root / "firmware/core/sensor_gen.h": c_sensor.header(contract),
-        root / "firmware/core/sensor_gen.c": c_sensor.source(contract),
-        root / "firmware/core/crc32_gen.c": c_crc.source(),
-        root / "firmware/core/fold_gen.h": c_fold.header(contract),
-        root / "firmware/core/fold_gen.c": c_fold.source(contract),
-        root / "firmware/core/root_gen.h": c_root.header(contract),
-        root / "firmware/core/root_gen.c": c_root.source(contract),
-        root / "firmware/core/map_gen.h": c_map.header(contract),
-        root / "firmware/variants/fold_f32_gen.h": c_variants.folded(contract, c_variants.F32),
-        root / "firmware/variants/fold_i64_gen.h": c_variants.folded(contract, c_variants.I64),
-        root / "firmware/variants/tables_gen.h": c_variants.tables(contract),
-        root / "firmware/core/wire_gen.h": c_wire.header(contract),
-        root / "firmware/core/wire_gen.c": c_wire.source(contract),
+        root / "firmware/core/wire/sensor_gen.h": c_sensor.header(contract),
+        root / "firmware/core/wire/sensor_gen.c": c_sensor.source(contract),
+        root / "firmware/core/wire/crc32_gen.c": c_crc.source(),
+        root / "firmware/core/solve/sums_gen.h": c_sums.header(contract),
+        root / "firmware/core/solve/sums_gen.c": c_sums.source(contract),
+        root / "firmware/core/solve/rsqrt_gen.h": c_rsqrt.header(contract),
+        root / "firmware/core/solve/rsqrt_gen.c": c_rsqrt.source(contract),
+        root / "firmware/core/map/map_gen.h": c_map.header(contract),
+        root / "tools/bench/variants/fold_f32_gen.h": c_variants.folded(contract, c_variants.F32),
+        root / "tools/bench/variants/fold_i64_gen.h": c_variants.folded(contract, c_variants.I64),
+        root / "tools/bench/variants/tables_gen.h": c_variants.tables(contract),
+        root / "firmware/core/wire/messages_gen.h": c_wire.header(contract),
+        root / "firmware/core/wire/messages_gen.c": c_wire.source(contract),
         root / "host/biotac/_sensor.py": python_code.sensor(contract),
         root / "host/biotac/_wire.py": python_code.wire(contract),
         root / "host/biotac/_map.py": python_code.wrench_map(contract),

@@ -1,8 +1,10 @@
 #include "gateway.h"
 
+#include "keep/storage.h"
 #include "port.h"
 #include "properties.h"
-#include "storage.h"
+#include "talk/host.h"
+#include "talk/streams.h"
 #include "word.h"
 
 #include "version.h"

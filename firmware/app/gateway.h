@@ -3,7 +3,7 @@
 #define BIOTAC_GATEWAY_H
 
 #include "sampler.h"
-#include "session.h"
+#include "talk/session.h"
 
 typedef struct {
     bt_sampler sampler;

@@ -5,7 +5,7 @@
 #define BIOTAC_IMAGE_NOTE_H
 
 #include "version.h"
-#include "wire_gen.h"
+#include "wire/messages_gen.h"
 
 #include <stdint.h>
 

@@ -1,6 +1,8 @@
 #include "finger.h"
 
-#include "fix.h"
+#include "fixed_point.h"
+#include "solve/poc.h"
+#include "touch/signals.h"
 
 #include <string.h>
 
@@ -17,40 +19,40 @@ void bt_finger_reset(bt_finger *finger, uint8_t index)
     bt_tare_reset(&finger->tare);
     bt_settings_reset(&initial);
     bt_pressure_use(&finger->pressure, &initial);
-    bt_frame_clear(&finger->frame);
+    bt_round_clear(&finger->round);
 }
 
 void bt_finger_begin(bt_finger *finger, uint32_t t_us, const bt_tare_settings *settings)
 {
     bt_tare_begin(&finger->tare, settings);
-    finger->frame.t_us = t_us;
-    finger->frame.good_words = 0;
+    finger->round.t_us = t_us;
+    finger->round.good_words = 0;
     finger->next_slot = 0;
 }
 
 static bool place(bt_finger *finger, uint8_t slot, uint16_t count)
 {
-    bt_frame *frame = &finger->frame;
+    bt_round *round = &finger->round;
     unsigned channel = bt_slot_channel[slot];
-    frame->good_words = (uint8_t)(frame->good_words + (count != BT_INVALID_COUNT));
+    round->good_words = (uint8_t)(round->good_words + (count != BT_INVALID_COUNT));
     if (channel == BT_CHANNEL_PAC) {
-        frame->pac[bt_slot_pac[slot]] = count;
+        round->pac[bt_slot_pac[slot]] = count;
         return false;
     }
     unsigned electrode = channel - BT_CHANNEL_E1;
     if (electrode < BT_ELECTRODES) {
-        frame->electrode[electrode] = count;
+        round->electrode[electrode] = count;
         return bt_tare_electrode(&finger->tare, electrode, count);
     }
     switch (channel) {
     case BT_CHANNEL_PDC:
-        frame->pdc = count;
+        round->pdc = count;
         return bt_tare_pressure(&finger->tare, count);
     case BT_CHANNEL_TAC:
-        frame->tac = count;
+        round->tac = count;
         break;
     case BT_CHANNEL_TDC:
-        frame->tdc = count;
+        round->tdc = count;
         bt_tare_temperature(&finger->tare, count);
         break;
     }
@@ -92,8 +94,8 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
         (void)fill(finger, BT_SLOTS);
     }
     finger->next_slot = 0; // POINT between two rounds is of the coming one, of which nothing has come yet
-    bt_pressure_add(&finger->pressure, finger->frame.pdc);
-    if (finger->frame.good_words == 0) {
+    bt_pressure_add(&finger->pressure, finger->round.pdc);
+    if (finger->round.good_words == 0) {
         fall_silent(finger);
         return false;
     }
@@ -141,20 +143,20 @@ static void tell_pressure(const bt_finger *finger, bt_msg_frame *msg)
     msg->pressure_force_100un = bt_pressure_force(msg->pdc_filtered_q4, msg->pdc_tare_q4, pressure->gain_nn);
 }
 
-void bt_finger_frame(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_frame *msg)
+void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, bt_msg_frame *msg)
 {
-    const bt_frame *frame = &finger->frame;
+    const bt_round *round = &finger->round;
     msg->seq = seq_of(finger);
-    msg->t_us = frame->t_us;
+    msg->t_us = round->t_us;
     msg->finger = finger->index;
     msg->tare_state = finger->tare.state;
-    msg->pdc = frame->pdc;
-    msg->tac = frame->tac;
-    msg->tdc = frame->tdc;
+    msg->pdc = round->pdc;
+    msg->tac = round->tac;
+    msg->tdc = round->tdc;
     msg->pdc_tare_q4 = bt_tare_q4(finger->tare.base.pdc_q16);
-    memcpy(msg->counts, frame->electrode, sizeof msg->counts);
+    memcpy(msg->counts, round->electrode, sizeof msg->counts);
     memcpy(msg->tare_q4, finger->tare.electrode_q4, sizeof msg->tare_q4);
-    bt_results(frame, &finger->tare, settings, finger->quantities, msg);
+    bt_results(round, &finger->tare, settings, finger->quantities, msg);
     tell_pressure(finger, msg);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
     finger->sent = finger->tare.gate.smooth;
@@ -163,29 +165,29 @@ void bt_finger_frame(bt_finger *finger, const bt_kernel_settings *settings, bt_m
 void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg)
 {
     msg->seq = (uint16_t)(seq_of(finger) - frame_follows);
-    msg->t_us = finger->frame.t_us;
+    msg->t_us = finger->round.t_us;
     msg->finger = finger->index;
     msg->tare_state = finger->tare.state;
-    msg->flags = bt_channel_flags(&finger->frame, &finger->tare) | BT_FRAME_FLAG_NOT_ASKED;
+    msg->flags = bt_channel_flags(&finger->round, &finger->tare) | BT_FRAME_FLAG_NOT_ASKED;
     msg->frames = finger->unsent;
     msg->energy_count2 = bt_gate_energy(&finger->tare.gate);
-    msg->pdc = finger->frame.pdc;
-    msg->tdc = finger->frame.tdc;
+    msg->pdc = finger->round.pdc;
+    msg->tdc = finger->round.tdc;
 }
 
 void bt_finger_pac(const bt_finger *finger, bt_msg_pac *msg)
 {
     msg->seq = seq_of(finger);
-    msg->t_us = finger->frame.t_us + BT_FIRST_PAC_SLOT * 1000000u / BT_SLOT_HZ;
+    msg->t_us = finger->round.t_us + BT_FIRST_PAC_SLOT * 1000000u / BT_SLOT_HZ;
     msg->finger = finger->index;
-    memcpy(msg->pac, finger->frame.pac, sizeof msg->pac);
+    memcpy(msg->pac, finger->round.pac, sizeof msg->pac);
 }
 
 void bt_finger_tare(const bt_finger *finger, bt_msg_tare *msg)
 {
     const bt_tare *tare = &finger->tare;
     msg->seq = seq_of(finger);
-    msg->t_us = finger->frame.t_us;
+    msg->t_us = finger->round.t_us;
     msg->finger = finger->index;
     msg->tare_state = tare->state;
     msg->reason = tare->reason;
@@ -194,16 +196,13 @@ void bt_finger_tare(const bt_finger *finger, bt_msg_tare *msg)
     msg->pdc_tare_q16 = tare->base.pdc_q16;
 }
 
-void bt_finger_point(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_point *msg)
+void bt_finger_point(bt_finger *finger, const bt_solve_settings *settings, bt_msg_point *msg)
 {
     int32_t e_q4[BT_ELECTRODES];
     bt_point point = {.um = {BT_INVALID_I16, BT_INVALID_I16, BT_INVALID_I16}};
-    bt_signals_q4(finger->frame.electrode, finger->tare.electrode_q4, e_q4);
-    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        bt_running_put(&finger->running, i, e_q4[i]);
-    }
+    bt_signals_q4(finger->round.electrode, finger->tare.electrode_q4, e_q4);
     if (finger->tare.reason != BT_TARE_REASON_NONE) {
-        (void)bt_running_point(&finger->running, settings->poc_weights, &point);
+        (void)bt_poc(e_q4, settings->poc_weights, &point);
     }
     msg->finger = finger->index;
     msg->seq = finger->seq;

@@ -3,11 +3,10 @@
 #ifndef BIOTAC_FINGER_H
 #define BIOTAC_FINGER_H
 
-#include "assembly.h"
-#include "pressure.h"
-#include "results.h"
-#include "running.h"
-#include "tare.h"
+#include "solve/pressure.h"
+#include "solve/results.h"
+#include "touch/round.h"
+#include "touch/tare.h"
 
 // Counts of what the bus delivered; wrap at 2^32.
 typedef struct {
@@ -29,11 +28,10 @@ typedef struct {
     uint16_t unsent;    // rounds for which an IDLE is still to speak
     bool fresh;         // nothing was sent since START: the first is a FRAME
     bool tare_unsent;   // the tare changed in the latest round
-    bt_frame frame;     // of the latest round, or being assembled
+    bt_round round;     // the latest round, or being assembled
     bt_tare tare;
     bt_pressure pressure;
-    bt_running running; // of the latest GET_POINT
-    bt_lanes sent;      // filtered counts when the last FRAME was sent
+    bt_lanes sent; // filtered counts when the last FRAME was sent
     bt_word_counts words;
 } bt_finger;
 
@@ -62,13 +60,13 @@ bool bt_finger_moved(const bt_finger *finger);
 
 // The round that has ended as messages. PoC, force and torque are computed in the first. An IDLE stands for
 // `unsent` rounds, of which the round that has ended is the last or, when its FRAME follows, not one.
-void bt_finger_frame(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_frame *msg);
+void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, bt_msg_frame *msg);
 void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg);
 void bt_finger_pac(const bt_finger *finger, bt_msg_pac *msg);
 
 // Where the finger is touched now, from the latest word of every electrode, be it of this round or of the
 // one before.
-void bt_finger_point(bt_finger *finger, const bt_kernel_settings *settings, bt_msg_point *msg);
+void bt_finger_point(bt_finger *finger, const bt_solve_settings *settings, bt_msg_point *msg);
 void bt_finger_tare(const bt_finger *finger, bt_msg_tare *msg);
 
 #endif

@@ -4,7 +4,7 @@
 #define BIOTAC_EMU_BUS_H
 
 #include "device.h"
-#include "sensor_gen.h"
+#include "wire/sensor_gen.h"
 
 #include <stdint.h>
 

@@ -1,6 +1,6 @@
 #include "device.h"
 
-#include "sensor_gen.h"
+#include "wire/sensor_gen.h"
 
 #include <string.h>
 

@@ -1,7 +1,7 @@
 #include "tape.h"
 
 #include "device.h"
-#include "sensor_gen.h"
+#include "wire/sensor_gen.h"
 
 #include <string.h>
 

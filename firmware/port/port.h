@@ -3,7 +3,7 @@
 #ifndef BIOTAC_PORT_H
 #define BIOTAC_PORT_H
 
-#include "map_store.h"
+#include "map/store.h"
 
 #include <stdbool.h>
 #include <stddef.h>

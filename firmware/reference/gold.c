@@ -1,6 +1,6 @@
 #include "gold.h"
 
-#include "fix.h"
+#include "fixed_point.h"
 
 // N_x in um times 1000 is the dividend of x in nm.
 _Static_assert(BT_SUM_SQUARES_R_MAX_Q8_UM <= INT64_MAX / 1000, "the x dividend must fit int64");

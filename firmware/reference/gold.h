@@ -5,8 +5,8 @@
 #ifndef BIOTAC_GOLD_H
 #define BIOTAC_GOLD_H
 
-#include "sensor_gen.h"
-#include "wire_gen.h"
+#include "wire/messages_gen.h"
+#include "wire/sensor_gen.h"
 
 #include <stdbool.h>
 #include <stdint.h>

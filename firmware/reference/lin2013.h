@@ -14,8 +14,8 @@
 #ifndef BIOTAC_LIN2013_H
 #define BIOTAC_LIN2013_H
 
-#include "sensor_gen.h"
-#include "wire_gen.h"
+#include "wire/messages_gen.h"
+#include "wire/sensor_gen.h"
 
 #include <stdint.h>
 

@@ -1,7 +1,7 @@
 #include "properties.h"
 
 #include "port.h"
-#include "sensor_gen.h"
+#include "wire/sensor_gen.h"
 
 #include <string.h>
 

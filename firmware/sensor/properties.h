@@ -2,7 +2,7 @@
 #ifndef BIOTAC_PROPERTIES_H
 #define BIOTAC_PROPERTIES_H
 
-#include "wire_gen.h"
+#include "wire/messages_gen.h"
 
 // Fills info; present is 1 when the serial number begins with "BT", as SynTouch's own library
 // decides it. An absent sensor reads as zeros or ones and leaves the texts zero.

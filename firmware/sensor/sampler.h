@@ -9,7 +9,7 @@
 #ifndef BIOTAC_SAMPLER_H
 #define BIOTAC_SAMPLER_H
 
-#include "sensor_gen.h"
+#include "wire/sensor_gen.h"
 
 #include <stdatomic.h>
 #include <stdbool.h>

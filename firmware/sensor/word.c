@@ -1,6 +1,6 @@
 #include "word.h"
 
-#include "wire_gen.h"
+#include "wire/messages_gen.h"
 
 static unsigned odd_parity(uint8_t byte)
 {

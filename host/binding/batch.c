@@ -1,19 +1,19 @@
 #include "binding.h"
 
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
-                      const bt_kernel_settings *settings, int16_t *poc_um, int32_t *force_100un,
+                      const bt_solve_settings *settings, int16_t *poc_um, int32_t *force_100un,
                       int32_t *torque_mnmm, uint32_t *flags)
 {
     for (int64_t k = 0; k < n; k++) {
         int32_t e_q4[BT_ELECTRODES];
         bt_signals_q4(counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, e_q4);
         flags[k] =
-            bt_kernel(e_q4, settings, BT_WANT_ALL, poc_um + 3 * k, force_100un + 3 * k, torque_mnmm + 3 * k);
+            bt_solve(e_q4, settings, BT_WANT_ALL, poc_um + 3 * k, force_100un + 3 * k, torque_mnmm + 3 * k);
     }
 }
 
 void bt_mapped_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4, const uint16_t *pdc,
-                      const uint16_t *pdc_tare_q4, const bt_kernel_settings *settings, int16_t *poc_um,
+                      const uint16_t *pdc_tare_q4, const bt_solve_settings *settings, int16_t *poc_um,
                       int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm, uint32_t *flags)
 {
     for (int64_t k = 0; k < n; k++) {
@@ -21,8 +21,8 @@ void bt_mapped_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
         bt_map_input frame = {counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES,
                               bt_pdc_above_rest_q4(pdc[k], pdc_tare_q4[k])};
         bt_signals_q4(frame.counts, frame.tare_q4, e_q4);
-        flags[k] = bt_kernel_mapped(e_q4, &frame, settings, BT_WANT_ALL, poc_um + 3 * k, force_100un + 3 * k,
-                                    torque_mnmm + 3 * k, torsion_mnmm + k);
+        flags[k] = bt_solve_mapped(e_q4, &frame, settings, BT_WANT_ALL, poc_um + 3 * k, force_100un + 3 * k,
+                                   torque_mnmm + 3 * k, torsion_mnmm + k);
     }
 }
 

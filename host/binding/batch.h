@@ -2,19 +2,19 @@
 #ifndef BIOTAC_BATCH_H
 #define BIOTAC_BATCH_H
 
-#include "kernel.h"
-#include "map.h"
-#include "pressure.h"
+#include "map/map.h"
+#include "solve/pressure.h"
+#include "solve/solve.h"
 
 // counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). flags: (n,), POC_INVALID
-// only. Every row goes through bt_signals_q4 and bt_kernel as on the board.
+// only. Every row goes through bt_signals_q4 and bt_solve as on the board.
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
-                      const bt_kernel_settings *settings, int16_t *poc_um, int32_t *force_100un,
+                      const bt_solve_settings *settings, int16_t *poc_um, int32_t *force_100un,
                       int32_t *torque_mnmm, uint32_t *flags);
 
-// The same with the settings' map in force, through bt_kernel_mapped; pdc, pdc_tare_q4, torsion_mnmm: (n,).
+// The same with the settings' map in force, through bt_solve_mapped; pdc, pdc_tare_q4, torsion_mnmm: (n,).
 void bt_mapped_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4, const uint16_t *pdc,
-                      const uint16_t *pdc_tare_q4, const bt_kernel_settings *settings, int16_t *poc_um,
+                      const uint16_t *pdc_tare_q4, const bt_solve_settings *settings, int16_t *poc_um,
                       int32_t *force_100un, int32_t *torque_mnmm, int32_t *torsion_mnmm, uint32_t *flags);
 
 // A map alone: pdc_above_rest_q4, torsion_mnmm (n,), force_100un and torque_mnmm (n, 3); marked invalid what

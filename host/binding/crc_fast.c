@@ -1,6 +1,6 @@
 #include "crc_fast.h"
 
-#include "crc32.h"
+#include "wire/crc32.h"
 
 #include <stdbool.h>
 

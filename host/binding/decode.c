@@ -1,6 +1,6 @@
 #include "decode.h"
 
-#include "little_endian.h"
+#include "wire/little_endian.h"
 
 #include <string.h>
 

@@ -11,7 +11,7 @@
 #define BIOTAC_DECODE_H
 
 #include "crc_fast.h"
-#include "framing.h"
+#include "wire/framing.h"
 
 #define BT_DECODE_BYTES    65536 // what one call takes
 // The call's bytes and the rest of the call before; a 32nd more where messages are filled up.

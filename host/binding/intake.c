@@ -1,7 +1,7 @@
 #include "intake.h"
 
 #include "descriptor.h"
-#include "little_endian.h"
+#include "wire/little_endian.h"
 
 #include <string.h>
 

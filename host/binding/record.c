@@ -1,7 +1,7 @@
 #include "record.h"
 
-#include "little_endian.h"
-#include "sensor_gen.h"
+#include "wire/little_endian.h"
+#include "wire/sensor_gen.h"
 
 #include <string.h>
 

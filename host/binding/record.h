@@ -2,8 +2,8 @@
 #ifndef BIOTAC_RECORD_H
 #define BIOTAC_RECORD_H
 
-#include "calibration.h"
-#include "storage.h"
+#include "keep/calibration.h"
+#include "keep/storage.h"
 
 #define BT_RECORD_MAX_BYTES BT_FLASH_PAGE_BYTES
 

@@ -20,7 +20,7 @@ static void mark_absent(const bt_finger *finger, bt_msg_frame *msg)
         msg->force_100un[d] = msg->torque_mnmm[d] = BT_INVALID_I32;
     }
     msg->seq = (uint16_t)(finger->seq - 1); // as the last frame: a round without a word has no number
-    msg->t_us = finger->frame.t_us;
+    msg->t_us = finger->round.t_us;
     msg->finger = finger->index;
     msg->tare_state = finger->tare.state;
     msg->flags = BT_FRAME_FLAG_POC_INVALID | BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_PDC_MISSING
@@ -36,7 +36,7 @@ void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map
                const uint16_t *words, const uint32_t *t_us, uint8_t *rows)
 {
     bt_tare_settings tare_settings = bt_tare_settings_from(settings);
-    bt_kernel_settings kernel_settings = bt_kernel_settings_from(settings);
+    bt_solve_settings kernel_settings = bt_solve_settings_from(settings);
     bt_pressure_use(&finger->pressure, settings);
     kernel_settings.map = map;
     for (int64_t k = 0; k < n; k++, words += BT_SLOTS, rows += BT_REPLAY_BYTES) {

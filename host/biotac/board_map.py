@@ -133,7 +133,7 @@ def on_board_q4(frames: StructArray, settings: Settings, its: BoardMap) -> Board
     raw, tare_q4, pdc, pdc_tare_q4 = (
         np.ascontiguousarray(frames[name]) for name in ("counts", "tare_q4", "pdc", "pdc_tare_q4")
     )
-    kernel = ffi.new("bt_kernel_settings *", lib.bt_kernel_settings_from(board_settings(settings)))
+    kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board_settings(settings)))
     kernel.map = its.handle
     n = len(frames)
     poc_um, flags = np.empty((n, 3), np.int16), np.empty(n, np.uint32)

@@ -66,7 +66,7 @@ def on_board_q4(
     """
     raw, tare_q4 = np.ascontiguousarray(counts), np.ascontiguousarray(tare_q4)
     board = board_settings(settings)
-    kernel = ffi.new("bt_kernel_settings *", lib.bt_kernel_settings_from(board))
+    kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board))
     n = len(raw)
     poc_um = np.empty((n, 3), np.int16)
     force_100un = np.empty((n, 3), np.int32)
@@ -88,7 +88,7 @@ def on_board_q4(
 def pressure_force_100un(
     filtered_q4: NDArray[np.uint16], tare_q4: NDArray[np.uint16], gain_nn: int
 ) -> NDArray[np.int32]:
-    """The board's force from pressure, of the integers of FRAME messages, all (n,); see firmware/core/pressure.h."""
+    """The board's force from pressure, of the integers of FRAME messages, all (n,); see core/solve/pressure.h."""
     filtered_q4, tare_q4 = np.ascontiguousarray(filtered_q4), np.ascontiguousarray(tare_q4)
     out = np.empty(len(filtered_q4), np.int32)
     lib.bt_pressure_forces(

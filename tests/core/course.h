@@ -36,14 +36,14 @@ static inline bool between(int k, int from, int to)
 }
 
 // What touches one finger in round k. The second is 30 rounds late, so that all phases meet.
-static inline bt_frame course_frame(emulated_finger *finger, int k)
+static inline bt_round course_frame(emulated_finger *finger, int k)
 {
     finger->load = between(k, 300, 450) ? 3.0 * (k - 300) : between(k, 450, 600) ? 450 : 0;
     finger->pdc_load = finger->load / 2;
     if (between(k, 850, 852) || between(k, 870, 871)) {
         finger->load = 90; // taps, too short for a contact
     }
-    bt_frame frame = next_frame(finger);
+    bt_round frame = next_frame(finger);
     for (int i = 0; between(k, 500, 580) && i < BT_ELECTRODES; i++) { // shear: some gain what others lose
         frame.electrode[i] = to_count(frame.electrode[i] + 120 * sin(1.1 * i) * sin(0.1 * (k - 500)));
     }
@@ -57,7 +57,7 @@ static inline bt_frame course_frame(emulated_finger *finger, int k)
     return frame;
 }
 
-static inline uint16_t course_word(const bt_frame *frame, uint8_t slot)
+static inline uint16_t course_word(const bt_round *frame, uint8_t slot)
 {
     unsigned channel = bt_slot_channel[slot];
     switch (channel) {
@@ -128,7 +128,7 @@ static inline void run_course(uint8_t quantities, uint64_t seed, course_log *log
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, BOTH_FINGERS, 0), BT_ERROR_OK);
     host_forget();
     for (int k = 0; k < COURSE_ROUNDS; k++) {
-        bt_frame frame[BT_MAX_FINGERS];
+        bt_round frame[BT_MAX_FINGERS];
         for (uint8_t f = FIRST_FINGER; f <= SECOND_FINGER; f += SECOND_FINGER - FIRST_FINGER) {
             int own = f == FIRST_FINGER ? k : k - 30;
             frame[f] = course_frame(&finger[f], own);

@@ -5,7 +5,7 @@
 
 #include "support.h"
 
-#include "tare.h"
+#include "touch/tare.h"
 
 #include <math.h>
 
@@ -62,10 +62,10 @@ static inline uint16_t to_count(double value)
 }
 
 // The next frame, 10 ms after the one before.
-static inline bt_frame next_frame(emulated_finger *finger)
+static inline bt_round next_frame(emulated_finger *finger)
 {
-    bt_frame frame;
-    bt_frame_clear(&frame);
+    bt_round frame;
+    bt_round_clear(&frame);
     finger->t_s += 1.0 / FRAMES_PER_S;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         double value =
@@ -82,9 +82,9 @@ static inline bt_frame next_frame(emulated_finger *finger)
 }
 
 // The next frame, but n electrodes from the first on read value.
-static inline bt_frame frame_without(emulated_finger *finger, int first, int n, uint16_t value)
+static inline bt_round frame_without(emulated_finger *finger, int first, int n, uint16_t value)
 {
-    bt_frame frame = next_frame(finger);
+    bt_round frame = next_frame(finger);
     for (int i = first; i < first + n; i++) {
         frame.electrode[i] = value;
     }
@@ -103,7 +103,7 @@ static inline void finger_init(emulated_finger *finger)
 
 // Gives the machine one frame as the slots would; returns the first electrode that opened the gate,
 // BT_LANE_PDC for the pressure, -1 for none.
-static inline int feed(emulated_finger *finger, const bt_frame *frame)
+static inline int feed(emulated_finger *finger, const bt_round *frame)
 {
     int touched = -1;
     bt_tare_begin(&finger->tare, &finger->settings);
@@ -124,7 +124,7 @@ static inline int feed(emulated_finger *finger, const bt_frame *frame)
 
 static inline void step(emulated_finger *finger)
 {
-    bt_frame frame = next_frame(finger);
+    bt_round frame = next_frame(finger);
     (void)feed(finger, &frame);
 }
 

@@ -2,7 +2,8 @@
 #ifndef BIOTAC_TEST_FAKE_BOARD_H
 #define BIOTAC_TEST_FAKE_BOARD_H
 
-#include "session.h"
+#include "talk/host.h"
+#include "talk/streams.h"
 
 static inline uint8_t keep_settings(const bt_settings *settings)
 {

@@ -4,7 +4,8 @@
 
 #include "support.h"
 
-#include "session.h"
+#include "talk/host.h"
+#include "talk/streams.h"
 
 #define MAX_RECEIVED 4096
 

@@ -2,9 +2,9 @@
 #ifndef BIOTAC_TEST_MAP_BLOB_H
 #define BIOTAC_TEST_MAP_BLOB_H
 
-#include "crc32.h"
-#include "little_endian.h"
-#include "map.h"
+#include "map/map.h"
+#include "wire/crc32.h"
+#include "wire/little_endian.h"
 
 #include <string.h>
 

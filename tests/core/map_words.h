@@ -2,7 +2,7 @@
 #ifndef BIOTAC_TEST_MAP_WORDS_H
 #define BIOTAC_TEST_MAP_WORDS_H
 
-#include "map.h"
+#include "map/map.h"
 #include "support.h"
 
 #define WORD(high, low) ((uint32_t)(uint16_t)(high) << 16 | (uint16_t)(low))

@@ -2,9 +2,10 @@
 #include "support.h"
 
 #include "finger.h"
+#include "touch/signals.h"
 
 static bt_finger finger;
-static bt_kernel_settings settings;
+static bt_solve_settings settings;
 static bt_tare_settings tare_settings;
 static bt_msg_frame frame;
 static bt_msg_pac pac;
@@ -17,7 +18,7 @@ static int new_finger(void **state)
     (void)state;
     bt_settings all;
     bt_settings_reset(&all);
-    settings = bt_kernel_settings_from(&all);
+    settings = bt_solve_settings_from(&all);
     tare_settings = bt_tare_settings_from(&all);
     bt_finger_reset(&finger, 3);
     now_us = 1000;
@@ -277,7 +278,7 @@ static void a_held_press_is_flagged_by_its_shape_and_age(void **state)
         assert_true(frame.flags & BT_FRAME_FLAG_TORSION_OK); // on the pad, four electrodes, strong
         assert_false(frame.flags
                      & (BT_FRAME_FLAG_POC_LOW | BT_FRAME_FLAG_SHEAR_MIX | BT_FRAME_FLAG_POC_INVALID));
-        assert_int_equal((frame.flags & BT_FRAME_FLAG_BASE_OLD) != 0, finger.tare.contact_frames > 6000);
+        assert_int_equal((frame.flags & BT_FRAME_FLAG_BASE_OLD) != 0, finger.tare.contact_rounds > 6000);
     }
     assert_true(frame.flags & BT_FRAME_FLAG_BASE_OLD);
 }

@@ -1,7 +1,7 @@
 // The core's arithmetic helpers at their edges.
 #include "support.h"
 
-#include "fix.h"
+#include "fixed_point.h"
 
 // Half away from zero: round(|num| / den) = floor((2 |num| + den) / (2 den)), stated in 128 bits where the
 // compiler has them. A 32-bit one has not: there by what is left over, twice which fits into 64 bits without

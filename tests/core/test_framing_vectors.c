@@ -1,9 +1,10 @@
 // Frames, COBS and CRC against protocol/vectors/, which other libraries made.
 #include "support.h"
 
-#include "crc32.h"
-#include "framing.h"
-#include "session.h"
+#include "talk/host.h"
+#include "talk/streams.h"
+#include "wire/crc32.h"
+#include "wire/framing.h"
 
 #define MAX_CASES  64
 #define MAX_FRAMES 64

@@ -107,14 +107,14 @@ static void a_jump_and_a_gap_are_forgotten(void **state)
         emulated_finger finger = resting;
         const uint16_t course[] = {2000, gaps[k], 2000, gaps[k], 2000, 2000};
         for (int round = 0; round < 6; round++) {
-            bt_frame frame = frame_without(&finger, 4, 1, course[round]);
+            bt_round frame = frame_without(&finger, 4, 1, course[round]);
             assert_int_equal(feed(&finger, &frame), round == 5 ? 4 : -1);
             assert_true(round == 5 || bt_gate_energy(&finger.tare.gate) == 0);
         }
         // The same with pressure.
         finger = resting;
         for (int round = 0; round < 6; round++) {
-            bt_frame frame = next_frame(&finger);
+            bt_round frame = next_frame(&finger);
             frame.pdc = course[round];
             assert_int_equal(feed(&finger, &frame), round == 5 ? BT_LANE_PDC : -1);
         }
@@ -130,7 +130,7 @@ static void a_step_is_seen_with_the_second_word_of_the_electrode_that_stepped(vo
     for (int i = 0; i < BT_ELECTRODES; i++) {
         for (int size = 25; size <= 500; size += 25) {
             emulated_finger finger = resting;
-            bt_frame frame = next_frame(&finger);
+            bt_round frame = next_frame(&finger);
             frame.electrode[i] = (uint16_t)(frame.electrode[i] - size);
             assert_int_equal(feed(&finger, &frame), -1);
             assert_int_equal(bt_gate_energy(&finger.tare.gate), 0);
@@ -149,7 +149,7 @@ static void the_slot_told_is_that_in_which_the_sum_passes_the_threshold(void **s
     emulated_finger resting = resting_finger();
     for (int trial = 0; trial < 2000; trial++) {
         emulated_finger finger = resting;
-        bt_frame frame = next_frame(&finger);
+        bt_round frame = next_frame(&finger);
         int size = (int)random_range(&seed, 4, 40);
         int expected[2] = {-1, -1};
         uint32_t sum[2] = {0, 0};
@@ -201,7 +201,7 @@ static void pressure_opens_the_gate_and_leaves_the_energy_alone(void **state)
     for (int above = -300; above <= 300; above++) {
         emulated_finger finger = resting;
         finger.pdc_load = above;
-        bt_frame frame = next_frame(&finger);
+        bt_round frame = next_frame(&finger);
         frame.electrode[2] = (uint16_t)(frame.electrode[2] + 20);
         int first = above > 6 && above <= 24 ? BT_LANE_PDC : -1;
         int second = above > 24 ? BT_LANE_PDC : -1;
@@ -225,7 +225,7 @@ static void pressure_without_a_known_rest_opens_nothing(void **state)
     assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
     for (int round = 0; round < 200; round++) {
         finger.pdc_load = 5 * round;
-        bt_frame frame = next_frame(&finger);
+        bt_round frame = next_frame(&finger);
         assert_int_equal(feed(&finger, &frame), -1);
         assert_true(finger.tare.gate.room >= 0);
     }
@@ -240,11 +240,11 @@ static void the_gate_stays_shut_where_nobody_rests(void **state)
     finger_init(&init);
     emulated_finger *fingers[] = {&init, &contact, &fault};
     static const uint8_t states[] = {BT_TARE_STATE_INIT, BT_TARE_STATE_CONTACT, BT_TARE_STATE_FAULT};
-    bt_frame dead = frame_without(&fault, 0, 3, 4095);
+    bt_round dead = frame_without(&fault, 0, 3, 4095);
     (void)feed(&fault, &dead);
     for (int k = 0; k < 3; k++) {
         for (int round = 0; round < 500; round++) {
-            bt_frame frame = next_frame(fingers[k]);
+            bt_round frame = next_frame(fingers[k]);
             for (int i = k == 2 ? 3 : 0; i < BT_ELECTRODES; i++) {
                 frame.electrode[i] = (uint16_t)random_range(&seed, 1, 4089);
             }

@@ -281,7 +281,7 @@ static size_t bytes_of(emulated_finger *finger, int rounds)
 {
     bytes_written = 0;
     for (int k = 0; k < rounds; k++) {
-        bt_frame frame = next_frame(finger);
+        bt_round frame = next_frame(finger);
         play(frame.electrode);
     }
     return bytes_written;

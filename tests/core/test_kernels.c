@@ -1,12 +1,12 @@
 // The integer kernels against the double reference (firmware/reference), within kernel_bounds.h.
 #include "support.h"
 
-#include "fix.h"
-#include "kernel.h"
+#include "fixed_point.h"
 #include "kernel_bounds.h"
 #include "lin2013.h"
-#include "poc.h"
-#include "wrench.h"
+#include "solve/poc.h"
+#include "solve/solve.h"
+#include "solve/wrench.h"
 
 #include <math.h>
 
@@ -98,11 +98,11 @@ static void check_all_weights(const int32_t e_q4[BT_ELECTRODES], const gains_nn 
 {
     double size = size_of(e_q4);
     for (int weights = 0; weights <= 2; weights++) {
-        bt_kernel_settings settings = {.poc_weights = weights,
-                                       .gains = bt_gains_from(gains->force_nn, gains->torque_nn)};
+        bt_solve_settings settings = {.poc_weights = weights,
+                                      .gains = bt_gains_from(gains->force_nn, gains->torque_nn)};
         int16_t poc_um[3];
         int32_t force_100un[3], torque_mnmm[3];
-        uint32_t flags = bt_kernel(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);
+        uint32_t flags = bt_solve(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);
         lin2013_result want = reference(e_q4, weights, gains);
         check_wrench(&want, size, gains, force_100un, torque_mnmm);
         if (isnan(want.poc_mm[0])) {
@@ -299,11 +299,11 @@ static void torque_x_is_good_to_2_mnmm_rms_up_to_40_n(void **state)
         for (int i = 0; i < BT_ELECTRODES; i++) {
             e[i] = -(int32_t)random_range(&seed, 0, size);
         }
-        bt_kernel_settings settings = {.poc_weights = k % 3,
-                                       .gains = bt_gains_from(defaults.force_nn, defaults.torque_nn)};
+        bt_solve_settings settings = {.poc_weights = k % 3,
+                                      .gains = bt_gains_from(defaults.force_nn, defaults.torque_nn)};
         int16_t poc_um[3];
         int32_t force_100un[3], torque_mnmm[3];
-        if (bt_kernel(e, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm) != 0) {
+        if (bt_solve(e, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm) != 0) {
             continue;
         }
         lin2013_result want = reference(e, k % 3, &defaults);

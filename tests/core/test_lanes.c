@@ -50,7 +50,7 @@ static void a_tare_from_the_host_holds_from_the_second_word_on(void **state)
             base.electrode_q16[i] = (uint32_t)(rest_count(&finger, i) - first) << 16;
         }
         assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
-        bt_frame frame = next_frame(&finger);
+        bt_round frame = next_frame(&finger);
         assert_int_equal(feed(&finger, &frame), -1);
         assert_int_equal(bt_gate_energy(&finger.tare.gate), 0);
         // The electrode with which (i + 1) first^2 passes 1000.

@@ -1,16 +1,16 @@
 // What a frame publishes that a wrench map is in force for.
 #include "emulated_finger.h"
 #include "map_words.h"
-#include "results.h"
+#include "solve/results.h"
 
 static bt_msg_frame published(emulated_finger *finger, const bt_map *map, uint16_t pdc, uint32_t quantities)
 {
     bt_settings all;
     bt_settings_reset(&all);
-    bt_kernel_settings settings = bt_kernel_settings_from(&all);
+    bt_solve_settings settings = bt_solve_settings_from(&all);
     assert_true(settings.map == NULL);
     settings.map = map;
-    bt_frame frame = next_frame(finger);
+    bt_round frame = next_frame(finger);
     frame.pdc = pdc;
     finger->tare.noise.count2 = 400;
     bt_msg_frame msg;

@@ -1,7 +1,7 @@
 // Every message in protocol/vectors/messages.txt: unpack gives the fields, pack gives the payload.
 #include "support.h"
 
-#include "wire_gen.h"
+#include "wire/messages_gen.h"
 
 // The type names in the BT_*_FIELDS lists.
 typedef uint8_t u8;

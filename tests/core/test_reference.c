@@ -2,9 +2,10 @@
 // without any reference: symmetry, and refusal where there is no answer.
 #include "support.h"
 
-#include "kernel.h"
 #include "lin2013.h"
-#include "poc.h"
+#include "solve/poc.h"
+#include "solve/solve.h"
+#include "touch/signals.h"
 
 #include <math.h>
 
@@ -150,8 +151,8 @@ typedef struct {
 static results kernel(const int32_t e_q4[BT_ELECTRODES], int weights)
 {
     results out;
-    bt_kernel_settings settings = {.poc_weights = weights, .gains = bt_gains_from(force_nn, torque_nn)};
-    out.flags = bt_kernel(e_q4, &settings, BT_WANT_ALL, out.poc_um, out.force_100un, out.torque_mnmm);
+    bt_solve_settings settings = {.poc_weights = weights, .gains = bt_gains_from(force_nn, torque_nn)};
+    out.flags = bt_solve(e_q4, &settings, BT_WANT_ALL, out.poc_um, out.force_100un, out.torque_mnmm);
     return out;
 }
 
@@ -198,12 +199,12 @@ static void what_nobody_wants_is_invalid(void **state)
         for (int i = 0; i < BT_ELECTRODES; i++) {
             e[i] = k % 20 == 0 ? 0 : (int32_t)random_range(&seed, -8000, 2000);
         }
-        bt_kernel_settings settings = {.poc_weights = k % 3, .gains = bt_gains_from(force_nn, torque_nn)};
+        bt_solve_settings settings = {.poc_weights = k % 3, .gains = bt_gains_from(force_nn, torque_nn)};
         int16_t all_poc[3], poc[3];
         int32_t all_force[3], all_torque[3], force[3], torque[3];
-        uint32_t all_flags = bt_kernel(e, &settings, BT_WANT_ALL, all_poc, all_force, all_torque);
+        uint32_t all_flags = bt_solve(e, &settings, BT_WANT_ALL, all_poc, all_force, all_torque);
         for (uint32_t wanted = 0; wanted <= BT_WANT_ALL; wanted++) {
-            uint32_t flags = bt_kernel(e, &settings, wanted, poc, force, torque);
+            uint32_t flags = bt_solve(e, &settings, wanted, poc, force, torque);
             assert_int_equal(flags, wanted & (BT_WANT_POC | BT_WANT_TORQUE) ? all_flags : 0);
             for (int d = 0; d < 3; d++) {
                 assert_int_equal(poc[d], wanted & BT_WANT_POC ? all_poc[d] : BT_INVALID_I16);

@@ -3,8 +3,8 @@
 #include "support.h"
 
 #include "gold.h"
-#include "root.h"
-#include "sensor_gen.h"
+#include "solve/rsqrt.h"
+#include "wire/sensor_gen.h"
 
 #include <math.h>
 

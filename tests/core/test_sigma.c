@@ -6,19 +6,19 @@
 #include "emulated_finger.h"
 
 #include "lin2013.h"
-#include "results.h"
-#include "sigma.h"
+#include "solve/results.h"
+#include "solve/uncertainty.h"
 
 #define SAMPLES 20000
 #define WITHIN  (5 / sqrt(2.0 * SAMPLES))
 
 static bt_settings all_settings;
 
-static bt_kernel_settings kernel_settings(int weights)
+static bt_solve_settings kernel_settings(int weights)
 {
     bt_settings_reset(&all_settings);
     assert_int_equal(bt_settings_set(&all_settings, BT_SETTING_POC_WEIGHTS, weights), BT_ERROR_OK);
-    return bt_kernel_settings_from(&all_settings);
+    return bt_solve_settings_from(&all_settings);
 }
 
 static lin2013_settings double_settings(int weights)
@@ -49,13 +49,13 @@ static void press(int middle, double e[BT_ELECTRODES])
 
 static bt_msg_frame sigmas(const double e[BT_ELECTRODES], int weights, uint32_t noise_count2)
 {
-    bt_kernel_settings settings = kernel_settings(weights);
+    bt_solve_settings settings = kernel_settings(weights);
     int32_t e_q4[BT_ELECTRODES];
     bt_msg_frame msg;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         e_q4[i] = (int32_t)lround(16 * e[i]);
     }
-    (void)bt_kernel(e_q4, &settings, BT_WANT_ALL, msg.poc_um, msg.force_100un, msg.torque_mnmm);
+    (void)bt_solve(e_q4, &settings, BT_WANT_ALL, msg.poc_um, msg.force_100un, msg.torque_mnmm);
     bt_sigma_unknown(&msg);
     bt_sigma(e_q4, &settings, noise_count2, &msg);
     return msg;
@@ -198,7 +198,7 @@ static void sigmas_saturate_below_the_mark(void **state)
     }
     (void)kernel_settings(0);
     assert_int_equal(bt_settings_set(&all_settings, BT_SETTING_FORCE_GAIN_X_NN, -100000000), BT_ERROR_OK);
-    bt_kernel_settings settings = bt_kernel_settings_from(&all_settings);
+    bt_solve_settings settings = bt_solve_settings_from(&all_settings);
     int32_t e_q4[BT_ELECTRODES] = {0};
     bt_msg_frame msg = {.poc_um = {BT_INVALID_I16}};
     bt_sigma_unknown(&msg);
@@ -210,14 +210,14 @@ static void sigmas_saturate_below_the_mark(void **state)
 static void only_what_is_asked_for_has_a_sigma(void **state)
 {
     (void)state;
-    bt_kernel_settings settings = kernel_settings(BT_POC_WEIGHTS_ABS_N2);
+    bt_solve_settings settings = kernel_settings(BT_POC_WEIGHTS_ABS_N2);
     emulated_finger finger;
     finger_init(&finger);
     finger.sigma = 2;
     run_seconds(&finger, 5);
     finger.load = 400;
     (void)run_until(&finger, BT_TARE_STATE_CONTACT, 10);
-    bt_frame frame = next_frame(&finger);
+    bt_round frame = next_frame(&finger);
     (void)feed(&finger, &frame);
     for (uint32_t quantities = 0; quantities < 64; quantities++) {
         bt_msg_frame msg;

@@ -2,8 +2,8 @@
 // record or the new one is there, whole, and the storage goes on working.
 #include "support.h"
 
-#include "calibration.h"
-#include "storage.h"
+#include "keep/calibration.h"
+#include "keep/storage.h"
 
 #define NEIGHBOUR 7  // another record that must outlive everything
 #define SAVES     40 // over two changes of sector

@@ -237,7 +237,7 @@ static void the_machine_serves_the_means_of_what_the_gate_let_through(void **sta
         finger.load = k % 700 > 500 ? 300 : 0;
         bool fault = random_unit(&seed) < 0.01;
         unsigned first = bt_sweep_first(&finger.tare.sweep), end = bt_sweep_end(&finger.tare.sweep);
-        bt_frame frame = fault ? frame_without(&finger, 5, 3, 0) : next_frame(&finger);
+        bt_round frame = fault ? frame_without(&finger, 5, 3, 0) : next_frame(&finger);
         (void)feed(&finger, &frame);
         memcpy(past.smooth[past.rounds++], finger.tare.gate.smooth.lane, sizeof past.smooth[0]);
         if (fault) { // it starts over with the next good round

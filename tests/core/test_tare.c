@@ -28,7 +28,7 @@ static void nothing_is_tared_while_one_electrode_moves(void **state)
     emulated_finger finger;
     finger_init(&finger);
     for (int k = 0; k < 1000; k++) {
-        bt_frame frame = frame_without(&finger, 13, 1, (uint16_t)(2000 + k % 50 * 10));
+        bt_round frame = frame_without(&finger, 13, 1, (uint16_t)(2000 + k % 50 * 10));
         (void)feed(&finger, &frame);
         assert_int_equal(finger.tare.state, BT_TARE_STATE_INIT);
     }
@@ -43,7 +43,7 @@ static void a_missing_word_does_not_look_like_motion(void **state)
     finger_init(&finger);
     step(&finger);
     for (int k = 0; k < 3000; k++) {
-        bt_frame frame = frame_without(&finger, k * 7 % 18, 1 + k % 2, BT_INVALID_COUNT);
+        bt_round frame = frame_without(&finger, k * 7 % 18, 1 + k % 2, BT_INVALID_COUNT);
         if (k % 3 == 0) {
             frame.pdc = BT_INVALID_COUNT;
         }
@@ -61,7 +61,7 @@ static void an_electrode_that_was_never_read_makes_no_contact_when_it_comes(void
     emulated_finger finger;
     finger_init(&finger);
     for (int k = 0; k < 200; k++) { // two missing electrodes are no fault
-        bt_frame frame = frame_without(&finger, 4, 2, BT_INVALID_COUNT);
+        bt_round frame = frame_without(&finger, 4, 2, BT_INVALID_COUNT);
         (void)feed(&finger, &frame);
     }
     run_seconds(&finger, 2);
@@ -81,7 +81,7 @@ static void a_stored_tare_before_the_first_word_makes_no_contact(void **state)
     }
     assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
     for (int k = 0; k < 10; k++) {
-        bt_frame frame = frame_without(&finger, 4, 1, BT_INVALID_COUNT);
+        bt_round frame = frame_without(&finger, 4, 1, BT_INVALID_COUNT);
         (void)feed(&finger, &frame);
         assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
     }
@@ -93,7 +93,7 @@ static void one_missing_pressure_word_does_not_forget_the_pressure_at_rest(void 
     emulated_finger finger;
     finger_init(&finger);
     run_frames(&finger, 2 * BT_SWEEP_ROUNDS - 1);
-    bt_frame frame = next_frame(&finger);
+    bt_round frame = next_frame(&finger);
     frame.pdc = BT_INVALID_COUNT; // in the very frame that tares
     (void)feed(&finger, &frame);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
@@ -140,7 +140,7 @@ static void energy_at_the_threshold_is_no_contact_and_over_it_is(void **state)
     for (int over = 0; over <= 1; over++) {
         emulated_finger finger = resting_finger();
         for (int k = 0; k < 6; k++) {
-            bt_frame frame = next_frame(&finger);
+            bt_round frame = next_frame(&finger);
             frame.electrode[3] = (uint16_t)(frame.electrode[3] - 30); // 900 + 100
             frame.electrode[7] = (uint16_t)(frame.electrode[7] - 10 - over);
             (void)feed(&finger, &frame);
@@ -189,7 +189,7 @@ static void the_tare_is_frozen_in_contact(void **state)
     run_seconds(&finger, 100);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
     assert_memory_equal(&finger.tare.base, &before, sizeof before);
-    assert_true(finger.tare.contact_frames >= 10000);
+    assert_true(finger.tare.contact_rounds >= 10000);
 }
 
 // ---- release -----------------------------------------------------------------------------------

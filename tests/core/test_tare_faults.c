@@ -20,7 +20,7 @@ static void railed_electrodes_are_never_tared(void **state)
         emulated_finger finger;
         finger_init(&finger);
         for (int n = 0; n < 500; n++) {
-            bt_frame frame = frame_without(&finger, 6, 3, ends[k]);
+            bt_round frame = frame_without(&finger, 6, 3, ends[k]);
             (void)feed(&finger, &frame);
             assert_int_equal(finger.tare.state, BT_TARE_STATE_FAULT);
             assert_int_equal(finger.tare.reason, BT_TARE_REASON_NONE);
@@ -40,7 +40,7 @@ static void a_fault_freezes_the_tare_and_release_rules_end_it(void **state)
     emulated_finger finger = resting_finger();
     bt_baseline before = finger.tare.base;
     for (int k = 0; k < 300; k++) {
-        bt_frame frame = frame_without(&finger, 0, 9, 0);
+        bt_round frame = frame_without(&finger, 0, 9, 0);
         (void)feed(&finger, &frame);
         assert_int_equal(finger.tare.state, BT_TARE_STATE_FAULT);
     }
@@ -56,7 +56,7 @@ static void two_railed_electrodes_are_no_fault(void **state)
 {
     (void)state;
     emulated_finger finger = resting_finger();
-    bt_frame frame = frame_without(&finger, 3, 2, BT_INVALID_COUNT);
+    bt_round frame = frame_without(&finger, 3, 2, BT_INVALID_COUNT);
     (void)feed(&finger, &frame);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
     frame = frame_without(&finger, 3, 3, BT_INVALID_COUNT);
@@ -71,11 +71,11 @@ static void a_first_word_in_a_faulty_round_is_met_once_the_fault_clears(void **s
     finger_init(&finger);
     finger.has_pdc = false;
     for (int k = 0; k < 50; k++) {
-        bt_frame frame = frame_without(&finger, 4, 1, BT_INVALID_COUNT);
+        bt_round frame = frame_without(&finger, 4, 1, BT_INVALID_COUNT);
         (void)feed(&finger, &frame);
     }
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
-    bt_frame frame = frame_without(&finger, 8, 3, BT_INVALID_COUNT); // E5 has come, three others are gone
+    bt_round frame = frame_without(&finger, 8, 3, BT_INVALID_COUNT); // E5 has come, three others are gone
     uint16_t rest = frame.electrode[4];
     frame.electrode[4] = (uint16_t)(rest - 10); // nothing of a faulty round may reach a tare
     (void)feed(&finger, &frame);
@@ -98,7 +98,7 @@ static void a_first_word_in_a_faulty_round_does_not_move_a_tare_from_the_host(vo
         base.electrode_q16[i] = (uint32_t)(rest_count(&finger, i) - 10) << 16;
     }
     assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
-    bt_frame frame = frame_without(&finger, 8, 3, BT_INVALID_COUNT);
+    bt_round frame = frame_without(&finger, 8, 3, BT_INVALID_COUNT);
     (void)feed(&finger, &frame);
     step(&finger);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
@@ -119,7 +119,7 @@ static void after_a_fault_no_older_frame_makes_a_tare(void **state)
         assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
     }
     for (int k = 0; k < 100; k++) {
-        bt_frame frame = frame_without(&finger, 0, 9, 0);
+        bt_round frame = frame_without(&finger, 0, 9, 0);
         (void)feed(&finger, &frame);
     }
     finger.load = 43; // it crept while nobody could see it
@@ -133,7 +133,7 @@ static void one_faulty_frame_starts_the_history_over(void **state)
 {
     (void)state;
     emulated_finger finger = resting_finger();
-    bt_frame frame = frame_without(&finger, 0, 3, 4095);
+    bt_round frame = frame_without(&finger, 0, 3, 4095);
     (void)feed(&finger, &frame);
     for (int k = 0; k < 7; k++) {
         step(&finger);
@@ -218,7 +218,7 @@ static void an_electrode_that_was_railed_is_never_tared_at_its_end(void **state)
         emulated_finger finger;
         finger_init(&finger);
         for (int n = 0; n < 50; n++) {
-            bt_frame frame = frame_without(&finger, 2, 1, ends[k]);
+            bt_round frame = frame_without(&finger, 2, 1, ends[k]);
             (void)feed(&finger, &frame);
         }
         assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
@@ -256,7 +256,7 @@ static void one_lost_pressure_word_does_not_end_a_light_contact(void **state)
     for (int phase = 0; phase < 2 * BT_SWEEP_ROUNDS; phase++) {
         emulated_finger finger = touched_finger(15, 40); // 225 count^2
         run_frames(&finger, 50 + phase);
-        bt_frame frame = next_frame(&finger);
+        bt_round frame = next_frame(&finger);
         frame.pdc = BT_INVALID_COUNT;
         (void)feed(&finger, &frame);
         run_frames(&finger, 50);

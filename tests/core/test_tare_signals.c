@@ -216,7 +216,7 @@ static void a_press_after_hours_of_drift_is_seen_whole(void **state)
     finger.drift_per_s = -0.1; // 720 counts in two hours
     run_seconds(&finger, 2 * 3600);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
-    assert_int_equal(finger.tare.age_frames, 2 * 3600 * FRAMES_PER_S - 2 * BT_SWEEP_ROUNDS);
+    assert_int_equal(finger.tare.age_rounds, 2 * 3600 * FRAMES_PER_S - 2 * BT_SWEEP_ROUNDS);
     assert_true(tare_error(&finger) < 1);
     finger.load = 400;
     (void)run_until(&finger, BT_TARE_STATE_CONTACT, 10);
@@ -237,7 +237,7 @@ static void an_hour_in_contact_ends_with_a_tare(void **state)
     run_seconds(&finger, 3600);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
     assert_memory_equal(&finger.tare.base, &frozen, sizeof frozen);
-    assert_in_range(finger.tare.contact_frames, 359990, 360010);
+    assert_in_range(finger.tare.contact_rounds, 359990, 360010);
     finger.load = 0; // 72 counts of drift are left on every electrode: energy 98,000
     finger.pdc_load = 0;
     assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 300), 40, 130);
@@ -255,8 +255,8 @@ static void counters_near_their_ends_do_not_wrap_into_nonsense(void **state)
     finger.load = 400;
     (void)run_until(&finger, BT_TARE_STATE_CONTACT, 10);
     // 497 days in contact: the forgiven residue is still that of a minute of drift, 10,275 count^2.
-    finger.tare.contact_frames = UINT32_MAX - 200;
-    finger.tare.age_frames = UINT32_MAX - 200;
+    finger.tare.contact_rounds = UINT32_MAX - 200;
+    finger.tare.age_rounds = UINT32_MAX - 200;
     run_frames(&finger, 400);
     assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
     finger.load = 0;

@@ -5,7 +5,7 @@
 // less than 8/256.
 #include "emulated_finger.h"
 
-#include "results.h"
+#include "solve/results.h"
 
 #define CUT   (8.0 / 256)
 #define APART 1000.0 // the bound: 500 counts up, 500 down
@@ -16,7 +16,7 @@ static uint16_t tdc_now; // what the finger's thermometer reads
 
 static void warm_round(emulated_finger *finger)
 {
-    bt_frame frame = next_frame(finger);
+    bt_round frame = next_frame(finger);
     frame.tdc = tdc_now;
     (void)feed(finger, &frame);
 }
@@ -246,8 +246,8 @@ static void a_first_temperature_in_contact_moves_nothing(void **state)
 static void a_degree_is_flagged_in_contact_alone(void **state)
 {
     (void)state;
-    bt_frame frame;
-    bt_frame_clear(&frame);
+    bt_round frame;
+    bt_round_clear(&frame);
     for (int step = -100; step <= 100; step++) {
         emulated_finger finger = held_finger(0);
         tdc_now = (uint16_t)(T0 + step);
@@ -316,7 +316,7 @@ static void a_tare_from_the_host_ends_the_following_at_once(void **state)
 
 static void fault_round(emulated_finger *finger)
 {
-    bt_frame frame = frame_without(finger, 3, 3, BT_INVALID_COUNT);
+    bt_round frame = frame_without(finger, 3, 3, BT_INVALID_COUNT);
     frame.tdc = tdc_now;
     (void)feed(finger, &frame);
     assert_int_equal(finger->tare.state, BT_TARE_STATE_FAULT);

@@ -1,7 +1,7 @@
 #include "fake_port.h"
 
 #include "port.h"
-#include "wire_gen.h"
+#include "wire/messages_gen.h"
 
 #include <string.h>
 

@@ -5,7 +5,7 @@
 
 #include "device.h"
 #include "port.h"
-#include "sensor_gen.h"
+#include "wire/sensor_gen.h"
 
 #include <setjmp.h>
 #include <stdbool.h>

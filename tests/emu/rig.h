@@ -6,9 +6,9 @@
 #include "support.h"
 
 #include "fake_port.h"
-#include "framing.h"
 #include "gateway.h"
 #include "port.h"
+#include "wire/framing.h"
 
 #define ROUND_NS   10000000ull
 #define MAX_ROUNDS 6100

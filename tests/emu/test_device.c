@@ -2,8 +2,8 @@
 #include "support.h"
 
 #include "device.h"
-#include "sensor_gen.h"
-#include "wire_gen.h"
+#include "wire/messages_gen.h"
+#include "wire/sensor_gen.h"
 #include "word.h"
 
 static bt_emu_device device;

@@ -34,7 +34,7 @@ def native(tmp_path_factory: pytest.TempPathFactory) -> Path:
     program = tmp_path_factory.mktemp("native") / "course"
     sources = [FIRMWARE / "emu" / f"{name}.c" for name in ("bus", "device", "tape")]
     words = ["cc", "-std=c11", "-O1", f"-I{FIRMWARE / 'emu'}", f"-I{FIRMWARE / 'core'}", HERE / "course.c"]
-    subprocess.run([*words, *sources, FIRMWARE / "core/sensor_gen.c", "-o", program], check=True)
+    subprocess.run([*words, *sources, FIRMWARE / "core/wire/sensor_gen.c", "-o", program], check=True)
     return program
 
 

@@ -4,9 +4,9 @@
 #include "input.h"
 
 #include "gold.h"
-#include "kernel.h"
 #include "kernel_bounds.h"
 #include "lin2013.h"
+#include "solve/solve.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -52,9 +52,9 @@ typedef struct {
 static uint32_t run_wanted(const frame_input *in, uint32_t wanted, int16_t poc_um[3], int32_t force_100un[3],
                            int32_t torque_mnmm[3])
 {
-    bt_kernel_settings settings = {.poc_weights = in->weights,
-                                   .gains = bt_gains_from(in->force_nn, in->torque_nn)};
-    return bt_kernel(in->e_q4, &settings, wanted, poc_um, force_100un, torque_mnmm);
+    bt_solve_settings settings = {.poc_weights = in->weights,
+                                  .gains = bt_gains_from(in->force_nn, in->torque_nn)};
+    return bt_solve(in->e_q4, &settings, wanted, poc_um, force_100un, torque_mnmm);
 }
 
 // Whatever else is wanted or not, what is wanted has the same value, and the rest is marked.

@@ -4,7 +4,7 @@
 // counts and tares.
 #include "input.h"
 
-#include "map.h"
+#include "map/map.h"
 
 #include <string.h>
 

@@ -9,9 +9,10 @@
 // is the sanitizers'.
 #include "input.h"
 
-#include "crc32.h"
 #include "fake_board.h"
-#include "session.h"
+#include "talk/host.h"
+#include "talk/streams.h"
+#include "wire/crc32.h"
 
 #include <string.h>
 

@@ -2,7 +2,7 @@
 #ifndef BIOTAC_FUZZ_INPUT_H
 #define BIOTAC_FUZZ_INPUT_H
 
-#include "framing.h"
+#include "wire/framing.h"
 
 #include <stdbool.h>
 #include <stddef.h>

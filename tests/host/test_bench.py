@@ -18,7 +18,7 @@ from biotac.cli.main import main
 from biotac.core import default_settings, on_board, reference
 
 EFFORT = kernels.Effort(frames=300, restarts=2, steps=200)
-#: um; what firmware/variants says of each (tests/core/test_variants.c derives them)
+#: um; what tools/bench/variants says of each (tests/core/test_variants.c derives them)
 POC_BOUNDS_UM = {
     "double": 1e-9,
     "float": 0.17,

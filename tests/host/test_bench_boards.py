@@ -81,7 +81,7 @@ def test_runs_are_cut_out_of_the_log_whatever_its_chunks(model, size) -> None:
     [
         *((name, True) for name in ("__aeabi_fadd", "__aeabi_dmul", "__aeabi_i2f", "__aeabi_ui2d", "__aeabi_d2iz")),
         *((name, True) for name in ("__aeabi_dcmplt", "__aeabi_cfcmple", "__mulsf3", "__floatsidf", "__aeabi_ul2d")),
-        *((name, False) for name in ("__aeabi_uidiv", "__aeabi_lmul", "__aeabi_idivmod", "bt_fold_force", "memcpy")),
+        *((name, False) for name in ("__aeabi_uidiv", "__aeabi_lmul", "__aeabi_idivmod", "bt_sums_force", "memcpy")),
     ],
 )
 def test_what_counts_as_floating_point(model, name, is_float) -> None:

@@ -97,10 +97,10 @@ def test_an_image_that_does_not_say_its_board_is_refused(tmp_path: Path, said: b
 
 
 def test_settings_and_maps_are_where_the_firmware_has_them() -> None:
-    storage = (ROOT / "firmware/core/storage.h").read_text()
+    storage = (ROOT / "firmware/core/keep/storage.h").read_text()
     assert "#define BT_FLASH_SECTOR_BYTES   4096" in storage
     assert "#define BT_STORAGE_BYTES        (2 * BT_FLASH_SECTOR_BYTES)" in storage
-    slots = (ROOT / "firmware/core/map_store.h").read_text()
+    slots = (ROOT / "firmware/core/map/store.h").read_text()
     assert "#define BT_MAP_SLOT_BYTES BT_MAP_MAX_BYTES" in slots
     assert "#define BT_MAP_SLOTS      (2 * BT_MAX_FINGERS + 1)" in slots
     port = (ROOT / "firmware/port/rp2040/flash.c").read_text()

@@ -7,8 +7,8 @@
 //
 // What is wanted comes from the double's square root, which is good to 2^-53: nothing beside the 2^-17
 // that is measured. Errors are split as root.h splits them: one unit, and a part of the result itself.
-#include "root.h"
-#include "sensor_gen.h"
+#include "solve/rsqrt.h"
+#include "wire/sensor_gen.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-# Gappa: one coordinate of to_radius (firmware/core/poc.c), from the exact direction to what is published.
+# Gappa: one coordinate of to_radius (firmware/core/solve/poc.c), from the exact direction to what is published.
 # test_finaliser.py fills in what stands between at-signs from the C; it says where each hypothesis comes from.
 #
 # te     exact direction cosine, 0..1 (signs are put back at the end, so magnitudes are enough)

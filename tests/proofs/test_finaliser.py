@@ -1,4 +1,4 @@
-"""The point of contact's last steps (to_radius in firmware/core/poc.c): direction, length, rounding.
+"""The point of contact's last steps (to_radius in firmware/core/solve/poc.c): direction, length, rounding.
 
 Gappa proves radius.g. Its hypotheses:
   root       every argument of the table, by tests/proofs/exhaustive.c, which is run here.
@@ -85,7 +85,7 @@ def bound(value: Fraction) -> str:
 
 def script(**changes: int) -> str:
     numbers = {"um_factor": UM_FACTOR, "lever_factor": LEVER_FACTOR, "direction_bits": DIRECTION_BITS} | changes
-    low, high = root_error(text_of(CORE / "root_gen.c"))
+    low, high = root_error(text_of(CORE / "solve/rsqrt_gen.c"))
     share = Fraction(RADIUS, 2 * UM_FACTOR)
     smallest = share * (1 << 32) / sqrt_up(Fraction(3 << 30)) * (1 + low)  # of the table, where it is halved
     um_unit, lever_unit = 1 << UM_BITS, 1 << LEVER_BITS
@@ -167,7 +167,7 @@ def test_a_wrong_factor_and_one_bit_less_are_too_far_off(gappa: str, changes: di
 
 
 def test_a_wrong_entry_of_the_table_is_found() -> None:
-    text = text_of(CORE / "root_gen.c")
+    text = text_of(CORE / "solve/rsqrt_gen.c")
     entry = re.findall(r"\b(\d{5}),", text)[200]
     with pytest.raises(ValueError, match="from the exact"):
         root_error(changed(text, entry, str(int(entry) + 3)))

@@ -1,4 +1,4 @@
-"""firmware/core/fix.h, proved for all inputs of the ranges it states; nothing undefined happens in it.
+"""firmware/core/fixed_point.h, proved for all inputs of the ranges it states; nothing undefined happens in it.
 
 Every claim is also made about a copy of the source with one thing wrong in it, which must be refuted by
 an input; that input then runs through the same C with known numbers.
@@ -21,7 +21,7 @@ from prover.prove import Input, Refuted, prove
 from prover.source import CORE, changed, parse, text_of
 from prover.storage import Value
 
-FIX = text_of(CORE / "fix.h")
+FIX = text_of(CORE / "fixed_point.h")
 
 
 def size(x: Any) -> Any:

@@ -1,4 +1,4 @@
-"""From the sums to the moments, and from the moments to x (firmware/core/poc.c), as z3 integers.
+"""From the sums to the moments, and from the moments to x (firmware/core/solve/poc.c), as z3 integers.
 
 What is run is the C: for the moments, what follows the call of the generated sum in its function, with
 the sum's results as inputs anywhere within the bounds that test_sums.py proves for them.
@@ -19,15 +19,15 @@ from prover.report import Report, nightly
 from prover.source import CORE, changed, parse, text_of
 from prover.table import constants, table
 
-POC = text_of(CORE / "poc.c")
+POC = text_of(CORE / "solve/poc.c")
 E_MAX, WEIGHT_MAX, SPLIT_SHIFT, SPLIT_BITS, LINEAR_BITS, X_UNIT, COUNT = constants(
     "poc.c",
-    *("BT_E_MAX_Q4", "WEIGHT_MAX", "BT_FOLD_SPLIT_BITS", "SPLIT_BITS", "LINEAR_BITS", "BT_FOLD_X_UNIT_UM"),
+    *("BT_E_MAX_Q4", "WEIGHT_MAX", "BT_SUMS_SPLIT_BITS", "SPLIT_BITS", "LINEAR_BITS", "BT_SUMS_X_UNIT_UM"),
     "BT_ELECTRODES",
 )
 AHEAD, BEHIND, Y, Z, LOW, Y_LOW = constants(
-    "fold_gen.h",
-    *(f"BT_FOLD_{name}" for name in ("AHEAD_UM", "BEHIND_UNITS", "Y_UM", "Z_UM", "LOW_MAX", "Y_LOW_MAX")),
+    "solve/sums_gen.h",
+    *(f"BT_SUMS_{name}" for name in ("AHEAD_UM", "BEHIND_UNITS", "Y_UM", "Z_UM", "LOW_MAX", "Y_LOW_MAX")),
 )
 X_MAX = max(abs(x) for x in table().column("um", 0))
 Y_MAX = max(abs(y) for y in table().column("um", 1))
@@ -64,7 +64,7 @@ int32_t proof_split({parameters}, int32_t y_hi, int32_t y_lo, int which)
     bt_split_sums sums;
 {stores}    sums.behind[0] = b0;
     sums.behind[1] = b1;
-{tail(text, "square_moments", "bt_fold_split")}
+{tail(text, "square_moments", "bt_sums_split")}
     return room.n[which];
 }}
 """
@@ -106,8 +106,8 @@ def test_moments_of_squares_fit_and_lose_only_what_is_cut(axis: int, proved: Rep
     [
         (0, ("(half & 31) * QUARTER_X >> 5", "(half & 15) * QUARTER_X >> 5")),
         (0, ("half >> 5) * QUARTER_X + ((half", "half * QUARTER_X >> 5) + ((half")),
-        (1, ("(sums.y_hi + sums.y_lo / (1 << BT_FOLD_SPLIT_BITS)) / (1 << LOW_BITS)", "sums.y_hi / (1 << LOW_BITS)")),
-        (2, ("(sums.z_lo >> SPLIT_BITS)", "(sums.z_lo >> BT_FOLD_SPLIT_BITS)")),
+        (1, ("(sums.y_hi + sums.y_lo / (1 << BT_SUMS_SPLIT_BITS)) / (1 << LOW_BITS)", "sums.y_hi / (1 << LOW_BITS)")),
+        (2, ("(sums.z_lo >> SPLIT_BITS)", "(sums.z_lo >> BT_SUMS_SPLIT_BITS)")),
     ],
 )
 def test_wrong_moments_of_squares_are_refuted(axis: int, wrong: tuple[str, str]) -> None:

@@ -1,6 +1,6 @@
 """Every generated sum is the plain sum over Table 1, and no step of it can leave its type.
 
-What is read is firmware/core/fold_gen.c itself, not its generator. That each proof can fail is shown by
+What is read is firmware/core/solve/sums_gen.c itself, not its generator. That each proof can fail is shown by
 changing every number in that file by one.
 """
 
@@ -26,12 +26,12 @@ E_MAX = table().e_max_q4
 SIGNALS = [f"v{i}" for i in range(COUNT)]
 COMPRESSED = [f"min(+1*v{i},0)" for i in range(COUNT)]
 WEIGHT_BITS, SPLIT_BITS, X_UNIT_UM, TORQUE_UNIT_NM, ARM_BITS = constants(
-    "fold_gen.h",
-    *(f"BT_FOLD_{name}" for name in ("WEIGHT_BITS", "SPLIT_BITS", "X_UNIT_UM", "TORQUE_UNIT_NM", "ARM_BITS")),
+    "solve/sums_gen.h",
+    *(f"BT_SUMS_{name}" for name in ("WEIGHT_BITS", "SPLIT_BITS", "X_UNIT_UM", "TORQUE_UNIT_NM", "ARM_BITS")),
 )
 AHEAD_UM, BEHIND_UNITS, Y_UM, Z_UM, LOW_MAX, Y_LOW_MAX = constants(
-    "fold_gen.h",
-    *(f"BT_FOLD_{name}" for name in ("AHEAD_UM", "BEHIND_UNITS", "Y_UM", "Z_UM", "LOW_MAX", "Y_LOW_MAX")),
+    "solve/sums_gen.h",
+    *(f"BT_SUMS_{name}" for name in ("AHEAD_UM", "BEHIND_UNITS", "Y_UM", "Z_UM", "LOW_MAX", "Y_LOW_MAX")),
 )
 INT32_MAX, UINT32_MAX = 2**31 - 1, 2**32 - 1
 WEIGHT_MAX = (1 << WEIGHT_BITS) - 1
@@ -41,24 +41,24 @@ SHIFTS = [(max(WEIGHT_BITS - bits, 0), max(bits - WEIGHT_BITS, 0)) for bits in r
 
 @cache
 def shipped() -> c_ast.FileAST:
-    return parse(text_of(CORE / "fold_gen.c"))
+    return parse(text_of(CORE / "solve/sums_gen.c"))
 
 
 def linear(unit: c_ast.FileAST, larger: int = 1) -> sums.Sums:
-    return sums.forms(unit, "bt_fold_linear", COUNT, -E_MAX * larger, E_MAX * larger)
+    return sums.forms(unit, "bt_sums_linear", COUNT, -E_MAX * larger, E_MAX * larger)
 
 
 def split(unit: c_ast.FileAST, up: int = 0, down: int = 0, bits: int = WEIGHT_BITS) -> sums.Sums:
     """Weights of as many bits as leave ``bits`` once they are shifted."""
-    return sums.forms(unit, "bt_fold_split", COUNT, 0, (1 << (bits - up + down)) - 1, up, down)
+    return sums.forms(unit, "bt_sums_split", COUNT, 0, (1 << (bits - up + down)) - 1, up, down)
 
 
 def force(unit: c_ast.FileAST, larger: int = 1) -> sums.Sums:
-    return sums.forms(unit, "bt_fold_force", COUNT, -E_MAX * larger, E_MAX * larger)
+    return sums.forms(unit, "bt_sums_force", COUNT, -E_MAX * larger, E_MAX * larger)
 
 
 def torque(unit: c_ast.FileAST, larger: int = 1) -> sums.Sums:
-    return sums.forms(unit, "bt_fold_torque", COUNT, -E_MAX * larger, E_MAX * larger)
+    return sums.forms(unit, "bt_sums_torque", COUNT, -E_MAX * larger, E_MAX * larger)
 
 
 def negated(values: list[int]) -> list[int]:
@@ -111,10 +111,10 @@ def check_torque(unit: c_ast.FileAST) -> None:
 
 
 IDENTITIES: dict[str, Callable[[c_ast.FileAST], None]] = {
-    "bt_fold_linear": check_linear,
-    "bt_fold_split": check_split,
-    "bt_fold_force": check_force,
-    "bt_fold_torque": check_torque,
+    "bt_sums_linear": check_linear,
+    "bt_sums_split": check_split,
+    "bt_sums_force": check_force,
+    "bt_sums_torque": check_torque,
 }
 
 
@@ -134,7 +134,7 @@ def test_the_tables_in_c_are_table_1() -> None:
         ("bt_arm_nm", table().arm_nm),
     ):
         places = [f"{name}[{i}][{d}]" for i in range(COUNT) for d in range(3)]
-        assert constants("sensor_gen.c", *places) == [value for row in rows for value in row]
+        assert constants("wire/sensor_gen.c", *places) == [value for row in rows for value in row]
 
 
 def check_bounds(found: sums.Sums, asserted: dict[str, int], proved: Report) -> None:
@@ -166,7 +166,7 @@ def test_split_sums_stay_within_what_is_asserted(proved: Report) -> None:
 
 
 def test_force_sums_reach_exactly_what_is_asserted(proved: Report) -> None:
-    (asserted,) = constants("sensor_gen.h", "BT_SUM_NORMAL_MAX_Q4_MILLI")
+    (asserted,) = constants("wire/sensor_gen.h", "BT_SUM_NORMAL_MAX_Q4_MILLI")
     found = force(shipped())
     check_bounds(found, {f"[{d}]": asserted for d in range(3)}, proved)
     assert max(form.size for form in found.out.values()) == asserted
@@ -174,7 +174,7 @@ def test_force_sums_reach_exactly_what_is_asserted(proved: Report) -> None:
 
 def test_torque_sums_stay_within_what_is_asserted(proved: Report) -> None:
     (asserted,) = constants(
-        "wrench.c", "BT_SUM_ARM_MAX_Q4_NM / BT_FOLD_TORQUE_UNIT_NM + 2 + BT_ELECTRODES * (int64_t)BT_E_MAX_Q4"
+        "wrench.c", "BT_SUM_ARM_MAX_Q4_NM / BT_SUMS_TORQUE_UNIT_NM + 2 + BT_ELECTRODES * (int64_t)BT_E_MAX_Q4"
     )
     found = torque(shipped())
     check_bounds(found, {"[0]": asserted, "[1]": asserted}, proved)
@@ -184,7 +184,7 @@ def test_a_bound_is_reached_by_the_corner_it_names() -> None:
     for name, form in force(shipped()).out.items():
         largest, corner = form.extreme(1)
         values = [corner.get(signal, 0) for signal in SIGNALS]
-        assert sums.evaluate(shipped(), "bt_fold_force", values)[name] == largest
+        assert sums.evaluate(shipped(), "bt_sums_force", values)[name] == largest
 
 
 def test_larger_signals_are_refuted_by_a_corner_that_overflows() -> None:
@@ -195,7 +195,7 @@ def test_larger_signals_are_refuted_by_a_corner_that_overflows() -> None:
         force(shipped(), enough + 1)
     corner = [refused.value.witness.get(name, 0) for name in SIGNALS]
     with pytest.raises(Undefined):
-        sums.evaluate(shipped(), "bt_fold_force", corner)
+        sums.evaluate(shipped(), "bt_sums_force", corner)
 
 
 @pytest.mark.parametrize("run", [linear, torque, lambda unit, _: split(unit, bits=WEIGHT_BITS + 1)])
@@ -206,9 +206,9 @@ def test_twice_the_input_is_refuted(run: Callable[[c_ast.FileAST, int], sums.Sum
 
 
 class Numbers(c_ast.NodeVisitor):  # type: ignore[misc]
-    """The constants in the bodies of fold_gen.c's own functions; fix.h's are proved in test_fix.py."""
+    """The constants in the bodies of sums_gen.c's own functions; fix.h's are proved in test_fix.py."""
 
-    def __init__(self, unit: c_ast.FileAST, prefix: str = "bt_fold_") -> None:
+    def __init__(self, unit: c_ast.FileAST, prefix: str = "bt_sums_") -> None:
         self.found: list[c_ast.Constant] = []
         for node in unit.ext:
             if isinstance(node, c_ast.FuncDef) and node.decl.name.startswith(prefix):
@@ -237,12 +237,12 @@ def test_every_number_of_the_file_matters() -> None:
 
 def test_a_wrong_coefficient_shows_in_a_frame_with_one_electrode() -> None:
     unit = copy.deepcopy(shipped())
-    node = next(n for n in Numbers(unit, "bt_fold_force").found if int(n.value) in table().column("milli", 1))
+    node = next(n for n in Numbers(unit, "bt_sums_force").found if int(n.value) in table().column("milli", 1))
     node.value = str(int(node.value) + 1)
     differences = []
     for i in range(COUNT):
         one = [int(k == i) for k in range(COUNT)]
-        if list(sums.evaluate(unit, "bt_fold_force", one).values()) != list(table().milli[i]):
+        if list(sums.evaluate(unit, "bt_sums_force", one).values()) != list(table().milli[i]):
             differences.append(i)
     assert differences
 

@@ -33,13 +33,13 @@ def hull(z_max_um: int) -> None:
 
 
 def test_every_weighted_centroid_lies_below_the_axis() -> None:
-    (z_max,) = constants("sensor_gen.h", "BT_ELECTRODE_Z_MAX_UM")
+    (z_max,) = constants("wire/sensor_gen.h", "BT_ELECTRODE_Z_MAX_UM")
     assert z_max < 0
     hull(z_max)
 
 
 def test_a_stronger_hull_is_refuted_by_weights() -> None:
-    (z_max,) = constants("sensor_gen.h", "BT_ELECTRODE_Z_MAX_UM")
+    (z_max,) = constants("wire/sensor_gen.h", "BT_ELECTRODE_Z_MAX_UM")
     with pytest.raises(Refuted) as refused:
         hull(z_max - 1)
     weights = [refused.value.witness[f"w{i}"] for i in range(COUNT)]

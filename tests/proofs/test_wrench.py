@@ -1,4 +1,4 @@
-"""Force and torque (firmware/core/wrench.c): every product fits, and how far each result is from the exact one.
+"""Force and torque (firmware/core/solve/wrench.c): every product fits, and how far each result is from the exact one.
 
 The bounds proved are the parts of firmware/reference/kernel_bounds.h that these functions are answerable for.
 """
@@ -19,7 +19,7 @@ from prover.report import Report
 from prover.source import CORE, changed, parse, text_of
 from prover.table import constants
 
-WRENCH = text_of(CORE / "wrench.c")
+WRENCH = text_of(CORE / "solve/wrench.c")
 (
     GAIN_MAX,
     FORCE_DIVISOR,
@@ -40,7 +40,7 @@ WRENCH = text_of(CORE / "wrench.c")
     "TORQUE_DIVISOR",
     "TORQUE_BITS",
     "BT_SUM_NORMAL_MAX_Q4_MILLI",
-    "BT_SUM_ARM_MAX_Q4_NM / BT_FOLD_TORQUE_UNIT_NM + 2 + BT_ELECTRODES * (int64_t)BT_E_MAX_Q4",
+    "BT_SUM_ARM_MAX_Q4_NM / BT_SUMS_TORQUE_UNIT_NM + 2 + BT_ELECTRODES * (int64_t)BT_E_MAX_Q4",
     "FORCE_MAX_100UN",
     "LEVER_MAX",
     "LEVER_BITS",

@@ -1,8 +1,8 @@
 #include "kernels.h"
 
 #include "gold.h"
-#include "kernel.h"
 #include "kernel_bounds.h"
+#include "solve/solve.h"
 
 #include <math.h>
 
@@ -15,11 +15,11 @@ const char *const kind_unit[KINDS] = {"um", "mN", "mN*mm", "mN*mm"};
 
 static void shipped_run(const int32_t e_q4[BT_ELECTRODES], const kernel_case *what, kernel_answer *answer)
 {
-    bt_kernel_settings settings = {.poc_weights = what->weights,
-                                   .gains = bt_gains_from(what->force_nn, what->torque_nn)};
+    bt_solve_settings settings = {.poc_weights = what->weights,
+                                  .gains = bt_gains_from(what->force_nn, what->torque_nn)};
     int16_t poc_um[3];
     int32_t force_100un[3], torque_mnmm[3];
-    uint32_t flags = bt_kernel(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);
+    uint32_t flags = bt_solve(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);
     answer->has_poc = flags == 0;
     for (int d = 0; d < 3; d++) {
         // A mark where there is a point, or a point where there is a mark, is off by all.

@@ -3,9 +3,9 @@
 #ifndef BIOTAC_BENCH_BITS_H
 #define BIOTAC_BENCH_BITS_H
 
-#include "crc32.h"
-#include "kernel.h"
 #include "maps.h"
+#include "solve/solve.h"
+#include "wire/crc32.h"
 
 #define BITS_FRAMES 100000
 
@@ -51,7 +51,7 @@ static inline uint32_t bits_hash(void)
     uint32_t chain[8] = {bits_map_hash()};
     bt_settings all;
     bt_settings_reset(&all);
-    bt_kernel_settings settings = bt_kernel_settings_from(&all);
+    bt_solve_settings settings = bt_solve_settings_from(&all);
     for (int k = 0; k < BITS_FRAMES; k++) {
         int32_t e_q4[BT_ELECTRODES];
         int16_t poc_um[3];
@@ -62,7 +62,7 @@ static inline uint32_t bits_hash(void)
             e_q4[i] = bits_step(&seed) & 3 ? -magnitude : magnitude;
         }
         settings.poc_weights = k % 3;
-        uint32_t flags = bt_kernel(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);
+        uint32_t flags = bt_solve(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);
         for (int d = 0; d < 3; d++) {
             chain[1 + d] = (uint32_t)force_100un[d];
             chain[4 + d] = (uint32_t)torque_mnmm[d] ^ (uint32_t)(uint16_t)poc_um[d] << 16;

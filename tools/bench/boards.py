@@ -29,12 +29,13 @@ BUILD = ROOT / "build" / "bench"
 FRAMES = 12  # per weighting
 # What some files want compiled otherwise than with -O3; the boards' images are built by the same facts.
 OPTIONS = json.loads((FIRMWARE / "boards" / "compile_options.json").read_text(encoding="utf-8"))["files"]
-APART = [FIRMWARE / "core" / name for name in OPTIONS]
-CORE = sorted(set((FIRMWARE / "core").glob("*.c")) - set(APART))
-JUDGED = sorted([*(FIRMWARE / "reference").glob("*.c"), *(FIRMWARE / "variants").glob("*.c")])
-SHIPPED = sorted(path for room in ("core", "sensor", "app") for path in (FIRMWARE / room).glob("*.c"))
-INCLUDE = [f"-I{FIRMWARE / room}" for room in ("core", "reference", "variants", "sensor", "port", "app")] + [
-    f"-I{HERE}"
+APART = [path for path in (FIRMWARE / "core").rglob("*.c") if path.name in OPTIONS]
+CORE = sorted(set((FIRMWARE / "core").rglob("*.c")) - set(APART))
+JUDGED = sorted([*(FIRMWARE / "reference").glob("*.c"), *(ROOT / "tools/bench/variants").glob("*.c")])
+SHIPPED = sorted(path for room in ("core", "sensor", "app") for path in (FIRMWARE / room).rglob("*.c"))
+INCLUDE = [f"-I{FIRMWARE / room}" for room in ("core", "reference", "sensor", "port", "app")] + [
+    f"-I{ROOT / 'tools/bench/variants'}",
+    f"-I{HERE}",
 ]
 PACKAGES = {
     "arm-none-eabi-gcc": "gcc-arm-none-eabi libnewlib-arm-none-eabi",

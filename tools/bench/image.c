@@ -1,8 +1,8 @@
 // What is counted on the emulated boards: each kernel variant over the same frames, once per scene, and
 // whole frames beside them. BENCH_FRAMES per weighting, given by the build.
+#include "keep/settings.h"
 #include "mark.h"
 #include "scenes.h"
-#include "settings.h"
 #include "variants.h"
 
 static const struct {

@@ -3,7 +3,7 @@
 #ifndef BIOTAC_BENCH_MAPS_H
 #define BIOTAC_BENCH_MAPS_H
 
-#include "map.h"
+#include "map/map.h"
 
 typedef struct {
     bt_map map;

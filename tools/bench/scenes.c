@@ -3,8 +3,8 @@
 #include "scenes.h"
 
 #include "finger.h"
-#include "framing.h"
 #include "maps.h"
+#include "wire/framing.h"
 
 #define LANES BT_LANES // a round's words that the front end looks at: electrodes, then pressure
 
@@ -49,57 +49,57 @@ static void untouched(bt_finger *finger)
     sink = bt_finger_idle(finger);
 }
 
-static void pressed(bt_finger *finger, const bt_kernel_settings *settings, uint32_t quantities)
+static void pressed(bt_finger *finger, const bt_solve_settings *settings, uint32_t quantities)
 {
     front_end(finger, press_lane);
     bt_results(&finger->frame, &finger->tare, settings, quantities, &message);
 }
 
-static void one_word(const bt_kernel_settings *settings)
+static void one_word(const bt_solve_settings *settings)
 {
     (void)settings;
     sink = (uint32_t)bt_gate_electrode(&gate, 3, rest_lane[3]);
 }
 
-static void front_at_rest(const bt_kernel_settings *settings)
+static void front_at_rest(const bt_solve_settings *settings)
 {
     (void)settings;
     front_end(&rest_front, rest_lane);
 }
 
-static void front_in_contact(const bt_kernel_settings *settings)
+static void front_in_contact(const bt_solve_settings *settings)
 {
     (void)settings;
     front_end(&press_front, press_lane);
 }
 
-static void whole_at_rest(const bt_kernel_settings *settings)
+static void whole_at_rest(const bt_solve_settings *settings)
 {
     (void)settings;
     untouched(&rest_whole);
 }
 
-static void whole_in_contact(const bt_kernel_settings *settings)
+static void whole_in_contact(const bt_solve_settings *settings)
 {
     pressed(&press_whole, settings, BT_WANT_ALL);
 }
 
-static void force_only(const bt_kernel_settings *settings)
+static void force_only(const bt_solve_settings *settings)
 {
     pressed(&press_force, settings, BT_WANT_FORCE);
 }
 
-static void poc_only(const bt_kernel_settings *settings)
+static void poc_only(const bt_solve_settings *settings)
 {
     pressed(&press_poc, settings, BT_WANT_POC);
 }
 
-static void with_sigma(const bt_kernel_settings *settings)
+static void with_sigma(const bt_solve_settings *settings)
 {
     pressed(&press_sigma, settings, BT_WANT_ALL | BT_QUANTITY_FLAG_SIGMA);
 }
 
-static void five_at_rest(const bt_kernel_settings *settings)
+static void five_at_rest(const bt_solve_settings *settings)
 {
     (void)settings;
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
@@ -107,14 +107,14 @@ static void five_at_rest(const bt_kernel_settings *settings)
     }
 }
 
-static void five_in_contact(const bt_kernel_settings *settings)
+static void five_in_contact(const bt_solve_settings *settings)
 {
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         pressed(&press_five[f], settings, BT_WANT_ALL);
     }
 }
 
-static void all_words(const bt_kernel_settings *settings)
+static void all_words(const bt_solve_settings *settings)
 {
     (void)settings;
     words(&rest_words, rest_count);
@@ -122,7 +122,7 @@ static void all_words(const bt_kernel_settings *settings)
 }
 
 // From the finished round to bytes for the link.
-static void sent(const bt_kernel_settings *settings)
+static void sent(const bt_solve_settings *settings)
 {
     bt_finger_frame(&press_sent, settings, &message);
     bt_msg_frame_pack(&message, payload);
@@ -137,31 +137,31 @@ static void mapped(const bt_map *map)
     sink = (uint32_t)force_100un[0];
 }
 
-static void map_affine(const bt_kernel_settings *settings)
+static void map_affine(const bt_solve_settings *settings)
 {
     (void)settings;
     mapped(&affine.map);
 }
 
-static void map_pooled(const bt_kernel_settings *settings)
+static void map_pooled(const bt_solve_settings *settings)
 {
     (void)settings;
     mapped(&pooled.map);
 }
 
-static void map_pooled_6(const bt_kernel_settings *settings)
+static void map_pooled_6(const bt_solve_settings *settings)
 {
     (void)settings;
     mapped(&pooled_6.map);
 }
 
-static void map_pooled_7(const bt_kernel_settings *settings)
+static void map_pooled_7(const bt_solve_settings *settings)
 {
     (void)settings;
     mapped(&pooled_7.map);
 }
 
-static void map_opened(const bt_kernel_settings *settings)
+static void map_opened(const bt_solve_settings *settings)
 {
     (void)settings;
     bt_map map;

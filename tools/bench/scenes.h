@@ -2,12 +2,12 @@
 #ifndef BIOTAC_BENCH_SCENES_H
 #define BIOTAC_BENCH_SCENES_H
 
-#include "kernel.h"
+#include "solve/solve.h"
 
 typedef struct {
     const char *kernel;
     const char *name;
-    void (*run)(const bt_kernel_settings *settings);
+    void (*run)(const bt_solve_settings *settings);
 } bench_scene;
 
 #define BENCH_SCENES 17

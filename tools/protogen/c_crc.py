@@ -19,7 +19,7 @@ def source() -> str:
     words = [f"0x{entry(byte):08X}," for byte in range(256)]
     lines = [
         f"// {GENERATED}",
-        '#include "crc32.h"',
+        '#include "wire/crc32.h"',
         "",
         "const uint32_t bt_crc32_table[256] = {",
         *(f"    {' '.join(words[k : k + PER_LINE])}" for k in range(0, 256, PER_LINE)),

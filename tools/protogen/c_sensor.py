@@ -104,7 +104,7 @@ def header(contract: Contract) -> str:
 def source(contract: Contract) -> str:
     channels, slots = contract.sensor["channel"], contract.sensor["frame"]["slots"]
     table = electrodes(contract)
-    lines = [f"// {GENERATED}", '#include "sensor_gen.h"', ""]
+    lines = [f"// {GENERATED}", '#include "wire/sensor_gen.h"', ""]
     lines += ["const uint8_t bt_channel_command[BT_CHANNELS] = {"]
     lines += [f"    [BT_CHANNEL_{c['name']}] = 0x{c['command']:02X}," for c in channels] + ["};", ""]
     lines += ["const uint8_t bt_slot_channel[BT_SLOTS] = {"]

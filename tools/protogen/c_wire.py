@@ -104,7 +104,7 @@ def header(contract: Contract) -> str:
 def source(contract: Contract) -> str:
     out = [
         f"// {GENERATED}",
-        '#include "wire_gen.h"',
+        '#include "wire/messages_gen.h"',
         "",
         "static uint8_t *put(uint8_t *at, uint32_t value, int bytes)",
         "{",

@@ -1,4 +1,4 @@
-"""The generated sums of fold_gen.c as exact linear forms."""
+"""The generated sums of sums_gen.c as exact linear forms."""
 
 from __future__ import annotations
 

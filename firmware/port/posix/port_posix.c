@@ -14,9 +14,9 @@
 #include "clock.h"
 #include "flash.h"
 #include "pty.h"
-#include "sensor_gen.h"
 #include "tape.h"
-#include "wire_gen.h"
+#include "wire/messages_gen.h"
+#include "wire/sensor_gen.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,9 +1,9 @@
 // The RP2040 without a vendor's SDK: start-up in order, identity, and the main loop's rest.
 #include "port.h"
 
-#include "crc32.h"
 #include "system.h"
-#include "wire_gen.h"
+#include "wire/crc32.h"
+#include "wire/messages_gen.h"
 
 #include "rp2040_regs.h"
 

@@ -2,9 +2,9 @@
 #include "port.h"
 
 #include "pins.h"
-#include "sensor_gen.h"
 #include "system.h"
 #include "wait.h"
+#include "wire/sensor_gen.h"
 
 // SCK = clk_peri / (CPSDVSR * (1 + SCR)) = 125 MHz / 28 = 4.46 MHz: the nearest to BT_SPI_HZ there is, and
 // far from the sensor's 10 MHz.

@@ -1,7 +1,7 @@
 #include "usb_descriptors.h"
 
 #include "version.h"
-#include "wire_gen.h"
+#include "wire/messages_gen.h"
 
 #include <stddef.h>
 

@@ -1,4 +1,4 @@
-"""Every kernel variant (firmware/variants) against the exact result, and against the others' time.
+"""Every kernel variant (tools/bench/variants) against the exact result, and against the others' time.
 
 Errors are distances to exact sums finished in extended precision (host/binding/kernels.c): over random
 frames of six classes, and the worst that hill climbing finds. Times are ratios to the shipped kernel

@@ -26,8 +26,8 @@ FAMILY_RP2040 = 0xE48BFF56
 
 FLASH_AT = 0x10000000
 FLASH_BYTES = 2 * 1024 * 1024  # of a Pico
-SETTINGS_BYTES = 2 * 4096  # at the flash's end: firmware/core/storage.h
-MAPS_BYTES = (2 * MAX_SENSORS + 1) * _map.MAX_BYTES  # before them: firmware/core/map_store.h
+SETTINGS_BYTES = 2 * 4096  # at the flash's end: firmware/core/keep/storage.h
+MAPS_BYTES = (2 * MAX_SENSORS + 1) * _map.MAX_BYTES  # before them: firmware/core/map/store.h
 BOOT2_BYTES = 252  # and its CRC behind it
 
 

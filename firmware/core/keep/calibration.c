@@ -1,0 +1,76 @@
+#include "keep/calibration.h"
+
+#include "wire/little_endian.h"
+
+#include <string.h>
+
+#define MADE_AT  BT_SERIAL_BYTES
+#define VALUE_AT (MADE_AT + 4)
+
+#define VALUES_OF_VERSION_1 7 // the first by id; what came later is as by default
+
+_Static_assert(BT_SERIAL_BYTES == sizeof(((bt_msg_sensor_info *)NULL)->serial)
+                   && BT_SERIAL_BYTES == sizeof(((bt_msg_calibration *)NULL)->serial)
+                   && BT_SERIAL_BYTES == sizeof(((bt_msg_set_calibration *)NULL)->serial),
+               "a calibration's serial number is a sensor's");
+_Static_assert(sizeof(((bt_msg_calibration *)NULL)->value) == sizeof(((bt_calibration *)NULL)->value)
+                   && sizeof(((bt_msg_set_calibration *)NULL)->value)
+                          == sizeof(((bt_calibration *)NULL)->value),
+               "both messages carry every value");
+
+bool bt_serial_fits(const uint8_t made_for[BT_SERIAL_BYTES], const uint8_t there[BT_SERIAL_BYTES])
+{
+    static const uint8_t any[BT_SERIAL_BYTES];
+    return memcmp(made_for, any, sizeof any) == 0 || memcmp(made_for, there, sizeof any) == 0;
+}
+
+uint8_t bt_calibration_apply(const bt_calibration *calibration, bt_settings *settings)
+{
+    bt_settings own = *settings;
+    for (int k = 0; k < BT_CALIBRATION_VALUES; k++) {
+        uint8_t error = bt_settings_set(&own, bt_calibration_setting[k], calibration->value[k]);
+        if (error != BT_ERROR_OK) {
+            return error;
+        }
+    }
+    *settings = own;
+    return BT_ERROR_OK;
+}
+
+size_t bt_calibration_pack(const bt_calibration *calibration, uint8_t record[BT_CALIBRATION_RECORD_BYTES])
+{
+    if (!calibration->present) {
+        return 0;
+    }
+    memcpy(record, calibration->serial, BT_SERIAL_BYTES);
+    bt_put_u32(record + MADE_AT, calibration->made_s);
+    for (int k = 0; k < BT_CALIBRATION_VALUES; k++) {
+        bt_put_u32(record + VALUE_AT + 4 * k, (uint32_t)calibration->value[k]);
+    }
+    return BT_CALIBRATION_RECORD_BYTES;
+}
+
+static int values_of(uint16_t version)
+{
+    return version == BT_CALIBRATION_RECORD_VERSION ? BT_CALIBRATION_VALUES
+           : version == 1                           ? VALUES_OF_VERSION_1
+                                                    : 0;
+}
+
+void bt_calibration_unpack(bt_calibration *calibration, uint16_t version, const uint8_t *record, size_t bytes)
+{
+    bt_settings trial;
+    memset(calibration, 0, sizeof *calibration);
+    int values = values_of(version);
+    if (values == 0 || bytes != (size_t)(VALUE_AT + 4 * values)) {
+        return;
+    }
+    bt_settings_reset(&trial);
+    memcpy(calibration->serial, record, BT_SERIAL_BYTES);
+    calibration->made_s = bt_get_u32(record + MADE_AT);
+    for (int k = 0; k < BT_CALIBRATION_VALUES; k++) {
+        calibration->value[k] = k < values ? (int32_t)bt_get_u32(record + VALUE_AT + 4 * k)
+                                           : bt_settings_get(&trial, bt_calibration_setting[k]);
+    }
+    calibration->present = bt_calibration_apply(calibration, &trial) == BT_ERROR_OK;
+}

@@ -1,0 +1,49 @@
+// The wrench map: a calibrated finger's force, and torque, as a sum of blocks (SPEC.md, Wrench maps). A block
+// is a vector of columns (its kind: signals, their pairs, conductances...) times a scalar (its gate: where
+// the contact is), with a coefficient per column and axis. A map is read where it lies, as a rule in flash;
+// nothing is copied.
+//
+// No input overflows: what the formats do not bound by themselves, bt_map_open bounds by the sums of the
+// coefficients' magnitudes. Results saturate at BT_MAP_RESULT_MAX.
+#ifndef BIOTAC_MAP_H
+#define BIOTAC_MAP_H
+
+#include "map/map_gen.h"
+#include "wire/messages_gen.h"
+#include "wire/sensor_gen.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct {
+    uint8_t axes;        // BT_MAP_AXES_FORCE, _TORQUE: that too, _TORSION: all; 0: there is no map
+    uint8_t block_count; // the rest points into the blob
+    uint16_t kinds;      // bit mask of the kinds that its blocks are of: what no block needs is not computed
+    uint16_t gates;      // likewise
+    uint32_t made_s;     // since 1970 UTC; 0: unknown
+    const uint8_t *serial; // [BT_MAP_SERIAL_BYTES] of the sensor it was made for; all zero: any sensor
+    const uint8_t *blocks;
+    const uint8_t *coefficients;
+} bt_map;
+
+// No map: what bt_map_open leaves of a blob that it refuses.
+void bt_map_close(bt_map *map);
+
+// Judge a blob and point map into it; blob stays where it is, unchanged, for as long as map is used, and
+// begins at a multiple of four bytes. Returns an enum bt_error: OK, BAD_LENGTH or OUT_OF_RANGE (version,
+// axes, kind, gate, exponent, a block twice, coefficients that could overflow, an odd address).
+uint8_t bt_map_open(bt_map *map, const uint8_t *blob, size_t bytes);
+
+// Whether results need PDC.
+bool bt_map_needs_pdc(const bt_map *map);
+
+// One frame's results. counts: 0..4095 or BT_INVALID_COUNT; an electrode without a count or without a tare
+// counts as signal 0. pdc_above_rest_q4: BT_INVALID_I32 where it is unknown; then a map that needs it gives
+// BT_INVALID_I32. torque_mnmm, about the centre of the tip sphere, and torsion_mnmm, about the outward normal
+// at the contact, are written by a map that has them. torque_mnmm NULL: neither is wanted.
+void bt_map_wrench(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
+                   const uint16_t tare_q4[BT_ELECTRODES], int32_t pdc_above_rest_q4, int32_t force_100un[3],
+                   int32_t *torque_mnmm, int32_t *torsion_mnmm);
+
+#endif

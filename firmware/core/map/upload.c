@@ -1,0 +1,64 @@
+#include "map/upload.h"
+
+#include "wire/crc32.h"
+
+#include <string.h>
+
+_Static_assert(BT_MAP_SLOT_BYTES / BT_FLASH_SECTOR_BYTES <= 8, "a bit for every sector of a slot");
+_Static_assert(BT_FLASH_PAGE_BYTES % BT_MAP_PART_BYTES == 0, "a part lies in one page");
+_Static_assert(BT_MAP_PARTS % 8 == 0, "the parts' bits fill their bytes");
+_Static_assert(BT_MAP_PART_BYTES == sizeof(((bt_msg_map_data *)NULL)->data), "read as it is written");
+
+void bt_upload_begin(bt_upload *upload, uint8_t finger, const bt_map_place *place)
+{
+    *upload = (bt_upload){.open = true, .finger = finger, .place = *place};
+}
+
+static bool is_written(const bt_upload *upload, size_t part)
+{
+    return upload->written[part / 8] >> part % 8 & 1;
+}
+
+uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t offset,
+                        const uint8_t data[BT_MAP_PART_BYTES])
+{
+    uint8_t page[BT_FLASH_PAGE_BYTES];
+    const uint16_t size = upload->place.bytes;
+    const size_t part = offset / BT_MAP_PART_BYTES;
+    const uint8_t sector = (uint8_t)(1u << offset / BT_FLASH_SECTOR_BYTES);
+    if (offset % BT_MAP_PART_BYTES != 0 || offset >= size) {
+        return BT_ERROR_OUT_OF_RANGE;
+    }
+    const size_t bytes =
+        (size_t)(size - offset) < BT_MAP_PART_BYTES ? (size_t)(size - offset) : BT_MAP_PART_BYTES;
+    const uint8_t *there = bt_map_bytes(flash, &upload->place) + offset;
+    if (is_written(upload, part)) { // its reply was lost, or somebody else writes too
+        return memcmp(there, data, bytes) == 0 ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
+    }
+    const uint32_t at = (uint32_t)(upload->place.slot * BT_MAP_SLOT_BYTES + offset);
+    if (!(upload->erased & sector)) {
+        // Even where it reads as erased: an erase that power cut short may read so, and not stay so.
+        if (!flash->erase(at - at % BT_FLASH_SECTOR_BYTES)) {
+            return BT_ERROR_NOT_STORED;
+        }
+        upload->erased |= sector;
+    }
+    memset(page, 0xFF, sizeof page); // what is programmed to 0xFF stays as it is
+    memcpy(page + at % BT_FLASH_PAGE_BYTES, data, bytes);
+    if (!flash->program(at - at % BT_FLASH_PAGE_BYTES, page) || memcmp(there, data, bytes) != 0) {
+        return BT_ERROR_NOT_STORED;
+    }
+    upload->written[part / 8] |= (uint8_t)(1u << part % 8);
+    return BT_ERROR_OK;
+}
+
+bool bt_upload_whole(const bt_upload *upload, const bt_map_flash *flash)
+{
+    const size_t parts = (upload->place.bytes + BT_MAP_PART_BYTES - 1) / BT_MAP_PART_BYTES;
+    for (size_t part = 0; part < parts; part++) {
+        if (!is_written(upload, part)) {
+            return false;
+        }
+    }
+    return bt_crc32(bt_map_bytes(flash, &upload->place), upload->place.bytes) == upload->place.crc32;
+}

@@ -1,0 +1,31 @@
+// A wrench map on its way into a slot of flash, part by part. Nobody uses the slot until it is whole.
+#ifndef BIOTAC_UPLOAD_H
+#define BIOTAC_UPLOAD_H
+
+#include "map/store.h"
+
+#define BT_MAP_PART_BYTES sizeof(((bt_msg_write_map *)NULL)->data)
+#define BT_MAP_PARTS      (BT_MAP_MAX_BYTES / BT_MAP_PART_BYTES)
+
+typedef struct {
+    bool open;
+    uint8_t finger;
+    bt_map_place place;
+    uint8_t erased;                    // bit mask of the slot's sectors
+    uint8_t written[BT_MAP_PARTS / 8]; // bit mask of the parts
+} bt_upload;
+
+// place says where to, how much and its CRC-32; an earlier upload ends.
+void bt_upload_begin(bt_upload *upload, uint8_t finger, const bt_map_place *place);
+
+// One part, at a multiple of BT_MAP_PART_BYTES; what lies behind the map's end is not written. Erases a
+// sector at most, the first time that a part comes to lie in it. Returns an enum bt_error: OK, also for a
+// part that is there already, OUT_OF_RANGE, or NOT_STORED when the flash did not take it or holds another
+// part in that place.
+uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t offset,
+                        const uint8_t data[BT_MAP_PART_BYTES]);
+
+// Every part has come, and together they have the CRC-32.
+bool bt_upload_whole(const bt_upload *upload, const bt_map_flash *flash);
+
+#endif

@@ -1,0 +1,161 @@
+#include "solve/results.h"
+
+#include "fixed_point.h"
+#include "solve/uncertainty.h"
+#include "touch/signals.h"
+
+#include <stddef.h>
+
+#define ACTIVE_Q4          (15 * 16) // an electrode that moved this far takes part in the contact
+#define ACTIVE_FOR_TORSION 4
+#define POC_LOW            4                     // times the contact threshold
+#define BASE_OLD_FRAMES    (60000 / BT_FRAME_MS) // one minute
+
+// Of a round's own signals, cut to 1/2 count.
+typedef struct {
+    uint32_t energy; // count^2
+    uint32_t bulge;  // count^2 of electrodes that gained
+} signal_shape;
+
+_Static_assert(BT_ELECTRODES *(BT_E_MAX_Q4 / 8 + 1LL) * (BT_E_MAX_Q4 / 8 + 1LL) <= UINT32_MAX,
+               "an energy in 1/4 count^2 must fit 32 bits");
+
+static inline void add_to_shape(signal_shape *shape_q2, int32_t e_q4)
+{
+    int32_t e_q1 = bt_shift_down(e_q4, 3);
+    uint32_t square_q2 = (uint32_t)(e_q1 * e_q1);
+    shape_q2->energy += square_q2;
+    if (e_q1 > 0) {
+        shape_q2->bulge += square_q2;
+    }
+}
+
+// Signals and shape in one pass where every electrode has a count and a tare. Called, not inlined: then the
+// compiler walks plain pointers.
+static BT_NOINLINE signal_shape all_signals(const uint16_t counts[BT_ELECTRODES],
+                                            const uint16_t tare_q4[BT_ELECTRODES],
+                                            int32_t e_q4[BT_ELECTRODES])
+{
+    signal_shape shape_q2 = {0, 0};
+    BT_UNROLL
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        e_q4[i] = 16 * (int32_t)counts[i] - tare_q4[i];
+        add_to_shape(&shape_q2, e_q4[i]);
+    }
+    return shape_q2;
+}
+
+static signal_shape signals(const bt_round *round, const bt_tare *tare, int32_t e_q4[BT_ELECTRODES])
+{
+    signal_shape shape = {0, 0};
+    if (tare->gate.missing == 0 && !(tare->gate.unknown & ((1u << BT_ELECTRODES) - 1))) {
+        shape = all_signals(round->electrode, tare->electrode_q4, e_q4);
+    } else {
+        bt_signals_q4(round->electrode, tare->electrode_q4, e_q4);
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            add_to_shape(&shape, e_q4[i]);
+        }
+    }
+    shape.energy >>= 2;
+    shape.bulge >>= 2;
+    return shape;
+}
+
+static BT_NOINLINE uint32_t trouble(const bt_round *round, const bt_tare *tare)
+{
+    uint32_t flags = 0;
+    flags |= tare->gate.missing > 0 ? BT_FRAME_FLAG_ELECTRODE_MISSING : 0;
+    flags |= tare->gate.railed > 0 ? BT_FRAME_FLAG_RAIL : 0;
+    flags |= bt_tare_faulty(tare) ? BT_FRAME_FLAG_FAULT : 0;
+    flags |= round->pdc == BT_INVALID_COUNT ? BT_FRAME_FLAG_PDC_MISSING : 0;
+    flags |= round->tac == BT_INVALID_COUNT ? BT_FRAME_FLAG_TAC_MISSING : 0;
+    flags |= round->tdc == BT_INVALID_COUNT ? BT_FRAME_FLAG_TDC_MISSING : 0;
+    return flags;
+}
+
+_Static_assert((BT_FULL_SCALE_COUNT & (BT_FULL_SCALE_COUNT + 1)) == 0
+                   && BT_INVALID_COUNT > BT_FULL_SCALE_COUNT,
+               "counts ORed are no more than a count, but with a missing word among them they are");
+
+uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
+{
+    uint32_t flags = BT_FRAME_FLAG_MX_DERIVED | BT_FRAME_FLAG_FX_WEAK;
+    // One look for what hardly ever happens: a missing word is above every count.
+    uint32_t counts = (uint32_t)(round->pdc | round->tac | round->tdc);
+    if (counts > BT_FULL_SCALE_COUNT || tare->gate.missing + tare->gate.railed > 0) {
+        flags |= trouble(round, tare);
+    }
+    if (tare->reason == BT_TARE_REASON_NONE) {
+        flags |= BT_FRAME_FLAG_UNTARED | BT_FRAME_FLAG_POC_INVALID;
+    }
+    if (tare->state == BT_TARE_STATE_CONTACT) {
+        flags |= BT_FRAME_FLAG_CONTACT;
+        flags |= tare->contact_rounds > BASE_OLD_FRAMES ? BT_FRAME_FLAG_BASE_OLD : 0;
+        flags |= bt_thermal_warmed(&tare->thermal) ? BT_FRAME_FLAG_TEMP : 0;
+    }
+    return flags;
+}
+
+// The PoC's outward normal is within 60 degrees of -z: c_z <= -r/2, on tip and cylinder alike.
+static bool faces_down(const int16_t poc_um[3])
+{
+    return poc_um[2] <= -BT_CORE_RADIUS_UM / 2 && poc_um[2] != BT_INVALID_I16;
+}
+
+static bool enough_active(const int32_t e_q4[BT_ELECTRODES])
+{
+    int wanted = ACTIVE_FOR_TORSION;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        // One comparison for both signs: what is in between wraps to below.
+        if ((uint32_t)(e_q4[i] + ACTIVE_Q4 - 1) > 2 * (ACTIVE_Q4 - 1) && --wanted == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static uint32_t mapped(const bt_round *round, const bt_tare *tare, const int32_t e_q4[BT_ELECTRODES],
+                       const bt_solve_settings *settings, uint32_t quantities, bt_msg_frame *msg)
+{
+    bt_map_input input = {
+        .counts = round->electrode,
+        .tare_q4 = tare->electrode_q4,
+        .pdc_above_rest_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16)),
+    };
+    return BT_FRAME_FLAG_MAPPED
+           | bt_solve_mapped(e_q4, &input, settings, quantities, msg->poc_um, msg->force_100un,
+                             msg->torque_mnmm, &msg->torsion_mnmm);
+}
+
+void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,
+                uint32_t quantities, bt_msg_frame *msg)
+{
+    uint32_t flags = bt_channel_flags(round, tare);
+    uint32_t every = BT_WANT_ALL | BT_QUANTITY_FLAG_PRESSURE; // sigma is asked for by few
+    flags |= (quantities & every) != every ? BT_FRAME_FLAG_NOT_ASKED : 0;
+    bt_sigma_unknown(msg);
+    msg->torsion_mnmm = BT_INVALID_I32; // but by a map
+    if (flags & BT_FRAME_FLAG_UNTARED) {
+        msg->flags = flags;
+        // Asked for nothing, the kernel marks everything and looks at no signal.
+        (void)bt_solve(NULL, settings, 0, msg->poc_um, msg->force_100un, msg->torque_mnmm);
+        return;
+    }
+    int32_t e_q4[BT_ELECTRODES];
+    signal_shape shape = signals(round, tare, e_q4);
+    if (settings->map != NULL) {
+        flags |= mapped(round, tare, e_q4, settings, quantities, msg);
+    } else {
+        flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
+    }
+    flags |= shape.energy < POC_LOW * tare->threshold_count2 ? BT_FRAME_FLAG_POC_LOW : 0;
+    flags |= shape.bulge > shape.energy - shape.bulge ? BT_FRAME_FLAG_SHEAR_MIX : 0;
+    bool complete = !(flags & (BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_RAIL));
+    if (complete && faces_down(msg->poc_um) && shape.energy > tare->threshold_count2 && enough_active(e_q4)) {
+        flags |= BT_FRAME_FLAG_TORSION_OK;
+    }
+    msg->flags = flags;
+    if (quantities & BT_QUANTITY_FLAG_SIGMA) {
+        bt_sigma(e_q4, settings, tare->noise.count2, msg);
+    }
+}

@@ -1,0 +1,19 @@
+// One frame's results: point of contact, force, torque and what to think of them.
+// Output units are those of the FRAME message: um, 100 uN, mN*mm, rounded half away from zero;
+// a result that cannot be given is the type's minimum, never 0 and never an older one.
+#ifndef BIOTAC_RESULTS_H
+#define BIOTAC_RESULTS_H
+
+#include "solve/solve.h"
+#include "touch/round.h"
+#include "touch/tare.h"
+
+// Fill flags, poc_um, force_100un, torque_mnmm and their sigmas of msg. quantities is a mask of
+// BT_QUANTITY_FLAG_*; what is not in it is not computed and marked invalid.
+void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,
+                uint32_t quantities, bt_msg_frame *msg);
+
+// The flags that need no computing.
+uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare);
+
+#endif

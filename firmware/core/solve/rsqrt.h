@@ -1,0 +1,18 @@
+// One over a square root, by table and a straight line between its entries.
+#ifndef BIOTAC_ROOT_H
+#define BIOTAC_ROOT_H
+
+#include "solve/rsqrt_gen.h"
+
+// share * 2^32 / sqrt(q) for q >= 2^30, see rsqrt_gen.h: 17 bits, off by at most 2^-17.4 of itself, for
+// that is how far a chord is from the curve, and by one unit that rounding the entries and the
+// product adds.
+static inline uint32_t bt_root_inverse(uint32_t q)
+{
+    const uint16_t *at = bt_root_table + ((q >> BT_ROOT_STEP_BITS) - (1u << (30 - BT_ROOT_STEP_BITS)));
+    uint32_t part = q >> (BT_ROOT_STEP_BITS - 16) & 0xFFFF;
+    uint32_t step = (uint32_t)at[0] - at[1];
+    return BT_ROOT_BASE + at[0] - ((step * part + (1u << 15)) >> 16);
+}
+
+#endif

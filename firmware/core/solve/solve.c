@@ -1,0 +1,105 @@
+#include "solve/solve.h"
+
+#include "fixed_point.h"
+#include "solve/poc.h"
+
+_Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
+
+// |gain| times the length of the electrodes' normals along one axis: nN * 1/1000, of which 1e8 are 100 uN.
+static uint32_t force_per_count(int32_t gain_nn, int axis)
+{
+    uint64_t product = (uint64_t)bt_abs32(gain_nn) * bt_normal_length_milli[axis];
+    return (uint32_t)((product << 16) / 100000000u);
+}
+
+bt_solve_settings bt_solve_settings_from(const bt_settings *settings)
+{
+    int32_t force_nn[3] = {bt_settings_get(settings, BT_SETTING_FORCE_GAIN_X_NN),
+                           bt_settings_get(settings, BT_SETTING_FORCE_GAIN_Y_NN),
+                           bt_settings_get(settings, BT_SETTING_FORCE_GAIN_Z_NN)};
+    int32_t torque_nn[2] = {bt_settings_get(settings, BT_SETTING_TORQUE_GAIN_Y_NN),
+                            bt_settings_get(settings, BT_SETTING_TORQUE_GAIN_Z_NN)};
+    bt_solve_settings kernel = {
+        .poc_weights = (int)bt_settings_get(settings, BT_SETTING_POC_WEIGHTS),
+        .gains = bt_gains_from(force_nn, torque_nn),
+    };
+    for (int d = 0; d < 3; d++) {
+        kernel.force_per_count_100un_q16[d] = force_per_count(force_nn[d], d);
+    }
+    return kernel;
+}
+
+// Not initialised by a copy: the board would call memcpy for it in every frame.
+static void mark_poc(int16_t poc_um[3])
+{
+    poc_um[0] = BT_INVALID_I16;
+    poc_um[1] = BT_INVALID_I16;
+    poc_um[2] = BT_INVALID_I16;
+}
+
+static void mark(int32_t result[3])
+{
+    result[0] = BT_INVALID_I32;
+    result[1] = BT_INVALID_I32;
+    result[2] = BT_INVALID_I32;
+}
+
+static inline void give_poc(bool valid, const bt_point *point, int16_t poc_um[3])
+{
+    if (valid) {
+        poc_um[0] = point->um[0];
+        poc_um[1] = point->um[1];
+        poc_um[2] = point->um[2];
+    } else {
+        mark_poc(poc_um);
+    }
+}
+
+uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t wanted,
+                  int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
+{
+    bt_point point;
+    bool asked = wanted & (BT_WANT_POC | BT_WANT_TORQUE);
+    bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
+    give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
+    if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
+        bt_force(e_q4, &settings->gains, force_100un);
+    }
+    if (wanted & BT_WANT_TORQUE) {
+        bt_torque_yz(e_q4, &settings->gains, torque_mnmm + 1);
+        torque_mnmm[0] = located ? bt_torque_x_derived(point.lever_yz, force_100un) : BT_INVALID_I32;
+    } else {
+        mark(torque_mnmm);
+    }
+    if (!(wanted & BT_WANT_FORCE)) {
+        mark(force_100un);
+    }
+    return asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0;
+}
+
+uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
+                         const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
+                         int32_t force_100un[3], int32_t torque_mnmm[3], int32_t *torsion_mnmm)
+{
+    bt_point point;
+    bool derived = wanted & BT_WANT_TORQUE && settings->map->axes == BT_MAP_AXES_FORCE;
+    bool asked = wanted & BT_WANT_POC || derived;
+    bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
+    give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
+    *torsion_mnmm = BT_INVALID_I32;
+    if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
+        bt_map_wrench(settings->map, frame->counts, frame->tare_q4, frame->pdc_above_rest_q4, force_100un,
+                      wanted & BT_WANT_TORQUE ? torque_mnmm : NULL, torsion_mnmm);
+    }
+    if (derived) {
+        bool possible = located && force_100un[0] != BT_INVALID_I32;
+        bt_torque_yz(e_q4, &settings->gains, torque_mnmm + 1);
+        torque_mnmm[0] = possible ? bt_torque_x_derived(point.lever_yz, force_100un) : BT_INVALID_I32;
+    } else if (!(wanted & BT_WANT_TORQUE)) {
+        mark(torque_mnmm);
+    }
+    if (!(wanted & BT_WANT_FORCE)) {
+        mark(force_100un);
+    }
+    return asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0;
+}

@@ -1,0 +1,10 @@
+// What each command does. Every command is answered exactly once: by its own message, or by REPLY.
+#ifndef BIOTAC_COMMANDS_H
+#define BIOTAC_COMMANDS_H
+
+#include "talk/session.h"
+
+// One good packet from the host; payload NULL: its length does not fit its id.
+void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_t now_us);
+
+#endif

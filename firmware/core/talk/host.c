@@ -1,0 +1,51 @@
+#include "talk/host.h"
+
+#include "talk/commands.h"
+#include "talk/status.h"
+
+void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, uint32_t now_us)
+{
+    for (size_t k = 0; k < bytes; k++) {
+        enum bt_deframed outcome = bt_deframer_push(&session->deframer, data[k]);
+        if (outcome == BT_DEFRAMED_GOOD) {
+            session->rx_frames++;
+            bool empty = session->deframer.payload_bytes == 0; // of an unknown id; no req_id in it
+            bt_command(session, session->deframer.id, empty ? NULL : session->deframer.buffer + 1, now_us);
+        } else if (outcome == BT_DEFRAMED_BAD_LENGTH) {
+            // The CRC is right, so somebody meant this: bt_command answers it in words.
+            session->rx_errors++;
+            bt_command(session, session->deframer.id, NULL, now_us);
+        } else if (outcome != BT_DEFRAMED_NOTHING) {
+            session->rx_errors++;
+        }
+    }
+}
+
+void bt_session_tick(bt_session *session, uint32_t now_us)
+{
+    while (now_us - session->second_us >= 1000000) {
+        session->second_us += 1000000;
+        session->uptime_s++;
+    }
+    if (session->keepalive_ms != 0 && now_us - session->heard_us > session->keepalive_ms * 1000u) {
+        bt_session_stop(session);
+    }
+    if (now_us - session->status_us < session->status_period_us) {
+        return;
+    }
+    session->status_us = now_us;
+    if (session->streams & BT_STREAM_FLAG_STATUS) {
+        bt_session_send_status(session, 0, now_us);
+        for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+            if (session->finger[f].present) {
+                bt_session_send_sensor_status(session, 0, f, now_us);
+            }
+        }
+    }
+}
+
+void bt_session_link_down(bt_session *session)
+{
+    bt_session_stop(session);
+    bt_deframer_reset(&session->deframer);
+}

@@ -1,0 +1,17 @@
+// The host as the board hears it: its bytes, its silence, its going. Times are device time in us, wrapping
+// at 2^32.
+#ifndef BIOTAC_HOST_H
+#define BIOTAC_HOST_H
+
+#include "talk/session.h"
+
+// Bytes from the host. Every command gets exactly one reply.
+void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, uint32_t now_us);
+
+// Call often: keep-alive and periodic status.
+void bt_session_tick(bt_session *session, uint32_t now_us);
+
+// The host closed the port: nobody is there to stream to.
+void bt_session_link_down(bt_session *session);
+
+#endif

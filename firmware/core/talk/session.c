@@ -1,0 +1,99 @@
+#include "talk/session.h"
+
+#include <string.h>
+
+void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, uint32_t now_us)
+{
+    memset(session, 0, sizeof *session);
+    session->identity = *identity;
+    session->write = write;
+    session->status_us = now_us;
+    session->second_us = now_us;
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_finger_reset(&session->finger[f], f);
+        bt_finger_map_reset(&session->map[f]);
+    }
+    bt_settings_reset(&session->settings);
+    bt_session_use_settings(session);
+    bt_deframer_reset(&session->deframer);
+}
+
+void bt_session_use_board(bt_session *session, const bt_board_actions *actions)
+{
+    session->board = *actions;
+}
+
+// Of what was made for the sensor of this serial number; NULL: there is nothing.
+static uint8_t state_of(const uint8_t *made_for, const bt_sensor_info *info)
+{
+    if (made_for == NULL) {
+        return BT_CALIBRATION_STATE_NONE;
+    }
+    return bt_serial_fits(made_for, info->serial) ? BT_CALIBRATION_STATE_IN_FORCE
+                                                  : BT_CALIBRATION_STATE_OTHER_SENSOR;
+}
+
+static void use_finger_settings(bt_session *session, int f)
+{
+    bt_settings own = session->settings;
+    const bt_calibration *calibration = &session->calibration[f];
+    const bt_finger_map *map = &session->map[f];
+    session->calibration_state[f] =
+        state_of(calibration->present ? calibration->serial : NULL, &session->info[f]);
+    session->map_state[f] = state_of(map->place.bytes != 0 ? map->map.serial : NULL, &session->info[f]);
+    if (session->calibration_state[f] == BT_CALIBRATION_STATE_IN_FORCE) {
+        (void)bt_calibration_apply(calibration, &own); // its ranges were seen to when it came
+    }
+    session->kernel[f] = bt_solve_settings_from(&own);
+    session->kernel[f].map = session->map_state[f] == BT_CALIBRATION_STATE_IN_FORCE ? &map->map : NULL;
+    session->tare[f] = bt_tare_settings_from(&own);
+    bt_pressure_use(&session->finger[f].pressure, &own);
+}
+
+void bt_session_use_settings(bt_session *session)
+{
+    const bt_settings *settings = &session->settings;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        use_finger_settings(session, f);
+    }
+    session->status_period_us = (uint32_t)bt_settings_get(settings, BT_SETTING_STATUS_PERIOD_MS) * 1000;
+    session->idle_rounds = (uint16_t)(bt_settings_get(settings, BT_SETTING_IDLE_PERIOD_MS) / BT_FRAME_MS);
+}
+
+void bt_session_send(bt_session *session, uint8_t id, const uint8_t *payload)
+{
+    uint8_t encoded[BT_ENCODED_MAX_BYTES];
+    size_t bytes = bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), encoded);
+    if (session->write(encoded, bytes)) {
+        session->messages_sent++;
+    } else {
+        session->messages_dropped++;
+    }
+}
+
+uint8_t bt_session_present(const bt_session *session)
+{
+    uint8_t mask = 0;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        mask = (uint8_t)(mask | session->finger[f].present << f);
+    }
+    return mask;
+}
+
+void bt_session_stop(bt_session *session)
+{
+    session->streams = 0;
+    session->keepalive_ms = 0;
+    session->upload.open = false;
+    bt_session_use_settings(session);
+}
+
+void bt_session_forget_sensor(bt_session *session, int f)
+{
+    if (session->info[f].present) {
+        memset(&session->info[f], 0, sizeof session->info[f]);
+        if (session->streams == 0) {
+            use_finger_settings(session, f);
+        }
+    }
+}

@@ -1,0 +1,99 @@
+// What one session with the host consists of: fingers, settings, calibrations, maps, streams, link
+// statistics. Knows no transport: bytes leave through one function that takes a whole frame or nothing;
+// host.h takes those that come. Times are device time in us, wrapping at 2^32.
+#ifndef BIOTAC_SESSION_H
+#define BIOTAC_SESSION_H
+
+#include "finger.h"
+#include "keep/calibration.h"
+#include "keep/settings.h"
+#include "map/upload.h"
+#include "wire/framing.h"
+
+typedef struct {
+    uint16_t board; // enum bt_board
+    uint8_t firmware_version[3];
+    uint8_t board_serial[12];
+    uint32_t boot_id;
+} bt_identity;
+
+// What a sensor says of itself, as it is sent.
+typedef bt_msg_sensor_info bt_sensor_info;
+
+// Takes all bytes or none; false means no room, or nobody there.
+typedef bool (*bt_link_write)(const uint8_t *data, size_t bytes);
+
+// What the session asks of its board. All return an enum bt_error.
+typedef struct {
+    uint8_t (*save_settings)(const bt_settings *settings);
+    uint8_t (*save_calibration)(uint8_t finger, const bt_calibration *calibration);
+    uint8_t (*save_map)(uint8_t finger, const bt_map_place *place);
+    uint8_t (*reboot_bootloader)(void); // OK: it happens once the reply is out
+    const bt_map_flash *maps;           // where wrench maps are kept; NULL: nowhere
+} bt_board_actions;
+
+// Finger-rounds of a FRAME stream in which something was not done because nobody needed it; wrap at 2^32.
+typedef struct {
+    uint32_t frames; // an IDLE spoke instead
+    uint32_t poc;
+    uint32_t force;
+    uint32_t torque;
+    uint32_t sigma;
+} bt_skips;
+
+typedef struct {
+    bt_finger finger[BT_MAX_FINGERS];
+    bt_sensor_info info[BT_MAX_FINGERS];
+    bt_settings settings;
+    bt_calibration calibration[BT_MAX_FINGERS];
+    uint8_t calibration_state[BT_MAX_FINGERS]; // enum; these follow from what is above, once per change
+    bt_finger_map map[BT_MAX_FINGERS];
+    uint8_t map_state[BT_MAX_FINGERS]; // enum bt_calibration_state, likewise
+    bt_upload upload;
+    bt_solve_settings kernel[BT_MAX_FINGERS];
+    bt_tare_settings tare[BT_MAX_FINGERS];
+    uint32_t status_period_us;
+    uint16_t idle_rounds;
+    bt_identity identity;
+    bt_link_write write;
+    bt_board_actions board;
+    bt_deframer deframer;
+
+    uint8_t streams; // BT_STREAM_FLAG_*
+    uint8_t fingers; // bit mask of the fingers that START named
+    uint16_t keepalive_ms;
+    uint32_t heard_us; // when the host last said anything
+    uint32_t status_us;
+    uint32_t second_us; // uptime is counted in whole seconds from here
+    uint32_t uptime_s;
+    uint16_t status_seq;
+    uint16_t sensor_status_seq;
+
+    uint32_t messages_sent;
+    uint32_t messages_dropped;
+    bt_skips skips;
+    uint32_t slots_late;
+    uint32_t rx_frames;
+    uint32_t rx_errors;
+} bt_session;
+
+void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, uint32_t now_us);
+
+// Until this is called, or where an action is NULL, the commands for it are answered NOT_HERE.
+void bt_session_use_board(bt_session *session, const bt_board_actions *actions);
+
+// Settings, calibrations or sensors have changed. Not while streaming: one recording, one set of settings.
+void bt_session_use_settings(bt_session *session);
+
+// End every stream. What waited for that, a sensor unplugged meanwhile, then counts.
+void bt_session_stop(bt_session *session);
+
+// The sensor of finger f is gone: what is plugged in next may be another.
+void bt_session_forget_sensor(bt_session *session, int f);
+
+// Bit mask of the fingers whose sensor answers.
+uint8_t bt_session_present(const bt_session *session);
+
+// Send one message, counting it as sent or dropped.
+void bt_session_send(bt_session *session, uint8_t id, const uint8_t *payload);
+#endif

@@ -1,0 +1,50 @@
+#include "talk/status.h"
+
+void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us)
+{
+    uint8_t payload[BT_STATUS_BYTES];
+    bt_msg_status msg = {
+        .seq = session->status_seq++,
+        .t_us = now_us,
+        .req_id = req_id,
+        .uptime_s = session->uptime_s,
+        .fingers_present = bt_session_present(session),
+        .streams = session->streams,
+        .messages_sent = session->messages_sent,
+        .messages_dropped = session->messages_dropped,
+        .slots_late = session->slots_late,
+        .rx_frames = session->rx_frames,
+        .rx_errors = session->rx_errors,
+        .frames_idle = session->skips.frames,
+        .poc_skipped = session->skips.poc,
+        .force_skipped = session->skips.force,
+        .torque_skipped = session->skips.torque,
+        .sigma_skipped = session->skips.sigma,
+    };
+    bt_msg_status_pack(&msg, payload);
+    bt_session_send(session, BT_STATUS_ID, payload);
+}
+
+void bt_session_send_sensor_status(bt_session *session, uint8_t req_id, uint8_t index, uint32_t now_us)
+{
+    uint8_t payload[BT_SENSOR_STATUS_BYTES];
+    const bt_finger *finger = &session->finger[index];
+    bt_msg_sensor_status msg = {
+        .seq = session->sensor_status_seq++,
+        .t_us = now_us,
+        .req_id = req_id,
+        .finger = index,
+        .present = finger->present,
+        .tare_state = finger->tare.state,
+        .tare_reason = finger->tare.reason,
+        .tare_age_ms = finger->tare.age_rounds * BT_FRAME_MS,
+        .noise_count2 = finger->tare.noise.count2,
+        .words_good = finger->words.good,
+        .words_stuck = finger->words.stuck,
+        .words_error = finger->words.error,
+        .words_parity = finger->words.parity,
+        .last_error_word = finger->words.last_error_word,
+    };
+    bt_msg_sensor_status_pack(&msg, payload);
+    bt_session_send(session, BT_SENSOR_STATUS_ID, payload);
+}

@@ -1,0 +1,137 @@
+#include "talk/streams.h"
+
+static bool streams(const bt_session *session, const bt_finger *finger, uint8_t what)
+{
+    return (session->streams & what) && (session->fingers >> finger->index & 1);
+}
+
+void bt_session_begin(bt_session *session, uint32_t t_us)
+{
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_finger_begin(&session->finger[f], t_us, &session->tare[f]);
+    }
+}
+
+static void send_touch(bt_session *session, const bt_finger *finger, uint8_t slot, uint32_t t_us)
+{
+    uint8_t payload[BT_TOUCH_BYTES];
+    if (!streams(session, finger, BT_STREAM_FLAG_FRAMES) || !(finger->quantities & BT_QUANTITY_FLAG_TOUCH)) {
+        return;
+    }
+    bt_msg_touch msg = {
+        .seq = finger->seq,
+        .t_us = t_us,
+        .finger = finger->index,
+        .slot = slot,
+        .energy_count2 = bt_gate_energy(&finger->tare.gate),
+    };
+    bt_msg_touch_pack(&msg, payload);
+    bt_session_send(session, BT_TOUCH_ID, payload);
+}
+
+void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_MAX_FINGERS], uint32_t t_us)
+{
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (bt_finger_put(&session->finger[f], slot, count[f])) {
+            send_touch(session, &session->finger[f], slot, t_us);
+        }
+    }
+}
+
+static void send_tare(bt_session *session, const bt_finger *finger)
+{
+    uint8_t payload[BT_TARE_BYTES];
+    bt_msg_tare msg;
+    bt_finger_tare(finger, &msg);
+    bt_msg_tare_pack(&msg, payload);
+    bt_session_send(session, BT_TARE_ID, payload);
+}
+
+static void send_idle(bt_session *session, bt_finger *finger, bool frame_follows)
+{
+    uint8_t payload[BT_IDLE_BYTES];
+    bt_msg_idle msg;
+    bt_finger_idle_message(finger, frame_follows, &msg);
+    bt_msg_idle_pack(&msg, payload);
+    bt_session_send(session, BT_IDLE_ID, payload);
+    finger->unsent = 0;
+}
+
+static void count_skips(bt_skips *skips, uint32_t quantities)
+{
+    // Torque x needs a point and a force: they are computed for it, though not sent.
+    bool torque = quantities & BT_QUANTITY_FLAG_TORQUE;
+    skips->poc += !(torque || quantities & BT_QUANTITY_FLAG_POC);
+    skips->force += !(torque || quantities & BT_QUANTITY_FLAG_FORCE);
+    skips->torque += !torque;
+    skips->sigma += !(quantities & BT_QUANTITY_FLAG_SIGMA);
+}
+
+static void send_frame(bt_session *session, bt_finger *finger)
+{
+    uint8_t payload[BT_FRAME_BYTES];
+    bt_msg_frame msg;
+    if (finger->tare_unsent) {
+        send_tare(session, finger);
+    }
+    bt_finger_frame(finger, &session->kernel[finger->index], &msg);
+    bt_msg_frame_pack(&msg, payload);
+    bt_session_send(session, BT_FRAME_ID, payload);
+    count_skips(&session->skips, finger->quantities);
+}
+
+// A FRAME, or the silence that an IDLE ends: when its period is over, and before the next FRAME, so that
+// every round is accounted for and a gap is a loss.
+static void send_round(bt_session *session, bt_finger *finger)
+{
+    bool idle = bt_finger_idle(finger) && !finger->fresh;
+    if (idle && finger->unsent + 1 >= session->idle_rounds) {
+        idle = !bt_finger_moved(finger);
+    }
+    if (!idle) {
+        if (finger->unsent > 0) {
+            send_idle(session, finger, true);
+        }
+        finger->fresh = false;
+        send_frame(session, finger);
+        return;
+    }
+    session->skips.frames++;
+    count_skips(&session->skips, 0);
+    if (++finger->unsent >= session->idle_rounds) {
+        send_idle(session, finger, false);
+    }
+}
+
+static void send_pac(bt_session *session, const bt_finger *finger)
+{
+    uint8_t payload[BT_PAC_BYTES];
+    bt_msg_pac msg;
+    bt_finger_pac(finger, &msg);
+    bt_msg_pac_pack(&msg, payload);
+    bt_session_send(session, BT_PAC_ID, payload);
+}
+
+void bt_session_round(bt_session *session)
+{
+    uint32_t answering = 0; // bit mask
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_finger *finger = &session->finger[f];
+        if (!bt_finger_end(finger, &session->tare[f])) {
+            if (finger->silent_rounds == BT_UNPLUGGED_ROUNDS) {
+                bt_session_forget_sensor(session, f); // the next one may be another
+            }
+            continue;
+        }
+        answering |= 1u << f;
+        if (streams(session, finger, BT_STREAM_FLAG_FRAMES)) {
+            send_round(session, finger);
+        }
+    }
+    // Vibration after all fingers' forces: who closes a grip waits for those.
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (answering >> f & 1 && streams(session, &session->finger[f], BT_STREAM_FLAG_PAC)) {
+            send_pac(session, &session->finger[f]);
+        }
+    }
+}

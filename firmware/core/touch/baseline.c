@@ -1,0 +1,48 @@
+#include "touch/baseline.h"
+
+#include "touch/sweep.h"
+
+#define SNAPSHOT_SWEEPS 3 // 240 ms
+#define ROLL_BACK       5 // snapshots
+
+_Static_assert(ROLL_BACK < BT_SNAPSHOTS, "the roll-back must be in the ring");
+_Static_assert(ROLL_BACK * SNAPSHOT_SWEEPS * BT_SWEEP_ROUNDS * BT_FRAME_MS >= 1000,
+               "the roll-back must reach back a second");
+
+void bt_rollback_start(bt_rollback *rollback, const bt_baseline *base)
+{
+    rollback->snapshot[0] = *base;
+    rollback->head = 0;
+    rollback->count = 1;
+    rollback->countdown = SNAPSHOT_SWEEPS;
+}
+
+void bt_rollback_keep(bt_rollback *rollback, const bt_baseline *base)
+{
+    if (--rollback->countdown > 0) {
+        return;
+    }
+    rollback->countdown = SNAPSHOT_SWEEPS;
+    rollback->head = (uint8_t)((rollback->head + 1) % BT_SNAPSHOTS);
+    rollback->snapshot[rollback->head] = *base;
+    if (rollback->count < BT_SNAPSHOTS) {
+        rollback->count++;
+    }
+}
+
+void bt_rollback_meet(bt_rollback *rollback, unsigned lane, uint32_t first_q16)
+{
+    for (int k = 0; k < BT_SNAPSHOTS; k++) {
+        if (lane == BT_LANE_PDC) {
+            rollback->snapshot[k].pdc_q16 = first_q16;
+        } else {
+            rollback->snapshot[k].electrode_q16[lane] = first_q16;
+        }
+    }
+}
+
+const bt_baseline *bt_rollback_before(const bt_rollback *rollback)
+{
+    int back = rollback->count > ROLL_BACK ? ROLL_BACK : rollback->count - 1;
+    return &rollback->snapshot[(rollback->head + BT_SNAPSHOTS - back) % BT_SNAPSHOTS];
+}

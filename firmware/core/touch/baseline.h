@@ -1,0 +1,53 @@
+// A baseline: what every electrode and the static pressure read at rest; and the ones of the last two
+// seconds, for a touch to go back to.
+//
+// Units: counts in 1/65536 (q16); rounds half away from zero when published in 1/16 count.
+#ifndef BIOTAC_BASELINE_H
+#define BIOTAC_BASELINE_H
+
+#include "touch/gate.h"
+
+#define BT_TARE_UNKNOWN 0xFFFFFFFFu // of a channel that was never read
+#define BT_SNAPSHOTS    8
+
+typedef struct {
+    uint32_t electrode_q16[BT_ELECTRODES];
+    uint32_t pdc_q16;
+} bt_baseline;
+
+typedef struct {
+    bt_baseline snapshot[BT_SNAPSHOTS];
+    uint8_t head; // the latest
+    uint8_t count;
+    uint8_t countdown; // sweeps until the next
+} bt_rollback;
+
+// A new baseline: nothing from before it may come back.
+void bt_rollback_start(bt_rollback *rollback, const bt_baseline *base);
+
+// After each sweep at rest.
+void bt_rollback_keep(bt_rollback *rollback, const bt_baseline *base);
+
+// A lane's first value, for all snapshots.
+void bt_rollback_meet(bt_rollback *rollback, unsigned lane, uint32_t first_q16);
+
+// The baseline of at least a second ago, or the oldest there is.
+const bt_baseline *bt_rollback_before(const bt_rollback *rollback);
+
+#ifndef BT_CDEF
+// A value that moves to its target by step_q16 at most.
+static inline uint32_t bt_baseline_follow(uint32_t base_q16, uint32_t target_q16, int32_t step_q16)
+{
+    int32_t change_q16 = (int32_t)(target_q16 - base_q16);
+    change_q16 = change_q16 > step_q16 ? step_q16 : change_q16 < -step_q16 ? -step_q16 : change_q16;
+    return base_q16 + (uint32_t)change_q16;
+}
+
+// As it is subtracted and published: 1/16 count; BT_INVALID_COUNT when unknown.
+static inline uint16_t bt_tare_q4(uint32_t base_q16)
+{
+    return base_q16 == BT_TARE_UNKNOWN ? BT_INVALID_COUNT : (uint16_t)((base_q16 + (1 << 11)) >> 12);
+}
+#endif
+
+#endif

@@ -1,0 +1,117 @@
+// The gate: every word of an electrode, or of static pressure, as it arrives. It takes single-sample
+// glitches out and adds the word's distance from rest to the round's energy, so that a touch is seen in
+// the slot in which it happens and not at the round's end.
+//
+// A real sensor's glitches are single samples 28 to 66 counts off; one alone is over the contact
+// threshold, and one round in ten has one. So a word far from rest is held back until the next one: if that
+// is far, too, it is a touch. (Far from the word before would be worse: that one's own noise counts as well,
+// and the way back from a glitch that passed would be held in its turn.) Where no touch is waited for,
+// because there is no tare or it is frozen, it is the jump from word to word that must be confirmed.
+//
+// A missing or railed word repeats the filter's value, so that it neither looks like motion nor enters
+// a tare; what is repeated is never published.
+//
+// Units: counts; energies in count^2 summed over electrodes. No rounding, but that `rest` is the tare in
+// whole counts: the energy is off by at most |e| + 1/4 for each electrode.
+#ifndef BIOTAC_GATE_H
+#define BIOTAC_GATE_H
+
+#include "touch/round.h"
+
+#define BT_LANES    (BT_ELECTRODES + 1) // what is filtered: the electrodes, then static pressure
+#define BT_LANE_PDC BT_ELECTRODES
+
+// One value for each lane; as pairs, two are added at once (sweep.c).
+typedef union {
+    uint16_t lane[BT_LANES];
+    uint32_t pair[BT_LANES / 2];
+} bt_lanes;
+
+// What both are of a lane that never had a good word: it adds no energy, every first word is far from it, and
+// eight of it fit the sum of a sweep.
+#define BT_GATE_UNREAD 8191
+
+typedef struct {
+    bt_lanes smooth;  // the filter's value
+    bt_lanes rest;    // what it is compared with
+    int32_t room;     // energy left until the gate opens; negative once it has
+    int32_t limit;    // the room that the round began with
+    uint32_t unknown; // lanes without a good word so far, a bit each
+    uint32_t met;     // lanes whose first good word came and that the owner has not taken note of
+    uint32_t far;     // lanes whose word of this round was far off, held back or not
+    uint32_t far_before;
+    uint8_t missing; // electrodes of this round
+    uint8_t railed;
+    bool pressure_now; // this round had a good pressure word
+} bt_gate;
+
+// More than any round can use up: a gate with this limit never opens.
+#define BT_GATE_NEVER (1 << 30)
+
+void bt_gate_reset(bt_gate *gate);
+
+// A round begins; the gate opens when its energy passes limit_count2, below BT_GATE_NEVER.
+#ifndef BT_CDEF
+static inline void bt_gate_begin(bt_gate *gate, int32_t limit_count2)
+{
+    gate->limit = limit_count2;
+    gate->room = limit_count2;
+    gate->far_before = gate->far;
+    gate->far = 0;
+    gate->missing = 0;
+    gate->railed = 0;
+    gate->pressure_now = false;
+}
+#endif
+
+// Out of the ordinary: a word that is missing or railed, and one that is far off. The first returns the room
+// left, the second the filter's new value.
+int32_t bt_gate_repeat(bt_gate *gate, unsigned electrode, uint16_t count);
+uint16_t bt_gate_far(bt_gate *gate, unsigned lane, uint16_t count);
+
+#define BT_GATE_FAR 24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
+
+#ifndef BT_CDEF // in every slot, so these are inlined
+static inline uint16_t bt_gate_filter(bt_gate *gate, unsigned lane, uint16_t count, uint16_t from)
+{
+    if ((uint32_t)count - from + BT_GATE_FAR > 2 * BT_GATE_FAR) {
+        count = bt_gate_far(gate, lane, count);
+    }
+    gate->smooth.lane[lane] = count;
+    return count;
+}
+
+// One electrode's word, 0..4095 or BT_INVALID_COUNT, where nobody waits for a touch.
+static inline void bt_gate_follow(bt_gate *gate, unsigned electrode, uint16_t count)
+{
+    if (bt_count_usable(count)) {
+        (void)bt_gate_filter(gate, electrode, count, gate->smooth.lane[electrode]);
+    } else {
+        (void)bt_gate_repeat(gate, electrode, count);
+    }
+}
+
+// The same where somebody does. Returns the room left.
+static inline int32_t bt_gate_electrode(bt_gate *gate, unsigned electrode, uint16_t count)
+{
+    if (!bt_count_usable(count)) {
+        return bt_gate_repeat(gate, electrode, count);
+    }
+    uint16_t smooth = bt_gate_filter(gate, electrode, count, gate->rest.lane[electrode]);
+    int32_t e = smooth - gate->rest.lane[electrode]; // a first word sets its own rest
+    return gate->room -= e * e;
+}
+#endif
+
+// The pressure word; `above` is what the filter's value may be over rest. Opens the gate when it is more.
+int32_t bt_gate_pressure(bt_gate *gate, uint16_t count, int32_t above);
+
+// The round's energy so far.
+#ifndef BT_CDEF
+static inline uint32_t bt_gate_energy(const bt_gate *gate)
+{
+    return (uint32_t)(gate->limit - gate->room);
+}
+#endif
+
+#endif

@@ -1,0 +1,37 @@
+#include "touch/noise.h"
+
+#include "fixed_point.h"
+#include "touch/sweep.h"
+
+#define FACTOR      3 // white noise on 19 electrodes passes it once in 10^5 rounds, never three in a row
+#define MEAN_SWEEPS 16
+
+_Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX <= INT32_MAX >> 8, "the noise in q8 must fit 31 bits");
+_Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX *(int64_t)FACTOR < BT_GATE_NEVER,
+               "a threshold is a limit");
+
+void bt_noise_add(bt_noise *noise, uint32_t deviation_q6, uint32_t setting_count2)
+{
+    // A count's distance from a mean that it is an eighth of holds seven eighths of the noise's energy.
+    // The sample is capped at the setting: a vibration that grows slowly must not raise the threshold
+    // ahead of itself for ever. The threshold so never exceeds FACTOR times the setting.
+    uint32_t cap_q8 = setting_count2 << 8;
+    uint32_t sample_q8 = cap_q8;
+    if (deviation_q6 < cap_q8 >> 2) {
+        sample_q8 = 4 * deviation_q6 + bt_div_round_u32(4 * deviation_q6, BT_SWEEP_ROUNDS - 1);
+        sample_q8 = sample_q8 < cap_q8 ? sample_q8 : cap_q8;
+    }
+    if (noise->sweeps < MEAN_SWEEPS) { // plain mean first, so that it starts unbiased
+        noise->sweeps++;
+    }
+    int32_t change_q8 = (int32_t)(sample_q8 - noise->mean_q8);
+    uint32_t step_q8 = bt_div_round_u32(bt_abs32(change_q8), noise->sweeps);
+    noise->mean_q8 += (uint32_t)bt_with_sign(step_q8, change_q8);
+    noise->count2 = (noise->mean_q8 + (1 << 7)) >> 8;
+}
+
+uint32_t bt_noise_threshold(const bt_noise *noise, uint32_t setting_count2)
+{
+    uint32_t raised = noise->count2 * FACTOR;
+    return raised > setting_count2 ? raised : setting_count2;
+}

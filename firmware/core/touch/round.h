@@ -1,0 +1,42 @@
+// A round: the words of one finger in its 44 slots, with validity per channel.
+// A channel that got no good word in its own slot is BT_INVALID_COUNT, never an older value.
+// Units: counts 0..4095; t_us is device time, wraps at 2^32.
+#ifndef BIOTAC_ASSEMBLY_H
+#define BIOTAC_ASSEMBLY_H
+
+#include "wire/messages_gen.h"
+#include "wire/sensor_gen.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct {
+    uint32_t t_us; // when slot 0 was sampled, or would have been if it was lost
+    uint16_t electrode[BT_ELECTRODES];
+    uint16_t pdc;
+    uint16_t tac;
+    uint16_t tdc;
+    uint16_t pac[BT_PAC_PER_FRAME];
+    uint8_t good_words; // 0 means that nothing answered
+} bt_round;
+
+void bt_round_clear(bt_round *round);
+
+#define BT_RAIL_COUNT 4090 // from here on, and at 0, a count is at the end of its range
+
+#ifndef BT_CDEF // asked for every electrode of every round, so they are inlined
+// Neither missing nor railed; one comparison, in which 0 wraps to the top.
+static inline bool bt_count_usable(uint16_t count)
+{
+    return (uint32_t)count - 1 < BT_RAIL_COUNT - 1;
+}
+
+static inline bool bt_count_railed(uint16_t count)
+{
+    return !bt_count_usable(count) && count != BT_INVALID_COUNT;
+}
+#endif
+
+#define BT_USABLE_WITHOUT 2 // electrodes that may be missing or railed; with more the round is faulty
+
+#endif

@@ -1,0 +1,82 @@
+// Means over eight rounds, a few lanes at a time.
+//
+// Release, drift and a new tare rest on means of eight rounds, and nothing about them is urgent. So
+// each lane's eight rounds end in another round than its neighbours', and a round serves only the
+// lanes whose turn it is: no round pays for all. Eight rounds are a sweep; after its last round every
+// lane has been served once.
+//
+// Units: a sum of eight filtered counts is a mean in 1/8 count (q3), exact.
+#ifndef BIOTAC_SWEEP_H
+#define BIOTAC_SWEEP_H
+
+#include "touch/gate.h"
+
+#define BT_SWEEP_ROUNDS 8
+#define BT_SWEEP_LANES  3 // served in one round
+
+#define BT_SWEEP_UNREAD_Q3 (BT_SWEEP_ROUNDS * BT_GATE_UNREAD)
+
+typedef struct {
+    bt_lanes sum;
+    bt_lanes mean_q3;     // of each lane's latest eight rounds; BT_SWEEP_UNREAD_Q3 for a lane never read
+    bt_lanes settled_q3;  // the means that the signals have stayed near for still_sweeps
+    uint8_t round;        // of the sweep, 0..BT_SWEEP_ROUNDS - 1
+    uint8_t still_sweeps; // whole sweeps since the means came to rest; saturates
+    bool begun;           // the first round after a restart has been added
+    bool moved;           // in this sweep, a mean left the settled one
+} bt_sweep;
+
+// Forget everything: the next sweep fills its windows anew.
+void bt_sweep_restart(bt_sweep *sweep);
+
+// Add a round's filtered counts.
+void bt_sweep_add(bt_sweep *sweep, const bt_lanes *smooth);
+
+// A lane that had its first word in the middle of a sweep: its window is filled with that word.
+void bt_sweep_meet(bt_sweep *sweep, unsigned lane, uint16_t smooth);
+
+// The lanes of this round's turn: first <= lane < end.
+#ifndef BT_CDEF
+static inline unsigned bt_sweep_first(const bt_sweep *sweep)
+{
+    return sweep->round * BT_SWEEP_LANES;
+}
+
+static inline unsigned bt_sweep_end(const bt_sweep *sweep)
+{
+    unsigned end = bt_sweep_first(sweep) + BT_SWEEP_LANES;
+    return end < BT_LANES ? end : BT_LANES;
+}
+#endif
+
+// Close one lane's window, note whether it moved by more than span_q3, and return its mean.
+#ifndef BT_CDEF
+static inline uint16_t bt_sweep_close(bt_sweep *sweep, unsigned lane, int span_q3)
+{
+    uint16_t mean_q3 = sweep->sum.lane[lane];
+    sweep->sum.lane[lane] = 0;
+    sweep->mean_q3.lane[lane] = mean_q3;
+    int change_q3 = mean_q3 - sweep->settled_q3.lane[lane];
+    if (change_q3 > span_q3 || change_q3 < -span_q3) {
+        sweep->moved = true;
+    }
+    return mean_q3;
+}
+#endif
+
+// After a sweep's last round: brings still_sweeps up to date and starts over.
+void bt_sweep_start_over(bt_sweep *sweep);
+
+// The round is over. True after a sweep's last one.
+#ifndef BT_CDEF
+static inline bool bt_sweep_next(bt_sweep *sweep)
+{
+    if (++sweep->round < BT_SWEEP_ROUNDS) {
+        return false;
+    }
+    bt_sweep_start_over(sweep);
+    return true;
+}
+#endif
+
+#endif

@@ -1,0 +1,87 @@
+// The tare machine: what the sensor reads at rest, per electrode and for static pressure.
+//
+// Lin's rule (re-tare whenever the sum of squares stays under 1000 count^2) zeroes every load that
+// grows slower than about 5 N/s and locks out after the first contact. This machine follows drift
+// at a bounded rate while nothing touches, freezes on contact, takes the tare back to before the
+// contact began, and re-tares after release once the signals are quiet (protocol/SPEC.md, Tare).
+//
+// Units: counts; baselines in 1/65536 count (q16); energies in count^2; time in rounds of 10 ms and
+// sweeps of eight rounds. Baselines round half away from zero when published in 1/16 count.
+#ifndef BIOTAC_TARE_H
+#define BIOTAC_TARE_H
+
+#include "keep/settings.h"
+#include "touch/baseline.h"
+#include "touch/gate.h"
+#include "touch/noise.h"
+#include "touch/release.h"
+#include "touch/sweep.h"
+#include "touch/thermal.h"
+
+// What the machine needs of the settings.
+typedef struct {
+    uint32_t contact_energy_count2;
+    int32_t thermal_gain_q16; // counts that a resting electrode gains per count of TDC
+} bt_tare_settings;
+
+bt_tare_settings bt_tare_settings_from(const bt_settings *settings);
+
+typedef struct {
+    bt_gate gate;
+    bt_sweep sweep;
+    uint8_t state;  // enum bt_tare_state
+    uint8_t reason; // enum bt_tare_reason of the last change
+    bool changed;   // the last round changed the tare by more than drift tracking
+    bt_baseline base;
+    uint16_t electrode_q4[BT_ELECTRODES]; // base as it is subtracted; BT_INVALID_COUNT when unknown
+    uint32_t threshold_count2;            // energy above which a round counts as touched
+    uint32_t age_rounds;                  // since the last change
+    uint32_t contact_rounds;              // since the contact was seen
+
+    bt_rollback rollback;
+    bt_noise noise;
+    bt_thermal thermal;
+    bt_release release;
+
+    uint8_t hits;           // consecutive rounds in which the gate opened
+    bool touched;           // in this round the gate opened, or before it and it is open still
+    bool partial;           // this sweep did not serve all electrodes in one state
+    bool partial_before;    // nor did the one before
+    uint32_t deviation_q6;  // count^2; of this sweep: filtered counts from their means
+    uint32_t energy_count2; // of this sweep: means from the tare
+} bt_tare;
+
+void bt_tare_reset(bt_tare *tare);
+
+// A round: begin, then each electrode's and the pressure's word as it comes, then end.
+// Every channel is given once in a round, BT_INVALID_COUNT where no good word came.
+// A word's function returns true in the slot in which a resting finger is first touched.
+void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings);
+bool bt_tare_touch(bt_tare *tare);
+#ifndef BT_CDEF
+static inline bool bt_tare_electrode(bt_tare *tare, unsigned electrode, uint16_t count)
+{
+    if (tare->state != BT_TARE_STATE_REST) {
+        bt_gate_follow(&tare->gate, electrode, count);
+        return false;
+    }
+    return bt_gate_electrode(&tare->gate, electrode, count) < 0 && bt_tare_touch(tare);
+}
+#endif
+bool bt_tare_pressure(bt_tare *tare, uint16_t count);
+void bt_tare_temperature(bt_tare *tare, uint16_t tdc);
+void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings);
+
+// Host commands; enum bt_error. NOW needs two sweeps that hold still; both are refused in FAULT.
+uint8_t bt_tare_now(bt_tare *tare);
+uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base);
+
+// More electrodes of this round were missing or railed than results can do without.
+#ifndef BT_CDEF
+static inline bool bt_tare_faulty(const bt_tare *tare)
+{
+    return tare->gate.missing + tare->gate.railed > BT_USABLE_WITHOUT;
+}
+#endif
+
+#endif

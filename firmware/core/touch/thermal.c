@@ -1,0 +1,49 @@
+#include "touch/thermal.h"
+
+#include "fixed_point.h"
+#include "touch/round.h"
+
+#define TDC_SHIFT   3           // a low-pass of eight sweeps: TDC has steps of half an electrode count
+#define APPLIED_MAX (500 << 16) // 15 degrees; more is a broken thermometer
+
+_Static_assert((int64_t)BT_SETTING_THERMAL_GAIN_MILLI_MAX * 65536 / 1000 <= INT32_MAX,
+               "a gain must fit its type");
+
+int32_t bt_thermal_gain_q16(int32_t gain_milli)
+{
+    return (int32_t)bt_div_round((int64_t)gain_milli * 65536, 1000);
+}
+
+void bt_thermal_add(bt_thermal *thermal, uint16_t tdc, bool end_of_sweep)
+{
+    if (!bt_count_usable(tdc)) {
+        return; // the last temperature holds
+    }
+    uint32_t tdc_q8 = (uint32_t)tdc << 8;
+    if (thermal->tdc_q8 == 0) {
+        thermal->tdc_q8 = tdc_q8;
+        thermal->tdc_then_q8 = tdc_q8;
+    } else if (end_of_sweep) {
+        thermal->tdc_q8 += (uint32_t)bt_shift_down((int32_t)(tdc_q8 - thermal->tdc_q8), TDC_SHIFT);
+    }
+}
+
+void bt_thermal_begin(bt_thermal *thermal)
+{
+    thermal->tdc_then_q8 = thermal->tdc_q8;
+    thermal->applied_q16 = 0;
+    thermal->step_q16 = 0;
+}
+
+static int32_t warmed_q8(const bt_thermal *thermal)
+{
+    return (int32_t)(thermal->tdc_q8 - thermal->tdc_then_q8);
+}
+
+void bt_thermal_follow(bt_thermal *thermal, int32_t gain_q16)
+{
+    int64_t due_q16 = (int64_t)warmed_q8(thermal) * gain_q16 / 256;
+    due_q16 = due_q16 > APPLIED_MAX ? APPLIED_MAX : due_q16 < -APPLIED_MAX ? -APPLIED_MAX : due_q16;
+    thermal->step_q16 = (int32_t)due_q16 - thermal->applied_q16;
+    thermal->applied_q16 = (int32_t)due_q16;
+}

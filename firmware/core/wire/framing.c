@@ -1,0 +1,82 @@
+#include "wire/framing.h"
+
+#include "wire/crc32.h"
+
+#include <string.h>
+
+// COBS then adds exactly one byte, so a frame never needs a second overhead byte.
+_Static_assert(BT_FRAME_MAX_BYTES <= BT_COBS_BLOCK_BYTES, "a frame must fit one COBS block");
+
+// Each byte is looked at once, for CRC and COBS together: a board spends more on this than on the maths.
+size_t bt_frame_encode(uint8_t id, const uint8_t *payload, size_t payload_bytes, uint8_t *out)
+{
+    bt_cobs_block block = bt_cobs_begin(out);
+    bt_cobs_put(&block, id);
+    uint32_t crc = bt_crc32_step(BT_CRC32_START, id);
+    for (size_t k = 0; k < payload_bytes; k++) {
+        bt_cobs_put(&block, payload[k]);
+        crc = bt_crc32_step(crc, payload[k]);
+    }
+    crc = bt_crc32_end(crc);
+    for (int k = 0; k < BT_CRC_BYTES; k++) {
+        bt_cobs_put(&block, (uint8_t)(crc >> (8 * k)));
+    }
+    uint8_t *end = bt_cobs_end(&block);
+    *end++ = 0;
+    return (size_t)(end - out);
+}
+
+void bt_deframer_reset(bt_deframer *deframer)
+{
+    memset(deframer, 0, sizeof *deframer);
+}
+
+static enum bt_deframed finish(bt_deframer *deframer, size_t bytes)
+{
+    uint8_t *buffer = deframer->buffer;
+    int plain_bytes = bt_cobs_decode(buffer, bytes, buffer);
+    if (plain_bytes < 0) {
+        return BT_DEFRAMED_BAD_COBS;
+    }
+    if (plain_bytes < 1 + BT_CRC_BYTES) {
+        return BT_DEFRAMED_BAD_CRC;
+    }
+    size_t covered = (size_t)plain_bytes - BT_CRC_BYTES;
+    uint32_t crc = bt_crc32(buffer, covered);
+    for (size_t k = 0; k < BT_CRC_BYTES; k++) {
+        if (buffer[covered + k] != (uint8_t)(crc >> (8 * k))) {
+            return BT_DEFRAMED_BAD_CRC;
+        }
+    }
+    deframer->id = buffer[0];
+    deframer->payload_bytes = (uint8_t)(covered - 1);
+    int expected = bt_wire_payload_bytes(deframer->id);
+    // An unknown id passes: it may be a newer peer's, and its receiver can answer in words.
+    if (expected >= 0 && expected != deframer->payload_bytes) {
+        return BT_DEFRAMED_BAD_LENGTH;
+    }
+    return BT_DEFRAMED_GOOD;
+}
+
+enum bt_deframed bt_deframer_push(bt_deframer *deframer, uint8_t byte)
+{
+    if (byte != 0) {
+        if (deframer->filled < BT_FRAME_MAX_BYTES + 1) {
+            deframer->buffer[deframer->filled++] = byte;
+        } else {
+            deframer->too_long = 1;
+        }
+        return BT_DEFRAMED_NOTHING;
+    }
+    size_t bytes = deframer->filled;
+    int too_long = deframer->too_long;
+    deframer->filled = 0;
+    deframer->too_long = 0;
+    if (too_long) {
+        return BT_DEFRAMED_TOO_LONG;
+    }
+    if (bytes == 0) {
+        return BT_DEFRAMED_NOTHING;
+    }
+    return finish(deframer, bytes);
+}

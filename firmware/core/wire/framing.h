@@ -1,0 +1,38 @@
+// From messages to bytes on the link and back: id + payload + CRC-32, COBS, 0x00.
+// protocol/SPEC.md fixes the format; protocol/vectors/ holds frames that both sides must agree on.
+#ifndef BIOTAC_FRAMING_H
+#define BIOTAC_FRAMING_H
+
+#include "wire/cobs.h"
+#include "wire/messages_gen.h"
+
+#define BT_CRC_BYTES         4
+#define BT_ENCODED_MAX_BYTES (BT_FRAME_MAX_BYTES + 2) // COBS and the delimiter add one each
+
+// Appends nothing and keeps nothing: out receives one whole frame with its delimiter.
+// payload_bytes <= BT_FRAME_MAX_BYTES - 5. Returns the number of bytes written.
+size_t bt_frame_encode(uint8_t id, const uint8_t *payload, size_t payload_bytes, uint8_t *out);
+
+// What became of the bytes between two delimiters.
+enum bt_deframed {
+    BT_DEFRAMED_NOTHING = 0,  // frame not finished, or an empty one
+    BT_DEFRAMED_GOOD = 1,     // id and payload are valid until the next push
+    BT_DEFRAMED_TOO_LONG = 2, // more bytes than any frame has
+    BT_DEFRAMED_BAD_COBS = 3,
+    BT_DEFRAMED_BAD_CRC = 4,    // also: too short to hold an id and a CRC
+    BT_DEFRAMED_BAD_LENGTH = 5, // CRC is right, but a known id has another length
+};
+
+typedef struct {
+    uint16_t filled;
+    uint8_t id;
+    uint8_t payload_bytes;
+    uint8_t too_long;
+    uint8_t buffer[BT_FRAME_MAX_BYTES + 2]; // frame, COBS code byte, one spare to notice overflow
+} bt_deframer;
+
+// All zero is a valid start. The payload of a good frame begins at buffer + 1.
+void bt_deframer_reset(bt_deframer *deframer);
+enum bt_deframed bt_deframer_push(bt_deframer *deframer, uint8_t byte);
+
+#endif
