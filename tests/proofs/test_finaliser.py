@@ -31,7 +31,7 @@ from prover.table import constants, doubles, table
 HERE = Path(__file__).parent
 RADIUS = table().radius_um
 UM_FACTOR, UM_BITS, LEVER_FACTOR, LEVER_BITS, DIRECTION_BITS = constants(
-    "poc.c",
+    "solve/poc.c",
     *(f"BT_ROOT_{name}" for name in ("UM_FACTOR", "UM_BITS", "LEVER_FACTOR", "LEVER_BITS")),
     "DIRECTION_BITS",
 )

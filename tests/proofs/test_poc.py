@@ -21,7 +21,7 @@ from prover.table import constants, table
 
 POC = text_of(CORE / "solve/poc.c")
 E_MAX, WEIGHT_MAX, SPLIT_SHIFT, SPLIT_BITS, LINEAR_BITS, X_UNIT, COUNT = constants(
-    "poc.c",
+    "solve/poc.c",
     *("BT_E_MAX_Q4", "WEIGHT_MAX", "BT_SUMS_SPLIT_BITS", "SPLIT_BITS", "LINEAR_BITS", "BT_SUMS_X_UNIT_UM"),
     "BT_ELECTRODES",
 )
@@ -147,7 +147,7 @@ def linear_box(ahead: Any, behind: Any, z: Any, total: Any, y: Any) -> Any:
 
 def linear_moment(text: str, axis: int) -> None:
     """Exact, or within one of N / 2^LINEAR_BITS (x: two parts are cut): whichever the total asks for."""
-    (whole_total,) = constants("poc.c", "WHOLE_TOTAL")
+    (whole_total,) = constants("solve/poc.c", "WHOLE_TOTAL")
 
     def claim(result: Any, ahead: Any, behind: Any, z: Any, total: Any, y: Any) -> Any:
         whole = [ahead - X_UNIT * behind, y, -z][axis]
@@ -200,7 +200,7 @@ def ratio(text: str, bits: int, total_min: int, total_max: int, off: int, timeou
     prove(parse(text + RATIO), "proof_ratio", inputs, assume, claim, domain=IntegerDomain(), timeout_s=timeout_s)
 
 
-(WHOLE_TOTAL,) = constants("poc.c", "WHOLE_TOTAL")
+(WHOLE_TOTAL,) = constants("solve/poc.c", "WHOLE_TOTAL")
 # Squares (bits = SPLIT_BITS, totals from 2^21 on) are left out: z3 does not decide that product in minutes.
 # tests/fuzz and tests/core/test_kernels.c judge them.
 RANGES = {

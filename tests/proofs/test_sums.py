@@ -174,7 +174,7 @@ def test_force_sums_reach_exactly_what_is_asserted(proved: Report) -> None:
 
 def test_torque_sums_stay_within_what_is_asserted(proved: Report) -> None:
     (asserted,) = constants(
-        "wrench.c", "BT_SUM_ARM_MAX_Q4_NM / BT_SUMS_TORQUE_UNIT_NM + 2 + BT_ELECTRODES * (int64_t)BT_E_MAX_Q4"
+        "solve/wrench.c", "BT_SUM_ARM_MAX_Q4_NM / BT_SUMS_TORQUE_UNIT_NM + 2 + BT_ELECTRODES * (int64_t)BT_E_MAX_Q4"
     )
     found = torque(shipped())
     check_bounds(found, {"[0]": asserted, "[1]": asserted}, proved)

@@ -33,7 +33,7 @@ WRENCH = text_of(CORE / "solve/wrench.c")
     LEVER_BITS,
     LEVER_SPLIT_BITS,
 ) = constants(
-    "wrench.c",
+    "solve/wrench.c",
     "BT_GAIN_MAX_NN",
     "FORCE_DIVISOR",
     "FORCE_BITS",
