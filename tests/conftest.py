@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from deframer import Deframer
 
-from biotac import _wire as wire
-from biotac.framing import encode
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 

@@ -34,9 +34,9 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "tools/bench/variants/tables_gen.h": c_variants.tables(contract),
         root / "firmware/core/wire/messages_gen.h": c_wire.header(contract),
         root / "firmware/core/wire/messages_gen.c": c_wire.source(contract),
-        root / "host/biotac/_sensor.py": python_code.sensor(contract),
-        root / "host/biotac/_wire.py": python_code.wire(contract),
-        root / "host/biotac/_map.py": python_code.wrench_map(contract),
+        root / "host/biotac/wire/sensor_gen.py": python_code.sensor(contract),
+        root / "host/biotac/wire/messages_gen.py": python_code.wire(contract),
+        root / "host/biotac/wire/map_gen.py": python_code.wrench_map(contract),
         root / "protocol/MESSAGES.md": docs.messages(contract),
         root / "protocol/schema.json": schema.canonical(contract, with_docs=True),
     }

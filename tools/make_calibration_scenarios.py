@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
-from biotac.sim.surface import RADIUS_MM  # noqa: E402
+from biotac.core.geometry import RADIUS_MM  # noqa: E402
 from committed import write_or_check  # noqa: E402
 
 FOLDER = ROOT / "host" / "biotac" / "sim" / "scenarios"

@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
-from biotac import _sensor as sensor  # noqa: E402
+from biotac.wire import sensor_gen as sensor  # noqa: E402
 from committed import write_or_check  # noqa: E402
 
 WIDTH, HEIGHT = 980, 560

@@ -9,10 +9,11 @@
 
 from __future__ import annotations
 
-from ._wire import CalibrationState, FrameFlags, PocWeights, QuantityFlags, Setting, TareReason, TareState
-from .batch import MAPPED_RESULT_DTYPE, RESULT_DTYPE, compute
-from .calibration import Calibration
-from .compatibility import HandWarning
+import importlib
+from typing import TYPE_CHECKING
+
+from .core.compute import MAPPED_RESULT_DTYPE, RESULT_DTYPE, compute
+from .core.finger import FINGER_DTYPE, Finger
 from .errors import (
     BiotacError,
     CallbackError,
@@ -26,14 +27,27 @@ from .errors import (
     ScenarioError,
     WireVersionError,
 )
-from .finger import FINGER_DTYPE, Finger
-from .frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
-from .hand import Hand
-from .live import FingerView, Gap
-from .opening import open
+from .hand.compatibility import HandWarning
+from .hand.gap import Gap
+from .hand.hand import Hand
+from .hand.opening import open
+from .hand.views import FingerView
+from .keep import Calibration
 from .recording import Compact, Recorder, Recording, load, load_compact
-from .stream import LinkStats
 from .version import __version__
+from .wire.batches import LinkStats
+from .wire.frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
+from .wire.messages_gen import CalibrationState, FrameFlags, PocWeights, QuantityFlags, Setting, TareReason, TareState
+
+if TYPE_CHECKING:
+    from .hand import aio
+
+
+def __getattr__(name: str) -> object:
+    if name == "aio":  # asyncio is imported for those who use it
+        return importlib.import_module(".hand.aio", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 __all__ = [
     "FINGER_DTYPE",
@@ -72,6 +86,7 @@ __all__ = [
     "TareState",
     "WireVersionError",
     "__version__",
+    "aio",
     "compute",
     "load",
     "load_compact",

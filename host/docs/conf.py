@@ -10,7 +10,7 @@ import numpy as np
 from sphinx.pycode import ModuleAnalyzer
 
 import biotac
-from biotac import _wire as wire
+from biotac.wire import messages_gen as wire
 
 project = "Open BioTac gateway"
 release = biotac.__version__

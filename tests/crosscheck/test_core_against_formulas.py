@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from biotac import PocWeights, Setting
-from biotac.core import default_settings, on_board, reference
-from biotac.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
+from biotac.core.compiled import default_settings, on_board, reference
+from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 
 try:
     import tomllib

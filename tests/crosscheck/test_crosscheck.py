@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from biotac import FrameFlags, Setting
-from biotac import _wire as wire
-from biotac.core import default_settings, on_board
-from biotac.crosscheck import CrossCheck
+from biotac.core.compiled import default_settings, on_board
+from biotac.lab.crosscheck import CrossCheck
+from biotac.wire import messages_gen as wire
 
 TORQUE = (Setting.TORQUE_GAIN_Y_NN, Setting.TORQUE_GAIN_Z_NN)
 FORCE = (Setting.FORCE_GAIN_X_NN, Setting.FORCE_GAIN_Y_NN, Setting.FORCE_GAIN_Z_NN)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from biotac import Finger, FrameFlags, Setting
-from biotac import _wire as wire
-from biotac.core import default_settings
-from biotac.crosscheck import CrossCheck
+from biotac.core.compiled import default_settings
+from biotac.lab.crosscheck import CrossCheck
+from biotac.wire import messages_gen as wire
 
 GAIN, FILTER = Setting.PRESSURE_GAIN_NN, Setting.PRESSURE_FILTER_MILLI
 ROUNDS = 600

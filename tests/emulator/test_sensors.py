@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biotac import _sensor
 from biotac.sim.source import Source
 from biotac.sim.tape import CODES, write_tape
+from biotac.wire import sensor_gen as _sensor
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent

@@ -14,7 +14,7 @@ import tomllib
 
 import biotac
 from biotac.link.ports import start_board
-from biotac.link.sim_process import SimBoard
+from biotac.sim.process import SimBoard
 from biotac.sim.source import load_source
 
 HERE = Path(__file__).resolve().parent

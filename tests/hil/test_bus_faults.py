@@ -9,7 +9,7 @@ import pytest
 
 import biotac
 from biotac import FrameFlags
-from biotac import _wire as wire
+from biotac.wire import messages_gen as wire
 
 INVALID = 0xFFFF
 

@@ -12,8 +12,8 @@ from rig import Rig
 
 import biotac
 from biotac import Calibration, CalibrationState, PocWeights
-from biotac.crosscheck import CrossCheck
 from biotac.errors import CommandRefusedError
+from biotac.lab.crosscheck import CrossCheck
 from biotac.recording import Recording
 
 OWN = Calibration(

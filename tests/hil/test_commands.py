@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import FrameFlags, Setting, TareReason, TareState, _map
-from biotac import _wire as wire
-from biotac.framing import encode
+from biotac import FrameFlags, Setting, TareReason, TareState
+from biotac.wire import map_gen as _map
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
 
 TARE_Q4 = (3000 * 16,) * 19
 NO_FINGER = 5

@@ -18,12 +18,12 @@ from maps import BIG, make_map
 from rig import ROOT, Rig
 
 from biotac import Calibration, Hand, Setting
-from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.errors import FlashError, InputError, NotAGatewayError
 from biotac.flash import Image, Outcome, flash, read_backup, read_image
 from biotac.flash.loader_emulated import EmulatedLoader
 from biotac.flash.target_emulated import EmulatedTarget
+from biotac.wire import messages_gen as wire
 
 BUILT = ROOT / "build/pico/biotac-pico.uf2"
 PAGE = 256

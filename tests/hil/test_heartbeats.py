@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from biotac import QuantityFlags
-from biotac import _wire as wire
-from biotac._sensor import SLOTS
-from biotac.core import on_board
+from biotac.core.compiled import on_board
+from biotac.wire import messages_gen as wire
+from biotac.wire.sensor_gen import SLOTS
 
 TOUCHED_TWICE = """
 name = "touched twice"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import _wire as wire
+from biotac.wire import messages_gen as wire
 
 BOARDS = {"posix": wire.Board.POSIX_SIM, "pico": wire.Board.PICO}
 # What a test of silicon would not forgive, and the emulator counts.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import biotac
-from biotac import _wire as wire
+from biotac.wire import messages_gen as wire
 
 
 @pytest.mark.parametrize(
@@ -13,7 +13,7 @@ from biotac import _wire as wire
 )
 def test_a_hand_comes_back_by_itself(rig, monkeypatch, ability: str, verbs: list[str], reason: str) -> None:
     rig.need(ability)
-    monkeypatch.setattr("biotac.streaming.SILENCE_S", 1.0)
+    monkeypatch.setattr("biotac.hand.streams.SILENCE_S", 1.0)
     port = rig.facts["port"].format(source="press.toml", options="fingers=2&seconds=600", port=rig.port)
     with biotac.open(port, reconnect=True) as hand:
         hand.set_setting(wire.Setting.IDLE_PERIOD_MS, 70)

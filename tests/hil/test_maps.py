@@ -14,12 +14,12 @@ from test_calibration import reboot
 
 import biotac
 from biotac import CalibrationState
-from biotac import _wire as wire
-from biotac.calibration.blob import PART_BYTES, for_any_sensor, part
 from biotac.cli.main import main
-from biotac.crosscheck import CrossCheck
 from biotac.errors import CommandRefusedError
+from biotac.keep.map_blob import PART_BYTES, for_any_sensor, part
+from biotac.lab.crosscheck import CrossCheck
 from biotac.recording import Recording
+from biotac.wire import messages_gen as wire
 
 SECTOR = 4096
 PAGE = 256

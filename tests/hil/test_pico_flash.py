@@ -14,7 +14,7 @@ from rig import Rig
 
 import biotac
 from biotac import Setting
-from biotac import _wire as wire
+from biotac.wire import messages_gen as wire
 
 PAGE = 256
 SECTOR = 4096

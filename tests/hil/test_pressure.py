@@ -12,13 +12,13 @@ from rig import Rig
 
 import biotac
 from biotac import Calibration, QuantityFlags, Setting
-from biotac import _wire as wire
-from biotac.core import default_settings
-from biotac.crosscheck import CrossCheck
-from biotac.experiments import navarro
+from biotac.core.compiled import default_settings
+from biotac.lab.crosscheck import CrossCheck
+from biotac.lab.experiments import navarro
 from biotac.recording import Recording
 from biotac.sim.physics import Profile
-from biotac.stream import Batch
+from biotac.wire import messages_gen as wire
+from biotac.wire.batches import Batch
 
 GAIN_NN = 12_345_678
 

@@ -11,14 +11,14 @@ from types import SimpleNamespace
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
-from biotac import _wire as wire
-from biotac import discovery
 from biotac.errors import DeviceLostError, PortError
 from biotac.flash import waiting
 from biotac.flash.image import Image
-from biotac.framing import encode
-from biotac.hand import Hand
+from biotac.hand.hand import Hand
+from biotac.link import discovery
 from biotac.link.serial_port import SerialLink
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 

@@ -6,10 +6,10 @@ import threading
 from pathlib import Path
 from types import ModuleType
 
-from biotac._sensor import LISTEN_WORD, SPI_HZ
-from biotac.core import ffi, lib
+from biotac.core.compiled import ffi, lib
 from biotac.sim.source import Source
 from biotac.sim.tape import write_tape
+from biotac.wire.sensor_gen import LISTEN_WORD, SPI_HZ
 
 
 class HeldClock:

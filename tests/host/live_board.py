@@ -8,8 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from biotac import _wire as wire
-from biotac.framing import encode
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
 
 
 def frame(seq: int, finger: int = 0, force_z_n: float = 0.0) -> bytes:

@@ -12,12 +12,12 @@ from hypothesis.extra.numpy import arrays
 
 import biotac
 from biotac import FRAME_DTYPE, RESULT_DTYPE, PocWeights, Setting
-from biotac import _wire as wire
-from biotac.batch import per_frame
-from biotac.bench import batch as bench
 from biotac.cli import main
-from biotac.core import default_settings, on_board, reference
-from biotac.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
+from biotac.core.compiled import default_settings, on_board, reference
+from biotac.core.compute import per_frame
+from biotac.lab.bench import batch as bench
+from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
+from biotac.wire import messages_gen as wire
 
 MISSING = 0xFFFF
 WEIGHTS = list(PocWeights)

@@ -12,10 +12,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from biotac._wire import PocWeights
-from biotac.bench import front, kernels, limit, scenes
 from biotac.cli.main import main
-from biotac.core import default_settings, on_board, reference
+from biotac.core.compiled import default_settings, on_board, reference
+from biotac.lab.bench import front, kernels, limit, scenes
+from biotac.wire.messages_gen import PocWeights
 
 EFFORT = kernels.Effort(frames=300, restarts=2, steps=200)
 #: um; what tools/bench/variants says of each (tests/core/test_variants.c derives them)
@@ -87,7 +87,7 @@ def test_a_variant_is_within_its_bound(outcome, name) -> None:
 
 
 def test_the_errors_of_the_shipped_kernel_are_those_of_the_package() -> None:
-    """The judge and the adapters against biotac.core's own path to the board's kernel and the double."""
+    """The judge and the adapters against biotac.core.compiled's own path to the board's kernel and the double."""
     e_q4 = np.ascontiguousarray(limit.frames_q4()[::7])
     tare_q4 = 2000 * 16 - e_q4 % 16
     count = (tare_q4 + e_q4) // 16

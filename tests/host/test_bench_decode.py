@@ -9,9 +9,9 @@ import zlib
 import numpy as np
 import pytest
 
-from biotac import _wire as wire
-from biotac.bench import decode
 from biotac.cli.main import main
+from biotac.lab.bench import decode
+from biotac.wire import messages_gen as wire
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,11 @@ import os
 import numpy as np
 import pytest
 
-from biotac import _wire as wire
-from biotac.bench import flood, live
 from biotac.cli.main import main
-from biotac.decode import Decoder
-from biotac.framing import encode
+from biotac.lab.bench import flood, live
+from biotac.wire import messages_gen as wire
+from biotac.wire.decoder import Decoder
+from biotac.wire.framing import encode
 
 
 def test_the_flood_is_good_frames_of_five_fingers() -> None:

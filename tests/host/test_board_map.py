@@ -12,17 +12,18 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import _map, board_map
-from biotac import _wire as wire
-from biotac._map import Gate, Kind
-from biotac.board_map import BoardBlock, BoardMap, from_blob
-from biotac.core import default_settings
-from biotac.crosscheck import CrossCheck
+from biotac.calibrate.wrench import board, features, fitted, models, recorded
+from biotac.calibrate.wrench.fitted import WrenchMap
+from biotac.core import board_map
+from biotac.core.board_map import BoardBlock, BoardMap, from_blob
+from biotac.core.compiled import default_settings
 from biotac.errors import InputError
-from biotac.frames import tare_to_q4
+from biotac.lab.crosscheck import CrossCheck
 from biotac.recording.rounds import Rounds, frames_and_tares
-from biotac.wrench import board, features, fitted, models, recorded
-from biotac.wrench.fitted import WrenchMap
+from biotac.wire import map_gen as _map
+from biotac.wire import messages_gen as wire
+from biotac.wire.frames import tare_to_q4
+from biotac.wire.map_gen import Gate, Kind
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 

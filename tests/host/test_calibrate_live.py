@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.board_map import from_blob
+from biotac.calibrate.wrench import fitted, provenance, upload
+from biotac.calibrate.wrench.sources import load
 from biotac.cli.main import main
+from biotac.core.board_map import from_blob
 from biotac.errors import PortError
-from biotac.wrench import fitted, provenance, upload
-from biotac.wrench.sources import load
 
 SERIAL = "BTSIM00000000006"
 
@@ -70,7 +70,7 @@ def test_another_fingers_board_is_refused(calibrated: Path, capsys: pytest.Captu
 
 def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A board that keeps another map than it was given, by one coefficient."""
-    from biotac.reference.csv_file import read_csv
+    from biotac.calibrate.reference.csv_file import read_csv
 
     reference = calibrated / f"{SERIAL}.csv"
     loaded = load(calibrated / f"{SERIAL}.mcap", (reference, read_csv(reference)))

@@ -16,14 +16,15 @@ from cobs import cobs
 
 import biotac
 from biotac import Calibration, CalibrationState, PocWeights, Setting
-from biotac import _wire as wire
-from biotac.calibration import file, record
 from biotac.cli.main import main
-from biotac.crosscheck import CrossCheck
-from biotac.framing import encode
-from biotac.link.sim_process import SimBoard, SimLink
+from biotac.keep import calibration_file as file
+from biotac.keep import record
+from biotac.lab.crosscheck import CrossCheck
 from biotac.recording import Recording
+from biotac.sim.process import SimBoard, SimLink
 from biotac.sim.source import load_source
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
 
 SERIAL = "BTEMU00000000042"
 ODD = Calibration(PocWeights.ABS_N2, (1, -2, 3), (-4, 5), -600, SERIAL, 1_763_731_310, 9_500_000)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import biotac
-import biotac.core
+import biotac.core.compiled
 from biotac.cli.main import VERBS, main, parser
 
 
@@ -106,7 +106,7 @@ def test_an_unknown_port_exits_3(capsys, verb: str) -> None:
 
 
 def test_a_port_that_is_no_gateway_exits_4(capsys, scripted_board, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.02)
     board = scripted_board(lambda i, p: b"OK\r\n")
     assert "no gateway" in fails(capsys, 4, "info", board.path)
 
@@ -191,7 +191,7 @@ def test_a_simulated_board_has_its_fingers_own_gains(tmp_path: Path) -> None:
     try:
         process.stdout.readline()
         with biotac.open(link) as hand:
-            assert hand.settings() == want != biotac.core.default_settings()
+            assert hand.settings() == want != biotac.core.compiled.default_settings()
     finally:
         process.terminate()
         process.wait()

@@ -20,12 +20,12 @@ import pytest
 from maps import make_map
 
 import biotac
-from biotac import _wire as wire
 from biotac import errors
-from biotac.calibration import map_file
 from biotac.cli.main import VERBS, main
-from biotac.framing import encode
+from biotac.keep import map_file
 from biotac.link.serial_port import SerialLink
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
 
 NO_PORT = "/dev/ttyNOWHERE7"
 #: Verbs with no BiotacError of their own, and why.
@@ -75,7 +75,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def calibration(serial: str) -> dict[str, object]:
     """A calibration file of the sensor with this serial number."""
-    from biotac.calibration import file
+    from biotac.keep import calibration_file as file
 
     return json.loads(file.dumps(biotac.Calibration(serial=serial), {}))
 
@@ -294,7 +294,7 @@ def opened(command: str, port: str, files: dict[str, Path]) -> list[str]:
 @pytest.mark.parametrize("command", OPENERS)
 def test_a_stranger_on_the_port_is_4(capsys, scripted_board, files, tmp_path, monkeypatch, command: str) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.02)
     board = scripted_board(lambda i, p: b"OK\r\n")
     assert "check that this is the board's port" in line_of(capsys, 4, opened(command, board.path, files))
     assert not list(tmp_path.iterdir())
@@ -314,13 +314,13 @@ def test_another_wire_is_5(
 @pytest.mark.parametrize("command", OPENERS)
 def test_a_board_that_falls_silent_is_6(capsys, scripted_board, hello, files, tmp_path, monkeypatch, command) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.02)
     board = scripted_board(lambda i, p: hello(p) if i == wire.HelloRequest.ID else b"")
     assert "check the cable and open it again" in line_of(capsys, 6, opened(command, board.path, files))
 
 
 def test_a_board_that_falls_silent_in_its_stream_is_6(capsys, scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.SILENCE_S", 0.05)
+    monkeypatch.setattr("biotac.hand.hand.SILENCE_S", 0.05)
 
     def answer(message_id: int, payload: bytes) -> bytes:
         if message_id == wire.HelloRequest.ID:
@@ -394,12 +394,12 @@ def test_a_simulator_that_does_not_start(capsys, monkeypatch, tmp_path) -> None:
 
 
 def test_bench_recording_without_its_extra(capsys, monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "biotac.bench.protobuf_mcap", None)
-    monkeypatch.delattr("biotac.bench.protobuf_mcap", raising=False)
+    monkeypatch.setitem(sys.modules, "biotac.lab.bench.protobuf_mcap", None)
+    monkeypatch.delattr("biotac.lab.bench.protobuf_mcap", raising=False)
     assert "pip install 'biotac-gateway[bench]'" in line_of(capsys, 2, ["bench", "recording"])
 
 
 def test_a_btd_without_end(capsys, monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr("biotac.sim.btd._MAX_BYTES", 4)
+    monkeypatch.setattr("biotac.recording.btd_file._MAX_BYTES", 4)
     (tmp_path / "long.btd").write_text("Begin File\n" + "0\n" * 10)
     assert "split it" in line_of(capsys, 2, ["import", str(tmp_path / "long.btd"), str(tmp_path / "a.mcap")])

@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 
 import biotac
 import biotac.clock
-from biotac import _sensor as sensor
-from biotac import _wire as wire
 from biotac.clock import LAST_SAMPLE_US, Arrivals, DeviceClock, channel_t_us, electrode_t_us, pac_t_us
 from biotac.clock.band import between
 from biotac.clock.segment import WANDER_PER_S
-from biotac.framing import encode
 from biotac.recording import Recorder
+from biotac.wire import messages_gen as wire
+from biotac.wire import sensor_gen as sensor
+from biotac.wire.framing import encode
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
+from biotac.calibrate.wrench.contact import MESH_STEP_MM, locate, locate_on_mesh, moment
 from biotac.cli.main import main
-from biotac.wrench.contact import MESH_STEP_MM, locate, locate_on_mesh, moment
 
 R = 5.08  # mm, Lin 2013: written here because the geometry under test is the package's
 

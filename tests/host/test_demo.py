@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
-from biotac.demo import expected_frames, run_demo
+from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
+from biotac.lab.demo import expected_frames, run_demo
 from biotac.sim.source import load_source
 
 

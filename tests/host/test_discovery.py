@@ -12,12 +12,12 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 import biotac
-from biotac import _wire as wire
 from biotac.cli.main import main
-from biotac.discovery import boards, choose, serial_ports
-from biotac.identity import serial_text
+from biotac.link.discovery import boards, choose, serial_ports
 from biotac.link.holders import Holder, holders
 from biotac.link.serial_port import describe_open_error
+from biotac.wire import messages_gen as wire
+from biotac.wire.identity import serial_text
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -40,7 +40,7 @@ def plugged(monkeypatch):
     """Makes this computer have these ports."""
 
     def plug(entries: list[ListPortInfo]) -> None:
-        monkeypatch.setattr("biotac.discovery.list_ports.comports", lambda: entries)
+        monkeypatch.setattr("biotac.link.discovery.list_ports.comports", lambda: entries)
 
     return plug
 

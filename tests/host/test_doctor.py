@@ -16,16 +16,16 @@ from serial.tools.list_ports_common import ListPortInfo
 
 import biotac
 from biotac import HandWarning
-from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.clock import Fit
-from biotac.discovery import SerialPort
 from biotac.doctor import CATALOGUE, BoardFacts, Facts, SystemFacts, judge, udev
 from biotac.doctor.system import look
 from biotac.errors import DeviceLostError, InputError, NotAGatewayError, PortError, WireVersionError
-from biotac.frames import FRAME_DTYPE, IDLE_DTYPE
+from biotac.link.discovery import SerialPort
 from biotac.link.holders import Holder
-from biotac.stream import LinkStats
+from biotac.wire import messages_gen as wire
+from biotac.wire.batches import LinkStats
+from biotac.wire.frames import FRAME_DTYPE, IDLE_DTYPE
 
 ROOT = Path(__file__).resolve().parents[2]
 PORT = "/dev/ttyACM0"
@@ -369,7 +369,7 @@ def test_a_sensor_that_is_not_there_is_missed_when_it_is_expected(capsys, tmp_pa
 def test_a_port_that_is_not_there_and_a_stranger_on_one(capsys, scripted_board, monkeypatch) -> None:
     assert main(["doctor", "/dev/ttyNOWHERE7"]) == 1
     assert capsys.readouterr().out.startswith("error port_failed: no port /dev/ttyNOWHERE7")
-    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.02)
     stranger = scripted_board(lambda i, p: b"OK\r\n")
     assert main(["doctor", stranger.path]) == 1
     assert "error not_a_gateway" in capsys.readouterr().out
@@ -377,7 +377,7 @@ def test_a_port_that_is_not_there_and_a_stranger_on_one(capsys, scripted_board, 
 
 def test_without_permission_the_rule_is_printed(capsys, monkeypatch) -> None:
     facts = Facts(PORT, SystemFacts(permitted=False, owner="root's"), PortError("no permission"))
-    monkeypatch.setattr("biotac.cli.doctor.examine", lambda *a, **k: facts)
+    monkeypatch.setattr("biotac.cli.boards.doctor.examine", lambda *a, **k: facts)
     assert main(["doctor"]) == 1
     assert udev.rule().splitlines()[2] in capsys.readouterr().out
 
@@ -385,7 +385,7 @@ def test_without_permission_the_rule_is_printed(capsys, monkeypatch) -> None:
 def test_a_serial_number_that_nobody_has_names_those_there(capsys, monkeypatch) -> None:
     entry = ListPortInfo(PORT, skip_link_detection=True)
     entry.vid, entry.pid, entry.serial_number = wire.USB_VENDOR, wire.USB_PRODUCT, "E6605838831F5B2C"
-    monkeypatch.setattr("biotac.discovery.list_ports.comports", lambda: [entry])
+    monkeypatch.setattr("biotac.link.discovery.list_ports.comports", lambda: [entry])
     assert main(["doctor", "serial:0", "--json"]) == 1
     (finding,) = json.loads(capsys.readouterr().out)["findings"]
     assert finding["code"] == "port_failed"

@@ -15,11 +15,12 @@ from pathlib import Path
 import pytest
 
 from biotac import Calibration
-from biotac.calibration import chip as chips
-from biotac.calibration import eeprom, file, harness
-from biotac.calibration.chip import KINDS, Chip
 from biotac.cli.main import main
 from biotac.errors import InputError, PortError
+from biotac.keep import calibration_file as file
+from biotac.keep import chip as chips
+from biotac.keep import eeprom, harness
+from biotac.keep.chip import KINDS, Chip
 
 _spec = importlib.util.spec_from_file_location("fake_smbus", Path(__file__).with_name("fake_smbus.py"))
 assert _spec is not None and _spec.loader is not None

@@ -9,7 +9,7 @@ import pytest
 import biotac
 from biotac.cli.main import main
 from biotac.errors import PortError
-from biotac.link import emulated
+from biotac.sim import emulated
 
 
 @pytest.fixture

@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biotac import _sensor
-from biotac import _wire as wire
+from biotac.calibrate.wrench import contact, features
+from biotac.calibrate.wrench.features import Signals
+from biotac.calibrate.wrench.fitted import WrenchMap
 from biotac.cli.main import main
+from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
-from biotac.experiments import catalogue, estimates, plate_normal, poke, recorded, shear, torsion, torsion_shear
-from biotac.experiments.estimates import Estimate
-from biotac.experiments.outcome import Options
-from biotac.experiments.trial import MIRROR, Trial
-from biotac.sim import surface
-from biotac.wrench import contact, features
-from biotac.wrench.features import Signals
-from biotac.wrench.fitted import WrenchMap
+from biotac.lab.experiments import catalogue, estimates, plate_normal, poke, recorded, shear, torsion, torsion_shear
+from biotac.lab.experiments.estimates import Estimate
+from biotac.lab.experiments.outcome import Options
+from biotac.lab.experiments.trial import MIRROR, Trial
+from biotac.wire import messages_gen as wire
+from biotac.wire import sensor_gen as _sensor
 
 FLIP = np.array([1.0, -1.0, 1.0])  # what a mirror across y = 0 does to a force, and to a torque times -1
 

@@ -17,10 +17,10 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 import biotac
-from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.export import COLUMNS, FORMATS, PAC_COLUMNS
 from biotac.export.columns import flat_name
+from biotac.wire import messages_gen as wire
 
 FINGERS = 2
 

@@ -9,9 +9,9 @@ import pytest
 
 import biotac
 from biotac import FRAME_DTYPE, FrameFlags, QuantityFlags, Setting, TareReason, TareState
-from biotac import _wire as wire
-from biotac.finger import FINGER_DTYPE, ROUND_US, Finger, to_frames
+from biotac.core.finger import FINGER_DTYPE, ROUND_US, Finger, to_frames
 from biotac.sim import load_source, sampling
+from biotac.wire import messages_gen as wire
 
 WIRE_FIELDS = wire.DTYPES[wire.Frame.ID].names
 EVERYTHING = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE | QuantityFlags.SIGMA

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.errors import BiotacError, FlashError, InputError, NotAGatewayError
 from biotac.flash import flash, loader_drive, read_backup, read_image
 from biotac.flash.image import Image
 from biotac.flash.loader_drive import linux_folders
+from biotac.wire import messages_gen as wire
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
@@ -24,7 +24,7 @@ from fake_flash_board import NEW_SETTING, FakeBoard, make_drive, make_image, no_
 @pytest.fixture
 def fake(scripted_board, hello, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> FakeBoard:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.5)
+    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.5)
     no_waiting(monkeypatch)
     return FakeBoard(scripted_board, hello)
 
@@ -219,7 +219,7 @@ def test_a_board_without_a_loader_is_not_flashed(fake: FakeBoard, tmp_path: Path
 def test_firmware_that_does_not_answer_is_touched_only_when_told(
     fake: FakeBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.05)
+    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.05)
     fake.answers = False
     assert "--no-backup" in fails(fake, tmp_path, NotAGatewayError)
     assert fake.events == []

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from biotac import _wire as wire
 from biotac.errors import InputError
 from biotac.flash import read_image
 from biotac.flash.image import BLOCK_BYTES, FLASH_BYTES, MAPS_BYTES, SETTINGS_BYTES, note_text
+from biotac.wire import messages_gen as wire
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import _sensor as sensor
-from biotac import _wire as wire
 from biotac.cli.main import main
 from biotac.sim import load_source
+from biotac.wire import messages_gen as wire
+from biotac.wire import sensor_gen as sensor
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "btd_biotacsp" / "data.btd.gz"
 CHANNEL = {name: (sensor.CHANNEL_COMMAND[name] & 0x7E) >> 1 for name in sensor.SLOTS}

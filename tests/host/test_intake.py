@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 from deframer import Deframer, encode
 
-from biotac import _wire as wire
-from biotac.decode import STREAMED
-from biotac.stream import Batch, StreamDecoder, join
+from biotac.wire import messages_gen as wire
+from biotac.wire.batches import Batch, StreamDecoder, join
+from biotac.wire.decoder import STREAMED
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no ports by file descriptor on this system")
 START = (wire.Reply.ID, wire.Reply(1, wire.Start.ID, wire.Error.OK).pack())

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import biotac
+from biotac.calibrate.reference import Mounting, Reference, Samples
+from biotac.calibrate.reference.rdt import RdtDecoder
+from biotac.calibrate.reference.timing import align
+from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
+from biotac.calibrate.wrench.provenance import check_serial
+from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
 from biotac.recording import Recording
-from biotac.reference import Mounting, Reference, Samples
-from biotac.reference.rdt import RdtDecoder
-from biotac.reference.timing import align
-from biotac.sim import surface
 from biotac.sim.nano17 import MOUNTING, Nano17
 from biotac.sim.source import Source
-from biotac.wrench.joined import Board, board_of, choose_finger, join
-from biotac.wrench.provenance import check_serial
 
 FROM_S, TO_S = 105.0, 175.0  # of calibrate.toml: the end of its rest, then a dozen places
 
@@ -205,7 +205,7 @@ def test_the_clocks_of_unequal_rates_to_a_fraction_of_a_step() -> None:
 
 
 def test_the_hash_is_of_the_data(tmp_path: Path) -> None:
-    from biotac.wrench.provenance import of_files
+    from biotac.calibrate.wrench.provenance import of_files
 
     a, b = tmp_path / "a", tmp_path / "b"
     a.write_bytes(b"counts")

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import _wire as wire
-from biotac.hand import Hand
+from biotac.hand import queue as queue_module
+from biotac.hand.hand import Hand
+from biotac.hand.views import Latest
 from biotac.link.serial_port import SerialLink
-from biotac.live import queue as queue_module
-from biotac.live.fingers import Latest
-from biotac.stream import StreamDecoder
+from biotac.wire import messages_gen as wire
+from biotac.wire.batches import StreamDecoder
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
@@ -52,7 +52,7 @@ def live(scripted_board, hello) -> Iterator[Live]:
     live.hand.close()
 
 
-def batch_of(*frames: bytes) -> biotac.stream.Batch:
+def batch_of(*frames: bytes) -> biotac.wire.batches.Batch:
     return StreamDecoder().feed(b"".join(frames))
 
 
@@ -126,7 +126,7 @@ def test_callbacks_get_everything_until_they_unsubscribe(live: Live) -> None:
     live.hand.run()
     assert [s.quantities & wire.QuantityFlags.TOUCH for s in live.firmware.of(wire.Subscribe)] == [32]
     touch = wire.Touch(3, 30_000, 2, 1, 500)
-    live.send(frame(0), frame(1), biotac.framing.encode(touch.ID, touch.pack()), frame(2))
+    live.send(frame(0), frame(1), biotac.wire.framing.encode(touch.ID, touch.pack()), frame(2))
     live.until(lambda: live.hand[0].t_us == 20_000)
     live.hand.ping()  # behind it
     live.hand.ping()  # and everything before is dispatched when the next is read
@@ -203,7 +203,7 @@ def test_a_callback_may_give_commands(live: Live) -> None:
 
 
 def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.streaming.LIMIT_ROWS", 100)
+    monkeypatch.setattr("biotac.hand.streams.LIMIT_ROWS", 100)
     live.hand.run(queue=True)
     for seq in range(1000):
         live.send(frame(seq))

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 import biotac
-import biotac.aio
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "host" / "docs" / "examples"
 SAYS = {

@@ -11,9 +11,9 @@ from types import SimpleNamespace
 import pytest
 
 import biotac
-from biotac import _wire as wire
-from biotac.hand import Hand
+from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
+from biotac.wire import messages_gen as wire
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 

@@ -12,9 +12,9 @@ import pylsl
 import pytest
 
 import biotac
+from biotac.bridges.lsl import Outlet, samples
 from biotac.cli.main import main
 from biotac.clock import DeviceClock, pac_t_us
-from biotac.lsl import Outlet, samples
 
 PATIENCE_S = 10.0
 
@@ -54,7 +54,7 @@ def test_every_sample_arrives_at_its_device_time_on_lsls_clock(inlet) -> None:
         clock = hand.clock = DeviceClock()
         for k in range(20):
             clock.round_trip(50.0 + k, 1_000_000 * k, 50.0 + k)
-        apart_s = pylsl.local_clock() - biotac.stamps.time.monotonic()
+        apart_s = pylsl.local_clock() - biotac.clock.stamps.time.monotonic()
         outlet.push(batch)
         assert (outlet.pushed, outlet.by_arrival) == (600, 0)
         values, stamps_s = pull(frames_in, 300)

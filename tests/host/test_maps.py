@@ -16,26 +16,27 @@ from maps import BIG, make_map
 from mcap.reader import make_reader
 
 import biotac
-from biotac import CalibrationState, _map
-from biotac import _wire as wire
-from biotac.board_map import BoardBlock, BoardMap, from_blob
-from biotac.calibration import map_file
-from biotac.calibration.blob import PART_BYTES, for_any_sensor, made_s, serial
+from biotac import CalibrationState
 from biotac.cli.main import main
+from biotac.core.board_map import BoardBlock, BoardMap, from_blob
 from biotac.export.columns import tables
-from biotac.framing import encode
-from biotac.hand import Hand
-from biotac.link.sim_process import SimBoard, SimLink
+from biotac.hand.hand import Hand
+from biotac.keep import map_file
+from biotac.keep.map_blob import PART_BYTES, for_any_sensor, made_s, serial
 from biotac.recording import Recording
 from biotac.recording.recompute import recompute
+from biotac.sim.process import SimBoard, SimLink
 from biotac.sim.source import load_source
+from biotac.wire import map_gen as _map
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import fake_spidev
 from live_board import Clock, point
 
-from biotac.link import spidev_link
+from biotac.link import spidev as spidev_link
 from biotac.link.ports import start_board
 from biotac.link.serial_port import SerialLink
 
@@ -132,7 +133,7 @@ class Upload:
 
 @pytest.fixture
 def board(scripted_board, hello, monkeypatch) -> Iterator[tuple[Upload, biotac.Hand]]:
-    monkeypatch.setattr("biotac.conversation.REPLY_TIMEOUT_S", 0.05)
+    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.05)
     upload = Upload(hello)
     with biotac.open(scripted_board(upload).path) as hand:
         yield upload, hand

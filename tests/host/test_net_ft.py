@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from biotac.calibrate.reference import rdt
+from biotac.calibrate.reference.net_ft import SILENCE_S, NetFtReader, parse_address
+from biotac.calibrate.reference.samples import Samples, join
 from biotac.errors import DeviceLostError, PortError
-from biotac.reference import rdt
-from biotac.reference.net_ft import SILENCE_S, NetFtReader, parse_address
-from biotac.reference.samples import Samples, join
 from biotac.sim.nano17 import Nano17
 from biotac.sim.net_ft_box import NetFtBox, Network
 from biotac.sim.source import Source, load_source

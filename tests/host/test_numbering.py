@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from biotac.core import ffi, lib
+from biotac.core.compiled import ffi, lib
 
 
 class Loop:

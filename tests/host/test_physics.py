@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from biotac import _sensor
-from biotac.sim import sampling, surface
+from biotac.core import geometry as surface
+from biotac.sim import sampling
 from biotac.sim.physics import Finger, States
 from biotac.sim.timeline import Pose, Track
+from biotac.wire import sensor_gen as _sensor
 
 NAMES = _sensor.ELECTRODE_NAMES
 

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.calibration import file
+from biotac.calibrate.pressure import guided
+from biotac.calibrate.pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
 from biotac.cli.main import main
-from biotac.experiments import navarro, navarro_script
-from biotac.experiments.outcome import Options
-from biotac.link.sim_process import SimBoard
-from biotac.pressure import guided
-from biotac.pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
+from biotac.keep import calibration_file as file
+from biotac.lab.experiments import navarro, navarro_script
+from biotac.lab.experiments.outcome import Options
 from biotac.recording import Recording
+from biotac.sim.process import SimBoard
 from biotac.sim.source import load_source
 
 FORCES = (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)

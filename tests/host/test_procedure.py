@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac._wire import FrameFlags
+from biotac.calibrate.reference import LIN, Samples
+from biotac.calibrate.reference.csv_file import read_csv
+from biotac.calibrate.reference.samples import Reference
+from biotac.calibrate.wrench.coverage import CELLS_PER_REGION, REGIONS, Coverage, cell_of
+from biotac.calibrate.wrench.procedure import MAX_WARM_UP_S, TARE_FRAMES, Plan, Procedure, Step
+from biotac.calibrate.wrench.sources import load
+from biotac.calibrate.wrench.walk import Places, walk
 from biotac.errors import DeviceLostError, InputError
-from biotac.frames import FRAME_DTYPE
 from biotac.recording import Recording
-from biotac.reference import LIN, Samples
-from biotac.reference.csv_file import read_csv
-from biotac.reference.samples import Reference
 from biotac.sim.nano17 import Nano17
 from biotac.sim.nano17_reader import Nano17Reader
 from biotac.sim.source import load_source
-from biotac.wrench.coverage import CELLS_PER_REGION, REGIONS, Coverage, cell_of
-from biotac.wrench.procedure import MAX_WARM_UP_S, TARE_FRAMES, Plan, Procedure, Step
-from biotac.wrench.sources import load
-from biotac.wrench.walk import Places, walk
+from biotac.wire.frames import FRAME_DTYPE
+from biotac.wire.messages_gen import FrameFlags
 
 R = 5.08  # mm, Lin 2013
 

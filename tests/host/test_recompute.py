@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import _wire as wire
 from biotac.cli.main import main
-from biotac.core import reference_q4
-from biotac.streaming import RESULTS
+from biotac.core.compiled import reference_q4
+from biotac.hand.streams import RESULTS
+from biotac.wire import messages_gen as wire
 
 
 def record(

@@ -15,9 +15,9 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 import biotac
-from biotac import _wire as wire
-from biotac.framing import encode
 from biotac.recording import layout
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
 
 SOURCE = "sim:press.toml?fingers=2&seconds=4"
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 import biotac
 from biotac.cli.main import main
+from biotac.hand.streams import RESULTS
 from biotac.recording.compact import Compact, entropy_bits, load_compact, write_compact
-from biotac.streaming import RESULTS
 
 
 def test_every_integer_of_a_recording_comes_back(tmp_path) -> None:

@@ -19,8 +19,8 @@ import pytest
 from cobs import cobs
 
 import biotac
-from biotac import _wire as wire
 from biotac.cli.main import main
+from biotac.wire import messages_gen as wire
 
 FINGERS = 5
 ROUNDS_PER_S = 100

@@ -14,9 +14,9 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 import biotac
-from biotac import _wire as wire
-from biotac.framing import encode
 from biotac.recording import writer
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
 
 UNITS = (("force_n", "force_n", 1), ("poc_m", "poc_mm", 1e3), ("torque_nm", "torque_nmm", 1e3))
 SOURCE = "sim:press.toml?fingers=2&seconds=4"

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
+from biotac.calibrate.reference import LIN, Mounting, Samples
+from biotac.calibrate.reference.csv_file import CsvWriter
+from biotac.calibrate.reference.files import read_reference
+from biotac.calibrate.reference.mounting import read_mounting
+from biotac.calibrate.reference.net_ft import parse_address, read_configuration
+from biotac.calibrate.reference.rdt import HOLD_RECORDS, RdtDecoder, Scale, request
 from biotac.errors import DeviceLostError, InputError, RecordingError
-from biotac.reference import LIN, Mounting, Samples
-from biotac.reference.csv_file import CsvWriter
-from biotac.reference.files import read_reference
-from biotac.reference.mounting import read_mounting
-from biotac.reference.net_ft import parse_address, read_configuration
-from biotac.reference.rdt import HOLD_RECORDS, RdtDecoder, Scale, request
 from biotac.sim.nano17 import MOUNTING, RESOLUTION, Nano17
 from biotac.sim.source import load_source
 

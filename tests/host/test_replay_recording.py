@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import _wire as wire
 from biotac.cli.main import main
-from biotac.hand import Hand
+from biotac.hand.hand import Hand
 from biotac.link.ports import open_link
-from biotac.link.replay_link import ReplayLink, open_replay
 from biotac.recording.playback import Playback
+from biotac.recording.replay_link import ReplayLink, open_replay
+from biotac.wire import messages_gen as wire
 
 SECONDS = 4
 

@@ -87,7 +87,7 @@ def test_stamps_are_the_rounds_begin_on_the_nodes_clock(ros, monkeypatch) -> Non
     ros.up = True
     ros.parameters["port"] = "sim:press.toml?seconds=0.5"
     # Monotonic time stands still at 70 s, the node's clock says 1000 s: 930 s between them.
-    monkeypatch.setattr("biotac.stamps.time", types.SimpleNamespace(monotonic=lambda: 70.0))
+    monkeypatch.setattr("biotac.clock.stamps.time", types.SimpleNamespace(monotonic=lambda: 70.0))
     ros.now_ns = 1000 * 10**9
     fingers = node().Fingers()
     clock = DeviceClock()

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biotac import _wire
+from biotac.core import geometry as surface
 from biotac.errors import InputError
-from biotac.sim import Source, bundled_scenarios, load_source, sampling, surface, tape
+from biotac.sim import Source, bundled_scenarios, load_source, sampling, tape
 from biotac.sim.gains import fit_gains
 from biotac.sim.physics import Finger
 from biotac.sim.scenario import FAULT_CODES, parse_scenario
+from biotac.wire import messages_gen as _wire
 
 REST = '[[step]]\ndo = "rest"\nseconds = 1.0\n'
 PRESS = '[[step]]\ndo = "press"\nseconds = 0.5\nat = "E17"\nforce_n = 5.0\n'

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import _wire as wire
-from biotac.calibration import eeprom
-from biotac.calibration.chip import Chip
-from biotac.link import spidev_link
+from biotac.keep import eeprom
+from biotac.keep.chip import Chip
+from biotac.link import spidev as spidev_link
 from biotac.sim.source import load_source
-from biotac.stream import Batch
+from biotac.wire import messages_gen as wire
+from biotac.wire.batches import Batch
 
 _spec = importlib.util.spec_from_file_location("fake_spidev", Path(__file__).with_name("fake_spidev.py"))
 assert _spec is not None and _spec.loader is not None

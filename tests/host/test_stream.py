@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from tests.support.deframer import Deframer
 
-from biotac import _wire as wire
-from biotac.decode import STREAMED
-from biotac.framing import encode
-from biotac.stream import StreamDecoder
+from biotac.wire import messages_gen as wire
+from biotac.wire.batches import StreamDecoder
+from biotac.wire.decoder import STREAMED
+from biotac.wire.framing import encode
 
 
 def frame(finger: int, seq: int, t_us: int, **changes: object) -> bytes:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from biotac import _sensor as sensor
-from biotac.unroll import unroll
+from biotac.core.unroll import unroll
+from biotac.wire import sensor_gen as sensor
 
 R = 5.08
 

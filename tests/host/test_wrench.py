@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 import wrench_run
 
+from biotac.calibrate.wrench import features, figures, fitted, models, moments
+from biotac.calibrate.wrench.blocks import BLOCKS, GUARD_ROWS, Blocks
+from biotac.calibrate.wrench.crossvalidation import SHIFTS_COUNTS, Validation, predict, validate
+from biotac.calibrate.wrench.recorded import MIN_ROWS, Run, load_run
 from biotac.cli.main import main
+from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
-from biotac.sim import surface
-from biotac.wrench import features, figures, fitted, models, moments
-from biotac.wrench.blocks import BLOCKS, GUARD_ROWS, Blocks
-from biotac.wrench.crossvalidation import SHIFTS_COUNTS, Validation, predict, validate
-from biotac.wrench.recorded import MIN_ROWS, Run, load_run
 
 
 @pytest.fixture(scope="module")

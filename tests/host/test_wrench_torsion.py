@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 import wrench_run
 
+from biotac.calibrate.wrench import contact, features, figures, models, moments, template
+from biotac.calibrate.wrench.blocks import BLOCKS, Blocks
+from biotac.calibrate.wrench.crossvalidation import AIR_SHARES, validate
+from biotac.calibrate.wrench.recorded import Run, load_run
+from biotac.core import geometry as surface
 from biotac.errors import RecordingError
-from biotac.experiments import random_loads, shear_torsion
-from biotac.experiments.outcome import Options
-from biotac.sim import surface
+from biotac.lab.experiments import random_loads, shear_torsion
+from biotac.lab.experiments.outcome import Options
 from biotac.sim.physics import Finger
-from biotac.wrench import contact, features, figures, models, moments, template
-from biotac.wrench.blocks import BLOCKS, Blocks
-from biotac.wrench.crossvalidation import AIR_SHARES, validate
-from biotac.wrench.recorded import Run, load_run
 
 FRAMES = 4000
 

@@ -12,9 +12,9 @@ from deframer import encode as reference_encode
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from biotac import _wire as wire
-from biotac.decode import Decoder
-from biotac.framing import FramingCounts, encode
+from biotac.wire import messages_gen as wire
+from biotac.wire.decoder import Decoder
+from biotac.wire.framing import FramingCounts, encode
 
 OUTCOMES = {2: "too_long", 3: "bad_cobs", 4: "bad_crc", 5: "bad_length"}
 

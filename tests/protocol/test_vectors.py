@@ -12,9 +12,9 @@ import pytest
 from cobs import cobs
 from deframer import Deframer
 
-from biotac import _wire as wire
-from biotac.decode import Decoder
-from biotac.framing import FramingCounts, encode
+from biotac.wire import messages_gen as wire
+from biotac.wire.decoder import Decoder
+from biotac.wire.framing import FramingCounts, encode
 
 VECTORS = Path(__file__).resolve().parents[2] / "protocol" / "vectors"
 CHUNK_BYTES = (1, 2, 3, 5, 7, 13, 63, 64, 65, 255, 10_000)

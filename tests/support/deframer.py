@@ -8,8 +8,8 @@ import zlib
 
 from cobs import cobs
 
-from biotac import _wire as wire
-from biotac.framing import FramingCounts
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import FramingCounts
 
 CRC_BYTES = 4
 # What an older peer's message lacks at its end, and is filled up with (host/binding/decode.h).

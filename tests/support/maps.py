@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 import struct
 
-from biotac import _map
+from biotac.wire import map_gen as _map
 
 AXES = 6
 

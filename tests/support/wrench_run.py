@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from biotac.sim import surface
+from biotac.core import geometry as surface
 from biotac.sim.physics import Finger, States
 
 KEYFRAME_ROWS = 40

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 import biotac
-from biotac.stream import Batch, LinkStats, join
 from biotac.view.player import Opener, Recorded
 from biotac.view.serving import Viewing
+from biotac.wire.batches import Batch, LinkStats, join
 
 CHROMIUM = shutil.which("chromium")
 PATIENCE_MS = 20_000

@@ -11,9 +11,9 @@ import pytest
 import tomllib
 
 import biotac
-from biotac import _sensor as sensor
-from biotac import _wire as wire
-from biotac.frames import electrode_signals
+from biotac.wire import messages_gen as wire
+from biotac.wire import sensor_gen as sensor
+from biotac.wire.frames import electrode_signals
 
 ROOT = Path(__file__).parents[2]
 FLAGS = tomllib.loads((ROOT / "protocol" / "link.toml").read_text(encoding="utf-8"))["flags"]["frame"]

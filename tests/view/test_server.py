@@ -16,15 +16,15 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import _wire as wire
 from biotac.cli.main import main
-from biotac.frames import electrode_signals
 from biotac.view import check as checking
 from biotac.view.recorded import RecordedPlayer
 from biotac.view.rows import FRAME_ROW, facts, frame_rows
 from biotac.view.server import TOKEN_HEADER
 from biotac.view.serving import lasting
 from biotac.view.state import KEPT_ROWS, State, tared
+from biotac.wire import messages_gen as wire
+from biotac.wire.frames import electrode_signals
 
 
 def ask(viewing, method: str, path: str, body: object = None, **headers: str) -> tuple[int, bytes]:

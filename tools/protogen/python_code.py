@@ -1,4 +1,4 @@
-"""The host's generated modules: _sensor.py (tables), _wire.py (messages) and _map.py (wrench maps)."""
+"""The host's generated modules: sensor_gen.py (tables), messages_gen.py and map_gen.py (wrench maps)."""
 
 from __future__ import annotations
 

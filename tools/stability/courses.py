@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from biotac import _wire as wire
-from biotac.finger import Finger
-from biotac.frames import StructArray
+from biotac.core.finger import Finger
+from biotac.core.geometry import Floats
 from biotac.sim import physics, sampling
-from biotac.sim.surface import Floats
 from biotac.sim.timeline import Pose, Track
+from biotac.wire import messages_gen as wire
+from biotac.wire.frames import StructArray
 
 PAD = Pose(x_mm=-2.8, y_mm=0.0, tip_mm=2.0)  # over E17
 LEAD_S = 10.0  # of rest before anything happens: the tare is taken and the noise measured

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from biotac import FrameFlags, Setting, TareReason, TareState
-from biotac import _wire as wire
-from biotac.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM, CrossCheck
-from biotac.finger import Finger
-from biotac.frames import StructArray
+from biotac.core.finger import Finger
+from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM, CrossCheck
 from biotac.sim.timeline import Pose
+from biotac.wire import messages_gen as wire
+from biotac.wire.frames import StructArray
 
 from .courses import LEAD_S, Course, Script, Sensor, resting
 

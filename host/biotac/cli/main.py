@@ -10,30 +10,11 @@ import threading
 from collections.abc import Sequence
 
 from ..errors import BiotacError, InputError
-from . import (
-    bench,
-    calibrate,
-    calibration,
-    check,
-    demo,
-    doctor,
-    experiment,
-    export,
-    flash,
-    import_btd,
-    info,
-    list_ports,
-    lsl,
-    recompute,
-    record,
-    replay,
-    sim,
-    stream,
-    udev_setup,
-    version,
-    view,
-    wrench_map,
-)
+from . import calibrate, version
+from .boards import calibration, doctor, flash, info, list_ports, udev_setup, wrench_map
+from .lab import bench, demo, experiment
+from .live import lsl, record, sim, stream, view
+from .recordings import check, export, import_btd, recompute, replay
 
 VERBS = (
     demo, list_ports, doctor, info, view, stream, lsl, record, check, replay, recompute, export, import_btd, calibrate,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 
-from .. import _wire as wire
 from ..version import __version__
+from ..wire import messages_gen as wire
 
 NAME = "version"
 HELP = "Print the release, the wire version and the schema hash."

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import _sensor as sensor
+from ..wire import sensor_gen as sensor
 
 SLOT_US = 1e6 / sensor.SLOT_HZ
 #: From a round's t_us to its last sample: no message of the round can have left before.

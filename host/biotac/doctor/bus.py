@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from .. import _sensor as sensor
+from ..wire import sensor_gen as sensor
 from .catalogue import Finding
 from .facts import Facts
 

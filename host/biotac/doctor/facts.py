@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .. import _wire as wire
 from ..clock import Fit
-from ..compatibility import HandWarning
-from ..discovery import SerialPort
 from ..errors import BiotacError
-from ..frames import StructArray
+from ..hand.compatibility import HandWarning
+from ..link.discovery import SerialPort
 from ..link.holders import Holder
-from ..stream import LinkStats
+from ..wire import messages_gen as wire
+from ..wire.batches import LinkStats
+from ..wire.frames import StructArray
 
 
 @dataclass(frozen=True)

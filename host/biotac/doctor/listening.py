@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 
-from .._sensor import MAX_SENSORS
 from ..errors import BiotacError, PortError
-from ..hand import Hand
-from ..opening import open as open_board
-from ..stream import join
+from ..hand.hand import Hand
+from ..hand.opening import open as open_board
+from ..wire.batches import join
+from ..wire.sensor_gen import MAX_SENSORS
 from .facts import BoardFacts, Facts
 from .system import look
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..identity import ascii_text
+from ..wire.identity import ascii_text
 from .catalogue import Finding
 from .facts import BoardFacts, Facts
 

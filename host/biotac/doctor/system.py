@@ -8,9 +8,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from .. import _wire as wire
-from ..discovery import boards
+from ..link.discovery import boards
 from ..link.holders import holders
+from ..wire import messages_gen as wire
 from .facts import SystemFacts
 
 #: Where the loader's drive turns up: macOS, then Linux desktops.

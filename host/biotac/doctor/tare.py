@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .. import _wire as wire
+from ..wire import messages_gen as wire
 from .catalogue import Finding
 from .facts import BoardFacts, Facts
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .. import _sensor as sensor
+from ..wire import sensor_gen as sensor
 from .catalogue import Finding
 from .facts import BoardFacts, Facts
 

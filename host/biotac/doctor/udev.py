@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .. import _wire as wire
 from ..errors import InputError, PortError
+from ..wire import messages_gen as wire
 
 # Before 73-seat-late.rules, or uaccess comes too late to have an effect.
 RULES = Path("/etc/udev/rules.d/70-biotac.rules")

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _sensor as sensor
-from .. import _wire as wire
-from ..frames import StructArray, to_units
 from ..recording.layout import frame_id
 from ..recording.reader import Recording
+from ..wire import messages_gen as wire
+from ..wire import sensor_gen as sensor
+from ..wire.frames import StructArray, to_units
 
 AXES = ("x", "y", "z")
 PAC_SAMPLES = tuple(str(k) for k in range(22))

@@ -8,9 +8,9 @@ from importlib import import_module
 from pathlib import Path
 
 from ..errors import InputError
+from ..partial_file import whole
 from ..recording.reader import Recording
 from .columns import Table, tables
-from .partial import whole
 
 #: Told a share 0..1 of the work that is done.
 Show = Callable[[float], None]

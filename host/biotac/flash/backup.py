@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
-from .. import _wire as wire
-from ..calibration import Calibration, map_file
-from ..calibration.file import from_dict, to_dict
-from ..commands import CALIBRATION_SINCE_MINOR, MAP_SINCE_MINOR
 from ..errors import CommandRefusedError, InputError
-from ..hand import Hand
-from ..identity import board_text, serial_text, version_text
+from ..hand.commands import CALIBRATION_SINCE_MINOR, MAP_SINCE_MINOR
+from ..hand.hand import Hand
+from ..keep import Calibration, map_file
+from ..keep.calibration_file import from_dict, to_dict
+from ..wire import messages_gen as wire
+from ..wire.identity import board_text, serial_text, version_text
 
 FORMAT = "biotac settings 1"
 LAST_ID = 255

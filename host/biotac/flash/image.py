@@ -9,10 +9,10 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
-from .. import _map
-from .._sensor import MAX_SENSORS
 from ..errors import InputError
-from ..identity import board_text
+from ..wire import map_gen as _map
+from ..wire.identity import board_text
+from ..wire.sensor_gen import MAX_SENSORS
 from . import note
 from .note import Note
 

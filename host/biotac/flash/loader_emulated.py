@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from ..link.emulated import EmulatedBoard
+from ..sim.emulated import EmulatedBoard
 from .image import Image
 from .loader import Show
 

@@ -7,10 +7,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from .. import _wire as wire
 from ..errors import BiotacError, CommandRefusedError, FlashError, InputError, NotAGatewayError, WireVersionError
-from ..hand import Hand
-from ..identity import board_text, serial_text, version_text
+from ..hand.hand import Hand
+from ..wire import messages_gen as wire
+from ..wire.identity import board_text, serial_text, version_text
 from .backup import Backup, Restored, restore, save
 from .image import Image, note_text
 from .loader import Loader

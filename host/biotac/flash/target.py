@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from ..hand import Hand
+from ..hand.hand import Hand
 
 
 class Target(Protocol):

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from ..errors import InputError
-from ..hand import Hand
-from ..link.emulated import EmulatedBoard
+from ..hand.hand import Hand
 from ..link.ports import parse_sim
 from ..link.serial_port import SerialLink
+from ..sim.emulated import EmulatedBoard
 from ..sim.source import load_source
 
 BACK_S = 10.0  # of emulated time

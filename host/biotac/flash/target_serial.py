@@ -6,9 +6,9 @@ from pathlib import Path
 
 import serial
 
-from ..discovery import boards
 from ..errors import BiotacError, DeviceLostError, PortError
-from ..hand import Hand
+from ..hand.hand import Hand
+from ..link.discovery import boards
 from ..link.serial_port import SerialLink, describe_open_error
 from .waiting import wait_for
 

@@ -13,8 +13,8 @@ from .base import Link
 from .serial_port import SerialLink
 
 if TYPE_CHECKING:
+    from ..sim.process import SimBoard
     from ..sim.source import Source
-    from .sim_process import SimBoard
 
 
 @dataclass(frozen=True)
@@ -84,18 +84,18 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
     scheme, colon, _ = port.partition(":")
     if scheme in FORMS and colon:
         # Imported here: a user of a real board needs neither the physics nor its import time.
+        from ..sim.process import SimLink
         from ..sim.source import load_source
-        from .sim_process import SimLink
 
         sim = parse_sim(port, pace)
         source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
         return SimLink(port, start_board(sim.board, source, pace=sim.pace, image=sim.image))
     if scheme == "replay" and colon:
-        from .replay_link import open_replay
+        from ..recording.replay_link import open_replay
 
         return open_replay(port, pace)
     if scheme == "spidev" and colon:
-        from .spidev_link import SpidevLink
+        from .spidev import SpidevLink
 
         return SpidevLink(port)
     if colon and os.sep not in port and not port.upper().startswith("COM") and len(scheme) > 1:
@@ -111,8 +111,8 @@ def start_board(board: str, source: Source, *, pace: float, image: str | None = 
 
     Raises PortError naming what is missing and how to get it.
     """
-    from .emulated import EmulatedBoard
-    from .sim_process import SimBoard
+    from ..sim.emulated import EmulatedBoard
+    from ..sim.process import SimBoard
 
     if board == "posix":
         return SimBoard(source, pace=pace, hold=True)

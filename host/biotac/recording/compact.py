@@ -19,7 +19,7 @@ import zstandard
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from ..frames import StructArray
+from ..wire.frames import StructArray
 from .reader import Recording
 
 FORMAT_VERSION = 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from ..framing import open_frame
+from ..wire.framing import open_frame
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ import struct
 from collections.abc import Iterator
 from typing import Any
 
-from .. import _wire as wire
-from ..calibration import blob as maps
-from ..decode import Decoder
 from ..errors import InputError
-from ..framing import encode
-from ..numbering import nearest
+from ..keep import map_blob as maps
+from ..wire import messages_gen as wire
+from ..wire.counters import nearest
+from ..wire.decoder import Decoder
+from ..wire.framing import encode
 from .pieces import Piece, split
 from .reader import Recording
 

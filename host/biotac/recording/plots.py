@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from mcap.writer import Writer
 
-from .. import _wire as wire
-from ..frames import StructArray
-from ..stream import StreamDecoder
+from ..wire import messages_gen as wire
+from ..wire.batches import StreamDecoder
+from ..wire.frames import StructArray
 from . import layout
 
 RESULTS_US = 40_000  # 25 a second

@@ -14,15 +14,15 @@ from mcap.exceptions import InvalidMagic, McapError
 from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from .. import _wire as wire
-from ..calibration.blob import as_blob
-from ..calibration.file import from_dict
-from ..calibration.values import own_settings
 from ..clock import LAST_SAMPLE_US, DeviceClock
 from ..errors import InputError, RecordingError
-from ..frames import StructArray
-from ..live.gap import GAP, Gap
-from ..stream import StreamDecoder, join
+from ..hand.gap import GAP, Gap
+from ..keep.calibration_file import from_dict
+from ..keep.map_blob import as_blob
+from ..keep.values import own_settings
+from ..wire import messages_gen as wire
+from ..wire.batches import StreamDecoder, join
+from ..wire.frames import StructArray
 from . import layout
 
 

@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _sensor as sensor
-from .. import _wire as wire
-from .. import board_map
-from ..board_map import BoardMap
-from ..calibration.file import to_dict
-from ..calibration.values import own_settings
-from ..core import on_board_q4, pressure_force_100un
+from ..core import board_map
+from ..core.board_map import BoardMap
+from ..core.compiled import on_board_q4, pressure_force_100un
 from ..errors import InputError
-from ..frames import StructArray
-from ..framing import encode
-from ..streaming import RESULTS
+from ..hand.streams import RESULTS
+from ..keep.calibration_file import to_dict
+from ..keep.values import own_settings
 from ..version import __version__
+from ..wire import messages_gen as wire
+from ..wire import sensor_gen as sensor
+from ..wire.frames import StructArray
+from ..wire.framing import encode
 from .file import RecordingFile
 from .layout import maps_text
 from .pieces import split

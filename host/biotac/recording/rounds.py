@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _wire as wire
-from ..board_map import BoardMap
+from ..core.board_map import BoardMap
+from ..core.finger import FINGER_DTYPE, Finger
 from ..errors import CommandRefusedError
-from ..finger import FINGER_DTYPE, Finger
-from ..frames import StructArray
+from ..wire import messages_gen as wire
+from ..wire.frames import StructArray
 
 _FRAME_FIELDS = list(wire.DTYPES[wire.Frame.ID].names or ())
 _ROWS = 2000  # between two calls of show

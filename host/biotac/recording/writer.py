@@ -9,12 +9,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
-from .. import _wire as wire
-from ..calibration import Calibration
-from ..calibration.file import to_dict
 from ..errors import InputError
-from ..framing import OVERHEAD_BYTES
+from ..keep import Calibration
+from ..keep.calibration_file import to_dict
 from ..version import __version__
+from ..wire import messages_gen as wire
+from ..wire.framing import OVERHEAD_BYTES
 from . import layout
 from .file import RecordingFile
 

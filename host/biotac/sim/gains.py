@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._wire import SETTINGS
-from . import surface
-from .surface import Floats
+from ..core import geometry as surface
+from ..core.geometry import Floats
+from ..wire.messages_gen import SETTINGS
 
 _ARMS_MM: Floats = np.asarray(np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL), dtype=np.float64)
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from ..calibrate.reference.mounting import Mounting
+from ..calibrate.reference.rdt import ERROR_BIT, NMM_PER_NM, RECORD_DTYPE, Scale
+from ..core.geometry import Floats
 from ..errors import InputError
-from ..reference.mounting import Mounting
-from ..reference.rdt import ERROR_BIT, NMM_PER_NM, RECORD_DTYPE, Scale
 from .sampling import FRAME_S
 from .source import Source
-from .surface import Floats
 
 RESOLUTION: Floats = np.array([1 / 320] * 3 + [1 / 64] * 3)  # N, N mm
 RANGE: Floats = np.array([12.0, 12.0, 17.0, 120.0, 120.0, 120.0])

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..reference.live import ReaderStats
-from ..reference.rdt import RdtDecoder
-from ..reference.samples import Samples
+from ..calibrate.reference.live import ReaderStats
+from ..calibrate.reference.rdt import RdtDecoder
+from ..calibrate.reference.samples import Samples
 from .nano17 import SENSOR, Nano17
 from .source import Source
 

@@ -14,7 +14,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import numpy as np
 
-from ..reference import rdt
+from ..calibrate.reference import rdt
 from .nano17 import COUNTS_PER_N, COUNTS_PER_NM, Nano17
 from .source import Source
 

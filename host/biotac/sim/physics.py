@@ -14,9 +14,9 @@ from typing import Literal
 
 import numpy as np
 
-from .. import _sensor
-from . import surface
-from .surface import Floats
+from ..core import geometry as surface
+from ..core.geometry import Floats
+from ..wire import sensor_gen as _sensor
 
 Profile = Literal["new", "worn"]
 PROFILES: tuple[Profile, ...] = ("new", "worn")

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from .. import _sensor
+from ..core.geometry import Floats
+from ..wire import sensor_gen as _sensor
 from . import sampling
 from .gains import fit_gains
 from .physics import Finger
 from .scenario import Fault, FingerSpec, Scenario, default_serial
 from .source import Source, Truth
-from .surface import Floats
 
 _REPEAT_SEED_STEP = 100  # apart enough that repeated fingers do not meet the scenario's own seeds
 

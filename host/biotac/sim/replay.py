@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import _sensor
 from ..errors import RecordingError
+from ..recording.btd_file import read_btd
+from ..wire import sensor_gen as _sensor
 from . import sampling, tape
-from .btd import read_btd
 from .source import Source
 
 _TARE_FRACTION = 16  # TARE_SET: counts with four fractional bits

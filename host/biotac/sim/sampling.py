@@ -10,9 +10,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from .. import _sensor
+from ..core.geometry import Floats
+from ..wire import sensor_gen as _sensor
 from .physics import REST_CELSIUS, Finger, States
-from .surface import Floats
 
 Words = npt.NDArray[np.uint16]
 

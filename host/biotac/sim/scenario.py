@@ -26,9 +26,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from .. import _sensor
+from ..core import geometry as surface
 from ..errors import ScenarioError
-from . import surface, tape
+from ..wire import sensor_gen as _sensor
+from . import tape
 from .physics import PROFILES, Profile
 from .source import MAX_SECONDS
 from .tables import Table, parse_toml

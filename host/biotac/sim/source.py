@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from .. import _sensor
 from ..errors import InputError
+from ..wire import sensor_gen as _sensor
 
 MAX_SECONDS = 3600.0  # 5 fingers for an hour are 160 MB of counts
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from .. import _sensor
 from ..errors import InputError
+from ..wire import sensor_gen as _sensor
 from .source import Source
 
 NO_CHANNEL = 0xFFFF  # the sensor has no such channel: error word 0xA558

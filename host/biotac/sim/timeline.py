@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import surface
+from ..core import geometry as surface
+from ..core.geometry import Floats
 from .physics import REST_CELSIUS, States
-from .surface import Floats
 
 
 @dataclass(frozen=True)

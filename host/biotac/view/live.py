@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 
-from .. import _wire as wire
 from ..errors import CommandRefusedError, InputError
-from ..opening import open as open_hand
+from ..hand.opening import open as open_hand
+from ..hand.streams import RESULTS
 from ..recording import Recorder
-from ..stream import Batch, LinkStats
-from ..streaming import RESULTS
+from ..wire import messages_gen as wire
+from ..wire.batches import Batch, LinkStats
 from .player import Recorded
 
 

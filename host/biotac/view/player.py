@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..stream import Batch, LinkStats
+from ..wire.batches import Batch, LinkStats
 
 
 @dataclass(frozen=True)

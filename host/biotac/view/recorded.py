@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..frames import StructArray
-from ..numbering import nearest
 from ..recording import Recording
-from ..stream import Batch, LinkStats
+from ..wire.batches import Batch, LinkStats
+from ..wire.counters import nearest
+from ..wire.frames import StructArray
 from .live import describe
 from .player import Recorded
 

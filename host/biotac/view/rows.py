@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _sensor as sensor
-from .. import _wire as wire
-from ..frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, StructArray
-from ..stream import Batch
-from ..unroll import unroll
+from ..core.unroll import unroll
+from ..wire import messages_gen as wire
+from ..wire import sensor_gen as sensor
+from ..wire.batches import Batch
+from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, StructArray
 
 TARE_Q4_PER_COUNT = 16
 

@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass, field
 from itertools import islice
 from typing import Any
 
-from .. import _wire as wire
-from ..stream import Batch, LinkStats
+from ..wire import messages_gen as wire
+from ..wire.batches import Batch, LinkStats
 from .player import Player
 from .rows import compact, frame_rows, pac_rows
 

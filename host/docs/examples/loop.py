@@ -3,7 +3,7 @@
 import asyncio
 import sys
 
-import biotac.aio
+import biotac
 
 
 async def main(port: str) -> None:

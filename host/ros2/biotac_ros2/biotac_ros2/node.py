@@ -16,8 +16,8 @@ from std_msgs.msg import UInt32
 from std_srvs.srv import Trigger
 
 import biotac
+from biotac.clock.stamps import Stamps
 from biotac.recording.layout import frame_id
-from biotac.stamps import Stamps
 
 #: Reliable, so that every subscriber's quality of service fits; half a second of rounds.
 DEPTH = 50

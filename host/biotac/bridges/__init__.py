@@ -1,0 +1,1 @@
+"""Streams handed on to other live systems."""

@@ -1,0 +1,147 @@
+"""Fingers as Lab Streaming Layer streams, beside EEG and motion capture. Needs the extra ``lsl``.
+
+>>> import biotac
+>>> from biotac.bridges.lsl import Outlet
+>>> with biotac.open("sim:press.toml?seconds=1") as hand:
+...     with Outlet(hand) as outlet:
+...         for batch in hand.batches():
+...             outlet.push(batch)
+...         print(outlet.pushed)
+100
+"""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..clock import electrode_t_us, pac_t_us
+from ..clock.stamps import Stamps
+from ..errors import InputError
+from ..export.columns import COLUMNS, PAC_COLUMNS, Column
+from ..hand.hand import Hand
+from ..wire import sensor_gen as sensor
+from ..wire.batches import Batch
+from ..wire.frames import StructArray
+from ..wire.identity import serial_text
+from ..wire.sensor_gen import SLOTS
+
+TYPE = "Tactile"
+_SENT = ("force_n", "torque_nm", "poc_m", "flags", "counts", "pdc", "tac", "tdc")
+_FRAME_COLUMNS = tuple(column for name in _SENT for column in COLUMNS if column.name == name)
+_PAC_COLUMN = PAC_COLUMNS[-1]
+_PAC_PER_ROUND = len(_PAC_COLUMN.parts)
+
+
+class Outlet:
+    """Two streams for each finger of ``hand``; use as a context manager, and push every batch.
+
+    ``BioTac finger0``: a sample a round, 100 a second, of force (N), torque (N*m), point of contact (m), flags, counts
+    of E1..E19, PDC, TAC and TDC; NaN and 65535 where invalid, as in exports. ``BioTac finger0 PAC``: 2200 a second,
+    counts. All are double64; labels, units and meanings stand in the streams' descriptions.
+
+    Stamps are device times on ``local_clock()``, by ``hand.clock``: of a frame the beginning of its round, of PAC
+    each sample's own. Where the clock knows nothing (a simulated board's time is none), a batch is stamped by its
+    arrival, and ``by_arrival`` counts its samples. ``push`` asks the board for its time twice a second.
+
+    Raises InputError when pylsl or its liblsl is missing.
+    """
+
+    def __init__(self, hand: Hand) -> None:
+        self._lsl = _pylsl()
+        self._hand = hand
+        self.pushed = 0  #: frames so far
+        self._stamps = Stamps(hand, self._lsl.local_clock)
+        self.infos: list[Any] = []  #: pylsl.StreamInfo of each stream
+        self._outlets: dict[tuple[int, str], Any] = {}
+        rounds_hz = hand.info.slot_hz / len(SLOTS)
+        for finger in hand.fingers:
+            self._add(finger, "", _FRAME_COLUMNS, rounds_hz)
+            self._add(finger, " PAC", (_PAC_COLUMN,), rounds_hz * _PAC_PER_ROUND)
+
+    def push(self, batch: Batch) -> None:
+        """Send what ``batch`` holds. Raises DeviceLostError when the board no longer answers."""
+        self._stamps.keep()
+        for finger in self._hand.fingers:
+            frames = batch.frames[batch.frames["finger"] == finger]
+            if len(frames):
+                self._push(finger, "", samples(frames), frames["t_us"].astype(np.float64))
+                self.pushed += len(frames)
+            pac = batch.pac[batch.pac["finger"] == finger]
+            if len(pac):
+                self._push(finger, " PAC", pac["pac"].reshape(-1, 1), pac_t_us(pac["t_us"]).ravel())
+
+    def close(self) -> None:
+        """Take the streams off the network. Safe to call twice."""
+        self._outlets.clear()
+        self.infos.clear()
+
+    def __enter__(self) -> Outlet:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _add(self, finger: int, suffix: str, columns: tuple[Column, ...], rate_hz: float) -> None:
+        lsl = self._lsl
+        labels = [c for column in columns for c in channels(column)] if not suffix else [("PAC", columns[0])]
+        source = f"biotac-{serial_text(self._hand.info)}-{finger}{suffix.replace(' ', '-')}"
+        info = lsl.StreamInfo(f"BioTac finger{finger}{suffix}", TYPE, len(labels), rate_hz, lsl.cf_double64, source)
+        about = info.desc()
+        for name, value in describe(self._hand, finger).items():
+            about.append_child_value(name, value)
+        listed = about.append_child("channels")
+        for label, column in labels:
+            channel = listed.append_child("channel")
+            for name, value in (("label", label), ("unit", column.unit), ("type", TYPE), ("meaning", column.what)):
+                channel.append_child_value(name, value)
+        self.infos.append(info)
+        self._outlets[finger, suffix] = lsl.StreamOutlet(info)
+
+    def _push(self, finger: int, suffix: str, values: NDArray[Any], t_us: NDArray[np.float64]) -> None:
+        stamps_s = self._stamps.of(t_us)
+        self._outlets[finger, suffix].push_chunk(values.astype(np.float64), stamps_s.tolist())
+
+    @property
+    def by_arrival(self) -> int:
+        """Samples so far that were stamped by their arrival."""
+        return self._stamps.by_arrival
+
+
+def samples(frames: StructArray) -> NDArray[np.float64]:
+    """FRAME_DTYPE (n,) as the rows (n, 31) of a frame stream, SI units."""
+    si = {"torque_nm": frames["torque_nmm"] / 1e3, "poc_m": frames["poc_mm"] / 1e3}
+    return np.column_stack([si[name] if name in si else frames[name].astype(np.float64) for name in _SENT])
+
+
+def channels(column: Column) -> list[tuple[str, Column]]:
+    """Label and column of each component, named as in flat exports."""
+    return [(f"{column.name}_{part}", column) for part in column.parts] or [(column.name, column)]
+
+
+def describe(hand: Hand, finger: int) -> dict[str, str]:
+    """What holds for all channels of a finger's streams."""
+    late_ms = float(electrode_t_us(0.0).mean()) / 1000
+    return {
+        "manufacturer": "SynTouch",
+        "finger": str(finger),
+        "board_serial": serial_text(hand.info),
+        "port": hand.port,
+        "axes": "x to the tip, y to E11's side, z dorsal; origin at the centre of the tip sphere",
+        "stamp": f"begin of the round; its electrodes were sampled {late_ms:.2f} ms later on average",
+        "core_radius_m": f"{sensor.CORE_RADIUS_UM / 1e6:g}",
+    }
+
+
+def _pylsl() -> Any:
+    try:
+        import pylsl
+    except (ImportError, RuntimeError) as error:  # RuntimeError: pylsl is there, liblsl is not
+        seen = str(error).splitlines()[0]
+        raise InputError(f"LSL needs pylsl and liblsl ({seen}); pip install 'biotac-gateway[lsl]'") from error
+    return pylsl

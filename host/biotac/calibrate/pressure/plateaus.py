@@ -1,0 +1,240 @@
+"""Rest and held contacts in a stream of pressure: rows in, presses out, with no look ahead.
+
+A gain fitted on ramps is wrong by what the filter and the sensor lag (+3 % in a test with the paper's filter), so only
+what is held counts. Held is a matter of the pressure alone: over the latest 0.4 s, means of 0.1 s differ by no more
+than 1 % of the load, or than the noise at rest explains. (Halves would not do: at the crest of a wave they are equal.)
+What passes changes by some 3 % a second, and lags by 0.03 % where the filter's lag is a row.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...wire.frames import StructArray
+from .rows import ROW_DTYPE
+
+HZ = 100
+WINDOW_ROWS = 40
+REST_ROWS = 50
+HOLD_ROWS = 50  # of one press: the paper's n
+MOVING_SHARE = 0.01  # of the load
+NOISE_SIGMAS = 5.0
+SIGMA_FLOOR = 0.25  # counts: words are whole, a quiet sensor shows less noise than it has
+PRESS_COUNTS = 20.0  # above rest: some 0.2 N; the board's own contact takes 6
+LETTING_GO_COUNTS = PRESS_COUNTS / 2
+GIVE_UP_ROWS = 60 * HZ
+
+
+class Phase(Enum):
+    """What a finger waits for."""
+
+    REST = "rest"
+    PRESS = "press"
+    RELEASE = "release"
+    DONE = "done"
+
+
+@dataclass(frozen=True)
+class Rest:
+    """An untouched finger: mean and noise of its filtered pressure in counts, over ``rows`` rows."""
+
+    counts: float
+    sigma: float
+    rows: int
+
+
+@dataclass(frozen=True)
+class Press:
+    """One held contact: ``rows`` (n,) of ROW_DTYPE. ``number`` counts a finger's presses from 1."""
+
+    finger: int
+    number: int
+    rows: StructArray
+
+    @property
+    def above_rest(self) -> Any:
+        """P - P0 (n,) in counts, with the tare that each frame carries."""
+        return self.rows["pressure"] - self.rows["rest"]
+
+    def with_force(self, force_n: float) -> Press:
+        """The same under one force throughout, as a scale showed it."""
+        rows = self.rows.copy()
+        rows["force_n"] = force_n
+        return Press(self.finger, self.number, rows)
+
+
+def motion(values: Any) -> float:
+    """The range of the means of the four quarters of ``values``."""
+    return float(np.ptp(np.reshape(values, (4, -1)).mean(axis=1)))
+
+
+def noise(values: Any) -> float:
+    """Standard deviation of what differs from row to row, whatever the mean does meanwhile; 0 of fewer than three.
+
+    For noise through the filter with alpha = 0.5 it is that of the values themselves.
+    """
+    return float(np.diff(values).std()) if len(values) > 2 else 0.0
+
+
+def motion_limit(level: float, sigma: float) -> float:
+    """What ``motion`` may be of a window that is held at ``level`` counts above rest, with ``sigma`` of noise."""
+    # Filtered noise is correlated; with alpha = 0.5 a mean scatters by sqrt(3) more than of independent rows.
+    scatter = max(sigma, SIGMA_FLOOR) * np.sqrt(3.0 * 2.0 / (WINDOW_ROWS / 4))
+    return float(max(MOVING_SHARE * abs(level), NOISE_SIGMAS * scatter))
+
+
+class Presses:
+    """One finger through ``count`` presses. Feed it rows; it knows no clock but them, and asks nobody.
+
+    ``needs_force``: rows without a reference are not held, whatever the pressure does.
+    """
+
+    def __init__(self, finger: int, count: int, *, needs_force: bool = True) -> None:
+        self.finger = finger
+        self.phase = Phase.REST
+        self.rest: Rest | None = None
+        self.presses: list[Press] = []
+        self._count = count
+        self._needs_force = needs_force
+        self._window: deque[float] = deque(maxlen=WINDOW_ROWS)
+        self._kept: list[Any] = []
+        self._waited = 0
+        self._railed = 0
+        self._forceless = 0
+        self._most_kept = 0
+        self._most_above = -np.inf
+        self._steadiest = (np.inf, 0.0)  # motion, limit
+
+    @property
+    def done(self) -> bool:
+        """Every press was seen, and let go of."""
+        return self.phase is Phase.DONE
+
+    def feed(self, rows: StructArray) -> int:
+        """Take rows (n,) of this finger, up to the one that ends its last press; returns how many were taken.
+
+        Raises InputError when it has waited for a minute in vain, with why.
+        """
+        for k, row in enumerate(rows):
+            if self.phase is Phase.DONE:
+                return k
+            self._waited += 1
+            self._take(row)
+            if self._waited >= GIVE_UP_ROWS:
+                raise InputError(self.why())
+        return len(rows)
+
+    def finish(self) -> None:
+        """No more rows come: InputError unless every press was seen."""
+        if self.phase is Phase.RELEASE and len(self.presses) == self._count:
+            self.phase = Phase.DONE
+        if self.phase is not Phase.DONE:
+            raise InputError(self.why())
+
+    def why(self) -> str:
+        """What is waited for and what was seen of it instead, in numbers."""
+        seen = f"finger {self.finger}, {self._waited} rows"
+        if self.phase is Phase.REST:
+            return (
+                f"{seen}: never at rest: {self._most_kept} untouched rows in a row at most, "
+                f"{self._moved()}; expected {REST_ROWS}; let go of it and wait for its tare"
+            )
+        if self.phase is Phase.RELEASE:
+            return f"{seen}: press {len(self.presses)} was not let go of; expected pressure back at rest"
+        which = f"press {len(self.presses) + 1} of {self._count}"
+        if self._railed:
+            return (
+                f"{seen}: {which} was never held: pressure was at the end of its range in {self._railed} rows; "
+                "expected none; press less"
+            )
+        if self._forceless and self._forceless >= self._most_kept:
+            return (
+                f"{seen}: {which} has no reference: in {self._forceless} held rows it told no force; expected one "
+                "in each; check that it runs, its place and its times"
+            )
+        if self._most_above < PRESS_COUNTS:
+            return (
+                f"{seen}: {which} never came: pressure rose by {self._most_above:.1f} counts at most, expected "
+                f"{PRESS_COUNTS:g}; press harder, or this finger is not on the plate"
+            )
+        return (
+            f"{seen}: {which} has no plateau: {self._most_kept} held rows in a row at most, {self._moved()}; expected "
+            f"{HOLD_ROWS}; hold still for a second"
+        )
+
+    def _moved(self) -> str:
+        moved, limit = self._steadiest
+        return f"the steadiest moved by {moved:.2f} counts (limit {limit:.2f})" if np.isfinite(moved) else "none still"
+
+    def _enter(self, phase: Phase) -> None:
+        self.phase = phase
+        self._window.clear()
+        self._kept = []
+        self._waited = self._railed = self._forceless = self._most_kept = 0
+        self._most_above = -np.inf
+        self._steadiest = (np.inf, 0.0)
+
+    def _take(self, row: Any) -> None:
+        above = float(row["pressure"] - row["rest"])
+        self._railed += bool(row["railed"])
+        if np.isnan(above):
+            self._begin_again()
+            return
+        self._most_above = max(self._most_above, above)
+        if self.phase is Phase.REST:
+            self._resting(row)
+        elif self.phase is Phase.PRESS:
+            self._pressing(row, above)
+        elif above < LETTING_GO_COUNTS:
+            self._enter(Phase.PRESS if len(self.presses) < self._count else Phase.DONE)
+
+    def _begin_again(self) -> None:
+        self._window.clear()
+        self._kept = []
+
+    def _is_steady(self, pressure: float, level: float, sigma: float) -> bool:
+        self._window.append(pressure)
+        if len(self._window) < WINDOW_ROWS:
+            return False
+        moved, limit = motion(list(self._window)), motion_limit(level, sigma)
+        if moved < self._steadiest[0]:
+            self._steadiest = (moved, limit)
+        return moved <= limit
+
+    def _resting(self, row: Any) -> None:
+        if row["touched"]:
+            self._begin_again()
+            return
+        self._kept.append(float(row["pressure"]))
+        self._most_kept = max(self._most_kept, len(self._kept))
+        sigma = noise(self._kept[-REST_ROWS:])
+        if not self._is_steady(self._kept[-1], 0.0, sigma) or len(self._kept) < REST_ROWS:
+            return
+        still = self._kept[-REST_ROWS:]
+        self.rest = Rest(float(np.mean(still)), sigma, len(still))
+        self._enter(Phase.PRESS)
+
+    def _pressing(self, row: Any, above: float) -> None:
+        assert self.rest is not None
+        if above < PRESS_COUNTS:
+            self._begin_again()
+            return
+        if not self._is_steady(float(row["pressure"]), above, self.rest.sigma):
+            self._kept = []
+            return
+        if self._needs_force and np.isnan(row["force_n"]):
+            self._forceless += 1
+            self._kept = []
+            return
+        self._kept.append(row)
+        self._most_kept = max(self._most_kept, len(self._kept))
+        if len(self._kept) == HOLD_ROWS:
+            held = np.array(self._kept, ROW_DTYPE)
+            self.presses.append(Press(self.finger, len(self.presses) + 1, held))
+            self._enter(Phase.RELEASE)

@@ -1,0 +1,118 @@
+"""The same from a recording: the last press of each finger verifies what the ones before it gave."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import InputError
+from ...hand.commands import PRESSURE_SINCE_MINOR
+from ...keep import Calibration
+from ...recording import Recording
+from ...version import __version__
+from ...wire import messages_gen as wire
+from ...wire.frames import StructArray
+from ...wire.identity import ascii_text
+from . import report
+from .fit import MIN_PRESSES, fit, told_by, verify
+from .procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure
+from .reference import Series, Unknown, check_alignment
+from .report import Outcome
+from .rows import rows_of, with_filter
+
+AROUND_ROWS = 50  # of a touch, in which the plate is this finger's
+
+
+def calibrate(
+    recording: Recording,
+    reference: Series | None,
+    *,
+    fingers: Sequence[int] = (),
+    forces_n: Sequence[float] = (),
+    made_s: int = 0,
+) -> Outcome:
+    """K of each of ``fingers`` (none: all that the recording has), from all of its presses but the last.
+
+    ``reference`` has the force over the board's time; without it ``forces_n`` are what a scale showed at each press,
+    the last one's included. What the board would have told at the last press is computed by the board's own code.
+    Raises InputError for data that K cannot be had from.
+    """
+    if reference is None and not forces_n:
+        raise InputError(
+            f"{recording.path}: no force to calibrate to; expected a reference file, or the force of each press"
+        )
+    asked = tuple(forces_n) or (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)
+    if len(asked) < MIN_PRESSES + 1:
+        raise InputError(
+            f"{len(asked)} forces are named, expected {MIN_PRESSES + 1} or more: one a press, the last for verification"
+        )
+    rows = recorded_rows(recording, reference)
+    there = [int(f) for f in np.unique(rows["finger"])]
+    absent = sorted(set(fingers) - set(there))
+    if absent or not there:
+        raise InputError(
+            f"{recording.path} has no frames of finger {absent[0] if absent else 0}; it has "
+            f"{', '.join(map(str, there)) or 'none at all'}"
+        )
+    outcome = Outcome({}, {}, {}, {}, {})
+    for finger in fingers or there:
+        mine = rows[rows["finger"] == finger]
+        if reference is not None:
+            outcome.lag_rows[finger] = _lag(recording, mine, finger)
+        # One for each: in a recording they may be in any order.
+        procedure = Procedure([finger], asked, needs_force=reference is not None)
+        procedure.feed(mine)
+        procedure.finish()
+        held = procedure.presses[finger]
+        if reference is None:
+            held = [press.with_force(force) for press, force in zip(held, forces_n, strict=True)]
+        its = fit(procedure.rests[finger], held[:-1])
+        outcome.fits[finger] = its
+        outcome.verified[finger] = verify(its, told_by(held[-1], its.gain_nn))
+        own = recording.calibrations.get(finger) or Calibration().changed(recording.settings)
+        outcome.calibrations[finger] = replace(
+            own, pressure_gain_nn=its.gain_nn, serial=_serial(recording, finger), made_s=made_s
+        )
+        outcome.provenance[finger] = {
+            "software": f"biotac-gateway {__version__}",
+            "method": "pressure, Navarro 2015",
+            "from": recording.path.name,
+            "sha256": hashlib.sha256(recording.path.read_bytes()).hexdigest(),
+            "reference": reference.name if reference is not None else "typed",
+            **report.facts_of(its),
+        }
+    return outcome
+
+
+def recorded_rows(recording: Recording, reference: Series | None) -> StructArray:
+    """ROW_DTYPE rows (n,) of a whole recording, in the order of arrival.
+
+    InputError when the reference's times are not the recording's.
+    """
+    messages = recording.wire
+    if recording.info.wire_minor < PRESSURE_SINCE_MINOR:
+        messages = with_filter(messages, recording.settings[wire.Setting.PRESSURE_FILTER_MILLI])
+    t_us = recording.frames["t_us"]
+    rows = rows_of(messages, t_us, (reference or Unknown()).at(messages["finger"], t_us))
+    if reference is not None and len(rows) and np.isnan(rows["force_n"]).all():
+        first_s, last_s = t_us.min() / 1e6, t_us.max() / 1e6
+        raise InputError(
+            f"{reference.name} covers none of {len(rows)} frames, which are from {first_s:.2f} to {last_s:.2f} s of "
+            "the board's time; expected t_s in that time (its t_us / 1e6)"
+        )
+    return rows
+
+
+def _lag(recording: Recording, mine: StructArray, finger: int) -> int:
+    # One plate for all fingers: it is this one's around its own touches alone.
+    near = np.convolve(mine["touched"], np.ones(2 * AROUND_ROWS + 1), "same") > 0
+    above = np.where(near, mine["pressure"] - mine["rest"], np.nan)
+    return check_alignment(f"{recording.path}, finger {finger}", above, mine["force_n"])
+
+
+def _serial(recording: Recording, finger: int) -> str:
+    told = next((s for s in recording.sensors if s.finger == finger), None)
+    return "" if told is None else ascii_text(told.serial)

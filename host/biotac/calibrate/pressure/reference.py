@@ -1,0 +1,150 @@
+"""Where the force comes from: a magnitude in N for every frame (Eq 2), from a scenario or from a file.
+
+A force plate's own driver is not here; whatever gives newtons with device times can be a ``Reference``.
+"""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...sim.sampling import FRAME_HZ
+from ...sim.source import Source
+from . import formulas
+from .formulas import Floats
+
+LAG_ROWS = 100
+MAX_LAG_ROWS = 20  # 0.2 s: more is no transport delay but another clock; a held contact of 0.5 s bears as much
+MIN_CORRELATION = 0.9
+MAX_FORCE_N = 200.0  # what no finger bears; millinewtons and grams are beyond
+
+
+class Reference(Protocol):
+    """The force on the finger that is pressed."""
+
+    def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
+        """Magnitude (n,) in N at device times (n,), NaN where it is not known."""
+
+
+class Unknown:
+    """No force: for presses whose force is typed in later."""
+
+    def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
+        """See Reference.at."""
+        return np.full(len(t_us), np.nan)
+
+
+class Truth:
+    """What a scenario applies, or a recording of counts carries (Source.known_force_n).
+
+    The first time it is asked for is that of the source's first row with any good word.
+    """
+
+    def __init__(self, source: Source) -> None:
+        known = source.known_force_n
+        if known is None:
+            raise InputError(f"{source.name} knows no force; expected a scenario or a recording with one")
+        self._force_n = formulas.magnitude(known)
+        self._first_row = int(np.argmax(np.any(source.samples <= 4095, axis=(1, 2))))
+        self._first_us: int | None = None
+
+    @property
+    def first_us(self) -> int:
+        """Device time of the source's first row; 0 before anything was asked."""
+        return self._first_us or 0
+
+    def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
+        """See Reference.at."""
+        if not len(t_us):
+            return np.empty(0)
+        if self._first_us is None:
+            self._first_us = int(t_us.min())
+        rows = self._first_row + np.rint((t_us - self._first_us) * FRAME_HZ / 1e6).astype(np.int64)
+        inside = (rows >= 0) & (rows < len(self._force_n))
+        force = self._force_n[np.clip(rows, 0, len(self._force_n) - 1), finger]
+        return np.where(inside, force, np.nan)
+
+
+class Series:
+    """Forces over device time, straight lines between; NaN before the first and after the last.
+
+    ``t_s`` (n,) seconds of the board's time and ``force_n`` (n,) newtons; ``name`` is for messages. Raises InputError
+    for times that do not rise, NaN, no change at all, and forces that no finger bears.
+    """
+
+    def __init__(self, name: str, t_s: Floats, force_n: Floats) -> None:
+        bad = ~np.isfinite(t_s) | ~np.isfinite(force_n)
+        if len(t_s) < 2 or bad.any():
+            seen = f"{len(t_s)} rows" if len(t_s) < 2 else f"{int(bad.sum())} of {len(t_s)} rows with NaN"
+            raise InputError(f"{name} has {seen}; expected two rows or more, and a number in each")
+        if (np.diff(t_s) <= 0).any():
+            raise InputError(f"{name}: time steps back or stands in row {int(np.argmax(np.diff(t_s) <= 0)) + 2}")
+        if np.abs(force_n).max() > MAX_FORCE_N:
+            raise InputError(
+                f"{name} has forces up to {np.abs(force_n).max():.4g}, expected newtons, {MAX_FORCE_N:g} at most; "
+                "convert them"
+            )
+        self.name = name
+        self._t_s, self._force_n = t_s, force_n
+
+    def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
+        """See Reference.at; one plate for all fingers."""
+        return np.asarray(np.interp(t_us / 1e6, self._t_s, self._force_n, left=np.nan, right=np.nan), np.float64)
+
+
+def lag_rows(above_rest: Floats, force_n: Floats) -> tuple[int, float]:
+    """By how many rows pressure comes after the force, and the correlation there; both (n,), NaN left out."""
+    best = (0, -1.0)
+    for lag in range(-LAG_ROWS, LAG_ROWS + 1):
+        a = above_rest[max(lag, 0) : len(above_rest) + min(lag, 0)]
+        b = force_n[max(-lag, 0) : len(force_n) + min(-lag, 0)]
+        both = np.isfinite(a) & np.isfinite(b)
+        if both.sum() < 2 or a[both].std() == 0 or b[both].std() == 0:
+            continue
+        correlation = float(np.corrcoef(a[both], b[both])[0, 1])
+        if correlation > best[1]:
+            best = (lag, correlation)
+    return best
+
+
+def check_alignment(where: str, above_rest: Floats, force_n: Floats) -> int:
+    """Lag in rows of one finger's pressure after the force. Raises InputError when they do not belong together."""
+    lag, correlation = lag_rows(above_rest, force_n)
+    if correlation < MIN_CORRELATION or abs(lag) > MAX_LAG_ROWS:
+        raise InputError(
+            f"{where}: force and pressure are not aligned: they agree best with pressure {lag} rows after the force, "
+            f"correlation {correlation:.2f}; expected at most {MAX_LAG_ROWS} rows and {MIN_CORRELATION:g}; is it this "
+            "recording's force, in the board's own time (t_us of `biotac export`)?"
+        )
+    return lag
+
+
+def load_csv(path: Path) -> Series:
+    """A file with a head: ``t_s`` (seconds of the board's time) and ``force_n``, or ``fx_n``, ``fy_n``, ``fz_n``.
+
+    Raises InputError naming what is wrong with it.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read ({error}); expected CSV with t_s and force_n") from error
+    head = [name.strip() for name in rows[0]] if rows else []
+    axes = ["force_n"] if "force_n" in head else ["fx_n", "fy_n", "fz_n"]
+    missing = [name for name in ("t_s", *axes) if name not in head]
+    if missing:
+        raise InputError(
+            f"{path} has columns {', '.join(head) or 'none'}; expected t_s and force_n, or t_s, fx_n, fy_n and fz_n, "
+            "in seconds and newtons"
+        )
+    try:
+        values = np.array([[float(row[head.index(name)]) for name in ("t_s", *axes)] for row in rows[1:] if row])
+    except (ValueError, IndexError) as error:
+        raise InputError(f"{path} has a row that is no numbers ({error}); expected one in each column") from error
+    values = values.reshape(-1, 1 + len(axes))
+    return Series(str(path), values[:, 0], formulas.magnitude(values[:, 1:]))

@@ -1,0 +1,89 @@
+"""What a pressure calibration came to: facts for files, lines for people."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from ...errors import CommandRefusedError
+from ...keep import Calibration
+from ...keep.calibration_file import Provenance
+from .fit import Fit, Verification
+
+PAPER_ERROR = 0.0591  # relative error of the fore finger's verification press
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """By finger: K, the calibration with it, where it comes from, and the verification press.
+
+    ``verified`` is empty when no verification was asked for; ``lag_rows`` is how late pressure came after a reference
+    with times of its own; ``not_saved`` is why the board did not keep what it was asked to keep.
+    """
+
+    fits: dict[int, Fit]
+    calibrations: dict[int, Calibration]
+    provenance: dict[int, Provenance]
+    verified: dict[int, Verification]
+    lag_rows: dict[int, int] = field(default_factory=dict)
+    not_saved: CommandRefusedError | None = None
+
+
+def facts_of(its: Fit) -> Provenance:
+    """The numbers of a fit, for a file."""
+    return {
+        "finger": its.finger,
+        "gain_n": its.gain_n,
+        "rest_counts": round(its.rest.counts, 2),
+        "rows": its.rows,
+        "press_forces_n": [round(force, 4) for force in its.press_forces_n],
+        "press_counts": [round(counts, 2) for counts in its.press_counts],
+        "press_gains_n": [round(gain, 7) for gain in its.press_gains_n],
+        "relative_error": round(its.relative_error, 5),
+    }
+
+
+def facts(outcome: Outcome) -> list[dict[str, Any]]:
+    """One object a finger, JSON types only."""
+    out = []
+    for finger, its in outcome.fits.items():
+        one = facts_of(its) | {
+            "serial": outcome.calibrations[finger].serial,
+            "pressure_gain_nn": its.gain_nn,
+            "notes": list(its.notes),
+        }
+        if finger in outcome.verified:
+            verified = outcome.verified[finger]
+            one["verification"] = {
+                "force_n": round(verified.force_n, 4),
+                "told_n": round(verified.told_n, 4),
+                "board_error": round(verified.board_error, 5),
+                "float_error": round(verified.float_error, 5),
+                "apart_n": round(verified.apart_n, 7),
+            }
+        if finger in outcome.lag_rows:
+            one["lag_rows"] = outcome.lag_rows[finger]
+        out.append(one)
+    return out
+
+
+def lines(outcome: Outcome) -> list[str]:
+    """The table of K and P0, with the verification press where there was one."""
+    head = f"{'finger':>6}  {'sensor':<16}  {'K N/count':>9}  {'P0 count':>8}  {'fit':>6}"
+    out = [head + (f"  {'force N':>7}  {'told N':>7}  {'error':>6}  {'float64':>7}" if outcome.verified else "")]
+    for finger, its in outcome.fits.items():
+        serial = outcome.calibrations[finger].serial or "any"
+        line = f"{finger:>6}  {serial:<16}  {its.gain_n:>9.6f}  {its.rest.counts:>8.1f}  {its.relative_error:>6.2%}"
+        if finger in outcome.verified:
+            seen = outcome.verified[finger]
+            line += f"  {seen.force_n:>7.3f}  {seen.told_n:>7.3f}  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
+        out.append(line)
+    notes = [note for its in outcome.fits.values() for note in its.notes]
+    notes += [
+        f"finger {f}: verified {seen.board_error:.1%} off, the paper's finger was {PAPER_ERROR:.2%}: another place or "
+        "another way of pressing than before?"
+        for f, seen in outcome.verified.items()
+        if seen.board_error > PAPER_ERROR
+    ]
+    lags = [f"finger {f}: pressure comes {lag} rows after the force" for f, lag in outcome.lag_rows.items() if lag]
+    return [*out, *(f"  {note}" for note in (*notes, *lags))]

@@ -1,0 +1,141 @@
+"""References as text: a header that names every column with its unit, and a row a sample.
+
+    # sensor: ATI Nano17 FT12345
+    # mounting: {"rotation": ..., "offset_mm": ..., "reads": "force on finger"}
+    t_s,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm
+
+Units may also stand in brackets: ``Fx [N]``, ``Tx (N m)``. Columns of other names are passed over. A column without
+a unit is refused: millimetres for metres is a factor that a calibration takes without a word.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from ...errors import InputError, RecordingError
+from .mounting import Mounting, from_json
+from .samples import Floats, Reference, Samples, check, from_wrench
+
+COLUMNS = ("t_s", "Fx_N", "Fy_N", "Fz_N", "Mx_Nmm", "My_Nmm", "Mz_Nmm")
+# in the order they are wanted; torque goes by M or T
+_NAMES = ("t", "fx", "fy", "fz", "mx", "my", "mz")
+_UNITS = {"t": {"s": 1.0}, "f": {"N": 1.0}, "m": {"Nmm": 1.0, "Nm": 1000.0}}
+_COLUMN = re.compile(r"^(t|time|[FMT][xyz])(?:\s*[\[(]\s*([^\])]*?)\s*[\])]|_(.+))?$", re.IGNORECASE)
+_WANTED = "t in s, forces in N, torques in N mm or N m"
+
+
+def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
+    """The reference in ``path``; ``mounting`` takes the place of the file's own.
+
+    Raises RecordingError for what cannot be read or believed, with its line.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        seen = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise RecordingError(f"{path}: cannot be read ({seen}): expected a CSV file of a force/torque sensor") from None
+    own, head, body = _split(text)
+    if head is None:
+        raise RecordingError(f"{path}: no header line: expected {','.join(COLUMNS)}")
+    its_mounting = mounting
+    if its_mounting is None and "mounting" in own:
+        its_mounting = from_json(own["mounting"], f"{path}: line '# mounting:'")
+    if its_mounting is None:
+        raise RecordingError(
+            f"{path}: says nothing of how the sensor is fixed to the finger: expected --mounting FILE.toml, or "
+            "--mounting lin where axes and origin are Lin's already"
+        )
+    separator = max(",;\t", key=head.count)
+    use, scale = _columns(path, head.split(separator))
+    try:
+        table = np.loadtxt(io.StringIO(body), delimiter=separator, usecols=use, ndmin=2, dtype=np.float64)
+    except ValueError as error:
+        raise RecordingError(
+            f"{path}: {error}: expected a number in every column; save it with decimal points"
+        ) from None
+    wrench = table[:, 1:] * scale
+    samples = from_wrench(table[:, 0], wrench)
+    check(str(path), samples)
+    return Reference(path.name, samples, its_mounting, own.get("sensor", ""))
+
+
+def _split(text: str) -> tuple[dict[str, str], str | None, str]:
+    """What '# key: value' lines say, the header, and the rest."""
+    own: dict[str, str] = {}
+    rest = text
+    while rest:
+        line, _, rest = rest.partition("\n")
+        line = line.strip()
+        if line.startswith("#"):
+            key, colon, value = line.lstrip("# ").partition(":")
+            if colon:
+                own[key.strip()] = value.strip()
+        elif line:
+            return own, line, rest
+    return own, None, ""
+
+
+def _columns(path: Path, names: list[str]) -> tuple[list[int], Floats]:
+    """Which columns are t, F and M, and what they are multiplied by."""
+    found: dict[str, tuple[int, float]] = {}
+    for place, cell in enumerate(names):
+        match = _COLUMN.match(cell.strip().strip('"'))
+        if match is None:
+            continue
+        word = match[1].lower()
+        name = "t" if word in ("t", "time") else word.replace("t", "m", 1)
+        unit = match[2] or match[3]
+        if not unit:
+            raise RecordingError(f"{path}: column {cell.strip()!r} has no unit: expected {_WANTED}, as in {COLUMNS[4]}")
+        factor = _UNITS[name[0]].get(re.sub(r"[\s*.·-]", "", unit))
+        if factor is None:
+            raise RecordingError(f"{path}: column {cell.strip()!r} is in {unit!r}: expected {_WANTED}; convert it")
+        if name in found:
+            raise RecordingError(f"{path}: column {cell.strip()!r} is there twice: expected it once; remove one")
+        found[name] = (place, factor)
+    torques = [name for name in _NAMES[4:] if name in found]
+    wanted = _NAMES if torques else _NAMES[:4]
+    missing = [COLUMNS[_NAMES.index(name)] for name in wanted if name not in found]
+    if missing:
+        raise RecordingError(f"{path}: no column {missing[0]}: expected {','.join(COLUMNS)}, or those without torque")
+    return [found[name][0] for name in wanted], np.array([found[name][1] for name in wanted[1:]])
+
+
+class CsvWriter:
+    """A reference being written; every ``add`` is handed to the operating system, so that a kill loses nothing.
+
+    Raises InputError when ``path`` exists and may not be overwritten, or cannot be written.
+    """
+
+    def __init__(self, path: Path, mounting: Mounting, sensor: str, *, overwrite: bool = False) -> None:
+        self.path = path
+        try:
+            self._stream: TextIO = path.open("w" if overwrite else "x", encoding="utf-8", newline="\n")
+        except FileExistsError:
+            raise InputError(f"{path} exists and would be overwritten; choose another name or say --force") from None
+        except OSError as error:
+            raise InputError(f"{path} cannot be written ({error.strerror}); choose another place") from None
+        self._stream.write(f"# sensor: {' '.join(sensor.split())}\n# mounting: {json.dumps(mounting.facts())}\n")
+        self._stream.write(",".join(COLUMNS) + "\n")
+        self._stream.flush()
+
+    def add(self, samples: Samples) -> None:
+        """Append; six axes."""
+        if len(samples):
+            np.savetxt(
+                self._stream,
+                np.column_stack([samples.t_s, samples.wrench()]),
+                fmt=["%.6f", *["%.6g"] * 6],
+                delimiter=",",
+            )
+            self._stream.flush()
+
+    def close(self) -> None:
+        """Safe to call twice."""
+        self._stream.close()

@@ -1,0 +1,28 @@
+"""References from files, by suffix."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...errors import InputError
+from .csv_file import read_csv
+from .mcap_file import read_mcap
+from .mounting import Mounting
+from .samples import Reference
+
+
+def read_reference(text: str, mounting: Mounting | None = None) -> Reference:
+    """``FILE.csv``, or ``FILE.mcap`` with one wrench topic, or ``FILE.mcap:TOPIC``.
+
+    ``mounting`` takes the place of what the file says. Raises InputError (RecordingError for the content).
+    """
+    name, colon, topic = text.rpartition(":")
+    if colon and name.lower().endswith(".mcap"):
+        return read_mcap(Path(name), mounting, topic)
+    path = Path(text)
+    suffix = path.suffix.lower()
+    if suffix == ".mcap":
+        return read_mcap(path, mounting)
+    if suffix in (".csv", ".tsv", ".txt"):
+        return read_csv(path, mounting)
+    raise InputError(f"{text}: unknown kind of reference: expected .csv, or .mcap with geometry_msgs WrenchStamped")

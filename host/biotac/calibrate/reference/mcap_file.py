@@ -1,0 +1,96 @@
+"""References as geometry_msgs WrenchStamped in an MCAP file: ROS 2 bags (CDR) or JSON, as Foxglove writes it.
+
+ROS fixes the units, N and N m (REP 103), and the message has its own stamp, so nothing is guessed.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+
+from ...errors import InputError, RecordingError
+from .mounting import Mounting
+from .samples import Reference, check, from_wrench
+
+SCHEMAS = ("geometry_msgs/msg/WrenchStamped", "geometry_msgs/WrenchStamped")
+NMM_PER_NM = 1000.0
+_AXES = ("x", "y", "z")
+
+Row = tuple[float, list[float]]
+
+
+def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -> Reference:
+    """The wrench of ``topic``, or of the only such topic.
+
+    Raises RecordingError for a file without one, InputError where CDR needs an extra that is not installed.
+    """
+    if mounting is None:
+        raise RecordingError(
+            f"{path}: a WrenchStamped says nothing of how the sensor is fixed to the finger: expected --mounting "
+            "FILE.toml, or --mounting lin where axes and origin are Lin's already"
+        )
+    rows: dict[str, list[Row]] = {}
+    decoders: dict[str, Callable[[bytes], Row]] = {}
+    seen: set[str] = set()
+    try:
+        with path.open("rb") as stream:
+            for schema, channel, message in make_reader(stream).iter_messages():
+                seen.add(f"{channel.topic} ({schema.name if schema else 'no schema'})")
+                if schema is None or schema.name not in SCHEMAS or (topic is not None and channel.topic != topic):
+                    continue
+                if channel.topic not in decoders:
+                    decoders[channel.topic] = _decoder(path, channel.message_encoding)
+                rows.setdefault(channel.topic, []).append(decoders[channel.topic](message.data))
+    except (OSError, McapError, struct.error, KeyError, TypeError, ValueError, AttributeError) as error:
+        raise RecordingError(f"{path}: cannot be read ({error}): expected an MCAP file with {SCHEMAS[0]}") from None
+    if len(rows) != 1:
+        known = ", ".join(sorted(rows)) or ", ".join(sorted(seen)[:6]) or "no message"
+        cure = "name one: --reference FILE:TOPIC" if rows else "record the sensor's topic too"
+        raise RecordingError(f"{path}: holds {known}: expected one topic of {SCHEMAS[0]}; {cure}")
+    ((name, its),) = rows.items()
+    its.sort(key=lambda row: row[0])  # a bag is in order of arrival, the stamps are the sensor's
+    samples = from_wrench(np.array([t for t, _ in its]), np.array([w for _, w in its]))
+    check(f"{path} {name}", samples)
+    return Reference(path.name, samples, mounting, name)
+
+
+def _decoder(path: Path, encoding: str) -> Callable[[bytes], Row]:
+    if encoding == "json":
+        return _from_json
+    if encoding != "cdr":
+        raise RecordingError(f"{path}: messages are {encoding!r}: expected json or cdr (ROS 2); convert the bag")
+    try:
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise InputError(
+            f"{path} is a ROS 2 bag, which needs the package rosbags; install it: pip install 'biotac-gateway[ros2]'"
+        ) from None
+    store = get_typestore(Stores.ROS2_HUMBLE)
+
+    def from_cdr(data: bytes) -> Row:
+        return _row(store.deserialize_cdr(data, SCHEMAS[0]))
+
+    return from_cdr
+
+
+def _row(message: Any) -> Row:
+    stamp, wrench = message.header.stamp, message.wrench
+    force = [float(getattr(wrench.force, axis)) for axis in _AXES]
+    return stamp.sec + stamp.nanosec * 1e-9, force + [NMM_PER_NM * float(getattr(wrench.torque, a)) for a in _AXES]
+
+
+def _from_json(data: bytes) -> Row:
+    message = json.loads(data)
+    stamp, wrench = message["header"]["stamp"], message["wrench"]
+    # ROS 2 and ROS 1 call the same thing nanosec and nsec
+    nanosec = stamp["nanosec"] if "nanosec" in stamp else stamp["nsec"]
+    second = stamp["sec"] if "sec" in stamp else stamp["secs"]
+    force = [float(wrench["force"][axis]) for axis in _AXES]
+    return float(second) + float(nanosec) * 1e-9, force + [NMM_PER_NM * float(wrench["torque"][a]) for a in _AXES]

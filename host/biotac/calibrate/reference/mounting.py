@@ -1,0 +1,127 @@
+"""How a force/torque sensor is fixed to a finger: what turns its axes and its origin into Lin's.
+
+The sensor has to move with the finger (it carries the finger, or the finger's holder), so that one rotation and one
+offset hold for the whole run. A file says it in TOML:
+
+    rotation = [[0, 1, 0], [1, 0, 0], [0, 0, -1]]  # rows: Lin's x, y, z in the sensor's axes
+    offset_mm = [-30.0, 0.0, 12.0]                 # the sensor's origin, seen from Lin's
+    reads = "force on finger"                      # or "force on sensor", its opposite
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+from ...errors import InputError
+
+Floats = npt.NDArray[np.float64]
+
+READS = ("force on finger", "force on sensor")
+MAX_SKEW = 1e-3  # of R R' - 1: three decimals in a file are a rotation, a forgotten minus is not
+MAX_OFFSET_MM = 500.0
+KEYS = ("rotation", "offset_mm", "reads")
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """``rotation`` (3, 3) takes vectors of the sensor's axes to Lin's; ``offset_mm`` (3,) is the sensor's origin
+    in Lin's frame; ``sign`` is -1 where it reads the force on itself. Raises InputError for what is no rotation.
+    """
+
+    rotation: Floats
+    offset_mm: Floats
+    sign: float = 1.0
+
+    def __post_init__(self) -> None:
+        rotation, offset = self.rotation, self.offset_mm
+        if rotation.shape != (3, 3) or not np.isfinite(rotation).all():
+            raise InputError(f"rotation has shape {rotation.shape}: expected 3 rows of 3 numbers")
+        if offset.shape != (3,) or not np.isfinite(offset).all() or np.abs(offset).max() > MAX_OFFSET_MM:
+            raise InputError(f"offset_mm is {offset.tolist()}: expected 3 numbers of up to {MAX_OFFSET_MM:g} mm")
+        skew = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+        if skew > MAX_SKEW:
+            raise InputError(
+                f"rotation is not orthonormal, R R' is off by {skew:.3g}: expected at most {MAX_SKEW:g}; its rows are "
+                "unit vectors at right angles"
+            )
+        if np.linalg.det(rotation) < 0.0:
+            raise InputError("rotation mirrors, its determinant is -1: expected +1; change the sign of one row")
+
+    def to_finger(self, wrench: Floats) -> Floats:
+        """Force on the finger, and moment about Lin's origin, of readings (n, 3) or (n, 6)."""
+        force: Floats = self.sign * wrench[:, :3] @ self.rotation.T
+        if wrench.shape[1] == 3:
+            return force
+        moment = self.sign * wrench[:, 3:] @ self.rotation.T + np.cross(self.offset_mm, force)
+        return np.column_stack([force, moment])
+
+    def to_sensor(self, wrench: Floats) -> Floats:
+        """What the sensor reads of a wrench (n, 6) in Lin's frame: to_finger turned round."""
+        force = wrench[:, :3]
+        moment = wrench[:, 3:] - np.cross(self.offset_mm, force)
+        return self.sign * np.column_stack([force @ self.rotation, moment @ self.rotation])
+
+    def facts(self) -> dict[str, Any]:
+        """As JSON types; of() takes them back."""
+        reads = READS[0] if self.sign > 0 else READS[1]
+        return {"rotation": self.rotation.tolist(), "offset_mm": self.offset_mm.tolist(), "reads": reads}
+
+
+#: Axes and origin are Lin's already, and the force is that on the finger.
+LIN = Mounting(np.eye(3), np.zeros(3))
+
+
+def of(facts: Mapping[str, Any], where: str) -> Mounting:
+    """A mounting from its three values. Raises InputError that begins with ``where``."""
+    missing, unknown = [key for key in KEYS if key not in facts], sorted(set(facts) - set(KEYS))
+    if missing or unknown:
+        seen = f"{missing[0]} is missing" if missing else f"{unknown[0]!r} is no part of it"
+        raise InputError(f"{where}: {seen}: expected {', '.join(KEYS)}")
+    if facts["reads"] not in READS:
+        raise InputError(f"{where}: reads is {facts['reads']!r}: expected {READS[0]!r} or {READS[1]!r}")
+    try:
+        rotation = np.array(facts["rotation"], dtype=np.float64)
+        offset = np.array(facts["offset_mm"], dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{where}: rotation or offset_mm holds no numbers: expected 3 by 3 and 3 of them") from None
+    try:
+        return Mounting(rotation, offset, 1.0 if facts["reads"] == READS[0] else -1.0)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def read_mounting(text: str) -> Mounting:
+    """From a TOML file, or the word ``lin``. Raises InputError naming what is wrong in it."""
+    if text == "lin":
+        return LIN
+    path = Path(text)
+    try:
+        facts = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        seen = error.strerror if isinstance(error, OSError) else str(error)
+        raise InputError(f"{path}: {seen}: expected a mounting in TOML, with {', '.join(KEYS)}, or lin") from None
+    return of(facts, str(path))
+
+
+def from_json(text: str, where: str) -> Mounting:
+    """From one line of JSON, as a recorded reference has it."""
+    try:
+        facts = json.loads(text)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}: expected a mounting as JSON") from None
+    if not isinstance(facts, dict):
+        raise InputError(f"{where}: {text[:40]!r}: expected an object with {', '.join(KEYS)}")
+    return of(facts, where)

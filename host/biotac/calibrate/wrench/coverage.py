@@ -1,0 +1,131 @@
+"""What of a finger's surface and of the directions of force a calibration has seen, and in words what it has not.
+
+Judged by the reference alone: its wrench says where the finger is touched and how, without any model of the
+sensor that is being calibrated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core import geometry as surface
+from . import contact
+from .recorded import Floats
+
+Bools = npt.NDArray[np.bool_]
+
+REGIONS = ("tip", "pad", "side of E11", "side of E1")
+CELLS_PER_REGION = 8
+WAYS = ("shear to the tip", "shear from the tip", "shear to E11's side", "shear to E1's side", "twist one way",
+        "twist the other way")  # fmt: skip
+FORCES = ("light press", "firm press")
+
+SIDE_DEG = 30.0  # around the finger, from the pad's middle: beyond, it is a side
+EDGE_DEG = 85.0
+TIP_UP_DEG = 32.0  # half of what a flat plate reaches of the tip
+
+
+@dataclass(frozen=True)
+class Demands:
+    """When a place, a direction or a force counts as seen, and when that is enough.
+
+    ``seconds`` of it in a cell, and in each region for a direction; ``cells`` of the 8 of each region, and
+    ``force_cells`` of them with a light press and with a firm one.
+    """
+
+    touch_n: float = 1.0
+    light_n: float = 3.0  # up to this, from touch_n
+    firm_n: float = 4.0
+    shear_n: float = 0.4
+    twist_nmm: float = 1.5
+    seconds: float = 0.25
+    cells: int = 6
+    force_cells: int = 4
+
+
+@dataclass
+class Coverage:
+    """Seconds seen of every cell (4 regions, 8 cells), way (4, 6) and force in a cell (4, 8, 2)."""
+
+    demands: Demands = field(default_factory=Demands)
+    cells_s: Floats = field(default_factory=lambda: np.zeros((len(REGIONS), CELLS_PER_REGION)))
+    ways_s: Floats = field(default_factory=lambda: np.zeros((len(REGIONS), len(WAYS))))
+    forces_s: Floats = field(default_factory=lambda: np.zeros((len(REGIONS), CELLS_PER_REGION, len(FORCES))))
+
+    def add(self, wrench: Floats, step_s: float) -> None:
+        """Take wrenches (n, 6) on the finger in Lin's frame, each of which lasted ``step_s``."""
+        its = self.demands
+        wrench = wrench[np.isfinite(wrench).all(axis=1)]
+        wrench = wrench[np.linalg.norm(wrench[:, :3], axis=1) > its.touch_n]
+        if not len(wrench):
+            return
+        found = contact.locate(wrench[:, :3], wrench[:, 3:])
+        there = found.on_skin & ~found.missed & (found.normal_force_n > its.touch_n)
+        region, cell = cell_of(found.point_mm[there], found.normal[there])
+        np.add.at(self.cells_s, (region, cell), step_s)
+        normal, pressed = found.normal[there], found.normal_force_n[there]
+        to_tip, to_side = surface.tangents_at(normal)
+        along, across = (
+            (wrench[there, :3] * to_tip).sum(axis=1),
+            (wrench[there, :3] * to_side).sum(axis=1),
+        )
+        twist = found.torsion_nmm[there]
+        seen = [along > its.shear_n, along < -its.shear_n, across > its.shear_n, across < -its.shear_n]
+        seen += [twist > its.twist_nmm, twist < -its.twist_nmm]
+        for way, hit in enumerate(seen):
+            np.add.at(self.ways_s[:, way], region[hit], step_s)
+        for force, hit in enumerate((pressed < its.light_n, pressed > its.firm_n)):
+            np.add.at(self.forces_s[:, :, force], (region[hit], cell[hit]), step_s)
+
+    @property
+    def cells(self) -> npt.NDArray[np.int64]:
+        """How many of the 8 cells of each region (4,) have been seen."""
+        result: npt.NDArray[np.int64] = (self.cells_s >= self.demands.seconds).sum(axis=1)
+        return result
+
+    @property
+    def complete(self) -> bool:
+        """Nothing is missing."""
+        return not self.missing()
+
+    def missing(self) -> list[str]:
+        """A line for each region that lacks something, the emptiest first."""
+        its = self.demands
+        lines: list[tuple[int, str]] = []
+        for region, name in enumerate(REGIONS):
+            have = int(self.cells[region])
+            parts = [f"{have} of {CELLS_PER_REGION} cells"] if have < its.cells else []
+            if have:  # of an untouched region there is no more to say
+                pressed = (self.forces_s[region] >= its.seconds).sum(axis=0).tolist()
+                for word, count in zip(FORCES, pressed, strict=True):
+                    if count < its.force_cells:
+                        parts.append(f"{word} in {count} of {its.force_cells} cells" if count else f"no {word}")
+                seen = zip(WAYS, self.ways_s[region], strict=True)
+                parts += [f"no {word}" for word, seconds in seen if seconds < its.seconds]
+            if parts:
+                lines.append((have, f"{name}: {'; '.join(parts)}"))
+        return [line for _, line in sorted(lines, key=lambda entry: entry[0])]
+
+    def summary(self) -> str:
+        """One line: cells a region."""
+        return ", ".join(f"{name} {k}/{CELLS_PER_REGION}" for name, k in zip(REGIONS, self.cells, strict=True))
+
+
+def cell_of(point_mm: Floats, normal: Floats) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Region and cell (n,) each of contacts (n, 3) on the ventral surface with outward normals (n, 3).
+
+    Pad and sides are cut into four along and two across, the tip into two up and four around.
+    """
+    around = np.degrees(np.arctan2(normal[:, 1], -normal[:, 2]))
+    up = np.degrees(np.arcsin(np.clip(normal[:, 0], 0.0, 1.0)))
+    tip = point_mm[:, 0] > 0.0
+    region = np.where(tip, 0, np.where(np.abs(around) <= SIDE_DEG, 1, np.where(around > 0.0, 2, 3)))
+    along = np.clip((point_mm[:, 0] / surface.PROXIMAL_END_MM * 4.0).astype(np.intp), 0, 3)
+    half = (SIDE_DEG + EDGE_DEG) / 2.0
+    across = np.where(region == 1, around > 0.0, np.abs(around) > half).astype(np.intp)
+    quarter = np.clip((around / SIDE_DEG / 1.2 + 2.0).astype(np.intp), 0, 3)
+    cell = np.where(tip, 4 * (up > TIP_UP_DEG) + quarter, 2 * along + across)
+    return region.astype(np.intp), cell.astype(np.intp)

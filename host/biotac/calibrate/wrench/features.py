@@ -1,0 +1,195 @@
+"""What the models are linear in: one row of features a frame, block by block.
+
+A block is a kind of column times a gate, e.g. the compressions times how far along the finger the contact
+lies (protocol/map.toml). Every model is a choice of blocks, and a board's map is a list of them. Features are
+functions of one frame's tared counts alone (and of PDC where there is one), so a frame can be checked by itself
+and at any drift. Columns are scaled to be of the order of one; none is centred or standardised by the run
+itself, because a fitted map has to mean the same on the next run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core import geometry as surface
+from ...wire import map_gen as _map
+from ...wire import sensor_gen as _sensor
+from ...wire.map_gen import Gate, Kind
+from .recorded import Floats
+
+ELECTRODES = len(_sensor.ELECTRODE_NAMES)
+SIGNAL_COUNTS = 500.0  # a firm press; only sets the columns' size
+PRESSURE_COUNTS = 100.0
+REACH_MM = (_map.REACH_X_UM / 1000, _map.REACH_Y_UM / 1000)
+STRAIGHT = (Gate.ONE, Gate.X, Gate.Y)
+
+_UPPER = np.triu_indices(ELECTRODES)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A range of columns: those of ``kind``, each times the scalar ``gate``."""
+
+    kind: Kind
+    gate: Gate
+
+    @property
+    def width(self) -> int:
+        """Columns."""
+        return _map.KINDS[self.kind].columns
+
+
+def _blocks(kinds: Iterable[Kind], gates: Iterable[Gate] = (Gate.ONE,)) -> tuple[Block, ...]:
+    several = tuple(kinds)
+    return tuple(Block(kind, gate) for gate in gates for kind in several)
+
+
+_SIGNAL = _blocks([Kind.SIGNAL])
+_SIGNAL_PAIRS = _blocks([Kind.SIGNAL_PAIRS])
+_CONDUCTANCE = _blocks([Kind.CONDUCTANCE])
+_CONDUCTANCE_PAIRS = _blocks([Kind.CONDUCTANCE_PAIRS])
+_SPLIT = (Kind.COMPRESSION, Kind.BULGE)  # different physics (biotac.md finding 4)
+_PRESSURE = _blocks([Kind.PRESSURE], Gate)
+
+# PRESSURE last: a run without PDC has the columns before it
+BLOCKS = (*_SIGNAL, *_SIGNAL_PAIRS, *_CONDUCTANCE, *_CONDUCTANCE_PAIRS, *_blocks(_SPLIT, Gate), *_PRESSURE)
+
+
+def blocks(*, with_pdc: bool) -> tuple[Block, ...]:
+    """The blocks of columns(), in their order."""
+    return BLOCKS if with_pdc else BLOCKS[: -len(_PRESSURE)]
+
+
+def width(*, with_pdc: bool) -> int:
+    """Columns of columns()."""
+    return sum(block.width for block in blocks(with_pdc=with_pdc))
+
+
+@dataclass(frozen=True)
+class Signals:
+    """One row a frame: ``e`` (n, 19) counts above ``tare`` (19,), ``pdc`` (n,) counts above rest or None."""
+
+    e: Floats
+    tare: Floats
+    pdc: Floats | None = None
+
+    def drifted(self, counts: Floats) -> Signals:
+        """As if every row had drifted by ``counts`` (19,)."""
+        return Signals(self.e + counts, self.tare, self.pdc)
+
+
+@dataclass(frozen=True)
+class Family:
+    """The blocks that a model uses, in the order of BLOCKS; PRESSURE only where it was recorded.
+
+    The columns of ``straight``, blocks whose gate is ONE, are to first order e divided by ``scale(tare)``
+    (19,) counts; that is how Lin's sums are written in them, which is what ridge shrinks toward.
+    """
+
+    blocks: tuple[Block, ...]
+    straight: tuple[Block, ...]
+    scale: Callable[[Floats], Floats]
+
+    def index(self, columns: int) -> npt.NDArray[np.intp]:
+        """Places of the family's columns among all ``columns`` of columns()."""
+        own = self._own(with_pdc=columns == width(with_pdc=True))
+        return np.concatenate([_place(block) for block in own])
+
+    def unit(self, tare: Floats, columns: int) -> Floats:
+        """(columns, 19): the family's own ``columns`` @ this is e in counts, to first order."""
+        with_pdc = columns == sum(block.width for block in self.blocks)
+        parts = [
+            np.diag(self.scale(tare)) if block in self.straight else np.zeros((block.width, ELECTRODES))
+            for block in self._own(with_pdc=with_pdc)
+        ]
+        return np.concatenate(parts)
+
+    def _own(self, *, with_pdc: bool) -> list[Block]:
+        return [block for block in blocks(with_pdc=with_pdc) if block in self.blocks]
+
+
+def columns(signals: Signals) -> Floats:
+    """All features (n, 646), or (n, 652) with PDC, in the order of blocks()."""
+    found, at = kinds(signals), gates(signals.e)
+    parts = []
+    for block in blocks(with_pdc=signals.pdc is not None):
+        kind = found[block.kind]
+        parts.append(kind if block.gate == Gate.ONE else kind * at[block.gate])
+    return np.concatenate(parts, axis=1)
+
+
+def kinds(signals: Signals) -> dict[Kind, Floats]:
+    """Each kind's columns (n, width); PRESSURE only where there is one."""
+    e = signals.e / SIGNAL_COUNTS
+    conductance = conductance_change(signals.e, signals.tare)
+    result = {
+        Kind.OFFSET: np.ones((len(e), 1)),
+        Kind.SIGNAL: e,
+        Kind.SIGNAL_PAIRS: _products(e),
+        Kind.CONDUCTANCE: conductance,
+        Kind.CONDUCTANCE_PAIRS: _products(conductance),
+        Kind.COMPRESSION: np.minimum(e, 0.0),
+        Kind.BULGE: np.maximum(e, 0.0),
+    }
+    if signals.pdc is not None:
+        result[Kind.PRESSURE] = signals.pdc[:, None] / PRESSURE_COUNTS
+    return result
+
+
+def gates(e: Floats) -> dict[Gate, Floats]:
+    """Each gate (n, 1)."""
+    centre = centroid_mm(e)
+    x, y = centre[:, :1] / REACH_MM[0], centre[:, 1:2] / REACH_MM[1]
+    return {Gate.ONE: np.ones_like(x), Gate.X: x, Gate.Y: y, Gate.XX: x * x, Gate.XY: x * y, Gate.YY: y * y}
+
+
+def conductance_change(e: Floats, tare: Floats) -> Floats:
+    """Electrodes' conductance (n, 19) over that at rest, less one."""
+    count = np.clip(e + tare, _map.COUNT_MIN, _map.COUNT_MAX)
+    at_rest = np.clip(tare, _map.COUNT_MIN, _map.COUNT_MAX)
+    # a wet or shorted electrode must not square to anything
+    return np.clip(_conductance(count) / _conductance(at_rest) - 1.0, -1.0, _map.RATIO_MAX)
+
+
+def centroid_mm(e: Floats) -> Floats:
+    """Centroid (n, 3) of the compressed electrodes in mm; the middle of all when none is compressed."""
+    weights = np.maximum(-e, 0.0) + _map.FLOOR_COUNTS
+    centre: Floats = weights @ surface.ELECTRODE_MM / weights.sum(axis=1, keepdims=True)
+    return centre
+
+
+def _place(block: Block) -> npt.NDArray[np.intp]:
+    start = sum(other.width for other in BLOCKS[: BLOCKS.index(block)])
+    return np.arange(start, start + block.width)
+
+
+def _conductance(count: Floats) -> Floats:
+    return count / (_sensor.FULL_SCALE_COUNT - count)
+
+
+def _products(of: Floats) -> Floats:
+    products: Floats = of[:, _UPPER[0]] * of[:, _UPPER[1]]
+    return products
+
+
+def _counts_scale(tare: Floats) -> Floats:
+    return np.full(ELECTRODES, SIGNAL_COUNTS)
+
+
+def _conductance_scale(tare: Floats) -> Floats:
+    at_rest = np.clip(tare, _map.COUNT_MIN, _map.COUNT_MAX)
+    scale: Floats = at_rest * (1.0 - at_rest / _sensor.FULL_SCALE_COUNT)  # d ln(c / (4095 - c)) / dc, turned over
+    return scale
+
+
+LINEAR = Family(_SIGNAL, _SIGNAL, _counts_scale)
+SIGN_SPLIT = Family(_blocks(_SPLIT), _blocks(_SPLIT), _counts_scale)
+GATED = Family(_blocks((*_SPLIT, Kind.PRESSURE), STRAIGHT), _blocks(_SPLIT), _counts_scale)
+GATED_TWICE = Family(_blocks((*_SPLIT, Kind.PRESSURE), Gate), _blocks(_SPLIT), _counts_scale)
+QUADRATIC = Family((*_SIGNAL, *_SIGNAL_PAIRS, *_PRESSURE), _SIGNAL, _counts_scale)
+CONDUCTANCE_QUADRATIC = Family((*_CONDUCTANCE, *_CONDUCTANCE_PAIRS, *_PRESSURE), _CONDUCTANCE, _conductance_scale)
+JOINED = Family((*GATED_TWICE.blocks, *_CONDUCTANCE, *_CONDUCTANCE_PAIRS), _blocks(_SPLIT), _counts_scale)

@@ -1,0 +1,105 @@
+"""The map a calibration ends with, and its file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InputError
+from . import features
+from .crossvalidation import Validation
+from .features import ELECTRODES, Signals
+from .figures import model_name
+from .moments import with_one
+from .recorded import Floats
+
+FORMAT = "biotac-wrench-map/2"
+
+
+@dataclass(frozen=True)
+class WrenchMap:
+    """One frame's counts to force on the finger; where calibrated, torque about Lin's origin and torsion.
+
+    ``coefficients`` (p + 1, axes) of features.columns, block by block, the offset last; ``tare`` (19,)
+    counts. It was trained for the mean of its results to ``window_rows`` frames, counts coming ``lag_rows``
+    later than force.
+    """
+
+    model: str
+    axes: tuple[str, ...]
+    tare: Floats
+    window_rows: int
+    lag_rows: int
+    coefficients: Floats
+
+    @property
+    def with_pdc(self) -> bool:
+        """Whether it was trained with PDC, and so needs it."""
+        return len(self.coefficients) - 1 == features.width(with_pdc=True)
+
+    def predict(self, counts: Floats, pdc: Floats | None = None) -> Floats:
+        """Wrench (n, axes) in N and N mm of each of ``counts`` (n, 19), NaN where a count is; the mean is the caller's.
+
+        ``pdc`` (n,) counts above rest. Raises InputError when it was trained with PDC and there is none.
+        """
+        if self.with_pdc and pdc is None:
+            raise InputError("this map was trained with PDC: expected pdc (n,) too; calibrate again without field PDC")
+        signals = Signals(np.asarray(counts, dtype=np.float64) - self.tare, self.tare, pdc if self.with_pdc else None)
+        result: Floats = with_one(features.columns(signals)) @ self.coefficients
+        return result
+
+
+def of(validation: Validation) -> WrenchMap:
+    """The map trained on the whole run."""
+    final, run = validation.final, validation.run
+    coefficients = np.column_stack([choice.coefficients for choice in final.best])
+    return WrenchMap(model_name(validation), run.axes, run.tare, final.window_rows, final.lag_rows, coefficients)
+
+
+def dumps(its: WrenchMap) -> str:
+    """As JSON; loads() gives the same numbers to the bit."""
+    facts = {
+        "format": FORMAT,
+        "model": its.model,
+        "axes": list(its.axes),
+        "tare_counts": its.tare.tolist(),
+        "window_rows": its.window_rows,
+        "lag_rows": its.lag_rows,
+        "blocks": _block_names(with_pdc=its.with_pdc),
+        "coefficients": its.coefficients.tolist(),
+    }
+    return json.dumps(facts) + "\n"
+
+
+def load(path: Path) -> WrenchMap:
+    """A map from its file. Raises InputError naming what is wrong with it."""
+    try:
+        facts = json.loads(path.read_text(encoding="utf-8"))
+        if facts["format"] != FORMAT:
+            raise ValueError(f"format {facts['format']!r}")
+        its = WrenchMap(
+            str(facts["model"]),
+            tuple(str(axis) for axis in facts["axes"]),
+            np.array(facts["tare_counts"], dtype=np.float64),
+            int(facts["window_rows"]),
+            int(facts["lag_rows"]),
+            np.array(facts["coefficients"], dtype=np.float64),
+        )
+        shapes = [(features.width(with_pdc=pdc) + 1, len(its.axes)) for pdc in (False, True)]
+        if its.coefficients.shape not in shapes or its.tare.shape != (ELECTRODES,):
+            raise ValueError(f"coefficients {its.coefficients.shape}, tare {its.tare.shape}")
+        if facts["blocks"] != _block_names(with_pdc=its.with_pdc):
+            raise ValueError(f"blocks {facts['blocks']}")
+        if not np.isfinite(its.coefficients).all() or not np.isfinite(its.tare).all():
+            raise ValueError("a coefficient that is no number")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        seen = str(error) or type(error).__name__
+        raise InputError(f"{path}: {seen}: expected a {FORMAT} as `biotac calibrate wrench --out` writes it") from None
+    return its
+
+
+def _block_names(*, with_pdc: bool) -> list[list[str]]:
+    return [[block.kind.name, block.gate.name] for block in features.blocks(with_pdc=with_pdc)]

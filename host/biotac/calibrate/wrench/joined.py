@@ -1,0 +1,267 @@
+"""A board's recording and a force/torque sensor's, each by its own clock, joined into a run.
+
+Counts, tare and contact are the board's own, frame by frame; the force is the mean of the reference over each
+frame's 10 ms. The reference's zero is taken where the board felt nothing, before its axes are turned into Lin's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from ...errors import InputError, RecordingError
+from ...wire import messages_gen as wire
+from ...wire import sensor_gen as sensor
+from ...wire.frames import electrode_signals
+from ..reference.samples import Reference
+from ..reference.timing import STEP_S, Alignment, align
+from . import contact, torsion
+from .recorded import MIN_REST_ROWS, REST_N, Floats, Run, check_clipping, check_rails, check_rows, check_units, drift_of
+
+Mask = npt.NDArray[np.bool_]
+
+MAX_INCOMPLETE_SHARE = 0.05
+MAX_GAP_S = 0.05  # between two samples of the reference: longer, and the force in between is not known
+SETTLE_ROWS = 30  # after a touch the skin creeps back, and a hand may still be near
+MAX_REST_FORCE_N = 0.5
+FIRM_N = 1.0
+MIN_ON_SKIN_SHARE = 0.7
+LEVER_MM = (0.1, 40.0)  # |M| / |F| about Lin's origin: contacts are within 17 mm of it, torsion adds some
+# After a frame's t_us: when its electrodes are read on average, and when its pressure is.
+ELECTRODES_S = float(np.mean([sensor.SLOTS.index(name) for name in sensor.ELECTRODE_NAMES])) / sensor.SLOT_HZ
+PDC_S = sensor.SLOTS.index("PDC") / sensor.SLOT_HZ
+IDLE_MEAN_ROWS = 50  # drift is slow: means have it without the noise
+
+
+@dataclass(frozen=True)
+class Joined:
+    """A run and how it came about. ``zero`` is the reference's, in its own axes: N, and N mm where it has torque.
+
+    ``on_skin_share`` of the firm rows have their line of action meet the finger's ventral surface; NaN without torque.
+    """
+
+    run: Run
+    finger: int
+    alignment: Alignment
+    zero: Floats
+    on_skin_share: float
+
+
+@dataclass(frozen=True)
+class Board:
+    """What a board said of one finger: n frames in order.
+
+    ``t_s`` (n,) device time; ``counts`` and ``e`` (n, 19), NaN where a word is missing or there was no tare yet;
+    ``pdc`` (n,) above its tare, NaN where unknown; ``quiet`` (n,): tared and not in contact, for a while.
+    """
+
+    finger: int
+    serial: str
+    t_s: Floats
+    counts: Floats
+    e: Floats
+    pdc: Floats
+    quiet: Mask
+
+    def only(self, rows: Mask) -> Board:
+        """Those frames."""
+        arrays = {name: getattr(self, name)[rows] for name in ("t_s", "counts", "e", "pdc", "quiet")}
+        return replace(self, **arrays)
+
+
+def board_of(frames: npt.NDArray[np.void], t_us: npt.NDArray[np.int64], finger: int, serial: str) -> Board:
+    """From FRAME messages (wire.DTYPES) of one finger and their unwrapped times."""
+    missing = wire.INVALID_COUNT
+    counts = np.where(frames["counts"] == missing, np.nan, frames["counts"].astype(np.float64))
+    no_pdc = (frames["pdc"] == missing) | (frames["pdc_tare_q4"] == missing)
+    pdc = np.where(no_pdc, np.nan, frames["pdc"] - frames["pdc_tare_q4"] / 16.0)
+    untouched = (frames["flags"] & (wire.FrameFlags.CONTACT | wire.FrameFlags.UNTARED)) == 0
+    since = np.arange(len(frames)) - np.maximum.accumulate(np.where(untouched, -1, np.arange(len(frames))))
+    quiet = untouched & (since > SETTLE_ROWS)
+    return Board(finger, serial, t_us / 1e6, counts, electrode_signals(frames), pdc, quiet)
+
+
+def join(where: str, board: Board, reference: Reference) -> Joined:
+    """Align, zero and turn. Raises RecordingError, beginning with ``where``, for what cannot be a calibration."""
+    known: Mask = np.isfinite(board.e.sum(axis=1))
+    if len(known) and (~known).mean() > MAX_INCOMPLETE_SHARE:
+        raise RecordingError(
+            f"{where}: {(~known).sum()} of {len(known)} frames have no tare or miss an electrode: expected at most "
+            f"{MAX_INCOMPLETE_SHARE:.0%}; tare before you record, and see to the wiring"
+        )
+    check_rows(where, int(known.sum()))
+    board = board.only(known)
+    wrench = reference.samples.wrench()
+    alignment = _align(where, board, reference.samples.t_s, wrench, _common_value(wrench))
+    rows = _means(reference.samples.t_s, wrench, alignment.to_reference_s(board.t_s + ELECTRODES_S))
+    zero = _zero(where, board, rows)
+    # once more with the zero that is now known: |F| grows with the load only about the right one
+    alignment = _align(where, board, reference.samples.t_s, wrench, zero)
+    rows = _means(reference.samples.t_s, wrench, alignment.to_reference_s(board.t_s + ELECTRODES_S))
+    zero = _zero(where, board, rows)
+    there: Mask = np.isfinite(rows.sum(axis=1))
+    check_rows(f"{where}, where counts and force are both known", int(there.sum()))
+    truth = reference.mounting.to_finger(rows[there] - zero)
+    check_clipping(where, "force", reference.mounting.sign * (rows[there] - zero)[:, :3])
+    return _run(where, board, there, truth, reference, alignment, zero)
+
+
+def _run(
+    where: str, board: Board, there: Mask, truth: Floats, reference: Reference, alignment: Alignment, zero: Floats
+) -> Joined:
+    counts, e, pdc, quiet = board.counts[there], board.e[there], board.pdc[there], board.quiet[there]
+    check_rails(where, counts)
+    tare = np.median(counts - e, axis=0)
+    moved = float(np.abs(counts - e - tare).max())
+    check_units(where, e, truth[:, :3])
+    on_skin = _on_skin(where, truth) if truth.shape[1] == 6 else float("nan")
+    about_torsion: tuple[str, ...] = ()
+    if truth.shape[1] == 6:
+        about_normal, about_torsion = torsion.truth(where, None, truth[:, :3], truth[:, 3:])
+        truth = np.column_stack([truth, about_normal])
+    resting = counts[quiet]
+    whole = len(resting) // IDLE_MEAN_ROWS * IDLE_MEAN_ROWS
+    drift, drift_note = drift_of("rest", resting[:whole].reshape(-1, IDLE_MEAN_ROWS, counts.shape[1]).mean(axis=1))
+    notes = (
+        f"tare: the board's own, which moved by up to {moved:.0f} counts",
+        f"reference: {reference.name}" + (f", {reference.sensor}" if reference.sensor else ""),
+        f"reference's zero: {_words(zero)}, from {int(board.quiet.sum())} rows in which the board felt nothing",
+        f"clocks: offset {alignment.offset_s:+.4f} s, {alignment.drift_ppm:+.0f} ppm; "
+        f"correlation {alignment.peak:.2f}, next best {alignment.runner_up:.2f}, "
+        f"{alignment.width_s * 1e3:.0f} ms wide at half height; "
+        f"{alignment.pieces} pieces scatter by {alignment.scatter_s * 1e3:.1f} ms",
+        f"{int((~there).sum())} of {len(there)} frames left out, for want of the reference",
+        *(
+            [f"{on_skin:.1%} of the rows above {FIRM_N:g} N have their line of action on the skin"]
+            * (on_skin == on_skin)
+        ),
+        drift_note,
+        *about_torsion,
+    )
+    run = Run(
+        name=where,
+        # with one tare for the whole run, and each frame's own e to the last bit
+        counts=e + tare,
+        tare=tare,
+        truth=truth,
+        pdc=pdc if np.isfinite(pdc).all() else None,
+        drift=drift,
+        rest=np.linalg.norm(truth[:, :3], axis=1) < REST_N,
+        notes=notes,
+        serial=board.serial,
+        by_clocks=True,
+    )
+    return Joined(run, board.finger, alignment, zero, on_skin)
+
+
+def _align(where: str, board: Board, t_s: Floats, wrench: Floats, zero: Floats) -> Alignment:
+    load = np.linalg.norm(wrench[:, :3] - zero[:3], axis=1)
+    tries = [(ELECTRODES_S, np.sqrt((board.e**2).mean(axis=1)))]
+    if np.isfinite(board.pdc).all() and np.ptp(board.pdc) > 0.0:
+        # the fluid's pressure follows the normal force closer than the counts do, where the channel works
+        tries.append((PDC_S, board.pdc))
+    best: Alignment | None = None
+    refusal: RecordingError | None = None
+    for after_s, its in tries:
+        try:
+            found = align(where, board.t_s + after_s, its, t_s, load)
+        except RecordingError as error:
+            refusal = refusal or error
+            continue
+        if best is None or found.peak > best.peak:
+            best = found
+    if best is None:
+        assert refusal is not None
+        raise refusal
+    return best
+
+
+def _common_value(wrench: Floats) -> Floats:
+    """Where the readings are most often: the zero, of a run that lets go now and then."""
+    result = np.zeros(wrench.shape[1])
+    for axis, column in enumerate(wrench.T):
+        values = np.sort(column[np.isfinite(column)])
+        width = max(1, len(values) // 50)
+        narrowest = int(np.argmin(values[width:] - values[:-width])) if len(values) > width else 0
+        result[axis] = values[narrowest : narrowest + width].mean()
+    return result
+
+
+def _means(t_s: Floats, values: Floats, at_s: Floats) -> Floats:
+    """Means (k, columns) over one board's step about ``at_s``; between two slow samples a straight line.
+
+    NaN beyond the ends and in gaps.
+    """
+    good = np.isfinite(values).all(axis=1)
+    t_s, values = t_s[good], values[good]
+    sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values - values[0], axis=0)])
+    low, high = (np.searchsorted(t_s, at_s + side * STEP_S) for side in (-0.5, 0.5))
+    many = high - low
+    with np.errstate(invalid="ignore", divide="ignore"):
+        result: Floats = (sums[high] - sums[low]) / many[:, None] + values[0]
+    after = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
+    share = (at_s - t_s[after - 1]) / (t_s[after] - t_s[after - 1])
+    line = values[after - 1] + share[:, None] * (values[after] - values[after - 1])
+    result = np.where((many >= 2)[:, None], result, line)
+    gap = (t_s[after] - t_s[after - 1] > MAX_GAP_S) & (many == 0)
+    result[gap | (at_s < t_s[0]) | (at_s > t_s[-1])] = np.nan
+    return result
+
+
+def _zero(where: str, board: Board, rows: Floats) -> Floats:
+    quiet = board.quiet & np.isfinite(rows).all(axis=1)
+    if quiet.sum() < MIN_REST_ROWS:
+        raise RecordingError(
+            f"{where}: never at rest: in {int(quiet.sum())} frames the board felt nothing: expected {MIN_REST_ROWS}; "
+            "let go in between, the reference's zero is taken there"
+        )
+    zero: Floats = np.median(rows[quiet], axis=0)
+    left = float(np.percentile(np.linalg.norm(rows[quiet, :3] - zero[:3], axis=1), 90))
+    if left > MAX_REST_FORCE_N:
+        raise RecordingError(
+            f"{where}: where the board felt nothing the reference says up to {left:.2f} N (90th percentile): expected "
+            f"at most {MAX_REST_FORCE_N:g} N; are they of the same run, and is the reference warm?"
+        )
+    return zero
+
+
+def _on_skin(where: str, truth: Floats) -> float:
+    """Share of firm rows whose contact is on the finger: wrong torque units or a wrong mounting put it elsewhere."""
+    firm = truth[np.linalg.norm(truth[:, :3], axis=1) > FIRM_N]
+    if not len(firm):
+        raise RecordingError(f"{where}: no force above {FIRM_N:g} N: expected firm presses; press harder")
+    lever = float(np.median(np.linalg.norm(firm[:, 3:], axis=1) / np.linalg.norm(firm[:, :3], axis=1)))
+    if not LEVER_MM[0] <= lever <= LEVER_MM[1]:
+        guess = "is it in N m?" if lever < LEVER_MM[0] else "is it in N um, or the mounting's offset wrong?"
+        raise RecordingError(
+            f"{where}: torque over force is {lever:.3g} mm about the fingertip's centre: expected {LEVER_MM[0]:g} to "
+            f"{LEVER_MM[1]:g} mm; {guess}"
+        )
+    its = contact.locate(firm[:, :3], firm[:, 3:])
+    share = float(np.mean(its.on_skin & ~its.missed))
+    if share < MIN_ON_SKIN_SHARE:
+        raise RecordingError(
+            f"{where}: in {share:.0%} of the rows above {FIRM_N:g} N the force's line meets the finger's skin: "
+            f"expected at least {MIN_ON_SKIN_SHARE:.0%}; check the mounting's rotation, offset and sign, and "
+            "the torque's unit"
+        )
+    return share
+
+
+def _words(zero: Floats) -> str:
+    text = ", ".join(f"{v:+.3f}" for v in zero[:3]) + " N"
+    return text if len(zero) == 3 else text + "; " + ", ".join(f"{v:+.2f}" for v in zero[3:]) + " N mm"
+
+
+def choose_finger(where: str, fingers: list[int], finger: int | None) -> int:
+    """The one that is asked for, or the only one. Raises InputError."""
+    seen = ", ".join(str(f) for f in fingers) or "none"
+    if finger is None:
+        if len(fingers) != 1:
+            raise InputError(f"{where}: holds fingers {seen}: expected one; say which with --finger")
+        return fingers[0]
+    if finger not in fingers:
+        raise InputError(f"{where}: holds fingers {seen}, not {finger}; say another with --finger")
+    return finger

@@ -1,0 +1,219 @@
+"""A calibration walked through: warm up, tare, load everywhere, done.
+
+Fed with a board's frames and a reference's samples, each by its own clock; it keeps no time of its own, prints
+nothing and asks nobody. What somebody has to do or might like to know comes out as Events.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from ...errors import InputError
+from ...wire import messages_gen as wire
+from ..reference.mounting import Mounting
+from ..reference.samples import Samples, join
+from .coverage import Coverage
+from .recorded import Floats
+
+Frames = npt.NDArray[np.void]
+
+SETTLE_FRAMES = 30  # after a touch or an invalid word
+MEAN_FRAMES = 50  # drift is slow: means of half a second have it without the noise
+TARE_FRAMES = 200
+TARE_SAMPLES_S = 1.0
+MAX_ZERO_SPREAD_N = 0.15  # 10 to 90 % of the reference while it is zeroed
+MAX_WARM_UP_S = 3600.0
+
+
+class Step(Enum):
+    """What is being done; the value is what a person is told."""
+
+    WARM_UP = "warming up: leave the finger alone"
+    TARE = "taring: leave the finger alone"
+    LOADS = "press, shear and twist: everywhere on the finger, and let go in between"
+    DONE = "done"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Limits. Drift is the mean over the electrodes, in counts a minute over the last ``drift_over_s``."""
+
+    max_drift_counts_per_min: float = 20.0
+    drift_over_s: float = 60.0
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something happened. ``step`` is the one in force now; ``words`` are one line."""
+
+    step: Step
+    words: str
+
+
+@dataclass
+class Procedure:
+    """Calibrates finger ``finger``. Feed ``frames`` and ``samples`` as they come; look at ``step`` and ``events``.
+
+    When ``wants_tare`` is true the board is to be told to tare, and ``tared`` called with whether it did.
+    """
+
+    finger: int
+    mounting: Mounting
+    plan: Plan = field(default_factory=Plan)
+    coverage: Coverage = field(default_factory=Coverage)
+    step: Step = Step.WARM_UP
+    events: list[Event] = field(default_factory=list)
+    zero: Floats | None = None
+    drift_counts_per_min: float = float("nan")
+    last_step: Step = Step.WARM_UP  # before the one in force
+
+    def __post_init__(self) -> None:
+        self._means: deque[tuple[float, float]] = deque()  # time in s, mean over the electrodes
+        self._half: list[tuple[float, Floats]] = []
+        self._begin_s: float | None = None
+        self._untouched = 0
+        self._asked = False
+        self._tared_frames = 0
+        self._recent: deque[Samples] = deque()
+        self._last_words = ""
+
+    # ---- what comes in -------------------------------------------------------------------------
+
+    def frames(self, frames: Frames) -> None:
+        """Take FRAME_DTYPE rows of any fingers, in order."""
+        for row in frames[frames["finger"] == self.finger]:
+            self._frame(row)
+
+    def samples(self, samples: Samples) -> None:
+        """Take what the reference has measured since. Raises InputError for one of three axes."""
+        if not len(samples):
+            return
+        if samples.torque_nmm is None:
+            raise InputError("the reference has no torque: expected six axes, places are found by them")
+        if self.step in (Step.WARM_UP, Step.TARE):
+            self._keep(samples)
+        elif self.step is Step.LOADS and self.zero is not None:
+            step_s = float(np.median(np.diff(samples.t_s))) if len(samples) > 1 else 0.0
+            self.coverage.add(self.mounting.to_finger(samples.wrench() - self.zero), step_s)
+            self._tell_progress()
+
+    def tared(self, *, accepted: bool) -> None:
+        """The board answered; one that refuses is asked again after a while of quiet."""
+        self._asked = accepted
+        self._tared_frames = 0
+        if not accepted:
+            self._untouched = 0
+            self._tell("the board refused to tare, its signals move: leave the finger alone")
+
+    def finish(self, why: str) -> None:
+        """Complete or not: on the user's word, or because nothing more comes."""
+        if self.step is not Step.DONE:
+            self._go(Step.DONE, why)
+
+    def status(self) -> str:
+        """One line of where it is, for a display that is renewed."""
+        if self.step is Step.WARM_UP:
+            return f"{Step.WARM_UP.value}: {self.drift_counts_per_min:+.0f} counts/min"
+        if self.step is Step.LOADS:
+            return f"{self.coverage.summary()}; missing: {next(iter(self.coverage.missing()), 'nothing')}"
+        words: str = self.step.value
+        return words
+
+    def take_events(self) -> list[Event]:
+        """What has happened since this was asked last."""
+        events, self.events = self.events, []
+        return events
+
+    @property
+    def wants_tare(self) -> bool:
+        """The board is to tare now."""
+        return self.step is Step.TARE and not self._asked and self._untouched >= TARE_FRAMES
+
+    # ---- warm-up and tare ----------------------------------------------------------------------
+
+    def _frame(self, row: np.void) -> None:
+        flags = int(row["flags"])
+        at_s = int(row["t_us"]) / 1e6
+        missing = bool((row["counts"] == wire.INVALID_COUNT).any()) or bool(flags & wire.FrameFlags.FAULT)
+        touched = bool(flags & wire.FrameFlags.CONTACT)
+        self._untouched = 0 if touched or missing else self._untouched + 1
+        if self.step is Step.WARM_UP:
+            self._warm_up(at_s, row, touched or missing)
+        elif self.step is Step.TARE and self._asked:
+            self._tared_frames = 0 if touched or missing else self._tared_frames + 1
+            if self._tared_frames >= TARE_FRAMES and not flags & wire.FrameFlags.UNTARED:
+                self._zero_reference()
+
+    def _warm_up(self, at_s: float, row: np.void, disturbed: bool) -> None:
+        if self._begin_s is None:
+            self._begin_s = at_s
+            self._tell(Step.WARM_UP.value)
+        if at_s - self._begin_s > MAX_WARM_UP_S:
+            raise InputError(
+                f"after {MAX_WARM_UP_S / 60:.0f} minutes the finger still drifts by {self.drift_counts_per_min:+.0f} "
+                f"counts/min: expected at most {self.plan.max_drift_counts_per_min:g}; is it alone, and is it on?"
+            )
+        if disturbed and self._untouched == 0:
+            # a warming finger that moves fast enough is called touched by the board; both are the wait's business
+            self._half.clear()
+            return
+        self._half.append((at_s, row["counts"].astype(np.float64)))
+        if len(self._half) < MEAN_FRAMES:
+            return
+        mean_s = float(np.mean([t for t, _ in self._half]))
+        self._means.append((mean_s, float(np.mean([counts.mean() for _, counts in self._half]))))
+        self._half.clear()
+        while mean_s - self._means[0][0] > self.plan.drift_over_s:
+            self._means.popleft()
+        times, counts = np.array(self._means).T
+        if len(times) > 3:
+            self.drift_counts_per_min = 60.0 * float(np.polyfit(times - times[0], counts, 1)[0])
+        long_enough = mean_s - self._begin_s >= self.plan.drift_over_s
+        enough = len(times) >= 0.8 * self.plan.drift_over_s * 100.0 / MEAN_FRAMES
+        if long_enough and enough and abs(self.drift_counts_per_min) <= self.plan.max_drift_counts_per_min:
+            self._go(Step.TARE, f"warm: {self.drift_counts_per_min:+.1f} counts/min over the last minute")
+
+    def _keep(self, samples: Samples) -> None:
+        self._recent.append(samples)
+        newest_s = float(samples.t_s[-1])
+        while len(self._recent) > 1 and newest_s - float(self._recent[1].t_s[0]) > TARE_SAMPLES_S:
+            self._recent.popleft()
+
+    def _zero_reference(self) -> None:
+        if not self._recent:
+            return
+        wrench = join(list(self._recent)).wrench()
+        wrench = wrench[np.isfinite(wrench).all(axis=1)]
+        if not len(wrench):
+            return
+        low, high = np.percentile(wrench[:, :3], (10, 90), axis=0)
+        if float((high - low).max()) > MAX_ZERO_SPREAD_N:
+            self._tared_frames = 0
+            self._tell(f"the reference moves by {float((high - low).max()):.2f} N: let go of everything")
+            return
+        self.zero = np.median(wrench, axis=0)
+        self._recent.clear()
+        self._go(Step.LOADS, Step.LOADS.value)
+
+    # ---- loads ---------------------------------------------------------------------------------
+
+    def _tell_progress(self) -> None:
+        if self.coverage.complete:
+            self._go(Step.DONE, f"covered: {self.coverage.summary()}")
+            return
+        words = self.status()
+        if words != self._last_words:
+            self._last_words = words
+            self._tell(words)
+
+    def _go(self, step: Step, words: str) -> None:
+        self.last_step, self.step = self.step, step
+        self._tell(words)
+
+    def _tell(self, words: str) -> None:
+        self.events.append(Event(self.step, words))

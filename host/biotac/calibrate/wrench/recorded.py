@@ -1,0 +1,256 @@
+"""A recording that carries its own truth, checked at the door.
+
+A calibration from a bad recording looks like any other: every refusal here is a mistake that was
+easy to make in the laboratory and hard to see in the coefficients.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...errors import RecordingError
+from ...sim.replay import counts_field, read_npz, to_lin_frame
+from ...wire import sensor_gen as _sensor
+from . import torsion
+from .blocks import BLOCKS, GUARD_ROWS, contacts
+
+Floats = npt.NDArray[np.float64]
+
+MIN_ROWS = BLOCKS * 2 * GUARD_ROWS  # a block shorter than its two guards would be all guard
+REST_N = 0.1  # a plate's reading below this is taken for "nothing touches"
+MIN_REST_ROWS = 50
+MAX_REST_SWING_COUNTS = 100.0  # 10 % to 90 %: warming up is 8 counts in 10 s (biotac.md finding 6), a press hundreds
+RAIL_LOW, RAIL_HIGH = 0, 4090  # numerics.md 1.3: beyond these an electrode is railed
+MAX_RAILED_SHARE = 0.01
+MAX_CLIPPED_SHARE = 0.005
+# |F| per RMS count: the physics model presses a point and gives 0.06, a flat plate moves all electrodes and gives
+# 0.01 (median rows). Grams (x 102) and millinewtons (x 1000) fall outside however the finger is pressed.
+NEWTON_PER_COUNT = (0.002, 0.5)
+MIN_DRIFT_SHARE = 0.5  # of the idle recording's variance: less is noise, and noise has no direction
+# Of the differences between two rests about their mean, which is drift: one finger's rests differ by its loadings'
+# spread (10 % of some hundred counts), two fingers' by how their electrodes are made (86 to 170 counts).
+MAX_OTHER_REST_COUNTS = 60.0
+
+FIELDS = ("E", "F", "M", "PDC", "E_base", "E_idle", "torsion", "contact", "serial")
+
+
+@dataclass(frozen=True)
+class Run:
+    """Counts with the force that made them; frame, signs and origin are Lin's (force on the finger).
+
+    ``counts`` (n, 19), ``tare`` (19,) counts; ``truth`` (n, 3) N, or (n, 7) with N mm about the origin and about
+    the outward normal at the contact;
+    ``pdc`` (n,) counts above rest, or None; ``drift`` (19,) what one count of mean drift does to each
+    electrode; ``rest`` bool (n,), rows without contact; ``notes`` say what was assumed; ``serial`` is the sensor's
+    number, "" where the recording does not say. ``by_clocks``: force and counts were aligned by their own times.
+    ``air`` (m, 19) are the counts of E_base, or None; ``contact`` (n,) is which contact each row belongs to, or
+    None: rows in time.
+    """
+
+    name: str
+    counts: Floats
+    tare: Floats
+    truth: Floats
+    pdc: Floats | None
+    drift: Floats
+    rest: npt.NDArray[np.bool_]
+    notes: tuple[str, ...]
+    serial: str = ""
+    by_clocks: bool = False
+    air: Floats | None = None
+    contact: npt.NDArray[np.int64] | None = None
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the truth's columns."""
+        return ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")[: self.truth.shape[1]]
+
+
+def load_run(path: Path) -> Run:
+    """A run from an .npz file of one finger, rows at a steady rate.
+
+    Fields: ``E`` (n, 19) raw counts and ``F`` (n, 3) N, required; ``M`` (n, 3) N mm about Lin's origin,
+    both in the recorded axes (X lateral, Y to the tip, Z out of the pad); ``PDC`` (n,) counts;
+    ``E_base`` (m, 19) the finger in free air, needed where the run itself never rests; ``E_idle``
+    (k, 19) an untouched finger, whose first principal component is the drift; ``torsion`` (n,) N mm about
+    the outward normal at the contact (with M; else it is computed); ``contact`` (n,) integers, which
+    contact a row belongs to, where rows are not in time; ``serial``, the sensor's number as text. Raises
+    RecordingError with what was seen, in numbers.
+    """
+    fields = read_npz(path, FIELDS)
+    missing = [name for name in ("E", "F") if name not in fields]
+    if missing:
+        seen = ", ".join(fields) or "none of the known fields"
+        raise RecordingError(
+            f"{path}: holds {seen}: expected E (n, 19) counts and F (n, 3) N; save {' and '.join(missing)} too"
+        )
+    counts = _counts(path, "E", fields["E"], None)
+    rows = len(counts)
+    check_rows(path, rows)
+    force = _truth(path, "F", "N", fields["F"], rows)
+    check_clipping(path, "F", force)
+    truth = force
+    about_torsion: tuple[str, ...] = ()
+    if "M" in fields:
+        moment = _truth(path, "M", "N mm", fields["M"], rows)
+        about_normal, about_torsion = torsion.truth(path, fields.get("torsion"), force, moment)
+        truth = np.column_stack([force, moment, about_normal])
+    check_rails(path, counts)
+    rest: npt.NDArray[np.bool_] = np.linalg.norm(force, axis=1) < REST_N
+    tare, notes = _tare(path, fields, counts, force, rest)
+    check_units(path, counts - tare, force)
+    # only now: in other units a press is a rest
+    if "E_base" in fields and rest.sum() >= MIN_REST_ROWS:
+        _check_same_finger(path, tare, np.median(counts[rest], axis=0))
+    pdc = None
+    if "PDC" in fields:
+        raw = counts_field(path, "PDC", fields["PDC"], rows, None).astype(np.float64)
+        # without a rest in the run the lowest percent stands for it; an offset does no harm to a linear model
+        pdc = raw - (np.median(raw[rest]) if rest.sum() >= MIN_REST_ROWS else np.percentile(raw, 1))
+    drift, note = np.ones(len(_sensor.ELECTRODE_NAMES)), "drift: no E_idle, all electrodes taken to drift alike"
+    if "E_idle" in fields:
+        drift, note = drift_of("E_idle", _counts(path, "E_idle", fields["E_idle"], None))
+    return Run(
+        path.name,
+        counts,
+        tare,
+        truth,
+        pdc,
+        drift,
+        rest,
+        (*notes, note, *about_torsion),
+        serial=_serial(path, fields),
+        air=_counts(path, "E_base", fields["E_base"], None) if "E_base" in fields else None,
+        contact=contacts(path, fields["contact"], rows) if "contact" in fields else None,
+    )
+
+
+def _counts(path: Path, name: str, array: npt.NDArray[Any], rows: int | None) -> Floats:
+    return counts_field(path, name, array, rows, len(_sensor.ELECTRODE_NAMES)).astype(np.float64)
+
+
+def _truth(path: Path, name: str, unit: str, array: npt.NDArray[Any], rows: int) -> Floats:
+    if array.shape != (rows, 3) or array.dtype.kind not in "iuf":
+        raise RecordingError(
+            f"{path}: field {name} is {array.dtype} {array.shape}: expected ({rows}, 3) in {unit}, a row a frame"
+        )
+    bad = ~np.isfinite(array).all(axis=1)
+    if bad.any():
+        raise RecordingError(
+            f"{path}: field {name} is not finite in {bad.sum()} of {rows} rows, first in row {int(np.argmax(bad))}: "
+            f"expected numbers in {unit}; leave those rows out of all fields"
+        )
+    return to_lin_frame(array)
+
+
+def check_rows(where: object, rows: int) -> None:
+    """Refuse a run that is too short to be held out block by block."""
+    if rows < MIN_ROWS:
+        raise RecordingError(
+            f"{where}: {rows} rows: expected at least {MIN_ROWS}, {BLOCKS} blocks of twice the guard of "
+            f"{GUARD_ROWS} rows; record longer"
+        )
+
+
+def _serial(path: Path, fields: dict[str, npt.NDArray[Any]]) -> str:
+    if "serial" not in fields:
+        return ""
+    if fields["serial"].dtype.kind != "U" or fields["serial"].size != 1:
+        raise RecordingError(f"{path}: field serial is {fields['serial'].dtype}: expected one text; save it as str")
+    return str(fields["serial"].reshape(()))
+
+
+def check_clipping(path: object, name: str, force: Floats) -> None:
+    """A plate at the end of its range repeats its last value; no measured force does."""
+    for axis in range(3):
+        column = force[:, axis]
+        for end in (column.min(), column.max()):
+            share = float((column == end).mean())
+            if abs(end) > REST_N and share > MAX_CLIPPED_SHARE:
+                raise RecordingError(
+                    f"{path}: {share:.1%} of the rows of {name} read exactly {end:.4g} N along {'xyz'[axis]}, the most "
+                    f"of all: expected at most {MAX_CLIPPED_SHARE:.1%}; the force sensor is saturated, press less"
+                )
+
+
+def check_rails(path: object, counts: Floats) -> None:
+    share = ((counts <= RAIL_LOW) | (counts >= RAIL_HIGH)).mean(axis=0)
+    worst = int(np.argmax(share))
+    if share[worst] > MAX_RAILED_SHARE:
+        raise RecordingError(
+            f"{path}: {_sensor.ELECTRODE_NAMES[worst]} is saturated (count {RAIL_LOW}, or {RAIL_HIGH} and above) in "
+            f"{share[worst]:.1%} of the rows: expected at most {MAX_RAILED_SHARE:.0%}; press less or see to it"
+        )
+
+
+def _tare(
+    path: Path, fields: dict[str, npt.NDArray[Any]], counts: Floats, force: Floats, rest: npt.NDArray[np.bool_]
+) -> tuple[Floats, tuple[str, ...]]:
+    """Counts at rest, from E_base or from the run's own rows without force."""
+    if "E_base" in fields:
+        base = _counts(path, "E_base", fields["E_base"], None)
+        low, median, high = np.percentile(base, (10, 50, 90), axis=0)
+        worst = int(np.argmax(high - low))
+        if high[worst] - low[worst] > MAX_REST_SWING_COUNTS:
+            raise RecordingError(
+                f"{path}: E_base is not at rest: {_sensor.ELECTRODE_NAMES[worst]} swings over "
+                f"{high[worst] - low[worst]:.0f} counts: expected at most {MAX_REST_SWING_COUNTS:.0f}; record it in air"
+            )
+        # the median, because a brief touch in the recording must not become the rest
+        return median, (f"tare: median of {len(base)} rows of E_base",)
+    if rest.sum() < MIN_REST_ROWS:
+        raise RecordingError(
+            f"{path}: never at rest: {rest.sum()} rows below {REST_N} N, the least force is "
+            f"{np.linalg.norm(force, axis=1).min():.2f} N, and there is no E_base: expected {MIN_REST_ROWS} rows "
+            f"without contact; let go in between, or add E_base"
+        )
+    resting: Floats = np.median(counts[rest], axis=0)
+    return resting, (f"tare: median of {rest.sum()} rows below {REST_N} N",)
+
+
+def check_units(path: object, signal: Floats, force: Floats) -> None:
+    size = np.linalg.norm(force, axis=1)
+    touched = size >= 0.25 * np.percentile(size, 90)
+    if not touched.any() or size.max() == 0.0:
+        raise RecordingError(f"{path}: F is 0 in every row: expected forces in N; was the plate connected?")
+    per_count = float(np.median(size[touched]) / max(np.sqrt((signal[touched] ** 2).mean(axis=1)).mean(), 1e-9))
+    low, high = NEWTON_PER_COUNT
+    if not low <= per_count <= high:
+        guess = "is F in gf or mN, or are counts missing?" if per_count > high else "is F in kN or kgf?"
+        raise RecordingError(
+            f"{path}: {per_count:.3g} units of F per RMS count (median |F| {np.median(size[touched]):.4g}): expected "
+            f"{low:g} to {high:g}, as newtons give on a BioTac; {guess}"
+        )
+
+
+def _check_same_finger(path: Path, base: Floats, resting: Floats) -> None:
+    """Rests of one finger differ by its drift, all electrodes alike; another finger's has another pattern."""
+    apart = resting - base
+    spread = float(apart.std())
+    if spread > MAX_OTHER_REST_COUNTS:
+        worst = int(np.argmax(np.abs(apart - apart.mean())))
+        raise RecordingError(
+            f"{path}: E at rest and E_base do not belong together: beside a common {apart.mean():+.0f} counts they "
+            f"differ by {spread:.0f} RMS ({_sensor.ELECTRODE_NAMES[worst]} by {apart[worst]:+.0f}): expected at most "
+            f"{MAX_OTHER_REST_COUNTS:.0f}; is E_base another finger's?"
+        )
+
+
+def drift_of(name: str, idle: Floats) -> tuple[Floats, str]:
+    """What drift does to the electrodes (19,) for one count on average, from an untouched finger, and words for it."""
+    common: Floats = np.ones(len(_sensor.ELECTRODE_NAMES))
+    variance, direction = (
+        np.linalg.eigh(np.cov(idle, rowvar=False)) if len(idle) > 1 else (np.zeros(1), common[:, None])
+    )
+    share = float(variance[-1] / max(variance.sum(), 1e-12))
+    first: Floats = direction[:, -1] * np.sign(direction[:, -1].sum())
+    mean = float(first.mean())
+    # loadings of both signs are a touch or a broken electrode, and dividing by their mean would blow them up
+    if share < MIN_DRIFT_SHARE or mean < 0.5 * float(np.abs(first).mean()):
+        return common, f"drift: {name}'s first component holds {share:.0%} of its variance, all electrodes taken alike"
+    return first / mean, f"drift: first component of {name}, {share:.1%} of its variance"

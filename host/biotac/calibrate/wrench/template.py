@@ -1,0 +1,146 @@
+"""Joint template least squares: what a press, a bulge, two shears and a torsion look like, five numbers a frame.
+
+Around the point of contact each of the five has a shape over the electrodes; their sizes come from one weighted
+5x5 solve, and a dozen coefficients an axis turn sizes into newtons (numerics.md 3.2). It knows little of the finger,
+so it tells how much of a calibrated map's accuracy is physics and how much is that finger's own. It runs on the
+host alone and is never chosen. Finding the point of contact again without what was explained as shear (numerics.md
+proposes it) gains a fiftieth of Fy's error on the emulated sensor and costs a tenth of the torsion's: not done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core import geometry as surface
+from ...core.geometry import Floats
+from ...wire import map_gen as _map
+from .features import PRESSURE_COUNTS, Signals, conductance_change
+from .moments import Rows, drifted, smoothed
+from .recorded import Run
+
+FOOTPRINT_MM = 2.5  # between a probe's and a flat's
+HOLE = 1.5  # footprints around the contact that do not bulge
+REACH_MM = 7.0  # of shear and torsion
+# A squeezed electrode follows nothing linearly: the further from rest, the less its row counts.
+SOFT = 0.5  # of log conductance
+STIFFNESS = 1e-3  # ridge of the solve, of its mean diagonal: sizes no electrode near the contact sees stay small
+LEAST_CONDUCTANCE = 0.003  # of that at rest: 10 MOhm
+
+LEAST_RIDGE = 1e-9  # an axis that a size does not reach has columns of zeros
+
+SHAPES = 5
+PRESS, BULGE, ALONG, ACROSS, TURN = range(SHAPES)
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """n frames: ``point_mm``, ``normal``, ``to_tip``, ``to_side`` (n, 3) at the contact; ``size`` (n, 5)."""
+
+    point_mm: Floats
+    normal: Floats
+    to_tip: Floats
+    to_side: Floats
+    size: Floats
+
+
+def solve(signals: Signals) -> Sizes:
+    """The five sizes of every frame."""
+    seen = np.log(np.maximum(conductance_change(signals.e, signals.tare) + 1.0, LEAST_CONDUCTANCE))
+    weight = 1.0 / (1.0 + (seen / SOFT) ** 2)
+    squeezed = np.maximum(-signals.e, 0.0) ** 2 + _map.FLOOR_COUNTS**2
+    point = surface.project(squeezed @ surface.ELECTRODE_MM / squeezed.sum(axis=1, keepdims=True))
+    normal = surface.normals_at(point)
+    to_tip, to_side = surface.tangents_at(normal)
+    shapes = _shapes(point, normal, to_tip, to_side)
+    weighted = shapes * weight[:, :, None]
+    gram = shapes.transpose(0, 2, 1) @ weighted
+    gram += STIFFNESS * np.trace(gram, axis1=1, axis2=2)[:, None, None] / SHAPES * np.eye(SHAPES)
+    size = np.linalg.solve(gram, (weighted * seen[:, :, None]).sum(axis=1)[:, :, None])[:, :, 0]
+    return Sizes(point, normal, to_tip, to_side, size)
+
+
+def _shapes(point: Floats, normal: Floats, to_tip: Floats, to_side: Floats) -> Floats:
+    """What each of the five does to log conductance (n, 19, 5): a closed gap conducts less."""
+    arm = surface.ELECTRODE_MM[None] - point[:, None, :]
+    far = (arm**2).sum(axis=2)
+    facing = np.maximum(normal @ surface.ELECTRODE_NORMAL.T, 0.0)
+    reach = np.exp(-far / (2.0 * REACH_MM**2))
+    moved = [to_tip @ surface.ELECTRODE_NORMAL.T, to_side @ surface.ELECTRODE_NORMAL.T]
+    moved.append((np.cross(normal[:, None, :], arm) * surface.ELECTRODE_NORMAL).sum(axis=2))
+    press = -np.exp(-far / (2.0 * FOOTPRINT_MM**2)) * facing
+    bulge = 1.0 - np.exp(-far / (2.0 * (HOLE * FOOTPRINT_MM) ** 2))
+    return np.stack([press, bulge, *[one * reach for one in moved]], axis=2)
+
+
+def columns(signals: Signals) -> Floats:
+    """What the coefficients multiply (n, 7, k), axis by axis: forces, c x F + torsion n, and the torsion.
+
+    A press makes a force along the inward normal, shears make them along the skin, and the torque of each is its
+    lever's; every axis has its own coefficient for each, because no finger is the drawing of one.
+    """
+    its = solve(signals)
+    size = its.size
+    pressed = np.abs(size[:, PRESS])
+    into = -its.normal
+    scalars = [pressed, np.sqrt(pressed), size[:, BULGE], np.ones(len(size))]
+    if signals.pdc is not None:
+        scalars.append(signals.pdc / PRESSURE_COUNTS)
+    forces = [into * scalar[:, None] for scalar in scalars]
+    # the firmer the press, the stiffer the skin
+    for direction, which in ((its.to_tip, ALONG), (its.to_side, ACROSS)):
+        forces += [direction * size[:, which, None], direction * (size[:, which] * np.sqrt(pressed))[:, None]]
+    torsions = [size[:, TURN], size[:, TURN] * np.sqrt(pressed)]
+    result = np.zeros((len(size), 7, len(forces) + len(torsions)))
+    for k, force in enumerate(forces):
+        result[:, :3, k] = force
+        result[:, 3:6, k] = np.cross(its.point_mm, force)
+    for k, torsion in enumerate(torsions, start=len(forces)):
+        result[:, 3:6, k] = its.normal * torsion[:, None]
+        result[:, 6, k] = torsion
+    return result
+
+
+def fit(of: Floats, truth: Floats) -> Floats:
+    """Coefficients (axes, k), axis by axis, from columns (n, 7, k) and truth (n, axes)."""
+    found = []
+    for axis in range(truth.shape[1]):
+        x = of[:, axis]
+        gram = x.T @ x
+        found.append(np.linalg.solve(gram + LEAST_RIDGE * np.trace(gram) * np.eye(len(gram)), x.T @ truth[:, axis]))
+    return np.array(found)
+
+
+def predict(of: Floats, coefficients: Floats) -> Floats:
+    """Wrench (n, axes)."""
+    wrench: Floats = np.einsum("nak,ak->na", of[:, : len(coefficients)], coefficients)
+    return wrench
+
+
+class Template:
+    """The model on a run, for any lag and window: columns are computed once for each."""
+
+    def __init__(self, run: Run) -> None:
+        self.run = run
+        self.axes = run.truth.shape[1]
+        self._columns: dict[tuple[int, int], Floats] = {}
+
+    def held_out(self, window_rows: int, lag_rows: int, trained: Rows, rows: Rows, shifts: Sequence[float]) -> Floats:
+        """Wrench (shifts, n, axes) of ``rows`` at each drift, by coefficients from the rows ``trained``."""
+        key = (window_rows, lag_rows)
+        if key not in self._columns:
+            self._columns[key] = np.array([self._mean(*key, counts) for counts in shifts])
+        of = self._columns[key]
+        coefficients = fit(of[0][trained], self.run.truth[trained])
+        return np.array([predict(shifted[rows], coefficients) for shifted in of])
+
+    def _mean(self, window_rows: int, lag_rows: int, counts: float) -> Floats:
+        every = np.arange(len(self.run.counts))
+
+        def flat(signals: Signals) -> Floats:
+            return columns(signals)[:, : self.axes].reshape(len(signals.e), -1)
+
+        mean = smoothed(self.run, window_rows, lag_rows, every, drifted(self.run, counts, flat))
+        return mean.reshape(len(every), self.axes, -1)

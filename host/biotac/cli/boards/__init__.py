@@ -1,0 +1,1 @@
+"""Verbs about boards: what is there, what ails it, what it keeps."""

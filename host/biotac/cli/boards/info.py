@@ -1,0 +1,70 @@
+"""biotac info PORT"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from typing import Any
+
+import biotac
+
+from ...keep import map_file
+from ...keep.calibration_file import to_dict, when
+from ...keep.map_blob import made_s
+from ...wire import messages_gen as wire
+from ...wire.identity import ascii_text, board_text, serial_text, version_text
+from .. import values
+
+NAME = "info"
+HELP = "Say who is on a port: board, firmware, sensors, settings, counters."
+EXAMPLE = "biotac info /dev/ttyACM0"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The port."""
+    values.add_port(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what the board says of itself."""
+    with biotac.open(args.port) as hand:
+        hello = hand.info
+        sensors = [hand.sensor_info(f) for f in hand.fingers]
+        settings = hand.settings()
+        calibrations = hand.calibrations()
+        maps = hand.maps()
+        status = hand.status()
+        warnings = hand.warnings
+    if args.json:
+        facts: dict[str, Any] = {
+            "port": hand.port,
+            "board": board_text(hello.board),
+            "firmware": version_text(hello),
+            "wire": f"{hello.wire_major}.{hello.wire_minor}",
+            "schema_hash": f"{hello.schema_hash:08x}",
+            "schema_matches": hello.schema_hash == wire.SCHEMA_HASH,
+            "serial_number": serial_text(hello),
+            "boot_id": hello.boot_id,
+            "sensors": [
+                {"finger": s.finger, "serial": ascii_text(s.serial), "software": ascii_text(s.software_version)}
+                for s in sensors
+            ],
+            "calibrations": {finger: to_dict(its) for finger, its in calibrations.items()},
+            "maps": {finger: map_file.to_dict(blob) for finger, blob in maps.items()},
+            "settings": {s.name.lower(): value for s, value in settings.items()},
+            "status": dataclasses.asdict(status),
+        }
+        print(json.dumps(facts))
+        return 0
+    print(f"{board_text(hello.board)}, firmware {version_text(hello)}, wire {hello.wire_major}.{hello.wire_minor}")
+    print(f"serial {serial_text(hello)}, boot {hello.boot_id:08x}, up {status.uptime_s} s")
+    for warning in warnings:
+        print(f"warning: {warning.text}")
+    for s in sensors:
+        own = f", calibration {when(calibrations[s.finger].made_s)}" if s.finger in calibrations else ""
+        own += f", wrench map {when(made_s(maps[s.finger]))}" if s.finger in maps else ""
+        print(f"finger {s.finger}: BioTac {ascii_text(s.serial)}, software {ascii_text(s.software_version)}{own}")
+    for setting, value in settings.items():
+        print(f"{setting.name.lower()} = {value} {wire.SETTINGS[setting].unit}")
+    return 0

@@ -1,0 +1,79 @@
+"""biotac list"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+from ...errors import BiotacError
+from ...hand.hand import Hand
+from ...link import open_link
+from ...link.discovery import SerialPort, serial_ports
+from ...sim.source import bundled_scenarios
+from ...wire import messages_gen as wire
+from ...wire.identity import board_text, serial_text, version_text
+
+NAME = "list"
+HELP = "List boards and other serial ports, and the scenarios that can be simulated."
+EXAMPLE = "biotac list"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """--all is not the default: bytes sent to an unknown device may mean something to it."""
+    parser.add_argument("--all", action="store_true", help="ask every port; without it only those with our USB ids")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print ports and scenarios."""
+    ports = [describe(port, ask=port.is_board or args.all) for port in serial_ports()]
+    scenarios = [f"sim:{name}" for name in bundled_scenarios()]
+    if args.json:
+        print(json.dumps({"ports": ports, "scenarios": scenarios}))
+        return 0
+    if not any(port["is_board"] for port in ports):
+        print("no board on USB; plug one in, ask `biotac doctor`, or try a simulated one:")
+    for port in ports:
+        print(as_line(port))
+    for name in scenarios:
+        print(name)
+    return 0
+
+
+def describe(port: SerialPort, *, ask: bool) -> dict[str, Any]:
+    """What the operating system says of a port, and what the port says when asked."""
+    facts: dict[str, Any] = {
+        "port": port.device,
+        "is_board": port.is_board,
+        "description": port.description,
+        "serial_number": port.serial_number,
+    }
+    if ask:
+        try:
+            with Hand(open_link(port.device)) as hand:
+                facts |= as_facts(hand.info, hand.fingers)
+        except BiotacError as error:
+            facts["problem"] = str(error)
+    return facts
+
+
+def as_facts(hello: wire.Hello, fingers: list[int]) -> dict[str, Any]:
+    """Of a port that answered."""
+    return {
+        "is_board": True,
+        "serial_number": serial_text(hello),
+        "board": board_text(hello.board),
+        "firmware": version_text(hello),
+        "fingers": fingers,
+    }
+
+
+def as_line(facts: dict[str, Any]) -> str:
+    """For a person."""
+    if "problem" in facts:
+        return f"{facts['port']}  {facts['problem']}"
+    if "firmware" not in facts:
+        return "  ".join(str(facts[key]) for key in ("port", "description", "serial_number") if facts[key])
+    fingers = ", ".join(map(str, facts["fingers"])) or "none"
+    words = (f"serial:{facts['serial_number']}", facts["board"], f"firmware {facts['firmware']}", f"fingers {fingers}")
+    return "  ".join([facts["port"], *words])

@@ -1,0 +1,37 @@
+"""biotac calibrate WHAT"""
+
+from __future__ import annotations
+
+import argparse
+
+from . import contact as calibrate_contact
+from . import pressure as calibrate_pressure
+from . import wrench as calibrate_wrench
+
+NAME = "calibrate"
+HELP = "Fit a finger's wrench, or its pressure, to a reference, measure it held out, give it to the board."
+EXAMPLE = calibrate_wrench.EXAMPLE
+
+WHATS = (calibrate_wrench, calibrate_pressure, calibrate_contact)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to calibrate; each has its own arguments."""
+    what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
+    for module in WHATS:
+        one = what.add_parser(
+            module.NAME,
+            help=module.HELP,
+            description=module.HELP,
+            epilog=f"example: {module.EXAMPLE}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        # of the verb already; here for those who write it last
+        one.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print JSON for machines")
+        module.add_arguments(one)
+        one.set_defaults(calibrate=module.run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do what was named."""
+    return int(args.calibrate(args))

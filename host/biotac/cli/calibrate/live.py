@@ -1,0 +1,98 @@
+"""biotac calibrate wrench --live PORT"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import biotac
+
+from ...calibrate.reference.live import Reader
+from ...calibrate.reference.mounting import Mounting, read_mounting
+from ...calibrate.reference.net_ft import PREFIX, NetFtReader, parse_address
+from ...calibrate.wrench.procedure import Event, Procedure
+from ...calibrate.wrench.provenance import check_serial
+from ...calibrate.wrench.walk import Places, walk
+from ...errors import BiotacError, InputError
+from ...sim.nano17 import Nano17
+from ...sim.nano17_reader import Nano17Reader
+from ...wire.identity import ascii_text
+from ..progress import Progress
+
+EMULATED = "nano17"
+
+
+def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Places, list[str]]:
+    """Walk through; the files, and what is missing in words.
+
+    Raises KeyboardInterrupt, in words, when it was ended before there was anything to fit.
+    """
+    serial = ascii_text(hand.sensor_info(finger).serial)
+    check_serial(f"finger {finger}", serial, args.serial, force=args.force)
+    name = serial or f"finger{finger}"
+    places = Places(args.out / f"{name}.mcap", args.out / f"{name}.csv")
+    progress = Progress()
+
+    def show(event: Event) -> None:
+        progress.done()
+        print(f"biotac: {event.words}", file=sys.stderr)
+
+    with _reader(args, hand, finger) as (reader, mounting):
+        make_folder(args.out)
+        procedure = Procedure(finger, mounting)
+        try:
+            walk(hand, reader, procedure, places, overwrite=args.force, show=show, progress=progress.show)
+        except BiotacError:
+            if places.recording.exists():
+                print(f"biotac: what was recorded is in {places.recording} and {places.reference}", file=sys.stderr)
+            raise
+        finally:
+            progress.done()
+        lost = reader.stats
+    if lost.lost or lost.late or lost.bad:
+        print(f"biotac: reference: {lost.lost} samples lost, {lost.late} late, {lost.bad} bad", file=sys.stderr)
+    if procedure.zero is None:
+        raise KeyboardInterrupt(
+            f"it ended while {procedure.last_step.value.partition(':')[0]}; what was recorded is in {places.recording} "
+            f"and {places.reference}"
+        )
+    return places, procedure.coverage.missing()
+
+
+def make_folder(folder: Path) -> None:
+    """With those above it. Raises InputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder} is no folder ({error.strerror}); choose another name") from error
+
+
+def open_board(args: argparse.Namespace) -> biotac.Hand:
+    """The board; a simulated one beside an emulated reference runs as fast as this side reads."""
+    return biotac.open(args.live, pace=0.0 if args.reference == [EMULATED] else 1.0)
+
+
+@contextlib.contextmanager
+def _reader(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> Iterator[tuple[Reader, Mounting]]:
+    if len(args.reference) != 1:
+        raise InputError(f"{len(args.reference)} --reference with --live: expected one, {PREFIX}HOST or {EMULATED}")
+    (text,) = args.reference
+    if text == EMULATED:
+        if hand.link.source is None:
+            raise InputError(f"{EMULATED} is emulated and feels a simulated finger only: expected --live sim:SCENARIO")
+        nano17 = Nano17() if args.mounting is None else Nano17(read_mounting(args.mounting))
+        yield Nano17Reader(hand.link.source, finger, nano17), nano17.mounting
+        return
+    if not text.startswith(PREFIX):
+        raise InputError(f"{text}: expected {PREFIX}HOST, a Net F/T box, or {EMULATED}, the emulated one")
+    if args.mounting is None:
+        raise InputError(f"{text} does not say how it is fixed to the finger: expected --mounting FILE.toml")
+    mounting = read_mounting(args.mounting)
+    reader = NetFtReader(parse_address(text))
+    try:
+        yield reader, mounting
+    finally:
+        reader.close()

@@ -1,0 +1,256 @@
+"""biotac calibrate wrench FILE..."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import biotac
+
+from ...calibrate.reference.files import read_reference
+from ...calibrate.reference.mounting import read_mounting
+from ...calibrate.wrench import board, figures, fitted, provenance, report
+from ...calibrate.wrench.crossvalidation import WINDOWS_ROWS, Validation, validate
+from ...calibrate.wrench.joined import choose_finger
+from ...calibrate.wrench.sources import Loaded, load
+from ...calibrate.wrench.upload import upload
+from ...errors import InputError
+from ...hand.views import checked_names, finger_index
+from ...partial_file import whole
+from ...wire.identity import ascii_text
+from ..progress import Progress
+from . import live as calibrate_live
+
+Put = Callable[[Validation, provenance.Provenance], dict[str, Any]]
+
+NAME = "wrench"
+HELP = (
+    "Counts to force: from a board's recordings with a force/torque sensor's file beside each, or from .npz with E, "
+    "F (N), E_base and E_idle; M (N mm) and PDC if there."
+)
+EXAMPLE = "biotac calibrate wrench thumb.mcap --reference thumb.csv --finger thumb --out calibrated/"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to fit, and from which files."""
+    parser.add_argument("files", metavar="FILE", nargs="*", type=Path, help="one finger each, fitted on its own")
+    parser.add_argument("--out", metavar="FOLDER", type=Path, help="report (.md, .png) and map (.wrench.json) go here")
+    parser.add_argument(
+        "--reference", metavar="REF", action="append", default=[],
+        help="force of the .mcap at the same place: .csv, or .mcap with WrenchStamped (:TOPIC if many); with --live "
+        "netft:HOST (ATI Net F/T), or nano17 (emulated, beside sim:)",
+    )  # fmt: skip
+    parser.add_argument("--mounting", metavar="M", help="how its sensor is fixed: a .toml, or lin (axes are Lin's)")
+    parser.add_argument("--finger", metavar="NAME", help="of a recording with several: name or chip select")
+    parser.add_argument("--serial", metavar="BT...", default="", help="refuse data of another sensor than this")
+    parser.add_argument("--force", action="store_true", help="overwrite what is there; take another sensor's data")
+    live = parser.add_argument_group("guided, on a board")
+    live.add_argument("--live", metavar="PORT", help="warm up, tare, load everywhere, fit, upload; Ctrl-C ends loading")
+    live.add_argument("--upload", metavar="PORT", help="give the map fitted from FILE to this board's finger")
+    live.add_argument("--no-upload", action="store_true", help="with --live: leave the board as it is")
+    live.add_argument("--save", action="store_true", help="have the board keep the map over a restart")
+    parser.add_argument(
+        "--as-recorded", action="store_true", help="do not correct the lag of counts after force, do not smooth counts"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Calibrate every file, or the finger of a board."""
+    if (args.live is None) != bool(args.files):
+        raise InputError("expected FILE..., or --live PORT and no FILE")
+    if args.live is not None:
+        return _live(args)
+    if args.upload is not None and len(args.files) != 1:
+        raise InputError(f"--upload with {len(args.files)} files: expected one, which is the finger's")
+    if args.out is not None:
+        _check_out(args.out, args.files, overwrite=args.force)
+    references = _references(args.files, args.reference)
+    mounting = None if args.mounting is None else read_mounting(args.mounting)
+    finger = None if args.finger is None else finger_number(args.finger)
+    for path in args.files:
+        its = references.get(path)
+        beside = None if its is None else (Path(its), read_reference(its, mounting))
+        loaded = load(path, beside, finger=finger, serial=args.serial, force=args.force)
+        fit(args, loaded, partial(_upload_to, args, finger, loaded))
+    return 0
+
+
+def _live(args: argparse.Namespace) -> int:
+    if args.finger is None:
+        raise InputError("--live calibrates one finger: expected --finger NAME")
+    if args.out is None:
+        raise InputError("--live keeps what it records: expected --out FOLDER")
+    finger = finger_number(args.finger)
+    with calibrate_live.open_board(args) as hand:
+        if finger not in hand.fingers:
+            raise InputError(f"finger {finger} does not answer: expected one of {hand.fingers}; see to its cable")
+        places, missing = calibrate_live.record(args, hand, finger)
+        for line in missing:
+            print(f"biotac: not covered: {line}", file=sys.stderr)
+        if not args.force:
+            _check_out(args.out, [places.recording], overwrite=False)
+        loaded = load(places.recording, (places.reference, read_reference(str(places.reference))), finger=finger)
+
+        def put(validation: Validation, its: provenance.Provenance) -> dict[str, Any]:
+            if args.no_upload:
+                return {}
+            return {"board": _put(args, hand, finger, loaded, validation, its)}
+
+        fit(args, loaded, put, {"not_covered": missing})
+    return 0
+
+
+def _upload_to(
+    args: argparse.Namespace, finger: int | None, loaded: Loaded, validation: Validation, its: provenance.Provenance
+) -> dict[str, Any]:
+    if args.upload is None:
+        return {}
+    with biotac.open(args.upload) as hand:
+        where = finger
+        if where is None:
+            where = (
+                loaded.joined.finger if loaded.joined is not None else choose_finger(args.upload, hand.fingers, None)
+            )
+        serial = ascii_text(hand.sensor_info(where).serial)
+        provenance.check_serial(f"{loaded.run.name}", its.serial, serial, force=args.force)
+        return {"board": _put(args, hand, where, loaded, validation, its)}
+
+
+def _put(
+    args: argparse.Namespace,
+    hand: biotac.Hand,
+    finger: int,
+    loaded: Loaded,
+    validation: Validation,
+    its: provenance.Provenance,
+) -> dict[str, Any]:
+    found = upload(
+        hand, finger, fitted.of(validation), loaded.run, serial=its.serial, made_s=its.made_s, force=args.force
+    )
+    if args.save:
+        hand.save_settings()
+    return found.facts() | {"saved": args.save}
+
+
+def finger_number(text: str) -> int:
+    """Chip select of a finger by name or number. Raises InputError."""
+    try:
+        return finger_index(checked_names(None), int(text) if text.isdigit() else text)
+    except KeyError as error:
+        raise InputError(str(error.args[0])) from None
+
+
+def _references(files: list[Path], references: list[str]) -> dict[Path, str]:
+    recordings = [path for path in files if path.suffix.lower() == ".mcap"]
+    if references and len(references) != len(recordings):
+        raise InputError(
+            f"{len(references)} --reference for {len(recordings)} .mcap recordings: expected one for each, in order"
+        )
+    return dict(zip(recordings, references, strict=False))
+
+
+def fit(args: argparse.Namespace, loaded: Loaded, put: Put, more: dict[str, Any] | None = None) -> None:
+    """Fit, write what was asked for, ``put`` it on a board, and tell all that, and ``more``."""
+    progress = Progress()
+    try:
+        windows = (1,) if args.as_recorded else WINDOWS_ROWS
+        # clocks that were aligned by themselves leave no lag to look for
+        its_own_lag = not args.as_recorded and not loaded.run.by_clocks
+        validation = validate(loaded.run, align=its_own_lag, windows=windows, show=progress.show)
+    finally:
+        progress.done()
+    its = loaded.provenance(int(time.time()))
+    facts = figures.summary(validation) | loaded.facts() | {"serial": its.serial, "data_sha256": its.data_sha256}
+    facts["fixed_point"] = board.summary(fitted.of(validation), validation.run)
+    if args.out is not None:
+        places = _write(validation, its, loaded.files[0], args.out, overwrite=args.force)
+        facts["written"] = [str(place) for place in places]
+    # the files are safe by now, whatever the board says
+    facts |= put(validation, its) | (more or {})
+    print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
+
+
+def _places(folder: Path, path: Path) -> tuple[Path, Path, Path]:
+    return folder / f"{path.stem}.md", folder / f"{path.stem}.png", folder / f"{path.stem}.wrench.json"
+
+
+def _check_out(folder: Path, files: list[Path], *, overwrite: bool) -> None:
+    """Before minutes of work and not after it."""
+    places = [place for path in files for place in _places(folder, path)]
+    twice = {place for place in places if places.count(place) > 1}
+    if twice:
+        raise InputError(f"{min(twice)} would be written twice; give files of the same name a folder each")
+    for place in places:
+        if place.exists() and not overwrite:
+            raise InputError(f"{place} exists and would be overwritten; choose another folder or say --force")
+    calibrate_live.make_folder(folder)
+
+
+def _write(
+    validation: Validation, its: provenance.Provenance, path: Path, folder: Path, *, overwrite: bool
+) -> tuple[Path, ...]:
+    page, picture, its_map = places = _places(folder, path)
+    with contextlib.ExitStack() as stack:
+        parts = [stack.enter_context(whole(place, overwrite=overwrite)) for place in (page, picture, its_map)]
+        parts[0].write_text(report.markdown(validation, picture.name) + _origin(its), encoding="utf-8")
+        report.draw(validation, parts[1])
+        parts[2].write_text(provenance.embed(fitted.dumps(fitted.of(validation)), its), encoding="utf-8")
+    return places
+
+
+def _origin(its: provenance.Provenance) -> str:
+    rows = [
+        ("sensor", its.serial or "not said by the recording"),
+        ("made", f"{its.made}, {its.software}"),
+        ("data", f"{', '.join(its.files)}, SHA-256 {its.data_sha256}"),
+        ("reference", its.reference),
+    ]
+    return "\n".join(["", "## Provenance", "", *[f"* {name}: {what}" for name, what in rows], ""])
+
+
+def _lines(facts: dict[str, Any]) -> list[str]:
+    def numbers(values: list[float | None]) -> str:
+        return "  ".join("    -" if value is None else f"{value:5.3f}" for value in values)
+
+    up, down = (f"{counts:+.0f}" for counts in facts["drift_counts"])
+    return [
+        f"{facts['file']}: {facts['rows']} rows, {facts['model']}",
+        f"  held out, x y z:        RMSE {numbers(facts['rmse_n'])} N   R2 {numbers(facts['r2'][:3])}   "
+        f"median angle {facts['median_angle_deg']:.2f} deg",
+        f"  drifted {up} counts:    RMSE {numbers(facts['drift_rmse_n'][0])} N",
+        f"  drifted {down} counts:    RMSE {numbers(facts['drift_rmse_n'][1])} N",
+        *([f"  torque, x y z:          RMSE {numbers(facts['rmse_nmm'])} N mm"] if "rmse_nmm" in facts else []),
+        *(
+            [f"  torsion:                RMSE {facts['torsion_rmse_nmm']:5.3f} N mm"]
+            if "torsion_rmse_nmm" in facts
+            else []
+        ),
+        f"  Lin's three scales:     RMSE {numbers(facts['models']['lin-scales'][:3])} N",
+        f"  counts {facts['lag_rows']} rows after the force, {facts['lag_corrected_rows']} corrected; "
+        f"mean of {facts['window_rows']} rows",
+        f"  where nothing touches:  {numbers(facts['rest_n'][:1])} N",
+        f"  {board.words(facts['fixed_point'])}",
+        *[f"  {note}" for note in facts["notes"]],
+        *[f"  written: {place}" for place in facts.get("written", [])],
+        *(_board_lines(facts["board"]) if "board" in facts else []),
+    ]
+
+
+def _board_lines(its: dict[str, Any]) -> list[str]:
+    torque = "" if its["torque_nmm_max"] is None else f", {its['torque_nmm_max']:.4f} N mm"
+    kept = "kept over a restart" if its["saved"] else "until it restarts; --save keeps it"
+    sent = f"{its['frames_bit_for_bit']} frames it then sent are bit for bit what its map says"
+    if not its["frames_bit_for_bit"]:
+        sent = "it sent no frame to compare, its simulated finger's script was over"
+    return [
+        f"  on the board, {kept}: {its['bytes']} bytes, read back alike",
+        f"  its code on {its['rows']} recorded rows: within {its['force_mn_max']:.3f} mN{torque} of the float model",
+        f"  {sent}",
+    ]

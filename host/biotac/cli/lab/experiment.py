@@ -1,0 +1,118 @@
+"""biotac experiment NAME [RECORDING]"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+from pathlib import Path
+from typing import Any
+
+from ...errors import InputError
+from ...lab.experiments import catalogue
+from ...lab.experiments.outcome import Experiment, Facts, Options, markdown, verdicts
+from ...partial_file import whole
+from ..progress import Progress
+
+NAME = "experiment"
+HELP = "Do a paper's experiment again: figure, table against the paper, JSON."
+EXAMPLE = "biotac experiment poke --out poked --check"
+SEED_MAX = 2**31 - 1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which experiment, on what, and where its results go."""
+    parser.add_argument(
+        "name",
+        metavar="NAME",
+        choices=list(catalogue.NAMES),
+        help="; ".join(f"{name}: {words}" for name, words in catalogue.NAMES.items()),
+    )
+    parser.add_argument(
+        "recording",
+        metavar="RECORDING",
+        nargs="?",
+        type=Path,
+        help="a laboratory's own trial, .npz or .mcap, instead of the emulated finger",
+    )
+    parser.add_argument("--finger", type=int, default=0, help="which finger of an .mcap (default 0)")
+    parser.add_argument("--seed", type=int, help="which emulated finger (default 1)")
+    parser.add_argument(
+        "--map",
+        metavar="FILE",
+        type=Path,
+        action="append",
+        default=[],
+        help="a .wrench.json to try beside the paper's model; more than once if you like",
+    )
+    parser.add_argument("--out", metavar="FOLDER", type=Path, help="NAME.md, NAME.png and NAME.json go here")
+    parser.add_argument("--force", action="store_true", help="overwrite what is there")
+    parser.add_argument("--check", action="store_true", help="exit 1 when a figure misses what is asked of it")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0, or 1 when --check finds something missed."""
+    experiment = catalogue.load(args.name)
+    _check_arguments(args, experiment)
+    progress = Progress()
+    try:
+        seed = 1 if args.seed is None else args.seed
+        options = Options(seed, args.recording, args.finger, tuple(args.map), progress.show)
+        result = experiment.run(options)
+        facts = experiment.facts(result)
+    finally:
+        progress.done()
+    if args.check and not facts["checks"]:
+        cure = "give --map FILE" if experiment.MAPS and args.recording is None else "leave --check out"
+        raise InputError(f"--check: nothing is asked of {args.name} on {facts['source']}: expected a figure; {cure}")
+    page = experiment.page(facts)
+    if args.out is not None:
+        facts["written"] = [str(place) for place in _write(args, experiment, result, facts, page)]
+    print(json.dumps(facts) if args.json else "\n".join(_lines(facts, page)))
+    return 1 if args.check and not all(one["met"] for one in facts["checks"]) else 0
+
+
+def _check_arguments(args: argparse.Namespace, experiment: Experiment) -> None:
+    """Before seconds of work and not after them."""
+    if args.recording is not None and not experiment.RECORDING:
+        raise InputError(f"{args.name} is for the emulated sensor only, seen {args.recording}: leave it out")
+    if args.recording is not None and args.seed is not None:
+        raise InputError("--seed chooses an emulated finger, and there is a recording: leave one out")
+    if args.seed is not None and not 0 <= args.seed <= SEED_MAX:
+        raise InputError(f"--seed is {args.seed}: expected 0 to {SEED_MAX}")
+    if args.map and not experiment.MAPS:
+        raise InputError(f"{args.name} has no use for a wrench map: leave --map out")
+    if args.out is None:
+        return
+    for place in _places(args.out, args.name):
+        if place.exists() and not args.force:
+            raise InputError(f"{place} exists and would be overwritten; choose another folder or say --force")
+    if args.out.exists() and not args.out.is_dir():
+        raise InputError(f"{args.out} is no folder; choose another name")
+
+
+def _places(folder: Path, name: str) -> tuple[Path, Path, Path]:
+    return folder / f"{name}.md", folder / f"{name}.png", folder / f"{name}.json"
+
+
+def _write(
+    args: argparse.Namespace, experiment: Experiment, result: Any, facts: Facts, page: list[str]
+) -> tuple[Path, ...]:
+    try:
+        args.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{args.out} is no folder ({error.strerror}); choose another name") from error
+    places = _places(args.out, args.name)
+    with contextlib.ExitStack() as stack:
+        text, picture, figures = (stack.enter_context(whole(place, overwrite=args.force)) for place in places)
+        title = f"{args.name}: {catalogue.NAMES[args.name]}"
+        text.write_text(markdown(title, page, facts, picture.name), encoding="utf-8")
+        experiment.draw(result, picture)
+        figures.write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
+    return places
+
+
+def _lines(facts: Facts, page: list[str]) -> list[str]:
+    notes = [f"  {note}" for note in facts["notes"]]
+    written = [f"  written: {place}" for place in facts.get("written", [])]
+    return [f"{facts['experiment']}: {facts['source']}", "", *page, *verdicts(facts), *notes, *written]

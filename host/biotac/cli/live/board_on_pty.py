@@ -1,0 +1,58 @@
+"""A board on a pty for as long as the command runs: told, linked, and gone with Ctrl-C."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Protocol
+
+from ...errors import PortError
+
+
+class Board(Protocol):
+    """What is on the pty."""
+
+    path: str
+
+    def close(self) -> None:
+        """End it."""
+
+
+@contextmanager
+def until_ctrl_c(board: Board, link: Path | None) -> Iterator[None]:
+    """Ctrl-C is the usual way to stop it; then the board and the link to it are gone, as after an error."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        pass
+    finally:
+        if link is not None and link.is_symlink():
+            link.unlink()
+        board.close()
+
+
+def tell(board: Board, link: Path | None, plays: str, facts: dict[str, Any], *, as_json: bool) -> None:
+    """Make the link, and print where the board is and what it plays; ``facts`` are those of --json besides the port."""
+    if link is not None:
+        make_link(link, board.path)
+    print(json.dumps({"port": board.path, **facts}) if as_json else f"{board.path} plays {plays}; Ctrl-C stops")
+    sys.stdout.flush()
+
+
+def tell_over(plays: str) -> None:
+    """A board does not vanish when nothing more happens to its fingers: it goes on answering."""
+    print(f"{plays} is over; the board stays until Ctrl-C", file=sys.stderr)
+
+
+def make_link(link: Path, target: str) -> None:
+    """Replace a link left over from before; never anything else."""
+    if link.is_symlink():
+        link.unlink()
+    try:
+        os.symlink(target, link)
+    except OSError as error:
+        raise PortError(f"{link} cannot be made a link ({error.strerror}); choose another path") from error

@@ -1,0 +1,70 @@
+"""biotac sim SOURCE"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+from pathlib import Path
+
+from ...errors import InputError
+from ...hand.opening import shake_hands
+from ...link.ports import start_board
+from ...link.serial_port import SerialLink
+from ...sim.process import SimBoard
+from ...sim.source import load_source
+from .. import values
+from .board_on_pty import tell, tell_over, until_ctrl_c
+
+NAME = "sim"
+HELP = "Run a simulated or emulated board on a pty that any serial program can open."
+EXAMPLE = "biotac sim press.toml --fingers 5 --board pico"
+SCENARIO_S = 600.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Source and pace."""
+    parser.add_argument("source", metavar="SOURCE", help="scenario (.toml) or recorded counts (.npz, .btd)")
+    parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
+    parser.add_argument(
+        "--seconds",
+        type=values.seconds,
+        help="device time (default: scenarios repeat for ten minutes, recordings play once)",
+    )
+    parser.add_argument(
+        "--board",
+        choices=("posix", "pico"),
+        default="posix",
+        help="posix (default): the firmware as a process; pico: the Pico's flash image in an emulator",
+    )
+    parser.add_argument("--image", help="flash image for --board pico (default: build/pico/biotac-pico.bin)")
+    parser.add_argument("--pace", type=values.pace, default=1.0, help="real (default) or device seconds per second")
+    parser.add_argument("--link", type=Path, help="also make this path a symbolic link to the pty")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the pty's path, then run until Ctrl-C."""
+    if args.pace == 0:
+        raise InputError("a board on a pty needs a pace above 0; unpaced boards are for biotac.open and biotac demo")
+    if args.image is not None and args.board == "posix":
+        raise InputError("--image is for boards that have one; add --board pico")
+    name = args.source.removeprefix("sim:")
+    seconds = args.seconds or (SCENARIO_S if name.endswith(".toml") else None)
+    source = load_source(name, fingers=args.fingers, seconds=seconds)
+    board = start_board(args.board, source, pace=args.pace, image=args.image)
+    with until_ctrl_c(board, args.link):
+        prepare(board)
+        facts = {"source": source.name, "fingers": source.samples.shape[1]}
+        tell(board, args.link, source.name, facts, as_json=args.json)
+        while not board.wait():
+            pass
+        tell_over(source.name)
+        signal.pause()
+    return 0
+
+
+def prepare(board: SimBoard) -> None:
+    """Give the board its source's settings and tare, as biotac.open does, and let its time run."""
+    link = SerialLink(board.path)
+    link.source = board.source
+    shake_hands(link).close()
+    board.release()

@@ -1,0 +1,58 @@
+"""biotac check REC"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from ...lab.crosscheck import CrossCheck
+from .loading import load
+
+NAME = "check"
+HELP = "Check every on-board result of a recording against the float64 reference."
+EXAMPLE = "biotac check grasp.mcap"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The recording."""
+    parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0: what is there is right. 1: a wrong result, damaged data or no frame. 2 (raised): unreadable.
+
+    A recording that was merely cut off, as by a kill, is right as far as it goes; stderr says so.
+    """
+    recording = load(args.recording, quiet=True)
+    outcome = CrossCheck(wire_minor=recording.info.wire_minor)
+    outcome.add(recording.wire, recording.settings, recording.finger_settings, recording.maps)
+    damaged = recording.counts.bad + recording.damaged_chunks
+    good = outcome.violations == 0 and damaged == 0 and len(recording.frames) > 0
+    if args.json:
+        facts = {
+            "recording": str(args.recording),
+            "good": good,
+            "frames": len(recording.frames),
+            "frames_lost": recording.frames_lost,
+            "crc_errors": recording.counts.bad_crc,
+            "cut_off": recording.cut_off,
+            "problems": recording.problems,
+            "crosscheck": outcome.as_dict(),
+        }
+        print(json.dumps(facts))
+        return 0 if good else 1
+    for problem in recording.problems:
+        print(f"biotac: {problem}", file=sys.stderr)
+    for finding in outcome.findings:
+        print(finding)
+    verdict = "good" if good else f"{outcome.violations} violation(s), {damaged} damaged part(s)"
+    print(
+        f"{args.recording}: {len(recording.frames)} frames, {recording.frames_lost} lost, {verdict}; largest error "
+        f"PoC {outcome.poc_um_max:.3f} um, force {outcome.force_mn_max:.4f} mN, "
+        f"torque {outcome.torque_nmm_max:.5f} N*mm, pressure {outcome.pressure.force_n_max * 1e3:.4f} mN"
+    )
+    if outcome.pressure.starts:
+        print(f"  of {outcome.pressure.starts} frames, with none before them, the pressure's filter is taken as told")
+    return 0 if good else 1

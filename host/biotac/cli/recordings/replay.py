@@ -1,0 +1,76 @@
+"""biotac replay REC"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from ...errors import InputError
+from ...recording.playback import Playback
+from .. import values
+from ..live import stream
+from ..live.board_on_pty import tell, tell_over, until_ctrl_c
+from .loading import load
+
+NAME = "replay"
+HELP = "Play a recording as the board that made it, here or on a pty."
+EXAMPLE = "biotac replay grasp.mcap --from 12.5 --pace 2"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Recording, which part of it, how fast and where to."""
+    parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record")
+    parser.add_argument("--from", dest="from_s", type=moment, default=0.0, help="seconds since its first frame")
+    parser.add_argument("--to", dest="to_s", type=moment, help="seconds since its first frame")
+    parser.add_argument("--pace", type=values.pace, default=1.0, help="real (default), fast, or seconds per second")
+    parser.add_argument("--rate", type=values.rate, default=10.0, help="lines per second and finger (0: all)")
+    parser.add_argument("--pty", action="store_true", help="be a board on a pty that any serial program can open")
+    parser.add_argument("--link", type=Path, help="with --pty: also make this path a symbolic link to the pty")
+
+
+def moment(text: str) -> float:
+    """Seconds, 0 or more."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is no time; expected seconds from 0 on")
+    return value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Play to the end or Ctrl-C; what the recording lacks is said on stderr."""
+    if args.link is not None and not args.pty:
+        raise InputError("--link is for a pty; add --pty")
+    recording = load(args.recording)
+    playback = Playback(recording, from_s=args.from_s, to_s=args.to_s)
+    return on_pty(args, playback) if args.pty else on_stdout(args, playback)
+
+
+def on_stdout(args: argparse.Namespace, playback: Playback) -> int:
+    """Print frames as biotac stream does."""
+    from ...hand.opening import shake_hands
+    from ...recording.replay_link import ReplayLink
+
+    with shake_hands(ReplayLink(f"replay:{args.recording}", playback, pace=args.pace)) as hand:
+        stream.show(hand, rate=args.rate, as_json=args.json)
+    return 0
+
+
+def on_pty(args: argparse.Namespace, playback: Playback) -> int:
+    """Be a board until Ctrl-C; it plays when somebody starts its stream."""
+    from ...recording.replay_pty import ReplayPty
+
+    board = ReplayPty(playback, args.pace)
+    name = str(args.recording)
+    with until_ctrl_c(board, args.link):
+        tell(board, args.link, name, {"recording": name}, as_json=args.json)
+        said = False
+        while True:
+            board.turn(1.0)
+            if board.over and not said:
+                said = True
+                tell_over(name)
+    return 0

@@ -1,0 +1,178 @@
+"""A wrench map as a board keeps it: its blob, and the board's own code on it.
+
+The blob's layout and the meaning of its integers are in protocol/SPEC.md, Wrench maps. Where a map comes
+from is ``biotac.calibrate.wrench``.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..wire import map_gen as _map
+from ..wire import messages_gen as wire
+from ..wire.frames import StructArray
+from ..wire.map_gen import Gate, Kind
+from .compiled import Settings, board_settings, ffi, lib
+
+Integers = NDArray[np.int64]
+BoardResults = tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]
+
+_HEADER = struct.Struct(f"<BBBB{_map.SERIAL_BYTES}sI")
+_BLOCK = struct.Struct(f"<BB{_map.EXPONENTS}B")
+
+
+@dataclass(frozen=True)
+class BoardBlock:
+    """``coefficients`` (columns, axes) of ``kind``'s columns, times 2^``exponent`` of each axis (axes,)."""
+
+    kind: Kind
+    gate: Gate
+    exponent: tuple[int, ...]
+    coefficients: Integers
+
+
+@dataclass(frozen=True)
+class BoardMap:
+    """``axes`` is 3 (force), 6 (and torque) or 7 (and torsion). ``serial`` is of the sensor it was made for, "": any.
+
+    ``made_s`` counts from 1970 UTC, 0: unknown.
+    """
+
+    axes: int
+    blocks: tuple[BoardBlock, ...]
+    serial: str = ""
+    made_s: int = 0
+
+    @cached_property
+    def blob(self) -> bytes:
+        """What a board stores. Raises InputError when the board would refuse it."""
+        serial = self.serial.encode("ascii")
+        head = _HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s)
+        blocks, coefficients = b"", b""
+        for block in self.blocks:
+            unused = (0,) * (_map.EXPONENTS - self.axes)
+            blocks += _BLOCK.pack(block.kind, block.gate, *block.exponent, *unused)
+            coefficients += b"".join(
+                np.ascontiguousarray(_words(block.coefficients[:, axis : axis + 3])).tobytes()
+                for axis in range(0, self.axes, 3)
+            )
+        blob = head + blocks + coefficients
+        _judged(blob)
+        return blob
+
+    @property
+    def with_pdc(self) -> bool:
+        """Whether its results need PDC."""
+        return any(block.kind == Kind.PRESSURE for block in self.blocks)
+
+    @property
+    def handle(self) -> Any:
+        """The C struct bt_map, good for as long as this object lives."""
+        return self._opened[0]
+
+    @cached_property
+    def _opened(self) -> tuple[Any, Any]:
+        return _judged(self.blob)
+
+    def results(
+        self, counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], pdc_above_rest_q4: NDArray[np.int32]
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+        """force_100un, torque_mnmm (n, 3), torsion_mnmm (n,) as on the board; counts, tare_q4 (n, 19), pressure (n,).
+
+        -2^31 where invalid: what the map does not have, and all where pressure, -2^31 itself, is needed and missing.
+        """
+        raw, tare = (np.ascontiguousarray(a, dtype=np.uint16) for a in (counts, tare_q4))
+        pdc = np.ascontiguousarray(pdc_above_rest_q4, dtype=np.int32)
+        force = np.empty((len(raw), 3), np.int32)
+        torque = np.empty((len(raw), 3), np.int32)
+        torsion = np.empty(len(raw), np.int32)
+        lib.bt_map_frames(
+            len(raw),
+            self.handle,
+            ffi.from_buffer("uint16_t[]", raw),
+            ffi.from_buffer("uint16_t[]", tare),
+            ffi.from_buffer("int32_t[]", pdc),
+            ffi.from_buffer("int32_t[]", force),
+            ffi.from_buffer("int32_t[]", torque),
+            ffi.from_buffer("int32_t[]", torsion),
+        )
+        return force, torque, torsion
+
+
+def opened(its: BoardMap | bytes) -> BoardMap:
+    """A map, or the one that a blob holds. Raises InputError when a board would refuse it."""
+    return its if isinstance(its, BoardMap) else from_blob(its)
+
+
+def from_blob(blob: bytes) -> BoardMap:
+    """Inverse of BoardMap.blob, to the bit. Raises InputError when a board would refuse it."""
+    _judged(blob)
+    _, axes, count, _, serial, made_s = _HEADER.unpack_from(blob)
+    heads = [_BLOCK.unpack_from(blob, _map.HEADER_BYTES + k * _map.BLOCK_BYTES) for k in range(count)]
+    at = _map.HEADER_BYTES + count * _map.BLOCK_BYTES
+    blocks = []
+    for kind, gate, *exponent in heads:
+        columns = _map.KINDS[Kind(kind)].columns
+        words = np.frombuffer(blob, "<i2", 2 * columns * axes, at).astype(np.int64).reshape(-1, 2)
+        groups = np.split(words[:, 1] * 65536 + words[:, 0], [3 * columns * k for k in range(1, axes // 3 + axes % 3)])
+        values = np.concatenate([group.reshape(columns, -1) for group in groups], axis=1)
+        blocks.append(BoardBlock(Kind(kind), Gate(gate), tuple(exponent[:axes]), values))
+        at += 4 * columns * axes
+    return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s)
+
+
+def on_board_q4(frames: StructArray, settings: Settings, its: BoardMap) -> BoardResults:
+    """core.on_board_q4() with a map in force, on FRAME messages (n,), whose PDC it may need; and torsion_mnmm (n,)."""
+    raw, tare_q4, pdc, pdc_tare_q4 = (
+        np.ascontiguousarray(frames[name]) for name in ("counts", "tare_q4", "pdc", "pdc_tare_q4")
+    )
+    kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board_settings(settings)))
+    kernel.map = its.handle
+    n = len(frames)
+    poc_um, flags = np.empty((n, 3), np.int16), np.empty(n, np.uint32)
+    force_100un, torque_mnmm, torsion_mnmm = (np.empty(shape, np.int32) for shape in ((n, 3), (n, 3), n))
+    lib.bt_mapped_frames(
+        n,
+        *(ffi.from_buffer("uint16_t[]", array) for array in (raw, tare_q4, pdc, pdc_tare_q4)),
+        kernel,
+        ffi.from_buffer("int16_t[]", poc_um),
+        ffi.from_buffer("int32_t[]", force_100un),
+        ffi.from_buffer("int32_t[]", torque_mnmm),
+        ffi.from_buffer("int32_t[]", torsion_mnmm),
+        ffi.from_buffer("uint32_t[]", flags),
+    )
+    return poc_um, force_100un, torque_mnmm, torsion_mnmm, flags
+
+
+def pdc_above_rest_q4(frames: StructArray) -> NDArray[np.int32]:
+    """Of FRAME messages (n,): PDC above its tare in 1/16 count, -2^31 where either is missing."""
+    missing = (frames["pdc"] == wire.INVALID_COUNT) | (frames["pdc_tare_q4"] == wire.INVALID_COUNT)
+    above = 16 * frames["pdc"].astype(np.int32) - frames["pdc_tare_q4"]
+    return np.where(missing, wire.INVALID_I32, above).astype(np.int32)
+
+
+def _words(values: Integers) -> NDArray[Any]:
+    """i16 low, i16 high of each value, so that high * 2^16 + low is it."""
+    low = (values + 0x8000) % 0x10000 - 0x8000
+    return np.stack([low, (values - low) // 0x10000], axis=-1).astype("<i2")
+
+
+def _judged(blob: bytes) -> tuple[Any, Any]:
+    """The board's own judgement: a bt_map into a copy of the blob, and that copy."""
+    room = ffi.new("uint32_t[]", len(blob) // 4 + 1)  # words, so that it is aligned
+    ffi.memmove(room, blob, len(blob))
+    handle = ffi.new("bt_map *")
+    error = lib.bt_map_open(handle, ffi.cast("uint8_t *", room), len(blob))
+    if error != wire.Error.OK:
+        raise InputError(
+            f"a wrench map of {len(blob)} bytes is refused as {wire.Error(error).name}: expected at most "
+            f"{_map.MAX_BYTES} bytes as protocol/SPEC.md lays them out, of version {_map.VERSION}; make the map again"
+        )
+    return handle, room

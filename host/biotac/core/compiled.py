@@ -1,0 +1,175 @@
+"""The compiled firmware core and its float64 reference, over whole arrays.
+
+Both run over the same recorded integers, so that any difference is arithmetic and nothing else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..wire import messages_gen as wire
+from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, tare_to_q4, to_units
+
+try:
+    from .._core import ffi as ffi
+    from .._core import lib as lib
+except ImportError as error:  # an editable tree without a build, or a wheel for another platform
+    raise ImportError(f"the compiled core is missing ({error}); install the package: pip install .") from error
+
+if lib.bt_binding_schema_hash() != wire.SCHEMA_HASH:
+    raise ImportError(
+        f"the compiled core was built for schema {lib.bt_binding_schema_hash():08x}, this Python code for "
+        f"{wire.SCHEMA_HASH:08x}; install the package again: pip install ."
+    )
+
+NN_PER_N = 1e9
+Settings = dict[wire.Setting, int]
+
+
+@dataclass(frozen=True)
+class Results:
+    """poc_mm, force_n, torque_nmm, each (n, 3) float64; NaN where there is no answer."""
+
+    poc_mm: NDArray[np.float64]
+    force_n: NDArray[np.float64]
+    torque_nmm: NDArray[np.float64]
+
+
+def default_settings() -> Settings:
+    """What a board starts with."""
+    return {setting: spec.default for setting, spec in wire.SETTINGS.items()}
+
+
+def on_board(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
+    """Run the on-board integer kernels: counts (n, 19) 0..4095 or 0xFFFF for missing, tare in counts.
+
+    ``tare`` is (19,) or (n, 19), rounded to 1/16 count as the board does. Raises ValueError for other
+    shapes or ranges.
+    """
+    raw, tare_q4 = checked(counts, tare)
+    poc_um, force_100un, torque_mnmm, _ = on_board_q4(raw, tare_q4, settings or default_settings())
+    return Results(
+        to_units(poc_um, UM_PER_MM), to_units(force_100un, FORCE_LSB_PER_N), to_units(torque_mnmm, MNMM_PER_NMM)
+    )
+
+
+def on_board_q4(
+    counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settings: Settings
+) -> tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]:
+    """on_board() on the integers of FRAME messages, both (n, 19), to such integers and the kernel's flags.
+
+    Returns poc_um, force_100un, torque_mnmm, each (n, 3), and flags (n,).
+    """
+    raw, tare_q4 = np.ascontiguousarray(counts), np.ascontiguousarray(tare_q4)
+    board = board_settings(settings)
+    kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board))
+    n = len(raw)
+    poc_um = np.empty((n, 3), np.int16)
+    force_100un = np.empty((n, 3), np.int32)
+    torque_mnmm = np.empty((n, 3), np.int32)
+    flags = np.empty(n, np.uint32)
+    lib.bt_kernel_frames(
+        n,
+        ffi.from_buffer("uint16_t[]", raw),
+        ffi.from_buffer("uint16_t[]", tare_q4),
+        kernel,
+        ffi.from_buffer("int16_t[]", poc_um),
+        ffi.from_buffer("int32_t[]", force_100un),
+        ffi.from_buffer("int32_t[]", torque_mnmm),
+        ffi.from_buffer("uint32_t[]", flags),
+    )
+    return poc_um, force_100un, torque_mnmm, flags
+
+
+def pressure_force_100un(
+    filtered_q4: NDArray[np.uint16], tare_q4: NDArray[np.uint16], gain_nn: int
+) -> NDArray[np.int32]:
+    """The board's force from pressure, of the integers of FRAME messages, all (n,); see core/solve/pressure.h."""
+    filtered_q4, tare_q4 = np.ascontiguousarray(filtered_q4), np.ascontiguousarray(tare_q4)
+    out = np.empty(len(filtered_q4), np.int32)
+    lib.bt_pressure_forces(
+        len(out),
+        ffi.from_buffer("uint16_t[]", filtered_q4),
+        ffi.from_buffer("uint16_t[]", tare_q4),
+        gain_nn,
+        ffi.from_buffer("int32_t[]", out),
+    )
+    return out
+
+
+def pressure_filtered_q4(pdc: NDArray[np.uint16], filter_milli: int) -> NDArray[np.uint16]:
+    """The board's filter over the PDC words (n,) of consecutive rounds, from its beginning; 1/16 count."""
+    pdc = np.ascontiguousarray(pdc, np.uint16)
+    out = np.empty(len(pdc), np.uint16)
+    pointers = ffi.from_buffer("uint16_t[]", pdc), ffi.from_buffer("uint16_t[]", out)
+    lib.bt_pressure_filter(len(out), pointers[0], filter_milli, pointers[1])
+    return out
+
+
+def board_settings(settings: Settings) -> Any:
+    """The C struct bt_settings with these values; what they do not name has its default.
+
+    Raises ValueError for a value out of the setting's range.
+    """
+    board = ffi.new("bt_settings *")
+    lib.bt_settings_reset(board)
+    for setting, value in settings.items():
+        if lib.bt_settings_set(board, setting, value) != wire.Error.OK:
+            spec = wire.SETTINGS[setting]
+            raise ValueError(f"{setting.name} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
+    return board
+
+
+def reference(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
+    """The same from firmware/reference: Lin 2013 Eq 1-4 in float64. Arguments as on_board()."""
+    raw, tare_q4 = checked(counts, tare)
+    return reference_q4(raw, tare_q4, settings or default_settings())
+
+
+def reference_q4(counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settings: Settings) -> Results:
+    """reference() on the integers of FRAME messages, both (n, 19); no check, the wire had one."""
+    raw, tare_q4 = np.ascontiguousarray(counts), np.ascontiguousarray(tare_q4)
+    gains = formula_settings(settings)
+    out = [np.empty((len(raw), 3), np.float64) for _ in range(3)]
+    lib.lin2013_frames(
+        len(raw),
+        ffi.from_buffer("uint16_t[]", raw),
+        ffi.from_buffer("uint16_t[]", tare_q4),
+        gains,
+        *(ffi.from_buffer("double[]", array) for array in out),
+    )
+    return Results(*out)
+
+
+def formula_settings(settings: Settings) -> Any:
+    """The C struct lin2013_settings, gains in N per count."""
+    return ffi.new(
+        "lin2013_settings *",
+        {
+            "poc_weights": settings[wire.Setting.POC_WEIGHTS],
+            "force_gain": [settings[s] / NN_PER_N for s in FORCE_GAINS],
+            "torque_gain": [settings[s] / NN_PER_N for s in TORQUE_GAINS],
+        },
+    )
+
+
+FORCE_GAINS = (wire.Setting.FORCE_GAIN_X_NN, wire.Setting.FORCE_GAIN_Y_NN, wire.Setting.FORCE_GAIN_Z_NN)
+TORQUE_GAINS = (wire.Setting.TORQUE_GAIN_Y_NN, wire.Setting.TORQUE_GAIN_Z_NN)
+
+
+def checked(counts: Any, tare: Any) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
+    """Contiguous uint16 counts and tare_q4 of one shape, or ValueError."""
+    raw = np.atleast_2d(np.asarray(counts))
+    base = np.broadcast_to(np.asarray(tare, dtype=np.float64), raw.shape)
+    if raw.ndim != 2 or raw.shape[1] != 19:
+        raise ValueError(f"counts have shape {raw.shape}, expected (n, 19)")
+    if not np.all(((raw >= 0) & (raw <= 4095)) | (raw == wire.INVALID_COUNT)):
+        raise ValueError("counts must be 0..4095, or 0xFFFF for a missing electrode")
+    if not np.all((base >= 0) & (base <= 4095)):
+        raise ValueError("a tare must be 0..4095 counts")
+    tare_q4 = tare_to_q4(base)
+    return np.ascontiguousarray(raw, dtype=np.uint16), np.ascontiguousarray(tare_q4)

@@ -1,0 +1,214 @@
+"""Point of contact, force and torque of whole recordings, in float64.
+
+The same formulas as core.reference, sixteen frames at a time in C (host/binding/blocks.c).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..wire import messages_gen as wire
+from ..wire import sensor_gen as sensor
+from ..wire.frames import StructArray
+from .board_map import BoardMap, opened
+from .compiled import FORCE_GAINS, TORQUE_GAINS, Settings, default_settings, ffi, formula_settings, lib
+
+#: poc_mm, force_n and torque_nmm of one frame, named, in units and with axes as in FRAME_DTYPE.
+RESULT_DTYPE = np.dtype([("poc_mm", "<f8", (3,)), ("force_n", "<f8", (3,)), ("torque_nmm", "<f8", (3,))])
+#: The same and ``torsion_nmm``, which a wrench map may have.
+MAPPED_RESULT_DTYPE = np.dtype([*RESULT_DTYPE.descr, ("torsion_nmm", "<f8")])
+
+_COUNT = np.dtype(np.uint16)
+_TARE = np.dtype(np.float64)
+_ELECTRODES = len(sensor.ELECTRODE_NAMES)
+_ONE = (_ELECTRODES,)
+_ALL_GOOD = -1
+
+# Looked up once: a call with one frame takes less time than a few of these would.
+_blocks = lib.bt_blocks
+_buffer = ffi.from_buffer
+_one_frame = lib.bt_one_frame
+
+
+def compute(
+    counts: Any,
+    tare: Any,
+    settings: Settings | None = None,
+    out: StructArray | None = None,
+    *,
+    wrench_map: BoardMap | bytes | None = None,
+    pdc_above_rest: Any = None,
+) -> StructArray:
+    """Results of recorded counts, as RESULT_DTYPE: shape (n,) for counts (n, 19), () for counts (19,).
+
+    ``counts`` are integers 0..4095, 0xFFFF where missing, which weighs nothing; uint16 is read in place,
+    also from a field of a structured array. ``tare`` is (19,) or of the shape of ``counts``, 0..4095
+    counts, rounded to 1/16 count as the board does. ``settings`` are those of a board; what they do not
+    name has its default. ``out``, a contiguous RESULT_DTYPE array of the result's shape, is filled and
+    returned: a buffer that was used before spares the page faults of a new one.
+
+    ``wrench_map``, or its blob, gives the force in place of the gains, and the torque where it has six
+    axes; else torque x is made of its force. The result, and ``out``, are MAPPED_RESULT_DTYPE then: with
+    torsion about the outward normal at the contact, NaN unless the map has it. ``pdc_above_rest`` (n,) or
+    one number, in counts, NaN where missing, is what it may need. Raises InputError for a blob that a board
+    would refuse.
+
+    NaN where there is no answer: poc_mm and torque_nmm x if nothing weighs. Where the board rounds to
+    its wire units this does not, and it never saturates. Raises ValueError for other shapes, types and
+    ranges, with the first bad row, what was seen and what was expected; ``out`` then holds no results.
+    """
+    if wrench_map is not None:
+        from ..calibrate.wrench.applied import by_map  # here: everybody would wait for it at `import biotac`
+
+        plain = compute(counts, tare, settings)
+        shape = plain.shape
+        out = np.empty(shape, MAPPED_RESULT_DTYPE) if out is None else _checked_out(out, shape, MAPPED_RESULT_DTYPE)
+        for name in RESULT_DTYPE.names or ():
+            out[name] = plain[name]
+        return by_map(out, opened(wrench_map), counts, tare, pdc_above_rest)
+    plan = _DEFAULT_PLAN if settings is None else _plan(settings)
+    # One frame in the types that frames have, as on the live path, where the checks would take longer
+    # than the maths. Copying 38 and 152 bytes is faster than borrowing two buffers.
+    try:
+        one = counts.dtype is _COUNT and tare.dtype is _TARE and counts.shape == _ONE == tare.shape
+    except AttributeError:
+        one = False
+    if one and (out is None or (out.dtype is RESULT_DTYPE and out.shape == () and out.flags.carray)):
+        if out is None:
+            out = np.empty((), RESULT_DTYPE)
+        if not _one_frame(plan, counts.tobytes(), tare.tobytes(), _buffer(out)):
+            raise ValueError(_explain(0, counts, tare))
+        return out
+
+    raw = _checked_counts(counts)
+    base = _checked_tare(tare, raw.shape)
+    out = np.empty(raw.shape[:-1], RESULT_DTYPE) if out is None else _checked_out(out, raw.shape[:-1])
+    n = 1 if raw.ndim == 1 else len(raw)
+    raw_stride = raw.strides[0] if raw.ndim == 2 else 0
+    base_stride = base.strides[0] if base.ndim == 2 else 0
+    if base.size == 0:  # of no rows, where NumPy may have a stride of 0, which is one row to C
+        return out
+    bad = _blocks(plan, n, _address(raw), raw_stride, _address(base), base_stride, _buffer(out))
+    if bad != _ALL_GOOD:
+        raise ValueError(_explain(bad, raw, base))
+    return out
+
+
+def per_frame(tare: Any, settings: Settings | None = None) -> Callable[[NDArray[np.uint16]], StructArray]:
+    """compute() for a live stream: a function from one frame's counts, uint16 (19,), to its results.
+
+    Tare and settings are looked at once, and every call fills and returns the same RESULT_DTYPE array of
+    shape (): copy what has to last. compute() spends half of its time for one frame on just that. Raises
+    ValueError as compute().
+    """
+    plan = _DEFAULT_PLAN if settings is None else _plan(settings)
+    base = _checked_tare(tare, _ONE)
+    out = np.empty((), RESULT_DTYPE)
+    compute(np.zeros(_ONE, _COUNT), base, settings, out)  # refuses a tare that is out of range
+    base_bytes, result, one_frame, dtype, shape = base.tobytes(), _buffer(out), lib.bt_one_frame, _COUNT, _ONE
+
+    def results(counts: NDArray[np.uint16]) -> StructArray:
+        if getattr(counts, "dtype", None) is not dtype or counts.shape != shape:
+            seen = (
+                f"{counts.dtype} of shape {counts.shape}" if isinstance(counts, np.ndarray) else type(counts).__name__
+            )
+            raise ValueError(f"counts are {seen}, expected uint16 of (19,)")
+        if not one_frame(plan, counts.tobytes(), base_bytes, result):
+            raise ValueError(_explain(0, counts, base))
+        return out
+
+    return results
+
+
+_PLAN_SETTINGS = (wire.Setting.POC_WEIGHTS, *FORCE_GAINS, *TORQUE_GAINS)
+_DEFAULTS = default_settings()
+
+
+def _plan(settings: Settings) -> Any:
+    return _plan_of(tuple(int(settings.get(key, _DEFAULTS[key])) for key in _PLAN_SETTINGS))
+
+
+@lru_cache(maxsize=16)
+def _plan_of(values: tuple[int, ...]) -> Any:
+    """The bt_block_plan of _PLAN_SETTINGS' values. It is only read, so that calls may share it."""
+    chosen = dict(zip(_PLAN_SETTINGS, values, strict=True))
+    for key, value in chosen.items():
+        spec = wire.SETTINGS[key]
+        if not spec.low <= value <= spec.high:
+            raise ValueError(f"{key.name} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
+    plan = ffi.new("bt_block_plan *")
+    if not lib.bt_block_plan_init(plan, formula_settings(chosen)):
+        raise RuntimeError("host/binding/blocks.c folds another geometry than the one that was generated")
+    return plan
+
+
+def _checked_counts(counts: Any) -> NDArray[np.uint16]:
+    """uint16 (n, 19) or (19,) with adjoining columns; other integers only if they are in range."""
+    raw = np.asarray(counts)
+    if raw.ndim not in (1, 2) or raw.shape[-1] != _ELECTRODES:
+        raise ValueError(f"counts have shape {raw.shape}, expected (n, 19) or (19,)")
+    if raw.dtype != _COUNT:
+        if raw.dtype.kind not in "iu":
+            raise ValueError(f"counts are {raw.dtype}, expected integers, best uint16")
+        bad = np.argwhere(~_countlike(raw))
+        if len(bad):
+            raise ValueError(_explain(int(bad[0, 0]) if raw.ndim == 2 else 0, raw, np.zeros(_ONE)))
+        raw = raw.astype(_COUNT)
+    return raw if raw.strides[-1] == _COUNT.itemsize else np.ascontiguousarray(raw)
+
+
+def _checked_tare(tare: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """float64 (19,) or ``shape`` with adjoining columns. The range is for C to check."""
+    base = np.asarray(tare)
+    if base.shape not in (_ONE, shape):
+        raise ValueError(f"the tare has shape {base.shape}, expected (19,) or {shape} as the counts")
+    if base.dtype.kind not in "iuf":
+        raise ValueError(f"the tare is {base.dtype}, expected numbers, best float64")
+    base = base.astype(_TARE, copy=False)
+    return base if base.strides[-1] == _TARE.itemsize else np.ascontiguousarray(base)
+
+
+def _checked_out(out: StructArray, shape: tuple[int, ...], dtype: np.dtype[np.void] = RESULT_DTYPE) -> StructArray:
+    if not (isinstance(out, np.ndarray) and out.dtype == dtype and out.shape == shape and out.flags.carray):
+        seen = f"{out.dtype} of shape {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
+        name = "RESULT_DTYPE" if dtype == RESULT_DTYPE else "MAPPED_RESULT_DTYPE"
+        raise ValueError(f"out is {seen}, expected a contiguous, writeable {name} of shape {shape}")
+    # The dtype has no alignment of its own, and C stores doubles.
+    if out.size and out.ctypes.data % 8:
+        raise ValueError("out begins at an odd address, expected one that float64 can be stored at")
+    return out
+
+
+def _address(array: NDArray[Any]) -> Any:
+    """For C, valid as long as the caller holds the array; cffi itself lends only contiguous ones."""
+    return _buffer(array) if array.flags.c_contiguous else ffi.cast("void *", array.ctypes.data)
+
+
+def _countlike(values: NDArray[Any]) -> NDArray[np.bool_]:
+    good = ((values >= 0) & (values <= sensor.FULL_SCALE_COUNT)) | (values == wire.INVALID_COUNT)
+    return np.asarray(good)
+
+
+def _explain(row: int, counts: NDArray[Any], tare: NDArray[Any]) -> str:
+    """What is out of range in a row that C refused."""
+    base = tare if tare.ndim == 1 else tare[row]
+    bad = np.flatnonzero(~((base >= 0) & (base <= sensor.FULL_SCALE_COUNT)))
+    if len(bad):
+        where = "" if tare.ndim == 1 else f" of row {row}"
+        name = sensor.ELECTRODE_NAMES[bad[0]]
+        return f"the tare{where} has {name} = {base[bad[0]]}, expected 0..{sensor.FULL_SCALE_COUNT} counts"
+    values = counts if counts.ndim == 1 else counts[row]
+    first = np.flatnonzero(~_countlike(values))[0]
+    where = "" if counts.ndim == 1 else f" of row {row}"
+    return (
+        f"the counts{where} have {sensor.ELECTRODE_NAMES[first]} = {values[first]}, expected "
+        f"0..{sensor.FULL_SCALE_COUNT}, or {wire.INVALID_COUNT} for a missing electrode"
+    )
+
+
+_DEFAULT_PLAN = _plan(_DEFAULTS)

@@ -1,0 +1,214 @@
+"""One finger as the board runs it: recorded counts in, every frame's tare, flags and results out.
+
+The compiled firmware core (firmware/core/finger.h) round by round, so that a recording is recomputed on
+the board's own code, bit for bit, with other settings if need be.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import CommandRefusedError
+from ..wire import messages_gen as wire
+from ..wire import sensor_gen as sensor
+from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
+from .board_map import BoardMap, opened
+from .compiled import Settings, board_settings, default_settings, ffi, lib
+
+ROUND_US = 10_000
+NO_TOUCH = 255
+TARE_UNKNOWN_Q16 = 0xFFFFFFFF
+
+#: What Finger.feed returns: the fields of a FRAME message as the board sends them (protocol/MESSAGES.md:
+#: integers, tare in 1/16 count, invalid marks), then ``present`` (0: no word was good, the board sends nothing
+#: and only seq, t_us and the marks mean anything), ``tare_reason`` (TareReason), ``touch_slot`` (slot in which a
+#: resting finger was first touched, 255: in none), ``energy_count2`` (of the filtered signals of a
+#: finger at rest, count^2; 0 in the other states, where nobody asks),
+#: ``noise_count2`` (at rest, 0 until measured) and ``threshold_count2`` (energy that counts as touched).
+FINGER_DTYPE = np.dtype(
+    [
+        *wire.DTYPES[wire.Frame.ID].descr,
+        ("present", "u1"),
+        ("tare_reason", "u1"),
+        ("touch_slot", "u1"),
+        ("energy_count2", "=u4"),
+        ("noise_count2", "=u4"),
+        ("threshold_count2", "=u4"),
+    ]
+)
+
+_ELECTRODES = len(sensor.ELECTRODE_NAMES)
+_SLOTS = np.array(sensor.SLOTS)
+_ELECTRODE_SLOTS = np.array([sensor.SLOTS.index(name) for name in sensor.ELECTRODE_NAMES])
+_SLOW = ("PDC", "TAC", "TDC")
+if FINGER_DTYPE.itemsize != lib.bt_replay_row_bytes():
+    raise ImportError(
+        "the compiled core has other rows than this Python code; install the package again: pip install ."
+    )
+
+
+class Finger:
+    """One finger of a board: its tare machine and its kernels, in the state that all rounds so far left.
+
+    ``settings`` are the board's; what they do not name has its default. ``index`` (0..4) is the finger's
+    number in the rows. ``quantities`` is the subscription, by default the board's own; QuantityFlags.SIGMA adds
+    standard deviations. ``wrench_map``, or its blob, is in force in place of the gains. Raises ValueError for a
+    setting or an index out of range, InputError for a blob that a board would refuse.
+
+    >>> finger = Finger()
+    >>> rows = finger.feed(np.full((30, 19), 3000))
+    >>> rows["tare_state"][[0, -1]].tolist()
+    [0, 1]
+    """
+
+    def __init__(
+        self,
+        settings: Settings | None = None,
+        *,
+        index: int = 0,
+        quantities: wire.QuantityFlags | None = None,
+        wrench_map: BoardMap | bytes | None = None,
+    ) -> None:
+        if not 0 <= index < sensor.MAX_SENSORS:
+            raise ValueError(f"index is {index}, expected 0 to {sensor.MAX_SENSORS - 1}")
+        self.settings: Settings = default_settings() | (settings or {})
+        self._settings = board_settings(self.settings)
+        self._finger = ffi.new("bt_finger *")
+        self._index = index
+        self._quantities = quantities
+        self._map = None if wrench_map is None else opened(wrench_map)
+        self.reset()
+
+    def reset(self) -> None:
+        """As after power-up: no tare, seq 0 comes next."""
+        lib.bt_finger_reset(self._finger, self._index)
+        if self._quantities is not None:
+            self._finger.quantities = int(self._quantities)
+        self._next_us = 0
+
+    def feed(
+        self,
+        counts: Any,
+        pdc: Any = None,
+        tac: Any = None,
+        tdc: Any = None,
+        pac: Any = None,
+        *,
+        t_us: Any = None,
+    ) -> StructArray:
+        """Give the finger n rounds of 10 ms and return FINGER_DTYPE (n,), a row for each.
+
+        ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,) and ``pac`` (n, 22) are integers 0..4095, 0xFFFF where no
+        good word came; a channel that is not given has none. PAC takes no part in any result. ``t_us`` (n,), the
+        rounds' device times, wraps at 2^32 as the board's; by default each is 10 ms after the one before. The
+        board's machine counts rounds, not times. Raises ValueError for other shapes, types and ranges, before any
+        round is taken.
+        """
+        electrodes = _words("counts", counts, None, _ELECTRODES)
+        n = len(electrodes)
+        words = np.full((n, len(_SLOTS)), wire.INVALID_COUNT, np.uint16)
+        words[:, _ELECTRODE_SLOTS] = electrodes
+        for name, channel in zip(_SLOW, (pdc, tac, tdc), strict=True):
+            if channel is not None:
+                words[:, name == _SLOTS] = _words(name.lower(), channel, n, None)[:, None]
+        if pac is not None:
+            words[:, _SLOTS == "PAC"] = _words("pac", pac, n, int((_SLOTS == "PAC").sum()))
+        return self._run(words, self._times(t_us, n))
+
+    def _times(self, t_us: Any, n: int) -> NDArray[np.uint32]:
+        times = self._next_us + ROUND_US * np.arange(n, dtype=np.int64) if t_us is None else np.asarray(t_us)
+        if times.shape != (n,) or times.dtype.kind not in "iu":
+            raise ValueError(f"t_us is {times.dtype} of shape {times.shape}, expected integers of ({n},)")
+        if n:
+            self._next_us = int(times[-1]) + ROUND_US
+        return (times.astype(np.int64) % 2**32).astype(np.uint32)
+
+    def _run(self, words: NDArray[np.uint16], times: NDArray[np.uint32]) -> StructArray:
+        rows = np.empty(len(words), FINGER_DTYPE)
+        if len(words):
+            lib.bt_replay(
+                self._finger,
+                self._settings,
+                ffi.NULL if self._map is None else self._map.handle,
+                len(words),
+                ffi.from_buffer("uint16_t[]", words),
+                ffi.from_buffer("uint32_t[]", times),
+                ffi.from_buffer("uint8_t[]", rows),
+            )
+        return rows
+
+    def tare_now(self) -> None:
+        """TARE_NOW: the latest means become the tare. Raises CommandRefusedError while the signals move."""
+        _accept("TARE_NOW", lib.bt_tare_now(ffi.addressof(self._finger, "tare")))
+
+    def set_tare(self, counts: Any, pdc: float | None = None) -> None:
+        """TARE_SET: use ``counts`` (19,), in counts 0..4095, from the next round on; ``pdc`` likewise, None: unknown.
+
+        Rounded to 1/16 count, which is what the message holds. Raises ValueError for other shapes and ranges,
+        CommandRefusedError with more than two electrodes railed.
+        """
+        tare = np.asarray(counts, dtype=np.float64)
+        values = tare if pdc is None else np.append(tare, pdc)
+        if tare.shape != (_ELECTRODES,) or not np.all((values >= 0) & (values <= sensor.FULL_SCALE_COUNT)):
+            raise ValueError(
+                f"a tare of shape {tare.shape}: expected ({_ELECTRODES},) and 0..{sensor.FULL_SCALE_COUNT}"
+            )
+        q16 = (tare_to_q4(values).astype(np.uint32) << 12).tolist()
+        base = ffi.new("bt_baseline *")
+        base.electrode_q16 = q16[:_ELECTRODES]
+        base.pdc_q16 = TARE_UNKNOWN_Q16 if pdc is None else q16[_ELECTRODES]
+        _accept("TARE_SET", lib.bt_tare_set(ffi.addressof(self._finger, "tare"), base))
+
+    def tare_message(self) -> wire.Tare:
+        """The TARE message a board sends when the latest round changed the tare; ``seq`` counts from reset."""
+        tare = self._finger.tare
+        return wire.Tare(
+            seq=(self._finger.seq - 1) % 2**16,
+            t_us=self._finger.frame.t_us,
+            finger=self._index,
+            tare_state=tare.state,
+            reason=tare.reason,
+            noise_count2=tare.noise.count2,
+            tare_q16=tuple(tare.base.electrode_q16),
+            pdc_tare_q16=tare.base.pdc_q16,
+        )
+
+    @property
+    def tare_counts(self) -> NDArray[np.float64]:
+        """The tare in force (19,), in counts with the machine's own 1/65536; NaN where unknown."""
+        q16 = np.array(list(self._finger.tare.base.electrode_q16), np.uint32)
+        return np.where(q16 == TARE_UNKNOWN_Q16, np.nan, q16 / 65536.0)
+
+
+def to_frames(rows: StructArray) -> StructArray:
+    """FRAME_DTYPE (n,) in mm, N and N*mm of FINGER_DTYPE rows; rounds in which nothing answered are left out.
+
+    ``seq`` and ``t_us`` are as in the rows, not unwrapped.
+    """
+    there = rows[rows["present"] != 0]
+    return frames_from_wire(there, there["seq"], there["t_us"])
+
+
+def _words(name: str, values: Any, rows: int | None, columns: int | None) -> NDArray[np.uint16]:
+    array = np.asarray(values)
+    wanted = f"({'n' if rows is None else rows},{'' if columns is None else f' {columns}'})"
+    right = array.ndim == (1 if columns is None else 2) and (rows is None or len(array) == rows)
+    if not right or (columns is not None and array.shape[1] != columns):
+        raise ValueError(f"{name} have shape {array.shape}, expected {wanted}")
+    if array.dtype.kind not in "iu":
+        raise ValueError(f"{name} are {array.dtype}, expected integers")
+    bad = (array != wire.INVALID_COUNT) & ((array < 0) | (array > sensor.FULL_SCALE_COUNT))
+    if bad.any():
+        row = int(np.argwhere(bad)[0][0])
+        raise ValueError(
+            f"{name} row {row} holds {array[bad][0]}, expected 0..{sensor.FULL_SCALE_COUNT}, or 0xFFFF where missing"
+        )
+    return array.astype(np.uint16)
+
+
+def _accept(command: str, error: int) -> None:
+    if error != wire.Error.OK:
+        raise CommandRefusedError(f"{command} was refused: {wire.Error(error).name} ({wire.ERROR_DOC[error]})")

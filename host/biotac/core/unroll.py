@@ -1,0 +1,22 @@
+"""The fingertip's surface laid flat, for every picture of it: a half cylinder with a quarter of a sphere as its tip."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..wire.sensor_gen import CORE_RADIUS_UM
+
+RADIUS_MM = CORE_RADIUS_UM / 1000
+
+Floats = NDArray[np.float64]
+
+
+def unroll(points_mm: NDArray[Any]) -> tuple[Floats, Floats]:
+    """Surface points (n, 3) to arc lengths (n,): across from the ventral line, along the finger, mm."""
+    x, y, z = points_mm.T
+    across = RADIUS_MM * np.arctan2(y, -z)
+    along = np.where(x > 0, RADIUS_MM * np.arcsin(np.clip(x / RADIUS_MM, 0, 1)), x)
+    return across, along

@@ -1,0 +1,108 @@
+"""The live API for asyncio: ``async with biotac.aio.open(port) as hand: async for batch in hand.batches(): ...``
+
+A Hand's own threads read (live/reader.py) and wake the event loop; nothing here blocks it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import suppress
+from types import TracebackType
+from typing import TypeVar
+
+from ..errors import DeviceLostError
+from ..wire.batches import Batch, LinkStats
+from ..wire.frames import Frame
+from .hand import Hand
+from .opening import open as open_hand
+from .views import FingerView
+
+Answer = TypeVar("Answer")
+
+
+class AsyncHand:
+    """A Hand inside an event loop. Made by ``biotac.aio.open``; use with ``async with``."""
+
+    def __init__(self, opener: Callable[[], Hand]) -> None:
+        self._opener = opener
+        self._hand: Hand | None = None
+
+    async def __aenter__(self) -> AsyncHand:
+        self._hand = await asyncio.to_thread(self._opener)
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await asyncio.to_thread(self.hand.__exit__, kind, error, trace)
+
+    @property
+    def hand(self) -> Hand:
+        """The Hand itself, whose commands block: see ``ask``."""
+        if self._hand is None:
+            raise DeviceLostError("this hand is not open yet; use `async with biotac.aio.open(port) as hand:`")
+        return self._hand
+
+    @property
+    def stats(self) -> LinkStats:
+        """See Hand.stats."""
+        return self.hand.stats
+
+    def __getitem__(self, finger: str | int) -> FingerView:
+        """See Hand.__getitem__."""
+        return self.hand[finger]
+
+    async def ask(self, command: Callable[[Hand], Answer]) -> Answer:
+        """Give a command in another thread: ``await hand.ask(lambda h: h.status())``."""
+        return await asyncio.to_thread(command, self.hand)
+
+    async def batches(self) -> AsyncIterator[Batch]:
+        """Batches as they arrive, starting the stream if need be; each iteration has its own, from its start on.
+
+        Ends with a simulated source, and when the stream is stopped. A loop that is slow loses the oldest, which
+        ``stats.batches_skipped`` counts; with a simulated board that is not paced, its time waits instead.
+        """
+        hand = self.hand
+        loop = asyncio.get_running_loop()
+        news = asyncio.Event()
+
+        def wake() -> None:
+            # The loop may be closed already while the reader ends.
+            with suppress(RuntimeError):
+                loop.call_soon_threadsafe(news.set)
+
+        queue = hand.open_queue(wake)
+        try:
+            if not hand.ended:
+                await asyncio.to_thread(hand.run)
+            while True:
+                news.clear()
+                ended = hand.ended or not hand.streaming  # before looking: what came until then is in the queue
+                while (batch := queue.take()) is not None:
+                    hand.took()
+                    yield batch
+                hand.check()
+                if ended:
+                    return
+                await news.wait()
+        finally:
+            hand.close_queue(queue)
+
+    async def frames(self) -> AsyncIterator[Frame]:
+        """Typed frames as they arrive; see ``batches``."""
+        async for batch in self.batches():
+            for row in batch.frames:
+                yield Frame.from_row(row)
+
+
+def open(
+    port: str | os.PathLike[str],
+    *,
+    pace: float = 0.0,
+    reconnect: bool = False,
+    fingers: Mapping[str, int] | None = None,
+) -> AsyncHand:
+    """See biotac.open; the board is opened by ``async with``."""
+    return AsyncHand(lambda: open_hand(port, pace=pace, reconnect=reconnect, fingers=fingers))

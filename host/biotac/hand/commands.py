@@ -1,0 +1,226 @@
+"""What a board can be asked and told, a method each; streams are streaming.py's."""
+
+from __future__ import annotations
+
+import zlib
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ..core.board_map import BoardMap
+from ..errors import CommandRefusedError, WireVersionError
+from ..keep import map_blob as maps
+from ..keep.values import Calibration, own_settings
+from ..wire import messages_gen as wire
+from ..wire.frames import tare_to_q4
+from ..wire.sensor_gen import MAX_SENSORS
+from . import map_transfer as transfer
+
+ALL_FINGERS = (1 << MAX_SENSORS) - 1
+CALIBRATION_SINCE_MINOR = 3  # of wire 1.x
+MAP_SINCE_MINOR = 4
+PRESSURE_SINCE_MINOR = 4
+
+Reply = TypeVar("Reply")
+
+
+class Commands(ABC):
+    """The commands of a Hand. Each raises CommandRefusedError with the board's reason, or DeviceLostError."""
+
+    info: wire.Hello
+
+    @abstractmethod
+    def _next_req_id(self) -> int: ...
+
+    @abstractmethod
+    def _ask(self, request: Any, reply: type[Reply]) -> Reply:
+        """Send a request and wait for its reply."""
+
+    def _command(self, request: Any) -> None:
+        self._ask(request, wire.Reply)
+
+    def subscribe(self, quantities: wire.QuantityFlags, *, fingers: int = ALL_FINGERS) -> None:
+        """Choose what the board computes and sends of ``fingers`` (a bit mask) in its frames.
+
+        What is left out is not computed; it arrives as NaN, under the flag NOT_ASKED. Without REST_FRAMES
+        an untouched finger sends heartbeats (``Batch.idle``) in place of frames, without loss of a touch:
+        a frame comes as soon as the signals move. At first it is POC | FORCE | TORQUE | PRESSURE | REST_FRAMES;
+        the choice lasts until the board restarts. A board that knows no PRESSURE is not asked for it.
+        """
+        if self.info.wire_minor < PRESSURE_SINCE_MINOR:
+            quantities &= ~wire.QuantityFlags.PRESSURE
+        self._command(wire.Subscribe(self._next_req_id(), fingers, int(quantities)))
+
+    def ping(self) -> None:
+        """Wait for the board; everything it sent before has arrived afterwards."""
+        self._command(wire.Ping(self._next_req_id()))
+
+    def status(self) -> wire.Status:
+        """Counters of the board and its link."""
+        return self._ask(wire.GetStatus(self._next_req_id()), wire.Status)
+
+    def sensor_status(self, finger: int) -> wire.SensorStatus:
+        """Counters and tare state of one sensor."""
+        return self._ask(wire.GetSensorStatus(self._next_req_id(), finger), wire.SensorStatus)
+
+    def sensor_info(self, finger: int) -> wire.SensorInfo:
+        """What the sensor says of itself."""
+        return self._ask(wire.GetSensorInfo(self._next_req_id(), finger), wire.SensorInfo)
+
+    def point(self, finger: int) -> wire.Point:
+        """Where ``finger`` is touched right now (``poc_um``), without waiting for the end of a round.
+
+        INVALID_I16 throughout without a touch or a tare. CommandRefusedError when no sensor answers there.
+        """
+        return self._ask(wire.GetPoint(self._next_req_id(), finger), wire.Point)
+
+    def tare(self, finger: int) -> None:
+        """Tare now; CommandRefusedError while the signals move."""
+        self._command(wire.TareNow(self._next_req_id(), finger))
+
+    def set_tare(self, finger: int, tare_counts: Any, pdc_counts: float | None = None) -> None:
+        """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, kept to 1/16 count.
+
+        Raises ValueError for another shape or range.
+        """
+        tare = np.asarray(tare_counts, dtype=np.float64)
+        if tare.shape != (19,) or not np.all((tare >= 0) & (tare <= 4095)):
+            raise ValueError(f"tare_counts has shape {tare.shape}; expected 19 values of 0..4095 counts")
+        tare_q4 = tuple(int(v) for v in tare_to_q4(tare))
+        pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
+        self._command(wire.TareSet(self._next_req_id(), finger, tare_q4, pdc_q4))
+
+    def setting(self, setting: wire.Setting | int) -> int:
+        """Value of a setting, in its own unit (see wire.SETTINGS)."""
+        return self._ask(wire.GetSetting(self._next_req_id(), setting), wire.SettingValue).value
+
+    def set_setting(self, setting: wire.Setting | int, value: int) -> None:
+        """Change a setting until the next reboot; refused while streaming."""
+        self._ask(wire.SetSetting(self._next_req_id(), setting, value), wire.SettingValue)
+
+    def save_settings(self) -> None:
+        """Keep the settings, calibrations and maps in force over reboots.
+
+        Not while streaming: the board loses slots meanwhile.
+        """
+        self._command(wire.SaveSettings(self._next_req_id()))
+
+    def reboot_bootloader(self) -> None:
+        """Send the board into its loader; it goes away and comes back as a drive."""
+        self._command(wire.RebootBootloader(self._next_req_id(), wire.BOOTLOADER_MAGIC))
+
+    def settings(self) -> dict[wire.Setting, int]:
+        """All settings; of one that the board's firmware does not have yet, the default, which is what it does."""
+        return {setting: self._known_setting(setting) for setting in wire.Setting}
+
+    def _known_setting(self, setting: wire.Setting) -> int:
+        try:
+            return self.setting(setting)
+        except CommandRefusedError as error:
+            if error.error != wire.Error.UNKNOWN_SETTING:
+                raise
+            return wire.SETTINGS[setting].default
+
+    # ---- calibrations --------------------------------------------------------------------------
+
+    def calibration(self, finger: int) -> Calibration | None:
+        """The finger's own values in place of the settings, None without; see calibration_state."""
+        told = self._calibration(finger)
+        return None if told.state == wire.CalibrationState.NONE else _known(told)
+
+    def calibration_state(self, finger: int) -> wire.CalibrationState:
+        """Whether the finger's results come from its calibration, or the sensor is another than its own."""
+        return wire.CalibrationState(self._calibration(finger).state)
+
+    def set_calibration(self, finger: int, calibration: Calibration) -> None:
+        """Give a finger values of its own until the next reboot, or for good with save_settings.
+
+        Refused while streaming, and for another sensor's serial number than the one that answered there when
+        the board started; ``serial=""`` is for any. Raises WireVersionError for a pressure gain on a board whose
+        firmware knows of none.
+        """
+        its = calibration
+        if its.pressure_gain_nn and self.info.wire_minor < PRESSURE_SINCE_MINOR:
+            raise WireVersionError(
+                "the board's firmware knows no pressure_gain_nn, expected wire "
+                f"1.{PRESSURE_SINCE_MINOR}; update it: biotac flash"
+            )
+        request = wire.SetCalibration(self._next_req_id(), finger, its.wire_serial(), its.made_s, its.wire_values())
+        self._ask(request, wire.Calibration)
+
+    def clear_calibration(self, finger: int) -> None:
+        """Return a finger to the board's settings, until the next reboot or, with save_settings, for good."""
+        self._command(wire.ClearCalibration(self._next_req_id(), finger))
+
+    def calibrations(self) -> dict[int, Calibration]:
+        """The calibrations in force, by finger; none on a board whose firmware knows of none."""
+        if self.info.wire_minor < CALIBRATION_SINCE_MINOR:
+            return {}
+        told = [self._calibration(finger) for finger in range(MAX_SENSORS)]
+        return {m.finger: _known(m) for m in told if m.state == wire.CalibrationState.IN_FORCE}
+
+    def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
+        """All settings that a finger's results come from, for the fingers with a calibration in force."""
+        return own_settings(self.settings(), self.calibrations())
+
+    # ---- wrench maps ---------------------------------------------------------------------------
+
+    def get_map(self, finger: int) -> bytes | None:
+        """The finger's wrench map as the board holds it, None without; see map_state.
+
+        Raises PortError when its bytes do not come whole.
+        """
+        return transfer.read(self._ask_for, finger)
+
+    def map_state(self, finger: int) -> wire.CalibrationState:
+        """Whether the finger's force comes from its map, or the sensor is another than its own."""
+        return wire.CalibrationState(transfer.info(self._ask_for, finger).state)
+
+    def set_map(self, finger: int, its: bytes | BoardMap, *, force: bool = False) -> None:
+        """Upload a wrench map and read it back; it is in force until the next reboot, or for good with save_settings.
+
+        Refused while streaming, and for another sensor's serial number than the one that answered there when the
+        board started; with ``force`` it goes there without its serial number, which is for any sensor, and is read
+        back so. What the finger had is in force until all of the new one is there. Raises InputError for more bytes
+        than a board takes (20 KiB), and PortError when other bytes come back.
+        """
+        blob = maps.as_blob(its)
+        transfer.write(self._ask_for, finger, maps.for_any_sensor(blob) if force else blob)
+
+    def clear_map(self, finger: int) -> None:
+        """Return a finger to its gains, until the next reboot or, with save_settings, for good."""
+        self._command(wire.ClearMap(self._next_req_id(), finger))
+
+    def maps(self) -> dict[int, bytes]:
+        """The maps in force, by finger; none on a board whose firmware knows of none."""
+        if self.info.wire_minor < MAP_SINCE_MINOR:
+            return {}
+        told = [transfer.info(self._ask_for, finger) for finger in range(MAX_SENSORS)]
+        held = {m.finger: self.get_map(m.finger) for m in told if m.state == wire.CalibrationState.IN_FORCE}
+        return {finger: blob for finger, blob in held.items() if blob is not None}
+
+    def _tell_map(self, finger: int, blob: bytes | None) -> None:
+        """Have the finger have this map, which it may have already; None: no map."""
+        told = transfer.info(self._ask_for, finger)
+        if blob is None:
+            self.clear_map(finger)
+        elif (told.size_bytes, told.crc32) != (len(blob), zlib.crc32(blob)):
+            transfer.write(self._ask_for, finger, blob)
+
+    def _ask_for(self, make: Callable[[int], Any], reply: type[Reply]) -> Reply:
+        return self._ask(make(self._next_req_id()), reply)
+
+    def _calibration(self, finger: int) -> wire.Calibration:
+        return self._ask(wire.GetCalibration(self._next_req_id(), finger), wire.Calibration)
+
+
+def _known(told: wire.Calibration) -> Calibration:
+    try:
+        return Calibration.from_wire(told.serial, told.made_s, told.value)
+    except ValueError as error:
+        raise WireVersionError(
+            f"the board's calibration of finger {told.finger} is none that this library knows ({error}); install the "
+            "biotac-gateway of the firmware's release"
+        ) from error

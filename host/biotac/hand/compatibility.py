@@ -1,0 +1,47 @@
+"""Whether a board's firmware and this library go together, in words with the command that cures it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..wire import messages_gen as wire
+
+#: Commands that have grown: the wire minor that did it, and how many bytes the one before knows.
+APPENDED = {wire.SetCalibration.ID: ((4, 50),)}
+
+
+@dataclass(frozen=True)
+class HandWarning:
+    """Something about a board that works, but not as well as it could."""
+
+    code: str
+    text: str  # one line with the cure
+
+
+def warnings(hello: wire.Hello, port: str) -> list[HandWarning]:
+    """What speaks against this board and this library together; empty when nothing does."""
+    if hello.schema_hash == wire.SCHEMA_HASH:
+        return []
+    text = f"the firmware on {port} has schema {hello.schema_hash:08x}, this library {wire.SCHEMA_HASH:08x}"
+    return [HandWarning("schema_differs", f"{text}; what only one side knows is left out: {cure(hello)}")]
+
+
+def describe_mismatch(hello: wire.Hello) -> str:
+    """Both wire versions, and the command that brings them together."""
+    mine = f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}"
+    return f"wire {hello.wire_major}.{hello.wire_minor}, this library {mine}; {cure(hello)}"
+
+
+def cut(message_id: int, payload: bytes, minor: int) -> bytes:
+    """``payload`` as a board of this wire minor knows it: without what was appended to a command since."""
+    for since, known_bytes in APPENDED.get(message_id, ()):
+        if minor < since:
+            return payload[:known_bytes]
+    return payload
+
+
+def cure(hello: wire.Hello) -> str:
+    """The command that updates the older side; of one wire version the firmware, which is told from this library."""
+    if (hello.wire_major, hello.wire_minor) > (wire.WIRE_MAJOR, wire.WIRE_MINOR):
+        return "update this library: pip install -U biotac-gateway"
+    return "update the firmware: biotac flash"

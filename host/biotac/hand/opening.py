@@ -1,0 +1,82 @@
+"""Opening a board: link, handshake, and what a simulated board is given before its time starts."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+from ..keep import Calibration, harness
+from ..link import Link, open_link
+from ..link.discovery import SERIAL_PREFIX, choose
+from ..wire import messages_gen as wire
+from .hand import Hand
+
+
+def open(
+    port: str | os.PathLike[str] | None = None,
+    *,
+    pace: float = 0.0,
+    reconnect: bool = False,
+    fingers: Mapping[str, int] | None = None,
+) -> Hand:
+    """Open a board and shake hands.
+
+    Without ``port`` it is the only board on USB, found by its USB ids; nothing else is opened. ``port`` is
+    ``serial:E6605838831F5B2C``, a board's serial number; a device path (``/dev/ttyACM0``, ``COM3``);
+    ``spidev:0.0,0.1`` for sensors on this computer's own SPI bus, one BUS.DEVICE a finger
+    (``?calibration=1:0x50:24c02``, one for each, loads what the EEPROMs on their harnesses hold); ``sim:SOURCE``
+    for a simulated board, where SOURCE is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``); or
+    ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the same.
+    ``replay:press.mcap?from=12.5&to=20`` plays a recording, or that part of it: the board's stream again, while
+    commands that would change a board raise CommandRefusedError.
+    ``pace`` is for simulated and emulated boards and recordings: device seconds per second, 0 for as fast as
+    this side reads.
+
+    ``reconnect`` has a board that went away looked for until it is back, by its serial number; what this session
+    changed (settings, calibrations, subscriptions) and the stream are put back, and the first batch has a
+    ``biotac.live.Gap`` in its messages. Without it, and for spidev, DeviceLostError is raised. ``fingers`` names
+    chip selects 0..4 for ``hand["thumb"]``; by default index, middle, ring, little, thumb.
+
+    Raises PortError, NotAGatewayError, WireVersionError, InputError for a source or a recording that cannot be
+    played or an EEPROM without a calibration, or CommandRefusedError for another sensor's.
+    """
+    text = None if port is None else os.fspath(port)
+    if text is None or text.startswith(SERIAL_PREFIX):
+        text = choose(text and text.removeprefix(SERIAL_PREFIX))
+    if text.startswith("spidev:"):
+        bare, own = harness.load(text)
+        return calibrated(shake_hands(open_link(bare, pace=pace), fingers=fingers), own)
+    return shake_hands(open_link(text, pace=pace), reconnect=reconnect, fingers=fingers)
+
+
+def calibrated(hand: Hand, own: Mapping[int, Calibration]) -> Hand:
+    """Give each finger its own. Closes the hand when that fails."""
+    try:
+        for finger, calibration in own.items():
+            hand.set_calibration(finger, calibration)
+    except BaseException:
+        hand.close()
+        raise
+    return hand
+
+
+def shake_hands(link: Link, *, reconnect: bool = False, fingers: Mapping[str, int] | None = None) -> Hand:
+    """Make a Hand of an open link.
+
+    A simulated board gets its source's settings (an emulated finger's own gains) and stored tare
+    first, as a real one would from its user. Closes the link when that fails.
+    """
+    hand = Hand(link, reconnect=reconnect, fingers=fingers)
+    source = link.source
+    if source is None:
+        return hand
+    try:
+        for name, value in source.settings.items():
+            hand.set_setting(wire.Setting[name.upper()], value)
+        if source.tare_q4 is not None:
+            for finger, tare_q4 in enumerate(source.tare_q4):
+                hand.set_tare(finger, tare_q4 / 16.0)
+    except BaseException:
+        hand.close()
+        raise
+    return hand

@@ -1,0 +1,70 @@
+"""Batches on their way to one consumer, who may be slow."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+
+from ..wire.batches import Batch
+
+# Ten to twenty seconds of five fingers with PAC, a few tens of megabytes.
+LIMIT_ROWS = 16_384
+
+
+class BatchQueue:
+    """First in, first out. ``bound`` gives it a limit: then, when full, the oldest go, and are counted."""
+
+    def __init__(self, wake: Callable[[], None] | None = None) -> None:
+        self._wake = wake
+        self._limit_rows: int | None = None
+        self._batches: deque[Batch] = deque()
+        #: How much waits; a batch of messages alone counts as one.
+        self.rows = 0
+        self._lock = threading.Lock()
+        self.batches_skipped = 0
+        self.frames_skipped = 0
+
+    def bound(self, limit_rows: int | None) -> None:
+        """Let go of the oldest above so many frames, PAC blocks and heartbeats; None: keep all."""
+        self._limit_rows = limit_rows
+
+    def put(self, batch: Batch) -> None:
+        """Add the newest."""
+        with self._lock:
+            self._batches.append(batch)
+            self.rows += weight(batch)
+            # The newest stays, however large it is.
+            while self._limit_rows is not None and self.rows > self._limit_rows and len(self._batches) > 1:
+                oldest = self._batches.popleft()
+                self.rows -= weight(oldest)
+                self.batches_skipped += 1
+                self.frames_skipped += len(oldest.wire)
+        self.wake()
+
+    def wake(self) -> None:
+        """Tell the consumer to look."""
+        if self._wake is not None:
+            self._wake()
+
+    def put_back(self, batch: Batch) -> None:
+        """Return what was taken and not used."""
+        with self._lock:
+            self._batches.appendleft(batch)
+            self.rows += weight(batch)
+
+    def take(self) -> Batch | None:
+        """The oldest; None when there is none."""
+        if not self._batches:
+            return None
+        with self._lock:
+            if not self._batches:
+                return None
+            batch = self._batches.popleft()
+            self.rows -= weight(batch)
+            return batch
+
+
+def weight(batch: Batch) -> int:
+    """Rows of a batch, at least one."""
+    return len(batch.wire) + len(batch.pac) + len(batch.idle) or 1

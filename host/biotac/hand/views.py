@@ -1,0 +1,258 @@
+"""Fingers by name, and the latest that each has said."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import deque
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..wire.batches import Batch
+from ..wire.frames import FRAME_DTYPE, Frame, StructArray, frames_from_wire
+from ..wire.messages_gen import INVALID_COUNT, FrameFlags
+from ..wire.sensor_gen import MAX_SENSORS
+
+if TYPE_CHECKING:
+    from ..clock.wall import Timing
+
+#: Chip selects by name, unless ``biotac.open(..., fingers=...)`` says otherwise.
+DEFAULT_NAMES = {"index": 0, "middle": 1, "ring": 2, "little": 3, "thumb": 4}
+
+NOTHING_YET = (
+    FrameFlags.UNTARED
+    | FrameFlags.POC_INVALID
+    | FrameFlags.ELECTRODE_MISSING
+    | FrameFlags.PDC_MISSING
+    | FrameFlags.TAC_MISSING
+    | FrameFlags.TDC_MISSING
+    | FrameFlags.FAULT
+)
+
+
+def checked_names(names: Mapping[str, int] | None) -> dict[str, int]:
+    """A copy; InputError unless each name has a chip select of its own."""
+    chosen = dict(DEFAULT_NAMES if names is None else names)
+    for name, finger in chosen.items():
+        if not isinstance(finger, int) or not 0 <= finger < MAX_SENSORS:
+            raise InputError(f"fingers: {name!r} is {finger!r}, expected a chip select 0 to {MAX_SENSORS - 1}")
+        if list(chosen.values()).count(finger) > 1:
+            raise InputError(f"fingers: {name!r} shares chip select {finger}; give each name its own")
+    return chosen
+
+
+def finger_index(names: Mapping[str, int], key: str | int) -> int:
+    """Chip select of a name or number; KeyError in words."""
+    if isinstance(key, str) and key in names:
+        return names[key]
+    if isinstance(key, int) and 0 <= key < MAX_SENSORS:
+        return key
+    raise KeyError(f"no finger {key!r}; expected one of {', '.join(map(repr, names))}, or 0 to {MAX_SENSORS - 1}")
+
+
+# Batches that wait until somebody looks, or there are so many.
+UNSEEN_BATCHES = 16
+
+
+class Latest:
+    """The newest frame or heartbeat of each finger, and when it came.
+
+    Whoever reads the link only notes the batch: to look into each costs as much as to decode it, and most are never
+    looked at.
+    """
+
+    def __init__(self, timing: Timing) -> None:
+        self.timing = timing
+        self._unseen: deque[tuple[Batch, float]] = deque()
+        self._unseen_fingers = 0  # bit mask
+        # finger: (batch, row, row is a heartbeat, arrival in s)
+        self._entries: dict[int, tuple[Batch, int, bool, float]] = {}
+        self._looking = threading.Lock()
+
+    def update(self, batch: Batch, when_s: float) -> None:
+        """Take note of it. One thread at a time."""
+        unseen, fingers = self._unseen, batch.fingers
+        if not unseen or (fingers >= 0 and not self._unseen_fingers & ~fingers):
+            unseen.clear()  # nobody will look at those: all their fingers are in this one
+            self._unseen_fingers = fingers
+        else:
+            self._unseen_fingers |= fingers
+        unseen.append((batch, when_s))
+        if len(unseen) >= UNSEEN_BATCHES:
+            self._look()
+
+    def _look(self) -> dict[int, tuple[Batch, int, bool, float]]:
+        with self._looking:
+            batches = []
+            while self._unseen:
+                with suppress(IndexError):  # the reader may clear it at the same time
+                    batches.append(self._unseen.popleft())
+            seen = 0
+            for batch, when_s in reversed(batches):
+                if not batch.fingers & ~seen:
+                    continue  # later ones had all of these
+                for finger, (row, idle) in _last_of(batch).items():
+                    if not seen >> finger & 1:
+                        self._entries[finger] = (batch, row, idle, when_s)
+                        seen |= 1 << finger
+            return self._entries
+
+    def last_t_us(self) -> int | None:
+        """Device time of the latest of all; None before any."""
+        rows = [self.row(finger)["t_us"][0] for finger in list(self._look())]
+        return int(max(rows)) if rows else None
+
+    def row(self, finger: int) -> StructArray:
+        """FRAME_DTYPE (1,): the frame, or what a heartbeat says, or nothing: all invalid, t_us -1."""
+        entry = self._look().get(finger)
+        if entry is None:
+            return _empty(finger, -1, 0, NOTHING_YET)
+        batch, row, idle, _ = entry
+        if not idle:
+            one = slice(row, row + 1)
+            return frames_from_wire(batch.wire[one], batch.seq[one], batch.t_us[one])
+        beat = batch.idle[row]
+        flags = FrameFlags(int(beat["flags"])) | FrameFlags.POC_INVALID | FrameFlags.NOT_ASKED
+        out = _empty(finger, int(beat["t_us"]), int(beat["seq"]), flags)
+        out["pdc"], out["tdc"] = beat["pdc"], beat["tdc"]
+        return out
+
+    def age_s(self, finger: int) -> float:
+        """Since the row came; inf before any."""
+        entry = self._look().get(finger)
+        return math.inf if entry is None else self.timing.monotonic_s() - entry[3]
+
+
+def _last_of(batch: Batch) -> dict[int, tuple[int, bool]]:
+    """Finger to its latest row, and whether that is a heartbeat's."""
+    rows = _last_rows(batch.wire)
+    out = {finger: (row, False) for finger, row in rows.items()}
+    for finger, row in _last_rows(batch.idle).items() if len(batch.idle) else ():
+        # A batch can hold both: what is later in device time is the latest.
+        if finger not in rows or batch.idle["t_us"][row] > batch.t_us[rows[finger]]:
+            out[finger] = (row, True)
+    return out
+
+
+def _last_rows(messages: StructArray) -> dict[int, int]:
+    """Finger to its last row."""
+    return {finger: row for row, finger in enumerate(messages["finger"].tolist())}
+
+
+def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
+    out = np.zeros(1, FRAME_DTYPE)
+    for name in ("counts", "pdc", "tac", "tdc"):
+        out[name] = INVALID_COUNT
+    for name in ("poc_mm", "force_n", "torque_nmm", "poc_sigma_mm", "force_sigma_n"):
+        out[name] = np.nan
+    out["pdc_filtered"] = out["pressure_force_n"] = out["torsion_nmm"] = np.nan
+    out["finger"], out["t_us"], out["seq"], out["flags"] = finger, t_us, seq, int(flags)
+    return out
+
+
+class FingerView:
+    """The latest of one finger, ``hand["index"]``: a look at it now, without waiting.
+
+    Values are those of the latest frame, NaN or 65535 where invalid, as in FRAME_DTYPE. Of an untouched finger
+    that sends heartbeats they are the latest heartbeat's: results are NaN, ``flags`` has NOT_ASKED. Before anything
+    came everything is invalid, ``t_us`` is -1 and ``age_s`` inf. Two properties may be of two frames; ``frame`` is one.
+    """
+
+    def __init__(self, name: str, finger: int, latest: Latest) -> None:
+        self.name = name
+        self.finger = finger
+        self._latest = latest
+
+    def __repr__(self) -> str:
+        return f"<biotac finger {self.name!r}, chip select {self.finger}, {self.age_s:.3f} s old>"
+
+    def _row(self) -> Any:
+        return self._latest.row(self.finger)[0]
+
+    @property
+    def frame(self) -> Frame:
+        """All values, of one moment."""
+        return Frame.from_row(self._row())
+
+    @property
+    def force_n(self) -> NDArray[np.float64]:
+        """Force on the finger, (3,) in N."""
+        return self._results("force_n")
+
+    @property
+    def pressure_force_n(self) -> float:
+        """Magnitude of the force that static pressure tells of, in N; NaN without a pressure calibration."""
+        return float(self._row()["pressure_force_n"])
+
+    @property
+    def poc_mm(self) -> NDArray[np.float64]:
+        """Point of contact, (3,) in mm."""
+        return self._results("poc_mm")
+
+    @property
+    def torque_nmm(self) -> NDArray[np.float64]:
+        """Torque on the finger, (3,) in N*mm."""
+        return self._results("torque_nmm")
+
+    @property
+    def torsion_nmm(self) -> float:
+        """Torque about the outward normal at the contact, in N*mm; NaN without a wrench map that has it."""
+        return float(self._row()["torsion_nmm"])
+
+    @property
+    def force_sigma_n(self) -> NDArray[np.float64]:
+        """One standard deviation of the force, (3,) in N; NaN unless wanted."""
+        return self._results("force_sigma_n")
+
+    @property
+    def poc_sigma_mm(self) -> float:
+        """One standard deviation of the point of contact, in mm; NaN unless wanted."""
+        return float(self._row()["poc_sigma_mm"])
+
+    def _results(self, name: str) -> NDArray[np.float64]:
+        return np.asarray(self._row()[name], np.float64)
+
+    @property
+    def counts(self) -> NDArray[np.uint16]:
+        """Electrodes E1..E19, (19,) in counts 0..4095, 65535 where missing."""
+        return np.asarray(self._row()["counts"], np.uint16)
+
+    @property
+    def pdc(self) -> int:
+        """Static pressure in counts, 65535 where missing."""
+        return int(self._row()["pdc"])
+
+    @property
+    def tac(self) -> int:
+        """Thermal flux in counts, 65535 where missing."""
+        return int(self._row()["tac"])
+
+    @property
+    def tdc(self) -> int:
+        """Temperature in counts, 65535 where missing."""
+        return int(self._row()["tdc"])
+
+    @property
+    def flags(self) -> FrameFlags:
+        """What to think of the results."""
+        return FrameFlags(int(self._row()["flags"]))
+
+    @property
+    def touched(self) -> bool:
+        """The finger is touched."""
+        return FrameFlags.CONTACT in self.flags
+
+    @property
+    def t_us(self) -> int:
+        """Device time in us, unwrapped; -1 before anything came."""
+        return int(self._row()["t_us"])
+
+    @property
+    def age_s(self) -> float:
+        """How long ago this computer received it, in s; inf before anything came."""
+        return self._latest.age_s(self.finger)

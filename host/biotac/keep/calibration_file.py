@@ -1,0 +1,133 @@
+"""A calibration as JSON: for people to read, keep and send, with where it comes from."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..wire import messages_gen as wire
+from .values import Calibration
+
+FORMAT = "biotac-calibration"
+VERSION = 2  # 1 had no pressure_gain_nn
+KEYS = (
+    "format",
+    "version",
+    "serial",
+    "made_s",
+    "poc_weights",
+    "force_gain_nn",
+    "torque_gain_nn",
+    "thermal_gain_milli",
+    "pressure_gain_nn",
+    "provenance",
+)
+AXES = {"force_gain_nn": "xyz", "torque_gain_nn": "yz"}
+
+#: How a calibration came about, for people: any keys, texts or numbers. Nothing is computed from it.
+Provenance = dict[str, Any]
+
+
+def to_dict(calibration: Calibration, provenance: Provenance | None = None) -> dict[str, Any]:
+    """The keys of a file, in their order."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "serial": calibration.serial,
+        "made_s": calibration.made_s,
+        "poc_weights": wire.PocWeights(calibration.poc_weights).name,
+        "force_gain_nn": dict(zip("xyz", calibration.force_gain_nn, strict=True)),
+        "torque_gain_nn": dict(zip("yz", calibration.torque_gain_nn, strict=True)),
+        "thermal_gain_milli": calibration.thermal_gain_milli,
+        "pressure_gain_nn": calibration.pressure_gain_nn,
+        "provenance": provenance or {},
+    }
+
+
+def from_dict(tree: Any) -> Calibration:
+    """Inverse of to_dict, provenance left out. ValueError says which key is wrong, and why."""
+    if not isinstance(tree, dict) or tree.get("format") != FORMAT:
+        raise ValueError(f'it has no "format": "{FORMAT}"')
+    if type(tree.get("version")) is not int or not 1 <= tree["version"] <= VERSION:
+        raise ValueError(
+            f"its version is {tree.get('version')!r}, expected 1 to {VERSION}; a newer biotac-gateway may read it"
+        )
+    if tree["version"] == 1:
+        tree = {"pressure_gain_nn": 0, **tree}
+    for key in tree:
+        if key not in KEYS:
+            raise ValueError(f"key {key!r} is unknown; expected {', '.join(KEYS)}")
+    for key in KEYS[:-1]:
+        if key not in tree:
+            raise ValueError(f"key {key!r} is missing")
+    if not isinstance(tree.get("provenance", {}), dict):
+        raise ValueError("provenance is no object; put its facts under keys of their own")
+    weights = [w.name for w in wire.PocWeights]
+    if tree["poc_weights"] not in weights:
+        raise ValueError(f"poc_weights is {tree['poc_weights']!r}, expected {', '.join(weights)}")
+    x, y, z = _axes(tree, "force_gain_nn")
+    torque_y, torque_z = _axes(tree, "torque_gain_nn")
+    return Calibration(
+        wire.PocWeights[tree["poc_weights"]],
+        (x, y, z),
+        (torque_y, torque_z),
+        tree["thermal_gain_milli"],
+        tree["serial"],
+        tree["made_s"],
+        tree["pressure_gain_nn"],
+    )
+
+
+def _axes(tree: dict[str, Any], key: str) -> list[Any]:
+    axes = AXES[key]
+    if not isinstance(tree[key], dict) or sorted(tree[key]) != list(axes):
+        raise ValueError(f"{key} is {tree[key]!r}, expected an object with {', '.join(axes)}")
+    return [tree[key][axis] for axis in axes]
+
+
+def dumps(calibration: Calibration, provenance: Provenance | None = None) -> str:
+    """The text of a file."""
+    return json.dumps(to_dict(calibration, provenance), indent=2) + "\n"
+
+
+def loads(text: str, where: str) -> Calibration:
+    """Read a file's text; InputError beginning with ``where`` says what is wrong with it."""
+    try:
+        return from_dict(json.loads(text))
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"{where} is no calibration that can be used: {error}; `biotac calibration get` writes one"
+        ) from error
+
+
+def load(path: Path) -> Calibration:
+    """Read a file; InputError when it cannot be read or used."""
+    try:
+        return loads(path.read_text(encoding="utf-8"), str(path))
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is no text; expected JSON that `biotac calibration get` wrote") from error
+
+
+def save(
+    path: Path, calibration: Calibration, provenance: Provenance | None = None, *, overwrite: bool = False
+) -> None:
+    """Write a file. InputError when it exists and may not be overwritten, or cannot be written."""
+    try:
+        with path.open("w" if overwrite else "x", encoding="utf-8") as file:
+            file.write(dumps(calibration, provenance))
+    except FileExistsError as error:
+        raise InputError(f"{path} exists and would be overwritten; choose another name or say --force") from error
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
+
+
+def when(made_s: int) -> str:
+    """``made_s`` for people."""
+    if made_s == 0:
+        return "made at an unknown time"
+    return f"made {datetime.fromtimestamp(made_s, timezone.utc):%Y-%m-%d %H:%M} UTC"

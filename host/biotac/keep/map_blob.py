@@ -1,0 +1,53 @@
+"""A wrench map as the board holds it: bytes, of which this side reads the header alone."""
+
+from __future__ import annotations
+
+import zlib
+
+from ..core.board_map import BoardMap
+from ..errors import InputError
+from ..wire import map_gen as _map
+from ..wire import messages_gen as wire
+from ..wire.identity import ascii_text
+
+SERIAL_AT = 4
+MADE_AT = SERIAL_AT + _map.SERIAL_BYTES
+
+
+def as_blob(its: bytes | BoardMap) -> bytes:
+    """The bytes of a map. InputError for what cannot be one by its size; the board judges the rest."""
+    blob = its.blob if isinstance(its, BoardMap) else bytes(its)
+    if not _map.HEADER_BYTES <= len(blob) <= _map.MAX_BYTES:
+        raise InputError(
+            f"the map has {len(blob)} bytes, expected {_map.HEADER_BYTES} to {_map.MAX_BYTES}; is it a map's file?"
+        )
+    return blob
+
+
+def serial(blob: bytes) -> str:
+    """Of the sensor that it was made for; "" for any."""
+    return ascii_text(blob[SERIAL_AT : SERIAL_AT + _map.SERIAL_BYTES])
+
+
+def made_s(blob: bytes) -> int:
+    """When it was made, in seconds since 1970 UTC; 0 when unknown."""
+    return int.from_bytes(blob[MADE_AT : MADE_AT + 4], "little")
+
+
+def for_any_sensor(blob: bytes) -> bytes:
+    """The same map without a serial number."""
+    return blob[:SERIAL_AT] + bytes(_map.SERIAL_BYTES) + blob[SERIAL_AT + _map.SERIAL_BYTES :]
+
+
+def info(blob: bytes, req_id: int, finger: int) -> wire.MapInfo:
+    """What a board says of such a map in force."""
+    told = tuple(blob[SERIAL_AT : SERIAL_AT + _map.SERIAL_BYTES])
+    return wire.MapInfo(req_id, finger, wire.CalibrationState.IN_FORCE, told, made_s(blob), len(blob), zlib.crc32(blob))
+
+
+def part(blob: bytes, offset: int) -> tuple[int, ...]:
+    """What READ_MAP and WRITE_MAP carry of it at ``offset``."""
+    return tuple(blob[offset : offset + PART_BYTES].ljust(PART_BYTES, b"\xff"))
+
+
+PART_BYTES = len(wire.MapData.unpack(bytes(wire.MapData.STRUCT.size)).data)

@@ -1,0 +1,86 @@
+"""A board's wrench map as a file: JSON with where it comes from, the map itself as base64."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import zlib
+from pathlib import Path
+from typing import Any
+
+from ..core.board_map import from_blob
+from ..errors import InputError
+from . import map_blob as of
+from .calibration_file import Provenance, when
+
+FORMAT = "biotac-board-map"
+VERSION = 1
+
+
+def to_dict(blob: bytes, provenance: Provenance | None = None) -> dict[str, Any]:
+    """The keys of a file, in their order. All but ``map`` are there to be read: the map has them too."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "serial": of.serial(blob),
+        "made_s": of.made_s(blob),
+        "bytes": len(blob),
+        "crc32": f"{zlib.crc32(blob):08x}",
+        "map": base64.b64encode(blob).decode("ascii"),
+        "provenance": provenance or {},
+    }
+
+
+def from_dict(tree: Any) -> bytes:
+    """Inverse of to_dict, provenance left out.
+
+    ValueError says what is wrong with the file, InputError that no board would take the map.
+    """
+    if not isinstance(tree, dict) or tree.get("format") != FORMAT:
+        raise ValueError(f'it has no "format": "{FORMAT}"')
+    if tree.get("version") != VERSION:
+        raise ValueError(
+            f"its version is {tree.get('version')!r}, expected {VERSION}; a newer biotac-gateway may read it"
+        )
+    try:
+        blob = base64.b64decode(tree.get("map", ""), validate=True)
+    except (TypeError, binascii.Error) as error:
+        raise ValueError(f"its map is no base64 ({error})") from error
+    for key, value in to_dict(blob).items():
+        if key != "provenance" and tree.get(key) != value:
+            raise ValueError(f"{key} is {tree.get(key)!r}, but its map's is {value!r}: it was changed or cut")
+    from_blob(blob)
+    return blob
+
+
+def load(path: Path) -> bytes:
+    """Read a file; InputError when it cannot be read or used."""
+    try:
+        return from_dict(json.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from error
+    except (ValueError, RecursionError, InputError) as error:
+        raise InputError(
+            f"{path} is no wrench map that can be used: {error}; `biotac map get` writes one that can"
+        ) from error
+
+
+def save(path: Path, blob: bytes, provenance: Provenance | None = None, *, overwrite: bool = False) -> None:
+    """Write a file. InputError when it exists and may not be overwritten, or cannot be written."""
+    text = json.dumps(to_dict(blob, provenance), indent=2) + "\n"
+    try:
+        with path.open("w" if overwrite else "x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError as error:
+        raise InputError(f"{path} exists and would be overwritten; choose another name or say --force") from error
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
+
+
+def title(blob: bytes) -> str:
+    """Whose it is, for people."""
+    whose = f"sensor {of.serial(blob)}" if of.serial(blob) else "any sensor"
+    its = from_blob(blob)
+    what = {3: "force", 6: "force and torque", 7: "force, torque and torsion"}[its.axes]
+    return f"{what}, {len(its.blocks)} block(s), {len(blob)} bytes, for {whose}, {when(of.made_s(blob))}"

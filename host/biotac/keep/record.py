@@ -1,0 +1,43 @@
+"""A calibration as the board's flash holds it, bit for bit: the board's own code packs and judges it.
+
+The layout stands in protocol/SPEC.md, Calibrations.
+"""
+
+from __future__ import annotations
+
+from ..core.compiled import ffi, lib
+from ..errors import InputError
+from .values import Calibration
+
+MAX_BYTES = 256
+
+_WHY = {
+    lib.BT_RECORD_DAMAGED: "holds no whole record: its CRC is wrong",
+    lib.BT_RECORD_OF_SOMETHING: "holds a record of something else than a calibration",
+    lib.BT_RECORD_OTHER_VERSION: "holds a calibration of a newer version; install a newer biotac-gateway",
+    lib.BT_RECORD_CLEARED: "holds a calibration that was cleared",
+    lib.BT_RECORD_OUT_OF_RANGE: "holds a calibration with a value out of its range",
+}
+
+
+def pack(calibration: Calibration) -> bytes:
+    """Header and data, as they stand in a page of the board's flash as finger 0's."""
+    its = ffi.new("bt_calibration *")
+    its.present = True
+    its.serial = calibration.wire_serial()
+    its.made_s = calibration.made_s
+    its.value = calibration.wire_values()
+    page = ffi.new("uint8_t[]", MAX_BYTES)
+    return bytes(ffi.buffer(page, lib.bt_record_pack(its, page)))
+
+
+def unpack(data: bytes, where: str) -> Calibration:
+    """The calibration in ``data``, which may be followed by 0xFF. InputError beginning with ``where`` says why not."""
+    its = ffi.new("bt_calibration *")
+    judgement = lib.bt_record_unpack(its, data, len(data))
+    if judgement != lib.BT_RECORD_GOOD:
+        raise InputError(f"{where} {_WHY[judgement]}")
+    try:
+        return Calibration.from_wire(list(its.serial), its.made_s, list(its.value))
+    except ValueError as error:
+        raise InputError(f"{where} holds a calibration that cannot be ({error})") from error

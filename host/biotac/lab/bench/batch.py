@@ -1,0 +1,152 @@
+"""biotac.compute against NumPy, in one run: interleaved rounds, warmed buffers, medians.
+
+Ratios are of wall time: OpenBLAS may use every core, compute() uses one (and OpenBLAS's threads spin on
+after their work, so that CPU time would be charged to whoever runs next). Absolute times say something
+about this machine only.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.compute import RESULT_DTYPE, compute, per_frame
+from ...wire import messages_gen as wire
+from .numpy_batch import Blocked, one_frame, whole_array
+
+ROUNDS = 15
+SINGLE_FRAMES = 1000
+BLOCK_SIZES = (2048, 4096, 8192, 16384, 32768)
+EQUAL = 1e-9  # mm, N, N*mm
+
+WARM, FRESH = "compute, out= reused", "compute, new result"
+WHOLE, BEST = "NumPy, whole-array matrix products", "NumPy, blocked, buffers reused"
+ONE_PREPARED, ONE_WARM = "per_frame, one frame per call", "compute, out= reused, one frame per call"
+ONE_WHOLE, ONE_OWN = "NumPy, whole-array code, one frame per call", "NumPy, written for one frame, one frame per call"
+
+#: (faster, slower, at least so many times), None where nothing was asked.
+ASKED: tuple[tuple[str, str, float | None], ...] = (
+    (WARM, WHOLE, 6.0),
+    (WARM, BEST, 2.0),
+    (ONE_PREPARED, ONE_WHOLE, 50.0),
+    (ONE_WARM, ONE_WHOLE, 50.0),
+    (ONE_PREPARED, ONE_OWN, None),
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Nanoseconds per frame over the rounds."""
+
+    name: str
+    median_ns: float
+    min_ns: float
+    max_ns: float
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Median time of ``slower`` over that of ``faster``, and what was asked of it."""
+
+    faster: str
+    slower: str
+    ratio: float
+    asked: float | None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One run."""
+
+    frames: int
+    block: int
+    rows: list[Row]
+    ratios: list[Ratio]
+
+
+@dataclass(frozen=True)
+class _Contestant:
+    name: str
+    frames: int
+    run: Callable[[], Any]
+
+
+def recording(frames: int) -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
+    """Synthetic counts (frames, 19), one in ten thousand missing, and their tare (19,)."""
+    random = np.random.default_rng(20130)
+    tare = np.round(random.normal(2000, 200, 19) * 16) / 16
+    counts = np.clip(tare + random.normal(-30, 150, (frames, 19)), 0, 4095).astype(np.uint16)
+    counts[random.random(counts.shape) < 1e-4] = wire.INVALID_COUNT
+    return counts, tare
+
+
+def measure(frames: int, rounds: int = ROUNDS) -> Outcome:
+    """Check that all contestants agree on ``frames`` frames, then time them. RuntimeError if they do not."""
+    counts, tare = recording(frames)
+    out = np.zeros(frames, RESULT_DTYPE)
+    arrays = (np.zeros((frames, 3)), np.zeros((frames, 3)), np.zeros((frames, 3)))
+    block = _best_block(counts, tare, arrays)
+    best = Blocked(block)
+    many = [
+        _Contestant(WARM, frames, lambda: compute(counts, tare, out=out)),
+        _Contestant(FRESH, frames, lambda: compute(counts, tare)),
+        _Contestant(WHOLE, frames, lambda: whole_array(counts, tare)),
+        _Contestant(BEST, frames, lambda: best(counts, tare, arrays)),
+    ]
+    singles = list(counts[:SINGLE_FRAMES])  # taking a row out of the array is nobody's time
+    one_out = np.zeros((), RESULT_DTYPE)
+    prepared = per_frame(tare)
+    ones: list[tuple[str, Callable[[NDArray[np.uint16]], Any]]] = [
+        (ONE_PREPARED, prepared),
+        (ONE_WARM, lambda row: compute(row, tare, None, one_out)),
+        (ONE_WHOLE, lambda row: whole_array(row[None], tare)),
+        (ONE_OWN, lambda row: one_frame(row, tare)),
+    ]
+    _check([c.run() for c in many], "all frames")
+    for row in singles[:50]:
+        _check([run(row) for _, run in ones], "one frame")
+    contestants = many + [_Contestant(name, len(singles), _looped(run, singles)) for name, run in ones]
+    rows = _timed(contestants, rounds)
+    time_of = {row.name: row.median_ns for row in rows}
+    ratios = [Ratio(fast, slow, time_of[slow] / time_of[fast], asked) for fast, slow, asked in ASKED]
+    return Outcome(frames, block, rows, ratios)
+
+
+def _looped(run: Callable[[NDArray[np.uint16]], Any], rows: list[NDArray[np.uint16]]) -> Callable[[], None]:
+    def loop() -> None:
+        for row in rows:
+            run(row)
+
+    return loop
+
+
+def _timed(contestants: list[_Contestant], rounds: int) -> list[Row]:
+    times: dict[str, list[float]] = {c.name: [] for c in contestants}
+    for _ in range(rounds):
+        for contestant in contestants:
+            contestant.run()  # its own pages and caches, not its neighbour's
+            start = time.perf_counter_ns()
+            contestant.run()
+            times[contestant.name].append((time.perf_counter_ns() - start) / contestant.frames)
+    return [Row(name, float(np.median(ns)), min(ns), max(ns)) for name, ns in times.items()]
+
+
+def _best_block(counts: NDArray[np.uint16], tare: NDArray[np.float64], arrays: Any) -> int:
+    """NumPy's best block size here; it depends on the cache."""
+    trials = [_Contestant(str(size), len(counts), partial(Blocked(size), counts, tare, arrays)) for size in BLOCK_SIZES]
+    return int(min(_timed(trials, 5), key=lambda row: row.median_ns).name)
+
+
+def _check(results: list[Any], what: str) -> None:
+    """All of them against the first, which is compute()'s."""
+    for other in results[1:]:
+        for k, name in enumerate(RESULT_DTYPE.names or ()):
+            values = other[k] if isinstance(other, tuple) else other[name]
+            if not np.allclose(np.squeeze(values), results[0][name], rtol=0, atol=EQUAL, equal_nan=True):
+                raise RuntimeError(f"{what}: two contestants differ in {name}; their times say nothing")

@@ -1,0 +1,314 @@
+"""The link's decoder against MAVLink's and against what one writes in Python, in one run.
+
+Five simulated fingers' FRAMEs and PACs, in memory, in chunks; what a chunk gives is let go before the next one,
+as by a live reader. Interleaved rounds, each contestant once untimed before it is timed, medians of CPU time.
+Absolute times say something about this machine only.
+"""
+
+from __future__ import annotations
+
+import gc
+import time
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+import biotac
+
+from ...errors import InputError
+from ...wire import messages_gen as wire
+from ...wire.batches import StreamDecoder
+from ...wire.decoder import Decoder
+from ...wire.frames import StructArray
+from ...wire.framing import encode
+from . import mavlink
+from .batch import Ratio, Row
+
+FINGERS = 5
+FRAMES_PER_S = 100 * FINGERS
+SOURCE = "sim:press.toml"
+ROUNDS = 7
+CHUNK_BYTES = (4096, 65536)  # what a serial port's read gives at most, and a recording's reader
+CRC_BYTES = 4
+CRC_RESIDUE = zlib.crc32(zlib.crc32(b"any").to_bytes(CRC_BYTES, "little"), zlib.crc32(b"any"))
+FRAME, PAC, UNITS_OF_FRAME = wire.Frame.ID, wire.Pac.ID, -1
+NAMES = {FRAME: "FRAME", PAC: "PAC"}
+EXTRA = "biotac bench decode runs against pymavlink and cobs; install them: pip install 'biotac-gateway[bench]'"
+
+OURS, LIVE, UNITS = "biotac Decoder", "biotac StreamDecoder", "biotac StreamDecoder, units"
+MAVLINK, STRUCT, NUMPY = "pymavlink", "C-cobs + zlib + struct", "C-cobs + zlib + NumPy frombuffer"
+
+#: (faster, slower, at least so many times), None where nothing was asked.
+ASKED: tuple[tuple[str, str, float | None], ...] = (
+    (OURS, MAVLINK, 150.0),
+    (OURS, STRUCT, 15.0),
+    (OURS, NUMPY, 5.0),
+    (LIVE, MAVLINK, None),
+)
+
+Chunks = list[bytes]
+Columns = dict[int, Any]  # by message id: an array, or a list of tuples or messages, in order of arrival
+Feed = Callable[[bytes], Columns]
+
+
+@dataclass(frozen=True)
+class Result:
+    """One chunk size. Rows are ns per message, of which a FRAME and a PAC are one each.
+
+    Ratios are against the slower one's best median of all chunk sizes.
+    """
+
+    chunk_bytes: int
+    rows: list[Row]
+    ratios: list[Ratio]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One run over ``seconds`` of stream; bytes of one message on the wire are means."""
+
+    seconds: float
+    messages: int
+    bytes_per_message: float
+    mavlink_bytes_per_message: float
+    results: list[Result]
+
+
+@dataclass(frozen=True)
+class _Contestant:
+    name: str
+    chunks: Chunks
+    start: Callable[[], Feed]  # a fresh decoder, as the function that takes its chunks
+
+
+def recording(frames: int) -> dict[int, StructArray]:
+    """FRAME and PAC messages of five simulated fingers, as rows of wire.DTYPES by id."""
+    with biotac.open(f"{SOURCE}?fingers={FINGERS}&seconds={frames / FRAMES_PER_S}") as hand:
+        hand.start()
+        batch = hand.read_batch(1e6)
+    pac = np.empty(len(batch.pac), wire.DTYPES[PAC])
+    pac["seq"], pac["t_us"] = batch.pac["seq"] % 2**16, batch.pac["t_us"] % 2**32
+    pac["finger"], pac["pac"] = batch.pac["finger"], batch.pac["pac"]
+    return {FRAME: batch.wire, PAC: pac}
+
+
+def measure(frames: int, rounds: int = ROUNDS) -> Outcome:
+    """Check that all contestants decode the same fields, then time them.
+
+    InputError without the extra `bench`, RuntimeError if two contestants differ.
+    """
+    cobs_decode, dialect = _extra()
+    sent = recording(frames)
+    messages = _as_sent(sent)
+    ours = b"".join(encode(m.ID, m.pack()) for m in messages)
+    theirs = b"".join(map(mavlink.encoder(dialect), messages))
+    tables: list[list[Row]] = []
+    for chunk_bytes in CHUNK_BYTES:
+        chunks, mavlink_chunks = _chunks(ours, chunk_bytes), _chunks(theirs, chunk_bytes)
+        contestants = [
+            _Contestant(OURS, chunks, _decoder),
+            _Contestant(LIVE, chunks, _live),
+            _Contestant(UNITS, chunks, _live_units),
+            _Contestant(MAVLINK, mavlink_chunks, _mavlink(dialect)),
+            _Contestant(STRUCT, chunks, _struct(cobs_decode)),
+            _Contestant(NUMPY, chunks, _numpy(cobs_decode)),
+        ]
+        for contestant in contestants:
+            _check(contestant, sent)
+        tables.append(_timed(contestants, rounds, len(messages)))
+    # Who makes an object of every value is slower with long chunks (fresh memory): each is taken at its best.
+    best = {row.name: min(row.median_ns, other.median_ns) for row, other in zip(*tables, strict=True)}
+    results = []
+    for chunk_bytes, rows in zip(CHUNK_BYTES, tables, strict=True):
+        times = {row.name: row.median_ns for row in rows}
+        ratios = [Ratio(fast, slow, best[slow] / times[fast], asked) for fast, slow, asked in ASKED]
+        results.append(Result(chunk_bytes, rows, ratios))
+    n = len(messages)
+    return Outcome(frames / FRAMES_PER_S, n, len(ours) / n, len(theirs) / n, results)
+
+
+def _extra() -> tuple[Callable[[bytes], bytes], ModuleType]:
+    try:
+        from cobs import cobs
+
+        return cobs.decode, mavlink.generate(NAMES)
+    except ImportError as error:
+        raise InputError(f"{EXTRA} ({error})") from None
+
+
+def _as_sent(sent: dict[int, StructArray]) -> list[Any]:
+    """In the board's order: of every round all FRAMEs, then all PACs."""
+    messages = [(wire.MESSAGES[i].unpack(row.tobytes()), k) for i, rows in sent.items() for k, row in enumerate(rows)]
+    return [m for m, k in sorted(messages, key=lambda message: (message[1] // FINGERS, message[0].ID))]
+
+
+def _chunks(data: bytes, size: int) -> Chunks:
+    return [data[at : at + size] for at in range(0, len(data), size)]
+
+
+# ---- contestants: all check what they take and count what they refuse ---------------------------
+
+
+def _decoder() -> Feed:
+    decoder = Decoder()
+
+    def feed(chunk: bytes) -> Columns:
+        decoded = decoder.feed(chunk)
+        return {FRAME: decoded.frames, PAC: decoded.pacs}
+
+    return feed
+
+
+def _live() -> Feed:
+    decoder = StreamDecoder()
+
+    def feed(chunk: bytes) -> Columns:
+        batch = decoder.feed(chunk)
+        return {FRAME: batch.wire, PAC: batch.pac}
+
+    return feed
+
+
+def _live_units() -> Feed:
+    decoder = StreamDecoder()
+
+    def feed(chunk: bytes) -> Columns:
+        batch = decoder.feed(chunk)
+        return {FRAME: batch.wire, PAC: batch.pac, UNITS_OF_FRAME: batch.frames}
+
+    return feed
+
+
+def _mavlink(dialect: ModuleType) -> Callable[[], Feed]:
+    frame_id = mavlink.FIRST_ID + FRAME
+
+    def start() -> Feed:
+        parser = dialect.MAVLink(None)
+
+        def feed(chunk: bytes) -> Columns:
+            frames: list[Any] = []
+            pacs: list[Any] = []
+            for message in parser.parse_buffer(chunk) or ():
+                (frames if message.id == frame_id else pacs).append(message)
+            return {FRAME: frames, PAC: pacs}
+
+        return feed
+
+    return start
+
+
+def _struct(cobs_decode: Callable[[bytes], bytes]) -> Callable[[], Feed]:
+    unpackers = {i: wire.MESSAGES[i].STRUCT.unpack for i in NAMES}
+
+    def start() -> Feed:
+        crc32 = zlib.crc32
+        rest, bad = b"", 0
+
+        def feed(chunk: bytes) -> Columns:
+            nonlocal rest, bad
+            *pieces, rest = (rest + chunk).split(b"\0")
+            columns: dict[int, list[Any]] = {FRAME: [], PAC: []}
+            for piece in pieces:
+                try:
+                    plain = cobs_decode(piece)
+                    if crc32(plain) != CRC_RESIDUE:
+                        bad += 1
+                        continue
+                    message_id = plain[0]
+                    columns[message_id].append(unpackers[message_id](plain[1:-CRC_BYTES]))
+                except Exception:
+                    bad += 1
+            return columns
+
+        return feed
+
+    return start
+
+
+def _numpy(cobs_decode: Callable[[bytes], bytes]) -> Callable[[], Feed]:
+    # With id and CRC in the row no message is cut up; a view leaves them out afterwards.
+    dtypes = {i: np.dtype([("id", "u1"), ("payload", wire.DTYPES[i]), ("crc", "<u4")]) for i in NAMES}
+    sizes = {i: dtype.itemsize for i, dtype in dtypes.items()}
+
+    def start() -> Feed:
+        crc32 = zlib.crc32
+        rest, bad = b"", 0
+
+        def feed(chunk: bytes) -> Columns:
+            nonlocal rest, bad
+            *pieces, rest = (rest + chunk).split(b"\0")
+            plains: dict[int, list[bytes]] = {FRAME: [], PAC: []}
+            for piece in pieces:
+                try:
+                    plain = cobs_decode(piece)
+                    message_id = plain[0]
+                    if crc32(plain) == CRC_RESIDUE and len(plain) == sizes[message_id]:
+                        plains[message_id].append(plain)
+                    else:
+                        bad += 1
+                except Exception:
+                    bad += 1
+            return {i: np.frombuffer(b"".join(rows), dtypes[i])["payload"] for i, rows in plains.items()}
+
+        return feed
+
+    return start
+
+
+# ---- the same content, and the clock ------------------------------------------------------------
+
+
+def _check(contestant: _Contestant, sent: dict[int, StructArray]) -> None:
+    name, feed = contestant.name, contestant.start()
+    parts = [feed(chunk) for chunk in contestant.chunks]
+    for message_id, rows in sent.items():
+        got = [part[message_id] for part in parts]
+        arrays = all(isinstance(part, np.ndarray) for part in got)
+        whole = np.concatenate(got) if arrays else _array([m for part in got for m in part], rows.dtype)
+        for field in rows.dtype.names or ():
+            if len(whole) != len(rows) or not np.array_equal(whole[field].astype(rows[field].dtype), rows[field]):
+                raise RuntimeError(f"{name} decoded another {field} of {NAMES[message_id]}; its times say nothing")
+
+
+def _array(messages: list[Any], dtype: np.dtype[Any]) -> StructArray:
+    """Tuples in the order of the fields, arrays flattened as struct gives them, or objects with the fields."""
+    out = np.empty(len(messages), dtype)
+    at = 0
+    for field in dtype.names or ():
+        shape = out[field].shape[1:]
+        width = int(np.prod(shape))
+        if messages and isinstance(messages[0], tuple):
+            values = [m[at : at + width] for m in messages]
+        else:
+            values = [getattr(m, field) for m in messages]
+        out[field] = np.array(values).reshape(len(messages), *shape)
+        at += width
+    return out
+
+
+def _timed(contestants: list[_Contestant], rounds: int, messages: int) -> list[Row]:
+    times: dict[str, list[float]] = {c.name: [] for c in contestants}
+    # The garbage collector stays on and is part of who makes many objects, but this benchmark's own are not
+    # theirs to walk.
+    gc.collect()
+    gc.freeze()
+    try:
+        for _ in range(rounds):
+            for contestant in contestants:
+                _cpu_ns(contestant)  # its own pages and caches, not its neighbour's
+                times[contestant.name].append(_cpu_ns(contestant) / messages)
+    finally:
+        gc.unfreeze()
+    return [Row(name, float(np.median(ns)), min(ns), max(ns)) for name, ns in times.items()]
+
+
+def _cpu_ns(contestant: _Contestant) -> int:
+    feed = contestant.start()
+    start = time.process_time_ns()
+    for chunk in contestant.chunks:
+        feed(chunk)
+    return time.process_time_ns() - start

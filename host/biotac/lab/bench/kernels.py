@@ -1,0 +1,188 @@
+"""Every kernel variant (tools/bench/variants) against the exact result, and against the others' time.
+
+Errors are distances to exact sums finished in extended precision (host/binding/kernels.c): over random
+frames of six classes, and the worst that hill climbing finds. Times are ratios to the shipped kernel
+within one run: interleaved rounds, warmed buffers, medians.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.compiled import FORCE_GAINS, TORQUE_GAINS, default_settings, ffi, lib
+from ...wire.messages_gen import PocWeights
+from . import limit, scenes
+
+#: What is compared, in the order of BT_KERNEL_ERRORS, and its unit. N*um is the wire's mN*mm.
+QUANTITIES: dict[str, str] = {
+    "PoC": "um",
+    "force": "mN",
+    "torque y, z": "N*um",
+    "torque x": "N*um",
+}
+WEIGHT_NAMES: dict[PocWeights, str] = {
+    PocWeights.ABS_N2: "abs n=2",
+    PocWeights.COMPRESS_N1: "compress n=1",
+    PocWeights.COMPRESS_N2: "compress n=2",
+}
+SHIPPED = "shipped"
+ROUNDS = 15
+TIMED_FRAMES = 2000
+SEED = 2013
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How hard to look for errors: frames per class, and hill climbing."""
+
+    frames: int = 50_000
+    restarts: int = 8
+    steps: int = 10_000
+
+
+@dataclass(frozen=True)
+class ClassError:
+    """Over one class of frames; 0 where no frame of it has such a result."""
+
+    rms: float
+    max: float
+
+
+@dataclass(frozen=True)
+class Error:
+    """One quantity of one variant. ``unanswered`` is the share of frames with a point that it denies.
+
+    ``at_1n`` is the RMS over the frames of limit.py, the only one that its budget is for.
+    """
+
+    at_1n: float
+    rms: float
+    max: float
+    max_in: str
+    adversarial: float
+    unanswered: float
+    classes: dict[str, ClassError]
+
+    @property
+    def worst(self) -> float:
+        return max(self.max, self.adversarial)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One variant with one kind of weights; ``errors`` by quantity."""
+
+    times_shipped: float
+    errors: dict[str, Error]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One run. ``variants`` by name and weights, ``limits`` by weights and quantity."""
+
+    effort: Effort
+    variants: dict[str, dict[str, Measured]]
+    limits: dict[str, dict[str, float]]
+
+    def budget(self, weights: str, quantity: str) -> float:
+        """What a kernel may add to one ADC step at 1 N."""
+        return self.limits[weights][quantity] * limit.BUDGET_SHARE
+
+
+def names() -> list[str]:
+    """The variants, in the C table's order."""
+    return [ffi.string(lib.bt_kernel_name(k)).decode() for k in range(lib.bt_kernel_variants())]
+
+
+def measure(effort: Effort) -> Outcome:
+    """Errors and ratios of every variant, with the default gains and each kind of weights."""
+    variants: dict[str, dict[str, Measured]] = {name: {} for name in names()}
+    limits = {}
+    for weights, label in WEIGHT_NAMES.items():
+        case = _case(weights)
+        frames = _frames(weights, effort.frames)
+        pressed = limit.frames_q4()
+        ratios = _ratios(case, scenes.bumps(np.random.default_rng(SEED), TIMED_FRAMES, weights))
+        for index, name in enumerate(variants):
+            found = {scene: _errors(index, case, e_q4) for scene, e_q4 in frames.items()}
+            at_1n = _errors(index, case, pressed)
+            errors = {
+                quantity: _error(
+                    at_1n[:, kind],
+                    {scene: rows[:, kind] for scene, rows in found.items()},
+                    _climb(index, case, kind, effort),
+                )
+                for kind, quantity in enumerate(QUANTITIES)
+            }
+            variants[name][label] = Measured(ratios[index], errors)
+        limits[label] = dict(zip(QUANTITIES, limit.one_step(weights).values(), strict=True))
+    return Outcome(effort, variants, limits)
+
+
+def _case(weights: PocWeights) -> Any:
+    settings = default_settings()
+    return ffi.new(
+        "bt_kernel_case *",
+        {
+            "poc_weights": int(weights),
+            "force_nn": [settings[s] for s in FORCE_GAINS],
+            "torque_nn": [settings[s] for s in TORQUE_GAINS],
+        },
+    )
+
+
+def _frames(weights: PocWeights, n: int) -> dict[str, scenes.Signals]:
+    random = np.random.default_rng([SEED, int(weights)])
+    return {name: make(random, n, weights) for name, make in scenes.CLASSES.items()}
+
+
+def _errors(index: int, case: Any, e_q4: scenes.Signals) -> NDArray[np.float64]:
+    out = np.empty((len(e_q4), len(QUANTITIES)))
+    lib.bt_kernel_errors(index, case, len(e_q4), ffi.from_buffer("int32_t[]", e_q4), ffi.from_buffer("double[]", out))
+    return out
+
+
+def _error(pressed: NDArray[np.float64], found: dict[str, NDArray[np.float64]], adversarial: float) -> Error:
+    answered = {scene: column[np.isfinite(column)] for scene, column in found.items()}
+    denied = sum(int(np.isinf(column).sum()) for column in found.values())
+    everything = np.concatenate(list(answered.values()))
+    classes = {scene: ClassError(_rms(column), float(column.max(initial=0.0))) for scene, column in answered.items()}
+    max_in = max(classes, key=lambda scene: classes[scene].max)
+    return Error(
+        at_1n=_rms(pressed[np.isfinite(pressed)]),
+        rms=_rms(everything),
+        max=classes[max_in].max,
+        max_in=max_in,
+        adversarial=adversarial,
+        unanswered=denied / max(denied + len(everything), 1),
+        classes=classes,
+    )
+
+
+def _rms(column: NDArray[np.float64]) -> float:
+    return float(np.sqrt((column**2).mean())) if len(column) else 0.0
+
+
+def _climb(index: int, case: Any, kind: int, effort: Effort) -> float:
+    worst = ffi.new(f"int32_t[{scenes.ELECTRODES}]")
+    return float(lib.bt_kernel_climb(index, case, kind, SEED, effort.restarts, effort.steps, worst))
+
+
+def _ratios(case: Any, e_q4: scenes.Signals) -> list[float]:
+    """Per variant, its median time over that of the shipped kernel."""
+    buffer = ffi.from_buffer("int32_t[]", e_q4)
+    every = range(lib.bt_kernel_variants())
+    times: list[list[int]] = [[] for _ in every]
+    for _ in range(ROUNDS):
+        for index in every:
+            lib.bt_kernel_run(index, case, len(e_q4), buffer)  # its own caches, not its neighbour's
+            start = time.perf_counter_ns()
+            lib.bt_kernel_run(index, case, len(e_q4), buffer)
+            times[index].append(time.perf_counter_ns() - start)
+    medians = [float(np.median(t)) for t in times]
+    return [median / medians[names().index(SHIPPED)] for median in medians]

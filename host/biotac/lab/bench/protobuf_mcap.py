@@ -1,0 +1,90 @@
+"""The contestant: the same content as one protobuf message a frame, in MCAP with the library's own settings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from mcap.reader import make_reader
+from mcap_protobuf.writer import Writer
+from numpy.typing import NDArray
+
+from ...recording.compact import KINDS, Compact, Fields
+from ...wire import messages_gen as wire
+
+_OF_KIND = {"frames": wire.Frame.ID, "pac": wire.Pac.ID, "idle": wire.Idle.ID}
+_FIELD = descriptor_pb2.FieldDescriptorProto
+
+
+def _messages() -> dict[str, Any]:
+    """Message classes by kind, fields as the wire's: unsigned as varint, signed as zigzag, arrays packed."""
+    file = descriptor_pb2.FileDescriptorProto(name="biotac_bench.proto", package="biotac_bench", syntax="proto3")
+    for kind, message_id in _OF_KIND.items():
+        message = file.message_type.add(name=kind.capitalize())
+        dtype = wire.DTYPES[message_id]
+        for number, name in enumerate(dtype.names or (), 1):
+            base, shape = dtype[name].base, dtype[name].shape
+            signed = base.kind == "i"
+            kind_of = _FIELD.TYPE_SINT32 if signed else _FIELD.TYPE_UINT64
+            label = _FIELD.LABEL_REPEATED if shape else _FIELD.LABEL_OPTIONAL
+            message.field.add(name=name, number=number, type=kind_of, label=label)
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    return {
+        kind: message_factory.GetMessageClass(pool.FindMessageTypeByName(f"biotac_bench.{kind.capitalize()}"))
+        for kind in _OF_KIND
+    }
+
+
+MESSAGES = _messages()
+
+
+def write(path: Path, content: Compact) -> None:
+    """One message a frame, PAC block and heartbeat."""
+    with path.open("wb") as stream, Writer(stream) as out:
+        for kind in KINDS:
+            for finger, fields in getattr(content, kind).items():
+                names = list(fields)
+                for row in zip(*(values.tolist() for values in fields.values()), strict=True):
+                    message = MESSAGES[kind](finger=finger, **dict(zip(names, row, strict=True)))
+                    stamp_ns = message.t_us * 1000
+                    out.write_message(f"/{kind}", message, stamp_ns, stamp_ns)
+
+
+def load(path: Path) -> Compact:
+    """All messages to arrays by finger, through one flat list a field."""
+    columns: dict[str, dict[int, dict[str, list[Any]]]] = {kind: {} for kind in KINDS}
+    plans = {kind: _plan(kind) for kind in KINDS}
+    with path.open("rb") as stream:
+        for _, channel, record in make_reader(stream).iter_messages(log_time_order=False):
+            kind = channel.topic[1:]
+            message = MESSAGES[kind].FromString(record.data)
+            single, repeated = plans[kind]
+            lists = columns[kind].get(message.finger)
+            if lists is None:
+                lists = columns[kind][message.finger] = {name: [] for name in (*single, *repeated)}
+            for name in single:
+                lists[name].append(getattr(message, name))
+            for name in repeated:
+                lists[name].extend(getattr(message, name))
+    out = Compact({})
+    for kind in KINDS:
+        for finger, lists in columns[kind].items():
+            fields: Fields = {name: _array(kind, name, values) for name, values in lists.items()}
+            getattr(out, kind)[finger] = fields
+    return out
+
+
+def _plan(kind: str) -> tuple[list[str], list[str]]:
+    """Fields with one value and with many, but for the finger's number."""
+    dtype = wire.DTYPES[_OF_KIND[kind]]
+    names = [name for name in dtype.names or () if name != "finger"]
+    return [n for n in names if not dtype[n].shape], [n for n in names if dtype[n].shape]
+
+
+def _array(kind: str, name: str, values: list[Any]) -> NDArray[Any]:
+    of_wire = wire.DTYPES[_OF_KIND[kind]][name]
+    dtype = np.dtype(np.int64) if name in ("seq", "t_us") else of_wire.base
+    return np.array(values, dtype).reshape(-1, *of_wire.shape)

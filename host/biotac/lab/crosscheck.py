@@ -1,0 +1,226 @@
+"""Every on-board result against the float64 reference, fed with the counts and the tare of its frame.
+
+The bounds follow from the board's number formats alone; firmware/reference/kernel_bounds.h derives them, and
+tests/core/test_kernels.c searches for inputs that come near.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibrate.pressure.check import FORCE_BOUND_N, PressureCheck
+from ..calibrate.wrench import board
+from ..calibrate.wrench.applied import replace_gains
+from ..core.board_map import BoardMap, opened, pdc_above_rest_q4
+from ..core.compiled import TORQUE_GAINS, Results, Settings, ffi, lib, reference_q4
+from ..hand.commands import PRESSURE_SINCE_MINOR
+from ..wire import map_gen as _map
+from ..wire import messages_gen as wire
+from ..wire.frames import UM_PER_MM, StructArray, electrode_signals, to_units
+from ..wire.sensor_gen import CORE_RADIUS_UM
+
+#: The PoC's distance and the force of each axis, see firmware/reference/kernel_bounds.h.
+POC_BOUND_UM: float = lib.bt_poc_bound_um()
+FORCE_BOUND_MN: float = lib.bt_force_bound_mn()
+
+FINDINGS = 20  # violations that are put into words; the rest is counted
+
+
+def torque_bound_nmm(messages: StructArray, truth: Results, settings: Settings) -> NDArray[np.float64]:
+    """Bound of each torque axis, N*mm, shape (n, 3): it grows with the signals and, for x, the force.
+
+    The formulas stand in firmware/reference/kernel_bounds.h.
+    """
+    size = np.nansum(np.abs(electrode_signals(messages)), axis=1)
+    gains = np.array([abs(settings[s]) / 1e9 for s in TORQUE_GAINS])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sums = np.nan_to_num(np.abs(truth.torque_nmm[:, 1:]) * 1000 / gains, posinf=0.0)
+    force = np.abs(truth.force_n[:, 1:]).sum(axis=1)
+    out = np.empty((len(messages), 3))
+    columns = [np.ascontiguousarray(a) for a in (size, sums, force, gains)]
+    pointers = [ffi.from_buffer("double[]", a) for a in (*columns, out)]
+    lib.bt_torque_bounds_mnmm(len(messages), *pointers)
+    return out / 1000
+
+
+@dataclass
+class CrossCheck:
+    """Outcome over any number of frames. Maxima are over valid results; 0 while there are none."""
+
+    frames: int = 0
+    violations: int = 0
+    poc_um_max: float = 0.0
+    force_mn_max: float = 0.0
+    torque_nmm_max: float = 0.0
+    torque_nmm_bound: float = 0.0  # the largest that any frame was held to
+    wire_minor: int = wire.WIRE_MINOR  # of the board: before 1.4 none told a force from pressure
+    pressure: PressureCheck = field(default_factory=PressureCheck)
+    mapped: int = 0  # frames by a wrench map, whose force has a bound of its own
+    mapped_force_mn_bound: float = 0.0  # the largest of those
+    findings: list[str] = field(default_factory=list)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: the maxima beside the bounds they are held to."""
+        return {
+            "frames": self.frames,
+            "violations": self.violations,
+            "poc_um_max": self.poc_um_max,
+            "poc_um_bound": POC_BOUND_UM,
+            "force_mn_max": self.force_mn_max,
+            "force_mn_bound": max(FORCE_BOUND_MN, self.mapped_force_mn_bound),
+            "torque_nmm_max": self.torque_nmm_max,
+            "torque_nmm_bound": self.torque_nmm_bound,
+            "pressure_mn_max": self.pressure.force_n_max * 1e3,
+            "pressure_mn_bound": FORCE_BOUND_N * 1e3,
+            "pdc_filtered_max": self.pressure.filter_max,
+            "pdc_filtered_bound": self.pressure.filter_bound,
+            "pdc_filter_starts": self.pressure.starts,
+            "mapped": self.mapped,
+            "findings": self.findings,
+        }
+
+    def add(
+        self,
+        messages: StructArray,
+        settings: Settings,
+        own: Mapping[int, Settings] | None = None,
+        maps: Mapping[int, BoardMap | bytes] | None = None,
+    ) -> None:
+        """Check FRAME messages (n,) as they came over the wire; live or from a file.
+
+        ``own`` has the settings of the fingers with a calibration (Hand.finger_settings, Recording.finger_settings),
+        ``maps`` the wrench maps in force or their blobs (Hand.maps, Recording.maps). Raises InputError for a map that
+        a board would refuse.
+        """
+        own, maps = own or {}, maps or {}
+        mapped = (messages["flags"] & wire.FrameFlags.MAPPED) != 0
+        for finger in np.unique(messages["finger"][mapped]).tolist():
+            its = messages[mapped & (messages["finger"] == finger)]
+            if finger not in maps:
+                for k in range(len(its)):
+                    self._find(its, k, "MAPPED, by a wrench map that is not known here")
+                continue
+            self._add(its, own.get(finger, settings), opened(maps[finger]))
+        shared = ~mapped
+        for finger, its_own in own.items():
+            of_finger = ~mapped & (messages["finger"] == finger)
+            self._add(messages[of_finger], its_own)
+            shared &= ~of_finger
+        self._add(messages[shared], settings)
+
+    def _add(self, messages: StructArray, settings: Settings, its: BoardMap | None = None) -> None:
+        if not len(messages):
+            return
+        untared = (messages["flags"] & wire.FrameFlags.UNTARED) != 0
+        truth = reference_q4(messages["counts"], messages["tare_q4"], settings)
+        force_bound: NDArray[np.float64] | float = FORCE_BOUND_MN
+        torsion, torsion_bound = (np.full((len(messages), 1), value) for value in (np.nan, 0.0))
+        if its is None:
+            torque_bound = torque_bound_nmm(messages, truth, settings)
+        else:
+            force_bound, torque_bound, torsion, torsion_bound = _by_map(messages, its, truth, settings)
+            self.mapped += len(messages)
+            self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
+        sent_torsion = messages["torsion_mnmm"][:, None]
+        for values in (truth.poc_mm, truth.force_n, truth.torque_nmm, torsion):
+            values[untared] = np.nan  # without a tare there is nothing to be right about
+        for values, sent in (
+            (truth.poc_mm, messages["poc_um"]),
+            (truth.force_n, messages["force_100un"]),
+            (truth.torque_nmm, messages["torque_mnmm"]),
+            (torsion, sent_torsion),
+        ):
+            values[not_asked(messages, sent)] = np.nan
+        for bound in (torque_bound, torsion_bound):
+            self.torque_nmm_bound = max(self.torque_nmm_bound, float(bound[~untared].max(initial=0.0)))
+
+        # The PoC is one point: its error is a distance. Force and torque count per axis.
+        poc_um = to_units(messages["poc_um"], 1) - truth.poc_mm * 1e3
+        distance_um = np.sqrt((poc_um**2).sum(axis=1, keepdims=True))
+        force_mn = np.abs(to_units(messages["force_100un"], 10) - truth.force_n * 1e3)
+        torque_nmm = np.abs(to_units(messages["torque_mnmm"], 1000) - truth.torque_nmm)
+        self.poc_um_max = max(self.poc_um_max, worst(distance_um))
+        self.force_mn_max = max(self.force_mn_max, worst(force_mn))
+        torsion_nmm = np.abs(to_units(sent_torsion, 1000) - torsion)
+        self.torque_nmm_max = max(self.torque_nmm_max, worst(torque_nmm), worst(torsion_nmm))
+        self._judge("PoC", "um", messages, messages["poc_um"], truth.poc_mm, distance_um, POC_BOUND_UM)
+        self._judge("force", "mN", messages, messages["force_100un"], truth.force_n, force_mn, force_bound)
+        self._judge("torque", "N*mm", messages, messages["torque_mnmm"], truth.torque_nmm, torque_nmm, torque_bound)
+        self._judge("torsion", "N*mm", messages, sent_torsion, torsion, torsion_nmm, torsion_bound)
+        self._judge_flag(messages)
+        if self.wire_minor >= PRESSURE_SINCE_MINOR:
+            for finding in self.pressure.add(messages, settings):
+                self._find(messages, finding.row, finding.what)
+        self.frames += len(messages)
+
+    def _judge_flag(self, messages: StructArray) -> None:
+        """POC_INVALID must stand exactly where the PoC is marked invalid."""
+        flagged = (messages["flags"] & wire.FrameFlags.POC_INVALID) != 0
+        marked = (messages["poc_um"] == wire.INVALID_I16).any(axis=1)
+        skipped = not_asked(messages, messages["poc_um"])
+        for k in np.flatnonzero((flagged != marked) & ~skipped):
+            self._find(messages, int(k), "the POC_INVALID flag contradicts the PoC")
+
+    def _find(self, messages: StructArray, k: int, what: str) -> None:
+        self.violations += 1
+        if len(self.findings) < FINDINGS:
+            place = f"finger {messages['finger'][k]} frame {messages['seq'][k]} ({messages['t_us'][k] / 1e6:.3f} s)"
+            self.findings.append(f"{place}: {what}")
+
+    def _judge(
+        self,
+        name: str,
+        unit: str,
+        messages: StructArray,
+        sent: NDArray[Any],
+        truth: NDArray[np.float64],
+        error: NDArray[np.float64],
+        bound: NDArray[np.float64] | float,
+    ) -> None:
+        one_sided = np.any(np.isnan(to_units(sent, 1)) != np.isnan(truth), axis=1)
+        outside = np.any(error > bound, axis=1)
+        for k in np.flatnonzero(one_sided | outside):
+            if one_sided[k]:
+                self._find(messages, int(k), f"{name} is valid on one side only")
+                continue
+            limits = np.broadcast_to(bound, error.shape)[k]
+            axis = int(np.nanargmax(error[k] - limits))
+            place = f" {'xyz'[axis]}" if error.shape[1] == 3 else ""
+            off = f"off by {error[k, axis]:.4g} {unit}, bound {limits[axis]:.4g} {unit}"
+            self._find(messages, int(k), f"{name}{place} {off}")
+
+
+def _by_map(
+    messages: StructArray, its: BoardMap, truth: Results, settings: Settings
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Put what the map's integers mean into ``truth``. Bounds of force, mN, and torque, N*mm, (n, 3); torsion and its
+    bound, N*mm, (n, 1), NaN and 0 without.
+    """
+    frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
+    wrench, off = board.exact(its, *frames), board.bound(its, None, *frames)
+    torsion = np.empty((len(messages), 1))
+    replace_gains(its, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
+    force_off, torque_off, torsion_off = np.split(np.nan_to_num(off), (3, 6), axis=1)
+    if its.axes < _map.AXES_TORSION:
+        torsion_off = np.zeros_like(torsion)
+    if its.axes == 3:
+        # x is derived from this force, by a lever of the core's radius at most
+        torque_off = torque_bound_nmm(messages, truth, settings)
+        torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * force_off[:, 1:].sum(axis=1)
+    return 1e3 * force_off, torque_off, torsion, torsion_off
+
+
+def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:
+    """Frames (n,) whose result ``sent`` (n, k) nobody subscribed to: it is marked invalid altogether."""
+    asked_for_all = (messages["flags"] & wire.FrameFlags.NOT_ASKED) == 0
+    return np.asarray(~asked_for_all & np.isnan(to_units(sent, 1)).all(axis=1))
+
+
+def worst(error: NDArray[np.float64]) -> float:
+    """Largest valid error, 0 without any."""
+    return float(np.nanmax(error, initial=0.0)) if not np.isnan(error).all() else 0.0

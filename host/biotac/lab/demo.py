@@ -1,0 +1,186 @@
+"""The whole chain once: simulated board, stream, recording, cross-check, report, picture."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..hand.opening import shake_hands
+from ..recording import Recording
+from ..sim.process import SimBoard, SimLink
+from ..sim.sampling import FRAME_HZ, PAC_SLOT
+from ..sim.source import Source, load_source
+from ..wire import messages_gen as wire
+from ..wire.batches import Batch, join
+from .crosscheck import CrossCheck
+
+Show = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class DemoRun:
+    """What a demo produced: the source it played, all that arrived, and the facts of its report."""
+
+    source: Source
+    batch: Batch
+    facts: dict[str, Any]
+
+    @property
+    def good(self) -> bool:
+        """Nothing lost, nothing damaged, no result out of bounds, the recording equal to the stream."""
+        return (
+            self.facts["frames_lost"] == 0
+            and self.facts["crc_errors"] == 0
+            and self.facts["crosscheck"]["violations"] == 0
+            and bool(self.facts["recording_matches"])
+        )
+
+
+def run_demo(
+    source_name: str, folder: Path, *, fingers: int | None = None, seconds: float | None = None, show: Show = print
+) -> DemoRun:
+    """Play a source through a simulated board and leave demo.mcap, report.json, report.md and demo.png.
+
+    Raises InputError when the source cannot be played or the folder cannot be written.
+    """
+    from .demo_picture import draw
+
+    source = load_source(source_name, fingers=fingers, seconds=seconds)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be made a folder ({error.strerror}); choose another --out") from error
+    recording_path = folder / "demo.mcap"
+    wall = time.monotonic()
+    # The board's counts are made; from here on it is a host with a board, and its cost is measured.
+    with shake_hands(SimLink(f"sim:{source.name}", SimBoard(source, pace=0.0, hold=True))) as hand:
+        settings = hand.settings()
+        has_pac = bool(np.any(source.samples[:, :, PAC_SLOT] <= 4095))
+        recorder = hand.record(recording_path, overwrite=True)
+        cpu = time.process_time()
+        outcome = CrossCheck()
+        batches: list[Batch] = []
+        hand.start(pac=has_pac)
+        for batch in hand.batches():
+            outcome.add(batch.wire, settings)
+            batches.append(batch)
+            show(f"{hand.stats.frames} of {source.samples.shape[0] * source.samples.shape[1]} frames")
+        recorder.close()
+        cpu = time.process_time() - cpu
+        stats = hand.stats
+        status = hand.status()
+    joined = join(batches)
+    rows, played_fingers = source.samples.shape[:2]
+    device_s = rows / FRAME_HZ
+    recorded = Recording(recording_path)
+    never_came = max(0, expected_frames(source) - len(joined.frames) - stats.frames_lost)
+    same = np.array_equal(recorded.wire, joined.wire) and np.array_equal(recorded.pac, joined.pac)
+    facts: dict[str, Any] = {
+        "source": source.name,
+        "fingers": played_fingers,
+        "rows": rows,
+        "rows_skipped": source.skipped_frames,
+        "frames": len(joined.frames),
+        "frames_lost": stats.frames_lost + never_came,
+        "pac_blocks": len(joined.pac),
+        "crc_errors": stats.crc_errors,
+        "other_errors": stats.other_errors,
+        "board_dropped": status.messages_dropped,
+        "board_slots_late": status.slots_late,
+        "device_seconds": device_s,
+        "wall_seconds": round(time.monotonic() - wall, 3),
+        "host_cpu_seconds": round(cpu, 3),
+        "host_cpu_percent": round(100 * cpu / device_s, 2),
+        "bytes": stats.bytes_received,
+        "recording_bytes": recording_path.stat().st_size,
+        "recording_matches": bool(same),
+        "tare_changes": tare_changes(joined.messages),
+        "force_rmse_n": force_error(source, joined),
+        "crosscheck": outcome.as_dict(),
+        "recording": str(recording_path),
+        "report": str(folder / "report.md"),
+        "picture": str(folder / "demo.png"),
+    }
+    draw(source, joined, source_rows(source, joined), folder / "demo.png")
+    (folder / "report.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
+    (folder / "report.md").write_text(report_text(facts), encoding="utf-8")
+    return DemoRun(source, joined, facts)
+
+
+def expected_frames(source: Source) -> int:
+    """Frames that the board owes: every round of every finger in which any word was good."""
+    return int(np.count_nonzero(np.any((source.samples <= 4095), axis=2)))
+
+
+def source_rows(source: Source, batch: Batch) -> NDArray[np.int64]:
+    """The source's row that each frame was sampled from, shape (n,).
+
+    By time and not by seq: a round in which a finger gave no good word has a row but no seq.
+    """
+    t_us = batch.frames["t_us"]
+    if not len(t_us):
+        return np.empty(0, np.int64)
+    first_row = int(np.argmax(np.any(source.samples <= 4095, axis=(1, 2))))
+    rows = first_row + np.rint((t_us - t_us.min()) * FRAME_HZ / 1e6).astype(np.int64)
+    return np.asarray(np.clip(rows, 0, len(source.samples) - 1))
+
+
+def tare_changes(messages: list[Any]) -> list[dict[str, Any]]:
+    """When, where and why the tare changed."""
+    return [
+        {"finger": m.finger, "seq": m.seq, "reason": wire.TareReason(m.reason).name}
+        for m in messages
+        if isinstance(m, wire.Tare)
+    ]
+
+
+def force_error(source: Source, batch: Batch) -> list[float] | None:
+    """RMS difference to the source's own force over contact frames, N per axis; None without one."""
+    truth = source.known_force_n
+    if truth is None:
+        return None
+    touched = (batch.frames["flags"] & wire.FrameFlags.CONTACT) != 0
+    if not touched.any():
+        return None
+    frames, rows = batch.frames[touched], source_rows(source, batch)[touched]
+    difference = frames["force_n"] - truth[rows, frames["finger"]]
+    return [float(v) for v in np.sqrt(np.nanmean(difference**2, axis=0))]
+
+
+def report_text(facts: dict[str, Any]) -> str:
+    """The report as Markdown."""
+    check = facts["crosscheck"]
+    lines = [
+        f"# Demo: {facts['source']}",
+        "",
+        f"{facts['rows']} rows on {facts['fingers']} finger(s), {facts['device_seconds']:.2f} s of device time.",
+        "",
+        "| | seen | bound |",
+        "|---|---|---|",
+        f"| frames | {facts['frames']} | |",
+        f"| frames lost | {facts['frames_lost']} | 0 |",
+        f"| CRC errors | {facts['crc_errors']} | 0 |",
+        f"| cross-check violations | {check['violations']} | 0 |",
+        f"| PoC error, max | {check['poc_um_max']:.3f} um | {check['poc_um_bound']:.3f} um |",
+        f"| force error, max | {check['force_mn_max']:.4f} mN | {check['force_mn_bound']:.4f} mN |",
+        f"| torque error, max | {check['torque_nmm_max']:.5f} N*mm | {check['torque_nmm_bound']:.5f} N*mm |",
+        f"| host CPU | {facts['host_cpu_percent']} % of one core | |",
+        "",
+        "The errors are those of the board's fixed point against the same formulas in float64, not those of the",
+        "formulas against a real force.",
+    ]
+    if facts["force_rmse_n"] is not None:
+        x, y, z = facts["force_rmse_n"]
+        lines.append(f"Against the source's own force, in contact: {x:.2f} / {y:.2f} / {z:.2f} N RMS in x / y / z.")
+    if facts["tare_changes"]:
+        lines += ["", "| finger | frame | tare changed because |", "|---|---|---|"]
+        lines += [f"| {t['finger']} | {t['seq']} | {t['reason']} |" for t in facts["tare_changes"][:50]]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,29 @@
+"""The experiments by name. A new one is a line here and a module of that name, `-` as `_`, beside this one."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from typing import cast
+
+from ...errors import InputError
+from .outcome import Experiment
+
+NAMES = {
+    "poke": "point of contact under a 2 mm probe on every electrode (Lin 2013, table 2)",
+    "plate-normal": "normal at the point of contact against a flat plate's",
+    "shear": "a weight pushed sideways (Lin 2013, figure 3)",
+    "torsion": "a weight turned both ways (Lin 2013, figure 9)",
+    "torsion-shear": "a weight turned while it is pushed (Lin 2013, figure 10)",
+    "shear-torsion": "shear and torsion at once on held-out places, calibrated against the paper's model",
+    "navarro": "pressure calibration and its verification press (Navarro et al.)",
+}
+
+
+def load(name: str) -> Experiment:
+    """The module of experiment ``name``. Raises InputError where it is not there."""
+    module = f"{__package__}.{name.replace('-', '_')}"
+    if name not in NAMES or importlib.util.find_spec(module) is None:
+        there = ", ".join(known for known in NAMES if known != name)
+        raise InputError(f"experiment {name} is not part of this version: expected one of {there}; update the package")
+    return cast(Experiment, importlib.import_module(module))

@@ -1,0 +1,323 @@
+"""Pressure calibration of five fingers, and its verification press: Navarro et al. 2015.
+
+Each finger pushes a force plate three times, harder each time; K follows from what was held, and goes to the board.
+Then each pushes once more, and what the board says is held to the plate. Here hand and plate are emulated; all numbers
+on the way are the board's own, set, read back and streamed over its link.
+
+The paper's Pa are counts (protocol/SPEC.md), and its P0 of 57 to 106 are of sensors whose zero nobody knows: K and
+P0 of another hand are another hand's. What can be compared is the verification press's relative error.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...calibrate.pressure import driving, formulas
+from ...calibrate.pressure.fit import Fit, Verification, fit, told_by, verify
+from ...calibrate.pressure.plateaus import Press
+from ...calibrate.pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure
+from ...calibrate.pressure.reference import Truth
+from ...calibrate.pressure.report import PAPER_ERROR
+from ...calibrate.pressure.rows import rows_of
+from ...hand.hand import Hand
+from ...hand.opening import shake_hands
+from ...link.ports import start_board
+from ...sim.physics import Profile
+from ...sim.process import SimLink
+from ...sim.source import Source
+from ...wire import messages_gen as wire
+from ...wire.batches import Batch
+from ..crosscheck import CrossCheck
+from . import navarro_script as script
+from .outcome import Facts, Options, check, claim, number, numbers, table, text
+
+RECORDING = ""
+MAPS = False
+
+NAMES = ("thumb", "fore", "middle", "ring", "little")
+PAPER_GAIN_N = (0.016, 0.010, 0.013, 0.009, 0.009)  # Table I
+PAPER_REST_COUNTS = (85.0, 86.0, 106.0, 57.0, 70.0)
+FINGERS = tuple(range(len(NAMES)))
+PLACE = "E17"
+PLACES = ("E7", "E10", "E17", "E18", "E16")  # from the tip backwards
+Show = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Hands:
+    """One emulated hand, calibrated and verified; ``fits`` and ``verified`` are in the fingers' order."""
+
+    profile: Profile
+    seeds: tuple[int, ...]
+    fits: tuple[Fit, ...]
+    presses: tuple[tuple[Press, ...], ...]
+    verified: tuple[Verification, ...]
+    verification: tuple[Press, ...]
+    frames_checked: int
+    violations: int
+    one_mn_apart: int  # frames in which board and float64 differ by more than 1 mN
+
+
+@dataclass(frozen=True)
+class Places:
+    """One finger calibrated at each of ``names``; ``errors`` (n, n): K of the row's place, at the column's."""
+
+    names: tuple[str, ...]
+    x_mm: tuple[float, ...]
+    gains_n: tuple[float, ...]
+    errors: Any
+
+
+@dataclass(frozen=True)
+class Result:
+    """Hands of each profile, and what the place of a press does."""
+
+    hands: tuple[Hands, ...]
+    places: Places
+
+
+def run(options: Options) -> Result:
+    """Five fingers of each profile, new ones from ``options.seed`` on and worn ones with the seeds after those."""
+    hands = (
+        calibrate(options.seed, "new", options.show),
+        calibrate(options.seed + len(FINGERS), "worn", options.show),
+    )
+    return Result(hands, places(options.seed))
+
+
+def calibrate(
+    seed: int,
+    profile: Profile = "new",
+    show: Show = lambda words: None,
+    *,
+    board: str = "posix",
+    fingers: Sequence[int] = FINGERS,
+) -> Hands:
+    """Calibrate and verify an emulated hand, of five fingers or some of them, on an emulated ``board`` (posix or pico).
+
+    The source is played twice: a board takes no calibration while it streams, and emulated time does not wait for
+    commands. The second time K is in force from the start, and only the last press of each finger is looked at.
+    """
+    seeds = tuple(seed + k for k in range(len(fingers)))
+    forces = CALIBRATION_FORCES_N, VERIFICATION_FORCES_N
+    series = [script.presses(fingers, its, [PLACE] * len(its)) for its in forces]
+    source = script.source("navarro", seeds, profile, [*series[0], *series[1]])
+    verify_s = script.seconds(series[0])  # a rest before the first of these presses: the one before it all, REST_S
+
+    first = Procedure(fingers, CALIBRATION_FORCES_N)
+    show(f"{profile}: three presses a finger")
+    with _open(source, board) as hand:
+        driving.drive(hand, first, Truth(source))
+    fits = {f: fit(first.rests[f], presses) for f, presses in first.presses.items()}
+
+    second = Procedure(fingers, VERIFICATION_FORCES_N)
+    outcome, truth, apart = CrossCheck(), Truth(source), 0
+    show(f"{profile}: a verification press a finger")
+    with _open(source, board) as hand:
+        for its in fits.values():
+            driving.put(hand, its.finger, driving.with_gain(hand, its, int(time.time())))
+        settings, own = hand.settings(), hand.finger_settings()
+        for batch in hand.batches():
+            outcome.add(batch.wire, settings, own)
+            apart += _apart(batch, fits)
+            rows = rows_of(batch.wire, batch.t_us, truth.at(batch.wire["finger"], batch.t_us))
+            second.feed(rows[rows["t_us"] - truth.first_us >= verify_s * 1e6])
+    second.finish()
+    verification = [second.presses[f][0] for f in fingers]
+    return Hands(
+        profile=profile,
+        seeds=seeds,
+        fits=tuple(fits[f] for f in fingers),
+        presses=tuple(tuple(first.presses[f]) for f in fingers),
+        verified=tuple(verify(fits[f], press) for f, press in zip(fingers, verification, strict=True)),
+        verification=tuple(verification),
+        frames_checked=outcome.frames,
+        violations=outcome.violations,
+        one_mn_apart=apart,
+    )
+
+
+def places(seed: int) -> Places:
+    """K of one finger at each of PLACES, and what it is worth at the others, by the board's own code."""
+    forces = CALIBRATION_FORCES_N * len(PLACES)
+    at = [place for place in PLACES for _ in CALIBRATION_FORCES_N]
+    source = script.source("places", [seed], "new", script.presses([0], forces, at))
+    procedure = Procedure([0], forces)
+    with _open(source, "posix") as hand:
+        driving.drive(hand, procedure, Truth(source))
+    each = len(CALIBRATION_FORCES_N)
+    groups = [procedure.presses[0][k : k + each] for k in range(0, len(forces), each)]
+    fits = [fit(procedure.rests[0], group) for group in groups]
+    errors = np.array([[_error(its, group) for group in groups] for its in fits])
+    assert source.truth is not None
+    touched = source.truth.contact[:, 0]
+    x_mm = [_x_mm(source, touched, group[0]) for group in groups]
+    return Places(PLACES, tuple(x_mm), tuple(its.gain_n for its in fits), errors)
+
+
+def _rest_off(its: Fit, presses: Sequence[Press]) -> float:
+    return max(float(np.abs(press.rows["rest"] - its.rest.counts).max()) for press in presses)
+
+
+def _open(source: Source, board: str) -> Hand:
+    return shake_hands(SimLink(f"{board}:{source.name}", start_board(board, source, pace=0.0)))
+
+
+def _error(its: Fit, group: Sequence[Press]) -> float:
+    rows = np.concatenate([told_by(press, its.gain_nn).rows for press in group])
+    return formulas.relative_error(rows["told_n"], rows["force_n"])
+
+
+def _x_mm(source: Source, touched: Any, press: Press) -> float:
+    assert source.truth is not None
+    frame = round(float(press.rows["t_us"].mean()) * 1e-6 * 100)
+    return float(source.truth.poc_mm[min(frame, len(touched) - 1), 0, 0])
+
+
+def _apart(batch: Batch, fits: dict[int, Fit]) -> int:
+    frames, apart = batch.frames, 0
+    rest = batch.wire["pdc_tare_q4"] / 16.0
+    tared = batch.wire["pdc_tare_q4"] != wire.INVALID_COUNT
+    for finger, its in fits.items():
+        mine = (frames["finger"] == finger) & tared
+        truth = formulas.force(frames["pdc_filtered"][mine], rest[mine], its.gain_nn / 1e9)
+        apart += int((np.abs(frames["pressure_force_n"][mine] - truth) > 1e-3).sum())
+    return apart
+
+
+# ---- words and pictures ------------------------------------------------------------------------------------
+
+
+def facts(result: Result) -> Facts:
+    """JSON types only."""
+    hands = [
+        {
+            "profile": its.profile,
+            "fingers": [
+                {
+                    "name": name,
+                    "seed": seed,
+                    "gain_n": number(fit_.gain_n * 1e3),
+                    "rest_counts": number(fit_.rest.counts),
+                    "rest_off_counts": number(_rest_off(fit_, presses)),
+                    "fit_error": number(fit_.relative_error * 100),
+                    "board_error": number(verified.board_error * 100),
+                    "float_error": number(verified.float_error * 100),
+                    "apart_mn": number(verified.apart_n * 1e3),
+                }
+                for name, seed, fit_, presses, verified in zip(
+                    NAMES, its.seeds, its.fits, its.presses, its.verified, strict=True
+                )
+            ],
+            "frames_checked": its.frames_checked,
+            "violations": its.violations,
+        }
+        for its in result.hands
+    ]
+    checks = []
+    for its in result.hands:
+        worst = max(one.board_error for one in its.verified)
+        what = f"relative error of the verification press, worst of five fingers, {its.profile}, computed on board"
+        checks.append(check(what, worst * 100, 5.9, "%"))
+        right = its.violations == 0 and its.one_mn_apart == 0 and its.frames_checked > 0
+        checks.append(claim(f"board and float64 agree in all {its.frames_checked} frames, {its.profile}", right))
+    return {
+        "experiment": "navarro",
+        "source": f"emulated hands of five fingers, seeds {result.hands[0].seeds[0]} to {result.hands[-1].seeds[-1]}",
+        "hands": hands,
+        "paper": {
+            "gain_n": [gain * 1e3 for gain in PAPER_GAIN_N],
+            "rest_counts": list(PAPER_REST_COUNTS),
+            "error": PAPER_ERROR * 100,
+        },
+        "places": {
+            "names": list(result.places.names),
+            "x_mm": numbers(result.places.x_mm),
+            "gain_n": numbers([gain * 1e3 for gain in result.places.gains_n]),
+            "errors": [numbers(row * 100) for row in result.places.errors],
+        },
+        "checks": checks,
+        "notes": [
+            f"presses of {', '.join(f'{f:g}' for f in CALIBRATION_FORCES_N)} N, then "
+            f"{VERIFICATION_FORCES_N[0]:g} N, with a 7 mm flat at {PLACE}; the force is the scenario's, without error",
+            "the emulated sensor's pressure is the same linear law in every finger, with a factor that depends on the "
+            "place along the finger: real fingers differ more in K, and their pressure creeps",
+            "a worn emulated sensor differs in its electrodes alone: for pressure it is five fingers more",
+            "relative error: |told - F| / |F|, Euclidean norms over the held rows; the paper gives no formula",
+            "P0 is the tare in each frame; the one in the table is the mean at rest before the first press",
+            "tare off: the most that the tare of a held row differs from that mean; a tare that is taken right after a "
+            "release still holds some of it",
+        ],
+    }
+
+
+def page(facts: Facts) -> list[str]:
+    """The table of K and P0, the errors, and what another place does."""
+    lines = []
+    for its in facts["hands"]:
+        rows = [
+            [
+                one["name"],
+                f"{text(one['gain_n'])} ({text(gain, 0)})",
+                f"{text(one['rest_counts'], 1)} ({text(rest, 0)})",
+                text(one["rest_off_counts"], 1),
+                text(one["fit_error"], 2),
+                text(one["board_error"], 2),
+                text(one["float_error"], 2),
+                text(one["apart_mn"]),
+            ]
+            for one, gain, rest in zip(
+                its["fingers"], facts["paper"]["gain_n"], facts["paper"]["rest_counts"], strict=True
+            )
+        ]
+        head = ["finger", "K (paper) [mN/count]", "P0 (paper) [count]", "tare off [count]", "fit [%]",
+                "verified, board [%]", "verified, float64 [%]", "apart [mN]"]  # fmt: skip
+        lines += [f"## Five fingers, {its['profile']}", "", *table(head, rows)]
+    where = facts["places"]
+    rows = [
+        [f"{name} ({text(x, 1)} mm)", text(gain), *[text(one, 2) for one in errors]]
+        for name, x, gain, errors in zip(where["names"], where["x_mm"], where["gain_n"], where["errors"], strict=True)
+    ]
+    lines += [
+        f"The paper's verification press of the fore finger: {facts['paper']['error']:.2f} %.",
+        "",
+        "## The place of the press",
+        "",
+        "K from one place (row), and the relative error in % that it gives at another (column). A K holds where it was "
+        "found.",
+        "",
+        *table(["K of (x)", "K [mN/count]", *where["names"]], rows),
+    ]
+    return lines
+
+
+def draw(result: Result, path: Path) -> None:
+    """Figure 3 for every finger: pressure above rest against force, the held rows and the line of slope K."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(len(result.hands), len(NAMES), figsize=(15, 3.4 * len(result.hands)), squeeze=False)
+    for its, row in zip(result.hands, axes, strict=True):
+        for k, ax in enumerate(row):
+            held = np.concatenate([press.rows for press in its.presses[k]])
+            extra = its.verification[k].rows
+            for rows, color, label in ((held, "#1d4ed8", "calibration"), (extra, "#c2410c", "verification")):
+                ax.plot(rows["pressure"] - rows["rest"], rows["force_n"], ".", color=color, markersize=3, label=label)
+            top = float((held["pressure"] - held["rest"]).max())
+            ax.plot([0, top], [0, top * its.fits[k].gain_n], color="#111111", linewidth=1, label="slope K")
+            error = its.verified[k].board_error
+            ax.set_title(f"{NAMES[k]}, {its.profile}: {its.fits[k].gain_n * 1e3:.2f} mN/count, {error:.2%}", fontsize=9)
+            ax.set(xlabel="P - P0 [count]", ylabel="F [N]")
+            ax.grid(alpha=0.25)
+    axes[0][0].legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)

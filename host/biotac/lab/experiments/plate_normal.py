@@ -1,0 +1,228 @@
+"""The normal at the point of contact against that of a flat plate: no fitting, the board's default weights.
+
+A flat plate that touches a convex finger does so where the finger's outward normal is the plate's. On a
+recording the plate's normal was measured (motion capture, trial_15330 of Robotic-Finger); protocol of
+reference/biotac.md, section 5: every frame in contact counts. In contact is where the board says so and PDC
+is more than CONTACT_COUNTS above the rest the board has for it, which on that sensor is more than 2000
+count^2 of signal; figures for other thresholds stand beside it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core import geometry as surface
+from ...core.geometry import Floats
+from ...errors import RecordingError
+from ...sim.physics import Profile
+from ...sim.timeline import Pose
+from ...wire import messages_gen as wire
+from . import recorded
+from .outcome import Facts, Options, check, number, table, text
+from .poke import SHIPPED, WEIGHTS, WORDS
+from .trial import Bools, Script, Trial, play
+from .weight import FLAT_MM
+
+RECORDING = "E, PDC and z_dir, a plate's unit normal"
+MAPS = False
+
+CONTACT_COUNTS = 40.0
+THRESHOLDS_COUNTS = (0.0, 20.0, 40.0, 80.0, 200.0)
+LIMIT_MEDIAN_DEG, LIMIT_P90_DEG = 8.9, 14.7
+# reference/biotac.md, section 5: the same trial in float64, median and 90th percentile
+KNOWN_DEG = {
+    wire.PocWeights.ABS_N2: (21.1, 56.6),
+    wire.PocWeights.COMPRESS_N1: (8.7, 14.7),
+    wire.PocWeights.COMPRESS_N2: (11.0, 19.4),
+}
+EMULATED_CONTACTS = 40
+
+
+@dataclass(frozen=True)
+class Angles:
+    """Degrees between the point's normal and the plate's in every frame of one kind of weights, NaN without a point."""
+
+    profile: str
+    weights: wire.PocWeights
+    angle_deg: Floats
+    touched: Bools
+    pressure: Floats
+
+    def over(self, threshold_counts: float) -> Floats:
+        """Of the frames in contact with more pressure than that; a frame without a point counts as 180 deg."""
+        rows = self.touched & (self.pressure > threshold_counts)
+        # leaving them out would reward weights that give up
+        return np.nan_to_num(self.angle_deg[rows], nan=180.0)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A case a sensor and kind of weights."""
+
+    source: str
+    cases: list[Angles]
+    notes: list[str]
+    is_recorded: bool
+
+
+def angles_deg(points_mm: Floats, normals: Floats) -> Floats:
+    """Between the core's outward normals at points (n, 3) and unit normals (n, 3); NaN without a point."""
+    known = np.asarray(np.isfinite(points_mm).all(axis=1))
+    mine = surface.normals_at(np.where(known[:, None], points_mm, [0.0, 0.0, -1.0]))
+    sine, cosine = np.linalg.norm(np.cross(mine, normals), axis=1), (mine * normals).sum(axis=1)
+    # atan2 keeps small angles that acos rounds to nothing
+    return np.where(known, np.degrees(np.arctan2(sine, cosine)), np.nan)
+
+
+def emulated(seed: int, profile: Profile) -> Trial:
+    """A flat plate pressed from EMULATED_CONTACTS directions, 1 to 6 N, released in between."""
+    rng = np.random.default_rng([seed, 15330])
+    script = Script()
+    for k in range(EMULATED_CONTACTS):
+        x_mm, roll_rad, force_n = rng.uniform(-12.0, 3.5), rng.uniform(-1.0, 1.0), rng.uniform(1.0, 6.0)
+        ring_mm = np.sqrt(surface.RADIUS_MM**2 - max(x_mm, 0.0) ** 2)
+        rest = Pose(x_mm, float(ring_mm * np.sin(roll_rad)), tip_mm=FLAT_MM)
+        script.phase("rest", 0.1, 1.4, rest, rest)
+        script.phase(f"press {k + 1}", 0.5, 1.0, Pose(rest.x_mm, rest.y_mm, force_n, tip_mm=FLAT_MM))
+        script.phase("release", 0.3, 0.2, rest)
+    return play("plate-normal", script, seed=seed, profile=profile)
+
+
+def run(options: Options) -> Result:
+    """On an emulated finger, new and worn; or on a recording."""
+    if options.recording is not None:
+        theirs = recorded.load(options.recording, options.finger, needs=("PDC", "z_dir"))
+        assert theirs.plate_normal is not None
+        cases = [_case("recorded", weights, theirs.trial, theirs.plate_normal) for weights in WEIGHTS]
+        for case in cases:
+            if not len(case.over(CONTACT_COUNTS)):
+                raise RecordingError(
+                    f"{options.recording}: PDC is never {CONTACT_COUNTS:g} counts above rest in contact: expected "
+                    f"presses; is it counts?"
+                )
+        return Result(str(options.recording), cases, list(theirs.notes), True)
+    cases = []
+    profiles: tuple[Profile, ...] = ("new", "worn")
+    for profile in profiles:
+        options.show(f"a plate on the {profile} sensor")
+        trial = emulated(options.seed, profile)
+        assert trial.at_mm is not None
+        contact = np.where(np.isfinite(trial.at_mm), trial.at_mm, [0.0, 0.0, -surface.RADIUS_MM])
+        cases += [_case(profile, weights, trial, surface.normals_at(contact)) for weights in WEIGHTS]
+    notes = [
+        f"emulated sensor, seed {options.seed}: {EMULATED_CONTACTS} presses of a {FLAT_MM:g} mm flat, 1 to 6 N, x -12 "
+        "to 3.5 mm, up to 57 deg of roll, no shear; a real plate also rubs: these angles are kinder than a laboratory's"
+    ]
+    return Result(f"emulated finger, seed {options.seed}", cases, notes, False)
+
+
+def _case(profile: str, weights: wire.PocWeights, trial: Trial, normals: Floats) -> Angles:
+    points = trial.again({wire.Setting.POC_WEIGHTS: int(weights)}).frames["poc_mm"]
+    return Angles(profile, weights, angles_deg(points, normals), trial.touched, trial.pressure)
+
+
+def facts(result: Result) -> Facts:
+    """All figures; angles in degrees."""
+    shipped = next(case for case in result.cases if case.weights == SHIPPED)
+    angles = shipped.over(CONTACT_COUNTS)
+    limits = ((f"{name}, default weights", q, limit) for name, q, limit in
+              (("median", 50, LIMIT_MEDIAN_DEG), ("90th percentile", 90, LIMIT_P90_DEG)))  # fmt: skip
+    return {
+        "experiment": "plate-normal",
+        "source": result.source,
+        "contact_counts": CONTACT_COUNTS,
+        "shipped": SHIPPED.name,
+        "cases": [_case_facts(case) for case in result.cases],
+        "known_deg": {weights.name: list(both) for weights, both in KNOWN_DEG.items()} if result.is_recorded else {},
+        "checks": [
+            check(f"{what}, {shipped.profile}", float(np.percentile(angles, q)), limit, "deg")
+            for what, q, limit in limits
+        ],
+        "notes": result.notes,
+    }
+
+
+def _case_facts(case: Angles) -> Facts:
+    return {
+        "profile": case.profile,
+        "weights": case.weights.name,
+        "words": WORDS[case.weights],
+        "by_threshold": [_summary(case.over(counts), counts) for counts in THRESHOLDS_COUNTS],
+    }
+
+
+def _summary(angles: Floats, counts: float) -> Facts:
+    median, p90 = np.percentile(angles, (50, 90)) if len(angles) else (np.nan, np.nan)
+    mean = angles.mean() if len(angles) else np.nan
+    return {"counts": counts, "frames": len(angles), "median_deg": number(median), "mean_deg": number(mean),
+            "p90_deg": number(p90)}  # fmt: skip
+
+
+def page(facts: Facts) -> list[str]:
+    """The angles at the threshold that counts, then at the others."""
+    rows, others = [], []
+    for case in facts["cases"]:
+        words = case["words"] + (" (default)" if case["weights"] == facts["shipped"] else "")
+        for its in case["by_threshold"]:
+            if its["counts"] == facts["contact_counts"]:
+                rows.append([case["profile"], words, str(its["frames"]),
+                             *[text(its[name], 2) for name in ("median_deg", "mean_deg", "p90_deg")]])  # fmt: skip
+        both = [f"{text(its['median_deg'], 1)} / {text(its['p90_deg'], 1)}" for its in case["by_threshold"]]
+        others.append([case["profile"], words, *both])
+    for name, (median, p90) in facts["known_deg"].items():
+        words = WORDS[wire.PocWeights[name]]
+        rows.append(["trial_15330 in float64, own tare", words, "-", text(median, 1), "-", text(p90, 1)])
+    return [
+        "Angle between the normal at the board's point of contact and the plate's, degrees, over every frame in "
+        f"contact with PDC more than {facts['contact_counts']:g} counts above rest. Frames without a point count as "
+        "180.",
+        "",
+        *table(["sensor", "weights", "frames", "median", "mean", "90th percentile"], rows),
+        "Median / 90th percentile for other thresholds:",
+        "",
+        *table(["sensor", "weights", *[f"> {counts:g} counts" for counts in THRESHOLDS_COUNTS]], others),
+    ]
+
+
+def draw(result: Result, path: Path) -> None:
+    """Shares of frames below an angle, and angles against pressure for the default weights."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(13, 5.4), layout="constrained")
+    figure.suptitle(f"Normal at the point of contact against a flat plate's: {result.source}")
+    colors = {SHIPPED: "#1d4ed8", wire.PocWeights.ABS_N2: "#c2410c", wire.PocWeights.COMPRESS_N2: "#15803d"}
+    styles = dict(zip(dict.fromkeys(case.profile for case in result.cases), ("-", "--"), strict=False))
+    for case in result.cases:
+        angles = np.sort(case.over(CONTACT_COUNTS))
+        label = f"{case.profile}: {WORDS[case.weights]}: {np.median(angles):.1f} / {np.percentile(angles, 90):.1f} deg"
+        axes[0].plot(angles, (np.arange(len(angles)) + 0.5) / len(angles), styles[case.profile],
+                     color=colors[case.weights], label=label)  # fmt: skip
+    for share, limit in ((0.5, LIMIT_MEDIAN_DEG), (0.9, LIMIT_P90_DEG)):
+        axes[0].plot(limit, share, "k>", markersize=8, label=f"asked: {share:.0%} within {limit} deg")
+    axes[0].set(xlabel="angle [deg]", ylabel="share of frames within it", xlim=(0, 60), ylim=(0, 1))
+    axes[0].set_title(f"frames with PDC > rest + {CONTACT_COUNTS:g} counts; median / 90th percentile", fontsize=10)
+    axes[0].legend(fontsize=8, loc="lower right")
+    for case in result.cases:
+        if case.weights in (SHIPPED, wire.PocWeights.ABS_N2) and case.profile == result.cases[0].profile:
+            _draw_pressure(axes[1], case, colors[case.weights])
+    axes[1].axvline(CONTACT_COUNTS, color="#111111", linewidth=1, linestyle=":")
+    axes[1].set(xlabel="PDC above rest [counts]", ylabel="angle [deg]", xscale="log", xlim=(5, None), ylim=(0, 90))
+    axes[1].set_title(f"{result.cases[0].profile}, frames in contact", fontsize=10)
+    axes[1].legend(fontsize=8, markerscale=4)
+    for axis in axes:
+        axis.grid(alpha=0.25)
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def _draw_pressure(axes: Any, case: Angles, color: str) -> None:
+    rows = case.touched & (case.pressure > 0.0)
+    axes.plot(case.pressure[rows], case.angle_deg[rows], ".", color=color, markersize=2, alpha=0.35,
+              label=WORDS[case.weights])  # fmt: skip

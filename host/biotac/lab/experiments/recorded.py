@@ -1,0 +1,140 @@
+"""A laboratory's own trial, through the board's code as an emulated one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...calibrate.wrench import contact
+from ...core.geometry import Floats
+from ...errors import RecordingError
+from ...recording import Recording
+from ...sim.replay import counts_field, read_npz, to_lin_frame
+from ...wire import messages_gen as wire
+from ...wire import sensor_gen as _sensor
+from .trial import Trial, Words, on_board
+
+FIELDS = ("E", "PDC", "F", "M", "E_base", "t", "z_dir")
+ROW_S = 0.01
+TOUCHED_N = 0.1  # a plate's reading below this is taken for "nothing touches"
+_ELECTRODES = len(_sensor.ELECTRODE_NAMES)
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A trial, and ``plate_normal`` (n, 3), the plate's unit normal in Lin's frame, where it was recorded."""
+
+    trial: Trial
+    plate_normal: Floats | None
+    notes: tuple[str, ...]
+
+
+def load(path: Path, finger: int = 0, needs: tuple[str, ...] = (), *, own_force: bool = False) -> Recorded:
+    """An .npz of one finger, or a recording of `biotac record`, of which ``finger`` is taken.
+
+    The latter has no truth; ``own_force`` takes the force that its board published, by its own scales, for F.
+
+    Fields of an .npz: ``E`` (n, 19) counts; optionally ``PDC`` (n,) counts, ``F`` (n, 3) N and ``M`` (n, 3)
+    N mm about Lin's origin in the recorded axes (X lateral, Y to the tip, Z out of the pad), ``t`` (n,) s,
+    ``E_base`` (m, 19), whose median is given to the board as its tare, and ``z_dir`` (n, 3), a plate's unit
+    normal in the axes of data/README.md. ``needs`` names the fields an experiment cannot do without. Raises
+    RecordingError naming the field.
+    """
+    if path.suffix.lower() != ".npz":
+        return _of_recording(path, finger, needs, own_force)
+    fields = read_npz(path, FIELDS)
+    _require(path, ("E", *needs), tuple(fields))
+    counts = counts_field(path, "E", fields["E"], None, _ELECTRODES)
+    n = len(counts)
+    pdc = np.full(n, wire.INVALID_COUNT, np.uint16)
+    if "PDC" in fields:
+        pdc = counts_field(path, "PDC", fields["PDC"], n, None)
+    notes = ["tare: the board's own"]
+    base = None
+    if "E_base" in fields:
+        base = np.median(counts_field(path, "E_base", fields["E_base"], None, _ELECTRODES), axis=0)
+        notes = [f"tare: median of {len(fields['E_base'])} rows of E_base, given to the board at the start"]
+    time_s = np.arange(n, dtype=np.float64) * ROW_S
+    if "t" in fields:
+        time_s = _numbers(path, "t", fields["t"], (n,), "s")
+        back = np.flatnonzero(np.diff(time_s) < 0.0)
+        if len(back):
+            raise RecordingError(
+                f"{path}: field t goes back in row {back[0] + 1}: expected times in order; sort the rows"
+            )
+    force, torque = (
+        to_lin_frame(_numbers(path, name, fields[name], (n, 3), unit)) if name in fields else None
+        for name, unit in (("F", "N"), ("M", "N mm"))
+    )
+    normal = _plate_normal(path, fields["z_dir"], n) if "z_dir" in fields else None
+    return Recorded(_trial(path, time_s, counts, pdc, force, torque, base), normal, tuple(notes))
+
+
+def _of_recording(path: Path, finger: int, needs: tuple[str, ...], own_force: bool) -> Recorded:
+    recording = Recording(path)
+    _require(path, needs, ("E", "PDC", "F") if own_force else ("E", "PDC"))
+    mine = recording.frames[recording.frames["finger"] == finger]
+    if not len(mine):
+        there = ", ".join(str(k) for k in np.unique(recording.frames["finger"])) or "none"
+        raise RecordingError(f"{path}: finger {finger} sent no frames: expected {there}; name another with --finger")
+    notes = ["tare: the board's own, from the recorded counts", *recording.problems]
+    if own_force:
+        notes.append("force: what the board published, by its own scales; no plate was there")
+    force = np.nan_to_num(mine["force_n"]) if own_force else None
+    time_s = (mine["t_us"] - mine["t_us"][0]) / 1e6
+    trial = _trial(path, time_s, mine["counts"].copy(), mine["pdc"].copy(), force, None, None)
+    return Recorded(trial, None, tuple(notes))
+
+
+def _trial(
+    path: Path, time_s: Floats, counts: Words, pdc: Words, force: Floats | None, torque: Floats | None,
+    base: Floats | None,
+) -> Trial:  # fmt: skip
+    rows, tare, pdc_rest = on_board(counts, pdc, given=base)
+    torsion = at_mm = None
+    if force is not None and torque is not None:
+        plate = contact.locate(force, torque)
+        # below that a plate's point of contact is noise over noise
+        known = (np.linalg.norm(force, axis=1) > TOUCHED_N) & plate.on_skin
+        torsion = np.where(known, plate.torsion_nmm, np.nan)
+        at_mm = np.where(known[:, None], plate.point_mm, np.nan)
+    return Trial(path.name, time_s, (), counts, pdc, rows, tare, pdc_rest, force, torque, torsion, at_mm, given=base)
+
+
+def _require(path: Path, needs: tuple[str, ...], seen: tuple[str, ...]) -> None:
+    missing = [name for name in needs if name not in seen]
+    if missing:
+        raise RecordingError(
+            f"{path}: holds {', '.join(seen) or 'none of the known fields'}: expected {', '.join(needs)} in an .npz; "
+            f"save {' and '.join(missing)} too"
+        )
+
+
+def _numbers(path: Path, name: str, array: npt.NDArray[Any], shape: tuple[int, ...], unit: str) -> Floats:
+    if array.shape != shape or array.dtype.kind not in "iuf":
+        raise RecordingError(f"{path}: field {name} is {array.dtype} {array.shape}: expected {shape} in {unit}")
+    values = array.astype(np.float64)
+    bad = ~np.isfinite(values)
+    if bad.any():
+        raise RecordingError(
+            f"{path}: field {name} is not finite in row {int(np.argwhere(bad)[0][0])}: expected {unit} in every row; "
+            f"cut the recording there"
+        )
+    return values
+
+
+def _plate_normal(path: Path, array: npt.NDArray[Any], rows: int) -> Floats:
+    z = _numbers(path, "z_dir", array, (rows, 3), "unit vectors")
+    length = np.linalg.norm(z, axis=1)
+    if np.abs(length - 1.0).max() > 0.01:
+        row = int(np.argmax(np.abs(length - 1.0)))
+        raise RecordingError(
+            f"{path}: field z_dir has length {length[row]:.3g} in row {row}: expected unit vectors; "
+            f"divide by the length"
+        )
+    result: Floats = np.column_stack([-z[:, 0], z[:, 1], -z[:, 2]]) / length[:, None]
+    return result

@@ -1,0 +1,69 @@
+"""Finding boards by their USB ids, and choosing one by its serial number. Nothing is opened here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from serial.tools import list_ports
+
+from ..errors import PortError
+from ..wire import messages_gen as wire
+
+SERIAL_PREFIX = "serial:"
+
+
+@dataclass(frozen=True)
+class SerialPort:
+    """What the operating system says of one serial port."""
+
+    device: str
+    description: str
+    serial_number: str | None  # of the USB device
+    vendor: int | None
+    product: int | None
+
+    @property
+    def is_board(self) -> bool:
+        """It has the USB ids of our firmware."""
+        return (self.vendor, self.product) == (wire.USB_VENDOR, wire.USB_PRODUCT)
+
+
+def serial_ports(entries: Iterable[Any] | None = None) -> list[SerialPort]:
+    """All serial ports, COM3 before COM10; ``entries`` are pyserial's, by default this computer's.
+
+    On macOS a port has two names; /dev/cu.* is kept, because opening /dev/tty.* waits for a modem's carrier.
+    """
+    listed = sorted(list_ports.comports() if entries is None else entries)
+    ports = [SerialPort(e.device, str(e.description), e.serial_number, e.vid, e.pid) for e in listed]
+    calling = {port.device for port in ports if port.device.startswith("/dev/cu.")}
+    return [port for port in ports if port.device.replace("/dev/tty.", "/dev/cu.", 1) not in calling - {port.device}]
+
+
+def boards(entries: Iterable[Any] | None = None) -> list[SerialPort]:
+    """The ports with our USB ids."""
+    return [port for port in serial_ports(entries) if port.is_board]
+
+
+def choose(serial_number: str | None = None, entries: Iterable[Any] | None = None) -> str:
+    """Device path of the board with this serial number; of the only board without one.
+
+    Raises PortError naming the boards that are there when none or several fit.
+    """
+    found = boards(entries)
+    fitting = [p for p in found if serial_number is None or same_serial(p.serial_number, serial_number)]
+    if len(fitting) == 1:
+        return fitting[0].device
+    there = ", ".join(f"{SERIAL_PREFIX}{p.serial_number} on {p.device}" for p in found)
+    if not found:
+        wanted = "no board" if serial_number is None else f"no board with serial number {serial_number}"
+        raise PortError(f"{wanted} on any USB port; plug one in and run `biotac doctor`, or try `biotac demo`")
+    if not fitting:
+        raise PortError(f"no board has serial number {serial_number}; there is {there}")
+    raise PortError(f"{len(fitting)} boards: {there}; name the one you mean as PORT")
+
+
+def same_serial(seen: str | None, wanted: str) -> bool:
+    """Serial numbers are told in either case by some systems."""
+    return seen is not None and seen.upper() == wanted.upper()

@@ -1,0 +1,270 @@
+"""Sensors on this computer's own SPI bus: the board is a thread of this process.
+
+The firmware's own sampler, session and framing run here (host/binding/sbc.c); Python gives them the bus through
+``spidev``, the time and the link. What differs from a microcontroller:
+
+- spidev talks to one sensor at a time, so the fingers of a slot sample one transfer after the other, not at once.
+  A slot's time is that of the first.
+- Linux and the interpreter keep no deadline. A slot that comes too late is left out and counted, as on a board
+  (``Status.slots_late``), and its channel is missing from its frame. Electrodes and PAC alternate: a bus that is a
+  little too slow for every slot loses one of the two kinds throughout.
+"""
+
+from __future__ import annotations
+
+import secrets
+import threading
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, Protocol
+
+from ..core.compiled import ffi, lib
+from ..errors import DeviceLostError, PortError
+from ..wire import sensor_gen as sensor
+
+if TYPE_CHECKING:
+    from ..sim.source import Source
+
+# As much as a board and the operating system would hold for a host that is slow; more is dropped in whole frames.
+OUTBOX_BYTES = 262_144
+# Linux wakes a sleeper some 60 us late, even from sleep(0): the last of a wait is spent awake. Other threads get
+# the interpreter whenever the board's C code runs, several times a slot.
+AWAKE_NS = 100_000
+
+
+class Clock(Protocol):
+    """Device time."""
+
+    def now_ns(self) -> int:
+        """Time since anything."""
+
+    def delay_ns(self, ns: int) -> None:
+        """Return not before ns have passed."""
+
+    def wait_until(self, t_ns: int) -> bool:
+        """Wait for t_ns; false when it has not come but the host may want something."""
+
+
+class MonotonicClock:
+    """The computer's."""
+
+    def now_ns(self) -> int:
+        """See Clock.now_ns."""
+        return time.monotonic_ns()
+
+    def delay_ns(self, ns: int) -> None:
+        """See Clock.delay_ns."""
+        self.wait_until(time.monotonic_ns() + ns)
+
+    def wait_until(self, t_ns: int) -> bool:
+        """See Clock.wait_until; never false, for the next slot is never far."""
+        while (left_ns := t_ns - time.monotonic_ns()) > 0:
+            if left_ns > AWAKE_NS:
+                time.sleep((left_ns - AWAKE_NS) / 1e9)
+        return True
+
+
+def parse_spidev(port: str) -> list[tuple[int, int]]:
+    """Bus and device of each finger of ``spidev:0.0,0.1``; PortError for anything else."""
+    texts = port.removeprefix("spidev:").split(",")
+    devices: list[tuple[int, int]] = []
+    for text in texts:
+        bus, dot, device = text.partition(".")
+        if not (dot and bus.isdecimal() and device.isdecimal() and text.isascii()):
+            raise PortError(f"{port}: {text!r} is no SPI device; expected BUS.DEVICE for each finger: spidev:0.0,0.1")
+        devices.append((int(bus), int(device)))
+    if len(devices) > sensor.MAX_SENSORS:
+        raise PortError(f"{port}: {len(devices)} devices; expected at most {sensor.MAX_SENSORS}, leave some out")
+    for bus_device in devices:
+        if devices.count(bus_device) > 1:
+            name = "{}.{}".format(*bus_device)
+            raise PortError(f"{port}: {name} stands there twice; each finger needs a chip select of its own")
+    return devices
+
+
+def open_devices(port: str) -> list[Any]:
+    """A ``spidev.SpiDev`` for each finger of the port; PortError says what is in the way."""
+    places = parse_spidev(port)
+    try:
+        import spidev
+    except ImportError as error:
+        raise PortError(f"{port} needs spidev ({error}); pip install 'biotac-gateway[spi]', on Linux") from error
+    opened: list[Any] = []
+    try:
+        for bus, device in places:
+            spi = spidev.SpiDev()
+            try:
+                spi.open(bus, device)
+                opened.append(spi)
+                spi.mode = 0
+                spi.max_speed_hz = sensor.SPI_HZ
+                spi.bits_per_word = 8  # two to a word: the Raspberry Pi's bus knows no 16
+            except OSError as error:
+                raise PortError(describe_open_error(f"/dev/spidev{bus}.{device}", error)) from error
+    except BaseException:
+        for spi in opened:
+            spi.close()
+        raise
+    return opened
+
+
+def describe_open_error(path: str, error: OSError) -> str:
+    """One line: what was seen and the cure."""
+    if isinstance(error, FileNotFoundError):
+        return f"no SPI device {path}; switch SPI on (raspi-config, Interface Options) and see ls /dev/spidev*"
+    if isinstance(error, PermissionError):
+        return f"no permission to open {path}; sudo usermod -aG spi $USER, and log in again"
+    return (
+        f"{path} cannot be used ({error}); check that it is an SPI device of mode 0 and up to {sensor.SPI_HZ / 1e6} MHz"
+    )
+
+
+class SpidevLink:
+    """A Link to the gateway that runs in this process."""
+
+    def __init__(self, port: str, *, clock: Clock | None = None) -> None:
+        self.port = port
+        self.source: Source | None = None
+        self.ended = False
+        self.fd: int | None = None
+        self.pace = 1.0
+        self._devices = open_devices(port)
+        self._clock: Clock = clock or MonotonicClock()
+        self._start_ns = self._clock.now_ns()
+        self._inbox = bytearray()
+        self._outbox = bytearray()
+        self._changed = threading.Condition()
+        self._closing = False
+        self._failure: BaseException | None = None
+        self._handle = ffi.new_handle(self)
+        board = lib.bt_sbc_new(self._handle, len(self._devices), secrets.randbits(32))
+        if board == ffi.NULL:
+            raise MemoryError("no memory for a board")
+        self._board = ffi.gc(board, lib.bt_sbc_free)
+        self._thread = threading.Thread(target=self._run, name=port, daemon=True)
+        self._thread.start()
+
+    # ---- the host's thread -----------------------------------------------------------------------
+
+    def read(self, timeout_s: float) -> bytes:
+        """See Link.read."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._outbox or self._failure or self._closing, timeout_s)
+            data = bytes(self._outbox)
+            self._outbox.clear()
+        if not data:
+            self._check()
+        return data
+
+    def write(self, data: bytes) -> None:
+        """See Link.write."""
+        self._check()
+        with self._changed:
+            self._inbox += data
+
+    def release(self) -> None:
+        """A real bus's time always runs."""
+
+    def places(self) -> list[str]:
+        """None: the bus is this computer's own, and nobody unplugs it."""
+        return []
+
+    def reopen(self, place: str) -> None:
+        """Never asked for: there are no places."""
+        raise PortError(f"{self.port} cannot be opened again; make a new one")
+
+    def close(self) -> None:
+        """See Link.close."""
+        self._closing = True
+        self._thread.join()
+        for spi in self._devices:
+            with suppress(OSError):  # one that is gone is closed
+                spi.close()
+        self._devices = []
+
+    def _check(self) -> None:
+        if self._failure is not None:
+            raise DeviceLostError(
+                f"{self.port} failed while it was open ({self._failure}); check the SPI bus and open it again"
+            ) from self._failure
+
+    # ---- the board's thread ----------------------------------------------------------------------
+
+    def _run(self) -> None:
+        """firmware/app/main.c, with an end."""
+        lib.bt_sbc_start(self._board)
+        while not self._closing and self._failure is None:
+            lib.bt_sbc_poll(self._board)
+            if self._clock.wait_until(self._due_ns()):
+                lib.bt_sbc_alarm(self._board)
+
+    def _due_ns(self) -> int:
+        """The board's 32-bit us, unwrapped around now."""
+        now_us = self._us()
+        ahead_us: int = (lib.bt_sbc_due_us(self._board) - now_us + 2**31) % 2**32 - 2**31
+        return self._start_ns + (now_us + ahead_us) * 1000
+
+    def _us(self) -> int:
+        return (self._clock.now_ns() - self._start_ns) // 1000
+
+    def _fail(self, error: BaseException) -> None:
+        with self._changed:
+            self._failure = self._failure or error
+            self._changed.notify_all()
+
+    def _exchange(self, finger: int, data: Any) -> None:
+        # After a failure the rest of the slot has no bus: zeros, and the loop ends behind it.
+        data[:] = bytes(len(data)) if self._failure else bytes(self._devices[finger].xfer2(list(bytes(data))))
+
+    def _send(self, data: bytes) -> bool:
+        with self._changed:
+            if len(self._outbox) + len(data) > OUTBOX_BYTES:
+                return False
+            self._outbox += data
+            self._changed.notify_all()
+        return True
+
+    def _receive(self, most: int) -> bytes:
+        if not self._inbox:
+            return b""
+        with self._changed:
+            data = bytes(self._inbox[:most])
+            del self._inbox[:most]
+        return data
+
+
+def _of(handle: Any) -> SpidevLink:
+    link: SpidevLink = ffi.from_handle(handle)
+    return link
+
+
+def _failed(kind: Any, error: Any, trace: Any) -> None:
+    """What a callback below raises must not be lost in C: it ends the board, and the host is told."""
+    _of(trace.tb_frame.f_locals["handle"])._fail(error)
+
+
+@ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
+def bt_sbc_now_us(handle: Any) -> int:
+    return _of(handle)._us() % 2**32
+
+
+@ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
+def bt_sbc_delay_us(handle: Any, us: int) -> None:
+    _of(handle)._clock.delay_ns(us * 1000)
+
+
+@ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
+def bt_sbc_exchange(handle: Any, finger: int, data: Any, n: int) -> None:
+    _of(handle)._exchange(finger, ffi.buffer(data, n))
+
+
+@ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
+def bt_sbc_link_write(handle: Any, data: Any, n: int) -> bool:
+    return _of(handle)._send(bytes(ffi.buffer(data, n)))
+
+
+@ffi.def_extern(onerror=_failed)  # type: ignore[untyped-decorator]
+def bt_sbc_link_read(handle: Any, data: Any, most: int) -> int:
+    received = _of(handle)._receive(most)
+    ffi.buffer(data, most)[: len(received)] = received
+    return len(received)

@@ -1,0 +1,49 @@
+"""Files that are whole or not there."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from .errors import InputError
+
+ROS2_METADATA = "metadata.yaml"
+
+
+@contextlib.contextmanager
+def whole(path: Path, *, overwrite: bool) -> Iterator[Path]:
+    """Give a place beside ``path`` to write to, file or folder; it becomes ``path`` when all went well.
+
+    Otherwise it is removed, and what was at ``path`` before is untouched. A KeyboardInterrupt goes on with
+    words that say so. Raises InputError when ``path`` exists and may not be overwritten.
+    """
+    if path.exists() and not overwrite:
+        raise InputError(f"{path} exists and would be overwritten; choose another name or say --force")
+    if path.is_dir() and not (path / ROS2_METADATA).is_file():
+        raise InputError(f"{path} is a folder, and no ROS 2 bag that could be written anew; choose another name")
+    try:
+        # In a folder of its own it has its right name already: a bag's files are called after it.
+        folder = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent))
+        try:
+            place = folder / path.name
+            yield place
+            _replace(place, path)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"{path} was not written, what there was of it is removed") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place") from error
+
+
+def _replace(place: Path, path: Path) -> None:
+    """os.replace, also where a folder is to go or to come."""
+    if path.is_dir():
+        shutil.rmtree(path)
+    elif place.is_dir():
+        path.unlink(missing_ok=True)
+    os.replace(place, path)

@@ -1,0 +1,156 @@
+"""SynTouch's .btd text: header lines, ``Begin File``, then one line a slot.
+
+A line is ``t batch frame channel`` and a pair ``value parity`` for each sensor of the adapter, parity
+0 good and 1 bad; an absent sensor reads bad parity throughout (BioTac QuickStart Guide; biotac.md
+1.6). The logger leaves gaps between batches.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import RecordingError
+from ..sim import tape
+from ..wire import sensor_gen as _sensor
+
+_FIRST_PAIR = 4
+_BEGIN = b"Begin File"
+_MAX_BYTES = 1 << 30  # a day of three sensors is larger; a compressed bomb is stopped here
+
+
+@dataclass(frozen=True)
+class BtdFrames:
+    """Complete frames of the sensors that were there.
+
+    ``samples`` uint16 (frames, sensors, 44) in our SLOTS order, with tape codes for bad parity; ``t_s``
+    (frames,) the file's time of each; ``skipped`` counts incomplete frames.
+    """
+
+    samples: npt.NDArray[np.uint16]
+    t_s: npt.NDArray[np.float64]
+    skipped: int
+
+
+def read_btd(path: Path) -> BtdFrames:
+    """Read a .btd or .btd.gz file. Raises RecordingError naming the line for anything malformed."""
+    data = _bytes(path)
+    header, begin, body = data.partition(_BEGIN)
+    if not begin:
+        raise RecordingError(f"{path}: no line 'Begin File': expected a SynTouch .btd text file")
+    first_line = header.count(b"\n") + 2
+    table = _numbers(path, body, first_line)
+    channel = table[:, 3]
+    values, parity = table[:, _FIRST_PAIR::2], table[:, _FIRST_PAIR + 1 :: 2]
+
+    present = (parity == 0).any(axis=0)
+    if not present.any():
+        raise RecordingError(f"{path}: no sensor has a word of good parity: expected at least one sensor")
+    if int(present.sum()) > _sensor.MAX_SENSORS:
+        raise RecordingError(f"{path}: {present.sum()} sensors: expected at most {_sensor.MAX_SENSORS}")
+    values, good = values[:, present], parity[:, present] == 0
+    wrong = good & ((values < 0) | (values > _sensor.FULL_SCALE_COUNT) | (values != np.floor(values)))
+    if wrong.any():
+        row, sensor = (int(k) for k in np.argwhere(wrong)[0])
+        raise RecordingError(
+            f"{path}: line {first_line + row} holds {values[row, sensor]:g} with good parity: "
+            f"expected a whole count 0..{_sensor.FULL_SCALE_COUNT}"
+        )
+    words = np.where(good, values, tape.BAD_PARITY).astype(np.uint16)
+
+    starts, skipped = _complete_frames(table[:, 1], table[:, 2], channel)
+    if len(starts) == 0:
+        raise RecordingError(
+            f"{path}: none of {skipped} frames is complete: expected {len(_sensor.SLOTS)} lines a frame with "
+            "E1..E19, PDC, TAC and TDC once and PAC 22 times (a BioTac SP's 54-slot frames are not played)"
+        )
+    rows = starts[:, None] + np.arange(len(_sensor.SLOTS))
+    # sorting by channel, stably, lines up the k-th sample of a channel here with the k-th there
+    here = np.argsort(channel[rows], axis=1, kind="stable")
+    there = np.argsort(_slot_channels(), kind="stable")
+    samples = np.empty((len(starts), words.shape[1], len(_sensor.SLOTS)), dtype=np.uint16)
+    samples[:, :, there] = words[np.take_along_axis(rows, here, axis=1)].transpose(0, 2, 1)
+    return BtdFrames(samples=samples, t_s=table[starts, 0], skipped=skipped)
+
+
+def _slot_channels() -> npt.NDArray[np.float64]:
+    """Channel numbers (44,) of our slots; a command is 1SSSSSSP, S the channel."""
+    return np.array([(_sensor.CHANNEL_COMMAND[name] & 0x7E) >> 1 for name in _sensor.SLOTS], dtype=np.float64)
+
+
+def _complete_frames(
+    batch: npt.NDArray[np.float64], frame: npt.NDArray[np.float64], channel: npt.NDArray[np.float64]
+) -> tuple[npt.NDArray[np.int64], int]:
+    """First rows of complete frames, and how many frames are not."""
+    change = np.flatnonzero((np.diff(batch) != 0) | (np.diff(frame) != 0)) + 1
+    starts = np.concatenate([[0], change]).astype(np.int64)
+    lengths = np.diff(np.append(starts, len(batch)))
+    slots = len(_sensor.SLOTS)
+    whole = starts[lengths == slots]
+    expected = np.sort(_slot_channels())
+    found = np.sort(channel[whole[:, None] + np.arange(slots)], axis=1)
+    complete = whole[(found == expected).all(axis=1)]
+    return complete, len(starts) - len(complete)
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        if path.name.lower().endswith(".gz"):
+            with gzip.open(path) as packed:
+                data = packed.read(_MAX_BYTES + 1)
+        else:
+            with path.open("rb") as plain:
+                data = plain.read(_MAX_BYTES + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        seen = getattr(error, "strerror", None)  # of the system; what damage raises has none
+        cure = "check the path" if seen else "copy it again"
+        raise RecordingError(f"{path}: cannot be read ({seen or error}): expected a .btd; {cure}") from None
+    if len(data) > _MAX_BYTES:
+        raise RecordingError(f"{path}: more than {_MAX_BYTES >> 20} MB of text: expected less; split it")
+    return data
+
+
+def _numbers(path: Path, body: bytes, first_line: int) -> npt.NDArray[np.float64]:
+    """The lines after ``Begin File`` as float64 (lines, 4 + 2 * sensors)."""
+    if not body.strip():
+        raise RecordingError(f"{path}: nothing after 'Begin File': expected one line a slot; record again")
+    # the rest of the line of 'Begin File' goes, so that row 0 is the line after it
+    body = body.partition(b"\n")[2]
+    try:
+        table = np.loadtxt(io.BytesIO(body), dtype=np.float64, ndmin=2, comments=None, encoding="latin-1")
+    except ValueError:
+        table = np.empty((0, 0))
+    columns = table.shape[1]
+    well_formed = columns >= _FIRST_PAIR + 2 and columns % 2 == 0 and bool(np.isfinite(table).all())
+    if well_formed:
+        parity = table[:, _FIRST_PAIR + 1 :: 2]
+        well_formed = bool(((parity == 0) | (parity == 1)).all())
+    if not well_formed:
+        raise RecordingError(f"{path}: {_first_fault(body, first_line)}")
+    return table
+
+
+def _first_fault(body: bytes, first_line: int) -> str:
+    """Says which line is the first that is wrong; slow, and only for the error."""
+    expected = "expected 't batch frame channel' and 'value parity' for each sensor; copy the file again"
+    columns = 0
+    for number, line in enumerate(body.split(b"\n"), first_line):
+        parts = line.split()
+        if not parts:
+            continue
+        columns = columns or len(parts)
+        try:
+            numbers = [float(part) for part in parts]
+        except ValueError:
+            numbers = []
+        paired = len(numbers) == columns >= _FIRST_PAIR + 2 and columns % 2 == 0
+        parity_good = all(parity in (0.0, 1.0) for parity in numbers[_FIRST_PAIR + 1 :: 2])
+        if not paired or not parity_good or not np.isfinite(numbers).all():
+            return f"line {number} is {line[:60].decode('latin-1').strip()!r}: {expected}"
+    return f"not a table of numbers: {expected}"

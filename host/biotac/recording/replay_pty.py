@@ -1,0 +1,66 @@
+"""A recording as a board on a pty, for any serial program."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import tty
+
+from ..errors import PortError
+from .playback import Playback
+from .replay_link import CHUNK_BYTES, Clock, Pacer, SystemClock
+
+
+class ReplayPty:
+    """A pty on which any serial program meets the recorded board; ``path`` names it."""
+
+    def __init__(self, playback: Playback, pace: float, *, clock: Clock | None = None) -> None:
+        self._pacer = Pacer(playback, pace, clock or SystemClock())
+        self._out = b""
+        try:
+            self._master, self._slave = pty.openpty()
+        except OSError as error:
+            raise PortError(f"no pty for the recording ({error.strerror}); use replay: in this process") from error
+        # Kept open: the pty outlives whoever opens and closes it. Raw, or it would echo our own bytes.
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+
+    @property
+    def over(self) -> bool:
+        """Everything was handed over."""
+        return self._pacer.playback.over and not self._out
+
+    def turn(self, timeout_s: float) -> None:
+        """Answer and play for one turn; waits at most ``timeout_s`` for something to do."""
+        wait_s = self._pacer.wait_s()
+        if not self._out and wait_s is not None:
+            timeout_s = min(timeout_s, wait_s)
+        readable, writable, _ = select.select([self._master], [self._master] if self._out else [], [], timeout_s)
+        if readable:
+            self._listen()
+        if not self._out:
+            self._out = self._pacer.due()
+        if writable or self._out:
+            self._speak()
+
+    def _listen(self) -> None:
+        playback = self._pacer.playback
+        for message_id, payload in playback.requests(os.read(self._master, CHUNK_BYTES)):
+            answer = playback.answer(message_id, payload)
+            self._out += playback.refusal(message_id, payload) if answer is None else answer
+
+    def _speak(self) -> None:
+        try:
+            sent = os.write(self._master, self._out)
+        except BlockingIOError:
+            sent = 0  # the reader is behind; nothing is dropped, time waits for it
+        self._out = self._out[sent:]
+
+    def close(self) -> None:
+        """Take the pty away. Safe to call twice."""
+        for fd in (self._master, self._slave):
+            if fd >= 0:
+                os.close(fd)
+        self._master = self._slave = -1

@@ -1,0 +1,132 @@
+"""The emulated board: a microcontroller's own flash image in an emulator, playing a Source.
+
+The emulator is a Node program in this project's repository (tools/emulator/); it is not part of the
+installed package. It speaks to this side as the posix simulator does, on a pty that is made here.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import shutil
+import subprocess
+import sys
+import tty
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import DeviceLostError, PortError
+from .process import SimBoard
+from .source import Source
+
+
+@dataclass(frozen=True)
+class Tools:
+    """What an emulated board is made of."""
+
+    node: str
+    program: Path
+    sensors: Path
+    image: Path
+
+
+class EmulatedBoard(SimBoard):
+    """A running emulator; ``path`` is the pty that any serial program can open."""
+
+    def __init__(self, board: str, source: Source, *, pace: float, hold: bool, image: str | None = None) -> None:
+        self._tools = find_tools(board, image)
+        super().__init__(source, pace=pace, hold=hold)
+
+    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
+        tools = self._tools
+        master, slave = pty.openpty()
+        try:
+            # Raw from the start: an echoing terminal would send our own frames back to us.
+            tty.setraw(slave)
+            path = os.ttyname(slave)
+            os.close(slave)  # while nobody holds it, reading the master fails: that is the board's DTR
+            os.set_blocking(master, False)
+            command = [tools.node, str(tools.program), "--image", str(tools.image), "--wasm", str(tools.sensors)]
+            command += ["--pty", path, *options]
+            command += ["--master", str(master)]
+            pipe = subprocess.PIPE
+            return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=[master])
+        finally:
+            os.close(master)
+
+    def plan(self, seconds: float, verb: str) -> None:
+        """Have something happen to the board once its sensors have lived for ``seconds``; see main.mjs."""
+        self.say(f"@{seconds:.9f} {verb}")
+
+    def do(self, verb: str) -> None:
+        """Have something happen to the board before whatever is written to its link from now on; see main.mjs.
+
+        Verbs and link are two pipes: without an answer on the one, the other may overtake it.
+        """
+        self.say(verb)
+        self.counters()
+
+    def counters(self) -> dict[str, Any]:
+        """What the emulator counted: time, resets, transfers, USB packets, breaches of the rules."""
+        self.say("counters")
+        return self._counted()[1]
+
+    def until(self, seconds: float, **counters: Any) -> dict[str, Any]:
+        """Wait until these counters are so, and return all of them then.
+
+        DeviceLostError when they are not within ``seconds`` of emulated time. Time that is held, or waits for
+        whoever has the link open to read, does not pass.
+        """
+        self.say(f"until {seconds:.6f} {json.dumps(counters)}")
+        word, facts = self._counted()
+        if word == "never":
+            seen = {name: facts.get(name) for name in counters}
+            raise DeviceLostError(f"within {seconds:g} s of its time the emulated board came to {seen}, not {counters}")
+        return facts
+
+    def _counted(self) -> tuple[str, dict[str, Any]]:
+        while not self._answers:
+            self.hear()
+        word, _, text = self._answers.pop(0).partition(" ")
+        return word, json.loads(text)
+
+
+def find_tools(board: str, image: str | None) -> Tools:
+    """Everything that is needed, or a PortError with the cure for what is missing."""
+    if board != "pico":
+        raise PortError(f"no emulated board is called {board!r}; there is one: emu:pico")
+    if os.name != "posix":
+        raise PortError("emulated boards need a pty, which this system lacks; use Linux or macOS")
+    folder = find_folder()
+    root = folder.parent.parent
+    node = shutil.which("node")
+    if node is None:
+        raise PortError("node is missing, which runs the emulator; install it (Debian: apt-get install nodejs npm)")
+    sensors = root / "build" / "emulator" / "sensors.wasm"
+    if not sensors.is_file() or not (root / "tools" / "node_modules" / "rp2040js").is_dir():
+        raise PortError(f"the emulator is not ready; run {folder / 'prepare'} once")
+    path = Path(image) if image else root / "build" / "pico" / "biotac-pico.bin"
+    if not path.is_file():
+        build = f"cmake -S {root / 'firmware'} --preset {board} && cmake --build {path.parent}"
+        cure = "check the path" if image else f"build it: {build}"
+        raise PortError(f"no image at {path}; {cure}")
+    return Tools(node, folder / "main.mjs", sensors, path)
+
+
+def find_folder() -> Path:
+    """tools/emulator of the repository that this process runs in, or that its environment lies in."""
+    override = os.environ.get("BIOTAC_EMULATOR")
+    if override:
+        places = [Path(override)]
+    else:
+        starts = [Path.cwd(), Path(sys.prefix), Path(__file__).resolve()]
+        places = [place / "tools" / "emulator" for start in starts for place in (start, *start.parents)]
+    for place in places:
+        if (place / "main.mjs").is_file():
+            return place.resolve()
+    raise PortError(
+        f"no emulator in {places[0]}; it is in the project's repository: run from inside a clone, or set "
+        "BIOTAC_EMULATOR to its tools/emulator"
+    )

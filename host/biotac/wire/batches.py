@@ -1,0 +1,262 @@
+"""From checked messages to arrays, with sequence numbers and device time unwrapped and losses counted.
+
+The live link, the recorder's reader and the tests all feed the same class. The work is C (host/binding/intake.c), and
+so is waiting for a port and reading it (host/binding/descriptor.c).
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import time
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.compiled import ffi, lib
+from . import messages_gen as wire
+from .decoder import FRAME, IDLE, NO_FRAME, ONE_STEP_BYTES, PAC, Buffer, counts_of, new, pairs
+from .frames import IDLE_DTYPE, PAC_DTYPE, StructArray, frames_from_wire
+from .framing import FramingCounts
+
+# Looked up once: a live link brings few messages at a time, thousands of times a second.
+_feed = lib.bt_intake_feed
+_read = lib.bt_intake_read
+_frombuffer = np.frombuffer
+_blank = object.__new__
+_NOTHING, _AGAIN = int(lib.BT_DESCRIPTOR_NOTHING), int(lib.BT_DESCRIPTOR_AGAIN)
+_HUNG_UP = int(lib.BT_DESCRIPTOR_HUNG_UP)
+_FACTS = struct.Struct(f"={int(lib.BT_INTAKE_FACTS)}q").unpack_from
+_INT64 = np.dtype(np.int64)
+_NO_INT64 = np.frombuffer(b"", _INT64)
+_NO_PAC, _NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (PAC_DTYPE, IDLE_DTYPE))
+
+
+@dataclass
+class Batch:
+    """What one chunk of bytes completed.
+
+    ``wire`` holds the FRAME messages as sent (wire.DTYPES), ``seq`` and ``t_us`` (int64) their unwrapped
+    numbers and device times, ``frames`` the same rows in user units, converted when first asked for;
+    ``pac`` is PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order. ``fingers`` is a bit mask:
+    others have no row in ``wire`` and ``idle``; -1 where it was not looked at.
+    """
+
+    wire: StructArray
+    seq: NDArray[np.int64]
+    t_us: NDArray[np.int64]
+    pac: StructArray
+    idle: StructArray
+    messages: list[Any] = field(default_factory=list)
+    fingers: int = field(default=-1, repr=False)
+    _numbers: bytes = field(default=b"", init=False, repr=False, compare=False)  # begins with seq, then t_us
+
+    @cached_property
+    def frames(self) -> StructArray:
+        """The FRAMEs in user units, FRAME_DTYPE (n,)."""
+        return frames_from_wire(self.wire, self.seq, self.t_us)
+
+    if not TYPE_CHECKING:  # for which it would be any attribute
+
+        def __getattr__(self, name: str) -> NDArray[np.int64]:
+            # Two columns of what StreamDecoder makes, when first asked for: most live programs never do.
+            if name not in ("seq", "t_us") or "wire" not in self.__dict__:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            n = len(self.wire)
+            column = _frombuffer(self._numbers, _INT64, n, 8 * n * (name == "t_us")) if n else _NO_INT64
+            setattr(self, name, column)
+            return column
+
+    def last_t_us(self) -> int | None:
+        """Device time of the latest frame or heartbeat; None without any."""
+        ends = [int(t_us.max()) for t_us in (self.t_us, self.idle["t_us"]) if len(t_us)]
+        return max(ends, default=None)
+
+    def first_t_us(self) -> int | None:
+        """Device time of the earliest frame or heartbeat; None without any."""
+        begins = [int(t_us.min()) for t_us in (self.t_us, self.idle["t_us"]) if len(t_us)]
+        return min(begins, default=None)
+
+
+@dataclass(frozen=True)
+class LinkStats:
+    """Health of the link as this side sees it."""
+
+    bytes_received: int
+    frames: int
+    frames_lost: int
+    pac_lost: int
+    disordered: int  # sequence numbers that repeat or step back, as after a reboot
+    crc_errors: int
+    other_errors: int
+    batches_skipped: int = 0  # came, and were let go for a consumer that was too slow
+    frames_skipped: int = 0
+    gaps: int = 0  # times in which the board was away
+
+
+class StreamDecoder:
+    """Chunks of bytes in, batches of arrays out; what is lost is known by the sequence numbers."""
+
+    def __init__(self) -> None:
+        self._state: Any = new("bt_intake *")
+        lib.bt_intake_reset(self._state)
+        # Views of the state; they do not keep it alive, self._state does.
+        self._facts = ffi.buffer(self._state.facts)
+        self._out = ffi.buffer(self._state.out)
+        self._in = ffi.buffer(getattr(self._state, "in"))
+        #: (finger, seq before the gap, frames lost) of every gap so far.
+        self.lost_after: list[tuple[int, int, int]] = []
+        # Of the last call that gave a batch.
+        self.taken = 0  #: bytes
+        self.arrived_s = 0.0  #: when ``read`` had them, by time.monotonic()
+        self.last_t_us: int | None = None  #: device time of the latest frame or heartbeat
+
+    @property
+    def lost(self) -> int:
+        """Frames that were made and never came."""
+        return int(self._state.rounds.lost)
+
+    @property
+    def lost_pac(self) -> int:
+        """PAC blocks that were made and never came."""
+        return int(self._state.pacs.lost)
+
+    @property
+    def disordered(self) -> int:
+        """Numbers that repeat or step back, as after a reboot."""
+        return int(self._state.rounds.disordered + self._state.pacs.disordered)
+
+    @property
+    def counts(self) -> FramingCounts:
+        """What became of the bytes so far."""
+        return counts_of(self._state.decoder)
+
+    def stats(self, bytes_received: int, frames: int) -> LinkStats:
+        """All counts, with what the caller has counted."""
+        counts = self.counts
+        return LinkStats(
+            bytes_received=bytes_received,
+            frames=frames,
+            frames_lost=self.lost,
+            pac_lost=self.lost_pac,
+            disordered=self.disordered,
+            crc_errors=counts.bad_crc,
+            other_errors=counts.bad - counts.bad_crc,
+        )
+
+    def accept_newer_minor(self) -> None:
+        """The peer's wire minor is newer: its messages may be longer than known here."""
+        self._state.decoder.allow_longer = True
+
+    def unwrap_t_us(self, t_us: int) -> int:
+        """A message's 32-bit device time on the same axis as the batches' ``t_us``."""
+        return int(lib.bt_unwrapped(ffi.addressof(self._state, "t_us"), t_us))
+
+    def feed(self, chunk: Buffer) -> Batch:
+        """Take any number of bytes; return what they complete."""
+        size = len(chunk)
+        if type(chunk) is bytes and size <= ONE_STEP_BYTES:
+            # cffi hands the bytes' address over, which is faster than to borrow a buffer.
+            _feed(self._state, chunk, size)
+            return self._batch()
+        batches: list[Batch] = []
+        with ffi.from_buffer(chunk) as data:
+            at, size = 0, len(data)
+            while at < size or not batches:
+                at += _feed(self._state, data + at, size - at)
+                batches.append(self._batch())
+        if len(batches) == 1:
+            return batches[0]
+        batch = join(batches)
+        self.taken, self.last_t_us = size, batch.last_t_us()
+        return batch
+
+    def read(self, fd: int, timeout_s: float) -> Batch | None:
+        """Wait for bytes of a port and return what they complete, like ``feed``: all in C, other threads run on.
+
+        None when nothing comes within timeout_s. OSError when the port is gone. POSIX only.
+        """
+        got = _read(self._state, fd, timeout_s)
+        if got == _AGAIN:
+            # Python's own handler of a signal runs between these lines.
+            deadline_s = time.monotonic() + timeout_s
+            while got == _AGAIN:
+                got = _read(self._state, fd, deadline_s - time.monotonic())
+        if got > 0:
+            return self._batch()
+        if got == _NOTHING:
+            return None
+        raise OSError("it hung up") if got == _HUNG_UP else OSError(-got, os.strerror(-got))
+
+    def chunk(self) -> bytes:
+        """The bytes of the last ``read`` that gave something."""
+        return bytes(self._in[: self.taken])
+
+    def _batch(self) -> Batch:
+        # What the state has is copied out: the next call writes over it.
+        self.taken, arrived_ns, size, n, pacs, idles, others, gaps, last_us, fingers = _FACTS(self._facts)
+        self.arrived_s = arrived_ns * 1e-9
+        self.last_t_us = last_us if n or idles else None
+        raw = self._out[:size]
+        at = 16 * (n + pacs + idles)
+        if gaps:
+            self.lost_after += [(gap.finger, gap.before, gap.missing) for gap in self._state.gaps[0:gaps]]
+        batch = _blank(Batch)
+        batch.wire = _frombuffer(raw, FRAME, n, at) if n else NO_FRAME
+        batch._numbers = raw
+        batch.pac = _NO_PAC
+        batch.idle = _NO_IDLE
+        batch.messages = []
+        batch.fingers = fingers
+        if not (pacs or idles or others):
+            return batch
+        at += n * FRAME.itemsize
+        if pacs:
+            sent = _frombuffer(raw, PAC, pacs, at)
+            batch.pac = pac = np.empty(pacs, PAC_DTYPE)
+            pac["seq"], pac["t_us"] = _frombuffer(raw, _INT64, 2 * pacs, 16 * n).reshape(2, pacs)
+            pac["finger"], pac["pac"] = sent["finger"], sent["pac"]
+            at += pacs * PAC.itemsize
+        if idles:
+            sent = _frombuffer(raw, IDLE, idles, at)
+            batch.idle = idle = np.empty(idles, IDLE_DTYPE)
+            idle["seq"], idle["t_us"] = _frombuffer(raw, _INT64, 2 * idles, 16 * (n + pacs)).reshape(2, idles)
+            for name in ("finger", "frames", "energy_count2", "pdc", "tdc", "flags"):
+                idle[name] = sent[name]
+        if others:
+            batch.messages = known(pairs(raw[size - others :]))
+        return batch
+
+
+def known(others: list[tuple[int, bytes]]) -> list[Any]:
+    """Messages of known ids; the others are a newer peer's."""
+    return [wire.MESSAGES[message_id].unpack(payload) for message_id, payload in others if message_id in wire.MESSAGES]
+
+
+def split(batch: Batch, end_us: int) -> tuple[Batch, Batch]:
+    """Rows before device time ``end_us``, and the rest."""
+    now = batch.t_us < end_us
+    pac_now = batch.pac["t_us"] < end_us
+    idle_now = batch.idle["t_us"] < end_us
+
+    def rows(mine: Any, pac: Any, idle: Any, messages: list[Any]) -> Batch:
+        return Batch(batch.wire[mine], batch.seq[mine], batch.t_us[mine], batch.pac[pac], batch.idle[idle], messages)
+
+    return rows(now, pac_now, idle_now, batch.messages), rows(~now, ~pac_now, ~idle_now, [])
+
+
+def join(batches: list[Batch]) -> Batch:
+    """One batch of all rows, in order."""
+    if not batches:
+        return StreamDecoder().feed(b"")
+    return Batch(
+        np.concatenate([b.wire for b in batches]),
+        np.concatenate([b.seq for b in batches]),
+        np.concatenate([b.t_us for b in batches]),
+        np.concatenate([b.pac for b in batches]),
+        np.concatenate([b.idle for b in batches]),
+        [m for b in batches for m in b.messages],
+    )

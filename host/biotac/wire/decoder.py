@@ -1,0 +1,137 @@
+"""The link's bytes to arrays of wire messages, a chunk at a time, in C (host/binding/decode.c). No I/O."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.compiled import ffi, lib
+from . import messages_gen as wire
+from .frames import StructArray
+from .framing import FramingCounts
+
+Buffer = bytes | bytearray | memoryview
+
+STREAMED = (wire.Frame.ID, wire.Pac.ID, wire.Idle.ID)  # what comes as rows; by enum bt_decoded
+
+# Looked up once: a chunk of few messages takes no longer than a few of these would.
+_decode = lib.bt_decode
+_from_buffer = ffi.from_buffer
+_unpack = ffi.unpack
+_frombuffer = np.frombuffer
+FRAME, PAC, IDLE = (wire.DTYPES[message_id] for message_id in STREAMED)
+NO_FRAME, NO_PAC, NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (FRAME, PAC, IDLE))
+_KINDS = int(lib.BT_DECODED_KINDS)
+ONE_STEP_BYTES = int(lib.bt_decode_bytes())
+
+# Not cleared, the reset sets what is read: most of it is room that a short connection never touches.
+new = ffi.new_allocator(should_clear_after_alloc=False)
+
+
+@dataclass(slots=True)
+class Decoded:
+    """What one chunk of bytes completed.
+
+    ``frames``, ``pacs`` and ``idles`` are the FRAME, PAC and IDLE messages as sent (wire.DTYPES), each in the
+    order of arrival and read-only. ``others`` are the rest as (message id, payload), with the ids that this
+    library does not know. ``ids`` has the id of every message, a byte each: it tells the order among all of them.
+    """
+
+    frames: StructArray
+    pacs: StructArray
+    idles: StructArray
+    others: list[tuple[int, bytes]]
+    ids: bytes
+
+    def order(self, message_id: int) -> NDArray[np.intp]:
+        """Where among all messages those of ``message_id`` came, counted from 0."""
+        return np.flatnonzero(_frombuffer(self.ids, np.uint8) == message_id)
+
+    def messages(self) -> list[tuple[int, bytes]]:
+        """All as (message id, payload), in the order of arrival. Slow: for few messages."""
+        rows = map(iter, (self.frames, self.pacs, self.idles))
+        streams = dict(zip(STREAMED, rows, strict=True))
+        others = iter(self.others)
+        return [
+            (message_id, next(streams[message_id]).tobytes()) if message_id in streams else next(others)
+            for message_id in self.ids
+        ]
+
+
+class Decoder:
+    """Splits a byte stream into checked messages; any chunking gives the same messages.
+
+    A frame that is damaged is counted and left out, and so is a known id with another length. What no
+    delimiter has ended yet waits for the next chunk.
+    """
+
+    def __init__(self) -> None:
+        self._state: Any = new("bt_decoder *")
+        lib.bt_decoder_reset(self._state)
+        # Views of the state; they do not keep it alive, self._state does.
+        self._filled = self._state.filled
+        self._data = [ffi.buffer(data) for data in self._state.data]
+        self._frames, self._pacs, self._idles, self._others, self._ids = self._data
+
+    def feed(self, chunk: Buffer) -> Decoded:
+        """Take any number of bytes; return what they complete."""
+        size = len(chunk)
+        if type(chunk) is bytes and size <= ONE_STEP_BYTES:
+            # cffi hands the bytes' address over, which is faster than to borrow a buffer. All in one place: to
+            # call for the parts is a quarter of the time of a chunk of 4096 bytes.
+            _decode(self._state, chunk, size)
+            n_frames, n_pacs, n_idles, n_others, n_ids = _unpack(self._filled, _KINDS)
+            return Decoded(
+                _frombuffer(self._frames[:n_frames], FRAME) if n_frames else NO_FRAME,
+                _frombuffer(self._pacs[:n_pacs], PAC) if n_pacs else NO_PAC,
+                _frombuffer(self._idles[:n_idles], IDLE) if n_idles else NO_IDLE,
+                pairs(self._others[:n_others]) if n_others else [],
+                self._ids[:n_ids],
+            )
+        steps = [(b"",) * _KINDS]
+        with _from_buffer(chunk) as data:
+            size = len(data)
+            at = 0
+            while at < size:
+                at += _decode(self._state, data + at, size - at)
+                # Copies: the next call writes over what this one completed.
+                steps.append(tuple(rows[:n] for rows, n in zip(self._data, _unpack(self._filled, _KINDS), strict=True)))
+        frames, pacs, idles, others, ids = (b"".join(parts) for parts in zip(*steps, strict=True))
+        return Decoded(_frombuffer(frames, FRAME), _frombuffer(pacs, PAC), _frombuffer(idles, IDLE), pairs(others), ids)
+
+    @property
+    def counts(self) -> FramingCounts:
+        """What became of the bytes so far."""
+        return counts_of(self._state)
+
+    @property
+    def allow_longer(self) -> bool:
+        """Accept payloads longer than this library knows, for a peer whose wire minor is newer.
+
+        Fields are append-only, so the known ones are at the front; the rest is cut off.
+        """
+        return bool(self._state.allow_longer)
+
+    @allow_longer.setter
+    def allow_longer(self, allow: bool) -> None:
+        self._state.allow_longer = allow
+
+
+def counts_of(decoder: Any) -> FramingCounts:
+    """What became of the bytes that a C struct bt_decoder was given."""
+    _, *outcomes = decoder.outcomes
+    return FramingCounts(*map(int, outcomes))
+
+
+def pairs(others: bytes) -> list[tuple[int, bytes]]:
+    """(message id, payload) of BT_DECODED_OTHER."""
+    out = []
+    at = 0
+    while at < len(others):
+        end = at + 2 + others[at + 1]
+        out.append((others[at], others[at + 2 : end]))
+        at = end
+    return out
