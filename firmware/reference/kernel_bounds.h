@@ -1,5 +1,5 @@
 // How far the shipped kernel's results may be from the formulas in double (firmware/reference/lin2013.h).
-// Held by tests/core/test_kernels.c frame by frame, by tests/fuzz and by `biotac check`; parts are proved in
+// Held by tests/core/solve/test_kernels.c frame by frame, by tests/fuzz and by `biotac check`; parts are proved in
 // tests/proofs.
 //
 // Where the bounds come from (nothing is tuned):

@@ -202,7 +202,7 @@ def ratio(text: str, bits: int, total_min: int, total_max: int, off: int, timeou
 
 (WHOLE_TOTAL,) = constants("solve/poc.c", "WHOLE_TOTAL")
 # Squares (bits = SPLIT_BITS, totals from 2^21 on) are left out: z3 does not decide that product in minutes.
-# tests/fuzz and tests/core/test_kernels.c judge them.
+# tests/fuzz and tests/core/solve/test_kernels.c judge them.
 RANGES = {
     "whole": (0, 1, WHOLE_TOTAL, 0),
     "linear": (LINEAR_BITS, WHOLE_TOTAL + 1, E_MAX * COUNT, 1),

@@ -1,7 +1,7 @@
 // Point of contact on the core's surface: Lin 2013 Eq 1 and 2, fused, in 32-bit arithmetic.
 // In: signals e = count - tare in 1/16 count (q4), |e| <= 4095 counts; compression is negative.
 // Out: um, rounded half away from zero; within 1.1 um of the exact point over every input that
-// tests/core/test_kernels.c finds, of which 0.87 um is the rounding to whole um itself.
+// tests/core/solve/test_kernels.c finds, of which 0.87 um is the rounding to whole um itself.
 #ifndef BIOTAC_POC_H
 #define BIOTAC_POC_H
 

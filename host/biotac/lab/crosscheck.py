@@ -1,7 +1,7 @@
 """Every on-board result against the float64 reference, fed with the counts and the tare of its frame.
 
 The bounds follow from the board's number formats alone; firmware/reference/kernel_bounds.h derives them, and
-tests/core/test_kernels.c searches for inputs that come near.
+tests/core/solve/test_kernels.c searches for inputs that come near.
 """
 
 from __future__ import annotations

@@ -10,8 +10,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import fake_spidev
 import numpy as np
 import pytest
+from live_board import Clock, point
 from maps import BIG, make_map
 from mcap.reader import make_reader
 
@@ -23,6 +25,9 @@ from biotac.export.columns import tables
 from biotac.hand.hand import Hand
 from biotac.keep import map_file
 from biotac.keep.map_blob import PART_BYTES, for_any_sensor, made_s, serial
+from biotac.link import spidev as spidev_link
+from biotac.link.ports import start_board
+from biotac.link.serial_port import SerialLink
 from biotac.recording import Recording
 from biotac.recording.recompute import recompute
 from biotac.sim.process import SimBoard, SimLink
@@ -30,15 +35,6 @@ from biotac.sim.source import load_source
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-import fake_spidev
-from live_board import Clock, point
-
-from biotac.link import spidev as spidev_link
-from biotac.link.ports import start_board
-from biotac.link.serial_port import SerialLink
 
 
 def serial_of(hand: biotac.Hand, finger: int) -> str:

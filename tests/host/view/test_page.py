@@ -15,7 +15,7 @@ from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.frames import electrode_signals
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 FLAGS = tomllib.loads((ROOT / "protocol" / "link.toml").read_text(encoding="utf-8"))["flags"]["frame"]
 
 SNAPSHOT = """() => {

@@ -22,7 +22,7 @@ from biotac.keep import chip as chips
 from biotac.keep import eeprom, harness
 from biotac.keep.chip import KINDS, Chip
 
-_spec = importlib.util.spec_from_file_location("fake_smbus", Path(__file__).with_name("fake_smbus.py"))
+_spec = importlib.util.spec_from_file_location("fake_smbus", Path(__file__).parents[2] / "support" / "fake_smbus.py")
 assert _spec is not None and _spec.loader is not None
 fake_smbus = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(fake_smbus)

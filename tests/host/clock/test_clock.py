@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import doctest
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from clock_model import WAY_S, Model
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -22,10 +22,6 @@ from biotac.recording import Recorder
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 from biotac.wire.framing import encode
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from clock_model import WAY_S, Model
 
 SEEDS = range(8)
 WORST = {"wander_ppm_per_s": WANDER_PER_S * 1e6, "way_back_s": 0.000_6}

@@ -19,12 +19,12 @@ from biotac.sim.source import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch
 
-_spec = importlib.util.spec_from_file_location("fake_spidev", Path(__file__).with_name("fake_spidev.py"))
+_spec = importlib.util.spec_from_file_location("fake_spidev", Path(__file__).parents[2] / "support" / "fake_spidev.py")
 assert _spec is not None and _spec.loader is not None
 fake_spidev = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(fake_spidev)
 
-_spec = importlib.util.spec_from_file_location("fake_smbus", Path(__file__).with_name("fake_smbus.py"))
+_spec = importlib.util.spec_from_file_location("fake_smbus", Path(__file__).parents[2] / "support" / "fake_smbus.py")
 assert _spec is not None and _spec.loader is not None
 fake_smbus = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(fake_smbus)

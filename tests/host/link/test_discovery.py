@@ -19,7 +19,7 @@ from biotac.link.serial_port import describe_open_error
 from biotac.wire import messages_gen as wire
 from biotac.wire.identity import serial_text
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def entry(device: str, serial: str | None = None, *, ours: bool = True, description: str = "a port") -> ListPortInfo:

@@ -18,7 +18,7 @@ import biotac
 from biotac.clock import DeviceClock
 from biotac.export import export
 
-PACKAGE = Path(__file__).parents[2] / "host/ros2/biotac_ros2"
+PACKAGE = Path(__file__).parents[3] / "host/ros2/biotac_ros2"
 
 
 @pytest.fixture

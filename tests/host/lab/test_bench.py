@@ -18,7 +18,7 @@ from biotac.lab.bench import front, kernels, limit, scenes
 from biotac.wire.messages_gen import PocWeights
 
 EFFORT = kernels.Effort(frames=300, restarts=2, steps=200)
-#: um; what tools/bench/variants says of each (tests/core/test_variants.c derives them)
+#: um; what tools/bench/variants says of each (tests/bench/test_variants.c derives them)
 POC_BOUNDS_UM = {
     "double": 1e-9,
     "float": 0.17,

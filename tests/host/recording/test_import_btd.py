@@ -14,7 +14,7 @@ from biotac.sim import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire import sensor_gen as sensor
 
-DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "btd_biotacsp" / "data.btd.gz"
+DATA = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "btd_biotacsp" / "data.btd.gz"
 CHANNEL = {name: (sensor.CHANNEL_COMMAND[name] & 0x7E) >> 1 for name in sensor.SLOTS}
 SECOND_S = 0.5  # a gap of the logger's, behind the first half
 

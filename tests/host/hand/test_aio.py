@@ -11,7 +11,7 @@ import pytest
 
 import biotac
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "host" / "docs" / "examples"
+EXAMPLES = Path(__file__).resolve().parents[3] / "host" / "docs" / "examples"
 SAYS = {
     "pull.py": "300 frames",
     "latest.py": "FrameFlags.CONTACT",

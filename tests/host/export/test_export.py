@@ -85,7 +85,7 @@ def export(recording: biotac.Recording, out: Path, *options: str) -> int:
 
 
 def test_every_column_is_documented_and_has_a_unit() -> None:
-    text = (Path(__file__).parents[2] / "host" / "docs" / "recording.md").read_text()
+    text = (Path(__file__).parents[3] / "host" / "docs" / "recording.md").read_text()
     for column in (*COLUMNS, *PAC_COLUMNS):
         assert column.unit and column.what
         assert f"| `{column.name}` | {column.unit} |" in text, column.name

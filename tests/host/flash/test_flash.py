@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from fake_flash_board import NEW_SETTING, FakeBoard, make_drive, make_image, no_waiting, note, plug_in
 
 from biotac.cli.main import main
 from biotac.errors import BiotacError, FlashError, InputError, NotAGatewayError
@@ -15,10 +15,6 @@ from biotac.flash import flash, loader_drive, read_backup, read_image
 from biotac.flash.image import Image
 from biotac.flash.loader_drive import linux_folders
 from biotac.wire import messages_gen as wire
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from fake_flash_board import NEW_SETTING, FakeBoard, make_drive, make_image, no_waiting, note, plug_in
 
 
 @pytest.fixture

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 import threading
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
+from live_board import Clock, Firmware, frame
 
 import biotac
 from biotac.hand import queue as queue_module
@@ -19,10 +18,6 @@ from biotac.hand.views import Latest
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from live_board import Clock, Firmware, frame
 
 WAIT_S = 20.0  # only a failing test waits so long
 

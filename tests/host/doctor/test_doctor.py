@@ -27,7 +27,7 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.batches import LinkStats
 from biotac.wire.frames import FRAME_DTYPE, IDLE_DTYPE
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 PORT = "/dev/ttyACM0"
 NOBODY = Holder(7, "minicom")
 

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import struct
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from fake_flash_board import make_image, note
 
 from biotac.errors import InputError
 from biotac.flash import read_image
 from biotac.flash.image import BLOCK_BYTES, FLASH_BYTES, MAPS_BYTES, SETTINGS_BYTES, note_text
 from biotac.wire import messages_gen as wire
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from fake_flash_board import make_image, note
-
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 FLASH = 0x10000000
 KEPT = FLASH + FLASH_BYTES - SETTINGS_BYTES - MAPS_BYTES  # from here on
 

@@ -13,7 +13,7 @@ from biotac.errors import InputError, RecordingError
 from biotac.sim import load_source, sampling, tape
 from biotac.wire import sensor_gen as _sensor
 
-DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
+DATA = Path(__file__).resolve().parents[3].parent / "shared" / "data"
 PDC, TAC, TDC = (_sensor.SLOTS.index(name) for name in ("PDC", "TAC", "TDC"))
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from fake_flash_board import FakeBoard, make_drive, make_image, plug_in
 
 from biotac.errors import DeviceLostError, FlashError
 from biotac.flash import loader_drive, read_image
@@ -14,10 +14,6 @@ from biotac.flash.image import BLOCK_BYTES
 from biotac.flash.loader_drive import DriveLoader, linux_folders
 from biotac.flash.loader_picotool import PicotoolLoader
 from biotac.flash.target_serial import SerialTarget
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from fake_flash_board import FakeBoard, make_drive, make_image, plug_in
 
 
 def drive_loader(root: Path, *, attached: bool = False) -> DriveLoader:

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from live_board import Clock, Firmware, frame, point
 
 import biotac
 from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from live_board import Clock, Firmware, frame, point
 
 WAIT_S = 20.0
 OURS, OTHER = (7,) * 12, (8,) * 12

@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 import json
 import struct
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+import wrench_run
 
 import biotac
 from biotac.calibrate.wrench import board, features, fitted, models, recorded
@@ -25,11 +25,7 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.frames import tare_to_q4
 from biotac.wire.map_gen import Gate, Kind
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
-
-import wrench_run
-
-SHARED = Path(__file__).parents[2] / ".." / "shared" / "data" / "syntouchcontact" / "F1.npz"
+SHARED = Path(__file__).parents[3] / ".." / "shared" / "data" / "syntouchcontact" / "F1.npz"
 FORCE_MN, TORQUE_NMM = 1.0, 0.01  # what the issue asks for, on every row
 TARE = np.array([2955.0 + 31 * k for k in range(19)])
 
