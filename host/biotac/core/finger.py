@@ -167,7 +167,7 @@ class Finger:
         tare = self._finger.tare
         return wire.Tare(
             seq=(self._finger.seq - 1) % 2**16,
-            t_us=self._finger.frame.t_us,
+            t_us=self._finger.round.t_us,
             finger=self._index,
             tare_state=tare.state,
             reason=tare.reason,
