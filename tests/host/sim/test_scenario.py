@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from biotac import sim
 from biotac.core import geometry as surface
 from biotac.errors import InputError
 from biotac.sim import Source, bundled_scenarios, load_source, sampling, tape
@@ -210,7 +211,7 @@ def test_the_bundled_scenarios_are_these() -> None:
 
 @pytest.mark.parametrize("name", bundled_scenarios())
 def test_bundled_scenarios_play_and_can_be_repeated(name: str) -> None:
-    text = (Path(surface.__file__).parent / "scenarios" / name).read_bytes()
+    text = (Path(sim.__file__).parent / "scenarios" / name).read_bytes()
     scenario = parse_scenario(text, file=name)
     assert scenario.name + ".toml" == name
     for track in scenario.tracks:
