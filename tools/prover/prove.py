@@ -39,7 +39,7 @@ class Undecided(Exception):
     """z3 gave up; never taken for a proof."""
 
 
-# Of z3's own units. The hardest question of the night takes 35 million (45 s), of the day 10 million.
+# Of z3's own units. The hardest question of the night takes 35 million (45 s), of the day 17 million.
 LIMIT = 400_000_000
 
 VALUE = re.compile(r"\((\w+) (?:(\d+)|\(- (\d+)\)|#x([0-9a-f]+)|#b([01]+))\)")

@@ -115,6 +115,8 @@ class SimBoard:
 class SimLink(SerialLink):
     """A SerialLink to a simulated board of its own, which it closes."""
 
+    patience = 60.0
+
     def __init__(self, port: str, board: SimBoard) -> None:
         self.board = board
         self._held = True

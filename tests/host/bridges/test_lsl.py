@@ -16,7 +16,7 @@ from biotac.bridges.lsl import Outlet, samples
 from biotac.cli.main import main
 from biotac.clock import DeviceClock, pac_t_us
 
-PATIENCE_S = 10.0
+PATIENCE_S = 300.0
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
 
-WAIT_S = 20.0
+WAIT_S = 600.0
 OURS, OTHER = (7,) * 12, (8,) * 12
 
 

@@ -17,7 +17,7 @@ from biotac.view.serving import Viewing
 from biotac.wire.batches import Batch, LinkStats, join
 
 CHROMIUM = shutil.which("chromium")
-PATIENCE_MS = 20_000
+PATIENCE_MS = 300_000  # only a failing test waits so long
 
 
 class ScriptedPlayer:
