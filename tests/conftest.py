@@ -18,10 +18,6 @@ from deframer import Deframer
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
-from biotac.wire import messages_gen as wire
-from biotac.wire.framing import encode
-from biotac.wire import messages_gen as wire
-from biotac.wire.framing import encode
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
