@@ -15,7 +15,7 @@ import z3
 from prover.cnumbers import INT, INT64, UINT
 from prover.integers import IntegerDomain
 from prover.prove import Input, Refuted, prove
-from prover.report import Report, nightly
+from prover.report import Report
 from prover.source import CORE, changed, parse, text_of
 from prover.table import constants, table
 
@@ -217,7 +217,7 @@ def test_x_without_what_the_remainder_says_is_refuted(line: str) -> None:
         ratio(changed(POC, line, ""), bits, total, total, off)
 
 
-@pytest.mark.parametrize("name", ["whole", pytest.param("linear", marks=nightly)])
+@pytest.mark.parametrize("name", ["whole", pytest.param("linear", marks=pytest.mark.nightly)])
 def test_x_on_the_cylinder_is_correctly_rounded(name: str, proved: Report) -> None:
     ratio(POC, *RANGES[name])
     proved(f"{name}: x is -N_x / W rounded half away from zero, for all totals of {RANGES[name][1:3]}")

@@ -108,7 +108,7 @@ class SimBoard:
 
     def _last_words(self) -> str:
         assert self._process.stderr is not None
-        self._process.wait(timeout=5)
+        self._process.wait(timeout=60)
         return self._process.stderr.read().decode(errors="replace").strip().replace("\n", " ")
 
 
