@@ -49,7 +49,7 @@ class Firmware:
     def wait_for(self, kind: type[Any], count: int = 1) -> None:
         """Until it was told so many of a kind."""
         with self.heard:
-            assert self.heard.wait_for(lambda: len(self.of(kind)) >= count, 20), f"no {kind.__name__}: {self.told}"
+            assert self.heard.wait_for(lambda: len(self.of(kind)) >= count, 600), f"no {kind.__name__}: {self.told}"
 
 
 class Clock:

@@ -23,6 +23,10 @@ class Link(Protocol):
     #: Device seconds per second here. 0: device time waits for whoever reads, and nothing need be dropped.
     pace: float
 
+    #: Times as long as a board on a cable it is waited for. More than 1 where the board is a process on this computer:
+    #: that is as slow as the computer is busy, and its end is noticed at once.
+    patience: float
+
     #: What can be read in place of ``read``: a file descriptor that gives the same bytes, and OSError when the board
     #: goes away. None where there is none, or ``read`` does more.
     fd: int | None

@@ -24,6 +24,8 @@ ONE_READ_BYTES = 8192  # more would be allocated for nothing, thousands of times
 class SerialLink:
     """A byte pipe over USB-serial. The bit rate is meaningless on USB and left at a common one."""
 
+    patience = 1.0
+
     def __init__(self, path: str) -> None:
         self.port = path
         self.source: Source | None = None

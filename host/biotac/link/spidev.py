@@ -125,6 +125,7 @@ class SpidevLink:
     def __init__(self, port: str, *, clock: Clock | None = None) -> None:
         self.port = port
         self.source: Source | None = None
+        self.patience = 1.0
         self.ended = False
         self.fd: int | None = None
         self.pace = 1.0

@@ -115,6 +115,7 @@ class ReplayLink:
     def __init__(self, port: str, playback: Playback, *, pace: float = 0.0, clock: Clock | None = None) -> None:
         self.port = port
         self.source: Source | None = None
+        self.patience = 1.0
         self.ended = False
         self.fd: int | None = None
         self.pace = pace

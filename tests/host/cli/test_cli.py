@@ -105,8 +105,7 @@ def test_an_unknown_port_exits_3(capsys, verb: str) -> None:
     assert expected in fails(capsys, 3, verb, "telnet:1")
 
 
-def test_a_port_that_is_no_gateway_exits_4(capsys, scripted_board, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.02)
+def test_a_port_that_is_no_gateway_exits_4(capsys, scripted_board, brief_silence) -> None:
     board = scripted_board(lambda i, p: b"OK\r\n")
     assert "no gateway" in fails(capsys, 4, "info", board.path)
 

@@ -34,7 +34,8 @@ def source() -> Source:
 
 
 @pytest.fixture
-def box(request: pytest.FixtureRequest, source: Source) -> Iterator[NetFtBox]:
+def box(request: pytest.FixtureRequest, source: Source, monkeypatch: pytest.MonkeyPatch) -> Iterator[NetFtBox]:
+    monkeypatch.setattr("biotac.calibrate.reference.net_ft.HTTP_TIMEOUT_S", 300.0)
     with NetFtBox(source, network=getattr(request, "param", None)) as its:
         yield its
 
