@@ -15,8 +15,9 @@ from ..errors import CommandRefusedError
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
+from ..wire.native import ffi, lib
 from .board_map import BoardMap, opened
-from .compiled import Settings, board_settings, default_settings, ffi, lib
+from .compiled import Settings, board_settings, default_settings
 
 ROUND_US = 10_000
 NO_TOUCH = 255

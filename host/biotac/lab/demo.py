@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..hand.opening import shake_hands
 from ..recording import Recording
+from ..sim.loading import load_source
 from ..sim.process import SimBoard, SimLink
-from ..sim.sampling import FRAME_HZ, PAC_SLOT
-from ..sim.source import Source, load_source
+from ..sim.source import Source
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, join
+from ..wire.slots import FRAME_HZ, PAC_SLOT
 from .crosscheck import CrossCheck
 
 Show = Callable[[str], None]

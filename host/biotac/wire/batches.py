@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import ffi, lib
 from . import messages_gen as wire
 from .decoder import FRAME, IDLE, NO_FRAME, ONE_STEP_BYTES, PAC, Buffer, counts_of, new, pairs
 from .frames import IDLE_DTYPE, PAC_DTYPE, StructArray, frames_from_wire
 from .framing import FramingCounts
+from .native import ffi, lib
 
 # Looked up once: a live link brings few messages at a time, thousands of times a second.
 _feed = lib.bt_intake_feed

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import ffi, lib
 from . import messages_gen as wire
 from .frames import StructArray
 from .framing import FramingCounts
+from .native import ffi, lib
 
 Buffer = bytes | bytearray | memoryview
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from deframer import Deframer, encode
 
-from biotac.core.compiled import ffi, lib
 from biotac.wire import messages_gen as wire
 from biotac.wire.decoder import STREAMED, Decoded, Decoder
+from biotac.wire.native import ffi, lib
 
 Message = tuple[int, bytes]
 UNKNOWN_ID = 0x7E

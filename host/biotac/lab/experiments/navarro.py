@@ -27,8 +27,8 @@ from ...calibrate.pressure.report import PAPER_ERROR
 from ...calibrate.pressure.rows import rows_of
 from ...hand.hand import Hand
 from ...hand.opening import shake_hands
-from ...link.ports import start_board
 from ...sim.physics import Profile
+from ...sim.ports import start_board
 from ...sim.process import SimLink
 from ...sim.source import Source
 from ...wire import messages_gen as wire
