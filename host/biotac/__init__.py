@@ -33,7 +33,7 @@ from .hand.hand import Hand
 from .hand.opening import open
 from .hand.views import FingerView
 from .keep import Calibration
-from .recording import Compact, Recorder, Recording, load, load_compact
+from .recording import Recorder, Recording, load
 from .version import __version__
 from .wire.batches import LinkStats
 from .wire.frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
@@ -61,7 +61,6 @@ __all__ = [
     "CalibrationState",
     "CallbackError",
     "CommandRefusedError",
-    "Compact",
     "DeviceLostError",
     "Finger",
     "FingerView",
@@ -89,6 +88,5 @@ __all__ = [
     "aio",
     "compute",
     "load",
-    "load_compact",
     "open",
 ]

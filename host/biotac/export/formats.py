@@ -32,7 +32,6 @@ FORMATS = {
     ".parquet": Format("parquet", "columns for pandas and Arrow; PAC in a file of its own", "parquet"),
     ".h5": Format("hdf5", "HDF5, a group a finger, a dataset a column", "hdf5"),
     ".npz": Format("npz", "NumPy arrays named finger0/force_n"),
-    ".btc": Format("compact", "the wire's own integers, small and quick to load with biotac.load_compact"),
     ".ros2": Format("ros2", "a ROS 2 bag, which is a folder: WrenchStamped, PointStamped, counts, PAC", "ros2"),
 }
 

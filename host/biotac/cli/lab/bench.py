@@ -180,20 +180,18 @@ def _recording(args: argparse.Namespace) -> int:
     finally:
         progress.done()
     if args.json:
-        print(json.dumps(asdict(outcome) | {"of_floor": outcome.of_floor, "faster": outcome.faster}))
+        print(json.dumps(asdict(outcome) | {"faster": outcome.faster}))
         return 0
     parts = ", ".join(f"{name} {size / recording.MB:.1f}" for name, size in outcome.mcap_parts.items())
-    floor_mb = outcome.floor_bytes / recording.MB
     print(f"{outcome.source}, {outcome.fingers} finger(s), {outcome.seconds:.1f} s, {outcome.frames} frames and PAC")
     print(f"MB: wire {outcome.wire_bytes / recording.MB:.1f}")
     print(
         f"    MCAP {outcome.mcap_bytes / recording.MB:.1f} ({parts}){_asked_mb(outcome)}\n"
         f"    MCAP with protobuf messages {outcome.protobuf_bytes / recording.MB:.1f}\n"
-        f"    compact {outcome.compact_bytes / recording.MB:.2f}, entropy floor {floor_mb:.2f}"
+        f"    entropy floor of the columns {outcome.floor_bytes / recording.MB:.2f}"
     )
-    print(f"{outcome.of_floor:.3f}x its entropy floor{_met(outcome.of_floor <= recording.ASKED_OF_FLOOR, '<= 1.25x')}")
     print("CPU s to load to NumPy: " + ", ".join(f"{name} {taken:.3f}" for name, taken in outcome.load_s.items()))
-    print(f"{outcome.faster:.1f}x  compact against protobuf{_met(outcome.faster >= recording.ASKED_LOAD, '>= 10x')}")
+    print(f"{outcome.faster:.1f}x  MCAP wire against protobuf")
     return 0
 
 

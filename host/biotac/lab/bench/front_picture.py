@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ...pages import pyplot
 from .front import EVERYTHING, Facts
 
 WEIGHTS = "compress n=1"  # what a board starts with
@@ -18,11 +19,7 @@ BELOW = ("float folded", "divider", "gold int64", "double")
 
 def draw(all_facts: Facts, path: Path) -> None:
     """Write a PNG. ``all_facts`` must have counts."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
+    plt = pyplot()
     figure, axes = plt.subplots(1, 2, figsize=(13, 6), sharey=True, layout="constrained")
     figure.suptitle(f"Cost of one frame against its largest PoC error (weights: {WEIGHTS})")
     for panel, (title, keys) in zip(axes, PANELS, strict=True):

@@ -11,8 +11,8 @@ from mcap.reader import make_reader
 from mcap_protobuf.writer import Writer
 from numpy.typing import NDArray
 
-from ...recording.compact import KINDS, Compact, Fields
 from ...wire import messages_gen as wire
+from .columns import KINDS, Columns, Fields
 
 _OF_KIND = {"frames": wire.Frame.ID, "pac": wire.Pac.ID, "idle": wire.Idle.ID}
 _FIELD = descriptor_pb2.FieldDescriptorProto
@@ -41,7 +41,7 @@ def _messages() -> dict[str, Any]:
 MESSAGES = _messages()
 
 
-def write(path: Path, content: Compact) -> None:
+def write(path: Path, content: Columns) -> None:
     """One message a frame, PAC block and heartbeat."""
     with path.open("wb") as stream, Writer(stream) as out:
         for kind in KINDS:
@@ -53,7 +53,7 @@ def write(path: Path, content: Compact) -> None:
                     out.write_message(f"/{kind}", message, stamp_ns, stamp_ns)
 
 
-def load(path: Path) -> Compact:
+def load(path: Path) -> Columns:
     """All messages to arrays by finger, through one flat list a field."""
     columns: dict[str, dict[int, dict[str, list[Any]]]] = {kind: {} for kind in KINDS}
     plans = {kind: _plan(kind) for kind in KINDS}
@@ -69,7 +69,7 @@ def load(path: Path) -> Compact:
                 lists[name].append(getattr(message, name))
             for name in repeated:
                 lists[name].extend(getattr(message, name))
-    out = Compact({})
+    out = Columns()
     for kind in KINDS:
         for finger, lists in columns[kind].items():
             fields: Fields = {name: _array(kind, name, values) for name, values in lists.items()}

@@ -22,6 +22,7 @@ from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...core.unroll import unroll
 from ...errors import RecordingError
+from ...pages import pyplot
 from ...sim.physics import Profile
 from ...sim.timeline import Pose
 from ...wire import messages_gen as wire
@@ -304,11 +305,7 @@ def _words(case: Facts, facts: Facts) -> str:
 
 def draw(result: Result, path: Path) -> None:
     """Figure 7 laid flat for the default and the paper's weights, table 2 as bars, and by force."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
+    plt = pyplot()
     figure = plt.figure(figsize=(15, 9.5), layout="constrained")
     grid = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
     first = result.cases[0].profile
