@@ -35,9 +35,9 @@ def page() -> str:
     ports, codes = EPILOG.strip().split("\n\n")
     parts = [HEAD, " ".join(ports.split()) + "\n", "## Exit codes\n", *exit_codes(codes)]
     verbs = subparsers(parser())
-    for module in VERBS:
-        parts.append(f"## biotac {module.NAME}\n")
-        parts += body(verbs[module.NAME], module.HELP)
+    for name, (_, text) in VERBS.items():
+        parts.append(f"## biotac {name}\n")
+        parts += body(verbs[name], text)
     return "\n".join(parts)
 
 

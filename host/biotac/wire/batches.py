@@ -39,7 +39,7 @@ _NO_PAC, _NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (PAC_DTYPE, IDLE_DTY
 class Batch:
     """What one chunk of bytes completed.
 
-    ``wire`` holds the FRAME messages as sent (wire.DTYPES), ``seq`` and ``t_us`` (int64) their unwrapped
+    ``wire`` holds the FRAME messages as sent (DTYPES), ``seq`` and ``t_us`` (int64) their unwrapped
     numbers and device times, ``frames`` the same rows in user units, converted when first asked for;
     ``pac`` is PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order. ``fingers`` is a bit mask:
     others have no row in ``wire`` and ``idle``; -1 where it was not looked at.

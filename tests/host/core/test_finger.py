@@ -13,8 +13,9 @@ from biotac.core.finger import FINGER_DTYPE, ROUND_US, Finger, to_frames
 from biotac.sim import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire import slots
+from biotac.wire.dtypes_gen import DTYPES
 
-WIRE_FIELDS = wire.DTYPES[wire.Frame.ID].names
+WIRE_FIELDS = DTYPES[wire.Frame.ID].names
 EVERYTHING = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE | QuantityFlags.SIGMA
 ALL_ROUNDS = EVERYTHING | QuantityFlags.REST_FRAMES
 

@@ -14,8 +14,6 @@ from ...sim.loading import bundled_scenarios
 from ...wire import messages_gen as wire
 from ...wire.identity import board_text, serial_text, version_text
 
-NAME = "list"
-HELP = "List boards and other serial ports, and the scenarios that can be simulated."
 EXAMPLE = "biotac list"
 
 

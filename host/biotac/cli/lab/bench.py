@@ -12,8 +12,6 @@ from ...lab.bench import batch, decode, front, front_picture, idle, kernels, liv
 from .. import values
 from ..progress import Progress
 
-NAME = "bench"
-HELP = "Measure kernels, batch maths, decoding, the live path, an idle link, recording sizes."
 EXAMPLE = "biotac bench kernels --counts counts.json --out front"
 BATCH_FRAMES = 200_000
 DECODE_FRAMES = 30_000  # a minute of five fingers

@@ -15,8 +15,6 @@ from ...pages import pyplot
 from ...partial_file import whole
 from ..progress import Progress
 
-NAME = "experiment"
-HELP = "Do a paper's experiment again: figure, table against the paper, JSON."
 EXAMPLE = "biotac experiment poke --out poked --check"
 SEED_MAX = 2**31 - 1
 

@@ -15,8 +15,6 @@ from ...sim.process import SimBoard
 from .. import values
 from .board_on_pty import tell, tell_over, until_ctrl_c
 
-NAME = "sim"
-HELP = "Run a simulated or emulated board on a pty that any serial program can open."
 EXAMPLE = "biotac sim press.toml --fingers 5 --board pico"
 SCENARIO_S = 600.0
 

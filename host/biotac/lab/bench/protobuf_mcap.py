@@ -12,6 +12,7 @@ from mcap_protobuf.writer import Writer
 from numpy.typing import NDArray
 
 from ...wire import messages_gen as wire
+from ...wire.dtypes_gen import DTYPES
 from .columns import KINDS, Columns, Fields
 
 _OF_KIND = {"frames": wire.Frame.ID, "pac": wire.Pac.ID, "idle": wire.Idle.ID}
@@ -23,7 +24,7 @@ def _messages() -> dict[str, Any]:
     file = descriptor_pb2.FileDescriptorProto(name="biotac_bench.proto", package="biotac_bench", syntax="proto3")
     for kind, message_id in _OF_KIND.items():
         message = file.message_type.add(name=kind.capitalize())
-        dtype = wire.DTYPES[message_id]
+        dtype = DTYPES[message_id]
         for number, name in enumerate(dtype.names or (), 1):
             base, shape = dtype[name].base, dtype[name].shape
             signed = base.kind == "i"
@@ -79,12 +80,12 @@ def load(path: Path) -> Columns:
 
 def _plan(kind: str) -> tuple[list[str], list[str]]:
     """Fields with one value and with many, but for the finger's number."""
-    dtype = wire.DTYPES[_OF_KIND[kind]]
+    dtype = DTYPES[_OF_KIND[kind]]
     names = [name for name in dtype.names or () if name != "finger"]
     return [n for n in names if not dtype[n].shape], [n for n in names if dtype[n].shape]
 
 
 def _array(kind: str, name: str, values: list[Any]) -> NDArray[Any]:
-    of_wire = wire.DTYPES[_OF_KIND[kind]][name]
+    of_wire = DTYPES[_OF_KIND[kind]][name]
     dtype = np.dtype(np.int64) if name in ("seq", "t_us") else of_wire.base
     return np.array(values, dtype).reshape(-1, *of_wire.shape)
