@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.unroll import unroll
-from ..pages import pyplot
 from ..sim.source import Source
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
@@ -21,7 +20,11 @@ AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")  # x, y, z: dark enough for whit
 
 def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], path: Path) -> None:
     """Write a PNG of finger 0; ``source_rows`` (n,) says which row of the source each frame is."""
-    plt = pyplot()
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
     mine = batch.frames["finger"] == 0
     frames, messages = batch.frames[mine], batch.wire[mine]
     figure, axes = plt.subplots(1, 2, figsize=(13, 5.6), width_ratios=(1, 1.9), layout="constrained")

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ...pages import pyplot, table
 from . import figures
 from .alignment import MAX_LAG_ROWS
 from .blocks import BLOCKS, GUARD_ROWS
@@ -69,7 +68,11 @@ def markdown(validation: Validation, picture: str) -> str:
 
 def draw(validation: Validation, path: Path) -> None:
     """Write a PNG: prediction against truth per force axis, and the models' errors."""
-    plt = pyplot()
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
     figure, axes = plt.subplots(1, 4, figsize=(16, 4.4), layout="constrained")
     figure.suptitle(f"{validation.run.name}: {figures.model_name(validation)}, held out")
     for axis in range(3):
@@ -104,6 +107,10 @@ def _rest(validation: Validation, facts: dict[str, Any]) -> list[str]:
     return [line + f" counts of drift; E_base is trained in with force 0, {facts['air_share']:.1%} of the run's weight"]
 
 
+def _table(head: list[str], rows: list[list[str]]) -> list[str]:
+    return ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]]
+
+
 def _unit(axis: str) -> str:
     return "N" if axis.startswith("F") else "N mm"
 
@@ -125,7 +132,7 @@ def _axes(validation: Validation) -> list[str]:
         chosen = ", ".join(f"{model} {folds}" for model, folds in votes.items())
         figures_here = [f"{e[k]:.3f} {_unit(name)}" for e in errors]
         rows.append([name, *figures_here, f"{explained[k]:.3f}", f"{truth[:, k].std():.3f} {_unit(name)}", chosen])
-    return table([*head[:-1], f"chosen by (of {BLOCKS} folds)"], rows)
+    return _table([*head[:-1], f"chosen by (of {BLOCKS} folds)"], rows)
 
 
 def _models(validation: Validation) -> list[str]:
@@ -134,7 +141,7 @@ def _models(validation: Validation) -> list[str]:
     for name, errors in validation.by_model.items():
         drifted = errors[1:].max(axis=0)
         rows.append([name, *[f"{a:.3f} ({b:.3f})" for a, b in zip(errors[0], drifted, strict=True)], words[name]])
-    return table(["model", *[f"{axis} [{_unit(axis)}]" for axis in validation.run.axes], ""], rows)
+    return _table(["model", *[f"{axis} [{_unit(axis)}]" for axis in validation.run.axes], ""], rows)
 
 
 def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
@@ -169,7 +176,7 @@ def _confusion(validation: Validation) -> list[str]:
     matrix = figures.confusion(validation.predicted[0], validation.run.truth)
     names = validation.run.axes
     rows = [[f"predicted {name}", *[f"{value:+.3f}" for value in row]] for name, row in zip(names, matrix, strict=True)]
-    return table(["", *[f"true {name}" for name in names]], rows)
+    return _table(["", *[f"true {name}" for name in names]], rows)
 
 
 def _draw_axis(axes: Any, validation: Validation, axis: int) -> None:

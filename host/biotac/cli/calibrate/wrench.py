@@ -23,7 +23,6 @@ from ...calibrate.wrench.sources import Loaded, load
 from ...calibrate.wrench.upload import upload
 from ...errors import InputError
 from ...hand.views import checked_names, finger_index
-from ...pages import pyplot
 from ...partial_file import whole
 from ...wire.identity import ascii_text
 from ..progress import Progress
@@ -184,7 +183,6 @@ def _places(folder: Path, path: Path) -> tuple[Path, Path, Path]:
 
 def _check_out(folder: Path, files: list[Path], *, overwrite: bool) -> None:
     """Before minutes of work and not after it."""
-    pyplot()
     places = [place for path in files for place in _places(folder, path)]
     twice = {place for place in places if places.count(place) > 1}
     if twice:

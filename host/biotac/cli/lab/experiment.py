@@ -11,7 +11,6 @@ from typing import Any
 from ...errors import InputError
 from ...lab.experiments import catalogue
 from ...lab.experiments.outcome import Experiment, Facts, Options, markdown, verdicts
-from ...pages import pyplot
 from ...partial_file import whole
 from ..progress import Progress
 
@@ -83,7 +82,6 @@ def _check_arguments(args: argparse.Namespace, experiment: Experiment) -> None:
         raise InputError(f"{args.name} has no use for a wrench map: leave --map out")
     if args.out is None:
         return
-    pyplot()
     for place in _places(args.out, args.name):
         if place.exists() and not args.force:
             raise InputError(f"{place} exists and would be overwritten; choose another folder or say --force")

@@ -27,7 +27,6 @@ from ...calibrate.pressure.report import PAPER_ERROR
 from ...calibrate.pressure.rows import rows_of
 from ...hand.hand import Hand
 from ...hand.opening import shake_hands
-from ...pages import pyplot
 from ...sim.physics import Profile
 from ...sim.ports import start_board
 from ...sim.process import SimLink
@@ -300,7 +299,11 @@ def page(facts: Facts) -> list[str]:
 
 def draw(result: Result, path: Path) -> None:
     """Figure 3 for every finger: pressure above rest against force, the held rows and the line of slope K."""
-    plt = pyplot()
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
     figure, axes = plt.subplots(len(result.hands), len(NAMES), figsize=(15, 3.4 * len(result.hands)), squeeze=False)
     for its, row in zip(result.hands, axes, strict=True):
         for k, ax in enumerate(row):

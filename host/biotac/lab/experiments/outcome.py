@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from ... import pages
-
 Facts = dict[str, Any]
 Show = Callable[[str], None]
 
@@ -89,8 +87,8 @@ def text(value: float | None, digits: int = 3) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a Markdown table, then an empty one."""
-    return [*pages.table(head, rows), ""]
+    """Lines of a markdown table, then an empty one."""
+    return ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]] + [""]
 
 
 def markdown(title: str, body: list[str], facts: Facts, picture: str) -> str:

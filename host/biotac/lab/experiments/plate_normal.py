@@ -18,7 +18,6 @@ import numpy as np
 from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...errors import RecordingError
-from ...pages import pyplot
 from ...sim.physics import Profile
 from ...sim.timeline import Pose
 from ...wire import messages_gen as wire
@@ -191,7 +190,11 @@ def page(facts: Facts) -> list[str]:
 
 def draw(result: Result, path: Path) -> None:
     """Shares of frames below an angle, and angles against pressure for the default weights."""
-    plt = pyplot()
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
     figure, axes = plt.subplots(1, 2, figsize=(13, 5.4), layout="constrained")
     figure.suptitle(f"Normal at the point of contact against a flat plate's: {result.source}")
     colors = {SHIPPED: "#1d4ed8", wire.PocWeights.ABS_N2: "#c2410c", wire.PocWeights.COMPRESS_N2: "#15803d"}

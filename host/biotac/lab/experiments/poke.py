@@ -22,7 +22,6 @@ from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...core.unroll import unroll
 from ...errors import RecordingError
-from ...pages import pyplot
 from ...sim.physics import Profile
 from ...sim.timeline import Pose
 from ...wire import messages_gen as wire
@@ -305,7 +304,11 @@ def _words(case: Facts, facts: Facts) -> str:
 
 def draw(result: Result, path: Path) -> None:
     """Figure 7 laid flat for the default and the paper's weights, table 2 as bars, and by force."""
-    plt = pyplot()
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
     figure = plt.figure(figsize=(15, 9.5), layout="constrained")
     grid = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
     first = result.cases[0].profile

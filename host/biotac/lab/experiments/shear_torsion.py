@@ -23,7 +23,6 @@ from ...calibrate.wrench.recorded import load_run
 from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...core.map_columns import Signals
-from ...pages import pyplot
 from ...sim import sampling
 from ...sim.physics import REST_CELSIUS, Finger, States
 from ...wire.messages_gen import SETTINGS, Setting
@@ -212,7 +211,11 @@ def page(facts: Facts) -> list[str]:
 
 def draw(result: Result, path: Path) -> None:
     """Fy and torsion against the truth, the paper's and the map's."""
-    plt = pyplot()
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
     truth, both = result.validation.run.truth, result.both
     figure, panels = plt.subplots(1, 2, figsize=(11, 5), layout="constrained")
     figure.suptitle(f"Shear and torsion at once, held-out locations: emulated finger, seed {result.seed}")

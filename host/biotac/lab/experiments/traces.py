@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ...core.geometry import Floats
-from ...pages import pyplot
 from ...wire import sensor_gen as _sensor
 from .estimates import PAPER, Estimate
 from .trial import Trial
@@ -65,7 +64,11 @@ def _values(trial: Trial, its: Estimate, axis: str) -> Floats | None:
 
 def draw(trial: Trial, below: Sequence[Panel], title: str, path: Path, marked: Sequence[str]) -> None:
     """Write a PNG; electrodes in ``marked`` are in colour, the others grey."""
-    plt = pyplot()
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
     ratios = [1.6] + [1.0] * len(below)
     figure, axes = plt.subplots(len(below) + 1, 1, figsize=(13, 2.4 * sum(ratios) / 1.15), sharex=True,
                                 height_ratios=ratios, layout="constrained")  # fmt: skip
