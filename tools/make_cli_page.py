@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
 from biotac.cli.main import EPILOG, VERBS, parser  # noqa: E402
-from biotac.pages import table  # noqa: E402
+from biotac.markdown import table  # noqa: E402
 from committed import write_or_check  # noqa: E402
 
 HEAD = """\
@@ -45,7 +45,7 @@ def exit_codes(text: str) -> Iterator[str]:
     """The epilog's codes as a table."""
     words = " ".join(text.removeprefix("exit codes:").split())
     rows = [(code, what.strip()) for code, what in re.findall(r"(\d+) (\D+)", words)]
-    yield "\n".join(table(["code", "meaning"], rows)) + "\n"
+    yield "\n".join(table(["code", "meaning"], rows))
 
 
 def body(verb: argparse.ArgumentParser, text: str) -> Iterator[str]:
@@ -53,7 +53,7 @@ def body(verb: argparse.ArgumentParser, text: str) -> Iterator[str]:
     yield text + "\n"
     rows = [row(action) for action in verb._actions if shown(action)]
     if rows:
-        yield "\n".join(table(["argument", "meaning"], rows)) + "\n"
+        yield "\n".join(table(["argument", "meaning"], rows))
     if verb.epilog:
         yield "    " + verb.epilog.removeprefix("example: ") + "\n"
     for name, part in subparsers(verb).items():

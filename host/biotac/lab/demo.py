@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..hand.opening import shake_hands
-from ..pages import pyplot, table
+from ..markdown import table
+from ..picture import check_drawable
 from ..recording import Recording
 from ..sim.loading import load_source
 from ..sim.process import SimBoard, SimLink
@@ -55,7 +56,7 @@ def run_demo(
     """
     from .demo_picture import draw
 
-    pyplot()  # missing, it is before the work that this is said
+    check_drawable()
     source = load_source(source_name, fingers=fingers, seconds=seconds)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -179,7 +180,6 @@ def report_text(facts: dict[str, Any]) -> str:
                 ["host CPU", f"{facts['host_cpu_percent']} % of one core", ""],
             ],
         ),
-        "",
         "The errors are those of the board's fixed point against the same formulas in float64, not those of the",
         "formulas against a real force.",
     ]
@@ -188,5 +188,5 @@ def report_text(facts: dict[str, Any]) -> str:
         lines.append(f"Against the source's own force, in contact: {x:.2f} / {y:.2f} / {z:.2f} N RMS in x / y / z.")
     if facts["tare_changes"]:
         changes = [[str(t["finger"]), str(t["seq"]), t["reason"]] for t in facts["tare_changes"][:50]]
-        lines += ["", *table(["finger", "frame", "tare changed because"], changes)]
+        lines += ["", *table(["finger", "frame", "tare changed because"], changes)[:-1]]
     return "\n".join(lines) + "\n"

@@ -24,6 +24,7 @@ from ...calibrate.wrench.upload import upload
 from ...errors import InputError
 from ...hand.views import checked_names, finger_index
 from ...partial_file import whole
+from ...picture import check_drawable
 from ...picture import picture as drawn
 from ...wire.identity import ascii_text
 from ..progress import Progress
@@ -184,6 +185,7 @@ def _places(folder: Path, path: Path) -> tuple[Path, Path, Path]:
 
 def _check_out(folder: Path, files: list[Path], *, overwrite: bool) -> None:
     """Before minutes of work and not after it."""
+    check_drawable()
     places = [place for path in files for place in _places(folder, path)]
     twice = {place for place in places if places.count(place) > 1}
     if twice:

@@ -79,14 +79,14 @@ def _kernels(args: argparse.Namespace) -> int:
     facts = front.facts(outcome, counts)
     if args.out:
         _write(args.out, facts, with_picture=counts is not None)
-    print(json.dumps(facts) if args.json else front.table(facts), end="")
+    print(json.dumps(facts) if args.json else front.page(facts), end="")
     return 0
 
 
 def _write(out: Path, facts: front.Facts, *, with_picture: bool) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
-        (out / "front.md").write_text(front.table(facts), encoding="utf-8")
+        (out / "front.md").write_text(front.page(facts), encoding="utf-8")
         (out / "front.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
         if with_picture:
             front_picture.draw(facts, out / "front.png")

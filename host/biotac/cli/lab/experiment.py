@@ -12,6 +12,7 @@ from ...errors import InputError
 from ...lab.experiments import catalogue
 from ...lab.experiments.outcome import Experiment, Facts, Options, markdown, verdicts
 from ...partial_file import whole
+from ...picture import check_drawable
 from ...picture import picture as drawn
 from ..progress import Progress
 
@@ -83,6 +84,7 @@ def _check_arguments(args: argparse.Namespace, experiment: Experiment) -> None:
         raise InputError(f"{args.name} has no use for a wrench map: leave --map out")
     if args.out is None:
         return
+    check_drawable()
     for place in _places(args.out, args.name):
         if place.exists() and not args.force:
             raise InputError(f"{place} exists and would be overwritten; choose another folder or say --force")

@@ -10,8 +10,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ... import pages
 from ...errors import InputError
+from ...markdown import table
 from . import limit
 from .kernels import QUANTITIES, WEIGHT_NAMES, Outcome
 
@@ -121,7 +121,7 @@ def exceptions(outcome: Outcome) -> list[str]:
     return out
 
 
-def table(all_facts: Facts) -> str:
+def page(all_facts: Facts) -> str:
     """Markdown: a table per kind of weights, the budget under it, and the exceptions."""
     effort = all_facts["effort"]
     lines = [
@@ -152,7 +152,7 @@ def _scene_table(all_facts: Facts) -> list[str]:
     for scene in next(iter(scenes.values())):
         cells = (row for key in cores for row in scenes[key][scene])
         rows.append([scene, *(f"{row['cycles']}, {row['cycles_max']}" for row in cells)])
-    return pages.table(head, rows)
+    return table(head, rows)[:-1]
 
 
 def _one_table(all_facts: Facts, weights: str) -> list[str]:
@@ -178,4 +178,4 @@ def _one_table(all_facts: Facts, weights: str) -> list[str]:
     rows.append(["one ADC step at 1 N, RMS", *blank, *(f"{step[q]:.2g}" for q in QUANTITIES)])
     share = all_facts["budget_share"]
     rows.append([f"1/{round(1 / share)} of it", *blank, *(f"{step[q] * share:.2g}" for q in QUANTITIES)])
-    return pages.table(head, rows)
+    return table(head, rows)[:-1]
