@@ -30,9 +30,7 @@ FORMATS = {
     ".parquet": Format("biotac.export.parquet", "columns for pandas and Arrow; PAC in a file of its own", "parquet"),
     ".h5": Format("biotac.export.hdf5", "HDF5, a group a finger, a dataset a column", "hdf5"),
     ".npz": Format("biotac.export.npz", "NumPy arrays named finger0/force_n"),
-    ".ros2": Format(
-        "biotac.export.ros2", "a ROS 2 bag, which is a folder: WrenchStamped, PointStamped, counts, PAC", "ros2"
-    ),
+    ".ros2": Format("biotac.export.ros2", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC", "ros2"),
 }
 
 

@@ -16,7 +16,7 @@ from .source import MAX_SECONDS, Source
 
 def bundled_scenarios() -> list[str]:
     """File names of the scenarios that come with the package."""
-    folder = resources.files("biotac.sim") / "scenarios"
+    folder = resources.files(__package__) / "scenarios"
     return sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
@@ -51,7 +51,7 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
 def _scenario_bytes(place: Path) -> bytes:
     try:
         if not place.exists() and place.parent == Path() and place.name in bundled_scenarios():
-            return (resources.files("biotac.sim") / "scenarios" / place.name).read_bytes()
+            return (resources.files(__package__) / "scenarios" / place.name).read_bytes()
         return place.read_bytes()
     except FileNotFoundError:
         raise InputError(
