@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ...errors import InputError
-from ...lab.bench import batch, decode, front, front_picture, idle, kernels, live, recording
+from ...lab.bench import batch, decode, front, front_picture, idle, imports, kernels, live, recording
 from .. import values
 from ..progress import Progress
 
@@ -27,11 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="WHAT",
         nargs="?",
         default="kernels",
-        choices=[*FRAMES, "idle", "live", "recording"],
+        choices=[*FRAMES, "idle", "imports", "live", "recording"],
         help="kernels (default): every variant's errors and cost; batch: whole recordings, biotac.compute; "
         "decode: the link's bytes to arrays, against pymavlink and Python; "
-        "idle: bytes on the link at rest and in contact; live: reading thread to callback, against a pyserial "
-        "thread; recording: sizes and load times of recordings",
+        "idle: bytes on the link at rest and in contact; imports: what starting costs; "
+        "live: reading thread to callback, against a pyserial thread; recording: sizes and load times of recordings",
     )
     parser.add_argument(
         "--frames",
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--source", default="press.toml", help="idle, recording: what to play (default %(default)s)")
     parser.add_argument("--fingers", type=int, default=5, help="recording: how many (default %(default)s)")
     parser.add_argument("--seconds", type=values.seconds, default=600.0, help="recording: device time (default 600)")
-    parser.add_argument("--rounds", type=_count, default=5, metavar="N", help="live: of each reader (default 5)")
+    parser.add_argument("--rounds", type=_count, default=5, metavar="N", help="imports, live: of each (default 5)")
     climb = parser.add_argument_group("kernels")
     climb.add_argument("--restarts", type=_count, default=effort.restarts, metavar="N", help="of the hill climbing")
     climb.add_argument("--steps", type=_count, default=effort.steps, metavar="N", help="of each restart")
@@ -64,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
         return _idle(args)
     if args.what == "recording":
         return _recording(args)
+    if args.what == "imports":
+        return _imports(args)
     if args.what == "live":
         return _live(args)
     low, high = FRAMES[args.what]
@@ -108,6 +110,16 @@ def _idle(args: argparse.Namespace) -> int:
         print(f"{name:22}{share.seconds:6.2f} s {share.frames:8} {share.heartbeats:11} {share.bytes_per_s:9.0f}")
     print(f"at rest {outcome.saved_percent:.1f} % fewer bytes per second than in contact")
     print("skipped: " + ", ".join(f"{name} {count}" for name, count in outcome.skipped.items()))
+    return 0
+
+
+def _imports(args: argparse.Namespace) -> int:
+    taken = imports.measure(args.rounds)
+    if args.json:
+        print(json.dumps(taken))
+        return 0
+    for name, cpu_s in taken.items():
+        print(f"{name:30} {cpu_s:6.3f} s CPU  {cpu_s / taken[imports.BASE]:5.2f} of {imports.BASE}")
     return 0
 
 
