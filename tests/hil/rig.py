@@ -15,8 +15,8 @@ import tomllib
 
 import biotac
 from biotac.link.ports import start_board
+from biotac.sim.loading import load_source
 from biotac.sim.process import SimBoard
-from biotac.sim.source import load_source
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

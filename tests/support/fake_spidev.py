@@ -6,9 +6,9 @@ import threading
 from pathlib import Path
 from types import ModuleType
 
-from biotac.core.compiled import ffi, lib
 from biotac.sim.source import Source
 from biotac.sim.tape import write_tape
+from biotac.wire.native import ffi, lib
 from biotac.wire.sensor_gen import LISTEN_WORD, SPI_HZ
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import subprocess
 import sys
@@ -29,8 +30,10 @@ def fails(capsys, code: int, *words: str) -> str:
 
 def test_help_fits_a_screen_and_every_verb_has_an_example() -> None:
     assert parser().format_help().count("\n") <= 40
-    for module in VERBS:
-        assert run(module.NAME, "--help").stdout.rstrip().endswith(f"example: {module.EXAMPLE}")
+    for name, (place, text) in VERBS.items():
+        example = importlib.import_module(place).EXAMPLE
+        said = run(name, "--help").stdout
+        assert text[:40] in said and said.rstrip().endswith(f"example: {example}")
 
 
 def test_version_names_release_and_wire(capsys) -> None:

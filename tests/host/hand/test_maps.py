@@ -30,8 +30,8 @@ from biotac.link.ports import start_board
 from biotac.link.serial_port import SerialLink
 from biotac.recording import Recording
 from biotac.recording.recompute import recompute
+from biotac.sim.loading import load_source
 from biotac.sim.process import SimBoard, SimLink
-from biotac.sim.source import load_source
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...core.map_columns import Signals, centroid_mm
 from .crossvalidation import SHIFTS_COUNTS, Validation
-from .features import Signals, centroid_mm, columns
+from .features import columns
 from .models import LIN
 from .moments import aligned, with_one
 from .recorded import Floats

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ...core.map_columns import ELECTRODES, Signals
 from ...errors import InputError
 from . import features
 from .crossvalidation import Validation
-from .features import ELECTRODES, Signals
 from .figures import model_name
 from .moments import with_one
 from .recorded import Floats

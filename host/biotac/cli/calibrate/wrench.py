@@ -24,6 +24,8 @@ from ...calibrate.wrench.upload import upload
 from ...errors import InputError
 from ...hand.views import checked_names, finger_index
 from ...partial_file import whole
+from ...picture import check_drawable
+from ...picture import picture as drawn
 from ...wire.identity import ascii_text
 from ..progress import Progress
 from . import live as calibrate_live
@@ -183,6 +185,7 @@ def _places(folder: Path, path: Path) -> tuple[Path, Path, Path]:
 
 def _check_out(folder: Path, files: list[Path], *, overwrite: bool) -> None:
     """Before minutes of work and not after it."""
+    check_drawable()
     places = [place for path in files for place in _places(folder, path)]
     twice = {place for place in places if places.count(place) > 1}
     if twice:
@@ -200,7 +203,8 @@ def _write(
     with contextlib.ExitStack() as stack:
         parts = [stack.enter_context(whole(place, overwrite=overwrite)) for place in (page, picture, its_map)]
         parts[0].write_text(report.markdown(validation, picture.name) + _origin(its), encoding="utf-8")
-        report.draw(validation, parts[1])
+        with drawn(parts[1]) as figure:
+            report.draw(validation, figure)
         parts[2].write_text(provenance.embed(fitted.dumps(fitted.of(validation)), its), encoding="utf-8")
     return places
 

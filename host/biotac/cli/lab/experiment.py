@@ -12,10 +12,10 @@ from ...errors import InputError
 from ...lab.experiments import catalogue
 from ...lab.experiments.outcome import Experiment, Facts, Options, markdown, verdicts
 from ...partial_file import whole
+from ...picture import check_drawable
+from ...picture import picture as drawn
 from ..progress import Progress
 
-NAME = "experiment"
-HELP = "Do a paper's experiment again: figure, table against the paper, JSON."
 EXAMPLE = "biotac experiment poke --out poked --check"
 SEED_MAX = 2**31 - 1
 
@@ -84,6 +84,7 @@ def _check_arguments(args: argparse.Namespace, experiment: Experiment) -> None:
         raise InputError(f"{args.name} has no use for a wrench map: leave --map out")
     if args.out is None:
         return
+    check_drawable()
     for place in _places(args.out, args.name):
         if place.exists() and not args.force:
             raise InputError(f"{place} exists and would be overwritten; choose another folder or say --force")
@@ -107,7 +108,8 @@ def _write(
         text, picture, figures = (stack.enter_context(whole(place, overwrite=args.force)) for place in places)
         title = f"{args.name}: {catalogue.NAMES[args.name]}"
         text.write_text(markdown(title, page, facts, picture.name), encoding="utf-8")
-        experiment.draw(result, picture)
+        with drawn(picture) as figure:
+            experiment.draw(result, figure)
         figures.write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
     return places
 

@@ -1,0 +1,34 @@
+"""A picture as a PNG, by matplotlib, which is imported only where something is drawn."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError
+
+
+def check_drawable() -> None:
+    """Raise InputError where matplotlib is missing: to be asked before minutes of work, not after them."""
+    if importlib.util.find_spec("matplotlib") is None:
+        raise InputError("a picture needs matplotlib, which is not installed; pip install 'biotac-gateway[plot]'")
+
+
+@contextlib.contextmanager
+def picture(path: Path) -> Iterator[Any]:
+    """A matplotlib figure to draw in, written to ``path`` at the end. Raises InputError without matplotlib."""
+    check_drawable()
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    page = plt.figure(layout="constrained")
+    try:
+        yield page
+        page.savefig(path, dpi=100)
+    finally:
+        plt.close(page)
