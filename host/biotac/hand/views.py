@@ -7,19 +7,17 @@ import threading
 from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clock.host_clock import HostClock
 from ..errors import InputError
 from ..wire.batches import Batch
 from ..wire.frames import FRAME_DTYPE, Frame, StructArray, frames_from_wire
 from ..wire.messages_gen import INVALID_COUNT, FrameFlags
 from ..wire.sensor_gen import MAX_SENSORS
-
-if TYPE_CHECKING:
-    from ..clock.wall import Timing
 
 #: Chip selects by name, unless ``biotac.open(..., fingers=...)`` says otherwise.
 DEFAULT_NAMES = {"index": 0, "middle": 1, "ring": 2, "little": 3, "thumb": 4}
@@ -66,13 +64,20 @@ class Latest:
     looked at.
     """
 
-    def __init__(self, timing: Timing) -> None:
-        self.timing = timing
+    def __init__(self, host_clock: HostClock, names: Mapping[str, int] | None = None) -> None:
+        self._monotonic_s = host_clock.monotonic_s
+        self._names = checked_names(names)
         self._unseen: deque[tuple[Batch, float]] = deque()
         self._unseen_fingers = 0  # bit mask
         # finger: (batch, row, row is a heartbeat, arrival in s)
         self._entries: dict[int, tuple[Batch, int, bool, float]] = {}
         self._looking = threading.Lock()
+
+    def __getitem__(self, key: str | int) -> FingerView:
+        """A finger by name or chip select; KeyError in words."""
+        index = finger_index(self._names, key)
+        names = {number: name for name, number in self._names.items()}
+        return FingerView(names.get(index, str(index)), index, self)
 
     def update(self, batch: Batch, when_s: float) -> None:
         """Take note of it. One thread at a time."""
@@ -125,7 +130,7 @@ class Latest:
     def age_s(self, finger: int) -> float:
         """Since the row came; inf before any."""
         entry = self._look().get(finger)
-        return math.inf if entry is None else self.timing.monotonic_s() - entry[3]
+        return math.inf if entry is None else self._monotonic_s() - entry[3]
 
 
 def _last_of(batch: Batch) -> dict[int, tuple[int, bool]]:

@@ -320,7 +320,7 @@ def test_a_board_that_falls_silent_is_6(capsys, scripted_board, hello, files, tm
 
 
 def test_a_board_that_falls_silent_in_its_stream_is_6(capsys, scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.hand.SILENCE_S", 0.05)
+    monkeypatch.setattr("biotac.hand.streams.SILENCE_S", 0.05)
 
     def answer(message_id: int, payload: bytes) -> bytes:
         if message_id == wire.HelloRequest.ID:
