@@ -30,10 +30,6 @@ Got = TypeVar("Got")
 Reply = TypeVar("Reply")
 
 
-def _lost_for_good(error: DeviceLostError, reason: Reason) -> None:
-    raise error
-
-
 class Board:
     """The board that answers on ``link``, which is closed when the handshake fails.
 
@@ -51,23 +47,17 @@ class Board:
         self.record: Callable[[bytes], object] | None = None
         #: Takes the gap before the first batch behind it.
         self.record_gap: Callable[[Gap], object] = lambda gap: None
-        #: What ended a recording, until it is told.
-        self.trouble: Exception | None = None
         #: The link is gone: raises, or returns once the board is back as it was.
-        self.lost: Callable[[DeviceLostError, Reason], None] = _lost_for_good
+        self.lost: Callable[[DeviceLostError, Reason], None] = self._lost
         #: Whether the caller's thread reads the link; others wait for what it reads.
         self.is_read_here: Callable[[], bool] = lambda: True
-        #: It can be talked to; false while it is looked for.
-        self.connected = True
-        #: Set when everything is to come to its end.
-        self.closing = threading.Event()
+        self.connected = True  #: it can be talked to; false while it is looked for
+        self.closing = threading.Event()  #: set when everything is to come to its end
         self.closed = False
-        #: What the thread that reads has died of.
-        self.failure: BaseException | None = None
-        #: How many replies are waited for.
-        self.awaiting = 0
-        #: To go with the next rows.
-        self.gap: Gap | None = None
+        self.failure: BaseException | None = None  #: what the thread that reads has died of
+        self.trouble: Exception | None = None  #: what ended a recording, until it is told
+        self.awaiting = 0  #: replies
+        self.gap: Gap | None = None  #: to go with the next rows
         self._gaps = self._bytes = self._frames = 0
         self._decoder = StreamDecoder()
         self._past: list[LinkStats] = []  # of decoders before a reboot
@@ -112,6 +102,9 @@ class Board:
     def _accept_newer_minor(self) -> None:
         if self.info.wire_minor > wire.WIRE_MINOR:
             self._decoder.accept_newer_minor()
+
+    def _lost(self, error: DeviceLostError, reason: Reason) -> None:
+        raise error
 
     def close(self) -> None:
         """Give the port back."""

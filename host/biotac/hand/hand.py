@@ -47,18 +47,12 @@ class Recorder(Protocol):
     def close(self) -> None: ...
 
 
-def _command(method: Callable[Concatenate[Commands, P], R]) -> Callable[Concatenate[Hand, P], R]:
+def _of(part: str, method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Hand, P], R]:
+    """A method of Hand that is its part's."""
+
     @wraps(method)
     def call(self: Hand, /, *args: P.args, **kwargs: P.kwargs) -> R:
-        return method(self._commands, *args, **kwargs)
-
-    return call
-
-
-def _stream(method: Callable[Concatenate[Streams, P], R]) -> Callable[Concatenate[Hand, P], R]:
-    @wraps(method)
-    def call(self: Hand, /, *args: P.args, **kwargs: P.kwargs) -> R:
-        return method(self._streams, *args, **kwargs)
+        return method(getattr(self, part), *args, **kwargs)
 
     return call
 
@@ -168,44 +162,44 @@ class Hand:
 
     # ---- commands (commands.py) ----------------------------------------------------------------
 
-    ping = _command(Commands.ping)
-    status = _command(Commands.status)
-    sync = _command(Commands.sync)
-    sensor_status = _command(Commands.sensor_status)
-    sensor_info = _command(Commands.sensor_info)
-    point = _command(Commands.point)
-    tare = _command(Commands.tare)
-    set_tare = _command(Commands.set_tare)
-    setting = _command(Commands.setting)
-    set_setting = _command(Commands.set_setting)
-    settings = _command(Commands.settings)
-    save_settings = _command(Commands.save_settings)
-    calibration = _command(Commands.calibration)
-    calibration_state = _command(Commands.calibration_state)
-    set_calibration = _command(Commands.set_calibration)
-    clear_calibration = _command(Commands.clear_calibration)
-    calibrations = _command(Commands.calibrations)
-    finger_settings = _command(Commands.finger_settings)
-    get_map = _command(Commands.get_map)
-    map_state = _command(Commands.map_state)
-    set_map = _command(Commands.set_map)
-    clear_map = _command(Commands.clear_map)
-    maps = _command(Commands.maps)
-    reboot_bootloader = _command(Commands.reboot_bootloader)
+    ping = _of("_commands", Commands.ping)
+    status = _of("_commands", Commands.status)
+    sync = _of("_commands", Commands.sync)
+    sensor_status = _of("_commands", Commands.sensor_status)
+    sensor_info = _of("_commands", Commands.sensor_info)
+    point = _of("_commands", Commands.point)
+    tare = _of("_commands", Commands.tare)
+    set_tare = _of("_commands", Commands.set_tare)
+    setting = _of("_commands", Commands.setting)
+    set_setting = _of("_commands", Commands.set_setting)
+    settings = _of("_commands", Commands.settings)
+    save_settings = _of("_commands", Commands.save_settings)
+    calibration = _of("_commands", Commands.calibration)
+    calibration_state = _of("_commands", Commands.calibration_state)
+    set_calibration = _of("_commands", Commands.set_calibration)
+    clear_calibration = _of("_commands", Commands.clear_calibration)
+    calibrations = _of("_commands", Commands.calibrations)
+    finger_settings = _of("_commands", Commands.finger_settings)
+    get_map = _of("_commands", Commands.get_map)
+    map_state = _of("_commands", Commands.map_state)
+    set_map = _of("_commands", Commands.set_map)
+    clear_map = _of("_commands", Commands.clear_map)
+    maps = _of("_commands", Commands.maps)
+    reboot_bootloader = _of("_commands", Commands.reboot_bootloader)
 
     # ---- streams (streams.py) ------------------------------------------------------------------
 
-    start = _stream(Streams.start)
-    stop = _stream(Streams.stop)
-    subscribe = _stream(Streams.subscribe)
-    want = _stream(Streams.want)
-    batches = _stream(Streams.batches)
-    on_batch = _stream(Streams.on_batch)
-    on_touch = _stream(Streams.on_touch)
-    on_tare = _stream(Streams.on_tare)
-    on_status = _stream(Streams.on_status)
-    on_gap = _stream(Streams.on_gap)
-    check = _stream(Streams.check)
+    start = _of("_streams", Streams.start)
+    stop = _of("_streams", Streams.stop)
+    subscribe = _of("_streams", Streams.subscribe)
+    want = _of("_streams", Streams.want)
+    batches = _of("_streams", Streams.batches)
+    on_batch = _of("_streams", Streams.on_batch)
+    on_touch = _of("_streams", Streams.on_touch)
+    on_tare = _of("_streams", Streams.on_tare)
+    on_status = _of("_streams", Streams.on_status)
+    on_gap = _of("_streams", Streams.on_gap)
+    check = _of("_streams", Streams.check)
 
     def run(self, *, queue: bool = False) -> Hand:
         """Have threads read the board from now on, and let it stream; returns this hand.
