@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -76,7 +77,7 @@ def replies_to(hand: biotac.Hand, message_id: int, payload: bytes) -> list[Any]:
         seen.append(message)
         return isinstance(message, wire.Reply) and message.req_id == 255
 
-    assert hand._await(last) is not None
+    assert hand._board.next_message(last, time.monotonic() + 60.0) is not None
     return [m for m in seen[:-1] if isinstance(m, wire.Reply) or getattr(m, "req_id", 0) == 7]
 
 
@@ -109,11 +110,11 @@ def test_a_command_from_the_future_and_one_of_wrong_length_are_answered_in_words
 
 def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:
     hand = board("press.toml?seconds=3")
-    hand._command(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 200))
+    hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 200))
     hand.link.release()
     frames = 0
-    while hand._pump(1.0) and not hand.link.ended:
-        while (batch := hand._batches.take()) is not None:
+    while hand._board.read(1.0) and not hand.link.ended:
+        while (batch := hand._streams._pulled.take()) is not None:
             frames += len(batch.frames)
     assert 18 <= frames <= 22  # 200 ms of 10 ms rounds, and what was under way
     assert hand.status().streams == 0

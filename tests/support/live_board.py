@@ -54,7 +54,7 @@ class Firmware:
 
 
 class Clock:
-    """live.timing.Timing by hand: ``pause`` calls ``while_away`` instead of waiting."""
+    """A HostClock by hand: ``sleep`` calls ``while_away`` instead of waiting."""
 
     def __init__(self) -> None:
         self.now_s = 1000.0
@@ -67,7 +67,7 @@ class Clock:
     def unix_ns(self) -> int:
         return round(self.now_s * 1e9)
 
-    def pause(self, seconds: float) -> None:
+    def sleep(self, seconds: float) -> None:
         self.pauses += 1
         self.now_s += seconds
         self.while_away(self.pauses)

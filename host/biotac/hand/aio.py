@@ -1,6 +1,6 @@
 """The live API for asyncio: ``async with biotac.aio.open(port) as hand: async for batch in hand.batches(): ...``
 
-A Hand's own threads read (live/reader.py) and wake the event loop; nothing here blocks it.
+A Hand's own threads read (reader.py) and wake the event loop; nothing here blocks it.
 """
 
 from __future__ import annotations
@@ -65,6 +65,7 @@ class AsyncHand:
         ``stats.batches_skipped`` counts; with a simulated board that is not paced, its time waits instead.
         """
         hand = self.hand
+        streams = hand._streams
         loop = asyncio.get_running_loop()
         news = asyncio.Event()
 
@@ -73,7 +74,7 @@ class AsyncHand:
             with suppress(RuntimeError):
                 loop.call_soon_threadsafe(news.set)
 
-        queue = hand.open_queue(wake)
+        queue = streams.open_queue(wake)
         try:
             if not hand.ended:
                 await asyncio.to_thread(hand.run)
@@ -81,14 +82,13 @@ class AsyncHand:
                 news.clear()
                 ended = hand.ended or not hand.streaming  # before looking: what came until then is in the queue
                 while (batch := queue.take()) is not None:
-                    hand.took()
                     yield batch
                 hand.check()
                 if ended:
                     return
                 await news.wait()
         finally:
-            hand.close_queue(queue)
+            streams.close_queue(queue)
 
     async def frames(self) -> AsyncIterator[Frame]:
         """Typed frames as they arrive; see ``batches``."""

@@ -1,95 +1,81 @@
-"""The conversation with one board: handshake, commands and their replies.
-
-Bytes are read by whoever waits for something, or, once there is one, by a Reader's threads (live/reader.py).
-"""
+"""One board on a link: its bytes are read and decoded, commands are given until they are answered."""
 
 from __future__ import annotations
 
-import secrets
 import struct
 import threading
 import time
-from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from itertools import cycle
+from typing import Any, TypeVar
 
 from ..clock import LAST_SAMPLE_US, Arrivals, DeviceClock
-from ..clock.wall import Timing
-from ..errors import CommandRefusedError, DeviceLostError, InputError, NotAGatewayError, WireVersionError
+from ..clock.host_clock import HostClock, SystemClock
+from ..errors import CommandRefusedError, DeviceLostError, InputError
 from ..link import Link
 from ..link.serial_port import went_away
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats, StreamDecoder
 from ..wire.framing import encode
 from . import compatibility
-from .commands import Commands, Reply
-from .compatibility import HandWarning, describe_mismatch
 from .gap import Gap, Reason
-from .session import Session
-
-if TYPE_CHECKING:
-    from ..recording.writer import Recorder
-    from .reader import Reader
+from .handshake import handshake
 
 REPLY_TIMEOUT_S = 1.0
 REPLY_TRIES = 3
 
 Got = TypeVar("Got")
+Reply = TypeVar("Reply")
 
 
-class Conversation(Commands):
-    """What a Hand needs of its link. Closes the link when the handshake fails."""
+class Board:
+    """The board that answers on ``link``, which is closed when the handshake fails.
 
-    def __init__(self, link: Link, *, reconnect: bool, timing: Timing) -> None:
+    Alone it reads when it waits for a reply. Others take a part by the callables below, set before anything is read.
+    """
+
+    def __init__(self, link: Link, *, host_clock: HostClock | None = None) -> None:
         self.link = link
-        self.timing = timing
-        #: The board can be talked to; false while it is looked for.
-        self.connected = True
-        self.closing = threading.Event()
-        self._reconnect = reconnect
+        self.host_clock = host_clock or SystemClock()
+        #: Device time as host time, fed by whatever is read; known after a first STATUS that was asked for.
+        self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
+        #: Takes every batch that has something, on the thread that reads.
+        self.deliver: Callable[[Batch], object] = lambda batch: None
+        #: Takes all bytes as they come, and none when none came in time; what it raises ends it, not the reading.
+        self.record: Callable[[bytes], object] | None = None
+        #: Takes the gap before the first batch behind it.
+        self.record_gap: Callable[[Gap], object] = lambda gap: None
+        #: The link is gone: raises, or returns once the board is back as it was.
+        self.lost: Callable[[DeviceLostError, Reason], None] = self._lost
+        #: Whether the caller's thread reads the link; others wait for what it reads.
+        self.is_read_here: Callable[[], bool] = lambda: True
+        self.connected = True  #: it can be talked to; false while it is looked for
+        self.closing = threading.Event()  #: set when everything is to come to its end
+        self.closed = False
+        self.failure: BaseException | None = None  #: what the thread that reads has died of
+        self.trouble: Exception | None = None  #: what ended a recording, until it is told
+        self.awaiting = 0  #: replies
+        self.gap: Gap | None = None  #: to go with the next rows
+        self._gaps = self._bytes = self._frames = 0
         self._decoder = StreamDecoder()
         self._past: list[LinkStats] = []  # of decoders before a reboot
+        self._arrivals = Arrivals(self.clock)
         self._replies: deque[Any] = deque()
-        self._reader: Reader | None = None
-        self._recorder: Recorder | None = None
-        self._session = Session()
-        self._started: wire.Start | None = None
-        self._streaming = False
-        self._req_id = 0
-        self._bytes = 0
-        self._frames = 0
-        self._gaps = 0
-        self._gap: Gap | None = None  # to go with the next rows
-        self._failure: BaseException | None = None
-        self._trouble: OSError | InputError | None = None
+        self._lasting: dict[tuple[str, int], Callable[[], object]] = {}
+        self._req_ids = cycle(range(1, 256))
         self._reading = threading.RLock()  # whose holder reads the link
         self._writing = threading.Lock()
         self._asking = threading.RLock()  # one command at a time
-        self._awaiting = 0
         self._changed = threading.Condition()
         self._waiters = 0  # for _changed
-        self._closed = False
-        #: Device time as host time, fed by whatever is read; known after a first ``status`` or ``sync``.
-        #: A simulated board's time is no clock: it waits for the computer, which shows as ``resets``.
-        self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
-        self._arrivals = Arrivals(self.clock)
         try:
-            self.info = self._handshake()
+            self.info = self.handshake()
         except BaseException:
             link.close()
             raise
-
-    @property
-    def port(self) -> str:
-        """The PORT this was opened as."""
-        return self.link.port
-
-    @property
-    def warnings(self) -> list[HandWarning]:
-        """What speaks against this board and this library together, in words; empty when nothing does."""
-        return compatibility.warnings(self.info, self.port)
+        self._accept_newer_minor()
 
     @property
     def stats(self) -> LinkStats:
@@ -101,104 +87,80 @@ class Conversation(Commands):
         }
         return replace(now, gaps=self._gaps, **lost)
 
+    def handshake(self) -> wire.Hello:
+        """See handshake.py."""
+        return handshake(self.link, self.send, timeout_s=self._patience_s())
+
     def _patience_s(self) -> float:
         """How long a reply may take."""
         return REPLY_TIMEOUT_S * self.link.patience
 
-    # ---- handshake -----------------------------------------------------------------------------
+    def restarted(self) -> None:
+        """The board counts anew, its sequence numbers and its time."""
+        self._past.append(self._decoder.stats(0, 0))
+        self._decoder = StreamDecoder()
+        self._accept_newer_minor()
+        self.clock.restart()
+        self._arrivals.forget()
 
-    def _handshake(self) -> wire.Hello:
-        # A board may still be streaming to whoever was here before: stop it, then look for the one
-        # HELLO that carries our nonce and let everything else pass.
-        nonce = secrets.randbits(32)
-        decoder = StreamDecoder()
-        # The known fields of HELLO never change place, so that any peer can be told its version.
-        decoder.accept_newer_minor()
-        seen = 0
-
-        def hello(left_s: float) -> wire.Hello | None:
-            nonlocal seen
-            chunk = self.link.read(max(0.0, left_s))
-            seen += len(chunk)
-            messages = decoder.feed(chunk).messages
-            return next((m for m in messages if isinstance(m, wire.Hello) and m.nonce == nonce), None)
-
-        for _ in range(REPLY_TRIES):
-            deadline = time.monotonic() + self._patience_s()
-            self.link.write(b"\0")  # ends whatever half frame a former program left behind
-            self._send(wire.Stop(self._next_req_id()))
-            self._send(wire.HelloRequest(self._next_req_id(), nonce))
-            left_s = self._patience_s()
-            while left_s > 0:
-                # What has come is looked at before the time is said to be over: it may be this side that was late.
-                left_s = deadline - time.monotonic()
-                told = hello(left_s)
-                if told is not None:
-                    return self._checked(told)
-        raise NotAGatewayError(self._describe_stranger(decoder.counts.good, seen))
-
-    def _checked(self, hello: wire.Hello) -> wire.Hello:
-        if hello.wire_major != wire.WIRE_MAJOR:
-            raise WireVersionError(f"the firmware on {self.port} speaks {describe_mismatch(hello)}")
-        if hello.wire_minor > wire.WIRE_MINOR:
+    def _accept_newer_minor(self) -> None:
+        if self.info.wire_minor > wire.WIRE_MINOR:
             self._decoder.accept_newer_minor()
-        return hello
 
-    def _describe_stranger(self, good: int, count: int) -> str:
-        if count == 0:
-            seen = "nothing answers"
-        elif good:
-            seen = f"{good} frames of this protocol came, but no HELLO"
-        else:
-            seen = f"{count} bytes came that are no frames of this protocol"
-        return (
-            f"no gateway on {self.port}: {seen}; expected a HELLO within {self._patience_s() * REPLY_TRIES:.0f} s; "
-            "check that this is the board's port and that it runs our firmware"
-        )
+    def _lost(self, error: DeviceLostError, reason: Reason) -> None:
+        raise error
+
+    def close(self) -> None:
+        """Give the port back."""
+        self.closed = True
+        self.link.close()
 
     # ---- reading -------------------------------------------------------------------------------
 
-    @abstractmethod
-    def _arrived(self, batch: Batch) -> None:
-        """Something has come; called by whoever reads."""
-
-    @abstractmethod
-    def _last_t_us(self) -> int | None:
-        """Device time of the latest row; None before any."""
-
-    def _pump(self, timeout_s: float) -> bool:
-        """Read once; False when nothing came within timeout_s. Not while a Reader does."""
+    def read(self, timeout_s: float) -> bool:
+        """Read once; False when nothing came within timeout_s. Raises what ``lost`` raises."""
         with self._reading:
-            fd = self.link.fd
+            decoder, fd = self._decoder, self.link.fd
             try:
                 if fd is None:
                     chunk = self.link.read(timeout_s)
                 else:
-                    batch = self._decoder.read(fd, timeout_s)
+                    batch = decoder.read(fd, timeout_s)
             except DeviceLostError as error:
-                self._lost(error, "unplugged")
+                self.lost(error, "unplugged")
                 return True
             except OSError as error:
-                self._lost(went_away(self.port, error), "unplugged")
+                self.lost(went_away(self.link.port, error), "unplugged")
                 return True
             if fd is None:
                 self._take(chunk)
                 return bool(chunk)
-            if self._recorder is not None:
-                self._record(self._recorder, b"" if batch is None else self._decoder.chunk())
+            if self.record is not None:
+                self._record(b"" if batch is None else decoder.chunk())
             if batch is None:
                 return False
-            self._hand_out(batch, self._decoder.arrived_s)
+            self._arrived(batch, decoder.arrived_s)
             return True
 
+    def end_packet(self) -> None:
+        """Nothing follows the half packet that was on its way, here and in a recording."""
+        self._take(b"\0")
+
     def _take(self, chunk: bytes) -> None:
-        if self._recorder is not None:
-            self._record(self._recorder, chunk)
+        if self.record is not None:
+            self._record(chunk)
         if chunk:
             arrived_s = time.monotonic()
-            self._hand_out(self._decoder.feed(chunk), arrived_s)
+            self._arrived(self._decoder.feed(chunk), arrived_s)
 
-    def _hand_out(self, batch: Batch, arrived_s: float) -> None:
+    def _record(self, chunk: bytes) -> None:
+        assert self.record is not None
+        try:
+            self.record(chunk)
+        except OSError as error:
+            self.record, self.trouble = None, error
+
+    def _arrived(self, batch: Batch, arrived_s: float) -> None:
         decoder = self._decoder
         self._bytes += decoder.taken
         last_us = decoder.last_t_us
@@ -207,19 +169,33 @@ class Conversation(Commands):
             self._frames += len(batch.wire)
         elif not (len(batch.pac) or batch.messages):
             return
-        if self._gap is not None:
-            first_us = batch.first_t_us()
-            if first_us is not None:
-                self._mark(replace(self._gap, next_t_us=first_us), batch)
-        if self._awaiting:
+        if self.gap is not None:
+            self._end_gap(self.gap, batch)
+        if self.awaiting:
             self._replies.extend(batch.messages)
-        self._arrived(batch)
+        self.deliver(batch)
         # Without a lock where nobody waits: whoever comes to wait after this looks first.
         if self._waiters:
-            with self._changed:
-                self._changed.notify_all()
+            self.notify()
 
-    def _wait_for(self, so: Callable[[], Any], timeout_s: float | None = None) -> bool:
+    def _end_gap(self, gap: Gap, batch: Batch) -> None:
+        first_us = batch.first_t_us()
+        if first_us is None:
+            return
+        gap = replace(gap, next_t_us=first_us)
+        self.gap = None
+        self._gaps += 1
+        batch.messages.insert(0, gap)
+        self.record_gap(gap)
+
+    # ---- waiting -------------------------------------------------------------------------------
+
+    def notify(self) -> None:
+        """Whoever waits is to look again."""
+        with self._changed:
+            self._changed.notify_all()
+
+    def wait_for(self, so: Callable[[], Any], timeout_s: float | None = None) -> bool:
         """Until ``so``, as a reading thread makes it; false after timeout_s without it."""
         with self._changed:
             self._waiters += 1
@@ -228,23 +204,13 @@ class Conversation(Commands):
             finally:
                 self._waiters -= 1
 
-    def _record(self, recorder: Recorder, chunk: bytes) -> None:
-        try:
-            recorder.write(chunk)
-        except OSError as error:
-            if self._reader is None:
-                raise
-            # A full disk ends the recording, not the reading; the next call says so.
-            self._recorder = None
-            self._trouble = error
-
     def _until(self, done: Callable[[], Got | None], deadline_s: float) -> Got | None:
         """Read, or wait for whoever reads, until ``done`` gives something; None after deadline_s without it."""
-        if self._reader is None or self._reader.is_here():
+        if self.is_read_here():
             left_s = 1.0
             while (got := done()) is None and left_s > 0:
                 left_s = deadline_s - time.monotonic()
-                self._pump(max(0.0, left_s))  # once more when time is over: it may be this side that was late
+                self.read(max(0.0, left_s))  # once more when time is over: it may be this side that was late
             return got
         found: list[Got] = []
 
@@ -252,22 +218,22 @@ class Conversation(Commands):
             got = done()
             if got is not None:
                 found.append(got)
-            return bool(found) or self._failure is not None or not self.connected or self.closing.is_set()
+            return bool(found) or self.failure is not None or not self.connected or self.closing.is_set()
 
-        self._wait_for(so, max(0.0, deadline_s - time.monotonic()))
-        if not found and self._failure is not None:
-            raise self._failure
+        self.wait_for(so, max(0.0, deadline_s - time.monotonic()))
+        if not found and self.failure is not None:
+            raise self.failure
         return found[0] if found else None
 
     # ---- commands ------------------------------------------------------------------------------
 
-    def _next_req_id(self) -> int:
-        self._req_id = self._req_id % 255 + 1
-        return self._req_id
+    def send(self, request: Any) -> None:
+        """Send a command and wait for nothing; whatever ``req_id`` it has, it gets the next."""
+        self._write(replace(request, req_id=next(self._req_ids)))
 
-    def _send(self, message: Any) -> None:
-        if self._closed:
-            raise DeviceLostError(f"this Hand on {self.port} was closed; open the port again")
+    def _write(self, message: Any) -> None:
+        if self.closed:
+            raise DeviceLostError(f"this Hand on {self.link.port} was closed; open the port again")
         try:
             payload = message.pack()
         except struct.error as error:
@@ -278,21 +244,8 @@ class Conversation(Commands):
         with self._writing:
             self.link.write(encode(message.ID, payload))
 
-    def status(self) -> wire.Status:
-        """Counters of the board and its link. Its time of answering also feeds ``clock``."""
-        # Of several tries the first one's time holds: whichever was answered had left by then, or later.
-        sent_s = time.monotonic()
-        status = super().status()
-        self.clock.round_trip(sent_s, self._decoder.unwrap_t_us(status.t_us), time.monotonic())
-        return status
-
-    def sync(self, round_trips: int = 5) -> None:
-        """Ask for the board's time: ``clock`` gets its bound from round trips, and the drift from later ones."""
-        for _ in range(round_trips):
-            self.status()
-
-    def _await(self, wanted: Callable[[Any], bool], deadline_s: float) -> Any:
-        """A message that passes ``wanted``; None after deadline_s without it."""
+    def next_message(self, wanted: Callable[[Any], bool], deadline_s: float) -> Any:
+        """The first message to come that passes ``wanted``; None after deadline_s without it."""
 
         def found() -> Any:
             while self._replies:
@@ -301,50 +254,67 @@ class Conversation(Commands):
                     return message
             return None
 
-        self._awaiting += 1
+        self.awaiting += 1
         try:
             return self._until(found, deadline_s)
         finally:
-            self._awaiting -= 1
+            self.awaiting -= 1
 
-    def _ask(self, request: Any, kind: type[Reply]) -> Reply:
-        """Send a command, retry it, return its reply; CommandRefusedError when the board says no."""
+    def ask(self, request: Any, reply: type[Reply]) -> Reply:
+        """Send a command, whatever its ``req_id`` with the next, until it is answered, and return its reply.
+
+        CommandRefusedError when the board says no; DeviceLostError when it says nothing, or is away.
+        """
 
         def answers(m: Any) -> bool:
-            return isinstance(m, (kind, wire.Reply)) and bool(getattr(m, "req_id", 0) == request.req_id)
+            return isinstance(m, (reply, wire.Reply)) and bool(getattr(m, "req_id", 0) == request.req_id)
 
         with self._asking:
+            request = replace(request, req_id=next(self._req_ids))
             self._replies.clear()
-            self._awaiting += 1
+            # Of several tries the first one's time holds: whichever was answered had left by then, or later.
+            sent_s = time.monotonic()
+            self.awaiting += 1
             try:
                 for _ in range(REPLY_TRIES):
-                    if not self.connected and not self._is_bringing_back():
-                        raise DeviceLostError(f"{self.port} is away and looked for; wait for its return")
+                    if not self.connected and not self.is_read_here():
+                        raise DeviceLostError(f"{self.link.port} is away and looked for; wait for its return")
                     deadline_s = time.monotonic() + self._patience_s()
-                    self._send(request)
-                    answer = self._await(answers, deadline_s)
-                    if isinstance(answer, kind) and not (isinstance(answer, wire.Reply) and answer.error):
-                        self._session.note(request)
+                    self._write(request)
+                    answer = self.next_message(answers, deadline_s)
+                    if isinstance(answer, reply) and not (isinstance(answer, wire.Reply) and answer.error):
+                        if isinstance(answer, wire.Status):
+                            self.clock.round_trip(sent_s, self._decoder.unwrap_t_us(answer.t_us), time.monotonic())
                         return answer
                     if answer is not None:
                         raise CommandRefusedError(describe_refusal(request, answer), answer.error)
             finally:
-                self._awaiting -= 1
+                self.awaiting -= 1
         raise DeviceLostError(
-            f"{self.port} did not answer {type(request).__name__} within "
+            f"{self.link.port} did not answer {type(request).__name__} within "
             f"{self._patience_s() * REPLY_TRIES:.0f} s; check the cable and open it again"
         )
 
-    def _is_bringing_back(self) -> bool:
-        return self._reader is None or self._reader.is_here()
+    def tell(self, request: Any, *, lasting: tuple[str, int] | None = None) -> None:
+        """Give a command whose reply says no more than that it was obeyed; ``lasting``: see remember."""
+        answers = wire.ANSWERS[type(request)]
+        self.ask(request, answers)
+        if lasting is not None:
+            self.remember(lasting, lambda: self.ask(request, answers))
 
-    @abstractmethod
-    def _lost(self, error: DeviceLostError, reason: Reason) -> None:
-        """The link is gone: raise, or return once the board is back as it was."""
+    def remember(self, what: tuple[str, int], again: Callable[[], object]) -> None:
+        """A board that lost it is told ``what`` (kind, number) by ``again``, in the order in which it was told last."""
+        with self._asking:
+            self._lasting.pop(what, None)
+            self._lasting[what] = again
 
-    @abstractmethod
-    def _mark(self, gap: Gap, batch: Batch) -> None:
-        """``batch`` has the first rows after the gap."""
+    def tell_again(self) -> None:
+        """All that lasts until the board restarts: settings, calibrations, maps and subscriptions.
+
+        Not tares: after a restart the board takes its own, and a former one may be wrong by then.
+        """
+        for again in list(self._lasting.values()):
+            again()
 
 
 def describe_refusal(request: Any, reply: wire.Reply) -> str:

@@ -7,76 +7,66 @@ from collections.abc import Callable
 from typing import Any
 
 from ..errors import CallbackError
-from ..wire import messages_gen as wire
 from ..wire.batches import Batch
-from .gap import Gap
+from .queue import BatchQueue
 
 Unsubscribe = Callable[[], None]
 
 
 class Callbacks:
-    """Who wants batches, and who wants which messages.
+    """Who wants what, and the batches that wait for them.
 
     What a callback raises is kept for ``report``: the first error, and how many more there were. It stays
     subscribed, and so do the others.
     """
 
     def __init__(self) -> None:
+        self.queue = BatchQueue()
+        self.thread_id = 0  #: the thread that calls ``dispatch``, by threading.get_ident()
+        self._next: Batch | None = None  # before all that waits in the queue
         self._lock = threading.Lock()
-        self._on_batch: list[Callable[[Batch], Any]] = []
-        self._on_message: dict[type[Any], list[Callable[[Any], Any]]] = {}
-        self.wanted = False  #: somebody wants something
+        self._wanted: list[tuple[type[Any], Callable[[Any], Any]]] = []  # replaced, never changed
         self._error: Exception | None = None
         self._culprit = ""
         self._more = 0
 
-    def on_batch(self, fn: Callable[[Batch], Any]) -> Unsubscribe:
-        """Call ``fn`` with every batch."""
-        return self._add(lambda: self._on_batch, lambda new: setattr(self, "_on_batch", new), fn)
-
-    def on_message(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
-        """Call ``fn`` with every message of a kind."""
-
-        def change(new: list[Callable[[Any], Any]]) -> None:
-            changed = {**self._on_message, kind: new}
-            self._on_message = {k: fns for k, fns in changed.items() if fns}
-
-        return self._add(lambda: self._on_message.get(kind, []), change, fn)
-
-    def _add(self, now: Callable[[], list[Any]], change: Callable[[list[Any]], None], fn: Any) -> Unsubscribe:
-        # Lists are replaced and never changed: the reader may be walking through one.
-        with self._lock:
-            change([*now(), fn])
-            self.wanted = True
-        done = False
+    def add(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
+        """Call ``fn`` with every message of a kind, or with every Batch; returns what ends that."""
+        entry = (kind, fn)
 
         def unsubscribe() -> None:
-            nonlocal done
             with self._lock:
-                if not done:
-                    left = now().copy()
-                    left.remove(fn)
-                    change(left)
-                    self.wanted = bool(self._on_batch or self._on_message)
-                done = True
+                self._wanted = [one for one in self._wanted if one is not entry]
 
+        with self._lock:
+            self._wanted = [*self._wanted, entry]
         return unsubscribe
 
-    def call(self, batch: Batch) -> None:
-        """Hand a batch around."""
-        for fn in self._on_batch:
-            try:
-                fn(batch)
-            except Exception as error:
-                self._keep(fn, error)
-        if not (batch.messages and self._on_message):
+    def put(self, batch: Batch) -> None:
+        """It has arrived."""
+        if not self._wanted:
             return
-        for message in batch.messages:
-            for fn in self._on_message.get(type(message), ()):
-                try:
-                    fn(message)
-                except Exception as error:
-                    self._keep(fn, error)
+        if self._next is None and not self.queue.rows and self.thread_id == threading.get_ident():
+            self._next = batch  # it is this thread's turn to hand it out, as the next thing it does
+        else:
+            self.queue.put(batch)
+
+    def dispatch(self) -> bool:
+        """Call with the oldest batch all who want it or its messages; False when none waits."""
+        batch = self._next
+        if batch is not None:
+            self._next = None
+        elif (batch := self.queue.take()) is None:
+            return False
+        wanted = self._wanted
+        for one in (batch, *batch.messages):
+            for kind, fn in wanted:
+                if type(one) is kind:
+                    try:
+                        fn(one)
+                    except Exception as error:
+                        self._keep(fn, error)
+        return True
 
     def _keep(self, fn: Callable[[Any], Any], error: Exception) -> None:
         with self._lock:
@@ -94,7 +84,3 @@ class Callbacks:
             self._error, self._more = None, 0
         again = f", and {more} more error(s) since" if more else ""
         raise CallbackError(f"callback {culprit} raised {type(error).__name__}: {error}{again}; correct it") from error
-
-
-#: What Hand.on_* offer beside batches.
-MESSAGES = {"touch": wire.Touch, "tare": wire.Tare, "status": wire.Status, "gap": Gap}

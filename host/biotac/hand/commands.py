@@ -1,11 +1,8 @@
-"""What a board can be asked and told, a method each; streams are streaming.py's."""
+"""What a board can be asked and told, a method each; what it streams is streams.py's."""
 
 from __future__ import annotations
 
-import zlib
-from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -17,68 +14,51 @@ from ..wire import messages_gen as wire
 from ..wire.frames import tare_to_q4
 from ..wire.sensor_gen import MAX_SENSORS
 from . import map_transfer as transfer
+from .board import Board
 
 ALL_FINGERS = (1 << MAX_SENSORS) - 1
 CALIBRATION_SINCE_MINOR = 3  # of wire 1.x
 MAP_SINCE_MINOR = 4
 PRESSURE_SINCE_MINOR = 4
 
-Reply = TypeVar("Reply")
 
+class Commands:
+    """Each raises CommandRefusedError with the board's reason, or DeviceLostError."""
 
-class Commands(ABC):
-    """The commands of a Hand. Each raises CommandRefusedError with the board's reason, or DeviceLostError."""
-
-    info: wire.Hello
-
-    @abstractmethod
-    def _next_req_id(self) -> int: ...
-
-    @abstractmethod
-    def _ask(self, request: Any, reply: type[Reply]) -> Reply:
-        """Send a request and wait for its reply."""
-
-    def _command(self, request: Any) -> None:
-        self._ask(request, wire.Reply)
-
-    def subscribe(self, quantities: wire.QuantityFlags, *, fingers: int = ALL_FINGERS) -> None:
-        """Choose what the board computes and sends of ``fingers`` (a bit mask) in its frames.
-
-        What is left out is not computed; it arrives as NaN, under the flag NOT_ASKED. Without REST_FRAMES
-        an untouched finger sends heartbeats (``Batch.idle``) in place of frames, without loss of a touch:
-        a frame comes as soon as the signals move. At first it is POC | FORCE | TORQUE | PRESSURE | REST_FRAMES;
-        the choice lasts until the board restarts. A board that knows no PRESSURE is not asked for it.
-        """
-        if self.info.wire_minor < PRESSURE_SINCE_MINOR:
-            quantities &= ~wire.QuantityFlags.PRESSURE
-        self._command(wire.Subscribe(self._next_req_id(), fingers, int(quantities)))
+    def __init__(self, board: Board) -> None:
+        self._board = board
 
     def ping(self) -> None:
         """Wait for the board; everything it sent before has arrived afterwards."""
-        self._command(wire.Ping(self._next_req_id()))
+        self._board.tell(wire.Ping(0))
 
     def status(self) -> wire.Status:
-        """Counters of the board and its link."""
-        return self._ask(wire.GetStatus(self._next_req_id()), wire.Status)
+        """Counters of the board and its link. Its time of answering also feeds ``clock``."""
+        return self._board.ask(wire.GetStatus(0), wire.Status)
+
+    def sync(self, round_trips: int = 5) -> None:
+        """Ask for the board's time: ``clock`` gets its bound from round trips, and the drift from later ones."""
+        for _ in range(round_trips):
+            self.status()
 
     def sensor_status(self, finger: int) -> wire.SensorStatus:
         """Counters and tare state of one sensor."""
-        return self._ask(wire.GetSensorStatus(self._next_req_id(), finger), wire.SensorStatus)
+        return self._board.ask(wire.GetSensorStatus(0, finger), wire.SensorStatus)
 
     def sensor_info(self, finger: int) -> wire.SensorInfo:
         """What the sensor says of itself."""
-        return self._ask(wire.GetSensorInfo(self._next_req_id(), finger), wire.SensorInfo)
+        return self._board.ask(wire.GetSensorInfo(0, finger), wire.SensorInfo)
 
     def point(self, finger: int) -> wire.Point:
         """Where ``finger`` is touched right now (``poc_um``), without waiting for the end of a round.
 
         INVALID_I16 throughout without a touch or a tare. CommandRefusedError when no sensor answers there.
         """
-        return self._ask(wire.GetPoint(self._next_req_id(), finger), wire.Point)
+        return self._board.ask(wire.GetPoint(0, finger), wire.Point)
 
     def tare(self, finger: int) -> None:
         """Tare now; CommandRefusedError while the signals move."""
-        self._command(wire.TareNow(self._next_req_id(), finger))
+        self._board.tell(wire.TareNow(0, finger))
 
     def set_tare(self, finger: int, tare_counts: Any, pdc_counts: float | None = None) -> None:
         """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, kept to 1/16 count.
@@ -90,26 +70,26 @@ class Commands(ABC):
             raise ValueError(f"tare_counts has shape {tare.shape}; expected 19 values of 0..4095 counts")
         tare_q4 = tuple(int(v) for v in tare_to_q4(tare))
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
-        self._command(wire.TareSet(self._next_req_id(), finger, tare_q4, pdc_q4))
+        self._board.tell(wire.TareSet(0, finger, tare_q4, pdc_q4))
 
     def setting(self, setting: wire.Setting | int) -> int:
         """Value of a setting, in its own unit (see wire.SETTINGS)."""
-        return self._ask(wire.GetSetting(self._next_req_id(), setting), wire.SettingValue).value
+        return self._board.ask(wire.GetSetting(0, setting), wire.SettingValue).value
 
     def set_setting(self, setting: wire.Setting | int, value: int) -> None:
         """Change a setting until the next reboot; refused while streaming."""
-        self._ask(wire.SetSetting(self._next_req_id(), setting, value), wire.SettingValue)
+        self._board.tell(wire.SetSetting(0, setting, value), lasting=("setting", int(setting)))
 
     def save_settings(self) -> None:
         """Keep the settings, calibrations and maps in force over reboots.
 
         Not while streaming: the board loses slots meanwhile.
         """
-        self._command(wire.SaveSettings(self._next_req_id()))
+        self._board.tell(wire.SaveSettings(0))
 
     def reboot_bootloader(self) -> None:
         """Send the board into its loader; it goes away and comes back as a drive."""
-        self._command(wire.RebootBootloader(self._next_req_id(), wire.BOOTLOADER_MAGIC))
+        self._board.tell(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
 
     def settings(self) -> dict[wire.Setting, int]:
         """All settings; of one that the board's firmware does not have yet, the default, which is what it does."""
@@ -142,21 +122,21 @@ class Commands(ABC):
         firmware knows of none.
         """
         its = calibration
-        if its.pressure_gain_nn and self.info.wire_minor < PRESSURE_SINCE_MINOR:
+        if its.pressure_gain_nn and self._board.info.wire_minor < PRESSURE_SINCE_MINOR:
             raise WireVersionError(
                 "the board's firmware knows no pressure_gain_nn, expected wire "
                 f"1.{PRESSURE_SINCE_MINOR}; update it: biotac flash"
             )
-        request = wire.SetCalibration(self._next_req_id(), finger, its.wire_serial(), its.made_s, its.wire_values())
-        self._ask(request, wire.Calibration)
+        request = wire.SetCalibration(0, finger, its.wire_serial(), its.made_s, its.wire_values())
+        self._board.tell(request, lasting=("calibration", finger))
 
     def clear_calibration(self, finger: int) -> None:
         """Return a finger to the board's settings, until the next reboot or, with save_settings, for good."""
-        self._command(wire.ClearCalibration(self._next_req_id(), finger))
+        self._board.tell(wire.ClearCalibration(0, finger), lasting=("calibration", finger))
 
     def calibrations(self) -> dict[int, Calibration]:
         """The calibrations in force, by finger; none on a board whose firmware knows of none."""
-        if self.info.wire_minor < CALIBRATION_SINCE_MINOR:
+        if self._board.info.wire_minor < CALIBRATION_SINCE_MINOR:
             return {}
         told = [self._calibration(finger) for finger in range(MAX_SENSORS)]
         return {m.finger: _known(m) for m in told if m.state == wire.CalibrationState.IN_FORCE}
@@ -172,11 +152,11 @@ class Commands(ABC):
 
         Raises PortError when its bytes do not come whole.
         """
-        return transfer.read(self._ask_for, finger)
+        return transfer.read(self._board, finger)
 
     def map_state(self, finger: int) -> wire.CalibrationState:
         """Whether the finger's force comes from its map, or the sensor is another than its own."""
-        return wire.CalibrationState(transfer.info(self._ask_for, finger).state)
+        return wire.CalibrationState(transfer.info(self._board, finger).state)
 
     def set_map(self, finger: int, its: bytes | BoardMap, *, force: bool = False) -> None:
         """Upload a wrench map and read it back; it is in force until the next reboot, or for good with save_settings.
@@ -186,34 +166,24 @@ class Commands(ABC):
         back so. What the finger had is in force until all of the new one is there. Raises InputError for more bytes
         than a board takes (20 KiB), and PortError when other bytes come back.
         """
-        blob = maps.as_blob(its)
-        transfer.write(self._ask_for, finger, maps.for_any_sensor(blob) if force else blob)
+        blob = maps.for_any_sensor(maps.as_blob(its)) if force else maps.as_blob(its)
+        transfer.write(self._board, finger, blob)
+        self._board.remember(("map", finger), lambda: transfer.restore(self._board, finger, blob))
 
     def clear_map(self, finger: int) -> None:
         """Return a finger to its gains, until the next reboot or, with save_settings, for good."""
-        self._command(wire.ClearMap(self._next_req_id(), finger))
+        self._board.tell(wire.ClearMap(0, finger), lasting=("map", finger))
 
     def maps(self) -> dict[int, bytes]:
         """The maps in force, by finger; none on a board whose firmware knows of none."""
-        if self.info.wire_minor < MAP_SINCE_MINOR:
+        if self._board.info.wire_minor < MAP_SINCE_MINOR:
             return {}
-        told = [transfer.info(self._ask_for, finger) for finger in range(MAX_SENSORS)]
+        told = [transfer.info(self._board, finger) for finger in range(MAX_SENSORS)]
         held = {m.finger: self.get_map(m.finger) for m in told if m.state == wire.CalibrationState.IN_FORCE}
         return {finger: blob for finger, blob in held.items() if blob is not None}
 
-    def _tell_map(self, finger: int, blob: bytes | None) -> None:
-        """Have the finger have this map, which it may have already; None: no map."""
-        told = transfer.info(self._ask_for, finger)
-        if blob is None:
-            self.clear_map(finger)
-        elif (told.size_bytes, told.crc32) != (len(blob), zlib.crc32(blob)):
-            transfer.write(self._ask_for, finger, blob)
-
-    def _ask_for(self, make: Callable[[int], Any], reply: type[Reply]) -> Reply:
-        return self._ask(make(self._next_req_id()), reply)
-
     def _calibration(self, finger: int) -> wire.Calibration:
-        return self._ask(wire.GetCalibration(self._next_req_id(), finger), wire.Calibration)
+        return self._board.ask(wire.GetCalibration(0, finger), wire.Calibration)
 
 
 def _known(told: wire.Calibration) -> Calibration:

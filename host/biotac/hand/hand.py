@@ -1,56 +1,147 @@
-"""One board with its fingers: its life and its frames; streaming.py has who reads, commands.py the commands."""
+"""One board with its fingers, as users see it: what it is composed of, and its life."""
 
 from __future__ import annotations
 
+import importlib
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from functools import wraps
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
-from ..errors import DeviceLostError, InputError
+from ..clock import DeviceClock
+from ..clock.host_clock import HostClock, SystemClock
+from ..errors import InputError
+from ..link import Link
 from ..wire import messages_gen as wire
-from ..wire.batches import Batch, join, split
+from ..wire.batches import Batch, LinkStats
 from ..wire.frames import Frame, StructArray
 from ..wire.sensor_gen import MAX_SENSORS
-from .streams import SILENCE_S, Streaming
-from .views import FingerView, finger_index
+from . import compatibility
+from .board import Board
+from .commands import Commands
+from .compatibility import HandWarning
+from .gap import GAP
+from .pull import take
+from .reconnect import Reconnection
+from .streams import SILENCE_S, Streams
+from .views import FingerView, Latest
 
-if TYPE_CHECKING:
-    from ..recording.writer import Recorder
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
-class Hand(Streaming):
+class Recorder(Protocol):
+    """What Hand.record returns: a recording.Recorder, of which nothing else is needed here."""
+
+    path: Path
+    paths: list[Path]
+
+    @property
+    def closed(self) -> bool: ...
+    def write(self, chunk: bytes) -> None: ...
+    def mark(self, what: str, facts: dict[str, str]) -> None: ...
+    def go_on(self, *board: Any) -> None: ...
+    def close(self) -> None: ...
+
+
+def _of(part: str, method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Hand, P], R]:
+    """A method of Hand that is its part's."""
+
+    @wraps(method)
+    def call(self: Hand, /, *args: P.args, **kwargs: P.kwargs) -> R:
+        return method(getattr(self, part), *args, **kwargs)
+
+    return call
+
+
+class Hand:
     """A board. Use as a context manager; made by ``biotac.open``."""
 
-    # ---- life ----------------------------------------------------------------------------------
+    def __init__(
+        self,
+        link: Link,
+        *,
+        reconnect: bool = False,
+        fingers: Mapping[str, int] | None = None,
+        host_clock: HostClock | None = None,
+    ) -> None:
+        host_clock = host_clock or SystemClock()
+        self._latest = Latest(host_clock, fingers)
+        self._board = Board(link, host_clock=host_clock)
+        self._commands = Commands(self._board)
+        self._streams = Streams(self._board, self._latest)
+        if reconnect:
+            Reconnection(self._board, self._latest.last_t_us, self._resume)
+        self._recorder: Recorder | None = None
+        #: What carries the bytes.
+        self.link = link
+        #: Device time as host time, fed by whatever is read; known after a first ``status`` or ``sync``.
+        #: A simulated board's time is no clock: it waits for the computer, which shows as ``resets``.
+        self.clock: DeviceClock = self._board.clock
+
+    # ---- what it is ----------------------------------------------------------------------------
+
+    @property
+    def port(self) -> str:
+        """The PORT this was opened as."""
+        return self.link.port
+
+    @property
+    def info(self) -> wire.Hello:
+        """What the board said of itself when it was opened, or came back."""
+        return self._board.info
 
     @property
     def fingers(self) -> list[int]:
         """Indices of the fingers whose sensor answered when this was opened."""
         return [f for f in range(MAX_SENSORS) if self.info.fingers_present >> f & 1]
 
+    @property
+    def warnings(self) -> list[HandWarning]:
+        """What speaks against this board and this library together, in words; empty when nothing does."""
+        return compatibility.warnings(self.info, self.port)
+
+    @property
+    def stats(self) -> LinkStats:
+        """Counts since the handshake, over reboots too."""
+        return self._streams.stats
+
+    @property
+    def connected(self) -> bool:
+        """The board can be talked to; false while it is looked for."""
+        return self._board.connected
+
+    @property
+    def streaming(self) -> bool:
+        """The board was told to stream, and has not ended or been stopped."""
+        return self._streams.streaming
+
+    @property
+    def ended(self) -> bool:
+        """A simulated source has played to its end and everything of it has arrived."""
+        return self._streams.ended
+
     def __getitem__(self, finger: str | int) -> FingerView:
         """The latest of one finger, by name or chip select; KeyError in words. Follows what is read: see ``run``."""
-        index = finger_index(self._names, finger)
-        names = {number: name for name, number in self._names.items()}
-        return FingerView(names.get(index, str(index)), index, self._latest)
+        return self._latest[finger]
 
     def __repr__(self) -> str:
-        return f"<biotac.Hand on {self.port}, fingers {self.fingers}{', closed' if self._closed else ''}>"
+        return f"<biotac.Hand on {self.port}, fingers {self.fingers}{', closed' if self._board.closed else ''}>"
+
+    # ---- life ----------------------------------------------------------------------------------
 
     def __enter__(self) -> Hand:
         return self
 
     def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._end()
         if error is None:
-            self._report()
+            self._streams.report()
 
     def close(self) -> None:
         """Stop the stream, finish a recording, give the port back. Safe to call twice.
@@ -58,66 +149,74 @@ class Hand(Streaming):
         Raises CallbackError, after all that, for what a callback has raised and nobody was told yet.
         """
         self._end()
-        self._report()
+        self._streams.report()
 
     def _end(self) -> None:
-        if self._closed:
+        if self._board.closed:
             return
-        self.closing.set()
-        self.timing.wake()
-        self._tell()
-        try:
-            if self._streaming and self.connected:
-                self._streaming = False
-                self._send(wire.Stop(self._next_req_id()))
-        except DeviceLostError:
-            pass  # it is gone already, which is what closing wants
-        finally:
-            if self._reader is not None:
-                self._reader.join()
-            self._closed = True
-            try:
-                if self._recorder is not None:
-                    self._recorder.close()
-            finally:
-                self.link.close()
+        with ExitStack() as last:  # whatever fails before
+            last.callback(self._board.close)
+            if self._recorder is not None:
+                last.callback(self._recorder.close)
+            self._streams.close()
 
-    # ---- frames --------------------------------------------------------------------------------
+    # ---- commands (commands.py) ----------------------------------------------------------------
 
-    def batches(self) -> Iterator[Batch]:
-        """Yield batches as they arrive, starting the stream if need be.
+    ping = _of("_commands", Commands.ping)
+    status = _of("_commands", Commands.status)
+    sync = _of("_commands", Commands.sync)
+    sensor_status = _of("_commands", Commands.sensor_status)
+    sensor_info = _of("_commands", Commands.sensor_info)
+    point = _of("_commands", Commands.point)
+    tare = _of("_commands", Commands.tare)
+    set_tare = _of("_commands", Commands.set_tare)
+    setting = _of("_commands", Commands.setting)
+    set_setting = _of("_commands", Commands.set_setting)
+    settings = _of("_commands", Commands.settings)
+    save_settings = _of("_commands", Commands.save_settings)
+    calibration = _of("_commands", Commands.calibration)
+    calibration_state = _of("_commands", Commands.calibration_state)
+    set_calibration = _of("_commands", Commands.set_calibration)
+    clear_calibration = _of("_commands", Commands.clear_calibration)
+    calibrations = _of("_commands", Commands.calibrations)
+    finger_settings = _of("_commands", Commands.finger_settings)
+    get_map = _of("_commands", Commands.get_map)
+    map_state = _of("_commands", Commands.map_state)
+    set_map = _of("_commands", Commands.set_map)
+    clear_map = _of("_commands", Commands.clear_map)
+    maps = _of("_commands", Commands.maps)
+    reboot_bootloader = _of("_commands", Commands.reboot_bootloader)
 
-        Ends with a simulated source, and when ``stop`` is called.
+    # ---- streams (streams.py) ------------------------------------------------------------------
+
+    start = _of("_streams", Streams.start)
+    stop = _of("_streams", Streams.stop)
+    subscribe = _of("_streams", Streams.subscribe)
+    want = _of("_streams", Streams.want)
+    batches = _of("_streams", Streams.batches)
+    on_batch = _of("_streams", Streams.on_batch)
+    on_touch = _of("_streams", Streams.on_touch)
+    on_tare = _of("_streams", Streams.on_tare)
+    on_status = _of("_streams", Streams.on_status)
+    on_gap = _of("_streams", Streams.on_gap)
+    check = _of("_streams", Streams.check)
+
+    def run(self, *, queue: bool = False) -> Hand:
+        """Have threads read the board from now on, and let it stream; returns this hand.
+
+        ``hand["index"]`` and callbacks then follow by themselves, the board stops within a second of this
+        process's death, and with ``reconnect`` its return is noticed by itself. Batches are kept for ``batches``,
+        ``frames`` and ``read`` from their first call on, or from now on with ``queue``; a caller that is slow
+        loses the oldest (``stats.batches_skipped``). A simulated board that is not paced waits instead.
         """
-        self._pulled = self._has_pulled = True
-        if not self._streaming and not self._ended:
-            self.check()
-            self.start()
-        while True:
-            while (batch := self._batches.take()) is not None:
-                self.took()
-                yield batch
-            self.check()
-            if self._ended or not self._streaming:
-                return
-            self._pump_stream()
-
-    def _pump_stream(self) -> None:
-        """Wait until there may be a batch."""
-        if self._reader is not None and not self._reader.is_here():
-            self._wait_for(
-                lambda: self._batches.rows or not self._streaming or self._failure or self.closing.is_set(), 1.0
-            )
-        elif self.link.ended:
-            self._finish()
-        elif not self._pump(self._silence_s()) and not self.link.ended:
-            self._lost(self._silent(), "silence")
+        self._streams.run(queue=queue)
+        return self
 
     def frames(self) -> Iterator[Frame]:
         """Yield typed frames as they arrive; ends only with a simulated source."""
         for batch in self.batches():
-            for k in range(len(batch.frames)):
-                yield Frame.from_row(batch.frames[k])
+            for row in batch.frames:
+                yield Frame.from_row(row)
 
     def read(self, seconds: float) -> StructArray:
         """Return the frames of the next ``seconds`` of device time as one FRAME_DTYPE array (n,).
@@ -129,27 +228,12 @@ class Hand(Streaming):
 
     def read_batch(self, seconds: float) -> Batch:
         """Like read, with the wire messages, PAC and events of the same time."""
-        if not 0 < seconds < float("inf"):
-            raise ValueError(f"seconds is {seconds}, expected a number above 0")
-        taken: list[Batch] = []
-        end_us: int | None = None
-        first_status_us: int | None = None
-        for batch in self.batches():
-            for status in (m for m in batch.messages if isinstance(m, wire.Status)):
-                first_status_us = status.t_us if first_status_us is None else first_status_us
-                if end_us is None and (status.t_us - first_status_us) % 2**32 > (seconds + SILENCE_S) * 1e6:
-                    return join(taken)  # the board is there, its sensors are not
-            first_us, last_us = batch.first_t_us(), batch.last_t_us()
-            if end_us is None and first_us is not None:
-                end_us = first_us + round(seconds * 1e6)
-            if end_us is None or last_us is None or last_us < end_us:
-                taken.append(batch)
-                continue
-            now, later = split(batch, end_us)
-            taken.append(now)
-            self._batches.put_back(later)
-            break
-        return join(taken)
+        batch, later = take(self.batches(), seconds, silence_s=SILENCE_S)
+        if later is not None:
+            self._streams.put_back(later)
+        return batch
+
+    # ---- recording -----------------------------------------------------------------------------
 
     def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
         """Write everything that arrives from now on to an MCAP file, until close or the recorder's close.
@@ -160,20 +244,40 @@ class Hand(Streaming):
         Raises InputError when the file exists and may not be overwritten, cannot be written, or when
         another recording of this hand is still open.
         """
-        from ..recording.writer import Recorder
-
         if self._recorder is not None and not self._recorder.closed:
             raise InputError(f"this hand is being recorded to {self._recorder.path}; close that recorder first")
-        settings, calibrations, sensors, maps = self._to_be_recorded()
-        self._recorder = Recorder(
+        hello, settings, calibrations, sensors, maps = self._to_be_recorded()
+        # The one way up from this room.
+        writer = importlib.import_module("...recording.writer", __name__)
+        recorder: Recorder = writer.Recorder(
             Path(path),
-            self.info,
+            hello,
             settings,
             calibrations,
             sensors,
             self.port,
             maps=maps,
             overwrite=overwrite,
-            mid_stream=self._streaming,
+            mid_stream=self.streaming,
         )
-        return self._recorder
+        self._record_to(recorder)
+        return recorder
+
+    def _to_be_recorded(self) -> tuple[Any, ...]:
+        """HELLO, settings, calibrations, sensors and maps: what a recording's results rest on."""
+        sensors = [self.sensor_info(finger) for finger in self.fingers]
+        return self.info, self.settings(), self.calibrations(), sensors, self.maps()
+
+    def _record_to(self, recorder: Recorder) -> None:
+        self._recorder = recorder
+        self._board.record = recorder.write
+        self._board.record_gap = lambda gap: recorder.mark(GAP, gap.as_text())
+
+    def _resume(self, restarted: bool) -> None:
+        """The board is back; a restarted one's rows go into a file of their own."""
+        if restarted and self._recorder is not None and not self._recorder.closed:
+            try:
+                self._recorder.go_on(*self._to_be_recorded())
+            except (OSError, InputError) as error:
+                self._recorder, self._board.record, self._board.trouble = None, None, error
+        self._streams.resume()

@@ -15,8 +15,9 @@ LIMIT_ROWS = 16_384
 class BatchQueue:
     """First in, first out. ``bound`` gives it a limit: then, when full, the oldest go, and are counted."""
 
-    def __init__(self, wake: Callable[[], None] | None = None) -> None:
-        self._wake = wake
+    def __init__(self, wake: Callable[[], None] | None = None, taken: Callable[[], None] | None = None) -> None:
+        self._wake = wake  # the consumer is to look
+        self._taken = taken  # there is room again
         self._limit_rows: int | None = None
         self._batches: deque[Batch] = deque()
         #: How much waits; a batch of messages alone counts as one.
@@ -62,7 +63,9 @@ class BatchQueue:
                 return None
             batch = self._batches.popleft()
             self.rows -= weight(batch)
-            return batch
+        if self._taken is not None:
+            self._taken()
+        return batch
 
 
 def weight(batch: Batch) -> int:

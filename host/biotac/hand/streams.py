@@ -2,32 +2,28 @@
 
 Two ways to read. Pull: whoever wants batches reads the link, one thread, the same every time; a slow caller makes the
 operating system's buffer fill and then the board drop whole frames. Live: after ``run``, or with callbacks or
-biotac.aio, threads of this package read always (live/reader.py), and a slow caller loses the oldest batches on this
-side.
+biotac.aio, threads of this package read always (reader.py), and a slow caller loses the oldest batches on this side.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from threading import get_ident
-from typing import Any, TypeVar
+from typing import Any
 
-from ..clock.wall import RealTiming, Timing
 from ..errors import DeviceLostError
-from ..link import Link
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
 from ..wire.sensor_gen import MAX_SENSORS
-from .callbacks import MESSAGES, Callbacks, Unsubscribe
-from .commands import ALL_FINGERS
+from .board import Board
+from .callbacks import Callbacks, Unsubscribe
+from .commands import ALL_FINGERS, PRESSURE_SINCE_MINOR
 from .gap import Gap
 from .queue import LIMIT_ROWS, BatchQueue
 from .reader import Reader
-from .reconnect import ComingBack
 from .subscription import Wants
-from .views import Latest, checked_names
+from .views import Latest
 
 #: What a FRAME can say of a contact, for Hand.subscribe.
 RESULTS = wire.QuantityFlags.POC | wire.QuantityFlags.FORCE | wire.QuantityFlags.TORQUE | wire.QuantityFlags.PRESSURE
@@ -38,66 +34,71 @@ SILENCE_S = 3.0
 KEEPALIVE_S = 1.0
 PINGS_PER_KEEPALIVE = 3
 
-Self = TypeVar("Self", bound="Streaming")
 
+class Streams:
+    """Takes what ``board`` delivers, keeps ``latest`` up to date, and hands batches to all who want them."""
 
-class Streaming(ComingBack):
-    """What a Hand sends and reads."""
-
-    def __init__(
-        self,
-        link: Link,
-        *,
-        reconnect: bool = False,
-        fingers: Mapping[str, int] | None = None,
-        timing: Timing | None = None,
-    ) -> None:
-        self._names = checked_names(fingers)
-        timing = timing or RealTiming()
-        self._batches = BatchQueue()  # for whoever pulls
-        self._pulled = True  # new batches are kept for them; without threads always
-        self._has_pulled = False
-        self._queues: list[BatchQueue] = []  # for others, such as biotac.aio
+    def __init__(self, board: Board, latest: Latest) -> None:
+        #: The board was told to stream, and has not ended or been stopped.
+        self.streaming = False
+        #: A simulated source has played to its end and everything of it has arrived.
+        self.ended = False
+        self._board = board
+        self._link = board.link
+        self._monotonic_s = board.host_clock.monotonic_s
+        self._latest = latest
         self._callbacks = Callbacks()
-        self._for_callbacks = BatchQueue()
-        self._latest = Latest(timing)
+        self._reader: Reader | None = None
+        self._has_pulled = False
+        self._pulled: BatchQueue | None = self._new_queue()  # for whoever pulls; without threads always
+        self._queues: list[BatchQueue] = []  # for others, such as biotac.aio
         self._wants: Wants | None = None
         self._quantities = dict.fromkeys(range(MAX_SENSORS), AT_FIRST)
-        self._next: Batch | None = None  # for callbacks, before all that waits in _for_callbacks
-        self._monotonic_s = timing.monotonic_s
-        self._heard_s = self._ping_due_s = timing.monotonic_s()
-        self._due_s = -math.inf  # until when keep_up has nothing to do while it streams
-        self._ended = False
-        super().__init__(link, reconnect=reconnect, timing=timing)
+        self._started: wire.Start | None = None
+        self._heard_s = self._ping_due_s = self._monotonic_s()
+        self._due_s = -math.inf  # until when there is nothing to do but read while it streams
+        board.deliver = self._deliver
 
-    # ---- what is on ---------------------------------------------------------------------------
     @property
     def stats(self) -> LinkStats:
         """Counts since the handshake, over reboots too."""
-        queues = (self._batches, self._for_callbacks, *self._queues)
+        queues = [self._callbacks.queue, *self._all_queues()]
         return replace(
-            super().stats,
+            self._board.stats,
             batches_skipped=sum(queue.batches_skipped for queue in queues),
             frames_skipped=sum(queue.frames_skipped for queue in queues),
         )
 
-    @property
-    def streaming(self) -> bool:
-        """The board was told to stream, and has not ended or been stopped."""
-        return self._streaming
+    def check(self) -> None:
+        """Raise what the reading threads, callbacks or a recording have come to, if anything."""
+        if self._board.failure is not None:
+            raise self._board.failure
+        self.report()
 
-    @property
-    def ended(self) -> bool:
-        """A simulated source has played to its end and everything of it has arrived."""
-        return self._ended
-
-    def _report(self) -> None:
-        trouble, self._trouble = self._trouble, None
+    def report(self) -> None:
+        """Raise what nobody was told yet of a recording or of callbacks."""
+        trouble, self._board.trouble = self._board.trouble, None
         if trouble is not None:
             raise trouble
         self._callbacks.report()
 
-    # ---- streams -------------------------------------------------------------------------------
+    def close(self) -> None:
+        """Stop the stream and the threads."""
+        board = self._board
+        board.closing.set()
+        board.host_clock.wake()
+        self._wake_all()
+        try:
+            if self.streaming and board.connected:
+                self.streaming = False
+                board.send(wire.Stop(0))
+        except DeviceLostError:
+            pass  # it is gone already, which is what closing wants
+        finally:
+            if self._reader is not None:
+                self._reader.join()
+
+    # ---- what the board sends ------------------------------------------------------------------
 
     def start(self, *, pac: bool = True, fingers: int = ALL_FINGERS) -> None:
         """Start streaming frames, status and, unless told otherwise, PAC; ``fingers`` is a bit mask."""
@@ -106,32 +107,39 @@ class Streaming(ComingBack):
             streams |= wire.StreamFlags.PAC
         self._start(self._wants.streams if self._wants else streams, fingers)
 
-    def _start(self, streams: wire.StreamFlags, fingers: int) -> None:
+    def _start(self, streams: int, fingers: int) -> None:
         # Pull alone has no keep-alive: it reads, and so could ping, only when its caller asks.
-        request = wire.Start(self._next_req_id(), int(streams), fingers, self._keepalive_ms())
-        self._command(request)
-        self._heard_s = self.timing.monotonic_s()
+        self._started = wire.Start(0, int(streams), fingers, self._keepalive_ms())
+        self._board.tell(self._started)
+        self._heard_s = self._monotonic_s()
         self._due_s = self._ping_due_s = self._heard_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
-        self._started = request
-        self._streaming = True
-        self.link.release()
+        self.streaming = True
+        self._link.release()
 
-    def _keepalive_ms(self) -> int:
-        # In device time, which a simulated board can let run fast; one that waits for its reader knows no dead host.
-        if self._reader is None or self.link.pace == 0:
-            return 0
-        return min(0xFFFF, round(1000 * KEEPALIVE_S * max(1.0, self.link.pace)))
+    def resume(self) -> None:
+        """Have a board that was away stream again, if it did."""
+        if self._started is not None:
+            self._board.tell(self._started)
 
     def stop(self) -> None:
         """Stop streaming. Frames already on their way are still delivered."""
-        self._command(wire.Stop(self._next_req_id()))
-        self._streaming = False
+        self._board.tell(wire.Stop(0))
+        self.streaming = False
         self._started = None
-        self._tell()
+        self._wake_all()
 
     def subscribe(self, quantities: wire.QuantityFlags, *, fingers: int = ALL_FINGERS) -> None:
-        """See Commands.subscribe."""
-        super().subscribe(quantities, fingers=fingers)
+        """Choose what the board computes and sends of ``fingers`` (a bit mask) in its frames.
+
+        What is left out is not computed; it arrives as NaN, under the flag NOT_ASKED. Without REST_FRAMES
+        an untouched finger sends heartbeats (``Batch.idle``) in place of frames, without loss of a touch:
+        a frame comes as soon as the signals move. At first it is POC | FORCE | TORQUE | PRESSURE | REST_FRAMES;
+        the choice lasts until the board restarts. A board that knows no PRESSURE is not asked for it.
+        """
+        asked = quantities
+        if self._board.info.wire_minor < PRESSURE_SINCE_MINOR:
+            asked &= ~wire.QuantityFlags.PRESSURE
+        self._board.tell(wire.Subscribe(0, fingers, int(asked)), lasting=("subscription", fingers))
         self._quantities.update({f: quantities for f in range(MAX_SENSORS) if fingers >> f & 1})
 
     def want(self, *names: str, rest: bool = True, rate_hz: float | None = None) -> None:
@@ -148,44 +156,72 @@ class Streaming(ComingBack):
         wants = Wants.of(names, rest=rest, rate_hz=rate_hz)
         self.subscribe(wants.quantities)
         self._wants = wants
-        if self._streaming and self._started is not None:
+        if self.streaming and self._started is not None:
             self._start(wants.streams, self._started.fingers)
+
+    # ---- pull ----------------------------------------------------------------------------------
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield batches as they arrive, starting the stream if need be.
+
+        Ends with a simulated source, and when ``stop`` is called.
+        """
+        self._has_pulled = True
+        queue = self._pulled = self._pulled or self._new_queue()
+        if not self.streaming and not self.ended:
+            self.check()
+            self.start()
+        while True:
+            while (batch := queue.take()) is not None:
+                yield batch
+            self.check()
+            if self.ended or not self.streaming:
+                return
+            self._await_batch(queue)
+
+    def _await_batch(self, queue: BatchQueue) -> None:
+        """Wait until there may be one."""
+        board = self._board
+        if not board.is_read_here():
+            board.wait_for(lambda: queue.rows or not self.streaming or board.failure or board.closing.is_set(), 1.0)
+        elif self._link.ended:
+            self._finish()
+        elif not board.read(self._silence_s()) and not self._link.ended:
+            board.lost(self._silent(), "silence")
+
+    def put_back(self, batch: Batch) -> None:
+        """Return what ``batches`` has given and was not used."""
+        if self._pulled is not None:
+            self._pulled.put_back(batch)
 
     # ---- live ----------------------------------------------------------------------------------
 
-    def run(self: Self, *, queue: bool = False) -> Self:
-        """Have threads read the board from now on, and let it stream; returns this hand.
-
-        ``hand["index"]`` and callbacks then follow by themselves, the board stops within a second of this
-        process's death, and with ``reconnect`` its return is noticed by itself. Batches are kept for ``batches``,
-        ``frames`` and ``read`` from their first call on, or from now on with ``queue``; a caller that is slow
-        loses the oldest (``stats.batches_skipped``). A simulated board that is not paced waits instead.
-        """
+    def run(self, *, queue: bool = False) -> None:
+        """See Hand.run."""
         if queue:
-            self._pulled = True
-        self._begin(pulled=queue)
-        if not self._streaming and not self._ended:
+            self._pulled = self._pulled or self._new_queue()
+        self._read_always(pulled=queue)
+        if not self.streaming and not self.ended:
             self.start()
-        return self
 
-    def _begin(self, *, pulled: bool) -> None:
-        self._report()
-        if self._closed:
-            raise DeviceLostError(f"this Hand on {self.port} was closed; open the port again")
+    def _read_always(self, *, pulled: bool = False) -> None:
+        self.report()
+        board = self._board
+        if board.closed:
+            raise DeviceLostError(f"this Hand on {self._link.port} was closed; open the port again")
         if self._reader is not None:
             return
         if not (pulled or self._has_pulled):
             # Nobody takes them: kept, they would be stale later, or hold up a board that waits for room.
-            self._pulled = False
-            self._batches = BatchQueue()
-        limit = LIMIT_ROWS if self.link.pace else None
-        for one in (self._batches, self._for_callbacks, *self._queues):
-            one.bound(limit)
-        self._reader = Reader(self, self.port)
-        self._heard_s = self.timing.monotonic_s()
+            self._pulled = None
+        self._reader = Reader(self, self._callbacks, board.closing, self._link.port)
+        board.is_read_here = self._reader.is_here
+        for queue in (self._callbacks.queue, *self._all_queues()):
+            queue.bound(self._limit_rows())
+        self._heard_s = self._monotonic_s()
         self._reader.start()
-        if self._streaming and self._started is not None:
-            self._start(wire.StreamFlags(self._started.streams), self._started.fingers)  # now with keep-alive
+        if self.streaming and self._started is not None:
+            self._start(self._started.streams, self._started.fingers)  # now with keep-alive
 
     def on_batch(self, fn: Callable[[Batch], Any]) -> Unsubscribe:
         """Call ``fn`` with every batch, on the reading thread; returns what ends that.
@@ -194,7 +230,7 @@ class Streaming(ComingBack):
         may give commands. While it is slow the link is read all the same, and callbacks lose the oldest batches.
         What it raises comes up as CallbackError at the next call or at ``close``.
         """
-        return self._subscribed(self._callbacks.on_batch(fn))
+        return self._on(Batch, fn)
 
     def on_touch(self, fn: Callable[[wire.Touch], Any]) -> Unsubscribe:
         """Call ``fn`` as soon as a resting finger's signals move, inside the round: a hint, CONTACT may follow.
@@ -205,157 +241,137 @@ class Streaming(ComingBack):
         for quantities in {q for q in self._quantities.values() if touch not in q}:
             mask = sum(1 << f for f, q in self._quantities.items() if q == quantities)
             self.subscribe(quantities | touch, fingers=mask)
-        return self._subscribed(self._callbacks.on_message(MESSAGES["touch"], fn))
+        return self._on(wire.Touch, fn)
 
     def on_tare(self, fn: Callable[[wire.Tare], Any]) -> Unsubscribe:
         """Call ``fn`` with every change of a tare."""
-        return self._subscribed(self._callbacks.on_message(MESSAGES["tare"], fn))
+        return self._on(wire.Tare, fn)
 
     def on_status(self, fn: Callable[[wire.Status], Any]) -> Unsubscribe:
         """Call ``fn`` with the board's counters, every second."""
-        return self._subscribed(self._callbacks.on_message(MESSAGES["status"], fn))
+        return self._on(wire.Status, fn)
 
     def on_gap(self, fn: Callable[[Gap], Any]) -> Unsubscribe:
         """Call ``fn`` when the board has come back and sends again."""
-        return self._subscribed(self._callbacks.on_message(MESSAGES["gap"], fn))
+        return self._on(Gap, fn)
 
-    def _subscribed(self, unsubscribe: Unsubscribe) -> Unsubscribe:
-        self._begin(pulled=False)
-        return unsubscribe
+    def _on(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
+        self._read_always()
+        return self._callbacks.add(kind, fn)
 
     def open_queue(self, wake: Callable[[], None] | None = None) -> BatchQueue:
         """A queue of one's own for what arrives from now on; ``wake`` is called on the reading thread."""
-        self._begin(pulled=False)
-        queue = BatchQueue(wake)
-        queue.bound(LIMIT_ROWS if self.link.pace else None)
+        self._read_always()
+        queue = self._new_queue(wake)
         self._queues = [*self._queues, queue]
         return queue
 
     def close_queue(self, queue: BatchQueue) -> None:
         """End what open_queue began."""
         self._queues = [one for one in self._queues if one is not queue]
-        self.took()
+        self._board.notify()
 
-    def took(self) -> None:
-        """Something was taken from a queue: a board that waits for room may go on."""
-        if self.link.pace == 0:
-            with self._changed:
-                self._changed.notify_all()
+    # ---- queues --------------------------------------------------------------------------------
 
-    def check(self) -> None:
-        """Raise what the reading threads or callbacks have come to, if anything."""
-        if self._failure is not None:
-            raise self._failure
-        self._report()
+    def _new_queue(self, wake: Callable[[], None] | None = None) -> BatchQueue:
+        # A board that waits for room may go on when something was taken.
+        queue = BatchQueue(wake, None if self._link.pace else self._board.notify)
+        queue.bound(self._limit_rows())
+        return queue
 
-    # ---- the reading threads' side (live/reader.py) ------------------------------------------------
+    def _limit_rows(self) -> int | None:
+        return LIMIT_ROWS if self._reader and self._link.pace else None
 
-    def _arrived(self, batch: Batch) -> None:
-        if self._wants is not None:
-            batch = self._wants.thin(batch)
-        self._latest.update(batch, self._monotonic_s())
-        if self._pulled:
-            self._batches.put(batch)
-        if self._callbacks.wanted:
-            reader = self._reader
-            if self._next is None and not self._for_callbacks.rows and reader and reader.dispatcher == get_ident():
-                self._next = batch  # it is this thread's turn to hand it out, as the next thing it does
-            else:
-                self._for_callbacks.put(batch)
-        for queue in self._queues:
-            queue.put(batch)
+    def _all_queues(self) -> list[BatchQueue]:
+        return self._queues if self._pulled is None else [self._pulled, *self._queues]
 
-    def _last_t_us(self) -> int | None:
-        return self._latest.last_t_us()
-
-    def read_once(self, timeout_s: float) -> None:
-        """See live.reader.Read."""
-        if self._pump(timeout_s):
-            self._heard_s = self._monotonic_s()
-
-    def keep_up(self) -> float:
-        """See live.reader.Read."""
-        silence_s = self._silence_s()
-        if not self._streaming:
-            return silence_s
-        if self.link.ended:
-            self._finish()
-            return silence_s
-        now_s = self._monotonic_s()
-        if now_s < self._due_s:
-            return self._due_s - now_s
-        if now_s - self._heard_s >= silence_s:
-            self._lost(self._silent(), "silence")
-            self._heard_s = now_s = self.timing.monotonic_s()
-        silent_s = self._heard_s + silence_s
-        if not self._keepalive_ms():
-            self._due_s = silent_s
-            return silent_s - now_s
-        if now_s >= self._ping_due_s:
-            self._ping_due_s = now_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
-            try:
-                self._send(wire.Ping(self._next_req_id()))
-            except DeviceLostError as error:
-                self._lost(error, "unplugged")
-        self._due_s = min(self._ping_due_s, silent_s)
-        return self._due_s - now_s
-
-    def wait_for_room(self) -> None:
-        """See live.reader.Read."""
-        if self.link.pace:
-            return
-        full = self._is_full()
-        self._wait_for(lambda: self._awaiting or self.closing.is_set() or not self._is_full())
-        if full:
-            self._heard_s = self.timing.monotonic_s()  # it was not the board that was silent
-
-    def _is_full(self) -> bool:
-        return any(one.rows >= LIMIT_ROWS for one in (self._batches, *self._queues))
-
-    def dispatch(self) -> bool:
-        """See live.reader.Read."""
-        batch = self._next
-        if batch is not None:
-            self._next = None
-        elif (batch := self._for_callbacks.take()) is None:
-            return False
-        self._callbacks.call(batch)
-        return True
-
-    def may_relieve(self) -> bool:
-        """See live.reader.Read."""
-        return bool(self.link.pace or self._awaiting)
-
-    def fail(self, error: BaseException) -> None:
-        """See live.reader.Read."""
-        if self.closing.is_set():
-            return
-        with self._changed:
-            self._failure = self._failure or error
-            self._streaming = False
-        self._tell()
-
-    def _finish(self) -> None:
-        """A simulated source is over."""
-        self.ping()  # a barrier: its reply comes behind the last frame
-        with self._changed:
-            self._ended = True
-            self._streaming = False
-        self._tell()
-
-    def _tell(self) -> None:
+    def _wake_all(self) -> None:
         """Whoever waits is to look again."""
-        with self._changed:
-            self._changed.notify_all()
+        self._board.notify()
         for queue in self._queues:
             queue.wake()
 
+    # ---- on the thread that reads --------------------------------------------------------------
+
+    def _deliver(self, batch: Batch) -> None:
+        if self._wants is not None:
+            batch = self._wants.thin(batch)
+        self._latest.update(batch, self._monotonic_s())
+        if self._pulled is not None:
+            self._pulled.put(batch)
+        self._callbacks.put(batch)
+        for queue in self._queues:
+            queue.put(batch)
+
+    def read(self, at_most_s: float) -> None:
+        """See reader.Source: waits for bytes, and does what is due: ping, notice silence or the end of a source."""
+        if self._link.pace == 0:
+            self._wait_for_room()
+        if self.streaming:
+            at_most_s = min(at_most_s, self._keep_alive())
+        if self._board.read(at_most_s):
+            self._heard_s = self._monotonic_s()
+
+    def _keep_alive(self) -> float:
+        """Do what is due while it streams; returns for how many s there is nothing more to do."""
+        if self._link.ended:
+            self._finish()
+            return self._silence_s()
+        now_s = self._monotonic_s()
+        if now_s < self._due_s:
+            return self._due_s - now_s
+        if now_s - self._heard_s >= self._silence_s():
+            self._board.lost(self._silent(), "silence")
+            self._heard_s = now_s = self._monotonic_s()
+        self._due_s = self._heard_s + self._silence_s()
+        if self._keepalive_ms():
+            if now_s >= self._ping_due_s:
+                self._ping_due_s = now_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
+                try:
+                    self._board.send(wire.Ping(0))
+                except DeviceLostError as error:
+                    self._board.lost(error, "unplugged")
+            self._due_s = min(self._ping_due_s, self._due_s)
+        return self._due_s - now_s
+
+    def _keepalive_ms(self) -> int:
+        # In device time, which a simulated board can let run fast; one that waits for its reader knows no dead host.
+        if self._reader is None or self._link.pace == 0:
+            return 0
+        return min(0xFFFF, round(1000 * KEEPALIVE_S * max(1.0, self._link.pace)))
+
+    def _wait_for_room(self) -> None:
+        """Where nothing may be dropped: until consumers have room, or somebody awaits a reply."""
+        if self._is_full():
+            board = self._board
+            board.wait_for(lambda: board.awaiting or board.closing.is_set() or not self._is_full())
+            self._heard_s = self._monotonic_s()  # it was not the board that was silent
+
+    def _is_full(self) -> bool:
+        return any(one.rows >= LIMIT_ROWS for one in self._all_queues())
+
+    def may_relieve(self) -> bool:
+        """See reader.Source."""
+        return bool(self._link.pace or self._board.awaiting)
+
+    def fail(self, error: BaseException) -> None:
+        """See reader.Source."""
+        if not self._board.closing.is_set():
+            self._board.failure = self._board.failure or error
+            self.streaming = False
+            self._wake_all()
+
+    def _finish(self) -> None:
+        """A simulated source is over."""
+        self._board.tell(wire.Ping(0))  # a barrier: its reply comes behind the last frame
+        self.ended = True
+        self.streaming = False
+        self._wake_all()
+
     def _silence_s(self) -> float:
         """How long a board that streams may be silent."""
-        return SILENCE_S * self.link.patience
+        return SILENCE_S * self._link.patience
 
     def _silent(self) -> DeviceLostError:
-        return DeviceLostError(
-            f"{self.port} has been silent for {self._silence_s():.0f} s while streaming; "
-            "check the cable and open it again"
-        )
+        silent = f"{self._link.port} has been silent for {self._silence_s():.0f} s while streaming"
+        return DeviceLostError(f"{silent}; check the cable and open it again")

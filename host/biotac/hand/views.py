@@ -5,21 +5,21 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clock.host_clock import HostClock
 from ..errors import InputError
 from ..wire.batches import Batch
 from ..wire.frames import FRAME_DTYPE, Frame, StructArray, frames_from_wire
 from ..wire.messages_gen import INVALID_COUNT, FrameFlags
 from ..wire.sensor_gen import MAX_SENSORS
 
-if TYPE_CHECKING:
-    from ..clock.wall import Timing
+T = TypeVar("T")
 
 #: Chip selects by name, unless ``biotac.open(..., fingers=...)`` says otherwise.
 DEFAULT_NAMES = {"index": 0, "middle": 1, "ring": 2, "little": 3, "thumb": 4}
@@ -66,13 +66,20 @@ class Latest:
     looked at.
     """
 
-    def __init__(self, timing: Timing) -> None:
-        self.timing = timing
+    def __init__(self, host_clock: HostClock, names: Mapping[str, int] | None = None) -> None:
+        self._monotonic_s = host_clock.monotonic_s
+        self._names = checked_names(names)
         self._unseen: deque[tuple[Batch, float]] = deque()
         self._unseen_fingers = 0  # bit mask
         # finger: (batch, row, row is a heartbeat, arrival in s)
         self._entries: dict[int, tuple[Batch, int, bool, float]] = {}
         self._looking = threading.Lock()
+
+    def __getitem__(self, key: str | int) -> FingerView:
+        """A finger by name or chip select; KeyError in words."""
+        index = finger_index(self._names, key)
+        names = {number: name for name, number in self._names.items()}
+        return FingerView(names.get(index, str(index)), index, self)
 
     def update(self, batch: Batch, when_s: float) -> None:
         """Take note of it. One thread at a time."""
@@ -125,7 +132,7 @@ class Latest:
     def age_s(self, finger: int) -> float:
         """Since the row came; inf before any."""
         entry = self._look().get(finger)
-        return math.inf if entry is None else self.timing.monotonic_s() - entry[3]
+        return math.inf if entry is None else self._monotonic_s() - entry[3]
 
 
 def _last_of(batch: Batch) -> dict[int, tuple[int, bool]]:
@@ -155,6 +162,19 @@ def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
     return out
 
 
+def _value(name: str, convert: Callable[[Any], T], doc: str) -> T:
+    """A property of FingerView, for the type checker what it gives."""
+    return cast(T, property(lambda view: convert(view._row()[name]), doc=doc))
+
+
+def _vector(name: str, doc: str) -> NDArray[np.float64]:
+    return _value(name, lambda row: np.asarray(row, np.float64), doc)
+
+
+def _counts(row: Any) -> NDArray[np.uint16]:
+    return np.asarray(row, np.uint16)
+
+
 class FingerView:
     """The latest of one finger, ``hand["index"]``: a look at it now, without waiting.
 
@@ -179,78 +199,32 @@ class FingerView:
         """All values, of one moment."""
         return Frame.from_row(self._row())
 
-    @property
-    def force_n(self) -> NDArray[np.float64]:
-        """Force on the finger, (3,) in N."""
-        return self._results("force_n")
-
-    @property
-    def pressure_force_n(self) -> float:
-        """Magnitude of the force that static pressure tells of, in N; NaN without a pressure calibration."""
-        return float(self._row()["pressure_force_n"])
-
-    @property
-    def poc_mm(self) -> NDArray[np.float64]:
-        """Point of contact, (3,) in mm."""
-        return self._results("poc_mm")
-
-    @property
-    def torque_nmm(self) -> NDArray[np.float64]:
-        """Torque on the finger, (3,) in N*mm."""
-        return self._results("torque_nmm")
-
-    @property
-    def torsion_nmm(self) -> float:
-        """Torque about the outward normal at the contact, in N*mm; NaN without a wrench map that has it."""
-        return float(self._row()["torsion_nmm"])
-
-    @property
-    def force_sigma_n(self) -> NDArray[np.float64]:
-        """One standard deviation of the force, (3,) in N; NaN unless wanted."""
-        return self._results("force_sigma_n")
-
-    @property
-    def poc_sigma_mm(self) -> float:
-        """One standard deviation of the point of contact, in mm; NaN unless wanted."""
-        return float(self._row()["poc_sigma_mm"])
-
-    def _results(self, name: str) -> NDArray[np.float64]:
-        return np.asarray(self._row()[name], np.float64)
-
-    @property
-    def counts(self) -> NDArray[np.uint16]:
-        """Electrodes E1..E19, (19,) in counts 0..4095, 65535 where missing."""
-        return np.asarray(self._row()["counts"], np.uint16)
-
-    @property
-    def pdc(self) -> int:
-        """Static pressure in counts, 65535 where missing."""
-        return int(self._row()["pdc"])
-
-    @property
-    def tac(self) -> int:
-        """Thermal flux in counts, 65535 where missing."""
-        return int(self._row()["tac"])
-
-    @property
-    def tdc(self) -> int:
-        """Temperature in counts, 65535 where missing."""
-        return int(self._row()["tdc"])
-
-    @property
-    def flags(self) -> FrameFlags:
-        """What to think of the results."""
-        return FrameFlags(int(self._row()["flags"]))
+    force_n = _vector("force_n", "Force on the finger, (3,) in N.")
+    torque_nmm = _vector("torque_nmm", "Torque on the finger, (3,) in N*mm.")
+    poc_mm = _vector("poc_mm", "Point of contact, (3,) in mm.")
+    force_sigma_n = _vector("force_sigma_n", "One standard deviation of the force, (3,) in N; NaN unless wanted.")
+    poc_sigma_mm = _value(
+        "poc_sigma_mm", float, "One standard deviation of the point of contact, in mm; NaN unless wanted."
+    )
+    pressure_force_n = _value(
+        "pressure_force_n",
+        float,
+        "Magnitude of the force by static pressure, in N; NaN without a pressure calibration.",
+    )
+    torsion_nmm = _value(
+        "torsion_nmm", float, "Torque about the outward normal at the contact, in N*mm; NaN without a map that has it."
+    )
+    counts = _value("counts", _counts, "Electrodes E1..E19, (19,) in counts 0..4095, 65535 where missing.")
+    pdc = _value("pdc", int, "Static pressure in counts, 65535 where missing.")
+    tac = _value("tac", int, "Thermal flux in counts, 65535 where missing.")
+    tdc = _value("tdc", int, "Temperature in counts, 65535 where missing.")
+    flags = _value("flags", lambda bits: FrameFlags(int(bits)), "What to think of the results.")
+    t_us = _value("t_us", int, "Device time in us, unwrapped; -1 before anything came.")
 
     @property
     def touched(self) -> bool:
         """The finger is touched."""
         return FrameFlags.CONTACT in self.flags
-
-    @property
-    def t_us(self) -> int:
-        """Device time in us, unwrapped; -1 before anything came."""
-        return int(self._row()["t_us"])
 
     @property
     def age_s(self) -> float:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import threading
-import time
 from dataclasses import dataclass
-from typing import Protocol
 
+from ..clock.host_clock import HostClock, SystemClock
 from ..errors import CommandRefusedError, DeviceLostError, PortError
 from ..link.base import Played
 from ..link.port_text import options_of, parse_pace
@@ -16,28 +15,6 @@ from .reader import Recording
 
 FORM = "replay:REC?pace=X&from=S&to=S"
 CHUNK_BYTES = 65536
-
-
-class Clock(Protocol):
-    """Host time; tests have one of their own."""
-
-    def now_s(self) -> float:
-        """Monotonic seconds."""
-
-    def sleep(self, seconds: float) -> None:
-        """Let time pass."""
-
-
-class SystemClock:
-    """This computer's."""
-
-    def now_s(self) -> float:
-        """See Clock."""
-        return time.monotonic()
-
-    def sleep(self, seconds: float) -> None:
-        """See Clock."""
-        time.sleep(seconds)
 
 
 @dataclass(frozen=True)
@@ -66,7 +43,7 @@ def parse_replay(port: str, pace: float) -> ReplayPort:
         raise PortError(f"{port}: {error}; an example is replay:press.mcap?pace=1&from=12.5&to=20") from error
 
 
-def open_replay(port: str, pace: float = 0.0, *, clock: Clock | None = None) -> ReplayLink:
+def open_replay(port: str, pace: float = 0.0, *, clock: HostClock | None = None) -> ReplayLink:
     """Open a replay: port; ``pace`` is the default. Raises PortError, RecordingError or InputError."""
     parsed = parse_replay(port, pace)
     playback = Playback(Recording(parsed.path), from_s=parsed.from_s, to_s=parsed.to_s)
@@ -76,7 +53,7 @@ def open_replay(port: str, pace: float = 0.0, *, clock: Clock | None = None) -> 
 class Pacer:
     """When the bytes of a playback are due on a clock; time stands still while nothing plays."""
 
-    def __init__(self, playback: Playback, pace: float, clock: Clock) -> None:
+    def __init__(self, playback: Playback, pace: float, clock: HostClock) -> None:
         self.playback = playback
         self._pace = pace
         self._clock = clock
@@ -91,8 +68,8 @@ class Pacer:
         if self._pace == 0:
             return 0.0
         if self._start_s is None:
-            self._start_s = self._clock.now_s() - due_us / 1e6 / self._pace
-        return max(0.0, self._start_s + due_us / 1e6 / self._pace - self._clock.now_s())
+            self._start_s = self._clock.monotonic_s() - due_us / 1e6 / self._pace
+        return max(0.0, self._start_s + due_us / 1e6 / self._pace - self._clock.monotonic_s())
 
     def due(self) -> bytes:
         """All that is due now, about CHUNK_BYTES at most."""
@@ -105,7 +82,7 @@ class Pacer:
 class ReplayLink:
     """A Link to a ``playback``. Commands that would change a board raise CommandRefusedError."""
 
-    def __init__(self, port: str, playback: Playback, *, pace: float = 0.0, clock: Clock | None = None) -> None:
+    def __init__(self, port: str, playback: Playback, *, pace: float = 0.0, clock: HostClock | None = None) -> None:
         self.port = port
         self.source: Played | None = None
         self.patience = 1.0

@@ -7,15 +7,16 @@ import pty
 import select
 import tty
 
+from ..clock.host_clock import HostClock, SystemClock
 from ..errors import PortError
 from .playback import Playback
-from .replay_link import CHUNK_BYTES, Clock, Pacer, SystemClock
+from .replay_link import CHUNK_BYTES, Pacer
 
 
 class ReplayPty:
     """A pty on which any serial program meets the recorded board; ``path`` names it."""
 
-    def __init__(self, playback: Playback, pace: float, *, clock: Clock | None = None) -> None:
+    def __init__(self, playback: Playback, pace: float, *, clock: HostClock | None = None) -> None:
         self._pacer = Pacer(playback, pace, clock or SystemClock())
         self._out = b""
         try:

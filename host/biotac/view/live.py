@@ -8,9 +8,9 @@ from datetime import datetime
 from pathlib import Path
 
 from ..errors import CommandRefusedError, InputError
+from ..hand.hand import Recorder
 from ..hand.opening import open as open_hand
 from ..hand.streams import RESULTS
-from ..recording import Recorder
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
 from .player import Recorded

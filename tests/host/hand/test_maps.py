@@ -187,7 +187,7 @@ def test_a_board_that_rebooted_gets_its_maps_again(tmp_path: Path) -> None:
     clock = Clock()
     clock.while_away = boot
     boot(0)
-    with Hand(SerialLink(str(path)), reconnect=True, timing=clock) as hand:
+    with Hand(SerialLink(str(path)), reconnect=True, host_clock=clock) as hand:
         blob = make_map(1, blocks=BIG)
         hand.set_map(1, make_map(2))
         hand.set_map(1, blob)

@@ -35,7 +35,7 @@ def world(scripted_board, hello, tmp_path) -> Iterator[SimpleNamespace]:
         there.board.hang_up()
 
     def opened(reconnect: bool = True) -> Hand:
-        world.hand = Hand(SerialLink(str(world.path)), reconnect=reconnect, timing=world.clock)
+        world.hand = Hand(SerialLink(str(world.path)), reconnect=reconnect, host_clock=world.clock)
         return world.hand
 
     world.plug, world.unplug, world.opened = plug, unplug, opened
@@ -49,7 +49,7 @@ def send(there: SimpleNamespace, *frames: bytes) -> None:
 
 
 def until(hand: Hand, so) -> None:
-    assert hand._wait_for(so, WAIT_S)
+    assert hand._board.wait_for(so, WAIT_S)
 
 
 def test_without_reconnect_a_pulled_cable_is_an_error(world) -> None:
@@ -138,7 +138,7 @@ def test_a_silent_board_that_answers_again_streams_again(world) -> None:
     there.firmware.wait_for(wire.Start, 2)
     send(there, frame(300))
     until(hand, lambda: hand[0].t_us == 3_000_000)
-    gaps = [m for b in iter(hand._batches.take, None) for m in b.messages if isinstance(m, biotac.Gap)]
+    gaps = [m for b in iter(hand._streams._pulled.take, None) for m in b.messages if isinstance(m, biotac.Gap)]
     assert [(g.reason, g.last_t_us, g.next_t_us) for g in gaps] == [("silence", 50_000, 3_000_000)]
 
 
@@ -175,7 +175,7 @@ def test_a_recording_goes_on_and_holds_the_gap(world, tmp_path) -> None:
     there = world.plug(boot_id=1)
     hand = world.opened()
     recorder = biotac.recording.writer.Recorder(tmp_path / "a.mcap", hand.info, {}, {}, [], hand.port)
-    hand._recorder = recorder
+    hand._record_to(recorder)
     hand.run()
     send(there, frame(10), frame(11), b"\x05half")
     until(hand, lambda: hand[0].t_us == 110_000)
@@ -200,9 +200,9 @@ def test_close_ends_the_search(world) -> None:
     there = world.plug()
     hand = world.opened()
     hand.run()
-    world.clock.while_away = lambda pauses: hand.closing.set()
+    world.clock.while_away = lambda pauses: hand._board.closing.set()
     world.unplug(there)
-    hand._reader.join()
+    hand._streams._reader.join()
     hand.close()
 
 
@@ -223,7 +223,7 @@ def test_the_simulated_board_reboots_and_is_found_again(tmp_path) -> None:
     clock = Clock()
     clock.while_away = boot
     boot(0)
-    with Hand(SerialLink(str(path)), reconnect=True, timing=clock) as hand:
+    with Hand(SerialLink(str(path)), reconnect=True, host_clock=clock) as hand:
         hand.set_setting(wire.Setting.IDLE_PERIOD_MS, 70)
         hand.subscribe(wire.QuantityFlags.FORCE | wire.QuantityFlags.REST_FRAMES)
         batches = hand.batches()

@@ -29,14 +29,14 @@ class Live:
         self.board = board
         self.firmware = firmware
         self.clock = clock
-        self.hand = Hand(SerialLink(board.path), timing=clock)
+        self.hand = Hand(SerialLink(board.path), host_clock=clock)
 
     def send(self, *frames: bytes) -> None:
         os.write(self.board._master, b"".join(frames))
 
     def until(self, so: Callable[[], bool]) -> None:
         """Woken by whatever arrives."""
-        assert self.hand._wait_for(so, WAIT_S)
+        assert self.hand._board.wait_for(so, WAIT_S)
 
 
 @pytest.fixture
@@ -270,10 +270,10 @@ def test_start_carries_the_keep_alive_and_pings_come_in_time(live: Live) -> None
 def test_a_board_whose_time_waits_has_no_keep_alive_and_a_fast_one_a_longer() -> None:
     with biotac.open("sim:drift.toml?seconds=1") as hand:
         hand.run()
-        assert hand._keepalive_ms() == 0
+        assert hand._streams._keepalive_ms() == 0
     with biotac.open("sim:drift.toml?seconds=1&pace=4") as hand:
         hand.run()
-        assert hand._keepalive_ms() == 4000
+        assert hand._streams._keepalive_ms() == 4000
 
 
 def test_silence_ends_the_reader_in_words(live: Live) -> None:
@@ -293,7 +293,7 @@ def test_a_recording_gets_every_chunk_while_threads_read(tmp_path) -> None:
         ended = threading.Event()
         hand.on_batch(lambda batch: None)
         hand.run()
-        assert hand._wait_for(lambda: hand.ended, WAIT_S)
+        assert hand._board.wait_for(lambda: hand.ended, WAIT_S)
         ended.set()
     recording = biotac.Recording(tmp_path / "a.mcap")
     assert recording.problems == []
@@ -308,7 +308,7 @@ def test_a_full_disk_ends_the_recording_and_is_told_not_the_reading(live: Live, 
 
     recorder.write = full
     live.hand.run()
-    live.hand._recorder = recorder
+    live.hand._record_to(recorder)
     live.send(frame(0), frame(1))
     live.until(lambda: live.hand[0].t_us == 10_000)
     with pytest.raises(OSError, match="No space left"):

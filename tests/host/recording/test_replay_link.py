@@ -38,8 +38,14 @@ class FakeClock:
     def __init__(self) -> None:
         self.now = 1000.0
 
-    def now_s(self) -> float:
+    def monotonic_s(self) -> float:
         return self.now
+
+    def unix_ns(self) -> int:
+        return round(self.now * 1e9)
+
+    def wake(self) -> None:
+        pass
 
     def sleep(self, seconds: float) -> None:
         assert seconds >= 0

@@ -1,4 +1,4 @@
-"""The clock that waiting goes by, so that tests need not wait."""
+"""This computer's clock, which reading and waiting go by; tests pass one of their own, so that they need not wait."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 from typing import Protocol
 
 
-class Timing(Protocol):
+class HostClock(Protocol):
     """Time on this side of the link."""
 
     def monotonic_s(self) -> float:
@@ -16,29 +16,26 @@ class Timing(Protocol):
     def unix_ns(self) -> int:
         """Time since 1970 UTC."""
 
-    def pause(self, seconds: float) -> None:
-        """Wait, between two tries to find the board again."""
+    def sleep(self, seconds: float) -> None:
+        """Let time pass."""
 
     def wake(self) -> None:
-        """End all pauses, present and to come."""
+        """End all sleeps, present and to come."""
 
 
-class RealTiming:
-    """The computer's clocks."""
+class SystemClock:
+    """The operating system's."""
 
     def __init__(self) -> None:
         self._awake = threading.Event()
 
     monotonic_s = staticmethod(time.monotonic)  # asked thousands of times a second
+    unix_ns = staticmethod(time.time_ns)
 
-    def unix_ns(self) -> int:
-        """See Timing."""
-        return time.time_ns()
-
-    def pause(self, seconds: float) -> None:
-        """See Timing."""
+    def sleep(self, seconds: float) -> None:
+        """See HostClock."""
         self._awake.wait(seconds)
 
     def wake(self) -> None:
-        """See Timing."""
+        """See HostClock."""
         self._awake.set()

@@ -1,0 +1,55 @@
+"""The first exchange with whatever is on a port: is it a gateway, and which."""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Callable
+from typing import Any
+
+from ..errors import NotAGatewayError, WireVersionError
+from ..link import Link
+from ..wire import messages_gen as wire
+from ..wire.batches import StreamDecoder
+from .compatibility import describe_mismatch
+
+TRIES = 3
+
+
+def handshake(link: Link, send: Callable[[Any], None], *, timeout_s: float) -> wire.Hello:
+    """The board's HELLO, asked for TRIES times, ``timeout_s`` each; ``send`` numbers a command and writes it.
+
+    A board may still be streaming to whoever was here before: it is stopped, and all is let pass but the one HELLO
+    that carries our nonce. Raises NotAGatewayError, WireVersionError or DeviceLostError.
+    """
+    nonce = secrets.randbits(32)
+    decoder = StreamDecoder()
+    # The known fields of HELLO never change place, so that any peer can be told its version.
+    decoder.accept_newer_minor()
+    seen = 0
+    for _ in range(TRIES):
+        deadline_s = time.monotonic() + timeout_s
+        link.write(b"\0")  # ends whatever half packet a former program left behind
+        send(wire.Stop(0))
+        send(wire.HelloRequest(0, nonce))
+        left_s = timeout_s
+        while left_s > 0:
+            # What has come is looked at before the time is said to be over: it may be this side that was late.
+            left_s = deadline_s - time.monotonic()
+            chunk = link.read(max(0.0, left_s))
+            seen += len(chunk)
+            for message in decoder.feed(chunk).messages:
+                if isinstance(message, wire.Hello) and message.nonce == nonce:
+                    if message.wire_major != wire.WIRE_MAJOR:
+                        raise WireVersionError(f"the firmware on {link.port} speaks {describe_mismatch(message)}")
+                    return message
+    if seen == 0:
+        words = "nothing answers"
+    elif decoder.counts.good:
+        words = f"{decoder.counts.good} frames of this protocol came, but no HELLO"
+    else:
+        words = f"{seen} bytes came that are no frames of this protocol"
+    raise NotAGatewayError(
+        f"no gateway on {link.port}: {words}; expected a HELLO within {timeout_s * TRIES:.0f} s; check that this is "
+        "the board's port and that it runs our firmware"
+    )
