@@ -1,5 +1,6 @@
 #include "batch.h"
 
+#include "touch/round.h"
 #include "touch/signals.h"
 
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
