@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.unroll import unroll
+from ..picture import picture
 from ..sim.source import Source
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
@@ -20,19 +21,14 @@ AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")  # x, y, z: dark enough for whit
 
 def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], path: Path) -> None:
     """Write a PNG of finger 0; ``source_rows`` (n,) says which row of the source each frame is."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
     mine = batch.frames["finger"] == 0
     frames, messages = batch.frames[mine], batch.wire[mine]
-    figure, axes = plt.subplots(1, 2, figsize=(13, 5.6), width_ratios=(1, 1.9), layout="constrained")
-    figure.suptitle(f"{source.name}: finger 0 through the simulated board")
-    draw_fingertip(figure, axes[0], frames, messages)
-    draw_force(axes[1], source, frames, source_rows[mine])
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    with picture(path) as figure:
+        figure.set_size_inches(13, 5.6)
+        axes = figure.subplots(1, 2, width_ratios=(1, 1.9))
+        figure.suptitle(f"{source.name}: finger 0 through the simulated board")
+        draw_fingertip(figure, axes[0], frames, messages)
+        draw_force(axes[1], source, frames, source_rows[mine])
 
 
 def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:

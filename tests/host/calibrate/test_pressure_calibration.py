@@ -17,6 +17,7 @@ from biotac.cli.main import main
 from biotac.keep import calibration_file as file
 from biotac.lab.experiments import navarro, navarro_script
 from biotac.lab.experiments.outcome import Options
+from biotac.picture import picture
 from biotac.recording import Recording
 from biotac.sim.process import SimBoard
 from biotac.sim.source import load_source
@@ -297,5 +298,6 @@ def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law(result: nav
 
 
 def test_the_picture_is_drawn(result: navarro.Result, tmp_path: Path) -> None:
-    navarro.draw(result, tmp_path / "navarro.png")
+    with picture(tmp_path / "navarro.png") as figure:
+        navarro.draw(result, figure)
     assert (tmp_path / "navarro.png").read_bytes()[:4] == b"\x89PNG"

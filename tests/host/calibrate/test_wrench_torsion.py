@@ -19,6 +19,7 @@ from biotac.core import geometry as surface
 from biotac.errors import RecordingError
 from biotac.lab.experiments import random_loads, shear_torsion
 from biotac.lab.experiments.outcome import Options
+from biotac.picture import picture
 from biotac.sim.physics import Finger
 
 FRAMES = 4000
@@ -146,7 +147,8 @@ def test_shear_and_torsion_at_once(result: shear_torsion.Result, tmp_path: Path)
     assert all(check["met"] for check in facts["checks"]), facts["checks"]
     page = "\n".join(shear_torsion.page(facts))
     assert f"{facts['rmse']['calibrated'][1]:.2f}" in page
-    shear_torsion.draw(result, tmp_path / "its.png")
+    with picture(tmp_path / "its.png") as figure:
+        shear_torsion.draw(result, figure)
     assert (tmp_path / "its.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...markdown import table
 from . import figures
 from .alignment import MAX_LAG_ROWS
 from .blocks import BLOCKS, GUARD_ROWS
@@ -32,7 +32,6 @@ def markdown(validation: Validation, picture: str) -> str:
         f"Chosen on the whole run: **{facts['model']}**, median angle {facts['median_angle_deg']:.2f} deg.",
         "",
         *_axes(validation),
-        "",
         "## Models",
         "",
         "RMSE held out; in brackets the worse of "
@@ -40,7 +39,6 @@ def markdown(validation: Validation, picture: str) -> str:
         + " counts of drift that nobody tared away.",
         "",
         *_models(validation),
-        "",
         "## Weak places",
         "",
         *_weak(validation, facts),
@@ -50,7 +48,6 @@ def markdown(validation: Validation, picture: str) -> str:
         "How much of each true axis appears on each predicted one; 1 on the diagonal and 0 beside it would be perfect.",
         "",
         *_confusion(validation),
-        "",
         "## Taken for granted",
         "",
         f"* force and counts: counts come {facts['lag_rows']} rows later, {facts['lag_corrected_rows']} corrected "
@@ -66,20 +63,14 @@ def markdown(validation: Validation, picture: str) -> str:
     return "\n".join(lines)
 
 
-def draw(validation: Validation, path: Path) -> None:
-    """Write a PNG: prediction against truth per force axis, and the models' errors."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(1, 4, figsize=(16, 4.4), layout="constrained")
+def draw(validation: Validation, figure: Any) -> None:
+    """Prediction against truth per force axis, and the models' errors, in a matplotlib figure."""
+    figure.set_size_inches(16, 4.4)
     figure.suptitle(f"{validation.run.name}: {figures.model_name(validation)}, held out")
+    axes = figure.subplots(1, 4)
     for axis in range(3):
         _draw_axis(axes[axis], validation, axis)
     _draw_models(axes[3], validation)
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
 
 
 def _cut(validation: Validation) -> str:
@@ -107,10 +98,6 @@ def _rest(validation: Validation, facts: dict[str, Any]) -> list[str]:
     return [line + f" counts of drift; E_base is trained in with force 0, {facts['air_share']:.1%} of the run's weight"]
 
 
-def _table(head: list[str], rows: list[list[str]]) -> list[str]:
-    return ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]]
-
-
 def _unit(axis: str) -> str:
     return "N" if axis.startswith("F") else "N mm"
 
@@ -119,20 +106,14 @@ def _axes(validation: Validation) -> list[str]:
     truth = validation.run.truth
     errors = [figures.rmse(predicted, truth) for predicted in validation.predicted]
     explained = figures.r2(validation.predicted[0], truth)
-    head = [
-        "axis",
-        "RMSE",
-        *[f"at {c:+.0f} counts" for c in SHIFTS_COUNTS[1:]],
-        "R2",
-        "spread of the truth",
-        "chosen by",
-    ]
+    drifts = [f"at {c:+.0f} counts" for c in SHIFTS_COUNTS[1:]]
+    head = ["axis", "RMSE", *drifts, "R2", "spread of the truth", f"chosen by (of {BLOCKS} folds)"]
     rows = []
     for k, (name, votes) in enumerate(zip(validation.run.axes, figures.votes(validation), strict=True)):
         chosen = ", ".join(f"{model} {folds}" for model, folds in votes.items())
         figures_here = [f"{e[k]:.3f} {_unit(name)}" for e in errors]
         rows.append([name, *figures_here, f"{explained[k]:.3f}", f"{truth[:, k].std():.3f} {_unit(name)}", chosen])
-    return _table([*head[:-1], f"chosen by (of {BLOCKS} folds)"], rows)
+    return table(head, rows)
 
 
 def _models(validation: Validation) -> list[str]:
@@ -141,7 +122,7 @@ def _models(validation: Validation) -> list[str]:
     for name, errors in validation.by_model.items():
         drifted = errors[1:].max(axis=0)
         rows.append([name, *[f"{a:.3f} ({b:.3f})" for a, b in zip(errors[0], drifted, strict=True)], words[name]])
-    return _table(["model", *[f"{axis} [{_unit(axis)}]" for axis in validation.run.axes], ""], rows)
+    return table(["model", *[f"{axis} [{_unit(axis)}]" for axis in validation.run.axes], ""], rows)
 
 
 def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
@@ -157,26 +138,20 @@ def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
         f"{worst.rmse_n:.3f} N; best region {best.rmse_n:.3f} N",
         f"* times better than Lin's three scales: {gain}",
     ]
-    for name, block, error in _worst_blocks(validation):
-        lines.append(f"* {name}: worst block {block + 1} of {BLOCKS}, RMSE {error:.3f} {_unit(name)}")
+    blocks = [validation.blocks.rows(k) for k in range(BLOCKS)]
+    errors = np.array([figures.rmse(validation.predicted[0][r], validation.run.truth[r]) for r in blocks])
+    for name, of_axis in zip(validation.run.axes, errors.T, strict=True):
+        worst_block = int(np.argmax(of_axis))
+        error = f"{of_axis[worst_block]:.3f} {_unit(name)}"
+        lines.append(f"* {name}: worst block {worst_block + 1} of {BLOCKS}, RMSE {error}")
     return lines
-
-
-def _worst_blocks(validation: Validation) -> list[tuple[str, int, float]]:
-    result = []
-    rows = [validation.blocks.rows(k) for k in range(BLOCKS)]
-    errors = np.array([figures.rmse(validation.predicted[0][r], validation.run.truth[r]) for r in rows])
-    for axis, name in enumerate(validation.run.axes):
-        block = int(np.argmax(errors[:, axis]))
-        result.append((name, block, float(errors[block, axis])))
-    return result
 
 
 def _confusion(validation: Validation) -> list[str]:
     matrix = figures.confusion(validation.predicted[0], validation.run.truth)
     names = validation.run.axes
     rows = [[f"predicted {name}", *[f"{value:+.3f}" for value in row]] for name, row in zip(names, matrix, strict=True)]
-    return _table(["", *[f"true {name}" for name in names]], rows)
+    return table(["", *[f"true {name}" for name in names]], rows)
 
 
 def _draw_axis(axes: Any, validation: Validation, axis: int) -> None:

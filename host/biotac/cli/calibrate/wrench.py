@@ -24,6 +24,7 @@ from ...calibrate.wrench.upload import upload
 from ...errors import InputError
 from ...hand.views import checked_names, finger_index
 from ...partial_file import whole
+from ...picture import picture as drawn
 from ...wire.identity import ascii_text
 from ..progress import Progress
 from . import live as calibrate_live
@@ -200,7 +201,8 @@ def _write(
     with contextlib.ExitStack() as stack:
         parts = [stack.enter_context(whole(place, overwrite=overwrite)) for place in (page, picture, its_map)]
         parts[0].write_text(report.markdown(validation, picture.name) + _origin(its), encoding="utf-8")
-        report.draw(validation, parts[1])
+        with drawn(parts[1]) as figure:
+            report.draw(validation, figure)
         parts[2].write_text(provenance.embed(fitted.dumps(fitted.of(validation)), its), encoding="utf-8")
     return places
 

@@ -12,6 +12,7 @@ from ...errors import InputError
 from ...lab.experiments import catalogue
 from ...lab.experiments.outcome import Experiment, Facts, Options, markdown, verdicts
 from ...partial_file import whole
+from ...picture import picture as drawn
 from ..progress import Progress
 
 NAME = "experiment"
@@ -107,7 +108,8 @@ def _write(
         text, picture, figures = (stack.enter_context(whole(place, overwrite=args.force)) for place in places)
         title = f"{args.name}: {catalogue.NAMES[args.name]}"
         text.write_text(markdown(title, page, facts, picture.name), encoding="utf-8")
-        experiment.draw(result, picture)
+        with drawn(picture) as figure:
+            experiment.draw(result, figure)
         figures.write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
     return places
 

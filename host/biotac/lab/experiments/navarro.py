@@ -13,7 +13,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,6 +27,7 @@ from ...calibrate.pressure.rows import rows_of
 from ...hand.hand import Hand
 from ...hand.opening import shake_hands
 from ...link.ports import start_board
+from ...markdown import table
 from ...sim.physics import Profile
 from ...sim.process import SimLink
 from ...sim.source import Source
@@ -35,7 +35,7 @@ from ...wire import messages_gen as wire
 from ...wire.batches import Batch
 from ..crosscheck import CrossCheck
 from . import navarro_script as script
-from .outcome import Facts, Options, check, claim, number, numbers, table, text
+from .outcome import Facts, Options, check, claim, number, numbers, text
 
 RECORDING = ""
 MAPS = False
@@ -297,14 +297,10 @@ def page(facts: Facts) -> list[str]:
     return lines
 
 
-def draw(result: Result, path: Path) -> None:
+def draw(result: Result, figure: Any) -> None:
     """Figure 3 for every finger: pressure above rest against force, the held rows and the line of slope K."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(len(result.hands), len(NAMES), figsize=(15, 3.4 * len(result.hands)), squeeze=False)
+    figure.set_size_inches(15, 3.4 * len(result.hands))
+    axes = figure.subplots(len(result.hands), len(NAMES), squeeze=False)
     for its, row in zip(result.hands, axes, strict=True):
         for k, ax in enumerate(row):
             held = np.concatenate([press.rows for press in its.presses[k]])
@@ -318,6 +314,3 @@ def draw(result: Result, path: Path) -> None:
             ax.set(xlabel="P - P0 [count]", ylabel="F [N]")
             ax.grid(alpha=0.25)
     axes[0][0].legend(fontsize=8)
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
-    plt.close(figure)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -48,7 +48,7 @@ class Experiment(Protocol):
 
     def page(self, facts: Facts) -> list[str]: ...
 
-    def draw(self, result: Any, path: Path) -> None: ...
+    def draw(self, result: Any, figure: Any) -> None: ...
 
 
 def check(what: str, seen: float, limit: float, unit: str) -> Facts:
@@ -76,7 +76,7 @@ def number(value: float) -> float | None:
     return round(float(value), 4) if math.isfinite(value) else None
 
 
-def numbers(values: Sequence[float] | Any) -> list[float | None]:
+def numbers(values: Iterable[float]) -> list[float | None]:
     """number() of each."""
     return [number(value) for value in values]
 
@@ -84,11 +84,6 @@ def numbers(values: Sequence[float] | Any) -> list[float | None]:
 def text(value: float | None, digits: int = 3) -> str:
     """For a table."""
     return "-" if value is None else f"{value:.{digits}f}"
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a markdown table, then an empty one."""
-    return ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]] + [""]
 
 
 def markdown(title: str, body: list[str], facts: Facts, picture: str) -> str:

@@ -10,7 +10,6 @@ count^2 of signal; figures for other thresholds stand beside it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,11 +17,12 @@ import numpy as np
 from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...errors import RecordingError
+from ...markdown import table
 from ...sim.physics import Profile
 from ...sim.timeline import Pose
 from ...wire import messages_gen as wire
 from . import recorded
-from .outcome import Facts, Options, check, number, table, text
+from .outcome import Facts, Options, check, number, text
 from .poke import SHIPPED, WEIGHTS, WORDS
 from .trial import Bools, Script, Trial, play
 from .weight import FLAT_MM
@@ -188,14 +188,10 @@ def page(facts: Facts) -> list[str]:
     ]
 
 
-def draw(result: Result, path: Path) -> None:
+def draw(result: Result, figure: Any) -> None:
     """Shares of frames below an angle, and angles against pressure for the default weights."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(1, 2, figsize=(13, 5.4), layout="constrained")
+    figure.set_size_inches(13, 5.4)
+    axes = figure.subplots(1, 2)
     figure.suptitle(f"Normal at the point of contact against a flat plate's: {result.source}")
     colors = {SHIPPED: "#1d4ed8", wire.PocWeights.ABS_N2: "#c2410c", wire.PocWeights.COMPRESS_N2: "#15803d"}
     styles = dict(zip(dict.fromkeys(case.profile for case in result.cases), ("-", "--"), strict=False))
@@ -218,8 +214,6 @@ def draw(result: Result, path: Path) -> None:
     axes[1].legend(fontsize=8, markerscale=4)
     for axis in axes:
         axis.grid(alpha=0.25)
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
 
 
 def _draw_pressure(axes: Any, case: Angles, color: str) -> None:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,12 +21,13 @@ from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...core.unroll import unroll
 from ...errors import RecordingError
+from ...markdown import table
 from ...sim.physics import Profile
 from ...sim.timeline import Pose
 from ...wire import messages_gen as wire
 from ...wire import sensor_gen as _sensor
 from . import recorded
-from .outcome import Facts, Options, check, number, numbers, table, text
+from .outcome import Facts, Options, check, number, numbers, text
 from .trial import Bools, Script, Trial, play
 
 RECORDING = "E and F, or an .mcap with good scales: 19 contacts above 1 N in the order of the electrodes"
@@ -302,14 +302,9 @@ def _words(case: Facts, facts: Facts) -> str:
     return str(case["words"]) + (" (default)" if case["weights"] == facts["shipped"] else "")
 
 
-def draw(result: Result, path: Path) -> None:
+def draw(result: Result, figure: Any) -> None:
     """Figure 7 laid flat for the default and the paper's weights, table 2 as bars, and by force."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure = plt.figure(figsize=(15, 9.5), layout="constrained")
+    figure.set_size_inches(15, 9.5)
     grid = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
     first = result.cases[0].profile
     for k, weights in enumerate((SHIPPED, wire.PocWeights.ABS_N2)):
@@ -318,8 +313,6 @@ def draw(result: Result, path: Path) -> None:
     _draw_bands(figure.add_subplot(grid[0, 2]), result)
     _draw_electrodes(figure.add_subplot(grid[1, :]), result)
     figure.suptitle(f"Electrode poking, 2 mm probe, above {FLOOR_N:g} N: {result.source}")
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
 
 
 def _draw_points(axes: Any, case: Case) -> None:

@@ -6,13 +6,13 @@ A 500 g weight with a flat surface lies on the pad and is pushed by hand to E11'
 
 from __future__ import annotations
 
-from pathlib import Path
+from functools import partial
+from typing import Any
 
-from ...sim.physics import Profile
+from ...markdown import table
 from . import traces, weight
-from .outcome import Facts, Options, claim, table, text
-from .trial import Trial, play
-from .weight import Result
+from .outcome import Facts, Options, claim, text
+from .weight import WEIGHT_N, Result
 
 RECORDING = "E and F"
 MAPS = True
@@ -21,30 +21,16 @@ SHEAR_N = 3.0
 HOLD_S = 2.5
 LATERAL = ("E1", "E4", "E11", "E14")
 MARKED = (*LATERAL, "E17")
-# phase, weight, push to +y
-PHASES = (("B", 1.0, 0.0), ("C", 1.0, 1.0), ("D", 1.0, 0.0), ("E", 1.0, -1.0), ("F", 1.0, 0.0), ("G", 0.0, 0.0))
+PUSHES_N = {"B": 0.0, "C": SHEAR_N, "D": 0.0, "E": -SHEAR_N, "F": 0.0}  # to +y
+STEPS = (*[(name, WEIGHT_N, push_n, 0.0) for name, push_n in PUSHES_N.items()], ("G", 0.0, 0.0, 0.0))
 
-
-def emulated(
-    seed: int, profile: Profile = "new", *, take: int = 0, noiseless: bool = False, mirrored: bool = False
-) -> Trial:
-    """Figure 3 on an emulated finger; ``mirrored`` is the same trial as its mirror image sees it."""
-    side = -1.0 if mirrored else 1.0
-    steps = [
-        (name, weight.pose(force_n=load * weight.WEIGHT_N, shear_y_n=side * push * SHEAR_N))
-        for name, load, push in PHASES
-    ]
-    script = weight.script(weight.pose(), steps, HOLD_S)
-    return play("figure 3", script, seed=seed, profile=profile, take=take, noiseless=noiseless, mirrored=mirrored)
+#: Figure 3 on an emulated finger.
+emulated = partial(weight.emulated, "figure 3", STEPS, HOLD_S)
 
 
 def run(options: Options) -> Result:
     """On an emulated finger or a recording."""
-    if options.recording is not None:
-        return weight.of_recording(options, torque=False)
-    notes = [f"emulated sensor, new, seed {options.seed}: {weight.WEIGHT_N:.1f} N over E17, pushed with {SHEAR_N:g} N"]
-    source = f"emulated finger, seed {options.seed}"
-    return weight.estimated(source, emulated(options.seed), options, notes, is_recorded=False)
+    return weight.run(options, emulated, f"pushed with {SHEAR_N:g} N", torque=False)
 
 
 def facts(result: Result) -> Facts:
@@ -57,12 +43,9 @@ def facts(result: Result) -> Facts:
 
 def _claims(counts: dict[str, dict[str, float]]) -> list[Facts]:
     """Figure 3's caption, from mean counts above tare by phase and electrode."""
-
-    def pushed(phase: str, before: str, name: str) -> float:
-        return counts[phase][name] - counts[before][name]
-
-    towards = {name: pushed("C", "B", name) for name in LATERAL}
-    away = {name: pushed("E", "D", name) for name in LATERAL}
+    towards, away = (
+        {name: counts[after][name] - counts[before][name] for name in LATERAL} for before, after in ("BC", "DE")
+    )
     opposed = all((move["E1"] > 0) != (move["E11"] > 0) and (move["E4"] > 0) != (move["E14"] > 0)
                   for move in (towards, away))  # fmt: skip
     return [
@@ -85,8 +68,8 @@ def page(facts: Facts) -> list[str]:
     return [*lines, "## Forces", "", *weight.phases_table(facts, ("Fy", "Fz"))]
 
 
-def draw(result: Result, path: Path) -> None:
+def draw(result: Result, figure: Any) -> None:
     """Figure 3, and the forces below it."""
     axes = ("Fx", "Fy", "Fz") if result.is_recorded else ("Fy", "Fz")
-    below = traces.panels(result.trial, result.estimates, axes)
-    traces.draw(result.trial, below, f"Shear trial (Lin 2013, figure 3): {result.source}", path, MARKED)
+    title = f"Shear trial (Lin 2013, figure 3): {result.source}"
+    traces.draw(result.trial, result.estimates, axes, title, figure, MARKED)

@@ -22,12 +22,13 @@ from ...calibrate.wrench.moments import with_one
 from ...calibrate.wrench.recorded import load_run
 from ...core import geometry as surface
 from ...core.geometry import Floats
+from ...markdown import table
 from ...sim import sampling
 from ...sim.physics import REST_CELSIUS, Finger, States
 from ...wire.messages_gen import SETTINGS, Setting
 from . import random_loads, torsion_shear, weight
 from .estimates import torsion
-from .outcome import Facts, Options, check, numbers, table, text
+from .outcome import Facts, Options, check, numbers, text
 from .trial import Bools
 
 RECORDING = ""
@@ -208,15 +209,11 @@ def page(facts: Facts) -> list[str]:
     ]
 
 
-def draw(result: Result, path: Path) -> None:
+def draw(result: Result, figure: Any) -> None:
     """Fy and torsion against the truth, the paper's and the map's."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
     truth, both = result.validation.run.truth, result.both
-    figure, panels = plt.subplots(1, 2, figsize=(11, 5), layout="constrained")
+    figure.set_size_inches(11, 5)
+    panels = figure.subplots(1, 2)
     figure.suptitle(f"Shear and torsion at once, held-out locations: emulated finger, seed {result.seed}")
     for panel, axis, unit in zip(panels, (FY, TORSION), ("N", "N mm"), strict=True):
         _dots(panel, truth[both, axis], result.paper[both, axis], f"{PAPER} (Eq 3 and 4)", "#9ca3af")
@@ -227,8 +224,6 @@ def draw(result: Result, path: Path) -> None:
         panel.set_ylim(2.0 * ends[0], 2.0 * ends[1])
         panel.grid(alpha=0.3)
         panel.legend(markerscale=5)
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
 
 
 def _dots(panel: Any, truth: Floats, guess: Floats, label: str, color: str) -> None:

@@ -8,17 +8,18 @@ much of a pure torsion (region II) shows up as lateral force.
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...core.geometry import Floats
+from ...markdown import table
 from ...sim.physics import Profile
 from . import shear, torsion, traces, weight
 from .estimates import PAPER, Estimate, rmse
-from .outcome import Facts, Options, claim, number, table, text
+from .outcome import Facts, Options, claim, number, text
 from .torsion import TORSION_NMM
-from .trial import Bools, Trial, play
+from .trial import Bools, Trial
 from .weight import E17_MM, FLAT_MM, WEIGHT_N, Result
 
 RECORDING = "E, F and M"
@@ -48,21 +49,18 @@ def replay(
 
     ``at_mm`` places the weight; ``force_n`` > 0 is its normal force, ``shear_n`` the push to +y in region I and
     to -y in III, ``torsion_nmm`` the torque's size. Phases are called "I clockwise", "II counter", ... after
-    REGIONS and TURNS. ``mirrored`` is the same trial as its mirror image sees it.
+    REGIONS and TURNS. The rest is as of weight.emulated.
     """
-    side = -1.0 if mirrored else 1.0
-    at = (at_mm[0], side * at_mm[1])
-    bare = weight.pose(at, tip_mm=tip_mm)
-    steps = [("B", weight.pose(at, force_n=force_n, tip_mm=tip_mm))]
-    for region, push in REGIONS.items():
-        for turn, sign in TURNS:
-            end = weight.pose(
-                at, force_n=force_n, shear_y_n=side * push * shear_n, torsion_nmm=side * sign * torsion_nmm,
-                tip_mm=tip_mm,
-            )  # fmt: skip
-            steps.append((f"{region} {turn}", end))
-    script = weight.script(bare, [*steps, ("G", bare)], HOLD_S)
-    return play("figure 10", script, seed=seed, profile=profile, take=take, noiseless=noiseless, mirrored=mirrored)
+    turned = [
+        (f"{region} {turn}", force_n, push * shear_n, sign * torsion_nmm)
+        for region, push in REGIONS.items()
+        for turn, sign in TURNS
+    ]
+    steps = [("B", force_n, 0.0, 0.0), *turned, ("G", 0.0, 0.0, 0.0)]
+    return weight.emulated(
+        "figure 10", steps, HOLD_S, seed, at_mm=at_mm, tip_mm=tip_mm, profile=profile, take=take, noiseless=noiseless,
+        mirrored=mirrored,
+    )  # fmt: skip
 
 
 def signs(trial: Trial, its: Estimate, at_mm: Floats) -> dict[str, bool]:
@@ -103,15 +101,12 @@ def _rows(trial: Trial, name: str) -> Bools:
 
 def run(options: Options) -> Result:
     """On an emulated finger or a recording."""
-    if options.recording is not None:
-        return weight.of_recording(options, torque=True)
-    notes = [
-        f"emulated sensor, new, seed {options.seed}: {WEIGHT_N:.1f} N over E17, turned by {TORSION_NMM:g} N mm; pushed "
-        f"with {SHEAR_N:g} N to +y in region I, not in II, to -y in III"
-    ]
-    before = (shear.emulated(options.seed, take=1), torsion.emulated(options.seed, take=2))
-    source = f"emulated finger, seed {options.seed}"
-    return weight.estimated(source, replay(seed=options.seed), options, notes, before, is_recorded=False)
+    how = f"turned by {TORSION_NMM:g} N mm; pushed with {SHEAR_N:g} N to +y in region I, not in II, to -y in III"
+
+    def before(seed: int) -> list[Trial]:
+        return [shear.emulated(seed, take=1), torsion.emulated(seed, take=2)]
+
+    return weight.run(options, lambda seed: replay(seed=seed), how, torque=True, before=before)
 
 
 def facts(result: Result) -> Facts:
@@ -159,8 +154,7 @@ def page(facts: Facts) -> list[str]:
     ]
 
 
-def draw(result: Result, path: Path) -> None:
+def draw(result: Result, figure: Any) -> None:
     """Figure 10, with the torsion about the contact's normal."""
-    below = traces.panels(result.trial, result.estimates, ("Fy", "Fz", "torsion"))
     title = f"Torsion with shear (Lin 2013, figure 10): {result.source}"
-    traces.draw(result.trial, below, title, path, torsion.MARKED)
+    traces.draw(result.trial, result.estimates, ("Fy", "Fz", "torsion"), title, figure, torsion.MARKED)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,69 +18,25 @@ OTHER_PAPER_COLOR = "#fb923c"
 MAX_POINTS = 20_000  # a line; more only make the picture larger
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One quantity over time: ``truth`` (n,) or None, and models' ``lines`` (n,) by name."""
+def draw(
+    trial: Trial, estimates: Sequence[Estimate], axes: Sequence[str], title: str, figure: Any, marked: Sequence[str]
+) -> None:
+    """``axes`` are of Fx, Fy, Fz, Mz and "torsion" (about the contact's normal, at the true contact).
 
-    label: str
-    truth: Floats | None
-    lines: dict[str, Floats]
-
-
-def panels(trial: Trial, estimates: Sequence[Estimate], axes: Sequence[str]) -> list[Panel]:
-    """Those of Fx, Fy, Fz, Mz and "torsion" (about the contact's normal, at the true contact) that are known."""
-    result = []
-    for axis in axes:
-        lines: dict[str, Floats] = {}
-        truth: Floats | None = None
-        for its in estimates:
-            values = _values(trial, its, axis)
-            if values is not None:
-                lines[its.name] = values
-        if axis.startswith("F"):
-            truth = None if trial.force_n is None else trial.force_n[:, "xyz".index(axis[1])]
-        elif axis == "Mz":
-            truth = None if trial.torque_nmm is None else trial.torque_nmm[:, 2]
-        else:
-            truth = trial.torsion_nmm
-        unit = "N" if axis.startswith("F") else "N mm"
-        result.append(Panel(f"{axis} [{unit}]", truth, lines))
-    return result
-
-
-def _values(trial: Trial, its: Estimate, axis: str) -> Floats | None:
-    if axis.startswith("F"):
-        column: Floats = its.force_n[:, "xyz".index(axis[1])]
-        return column
-    if its.torque_nmm is None:
-        return None
-    if axis == "Mz":
-        about: Floats = its.torque_nmm[:, 2]
-        return about
-    return None if trial.at_mm is None else its.torsion_nmm(trial.at_mm)
-
-
-def draw(trial: Trial, below: Sequence[Panel], title: str, path: Path, marked: Sequence[str]) -> None:
-    """Write a PNG; electrodes in ``marked`` are in colour, the others grey."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    ratios = [1.6] + [1.0] * len(below)
-    figure, axes = plt.subplots(len(below) + 1, 1, figsize=(13, 2.4 * sum(ratios) / 1.15), sharex=True,
-                                height_ratios=ratios, layout="constrained")  # fmt: skip
+    Electrodes in ``marked`` are in colour, the others grey.
+    """
+    ratios = [1.6] + [1.0] * len(axes)
+    figure.set_size_inches(13, 2.4 * sum(ratios) / 1.15)
     figure.suptitle(title)
-    _electrodes(axes[0], trial, marked)
-    for axis, panel in zip(axes[1:], below, strict=True):
-        _panel(axis, trial, panel)
-    for axis in axes:
-        _phases(axis, trial, named=axis is axes[0])
-        axis.grid(alpha=0.25)
-        axis.margins(x=0.0)
-    axes[-1].set_xlabel("time [s]")
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
+    panels = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
+    _electrodes(panels[0], trial, marked)
+    for panel, axis in zip(panels[1:], axes, strict=True):
+        _quantity(panel, trial, estimates, axis)
+    for panel in panels:
+        _phases(panel, trial, named=panel is panels[0])
+        panel.grid(alpha=0.25)
+        panel.margins(x=0.0)
+    panels[-1].set_xlabel("time [s]")
 
 
 def _electrodes(axes: Any, trial: Trial, marked: Sequence[str]) -> None:
@@ -98,20 +52,32 @@ def _electrodes(axes: Any, trial: Trial, marked: Sequence[str]) -> None:
     _legend(axes)
 
 
-def _panel(axes: Any, trial: Trial, panel: Panel) -> None:
+def _quantity(panel: Any, trial: Trial, estimates: Sequence[Estimate], axis: str) -> None:
     step = max(1, len(trial) // MAX_POINTS)
-    if panel.truth is not None:
-        axes.plot(trial.time_s[::step], panel.truth[::step], color="#111111", linewidth=3, alpha=0.3, label="applied")
+    truth = _of(axis, trial.force_n, trial.torque_nmm, trial.torsion_nmm)
+    if truth is not None:
+        panel.plot(trial.time_s[::step], truth[::step], color="#111111", linewidth=3, alpha=0.3, label="applied")
     colors = iter(MAP_COLORS)
     papers = iter((PAPER_COLOR, OTHER_PAPER_COLOR))
-    for name, line in panel.lines.items():
-        of_paper = name.startswith(PAPER)
+    for its in estimates:
+        at_contact = None if trial.at_mm is None or its.torque_nmm is None else its.torsion_nmm(trial.at_mm)
+        line = _of(axis, its.force_n, its.torque_nmm, at_contact)
+        if line is None:
+            continue
+        of_paper = its.name.startswith(PAPER)
         color = next(papers, PAPER_COLOR) if of_paper else next(colors, MAP_COLORS[-1])
         # a map follows every count's noise: drawn last, its line would hide the others
-        axes.plot(trial.time_s[::step], line[::step], color=color, linewidth=1.0, label=name, zorder=3 + of_paper)
-    axes.axhline(0.0, color="#111111", linewidth=0.6)
-    axes.set_ylabel(panel.label)
-    _legend(axes)
+        panel.plot(trial.time_s[::step], line[::step], color=color, linewidth=1.0, label=its.name, zorder=3 + of_paper)
+    panel.axhline(0.0, color="#111111", linewidth=0.6)
+    panel.set_ylabel(f"{axis} [{'N' if axis.startswith('F') else 'N mm'}]")
+    _legend(panel)
+
+
+def _of(axis: str, force_n: Floats | None, torque_nmm: Floats | None, torsion_nmm: Floats | None) -> Floats | None:
+    if axis == "torsion":
+        return torsion_nmm
+    values = force_n if axis.startswith("F") else torque_nmm
+    return None if values is None else values[:, "xyz".index(axis[1])]
 
 
 def _legend(axes: Any) -> None:

@@ -6,20 +6,22 @@ fitted maps; its figures are errors over the loaded frames and means over the ph
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...errors import RecordingError
+from ...markdown import table
+from ...sim.physics import Profile
 from ...sim.timeline import Pose
 from ...wire import sensor_gen as _sensor
 from . import recorded
 from .estimates import PAPER, Estimate, by_map, by_paper, load_maps, paper_scales, rmse
-from .outcome import Facts, Options, number, numbers, table, text
-from .trial import Bools, Script, Trial
+from .outcome import Facts, Options, number, numbers, text
+from .trial import Bools, Script, Trial, play
 
 WEIGHT_N = 4.905  # 500 g
 FLAT_MM = 7.0  # numerics.md 3.1: a flat surface leaves a footprint of 3.5 mm radius
@@ -27,6 +29,7 @@ LOADED_N = 0.5
 RAMP_S = 0.5
 _E17 = surface.ELECTRODE_MM[_sensor.ELECTRODE_NAMES.index("E17")]
 E17_MM = (float(_E17[0]), float(_E17[1]))  # the paper does not say where the weight lies; figure 3 has it over E17
+Step = tuple[str, float, float, float]  # phase, weight N, push to +y N, torsion about the outward normal N mm
 FORCES, TORQUES = ("Fx", "Fy", "Fz"), ("Mx", "My", "Mz")
 
 
@@ -42,23 +45,50 @@ class Result:
     is_recorded: bool
 
 
-def pose(at_mm: tuple[float, float] = E17_MM, *, force_n: float = 0.0, shear_y_n: float = 0.0,
-         torsion_nmm: float = 0.0, tip_mm: float = FLAT_MM) -> Pose:  # fmt: skip
-    """The weight on the pad at x, y."""
-    return Pose(*at_mm, force_n, shear_y_n=shear_y_n, torsion_nmm=torsion_nmm, tip_mm=tip_mm)
+def emulated(
+    figure: str,
+    steps: Iterable[Step],
+    hold_s: float,
+    seed: int,
+    *,
+    at_mm: tuple[float, float] = E17_MM,
+    tip_mm: float = FLAT_MM,
+    profile: Profile = "new",
+    take: int = 0,
+    noiseless: bool = False,
+    mirrored: bool = False,
+) -> Trial:
+    """Two seconds at rest (A), then each step's load at ``at_mm``, reached in RAMP_S and held for ``hold_s``.
+
+    ``mirrored`` is the same trial as its mirror image sees it; ``profile``, ``take`` and ``noiseless`` as of play().
+    """
+    side = -1.0 if mirrored else 1.0
+    bare = Pose(at_mm[0], side * at_mm[1], tip_mm=tip_mm)
+    script = Script()
+    script.phase("A", 0.1, 1.9, bare, bare)
+    for name, force_n, push_n, torsion_nmm in steps:
+        end = replace(bare, force_n=force_n, shear_y_n=side * push_n, torsion_nmm=side * torsion_nmm)
+        script.phase(name, RAMP_S, hold_s, end)
+    return play(figure, script, seed=seed, profile=profile, take=take, noiseless=noiseless, mirrored=mirrored)
 
 
-def script(bare: Pose, steps: Iterable[tuple[str, Pose]], hold_s: float) -> Script:
-    """Two seconds at rest (A), then each phase's pose, reached in RAMP_S and held; ``bare`` is where nothing loads."""
-    its = Script()
-    its.phase("A", 0.1, 1.9, bare, bare)
-    for name, end in steps:
-        its.phase(name, RAMP_S, hold_s, end)
-    return its
+def run(
+    options: Options,
+    emulate: Callable[[int], Trial],
+    how: str,
+    *,
+    torque: bool,
+    before: Callable[[int], Sequence[Trial]] = lambda seed: (),
+) -> Result:
+    """On an emulated finger by its seed, loaded ``how``; or on a recording with F, and M for ``torque``."""
+    if options.recording is not None:
+        return _of_recording(options, torque=torque)
+    seed = options.seed
+    notes = [f"emulated sensor, new, seed {seed}: {WEIGHT_N:.1f} N over E17, {how}"]
+    return _estimated(f"emulated finger, seed {seed}", emulate(seed), options, notes, before(seed), is_recorded=False)
 
 
-def of_recording(options: Options, *, torque: bool) -> Result:
-    """A laboratory's trial with F, and M where ``torque`` is what it is about."""
+def _of_recording(options: Options, *, torque: bool) -> Result:
     assert options.recording is not None
     theirs = recorded.load(options.recording, options.finger, needs=("F", "M") if torque else ("F",))
     assert theirs.trial.force_n is not None
@@ -73,10 +103,10 @@ def of_recording(options: Options, *, torque: bool) -> Result:
             f"{options.recording}: never loaded, the most is {most:.2f} N: expected over {LOADED_N:g} N; is F in N?"
         )
     notes = [*theirs.notes, "phases are not looked for in a recording: its errors are over all loaded frames"]
-    return estimated(str(options.recording), theirs.trial, options, notes, is_recorded=True)
+    return _estimated(str(options.recording), theirs.trial, options, notes, is_recorded=True)
 
 
-def estimated(
+def _estimated(
     source: str, trial: Trial, options: Options, notes: list[str], before: Sequence[Trial] = (), *, is_recorded: bool
 ) -> Result:
     """The paper's scales fitted on the trial itself, on the trials ``before`` it, and the maps of the options."""
