@@ -12,7 +12,7 @@ import pytest
 
 import biotac
 from biotac.calibrate.pressure import guided
-from biotac.calibrate.pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
+from biotac.calibrate.pressure.presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
 from biotac.lab.experiments import navarro, navarro_script

@@ -7,22 +7,23 @@ only what comes after the first presses is looked at.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from ...errors import CommandRefusedError, InputError
 from ...hand.hand import Hand
+from ...keep import Calibration
 from ...keep.calibration_file import Provenance
 from ...version import __version__
+from ...wire import messages_gen as wire
 from ...wire.identity import ascii_text, serial_text
 from . import report
-from .driving import drive, fits_of, put, with_gain
-from .fit import MIN_PRESSES, Fit, verify
-from .plateaus import Phase, Press
-from .procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure, Step
-from .reference import Reference, Truth, Unknown
+from .fit import MIN_PRESSES, Fit, fit, verify
+from .force_source import Reference, Truth, Unknown
+from .presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Phase, Press, Procedure, Step
 from .report import Outcome
+from .rows import rows_of
 
 
 class Face(Protocol):
@@ -168,3 +169,61 @@ def _provenance(hand: Hand, its: Fit) -> Provenance:
         "board_serial": serial_text(hand.info),
         **report.facts_of(its),
     }
+
+
+Show = Callable[[Step | None], None]
+
+
+def drive(
+    hand: Hand,
+    procedure: Procedure,
+    reference: Reference,
+    show: Show = lambda step: None,
+    *,
+    after_us: int = 0,
+) -> None:
+    """Feed ``procedure`` with what ``hand`` streams until it is done, telling ``show`` each new step.
+
+    Starts the stream if need be and leaves it on; the first ``after_us`` of device time are passed over. Raises
+    InputError when a finger waits in vain, or a simulated source ends first.
+    """
+    shown: Step | None = procedure.step
+    show(shown)
+    first_us: int | None = None
+    for batch in hand.batches():
+        force_n = reference.at(batch.wire["finger"], batch.t_us)
+        rows = rows_of(batch.wire, batch.t_us, force_n)
+        if first_us is None and len(rows):
+            first_us = int(rows["t_us"].min())
+        procedure.feed(rows[rows["t_us"] - (first_us or 0) >= after_us])
+        if procedure.step != shown:
+            shown = procedure.step
+            show(shown)
+        if procedure.done:
+            return
+    procedure.finish()
+
+
+def fits_of(procedure: Procedure, presses: Mapping[int, Sequence[Press]]) -> dict[int, Fit]:
+    """K of each finger from these of its presses. Raises InputError, see ``fit``."""
+    return {finger: fit(procedure.rests[finger], mine) for finger, mine in presses.items()}
+
+
+def with_gain(hand: Hand, its: Fit, made_s: int) -> Calibration:
+    """The finger's calibration as it is on the board, with K in it, for the sensor that is there."""
+    own = hand.calibration(its.finger)
+    if own is None or hand.calibration_state(its.finger) != wire.CalibrationState.IN_FORCE:
+        own = Calibration().changed(hand.settings())
+    told = hand.sensor_info(its.finger)
+    return replace(own, pressure_gain_nn=its.gain_nn, serial=ascii_text(told.serial), made_s=made_s)
+
+
+def put(hand: Hand, finger: int, calibration: Calibration) -> None:
+    """Set it and read it back. Not while streaming. Raises CommandRefusedError, or InputError if it is another then."""
+    hand.set_calibration(finger, calibration)
+    back = hand.calibration(finger)
+    if back != calibration or hand.calibration_state(finger) != wire.CalibrationState.IN_FORCE:
+        raise InputError(
+            f"finger {finger}: the board says {back}, expected what it was given, in force; read it with "
+            "`biotac calibration show`"
+        )

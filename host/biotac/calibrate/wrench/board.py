@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.board_map import BoardBlock, BoardMap
+from ...core.geometry import Floats
 from ...errors import InputError
 from ...wire import map_gen as _map
 from ...wire import messages_gen as wire
@@ -24,7 +25,7 @@ from ...wire.map_gen import Gate, Kind
 from . import features
 from .features import ELECTRODES, Signals
 from .fitted import WrenchMap
-from .recorded import Floats, Run
+from .run import Run
 
 Q4 = 16
 # What 1 in a column of features is as the board's factor, of which 2^16 is a coefficient's unit.

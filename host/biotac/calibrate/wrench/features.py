@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import geometry as surface
+from ...core.geometry import Floats
 from ...wire import map_gen as _map
 from ...wire import sensor_gen as _sensor
 from ...wire.map_gen import Gate, Kind
-from .recorded import Floats
 
 ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 SIGNAL_COUNTS = 500.0  # a firm press; only sets the columns' size

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...core.geometry import Floats
 from .crossvalidation import SHIFTS_COUNTS, Validation
 from .features import Signals, centroid_mm, columns
 from .models import LIN
 from .moments import aligned, with_one
-from .recorded import Floats
 
 ANGLE_MIN_N = 0.5  # a smaller force has a direction only on paper
 THIRDS = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)

@@ -11,14 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from ...core.geometry import Floats
 from ...errors import InputError, RecordingError
 from ...wire import messages_gen as wire
 from ...wire import sensor_gen as sensor
 from ...wire.frames import electrode_signals
 from ..reference.samples import Reference
 from ..reference.timing import STEP_S, Alignment, align
-from . import contact, torsion
-from .recorded import MIN_REST_ROWS, REST_N, Floats, Run, check_clipping, check_rails, check_rows, check_units, drift_of
+from . import contact
+from .run import MIN_REST_ROWS, REST_N, Run, check_clipping, check_rails, check_rows, check_units, drift_of
 
 Mask = npt.NDArray[np.bool_]
 
@@ -119,7 +120,7 @@ def _run(
     on_skin = _on_skin(where, truth) if truth.shape[1] == 6 else float("nan")
     about_torsion: tuple[str, ...] = ()
     if truth.shape[1] == 6:
-        about_normal, about_torsion = torsion.truth(where, None, truth[:, :3], truth[:, 3:])
+        about_normal, about_torsion = contact.torsion_truth(where, None, truth[:, :3], truth[:, 3:])
         truth = np.column_stack([truth, about_normal])
     resting = counts[quiet]
     whole = len(resting) // IDLE_MEAN_ROWS * IDLE_MEAN_ROWS

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from ...core.geometry import Floats
 from ...markdown import table
 from . import figures
-from .alignment import MAX_LAG_ROWS
 from .blocks import BLOCKS, GUARD_ROWS
 from .crossvalidation import INNER_FOLDS, SHIFTS_COUNTS, Validation
+from .lag import MAX_LAG_ROWS
 from .models import MODELS, POOLED, POOLED_WORDS, TEMPLATE, TEMPLATE_WORDS
-from .recorded import Floats
 
 AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")
 MAX_DOTS = 4000  # an axis; more only make the picture larger

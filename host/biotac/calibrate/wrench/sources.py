@@ -14,7 +14,7 @@ from ...wire.identity import ascii_text
 from ..reference.samples import Reference
 from .joined import Joined, board_of, choose_finger, join
 from .provenance import Provenance, check_serial, of_files
-from .recorded import Run, load_run
+from .run import Run, load_run
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,11 @@ from pathlib import Path
 
 import biotac
 
-from ...calibrate.reference.live import Reader
 from ...calibrate.reference.mounting import Mounting, read_mounting
 from ...calibrate.reference.net_ft import PREFIX, NetFtReader, parse_address
-from ...calibrate.wrench.procedure import Event, Procedure
+from ...calibrate.reference.samples import Reader
+from ...calibrate.wrench.guided import Event, Places, Procedure, walk
 from ...calibrate.wrench.provenance import check_serial
-from ...calibrate.wrench.walk import Places, walk
 from ...errors import BiotacError, InputError
 from ...sim.nano17 import Nano17
 from ...sim.nano17_reader import Nano17Reader

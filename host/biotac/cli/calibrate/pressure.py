@@ -10,10 +10,9 @@ from pathlib import Path
 
 import biotac
 
-from ...calibrate.pressure import guided, recorded, report
-from ...calibrate.pressure.plateaus import Phase
-from ...calibrate.pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
-from ...calibrate.pressure.reference import load_csv
+from ...calibrate.pressure import from_recording, guided, report
+from ...calibrate.pressure.force_source import load_csv
+from ...calibrate.pressure.presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Phase, Step
 from ...errors import InputError
 from ...hand.hand import Hand
 from ...keep import calibration_file as file
@@ -77,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     reference = load_csv(args.reference) if args.reference is not None else None
     for place in recordings:
-        outcome = recorded.calibrate(
+        outcome = from_recording.calibrate(
             load(Path(place)),
             reference,
             fingers=args.fingers,

@@ -17,11 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from ...calibrate.pressure import driving, formulas
+from ...calibrate.pressure import formulas, guided
 from ...calibrate.pressure.fit import Fit, Verification, fit, told_by, verify
-from ...calibrate.pressure.plateaus import Press
-from ...calibrate.pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure
-from ...calibrate.pressure.reference import Truth
+from ...calibrate.pressure.force_source import Truth
+from ...calibrate.pressure.presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Press, Procedure
 from ...calibrate.pressure.report import PAPER_ERROR
 from ...calibrate.pressure.rows import rows_of
 from ...hand.hand import Hand
@@ -113,7 +112,7 @@ def calibrate(
     first = Procedure(fingers, CALIBRATION_FORCES_N)
     show(f"{profile}: three presses a finger")
     with _open(source, board) as hand:
-        driving.drive(hand, first, Truth(source))
+        guided.drive(hand, first, Truth(source))
     fits = {f: fit(first.rests[f], presses) for f, presses in first.presses.items()}
 
     second = Procedure(fingers, VERIFICATION_FORCES_N)
@@ -121,7 +120,7 @@ def calibrate(
     show(f"{profile}: a verification press a finger")
     with _open(source, board) as hand:
         for its in fits.values():
-            driving.put(hand, its.finger, driving.with_gain(hand, its, int(time.time())))
+            guided.put(hand, its.finger, guided.with_gain(hand, its, int(time.time())))
         settings, own = hand.settings(), hand.finger_settings()
         for batch in hand.batches():
             outcome.add(batch.wire, settings, own)
@@ -150,7 +149,7 @@ def places(seed: int) -> Places:
     source = script.source("places", [seed], "new", script.presses([0], forces, at))
     procedure = Procedure([0], forces)
     with _open(source, "posix") as hand:
-        driving.drive(hand, procedure, Truth(source))
+        guided.drive(hand, procedure, Truth(source))
     each = len(CALIBRATION_FORCES_N)
     groups = [procedure.presses[0][k : k + each] for k in range(0, len(forces), each)]
     fits = [fit(procedure.rests[0], group) for group in groups]

@@ -21,7 +21,7 @@ from ...markdown import table
 from ...sim.physics import Profile
 from ...sim.timeline import Pose
 from ...wire import messages_gen as wire
-from . import recorded
+from . import laboratory
 from .outcome import Facts, Options, check, number, text
 from .poke import SHIPPED, WEIGHTS, WORDS
 from .trial import Bools, Script, Trial, play
@@ -95,7 +95,7 @@ def emulated(seed: int, profile: Profile) -> Trial:
 def run(options: Options) -> Result:
     """On an emulated finger, new and worn; or on a recording."""
     if options.recording is not None:
-        theirs = recorded.load(options.recording, options.finger, needs=("PDC", "z_dir"))
+        theirs = laboratory.load(options.recording, options.finger, needs=("PDC", "z_dir"))
         assert theirs.plate_normal is not None
         cases = [_case("recorded", weights, theirs.trial, theirs.plate_normal) for weights in WEIGHTS]
         for case in cases:

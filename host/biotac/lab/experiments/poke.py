@@ -26,7 +26,7 @@ from ...sim.physics import Profile
 from ...sim.timeline import Pose
 from ...wire import messages_gen as wire
 from ...wire import sensor_gen as _sensor
-from . import recorded
+from . import laboratory
 from .outcome import Facts, Options, check, number, numbers, text
 from .trial import Bools, Script, Trial, play
 
@@ -152,7 +152,7 @@ def contacts(trial: Trial, low_n: float = FLOOR_N, high_n: float = np.inf) -> li
 def run(options: Options) -> Result:
     """On an emulated finger, new and worn, twice each; or on a recording."""
     if options.recording is not None:
-        theirs = recorded.load(options.recording, options.finger, needs=("F",), own_force=True)
+        theirs = laboratory.load(options.recording, options.finger, needs=("F",), own_force=True)
         firm = contacts(theirs.trial)
         banded = [contacts(theirs.trial, *band) for band in BANDS_N]
         cases = [_case("recorded", weights, [theirs.trial], theirs.trial, [firm], banded) for weights in WEIGHTS]

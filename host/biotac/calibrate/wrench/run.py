@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...core.geometry import Floats
 from ...errors import RecordingError
 from ...sim.replay import counts_field, read_npz, to_lin_frame
 from ...wire import sensor_gen as _sensor
-from . import torsion
+from . import contact
 from .blocks import BLOCKS, GUARD_ROWS, contacts
-
-Floats = npt.NDArray[np.float64]
 
 MIN_ROWS = BLOCKS * 2 * GUARD_ROWS  # a block shorter than its two guards would be all guard
 REST_N = 0.1  # a plate's reading below this is taken for "nothing touches"
@@ -98,7 +97,7 @@ def load_run(path: Path) -> Run:
     about_torsion: tuple[str, ...] = ()
     if "M" in fields:
         moment = _truth(path, "M", "N mm", fields["M"], rows)
-        about_normal, about_torsion = torsion.truth(path, fields.get("torsion"), force, moment)
+        about_normal, about_torsion = contact.torsion_truth(path, fields.get("torsion"), force, moment)
         truth = np.column_stack([force, moment, about_normal])
     check_rails(path, counts)
     rest: npt.NDArray[np.bool_] = np.linalg.norm(force, axis=1) < REST_N

@@ -18,8 +18,8 @@ from ...wire.frames import StructArray
 from ...wire.identity import ascii_text
 from . import report
 from .fit import MIN_PRESSES, fit, told_by, verify
-from .procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure
-from .reference import Series, Unknown, check_alignment
+from .force_source import Series, Unknown, check_alignment
+from .presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure
 from .report import Outcome
 from .rows import rows_of, with_filter
 
