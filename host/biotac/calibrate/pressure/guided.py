@@ -7,15 +7,13 @@ only what comes after the first presses is looked at.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 from ...errors import CommandRefusedError, InputError
 from ...hand.hand import Hand
 from ...keep import Calibration
-from ...keep.calibration_file import Provenance
-from ...version import __version__
 from ...wire import messages_gen as wire
 from ...wire.identity import ascii_text, serial_text
 from . import report
@@ -59,7 +57,7 @@ def calibrate(open_hand: Callable[[], Hand], plan: Plan, face: Face, *, made_s: 
         serials = {finger: _serial(hand, finger) for finger in fingers}
         reference: Reference = Unknown() if hand.link.source is None else Truth(hand.link.source)
         first = _run(hand, Procedure(fingers, plan.forces_n, needs_force=_known(reference)), reference, face)
-        fits = fits_of(first.procedure, first.presses)
+        fits = {finger: fit(first.procedure.rests[finger], mine) for finger, mine in first.presses.items()}
         again = hand.link.source is not None and hand.link.pace == 0
         if not again:
             hand.stop()
@@ -126,7 +124,7 @@ def _on_board(
                 "the same: begin again"
             )
         calibrations[finger] = with_gain(hand, its, made_s)
-        provenance[finger] = _provenance(hand, its)
+        provenance[finger] = report.provenance(its, **{"from": hand.port, "board_serial": serial_text(hand.info)})
         put(hand, finger, calibrations[finger])
     verified = {}
     if plan.verification_n:
@@ -158,17 +156,6 @@ def _fingers(hand: Hand, plan: Plan) -> Sequence[int]:
 
 def _serial(hand: Hand, finger: int) -> str:
     return ascii_text(hand.sensor_info(finger).serial)
-
-
-def _provenance(hand: Hand, its: Fit) -> Provenance:
-    """How K came about, for people."""
-    return {
-        "software": f"biotac-gateway {__version__}",
-        "method": "pressure, Navarro 2015",
-        "from": hand.port,
-        "board_serial": serial_text(hand.info),
-        **report.facts_of(its),
-    }
 
 
 Show = Callable[[Step | None], None]
@@ -204,18 +191,12 @@ def drive(
     procedure.finish()
 
 
-def fits_of(procedure: Procedure, presses: Mapping[int, Sequence[Press]]) -> dict[int, Fit]:
-    """K of each finger from these of its presses. Raises InputError, see ``fit``."""
-    return {finger: fit(procedure.rests[finger], mine) for finger, mine in presses.items()}
-
-
 def with_gain(hand: Hand, its: Fit, made_s: int) -> Calibration:
     """The finger's calibration as it is on the board, with K in it, for the sensor that is there."""
     own = hand.calibration(its.finger)
     if own is None or hand.calibration_state(its.finger) != wire.CalibrationState.IN_FORCE:
         own = Calibration().changed(hand.settings())
-    told = hand.sensor_info(its.finger)
-    return replace(own, pressure_gain_nn=its.gain_nn, serial=ascii_text(told.serial), made_s=made_s)
+    return replace(own, pressure_gain_nn=its.gain_nn, serial=_serial(hand, its.finger), made_s=made_s)
 
 
 def put(hand: Hand, finger: int, calibration: Calibration) -> None:

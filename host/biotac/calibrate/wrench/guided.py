@@ -27,7 +27,6 @@ from .coverage import Coverage
 
 Frames = npt.NDArray[np.void]
 
-SETTLE_FRAMES = 30  # after a touch or an invalid word
 MEAN_FRAMES = 50  # drift is slow: means of half a second have it without the noise
 TARE_FRAMES = 200
 TARE_SAMPLES_S = 1.0
