@@ -15,7 +15,7 @@ from biotac.calibrate.pressure import guided
 from biotac.calibrate.pressure.presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
-from biotac.lab.experiments import navarro, navarro_script
+from biotac.lab.experiments import navarro
 from biotac.lab.experiments.outcome import Options
 from biotac.picture import picture
 from biotac.recording import Recording
@@ -44,10 +44,10 @@ class Silent:
 
 def test_the_bundled_scenario_is_the_experiments() -> None:
     steps = [
-        *navarro_script.presses(FINGERS, CALIBRATION_FORCES_N, [navarro.PLACE] * 3),
-        *navarro_script.presses(FINGERS, VERIFICATION_FORCES_N, [navarro.PLACE]),
+        *navarro.presses(FINGERS, CALIBRATION_FORCES_N, [navarro.PLACE] * 3),
+        *navarro.presses(FINGERS, VERIFICATION_FORCES_N, [navarro.PLACE]),
     ]
-    wanted = navarro_script.source("fingers", [1, 2, 3, 4, 5], "new", steps)
+    wanted = navarro.emulated_hand("fingers", [1, 2, 3, 4, 5], "new", steps)
     np.testing.assert_array_equal(load_source("fingers.toml").samples, wanted.samples)
 
 
@@ -157,10 +157,10 @@ def pressed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two fingers through all presses, recorded, and the plate beside it."""
     folder = tmp_path_factory.mktemp("pressed")
     steps = [
-        *navarro_script.presses([0, 1], CALIBRATION_FORCES_N, ["E17"] * 3),
-        *navarro_script.presses([0, 1], VERIFICATION_FORCES_N, ["E17"]),
+        *navarro.presses([0, 1], CALIBRATION_FORCES_N, ["E17"] * 3),
+        *navarro.presses([0, 1], VERIFICATION_FORCES_N, ["E17"]),
     ]
-    (folder / "two.toml").write_text(navarro_script.scenario("two", [11, 12], "worn", steps))
+    (folder / "two.toml").write_text(navarro.scenario("two", [11, 12], "worn", steps))
     with biotac.open(f"sim:{folder / 'two.toml'}") as hand:
         hand.record(folder / "two.mcap")
         hand.read_batch(1000)

@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import biotac
 
@@ -19,6 +18,7 @@ from ...errors import BiotacError, InputError
 from ...sim.nano17 import Nano17
 from ...sim.nano17_reader import Nano17Reader
 from ...wire.identity import ascii_text
+from .. import outputs
 from ..progress import Progress
 
 EMULATED = "nano17"
@@ -40,7 +40,7 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
         print(f"biotac: {event.words}", file=sys.stderr)
 
     with _reader(args, hand, finger) as (reader, mounting):
-        make_folder(args.out)
+        outputs.make_folder(args.out)
         procedure = Procedure(finger, mounting)
         try:
             walk(hand, reader, procedure, places, overwrite=args.force, show=show, progress=progress.show)
@@ -59,14 +59,6 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
             f"and {places.reference}"
         )
     return places, procedure.coverage.missing()
-
-
-def make_folder(folder: Path) -> None:
-    """With those above it. Raises InputError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder} is no folder ({error.strerror}); choose another name") from error
 
 
 def open_board(args: argparse.Namespace) -> biotac.Hand:

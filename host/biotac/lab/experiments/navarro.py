@@ -28,12 +28,13 @@ from ...hand.opening import shake_hands
 from ...link.ports import start_board
 from ...markdown import table
 from ...sim.physics import Profile
+from ...sim.play import play
 from ...sim.process import SimLink
+from ...sim.scenario import parse_scenario
 from ...sim.source import Source
 from ...wire import messages_gen as wire
 from ...wire.batches import Batch
 from ..crosscheck import CrossCheck
-from . import navarro_script as script
 from .outcome import Facts, Options, check, claim, number, numbers, text
 
 RECORDING = ""
@@ -45,6 +46,8 @@ PAPER_REST_COUNTS = (85.0, 86.0, 106.0, 57.0, 70.0)
 FINGERS = tuple(range(len(NAMES)))
 PLACE = "E17"
 PLACES = ("E7", "E10", "E17", "E18", "E16")  # from the tip backwards
+RAMP_S, HOLD_S, REST_S = 0.4, 1.4, 1.5
+PRESS_S = 2 * RAMP_S + HOLD_S + REST_S
 Show = Callable[[str], None]
 
 
@@ -105,9 +108,10 @@ def calibrate(
     """
     seeds = tuple(seed + k for k in range(len(fingers)))
     forces = CALIBRATION_FORCES_N, VERIFICATION_FORCES_N
-    series = [script.presses(fingers, its, [PLACE] * len(its)) for its in forces]
-    source = script.source("navarro", seeds, profile, [*series[0], *series[1]])
-    verify_s = script.seconds(series[0])  # a rest before the first of these presses: the one before it all, REST_S
+    series = [presses(fingers, its, [PLACE] * len(its)) for its in forces]
+    source = emulated_hand("navarro", seeds, profile, [*series[0], *series[1]])
+    # what is before the second series: as long as the first, and the rest before it all that its first press needs
+    verify_s = len(fingers) * len(CALIBRATION_FORCES_N) * PRESS_S
 
     first = Procedure(fingers, CALIBRATION_FORCES_N)
     show(f"{profile}: three presses a finger")
@@ -146,7 +150,7 @@ def places(seed: int) -> Places:
     """K of one finger at each of PLACES, and what it is worth at the others, by the board's own code."""
     forces = CALIBRATION_FORCES_N * len(PLACES)
     at = [place for place in PLACES for _ in CALIBRATION_FORCES_N]
-    source = script.source("places", [seed], "new", script.presses([0], forces, at))
+    source = emulated_hand("places", [seed], "new", presses([0], forces, at))
     procedure = Procedure([0], forces)
     with _open(source, "posix") as hand:
         guided.drive(hand, procedure, Truth(source))
@@ -158,6 +162,39 @@ def places(seed: int) -> Places:
     touched = source.truth.contact[:, 0]
     x_mm = [_x_mm(source, touched, group[0]) for group in groups]
     return Places(PLACES, tuple(x_mm), tuple(its.gain_n for its in fits), errors)
+
+
+# ---- what the emulated hand does ----------------------------------------------------------------
+
+
+def presses(fingers: Sequence[int], forces_n: Sequence[float], at: Sequence[str]) -> list[str]:
+    """Scenario steps in which each of ``fingers`` presses with each force, at the electrode ``at`` the same place."""
+    return [
+        _step(finger, do, for_s, more)
+        for finger in fingers
+        for force_n, place in zip(forces_n, at, strict=True)
+        for do, for_s, more in (
+            ("press", RAMP_S, f'at = "{place}"\nforce_n = {force_n:g}\n'),
+            ("hold", HOLD_S, ""),
+            ("press", RAMP_S, "force_n = 0.0\n"),
+            ("rest", REST_S, ""),
+        )
+    ]
+
+
+def _step(finger: int, do: str, for_s: float, more: str) -> str:
+    return f'[[step]]\ndo = "{do}"\nfingers = [{finger}]\nseconds = {for_s:g}\n{more}'
+
+
+def scenario(name: str, seeds: Sequence[int], profile: Profile, steps: Sequence[str]) -> str:
+    """The text of a scenario: a finger for every seed, at rest at first."""
+    sensors = [f'[[finger]]\nseed = {seed}\nprofile = "{profile}"\n' for seed in seeds]
+    return "\n".join([f'name = "{name}"\n', *sensors, f'[[step]]\ndo = "rest"\nseconds = {REST_S:g}\n', *steps])
+
+
+def emulated_hand(name: str, seeds: Sequence[int], profile: Profile, steps: Sequence[str]) -> Source:
+    """That scenario, played."""
+    return play(parse_scenario(scenario(name, seeds, profile, steps).encode(), file=f"{name}.toml"))
 
 
 def _rest_off(its: Fit, presses: Sequence[Press]) -> float:
