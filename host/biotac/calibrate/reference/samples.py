@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -49,7 +49,6 @@ class Reference:
     samples: Samples
     mounting: Mounting
     sensor: str = ""
-    notes: tuple[str, ...] = field(default=())
 
 
 def from_wrench(t_s: Floats, wrench: Floats) -> Samples:
