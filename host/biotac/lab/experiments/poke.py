@@ -231,9 +231,7 @@ def facts(result: Result) -> Facts:
             for name, its in result.plate.items()
         },
         "checks": [
-            check(
-                f"mean standard deviation above {FLOOR_N:g} N, {which}, trial {k}", _mean(trial.std_mm), LIMIT_MM, "mm"
-            )
+            check(f"{what}, trial {k}", _mean(trial.std_mm), LIMIT_MM, "mm")
             for k, trial in enumerate(shipped.trials, start=1)
         ],
         "notes": result.notes,
