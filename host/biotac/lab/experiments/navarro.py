@@ -67,21 +67,11 @@ class Hands:
 
 
 @dataclass(frozen=True)
-class Places:
-    """One finger calibrated at each of ``names``; ``errors`` (n, n): K of the row's place, at the column's."""
-
-    names: tuple[str, ...]
-    x_mm: tuple[float, ...]
-    gains_n: tuple[float, ...]
-    errors: Any
-
-
-@dataclass(frozen=True)
 class Result:
-    """Hands of each profile, and what the place of a press does."""
+    """Hands of each profile, and what the place of a press does, see places()."""
 
     hands: tuple[Hands, ...]
-    places: Places
+    places: Facts
 
 
 def run(options: Options) -> Result:
@@ -146,22 +136,36 @@ def calibrate(
     )
 
 
-def places(seed: int) -> Places:
-    """K of one finger at each of PLACES, and what it is worth at the others, by the board's own code."""
+def places(seed: int) -> Facts:
+    """One finger calibrated at each of PLACES, by the board's own code.
+
+    ``gain_n`` in mN per count; ``errors`` in %: K of the row's place, at the column's.
+    """
+    each = len(CALIBRATION_FORCES_N)
     forces = CALIBRATION_FORCES_N * len(PLACES)
-    at = [place for place in PLACES for _ in CALIBRATION_FORCES_N]
-    source = emulated_hand("places", [seed], "new", presses([0], forces, at))
+    source = emulated_hand("places", [seed], "new", presses([0], forces, np.repeat(PLACES, each).tolist()))
     procedure = Procedure([0], forces)
     with _open(source, "posix") as hand:
         guided.drive(hand, procedure, Truth(source))
-    each = len(CALIBRATION_FORCES_N)
     groups = [procedure.presses[0][k : k + each] for k in range(0, len(forces), each)]
     fits = [fit(procedure.rests[0], group) for group in groups]
-    errors = np.array([[_error(its, group) for group in groups] for its in fits])
     assert source.truth is not None
-    touched = source.truth.contact[:, 0]
-    x_mm = [_x_mm(source, touched, group[0]) for group in groups]
-    return Places(PLACES, tuple(x_mm), tuple(its.gain_n for its in fits), errors)
+    frames = [round(float(group[0].rows["t_us"].mean()) * 1e-6 * 100) for group in groups]
+    return {
+        "names": list(PLACES),
+        "x_mm": numbers(source.truth.poc_mm[frames, 0, 0]),
+        "gain_n": numbers([its.gain_n * 1e3 for its in fits]),
+        "errors": [numbers([_error_percent(its.gain_nn, group) for group in groups]) for its in fits],
+    }
+
+
+def _error_percent(gain_nn: int, group: Sequence[Press]) -> float:
+    rows = np.concatenate([told_by(press, gain_nn).rows for press in group])
+    return 100 * formulas.relative_error(rows["told_n"], rows["force_n"])
+
+
+def _open(source: Source, board: str) -> Hand:
+    return shake_hands(SimLink(f"{board}:{source.name}", start_board(board, source, pace=0.0)))
 
 
 # ---- what the emulated hand does ----------------------------------------------------------------
@@ -199,21 +203,6 @@ def emulated_hand(name: str, seeds: Sequence[int], profile: Profile, steps: Sequ
 
 def _rest_off(its: Fit, presses: Sequence[Press]) -> float:
     return max(float(np.abs(press.rows["rest"] - its.rest.counts).max()) for press in presses)
-
-
-def _open(source: Source, board: str) -> Hand:
-    return shake_hands(SimLink(f"{board}:{source.name}", start_board(board, source, pace=0.0)))
-
-
-def _error(its: Fit, group: Sequence[Press]) -> float:
-    rows = np.concatenate([told_by(press, its.gain_nn).rows for press in group])
-    return formulas.relative_error(rows["told_n"], rows["force_n"])
-
-
-def _x_mm(source: Source, touched: Any, press: Press) -> float:
-    assert source.truth is not None
-    frame = round(float(press.rows["t_us"].mean()) * 1e-6 * 100)
-    return float(source.truth.poc_mm[min(frame, len(touched) - 1), 0, 0])
 
 
 def _apart(batch: Batch, fits: dict[int, Fit]) -> int:
@@ -272,12 +261,7 @@ def facts(result: Result) -> Facts:
             "rest_counts": list(PAPER_REST_COUNTS),
             "error": PAPER_ERROR * 100,
         },
-        "places": {
-            "names": list(result.places.names),
-            "x_mm": numbers(result.places.x_mm),
-            "gain_n": numbers([gain * 1e3 for gain in result.places.gains_n]),
-            "errors": [numbers(row * 100) for row in result.places.errors],
-        },
+        "places": result.places,
         "checks": checks,
         "notes": [
             f"presses of {', '.join(f'{f:g}' for f in CALIBRATION_FORCES_N)} N, then "
