@@ -6,13 +6,16 @@ import os
 import pty
 import select
 import threading
+import time
 import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from deframer import Deframer
 
+from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
 
@@ -25,6 +28,39 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Here and not in tests/hil: pytest asks only the outermost conftest files for options."""
     parser.addoption("--rig", action="append", help="run tests/hil against this rig only; may be repeated")
     parser.addoption("--port", help="a real board's port, for the rig 'real' of tests/hil")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def patience() -> Iterator[None]:
+    """Whoever answers is waited for, for minutes, however busy this computer is."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SerialLink, "patience", 60.0)
+        yield
+
+
+@pytest.fixture
+def brief_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For boards that say nothing at all, or nothing that matters: waiting longer would not change what is found."""
+    monkeypatch.setattr(SerialLink, "patience", 1.0)
+    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.02)
+
+
+@pytest.fixture
+def time_passes(monkeypatch: pytest.MonkeyPatch) -> Callable[[], bytes]:
+    """For boards that answer some of what they are asked: what this returns, in place of an answer, ends the wait.
+
+    The host's clock jumps ahead, and an empty packet has it look at its clock.
+    """
+    ahead_s = 0.0
+
+    def jump() -> bytes:
+        nonlocal ahead_s
+        ahead_s += 3600.0
+        return b"\0"
+
+    clock = SimpleNamespace(monotonic=lambda: time.monotonic() + ahead_s, time=time.time)
+    monkeypatch.setattr("biotac.hand.board.time", clock)
+    return jump
 
 
 class ScriptedBoard:

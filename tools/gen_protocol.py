@@ -36,6 +36,7 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "firmware/core/wire/messages_gen.c": c_wire.source(contract),
         root / "host/biotac/wire/sensor_gen.py": python_code.sensor(contract),
         root / "host/biotac/wire/messages_gen.py": python_code.wire(contract),
+        root / "host/biotac/wire/dtypes_gen.py": python_code.dtypes(contract),
         root / "host/biotac/wire/map_gen.py": python_code.wrench_map(contract),
         root / "protocol/MESSAGES.md": docs.messages(contract),
         root / "protocol/schema.json": schema.canonical(contract, with_docs=True),

@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
 from biotac.cli.main import EPILOG, VERBS, parser  # noqa: E402
+from biotac.markdown import table  # noqa: E402
 from committed import write_or_check  # noqa: E402
 
 HEAD = """\
@@ -34,17 +35,17 @@ def page() -> str:
     ports, codes = EPILOG.strip().split("\n\n")
     parts = [HEAD, " ".join(ports.split()) + "\n", "## Exit codes\n", *exit_codes(codes)]
     verbs = subparsers(parser())
-    for module in VERBS:
-        parts.append(f"## biotac {module.NAME}\n")
-        parts += body(verbs[module.NAME], module.HELP)
+    for name, (_, text) in VERBS.items():
+        parts.append(f"## biotac {name}\n")
+        parts += body(verbs[name], text)
     return "\n".join(parts)
 
 
 def exit_codes(text: str) -> Iterator[str]:
     """The epilog's codes as a table."""
     words = " ".join(text.removeprefix("exit codes:").split())
-    rows = [f"| {code} | {what.strip()} |" for code, what in re.findall(r"(\d+) (\D+)", words)]
-    yield "\n".join(["| code | meaning |", "|---|---|", *rows]) + "\n"
+    rows = [(code, what.strip()) for code, what in re.findall(r"(\d+) (\D+)", words)]
+    yield "\n".join(table(["code", "meaning"], rows))
 
 
 def body(verb: argparse.ArgumentParser, text: str) -> Iterator[str]:
@@ -52,7 +53,7 @@ def body(verb: argparse.ArgumentParser, text: str) -> Iterator[str]:
     yield text + "\n"
     rows = [row(action) for action in verb._actions if shown(action)]
     if rows:
-        yield "\n".join(["| argument | meaning |", "|---|---|", *rows]) + "\n"
+        yield "\n".join(table(["argument", "meaning"], rows))
     if verb.epilog:
         yield "    " + verb.epilog.removeprefix("example: ") + "\n"
     for name, part in subparsers(verb).items():
@@ -67,7 +68,7 @@ def shown(action: argparse.Action) -> bool:
     )
 
 
-def row(action: argparse.Action) -> str:
+def row(action: argparse.Action) -> tuple[str, str]:
     """How it is written, and what it means."""
     value = action.metavar or action.dest.removesuffix("_s").upper()
     if action.choices is not None and action.metavar is None:
@@ -82,7 +83,7 @@ def row(action: argparse.Action) -> str:
         text += f"{': ' if text else ''}{listed}"
     if action.option_strings and action.required:
         text += f"{'; ' if text else ''}has to be given"
-    return f"| `{in_cell(name)}` | {in_cell(text)} |"
+    return f"`{in_cell(name)}`", in_cell(text)
 
 
 def in_cell(text: str) -> str:

@@ -1,6 +1,6 @@
 // How far the shipped kernel's results may be from the formulas in double (firmware/reference/lin2013.h).
-// Held by tests/core/solve/test_kernels.c frame by frame, by tests/fuzz and by `biotac check`; parts are proved in
-// tests/proofs.
+// Held by tests/core/solve/test_kernels.c frame by frame, by tests/fuzz and by `biotac check`; parts are
+// proved in tests/proofs.
 //
 // Where the bounds come from (nothing is tuned):
 //  PoC    the published um: 0.5 per axis. Direction components of 16 bits, rounded: 2^-16 of r per

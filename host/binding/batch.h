@@ -32,4 +32,7 @@ void bt_pressure_filter(int64_t n, const uint16_t *pdc, int32_t filter_milli, ui
 
 int bt_rail_count(void); // BT_RAIL_COUNT
 
+// Compared with host/biotac/wire/messages_gen.py when the module is imported.
+uint32_t bt_binding_schema_hash(void);
+
 #endif

@@ -27,7 +27,4 @@
 #include "wire/crc32.h"
 #include "wire/framing.h"
 
-// Compared with host/biotac/wire/messages_gen.py when the module is imported.
-uint32_t bt_binding_schema_hash(void);
-
 #endif

@@ -1,4 +1,4 @@
-#include "binding.h"
+#include "replay.h"
 
 #include <string.h>
 

@@ -12,83 +12,78 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from .core.compute import MAPPED_RESULT_DTYPE, RESULT_DTYPE, compute
-from .core.finger import FINGER_DTYPE, Finger
-from .errors import (
-    BiotacError,
-    CallbackError,
-    CommandRefusedError,
-    DeviceLostError,
-    FlashError,
-    InputError,
-    NotAGatewayError,
-    PortError,
-    RecordingError,
-    ScenarioError,
-    WireVersionError,
-)
-from .hand.compatibility import HandWarning
-from .hand.gap import Gap
-from .hand.hand import Hand
-from .hand.opening import open
-from .hand.views import FingerView
-from .keep import Calibration
-from .recording import Compact, Recorder, Recording, load, load_compact
-from .version import __version__
-from .wire.batches import LinkStats
-from .wire.frames import FRAME_DTYPE, IDLE_DTYPE, PAC_DTYPE, Frame
-from .wire.messages_gen import CalibrationState, FrameFlags, PocWeights, QuantityFlags, Setting, TareReason, TareState
-
 if TYPE_CHECKING:
-    from .hand import aio
+    from .core.compute import MAPPED_RESULT_DTYPE as MAPPED_RESULT_DTYPE
+    from .core.compute import RESULT_DTYPE as RESULT_DTYPE
+    from .core.compute import compute as compute
+    from .core.finger import FINGER_DTYPE as FINGER_DTYPE
+    from .core.finger import Finger as Finger
+    from .errors import BiotacError as BiotacError
+    from .errors import CallbackError as CallbackError
+    from .errors import CommandRefusedError as CommandRefusedError
+    from .errors import DeviceLostError as DeviceLostError
+    from .errors import FlashError as FlashError
+    from .errors import InputError as InputError
+    from .errors import NotAGatewayError as NotAGatewayError
+    from .errors import PortError as PortError
+    from .errors import RecordingError as RecordingError
+    from .errors import ScenarioError as ScenarioError
+    from .errors import WireVersionError as WireVersionError
+    from .hand import aio as aio
+    from .hand.compatibility import HandWarning as HandWarning
+    from .hand.gap import Gap as Gap
+    from .hand.hand import Hand as Hand
+    from .hand.opening import open as open
+    from .hand.views import FingerView as FingerView
+    from .keep import Calibration as Calibration
+    from .recording import Recorder as Recorder
+    from .recording import Recording as Recording
+    from .recording import load as load
+    from .version import __version__ as __version__
+    from .wire.batches import LinkStats as LinkStats
+    from .wire.frames import FRAME_DTYPE as FRAME_DTYPE
+    from .wire.frames import IDLE_DTYPE as IDLE_DTYPE
+    from .wire.frames import PAC_DTYPE as PAC_DTYPE
+    from .wire.frames import Frame as Frame
+    from .wire.messages_gen import CalibrationState as CalibrationState
+    from .wire.messages_gen import FrameFlags as FrameFlags
+    from .wire.messages_gen import PocWeights as PocWeights
+    from .wire.messages_gen import QuantityFlags as QuantityFlags
+    from .wire.messages_gen import Setting as Setting
+    from .wire.messages_gen import TareReason as TareReason
+    from .wire.messages_gen import TareState as TareState
+
+#: Where each name is; its module is imported when somebody asks for the first name in it.
+_HOMES = {
+    ".core.compute": "MAPPED_RESULT_DTYPE RESULT_DTYPE compute",
+    ".core.finger": "FINGER_DTYPE Finger",
+    ".errors": "BiotacError CallbackError CommandRefusedError DeviceLostError FlashError InputError "
+    "NotAGatewayError PortError RecordingError ScenarioError WireVersionError",
+    ".hand.aio": "aio",
+    ".hand.compatibility": "HandWarning",
+    ".hand.gap": "Gap",
+    ".hand.hand": "Hand",
+    ".hand.opening": "open",
+    ".hand.views": "FingerView",
+    ".keep": "Calibration",
+    ".recording": "Recorder Recording load",
+    ".version": "__version__",
+    ".wire.batches": "LinkStats",
+    ".wire.frames": "FRAME_DTYPE IDLE_DTYPE PAC_DTYPE Frame",
+    ".wire.messages_gen": "CalibrationState FrameFlags PocWeights QuantityFlags Setting TareReason TareState",
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
+
+__all__ = sorted(_HOME_OF)
 
 
 def __getattr__(name: str) -> object:
-    if name == "aio":  # asyncio is imported for those who use it
-        return importlib.import_module(".hand.aio", __name__)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _HOME_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = importlib.import_module(_HOME_OF[name], __name__)
+    value = globals()[name] = getattr(module, name, module)
+    return value
 
 
-__all__ = [
-    "FINGER_DTYPE",
-    "FRAME_DTYPE",
-    "IDLE_DTYPE",
-    "MAPPED_RESULT_DTYPE",
-    "PAC_DTYPE",
-    "RESULT_DTYPE",
-    "BiotacError",
-    "Calibration",
-    "CalibrationState",
-    "CallbackError",
-    "CommandRefusedError",
-    "Compact",
-    "DeviceLostError",
-    "Finger",
-    "FingerView",
-    "FlashError",
-    "Frame",
-    "FrameFlags",
-    "Gap",
-    "Hand",
-    "HandWarning",
-    "InputError",
-    "LinkStats",
-    "NotAGatewayError",
-    "PocWeights",
-    "PortError",
-    "QuantityFlags",
-    "Recorder",
-    "Recording",
-    "RecordingError",
-    "ScenarioError",
-    "Setting",
-    "TareReason",
-    "TareState",
-    "WireVersionError",
-    "__version__",
-    "aio",
-    "compute",
-    "load",
-    "load_compact",
-    "open",
-]
+def __dir__() -> list[str]:
+    return [*globals(), *__all__]

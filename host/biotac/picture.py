@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,18 @@ from typing import Any
 from .errors import InputError
 
 
+def check_drawable() -> None:
+    """Raise InputError where matplotlib is missing: to be asked before minutes of work, not after them."""
+    if importlib.util.find_spec("matplotlib") is None:
+        raise InputError("a picture needs matplotlib, which is not installed; pip install 'biotac-gateway[plot]'")
+
+
 @contextlib.contextmanager
 def picture(path: Path) -> Iterator[Any]:
     """A matplotlib figure to draw in, written to ``path`` at the end. Raises InputError without matplotlib."""
-    try:
-        import matplotlib
-    except ImportError:
-        raise InputError("a picture needs the package matplotlib; install it: pip install matplotlib") from None
+    check_drawable()
+    import matplotlib
+
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 

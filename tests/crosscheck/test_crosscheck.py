@@ -9,6 +9,7 @@ from biotac import FrameFlags, Setting
 from biotac.core.compiled import default_settings, on_board
 from biotac.lab.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
+from biotac.wire.dtypes_gen import DTYPES
 
 TORQUE = (Setting.TORQUE_GAIN_Y_NN, Setting.TORQUE_GAIN_Z_NN)
 FORCE = (Setting.FORCE_GAIN_X_NN, Setting.FORCE_GAIN_Y_NN, Setting.FORCE_GAIN_Z_NN)
@@ -17,7 +18,7 @@ FORCE = (Setting.FORCE_GAIN_X_NN, Setting.FORCE_GAIN_Y_NN, Setting.FORCE_GAIN_Z_
 def frames(n: int, settings: dict[Setting, int], seed: int = 1) -> np.ndarray:
     """FRAME messages that a board with these settings would send for random counts."""
     rng = np.random.default_rng(seed)
-    out = np.zeros(n, wire.DTYPES[wire.Frame.ID])
+    out = np.zeros(n, DTYPES[wire.Frame.ID])
     out["seq"] = np.arange(n)
     out["counts"] = rng.integers(0, 4096, (n, 19))
     tare = rng.uniform(0, 4095, (n, 19))

@@ -11,6 +11,7 @@ from biotac import Finger, FrameFlags, Setting
 from biotac.core.compiled import default_settings
 from biotac.lab.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
+from biotac.wire.dtypes_gen import DTYPES
 
 GAIN, FILTER = Setting.PRESSURE_GAIN_NN, Setting.PRESSURE_FILTER_MILLI
 ROUNDS = 600
@@ -24,7 +25,7 @@ def frames(settings: dict[Setting, int], seed: int = 1) -> Any:
     pdc[300:310], pdc[320], pdc[330] = wire.INVALID_COUNT, 0, 4095
     counts = np.rint(2900 + rng.normal(0, 1.5, (ROUNDS, 19))).astype(np.uint16)
     rows = Finger(settings).feed(counts, pdc=pdc)
-    out = np.zeros(len(rows), wire.DTYPES[wire.Frame.ID])
+    out = np.zeros(len(rows), DTYPES[wire.Frame.ID])
     for name in out.dtype.names or ():
         out[name] = rows[name]
     return out

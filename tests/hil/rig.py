@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 import subprocess
@@ -14,8 +15,8 @@ import tomllib
 
 import biotac
 from biotac.link.ports import start_board
+from biotac.sim.loading import load_source
 from biotac.sim.process import SimBoard
-from biotac.sim.source import load_source
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -72,10 +73,13 @@ def prepare(facts: dict[str, Any]) -> str | None:
     missing = [tool for tool in facts.get("tools", []) if shutil.which(tool) is None]
     if missing:
         return f"{', '.join(missing)} missing; tools/test installs what this rig needs"
-    for words in facts.get("prepare", []):
-        done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
-        if done.returncode:
-            raise RuntimeError(f"{' '.join(words)} failed: {(done.stderr or done.stdout).strip()}")
+    (ROOT / "build").mkdir(exist_ok=True)
+    with open(ROOT / "build/rigs.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # of several test processes one builds, the others find it built
+        for words in facts.get("prepare", []):
+            done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
+            if done.returncode:
+                raise RuntimeError(f"{' '.join(words)} failed: {(done.stderr or done.stdout).strip()}")
     return None
 
 

@@ -11,9 +11,8 @@ from biotac.wire import messages_gen as wire
 @pytest.mark.parametrize(
     ("ability", "verbs", "reason"), [("cable", ["unplug", "plug"], "silence"), ("power", ["cut power"], "rebooted")]
 )
-def test_a_hand_comes_back_by_itself(rig, monkeypatch, ability: str, verbs: list[str], reason: str) -> None:
+def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason: str) -> None:
     rig.need(ability)
-    monkeypatch.setattr("biotac.hand.streams.SILENCE_S", 1.0)
     port = rig.facts["port"].format(source="press.toml", options="fingers=2&seconds=600", port=rig.port)
     with biotac.open(port, reconnect=True) as hand:
         hand.set_setting(wire.Setting.IDLE_PERIOD_MS, 70)
@@ -25,7 +24,9 @@ def test_a_hand_comes_back_by_itself(rig, monkeypatch, ability: str, verbs: list
         for batch in hand.batches():
             if not acted and len(batch.wire):
                 for verb in verbs:
-                    hand.link.board.say(verb)
+                    hand.link.board.do(verb)
+                if reason == "silence":
+                    hand.link.patience = 1.0
                 acted = True
             gap = gap or next((m for m in batch.messages if isinstance(m, biotac.Gap)), None)
             if gap is not None:

@@ -11,8 +11,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
 from prover.report import Report
 
-FIGURES: list[str] = []
-
 
 @pytest.fixture
 def proved(request: pytest.FixtureRequest) -> Report:
@@ -20,13 +18,16 @@ def proved(request: pytest.FixtureRequest) -> Report:
     name = request.node.name.removeprefix("test_").replace("_", " ")
 
     def keep(figure: str) -> None:
-        FIGURES.append(f"{name}: {figure}")
+        # With the test's report, which comes here from whatever process ran the test.
+        request.node.user_properties.append(("proved", f"{name}: {figure}"))
 
     return keep
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    if FIGURES:
+    reports = [report for outcome in ("passed", "failed") for report in terminalreporter.stats.get(outcome, [])]
+    figures = [figure for report in reports for kind, figure in report.user_properties if kind == "proved"]
+    if figures:
         terminalreporter.section("proved")
-        for figure in FIGURES:
+        for figure in figures:
             terminalreporter.write_line(figure)

@@ -171,3 +171,11 @@ def test_a_wrong_entry_of_the_table_is_found() -> None:
     entry = re.findall(r"\b(\d{5}),", text)[200]
     with pytest.raises(ValueError, match="from the exact"):
         root_error(changed(text, entry, str(int(entry) + 3)))
+
+
+@pytest.mark.nightly
+def test_every_argument_of_the_table_one_by_one(proved: Report) -> None:
+    """3 * 2^30 of them; root_error has the ends of each entry's range."""
+    low, high = root_error(text_of(CORE / "solve/rsqrt_gen.c"), "all")
+    assert (low, high) == root_error(text_of(CORE / "solve/rsqrt_gen.c"))
+    proved(f"relative error from {float(low):.3g} to {float(high):.3g}")

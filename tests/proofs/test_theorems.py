@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import z3
 
-from prover.prove import Refuted, ask
+from prover.prove import Refuted, Undecided, ask
 from prover.table import constants, table
 
 COUNT = len(table().um)
@@ -16,7 +16,7 @@ E_MAX = table().e_max_q4
 
 
 def contradict(claim: str, inputs: dict[str, Any], *conditions: Any) -> None:
-    ask(claim, conditions, inputs, dict.fromkeys(inputs, True), 60)
+    ask(claim, conditions, inputs, dict.fromkeys(inputs, True))
 
 
 # ---- the hull: no point of contact on the axis ---------------------------------------------------
@@ -45,6 +45,12 @@ def test_a_stronger_hull_is_refuted_by_weights() -> None:
     weights = [refused.value.witness[f"w{i}"] for i in range(COUNT)]
     moment = sum(w * z for w, z in zip(weights, table().column("um", 2), strict=True))
     assert min(weights) >= 0 and sum(weights) > 0 and moment > (z_max - 1) * sum(weights)
+
+
+def test_a_question_that_z3_has_no_time_for_is_no_proof(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("prover.prove.LIMIT", 1)
+    with pytest.raises(Undecided, match="within 1 units of work"):
+        test_every_weighted_centroid_lies_below_the_axis()
 
 
 # ---- incremental == batch ------------------------------------------------------------------------

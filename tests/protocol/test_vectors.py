@@ -14,6 +14,7 @@ from deframer import Deframer
 
 from biotac.wire import messages_gen as wire
 from biotac.wire.decoder import Decoder
+from biotac.wire.dtypes_gen import DTYPES
 from biotac.wire.framing import FramingCounts, encode
 
 VECTORS = Path(__file__).resolve().parents[2] / "protocol" / "vectors"
@@ -157,7 +158,7 @@ def test_unpack_gives_the_fields_and_pack_the_payload(vector: MessageVector) -> 
 
 @each_message
 def test_the_array_type_reads_the_same_fields(vector: MessageVector) -> None:
-    dtype = wire.DTYPES[vector.message_id]
+    dtype = DTYPES[vector.message_id]
     assert dtype.itemsize == len(vector.payload)
     rows = np.frombuffer(vector.payload * 2, dtype=dtype)
     assert rows.dtype.names == tuple(vector.fields)

@@ -6,9 +6,9 @@ import threading
 from pathlib import Path
 from types import ModuleType
 
-from biotac.core.compiled import ffi, lib
 from biotac.sim.source import Source
 from biotac.sim.tape import write_tape
+from biotac.wire.native import ffi, lib
 from biotac.wire.sensor_gen import LISTEN_WORD, SPI_HZ
 
 
@@ -48,7 +48,7 @@ class HeldClock:
 
     def wait(self) -> None:
         """Until the time that run() gave is used up."""
-        assert self._rests.wait(60)
+        assert self._rests.wait(600)
 
 
 class Bus:

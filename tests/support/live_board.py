@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from biotac.wire import messages_gen as wire
+from biotac.wire.dtypes_gen import DTYPES
 from biotac.wire.framing import encode
 
 
 def frame(seq: int, finger: int = 0, force_z_n: float = 0.0) -> bytes:
     """A FRAME of device time 10 ms * seq."""
-    values: dict[str, Any] = dict.fromkeys(wire.DTYPES[wire.Frame.ID].names or (), 0)
+    values: dict[str, Any] = dict.fromkeys(DTYPES[wire.Frame.ID].names or (), 0)
     values |= {"seq": seq % 65536, "t_us": seq * 10_000, "finger": finger, "counts": (2000,) * 19}
     values |= {"tare_q4": (32000,) * 19, "poc_um": (0, 0, 5080), "force_100un": (0, 0, round(force_z_n * 1e4))}
     values |= {"torsion_mnmm": 250 * finger, "torque_mnmm": (0, 0, 0), "force_sigma_100un": (0, 0, 0)}
@@ -49,7 +50,7 @@ class Firmware:
     def wait_for(self, kind: type[Any], count: int = 1) -> None:
         """Until it was told so many of a kind."""
         with self.heard:
-            assert self.heard.wait_for(lambda: len(self.of(kind)) >= count, 20), f"no {kind.__name__}: {self.told}"
+            assert self.heard.wait_for(lambda: len(self.of(kind)) >= count, 600), f"no {kind.__name__}: {self.told}"
 
 
 class Clock:

@@ -86,7 +86,7 @@ def wire(contract: Contract) -> str:
     out = [
         f'"""{GENERATED}',
         "",
-        "Messages of the USB link: enums, flags, one dataclass and one NumPy dtype per message.",
+        "Messages of the USB link: enums, flags, and one dataclass per message; the array types are in dtypes_gen.py.",
         "Units and Q formats are in protocol/MESSAGES.md.",
         '"""',
         "",
@@ -96,8 +96,6 @@ def wire(contract: Contract) -> str:
         "from dataclasses import dataclass",
         "from enum import IntEnum, IntFlag",
         "from typing import Any, ClassVar, NamedTuple",
-        "",
-        "import numpy as np",
         "",
         f"WIRE_MAJOR = {link['wire']['major']}",
         f"WIRE_MINOR = {link['wire']['minor']}",
@@ -139,10 +137,29 @@ def wire(contract: Contract) -> str:
     class_of = {message.name: class_name(message) for message in contract.messages}
     out += ["# What each command is answered by.", "ANSWERS: dict[type[Any], type[Any]] = {"]
     out += [f"    {class_name(m)}: {class_of[m.reply]}," for m in contract.messages if m.reply] + ["}", ""]
-    out += ["# One array type per message id, for decoding many payloads at once."]
-    out += ["DTYPES: dict[int, np.dtype[Any]] = {"]
+    return "\n".join(out).rstrip() + "\n"
+
+
+def dtypes(contract: Contract) -> str:
+    """The array types, apart from the messages: these alone need NumPy."""
+    out = [
+        f'"""{GENERATED}',
+        "",
+        "One array type per message id, for decoding many payloads at once.",
+        '"""',
+        "",
+        "from __future__ import annotations",
+        "",
+        "from typing import Any",
+        "",
+        "import numpy as np",
+        "",
+        "from . import messages_gen as wire",
+        "",
+        "DTYPES: dict[int, np.dtype[Any]] = {",
+    ]
     for message in contract.messages:
-        out += [f"    {class_name(message)}.ID: np.dtype(", "        ["]
+        out += [f"    wire.{class_name(message)}.ID: np.dtype(", "        ["]
         out += [f"            {dtype_entry(f)}," for f in message.fields] + ["        ]", "    ),"]
     return "\n".join([*out, "}"]) + "\n"
 

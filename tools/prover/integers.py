@@ -41,6 +41,7 @@ class IntegerDomain:
         self.inputs: dict[str, Any] = {}
         self.parts: dict[tuple[int, int, int], tuple[Number, Number]] = {}
         self.kept: list[Any] = []  # keeps terms alive whose ids are keys
+        self.made = 0  # fresh numbers; counted here, so that a question is the same text whatever was asked before
 
     def input(self, name: str, kind: CType) -> Number:
         term = self.inputs.setdefault(name, z3.Int(name))
@@ -48,7 +49,8 @@ class IntegerDomain:
         return Number(term, kind.low, kind.high)
 
     def fresh(self, name: str, low: int, high: int, guard: Any) -> Number:
-        out = Number(z3.FreshInt(name), low, high)
+        self.made += 1
+        out = Number(z3.Int(f"{name}.{self.made}"), low, high)
         self.fact(z3.And(low <= out.term, out.term <= high), guard)
         return out
 

@@ -13,6 +13,7 @@ from biotac.core.geometry import Floats
 from biotac.sim import physics, sampling
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as wire
+from biotac.wire import slots
 from biotac.wire.frames import StructArray
 
 PAD = Pose(x_mm=-2.8, y_mm=0.0, tip_mm=2.0)  # over E17
@@ -90,7 +91,7 @@ class Script:
     def load(self, force_n: float, n_per_s: float, at: Pose | None = None) -> Script:
         """To this normal force at this rate; ``at`` is where, after a release."""
         place = at or self.track.pose
-        seconds = max(abs(force_n - self.track.pose.force_n) / n_per_s, sampling.FRAME_S)
+        seconds = max(abs(force_n - self.track.pose.force_n) / n_per_s, slots.FRAME_S)
         start = replace(place, force_n=self.track.pose.force_n, celsius=self.track.pose.celsius) if at else None
         self.track.ramp(seconds, replace(place, force_n=force_n, celsius=self.track.pose.celsius), start)
         return self
@@ -102,8 +103,8 @@ class Script:
 
     def make(self) -> Course:
         """The counts and the truth."""
-        frames = round(self.track.seconds / sampling.FRAME_S)
-        times: Floats = np.arange(frames + 1, dtype=np.float64) * sampling.FRAME_S
+        frames = round(self.track.seconds / slots.FRAME_S)
+        times: Floats = np.arange(frames + 1, dtype=np.float64) * slots.FRAME_S
         states = self.track.states(times)
         samples = sampling.sample(self.sensor, states)
         drift = self.sensor.drift_per_min / 60.0 * times[:, None]
@@ -114,10 +115,10 @@ class Script:
         return Course(
             sensor=self.sensor,
             words={
-                "counts": samples[:, sampling.ELECTRODE_SLOT],
-                "pdc": samples[:, sampling.PDC_SLOT],
-                "tac": samples[:, sampling.TAC_SLOT],
-                "tdc": samples[:, sampling.TDC_SLOT],
+                "counts": samples[:, slots.ELECTRODE_SLOT],
+                "pdc": samples[:, slots.PDC_SLOT],
+                "tac": samples[:, slots.TAC_SLOT],
+                "tdc": samples[:, slots.TDC_SLOT],
             },
             force_n=np.maximum(states.force_n[:-1], states.force_n[1:]),
             rest=_middle(rest),
@@ -135,9 +136,9 @@ def script(seed: int, profile: physics.Profile = "new", lead_s: float = LEAD_S) 
 
 def resting(sensor: physics.Finger, seconds: float, seed: int, start_s: float = 0.0) -> dict[str, np.ndarray]:
     """Words of a finger that nothing touches, from ``start_s`` of its drift on: cheap enough for hours."""
-    frames = round(seconds * sampling.FRAME_HZ)
+    frames = round(seconds * slots.FRAME_HZ)
     rng = np.random.default_rng([seed, round(start_s)])
-    time_min = (start_s + np.arange(frames) * sampling.FRAME_S) / 60.0
+    time_min = (start_s + np.arange(frames) * slots.FRAME_S) / 60.0
     counts = rng.standard_normal((frames, 19), dtype=np.float32) * np.float32(sensor.noise_counts)
     counts += sensor.rest_counts(np.zeros(1)) + time_min[:, None] * sensor.drift_per_min
     hit = rng.random((frames, 19), dtype=np.float32) < sensor.glitch_share

@@ -11,6 +11,9 @@
 #define REG_SET(reg) (*(&(reg) + 0x2000 / 4))
 #define REG_CLR(reg) (*(&(reg) + 0x3000 / 4))
 
+// What clocks_start (system.c) makes of the crystal.
+#define CLK_SYS_HZ 125000000u
+
 // ---- 2.3.1 SIO: single-cycle IO
 #define SIO_GPIO_OUT_SET REG32(0xD0000014u)
 #define SIO_GPIO_OUT_CLR REG32(0xD0000018u)

@@ -11,8 +11,6 @@
 #define IN_SRAM __attribute__((section(".sram_code"), noinline))
 
 // ---- system.c: clocks, watchdog, reset
-#define CLK_SYS_HZ 125000000u
-
 // CLK_SYS_HZ from the crystal, 48 MHz for USB, the 1 us tick; false when the crystal or a PLL never came up.
 bool clocks_start(void);
 void watchdog_start(void);

@@ -4,7 +4,6 @@
 #define BIOTAC_RP2040_WAIT_H
 
 #include "rp2040_regs.h"
-#include "system.h"
 
 #include <stdbool.h>
 

@@ -3,23 +3,64 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from ..errors import BiotacError, InputError
-from . import calibrate, version
-from .boards import calibration, doctor, flash, info, list_ports, udev_setup, wrench_map
-from .lab import bench, demo, experiment
-from .live import lsl, record, sim, stream, view
-from .recordings import check, export, import_btd, recompute, replay
 
-VERBS = (
-    demo, list_ports, doctor, info, view, stream, lsl, record, check, replay, recompute, export, import_btd, calibrate,
-    calibration, wrench_map, experiment, sim, flash, bench, udev_setup, version,
-)  # fmt: skip
+#: In the order of ``biotac --help``: where each is, imported when it is called, and what it does.
+VERBS = {
+    "demo": (
+        "biotac.cli.lab.demo",
+        "Run the whole chain once: simulated board, stream, recording, cross-check, picture.",
+    ),
+    "list": (
+        "biotac.cli.boards.list_ports",
+        "List boards and other serial ports, and the scenarios that can be simulated.",
+    ),
+    "doctor": (
+        "biotac.cli.boards.doctor",
+        "Find what is wrong with a board, its sensors or this computer, and the cure.",
+    ),
+    "info": ("biotac.cli.boards.info", "Say who is on a port: board, firmware, sensors, settings, counters."),
+    "view": ("biotac.cli.live.view", "Show a board or a recording live in the browser."),
+    "stream": ("biotac.cli.live.stream", "Print frames as they arrive: one line each, or one JSON object each."),
+    "lsl": ("biotac.cli.live.lsl", "Publish fingers on the Lab Streaming Layer."),
+    "record": ("biotac.cli.live.record", "Record everything a board sends to an MCAP file."),
+    "check": (
+        "biotac.cli.recordings.check",
+        "Check every on-board result of a recording against the float64 reference.",
+    ),
+    "replay": ("biotac.cli.recordings.replay", "Play a recording as the board that made it, here or on a pty."),
+    "recompute": ("biotac.cli.recordings.recompute", "Run a recording's counts through the maths with other settings."),
+    "export": ("biotac.cli.recordings.export", "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag."),
+    "import": ("biotac.cli.recordings.import_btd", "Turn a SynTouch .btd file into a recording."),
+    "calibrate": (
+        "biotac.cli.calibrate",
+        "Fit a finger's wrench, or its pressure, to a reference, measure it held out, give it to the board.",
+    ),
+    "calibration": ("biotac.cli.boards.calibration", "Show, get, put or store a finger's calibration."),
+    "map": (
+        "biotac.cli.boards.wrench_map",
+        "Show, get, put or clear the wrench map that a board computes a finger's force by.",
+    ),
+    "experiment": (
+        "biotac.cli.lab.experiment",
+        "Do a paper's experiment again: figure, table against the paper, JSON.",
+    ),
+    "sim": ("biotac.cli.live.sim", "Run a simulated or emulated board on a pty that any serial program can open."),
+    "flash": ("biotac.cli.boards.flash", "Write a firmware image to a board, and give it its settings back."),
+    "bench": (
+        "biotac.cli.lab.bench",
+        "Measure kernels, batch maths, decoding, the live path, an idle link, recording sizes.",
+    ),
+    "udev-setup": ("biotac.cli.boards.udev_setup", "Install the Linux rule that lets you open boards (needs root)."),
+    "version": ("biotac.cli.version", "Print the release, the wire version and the schema hash."),
+}
 
 EPILOG = """\
 A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, sim:SOURCE, a simulated board that plays
@@ -41,8 +82,8 @@ class OneLineEach(argparse.RawDescriptionHelpFormatter):
         self._action_max_length = 16
 
 
-def parser() -> argparse.ArgumentParser:
-    """The whole command line."""
+def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
+    """The command line, with the arguments of the verbs that are ``called``."""
     top = argparse.ArgumentParser(
         prog="biotac",
         description="BioTac fingertips over USB: forces, points of contact, torques.",
@@ -50,23 +91,21 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=OneLineEach,
     )
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
-    for module in VERBS:
-        verb = verbs.add_parser(
-            module.NAME,
-            help=module.HELP,
-            description=module.HELP,
-            epilog=f"example: {module.EXAMPLE}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
+    for name, (place, text) in VERBS.items():
+        verb = verbs.add_parser(name, help=text, description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
         verb.add_argument("--json", action="store_true", help="print JSON for machines")
-        module.add_arguments(verb)
-        verb.set_defaults(run=module.run)
+        if name in called:
+            module = importlib.import_module(place)
+            verb.epilog = f"example: {module.EXAMPLE}"
+            module.add_arguments(verb)
+            verb.set_defaults(run=module.run)
     return top
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; return its exit code. Errors are one line on stderr."""
-    args = parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    args = parser(words[:1]).parse_args(words)
     if threading.current_thread() is threading.main_thread():
         # A terminated command leaves no simulator and no temporary file behind either.
         signal.signal(signal.SIGTERM, signal.default_int_handler)

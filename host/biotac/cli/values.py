@@ -30,7 +30,7 @@ def rate(text: str) -> float:
 
 def pace(text: str) -> float:
     """real, fast, or device seconds per second."""
-    from ..link.ports import parse_pace
+    from ..link.port_text import parse_pace
 
     try:
         return parse_pace(text)

@@ -8,8 +8,6 @@ import json
 from ..version import __version__
 from ..wire import messages_gen as wire
 
-NAME = "version"
-HELP = "Print the release, the wire version and the schema hash."
 EXAMPLE = "biotac version"
 
 

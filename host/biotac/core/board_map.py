@@ -19,7 +19,8 @@ from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import StructArray
 from ..wire.map_gen import Gate, Kind
-from .compiled import Settings, board_settings, ffi, lib
+from ..wire.native import ffi, lib
+from .compiled import Settings, board_settings
 
 Integers = NDArray[np.int64]
 BoardResults = tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]

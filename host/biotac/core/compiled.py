@@ -13,18 +13,7 @@ from numpy.typing import NDArray
 
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, tare_to_q4, to_units
-
-try:
-    from .._core import ffi as ffi
-    from .._core import lib as lib
-except ImportError as error:  # an editable tree without a build, or a wheel for another platform
-    raise ImportError(f"the compiled core is missing ({error}); install the package: pip install .") from error
-
-if lib.bt_binding_schema_hash() != wire.SCHEMA_HASH:
-    raise ImportError(
-        f"the compiled core was built for schema {lib.bt_binding_schema_hash():08x}, this Python code for "
-        f"{wire.SCHEMA_HASH:08x}; install the package again: pip install ."
-    )
+from ..wire.native import ffi, lib
 
 NN_PER_N = 1e9
 Settings = dict[wire.Setting, int]

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.frames import StructArray
+from ..wire.native import ffi, lib
 from .board_map import BoardMap, opened
-from .compiled import FORCE_GAINS, TORQUE_GAINS, Settings, default_settings, ffi, formula_settings, lib
+from .compiled import FORCE_GAINS, TORQUE_GAINS, Settings, default_settings, formula_settings
 
 #: poc_mm, force_n and torque_nmm of one frame, named, in units and with axes as in FRAME_DTYPE.
 RESULT_DTYPE = np.dtype([("poc_mm", "<f8", (3,)), ("force_n", "<f8", (3,)), ("torque_nmm", "<f8", (3,))])
@@ -63,7 +64,7 @@ def compute(
     ranges, with the first bad row, what was seen and what was expected; ``out`` then holds no results.
     """
     if wrench_map is not None:
-        from ..calibrate.wrench.applied import by_map  # here: everybody would wait for it at `import biotac`
+        from .map_float64 import by_map  # here: everybody would wait for it at `import biotac`
 
         plain = compute(counts, tare, settings)
         shape = plain.shape

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from ..errors import CommandRefusedError
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
+from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
+from ..wire.native import ffi, lib
 from .board_map import BoardMap, opened
-from .compiled import Settings, board_settings, default_settings, ffi, lib
+from .compiled import Settings, board_settings, default_settings
 
 ROUND_US = 10_000
 NO_TOUCH = 255
@@ -30,7 +32,7 @@ TARE_UNKNOWN_Q16 = 0xFFFFFFFF
 #: ``noise_count2`` (at rest, 0 until measured) and ``threshold_count2`` (energy that counts as touched).
 FINGER_DTYPE = np.dtype(
     [
-        *wire.DTYPES[wire.Frame.ID].descr,
+        *DTYPES[wire.Frame.ID].descr,
         ("present", "u1"),
         ("tare_reason", "u1"),
         ("touch_slot", "u1"),
@@ -167,7 +169,7 @@ class Finger:
         tare = self._finger.tare
         return wire.Tare(
             seq=(self._finger.seq - 1) % 2**16,
-            t_us=self._finger.frame.t_us,
+            t_us=self._finger.round.t_us,
             finger=self._index,
             tare_state=tare.state,
             reason=tare.reason,

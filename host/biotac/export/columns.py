@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,9 @@ from ..recording.reader import Recording
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.frames import StructArray, to_units
+
+#: Told a share 0..1 of the work that is done.
+Show = Callable[[float], None]
 
 AXES = ("x", "y", "z")
 PAC_SAMPLES = tuple(str(k) for k in range(22))

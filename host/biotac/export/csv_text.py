@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..recording.reader import Recording
-from .columns import Table
-from .formats import Show
+from .columns import Show, Table
 
 PAC_APART = True
 _ROWS = 10_000

@@ -10,17 +10,15 @@ from pathlib import Path
 from ..errors import InputError
 from ..partial_file import whole
 from ..recording.reader import Recording
-from .columns import Table, tables
+from .columns import Show, Table, tables
 
-#: Told a share 0..1 of the work that is done.
-Show = Callable[[float], None]
 #: Writes tables to a place; called by export() alone.
 Write = Callable[[Path, list[Table], Recording, Show], None]
 
 
 @dataclass(frozen=True)
 class Format:
-    """``module`` is one of this package, ``extra`` what has to be installed for it."""
+    """``module`` is imported when it is asked for, ``extra`` what has to be installed for it."""
 
     module: str
     what: str
@@ -28,12 +26,11 @@ class Format:
 
 
 FORMATS = {
-    ".csv": Format("csv_text", "text, one line a finger and round; PAC in a file of its own"),
-    ".parquet": Format("parquet", "columns for pandas and Arrow; PAC in a file of its own", "parquet"),
-    ".h5": Format("hdf5", "HDF5, a group a finger, a dataset a column", "hdf5"),
-    ".npz": Format("npz", "NumPy arrays named finger0/force_n"),
-    ".btc": Format("compact", "the wire's own integers, small and quick to load with biotac.load_compact"),
-    ".ros2": Format("ros2", "a ROS 2 bag, which is a folder: WrenchStamped, PointStamped, counts, PAC", "ros2"),
+    ".csv": Format("biotac.export.csv_text", "text, one line a finger and round; PAC in a file of its own"),
+    ".parquet": Format("biotac.export.parquet", "columns for pandas and Arrow; PAC in a file of its own", "parquet"),
+    ".h5": Format("biotac.export.hdf5", "HDF5, a group a finger, a dataset a column", "hdf5"),
+    ".npz": Format("biotac.export.npz", "NumPy arrays named finger0/force_n"),
+    ".ros2": Format("biotac.export.ros2", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC", "ros2"),
 }
 
 
@@ -47,7 +44,7 @@ def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Sh
     if kind is None:
         raise InputError(f"{out}: no format has the suffix {out.suffix!r}; expected {', '.join(FORMATS)}")
     try:
-        module = import_module(f".{kind.module}", __package__)
+        module = import_module(kind.module)
     except ImportError as error:
         raise InputError(
             f"{out.suffix} needs {error.name}, which is not installed; pip install 'biotac-gateway[{kind.extra}]'"

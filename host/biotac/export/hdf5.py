@@ -7,8 +7,7 @@ from pathlib import Path
 import h5py
 
 from ..recording.reader import Recording
-from .columns import Table
-from .formats import Show
+from .columns import Show, Table
 
 PAC_APART = False
 

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recording.reader import Recording
-from .columns import COLUMNS, PAC_COLUMNS, Table
-from .formats import Show
+from .columns import COLUMNS, PAC_COLUMNS, Show, Table
 
 PAC_APART = False
 

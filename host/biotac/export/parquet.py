@@ -8,8 +8,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..recording.reader import Recording
-from .columns import Table
-from .formats import Show
+from .columns import Show, Table
 
 PAC_APART = True
 

@@ -10,8 +10,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from ..recording.reader import Recording
-from .columns import Table
-from .formats import Show
+from .columns import Show, Table
 
 PAC_APART = False
 _SHOW_ROWS = 1000

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from ..errors import InputError
 from ..hand.hand import Hand
-from ..link.ports import parse_sim
 from ..link.serial_port import SerialLink
 from ..sim.emulated import EmulatedBoard
-from ..sim.source import load_source
+from ..sim.loading import load_source
+from ..sim.ports import parse_sim
 
 BACK_S = 10.0  # of emulated time
 WORLD_S = 600.0  # the tape must outlast all that is done here: behind its end time stands still

@@ -101,6 +101,10 @@ class Conversation(Commands):
         }
         return replace(now, gaps=self._gaps, **lost)
 
+    def _patience_s(self) -> float:
+        """How long a reply may take."""
+        return REPLY_TIMEOUT_S * self.link.patience
+
     # ---- handshake -----------------------------------------------------------------------------
 
     def _handshake(self) -> wire.Hello:
@@ -112,20 +116,23 @@ class Conversation(Commands):
         decoder.accept_newer_minor()
         seen = 0
 
-        def hello() -> wire.Hello | None:
+        def hello(left_s: float) -> wire.Hello | None:
             nonlocal seen
-            chunk = self.link.read(max(0.0, deadline - time.monotonic()))
+            chunk = self.link.read(max(0.0, left_s))
             seen += len(chunk)
             messages = decoder.feed(chunk).messages
             return next((m for m in messages if isinstance(m, wire.Hello) and m.nonce == nonce), None)
 
         for _ in range(REPLY_TRIES):
+            deadline = time.monotonic() + self._patience_s()
             self.link.write(b"\0")  # ends whatever half frame a former program left behind
             self._send(wire.Stop(self._next_req_id()))
             self._send(wire.HelloRequest(self._next_req_id(), nonce))
-            deadline = time.monotonic() + REPLY_TIMEOUT_S
-            while time.monotonic() < deadline:
-                told = hello()
+            left_s = self._patience_s()
+            while left_s > 0:
+                # What has come is looked at before the time is said to be over: it may be this side that was late.
+                left_s = deadline - time.monotonic()
+                told = hello(left_s)
                 if told is not None:
                     return self._checked(told)
         raise NotAGatewayError(self._describe_stranger(decoder.counts.good, seen))
@@ -145,8 +152,8 @@ class Conversation(Commands):
         else:
             seen = f"{count} bytes came that are no frames of this protocol"
         return (
-            f"no gateway on {self.port}: {seen}; expected a HELLO within "
-            f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check that this is the board's port and that it runs our firmware"
+            f"no gateway on {self.port}: {seen}; expected a HELLO within {self._patience_s() * REPLY_TRIES:.0f} s; "
+            "check that this is the board's port and that it runs our firmware"
         )
 
     # ---- reading -------------------------------------------------------------------------------
@@ -231,16 +238,14 @@ class Conversation(Commands):
             self._recorder = None
             self._trouble = error
 
-    def _until(self, done: Callable[[], Got | None], timeout_s: float) -> Got | None:
-        """Read, or wait for whoever reads, until ``done`` gives something; None after timeout_s without it."""
+    def _until(self, done: Callable[[], Got | None], deadline_s: float) -> Got | None:
+        """Read, or wait for whoever reads, until ``done`` gives something; None after deadline_s without it."""
         if self._reader is None or self._reader.is_here():
-            deadline = time.monotonic() + timeout_s
-            while True:
-                got = done()
-                left = deadline - time.monotonic()
-                if got is not None or left <= 0:
-                    return got
-                self._pump(left)
+            left_s = 1.0
+            while (got := done()) is None and left_s > 0:
+                left_s = deadline_s - time.monotonic()
+                self._pump(max(0.0, left_s))  # once more when time is over: it may be this side that was late
+            return got
         found: list[Got] = []
 
         def so() -> bool:
@@ -249,7 +254,7 @@ class Conversation(Commands):
                 found.append(got)
             return bool(found) or self._failure is not None or not self.connected or self.closing.is_set()
 
-        self._wait_for(so, timeout_s)
+        self._wait_for(so, max(0.0, deadline_s - time.monotonic()))
         if not found and self._failure is not None:
             raise self._failure
         return found[0] if found else None
@@ -286,8 +291,8 @@ class Conversation(Commands):
         for _ in range(round_trips):
             self.status()
 
-    def _await(self, wanted: Callable[[Any], bool]) -> Any:
-        """A message that passes ``wanted``; None after a second without it."""
+    def _await(self, wanted: Callable[[Any], bool], deadline_s: float) -> Any:
+        """A message that passes ``wanted``; None after deadline_s without it."""
 
         def found() -> Any:
             while self._replies:
@@ -298,7 +303,7 @@ class Conversation(Commands):
 
         self._awaiting += 1
         try:
-            return self._until(found, REPLY_TIMEOUT_S)
+            return self._until(found, deadline_s)
         finally:
             self._awaiting -= 1
 
@@ -315,8 +320,9 @@ class Conversation(Commands):
                 for _ in range(REPLY_TRIES):
                     if not self.connected and not self._is_bringing_back():
                         raise DeviceLostError(f"{self.port} is away and looked for; wait for its return")
+                    deadline_s = time.monotonic() + self._patience_s()
                     self._send(request)
-                    answer = self._await(answers)
+                    answer = self._await(answers, deadline_s)
                     if isinstance(answer, kind) and not (isinstance(answer, wire.Reply) and answer.error):
                         self._session.note(request)
                         return answer
@@ -326,7 +332,7 @@ class Conversation(Commands):
                 self._awaiting -= 1
         raise DeviceLostError(
             f"{self.port} did not answer {type(request).__name__} within "
-            f"{REPLY_TIMEOUT_S * REPLY_TRIES:.0f} s; check the cable and open it again"
+            f"{self._patience_s() * REPLY_TRIES:.0f} s; check the cable and open it again"
         )
 
     def _is_bringing_back(self) -> bool:

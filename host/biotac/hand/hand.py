@@ -110,7 +110,7 @@ class Hand(Streaming):
             )
         elif self.link.ended:
             self._finish()
-        elif not self._pump(SILENCE_S) and not self.link.ended:
+        elif not self._pump(self._silence_s()) and not self.link.ended:
             self._lost(self._silent(), "silence")
 
     def frames(self) -> Iterator[Frame]:

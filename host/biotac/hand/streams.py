@@ -275,18 +275,19 @@ class Streaming(ComingBack):
 
     def keep_up(self) -> float:
         """See live.reader.Read."""
+        silence_s = self._silence_s()
         if not self._streaming:
-            return SILENCE_S
+            return silence_s
         if self.link.ended:
             self._finish()
-            return SILENCE_S
+            return silence_s
         now_s = self._monotonic_s()
         if now_s < self._due_s:
             return self._due_s - now_s
-        if now_s - self._heard_s >= SILENCE_S:
+        if now_s - self._heard_s >= silence_s:
             self._lost(self._silent(), "silence")
             self._heard_s = now_s = self.timing.monotonic_s()
-        silent_s = self._heard_s + SILENCE_S
+        silent_s = self._heard_s + silence_s
         if not self._keepalive_ms():
             self._due_s = silent_s
             return silent_s - now_s
@@ -349,7 +350,12 @@ class Streaming(ComingBack):
         for queue in self._queues:
             queue.wake()
 
+    def _silence_s(self) -> float:
+        """How long a board that streams may be silent."""
+        return SILENCE_S * self.link.patience
+
     def _silent(self) -> DeviceLostError:
         return DeviceLostError(
-            f"{self.port} has been silent for {SILENCE_S:.0f} s while streaming; check the cable and open it again"
+            f"{self.port} has been silent for {self._silence_s():.0f} s while streaming; "
+            "check the cable and open it again"
         )

@@ -5,8 +5,8 @@ The layout stands in protocol/SPEC.md, Calibrations.
 
 from __future__ import annotations
 
-from ..core.compiled import ffi, lib
 from ..errors import InputError
+from ..wire.native import ffi, lib
 from .values import Calibration
 
 MAX_BYTES = 256

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from ..calibrate.pressure.check import FORCE_BOUND_N, PressureCheck
 from ..calibrate.wrench import board
-from ..calibrate.wrench.applied import replace_gains
 from ..core.board_map import BoardMap, opened, pdc_above_rest_q4
-from ..core.compiled import TORQUE_GAINS, Results, Settings, ffi, lib, reference_q4
+from ..core.compiled import TORQUE_GAINS, Results, Settings, reference_q4
+from ..core.map_float64 import exact, replace_gains
 from ..hand.commands import PRESSURE_SINCE_MINOR
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import UM_PER_MM, StructArray, electrode_signals, to_units
+from ..wire.native import ffi, lib
 from ..wire.sensor_gen import CORE_RADIUS_UM
 
 #: The PoC's distance and the force of each axis, see firmware/reference/kernel_bounds.h.
@@ -202,7 +203,7 @@ def _by_map(
     bound, N*mm, (n, 1), NaN and 0 without.
     """
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
-    wrench, off = board.exact(its, *frames), board.bound(its, None, *frames)
+    wrench, off = exact(its, *frames), board.bound(its, None, *frames)
     torsion = np.empty((len(messages), 1))
     replace_gains(its, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
     force_off, torque_off, torsion_off = np.split(np.nan_to_num(off), (3, 6), axis=1)

@@ -14,12 +14,15 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..hand.opening import shake_hands
+from ..markdown import table
+from ..picture import check_drawable
 from ..recording import Recording
+from ..sim.loading import load_source
 from ..sim.process import SimBoard, SimLink
-from ..sim.sampling import FRAME_HZ, PAC_SLOT
-from ..sim.source import Source, load_source
+from ..sim.source import Source
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, join
+from ..wire.slots import FRAME_HZ, PAC_SLOT
 from .crosscheck import CrossCheck
 
 Show = Callable[[str], None]
@@ -53,6 +56,7 @@ def run_demo(
     """
     from .demo_picture import draw
 
+    check_drawable()
     source = load_source(source_name, fingers=fingers, seconds=seconds)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -163,17 +167,19 @@ def report_text(facts: dict[str, Any]) -> str:
         "",
         f"{facts['rows']} rows on {facts['fingers']} finger(s), {facts['device_seconds']:.2f} s of device time.",
         "",
-        "| | seen | bound |",
-        "|---|---|---|",
-        f"| frames | {facts['frames']} | |",
-        f"| frames lost | {facts['frames_lost']} | 0 |",
-        f"| CRC errors | {facts['crc_errors']} | 0 |",
-        f"| cross-check violations | {check['violations']} | 0 |",
-        f"| PoC error, max | {check['poc_um_max']:.3f} um | {check['poc_um_bound']:.3f} um |",
-        f"| force error, max | {check['force_mn_max']:.4f} mN | {check['force_mn_bound']:.4f} mN |",
-        f"| torque error, max | {check['torque_nmm_max']:.5f} N*mm | {check['torque_nmm_bound']:.5f} N*mm |",
-        f"| host CPU | {facts['host_cpu_percent']} % of one core | |",
-        "",
+        *table(
+            ["", "seen", "bound"],
+            [
+                ["frames", f"{facts['frames']}", ""],
+                ["frames lost", f"{facts['frames_lost']}", "0"],
+                ["CRC errors", f"{facts['crc_errors']}", "0"],
+                ["cross-check violations", f"{check['violations']}", "0"],
+                ["PoC error, max", f"{check['poc_um_max']:.3f} um", f"{check['poc_um_bound']:.3f} um"],
+                ["force error, max", f"{check['force_mn_max']:.4f} mN", f"{check['force_mn_bound']:.4f} mN"],
+                ["torque error, max", f"{check['torque_nmm_max']:.5f} N*mm", f"{check['torque_nmm_bound']:.5f} N*mm"],
+                ["host CPU", f"{facts['host_cpu_percent']} % of one core", ""],
+            ],
+        ),
         "The errors are those of the board's fixed point against the same formulas in float64, not those of the",
         "formulas against a real force.",
     ]
@@ -181,6 +187,6 @@ def report_text(facts: dict[str, Any]) -> str:
         x, y, z = facts["force_rmse_n"]
         lines.append(f"Against the source's own force, in contact: {x:.2f} / {y:.2f} / {z:.2f} N RMS in x / y / z.")
     if facts["tare_changes"]:
-        lines += ["", "| finger | frame | tare changed because |", "|---|---|---|"]
-        lines += [f"| {t['finger']} | {t['seq']} | {t['reason']} |" for t in facts["tare_changes"][:50]]
+        changes = [[str(t["finger"]), str(t["seq"]), t["reason"]] for t in facts["tare_changes"][:50]]
+        lines += ["", *table(["finger", "frame", "tare changed because"], changes)[:-1]]
     return "\n".join(lines) + "\n"

@@ -1,6 +1,7 @@
 """Ways to reach a board; a PORT string names one.
 
 ``/dev/ttyACM0``, ``COM3``   a serial port
+``serial:NUMBER``            the board with that serial number
 ``spidev:0.0,0.1``           sensors on this computer's own SPI bus, one device a finger
 ``sim:SOURCE``               a simulated board playing a scenario or a recording
 ``emu:pico?source=SOURCE``   the same with a board's flash image in an emulator

@@ -2,10 +2,35 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Mapping
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from ..sim.source import Source
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Played(Protocol):
+    """What a simulated board plays, and what its user would know of it; sim/source.py says more of each."""
+
+    @property
+    def name(self) -> str:
+        """For messages."""
+
+    @property
+    def samples(self) -> NDArray[np.uint16]:
+        """(frames, fingers, 44), 0..4095 where a count came."""
+
+    @property
+    def settings(self) -> Mapping[str, int]:
+        """What to set before streaming, by name in link.toml."""
+
+    @property
+    def tare_q4(self) -> NDArray[np.uint16] | None:
+        """(fingers, 19) to be given before streaming, or None."""
+
+    @property
+    def known_force_n(self) -> NDArray[np.float64] | None:
+        """The force that is applied (frames, fingers, 3), or None."""
 
 
 class Link(Protocol):
@@ -15,13 +40,17 @@ class Link(Protocol):
     port: str
 
     #: What a simulated board plays; None for a real one.
-    source: Source | None
+    source: Played | None
 
     #: The source is over: nothing new will come until a command asks for it.
     ended: bool
 
     #: Device seconds per second here. 0: device time waits for whoever reads, and nothing need be dropped.
     pace: float
+
+    #: Times as long as a board on a cable it is waited for. More than 1 where the board is a process on this computer:
+    #: that is as slow as the computer is busy, and its end is noticed at once.
+    patience: float
 
     #: What can be read in place of ``read``: a file descriptor that gives the same bytes, and OSError when the board
     #: goes away. None where there is none, or ``read`` does more.

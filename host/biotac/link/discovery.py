@@ -10,6 +10,7 @@ from serial.tools import list_ports
 
 from ..errors import PortError
 from ..wire import messages_gen as wire
+from .serial_port import SerialLink
 
 SERIAL_PREFIX = "serial:"
 
@@ -62,6 +63,11 @@ def choose(serial_number: str | None = None, entries: Iterable[Any] | None = Non
     if not fitting:
         raise PortError(f"no board has serial number {serial_number}; there is {there}")
     raise PortError(f"{len(fitting)} boards: {there}; name the one you mean as PORT")
+
+
+def open_serial(port: str, pace: float) -> SerialLink:
+    """Open a serial: port, the board with that number; its time is its own, whatever ``pace`` is."""
+    return SerialLink(choose(port.removeprefix(SERIAL_PREFIX)))
 
 
 def same_serial(seen: str | None, wanted: str) -> bool:

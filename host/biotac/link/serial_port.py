@@ -5,16 +5,14 @@ from __future__ import annotations
 import errno
 import os
 import select
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import serial
 from serial.tools.list_ports import comports
 
 from ..errors import DeviceLostError, PortError
+from .base import Played
 from .holders import holders, in_words
-
-if TYPE_CHECKING:
-    from ..sim.source import Source
 
 READ_BYTES = 65536
 TTY_BYTES = 4000  # nearly what one tty read gives at most
@@ -24,9 +22,11 @@ ONE_READ_BYTES = 8192  # more would be allocated for nothing, thousands of times
 class SerialLink:
     """A byte pipe over USB-serial. The bit rate is meaningless on USB and left at a common one."""
 
+    patience = 1.0
+
     def __init__(self, path: str) -> None:
         self.port = path
-        self.source: Source | None = None
+        self.source: Played | None = None
         self.ended = False
         self.pace = 1.0
         self.fd: int | None = None
@@ -113,6 +113,11 @@ class SerialLink:
     def _close_port(self) -> None:
         if self._serial is not None:
             self._serial.close()
+
+
+def open_path(path: str, pace: float) -> SerialLink:
+    """Open a serial port; its time is its own, whatever ``pace`` is."""
+    return SerialLink(path)
 
 
 def went_away(port: str, error: Exception) -> DeviceLostError:

@@ -16,14 +16,12 @@ import secrets
 import threading
 import time
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
-from ..core.compiled import ffi, lib
 from ..errors import DeviceLostError, PortError
 from ..wire import sensor_gen as sensor
-
-if TYPE_CHECKING:
-    from ..sim.source import Source
+from ..wire.native import ffi, lib
+from .base import Played
 
 # As much as a board and the operating system would hold for a host that is slow; more is dropped in whole frames.
 OUTBOX_BYTES = 262_144
@@ -124,7 +122,8 @@ class SpidevLink:
 
     def __init__(self, port: str, *, clock: Clock | None = None) -> None:
         self.port = port
-        self.source: Source | None = None
+        self.source: Played | None = None
+        self.patience = 1.0
         self.ended = False
         self.fd: int | None = None
         self.pace = 1.0
@@ -231,6 +230,11 @@ class SpidevLink:
             data = bytes(self._inbox[:most])
             del self._inbox[:most]
         return data
+
+
+def open_spidev(port: str, pace: float) -> SpidevLink:
+    """Open a spidev: port; its time is its own, whatever ``pace`` is."""
+    return SpidevLink(port)
 
 
 def _of(handle: Any) -> SpidevLink:

@@ -8,8 +8,7 @@ record of the wire holds protocol/schema.json of the day. host/docs/recording.md
 
 from __future__ import annotations
 
-from .compact import Compact, load_compact
 from .reader import Recording, load
 from .writer import Recorder
 
-__all__ = ["Compact", "Recorder", "Recording", "load", "load_compact"]
+__all__ = ["Recorder", "Recording", "load"]

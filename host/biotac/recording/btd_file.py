@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import RecordingError
-from ..sim import tape
 from ..wire import sensor_gen as _sensor
+from ..wire.messages_gen import INVALID_COUNT
 
 _FIRST_PAIR = 4
 _BEGIN = b"Begin File"
@@ -29,7 +29,7 @@ _MAX_BYTES = 1 << 30  # a day of three sensors is larger; a compressed bomb is s
 class BtdFrames:
     """Complete frames of the sensors that were there.
 
-    ``samples`` uint16 (frames, sensors, 44) in our SLOTS order, with tape codes for bad parity; ``t_s``
+    ``samples`` uint16 (frames, sensors, 44) in our SLOTS order, INVALID_COUNT where the parity was bad; ``t_s``
     (frames,) the file's time of each; ``skipped`` counts incomplete frames.
     """
 
@@ -62,7 +62,7 @@ def read_btd(path: Path) -> BtdFrames:
             f"{path}: line {first_line + row} holds {values[row, sensor]:g} with good parity: "
             f"expected a whole count 0..{_sensor.FULL_SCALE_COUNT}"
         )
-    words = np.where(good, values, tape.BAD_PARITY).astype(np.uint16)
+    words = np.where(good, values, INVALID_COUNT).astype(np.uint16)
 
     starts, skipped = _complete_frames(table[:, 1], table[:, 2], channel)
     if len(starts) == 0:

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ..core.compiled import default_settings
-from ..sim import sampling
 from ..version import __version__
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
+from ..wire import slots
 from ..wire.framing import encode
 from .btd_file import read_btd
 from .file import RecordingFile
@@ -21,7 +21,7 @@ from .writer import describe
 
 NO_BOARD = 0
 _BLOCK_US = 1_000_000
-_FIRST_PAC_US = int(sampling.PAC_SLOT[0]) * 1_000_000 // sensor.SLOT_HZ
+_FIRST_PAC_US = int(slots.PAC_SLOT[0]) * 1_000_000 // sensor.SLOT_HZ
 
 
 def import_btd(path: Path, out: Path, show: Callable[[float], None] = lambda share: None) -> dict[str, int]:
@@ -32,7 +32,7 @@ def import_btd(path: Path, out: Path, show: Callable[[float], None] = lambda sha
     numbers go on, as the tare machine counts rounds. Raises RecordingError naming the line.
     """
     read = read_btd(path)
-    words = np.where(read.samples > sensor.FULL_SCALE_COUNT, wire.INVALID_COUNT, read.samples)
+    words = read.samples
     frames, fingers = words.shape[:2]
     t_us = np.rint((read.t_s - read.t_s[0]) * 1e6).astype(np.int64)
     settings = default_settings()
@@ -46,8 +46,8 @@ def import_btd(path: Path, out: Path, show: Callable[[float], None] = lambda sha
 
     for finger in range(fingers):
         own = words[:, finger]
-        pdc, tac, tdc = (own[:, slot] for slot in (sampling.PDC_SLOT, sampling.TAC_SLOT, sampling.TDC_SLOT))
-        rounds = Rounds(finger, own[:, sampling.ELECTRODE_SLOT], pdc, tac, tdc, t_us)
+        pdc, tac, tdc = (own[:, slot] for slot in (slots.PDC_SLOT, slots.TAC_SLOT, slots.TDC_SLOT))
+        rounds = Rounds(finger, own[:, slots.ELECTRODE_SLOT], pdc, tac, tdc, t_us)
         rows, tares = frames_and_tares(rounds, settings, ran_rows)
         answered = np.flatnonzero((own != wire.INVALID_COUNT).any(axis=1))
         for k, row in enumerate(rows):
@@ -55,7 +55,7 @@ def import_btd(path: Path, out: Path, show: Callable[[float], None] = lambda sha
             if k in tares:
                 messages.append((at, 0, encode(wire.Tare.ID, tares[k].pack())))
             messages.append((at, 1, encode(wire.Frame.ID, row.tobytes())))
-            samples = tuple(own[answered[k], sampling.PAC_SLOT].tolist())
+            samples = tuple(own[answered[k], slots.PAC_SLOT].tolist())
             pac = wire.Pac(int(row["seq"]), (at + _FIRST_PAC_US) % 2**32, finger, samples)
             messages.append((at, 2, encode(wire.Pac.ID, pac.pack())))
         made += len(rows)

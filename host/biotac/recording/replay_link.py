@@ -5,16 +5,14 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
-from urllib.parse import parse_qsl
+from typing import Protocol
 
 from ..errors import CommandRefusedError, DeviceLostError, PortError
+from ..link.base import Played
+from ..link.port_text import options_of, parse_pace
 from ..wire import messages_gen as wire
 from .playback import Playback
 from .reader import Recording
-
-if TYPE_CHECKING:
-    from ..sim.source import Source
 
 FORM = "replay:REC?pace=X&from=S&to=S"
 CHUNK_BYTES = 65536
@@ -54,14 +52,9 @@ class ReplayPort:
 
 def parse_replay(port: str, pace: float) -> ReplayPort:
     """Split a replay: port; ``pace`` is the default. Raises PortError."""
-    from ..link.ports import parse_pace
-
-    path, _, query = port.partition(":")[2].partition("?")
-    options = dict(parse_qsl(query))
-    unknown = set(options) - {"pace", "from", "to"}
-    if unknown or not path:
-        seen = f"option {sorted(unknown)[0]!r}" if unknown else "no recording"
-        raise PortError(f"{port}: {seen}; expected {FORM}")
+    path, options = options_of(port, ("pace", "from", "to"), FORM)
+    if not path:
+        raise PortError(f"{port}: no recording; expected {FORM}")
     try:
         return ReplayPort(
             path,
@@ -114,7 +107,8 @@ class ReplayLink:
 
     def __init__(self, port: str, playback: Playback, *, pace: float = 0.0, clock: Clock | None = None) -> None:
         self.port = port
-        self.source: Source | None = None
+        self.source: Played | None = None
+        self.patience = 1.0
         self.ended = False
         self.fd: int | None = None
         self.pace = pace

@@ -13,9 +13,10 @@ from ..core.board_map import BoardMap
 from ..core.finger import FINGER_DTYPE, Finger
 from ..errors import CommandRefusedError
 from ..wire import messages_gen as wire
+from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray
 
-_FRAME_FIELDS = list(wire.DTYPES[wire.Frame.ID].names or ())
+_FRAME_FIELDS = list(DTYPES[wire.Frame.ID].names or ())
 _ROWS = 2000  # between two calls of show
 
 
@@ -77,7 +78,7 @@ def frames_and_tares(
         if row in ends:
             messages[int(order[row - 1])] = finger.tare_message()
     there = rows[rows["present"] != 0]
-    frames = np.empty(len(there), wire.DTYPES[wire.Frame.ID])
+    frames = np.empty(len(there), DTYPES[wire.Frame.ID])
     for name in _FRAME_FIELDS:
         frames[name] = there[name]
     return frames, messages

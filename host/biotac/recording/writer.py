@@ -14,6 +14,7 @@ from ..keep import Calibration
 from ..keep.calibration_file import to_dict
 from ..version import __version__
 from ..wire import messages_gen as wire
+from ..wire.dtypes_gen import DTYPES
 from ..wire.framing import OVERHEAD_BYTES
 from . import layout
 from .file import RecordingFile
@@ -21,7 +22,7 @@ from .file import RecordingFile
 # Less than the second that may be lost: some of it comes between the decision and the end of the write.
 FLUSH_S = 0.9
 # Of a full stream. A simulated board may live faster than the host's clock: then it is bytes that close a block.
-FINGER_BYTES_PER_S = 100 * sum(wire.DTYPES[m].itemsize + OVERHEAD_BYTES for m in (wire.Frame.ID, wire.Pac.ID))
+FINGER_BYTES_PER_S = 100 * sum(DTYPES[m].itemsize + OVERHEAD_BYTES for m in (wire.Frame.ID, wire.Pac.ID))
 NO_MAPS: Mapping[int, bytes] = {}
 
 

@@ -1,5 +1,6 @@
 """Sources of counts for the emulated sensor: scenarios through a physics model, and recordings."""
 
-from .source import Source, Truth, bundled_scenarios, load_source
+from .loading import bundled_scenarios, load_source
+from .source import Source, Truth
 
 __all__ = ["Source", "Truth", "bundled_scenarios", "load_source"]

@@ -15,7 +15,7 @@ from ..calibrate.reference.mounting import Mounting
 from ..calibrate.reference.rdt import ERROR_BIT, NMM_PER_NM, RECORD_DTYPE, Scale
 from ..core.geometry import Floats
 from ..errors import InputError
-from .sampling import FRAME_S
+from ..wire.slots import FRAME_S
 from .source import Source
 
 RESOLUTION: Floats = np.array([1 / 320] * 3 + [1 / 64] * 3)  # N, N mm

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from ..core.geometry import Floats
 from ..wire import sensor_gen as _sensor
+from ..wire import slots
 from . import sampling
 from .gains import fit_gains
 from .physics import Finger
@@ -26,8 +27,8 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
     """
     own = len(scenario.fingers)
     count = own if fingers is None else fingers
-    period = max(1, round(scenario.seconds * sampling.FRAME_HZ))
-    frames = period if seconds is None else max(1, round(seconds * sampling.FRAME_HZ))
+    period = max(1, round(scenario.seconds * slots.FRAME_HZ))
+    frames = period if seconds is None else max(1, round(seconds * slots.FRAME_HZ))
     specs = [_repeated(scenario.fingers[k % own], k // own) for k in range(count)]
 
     boundary = np.arange(frames + 1)
@@ -36,7 +37,7 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
     boundary_s = _seconds(np.append(boundary[:-1] % period, (frames - 1) % period + 1))
     middle_s = _seconds(boundary[:-1] % period + 0.5)
 
-    samples = np.empty((frames, count, sampling.SLOTS_PER_FRAME), dtype=np.uint16)
+    samples = np.empty((frames, count, slots.SLOTS_PER_FRAME), dtype=np.uint16)
     truth = Truth(
         contact=np.zeros((frames, count), dtype=np.bool_),
         poc_mm=np.full((frames, count, 3), np.nan),
@@ -65,7 +66,7 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
 
 
 def _seconds(frame: npt.ArrayLike) -> Floats:
-    return np.asarray(frame, dtype=np.float64) * sampling.FRAME_S
+    return np.asarray(frame, dtype=np.float64) * slots.FRAME_S
 
 
 def _repeated(spec: FingerSpec, repetition: int) -> FingerSpec:

@@ -108,12 +108,14 @@ class SimBoard:
 
     def _last_words(self) -> str:
         assert self._process.stderr is not None
-        self._process.wait(timeout=5)
+        self._process.wait(timeout=60)
         return self._process.stderr.read().decode(errors="replace").strip().replace("\n", " ")
 
 
 class SimLink(SerialLink):
     """A SerialLink to a simulated board of its own, which it closes."""
+
+    patience = 60.0
 
     def __init__(self, port: str, board: SimBoard) -> None:
         self.board = board

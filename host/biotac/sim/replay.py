@@ -6,10 +6,6 @@ jitter of the logger are not replayed.
 
 from __future__ import annotations
 
-import struct
-import zipfile
-import zlib
-from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +14,19 @@ import numpy.typing as npt
 
 from ..errors import RecordingError
 from ..recording.btd_file import read_btd
-from ..wire import sensor_gen as _sensor
-from . import sampling, tape
+from ..recording.npz_file import counts_field, read_npz, to_lin_frame
+from ..wire import slots
+from ..wire.messages_gen import INVALID_COUNT
+from . import tape
 from .source import Source
 
 _TARE_FRACTION = 16  # TARE_SET: counts with four fractional bits
 _SLOTS_OF = {
-    "E": sampling.ELECTRODE_SLOT,
-    "PDC": np.array([sampling.PDC_SLOT]),
-    "TAC": np.array([sampling.TAC_SLOT]),
-    "TDC": np.array([sampling.TDC_SLOT]),
-    "PAC": sampling.PAC_SLOT,
+    "E": slots.ELECTRODE_SLOT,
+    "PDC": np.array([slots.PDC_SLOT]),
+    "TAC": np.array([slots.TAC_SLOT]),
+    "TDC": np.array([slots.TDC_SLOT]),
+    "PAC": slots.PAC_SLOT,
 }
 
 
@@ -45,16 +43,16 @@ def load_npz(path: Path, *, fingers: int | None = None, seconds: float | None = 
     if "E" not in fields:
         seen = ", ".join(fields) or "none of the known fields"
         raise RecordingError(f"{path}: holds {seen}: expected a field E of shape (n, 19); save it as E")
-    electrodes = counts_field(path, "E", fields["E"], None, len(sampling.ELECTRODE_SLOT))
+    electrodes = counts_field(path, "E", fields["E"], None, len(slots.ELECTRODE_SLOT))
     frames = len(electrodes)
-    samples = np.full((frames, 1, sampling.SLOTS_PER_FRAME), tape.NO_CHANNEL, dtype=np.uint16)
-    for name, slots in _SLOTS_OF.items():
+    samples = np.full((frames, 1, slots.SLOTS_PER_FRAME), tape.NO_CHANNEL, dtype=np.uint16)
+    for name, its in _SLOTS_OF.items():
         if name in fields:
-            columns = None if name in ("PDC", "TAC", "TDC") else len(slots)
-            samples[:, 0, slots] = counts_field(path, name, fields[name], frames, columns).reshape(frames, -1)
+            columns = None if name in ("PDC", "TAC", "TDC") else len(its)
+            samples[:, 0, its] = counts_field(path, name, fields[name], frames, columns).reshape(frames, -1)
     tare_q4 = None
     if "E_base" in fields:
-        base = counts_field(path, "E_base", fields["E_base"], None, len(sampling.ELECTRODE_SLOT))
+        base = counts_field(path, "E_base", fields["E_base"], None, len(slots.ELECTRODE_SLOT))
         tare_q4 = np.rint(base.mean(axis=0) * _TARE_FRACTION).astype(np.uint16)[None, :]
     force_n = _force(path, fields["F"], frames)[:, None, :] if "F" in fields else None
     return _source(path, samples, fingers, seconds, tare_q4=tare_q4, force_n=force_n)
@@ -66,50 +64,8 @@ def load_btd(path: Path, *, fingers: int | None = None, seconds: float | None = 
     Raises RecordingError naming the line.
     """
     read = read_btd(path)
-    return _source(path, read.samples, fingers, seconds, skipped=read.skipped)
-
-
-def read_npz(path: Path, wanted: Collection[str]) -> dict[str, npt.NDArray[Any]]:
-    """Those of the ``wanted`` arrays that the file has. Raises RecordingError for what is no .npz."""
-    try:
-        # opened here because np.load leaves a file it cannot read open
-        with path.open("rb") as file:
-            archive = np.load(file, allow_pickle=False)
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise RecordingError(f"{path}: one bare array: expected an .npz with field E; use numpy.savez")
-            return {name: np.asarray(archive[name]) for name in archive.files if name in wanted}
-    except (
-        OSError, EOFError, ValueError, MemoryError, RuntimeError, struct.error, zipfile.BadZipFile, zlib.error,
-    ) as error:  # fmt: skip
-        seen = str(error).partition("\n")[0]
-        raise RecordingError(
-            f"{path}: cannot be read ({seen}): expected an .npz of number arrays; save it again"
-        ) from None
-
-
-def counts_field(
-    path: Path, name: str, array: npt.NDArray[Any], rows: int | None, columns: int | None
-) -> npt.NDArray[np.uint16]:
-    """``array`` as counts; ``rows`` None: any number but 0; ``columns`` None: one-dimensional.
-
-    Raises RecordingError naming file, field and row.
-    """
-    wanted = f"({rows if rows is not None else 'n'}{f', {columns}' if columns is not None else ','})"
-    shape: tuple[int, ...] = array.shape
-    good = len(shape) == (1 if columns is None else 2) and shape[0] > 0
-    good = good and (rows is None or shape[0] == rows) and (columns is None or shape[1] == columns)
-    if not good:
-        raise RecordingError(f"{path}: field {name} has shape {shape}: expected {wanted}, one row a frame")
-    expected = f"expected whole counts 0..{_sensor.FULL_SCALE_COUNT}; save raw counts"
-    if array.dtype.kind not in "iuf":
-        raise RecordingError(f"{path}: field {name} holds {array.dtype}: {expected}")
-    # written so that NaN is wrong too
-    right = (array >= 0) & (array <= _sensor.FULL_SCALE_COUNT) & (array == np.floor(array))
-    if not right.all():
-        row = int(np.argwhere(~right)[0][0])
-        raise RecordingError(f"{path}: field {name} row {row} holds {array[~right][0]}: {expected}")
-    counts: npt.NDArray[np.uint16] = array.astype(np.uint16)
-    return counts
+    samples = np.where(read.samples == INVALID_COUNT, tape.BAD_PARITY, read.samples).astype(np.uint16)
+    return _source(path, samples, fingers, seconds, skipped=read.skipped)
 
 
 def _force(path: Path, array: npt.NDArray[Any], rows: int) -> npt.NDArray[np.float64]:
@@ -119,15 +75,6 @@ def _force(path: Path, array: npt.NDArray[Any], rows: int) -> npt.NDArray[np.flo
             f"{path}: field F is {array.dtype} {array.shape}: expected finite numbers ({rows}, 3) in N"
         )
     return to_lin_frame(array)
-
-
-def to_lin_frame(vectors: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
-    """Recorded vectors (n, 3), X lateral, Y to the tip, Z out of the pad, in Lin's frame: x = Y, y = X, z = -Z.
-
-    That is a rotation, so torques turn as forces do.
-    """
-    recorded = vectors.astype(np.float64)
-    return np.column_stack([recorded[:, 1], recorded[:, 0], -recorded[:, 2]])
 
 
 def _source(
@@ -141,7 +88,7 @@ def _source(
     skipped: int = 0,
 ) -> Source:
     """Crop to ``seconds`` and cut or copy to ``fingers``."""
-    end = None if seconds is None else max(1, round(seconds * sampling.FRAME_HZ))
+    end = None if seconds is None else max(1, round(seconds * slots.FRAME_HZ))
     recorded = samples.shape[1]
     which = np.arange(recorded if fingers is None else fingers) % recorded
     return Source(

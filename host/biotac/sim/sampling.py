@@ -12,17 +12,10 @@ import numpy.typing as npt
 
 from ..core.geometry import Floats
 from ..wire import sensor_gen as _sensor
+from ..wire.slots import ELECTRODE_SLOT, FRAME_S, PAC_SLOT, PDC_SLOT, SLOTS_PER_FRAME, TAC_SLOT, TDC_SLOT
 from .physics import REST_CELSIUS, Finger, States
 
 Words = npt.NDArray[np.uint16]
-
-SLOTS_PER_FRAME = len(_sensor.SLOTS)
-FRAME_S = SLOTS_PER_FRAME / _sensor.SLOT_HZ
-FRAME_HZ = _sensor.SLOT_HZ / SLOTS_PER_FRAME
-
-ELECTRODE_SLOT = np.array([_sensor.SLOTS.index(name) for name in _sensor.ELECTRODE_NAMES])
-PAC_SLOT = np.flatnonzero(np.array(_sensor.SLOTS) == "PAC")
-PDC_SLOT, TAC_SLOT, TDC_SLOT = (_sensor.SLOTS.index(name) for name in ("PDC", "TAC", "TDC"))
 
 CREEP_S = 10.0
 PDC_REST, PDC_PER_N, PDC_NOISE = 1326.0, 100.0, 1.0

@@ -16,7 +16,7 @@ from .serving import Viewing
 
 SOURCE = "sim:press.toml?fingers=5&seconds=60"
 ROUNDS = 20
-PATIENCE_S = 30.0
+PATIENCE_S = 300.0
 
 
 @dataclass(frozen=True)

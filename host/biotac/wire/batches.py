@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import ffi, lib
 from . import messages_gen as wire
 from .decoder import FRAME, IDLE, NO_FRAME, ONE_STEP_BYTES, PAC, Buffer, counts_of, new, pairs
 from .frames import IDLE_DTYPE, PAC_DTYPE, StructArray, frames_from_wire
 from .framing import FramingCounts
+from .native import ffi, lib
 
 # Looked up once: a live link brings few messages at a time, thousands of times a second.
 _feed = lib.bt_intake_feed
@@ -39,7 +39,7 @@ _NO_PAC, _NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (PAC_DTYPE, IDLE_DTY
 class Batch:
     """What one chunk of bytes completed.
 
-    ``wire`` holds the FRAME messages as sent (wire.DTYPES), ``seq`` and ``t_us`` (int64) their unwrapped
+    ``wire`` holds the FRAME messages as sent (DTYPES), ``seq`` and ``t_us`` (int64) their unwrapped
     numbers and device times, ``frames`` the same rows in user units, converted when first asked for;
     ``pac`` is PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order. ``fingers`` is a bit mask:
     others have no row in ``wire`` and ``idle``; -1 where it was not looked at.

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import ffi, lib
 from . import messages_gen as wire
+from .dtypes_gen import DTYPES
 from .frames import StructArray
 from .framing import FramingCounts
+from .native import ffi, lib
 
 Buffer = bytes | bytearray | memoryview
 
@@ -22,7 +23,7 @@ _decode = lib.bt_decode
 _from_buffer = ffi.from_buffer
 _unpack = ffi.unpack
 _frombuffer = np.frombuffer
-FRAME, PAC, IDLE = (wire.DTYPES[message_id] for message_id in STREAMED)
+FRAME, PAC, IDLE = (DTYPES[message_id] for message_id in STREAMED)
 NO_FRAME, NO_PAC, NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (FRAME, PAC, IDLE))
 _KINDS = int(lib.BT_DECODED_KINDS)
 ONE_STEP_BYTES = int(lib.bt_decode_bytes())
@@ -35,7 +36,7 @@ new = ffi.new_allocator(should_clear_after_alloc=False)
 class Decoded:
     """What one chunk of bytes completed.
 
-    ``frames``, ``pacs`` and ``idles`` are the FRAME, PAC and IDLE messages as sent (wire.DTYPES), each in the
+    ``frames``, ``pacs`` and ``idles`` are the FRAME, PAC and IDLE messages as sent (DTYPES), each in the
     order of arrival and read-only. ``others`` are the rest as (message id, payload), with the ids that this
     library does not know. ``ids`` has the id of every message, a byte each: it tells the order among all of them.
     """

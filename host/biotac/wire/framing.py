@@ -8,8 +8,8 @@ from __future__ import annotations
 import zlib
 from dataclasses import dataclass
 
-from ..core.compiled import ffi, lib
 from . import messages_gen as wire
+from .native import ffi, lib
 
 CRC_BYTES = 4
 OVERHEAD_BYTES = 1 + CRC_BYTES + 1 + 1  # id, CRC, COBS, delimiter

@@ -19,8 +19,8 @@ from biotac.lab.experiments import navarro
 from biotac.lab.experiments.outcome import Options
 from biotac.picture import picture
 from biotac.recording import Recording
+from biotac.sim.loading import load_source
 from biotac.sim.process import SimBoard
-from biotac.sim.source import load_source
 
 FORCES = (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)
 FINGERS = range(5)

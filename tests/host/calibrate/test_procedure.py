@@ -16,9 +16,9 @@ from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Places, P
 from biotac.calibrate.wrench.sources import load
 from biotac.errors import DeviceLostError, InputError
 from biotac.recording import Recording
+from biotac.sim.loading import load_source
 from biotac.sim.nano17 import Nano17
 from biotac.sim.nano17_reader import Nano17Reader
-from biotac.sim.source import load_source
 from biotac.wire.frames import FRAME_DTYPE
 from biotac.wire.messages_gen import FrameFlags
 

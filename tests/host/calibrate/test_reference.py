@@ -17,8 +17,8 @@ from biotac.calibrate.reference.mounting import read_mounting
 from biotac.calibrate.reference.net_ft import parse_address, read_configuration
 from biotac.calibrate.reference.rdt import HOLD_RECORDS, RdtDecoder, Scale, request
 from biotac.errors import DeviceLostError, InputError, RecordingError
+from biotac.sim.loading import load_source
 from biotac.sim.nano17 import MOUNTING, RESOLUTION, Nano17
-from biotac.sim.source import load_source
 
 N = 2000
 

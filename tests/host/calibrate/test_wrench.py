@@ -17,6 +17,7 @@ from biotac.calibrate.wrench.crossvalidation import SHIFTS_COUNTS, Validation, p
 from biotac.calibrate.wrench.run import MIN_ROWS, Run, load_run
 from biotac.cli.main import main
 from biotac.core import geometry as surface
+from biotac.core.map_columns import SIGNAL_COUNTS, Signals
 from biotac.errors import InputError, RecordingError
 
 
@@ -90,7 +91,7 @@ def test_sums_are_those_of_the_rows(finger: Path) -> None:
     run = load_run(finger)
     blocks = Blocks(run.rest)
     sums = moments.moments(run, blocks, 1, 0, moments.linear_columns, moments.NO_DRIFT).sum(axis=0)
-    z = np.column_stack([(run.counts - run.tare) / features.SIGNAL_COUNTS, np.ones(len(run.counts)), run.truth])
+    z = np.column_stack([(run.counts - run.tare) / SIGNAL_COUNTS, np.ones(len(run.counts)), run.truth])
     np.testing.assert_allclose(sums, z.T @ z, rtol=1e-9)
     # least ridge is plain least squares, and errors from sums are errors from rows
     found = models.solve(models.AFFINE, sums, 3, run.tare)[:1]
@@ -103,7 +104,7 @@ def test_sums_are_those_of_the_rows(finger: Path) -> None:
 def test_the_mean_window_is_of_outputs_and_centred_on_the_late_counts(finger: Path) -> None:
     run = load_run(finger)
 
-    def squared(signals: features.Signals) -> np.ndarray:
+    def squared(signals: Signals) -> np.ndarray:
         return signals.e**2
 
     mean = moments.smoothed(run, 5, 3, np.arange(100, 102), squared)
@@ -125,7 +126,7 @@ def test_ridge_shrinks_toward_lins_geometry(name: str, finger: Path, monkeypatch
     found = models.solve(model, sums[np.ix_(index, index)], 3, run.tare)[0]
     # a small signal through the map: proportional to the electrodes' normals, per axis
     small = np.vstack([np.zeros(19), np.eye(19)])
-    signals = features.Signals(small, run.tare)
+    signals = Signals(small, run.tare)
     own = model.family.index(features.width(with_pdc=False))
     response = moments.with_one(features.columns(signals)[:, own]) @ found
     slope = response[1:] - response[0]

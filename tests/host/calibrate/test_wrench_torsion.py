@@ -16,6 +16,7 @@ from biotac.calibrate.wrench.blocks import BLOCKS, Blocks
 from biotac.calibrate.wrench.crossvalidation import AIR_SHARES, validate
 from biotac.calibrate.wrench.run import Run, load_run
 from biotac.core import geometry as surface
+from biotac.core.map_columns import Signals
 from biotac.errors import RecordingError
 from biotac.lab.experiments import random_loads, shear_torsion
 from biotac.lab.experiments.outcome import Options
@@ -211,7 +212,7 @@ def test_ridge_shrinks_toward_lins_geometry_on_all_axes(name: str, run: Run, mon
     index = models.used(model, len(sums), 7)
     monkeypatch.setattr(models, "LAMBDAS", np.array([1e12]))
     found = models.solve(model, sums[np.ix_(index, index)], 7, run.tare)[0]
-    small = features.Signals(np.vstack([np.zeros(19), np.eye(19)]), run.tare, np.zeros(20))
+    small = Signals(np.vstack([np.zeros(19), np.eye(19)]), run.tare, np.zeros(20))
     own = model.family.index(features.width(with_pdc=True))
     response = moments.with_one(features.columns(small)[:, own]) @ found
     slope = response[1:] - response[0]
@@ -222,7 +223,7 @@ def test_ridge_shrinks_toward_lins_geometry_on_all_axes(name: str, run: Run, mon
         likeness = abs(slope[:, axis] @ lin) / np.linalg.norm(slope[:, axis]) / np.linalg.norm(lin)
         assert likeness > 0.999, f"axis {axis}"
     # pressure says nothing until a run says so
-    pressed = features.Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 100.0]))
+    pressed = Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 100.0]))
     said = moments.with_one(features.columns(pressed)[:, own]) @ found
     np.testing.assert_allclose(said[1], said[0], atol=1e-6)
 
@@ -235,7 +236,7 @@ def test_pressure_that_never_moved_in_training_goes_nowhere_when_it_does(run: Ru
     index = models.used(model, len(sums), 7)
     found = models.solve(model, sums[np.ix_(index, index)], 7, run.tare)
     own = model.family.index(features.width(with_pdc=True))
-    pressed = features.Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 500.0]))
+    pressed = Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 500.0]))
     said = moments.with_one(features.columns(pressed)[:, own]) @ found
     assert np.abs(said[:, 1] - said[:, 0]).max() < 1e-3
 
@@ -250,7 +251,7 @@ def test_a_signal_made_of_the_shapes_gives_their_sizes_back() -> None:
     normal = surface.normals_at(point)
     shapes = template._shapes(point, normal, *surface.tangents_at(normal))[0]
     sizes = np.array([0.3, 0.02, 0.01, -0.02, 0.005])
-    found = template.solve(features.Signals(counts_of(shapes @ sizes, tare) - tare, tare))
+    found = template.solve(Signals(counts_of(shapes @ sizes, tare) - tare, tare))
     # it looks where the compression's centre is, which is not quite where it was made
     np.testing.assert_allclose(found.size[0], sizes, atol=0.02)
     assert np.linalg.norm(found.point_mm - point) < 1.0
@@ -272,7 +273,7 @@ def test_a_touch_turned_and_pushed_the_other_way_changes_signs(run: Run) -> None
         its = replace(loads, contact_mm=contact_mm, force_n=np.full(2, 5.0), tip_radius_mm=np.full(2, 1.8), **push)
         finger = Finger(2)
         tare = finger.rest_counts(np.zeros(1))[0]
-        size = template.solve(features.Signals(finger.counts(its) - tare, tare)).size
+        size = template.solve(Signals(finger.counts(its) - tare, tare)).size
         assert size[0, which] > 0.0 > size[1, which]
 
 
@@ -287,7 +288,7 @@ def test_the_template_knows_more_than_the_papers_formulas_and_less_than_a_map(re
 
 def test_a_block_is_its_kind_times_its_gate(run: Run) -> None:
     assert run.pdc is not None
-    signals = features.Signals(run.counts[:50] - run.tare, run.tare, run.pdc[:50])
+    signals = Signals(run.counts[:50] - run.tare, run.tare, run.pdc[:50])
     found = features.columns(signals)
     assert found.shape == (50, features.width(with_pdc=True))
     at = 0
@@ -303,5 +304,5 @@ def test_a_block_is_its_kind_times_its_gate(run: Run) -> None:
         at += block.width
     assert at == found.shape[1]
     # without PDC the columns are the first of them
-    dry = features.columns(features.Signals(signals.e, run.tare))
+    dry = features.columns(Signals(signals.e, run.tare))
     np.testing.assert_array_equal(dry, found[:, : dry.shape[1]])

@@ -255,7 +255,7 @@ def test_it_fails_with_its_code_and_the_cure(
 
 
 def test_every_verb_and_every_code_has_a_case() -> None:
-    assert {command.split()[0] for _, _, command in CASES} | {"udev-setup"} == {v.NAME for v in VERBS} - set(NEVER)
+    assert {command.split()[0] for _, _, command in CASES} | {"udev-setup"} == set(VERBS) - set(NEVER)
     codes = {c.exit_code for c in vars(errors).values() if isinstance(c, type) and issubclass(c, errors.BiotacError)}
     staged = {4, 5, 6}  # below
     with_device = {8}  # test_flash.py
@@ -292,9 +292,10 @@ def opened(command: str, port: str, files: dict[str, Path]) -> list[str]:
 
 
 @pytest.mark.parametrize("command", OPENERS)
-def test_a_stranger_on_the_port_is_4(capsys, scripted_board, files, tmp_path, monkeypatch, command: str) -> None:
+def test_a_stranger_on_the_port_is_4(
+    capsys, scripted_board, brief_silence, files, tmp_path, monkeypatch, command: str
+) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.02)
     board = scripted_board(lambda i, p: b"OK\r\n")
     assert "check that this is the board's port" in line_of(capsys, 4, opened(command, board.path, files))
     assert not list(tmp_path.iterdir())
@@ -312,15 +313,22 @@ def test_another_wire_is_5(
 
 
 @pytest.mark.parametrize("command", OPENERS)
-def test_a_board_that_falls_silent_is_6(capsys, scripted_board, hello, files, tmp_path, monkeypatch, command) -> None:
+def test_a_board_that_falls_silent_is_6(
+    capsys, scripted_board, hello, time_passes, files, tmp_path, monkeypatch, command
+) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.02)
-    board = scripted_board(lambda i, p: hello(p) if i == wire.HelloRequest.ID else b"")
+
+    def answer(message_id: int, payload: bytes) -> bytes:
+        if message_id == wire.HelloRequest.ID:
+            return hello(payload)
+        return b"" if message_id == wire.Stop.ID else time_passes()
+
+    board = scripted_board(answer)
     assert "check the cable and open it again" in line_of(capsys, 6, opened(command, board.path, files))
 
 
 def test_a_board_that_falls_silent_in_its_stream_is_6(capsys, scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.hand.SILENCE_S", 0.05)
+    monkeypatch.setattr("biotac.hand.streams.SILENCE_S", 0.001)
 
     def answer(message_id: int, payload: bytes) -> bytes:
         if message_id == wire.HelloRequest.ID:

@@ -304,7 +304,7 @@ def test_a_hand_asks_the_board_for_its_time(scripted_board, hello) -> None:
     assert hand.clock.resets == 0
     assert abs(now.host_s - begin_s - now.t_us / 1e6) <= now.uncertainty_s <= hand.clock.quickest_round_trip_s
     unix_s = float(hand.clock.unix_time_s(now.t_us))
-    assert unix_s - now.host_s == pytest.approx(time.time() - time.monotonic(), abs=0.1)
+    assert unix_s - now.host_s == pytest.approx(time.time() - time.monotonic(), abs=60)
 
 
 def test_a_recording_has_a_clock_too(tmp_path: Path) -> None:

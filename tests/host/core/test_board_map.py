@@ -18,6 +18,7 @@ from biotac.calibrate.wrench.run import Run, load_run
 from biotac.core import board_map
 from biotac.core.board_map import BoardBlock, BoardMap, from_blob
 from biotac.core.compiled import default_settings
+from biotac.core.map_float64 import exact, result_units
 from biotac.errors import InputError
 from biotac.lab.crosscheck import CrossCheck
 from biotac.recording.rounds import Rounds, frames_and_tares
@@ -60,7 +61,7 @@ def frames_of(seed: int, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 def got(its: BoardMap, *frames: np.ndarray) -> np.ndarray:
     force, torque, torsion = its.results(*frames)
-    return np.column_stack([force, torque, torsion])[:, : its.axes] / board.result_units(its.axes)
+    return np.column_stack([force, torque, torsion])[:, : its.axes] / result_units(its.axes)
 
 
 # ---- bytes -------------------------------------------------------------------------------------
@@ -133,11 +134,11 @@ def test_any_frame_is_within_the_proved_bound_of_float64(seed: int, axes: int) -
     model = random_map(seed, axes)
     its = board.quantise(model)
     frames = frames_of(seed, 3000)
-    meant, off = board.exact(its, *frames), board.bound(its, None, *frames)
+    meant, off = exact(its, *frames), board.bound(its, None, *frames)
     error = np.abs(got(its, *frames) - meant)
     assert (error <= off).all()
     assert error.max() > 0.02 * off.max()  # the bound is about something
-    assert off[:, :3].max() < 0.01 and off.min() >= 0.5 / board.result_units(axes)[0] * 0.999
+    assert off[:, :3].max() < 0.01 and off.min() >= 0.5 / result_units(axes)[0] * 0.999
 
 
 def test_the_integers_mean_the_fitted_map() -> None:
@@ -149,7 +150,7 @@ def test_the_integers_mean_the_fitted_map() -> None:
     truth = model.predict(counts.astype(float), pdc_q4 / 16)
     limit = board.bound(its, model, counts, tare_q4, pdc_q4)
     assert (np.abs(got(its, counts, tare_q4, pdc_q4) - truth) <= limit).all()
-    assert np.abs(board.exact(its, counts, tare_q4, pdc_q4) - truth).max() < 5e-3
+    assert np.abs(exact(its, counts, tare_q4, pdc_q4) - truth).max() < 5e-3
 
 
 def test_a_whole_model_of_seven_axes_has_room_on_a_board() -> None:

@@ -18,6 +18,7 @@ from biotac.core.compute import per_frame
 from biotac.lab.bench import batch as bench
 from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 from biotac.wire import messages_gen as wire
+from biotac.wire.dtypes_gen import DTYPES
 
 MISSING = 0xFFFF
 WEIGHTS = list(PocWeights)
@@ -296,7 +297,7 @@ def test_the_link_of_an_untouched_finger_is_measured(capsys) -> None:
     told = json.loads(capsys.readouterr().out)
     assert told["saved_percent"] >= 80
     # A FRAME a round, and a heartbeat in ten of them.
-    frame_bytes = wire.DTYPES[wire.Frame.ID].itemsize + 7
+    frame_bytes = DTYPES[wire.Frame.ID].itemsize + 7
     assert told["contact"]["bytes_per_s"] >= 100 * frame_bytes
     assert told["rest_with_heartbeats"]["heartbeats"] >= 9 * told["rest_with_heartbeats"]["seconds"]
     assert main(["bench", "idle"]) == 0

@@ -10,10 +10,12 @@ import pytest
 import biotac
 from biotac import FRAME_DTYPE, FrameFlags, QuantityFlags, Setting, TareReason, TareState
 from biotac.core.finger import FINGER_DTYPE, ROUND_US, Finger, to_frames
-from biotac.sim import load_source, sampling
+from biotac.sim import load_source
 from biotac.wire import messages_gen as wire
+from biotac.wire import slots
+from biotac.wire.dtypes_gen import DTYPES
 
-WIRE_FIELDS = wire.DTYPES[wire.Frame.ID].names
+WIRE_FIELDS = DTYPES[wire.Frame.ID].names
 EVERYTHING = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE | QuantityFlags.SIGMA
 ALL_ROUNDS = EVERYTHING | QuantityFlags.REST_FRAMES
 
@@ -23,11 +25,11 @@ def words_of(name: str, finger: int) -> dict[str, np.ndarray]:
     samples = load_source(name).samples[:, finger].copy()
     samples[samples > 4095] = wire.INVALID_COUNT
     return {
-        "counts": samples[:, sampling.ELECTRODE_SLOT],
-        "pdc": samples[:, sampling.PDC_SLOT],
-        "tac": samples[:, sampling.TAC_SLOT],
-        "tdc": samples[:, sampling.TDC_SLOT],
-        "pac": samples[:, sampling.PAC_SLOT],
+        "counts": samples[:, slots.ELECTRODE_SLOT],
+        "pdc": samples[:, slots.PDC_SLOT],
+        "tac": samples[:, slots.TAC_SLOT],
+        "tdc": samples[:, slots.TDC_SLOT],
+        "pac": samples[:, slots.PAC_SLOT],
     }
 
 

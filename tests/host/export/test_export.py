@@ -225,8 +225,8 @@ def test_a_failing_disk_leaves_nothing(recorded, tmp_path, capsys, monkeypatch) 
     def full(*_: Any, **__: Any) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("biotac.recording.compact.zstandard.ZstdCompressor", full)
-    assert export(recorded, tmp_path / "a.btc") == 2
+    monkeypatch.setattr("biotac.export.csv_text.csv.writer", full)
+    assert export(recorded, tmp_path / "a.csv") == 2
     assert "No space left" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 

@@ -20,7 +20,6 @@ from biotac.wire import messages_gen as wire
 @pytest.fixture
 def fake(scripted_board, hello, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> FakeBoard:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.5)
     no_waiting(monkeypatch)
     return FakeBoard(scripted_board, hello)
 
@@ -213,10 +212,9 @@ def test_a_board_without_a_loader_is_not_flashed(fake: FakeBoard, tmp_path: Path
 
 
 def test_firmware_that_does_not_answer_is_touched_only_when_told(
-    fake: FakeBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    fake: FakeBoard, tmp_path: Path, time_passes: Callable[[], bytes]
 ) -> None:
-    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.05)
-    fake.answers = False
+    fake.answers, fake.silence = False, time_passes
     assert "--no-backup" in fails(fake, tmp_path, NotAGatewayError)
     assert fake.events == []
     outcome = flash(read_image(make_image(tmp_path)), fake, [fake], keep=False)

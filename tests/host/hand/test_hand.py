@@ -15,16 +15,14 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
 
 
-def test_nothing_answers_is_no_gateway(scripted_board, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.02)
+def test_nothing_answers_is_no_gateway(scripted_board, brief_silence) -> None:
     board = scripted_board(lambda message_id, payload: b"")
     with pytest.raises(biotac.NotAGatewayError, match=r"nothing answers.*expected a HELLO.*check that this is"):
         biotac.open(board.path)
 
 
-def test_another_kind_of_device_is_no_gateway(scripted_board, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.02)
-    board = scripted_board(lambda message_id, payload: b"$GPGGA,123519,4807.038,N*47\r\n")
+def test_another_kind_of_device_is_no_gateway(scripted_board, time_passes) -> None:
+    board = scripted_board(lambda message_id, payload: b"$GPGGA,123519,4807.038,N*47\r\n" + time_passes())
     with pytest.raises(biotac.NotAGatewayError, match="bytes came that are no frames"):
         biotac.open(board.path)
 
@@ -115,7 +113,7 @@ def test_a_board_that_dies_in_mid_stream_is_named(monkeypatch) -> None:
 
 
 def test_a_silent_board_is_a_lost_board(scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.streams.SILENCE_S", 0.05)
+    monkeypatch.setattr("biotac.hand.streams.SILENCE_S", 0.001)
 
     def answer(message_id: int, payload: bytes) -> bytes:
         if message_id == wire.HelloRequest.ID:

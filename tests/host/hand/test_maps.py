@@ -30,8 +30,8 @@ from biotac.link.ports import start_board
 from biotac.link.serial_port import SerialLink
 from biotac.recording import Recording
 from biotac.recording.recompute import recompute
+from biotac.sim.loading import load_source
 from biotac.sim.process import SimBoard, SimLink
-from biotac.sim.source import load_source
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
@@ -81,8 +81,9 @@ def test_another_sensors_is_refused_in_words() -> None:
 class Upload:
     """A board that keeps one finger's map, and spoils what it is told to."""
 
-    def __init__(self, hello: Callable[..., bytes]) -> None:
+    def __init__(self, hello: Callable[..., bytes], time_passes: Callable[[], bytes]) -> None:
         self._hello = hello
+        self._time_passes = time_passes
         self.kept = b""
         self.coming = bytearray()
         self.begun = False
@@ -101,7 +102,7 @@ class Upload:
         if number in self.forgets:
             self.begun = False
         answer = self._answer(wire.MESSAGES[message_id].unpack(payload))
-        return b"" if number in self.silent else encode(answer.ID, answer.pack())
+        return self._time_passes() if number in self.silent else encode(answer.ID, answer.pack())
 
     def _answer(self, asked: object) -> object:
         if isinstance(asked, wire.GetMap):
@@ -128,9 +129,8 @@ class Upload:
 
 
 @pytest.fixture
-def board(scripted_board, hello, monkeypatch) -> Iterator[tuple[Upload, biotac.Hand]]:
-    monkeypatch.setattr("biotac.hand.board.REPLY_TIMEOUT_S", 0.05)
-    upload = Upload(hello)
+def board(scripted_board, hello, time_passes) -> Iterator[tuple[Upload, biotac.Hand]]:
+    upload = Upload(hello, time_passes)
     with biotac.open(scripted_board(upload).path) as hand:
         yield upload, hand
 

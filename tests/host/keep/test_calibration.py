@@ -21,8 +21,8 @@ from biotac.keep import calibration_file as file
 from biotac.keep import record
 from biotac.lab.crosscheck import CrossCheck
 from biotac.recording import Recording
+from biotac.sim.loading import load_source
 from biotac.sim.process import SimBoard, SimLink
-from biotac.sim.source import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
 

@@ -12,6 +12,7 @@ import pytest
 from biotac.cli.main import main
 from biotac.lab.bench import decode
 from biotac.wire import messages_gen as wire
+from biotac.wire.dtypes_gen import DTYPES
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +23,7 @@ def outcome() -> decode.Outcome:
 def test_every_contestant_is_timed_at_every_chunk_size(outcome) -> None:
     assert (outcome.seconds, outcome.messages) == (1.0, 1000)
     # id, CRC, COBS and delimiter around the mean of a FRAME and a PAC; MAVLink 2 cuts a payload's last zeros off
-    sizes = [wire.DTYPES[i].itemsize for i in (wire.Frame.ID, wire.Pac.ID)]
+    sizes = [DTYPES[i].itemsize for i in (wire.Frame.ID, wire.Pac.ID)]
     assert outcome.bytes_per_message == np.mean(sizes) + 7
     assert np.mean(sizes) < outcome.mavlink_bytes_per_message <= np.mean(sizes) + 12
     assert [result.chunk_bytes for result in outcome.results] == list(decode.CHUNK_BYTES)

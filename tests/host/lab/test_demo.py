@@ -10,7 +10,7 @@ import pytest
 import biotac
 from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 from biotac.lab.demo import expected_frames, run_demo
-from biotac.sim.source import load_source
+from biotac.sim.loading import load_source
 
 
 def quiet(text: str) -> None:

@@ -21,6 +21,7 @@ from deframer import Deframer, encode
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch, StreamDecoder, join
 from biotac.wire.decoder import STREAMED
+from biotac.wire.dtypes_gen import DTYPES
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no ports by file descriptor on this system")
 START = (wire.Reply.ID, wire.Reply(1, wire.Start.ID, wire.Error.OK).pack())
@@ -34,7 +35,7 @@ def sent(random: np.random.Generator, n: int) -> list[tuple[int, bytes]]:
         if kind == wire.Reply.ID:
             out.append(START if random.random() < 0.3 else (kind, wire.Reply(k % 256, wire.Ping.ID, 0).pack()))
             continue
-        row = np.frombuffer(random.bytes(wire.DTYPES[kind].itemsize), wire.DTYPES[kind]).copy()
+        row = np.frombuffer(random.bytes(DTYPES[kind].itemsize), DTYPES[kind]).copy()
         row["finger"] = random.choice([0, 3, 255])
         row["seq"] = (65_000 + k + random.choice([0, 0, 0, 0, 5, -40])) % 2**16
         row["t_us"] = (2**32 - 10**6 + 10_000 * k) % 2**32

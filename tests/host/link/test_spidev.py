@@ -15,7 +15,7 @@ import biotac
 from biotac.keep import eeprom
 from biotac.keep.chip import Chip
 from biotac.link import spidev as spidev_link
-from biotac.sim.source import load_source
+from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch
 

@@ -17,6 +17,7 @@ from mcap.writer import CompressionType, Writer
 import biotac
 from biotac.recording import layout
 from biotac.wire import messages_gen as wire
+from biotac.wire.dtypes_gen import DTYPES
 from biotac.wire.framing import encode
 
 SOURCE = "sim:press.toml?fingers=2&seconds=4"
@@ -56,7 +57,7 @@ def alter(seq: int, finger: int, edit: Callable[[np.ndarray], None]) -> Callable
         out = b""
         for message_id, payload in Deframer().feed(data):
             if message_id == wire.Frame.ID:
-                rows = np.frombuffer(payload, wire.DTYPES[wire.Frame.ID]).copy()
+                rows = np.frombuffer(payload, DTYPES[wire.Frame.ID]).copy()
                 if rows["seq"][0] == seq and rows["finger"][0] == finger:
                     edit(rows)
                     payload = rows.tobytes()

@@ -12,9 +12,10 @@ from biotac.calibrate.reference import rdt
 from biotac.calibrate.reference.net_ft import SILENCE_S, NetFtReader, parse_address
 from biotac.calibrate.reference.samples import Samples, join
 from biotac.errors import DeviceLostError, PortError
+from biotac.sim.loading import load_source
 from biotac.sim.nano17 import Nano17
 from biotac.sim.net_ft_box import NetFtBox, Network
-from biotac.sim.source import Source, load_source
+from biotac.sim.source import Source
 
 STEP_S = 0.1  # 50 datagrams: they fit any socket's buffer
 
@@ -34,7 +35,8 @@ def source() -> Source:
 
 
 @pytest.fixture
-def box(request: pytest.FixtureRequest, source: Source) -> Iterator[NetFtBox]:
+def box(request: pytest.FixtureRequest, source: Source, monkeypatch: pytest.MonkeyPatch) -> Iterator[NetFtBox]:
+    monkeypatch.setattr("biotac.calibrate.reference.net_ft.HTTP_TIMEOUT_S", 300.0)
     with NetFtBox(source, network=getattr(request, "param", None)) as its:
         yield its
 

@@ -10,6 +10,7 @@ from biotac.sim import sampling
 from biotac.sim.physics import Finger, States
 from biotac.sim.timeline import Pose, Track
 from biotac.wire import sensor_gen as _sensor
+from biotac.wire import slots
 
 NAMES = _sensor.ELECTRODE_NAMES
 
@@ -300,7 +301,7 @@ def test_profiles_set_resistance_and_noise(profile: str, low_ohm: float, high_oh
     assert rest.min() >= low_ohm and rest.max() <= high_ohm and np.ptp(rest) > 0.95 * (high_ohm - low_ohm)
     finger = Finger(1, profile)
     finger.drift_per_min, finger.glitch_share = np.zeros(19), 0.0
-    words = sampling.sample(finger, at_rest(2001))[:, sampling.ELECTRODE_SLOT]
+    words = sampling.sample(finger, at_rest(2001))[:, slots.ELECTRODE_SLOT]
     # rounding adds 1/12; 38 000 samples know sigma to 0.4 %
     assert words.std(axis=0).mean() == pytest.approx(np.sqrt(sigma**2 + 1 / 12), rel=0.02)
 
@@ -308,7 +309,7 @@ def test_profiles_set_resistance_and_noise(profile: str, low_ohm: float, high_oh
 def test_worn_glitches_are_single_dips() -> None:
     finger = quiet(1)
     finger.glitch_share = Finger(1, "worn").glitch_share
-    words = sampling.sample(finger, at_rest(4001))[:, sampling.ELECTRODE_SLOT]
+    words = sampling.sample(finger, at_rest(4001))[:, slots.ELECTRODE_SLOT]
     dips = finger.rest_counts(np.zeros(1)) - words
     hit = dips > 1.0
     assert hit.mean() == pytest.approx(0.005, rel=0.2)
@@ -352,16 +353,16 @@ def test_pressure_temperature_and_flux_channels() -> None:
 
 def test_dynamic_pressure_answers_to_changes_of_force_only() -> None:
     held = touch(np.tile([-2.8, 0.0, -5.08], (501, 1)), 5.0)
-    rest_pac = sampling.sample(Finger(1), at_rest(501))[:, sampling.PAC_SLOT].astype(float)
-    held_pac = sampling.sample(Finger(1), held)[:, sampling.PAC_SLOT].astype(float)
+    rest_pac = sampling.sample(Finger(1), at_rest(501))[:, slots.PAC_SLOT].astype(float)
+    held_pac = sampling.sample(Finger(1), held)[:, slots.PAC_SLOT].astype(float)
     for pac in (rest_pac, held_pac):
         assert pac.mean() == pytest.approx(2038, abs=0.2) and pac.std() == pytest.approx(4.0, rel=0.05)
-    slow = sampling.sample(Finger(1), ramp_states(50, 1.0))[:, sampling.PAC_SLOT].mean() - 2038
-    fast = sampling.sample(Finger(1), ramp_states(50, 2.0))[:, sampling.PAC_SLOT].mean() - 2038
+    slow = sampling.sample(Finger(1), ramp_states(50, 1.0))[:, slots.PAC_SLOT].mean() - 2038
+    fast = sampling.sample(Finger(1), ramp_states(50, 2.0))[:, slots.PAC_SLOT].mean() - 2038
     assert slow > 50 and fast == pytest.approx(2 * slow, rel=0.1)
 
 
 def test_words_stay_within_the_converter() -> None:
     words = sampling.sample(Finger(1, "worn"), ramp_states(5, 50.0))
     assert words.max() <= 4095  # PAC would be far beyond
-    assert (words[:, sampling.PAC_SLOT] == 4095).any()
+    assert (words[:, slots.PAC_SLOT] == 4095).any()

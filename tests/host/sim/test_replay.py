@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from biotac.errors import InputError, RecordingError
-from biotac.sim import load_source, sampling, tape
+from biotac.sim import load_source, tape
 from biotac.wire import sensor_gen as _sensor
+from biotac.wire import slots
 
 DATA = Path(__file__).resolve().parents[3].parent / "shared" / "data"
 PDC, TAC, TDC = (_sensor.SLOTS.index(name) for name in ("PDC", "TAC", "TDC"))
@@ -73,7 +74,7 @@ def test_the_mean_of_the_base_is_the_tare_in_sixteenths(tmp_path: Path) -> None:
 def test_missing_channels_are_channels_the_sensor_does_not_have(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", E=arrays()["E"])
     source = load_source(tmp_path / "a.npz")
-    other = [k for k in range(44) if k not in sampling.ELECTRODE_SLOT]
+    other = [k for k in range(44) if k not in slots.ELECTRODE_SLOT]
     assert len(other) == 25 and (source.samples[:, 0, other] == tape.NO_CHANNEL).all()
     assert source.tare_q4 is None and source.truth_force_n is None
 
@@ -270,8 +271,8 @@ def test_the_real_btd_equals_its_decoded_arrays() -> None:
     decoded = np.load(needs("btd_biotacsp/btd.npz"))
     assert source.samples.shape == (2124, 1, 44) and source.skipped_frames == 0
     words = source.samples[:, 0]
-    np.testing.assert_array_equal(words[:, sampling.ELECTRODE_SLOT], decoded["E"])
-    np.testing.assert_array_equal(words[:, sampling.PAC_SLOT], decoded["PAC"])
+    np.testing.assert_array_equal(words[:, slots.ELECTRODE_SLOT], decoded["E"])
+    np.testing.assert_array_equal(words[:, slots.PAC_SLOT], decoded["PAC"])
     for name, slot in (("PDC", PDC), ("TAC", TAC), ("TDC", TDC)):
         np.testing.assert_array_equal(words[:, slot], decoded[name])
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from biotac import sim
 from biotac.core import geometry as surface
 from biotac.errors import InputError
 from biotac.sim import Source, bundled_scenarios, load_source, sampling, tape
@@ -14,6 +15,7 @@ from biotac.sim.gains import fit_gains
 from biotac.sim.physics import Finger
 from biotac.sim.scenario import FAULT_CODES, parse_scenario
 from biotac.wire import messages_gen as _wire
+from biotac.wire import slots
 
 REST = '[[step]]\ndo = "rest"\nseconds = 1.0\n'
 PRESS = '[[step]]\ndo = "press"\nseconds = 0.5\nat = "E17"\nforce_n = 5.0\n'
@@ -42,7 +44,7 @@ def test_a_press_ramps_holds_and_lets_go(tmp_path: Path) -> None:
     np.testing.assert_allclose(truth.poc_mm[200, 0], [-2.8, 0.0, -5.08])
     assert np.isnan(truth.poc_mm[50]).all() and np.isnan(truth.poc_mm[300]).all()
     # the counts follow: E17 falls while pressed and comes back
-    e17 = source.samples[:, 0, sampling.ELECTRODE_SLOT[16]].astype(float)
+    e17 = source.samples[:, 0, slots.ELECTRODE_SLOT[16]].astype(float)
     assert e17[150:250].mean() < e17[:100].mean() - 100 and abs(e17[300:].mean() - e17[:100].mean()) < 20
 
 
@@ -76,7 +78,7 @@ def test_temperature_reaches_the_sensor_and_leaves_contacts_alone(tmp_path: Path
     text = 'name = "t"\n' + PRESS + '[[step]]\ndo = "temperature"\nseconds = 2\ncelsius = 35\n'
     source = play(tmp_path, text)
     assert source.truth is not None and source.truth.contact[60:].all()
-    tdc = source.samples[:, 0, sampling.TDC_SLOT].astype(float)
+    tdc = source.samples[:, 0, slots.TDC_SLOT].astype(float)
     assert abs(tdc[:50].mean() - 1008.2) < 1 and abs(tdc[-1] - sampling.tdc_counts(np.array([35.0]))[0]) < 4
 
 
@@ -127,7 +129,7 @@ def test_seconds_crop_and_repeat(tmp_path: Path) -> None:
 
 def test_the_last_frame_of_a_scenario_that_ends_in_contact_is_pressed(tmp_path: Path) -> None:
     source = play(tmp_path, 'name = "t"\n' + REST + PRESS + '[[step]]\ndo = "hold"\nseconds = 0.5\n')
-    pdc = source.samples[-5:, 0, sampling.PDC_SLOT].astype(float)
+    pdc = source.samples[-5:, 0, slots.PDC_SLOT].astype(float)
     assert pdc.min() > 1326 + 400
 
 
@@ -139,7 +141,7 @@ def test_finger_tables_choose_the_sensors(tmp_path: Path) -> None:
     source = play(tmp_path, text)
     assert source.serials == ("BT2P0220B11E0004", "BTSIM00000000004")
     for k, profile in enumerate(("worn", "new")):
-        mean = source.samples[:, k, sampling.ELECTRODE_SLOT].mean(axis=0)
+        mean = source.samples[:, k, slots.ELECTRODE_SLOT].mean(axis=0)
         np.testing.assert_allclose(mean, Finger(4, profile).rest_counts(np.zeros(1))[0], atol=3)
 
 
@@ -156,7 +158,7 @@ def test_a_fault_replaces_exactly_the_words_it_covers(tmp_path: Path) -> None:
         expected[50:60, 1, :] = code
         np.testing.assert_array_equal(words, expected)
     words = play(tmp_path, text + fault.format("bad_parity") + 'channel = "PAC"\n').samples
-    assert (words[50:60, 1, sampling.PAC_SLOT] == tape.BAD_PARITY).all()
+    assert (words[50:60, 1, slots.PAC_SLOT] == tape.BAD_PARITY).all()
     assert (words == tape.BAD_PARITY).sum() == 220
     # between frames: 4400 slots a second, so 0.502 s is slot 2209, the tenth of frame 50 (from 0: 9)
     words = play(tmp_path, text + fault.format("stuck_low").replace("0.5", "0.502", 1)).samples
@@ -188,7 +190,7 @@ def test_gains_fit_the_axes_the_scenario_loads(tmp_path: Path) -> None:
     assert sorted(source.settings) == ["force_gain_z_nn", "torque_gain_y_nn"]
     assert source.truth is not None
     # noise of 1.5 counts and creep are all that parts the played counts from the fitted ones
-    signal = source.samples[:, 0, sampling.ELECTRODE_SLOT].astype(float)
+    signal = source.samples[:, 0, slots.ELECTRODE_SLOT].astype(float)
     signal -= signal[:90].mean(axis=0)
     total, truth = signal @ surface.ELECTRODE_NORMAL[:, 2], source.truth.force_n[:, 0, 2]
     expected = 1e9 * (total @ truth) / (total @ total)
@@ -210,7 +212,7 @@ def test_the_bundled_scenarios_are_these() -> None:
 
 @pytest.mark.parametrize("name", bundled_scenarios())
 def test_bundled_scenarios_play_and_can_be_repeated(name: str) -> None:
-    text = (Path(surface.__file__).parent / "scenarios" / name).read_bytes()
+    text = (Path(sim.__file__).parent / "scenarios" / name).read_bytes()
     scenario = parse_scenario(text, file=name)
     assert scenario.name + ".toml" == name
     for track in scenario.tracks:
@@ -245,7 +247,7 @@ def test_poke_visits_every_electrode_with_more_than_a_newton() -> None:
 def test_drift_never_touches_and_keeps_below_the_tares_slew() -> None:
     source = load_source("drift.toml")
     assert source.truth is not None and not source.truth.contact.any() and len(source.samples) == 6000
-    counts = source.samples[:, :, sampling.ELECTRODE_SLOT].astype(float)
+    counts = source.samples[:, :, slots.ELECTRODE_SLOT].astype(float)
     # 10 s means are 10 s apart; the tare follows 0.5 count/s (numerics.md 1.4)
     means = counts.reshape(6, 1000, -1).mean(axis=1)
     slope = np.abs(np.diff(means, axis=0)).max() / 10.0

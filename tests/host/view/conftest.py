@@ -17,7 +17,7 @@ from biotac.view.serving import Viewing
 from biotac.wire.batches import Batch, LinkStats, join
 
 CHROMIUM = shutil.which("chromium")
-PATIENCE_MS = 20_000
+PATIENCE_MS = 300_000  # only a failing test waits so long
 
 
 class ScriptedPlayer:
@@ -76,8 +76,9 @@ def touch() -> Batch:
 
 
 @pytest.fixture
-def view(tmp_path: Path) -> Iterator[Callable[..., Viewing]]:
+def view(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Viewing]]:
     """Serves a source; its recordings go to tmp_path. Closed after the test."""
+    monkeypatch.setattr("biotac.view.reader.ANSWER_S", PATIENCE_MS / 1000)
     served: list[Viewing] = []
 
     def serve(source: str, **options: Any) -> Viewing:

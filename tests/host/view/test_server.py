@@ -28,7 +28,7 @@ from biotac.wire.frames import electrode_signals
 
 
 def ask(viewing, method: str, path: str, body: object = None, **headers: str) -> tuple[int, bytes]:
-    connection = http.client.HTTPConnection("127.0.0.1", viewing.server.server_port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", viewing.server.server_port, timeout=300)
     text = body if isinstance(body, str) else json.dumps(body)
     connection.request(
         method, path, None if body is None else text, {k.replace("_", "-"): v for k, v in headers.items()}

@@ -9,6 +9,7 @@ from tests.support.deframer import Deframer
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder
 from biotac.wire.decoder import STREAMED
+from biotac.wire.dtypes_gen import DTYPES
 from biotac.wire.framing import encode
 
 
@@ -218,7 +219,7 @@ def test_lost_pac_blocks_are_counted_apart() -> None:
 
 def test_rows_begin_as_the_compiled_numbering_reads_them() -> None:
     for message_id in STREAMED:
-        fields = wire.DTYPES[message_id].fields
+        fields = DTYPES[message_id].fields
         assert fields is not None
         begin = {name: (fields[name][0].str, fields[name][1]) for name in ("seq", "t_us", "finger")}
         assert begin == {"seq": ("<u2", 0), "t_us": ("<u4", 2), "finger": ("|u1", 6)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from biotac.core.compiled import ffi, lib
+from biotac.wire.native import ffi, lib
 
 
 class Loop:

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from deframer import Deframer, encode
 
-from biotac.core.compiled import ffi, lib
 from biotac.wire import messages_gen as wire
 from biotac.wire.decoder import STREAMED, Decoded, Decoder
+from biotac.wire.dtypes_gen import DTYPES
+from biotac.wire.native import ffi, lib
 
 Message = tuple[int, bytes]
 UNKNOWN_ID = 0x7E
@@ -25,7 +26,7 @@ def messages(random: np.random.Generator, n: int, longer_by: int = 0) -> list[Me
     ids = np.where(random.random(n) < 0.8, random.choice(STREAMED, n), random.choice([*wire.MESSAGES, UNKNOWN_ID], n))
     out = []
     for message_id in ids.tolist():
-        size = wire.DTYPES[message_id].itemsize if message_id in wire.DTYPES else int(random.integers(0, 250))
+        size = DTYPES[message_id].itemsize if message_id in DTYPES else int(random.integers(0, 250))
         size += longer_by if random.random() < 0.1 else 0
         payload = random.integers(0, 256, size, np.uint8)
         payload[random.random(size) < random.choice([0.0, 0.1, 0.9])] = 0
@@ -55,7 +56,7 @@ def cut(random: np.random.Generator, data: bytes, longest: int) -> Iterator[byte
 
 def assert_rows_are_those_of(decoded: Decoded, got: list[Message]) -> None:
     for message_id, rows in zip(STREAMED, (decoded.frames, decoded.pacs, decoded.idles), strict=True):
-        assert rows.dtype == wire.DTYPES[message_id]
+        assert rows.dtype == DTYPES[message_id]
         assert rows.tobytes() == b"".join(payload for i, payload in got if i == message_id)
         assert decoded.order(message_id).tolist() == [k for k, (i, _) in enumerate(got) if i == message_id]
     assert decoded.others == [(i, payload) for i, payload in got if i not in STREAMED]

@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.compiled import Settings, lib
+from ...core.compiled import Settings
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
+from ...wire.native import lib
 from . import formulas
 
 ROUND_US = 10_000

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...sim.sampling import FRAME_HZ
-from ...sim.source import Source
+from ...link.base import Played
+from ...wire.slots import FRAME_HZ
 from ..reference.csv_file import open_table
 from . import formulas
 from .formulas import Floats
@@ -45,7 +45,7 @@ class Truth:
     The first time it is asked for is that of the source's first row with any good word.
     """
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Played) -> None:
         known = source.known_force_n
         if known is None:
             raise InputError(f"{source.name} knows no force; expected a scenario or a recording with one")

@@ -1,4 +1,4 @@
-"""A fitted map in the board's fixed point: made, evaluated exactly, and compared.
+"""A fitted map in the board's fixed point: made, and compared with the fit.
 
 Quantised by one rule: an axis of a block gets the smallest exponent at which its coefficients pass the
 board's own bound, and they are rounded to that. What that costs is computed frame by frame (``bound``),
@@ -8,7 +8,6 @@ from protocol/SPEC.md, Wrench maps; nothing here is measured and then called a t
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,27 +16,18 @@ import numpy.typing as npt
 
 from ...core.board_map import BoardBlock, BoardMap
 from ...core.geometry import Floats
+from ...core.map_columns import ELECTRODES, Signals, gates, kinds
+from ...core.map_float64 import FACTOR, Q4, factor_product, result_units, tared
 from ...errors import InputError
 from ...wire import map_gen as _map
-from ...wire import messages_gen as wire
-from ...wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, tare_to_q4
+from ...wire.frames import tare_to_q4
 from ...wire.map_gen import Gate, Kind
 from . import features
-from .features import ELECTRODES, Signals
 from .fitted import WrenchMap
 from .run import Run
 
-Q4 = 16
-# What 1 in a column of features is as the board's factor, of which 2^16 is a coefficient's unit.
-FACTOR = {
-    "one": 2.0**_map.ONE_Q,
-    "signal": Q4 * features.SIGNAL_COUNTS,
-    "conductance": 2.0 ** (_map.CONDUCTANCE_Q - _map.CONDUCTANCE_FINE_BITS),
-    "pressure": Q4 * features.PRESSURE_COUNTS,
-}
 _UPPER = np.triu_indices(ELECTRODES)
 _ROW_COLUMNS = np.arange(ELECTRODES, 0, -1)  # of each row of pairs
-_CHUNK_ROWS = 4096
 
 
 @dataclass(frozen=True)
@@ -104,18 +94,6 @@ def _merged(its: WrenchMap) -> dict[tuple[Kind, Gate], Floats]:
     return found
 
 
-def result_units(axes: int) -> Floats:
-    """The board's units of a result (axes,) in 1 N and 1 N mm."""
-    units: Floats = np.array([FORCE_LSB_PER_N] * 3 + [MNMM_PER_NMM] * 4, dtype=np.float64)
-    return units[:axes]
-
-
-def factor_product(kind: Kind) -> float:
-    """What 1 in a column of features is in the board's block, per unit of a coefficient."""
-    spec = _map.KINDS[kind]
-    return float((FACTOR[spec.of] / 2.0**16) ** (2 if spec.shape == "pairs" else 1))
-
-
 def _quantised(kind: Kind, gate: Gate, values: Floats, names: tuple[str, ...]) -> BoardBlock:
     exponents, columns = [], []
     for axis, name in enumerate(names):
@@ -145,42 +123,6 @@ def _row_sums(kind: Kind, magnitudes: Floats) -> Floats:
     return sums
 
 
-# ---- the integers' meaning, in float64 ---------------------------------------------------------
-
-
-def exact(
-    its: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
-) -> Floats:
-    """What the integers mean, without any of the board's rounding: (n, axes) in N and N mm; arguments as results()."""
-    parts = [
-        np.sum([value for _, value in _evaluated(its, signals)], axis=0)
-        for signals in _signals(its, counts, tare_q4, pdc_q4)
-    ]
-    limit = _map.RESULT_MAX
-    result: Floats = np.clip(np.concatenate(parts), -limit, limit) / result_units(its.axes)
-    return result
-
-
-def _signals(
-    its: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
-) -> Iterator[Signals]:
-    missing = (counts == wire.INVALID_COUNT) | (tare_q4 == wire.INVALID_COUNT)
-    tare = np.where(missing, 0.0, tare_q4 / Q4)
-    e = np.where(missing, 0.0, counts - tare)
-    pressure = np.where(pdc_q4 == wire.INVALID_I32, np.nan, pdc_q4 / Q4) if its.with_pdc else np.zeros(len(counts))
-    for start in range(0, len(counts), _CHUNK_ROWS):
-        rows = slice(start, start + _CHUNK_ROWS)
-        yield Signals(e[rows], tare[rows], pressure[rows])
-
-
-def _evaluated(its: BoardMap, signals: Signals) -> Iterator[tuple[BoardBlock, Floats]]:
-    """Each block, and what it adds (n, axes) in the result's units."""
-    kinds, gates = features.kinds(signals), features.gates(signals.e)
-    for block in its.blocks:
-        scale = 2.0 ** (np.array(block.exponent) - _map.RESULT_Q) * factor_product(block.kind)
-        yield block, kinds[block.kind] @ block.coefficients * scale * gates[block.gate]
-
-
 # ---- what the board's rounding can cost --------------------------------------------------------
 
 GATE_OFF = {Gate.ONE: 0.0, Gate.X: 0.6, Gate.Y: 0.6, Gate.XX: 2.6, Gate.XY: 2.6, Gate.YY: 2.6}  # in 2^-19
@@ -196,23 +138,23 @@ def bound(
 ) -> Floats:
     """How far the board's result may be off (n, axes) in N and N mm: from ``model``, or without one from exact()."""
     wanted = _merged(model) if model is not None else {}
-    off = np.concatenate([_bound(its, wanted, s) for s in _signals(its, counts, tare_q4, pdc_q4)])
+    off = np.concatenate([_bound(its, wanted, s) for s in tared(its, counts, tare_q4, pdc_q4)])
     result: Floats = off / result_units(its.axes)
     return result
 
 
 def _bound(its: BoardMap, wanted: dict[tuple[Kind, Gate], Floats], signals: Signals) -> Floats:
-    kinds, gates = features.kinds(signals), features.gates(signals.e)
+    kind_columns, gate_values = kinds(signals), gates(signals.e)
     total = np.full((len(signals.e), its.axes), 0.5)
     for block in its.blocks:
         scale = 2.0 ** np.array(block.exponent)
         rounded = np.zeros(block.coefficients.shape)
         if wanted:
             rounded = np.abs(wanted[block.kind, block.gate] / scale - block.coefficients)
-        columns = kinds[block.kind] * factor_product(block.kind)
-        off = np.abs(columns) @ rounded + _block_off(block, kinds)
+        columns = kind_columns[block.kind] * factor_product(block.kind)
+        off = np.abs(columns) @ rounded + _block_off(block, kind_columns)
         size = np.abs(columns @ block.coefficients) + off
-        gate = np.abs(gates[block.gate])
+        gate = np.abs(gate_values[block.gate])
         gated = gate * off + GATE_OFF[block.gate] / 2.0**_map.GATE_Q * size + (block.gate != Gate.ONE) * 0.5
         total += gated * scale / 2.0**_map.RESULT_Q
     return total
@@ -228,9 +170,9 @@ def _sum_off(columns: npt.ArrayLike, *, fine: bool) -> Floats:
     return off
 
 
-def _block_off(block: BoardBlock, kinds: dict[Kind, Floats]) -> Floats:
+def _block_off(block: BoardBlock, kind_columns: dict[Kind, Floats]) -> Floats:
     """By how much a block's integer may be off (n, axes) with the coefficients it has."""
-    spec, n = _map.KINDS[block.kind], len(kinds[Kind.SIGNAL])
+    spec, n = _map.KINDS[block.kind], len(kind_columns[Kind.SIGNAL])
     fine = spec.of == "conductance"
     size = np.abs(block.coefficients).astype(np.float64)
     if spec.shape == "one":
@@ -238,7 +180,7 @@ def _block_off(block: BoardBlock, kinds: dict[Kind, Floats]) -> Floats:
     if spec.shape == "electrodes":
         off = _sum_off(ELECTRODES, fine=fine) + fine * RATIO_OFF * size.sum(axis=0)
         return np.broadcast_to(off, (n, len(off)))
-    factors = np.abs(kinds[Kind.CONDUCTANCE if fine else Kind.SIGNAL]) * FACTOR[spec.of] / 2.0**16
+    factors = np.abs(kind_columns[Kind.CONDUCTANCE if fine else Kind.SIGNAL]) * FACTOR[spec.of] / 2.0**16
     row_off = _sum_off(_ROW_COLUMNS, fine=fine)[:, None] + fine * RATIO_OFF * _row_sums(block.kind, size)
     sums: Floats = factors @ row_off + _sum_off(ELECTRODES, fine=fine)
     if fine:

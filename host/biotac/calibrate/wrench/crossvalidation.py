@@ -16,6 +16,7 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from ...core.geometry import Floats
+from ...core.map_columns import Signals
 from . import features
 from .blocks import BLOCKS, Blocks
 from .lag import best_lag, check, lag_moments
@@ -249,7 +250,7 @@ def predict(run: Run, fit: Fit, choices: tuple[Choice, ...], rows: Rows | None =
     coefficients = np.column_stack([choice.coefficients for choice in choices])
     index = np.arange(len(run.counts)) if rows is None else rows
 
-    def mapped(signals: features.Signals) -> Floats:
+    def mapped(signals: Signals) -> Floats:
         wrench: Floats = with_one(features.columns(signals)) @ coefficients
         return wrench
 

@@ -15,19 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ...core import geometry as surface
 from ...core.geometry import Floats
+from ...core.map_columns import ELECTRODES, SIGNAL_COUNTS, Signals, gates, kinds
 from ...wire import map_gen as _map
 from ...wire import sensor_gen as _sensor
 from ...wire.map_gen import Gate, Kind
 
-ELECTRODES = len(_sensor.ELECTRODE_NAMES)
-SIGNAL_COUNTS = 500.0  # a firm press; only sets the columns' size
-PRESSURE_COUNTS = 100.0
-REACH_MM = (_map.REACH_X_UM / 1000, _map.REACH_Y_UM / 1000)
 STRAIGHT = (Gate.ONE, Gate.X, Gate.Y)
-
-_UPPER = np.triu_indices(ELECTRODES)
 
 
 @dataclass(frozen=True)
@@ -70,19 +64,6 @@ def width(*, with_pdc: bool) -> int:
 
 
 @dataclass(frozen=True)
-class Signals:
-    """One row a frame: ``e`` (n, 19) counts above ``tare`` (19,), ``pdc`` (n,) counts above rest or None."""
-
-    e: Floats
-    tare: Floats
-    pdc: Floats | None = None
-
-    def drifted(self, counts: Floats) -> Signals:
-        """As if every row had drifted by ``counts`` (19,)."""
-        return Signals(self.e + counts, self.tare, self.pdc)
-
-
-@dataclass(frozen=True)
 class Family:
     """The blocks that a model uses, in the order of BLOCKS; PRESSURE only where it was recorded.
 
@@ -122,58 +103,9 @@ def columns(signals: Signals) -> Floats:
     return np.concatenate(parts, axis=1)
 
 
-def kinds(signals: Signals) -> dict[Kind, Floats]:
-    """Each kind's columns (n, width); PRESSURE only where there is one."""
-    e = signals.e / SIGNAL_COUNTS
-    conductance = conductance_change(signals.e, signals.tare)
-    result = {
-        Kind.OFFSET: np.ones((len(e), 1)),
-        Kind.SIGNAL: e,
-        Kind.SIGNAL_PAIRS: _products(e),
-        Kind.CONDUCTANCE: conductance,
-        Kind.CONDUCTANCE_PAIRS: _products(conductance),
-        Kind.COMPRESSION: np.minimum(e, 0.0),
-        Kind.BULGE: np.maximum(e, 0.0),
-    }
-    if signals.pdc is not None:
-        result[Kind.PRESSURE] = signals.pdc[:, None] / PRESSURE_COUNTS
-    return result
-
-
-def gates(e: Floats) -> dict[Gate, Floats]:
-    """Each gate (n, 1)."""
-    centre = centroid_mm(e)
-    x, y = centre[:, :1] / REACH_MM[0], centre[:, 1:2] / REACH_MM[1]
-    return {Gate.ONE: np.ones_like(x), Gate.X: x, Gate.Y: y, Gate.XX: x * x, Gate.XY: x * y, Gate.YY: y * y}
-
-
-def conductance_change(e: Floats, tare: Floats) -> Floats:
-    """Electrodes' conductance (n, 19) over that at rest, less one."""
-    count = np.clip(e + tare, _map.COUNT_MIN, _map.COUNT_MAX)
-    at_rest = np.clip(tare, _map.COUNT_MIN, _map.COUNT_MAX)
-    # a wet or shorted electrode must not square to anything
-    return np.clip(_conductance(count) / _conductance(at_rest) - 1.0, -1.0, _map.RATIO_MAX)
-
-
-def centroid_mm(e: Floats) -> Floats:
-    """Centroid (n, 3) of the compressed electrodes in mm; the middle of all when none is compressed."""
-    weights = np.maximum(-e, 0.0) + _map.FLOOR_COUNTS
-    centre: Floats = weights @ surface.ELECTRODE_MM / weights.sum(axis=1, keepdims=True)
-    return centre
-
-
 def _place(block: Block) -> npt.NDArray[np.intp]:
     start = sum(other.width for other in BLOCKS[: BLOCKS.index(block)])
     return np.arange(start, start + block.width)
-
-
-def _conductance(count: Floats) -> Floats:
-    return count / (_sensor.FULL_SCALE_COUNT - count)
-
-
-def _products(of: Floats) -> Floats:
-    products: Floats = of[:, _UPPER[0]] * of[:, _UPPER[1]]
-    return products
 
 
 def _counts_scale(tare: Floats) -> Floats:

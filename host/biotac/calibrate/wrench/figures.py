@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ...core.geometry import Floats
+from ...core.map_columns import Signals, centroid_mm
 from .crossvalidation import SHIFTS_COUNTS, Validation
-from .features import Signals, centroid_mm, columns
+from .features import columns
 from .models import LIN
 from .moments import aligned, with_one
 

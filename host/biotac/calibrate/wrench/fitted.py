@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ...core.geometry import Floats
+from ...core.map_columns import ELECTRODES, Signals
 from ...errors import InputError
 from . import features
 from .crossvalidation import Validation
-from .features import ELECTRODES, Signals
 from .figures import model_name
 from .moments import with_one
 

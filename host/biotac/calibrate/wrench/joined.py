@@ -73,7 +73,7 @@ class Board:
 
 
 def board_of(frames: npt.NDArray[np.void], t_us: npt.NDArray[np.int64], finger: int, serial: str) -> Board:
-    """From FRAME messages (wire.DTYPES) of one finger and their unwrapped times."""
+    """From FRAME messages (DTYPES) of one finger and their unwrapped times."""
     missing = wire.INVALID_COUNT
     counts = np.where(frames["counts"] == missing, np.nan, frames["counts"].astype(np.float64))
     no_pdc = (frames["pdc"] == missing) | (frames["pdc_tare_q4"] == missing)

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.geometry import Floats
+from ...core.map_columns import SIGNAL_COUNTS, Signals
 from . import features
 from .blocks import Blocks
-from .features import Signals
 from .run import Run
 
 DRIFT_SIGMA_COUNTS = 100.0  # what a finger drifts by in about two minutes of warm-up (biotac.md finding 6)
@@ -54,7 +54,7 @@ def smoothed(run: Run, window_rows: int, lag_rows: int, rows: Rows, of: Columns)
 
 def linear_columns(signals: Signals) -> Floats:
     """The columns of LINEAR alone: enough for lag and window, and thirty times cheaper."""
-    return signals.e / features.SIGNAL_COUNTS
+    return signals.e / SIGNAL_COUNTS
 
 
 def with_one(columns: Floats) -> Floats:

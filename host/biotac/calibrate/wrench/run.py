@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from ...core.geometry import Floats
 from ...errors import RecordingError
-from ...sim.replay import counts_field, read_npz, to_lin_frame
+from ...recording.npz_file import counts_field, read_npz, to_lin_frame
 from ...wire import sensor_gen as _sensor
 from . import contact
 from .blocks import BLOCKS, GUARD_ROWS, contacts

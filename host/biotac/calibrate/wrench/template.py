@@ -16,8 +16,8 @@ import numpy as np
 
 from ...core import geometry as surface
 from ...core.geometry import Floats
+from ...core.map_columns import PRESSURE_COUNTS, Signals, conductance_change
 from ...wire import map_gen as _map
-from .features import PRESSURE_COUNTS, Signals, conductance_change
 from .moments import Rows, drifted, smoothed
 from .run import Run
 

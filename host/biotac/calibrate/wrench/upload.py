@@ -17,6 +17,7 @@ from ...errors import InputError, PortError
 from ...hand.commands import MAP_SINCE_MINOR
 from ...hand.hand import Hand
 from ...wire import messages_gen as wire
+from ...wire.dtypes_gen import DTYPES
 from ...wire.frames import StructArray
 from ...wire.map_gen import HEADER_BYTES
 from . import board
@@ -86,7 +87,7 @@ def upload(
 
 def _mapped_frames(hand: Hand, finger: int) -> StructArray:
     """Whole FRAME messages of the finger whose force is its map's."""
-    found: StructArray = np.empty(0, wire.DTYPES[wire.Frame.ID])
+    found: StructArray = np.empty(0, DTYPES[wire.Frame.ID])
     # what arrived before the map did may still wait to be read
     for _ in range(TRIES):
         frames = hand.read_batch(STREAM_S).wire

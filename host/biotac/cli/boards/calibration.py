@@ -20,8 +20,6 @@ from ...wire import messages_gen as wire
 from ...wire.sensor_gen import MAX_SENSORS
 from . import subverbs
 
-NAME = "calibration"
-HELP = "Show, get, put or store a finger's calibration."
 EXAMPLE = "biotac calibration put /dev/ttyACM0 thumb.json --finger 0 --save"
 
 run = subverbs.run
@@ -30,7 +28,7 @@ run = subverbs.run
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to do, each with its own arguments."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
-    add = partial(subverbs.add, what, NAME)
+    add = partial(subverbs.add, what, "calibration")
 
     show = add("show", _show, "What a board, a file or an EEPROM holds.", "show thumb.json")
     show.add_argument("where", metavar="PORT|FILE", nargs="?", help="left out with --i2c")

@@ -12,17 +12,15 @@ from ...doctor.listening import examine
 from ...doctor.timing import slots_per_s
 from .. import values
 
-NAME = "doctor"
-HELP = "Find what is wrong with a board, its sensors or this computer, and the cure."
 EXAMPLE = "biotac doctor --fingers 5"
-DESCRIPTION = f"""{HELP}
+CODES = f"""
 Exit code 0: healthy; 1: there are findings. Their codes are fixed:
 {textwrap.fill(" ".join(CATALOGUE), 100, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)}"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Port, time, and how many sensors there should be."""
-    parser.description = DESCRIPTION
+    parser.description = f"{parser.description}{CODES}"
     values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, default=3.0, help="how long to listen (default 3)")
     parser.add_argument("--fingers", type=int, help="how many sensors there should be (default: those that answer)")

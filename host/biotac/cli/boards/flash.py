@@ -14,8 +14,6 @@ from ...flash.image import note_text
 from ...wire.identity import serial_text, version_text
 from ..progress import Progress
 
-NAME = "flash"
-HELP = "Write a firmware image to a board, and give it its settings back."
 EXAMPLE = "biotac flash /dev/ttyACM0 build/pico/biotac-pico.uf2"
 IMAGE = Path("build/pico/biotac-pico.uf2")
 EMULATED = "emu:pico?source=press.toml"

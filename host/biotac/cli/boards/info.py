@@ -16,8 +16,6 @@ from ...wire import messages_gen as wire
 from ...wire.identity import ascii_text, board_text, serial_text, version_text
 from .. import values
 
-NAME = "info"
-HELP = "Say who is on a port: board, firmware, sensors, settings, counters."
 EXAMPLE = "biotac info /dev/ttyACM0"
 
 

@@ -10,12 +10,10 @@ from ...errors import BiotacError
 from ...hand.hand import Hand
 from ...link import open_link
 from ...link.discovery import SerialPort, serial_ports
-from ...sim.source import bundled_scenarios
+from ...sim.loading import bundled_scenarios
 from ...wire import messages_gen as wire
 from ...wire.identity import board_text, serial_text, version_text
 
-NAME = "list"
-HELP = "List boards and other serial ports, and the scenarios that can be simulated."
 EXAMPLE = "biotac list"
 
 

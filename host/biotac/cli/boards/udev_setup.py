@@ -7,8 +7,6 @@ import json
 
 from ...doctor import udev
 
-NAME = "udev-setup"
-HELP = "Install the Linux rule that lets you open boards (needs root)."
 EXAMPLE = "sudo biotac udev-setup"
 
 

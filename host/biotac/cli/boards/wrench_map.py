@@ -14,8 +14,6 @@ from ...keep import map_file as file
 from ...wire.sensor_gen import MAX_SENSORS
 from . import subverbs
 
-NAME = "map"
-HELP = "Show, get, put or clear the wrench map that a board computes a finger's force by."
 EXAMPLE = "biotac map put /dev/ttyACM0 thumb.json --finger 0 --save"
 
 run = subverbs.run
@@ -24,7 +22,7 @@ run = subverbs.run
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to do, each with its own arguments."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
-    add = partial(subverbs.add, what, NAME)
+    add = partial(subverbs.add, what, "map")
 
     show = add("show", _show, "What a board, a recording or a file holds.", "show /dev/ttyACM0")
     show.add_argument("where", metavar="PORT|FILE")

@@ -8,8 +8,6 @@ from . import contact as calibrate_contact
 from . import pressure as calibrate_pressure
 from . import wrench as calibrate_wrench
 
-NAME = "calibrate"
-HELP = "Fit a finger's wrench, or its pressure, to a reference, measure it held out, give it to the board."
 EXAMPLE = calibrate_wrench.EXAMPLE
 
 WHATS = (calibrate_wrench, calibrate_pressure, calibrate_contact)

@@ -17,6 +17,7 @@ from ...calibrate.wrench.provenance import check_serial
 from ...errors import BiotacError, InputError
 from ...sim.nano17 import Nano17
 from ...sim.nano17_reader import Nano17Reader
+from ...sim.source import Source
 from ...wire.identity import ascii_text
 from .. import outputs
 from ..progress import Progress
@@ -72,7 +73,7 @@ def _reader(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> Iterato
         raise InputError(f"{len(args.reference)} --reference with --live: expected one, {PREFIX}HOST or {EMULATED}")
     (text,) = args.reference
     if text == EMULATED:
-        if hand.link.source is None:
+        if not isinstance(hand.link.source, Source):
             raise InputError(f"{EMULATED} is emulated and feels a simulated finger only: expected --live sim:SCENARIO")
         nano17 = Nano17() if args.mounting is None else Nano17(read_mounting(args.mounting))
         yield Nano17Reader(hand.link.source, finger, nano17), nano17.mounting

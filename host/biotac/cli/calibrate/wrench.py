@@ -24,6 +24,7 @@ from ...calibrate.wrench.upload import upload
 from ...errors import InputError
 from ...hand.views import checked_names, finger_index
 from ...partial_file import whole
+from ...picture import check_drawable
 from ...picture import picture as drawn
 from ...wire.identity import ascii_text
 from .. import outputs
@@ -184,6 +185,7 @@ def _places(folder: Path, path: Path) -> tuple[Path, Path, Path]:
 
 
 def _check_out(folder: Path, files: list[Path], *, overwrite: bool) -> None:
+    check_drawable()
     outputs.check(folder, [place for path in files for place in _places(folder, path)], overwrite=overwrite)
     outputs.make_folder(folder)
 

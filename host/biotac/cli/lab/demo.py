@@ -10,8 +10,6 @@ from ...lab.demo import run_demo
 from .. import values
 from ..progress import Progress
 
-NAME = "demo"
-HELP = "Run the whole chain once: simulated board, stream, recording, cross-check, picture."
 EXAMPLE = "biotac demo press.toml --out my-demo"
 
 

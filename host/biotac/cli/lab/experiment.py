@@ -12,12 +12,11 @@ from ...errors import InputError
 from ...lab.experiments import catalogue
 from ...lab.experiments.outcome import Experiment, Facts, Options, markdown, verdicts
 from ...partial_file import whole
+from ...picture import check_drawable
 from ...picture import picture as drawn
 from .. import outputs
 from ..progress import Progress
 
-NAME = "experiment"
-HELP = "Do a paper's experiment again: figure, table against the paper, JSON."
 EXAMPLE = "biotac experiment poke --out poked --check"
 SEED_MAX = 2**31 - 1
 
@@ -85,6 +84,7 @@ def _check_arguments(args: argparse.Namespace, experiment: Experiment) -> None:
     if args.map and not experiment.MAPS:
         raise InputError(f"{args.name} has no use for a wrench map: leave --map out")
     if args.out is not None:
+        check_drawable()
         outputs.check(args.out, _places(args.out, args.name), overwrite=args.force)
 
 

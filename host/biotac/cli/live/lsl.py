@@ -10,8 +10,6 @@ import biotac
 
 from .. import values
 
-NAME = "lsl"
-HELP = "Publish fingers on the Lab Streaming Layer."
 EXAMPLE = "biotac lsl 'sim:press.toml?fingers=2'"
 
 

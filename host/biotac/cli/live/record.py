@@ -11,8 +11,6 @@ import biotac
 from .. import values
 from ..progress import Progress
 
-NAME = "record"
-HELP = "Record everything a board sends to an MCAP file."
 EXAMPLE = "biotac record /dev/ttyACM0 grasp.mcap --seconds 30"
 
 

@@ -8,15 +8,13 @@ from pathlib import Path
 
 from ...errors import InputError
 from ...hand.opening import shake_hands
-from ...link.ports import start_board
 from ...link.serial_port import SerialLink
+from ...sim.loading import load_source
+from ...sim.ports import start_board
 from ...sim.process import SimBoard
-from ...sim.source import load_source
 from .. import values
 from .board_on_pty import tell, tell_over, until_ctrl_c
 
-NAME = "sim"
-HELP = "Run a simulated or emulated board on a pty that any serial program can open."
 EXAMPLE = "biotac sim press.toml --fingers 5 --board pico"
 SCENARIO_S = 600.0
 

@@ -14,8 +14,6 @@ from ...wire.frames import Frame
 from ...wire.messages_gen import FrameFlags
 from .. import values
 
-NAME = "stream"
-HELP = "Print frames as they arrive: one line each, or one JSON object each."
 EXAMPLE = "biotac stream sim:press.toml --rate 5"
 
 

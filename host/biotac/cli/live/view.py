@@ -14,8 +14,6 @@ from ...errors import InputError
 from ...view import DEFAULT_PORT
 from ..ports import only_port
 
-NAME = "view"
-HELP = "Show a board or a recording live in the browser."
 EXAMPLE = "biotac view 'sim:press.toml?fingers=5'"
 
 

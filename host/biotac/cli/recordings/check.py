@@ -10,8 +10,6 @@ from pathlib import Path
 from ...lab.crosscheck import CrossCheck
 from .loading import load
 
-NAME = "check"
-HELP = "Check every on-board result of a recording against the float64 reference."
 EXAMPLE = "biotac check grasp.mcap"
 
 

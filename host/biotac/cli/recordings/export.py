@@ -10,8 +10,6 @@ from ...export import FORMATS, export
 from ..progress import Progress
 from .loading import load
 
-NAME = "export"
-HELP = "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag."
 EXAMPLE = "biotac export grasp.mcap grasp.parquet"
 
 

@@ -10,8 +10,6 @@ from ...partial_file import whole
 from ...recording.btd_import import import_btd
 from ..progress import Progress
 
-NAME = "import"
-HELP = "Turn a SynTouch .btd file into a recording."
 EXAMPLE = "biotac import trial.btd trial.mcap"
 
 

@@ -18,8 +18,6 @@ from ...wire import messages_gen as wire
 from ..progress import Progress
 from .loading import load
 
-NAME = "recompute"
-HELP = "Run a recording's counts through the maths with other settings."
 EXAMPLE = "biotac recompute grasp.mcap again.mcap --poc-weights compress_n2"
 
 

@@ -13,8 +13,6 @@ from ..live import stream
 from ..live.board_on_pty import tell, tell_over, until_ctrl_c
 from .loading import load
 
-NAME = "replay"
-HELP = "Play a recording as the board that made it, here or on a pty."
 EXAMPLE = "biotac replay grasp.mcap --from 12.5 --pace 2"
 
 

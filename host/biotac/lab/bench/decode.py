@@ -23,6 +23,7 @@ from ...errors import InputError
 from ...wire import messages_gen as wire
 from ...wire.batches import StreamDecoder
 from ...wire.decoder import Decoder
+from ...wire.dtypes_gen import DTYPES
 from ...wire.frames import StructArray
 from ...wire.framing import encode
 from . import mavlink
@@ -86,11 +87,11 @@ class _Contestant:
 
 
 def recording(frames: int) -> dict[int, StructArray]:
-    """FRAME and PAC messages of five simulated fingers, as rows of wire.DTYPES by id."""
+    """FRAME and PAC messages of five simulated fingers, as rows of DTYPES by id."""
     with biotac.open(f"{SOURCE}?fingers={FINGERS}&seconds={frames / FRAMES_PER_S}") as hand:
         hand.start()
         batch = hand.read_batch(1e6)
-    pac = np.empty(len(batch.pac), wire.DTYPES[PAC])
+    pac = np.empty(len(batch.pac), DTYPES[PAC])
     pac["seq"], pac["t_us"] = batch.pac["seq"] % 2**16, batch.pac["t_us"] % 2**32
     pac["finger"], pac["pac"] = batch.pac["finger"], batch.pac["pac"]
     return {FRAME: batch.wire, PAC: pac}
@@ -231,7 +232,7 @@ def _struct(cobs_decode: Callable[[bytes], bytes]) -> Callable[[], Feed]:
 
 def _numpy(cobs_decode: Callable[[bytes], bytes]) -> Callable[[], Feed]:
     # With id and CRC in the row no message is cut up; a view leaves them out afterwards.
-    dtypes = {i: np.dtype([("id", "u1"), ("payload", wire.DTYPES[i]), ("crc", "<u4")]) for i in NAMES}
+    dtypes = {i: np.dtype([("id", "u1"), ("payload", DTYPES[i]), ("crc", "<u4")]) for i in NAMES}
     sizes = {i: dtype.itemsize for i, dtype in dtypes.items()}
 
     def start() -> Feed:

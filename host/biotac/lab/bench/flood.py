@@ -23,6 +23,7 @@ import numpy as np
 
 from ...wire import messages_gen as wire
 from ...wire.decoder import Decoder
+from ...wire.dtypes_gen import DTYPES
 from ...wire.framing import encode
 
 FINGERS = 5
@@ -38,7 +39,7 @@ def burst_frames(rate: int) -> int:
 
 def frames(count: int) -> list[bytes]:
     """``count`` encoded FRAMEs: finger k % 5, seq k // 5."""
-    values: dict[str, Any] = dict.fromkeys(wire.DTYPES[wire.Frame.ID].names or (), 0)
+    values: dict[str, Any] = dict.fromkeys(DTYPES[wire.Frame.ID].names or (), 0)
     noise = np.random.default_rng(1).integers(1900, 3200, (256, 19))
     three: dict[str, Any] = {"poc_um": (-5497, 1667, -4799), "force_100un": (120, -340, 9000)}
     three |= {"torque_mnmm": (8, 134, 29), "force_sigma_100un": (20, 20, 20)}

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
+from ...markdown import table
 from . import limit
 from .kernels import QUANTITIES, WEIGHT_NAMES, Outcome
 
@@ -120,7 +121,7 @@ def exceptions(outcome: Outcome) -> list[str]:
     return out
 
 
-def table(all_facts: Facts) -> str:
+def page(all_facts: Facts) -> str:
     """Markdown: a table per kind of weights, the budget under it, and the exceptions."""
     effort = all_facts["effort"]
     lines = [
@@ -147,11 +148,11 @@ def _scene_table(all_facts: Facts) -> list[str]:
     cores, scenes = all_facts["cores"], all_facts["scenes"]
     weights = list(WEIGHT_NAMES.values())
     head = ["scene", *(f"{core['title']}, {w}" for core in cores.values() for w in weights)]
-    rows = [head, ["---"] * len(head)]
+    rows = []
     for scene in next(iter(scenes.values())):
         cells = (row for key in cores for row in scenes[key][scene])
         rows.append([scene, *(f"{row['cycles']}, {row['cycles_max']}" for row in cells)])
-    return ["| " + " | ".join(row) + " |" for row in rows]
+    return table(head, rows)[:-1]
 
 
 def _one_table(all_facts: Facts, weights: str) -> list[str]:
@@ -159,7 +160,7 @@ def _one_table(all_facts: Facts, weights: str) -> list[str]:
     step = all_facts["one_adc_step_at_1n"][weights]
     head = ["variant", *(f"{core['title']}: cycles, longest (instr.)" for core in cores.values()), "host"]
     head += [f"{quantity} RMS / max / adv. [{unit}]" for quantity, unit in QUANTITIES.items()]
-    rows = [head, ["---"] * len(head)]
+    rows = []
     for name, by_weights in all_facts["variants"].items():
         one = by_weights[weights]
         cells = [name]
@@ -177,4 +178,4 @@ def _one_table(all_facts: Facts, weights: str) -> list[str]:
     rows.append(["one ADC step at 1 N, RMS", *blank, *(f"{step[q]:.2g}" for q in QUANTITIES)])
     share = all_facts["budget_share"]
     rows.append([f"1/{round(1 / share)} of it", *blank, *(f"{step[q] * share:.2g}" for q in QUANTITIES)])
-    return [f"| {' | '.join(row)} |" for row in rows]
+    return table(head, rows)[:-1]

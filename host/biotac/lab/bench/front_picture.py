@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ...picture import picture
 from .front import EVERYTHING, Facts
 
 WEIGHTS = "compress n=1"  # what a board starts with
@@ -18,18 +19,13 @@ BELOW = ("float folded", "divider", "gold int64", "double")
 
 def draw(all_facts: Facts, path: Path) -> None:
     """Write a PNG. ``all_facts`` must have counts."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(1, 2, figsize=(13, 6), sharey=True, layout="constrained")
-    figure.suptitle(f"Cost of one frame against its largest PoC error (weights: {WEIGHTS})")
-    for panel, (title, keys) in zip(axes, PANELS, strict=True):
-        _panel(panel, all_facts, title, keys)
-    axes[0].set_ylabel("largest PoC error, random and adversarial frames [um]")
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    with picture(path) as figure:
+        figure.set_size_inches(13, 6)
+        figure.suptitle(f"Cost of one frame against its largest PoC error (weights: {WEIGHTS})")
+        axes = figure.subplots(1, 2, sharey=True)
+        for panel, (title, keys) in zip(axes, PANELS, strict=True):
+            _panel(panel, all_facts, title, keys)
+        axes[0].set_ylabel("largest PoC error, random and adversarial frames [um]")
 
 
 def _panel(axes: Any, all_facts: Facts, title: str, keys: tuple[str, ...]) -> None:

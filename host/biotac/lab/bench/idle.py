@@ -16,6 +16,7 @@ import biotac
 from ...hand.streams import RESULTS
 from ...wire import messages_gen as wire
 from ...wire.batches import Batch
+from ...wire.dtypes_gen import DTYPES
 from ...wire.framing import OVERHEAD_BYTES
 
 FRAME_S = 0.01  # one round of slots
@@ -75,6 +76,6 @@ def _share(batch: Batch, *, touched: bool) -> Share:
     beats = 0 if touched else len(batch.idle)
     rounds = frames + (0 if touched else int(batch.idle["frames"].sum()))
     sizes = ((frames, wire.Frame.ID), (tares, wire.Tare.ID), (beats, wire.Idle.ID))
-    total = sum(n * (wire.DTYPES[message_id].itemsize + OVERHEAD_BYTES) for n, message_id in sizes)
+    total = sum(n * (DTYPES[message_id].itemsize + OVERHEAD_BYTES) for n, message_id in sizes)
     seconds = rounds * FRAME_S
     return Share(seconds, frames, beats, total / seconds if seconds else 0.0)

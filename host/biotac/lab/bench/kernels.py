@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.compiled import FORCE_GAINS, TORQUE_GAINS, default_settings, ffi, lib
+from ...core.compiled import FORCE_GAINS, TORQUE_GAINS, default_settings
 from ...wire.messages_gen import PocWeights
+from ...wire.native import ffi, lib
 from . import limit, scenes
 
 #: What is compared, in the order of BT_KERNEL_ERRORS, and its unit. N*um is the wire's mN*mm.

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import geometry as surface
-from ...core.compiled import default_settings, ffi, formula_settings, lib
+from ...core.compiled import default_settings, formula_settings
 from ...sim import physics
 from ...wire.messages_gen import PocWeights, Setting
+from ...wire.native import ffi, lib
 
 FORCE_N = 1.0
 TIP_RADIUS_MM = 2.0

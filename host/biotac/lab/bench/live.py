@@ -29,6 +29,7 @@ from ...hand.hand import Hand
 from ...link.serial_port import SerialLink
 from ...wire import messages_gen as wire
 from ...wire.batches import Batch
+from ...wire.dtypes_gen import DTYPES
 from ...wire.framing import encode
 from . import flood
 
@@ -176,7 +177,7 @@ def pyserial_thread(path: str, arrivals: list[Arrival], until: Callable[[], None
         over.set()
         thread.join()
     for payload, when in came:
-        row = np.frombuffer(payload, wire.DTYPES[wire.Frame.ID])
+        row = np.frombuffer(payload, DTYPES[wire.Frame.ID])
         arrivals.append((row["finger"], row["seq"], when))
 
 

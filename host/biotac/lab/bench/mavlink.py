@@ -13,7 +13,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ...wire import messages_gen as wire
+from ...wire.dtypes_gen import DTYPES
 
 FIRST_ID = 100  # of the dialect's messages; the link's own id is added
 TYPES = {"u1": "uint8_t", "u2": "uint16_t", "u4": "uint32_t", "i2": "int16_t", "i4": "int32_t"}
@@ -42,7 +42,7 @@ def _dialect(names: dict[int, str]) -> str:
     messages = []
     for message_id, name in names.items():
         fields = []
-        for field, (kind, *_) in (wire.DTYPES[message_id].fields or {}).items():
+        for field, (kind, *_) in (DTYPES[message_id].fields or {}).items():
             count = int(np.prod(kind.shape))
             size = f"[{count}]" if kind.shape else ""
             fields.append(f"<field type={quoteattr(TYPES[kind.base.str[1:]] + size)} name={quoteattr(field)}/>")

@@ -11,8 +11,9 @@ from mcap.reader import make_reader
 from mcap_protobuf.writer import Writer
 from numpy.typing import NDArray
 
-from ...recording.compact import KINDS, Compact, Fields
 from ...wire import messages_gen as wire
+from ...wire.dtypes_gen import DTYPES
+from .columns import KINDS, Columns, Fields
 
 _OF_KIND = {"frames": wire.Frame.ID, "pac": wire.Pac.ID, "idle": wire.Idle.ID}
 _FIELD = descriptor_pb2.FieldDescriptorProto
@@ -23,7 +24,7 @@ def _messages() -> dict[str, Any]:
     file = descriptor_pb2.FileDescriptorProto(name="biotac_bench.proto", package="biotac_bench", syntax="proto3")
     for kind, message_id in _OF_KIND.items():
         message = file.message_type.add(name=kind.capitalize())
-        dtype = wire.DTYPES[message_id]
+        dtype = DTYPES[message_id]
         for number, name in enumerate(dtype.names or (), 1):
             base, shape = dtype[name].base, dtype[name].shape
             signed = base.kind == "i"
@@ -41,7 +42,7 @@ def _messages() -> dict[str, Any]:
 MESSAGES = _messages()
 
 
-def write(path: Path, content: Compact) -> None:
+def write(path: Path, content: Columns) -> None:
     """One message a frame, PAC block and heartbeat."""
     with path.open("wb") as stream, Writer(stream) as out:
         for kind in KINDS:
@@ -53,7 +54,7 @@ def write(path: Path, content: Compact) -> None:
                     out.write_message(f"/{kind}", message, stamp_ns, stamp_ns)
 
 
-def load(path: Path) -> Compact:
+def load(path: Path) -> Columns:
     """All messages to arrays by finger, through one flat list a field."""
     columns: dict[str, dict[int, dict[str, list[Any]]]] = {kind: {} for kind in KINDS}
     plans = {kind: _plan(kind) for kind in KINDS}
@@ -69,7 +70,7 @@ def load(path: Path) -> Compact:
                 lists[name].append(getattr(message, name))
             for name in repeated:
                 lists[name].extend(getattr(message, name))
-    out = Compact({})
+    out = Columns()
     for kind in KINDS:
         for finger, lists in columns[kind].items():
             fields: Fields = {name: _array(kind, name, values) for name, values in lists.items()}
@@ -79,12 +80,12 @@ def load(path: Path) -> Compact:
 
 def _plan(kind: str) -> tuple[list[str], list[str]]:
     """Fields with one value and with many, but for the finger's number."""
-    dtype = wire.DTYPES[_OF_KIND[kind]]
+    dtype = DTYPES[_OF_KIND[kind]]
     names = [name for name in dtype.names or () if name != "finger"]
     return [n for n in names if not dtype[n].shape], [n for n in names if dtype[n].shape]
 
 
 def _array(kind: str, name: str, values: list[Any]) -> NDArray[Any]:
-    of_wire = wire.DTYPES[_OF_KIND[kind]][name]
+    of_wire = DTYPES[_OF_KIND[kind]][name]
     dtype = np.dtype(np.int64) if name in ("seq", "t_us") else of_wire.base
     return np.array(values, dtype).reshape(-1, *of_wire.shape)

@@ -13,7 +13,7 @@ from ...calibrate.wrench import contact, run
 from ...core.geometry import Floats
 from ...errors import RecordingError
 from ...recording import Recording
-from ...sim.replay import counts_field, read_npz, to_lin_frame
+from ...recording.npz_file import counts_field, read_npz, to_lin_frame
 from ...wire import messages_gen as wire
 from ...wire import sensor_gen as _sensor
 from .trial import Trial, Words, on_board

@@ -25,10 +25,10 @@ from ...calibrate.pressure.report import PAPER_ERROR
 from ...calibrate.pressure.rows import rows_of
 from ...hand.hand import Hand
 from ...hand.opening import shake_hands
-from ...link.ports import start_board
 from ...markdown import table
 from ...sim.physics import Profile
 from ...sim.play import play
+from ...sim.ports import start_board
 from ...sim.process import SimLink
 from ...sim.scenario import parse_scenario
 from ...sim.source import Source

@@ -22,6 +22,7 @@ from ...calibrate.wrench.moments import with_one
 from ...calibrate.wrench.run import load_run
 from ...core import geometry as surface
 from ...core.geometry import Floats
+from ...core.map_columns import Signals
 from ...markdown import table
 from ...sim import sampling
 from ...sim.physics import REST_CELSIUS, Finger, States
@@ -123,7 +124,7 @@ def _held_out(validation: Validation, counts: Floats, tare: Floats) -> Floats:
         rows = validation.blocks.rows(block)
         coefficients = np.column_stack([choice.coefficients for choice in fit.best])
         pdc = validation.run.pdc
-        signals = features.Signals(counts[rows] - tare[rows], tare[rows], None if pdc is None else pdc[rows])
+        signals = Signals(counts[rows] - tare[rows], tare[rows], None if pdc is None else pdc[rows])
         result[rows] = with_one(features.columns(signals)) @ coefficients
     return result
 

@@ -20,6 +20,7 @@ from ...sim import physics, sampling
 from ...sim.physics import Profile, States
 from ...sim.timeline import Pose, Track
 from ...wire import messages_gen as wire
+from ...wire import slots
 from ...wire.frames import StructArray, to_units
 
 Bools = npt.NDArray[np.bool_]
@@ -139,12 +140,12 @@ def play(
     if mirrored:
         for own in (finger.r0_ohm, finger.gap_gain, finger.drift_per_min):
             own[:] = own[MIRROR]
-    frames = round(script.track.seconds / sampling.FRAME_S)
-    boundary_s: Floats = np.arange(frames + 1, dtype=np.float64) * sampling.FRAME_S
+    frames = round(script.track.seconds / slots.FRAME_S)
+    boundary_s: Floats = np.arange(frames + 1, dtype=np.float64) * slots.FRAME_S
     words = sampling.sample(finger, script.track.states(boundary_s))
-    time_s: Floats = boundary_s[:-1] + sampling.FRAME_S / 2.0
+    time_s: Floats = boundary_s[:-1] + slots.FRAME_S / 2.0
     states = script.track.states(time_s)
-    counts, pdc = words[:, sampling.ELECTRODE_SLOT], words[:, sampling.PDC_SLOT]
+    counts, pdc = words[:, slots.ELECTRODE_SLOT], words[:, slots.PDC_SLOT]
     rows, tare, pdc_rest = on_board(counts, pdc)
     force, torque = states.wrench()
     touched = states.force_n > 0.0

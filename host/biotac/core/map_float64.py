@@ -1,0 +1,108 @@
+"""What a board's wrench map means, in float64 and without any of the board's rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..wire import map_gen as _map
+from ..wire import messages_gen as wire
+from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, StructArray, tare_to_q4
+from ..wire.map_gen import Kind
+from . import map_columns as columns
+from .board_map import BoardMap
+from .geometry import Floats
+from .map_columns import Signals
+
+Q4 = 16
+# What 1 in a column of features is as the board's factor, of which 2^16 is a coefficient's unit.
+FACTOR = {
+    "one": 2.0**_map.ONE_Q,
+    "signal": Q4 * columns.SIGNAL_COUNTS,
+    "conductance": 2.0 ** (_map.CONDUCTANCE_Q - _map.CONDUCTANCE_FINE_BITS),
+    "pressure": Q4 * columns.PRESSURE_COUNTS,
+}
+_CHUNK_ROWS = 4096
+
+
+def result_units(axes: int) -> Floats:
+    """The board's units of a result (axes,) in 1 N and 1 N mm."""
+    units: Floats = np.array([FORCE_LSB_PER_N] * 3 + [MNMM_PER_NMM] * 4, dtype=np.float64)
+    return units[:axes]
+
+
+def factor_product(kind: Kind) -> float:
+    """What 1 in a column of features is in the board's block, per unit of a coefficient."""
+    spec = _map.KINDS[kind]
+    return float((FACTOR[spec.of] / 2.0**16) ** (2 if spec.shape == "pairs" else 1))
+
+
+def by_map(results: StructArray, its: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
+    """``results`` of biotac.compute, MAPPED_RESULT_DTYPE, with what a map has in place of the gains'; the same array.
+
+    Shapes as there; ``pdc_above_rest`` in counts, (n,), one number, or None: missing. Raises ValueError for
+    a pressure of another shape.
+    """
+    rows = results.reshape(-1)
+    raw = np.asarray(counts).reshape(len(rows), -1).astype(np.uint16)
+    tare_q4 = tare_to_q4(np.broadcast_to(np.asarray(tare, dtype=np.float64), raw.shape))
+    pressure = np.asarray(np.nan if pdc_above_rest is None else pdc_above_rest, dtype=np.float64)
+    if pressure.shape not in ((), (len(rows),)):
+        raise ValueError(f"pdc_above_rest has shape {pressure.shape}, expected ({len(rows)},) or one number")
+    known = np.rint(16 * np.nan_to_num(np.broadcast_to(pressure, len(rows))))
+    pdc_q4 = np.where(np.isnan(pressure), wire.INVALID_I32, known).astype(np.int32)
+    wrench = exact(its, raw, tare_q4, pdc_q4)
+    replace_gains(its, wrench, rows["poc_mm"], rows["force_n"], rows["torque_nmm"], rows["torsion_nmm"])
+    return results
+
+
+def replace_gains(
+    its: BoardMap, wrench: Floats, poc_mm: Floats, force_n: Floats, torque_nmm: Floats, torsion_nmm: Floats
+) -> None:
+    """Put a map's ``wrench`` (n, axes), as of exact, into the gains' results: (n, 3) each, torsion (n,).
+
+    Without torque of its own the map's force makes torque x, by the lever to ``poc_mm`` (n, 3), and the rest of the
+    torque stays; without torsion there is none, NaN.
+    """
+    force_n[:] = wrench[:, :3]
+    if its.axes > 3:
+        torque_nmm[:] = wrench[:, 3:6]
+    else:
+        torque_nmm[:, 0] = poc_mm[:, 1] * wrench[:, 2] - poc_mm[:, 2] * wrench[:, 1]
+    torsion_nmm[:] = wrench[:, 6] if its.axes == _map.AXES_TORSION else np.nan
+
+
+def exact(
+    its: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
+) -> Floats:
+    """What the integers mean, without any of the board's rounding: (n, axes) in N and N mm; arguments as results()."""
+    parts = [_sum(its, signals) for signals in tared(its, counts, tare_q4, pdc_q4)]
+    limit = _map.RESULT_MAX
+    result: Floats = np.clip(np.concatenate(parts), -limit, limit) / result_units(its.axes)
+    return result
+
+
+def tared(
+    its: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
+) -> Iterator[Signals]:
+    """Signals of so many frames at a time that their columns fit memory; arguments as exact()."""
+    missing = (counts == wire.INVALID_COUNT) | (tare_q4 == wire.INVALID_COUNT)
+    tare = np.where(missing, 0.0, tare_q4 / Q4)
+    e = np.where(missing, 0.0, counts - tare)
+    pressure = np.where(pdc_q4 == wire.INVALID_I32, np.nan, pdc_q4 / Q4) if its.with_pdc else np.zeros(len(counts))
+    for start in range(0, len(counts), _CHUNK_ROWS):
+        rows = slice(start, start + _CHUNK_ROWS)
+        yield Signals(e[rows], tare[rows], pressure[rows])
+
+
+def _sum(its: BoardMap, signals: Signals) -> Floats:
+    """What all blocks add up to (n, axes), in the result's units."""
+    kinds, gates = columns.kinds(signals), columns.gates(signals.e)
+    total = np.zeros((len(signals.e), its.axes))
+    for block in its.blocks:
+        scale = 2.0 ** (np.array(block.exponent) - _map.RESULT_Q) * factor_product(block.kind)
+        total += kinds[block.kind] @ block.coefficients * scale * gates[block.gate]
+    return total

@@ -1,0 +1,31 @@
+"""What the text of a PORT says: ``SCHEME:WHAT?key=value&...``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from urllib.parse import parse_qsl
+
+from ..errors import PortError
+
+
+def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:
+    """WHAT, and the options by their keys; PortError for one that is not ``known``, with the ``form`` expected."""
+    what, _, query = port.partition(":")[2].partition("?")
+    options = dict(parse_qsl(query))
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise PortError(f"{port}: option {unknown[0]!r}; expected {form}")
+    return what, options
+
+
+def parse_pace(text: str) -> float:
+    """``real``, ``fast`` or device seconds per second."""
+    named = {"real": 1.0, "fast": 0.0}
+    try:
+        pace = named[text] if text in named else float(text)
+    except ValueError:
+        pace = math.nan
+    if not 0 <= pace < math.inf:
+        raise ValueError(f"pace is {text!r}, expected real, fast or device seconds per second")
+    return pace

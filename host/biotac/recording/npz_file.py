@@ -1,0 +1,68 @@
+"""Trials as .npz files of arrays: read and checked, and turned into Lin's frame."""
+
+from __future__ import annotations
+
+import struct
+import zipfile
+import zlib
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import RecordingError
+from ..wire import sensor_gen as _sensor
+
+
+def read_npz(path: Path, wanted: Collection[str]) -> dict[str, npt.NDArray[Any]]:
+    """Those of the ``wanted`` arrays that the file has. Raises RecordingError for what is no .npz."""
+    try:
+        # opened here because np.load leaves a file it cannot read open
+        with path.open("rb") as file:
+            archive = np.load(file, allow_pickle=False)
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                raise RecordingError(f"{path}: one bare array: expected an .npz with field E; use numpy.savez")
+            return {name: np.asarray(archive[name]) for name in archive.files if name in wanted}
+    except (
+        OSError, EOFError, ValueError, MemoryError, RuntimeError, struct.error, zipfile.BadZipFile, zlib.error,
+    ) as error:  # fmt: skip
+        seen = str(error).partition("\n")[0]
+        raise RecordingError(
+            f"{path}: cannot be read ({seen}): expected an .npz of number arrays; save it again"
+        ) from None
+
+
+def counts_field(
+    path: Path, name: str, array: npt.NDArray[Any], rows: int | None, columns: int | None
+) -> npt.NDArray[np.uint16]:
+    """``array`` as counts; ``rows`` None: any number but 0; ``columns`` None: one-dimensional.
+
+    Raises RecordingError naming file, field and row.
+    """
+    wanted = f"({rows if rows is not None else 'n'}{f', {columns}' if columns is not None else ','})"
+    shape: tuple[int, ...] = array.shape
+    good = len(shape) == (1 if columns is None else 2) and shape[0] > 0
+    good = good and (rows is None or shape[0] == rows) and (columns is None or shape[1] == columns)
+    if not good:
+        raise RecordingError(f"{path}: field {name} has shape {shape}: expected {wanted}, one row a frame")
+    expected = f"expected whole counts 0..{_sensor.FULL_SCALE_COUNT}; save raw counts"
+    if array.dtype.kind not in "iuf":
+        raise RecordingError(f"{path}: field {name} holds {array.dtype}: {expected}")
+    # written so that NaN is wrong too
+    right = (array >= 0) & (array <= _sensor.FULL_SCALE_COUNT) & (array == np.floor(array))
+    if not right.all():
+        row = int(np.argwhere(~right)[0][0])
+        raise RecordingError(f"{path}: field {name} row {row} holds {array[~right][0]}: {expected}")
+    counts: npt.NDArray[np.uint16] = array.astype(np.uint16)
+    return counts
+
+
+def to_lin_frame(vectors: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Recorded vectors (n, 3), X lateral, Y to the tip, Z out of the pad, in Lin's frame: x = Y, y = X, z = -Z.
+
+    That is a rotation, so torques turn as forces do.
+    """
+    recorded = vectors.astype(np.float64)
+    return np.column_stack([recorded[:, 1], recorded[:, 0], -recorded[:, 2]])

@@ -1,0 +1,72 @@
+"""Simulated boards by PORT: ``sim:SOURCE`` and ``emu:BOARD?source=SOURCE``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import PortError
+from ..link.port_text import options_of, parse_pace
+from .emulated import EmulatedBoard
+from .loading import load_source
+from .process import SimBoard, SimLink
+from .source import Source
+
+
+@dataclass(frozen=True)
+class SimPort:
+    """A parsed ``sim:SOURCE?...`` or ``emu:BOARD?source=SOURCE&...``."""
+
+    board: str  # "posix", or what is emulated
+    source: str
+    pace: float
+    fingers: int | None
+    seconds: float | None
+    image: str | None
+
+
+FORMS = {
+    "sim": "sim:SOURCE?pace=X&fingers=N&seconds=S",
+    "emu": "emu:pico?source=SOURCE&image=FILE&pace=X&fingers=N&seconds=S",
+}
+EXAMPLES = {
+    "sim": "sim:press.toml?pace=real&fingers=2&seconds=5",
+    "emu": "emu:pico?source=press.toml&pace=real&fingers=2&seconds=5",
+}
+_OPTIONS = {"sim": {"pace", "fingers", "seconds"}, "emu": {"pace", "fingers", "seconds", "source", "image"}}
+
+
+def parse_sim(port: str, pace: float) -> SimPort:
+    """Split a sim: or emu: port; ``pace`` is the default, in device seconds per second (0: unpaced)."""
+    scheme = port.partition(":")[0]
+    head, options = options_of(port, _OPTIONS[scheme], FORMS[scheme])
+    board, source = ("posix", head) if scheme == "sim" else (head, options.get("source", ""))
+    if not source:
+        raise PortError(f"{port}: no source; expected {FORMS[scheme]}")
+    try:
+        return SimPort(
+            board,
+            source,
+            parse_pace(options["pace"]) if "pace" in options else pace,
+            int(options["fingers"]) if "fingers" in options else None,
+            float(options["seconds"]) if "seconds" in options else None,
+            options.get("image"),
+        )
+    except ValueError as error:
+        raise PortError(f"{port}: {error}; an example is {EXAMPLES[scheme]}") from error
+
+
+def open_sim(port: str, pace: float) -> SimLink:
+    """Open a sim: or emu: port. Raises PortError, or InputError for a source that cannot be played."""
+    sim = parse_sim(port, pace)
+    source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
+    return SimLink(port, start_board(sim.board, source, pace=sim.pace, image=sim.image))
+
+
+def start_board(board: str, source: Source, *, pace: float, image: str | None = None) -> SimBoard:
+    """Start a board that is a program, held until its release: ``posix`` or an emulated one.
+
+    Raises PortError naming what is missing and how to get it.
+    """
+    if board == "posix":
+        return SimBoard(source, pace=pace, hold=True)
+    return EmulatedBoard(board, source, pace=pace, hold=True, image=image)

@@ -1,0 +1,17 @@
+"""The compiled firmware core, of the same schema as this package."""
+
+from __future__ import annotations
+
+from .messages_gen import SCHEMA_HASH
+
+try:
+    from .._core import ffi as ffi
+    from .._core import lib as lib
+except ImportError as error:  # an editable tree without a build, or a wheel for another platform
+    raise ImportError(f"the compiled core is missing ({error}); install the package: pip install .") from error
+
+if lib.bt_binding_schema_hash() != SCHEMA_HASH:
+    raise ImportError(
+        f"the compiled core was built for schema {lib.bt_binding_schema_hash():08x}, this Python code for "
+        f"{SCHEMA_HASH:08x}; install the package again: pip install ."
+    )

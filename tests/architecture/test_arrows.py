@@ -1,0 +1,262 @@
+"""Imports and includes run one way: as the table of rooms in host/docs/architecture.md allows, and in no circle.
+
+Python's imports are read wherever they stand, inside functions too, and so are modules that are named in strings.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "host/docs/architecture.md"
+PYTHON = "host/biotac"
+C = ("firmware", "host/binding")
+BY_NAME = re.compile(r"biotac(\.\w+)+(:\w+)?")
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """``source`` in ``line`` imports ``target``; files relative to the root."""
+
+    source: str
+    line: int
+    target: str
+
+
+@dataclass
+class Table:
+    """Which rooms a room may import, and which files may name which others although they lie above."""
+
+    rooms: dict[str, set[str]] = field(default_factory=dict)
+    hooks: set[tuple[str, str]] = field(default_factory=set)
+
+    def room(self, file: str) -> str | None:
+        """The nearest room around a file; a room is a folder or a single file."""
+        around = [file, *map(str, Path(file).parents)]
+        return next((place for place in around if place in self.rooms), None)
+
+
+def read_table(page: str) -> Table:
+    """Rows of a room, a sentence and the rooms it may import; rows of a file, a file and why under Hooks."""
+    table = Table()
+    rooms, _, hooks = page.partition("\n## Hooks")
+    for row in re.findall(r"^\| `(.+?)` \|[^|]*\|([^|]*)\|$", rooms, re.M):
+        table.rooms[row[0]] = set(re.findall(r"`(.+?)`", row[1]))
+    for source, target in re.findall(r"^\| `(.+?)` \| `(.+?)` \|", hooks, re.M):
+        table.hooks.add((source, target))
+    return table
+
+
+def tracked(root: Path) -> list[str]:
+    """Files of the project: git's, or all where there is no git."""
+    if not (root / ".git").exists():
+        return [str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()]
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True).stdout.splitlines()
+    return [name for name in listed if (root / name).is_file()]
+
+
+def python_arrows(root: Path, files: Iterable[str]) -> Iterator[Arrow]:
+    """Imports of the package's own modules by its own modules."""
+    modules = {}
+    for file in files:
+        if file.startswith(f"{PYTHON}/") and file.endswith(".py"):
+            modules[file.removeprefix("host/").removesuffix(".py").replace("/", ".").removesuffix(".__init__")] = file
+    for module, file in modules.items():
+        package = module if file.endswith("/__init__.py") else module.rpartition(".")[0]
+        for node in ast.walk(ast.parse((root / file).read_text(encoding="utf-8"))):
+            for name in imported(node, module, package):
+                named = [name, name.rpartition(".")[0]] if not isinstance(node, ast.Constant) else [name]
+                known = next((it for it in named if it in modules), module)
+                if known != module:
+                    yield Arrow(file, node.lineno, modules[known])
+
+
+def imported(node: ast.AST, module: str, package: str) -> Iterator[str]:
+    """Absolute names that a node imports; of ``from a import b`` it is a.b, which may be a module or a name in one."""
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        base = absolute("." * node.level + (node.module or ""), package)
+        yield from (f"{base}.{alias.name}" for alias in node.names)
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str) and BY_NAME.fullmatch(node.value):
+        yield node.value.partition(":")[0]
+    elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module") and len(node.args) == 2:
+        name, anchor = (ast.unparse(argument) for argument in node.args)
+        if name.startswith("'."):
+            yield absolute(ast.literal_eval(name), module if anchor == "__name__" else package)
+
+
+def absolute(name: str, package: str) -> str:
+    """``..wire.frames`` as seen from ``package``."""
+    dots = len(name) - len(name.lstrip("."))
+    if dots == 0:
+        return name
+    return ".".join([*package.split(".")[: package.count(".") + 2 - dots], *filter(None, [name.lstrip(".")])])
+
+
+def c_arrows(root: Path, files: Iterable[str]) -> Iterator[Arrow]:
+    """Includes in quotes; one that no file of the project answers to is an error of its own."""
+    sources = [file for file in files if file.startswith(C) and file.endswith((".c", ".h"))]
+    named = [file for file in files if file.endswith(".h") and not file.startswith("tests/")]
+    for file in sources:
+        for number, line in enumerate((root / file).read_text(encoding="utf-8").splitlines(), 1):
+            include = re.match(r'\s*#\s*include\s*"(.+?)"', line)
+            if not include:
+                continue
+            beside = str(Path(file).parent / include[1])
+            found = [beside] if beside in named else [h for h in named if h.endswith(f"/{include[1]}")]
+            assert len(found) == 1, f"{file}:{number}: {include[1]} is {found or 'nowhere'}"
+            yield Arrow(file, number, found[0])
+
+
+def wrong(arrows: Iterable[Arrow], table: Table) -> list[str]:
+    """What points the wrong way, each with file and line."""
+    found = []
+    for arrow in arrows:
+        here, there = table.room(arrow.source), table.room(arrow.target)
+        if None in (here, there):
+            found.append(f"{arrow.source}:{arrow.line}: {arrow.source if here is None else arrow.target} has no room")
+        elif here != there and there not in table.rooms[str(here)] and not hooked(arrow, table):
+            found.append(f"{arrow.source}:{arrow.line}: {here} may not import {there} ({arrow.target})")
+    return found
+
+
+def hooked(arrow: Arrow, table: Table) -> bool:
+    """By the page's second table."""
+    return (arrow.source, arrow.target) in table.hooks
+
+
+def circles(edges: Iterable[tuple[str, str]]) -> list[list[str]]:
+    """Groups of nodes each of which leads back to itself (Tarjan)."""
+    graph = defaultdict(set)
+    for source, target in edges:
+        graph[source].add(target)
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found = []
+
+    def visit(node: str) -> None:
+        index[node] = low[node] = len(index)
+        stack.append(node)
+        for target in sorted(graph.get(node, ())):
+            if target not in index:
+                visit(target)
+                low[node] = min(low[node], low[target])
+            elif target in stack:
+                low[node] = min(low[node], index[target])
+        if low[node] == index[node]:
+            group = stack[stack.index(node) :]
+            del stack[stack.index(node) :]
+            if len(group) > 1:
+                found.append(sorted(group))
+
+    for node in sorted(graph):
+        if node not in index:
+            visit(node)
+    return found
+
+
+def stem(file: str) -> str:
+    """A C module: its header and its source are one."""
+    return file[:-2]
+
+
+def judge(root: Path, table: Table) -> list[str]:
+    """All that is wrong with the project at ``root``."""
+    files = tracked(root)
+    python, c = list(python_arrows(root, files)), list(c_arrows(root, files))
+    found = wrong([*python, *c], table)
+    for circle in circles((a.source, a.target) for a in python if not hooked(a, table)):
+        found.append(f"{circle[0]}: in a circle with {', '.join(circle[1:])}")
+    for circle in circles((stem(a.source), stem(a.target)) for a in c if stem(a.source) != stem(a.target)):
+        found.append(f"{circle[0]}.c: in a circle with {', '.join(circle[1:])}")
+    return found
+
+
+def test_every_arrow_points_the_way_the_page_says() -> None:
+    assert judge(ROOT, read_table(PAGE.read_text(encoding="utf-8"))) == []
+
+
+def test_the_page_is_about_what_there_is_and_runs_one_way() -> None:
+    table = read_table(PAGE.read_text(encoding="utf-8"))
+    places = [*table.rooms, *(end for hook in table.hooks for end in hook)]
+    assert [place for place in places if not (ROOT / place).exists()] == []
+    assert [name for may in table.rooms.values() for name in may if name not in table.rooms] == []
+    assert circles((room, other) for room, may in table.rooms.items() for other in may) == []
+    used = {(a.source, a.target) for a in python_arrows(ROOT, tracked(ROOT))}
+    assert table.hooks - used == set(), "a hook that nothing needs"
+
+
+# ---- that it can fail ----------------------------------------------------------------------------
+
+MADE_UP = """
+| room | what is in it | may import |
+|---|---|---|
+| `host/biotac/low` | ground | |
+| `host/biotac/high` | above it | `host/biotac/low` |
+| `firmware/low` | ground | |
+| `firmware/high` | above it | `firmware/low` |
+
+## Hooks
+
+| file | names | why |
+|---|---|---|
+| `host/biotac/low/hook.py` | `host/biotac/high/top.py` | on purpose |
+"""
+
+
+@pytest.mark.parametrize(
+    ("files", "complaint"),
+    [
+        ({"host/biotac/low/a.py": "from ..high import top\n"}, "host/biotac/low/a.py:1: host/biotac/low may not"),
+        ({"host/biotac/low/a.py": "from biotac.high.top import x\n"}, "host/biotac/low/a.py:1: "),
+        ({"host/biotac/low/a.py": "import biotac.high.top\n"}, "host/biotac/low/a.py:1: "),
+        ({"host/biotac/low/a.py": "def f():\n    from ..high.top import x\n"}, "host/biotac/low/a.py:2: "),
+        ({"host/biotac/low/a.py": "x = {'k': 'biotac.high.top:open'}\n"}, "host/biotac/low/a.py:1: "),
+        ({"host/biotac/low/a.py": "\nimport_module('..high.top', __package__)\n"}, "host/biotac/low/a.py:2: "),
+        ({"host/biotac/low/a.py": "import_module('...high.top', __name__)\n"}, "host/biotac/low/a.py:1: "),
+        ({"host/biotac/low/a.py": "from . import b\n", "host/biotac/low/b.py": "from .a import x\n"}, "circle"),
+        ({"host/biotac/elsewhere.py": "from .low import hook\n"}, "host/biotac/elsewhere.py has no room"),
+        ({"firmware/low/a.c": '#include "a.h"\n#include "high/b.h"\n', "firmware/low/a.h": ""}, "firmware/low/a.c:2: "),
+        (
+            {
+                "firmware/high/c.h": "",
+                "firmware/high/c.c": '#include "high/c.h"\n#include "high/d.h"\n',
+                "firmware/high/d.h": "",
+                "firmware/high/d.c": '#include "high/d.h"\n#include "high/c.h"\n',
+            },
+            "firmware/high/c.c: in a circle with firmware/high/d",
+        ),
+    ],
+)
+def test_a_wrong_arrow_is_named(tmp_path: Path, files: dict[str, str], complaint: str) -> None:
+    right = {
+        "host/biotac/low/__init__.py": "",
+        "host/biotac/low/hook.py": "y = 'biotac.high.top:open'\n",
+        "host/biotac/high/top.py": "from ..low import hook\n",
+        "firmware/low/ground.h": "#include <stdint.h>\n",
+        "firmware/high/b.h": '#include "low/ground.h"\n',
+    }
+    for name, text in (right | files).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    found = judge(tmp_path, read_table(MADE_UP))
+    assert len(found) == 1 and complaint in found[0]
+
+
+def test_a_right_tree_has_nothing_to_complain_of(tmp_path: Path) -> None:
+    (tmp_path / "host/biotac/high").mkdir(parents=True)
+    (tmp_path / "host/biotac/low").mkdir()
+    (tmp_path / "host/biotac/high/top.py").write_text("from ..low import ground\n", encoding="utf-8")
+    (tmp_path / "host/biotac/low/ground.py").write_text("", encoding="utf-8")
+    assert judge(tmp_path, read_table(MADE_UP)) == []

@@ -1,0 +1,75 @@
+# Sourced by tools/test and tools/nightly: the steps that they are made of, and what each needs installed.
+# shellcheck shell=bash
+. tools/venv.sh
+export BIOTAC_CI=1 # a proof or a rig whose tool is missing fails instead of being skipped
+PATH="$PWD/.venv/bin:$PATH"
+
+step() { # step "WHAT IS DONE" FUNCTION [ARGUMENT...]: runs it and tells how long it took
+    local begin=$SECONDS
+    echo
+    echo "== $1"
+    shift
+    "$@"
+    echo "-- $((SECONDS - begin)) s"
+}
+
+install_for_quick() {
+    make_venv test
+    need "test -e /usr/include/cmocka.h" libcmocka-dev
+}
+
+install_for_proofs_and_fuzzing() {
+    need "command -v gappa" gappa
+    need "echo 'int LLVMFuzzerTestOneInput(void){return 0;}' | clang -fsanitize=fuzzer,address -xc - -o /dev/null" \
+        clang libclang-rt-dev
+}
+
+install_for_boards_and_pages() {
+    # The emulated rig: the emulator, its sensors as WebAssembly, and the board's image.
+    need "command -v node" nodejs
+    need "command -v npm" npm
+    need "command -v wasm-ld" lld
+    need "arm-none-eabi-gcc -print-file-name=nano.specs | grep / " gcc-arm-none-eabi libnewlib-arm-none-eabi
+    need "command -v qemu-system-arm" qemu-system-arm
+    need "command -v chromium" chromium # the page of `biotac view`
+}
+
+generated_files() {
+    python tools/gen_protocol.py --check
+    python tools/make_vectors.py --check
+}
+
+style() {
+    ruff check .
+    ruff format --check .
+    mypy
+    git ls-files '*.c' '*.h' | grep -v _gen | xargs clang-format --dry-run -Werror
+}
+
+c_tests() { # c_tests FOLDER [CMAKE-OPTION...]
+    local build=build/$1
+    shift
+    cmake -S . -B "$build" -G Ninja -DBIOTAC_TESTS=ON "$@" >/dev/null
+    cmake --build "$build" >"$build/log" || { cat "$build/log"; return 1; }
+    ctest --test-dir "$build" -j2 --output-on-failure
+}
+
+pico() {
+    cmake -S firmware --preset pico >/dev/null
+    cmake --build build/pico
+    tools/emulator/prepare
+}
+
+m4f_tests() {
+    cmake -S firmware --preset m4f >/dev/null
+    cmake --build build/m4f >build/m4f/log || { cat build/m4f/log; return 1; }
+    ctest --test-dir build/m4f -j2 --output-on-failure
+}
+
+python_tests() { # arguments go to pytest; two processes, each with whole files, for what tests of a file share
+    pytest -n 2 --dist loadfile "$@"
+}
+
+sanitized_board() {
+    BIOTAC_SIM="$PWD/build/sanitize/biotac-sim" python_tests tests/hil --rig posix
+}
