@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from ..calibrate.reference.live import ReaderStats
 from ..calibrate.reference.rdt import RdtDecoder
-from ..calibrate.reference.samples import Samples
+from ..calibrate.reference.samples import ReaderStats, Samples
 from .nano17 import SENSOR, Nano17
 from .source import Source
 

@@ -14,9 +14,8 @@ import pytest
 from biotac import InputError
 from biotac.calibrate.pressure import formulas, guided, report
 from biotac.calibrate.pressure.fit import Fit, fit, told_by, verify
-from biotac.calibrate.pressure.plateaus import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Rest
-from biotac.calibrate.pressure.procedure import Procedure, Step
-from biotac.calibrate.pressure.reference import MAX_LAG_ROWS, Series, check_alignment, lag_rows
+from biotac.calibrate.pressure.force_source import MAX_LAG_ROWS, Series, check_alignment, lag_rows
+from biotac.calibrate.pressure.presses import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Procedure, Rest, Step
 from biotac.calibrate.pressure.rows import ROW_DTYPE
 
 K = 0.0125  # N per count

@@ -12,10 +12,10 @@ import pytest
 
 import biotac
 from biotac.calibrate.pressure import guided
-from biotac.calibrate.pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
+from biotac.calibrate.pressure.presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
-from biotac.lab.experiments import navarro, navarro_script
+from biotac.lab.experiments import navarro
 from biotac.lab.experiments.outcome import Options
 from biotac.picture import picture
 from biotac.recording import Recording
@@ -44,10 +44,10 @@ class Silent:
 
 def test_the_bundled_scenario_is_the_experiments() -> None:
     steps = [
-        *navarro_script.presses(FINGERS, CALIBRATION_FORCES_N, [navarro.PLACE] * 3),
-        *navarro_script.presses(FINGERS, VERIFICATION_FORCES_N, [navarro.PLACE]),
+        *navarro.presses(FINGERS, CALIBRATION_FORCES_N, [navarro.PLACE] * 3),
+        *navarro.presses(FINGERS, VERIFICATION_FORCES_N, [navarro.PLACE]),
     ]
-    wanted = navarro_script.source("fingers", [1, 2, 3, 4, 5], "new", steps)
+    wanted = navarro.emulated_hand("fingers", [1, 2, 3, 4, 5], "new", steps)
     np.testing.assert_array_equal(load_source("fingers.toml").samples, wanted.samples)
 
 
@@ -157,10 +157,10 @@ def pressed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two fingers through all presses, recorded, and the plate beside it."""
     folder = tmp_path_factory.mktemp("pressed")
     steps = [
-        *navarro_script.presses([0, 1], CALIBRATION_FORCES_N, ["E17"] * 3),
-        *navarro_script.presses([0, 1], VERIFICATION_FORCES_N, ["E17"]),
+        *navarro.presses([0, 1], CALIBRATION_FORCES_N, ["E17"] * 3),
+        *navarro.presses([0, 1], VERIFICATION_FORCES_N, ["E17"]),
     ]
-    (folder / "two.toml").write_text(navarro_script.scenario("two", [11, 12], "worn", steps))
+    (folder / "two.toml").write_text(navarro.scenario("two", [11, 12], "worn", steps))
     with biotac.open(f"sim:{folder / 'two.toml'}") as hand:
         hand.record(folder / "two.mcap")
         hand.read_batch(1000)
@@ -290,11 +290,12 @@ def test_a_board_that_is_off_by_a_millinewton_is_seen(result: navarro.Result) ->
 def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law(result: navarro.Result) -> None:
     """The law is physics' own: what a K is worth at another place follows from it without the code under test."""
     places = result.places
-    law = 1 + 0.15 * np.tanh(np.array(places.x_mm) / 8)
-    np.testing.assert_allclose(np.array(places.gains_n) * 100 * law, 1.0, rtol=0.01)
+    errors = np.array(places["errors"]) / 100
+    law = 1 + 0.15 * np.tanh(np.array(places["x_mm"]) / 8)
+    np.testing.assert_allclose(np.array(places["gain_n"]) / 1e3 * 100 * law, 1.0, rtol=0.01)
     wanted = np.abs(law[None, :] / law[:, None] - 1)
-    np.testing.assert_allclose(places.errors, wanted, atol=0.01)
-    assert np.diag(places.errors).max() < 0.01 < 0.2 < places.errors.max()
+    np.testing.assert_allclose(errors, wanted, atol=0.01)
+    assert np.diag(errors).max() < 0.01 < 0.2 < errors.max()
 
 
 def test_the_picture_is_drawn(result: navarro.Result, tmp_path: Path) -> None:

@@ -12,9 +12,8 @@ from biotac.calibrate.reference import LIN, Samples
 from biotac.calibrate.reference.csv_file import read_csv
 from biotac.calibrate.reference.samples import Reference
 from biotac.calibrate.wrench.coverage import CELLS_PER_REGION, REGIONS, Coverage, cell_of
-from biotac.calibrate.wrench.procedure import MAX_WARM_UP_S, TARE_FRAMES, Plan, Procedure, Step
+from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Places, Plan, Procedure, Step, walk
 from biotac.calibrate.wrench.sources import load
-from biotac.calibrate.wrench.walk import Places, walk
 from biotac.errors import DeviceLostError, InputError
 from biotac.recording import Recording
 from biotac.sim.loading import load_source

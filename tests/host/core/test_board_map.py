@@ -12,8 +12,9 @@ import pytest
 import wrench_run
 
 import biotac
-from biotac.calibrate.wrench import board, features, fitted, models, recorded
+from biotac.calibrate.wrench import board, features, fitted, models
 from biotac.calibrate.wrench.fitted import WrenchMap
+from biotac.calibrate.wrench.run import Run, load_run
 from biotac.core import board_map
 from biotac.core.board_map import BoardBlock, BoardMap, from_blob
 from biotac.core.compiled import default_settings
@@ -242,7 +243,7 @@ def test_pressure_that_is_missing_makes_results_nan_only_where_it_is_needed() ->
 # ---- on real and emulated fingers --------------------------------------------------------------
 
 
-def fit(run: recorded.Run, lam: float) -> WrenchMap:
+def fit(run: Run, lam: float) -> WrenchMap:
     """Ridge as the models have it on all columns at once; coefficients of the size that data make, held out or not."""
     signals = features.Signals(run.counts - run.tare, run.tare, run.pdc)
     z = np.column_stack([features.columns(signals), np.ones(len(run.counts))])
@@ -256,7 +257,7 @@ def fit(run: recorded.Run, lam: float) -> WrenchMap:
 @pytest.mark.parametrize("lam", models.LAMBDAS[[0, 4]])
 def test_on_the_emulated_sensor_every_row_is_right_force_and_torque(tmp_path: Path, lam: float) -> None:
     path = wrench_run.save(tmp_path / "run.npz", wrench_run.fields(6000, 3, moment=True, pdc=True))
-    run = recorded.load_run(path)
+    run = load_run(path)
     facts = board.summary(fit(run, lam), run)
     assert facts["rows"] == 6000 and facts["outside"] == 0
     assert facts["force_mn_max"] <= min(facts["force_mn_bound"], FORCE_MN)
@@ -268,14 +269,14 @@ def test_on_the_emulated_sensor_every_row_is_right_force_and_torque(tmp_path: Pa
 def test_on_a_real_finger_every_row_is_right(lam: float) -> None:
     if not SHARED.exists():
         pytest.skip(f"{SHARED.name} is not at ../shared/data: real recordings are not part of the project")
-    run = recorded.load_run(SHARED)
+    run = load_run(SHARED)
     facts = board.summary(fit(run, lam), run)
     assert facts["rows"] == len(run.counts) and facts["outside"] == 0
     assert facts["force_mn_max"] <= min(facts["force_mn_bound"], FORCE_MN)
 
 
 def test_a_map_that_no_board_can_hold_is_told_and_not_raised(tmp_path: Path) -> None:
-    run = recorded.load_run(wrench_run.save(tmp_path / "run.npz", wrench_run.fields(4000, 4)))
+    run = load_run(wrench_run.save(tmp_path / "run.npz", wrench_run.fields(4000, 4)))
     model = fit(run, 1e-3)
     facts = board.summary(dataclasses.replace(model, coefficients=1e9 * model.coefficients), run)
     assert "add up to" in facts["refused"] and facts["refused"] in board.words(facts)

@@ -16,7 +16,7 @@ from biotac.calibrate.wrench.fitted import WrenchMap
 from biotac.cli.main import main
 from biotac.core import geometry as surface
 from biotac.errors import InputError, RecordingError
-from biotac.lab.experiments import catalogue, estimates, plate_normal, poke, recorded, shear, torsion, torsion_shear
+from biotac.lab.experiments import catalogue, estimates, laboratory, plate_normal, poke, shear, torsion, torsion_shear
 from biotac.lab.experiments.estimates import Estimate
 from biotac.lab.experiments.outcome import Options
 from biotac.lab.experiments.trial import MIRROR, Trial
@@ -302,7 +302,7 @@ def test_the_caption_of_figure_3_can_be_wrong() -> None:
 def test_bad_fields_are_refused(tmp_path: Path, figure10: Trial, field: str, values, words: str) -> None:
     arrays = {"M": recorded_axes(figure10.torque_nmm)} | {field: values}
     with pytest.raises(RecordingError, match=words):
-        recorded.load(save(tmp_path / "bad.npz", figure10, **arrays), needs=("F", "M"))
+        laboratory.load(save(tmp_path / "bad.npz", figure10, **arrays), needs=("F", "M"))
 
 
 # ---- the command ---------------------------------------------------------------------------------

@@ -3,10 +3,9 @@
 - ``formulas``: the paper's equations in float64
 - ``check``: the board's own numbers held to them, frame by frame
 - ``rows``: what a calibration looks at of a frame
-- ``plateaus``: what of a press was held, and what of it is rest
-- ``procedure``: the guided sequence of presses, as a machine that consumes rows
-- ``reference``: where the force comes from that the fingers are calibrated to
+- ``presses``: what of a press was held, what of it is rest, and the guided sequence of presses
+- ``force_source``: where the force comes from that the fingers are calibrated to
 - ``fit``: K and the relative error of a finger; what is refused
-- ``driving``, ``guided``: all that with a board; ``recorded``: with a recording
+- ``guided``: all that with a board; ``from_recording``: with a recording
 - ``report``: what it came to
 """

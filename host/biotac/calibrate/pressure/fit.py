@@ -13,7 +13,7 @@ from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, to_units
 from . import formulas
 from .formulas import Floats
-from .plateaus import HOLD_ROWS, Press, Rest
+from .presses import HOLD_ROWS, Press, Rest
 
 NN_PER_N = 1e9
 MIN_PRESSES = 3

@@ -8,21 +8,20 @@ only what comes after the first presses is looked at.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from ...errors import CommandRefusedError, InputError
 from ...hand.hand import Hand
-from ...keep.calibration_file import Provenance
-from ...version import __version__
+from ...keep import Calibration
+from ...wire import messages_gen as wire
 from ...wire.identity import ascii_text, serial_text
 from . import report
-from .driving import drive, fits_of, put, with_gain
-from .fit import MIN_PRESSES, Fit, verify
-from .plateaus import Phase, Press
-from .procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure, Step
-from .reference import Reference, Truth, Unknown
+from .fit import MIN_PRESSES, Fit, fit, verify
+from .force_source import Reference, Truth, Unknown
+from .presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Phase, Press, Procedure, Step
 from .report import Outcome
+from .rows import rows_of
 
 
 class Face(Protocol):
@@ -58,7 +57,7 @@ def calibrate(open_hand: Callable[[], Hand], plan: Plan, face: Face, *, made_s: 
         serials = {finger: _serial(hand, finger) for finger in fingers}
         reference: Reference = Unknown() if hand.link.source is None else Truth(hand.link.source)
         first = _run(hand, Procedure(fingers, plan.forces_n, needs_force=_known(reference)), reference, face)
-        fits = fits_of(first.procedure, first.presses)
+        fits = {finger: fit(first.procedure.rests[finger], mine) for finger, mine in first.presses.items()}
         again = hand.link.source is not None and hand.link.pace == 0
         if not again:
             hand.stop()
@@ -125,7 +124,7 @@ def _on_board(
                 "the same: begin again"
             )
         calibrations[finger] = with_gain(hand, its, made_s)
-        provenance[finger] = _provenance(hand, its)
+        provenance[finger] = report.provenance(its, **{"from": hand.port, "board_serial": serial_text(hand.info)})
         put(hand, finger, calibrations[finger])
     verified = {}
     if plan.verification_n:
@@ -159,12 +158,53 @@ def _serial(hand: Hand, finger: int) -> str:
     return ascii_text(hand.sensor_info(finger).serial)
 
 
-def _provenance(hand: Hand, its: Fit) -> Provenance:
-    """How K came about, for people."""
-    return {
-        "software": f"biotac-gateway {__version__}",
-        "method": "pressure, Navarro 2015",
-        "from": hand.port,
-        "board_serial": serial_text(hand.info),
-        **report.facts_of(its),
-    }
+Show = Callable[[Step | None], None]
+
+
+def drive(
+    hand: Hand,
+    procedure: Procedure,
+    reference: Reference,
+    show: Show = lambda step: None,
+    *,
+    after_us: int = 0,
+) -> None:
+    """Feed ``procedure`` with what ``hand`` streams until it is done, telling ``show`` each new step.
+
+    Starts the stream if need be and leaves it on; the first ``after_us`` of device time are passed over. Raises
+    InputError when a finger waits in vain, or a simulated source ends first.
+    """
+    shown: Step | None = procedure.step
+    show(shown)
+    first_us: int | None = None
+    for batch in hand.batches():
+        force_n = reference.at(batch.wire["finger"], batch.t_us)
+        rows = rows_of(batch.wire, batch.t_us, force_n)
+        if first_us is None and len(rows):
+            first_us = int(rows["t_us"].min())
+        procedure.feed(rows[rows["t_us"] - (first_us or 0) >= after_us])
+        if procedure.step != shown:
+            shown = procedure.step
+            show(shown)
+        if procedure.done:
+            return
+    procedure.finish()
+
+
+def with_gain(hand: Hand, its: Fit, made_s: int) -> Calibration:
+    """The finger's calibration as it is on the board, with K in it, for the sensor that is there."""
+    own = hand.calibration(its.finger)
+    if own is None or hand.calibration_state(its.finger) != wire.CalibrationState.IN_FORCE:
+        own = Calibration().changed(hand.settings())
+    return replace(own, pressure_gain_nn=its.gain_nn, serial=_serial(hand, its.finger), made_s=made_s)
+
+
+def put(hand: Hand, finger: int, calibration: Calibration) -> None:
+    """Set it and read it back. Not while streaming. Raises CommandRefusedError, or InputError if it is another then."""
+    hand.set_calibration(finger, calibration)
+    back = hand.calibration(finger)
+    if back != calibration or hand.calibration_state(finger) != wire.CalibrationState.IN_FORCE:
+        raise InputError(
+            f"finger {finger}: the board says {back}, expected what it was given, in force; read it with "
+            "`biotac calibration show`"
+        )

@@ -8,6 +8,7 @@ from typing import Any
 from ...errors import CommandRefusedError
 from ...keep import Calibration
 from ...keep.calibration_file import Provenance
+from ...version import __version__
 from .fit import Fit, Verification
 
 PAPER_ERROR = 0.0591  # relative error of the fore finger's verification press
@@ -29,8 +30,13 @@ class Outcome:
     not_saved: CommandRefusedError | None = None
 
 
-def facts_of(its: Fit) -> Provenance:
-    """The numbers of a fit, for a file."""
+def provenance(its: Fit, **source: str) -> Provenance:
+    """How K came about, for a calibration's file: the ``source`` it is from, and the numbers of the fit."""
+    made = {"software": f"biotac-gateway {__version__}", "method": "pressure, Navarro 2015"}
+    return {**made, **source, **_numbers(its)}
+
+
+def _numbers(its: Fit) -> Provenance:
     return {
         "finger": its.finger,
         "gain_n": its.gain_n,
@@ -47,20 +53,15 @@ def facts(outcome: Outcome) -> list[dict[str, Any]]:
     """One object a finger, JSON types only."""
     out = []
     for finger, its in outcome.fits.items():
-        one = facts_of(its) | {
+        one = _numbers(its) | {
             "serial": outcome.calibrations[finger].serial,
             "pressure_gain_nn": its.gain_nn,
             "notes": list(its.notes),
         }
         if finger in outcome.verified:
-            verified = outcome.verified[finger]
-            one["verification"] = {
-                "force_n": round(verified.force_n, 4),
-                "told_n": round(verified.told_n, 4),
-                "board_error": round(verified.board_error, 5),
-                "float_error": round(verified.float_error, 5),
-                "apart_n": round(verified.apart_n, 7),
-            }
+            digits = {"force_n": 4, "told_n": 4, "board_error": 5, "float_error": 5, "apart_n": 7}
+            seen = outcome.verified[finger]
+            one["verification"] = {name: round(getattr(seen, name), places) for name, places in digits.items()}
         if finger in outcome.lag_rows:
             one["lag_rows"] = outcome.lag_rows[finger]
         out.append(one)

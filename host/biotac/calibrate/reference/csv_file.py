@@ -13,6 +13,7 @@ from __future__ import annotations
 import io
 import json
 import re
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TextIO
 
@@ -35,14 +36,7 @@ def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
 
     Raises RecordingError for what cannot be read or believed, with its line.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        seen = error.strerror if isinstance(error, OSError) else "it is no text"
-        raise RecordingError(f"{path}: cannot be read ({seen}): expected a CSV file of a force/torque sensor") from None
-    own, head, body = _split(text)
-    if head is None:
-        raise RecordingError(f"{path}: no header line: expected {','.join(COLUMNS)}")
+    own, head, read = open_table(path)
     its_mounting = mounting
     if its_mounting is None and "mounting" in own:
         its_mounting = from_json(own["mounting"], f"{path}: line '# mounting:'")
@@ -51,18 +45,40 @@ def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
             f"{path}: says nothing of how the sensor is fixed to the finger: expected --mounting FILE.toml, or "
             "--mounting lin where axes and origin are Lin's already"
         )
-    separator = max(",;\t", key=head.count)
-    use, scale = _columns(path, head.split(separator))
-    try:
-        table = np.loadtxt(io.StringIO(body), delimiter=separator, usecols=use, ndmin=2, dtype=np.float64)
-    except ValueError as error:
-        raise RecordingError(
-            f"{path}: {error}: expected a number in every column; save it with decimal points"
-        ) from None
+    use, scale = _columns(path, head)
+    table = read(use)
     wrench = table[:, 1:] * scale
     samples = from_wrench(table[:, 0], wrench)
     check(str(path), samples)
     return Reference(path.name, samples, its_mounting, own.get("sensor", ""))
+
+
+def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequence[int]], Floats]]:
+    """What '# key: value' lines say, the header's names, and a function from columns' places to their numbers (n, k).
+
+    Columns are parted by comma, semicolon or tab. Raises RecordingError; so does the function, with the line.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        seen = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise RecordingError(f"{path}: cannot be read ({seen}): expected a CSV file of a force/torque sensor") from None
+    own, head, body = _split(text)
+    if head is None:
+        raise RecordingError(f"{path}: no header line: expected one that names every column")
+    separator = max(",;\t", key=head.count)
+
+    def read(places: Sequence[int]) -> Floats:
+        if not body.strip():
+            return np.empty((0, len(places)))
+        try:
+            return np.loadtxt(io.StringIO(body), delimiter=separator, usecols=places, ndmin=2, dtype=np.float64)
+        except ValueError as error:
+            raise RecordingError(
+                f"{path}: {error}: expected a number in every column; save it with decimal points"
+            ) from None
+
+    return own, [name.strip().strip('"') for name in head.split(separator)], read
 
 
 def _split(text: str) -> tuple[dict[str, str], str | None, str]:
@@ -85,19 +101,19 @@ def _columns(path: Path, names: list[str]) -> tuple[list[int], Floats]:
     """Which columns are t, F and M, and what they are multiplied by."""
     found: dict[str, tuple[int, float]] = {}
     for place, cell in enumerate(names):
-        match = _COLUMN.match(cell.strip().strip('"'))
+        match = _COLUMN.match(cell)
         if match is None:
             continue
         word = match[1].lower()
         name = "t" if word in ("t", "time") else word.replace("t", "m", 1)
         unit = match[2] or match[3]
         if not unit:
-            raise RecordingError(f"{path}: column {cell.strip()!r} has no unit: expected {_WANTED}, as in {COLUMNS[4]}")
+            raise RecordingError(f"{path}: column {cell!r} has no unit: expected {_WANTED}, as in {COLUMNS[4]}")
         factor = _UNITS[name[0]].get(re.sub(r"[\s*.·-]", "", unit))
         if factor is None:
-            raise RecordingError(f"{path}: column {cell.strip()!r} is in {unit!r}: expected {_WANTED}; convert it")
+            raise RecordingError(f"{path}: column {cell!r} is in {unit!r}: expected {_WANTED}; convert it")
         if name in found:
-            raise RecordingError(f"{path}: column {cell.strip()!r} is there twice: expected it once; remove one")
+            raise RecordingError(f"{path}: column {cell!r} is there twice: expected it once; remove one")
         found[name] = (place, factor)
     torques = [name for name in _NAMES[4:] if name in found]
     wanted = _NAMES if torques else _NAMES[:4]

@@ -9,6 +9,7 @@ import json
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,6 @@ from .samples import Reference, check, from_wrench
 
 SCHEMAS = ("geometry_msgs/msg/WrenchStamped", "geometry_msgs/WrenchStamped")
 NMM_PER_NM = 1000.0
-_AXES = ("x", "y", "z")
 
 Row = tuple[float, list[float]]
 
@@ -37,7 +37,7 @@ def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -
             "FILE.toml, or --mounting lin where axes and origin are Lin's already"
         )
     rows: dict[str, list[Row]] = {}
-    decoders: dict[str, Callable[[bytes], Row]] = {}
+    decoders: dict[str, Callable[[bytes], Any]] = {}
     seen: set[str] = set()
     try:
         with path.open("rb") as stream:
@@ -47,7 +47,7 @@ def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -
                     continue
                 if channel.topic not in decoders:
                     decoders[channel.topic] = _decoder(path, channel.message_encoding)
-                rows.setdefault(channel.topic, []).append(decoders[channel.topic](message.data))
+                rows.setdefault(channel.topic, []).append(_row(decoders[channel.topic](message.data)))
     except (OSError, McapError, struct.error, KeyError, TypeError, ValueError, AttributeError) as error:
         raise RecordingError(f"{path}: cannot be read ({error}): expected an MCAP file with {SCHEMAS[0]}") from None
     if len(rows) != 1:
@@ -61,9 +61,10 @@ def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -
     return Reference(path.name, samples, mounting, name)
 
 
-def _decoder(path: Path, encoding: str) -> Callable[[bytes], Row]:
+def _decoder(path: Path, encoding: str) -> Callable[[bytes], Any]:
+    """From a message's bytes to its fields as attributes."""
     if encoding == "json":
-        return _from_json
+        return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
     if encoding != "cdr":
         raise RecordingError(f"{path}: messages are {encoding!r}: expected json or cdr (ROS 2); convert the bag")
     try:
@@ -73,24 +74,13 @@ def _decoder(path: Path, encoding: str) -> Callable[[bytes], Row]:
             f"{path} is a ROS 2 bag, which needs the package rosbags; install it: pip install 'biotac-gateway[ros2]'"
         ) from None
     store = get_typestore(Stores.ROS2_HUMBLE)
-
-    def from_cdr(data: bytes) -> Row:
-        return _row(store.deserialize_cdr(data, SCHEMAS[0]))
-
-    return from_cdr
+    return lambda data: store.deserialize_cdr(data, SCHEMAS[0])
 
 
 def _row(message: Any) -> Row:
     stamp, wrench = message.header.stamp, message.wrench
-    force = [float(getattr(wrench.force, axis)) for axis in _AXES]
-    return stamp.sec + stamp.nanosec * 1e-9, force + [NMM_PER_NM * float(getattr(wrench.torque, a)) for a in _AXES]
-
-
-def _from_json(data: bytes) -> Row:
-    message = json.loads(data)
-    stamp, wrench = message["header"]["stamp"], message["wrench"]
-    # ROS 2 and ROS 1 call the same thing nanosec and nsec
-    nanosec = stamp["nanosec"] if "nanosec" in stamp else stamp["nsec"]
-    second = stamp["sec"] if "sec" in stamp else stamp["secs"]
-    force = [float(wrench["force"][axis]) for axis in _AXES]
-    return float(second) + float(nanosec) * 1e-9, force + [NMM_PER_NM * float(wrench["torque"][a]) for a in _AXES]
+    # ROS 2 and ROS 1 call the same things sec and nanosec, and secs and nsec
+    second = stamp.sec if hasattr(stamp, "sec") else stamp.secs
+    nanosec = stamp.nanosec if hasattr(stamp, "nanosec") else stamp.nsec
+    force, torque = ([float(getattr(of, axis)) for axis in "xyz"] for of in (wrench.force, wrench.torque))
+    return float(second) + float(nanosec) * 1e-9, [*force, *[NMM_PER_NM * t for t in torque]]

@@ -17,9 +17,8 @@ from urllib.parse import parse_qsl
 
 from ...errors import DeviceLostError, InputError, PortError
 from . import rdt
-from .live import ReaderStats
 from .rdt import RdtDecoder, Scale
-from .samples import Samples
+from .samples import ReaderStats, Samples
 
 PREFIX = "netft:"
 SILENCE_S = 2.0

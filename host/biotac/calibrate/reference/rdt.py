@@ -86,7 +86,7 @@ class RdtDecoder:
     def take(self, *, all_of_them: bool = False) -> Samples:
         """What is in order by now; with ``all_of_them`` also what was held back."""
         if not self._waiting:
-            return _samples(np.empty(0), np.empty((0, 6)))
+            return from_wrench(np.empty(0), np.empty((0, 6)))
         numbers = np.concatenate([n for n, _ in self._waiting])
         records = np.concatenate([r for _, r in self._waiting])
         order = np.argsort(numbers, kind="stable")
@@ -107,8 +107,4 @@ class RdtDecoder:
         wrong = (records["status"] & ERROR_BIT) != 0
         self.bad += int(wrong.sum())
         wrench[wrong] = np.nan
-        return _samples(numbers / self.scale.rate_hz, wrench)
-
-
-def _samples(t_s: npt.NDArray[np.float64], wrench: npt.NDArray[np.float64]) -> Samples:
-    return from_wrench(t_s, wrench)
+        return from_wrench(numbers / self.scale.rate_hz, wrench)

@@ -1,9 +1,10 @@
-"""What a force/torque sensor measured, checked at the door."""
+"""What a force/torque sensor measured, checked at the door; from a file, or read while it measures."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -48,7 +49,6 @@ class Reference:
     samples: Samples
     mounting: Mounting
     sensor: str = ""
-    notes: tuple[str, ...] = field(default=())
 
 
 def from_wrench(t_s: Floats, wrench: Floats) -> Samples:
@@ -102,3 +102,33 @@ def check(where: str, samples: Samples) -> None:
             f"{where}: force changes by {size_n:.4g} N (99th percentile): expected {FORCE_N[0]:g} to {FORCE_N[1]:g} N "
             f"on a finger; {guess}"
         )
+
+
+@dataclass(frozen=True)
+class ReaderStats:
+    """Samples that never came, came too late or twice, and that the sensor itself called bad."""
+
+    lost: int
+    late: int
+    bad: int
+
+
+class Reader(Protocol):
+    """``sensor`` is its name and number as far as it says them."""
+
+    @property
+    def sensor(self) -> str:
+        """For people and for provenance."""
+
+    @property
+    def stats(self) -> ReaderStats:
+        """Counts so far."""
+
+    def read(self, board_s: float) -> Samples:
+        """Samples since the last call, six axes, in order. Raises DeviceLostError when the sensor has gone.
+
+        ``board_s`` is how long the board has streamed by its own clock: what an emulated sensor goes by.
+        """
+
+    def close(self) -> None:
+        """Safe to call twice."""

@@ -119,7 +119,7 @@ def align(where: str, board_s: Floats, board_load: Floats, reference_s: Floats, 
 def on_grid(t_s: Floats, values: Floats, edges_s: Floats) -> Floats:
     """Means (k, columns) of ``values`` (n, columns) between k + 1 ``edges_s``; NaN where there is no sample.
 
-    Means, and not the sample next to it: a sensor ten times as fast as the grid would fold its noise into it.
+    Means, and not the sample next to it: a sensor ten times as fast as the grid would alias its noise into it.
     """
     cell = np.searchsorted(edges_s, t_s, side="right") - 1
     good = np.isfinite(values).all(axis=1) & (cell >= 0) & (cell < len(edges_s) - 1)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.board_map import BoardBlock, BoardMap
+from ...core.geometry import Floats
 from ...core.map_columns import ELECTRODES, Signals, gates, kinds
 from ...core.map_float64 import FACTOR, Q4, factor_product, result_units, tared
 from ...errors import InputError
@@ -23,7 +24,7 @@ from ...wire.frames import tare_to_q4
 from ...wire.map_gen import Gate, Kind
 from . import features
 from .fitted import WrenchMap
-from .recorded import Floats, Run
+from .run import Run
 
 _UPPER = np.triu_indices(ELECTRODES)
 _ROW_COLUMNS = np.arange(ELECTRODES, 0, -1)  # of each row of pairs

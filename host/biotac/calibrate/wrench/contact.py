@@ -10,12 +10,14 @@ in mm, forces in N on the finger, moments in N mm.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core import geometry as surface
 from ...core.geometry import Floats
+from ...errors import RecordingError
 
 MESH_STEP_MM = 0.5
 
@@ -119,3 +121,112 @@ def locate_on_mesh(force_n: Floats, moment_nmm: Floats, step_mm: float = MESH_ST
         if np.isfinite(left[best]):
             result[k] = points[best]
     return result
+
+
+LIGHT_N = 0.5  # a lighter contact holds no torsion to speak of: friction times force times half its width
+MAX_NOWHERE_SHARE = 0.01
+MAX_OFF_MM = 2.0  # how far beside the core a line of action may pass and still be a touch of the skin over it
+
+
+def torsion_truth(
+    where: object, given: npt.NDArray[Any] | None, force_n: Floats, moment_nmm: Floats
+) -> tuple[Floats, tuple[str, ...]]:
+    """Torsion (n, 1) in N mm about the outward normal, or (n, 0) where there is none to be had, and notes.
+
+    Truth for a row of the map of its own: torque about the origin is mostly the force's lever, and what is left after
+    taking c x F away again is the point of contact's error times the force (three times a good map's error).
+
+    ``given`` (n,) is the recording's own, else it follows from the wrench on a point contact. Raises
+    RecordingError when ``given`` is no number a row.
+    """
+    rows = len(force_n)
+    if given is not None:
+        if given.shape != (rows,) or given.dtype.kind not in "iuf" or not np.isfinite(given).all():
+            raise RecordingError(
+                f"{where}: field torsion is {given.dtype} {given.shape}: expected ({rows},) finite numbers in N mm "
+                f"about the outward normal, a row a frame; leave it out to have it computed from F and M"
+            )
+        return given.astype(np.float64)[:, None], ()
+    size = np.linalg.norm(force_n, axis=1)
+    firm = size >= LIGHT_N
+    torsion = np.zeros(rows)
+    found = locate(force_n[firm], moment_nmm[firm])
+    torsion[firm] = found.torsion_nmm
+    missed = firm.copy()
+    missed[firm] = found.missed | ~found.on_skin
+    torsion[missed] = _on_mesh(force_n[missed], moment_nmm[missed])
+    nowhere = ~np.isfinite(torsion)
+    note = f"torsion: from F and M of point contacts; the line of action misses the finger in {missed.sum()} rows"
+    if nowhere.sum() > MAX_NOWHERE_SHARE * rows:
+        return np.zeros((rows, 0)), (f"{note}, {nowhere.sum()} press on no place of it: torsion is left out",)
+    torsion[nowhere] = 0.0
+    return torsion[:, None], (note,)
+
+
+def _on_mesh(force_n: Floats, moment_nmm: Floats) -> Floats:
+    """Torsion (n,) at the mesh point that fits best; NaN where none explains the moment to MAX_OFF_MM."""
+    point = locate_on_mesh(force_n, moment_nmm)
+    normal = surface.normals_at(point)
+    about = moment_nmm - np.cross(point, force_n)
+    off_mm = np.linalg.norm(np.cross(normal, about), axis=1) / np.linalg.norm(force_n, axis=1)
+    return np.where(off_mm <= MAX_OFF_MM, (about * normal).sum(axis=1), np.nan)
+
+
+# What is laid over the wrench, in N and N mm: nothing, a Nano17's resolution, and a lesser plate's noise.
+NOISES = (("exact wrench", 0.0, 0.0), ("Nano17's resolution", 1 / 320, 1 / 64), ("20 mN, 0.2 N mm", 0.02, 0.2))
+
+
+@dataclass(frozen=True)
+class ContactError:
+    """Distances in mm between the contact found and the true one, over ``found`` of the contacts.
+
+    A contact that noise puts beside the finger has no place: it is not in ``found``.
+    """
+
+    noise: str
+    method: str
+    found: int
+    rms_mm: float
+    p95_mm: float
+    max_mm: float
+
+
+def compare(contacts: int, *, seed: int = 0, step_mm: float = MESH_STEP_MM) -> list[ContactError]:
+    """Both methods under every noise of NOISES, on ``contacts`` random contacts with shear and torsion."""
+    rng = np.random.default_rng(seed)
+    point, force, torsion = random_contacts(contacts, rng)
+    torque = moment(point, force, torsion)
+    result = []
+    for name, force_n, torque_nmm in NOISES:
+        read_f = force + rng.normal(0.0, 1.0, force.shape) * force_n
+        read_m = torque + rng.normal(0.0, 1.0, torque.shape) * torque_nmm
+        closed = locate(read_f, read_m)
+        result.append(_error(name, "closed form", np.where(closed.missed[:, None], np.nan, closed.point_mm) - point))
+        on_mesh = locate_on_mesh(read_f, read_m, step_mm)
+        result.append(_error(name, f"mesh of {step_mm:g} mm", on_mesh - point))
+    return result
+
+
+def random_contacts(count: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
+    """Points (n, 3) all over the ventral surface, forces (n, 3) of 0.5 to 20 N into it, torsions (n,)."""
+    x, angle = rng.uniform(surface.PROXIMAL_END_MM, 0.95 * surface.RADIUS_MM, count), rng.uniform(-1.5, 1.5, count)
+    radius = np.sqrt(surface.RADIUS_MM**2 - np.maximum(x, 0.0) ** 2)
+    point = np.column_stack([x, radius * np.sin(angle), -radius * np.cos(angle)])
+    normal = surface.normals_at(point)
+    pressed = rng.uniform(0.5, 20.0, (count, 1))
+    shear = rng.normal(0.0, 0.25, (count, 3)) * pressed
+    shear -= (shear * normal).sum(axis=1, keepdims=True) * normal
+    torsion: Floats = rng.normal(0.0, 5.0, count)
+    return point, shear - pressed * normal, torsion
+
+
+def _error(noise: str, method: str, off: Floats) -> ContactError:
+    distance = np.linalg.norm(off[np.isfinite(off).all(axis=1)], axis=1)
+    return ContactError(
+        noise,
+        method,
+        len(distance),
+        float(np.sqrt((distance**2).mean())),
+        float(np.percentile(distance, 95)),
+        float(distance.max()),
+    )

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import geometry as surface
+from ...core.geometry import Floats
 from . import contact
-from .recorded import Floats
 
 Bools = npt.NDArray[np.bool_]
 

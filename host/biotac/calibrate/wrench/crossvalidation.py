@@ -15,13 +15,14 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from ...core.geometry import Floats
 from ...core.map_columns import Signals
 from . import features
-from .alignment import best_lag, check, lag_moments
 from .blocks import BLOCKS, Blocks
+from .lag import best_lag, check, lag_moments
 from .models import AFFINE, GATED, LAMBDAS, MODELS, POOL, POOLED, TEMPLATE, solve, squared_errors, truth_variance, used
 from .moments import Rows, air_moments, drifted, linear_columns, moments, smoothed, with_one
-from .recorded import Floats, Run
+from .run import Run
 from .template import Template
 
 INNER_FOLDS = 5

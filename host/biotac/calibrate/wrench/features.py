@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ...core.geometry import Floats
 from ...core.map_columns import ELECTRODES, SIGNAL_COUNTS, Signals, gates, kinds
 from ...wire import map_gen as _map
 from ...wire import sensor_gen as _sensor
 from ...wire.map_gen import Gate, Kind
-from .recorded import Floats
 
 STRAIGHT = (Gate.ONE, Gate.X, Gate.Y)
 

@@ -3,31 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ...core.geometry import Floats
 from ...core.map_columns import Signals, centroid_mm
 from .crossvalidation import SHIFTS_COUNTS, Validation
 from .features import columns
 from .models import LIN
 from .moments import aligned, with_one
-from .recorded import Floats
 
 ANGLE_MIN_N = 0.5  # a smaller force has a direction only on paper
 THIRDS = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
-
-
-@dataclass(frozen=True)
-class Region:
-    """Rows whose compression's centroid lies in a rectangle, and the length of their error."""
-
-    x_mm: tuple[float, float]
-    y_mm: tuple[float, float]
-    rows: int
-    rmse_n: float
 
 
 def rmse(predicted: Floats, truth: Floats) -> Floats:
@@ -67,27 +56,26 @@ def confusion(predicted: Floats, truth: Floats) -> Floats:
     return found
 
 
-def regions(validation: Validation) -> list[Region]:
-    """Thirds along times thirds across of the run's own contacts, the worst first."""
+def regions(validation: Validation) -> list[dict[str, Any]]:
+    """RMS length of the error by where the compression's centroid lies, ``x_mm`` and ``y_mm``, the worst first.
+
+    Thirds along times thirds across of the run's own contacts; those with hardly a row are left out.
+    """
     run, final = validation.run, validation.final
     centre = centroid_mm(aligned(run, final.lag_rows).e)
     error = ((validation.predicted[0][:, :3] - run.truth[:, :3]) ** 2).sum(axis=1)
     touched = ~run.rest
+    edges = [np.quantile(centre[touched, axis], THIRDS) for axis in (0, 1)]
     result = []
-    x_edges, y_edges = (np.quantile(centre[touched, axis], THIRDS) for axis in (0, 1))
-    for i in range(3):
-        for j in range(3):
-            here = touched & _within(centre[:, 0], x_edges, i) & _within(centre[:, 1], y_edges, j)
-            if here.sum() >= 0.01 * touched.sum():
-                bounds = [(float(e[k]), float(e[k + 1])) for e, k in ((x_edges, i), (y_edges, j))]
-                result.append(Region(bounds[0], bounds[1], int(here.sum()), float(np.sqrt(error[here].mean()))))
-    return sorted(result, key=lambda region: -region.rmse_n)
-
-
-def _within(values: Floats, edges: Floats, k: int) -> npt.NDArray[np.bool_]:
-    low, high = edges[k], edges[k + 1]
-    inside: npt.NDArray[np.bool_] = (values >= low) & ((values <= high) if k == 2 else (values < high))
-    return inside
+    for thirds in product(range(3), repeat=2):
+        here, bounds = touched.copy(), []
+        for values, its, k in zip(centre.T, edges, thirds, strict=False):
+            here &= (values >= its[k]) & ((values <= its[k + 1]) if k == 2 else (values < its[k + 1]))
+            bounds.append((float(its[k]), float(its[k + 1])))
+        if here.sum() >= 0.01 * touched.sum():
+            rmse_n = float(np.sqrt(error[here].mean()))
+            result.append({"x_mm": bounds[0], "y_mm": bounds[1], "rows": int(here.sum()), "rmse_n": rmse_n})
+    return sorted(result, key=lambda region: -region["rmse_n"])
 
 
 def votes(validation: Validation) -> list[dict[str, int]]:
@@ -108,7 +96,6 @@ def summary(validation: Validation) -> dict[str, Any]:
     """All figures as JSON types; forces in N, torques in N mm, axes as in ``axes``."""
     run, truth, predicted = validation.run, validation.run.truth, validation.predicted
     lin = validation.by_model[LIN.name][0]
-    worst = regions(validation)[0]
     of = [rmse(p, truth) for p in predicted]
     result: dict[str, Any] = {
         "file": run.name,
@@ -131,7 +118,7 @@ def summary(validation: Validation) -> dict[str, Any]:
         "models": {name: _list(errors[0]) for name, errors in validation.by_model.items()},
         "models_drifted": {name: _list(errors[1:].max(axis=0)) for name, errors in validation.by_model.items()},
         "confusion": [_list(row) for row in confusion(predicted[0], truth)],
-        "worst_region": {"x_mm": worst.x_mm, "y_mm": worst.y_mm, "rows": worst.rows, "rmse_n": worst.rmse_n},
+        "worst_region": regions(validation)[0],
         "contact_edges": validation.blocks.whole_contacts,
         "contacts": validation.blocks.contacts,
         "notes": list(run.notes),

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ...core.geometry import Floats
 from ...core.map_columns import ELECTRODES, Signals
 from ...errors import InputError
 from . import features
 from .crossvalidation import Validation
 from .figures import model_name
 from .moments import with_one
-from .recorded import Floats
 
 FORMAT = "biotac-wrench-map/2"
 

@@ -11,14 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from ...core.geometry import Floats
 from ...errors import InputError, RecordingError
 from ...wire import messages_gen as wire
 from ...wire import sensor_gen as sensor
 from ...wire.frames import electrode_signals
 from ..reference.samples import Reference
 from ..reference.timing import STEP_S, Alignment, align
-from . import contact, torsion
-from .recorded import MIN_REST_ROWS, REST_N, Floats, Run, check_clipping, check_rails, check_rows, check_units, drift_of
+from . import contact
+from .run import MIN_REST_ROWS, REST_N, Run, check_clipping, check_rails, check_rows, check_units, drift_of
 
 Mask = npt.NDArray[np.bool_]
 
@@ -111,17 +112,21 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
 def _run(
     where: str, board: Board, there: Mask, truth: Floats, reference: Reference, alignment: Alignment, zero: Floats
 ) -> Joined:
-    counts, e, pdc, quiet = board.counts[there], board.e[there], board.pdc[there], board.quiet[there]
+    its = board.only(there)
+    counts, e = its.counts, its.e
     check_rails(where, counts)
     tare = np.median(counts - e, axis=0)
     moved = float(np.abs(counts - e - tare).max())
     check_units(where, e, truth[:, :3])
-    on_skin = _on_skin(where, truth) if truth.shape[1] == 6 else float("nan")
+    on_skin = float("nan")
+    on_skin_note: list[str] = []
     about_torsion: tuple[str, ...] = ()
     if truth.shape[1] == 6:
-        about_normal, about_torsion = torsion.truth(where, None, truth[:, :3], truth[:, 3:])
+        on_skin = _on_skin(where, truth)
+        on_skin_note = [f"{on_skin:.1%} of the rows above {FIRM_N:g} N have their line of action on the skin"]
+        about_normal, about_torsion = contact.torsion_truth(where, None, truth[:, :3], truth[:, 3:])
         truth = np.column_stack([truth, about_normal])
-    resting = counts[quiet]
+    resting = counts[its.quiet]
     whole = len(resting) // IDLE_MEAN_ROWS * IDLE_MEAN_ROWS
     drift, drift_note = drift_of("rest", resting[:whole].reshape(-1, IDLE_MEAN_ROWS, counts.shape[1]).mean(axis=1))
     notes = (
@@ -133,10 +138,7 @@ def _run(
         f"{alignment.width_s * 1e3:.0f} ms wide at half height; "
         f"{alignment.pieces} pieces scatter by {alignment.scatter_s * 1e3:.1f} ms",
         f"{int((~there).sum())} of {len(there)} frames left out, for want of the reference",
-        *(
-            [f"{on_skin:.1%} of the rows above {FIRM_N:g} N have their line of action on the skin"]
-            * (on_skin == on_skin)
-        ),
+        *on_skin_note,
         drift_note,
         *about_torsion,
     )
@@ -146,7 +148,7 @@ def _run(
         counts=e + tare,
         tare=tare,
         truth=truth,
-        pdc=pdc if np.isfinite(pdc).all() else None,
+        pdc=its.pdc if np.isfinite(its.pdc).all() else None,
         drift=drift,
         rest=np.linalg.norm(truth[:, :3], axis=1) < REST_N,
         notes=notes,

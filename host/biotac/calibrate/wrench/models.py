@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import geometry as surface
+from ...core.geometry import Floats
 from . import features
 from .features import Family
-from .recorded import Floats
 
 LAMBDAS: Floats = np.logspace(-6, 1, 8)  # per row, in units of each column's own variance
 # A column that is constant in training has no variance to be measured in: without a floor it is free,

@@ -13,10 +13,11 @@ from collections.abc import Callable, Iterable
 import numpy as np
 import numpy.typing as npt
 
+from ...core.geometry import Floats
 from ...core.map_columns import SIGNAL_COUNTS, Signals
 from . import features
 from .blocks import Blocks
-from .recorded import Floats, Run
+from .run import Run
 
 DRIFT_SIGMA_COUNTS = 100.0  # what a finger drifts by in about two minutes of warm-up (biotac.md finding 6)
 DRIFT_NODES = ((0.0, 2.0 / 3.0), (-np.sqrt(3.0), 1.0 / 6.0), (np.sqrt(3.0), 1.0 / 6.0))

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from ...core.geometry import Floats
 from ...markdown import table
 from . import figures
-from .alignment import MAX_LAG_ROWS
 from .blocks import BLOCKS, GUARD_ROWS
 from .crossvalidation import INNER_FOLDS, SHIFTS_COUNTS, Validation
+from .lag import MAX_LAG_ROWS
 from .models import MODELS, POOLED, POOLED_WORDS, TEMPLATE, TEMPLATE_WORDS
-from .recorded import Floats
 
 AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")
 MAX_DOTS = 4000  # an axis; more only make the picture larger
@@ -133,9 +133,9 @@ def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
     axis = min(range(len(r2)), key=lambda k: np.inf if r2[k] is None else r2[k])
     lines = [
         f"* weakest axis: {validation.run.axes[axis]}" + ("" if r2[axis] is None else f", R2 {r2[axis]:.3f}"),
-        f"* worst region: compression centred at x {worst.x_mm[0]:.1f} to {worst.x_mm[1]:.1f} mm, "
-        f"y {worst.y_mm[0]:.1f} to {worst.y_mm[1]:.1f} mm ({worst.rows} rows): RMS length of the error "
-        f"{worst.rmse_n:.3f} N; best region {best.rmse_n:.3f} N",
+        f"* worst region: compression centred at x {worst['x_mm'][0]:.1f} to {worst['x_mm'][1]:.1f} mm, "
+        f"y {worst['y_mm'][0]:.1f} to {worst['y_mm'][1]:.1f} mm ({worst['rows']} rows): RMS length of the error "
+        f"{worst['rmse_n']:.3f} N; best region {best['rmse_n']:.3f} N",
         f"* times better than Lin's three scales: {gain}",
     ]
     blocks = [validation.blocks.rows(k) for k in range(BLOCKS)]

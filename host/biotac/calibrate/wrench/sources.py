@@ -14,7 +14,7 @@ from ...wire.identity import ascii_text
 from ..reference.samples import Reference
 from .joined import Joined, board_of, choose_finger, join
 from .provenance import Provenance, check_serial, of_files
-from .recorded import Run, load_run
+from .run import Run, load_run
 
 
 @dataclass(frozen=True)
@@ -28,16 +28,12 @@ class Loaded:
 
     def provenance(self, made_s: int) -> Provenance:
         """For the map that is made of it."""
-        if self.reference is None or self.joined is None:
+        its, joined = self.reference, self.joined
+        if its is None or joined is None:
             return of_files(self.run.serial, self.files, "in the same file", made_s=made_s)
-        return of_files(
-            self.run.serial,
-            self.files,
-            " ".join(word for word in (self.reference.name, self.reference.sensor) if word),
-            made_s=made_s,
-            mounting=self.reference.mounting.facts(),
-            alignment=self.joined.alignment.facts(),
-        )
+        words = f"{its.name} {its.sensor}".strip()
+        mounting, alignment = its.mounting.facts(), joined.alignment.facts()
+        return of_files(self.run.serial, self.files, words, made_s=made_s, mounting=mounting, alignment=alignment)
 
     def facts(self) -> dict[str, Any]:
         """What joining found, as JSON types."""

@@ -19,7 +19,7 @@ from ...core.geometry import Floats
 from ...core.map_columns import PRESSURE_COUNTS, Signals, conductance_change
 from ...wire import map_gen as _map
 from .moments import Rows, drifted, smoothed
-from .recorded import Run
+from .run import Run
 
 FOOTPRINT_MM = 2.5  # between a probe's and a flat's
 HOLE = 1.5  # footprints around the contact that do not bulge

@@ -23,7 +23,7 @@ from ...wire.map_gen import HEADER_BYTES
 from . import board
 from .board import Comparison
 from .fitted import WrenchMap
-from .recorded import Run
+from .run import Run
 
 STREAM_S = 0.5
 TRIES = 60  # a simulated board that runs ahead leaves some seconds of frames unread

@@ -6,7 +6,7 @@ import argparse
 import json
 from dataclasses import asdict
 
-from ...calibrate.wrench.contact_error import compare
+from ...calibrate.wrench.contact import compare
 
 NAME = "contact"
 HELP = "How well a wrench says where a finger is touched: closed form against the paper's 0.5 mm mesh."

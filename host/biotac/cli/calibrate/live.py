@@ -6,21 +6,20 @@ import argparse
 import contextlib
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import biotac
 
-from ...calibrate.reference.live import Reader
 from ...calibrate.reference.mounting import Mounting, read_mounting
 from ...calibrate.reference.net_ft import PREFIX, NetFtReader, parse_address
-from ...calibrate.wrench.procedure import Event, Procedure
+from ...calibrate.reference.samples import Reader
+from ...calibrate.wrench.guided import Event, Places, Procedure, walk
 from ...calibrate.wrench.provenance import check_serial
-from ...calibrate.wrench.walk import Places, walk
 from ...errors import BiotacError, InputError
 from ...sim.nano17 import Nano17
 from ...sim.nano17_reader import Nano17Reader
 from ...sim.source import Source
 from ...wire.identity import ascii_text
+from .. import outputs
 from ..progress import Progress
 
 EMULATED = "nano17"
@@ -42,7 +41,7 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
         print(f"biotac: {event.words}", file=sys.stderr)
 
     with _reader(args, hand, finger) as (reader, mounting):
-        make_folder(args.out)
+        outputs.make_folder(args.out)
         procedure = Procedure(finger, mounting)
         try:
             walk(hand, reader, procedure, places, overwrite=args.force, show=show, progress=progress.show)
@@ -61,14 +60,6 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
             f"and {places.reference}"
         )
     return places, procedure.coverage.missing()
-
-
-def make_folder(folder: Path) -> None:
-    """With those above it. Raises InputError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder} is no folder ({error.strerror}); choose another name") from error
 
 
 def open_board(args: argparse.Namespace) -> biotac.Hand:

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import biotac
 
-from ...calibrate.pressure import guided, recorded, report
-from ...calibrate.pressure.plateaus import Phase
-from ...calibrate.pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
-from ...calibrate.pressure.reference import load_csv
+from ...calibrate.pressure import from_recording, guided, report
+from ...calibrate.pressure.force_source import load_csv
+from ...calibrate.pressure.presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Phase, Step
 from ...errors import InputError
 from ...hand.hand import Hand
 from ...keep import calibration_file as file
 from ...wire.sensor_gen import MAX_SENSORS
+from .. import outputs
 from ..recordings.loading import load
 
 NAME = "pressure"
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     reference = load_csv(args.reference) if args.reference is not None else None
     for place in recordings:
-        outcome = recorded.calibrate(
+        outcome = from_recording.calibrate(
             load(Path(place)),
             reference,
             fingers=args.fingers,
@@ -146,24 +146,13 @@ def _place(args: argparse.Namespace, name: str | None, finger: int) -> Path:
 
 
 def _check_out(args: argparse.Namespace, recordings: list[str]) -> None:
-    """Before anybody presses anything, and not after it."""
     names: list[str | None] = [*recordings] or [None]
     places = [_place(args, name, finger) for name in names for finger in args.fingers or range(MAX_SENSORS)]
-    twice = {place for place in places if places.count(place) > 1}
-    if twice:
-        raise InputError(f"{min(twice)} would be written twice; give recordings of the same name a folder each")
-    there = [place for place in places if place.exists()]
-    if there and not args.force:
-        raise InputError(f"{there[0]} exists and would be overwritten; choose another folder or say --force")
-    if args.out.exists() and not args.out.is_dir():
-        raise InputError(f"{args.out} is no folder; choose another name")
+    outputs.check(args.out, places, overwrite=args.force)
 
 
 def _write(args: argparse.Namespace, outcome: report.Outcome, name: str | None) -> list[str]:
-    try:
-        args.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{args.out} is no folder ({error.strerror}); choose another name") from error
+    outputs.make_folder(args.out)
     written = []
     for finger, its in outcome.calibrations.items():
         place = _place(args, name, finger)

@@ -27,6 +27,7 @@ from ...partial_file import whole
 from ...picture import check_drawable
 from ...picture import picture as drawn
 from ...wire.identity import ascii_text
+from .. import outputs
 from ..progress import Progress
 from . import live as calibrate_live
 
@@ -184,16 +185,9 @@ def _places(folder: Path, path: Path) -> tuple[Path, Path, Path]:
 
 
 def _check_out(folder: Path, files: list[Path], *, overwrite: bool) -> None:
-    """Before minutes of work and not after it."""
     check_drawable()
-    places = [place for path in files for place in _places(folder, path)]
-    twice = {place for place in places if places.count(place) > 1}
-    if twice:
-        raise InputError(f"{min(twice)} would be written twice; give files of the same name a folder each")
-    for place in places:
-        if place.exists() and not overwrite:
-            raise InputError(f"{place} exists and would be overwritten; choose another folder or say --force")
-    calibrate_live.make_folder(folder)
+    outputs.check(folder, [place for path in files for place in _places(folder, path)], overwrite=overwrite)
+    outputs.make_folder(folder)
 
 
 def _write(

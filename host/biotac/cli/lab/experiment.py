@@ -14,6 +14,7 @@ from ...lab.experiments.outcome import Experiment, Facts, Options, markdown, ver
 from ...partial_file import whole
 from ...picture import check_drawable
 from ...picture import picture as drawn
+from .. import outputs
 from ..progress import Progress
 
 EXAMPLE = "biotac experiment poke --out poked --check"
@@ -82,14 +83,9 @@ def _check_arguments(args: argparse.Namespace, experiment: Experiment) -> None:
         raise InputError(f"--seed is {args.seed}: expected 0 to {SEED_MAX}")
     if args.map and not experiment.MAPS:
         raise InputError(f"{args.name} has no use for a wrench map: leave --map out")
-    if args.out is None:
-        return
-    check_drawable()
-    for place in _places(args.out, args.name):
-        if place.exists() and not args.force:
-            raise InputError(f"{place} exists and would be overwritten; choose another folder or say --force")
-    if args.out.exists() and not args.out.is_dir():
-        raise InputError(f"{args.out} is no folder; choose another name")
+    if args.out is not None:
+        check_drawable()
+        outputs.check(args.out, _places(args.out, args.name), overwrite=args.force)
 
 
 def _places(folder: Path, name: str) -> tuple[Path, Path, Path]:
@@ -99,10 +95,7 @@ def _places(folder: Path, name: str) -> tuple[Path, Path, Path]:
 def _write(
     args: argparse.Namespace, experiment: Experiment, result: Any, facts: Facts, page: list[str]
 ) -> tuple[Path, ...]:
-    try:
-        args.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{args.out} is no folder ({error.strerror}); choose another name") from error
+    outputs.make_folder(args.out)
     places = _places(args.out, args.name)
     with contextlib.ExitStack() as stack:
         text, picture, figures = (stack.enter_context(whole(place, overwrite=args.force)) for place in places)

@@ -17,24 +17,24 @@ from typing import Any
 
 import numpy as np
 
-from ...calibrate.pressure import driving, formulas
+from ...calibrate.pressure import formulas, guided
 from ...calibrate.pressure.fit import Fit, Verification, fit, told_by, verify
-from ...calibrate.pressure.plateaus import Press
-from ...calibrate.pressure.procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure
-from ...calibrate.pressure.reference import Truth
+from ...calibrate.pressure.force_source import Truth
+from ...calibrate.pressure.presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Press, Procedure
 from ...calibrate.pressure.report import PAPER_ERROR
 from ...calibrate.pressure.rows import rows_of
 from ...hand.hand import Hand
 from ...hand.opening import shake_hands
 from ...markdown import table
 from ...sim.physics import Profile
+from ...sim.play import play
 from ...sim.ports import start_board
 from ...sim.process import SimLink
+from ...sim.scenario import parse_scenario
 from ...sim.source import Source
 from ...wire import messages_gen as wire
 from ...wire.batches import Batch
 from ..crosscheck import CrossCheck
-from . import navarro_script as script
 from .outcome import Facts, Options, check, claim, number, numbers, text
 
 RECORDING = ""
@@ -46,6 +46,8 @@ PAPER_REST_COUNTS = (85.0, 86.0, 106.0, 57.0, 70.0)
 FINGERS = tuple(range(len(NAMES)))
 PLACE = "E17"
 PLACES = ("E7", "E10", "E17", "E18", "E16")  # from the tip backwards
+RAMP_S, HOLD_S, REST_S = 0.4, 1.4, 1.5
+PRESS_S = 2 * RAMP_S + HOLD_S + REST_S
 Show = Callable[[str], None]
 
 
@@ -65,21 +67,11 @@ class Hands:
 
 
 @dataclass(frozen=True)
-class Places:
-    """One finger calibrated at each of ``names``; ``errors`` (n, n): K of the row's place, at the column's."""
-
-    names: tuple[str, ...]
-    x_mm: tuple[float, ...]
-    gains_n: tuple[float, ...]
-    errors: Any
-
-
-@dataclass(frozen=True)
 class Result:
-    """Hands of each profile, and what the place of a press does."""
+    """Hands of each profile, and what the place of a press does, see places()."""
 
     hands: tuple[Hands, ...]
-    places: Places
+    places: Facts
 
 
 def run(options: Options) -> Result:
@@ -106,14 +98,15 @@ def calibrate(
     """
     seeds = tuple(seed + k for k in range(len(fingers)))
     forces = CALIBRATION_FORCES_N, VERIFICATION_FORCES_N
-    series = [script.presses(fingers, its, [PLACE] * len(its)) for its in forces]
-    source = script.source("navarro", seeds, profile, [*series[0], *series[1]])
-    verify_s = script.seconds(series[0])  # a rest before the first of these presses: the one before it all, REST_S
+    series = [presses(fingers, its, [PLACE] * len(its)) for its in forces]
+    source = emulated_hand("navarro", seeds, profile, [*series[0], *series[1]])
+    # what is before the second series: as long as the first, and the rest before it all that its first press needs
+    verify_s = len(fingers) * len(CALIBRATION_FORCES_N) * PRESS_S
 
     first = Procedure(fingers, CALIBRATION_FORCES_N)
     show(f"{profile}: three presses a finger")
     with _open(source, board) as hand:
-        driving.drive(hand, first, Truth(source))
+        guided.drive(hand, first, Truth(source))
     fits = {f: fit(first.rests[f], presses) for f, presses in first.presses.items()}
 
     second = Procedure(fingers, VERIFICATION_FORCES_N)
@@ -121,7 +114,7 @@ def calibrate(
     show(f"{profile}: a verification press a finger")
     with _open(source, board) as hand:
         for its in fits.values():
-            driving.put(hand, its.finger, driving.with_gain(hand, its, int(time.time())))
+            guided.put(hand, its.finger, guided.with_gain(hand, its, int(time.time())))
         settings, own = hand.settings(), hand.finger_settings()
         for batch in hand.batches():
             outcome.add(batch.wire, settings, own)
@@ -143,41 +136,73 @@ def calibrate(
     )
 
 
-def places(seed: int) -> Places:
-    """K of one finger at each of PLACES, and what it is worth at the others, by the board's own code."""
+def places(seed: int) -> Facts:
+    """One finger calibrated at each of PLACES, by the board's own code.
+
+    ``gain_n`` in mN per count; ``errors`` in %: K of the row's place, at the column's.
+    """
+    each = len(CALIBRATION_FORCES_N)
     forces = CALIBRATION_FORCES_N * len(PLACES)
-    at = [place for place in PLACES for _ in CALIBRATION_FORCES_N]
-    source = script.source("places", [seed], "new", script.presses([0], forces, at))
+    source = emulated_hand("places", [seed], "new", presses([0], forces, np.repeat(PLACES, each).tolist()))
     procedure = Procedure([0], forces)
     with _open(source, "posix") as hand:
-        driving.drive(hand, procedure, Truth(source))
-    each = len(CALIBRATION_FORCES_N)
+        guided.drive(hand, procedure, Truth(source))
     groups = [procedure.presses[0][k : k + each] for k in range(0, len(forces), each)]
     fits = [fit(procedure.rests[0], group) for group in groups]
-    errors = np.array([[_error(its, group) for group in groups] for its in fits])
     assert source.truth is not None
-    touched = source.truth.contact[:, 0]
-    x_mm = [_x_mm(source, touched, group[0]) for group in groups]
-    return Places(PLACES, tuple(x_mm), tuple(its.gain_n for its in fits), errors)
+    frames = [round(float(group[0].rows["t_us"].mean()) * 1e-6 * 100) for group in groups]
+    return {
+        "names": list(PLACES),
+        "x_mm": numbers(source.truth.poc_mm[frames, 0, 0]),
+        "gain_n": numbers([its.gain_n * 1e3 for its in fits]),
+        "errors": [numbers([_error_percent(its.gain_nn, group) for group in groups]) for its in fits],
+    }
 
 
-def _rest_off(its: Fit, presses: Sequence[Press]) -> float:
-    return max(float(np.abs(press.rows["rest"] - its.rest.counts).max()) for press in presses)
+def _error_percent(gain_nn: int, group: Sequence[Press]) -> float:
+    rows = np.concatenate([told_by(press, gain_nn).rows for press in group])
+    return 100 * formulas.relative_error(rows["told_n"], rows["force_n"])
 
 
 def _open(source: Source, board: str) -> Hand:
     return shake_hands(SimLink(f"{board}:{source.name}", start_board(board, source, pace=0.0)))
 
 
-def _error(its: Fit, group: Sequence[Press]) -> float:
-    rows = np.concatenate([told_by(press, its.gain_nn).rows for press in group])
-    return formulas.relative_error(rows["told_n"], rows["force_n"])
+# ---- what the emulated hand does ----------------------------------------------------------------
 
 
-def _x_mm(source: Source, touched: Any, press: Press) -> float:
-    assert source.truth is not None
-    frame = round(float(press.rows["t_us"].mean()) * 1e-6 * 100)
-    return float(source.truth.poc_mm[min(frame, len(touched) - 1), 0, 0])
+def presses(fingers: Sequence[int], forces_n: Sequence[float], at: Sequence[str]) -> list[str]:
+    """Scenario steps in which each of ``fingers`` presses with each force, at the electrode ``at`` the same place."""
+    return [
+        _step(finger, do, for_s, more)
+        for finger in fingers
+        for force_n, place in zip(forces_n, at, strict=True)
+        for do, for_s, more in (
+            ("press", RAMP_S, f'at = "{place}"\nforce_n = {force_n:g}\n'),
+            ("hold", HOLD_S, ""),
+            ("press", RAMP_S, "force_n = 0.0\n"),
+            ("rest", REST_S, ""),
+        )
+    ]
+
+
+def _step(finger: int, do: str, for_s: float, more: str) -> str:
+    return f'[[step]]\ndo = "{do}"\nfingers = [{finger}]\nseconds = {for_s:g}\n{more}'
+
+
+def scenario(name: str, seeds: Sequence[int], profile: Profile, steps: Sequence[str]) -> str:
+    """The text of a scenario: a finger for every seed, at rest at first."""
+    sensors = [f'[[finger]]\nseed = {seed}\nprofile = "{profile}"\n' for seed in seeds]
+    return "\n".join([f'name = "{name}"\n', *sensors, f'[[step]]\ndo = "rest"\nseconds = {REST_S:g}\n', *steps])
+
+
+def emulated_hand(name: str, seeds: Sequence[int], profile: Profile, steps: Sequence[str]) -> Source:
+    """That scenario, played."""
+    return play(parse_scenario(scenario(name, seeds, profile, steps).encode(), file=f"{name}.toml"))
+
+
+def _rest_off(its: Fit, presses: Sequence[Press]) -> float:
+    return max(float(np.abs(press.rows["rest"] - its.rest.counts).max()) for press in presses)
 
 
 def _apart(batch: Batch, fits: dict[int, Fit]) -> int:
@@ -236,12 +261,7 @@ def facts(result: Result) -> Facts:
             "rest_counts": list(PAPER_REST_COUNTS),
             "error": PAPER_ERROR * 100,
         },
-        "places": {
-            "names": list(result.places.names),
-            "x_mm": numbers(result.places.x_mm),
-            "gain_n": numbers([gain * 1e3 for gain in result.places.gains_n]),
-            "errors": [numbers(row * 100) for row in result.places.errors],
-        },
+        "places": result.places,
         "checks": checks,
         "notes": [
             f"presses of {', '.join(f'{f:g}' for f in CALIBRATION_FORCES_N)} N, then "

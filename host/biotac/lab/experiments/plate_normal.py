@@ -18,12 +18,12 @@ from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...errors import RecordingError
 from ...markdown import table
-from ...sim.physics import Profile
+from ...sim.physics import PROFILES, Profile
 from ...sim.timeline import Pose
 from ...wire import messages_gen as wire
-from . import recorded
+from . import laboratory
 from .outcome import Facts, Options, check, number, text
-from .poke import SHIPPED, WEIGHTS, WORDS
+from .poke import COLORS, SHIPPED, WEIGHTS, WORDS, words
 from .trial import Bools, Script, Trial, play
 from .weight import FLAT_MM
 
@@ -95,7 +95,7 @@ def emulated(seed: int, profile: Profile) -> Trial:
 def run(options: Options) -> Result:
     """On an emulated finger, new and worn; or on a recording."""
     if options.recording is not None:
-        theirs = recorded.load(options.recording, options.finger, needs=("PDC", "z_dir"))
+        theirs = laboratory.load(options.recording, options.finger, needs=("PDC", "z_dir"))
         assert theirs.plate_normal is not None
         cases = [_case("recorded", weights, theirs.trial, theirs.plate_normal) for weights in WEIGHTS]
         for case in cases:
@@ -106,8 +106,7 @@ def run(options: Options) -> Result:
                 )
         return Result(str(options.recording), cases, list(theirs.notes), True)
     cases = []
-    profiles: tuple[Profile, ...] = ("new", "worn")
-    for profile in profiles:
+    for profile in PROFILES:
         options.show(f"a plate on the {profile} sensor")
         trial = emulated(options.seed, profile)
         assert trial.at_mm is not None
@@ -129,8 +128,7 @@ def facts(result: Result) -> Facts:
     """All figures; angles in degrees."""
     shipped = next(case for case in result.cases if case.weights == SHIPPED)
     angles = shipped.over(CONTACT_COUNTS)
-    limits = ((f"{name}, default weights", q, limit) for name, q, limit in
-              (("median", 50, LIMIT_MEDIAN_DEG), ("90th percentile", 90, LIMIT_P90_DEG)))  # fmt: skip
+    limits = (("median", 50, LIMIT_MEDIAN_DEG), ("90th percentile", 90, LIMIT_P90_DEG))
     return {
         "experiment": "plate-normal",
         "source": result.source,
@@ -139,7 +137,7 @@ def facts(result: Result) -> Facts:
         "cases": [_case_facts(case) for case in result.cases],
         "known_deg": {weights.name: list(both) for weights, both in KNOWN_DEG.items()} if result.is_recorded else {},
         "checks": [
-            check(f"{what}, {shipped.profile}", float(np.percentile(angles, q)), limit, "deg")
+            check(f"{what}, default weights, {shipped.profile}", float(np.percentile(angles, q)), limit, "deg")
             for what, q, limit in limits
         ],
         "notes": result.notes,
@@ -166,16 +164,16 @@ def page(facts: Facts) -> list[str]:
     """The angles at the threshold that counts, then at the others."""
     rows, others = [], []
     for case in facts["cases"]:
-        words = case["words"] + (" (default)" if case["weights"] == facts["shipped"] else "")
+        which = [case["profile"], words(case, facts)]
         for its in case["by_threshold"]:
             if its["counts"] == facts["contact_counts"]:
-                rows.append([case["profile"], words, str(its["frames"]),
-                             *[text(its[name], 2) for name in ("median_deg", "mean_deg", "p90_deg")]])  # fmt: skip
+                angles = [text(its[name], 2) for name in ("median_deg", "mean_deg", "p90_deg")]
+                rows.append([*which, str(its["frames"]), *angles])
         both = [f"{text(its['median_deg'], 1)} / {text(its['p90_deg'], 1)}" for its in case["by_threshold"]]
-        others.append([case["profile"], words, *both])
+        others.append([*which, *both])
     for name, (median, p90) in facts["known_deg"].items():
-        words = WORDS[wire.PocWeights[name]]
-        rows.append(["trial_15330 in float64, own tare", words, "-", text(median, 1), "-", text(p90, 1)])
+        weights = WORDS[wire.PocWeights[name]]
+        rows.append(["trial_15330 in float64, own tare", weights, "-", text(median, 1), "-", text(p90, 1)])
     return [
         "Angle between the normal at the board's point of contact and the plate's, degrees, over every frame in "
         f"contact with PDC more than {facts['contact_counts']:g} counts above rest. Frames without a point count as "
@@ -193,13 +191,12 @@ def draw(result: Result, figure: Any) -> None:
     figure.set_size_inches(13, 5.4)
     axes = figure.subplots(1, 2)
     figure.suptitle(f"Normal at the point of contact against a flat plate's: {result.source}")
-    colors = {SHIPPED: "#1d4ed8", wire.PocWeights.ABS_N2: "#c2410c", wire.PocWeights.COMPRESS_N2: "#15803d"}
     styles = dict(zip(dict.fromkeys(case.profile for case in result.cases), ("-", "--"), strict=False))
     for case in result.cases:
         angles = np.sort(case.over(CONTACT_COUNTS))
         label = f"{case.profile}: {WORDS[case.weights]}: {np.median(angles):.1f} / {np.percentile(angles, 90):.1f} deg"
         axes[0].plot(angles, (np.arange(len(angles)) + 0.5) / len(angles), styles[case.profile],
-                     color=colors[case.weights], label=label)  # fmt: skip
+                     color=COLORS[case.weights], label=label)  # fmt: skip
     for share, limit in ((0.5, LIMIT_MEDIAN_DEG), (0.9, LIMIT_P90_DEG)):
         axes[0].plot(limit, share, "k>", markersize=8, label=f"asked: {share:.0%} within {limit} deg")
     axes[0].set(xlabel="angle [deg]", ylabel="share of frames within it", xlim=(0, 60), ylim=(0, 1))
@@ -207,7 +204,7 @@ def draw(result: Result, figure: Any) -> None:
     axes[0].legend(fontsize=8, loc="lower right")
     for case in result.cases:
         if case.weights in (SHIPPED, wire.PocWeights.ABS_N2) and case.profile == result.cases[0].profile:
-            _draw_pressure(axes[1], case, colors[case.weights])
+            _draw_pressure(axes[1], case, COLORS[case.weights])
     axes[1].axvline(CONTACT_COUNTS, color="#111111", linewidth=1, linestyle=":")
     axes[1].set(xlabel="PDC above rest [counts]", ylabel="angle [deg]", xscale="log", xlim=(5, None), ylim=(0, 90))
     axes[1].set_title(f"{result.cases[0].profile}, frames in contact", fontsize=10)

@@ -22,11 +22,11 @@ from ...core.geometry import Floats
 from ...core.unroll import unroll
 from ...errors import RecordingError
 from ...markdown import table
-from ...sim.physics import Profile
+from ...sim.physics import PROFILES, Profile
 from ...sim.timeline import Pose
 from ...wire import messages_gen as wire
 from ...wire import sensor_gen as _sensor
-from . import recorded
+from . import laboratory
 from .outcome import Facts, Options, check, number, numbers, text
 from .trial import Bools, Script, Trial, play
 
@@ -48,6 +48,7 @@ WORDS = {
     wire.PocWeights.COMPRESS_N1: "compression, n = 1",
     wire.PocWeights.COMPRESS_N2: "compression, n = 2",
 }
+COLORS = {SHIPPED: "#1d4ed8", wire.PocWeights.ABS_N2: "#c2410c", wire.PocWeights.COMPRESS_N2: "#15803d"}
 # Table 2, mm: BioTac trials 1 and 2, Nano17 trials 1 and 2
 PAPER_MM = (
     (0.0388, 0.2452, 0.1118, 0.0208, 0.3911, 0.0695, 0.0690, 0.0681, 0.1527, 0.5356, 0.0076, 0.1088, 0.6269, 0.0122,
@@ -152,15 +153,14 @@ def contacts(trial: Trial, low_n: float = FLOOR_N, high_n: float = np.inf) -> li
 def run(options: Options) -> Result:
     """On an emulated finger, new and worn, twice each; or on a recording."""
     if options.recording is not None:
-        theirs = recorded.load(options.recording, options.finger, needs=("F",), own_force=True)
+        theirs = laboratory.load(options.recording, options.finger, needs=("F",), own_force=True)
         firm = contacts(theirs.trial)
         banded = [contacts(theirs.trial, *band) for band in BANDS_N]
         cases = [_case("recorded", weights, [theirs.trial], theirs.trial, [firm], banded) for weights in WEIGHTS]
         return Result(str(options.recording), cases, {}, [*theirs.notes], True)
     cases = []
     plate: dict[str, Spread] = {}
-    profiles: tuple[Profile, ...] = ("new", "worn")
-    for profile in profiles:
+    for profile in PROFILES:
         options.show(f"poking the {profile} sensor")
         trials = [emulated(options.seed, profile, take=take) for take in (0, 1)]
         slow = emulated(options.seed, profile, take=2, slow=True)
@@ -216,6 +216,7 @@ def facts(result: Result) -> Facts:
     """All figures; lengths in mm."""
     shipped = next(case for case in result.cases if case.weights == SHIPPED)
     which = "recorded" if result.is_recorded else f"{shipped.profile} sensor"
+    what = f"mean standard deviation above {FLOOR_N:g} N, {which}"
     return {
         "experiment": "poke",
         "source": result.source,
@@ -230,13 +231,8 @@ def facts(result: Result) -> Facts:
             for name, its in result.plate.items()
         },
         "checks": [
-            check(
-                f"mean standard deviation above {FLOOR_N:g} N, {which}, trial {k + 1}",
-                _mean(trial.std_mm),
-                LIMIT_MM,
-                "mm",
-            )
-            for k, trial in enumerate(shipped.trials)
+            check(f"{what}, trial {k}", _mean(trial.std_mm), LIMIT_MM, "mm")
+            for k, trial in enumerate(shipped.trials, start=1)
         ],
         "notes": result.notes,
     }
@@ -265,7 +261,7 @@ def page(facts: Facts) -> list[str]:
     for case in facts["cases"]:
         for k, mean in enumerate(case["mean_std_mm"]):
             found = [mean, case["mean_axis_std_mm"][k], case["mean_bias_mm"][k]]
-            rows.append([case["profile"], _words(case, facts), str(k + 1), *[text(value) for value in found]])
+            rows.append([case["profile"], words(case, facts), str(k + 1), *[text(value) for value in found]])
     rows += [
         ["force plate", name, "1", text(its["mean_std_mm"]), "", text(its["mean_bias_mm"])]
         for name, its in facts["plate"].items()
@@ -286,7 +282,7 @@ def page(facts: Facts) -> list[str]:
     rows = []
     for case in facts["cases"]:
         both = zip(case["band_std_mm"], case["band_bias_mm"], strict=True)
-        rows.append([case["profile"], _words(case, facts), *[f"{text(std)} ({text(bias)})" for std, bias in both]])
+        rows.append([case["profile"], words(case, facts), *[f"{text(std)} ({text(bias)})" for std, bias in both]])
     lines += table(["sensor", "weights", *bands], rows)
     shipped = [case for case in facts["cases"] if case["weights"] == facts["shipped"]]
     head = ["electrode", *[f"{case['profile']} {k + 1}" for case in shipped for k in range(len(case["std_mm"]))]]
@@ -298,7 +294,8 @@ def page(facts: Facts) -> list[str]:
     return [*lines, "## Table 2, with the board's default weights", "", "mm.", "", *table(head, rows)]
 
 
-def _words(case: Facts, facts: Facts) -> str:
+def words(case: Facts, facts: Facts) -> str:
+    """The weights in words."""
     return str(case["words"]) + (" (default)" if case["weights"] == facts["shipped"] else "")
 
 
@@ -331,10 +328,9 @@ def _draw_points(axes: Any, case: Case) -> None:
 
 def _draw_bands(axes: Any, result: Result) -> None:
     styles = dict(zip(dict.fromkeys(case.profile for case in result.cases), ("-", "--"), strict=False))
-    colors = {SHIPPED: "#1d4ed8", wire.PocWeights.ABS_N2: "#c2410c", wire.PocWeights.COMPRESS_N2: "#15803d"}
     for case in result.cases:
         axes.plot(range(len(BANDS_N)), [_mean(band.std_mm) for band in case.bands], styles[case.profile], marker="o",
-                  markersize=4, color=colors[case.weights], label=f"{case.profile}: {WORDS[case.weights]}")  # fmt: skip
+                  markersize=4, color=COLORS[case.weights], label=f"{case.profile}: {WORDS[case.weights]}")  # fmt: skip
     axes.axhline(LIMIT_MM, color="#111111", linewidth=1, linestyle=":")
     axes.annotate(f"{LIMIT_MM} mm", (0, LIMIT_MM), xycoords=("axes fraction", "data"), xytext=(3, 3),
                   textcoords="offset points", fontsize=8)  # fmt: skip

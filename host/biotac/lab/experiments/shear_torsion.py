@@ -19,7 +19,7 @@ from ...calibrate.wrench.blocks import BLOCKS
 from ...calibrate.wrench.crossvalidation import Validation, validate
 from ...calibrate.wrench.models import lin_directions
 from ...calibrate.wrench.moments import with_one
-from ...calibrate.wrench.recorded import load_run
+from ...calibrate.wrench.run import load_run
 from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...core.map_columns import Signals

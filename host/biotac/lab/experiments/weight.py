@@ -18,7 +18,7 @@ from ...markdown import table
 from ...sim.physics import Profile
 from ...sim.timeline import Pose
 from ...wire import sensor_gen as _sensor
-from . import recorded
+from . import laboratory
 from .estimates import PAPER, Estimate, by_map, by_paper, load_maps, paper_scales, rmse
 from .outcome import Facts, Options, number, numbers, text
 from .trial import Bools, Script, Trial, play
@@ -90,7 +90,7 @@ def run(
 
 def _of_recording(options: Options, *, torque: bool) -> Result:
     assert options.recording is not None
-    theirs = recorded.load(options.recording, options.finger, needs=("F", "M") if torque else ("F",))
+    theirs = laboratory.load(options.recording, options.finger, needs=("F", "M") if torque else ("F",))
     assert theirs.trial.force_n is not None
     if not np.isfinite(theirs.trial.tare).any():
         raise RecordingError(

@@ -12,14 +12,13 @@ from ...errors import InputError
 from ...hand.commands import PRESSURE_SINCE_MINOR
 from ...keep import Calibration
 from ...recording import Recording
-from ...version import __version__
 from ...wire import messages_gen as wire
 from ...wire.frames import StructArray
 from ...wire.identity import ascii_text
 from . import report
 from .fit import MIN_PRESSES, fit, told_by, verify
-from .procedure import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure
-from .reference import Series, Unknown, check_alignment
+from .force_source import Series, Unknown, check_alignment
+from .presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure
 from .report import Outcome
 from .rows import rows_of, with_filter
 
@@ -76,14 +75,12 @@ def calibrate(
         outcome.calibrations[finger] = replace(
             own, pressure_gain_nn=its.gain_nn, serial=_serial(recording, finger), made_s=made_s
         )
-        outcome.provenance[finger] = {
-            "software": f"biotac-gateway {__version__}",
-            "method": "pressure, Navarro 2015",
+        source = {
             "from": recording.path.name,
             "sha256": hashlib.sha256(recording.path.read_bytes()).hexdigest(),
             "reference": reference.name if reference is not None else "typed",
-            **report.facts_of(its),
         }
+        outcome.provenance[finger] = report.provenance(its, **source)
     return outcome
 
 

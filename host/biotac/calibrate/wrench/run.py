@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...core.geometry import Floats
 from ...errors import RecordingError
 from ...recording.npz_file import counts_field, read_npz, to_lin_frame
 from ...wire import sensor_gen as _sensor
-from . import torsion
+from . import contact
 from .blocks import BLOCKS, GUARD_ROWS, contacts
-
-Floats = npt.NDArray[np.float64]
 
 MIN_ROWS = BLOCKS * 2 * GUARD_ROWS  # a block shorter than its two guards would be all guard
 REST_N = 0.1  # a plate's reading below this is taken for "nothing touches"
@@ -89,16 +88,16 @@ def load_run(path: Path) -> Run:
         raise RecordingError(
             f"{path}: holds {seen}: expected E (n, 19) counts and F (n, 3) N; save {' and '.join(missing)} too"
         )
-    counts = _counts(path, "E", fields["E"], None)
+    counts = _counts(path, "E", fields)
     rows = len(counts)
     check_rows(path, rows)
-    force = _truth(path, "F", "N", fields["F"], rows)
+    force = to_lin_frame(numbers(path, "F", fields["F"], (rows, 3), "N"))
     check_clipping(path, "F", force)
     truth = force
     about_torsion: tuple[str, ...] = ()
     if "M" in fields:
-        moment = _truth(path, "M", "N mm", fields["M"], rows)
-        about_normal, about_torsion = torsion.truth(path, fields.get("torsion"), force, moment)
+        moment = to_lin_frame(numbers(path, "M", fields["M"], (rows, 3), "N mm"))
+        about_normal, about_torsion = contact.torsion_truth(path, fields.get("torsion"), force, moment)
         truth = np.column_stack([force, moment, about_normal])
     check_rails(path, counts)
     rest: npt.NDArray[np.bool_] = np.linalg.norm(force, axis=1) < REST_N
@@ -114,7 +113,7 @@ def load_run(path: Path) -> Run:
         pdc = raw - (np.median(raw[rest]) if rest.sum() >= MIN_REST_ROWS else np.percentile(raw, 1))
     drift, note = np.ones(len(_sensor.ELECTRODE_NAMES)), "drift: no E_idle, all electrodes taken to drift alike"
     if "E_idle" in fields:
-        drift, note = drift_of("E_idle", _counts(path, "E_idle", fields["E_idle"], None))
+        drift, note = drift_of("E_idle", _counts(path, "E_idle", fields))
     return Run(
         path.name,
         counts,
@@ -125,27 +124,28 @@ def load_run(path: Path) -> Run:
         rest,
         (*notes, note, *about_torsion),
         serial=_serial(path, fields),
-        air=_counts(path, "E_base", fields["E_base"], None) if "E_base" in fields else None,
+        air=_counts(path, "E_base", fields) if "E_base" in fields else None,
         contact=contacts(path, fields["contact"], rows) if "contact" in fields else None,
     )
 
 
-def _counts(path: Path, name: str, array: npt.NDArray[Any], rows: int | None) -> Floats:
-    return counts_field(path, name, array, rows, len(_sensor.ELECTRODE_NAMES)).astype(np.float64)
+def _counts(path: Path, name: str, fields: dict[str, npt.NDArray[Any]]) -> Floats:
+    return counts_field(path, name, fields[name], None, len(_sensor.ELECTRODE_NAMES)).astype(np.float64)
 
 
-def _truth(path: Path, name: str, unit: str, array: npt.NDArray[Any], rows: int) -> Floats:
-    if array.shape != (rows, 3) or array.dtype.kind not in "iuf":
+def numbers(path: Path, name: str, array: npt.NDArray[Any], shape: tuple[int, ...], unit: str) -> Floats:
+    """Field ``name``, of ``shape`` and finite throughout. Raises RecordingError."""
+    if array.shape != shape or array.dtype.kind not in "iuf":
         raise RecordingError(
-            f"{path}: field {name} is {array.dtype} {array.shape}: expected ({rows}, 3) in {unit}, a row a frame"
+            f"{path}: field {name} is {array.dtype} {array.shape}: expected {shape} in {unit}, a row a frame"
         )
-    bad = ~np.isfinite(array).all(axis=1)
+    bad = ~np.isfinite(array.reshape(len(array), -1)).all(axis=1)
     if bad.any():
         raise RecordingError(
-            f"{path}: field {name} is not finite in {bad.sum()} of {rows} rows, first in row {int(np.argmax(bad))}: "
-            f"expected numbers in {unit}; leave those rows out of all fields"
+            f"{path}: field {name} is not finite in row {int(np.argmax(bad))}, and in {bad.sum()} of {len(bad)} rows: "
+            f"expected {unit} in every row; leave those rows out of all fields"
         )
-    return to_lin_frame(array)
+    return array.astype(np.float64)
 
 
 def check_rows(where: object, rows: int) -> None:
@@ -193,7 +193,7 @@ def _tare(
 ) -> tuple[Floats, tuple[str, ...]]:
     """Counts at rest, from E_base or from the run's own rows without force."""
     if "E_base" in fields:
-        base = _counts(path, "E_base", fields["E_base"], None)
+        base = _counts(path, "E_base", fields)
         low, median, high = np.percentile(base, (10, 50, 90), axis=0)
         worst = int(np.argmax(high - low))
         if high[worst] - low[worst] > MAX_REST_SWING_COUNTS:

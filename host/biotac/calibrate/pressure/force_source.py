@@ -5,7 +5,6 @@ A force plate's own driver is not here; whatever gives newtons with device times
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Protocol
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...link.base import Played
 from ...wire.slots import FRAME_HZ
+from ..reference.csv_file import open_table
 from . import formulas
 from .formulas import Floats
 
@@ -129,12 +129,7 @@ def load_csv(path: Path) -> Series:
 
     Raises InputError naming what is wrong with it.
     """
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read ({error}); expected CSV with t_s and force_n") from error
-    head = [name.strip() for name in rows[0]] if rows else []
+    _, head, read = open_table(path)
     axes = ["force_n"] if "force_n" in head else ["fx_n", "fy_n", "fz_n"]
     missing = [name for name in ("t_s", *axes) if name not in head]
     if missing:
@@ -142,9 +137,5 @@ def load_csv(path: Path) -> Series:
             f"{path} has columns {', '.join(head) or 'none'}; expected t_s and force_n, or t_s, fx_n, fy_n and fz_n, "
             "in seconds and newtons"
         )
-    try:
-        values = np.array([[float(row[head.index(name)]) for name in ("t_s", *axes)] for row in rows[1:] if row])
-    except (ValueError, IndexError) as error:
-        raise InputError(f"{path} has a row that is no numbers ({error}); expected one in each column") from error
-    values = values.reshape(-1, 1 + len(axes))
+    values = read([head.index(name) for name in ("t_s", *axes)])
     return Series(str(path), values[:, 0], formulas.magnitude(values[:, 1:]))

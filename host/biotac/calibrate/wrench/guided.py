@@ -1,28 +1,32 @@
-"""A calibration walked through: warm up, tare, load everywhere, done.
+"""A calibration walked through on a board: warm up, tare, load everywhere, done.
 
-Fed with a board's frames and a reference's samples, each by its own clock; it keeps no time of its own, prints
-nothing and asks nobody. What somebody has to do or might like to know comes out as Events.
+The procedure is fed with a board's frames and a reference's samples, each by its own clock; it keeps no time of its
+own, prints nothing and asks nobody. What somebody has to do or might like to know comes out as Events. walk() reads
+both and records them: the files are complete up to the last second, so whatever ends it, they can be fitted later.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from ...errors import InputError
+from ...core.geometry import Floats
+from ...errors import CommandRefusedError, InputError
+from ...hand.hand import Hand
 from ...wire import messages_gen as wire
+from ..reference.csv_file import CsvWriter
 from ..reference.mounting import Mounting
-from ..reference.samples import Samples, join
+from ..reference.samples import Reader, Samples, join
 from .coverage import Coverage
-from .recorded import Floats
 
 Frames = npt.NDArray[np.void]
 
-SETTLE_FRAMES = 30  # after a touch or an invalid word
 MEAN_FRAMES = 50  # drift is slow: means of half a second have it without the noise
 TARE_FRAMES = 200
 TARE_SAMPLES_S = 1.0
@@ -217,3 +221,74 @@ class Procedure:
 
     def _tell(self, words: str) -> None:
         self.events.append(Event(self.step, words))
+
+
+Show = Callable[[Event], None]
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the board's recording (.mcap) and the reference (.csv) go."""
+
+    recording: Path
+    reference: Path
+
+
+def walk(
+    hand: Hand,
+    reader: Reader,
+    procedure: Procedure,
+    places: Places,
+    *,
+    overwrite: bool = False,
+    show: Show = lambda event: None,
+    progress: Callable[[str], None] = lambda text: None,
+) -> None:
+    """Until the procedure is done, the board's source ends, or a KeyboardInterrupt, which ends the procedure too.
+
+    The board streams no more afterwards. Raises InputError when a file exists or cannot be written, DeviceLostError
+    when the board or the reference goes away; what was recorded until then is kept.
+    """
+    writer = CsvWriter(places.reference, procedure.mounting, reader.sensor, overwrite=overwrite)
+    try:
+        recorder = hand.record(places.recording, overwrite=overwrite)
+        try:
+            _loop(hand, reader, procedure, writer, show, progress)
+            if procedure.step is not Step.DONE:
+                procedure.finish("the simulated finger's script is over")
+        except KeyboardInterrupt:
+            procedure.finish("ended on your word")
+        finally:
+            recorder.close()
+    finally:
+        writer.close()
+    for event in procedure.take_events():
+        show(event)
+    # also a board whose source has ended: it streams nothing, and still calls itself busy
+    hand.stop()
+
+
+def _loop(
+    hand: Hand, reader: Reader, procedure: Procedure, writer: CsvWriter, show: Show, progress: Callable[[str], None]
+) -> None:
+    first_us: int | None = None
+    for batch in hand.batches():
+        last_us = batch.last_t_us()
+        if last_us is not None:
+            first_us = last_us if first_us is None else first_us
+            samples = reader.read((last_us - first_us) / 1e6)
+            # kept before it is judged
+            writer.add(samples)
+            procedure.frames(batch.frames)
+            procedure.samples(samples)
+        if procedure.wants_tare:
+            try:
+                hand.tare(procedure.finger)
+                procedure.tared(accepted=True)
+            except CommandRefusedError:
+                procedure.tared(accepted=False)
+        for event in procedure.take_events():
+            show(event)
+        progress(procedure.status())
+        if procedure.step is Step.DONE:
+            return

@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from ...core.geometry import Floats
 from ...errors import RecordingError
 from .blocks import BLOCKS, Blocks
 from .models import AFFINE, solve, squared_errors, truth_variance
 from .moments import NO_DRIFT, linear_columns, moments
-from .recorded import Floats, Run
+from .run import Run
 
 SEARCH_ROWS = 50
 MAX_LAG_ROWS = 20  # 0.2 s at 100 Hz: more is no transport delay but another clock

@@ -1,0 +1,27 @@
+"""Where a verb's results go, looked at before minutes of work and not after them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..errors import InputError
+
+
+def check(folder: Path, places: Sequence[Path], *, overwrite: bool) -> None:
+    """Raises InputError when a place in ``folder`` is named twice, or is there and may not be overwritten."""
+    for place in places:
+        if places.count(place) > 1:
+            raise InputError(f"{place} would be written twice; give files of the same name a folder each")
+        if place.exists() and not overwrite:
+            raise InputError(f"{place} exists and would be overwritten; choose another folder or say --force")
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is no folder; choose another name")
+
+
+def make_folder(folder: Path) -> None:
+    """With those above it. Raises InputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder} is no folder ({error.strerror}); choose another name") from error
