@@ -25,9 +25,9 @@ def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason
             if not acted and len(batch.wire):
                 for verb in verbs:
                     hand.link.board.do(verb)
-                if reason == "silence":
-                    hand.link.patience = 1.0
-                    hand._due_s = 0.0  # silence was to be looked for when patience for it would have been over
+                # From now on silence is what is looked for, and at once: until here a busy computer made none.
+                hand.link.patience = 1.0
+                hand._due_s = 0.0
                 acted = True
             gap = gap or next((m for m in batch.messages if isinstance(m, biotac.Gap)), None)
             if gap is not None:
