@@ -24,7 +24,7 @@ def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason
         for batch in hand.batches():
             if not acted and len(batch.wire):
                 for verb in verbs:
-                    hand.link.board.do(verb)
+                    hand.link.board.say(verb)
                 # From now on silence is what is looked for, and at once: until here a busy computer made none.
                 hand.link.patience = 1.0
                 hand._due_s = 0.0
