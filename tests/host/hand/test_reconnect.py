@@ -208,8 +208,8 @@ def test_close_ends_the_search(world) -> None:
 
 def test_the_simulated_board_reboots_and_is_found_again(tmp_path) -> None:
     """The real firmware: a process that dies, and another one of the same serial number behind the same name."""
-    from biotac.link.ports import start_board
     from biotac.sim.loading import load_source
+    from biotac.sim.ports import start_board
 
     path = tmp_path / "ttyBOARD"
     boards = []
