@@ -59,7 +59,6 @@ class Board:
         self.awaiting = 0  #: replies
         self.gap: Gap | None = None  #: to go with the next rows
         self._gaps = self._bytes = self._frames = 0
-        self._decoder = StreamDecoder()
         self._past: list[LinkStats] = []  # of decoders before a reboot
         self._arrivals = Arrivals(self.clock)
         self._replies: deque[Any] = deque()
@@ -75,7 +74,7 @@ class Board:
         except BaseException:
             link.close()
             raise
-        self._accept_newer_minor()
+        self._decoder = self._new_decoder()
 
     @property
     def stats(self) -> LinkStats:
@@ -98,14 +97,15 @@ class Board:
     def restarted(self) -> None:
         """The board counts anew, its sequence numbers and its time."""
         self._past.append(self._decoder.stats(0, 0))
-        self._decoder = StreamDecoder()
-        self._accept_newer_minor()
+        self._decoder = self._new_decoder()
         self.clock.restart()
         self._arrivals.forget()
 
-    def _accept_newer_minor(self) -> None:
+    def _new_decoder(self) -> StreamDecoder:
+        decoder = StreamDecoder()
         if self.info.wire_minor > wire.WIRE_MINOR:
-            self._decoder.accept_newer_minor()
+            decoder.accept_newer_minor()
+        return decoder
 
     def _lost(self, error: DeviceLostError, reason: Reason) -> None:
         raise error

@@ -34,7 +34,7 @@ def open(
 
     ``reconnect`` has a board that went away looked for until it is back, by its serial number; what this session
     changed (settings, calibrations, subscriptions) and the stream are put back, and the first batch has a
-    ``biotac.live.Gap`` in its messages. Without it, and for spidev, DeviceLostError is raised. ``fingers`` names
+    ``biotac.Gap`` in its messages. Without it, and for spidev, DeviceLostError is raised. ``fingers`` names
     chip selects 0..4 for ``hand["thumb"]``; by default index, middle, ring, little, thumb.
 
     Raises PortError, NotAGatewayError, WireVersionError, InputError for a source or a recording that cannot be
@@ -45,35 +45,30 @@ def open(
         text = choose(text and text.removeprefix(SERIAL_PREFIX))
     if text.startswith("spidev:"):
         bare, own = harness.load(text)
-        return calibrated(shake_hands(open_link(bare, pace=pace), fingers=fingers), own)
+        return shake_hands(open_link(bare, pace=pace), fingers=fingers, calibrations=own)
     return shake_hands(open_link(text, pace=pace), reconnect=reconnect, fingers=fingers)
 
 
-def calibrated(hand: Hand, own: Mapping[int, Calibration]) -> Hand:
-    """Give each finger its own. Closes the hand when that fails."""
-    try:
-        for finger, calibration in own.items():
-            hand.set_calibration(finger, calibration)
-    except BaseException:
-        hand.close()
-        raise
-    return hand
-
-
-def shake_hands(link: Link, *, reconnect: bool = False, fingers: Mapping[str, int] | None = None) -> Hand:
-    """Make a Hand of an open link.
+def shake_hands(
+    link: Link,
+    *,
+    reconnect: bool = False,
+    fingers: Mapping[str, int] | None = None,
+    calibrations: Mapping[int, Calibration] | None = None,
+) -> Hand:
+    """Make a Hand of an open link, and give it each finger's calibration.
 
     A simulated board gets its source's settings (an emulated finger's own gains) and stored tare
     first, as a real one would from its user. Closes the link when that fails.
     """
     hand = Hand(link, reconnect=reconnect, fingers=fingers)
     source = link.source
-    if source is None:
-        return hand
     try:
-        for name, value in source.settings.items():
+        for finger, calibration in (calibrations or {}).items():
+            hand.set_calibration(finger, calibration)
+        for name, value in source.settings.items() if source else ():
             hand.set_setting(wire.Setting[name.upper()], value)
-        if source.tare_q4 is not None:
+        if source and source.tare_q4 is not None:
             for finger, tare_q4 in enumerate(source.tare_q4):
                 hand.set_tare(finger, tare_q4 / 16.0)
     except BaseException:

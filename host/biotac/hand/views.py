@@ -203,28 +203,16 @@ class FingerView:
     torque_nmm = _vector("torque_nmm", "Torque on the finger, (3,) in N*mm.")
     poc_mm = _vector("poc_mm", "Point of contact, (3,) in mm.")
     force_sigma_n = _vector("force_sigma_n", "One standard deviation of the force, (3,) in N; NaN unless wanted.")
-    poc_sigma_mm = _value(
-        "poc_sigma_mm", float, "One standard deviation of the point of contact, in mm; NaN unless wanted."
-    )
-    pressure_force_n = _value(
-        "pressure_force_n",
-        float,
-        "Magnitude of the force by static pressure, in N; NaN without a pressure calibration.",
-    )
-    torsion_nmm = _value(
-        "torsion_nmm", float, "Torque about the outward normal at the contact, in N*mm; NaN without a map that has it."
-    )
+    poc_sigma_mm = _value("poc_sigma_mm", float, "One standard deviation of poc_mm, in mm; NaN unless wanted.")
+    pressure_force_n = _value("pressure_force_n", float, "Force by static pressure, in N; NaN unless calibrated.")
+    torsion_nmm = _value("torsion_nmm", float, "Torque about the contact's normal, in N*mm; NaN without a map of it.")
     counts = _value("counts", _counts, "Electrodes E1..E19, (19,) in counts 0..4095, 65535 where missing.")
     pdc = _value("pdc", int, "Static pressure in counts, 65535 where missing.")
     tac = _value("tac", int, "Thermal flux in counts, 65535 where missing.")
     tdc = _value("tdc", int, "Temperature in counts, 65535 where missing.")
+    touched = _value("flags", lambda bits: bool(int(bits) & FrameFlags.CONTACT), "The finger is touched.")
     flags = _value("flags", lambda bits: FrameFlags(int(bits)), "What to think of the results.")
     t_us = _value("t_us", int, "Device time in us, unwrapped; -1 before anything came.")
-
-    @property
-    def touched(self) -> bool:
-        """The finger is touched."""
-        return FrameFlags.CONTACT in self.flags
 
     @property
     def age_s(self) -> float:

@@ -26,11 +26,11 @@ from biotac.hand.hand import Hand
 from biotac.keep import map_file
 from biotac.keep.map_blob import PART_BYTES, for_any_sensor, made_s, serial
 from biotac.link import spidev as spidev_link
-from biotac.link.ports import start_board
 from biotac.link.serial_port import SerialLink
 from biotac.recording import Recording
 from biotac.recording.recompute import recompute
 from biotac.sim.loading import load_source
+from biotac.sim.ports import start_board
 from biotac.sim.process import SimBoard, SimLink
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire

@@ -134,7 +134,7 @@ def test_a_silent_board_that_answers_again_streams_again(world) -> None:
     hand.run(queue=True)
     send(there, frame(5))
     until(hand, lambda: hand[0].t_us == 50_000)
-    world.clock.now_s += hand._silence_s() + 0.5
+    world.clock.now_s += hand._streams._silence_s() + 0.5
     there.firmware.wait_for(wire.Start, 2)
     send(there, frame(300))
     until(hand, lambda: hand[0].t_us == 3_000_000)
@@ -208,8 +208,8 @@ def test_close_ends_the_search(world) -> None:
 
 def test_the_simulated_board_reboots_and_is_found_again(tmp_path) -> None:
     """The real firmware: a process that dies, and another one of the same serial number behind the same name."""
-    from biotac.link.ports import start_board
     from biotac.sim.loading import load_source
+    from biotac.sim.ports import start_board
 
     path = tmp_path / "ttyBOARD"
     boards = []
