@@ -12,14 +12,6 @@ add_library(biotac_reference STATIC ${fw}/reference/lin2013.c ${fw}/reference/go
 target_include_directories(biotac_reference PUBLIC ${fw}/reference ${fw}/core)
 target_link_libraries(biotac_reference PUBLIC biotac_core m)
 
-# Kernels that do not ship, for the benchmark. Products are not fused into sums: no two compilers agree
-# on where, and the errors are to be the kernels' own.
-file(GLOB variants CONFIGURE_DEPENDS ${fw}/../tools/bench/variants/*.c)
-add_library(biotac_variants STATIC ${variants})
-target_include_directories(biotac_variants PUBLIC ${fw}/../tools/bench/variants)
-target_compile_options(biotac_variants PRIVATE -ffp-contract=off -fno-math-errno)
-target_link_libraries(biotac_variants PUBLIC biotac_reference)
-
 # The SPI driver, over port.h.
 add_library(biotac_sensor STATIC
   ${fw}/sensor/properties.c ${fw}/sensor/sampler.c ${fw}/sensor/word.c)
@@ -31,7 +23,7 @@ add_library(biotac_emu STATIC ${fw}/emu/bus.c ${fw}/emu/device.c ${fw}/emu/tape.
 target_include_directories(biotac_emu PUBLIC ${fw}/emu)
 target_link_libraries(biotac_emu PUBLIC biotac_core)
 
-foreach(lib biotac_core biotac_reference biotac_variants biotac_sensor biotac_emu)
+foreach(lib biotac_core biotac_reference biotac_sensor biotac_emu)
   if(NOT CMAKE_CROSSCOMPILING)
     set_target_properties(${lib} PROPERTIES POSITION_INDEPENDENT_CODE ON) # they go into Python's extension
   endif()

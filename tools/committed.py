@@ -6,20 +6,24 @@ import argparse
 import sys
 from pathlib import Path
 
+import __main__
 
-def write_or_check(description: str, root: Path, outputs: dict[Path, str], source: str, command: str) -> int:
-    """The whole command line of a generator.
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def write_or_check(outputs: dict[Path, str], source: str) -> int:
+    """The whole command line of a generator: of the program that runs, whose docstring is its help.
 
     Without arguments writes what differs; with --check writes nothing, names what drifted from
     ``source``, and returns 1.
     """
-    parser = argparse.ArgumentParser(description=description)
+    parser = argparse.ArgumentParser(description=(__main__.__doc__ or "").splitlines()[0])
     parser.add_argument("--check", action="store_true", help="compare, do not write")
     check = parser.parse_args().check
     drifted = [path for path, text in outputs.items() if not path.exists() or path.read_text(encoding="utf-8") != text]
     if check and drifted:
-        names = ", ".join(str(path.relative_to(root)) for path in drifted)
-        print(f"drifted from {source}: {names}; run {command}", file=sys.stderr)
+        names = ", ".join(str(path.relative_to(ROOT)) for path in drifted)
+        print(f"drifted from {source}: {names}; run tools/{Path(sys.argv[0]).name}", file=sys.stderr)
         return 1
     if not check:
         for path in drifted:

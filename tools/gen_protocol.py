@@ -10,11 +10,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tools"))
-
-from committed import write_or_check  # noqa: E402
-from protogen import c_crc, c_map, c_rsqrt, c_sensor, c_sums, c_variants, c_wire, docs, python_code, schema  # noqa: E402
+from committed import ROOT, write_or_check
+from protogen import c_crc, c_map, c_rsqrt, c_sensor, c_sums, c_variants, c_wire, docs, python_code, schema
 
 
 def outputs(root: Path) -> dict[Path, str]:
@@ -29,8 +26,8 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "firmware/core/solve/rsqrt_gen.h": c_rsqrt.header(contract),
         root / "firmware/core/solve/rsqrt_gen.c": c_rsqrt.source(contract),
         root / "firmware/core/map/map_gen.h": c_map.header(contract),
-        root / "tools/bench/variants/fold_f32_gen.h": c_variants.folded(contract, c_variants.F32),
-        root / "tools/bench/variants/fold_i64_gen.h": c_variants.folded(contract, c_variants.I64),
+        root / "tools/bench/variants/mirrored_f32_gen.h": c_variants.mirrored(contract, c_variants.F32),
+        root / "tools/bench/variants/mirrored_i64_gen.h": c_variants.mirrored(contract, c_variants.I64),
         root / "tools/bench/variants/tables_gen.h": c_variants.tables(contract),
         root / "firmware/core/wire/messages_gen.h": c_wire.header(contract),
         root / "firmware/core/wire/messages_gen.c": c_wire.source(contract),
@@ -43,10 +40,5 @@ def outputs(root: Path) -> dict[Path, str]:
     }
 
 
-def main() -> int:
-    description = (__doc__ or "").splitlines()[0]
-    return write_or_check(description, ROOT, outputs(ROOT), "protocol/*.toml", "tools/gen_protocol.py")
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(write_or_check(outputs(ROOT), "protocol/*.toml"))

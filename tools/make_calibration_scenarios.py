@@ -10,13 +10,9 @@ from __future__ import annotations
 import math
 import random
 import sys
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tools"))
-
-from biotac.core.geometry import RADIUS_MM  # noqa: E402
-from committed import write_or_check  # noqa: E402
+from biotac.core.geometry import RADIUS_MM
+from committed import ROOT, write_or_check
 
 FOLDER = ROOT / "host" / "biotac" / "sim" / "scenarios"
 
@@ -105,8 +101,7 @@ def main() -> int:
         shear_to_tip=False,
     )
     files = {FOLDER / "calibrate.toml": everywhere, FOLDER / "calibrate_gaps.toml": with_gaps}
-    description, me = (__doc__ or "").splitlines()[0], "tools/make_calibration_scenarios.py"
-    return write_or_check(description, ROOT, files, me, me)
+    return write_or_check(files, "tools/make_calibration_scenarios.py")
 
 
 if __name__ == "__main__":

@@ -10,13 +10,9 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tools"))
-
-from biotac.wire import sensor_gen as sensor  # noqa: E402
-from committed import write_or_check  # noqa: E402
+from biotac.wire import sensor_gen as sensor
+from committed import ROOT, write_or_check
 
 WIDTH, HEIGHT = 980, 560
 PX_PER_MM = 15.0
@@ -231,13 +227,5 @@ def drawing() -> str:
     return "\n".join([*parts, *pushes(), *legend(), "</svg>"]) + "\n"
 
 
-def main() -> int:
-    """The command line."""
-    outputs = {ROOT / "host/docs/frames.svg": drawing()}
-    return write_or_check(
-        (__doc__ or "").splitlines()[0], ROOT, outputs, "protocol/sensor.toml", "tools/make_frames_drawing.py"
-    )
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(write_or_check({ROOT / "host/docs/frames.svg": drawing()}, "protocol/sensor.toml"))

@@ -26,10 +26,7 @@ try:
 except ModuleNotFoundError:  # Python 3.10
     import tomli as tomllib
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tools"))
-
-from committed import write_or_check  # noqa: E402
+from committed import ROOT, write_or_check
 
 LINK: dict[str, Any] = tomllib.loads((ROOT / "protocol/link.toml").read_text(encoding="utf-8"))
 
@@ -329,10 +326,5 @@ def outputs() -> dict[Path, str]:
     }
 
 
-def main() -> int:
-    description = (__doc__ or "").splitlines()[0]
-    return write_or_check(description, ROOT, outputs(), "tools/make_vectors.py", "it")
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(write_or_check(outputs(), "tools/make_vectors.py"))

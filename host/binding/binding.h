@@ -22,7 +22,6 @@
 #include "tape.h"
 #include "touch/signals.h"
 #include "touch/tare.h"
-#include "variant_errors.h"
 #include "wire/cobs.h"
 #include "wire/crc32.h"
 #include "wire/framing.h"

@@ -18,8 +18,8 @@
 // E17 E18 E19. Left and right share x, z and two of three arms, a line shares y, z and its normal: adding
 // before multiplying leaves half of the arithmetic (34 -> 24 ns/frame measured for the lines alone).
 static const int left_of[BT_MIRRORED] = {0, 1, 2, 4, 3, 5, 7};
-static const int right_of[BT_FOLDED] = {10, 11, 12, 14, 13, 15, 8, 6, 9, 16, 17, 18}; // or on the midline
-static const int line_of[BT_FOLDED] = {0, 1, 1, 1, 2, 2, 3, 4, 5, 6, 6, 6};
+static const int right_of[BT_ONE_SIDE] = {10, 11, 12, 14, 13, 15, 8, 6, 9, 16, 17, 18}; // or on the midline
+static const int line_of[BT_ONE_SIDE] = {0, 1, 1, 1, 2, 2, 3, 4, 5, 6, 6, 6};
 static const int first_of_line[BT_LINES] = {0, 1, 4, 6, 7, 8, 9};
 
 // What the sums below leave out because it is 0.
@@ -39,10 +39,10 @@ static bool mirrored(int left, int right)
            && bt_arm_nm[left][1] == bt_arm_nm[right][1] && bt_arm_nm[left][2] == -bt_arm_nm[right][2];
 }
 
-static bool folds(void)
+static bool is_mirrored(void)
 {
     bool good = true;
-    for (int p = 0; p < BT_FOLDED; p++) {
+    for (int p = 0; p < BT_ONE_SIDE; p++) {
         int i = right_of[p];
         int first = right_of[first_of_line[line_of[p]]];
         for (int d = 0; d < 3; d++) {
@@ -58,7 +58,7 @@ static bool folds(void)
 int bt_block_plan_init(bt_block_plan *plan, const lin2013_settings *settings)
 {
     plan->poc_weights = settings->poc_weights;
-    for (int p = 0; p < BT_FOLDED; p++) {
+    for (int p = 0; p < BT_ONE_SIDE; p++) {
         plan->x_um[p] = bt_electrode_um[right_of[p]][0];
         plan->arm_y_nm[p] = bt_arm_nm[right_of[p]][1];
     }
@@ -81,7 +81,7 @@ int bt_block_plan_init(bt_block_plan *plan, const lin2013_settings *settings)
     for (int d = 0; d < 2; d++) {
         plan->torque_scale[d] = settings->torque_gain[d] / (16 * 1e6);
     }
-    return folds();
+    return is_mirrored();
 }
 
 // One row of a tare in 1/16 count, each value `step` after the one before; false if one is out of range.
@@ -100,11 +100,11 @@ static bool tare_row(const uint8_t *row, int32_t *tare_q4, int step)
 
 // From here on one row per electrode, pair or result and one column per frame: [row * width + frame].
 typedef struct {
-    int32_t even[BT_FOLDED * BLOCK];  // e of the right one + e of the left one, 1/16 count
-    int32_t odd[BT_MIRRORED * BLOCK]; // e of the right one - e of the left one
-    double w_even[BT_FOLDED * BLOCK]; // the same of the weights, which are negated throughout
+    int32_t even[BT_ONE_SIDE * BLOCK];  // e of the right one + e of the left one, 1/16 count
+    int32_t odd[BT_MIRRORED * BLOCK];   // e of the right one - e of the left one
+    double w_even[BT_ONE_SIDE * BLOCK]; // the same of the weights, which are negated throughout
     double w_odd[BT_MIRRORED * BLOCK];
-} folded;
+} sides;
 
 typedef struct {
     double total[BLOCK];     // sum of the weights
@@ -155,7 +155,7 @@ SPECIALISED double negated_weight(int32_t e, int weights)
     return weights == BT_POC_WEIGHTS_COMPRESS_N1 ? m : -(m * m);
 }
 
-SPECIALISED void fold(const int32_t *restrict e, int weights, folded *restrict f, int width)
+SPECIALISED void to_sides(const int32_t *restrict e, int weights, sides *restrict f, int width)
 {
     for (int p = 0; p < BT_MIRRORED; p++) {
         const int32_t *right = e + right_of[p] * width;
@@ -169,7 +169,7 @@ SPECIALISED void fold(const int32_t *restrict e, int weights, folded *restrict f
             f->w_odd[p * width + k] = negated_weight(r, weights) - negated_weight(l, weights);
         }
     }
-    for (int p = BT_MIRRORED; p < BT_FOLDED; p++) {
+    for (int p = BT_MIRRORED; p < BT_ONE_SIDE; p++) {
         const int32_t *middle = e + right_of[p] * width;
         for (int k = 0; k < width; k++) {
             f->even[p * width + k] = middle[k];
@@ -187,7 +187,7 @@ SPECIALISED void fold(const int32_t *restrict e, int weights, folded *restrict f
 #define SUM_PAIRS(rows, factors)                                                                             \
     (DOT(rows, 0, factors) + DOT(rows, 1, factors) + DOT(rows, 2, factors) + DOT(rows, 3, factors)           \
      + DOT(rows, 4, factors) + DOT(rows, 5, factors) + DOT(rows, 6, factors))
-#define SUM_FOLDED(rows, factors)                                                                            \
+#define SUM_ONE_SIDE(rows, factors)                                                                          \
     (SUM_PAIRS(rows, factors) + DOT(rows, 7, factors) + DOT(rows, 8, factors) + DOT(rows, 9, factors)        \
      + DOT(rows, 10, factors) + DOT(rows, 11, factors))
 #define SUM_LINES(rows, factors)                                                                             \
@@ -200,19 +200,19 @@ SPECIALISED void fold(const int32_t *restrict e, int weights, folded *restrict f
 #define SUM_SIDES(rows, factors)                                                                             \
     (AT(rows, 0) * (factors)[0] + LINE_1(rows) * (factors)[1] + LINE_2(rows) * (factors)[2])
 
-SPECIALISED void sums(const bt_block_plan *restrict plan, const folded *restrict f, columns *restrict c,
+SPECIALISED void sums(const bt_block_plan *restrict plan, const sides *restrict f, columns *restrict c,
                       int width)
 {
     for (int k = 0; k < width; k++) {
         c->total[k] = AT(f->w_even, 0) + LINE_1(f->w_even) + LINE_2(f->w_even) + AT(f->w_even, 6)
                       + AT(f->w_even, 7) + AT(f->w_even, 8) + LINE_6(f->w_even);
-        c->moment[0][k] = SUM_FOLDED(f->w_even, plan->x_um);
+        c->moment[0][k] = SUM_ONE_SIDE(f->w_even, plan->x_um);
         c->moment[1][k] = SUM_SIDES(f->w_odd, plan->y_um) + AT(f->w_odd, 6) * plan->y_um[3];
         c->moment[2][k] = SUM_LINES(f->w_even, plan->z_um);
         c->force[0][k] = SUM_TIP(f->even, plan->normal_x);
         c->force[1][k] = SUM_SIDES(f->odd, plan->normal_y);
         c->force[2][k] = SUM_LINES(f->even, plan->normal_z);
-        c->torque[1][k] = SUM_FOLDED(f->even, plan->arm_y_nm);
+        c->torque[1][k] = SUM_ONE_SIDE(f->even, plan->arm_y_nm);
         c->torque[2][k] = SUM_PAIRS(f->odd, plan->arm_z_nm);
     }
 }
@@ -278,7 +278,7 @@ SPECIALISED bool block(const bt_block_plan *plan, const uint8_t *rows, int64_t s
 {
     uint16_t counts[BT_ELECTRODES * BLOCK];
     int32_t e[BT_ELECTRODES * BLOCK];
-    folded f;
+    sides f;
     columns c;
     transpose(rows, stride, counts, width);
     if (!signals(counts, tare_q4, e, width)) {
@@ -286,13 +286,13 @@ SPECIALISED bool block(const bt_block_plan *plan, const uint8_t *rows, int64_t s
     }
     switch (plan->poc_weights) {
     case BT_POC_WEIGHTS_ABS_N2:
-        fold(e, BT_POC_WEIGHTS_ABS_N2, &f, width);
+        to_sides(e, BT_POC_WEIGHTS_ABS_N2, &f, width);
         break;
     case BT_POC_WEIGHTS_COMPRESS_N2:
-        fold(e, BT_POC_WEIGHTS_COMPRESS_N2, &f, width);
+        to_sides(e, BT_POC_WEIGHTS_COMPRESS_N2, &f, width);
         break;
     default:
-        fold(e, BT_POC_WEIGHTS_COMPRESS_N1, &f, width);
+        to_sides(e, BT_POC_WEIGHTS_COMPRESS_N1, &f, width);
     }
     sums(plan, &f, &c, width);
     finish(plan, &c, width);

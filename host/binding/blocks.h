@@ -9,16 +9,16 @@
 #include "lin2013.h"
 
 #define BT_MIRRORED       7  // pairs of electrodes left and right of the midline
-#define BT_FOLDED         12 // the pairs, and the electrodes on the midline
+#define BT_ONE_SIDE       12 // the pairs, and the electrodes on the midline
 #define BT_LINES          7  // of them along the finger, with y, z and normal in common
 #define BT_MIRRORED_LINES 4
 #define BT_RESULTS        9 // poc_mm, force_n, torque_nmm of one frame
 
-// The settings and the generated geometry, folded at the midline.
+// The settings and the generated geometry, mirrored at the midline.
 typedef struct {
     int poc_weights;
-    double x_um[BT_FOLDED];
-    double arm_y_nm[BT_FOLDED];
+    double x_um[BT_ONE_SIDE];
+    double arm_y_nm[BT_ONE_SIDE];
     double arm_z_nm[BT_MIRRORED];
     double y_um[BT_MIRRORED_LINES];
     double z_um[BT_LINES];
@@ -29,7 +29,7 @@ typedef struct {
     double torque_scale[2]; // N*mm per 1/16 count * nm
 } bt_block_plan;
 
-// 0 if the generated geometry does not fold as this file believes; the plan is not to be used then.
+// 0 if the generated geometry is not mirrored as this file believes; the plan is not to be used then.
 int bt_block_plan_init(bt_block_plan *plan, const lin2013_settings *settings);
 
 // counts: n rows of 19 uint16, counts_stride bytes apart, of any alignment; 0..4095 or

@@ -119,7 +119,7 @@ IDENTITIES: dict[str, Callable[[c_ast.FileAST], None]] = {
 
 
 @pytest.mark.parametrize("function", IDENTITIES)
-def test_the_folded_sum_is_the_sum_over_table_1(function: str) -> None:
+def test_the_mirrored_sum_is_the_sum_over_table_1(function: str) -> None:
     IDENTITIES[function](shipped())
 
 

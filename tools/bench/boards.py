@@ -6,13 +6,15 @@ import json
 import os
 import re
 import shutil
+import statistics
 import subprocess
 import sys
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from m4f_model import Model, UnknownInstruction, runs
 
@@ -21,12 +23,13 @@ sys.path.insert(0, str(HERE.parent))
 
 import qemu  # noqa: E402
 from image.symbols import FLOAT_SYMBOL  # noqa: E402
-from qemu import Failed  # noqa: E402
+from qemu import Failed as Failed  # noqa: E402
 
 ROOT = HERE.parent.parent
 FIRMWARE = ROOT / "firmware"
 BUILD = ROOT / "build" / "bench"
 FRAMES = 12  # per weighting
+WEIGHTS = ("abs n=2", "compress n=1", "compress n=2")  # in the order of enum bt_poc_weights, as image.c counts
 # What some files want compiled otherwise than with -O3; the boards' images are built by the same facts.
 OPTIONS = json.loads((FIRMWARE / "boards" / "compile_options.json").read_text(encoding="utf-8"))["files"]
 APART = [path for path in (FIRMWARE / "core").rglob("*.c") if path.name in OPTIONS]
@@ -170,6 +173,35 @@ def _log(elf: Path) -> Iterator[bytes]:
 def count(board: Board) -> list[Row]:
     elf = build(board, "count", HERE / "image.c", HERE / "scenes.c")
     return run_m4f(elf) if board.machine == M4F else run_rp2040(elf)[0]
+
+
+def tally(rows: list[Row]) -> dict[str, dict[str, list[dict[str, int]]]]:
+    """Kernel -> scene -> per weighting, the median and largest counts over the frames."""
+    counts: dict[tuple[str, str], list[tuple[int, int]]] = defaultdict(list)
+    for kernel, scene, instructions, cycles in rows:
+        counts[kernel, scene].append((instructions, cycles))
+    empty_instructions, empty_cycles = counts.pop(("nothing", ""))[0]
+    out: dict[str, dict[str, list[dict[str, int]]]] = defaultdict(dict)
+    for (kernel, scene), pairs in counts.items():
+        out[kernel][scene] = []
+        for w in range(len(WEIGHTS)):
+            some = pairs[w * FRAMES : (w + 1) * FRAMES]
+            out[kernel][scene].append(
+                {
+                    "cycles": int(statistics.median(c for _, c in some)) - empty_cycles,
+                    "cycles_max": max(c for _, c in some) - empty_cycles,
+                    "instructions": int(statistics.median(i for i, _ in some)) - empty_instructions,
+                }
+            )
+    return dict(out)
+
+
+def counts() -> dict[str, Any]:
+    """Of every board: key -> title, where its cycles are from, and its kernels' counts as tally() has them."""
+    return {
+        board.key: {"title": board.title, "cycles_by": board.cycles_by, "kernels": tally(count(board))}
+        for board in BOARDS
+    }
 
 
 def bits_frames() -> int:

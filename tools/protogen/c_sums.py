@@ -14,6 +14,7 @@ from functools import reduce
 from math import gcd
 
 from .c_sensor import electrodes
+from .pairs import mirror_image
 from .schema import GENERATED, Contract
 
 UINT32_MAX = 2**32 - 1
@@ -41,7 +42,7 @@ class Line:
         return 2 if self.mirrored else 1
 
 
-class Folding:
+class MirroredLines:
     """Table 1 as lines."""
 
     def __init__(self, contract: Contract) -> None:
@@ -50,14 +51,10 @@ class Folding:
         for i, (name, r, n) in enumerate(table):
             if r[1] > 0:
                 continue
-            mirror = ((r[0], -r[1], r[2]), (n[0], -n[1], n[2]))
-            twins = [j for j, (_, q, m) in enumerate(table) if (q, m) == mirror and j != i]
-            if r[1] < 0 and len(twins) != 1:
-                raise ValueError(f"sensor.toml: {name} has no mirror image; the sums cannot be folded")
             if r[1] == 0 and n[1]:
                 raise ValueError(f"sensor.toml: {name} is on the midline and faces sideways")
             key = (-r[1], r[2], (n[0], -n[1], n[2]))
-            groups.setdefault(key, []).append((i, twins[0] if r[1] else None, r[0]))
+            groups.setdefault(key, []).append((i, mirror_image(table, i), r[0]))
         self.lines = [Line(y, z, n, members) for (y, z, n), members in groups.items()]
         self.count = len(table)
         behind = [-x for line in self.lines for _, _, x in line.members if x < 0]
@@ -118,7 +115,7 @@ def load(line: Line, member: tuple[int, int | None, int], k: int, form: str) -> 
     return out
 
 
-def moments(folding: Folding, *, split: bool) -> list[str]:
+def moments(finger: MirroredLines, *, split: bool) -> list[str]:
     """The moments' body; split: coordinates in two parts, and x behind the seam in two sums."""
     out = ["    uint32_t a, b, pair, even, odd;"]
     names = ["ahead_hi", "ahead_lo", "y_hi", "y_lo", "z_hi", "z_lo"] if split else ["ahead", "y", "z"]
@@ -138,7 +135,7 @@ def moments(folding: Folding, *, split: bool) -> list[str]:
     used = 0
     moved = False
     # From ahead to behind, so that only one sum of x is live at a time.
-    for line in sorted(folding.lines, key=lambda line: line.members[0][2] < 0):
+    for line in sorted(finger.lines, key=lambda line: line.members[0][2] < 0):
         out.append(title(line))
         for k, member in enumerate(line.members):
             out += load(line, member, k, form)
@@ -146,7 +143,7 @@ def moments(folding: Folding, *, split: bool) -> list[str]:
             if x > 0:
                 out += product("ahead", x, "pair")
             elif x < 0:
-                unit = -x // folding.x_unit
+                unit = -x // finger.x_unit
                 used += line.width * unit
                 if split and not moved and used > UINT32_MAX >> WEIGHT_BITS:
                     out += ["    sums->behind[0] = behind;", "    behind = 0;"]
@@ -165,10 +162,10 @@ def moments(folding: Folding, *, split: bool) -> list[str]:
     return out + [f"    sums->{name} = {'(int32_t)' if name in signed else ''}{name};" for name in names]
 
 
-def force(folding: Folding) -> list[str]:
+def force(finger: MirroredLines) -> list[str]:
     out = ["    int32_t a, b, pair, even, odd;"]
     out += [f"    int32_t {axis} = 0;" for axis in "xyz"]
-    for line in folding.lines:
+    for line in finger.lines:
         out.append(title(line))
         for k, member in enumerate(line.members):
             out += load(line, member, k, "{}")
@@ -177,9 +174,9 @@ def force(folding: Folding) -> list[str]:
     return [*out, *(f"    sum[{d}] = {axis};" for d, axis in enumerate("xyz"))]
 
 
-def fraction(folding: Folding, arm_nm: int) -> tuple[int, int]:
+def fraction(finger: MirroredLines, arm_nm: int) -> tuple[int, int]:
     """An arm in units of a torque sum, as a whole part and 2^-ARM_SPLIT_BITS, rounded half up."""
-    unit_nm = folding.x_unit << ARM_SHIFT
+    unit_nm = finger.x_unit << ARM_SHIFT
     scaled = (2 * (arm_nm << ARM_SPLIT_BITS) + unit_nm) // (2 * unit_nm)
     hi = (scaled + (1 << ARM_SPLIT_BITS - 1)) >> ARM_SPLIT_BITS
     return hi, scaled - (hi << ARM_SPLIT_BITS)
@@ -192,15 +189,15 @@ def arms(line: Line) -> tuple[int, int]:
 
 
 def by_line(line: Line) -> bool:
-    """Lines behind the seam that face straight away from the axis: arms are x times the normal."""
+    """MirroredLines behind the seam that face straight away from the axis: arms are x times the normal."""
     return line.normal[0] == 0 and all(x < 0 for _, _, x in line.members)
 
 
-def torque(folding: Folding) -> list[str]:
+def torque(finger: MirroredLines) -> list[str]:
     """Three sums each: whole units; 2^-ARM_SHIFT, exact, of the lines; 2^-ARM_SPLIT_BITS of rounded arms."""
     out = ["    int32_t a, b, pair, even, odd, x_even, x_odd;"]
     out += [f"    int32_t {axis}_{part} = 0;" for axis in "yz" for part in ("hi", "line", "lo")]
-    for line in folding.lines:
+    for line in finger.lines:
         out.append(title(line))
         if not by_line(line):
             if len(line.members) != 1:
@@ -208,11 +205,11 @@ def torque(folding: Folding) -> list[str]:
             out += load(line, line.members[0], 0, "{}")
             for axis, term, arm in zip("yz", ("even", "odd"), arms(line), strict=True):
                 if term == "even" or line.mirrored:
-                    hi, lo = fraction(folding, arm)
+                    hi, lo = fraction(finger, arm)
                     out += Sum(f"{axis}_hi").add(hi, term) + Sum(f"{axis}_lo").add(lo, term)
             continue
         for k, (a, b, x) in enumerate(line.members):
-            unit, sign = -x // folding.x_unit, "" if k == 0 else "+"
+            unit, sign = -x // finger.x_unit, "" if k == 0 else "+"
             out.append(f"    a = v[{a}];")
             if b is None:
                 out.append(f"    x_even {sign}= {unit} * a;")
@@ -233,41 +230,41 @@ def line_factors(line: Line) -> list[tuple[str, str, int]]:
     return [*pairs, ("z", "x_odd", -line.normal[1])] if line.mirrored else pairs
 
 
-def line_parts_max(folding: Folding) -> int:
+def line_parts_max(finger: MirroredLines) -> int:
     """The largest sum of the lines' fractions, per unit of |e|."""
     sums = {"y": 0, "z": 0}
-    for line in folding.lines:
+    for line in finger.lines:
         if by_line(line):
-            length = sum(-x for _, _, x in line.members) // folding.x_unit * line.width
+            length = sum(-x for _, _, x in line.members) // finger.x_unit * line.width
             for axis, _, n in line_factors(line):
                 sums[axis] += length * (abs(n) % (1 << ARM_SHIFT))
     return max(sums.values())
 
 
 def header(contract: Contract) -> str:
-    folding = Folding(contract)
+    finger = MirroredLines(contract)
     top = 1 << WEIGHT_BITS
-    low = {axis: folding.low(axis) * top for axis in "xyz"}
+    low = {axis: finger.low(axis) * top for axis in "xyz"}
     lines = [
         f"// {GENERATED}",
-        "// Sums over the electrodes with the left/right symmetry folded, each within 32 bits. ahead: over the",
+        "// Sums over mirrored pairs of electrodes, each within 32 bits. ahead: over the",
         "// electrodes with x > 0, in um; behind: over the others, -x in BT_SUMS_X_UNIT_UM; y and z (downwards)",
         "// in um.",
-        "#ifndef BIOTAC_FOLD_GEN_H",
-        "#define BIOTAC_FOLD_GEN_H",
+        "#ifndef BIOTAC_SUMS_GEN_H",
+        "#define BIOTAC_SUMS_GEN_H",
         "",
         "#include <stdint.h>",
         "",
-        f"#define BT_SUMS_X_UNIT_UM {folding.x_unit}",
+        f"#define BT_SUMS_X_UNIT_UM {finger.x_unit}",
         f"#define BT_SUMS_WEIGHT_BITS {WEIGHT_BITS} // a shifted weight is below 2^this",
         f"#define BT_SUMS_SPLIT_BITS {SPLIT_BITS}",
         "",
         "// The coordinates' sums of magnitudes, and those of their split-off low bits: what the largest",
         "// weight is multiplied by. The core asserts that everything fits.",
-        f"#define BT_SUMS_AHEAD_UM {folding.ahead()}",
-        f"#define BT_SUMS_BEHIND_UNITS {folding.behind()}",
-        f"#define BT_SUMS_Y_UM {folding.across()}",
-        f"#define BT_SUMS_Z_UM {folding.below()}",
+        f"#define BT_SUMS_AHEAD_UM {finger.ahead()}",
+        f"#define BT_SUMS_BEHIND_UNITS {finger.behind()}",
+        f"#define BT_SUMS_Y_UM {finger.across()}",
+        f"#define BT_SUMS_Z_UM {finger.below()}",
         f"#define BT_SUMS_LOW_MAX {max(low['x'] // top, low['z'] // top)}",
         f"#define BT_SUMS_Y_LOW_MAX {low['y'] // top}",
         "",
@@ -276,7 +273,7 @@ def header(contract: Contract) -> str:
         "    uint32_t ahead, behind, z, total;",
         "    int32_t y;",
         "} bt_linear_sums;",
-        f"void bt_sums_linear(const int32_t v[{folding.count}], bt_linear_sums *sums);",
+        f"void bt_sums_linear(const int32_t v[{finger.count}], bt_linear_sums *sums);",
         "",
         "// With weights v << up >> down, each below 2^BT_SUMS_WEIGHT_BITS; a sum is hi << BT_SUMS_SPLIT_BITS + lo,",
         "// and behind the seam that of both.",
@@ -284,17 +281,17 @@ def header(contract: Contract) -> str:
         "    uint32_t ahead_hi, ahead_lo, behind[2], z_hi, z_lo, total;",
         "    int32_t y_hi, y_lo;",
         "} bt_split_sums;",
-        f"void bt_sums_split(const uint32_t v[{folding.count}], int up, int down, bt_split_sums *sums);",
+        f"void bt_sums_split(const uint32_t v[{finger.count}], int up, int down, bt_split_sums *sums);",
         "",
         "// sum e n in e * 1/1000; fits int32 for every |e| <= 4095 counts in 1/16 count.",
-        f"void bt_sums_force(const int32_t v[{folding.count}], int32_t sum[3]);",
+        f"void bt_sums_force(const int32_t v[{finger.count}], int32_t sum[3]);",
         "",
         "// sum e (r x n), y and z, in BT_SUMS_TORQUE_UNIT_NM * e: less than 2 are cut, and arms ahead of the seam",
         "// are rounded to 1/2^BT_SUMS_ARM_BITS of the unit.",
-        f"#define BT_SUMS_TORQUE_UNIT_NM {folding.x_unit << ARM_SHIFT}",
+        f"#define BT_SUMS_TORQUE_UNIT_NM {finger.x_unit << ARM_SHIFT}",
         f"#define BT_SUMS_ARM_BITS {ARM_SPLIT_BITS}",
-        f"#define BT_SUMS_LINE_PARTS_MAX {line_parts_max(folding)} // what the largest e is multiplied by",
-        f"void bt_sums_torque(const int32_t v[{folding.count}], int32_t sum[2]);",
+        f"#define BT_SUMS_LINE_PARTS_MAX {line_parts_max(finger)} // what the largest e is multiplied by",
+        f"void bt_sums_torque(const int32_t v[{finger.count}], int32_t sum[2]);",
         "",
         "#endif",
         "",
@@ -303,16 +300,16 @@ def header(contract: Contract) -> str:
 
 
 def source(contract: Contract) -> str:
-    folding = Folding(contract)
-    n = folding.count
+    finger = MirroredLines(contract)
+    n = finger.count
     functions = [
-        (f"void bt_sums_linear(const int32_t v[{n}], bt_linear_sums *sums)", moments(folding, split=False)),
+        (f"void bt_sums_linear(const int32_t v[{n}], bt_linear_sums *sums)", moments(finger, split=False)),
         (
             f"void bt_sums_split(const uint32_t v[{n}], int up, int down, bt_split_sums *sums)",
-            moments(folding, split=True),
+            moments(finger, split=True),
         ),
-        (f"void bt_sums_force(const int32_t v[{n}], int32_t sum[3])", force(folding)),
-        (f"void bt_sums_torque(const int32_t v[{n}], int32_t sum[2])", torque(folding)),
+        (f"void bt_sums_force(const int32_t v[{n}], int32_t sum[3])", force(finger)),
+        (f"void bt_sums_torque(const int32_t v[{n}], int32_t sum[2])", torque(finger)),
     ]
     out = [f"// {GENERATED}", '#include "solve/sums_gen.h"', "", '#include "fixed_point.h"', ""]
     out += ["// min(e, 0), without a branch.", "static inline uint32_t compressed(int32_t e)", "{"]

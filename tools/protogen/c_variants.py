@@ -1,4 +1,4 @@
-"""C for the benchmark's own kernels: the symmetry-folded sums in float32 and int64, and tables.
+"""C for the benchmark's own kernels: sums over mirrored electrode pairs in float32 and int64, and tables.
 
 Here a processor has a multiplier that is wide enough (SMLAL) or an FPU,
 so that nothing is split in two.
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .c_sensor import arm_nm
-from .pairs import Folding, join
+from .pairs import Mirror, join
 from .schema import GENERATED, Contract
 
 Q15_ONE = 1 << 15
@@ -18,7 +18,7 @@ Q15_ONE = 1 << 15
 
 @dataclass(frozen=True)
 class Kind:
-    """A number type to fold in. ``narrow`` holds a group of terms, ``wide`` a sum of products."""
+    """A number type to sum in. ``narrow`` holds a group of terms, ``wide`` a sum of products."""
 
     name: str
     narrow: str
@@ -44,85 +44,85 @@ def products(kind: Kind, groups: dict[int, list[str]], wide: str) -> str:
     return out
 
 
-def folded_moments(folding: Folding) -> list[str]:
-    r = [line[1] for line in folding.table]
-    pairs = [f"(v[{a}] + v[{b}])" for a, b in folding.pairs] + [f"v[{i}]" for i in folding.singles]
+def mirrored_moments(mirror: Mirror) -> list[str]:
+    r = [line[1] for line in mirror.table]
+    pairs = [f"(v[{a}] + v[{b}])" for a, b in mirror.pairs] + [f"v[{i}]" for i in mirror.singles]
     lines = [
         "// sum w r in um; returns sum w.",
-        f"static inline float fold_f32_moments(const float v[{len(r)}], float sum[3])",
+        f"static inline float mirrored_f32_moments(const float v[{len(r)}], float sum[3])",
     ]
     lines.append("{")
     for d in range(3):
-        groups = folding.groups(lambda i, d=d: r[i][d], odd=d == 1)
+        groups = mirror.groups(lambda i, d=d: r[i][d], odd=d == 1)
         lines.append(f"    sum[{d}] = {products(F32, groups, 'float')};")
     return [*lines, f"    return {' + '.join(pairs)};", "}", ""]
 
 
-def moment_lists(folding: Folding) -> list[str]:
+def moment_lists(mirror: Mirror) -> list[str]:
     """Table 1's places pair by pair, for a kernel that keeps every sum in registers: taken axis by axis,
     all the weights would have to be kept instead. Coefficients are not negative: they then are immediates."""
-    r = [line[1] for line in folding.table]
+    r = [line[1] for line in mirror.table]
     behind = -min(p[0] for p in r)
-    pairs = [f"PAIR({a}, {b}, {r[b][0] + behind}, {r[b][1]}, {-r[b][2]})" for a, b in folding.pairs]
-    singles = [f"SINGLE({i}, {r[i][0] + behind}, {-r[i][2]})" for i in folding.singles]
+    pairs = [f"PAIR({a}, {b}, {r[b][0] + behind}, {r[b][1]}, {-r[b][2]})" for a, b in mirror.pairs]
+    singles = [f"SINGLE({i}, {r[i][0] + behind}, {-r[i][2]})" for i in mirror.singles]
     wrap = " \\\n    "
     return [
-        f"#define FOLD_BEHIND_UM {behind} // no electrode lies farther from the tip than x = -this",
+        f"#define MIRRORED_BEHIND_UM {behind} // no electrode lies farther from the tip than x = -this",
         "",
-        "// For each pair of electrodes: left, right, and in um x + FOLD_BEHIND_UM, y of the right one, -z; for each",
-        "// on the midline itself, x + FOLD_BEHIND_UM and -z.",
-        f"#define FOLD_PLACES(PAIR, SINGLE){wrap}{wrap.join(pairs + singles)}",
+        "// For each pair of electrodes: left, right, and in um x + MIRRORED_BEHIND_UM, y of the right one, -z;",
+        "// for each on the midline, x + MIRRORED_BEHIND_UM and -z.",
+        f"#define MIRRORED_PLACES(PAIR, SINGLE){wrap}{wrap.join(pairs + singles)}",
         "",
     ]
 
 
-def folded(contract: Contract, kind: Kind) -> str:
+def mirrored(contract: Contract, kind: Kind) -> str:
     """A header with the sums of one number type, inline: these cores have the registers."""
-    folding = Folding(contract)
-    n = len(folding.table)
-    normal = [line[2] for line in folding.table]
-    arms = [arm_nm(a, b) for _, a, b in folding.table]
-    guard = f"BIOTAC_FOLD_{kind.name.upper()}_GEN_H"
+    mirror = Mirror(contract)
+    n = len(mirror.table)
+    normal = [line[2] for line in mirror.table]
+    arms = [arm_nm(a, b) for _, a, b in mirror.table]
+    guard = f"BIOTAC_MIRRORED_{kind.name.upper()}_GEN_H"
     lines = [
         f"// {GENERATED}",
-        f"// Sums over the electrodes with the left/right symmetry folded, in {kind.wide}.",
+        f"// Sums over mirrored pairs of electrodes, in {kind.wide}.",
         f"#ifndef {guard}",
         f"#define {guard}",
         "",
         "#include <stdint.h>",
         "",
     ]
-    lines += folded_moments(folding) if kind is F32 else moment_lists(folding)
+    lines += mirrored_moments(mirror) if kind is F32 else moment_lists(mirror)
     lines += [
         "// sum e n in e * 1/1000.",
-        f"static inline void fold_{kind.name}_force(const {kind.narrow} v[{n}], {kind.force} sum[3])",
+        f"static inline void mirrored_{kind.name}_force(const {kind.narrow} v[{n}], {kind.force} sum[3])",
         "{",
     ]
     for d in range(3):
-        groups = folding.groups(lambda i, d=d: normal[i][d], odd=d == 1)
+        groups = mirror.groups(lambda i, d=d: normal[i][d], odd=d == 1)
         lines.append(f"    sum[{d}] = {products(kind, groups, kind.force)};")
     lines += [
         "}",
         "",
         "// sum e (r x n) for y and z in e * nm.",
-        f"static inline void fold_{kind.name}_torque(const {kind.narrow} v[{n}], {kind.wide} sum[2])",
+        f"static inline void mirrored_{kind.name}_torque(const {kind.narrow} v[{n}], {kind.wide} sum[2])",
         "{",
     ]
     for k, (d, odd) in enumerate(((1, False), (2, True))):
-        groups = folding.groups(lambda i, d=d: arms[i][d], odd=odd)
+        groups = mirror.groups(lambda i, d=d: arms[i][d], odd=odd)
         lines.append(f"    sum[{k}] = {products(kind, groups, kind.wide)};")
     return "\n".join([*lines, "}", "", "#endif", ""])
 
 
 def tables(contract: Contract) -> str:
-    """Table 1 for the loops that do not fold: in float32, and in Q15 of its largest numbers."""
-    table = Folding(contract).table
+    """Table 1 for the loops over single electrodes: in float32, and in Q15 of its largest numbers."""
+    table = Mirror(contract).table
     arms = [arm_nm(r, n)[1:] for _, r, n in table]
     place = max(abs(v) for _, r, _ in table for v in r)
     arm = max(abs(v) for a in arms for v in a)
     lines = [
         f"// {GENERATED}",
-        "// Table 1 as the loops that do not fold it need it. arm: y and z of r x n.",
+        "// Table 1 for loops over single electrodes. arm: y and z of r x n.",
         "#ifndef BIOTAC_TABLES_GEN_H",
         "#define BIOTAC_TABLES_GEN_H",
         "",

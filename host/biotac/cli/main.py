@@ -56,7 +56,7 @@ VERBS = {
     "flash": ("biotac.cli.boards.flash", "Write a firmware image to a board, and give it its settings back."),
     "bench": (
         "biotac.cli.lab.bench",
-        "Measure kernels, batch maths, decoding, the live path, an idle link, recording sizes.",
+        "Measure batch maths, decoding, starting, the live path, an idle link, recording sizes.",
     ),
     "udev-setup": ("biotac.cli.boards.udev_setup", "Install the Linux rule that lets you open boards (needs root)."),
     "version": ("biotac.cli.version", "Print the release, the wire version and the schema hash."),

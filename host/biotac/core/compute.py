@@ -144,7 +144,7 @@ def _plan_of(values: tuple[int, ...]) -> Any:
             raise ValueError(f"{key.name} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
     plan = ffi.new("bt_block_plan *")
     if not lib.bt_block_plan_init(plan, formula_settings(chosen)):
-        raise RuntimeError("host/binding/blocks.c folds another geometry than the one that was generated")
+        raise RuntimeError("host/binding/blocks.c mirrors another geometry than the one that was generated")
     return plan
 
 

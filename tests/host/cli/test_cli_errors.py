@@ -214,8 +214,6 @@ CASES: list[tuple[int, str, str]] = [
     (2, "take the build's .uf2", f"flash {NO_PORT} @text.uf2"),
     (2, "name the IMAGE", "flash"),
     (2, "expected 500 to", "bench decode --frames 1"),
-    (2, "write it with tools/bench/run", "bench kernels --counts +no.json"),
-    (2, "write it again with", "bench kernels --counts @counts.json"),
     (2, "expected a scenario's path or one of", "bench idle --source nowhere.toml"),
 ]
 

@@ -48,7 +48,9 @@ def test_a_contestant_that_decodes_another_value_is_named(field: str) -> None:
     message_id = decode.PAC if field == "pac" else decode.FRAME
     sent[message_id] = sent[message_id].copy()
     sent[message_id][field].reshape(len(sent[message_id]), -1)[77, -1] ^= 1
-    contestant = decode._Contestant("it", [data], decode._decoder)
+    contestant = decode._Contestant(
+        "it", [data], decode._ours(decode.Decoder, {decode.FRAME: "frames", decode.PAC: "pacs"})
+    )
     with pytest.raises(RuntimeError, match=f"it decoded another {field} of {decode.NAMES[message_id]}"):
         decode._check(contestant, sent)
 

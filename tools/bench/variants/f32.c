@@ -85,12 +85,3 @@ bool variant_f32(const int32_t e_q4[BT_ELECTRODES], const variant_settings *sett
     }
     return true;
 }
-
-void variant_read_f32(const variant_output *out, variant_result *result)
-{
-    for (int d = 0; d < 3; d++) {
-        result->poc_um[d] = (double)out->f32.poc_mm[d] * 1000;
-        result->force_mn[d] = (double)out->f32.force_n[d] * 1000;
-        result->torque_mnmm[d] = (double)out->f32.torque_nmm[d] * 1000;
-    }
-}

@@ -1,12 +1,12 @@
-// For a core with an FPU and a long multiply (Cortex-M4F): exact integer sums, of force and torque with the
-// symmetry folded, and float32 for the last division and root alone. The PoC is in 1/8 um.
+// For a core with an FPU and a long multiply (Cortex-M4F): exact integer sums, of force and torque over
+// mirrored pairs, and float32 for the last division and root alone. The PoC is in 1/8 um.
 //
 // Weights have 30 bits: all of them are exact up to 2047 counts. In a frame beyond, squares are summed
 // once more, cut below 2^-29 of the largest; that costs as long again.
 #include "variants.h"
 
 #include "fixed_point.h"
-#include "fold_i64_gen.h"
+#include "mirrored_i64_gen.h"
 
 #include <math.h>
 
@@ -77,11 +77,11 @@ INLINED weight_sums sum_up(const int32_t e_q4[BT_ELECTRODES], int weights, int d
         x += (int64_t)even * (x_um);                                                                         \
         z += (int64_t)even * (z_um);                                                                         \
     }
-    FOLD_PLACES(PAIR, SINGLE)
+    MIRRORED_PLACES(PAIR, SINGLE)
 #undef PAIR
 #undef SINGLE
     int64_t weight_sum = (int64_t)total;
-    weight_sums sums = {weight_sum, x - weight_sum * FOLD_BEHIND_UM, y, -z, all};
+    weight_sums sums = {weight_sum, x - weight_sum * MIRRORED_BEHIND_UM, y, -z, all};
     return sums;
 }
 
@@ -154,14 +154,14 @@ bool variant_fpu(const int32_t e_q4[BT_ELECTRODES], const variant_settings *sett
     fpu_output *fpu = &out->fpu;
     if (wanted & (VARIANT_FORCE | VARIANT_TORQUE)) {
         int32_t sum[3];
-        fold_i64_force(e_q4, sum);
+        mirrored_i64_force(e_q4, sum);
         for (int d = 0; d < 3; d++) {
             fpu->force_100un[d] = scale(sum[d], settings->fpu_force[d], FPU_FORCE_BITS);
         }
     }
     if (wanted & VARIANT_TORQUE) {
         int64_t sum[2];
-        fold_i64_torque(e_q4, sum);
+        mirrored_i64_torque(e_q4, sum);
         for (int d = 0; d < 2; d++) {
             int32_t rounded = (int32_t)((sum[d] + (1 << (ARM_SHIFT - 1))) >> ARM_SHIFT);
             fpu->torque_mnmm[d + 1] = scale(rounded, settings->fpu_torque[d], FPU_TORQUE_SHIFT);
@@ -183,13 +183,4 @@ bool variant_fpu(const int32_t e_q4[BT_ELECTRODES], const variant_settings *sett
         fpu->torque_mnmm[0] = to_whole(lever * (1.0F / 80000));
     }
     return true;
-}
-
-void variant_read_fpu(const variant_output *out, variant_result *result)
-{
-    for (int d = 0; d < 3; d++) {
-        result->poc_um[d] = out->fpu.poc_um_q3[d] / 8.0;
-        result->force_mn[d] = out->fpu.force_100un[d] / 10.0;
-        result->torque_mnmm[d] = out->fpu.torque_mnmm[d];
-    }
 }

@@ -15,15 +15,6 @@ bool variant_double(const int32_t e_q4[BT_ELECTRODES], const variant_settings *s
     return out->real64.poc_mm[0] == out->real64.poc_mm[0]; // not NaN
 }
 
-void variant_read_double(const variant_output *out, variant_result *result)
-{
-    for (int d = 0; d < 3; d++) {
-        result->poc_um[d] = out->real64.poc_mm[d] * 1000;
-        result->force_mn[d] = out->real64.force_n[d] * 1000;
-        result->torque_mnmm[d] = out->real64.torque_nmm[d] * 1000;
-    }
-}
-
 bool variant_gold(const int32_t e_q4[BT_ELECTRODES], const variant_settings *settings, unsigned wanted,
                   variant_output *out)
 {
@@ -42,13 +33,4 @@ bool variant_gold(const int32_t e_q4[BT_ELECTRODES], const variant_settings *set
         gold->torque_mnmm[0] = gold_torque_x_mnmm(gold->poc_nm, gold->force_un);
     }
     return has_poc;
-}
-
-void variant_read_gold(const variant_output *out, variant_result *result)
-{
-    for (int d = 0; d < 3; d++) {
-        result->poc_um[d] = out->gold.poc_nm[d] / 1000.0;
-        result->force_mn[d] = (double)out->gold.force_un[d] / 1000;
-        result->torque_mnmm[d] = (double)out->gold.torque_mnmm[d];
-    }
 }

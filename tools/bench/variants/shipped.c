@@ -13,12 +13,3 @@ bool variant_shipped(const int32_t e_q4[BT_ELECTRODES], const variant_settings *
                     integer->torque_mnmm)
            == 0;
 }
-
-void variant_read_integer(const variant_output *out, variant_result *result)
-{
-    for (int d = 0; d < 3; d++) {
-        result->poc_um[d] = out->integer.poc_um[d];
-        result->force_mn[d] = out->integer.force_100un[d] / 10.0;
-        result->torque_mnmm[d] = out->integer.torque_mnmm[d];
-    }
-}

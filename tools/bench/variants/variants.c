@@ -3,14 +3,31 @@
 #include "fixed_point.h"
 #include "tables_gen.h"
 
+// From a variant's own fields and units to um, mN and mN*mm.
+#define READ(from, poc, to_um, force, to_mn, torque, to_mnmm)                                                \
+    static void read_##from(const variant_output *out, variant_result *result)                               \
+    {                                                                                                        \
+        for (int d = 0; d < 3; d++) {                                                                        \
+            result->poc_um[d] = (double)out->from.poc[d] to_um;                                              \
+            result->force_mn[d] = (double)out->from.force[d] to_mn;                                          \
+            result->torque_mnmm[d] = (double)out->from.torque[d] to_mnmm;                                    \
+        }                                                                                                    \
+    }
+READ(real64, poc_mm, *1000, force_n, *1000, torque_nmm, *1000)
+READ(gold, poc_nm, / 1000, force_un, / 1000, torque_mnmm, )
+READ(f32, poc_mm, *1000, force_n, *1000, torque_nmm, *1000)
+READ(mirrored, poc_um, , force_mn, , torque_mnmm, )
+READ(fpu, poc_um_q3, / 8, force_100un, / 10, torque_mnmm, )
+READ(integer, poc_um, , force_100un, / 10, torque_mnmm, )
+
 const variant variants[VARIANTS] = {
-    {"double", variant_double, variant_read_double, false},
-    {"float", variant_f32, variant_read_f32, true},
-    {"float folded", variant_f32_folded, variant_read_f32_folded, true},
-    {"gold int64", variant_gold, variant_read_gold, true},
-    {"shipped", variant_shipped, variant_read_integer, true},
-    {"Q15", variant_q15, variant_read_integer, true},
-    {"int + FPU", variant_fpu, variant_read_fpu, true},
+    {"double", variant_double, read_real64, false},
+    {"float", variant_f32, read_f32, true},
+    {"float mirrored", variant_f32_mirrored, read_mirrored, true},
+    {"gold int64", variant_gold, read_gold, true},
+    {"shipped", variant_shipped, read_integer, true},
+    {"Q15", variant_q15, read_integer, true},
+    {"int + FPU", variant_fpu, read_fpu, true},
 };
 
 #define MANTISSA_MAX 2047
@@ -44,7 +61,7 @@ void variant_settings_init(variant_settings *settings, int poc_weights, const in
         settings->force_nn[d] = force_nn[d];
         settings->real64.force_gain[d] = gain_n;
         settings->f32_force[d] = (float)gain_n;
-        settings->folded_force[d] = (float)(gain_n / 16); // 1000 mN/N * 1/16 * 1/1000
+        settings->mirrored_force[d] = (float)(gain_n / 16); // 1000 mN/N * 1/16 * 1/1000
         settings->fpu_force[d] =
             (int32_t)bt_div_round(force_nn[d] * ((int64_t)1 << FPU_FORCE_BITS), FPU_FORCE_DIVISOR);
         settings->q15_force[d] = gain_of(gain_n * 1e4 / 8);
@@ -55,7 +72,7 @@ void variant_settings_init(variant_settings *settings, int poc_weights, const in
         settings->torque_nn[d] = torque_nn[d];
         settings->real64.torque_gain[d] = gain_n;
         settings->f32_torque[d] = (float)gain_n;
-        settings->folded_torque[d] = (float)per_nm;
+        settings->mirrored_torque[d] = (float)per_nm;
         settings->fpu_torque[d] =
             (int32_t)bt_div_round(torque_nn[d] * ((int64_t)1 << FPU_TORQUE_BITS), FPU_TORQUE_DIVISOR);
         settings->q15_torque[d] = gain_of(per_nm * 2 * Q15_ARM_NM);

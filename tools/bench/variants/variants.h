@@ -41,14 +41,14 @@ typedef struct {
     int32_t torque_nn[2];
     bt_solve_settings shipped;
     lin2013_settings real64;
-    float f32_force[3];     // N per count
-    float f32_torque[2];    // N per count
-    float folded_force[3];  // mN per (1/16 count * 1/1000)
-    float folded_torque[2]; // mN*mm per (1/16 count * nm)
-    int32_t fpu_force[3];   // 100 uN per (1/16 count * 1/1000), times 2^34
-    int32_t fpu_torque[2];  // mN*mm per (1/16 count * 4096 nm), times 2^36
-    q15_gain q15_force[3];  // 100 uN per 1/8 count
-    q15_gain q15_torque[2]; // mN*mm per (1/8 count * full scale of the arms)
+    float f32_force[3];       // N per count
+    float f32_torque[2];      // N per count
+    float mirrored_force[3];  // mN per (1/16 count * 1/1000)
+    float mirrored_torque[2]; // mN*mm per (1/16 count * nm)
+    int32_t fpu_force[3];     // 100 uN per (1/16 count * 1/1000), times 2^34
+    int32_t fpu_torque[2];    // mN*mm per (1/16 count * 4096 nm), times 2^36
+    q15_gain q15_force[3];    // 100 uN per 1/8 count
+    q15_gain q15_torque[2];   // mN*mm per (1/8 count * full scale of the arms)
 } variant_settings;
 
 typedef struct {
@@ -67,7 +67,7 @@ typedef struct {
     float poc_um[3];
     float force_mn[3];
     float torque_mnmm[3];
-} folded_output;
+} mirrored_output;
 
 typedef struct {
     int32_t poc_um_q3[3]; // 1/8 um
@@ -85,7 +85,7 @@ typedef union {
     lin2013_result real64;
     gold_output gold;
     f32_output f32;
-    folded_output folded;
+    mirrored_output mirrored;
     fpu_output fpu;
     integer_output integer;
 } variant_output;
@@ -115,9 +115,7 @@ void variant_settings_init(variant_settings *settings, int poc_weights, const in
                            const int32_t torque_nn[2]);
 
 // The kernels of this folder, one a file, and the adapters of the others (judges.c, shipped.c).
-variant_run variant_double, variant_f32, variant_f32_folded, variant_gold, variant_shipped, variant_q15,
+variant_run variant_double, variant_f32, variant_f32_mirrored, variant_gold, variant_shipped, variant_q15,
     variant_fpu;
-variant_read variant_read_double, variant_read_f32, variant_read_f32_folded, variant_read_gold,
-    variant_read_integer, variant_read_fpu;
 
 #endif

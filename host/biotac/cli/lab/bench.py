@@ -1,54 +1,46 @@
-"""biotac bench [WHAT]"""
+"""biotac bench WHAT"""
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable
 from dataclasses import asdict
-from pathlib import Path
+from typing import Any
 
 from ...errors import InputError
-from ...lab.bench import batch, decode, front, front_picture, idle, imports, kernels, live, recording
+from ...lab.bench import batch, decode, idle, imports, live, recording, timing
 from .. import values
 from ..progress import Progress
 
-EXAMPLE = "biotac bench kernels --counts counts.json --out front"
+EXAMPLE = "biotac bench batch"
 BATCH_FRAMES = 200_000
 DECODE_FRAMES = 30_000  # a minute of five fingers
 # Memory bounds all.
-FRAMES = {"kernels": (100, 1_000_000), "batch": (batch.SINGLE_FRAMES, 10_000_000), "decode": (500, 1_000_000)}
+FRAMES = {"batch": (batch.SINGLE_FRAMES, 10_000_000), "decode": (500, 1_000_000)}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What, and how much of it."""
-    effort = kernels.Effort()
     parser.add_argument(
         "what",
         metavar="WHAT",
-        nargs="?",
-        default="kernels",
-        choices=[*FRAMES, "idle", "imports", "live", "recording"],
-        help="kernels (default): every variant's errors and cost; batch: whole recordings, biotac.compute; "
-        "decode: the link's bytes to arrays, against pymavlink and Python; "
-        "idle: bytes on the link at rest and in contact; imports: what starting costs; "
+        choices=list(WHAT),
+        help="batch: whole recordings, biotac.compute; decode: the link's bytes to arrays, against pymavlink and "
+        "Python; idle: bytes on the link at rest and in contact; imports: what starting costs; "
         "live: reading thread to callback, against a pyserial thread; recording: sizes and load times of recordings",
     )
     parser.add_argument(
         "--frames",
         type=int,
         metavar="N",
-        help=f"kernels: per class (default {effort.frames}); batch: recording length (default {BATCH_FRAMES}); "
-        f"decode: of five fingers together (default {DECODE_FRAMES})",
+        help=f"batch: recording length (default {BATCH_FRAMES}); decode: of five fingers together "
+        f"(default {DECODE_FRAMES})",
     )
     parser.add_argument("--source", default="press.toml", help="idle, recording: what to play (default %(default)s)")
     parser.add_argument("--fingers", type=int, default=5, help="recording: how many (default %(default)s)")
     parser.add_argument("--seconds", type=values.seconds, default=600.0, help="recording: device time (default 600)")
     parser.add_argument("--rounds", type=_count, default=5, metavar="N", help="imports, live: of each (default 5)")
-    climb = parser.add_argument_group("kernels")
-    climb.add_argument("--restarts", type=_count, default=effort.restarts, metavar="N", help="of the hill climbing")
-    climb.add_argument("--steps", type=_count, default=effort.steps, metavar="N", help="of each restart")
-    climb.add_argument("--counts", type=Path, metavar="FILE", help="what tools/bench/run --json wrote")
-    climb.add_argument("--out", type=Path, metavar="DIR", help="write front.md and front.json, with counts front.png")
 
 
 def _count(text: str) -> int:
@@ -60,48 +52,22 @@ def _count(text: str) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Print and return 0, whatever the numbers are: they are for people to judge."""
-    if args.what == "idle":
-        return _idle(args)
-    if args.what == "recording":
-        return _recording(args)
-    if args.what == "imports":
-        return _imports(args)
-    if args.what == "live":
-        return _live(args)
-    low, high = FRAMES[args.what]
-    if args.frames is not None and not low <= args.frames <= high:
-        raise InputError(f"--frames is {args.frames}, expected {low} to {high} for bench {args.what}")
-    return {"kernels": _kernels, "batch": _batch, "decode": _decode}[args.what](args)
-
-
-def _kernels(args: argparse.Namespace) -> int:
-    counts = front.load_counts(args.counts, kernels.names()) if args.counts else None
-    frames = args.frames or kernels.Effort().frames
-    outcome = kernels.measure(kernels.Effort(frames, args.restarts, args.steps))
-    facts = front.facts(outcome, counts)
-    if args.out:
-        _write(args.out, facts, with_picture=counts is not None)
-    print(json.dumps(facts) if args.json else front.page(facts), end="")
+    if args.what in FRAMES and args.frames is not None:
+        low, high = FRAMES[args.what]
+        if not low <= args.frames <= high:
+            raise InputError(f"--frames is {args.frames}, expected {low} to {high} for bench {args.what}")
+    measure, show, more = WHAT[args.what]
+    outcome = measure(args)
+    if args.json:
+        facts = outcome if isinstance(outcome, dict) else asdict(outcome)
+        print(json.dumps(facts | {name: getattr(outcome, name) for name in more}))
+    else:
+        show(outcome)
     return 0
 
 
-def _write(out: Path, facts: front.Facts, *, with_picture: bool) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / "front.md").write_text(front.page(facts), encoding="utf-8")
-        (out / "front.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
-        if with_picture:
-            front_picture.draw(facts, out / "front.png")
-    except OSError as error:
-        raise InputError(f"{out} cannot be written: {error.strerror}; choose another --out") from None
-
-
-def _idle(args: argparse.Namespace) -> int:
-    outcome = idle.measure(args.source)
-    if args.json:
-        print(json.dumps(asdict(outcome)))
-        return 0
-    print(f"{args.source}: {'finger time':>14} {'frames':>8} {'heartbeats':>11} {'bytes/s':>9}")
+def _idle(outcome: idle.Outcome) -> None:
+    print(f"{outcome.source}: {'finger time':>14} {'frames':>8} {'heartbeats':>11} {'bytes/s':>9}")
     for name, share in (
         ("in contact", outcome.contact),
         ("at rest, REST_FRAMES", outcome.rest_with_frames),
@@ -110,24 +76,14 @@ def _idle(args: argparse.Namespace) -> int:
         print(f"{name:22}{share.seconds:6.2f} s {share.frames:8} {share.heartbeats:11} {share.bytes_per_s:9.0f}")
     print(f"at rest {outcome.saved_percent:.1f} % fewer bytes per second than in contact")
     print("skipped: " + ", ".join(f"{name} {count}" for name, count in outcome.skipped.items()))
-    return 0
 
 
-def _imports(args: argparse.Namespace) -> int:
-    taken = imports.measure(args.rounds)
-    if args.json:
-        print(json.dumps(taken))
-        return 0
+def _imports(taken: dict[str, float]) -> None:
     for name, cpu_s in taken.items():
         print(f"{name:30} {cpu_s:6.3f} s CPU  {cpu_s / taken[imports.BASE]:5.2f} of {imports.BASE}")
-    return 0
 
 
-def _live(args: argparse.Namespace) -> int:
-    outcome = live.measure(rounds=args.rounds)
-    if args.json:
-        print(json.dumps(asdict(outcome)))
-        return 0
+def _live(outcome: live.Outcome) -> None:
     width = max(len(row.name) for row in outcome.rows)
     print(f"{'frames/s':>8} {'reader':{width}} {'loss':>8} {'worst':>8} {'median us':>10} {'p99 us':>8} {'CPU %':>7}")
     for row in outcome.rows:
@@ -138,27 +94,17 @@ def _live(args: argparse.Namespace) -> int:
     print(f"{outcome.rounds} rounds of {outcome.seconds:g} s in turns, a board with a ring of 16 KiB on a pty")
     for asked in live.asked(outcome):
         print(f"{asked.what}: {asked.seen} (asked {asked.wanted}: {'met' if asked.met else 'NOT met'})")
-    return 0
 
 
-def _batch(args: argparse.Namespace) -> int:
-    outcome = batch.measure(args.frames or BATCH_FRAMES)
-    if args.json:
-        print(json.dumps(asdict(outcome)))
-        return 0
+def _batch(outcome: batch.Outcome) -> None:
     _rows("ns per frame", outcome.rows)
     print(
         f"{outcome.frames} frames, {batch.ROUNDS} interleaved rounds; NumPy's best block here: {outcome.block} frames"
     )
     _ratios(outcome.ratios)
-    return 0
 
 
-def _decode(args: argparse.Namespace) -> int:
-    outcome = decode.measure(args.frames or DECODE_FRAMES)
-    if args.json:
-        print(json.dumps(asdict(outcome)))
-        return 0
+def _decode(outcome: decode.Outcome) -> None:
     print(
         f"{outcome.seconds:g} s of {decode.FINGERS} fingers, {outcome.messages} FRAMEs and PACs of "
         f"{outcome.bytes_per_message:.0f} bytes each, pymavlink's {outcome.mavlink_bytes_per_message:.0f}; CPU time, "
@@ -168,30 +114,21 @@ def _decode(args: argparse.Namespace) -> int:
         print()
         _rows(f"ns per message, chunks of {result.chunk_bytes} bytes", result.rows)
         _ratios(result.ratios)
-    return 0
 
 
-def _rows(title: str, rows: list[batch.Row]) -> None:
+def _rows(title: str, rows: list[timing.Row]) -> None:
     width = max(len(title), *(len(row.name) for row in rows))
     print(f"{title:{width}}  {'median':>9} {'min':>9} {'max':>9}")
     for row in rows:
         print(f"{row.name:{width}}  {row.median_ns:9.1f} {row.min_ns:9.1f} {row.max_ns:9.1f}")
 
 
-def _ratios(ratios: list[batch.Ratio]) -> None:
+def _ratios(ratios: list[timing.Ratio]) -> None:
     for ratio in ratios:
         print(f"{ratio.ratio:5.1f}x  {ratio.faster} against {ratio.slower}{_verdict(ratio)}")
 
 
-def _recording(args: argparse.Namespace) -> int:
-    progress = Progress()
-    try:
-        outcome = recording.measure(args.source, fingers=args.fingers, seconds=args.seconds, show=progress.show)
-    finally:
-        progress.done()
-    if args.json:
-        print(json.dumps(asdict(outcome) | {"faster": outcome.faster}))
-        return 0
+def _recording(outcome: recording.Outcome) -> None:
     parts = ", ".join(f"{name} {size / recording.MB:.1f}" for name, size in outcome.mcap_parts.items())
     print(f"{outcome.source}, {outcome.fingers} finger(s), {outcome.seconds:.1f} s, {outcome.frames} frames and PAC")
     print(f"MB: wire {outcome.wire_bytes / recording.MB:.1f}")
@@ -202,7 +139,6 @@ def _recording(args: argparse.Namespace) -> int:
     )
     print("CPU s to load to NumPy: " + ", ".join(f"{name} {taken:.3f}" for name, taken in outcome.load_s.items()))
     print(f"{outcome.faster:.1f}x  MCAP wire against protobuf")
-    return 0
 
 
 def _asked_mb(outcome: recording.Outcome) -> str:
@@ -216,7 +152,26 @@ def _met(met: bool, asked: str) -> str:
     return f" (asked {asked}: {'met' if met else 'NOT met'})"
 
 
-def _verdict(ratio: batch.Ratio) -> str:
+def _verdict(ratio: timing.Ratio) -> str:
     if ratio.asked is None:
         return ""
     return f" (asked {ratio.asked:.0f}x: {'met' if ratio.ratio >= ratio.asked else 'NOT met'})"
+
+
+def _record(args: argparse.Namespace) -> recording.Outcome:
+    progress = Progress()
+    try:
+        return recording.measure(args.source, fingers=args.fingers, seconds=args.seconds, show=progress.show)
+    finally:
+        progress.done()
+
+
+# What is measured, how it is printed, and what of its properties JSON has besides its fields.
+WHAT: dict[str, tuple[Callable[[argparse.Namespace], Any], Callable[[Any], None], tuple[str, ...]]] = {
+    "batch": (lambda args: batch.measure(args.frames or BATCH_FRAMES), _batch, ()),
+    "decode": (lambda args: decode.measure(args.frames or DECODE_FRAMES), _decode, ()),
+    "idle": (lambda args: idle.measure(args.source), _idle, ()),
+    "imports": (lambda args: imports.measure(args.rounds), _imports, ()),
+    "live": (lambda args: live.measure(rounds=args.rounds), _live, ()),
+    "recording": (_record, _recording, ("faster",)),
+}

@@ -7,7 +7,6 @@ about this machine only.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from ...core.compute import RESULT_DTYPE, compute, per_frame
 from ...wire import messages_gen as wire
 from .numpy_batch import Blocked, one_frame, whole_array
+from .timing import Contestant, Ratio, Row, timed
 
 ROUNDS = 15
 SINGLE_FRAMES = 1000
@@ -41,26 +41,6 @@ ASKED: tuple[tuple[str, str, float | None], ...] = (
 
 
 @dataclass(frozen=True)
-class Row:
-    """Nanoseconds per frame over the rounds."""
-
-    name: str
-    median_ns: float
-    min_ns: float
-    max_ns: float
-
-
-@dataclass(frozen=True)
-class Ratio:
-    """Median time of ``slower`` over that of ``faster``, and what was asked of it."""
-
-    faster: str
-    slower: str
-    ratio: float
-    asked: float | None
-
-
-@dataclass(frozen=True)
 class Outcome:
     """One run."""
 
@@ -68,13 +48,6 @@ class Outcome:
     block: int
     rows: list[Row]
     ratios: list[Ratio]
-
-
-@dataclass(frozen=True)
-class _Contestant:
-    name: str
-    frames: int
-    run: Callable[[], Any]
 
 
 def recording(frames: int) -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
@@ -94,10 +67,10 @@ def measure(frames: int, rounds: int = ROUNDS) -> Outcome:
     block = _best_block(counts, tare, arrays)
     best = Blocked(block)
     many = [
-        _Contestant(WARM, frames, lambda: compute(counts, tare, out=out)),
-        _Contestant(FRESH, frames, lambda: compute(counts, tare)),
-        _Contestant(WHOLE, frames, lambda: whole_array(counts, tare)),
-        _Contestant(BEST, frames, lambda: best(counts, tare, arrays)),
+        Contestant(WARM, frames, lambda: compute(counts, tare, out=out)),
+        Contestant(FRESH, frames, lambda: compute(counts, tare)),
+        Contestant(WHOLE, frames, lambda: whole_array(counts, tare)),
+        Contestant(BEST, frames, lambda: best(counts, tare, arrays)),
     ]
     singles = list(counts[:SINGLE_FRAMES])  # taking a row out of the array is nobody's time
     one_out = np.zeros((), RESULT_DTYPE)
@@ -111,8 +84,8 @@ def measure(frames: int, rounds: int = ROUNDS) -> Outcome:
     _check([c.run() for c in many], "all frames")
     for row in singles[:50]:
         _check([run(row) for _, run in ones], "one frame")
-    contestants = many + [_Contestant(name, len(singles), _looped(run, singles)) for name, run in ones]
-    rows = _timed(contestants, rounds)
+    contestants = many + [Contestant(name, len(singles), _looped(run, singles)) for name, run in ones]
+    rows = timed(contestants, rounds)
     time_of = {row.name: row.median_ns for row in rows}
     ratios = [Ratio(fast, slow, time_of[slow] / time_of[fast], asked) for fast, slow, asked in ASKED]
     return Outcome(frames, block, rows, ratios)
@@ -126,21 +99,10 @@ def _looped(run: Callable[[NDArray[np.uint16]], Any], rows: list[NDArray[np.uint
     return loop
 
 
-def _timed(contestants: list[_Contestant], rounds: int) -> list[Row]:
-    times: dict[str, list[float]] = {c.name: [] for c in contestants}
-    for _ in range(rounds):
-        for contestant in contestants:
-            contestant.run()  # its own pages and caches, not its neighbour's
-            start = time.perf_counter_ns()
-            contestant.run()
-            times[contestant.name].append((time.perf_counter_ns() - start) / contestant.frames)
-    return [Row(name, float(np.median(ns)), min(ns), max(ns)) for name, ns in times.items()]
-
-
 def _best_block(counts: NDArray[np.uint16], tare: NDArray[np.float64], arrays: Any) -> int:
     """NumPy's best block size here; it depends on the cache."""
-    trials = [_Contestant(str(size), len(counts), partial(Blocked(size), counts, tare, arrays)) for size in BLOCK_SIZES]
-    return int(min(_timed(trials, 5), key=lambda row: row.median_ns).name)
+    trials = [Contestant(str(size), len(counts), partial(Blocked(size), counts, tare, arrays)) for size in BLOCK_SIZES]
+    return int(min(timed(trials, 5), key=lambda row: row.median_ns).name)
 
 
 def _check(results: list[Any], what: str) -> None:

@@ -8,10 +8,11 @@ Absolute times say something about this machine only.
 from __future__ import annotations
 
 import gc
-import time
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from time import process_time_ns
 from types import ModuleType
 from typing import Any
 
@@ -27,7 +28,7 @@ from ...wire.dtypes_gen import DTYPES
 from ...wire.frames import StructArray
 from ...wire.framing import encode
 from . import mavlink
-from .batch import Ratio, Row
+from .timing import Contestant, Ratio, Row, timed
 
 FINGERS = 5
 FRAMES_PER_S = 100 * FINGERS
@@ -111,9 +112,9 @@ def measure(frames: int, rounds: int = ROUNDS) -> Outcome:
     for chunk_bytes in CHUNK_BYTES:
         chunks, mavlink_chunks = _chunks(ours, chunk_bytes), _chunks(theirs, chunk_bytes)
         contestants = [
-            _Contestant(OURS, chunks, _decoder),
-            _Contestant(LIVE, chunks, _live),
-            _Contestant(UNITS, chunks, _live_units),
+            _Contestant(OURS, chunks, _ours(Decoder, {FRAME: "frames", PAC: "pacs"})),
+            _Contestant(LIVE, chunks, _ours(StreamDecoder, {FRAME: "wire", PAC: "pac"})),
+            _Contestant(UNITS, chunks, _ours(StreamDecoder, {FRAME: "wire", PAC: "pac", UNITS_OF_FRAME: "frames"})),
             _Contestant(MAVLINK, mavlink_chunks, _mavlink(dialect)),
             _Contestant(STRUCT, chunks, _struct(cobs_decode)),
             _Contestant(NUMPY, chunks, _numpy(cobs_decode)),
@@ -154,34 +155,19 @@ def _chunks(data: bytes, size: int) -> Chunks:
 # ---- contestants: all check what they take and count what they refuse ---------------------------
 
 
-def _decoder() -> Feed:
-    decoder = Decoder()
+def _ours(make: Callable[[], Any], columns: dict[int, str]) -> Callable[[], Feed]:
+    """A decoder of this package; ``columns`` names what of its batches is read, by message id."""
 
-    def feed(chunk: bytes) -> Columns:
-        decoded = decoder.feed(chunk)
-        return {FRAME: decoded.frames, PAC: decoded.pacs}
+    def start() -> Feed:
+        decoder = make()
 
-    return feed
+        def feed(chunk: bytes) -> Columns:
+            batch = decoder.feed(chunk)
+            return {message_id: getattr(batch, name) for message_id, name in columns.items()}
 
+        return feed
 
-def _live() -> Feed:
-    decoder = StreamDecoder()
-
-    def feed(chunk: bytes) -> Columns:
-        batch = decoder.feed(chunk)
-        return {FRAME: batch.wire, PAC: batch.pac}
-
-    return feed
-
-
-def _live_units() -> Feed:
-    decoder = StreamDecoder()
-
-    def feed(chunk: bytes) -> Columns:
-        batch = decoder.feed(chunk)
-        return {FRAME: batch.wire, PAC: batch.pac, UNITS_OF_FRAME: batch.frames}
-
-    return feed
+    return start
 
 
 def _mavlink(dialect: ModuleType) -> Callable[[], Feed]:
@@ -292,24 +278,17 @@ def _array(messages: list[Any], dtype: np.dtype[Any]) -> StructArray:
 
 
 def _timed(contestants: list[_Contestant], rounds: int, messages: int) -> list[Row]:
-    times: dict[str, list[float]] = {c.name: [] for c in contestants}
     # The garbage collector stays on and is part of who makes many objects, but this benchmark's own are not
     # theirs to walk.
     gc.collect()
     gc.freeze()
     try:
-        for _ in range(rounds):
-            for contestant in contestants:
-                _cpu_ns(contestant)  # its own pages and caches, not its neighbour's
-                times[contestant.name].append(_cpu_ns(contestant) / messages)
+        return timed([Contestant(c.name, messages, partial(_feed, c)) for c in contestants], rounds, process_time_ns)
     finally:
         gc.unfreeze()
-    return [Row(name, float(np.median(ns)), min(ns), max(ns)) for name, ns in times.items()]
 
 
-def _cpu_ns(contestant: _Contestant) -> int:
+def _feed(contestant: _Contestant) -> None:
     feed = contestant.start()
-    start = time.process_time_ns()
     for chunk in contestant.chunks:
         feed(chunk)
-    return time.process_time_ns() - start

@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import geometry as surface
-from ...wire import sensor_gen as sensor
-from ...wire.messages_gen import PocWeights
+from biotac.core import geometry as surface
+from biotac.wire import sensor_gen as sensor
+from biotac.wire.messages_gen import PocWeights
 
 Signals = NDArray[np.int32]
 

@@ -1,10 +1,10 @@
-// How far each kernel variant is from the exact result, for the host's benchmark.
+// How far each kernel variant is from the exact result, for tools/bench/front.
 //
 // The judge is neither of the references: sums of whole numbers in int64, exact, and the last quotient
 // or root in long double. A variant's error is what it is off by: the point's distance in um; of the force in
 // mN and of torque y and z in mN*mm (N*um), the axis that is furthest off; of torque x.
-#ifndef BIOTAC_VARIANT_ERRORS_H
-#define BIOTAC_VARIANT_ERRORS_H
+#ifndef BIOTAC_ERRORS_H
+#define BIOTAC_ERRORS_H
 
 #include <stdint.h>
 
@@ -29,8 +29,8 @@ void bt_kernel_errors(int variant, const bt_kernel_case *what, int64_t n, const 
 int64_t bt_kernel_run(int variant, const bt_kernel_case *what, int64_t n, const int32_t *e_q4);
 
 // The largest error of one kind (0..3) that hill climbing finds: `restarts` times from a random frame,
-// `steps` changes each, kept if they do not lower the error. worst_e_q4: (19,), the frame. Deterministic.
+// `steps` changes each, kept if they do not lower the error. Deterministic.
 double bt_kernel_climb(int variant, const bt_kernel_case *what, int kind, uint64_t seed, int restarts,
-                       int steps, int32_t *worst_e_q4);
+                       int steps);
 
 #endif

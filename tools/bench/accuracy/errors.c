@@ -1,4 +1,4 @@
-#include "variant_errors.h"
+#include "errors.h"
 
 #include "variants.h"
 
@@ -196,12 +196,11 @@ static void change(uint64_t *state, int32_t e_q4[BT_ELECTRODES])
 }
 
 double bt_kernel_climb(int variant, const bt_kernel_case *what, int kind, uint64_t seed, int restarts,
-                       int steps, int32_t *worst_e_q4)
+                       int steps)
 {
     variant_settings settings = settings_of(what);
     uint64_t state = seed * 0x9E3779B97F4A7C15ull + 1;
     double worst = 0;
-    memset(worst_e_q4, 0, BT_ELECTRODES * sizeof *worst_e_q4);
     for (int restart = 0; restart < restarts; restart++) {
         int32_t here[BT_ELECTRODES];
         double height = -1;
@@ -221,10 +220,7 @@ double bt_kernel_climb(int variant, const bt_kernel_case *what, int kind, uint64
                 memcpy(here, next, sizeof here);
             }
         }
-        if (height > worst) {
-            worst = height;
-            memcpy(worst_e_q4, here, sizeof here);
-        }
+        worst = height > worst ? height : worst;
     }
     return worst;
 }

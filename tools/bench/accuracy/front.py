@@ -1,75 +1,26 @@
-"""The front of accuracy against cost: errors and host times, and what emulated boards counted, as one table.
-
-Counts come from a file of `tools/bench/run --json`; without one the table has errors and host times only.
-"""
+"""The front of accuracy against cost: errors and host times, and what emulated boards counted, as one table."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
-from ...errors import InputError
-from ...markdown import table
-from . import limit
-from .kernels import QUANTITIES, WEIGHT_NAMES, Outcome
+from biotac.markdown import table
 
-FORMAT = "biotac bench counts 1"
+from . import limit
+from .measure import QUANTITIES, WEIGHT_NAMES, Outcome
+
 EVERYTHING = "everything"
 DOUBLED = "everything, doubled"  # the same frames over the ADC's whole range
-COUNTED = ("cycles", "cycles_max", "instructions")
 
 Facts = dict[str, Any]
 
 
-def load_counts(path: Path, variants: list[str]) -> Facts:
-    """What `tools/bench/run --json` wrote; InputError for anything else."""
-    try:
-        counts = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}; write it with tools/bench/run --json") from None
-    except ValueError:
-        raise InputError(f"{path} is no JSON; write it with tools/bench/run --json > {path}") from None
-    wrong = _misshapen(counts, variants)
-    if wrong:
-        raise InputError(f"{path} has {wrong}; write it again with tools/bench/run --json > {path}")
-    assert isinstance(counts, dict)
-    return counts
+def facts(outcome: Outcome, cores: Facts) -> Facts:
+    """Everything as JSON: variants by name and weights, each with errors, host time and counts by core.
 
-
-def _misshapen(counts: Any, variants: list[str]) -> str:
-    """What is wrong with it, or nothing."""
-    if not isinstance(counts, dict) or counts.get("format") != FORMAT:
-        return f"no {FORMAT!r}"
-    if counts.get("weights") != list(WEIGHT_NAMES.values()):
-        return f"other weights than {', '.join(WEIGHT_NAMES.values())}"
-    cores = counts.get("cores")
-    if not isinstance(cores, dict) or not cores:
-        return "no cores"
-    for key, core in cores.items():
-        if not isinstance(core, dict) or not isinstance(core.get("kernels"), dict):
-            return f"no kernels for {key}"
-        if not all(isinstance(core.get(word), str) for word in ("title", "cycles_by")):
-            return f"no title for {key}"
-        for name in variants:
-            rows = core["kernels"].get(name, {}).get(EVERYTHING)
-            if not _is_counted(rows):
-                return f"no counts of {name} on {key}"
-    return ""
-
-
-def _is_counted(rows: Any) -> bool:
-    return (
-        isinstance(rows, list)
-        and len(rows) == len(WEIGHT_NAMES)
-        and all(isinstance(row, dict) and all(isinstance(row.get(c), int) for c in COUNTED) for row in rows)
-    )
-
-
-def facts(outcome: Outcome, counts: Facts | None) -> Facts:
-    """Everything as JSON: variants by name and weights, each with errors, host time and counts by core."""
-    cores = counts["cores"] if counts else {}
+    ``cores`` are boards.counts(), or empty.
+    """
     variants: Facts = {}
     for name, by_weights in outcome.variants.items():
         variants[name] = {}

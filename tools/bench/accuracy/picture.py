@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...picture import picture
+from biotac.picture import picture
+
 from .front import EVERYTHING, Facts
 
 WEIGHTS = "compress n=1"  # what a board starts with
@@ -14,11 +15,11 @@ PANELS = (("Cortex-M0+", ("m0plus", "m0plus_divider")), ("Cortex-M4F", ("m4f",))
 HIGHLIGHT = {"shipped": "#c2410c", "int + FPU": "#15803d"}
 OTHER = "#334155"
 LEFT = ("double",)  # labels stand right of their points and above, but for these
-BELOW = ("float folded", "divider", "gold int64", "double")
+BELOW = ("float mirrored", "divider", "gold int64", "double")
 
 
 def draw(all_facts: Facts, path: Path) -> None:
-    """Write a PNG. ``all_facts`` must have counts."""
+    """Write a PNG. The facts must have counts."""
     with picture(path) as figure:
         figure.set_size_inches(13, 6)
         figure.suptitle(f"Cost of one frame against its largest PoC error (weights: {WEIGHTS})")

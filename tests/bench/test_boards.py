@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[3]
-
-
-@pytest.fixture
-def model(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.syspath_prepend(str(ROOT / "tools/bench"))
-    import m4f_model
-
-    return m4f_model
+import boards
+import m4f_model
 
 
 def listing(*instructions: str) -> str:
@@ -51,29 +42,29 @@ def listing(*instructions: str) -> str:
         (("itte ne", "nop"), 1),
     ],
 )
-def test_cycles_of_neighbours(model, instructions, cycles) -> None:
-    code = model.Model(listing(*instructions))
+def test_cycles_of_neighbours(instructions, cycles) -> None:
+    code = m4f_model.Model(listing(*instructions))
     assert code.cycles(Counter(pairwise(sorted(code.code)))) == cycles
 
 
-def test_a_branch_costs_more_when_it_is_taken(model) -> None:
-    code = model.Model(listing("beq.n 104", "nop", "nop"))
+def test_a_branch_costs_more_when_it_is_taken() -> None:
+    code = m4f_model.Model(listing("beq.n 104", "nop", "nop"))
     assert code.cycles(Counter([(0x100, 0x102)])) == 1
     assert code.cycles(Counter([(0x100, 0x104)])) == 3
 
 
-def test_an_unknown_instruction_is_named(model) -> None:
-    code = model.Model(listing("qadd16 r0, r1, r2", "nop"))
-    with pytest.raises(model.UnknownInstruction, match="no cycles for qadd16"):
+def test_an_unknown_instruction_is_named() -> None:
+    code = m4f_model.Model(listing("qadd16 r0, r1, r2", "nop"))
+    with pytest.raises(m4f_model.UnknownInstruction, match="no cycles for qadd16"):
         code.cycles(Counter([(0x100, 0x102)]))
 
 
 @pytest.mark.parametrize("size", [1, 7, 60, 61, 1000])
-def test_runs_are_cut_out_of_the_log_whatever_its_chunks(model, size) -> None:
+def test_runs_are_cut_out_of_the_log_whatever_its_chunks(size) -> None:
     addresses = [0x10, 0x40, 0x20, 0x22, 0x40, 0x30, 0x40, 0x24, 0x40, 0x50]
     log = b"".join(b"Trace 0: 0x7f00 [00800408/%08x/00000110/ff000201] name\n" % a for a in addresses)
     chunks = [log[k : k + size] for k in range(0, len(log), size)]
-    assert list(model.runs(chunks, 0x40)) == [[0x20, 0x22], [0x24]]
+    assert list(m4f_model.runs(chunks, 0x40)) == [[0x20, 0x22], [0x24]]
 
 
 @pytest.mark.parametrize(
@@ -84,8 +75,5 @@ def test_runs_are_cut_out_of_the_log_whatever_its_chunks(model, size) -> None:
         *((name, False) for name in ("__aeabi_uidiv", "__aeabi_lmul", "__aeabi_idivmod", "bt_sums_force", "memcpy")),
     ],
 )
-def test_what_counts_as_floating_point(model, name, is_float) -> None:
-    import boards
-
+def test_what_counts_as_floating_point(name, is_float) -> None:
     assert bool(boards.FLOAT_SYMBOL.match(name)) is is_float
-    assert str(ROOT / "tools/bench") in sys.path

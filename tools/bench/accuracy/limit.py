@@ -1,10 +1,9 @@
 """What one step of the sensor's own ADC does to the results: the limit that no kernel can beat.
 
-The simulated finger (sim/physics.py) is pressed with 1 N by a flat of 2 mm at places all over it, without
+The simulated finger (biotac.sim.physics) is pressed with 1 N by a flat of 2 mm at places all over it, without
 noise. Its counts, exact and rounded to whole ones, go through the formulas in float64; the distance between
 the two results is what rounding in the converter does. The resting counts stay exact: a tare is an average
-of many frames. A kernel's own error on those
-frames is asked to stay below a twentieth of that.
+of many frames. A kernel's own error on those frames is asked to stay below a twentieth of that.
 """
 
 from __future__ import annotations
@@ -14,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import geometry as surface
-from ...core.compiled import default_settings, formula_settings
-from ...sim import physics
-from ...wire.messages_gen import PocWeights, Setting
-from ...wire.native import ffi, lib
+from biotac.core import geometry as surface
+from biotac.core.compiled import default_settings, formula_settings
+from biotac.sim import physics
+from biotac.wire.messages_gen import PocWeights, Setting
+from biotac.wire.native import ffi, lib
 
 FORCE_N = 1.0
 TIP_RADIUS_MM = 2.0
@@ -38,7 +37,7 @@ class Limit:
     torque_x_mnmm: float
 
     def values(self) -> tuple[float, float, float, float]:
-        """In the order of kernels.QUANTITIES."""
+        """In the order of measure.QUANTITIES."""
         return self.poc_um, self.force_mn, self.torque_yz_mnmm, self.torque_x_mnmm
 
 

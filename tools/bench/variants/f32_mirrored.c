@@ -1,8 +1,8 @@
-// float32 with the finger's symmetry folded, and Eq 1 and 2 fused: no division by the weight sum on
+// float32 sums over mirrored pairs of electrodes, and Eq 1 and 2 fused: no division by the weight sum on
 // the tip, and each coefficient is a whole number that float32 holds exactly.
 #include "variants.h"
 
-#include "fold_f32_gen.h"
+#include "mirrored_f32_gen.h"
 
 #include <math.h>
 
@@ -17,7 +17,7 @@ static bool point_of_contact(const float e[BT_ELECTRODES], int weights, float po
         w[i] = weights == BT_POC_WEIGHTS_COMPRESS_N1 ? base : base * base;
     }
     float sum[3];
-    float total = fold_f32_moments(w, sum);
+    float total = mirrored_f32_moments(w, sum);
     if (!(total > 0)) {
         return false;
     }
@@ -30,46 +30,37 @@ static bool point_of_contact(const float e[BT_ELECTRODES], int weights, float po
     return true;
 }
 
-bool variant_f32_folded(const int32_t e_q4[BT_ELECTRODES], const variant_settings *settings, unsigned wanted,
-                        variant_output *out)
+bool variant_f32_mirrored(const int32_t e_q4[BT_ELECTRODES], const variant_settings *settings,
+                          unsigned wanted, variant_output *out)
 {
-    folded_output *folded = &out->folded;
+    mirrored_output *mirrored = &out->mirrored;
     float e[BT_ELECTRODES]; // in 1/16 count: exact, and the gains know
     for (int i = 0; i < BT_ELECTRODES; i++) {
         e[i] = (float)e_q4[i];
     }
     if (wanted & (VARIANT_FORCE | VARIANT_TORQUE)) {
         float sum[3];
-        fold_f32_force(e, sum);
+        mirrored_f32_force(e, sum);
         for (int d = 0; d < 3; d++) {
-            folded->force_mn[d] = settings->folded_force[d] * sum[d];
+            mirrored->force_mn[d] = settings->mirrored_force[d] * sum[d];
         }
     }
     if (wanted & VARIANT_TORQUE) {
         float sum[2];
-        fold_f32_torque(e, sum);
+        mirrored_f32_torque(e, sum);
         for (int d = 0; d < 2; d++) {
-            folded->torque_mnmm[d + 1] = settings->folded_torque[d] * sum[d];
+            mirrored->torque_mnmm[d + 1] = settings->mirrored_torque[d] * sum[d];
         }
     }
     if (!(wanted & (VARIANT_POC | VARIANT_TORQUE))) {
         return true;
     }
-    if (!point_of_contact(e, settings->poc_weights, folded->poc_um)) {
+    if (!point_of_contact(e, settings->poc_weights, mirrored->poc_um)) {
         return false;
     }
     if (wanted & VARIANT_TORQUE) {
-        const float *force = folded->force_mn;
-        folded->torque_mnmm[0] = (folded->poc_um[1] * force[2] - folded->poc_um[2] * force[1]) * 1e-3F;
+        const float *force = mirrored->force_mn;
+        mirrored->torque_mnmm[0] = (mirrored->poc_um[1] * force[2] - mirrored->poc_um[2] * force[1]) * 1e-3F;
     }
     return true;
-}
-
-void variant_read_f32_folded(const variant_output *out, variant_result *result)
-{
-    for (int d = 0; d < 3; d++) {
-        result->poc_um[d] = (double)out->folded.poc_um[d];
-        result->force_mn[d] = (double)out->folded.force_mn[d];
-        result->torque_mnmm[d] = (double)out->folded.torque_mnmm[d];
-    }
 }

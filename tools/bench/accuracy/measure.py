@@ -1,23 +1,31 @@
 """Every kernel variant (tools/bench/variants) against the exact result, and against the others' time.
 
-Errors are distances to exact sums finished in extended precision (host/binding/kernels.c): over random
-frames of six classes, and the worst that hill climbing finds. Times are ratios to the shipped kernel
+Errors are distances to exact sums finished in extended precision (errors.c): over random frames of six
+classes, and the worst that hill climbing finds. Times are ratios to the shipped kernel
 within one run: interleaved rounds, warmed buffers, medians.
 """
 
 from __future__ import annotations
 
-import time
+import re
 from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
+import cffi
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.compiled import FORCE_GAINS, TORQUE_GAINS, default_settings
-from ...wire.messages_gen import PocWeights
-from ...wire.native import ffi, lib
-from . import limit, scenes
+import boards
+from biotac.core.compiled import FORCE_GAINS, TORQUE_GAINS, default_settings
+from biotac.lab.bench.timing import Contestant, timed
+from biotac.wire.messages_gen import PocWeights
+
+from . import limit, signals
+
+ffi = cffi.FFI()
+ffi.cdef(re.sub("^#.*", "", Path(__file__).with_name("errors.h").read_text(encoding="utf-8"), flags=re.MULTILINE))
 
 #: What is compared, in the order of BT_KERNEL_ERRORS, and its unit. N*um is the wire's mN*mm.
 QUANTITIES: dict[str, str] = {
@@ -26,11 +34,7 @@ QUANTITIES: dict[str, str] = {
     "torque y, z": "N*um",
     "torque x": "N*um",
 }
-WEIGHT_NAMES: dict[PocWeights, str] = {
-    PocWeights.ABS_N2: "abs n=2",
-    PocWeights.COMPRESS_N1: "compress n=1",
-    PocWeights.COMPRESS_N2: "compress n=2",
-}
+WEIGHT_NAMES: dict[PocWeights, str] = dict(zip(PocWeights, boards.WEIGHTS, strict=True))
 SHIPPED = "shipped"
 ROUNDS = 15
 TIMED_FRAMES = 2000
@@ -95,8 +99,19 @@ class Outcome:
         return self.limits[weights][quantity] * limit.BUDGET_SHARE
 
 
+@cache
+def compiled() -> Any:
+    """errors.c and the variants, built by this machine's compiler."""
+    build = boards.BUILD / "accuracy"
+    boards.command("cmake", "-S", boards.ROOT, "-B", build, "-DBIOTAC_BENCH=ON")
+    boards.command("cmake", "--build", build, "--target", "biotac_errors")
+    return ffi.dlopen(str(build / "tools" / "bench" / "libbiotac_errors.so"))
+
+
+@cache
 def names() -> list[str]:
     """The variants, in the C table's order."""
+    lib = compiled()
     return [ffi.string(lib.bt_kernel_name(k)).decode() for k in range(lib.bt_kernel_variants())]
 
 
@@ -108,7 +123,7 @@ def measure(effort: Effort) -> Outcome:
         case = _case(weights)
         frames = _frames(weights, effort.frames)
         pressed = limit.frames_q4()
-        ratios = _ratios(case, scenes.bumps(np.random.default_rng(SEED), TIMED_FRAMES, weights))
+        ratios = _ratios(case, signals.bumps(np.random.default_rng(SEED), TIMED_FRAMES, weights))
         for index, name in enumerate(variants):
             found = {scene: _errors(index, case, e_q4) for scene, e_q4 in frames.items()}
             at_1n = _errors(index, case, pressed)
@@ -137,14 +152,15 @@ def _case(weights: PocWeights) -> Any:
     )
 
 
-def _frames(weights: PocWeights, n: int) -> dict[str, scenes.Signals]:
+def _frames(weights: PocWeights, n: int) -> dict[str, signals.Signals]:
     random = np.random.default_rng([SEED, int(weights)])
-    return {name: make(random, n, weights) for name, make in scenes.CLASSES.items()}
+    return {name: make(random, n, weights) for name, make in signals.CLASSES.items()}
 
 
-def _errors(index: int, case: Any, e_q4: scenes.Signals) -> NDArray[np.float64]:
+def _errors(index: int, case: Any, e_q4: signals.Signals) -> NDArray[np.float64]:
     out = np.empty((len(e_q4), len(QUANTITIES)))
-    lib.bt_kernel_errors(index, case, len(e_q4), ffi.from_buffer("int32_t[]", e_q4), ffi.from_buffer("double[]", out))
+    rows = ffi.from_buffer("int32_t[]", e_q4), ffi.from_buffer("double[]", out)
+    compiled().bt_kernel_errors(index, case, len(e_q4), *rows)
     return out
 
 
@@ -170,20 +186,12 @@ def _rms(column: NDArray[np.float64]) -> float:
 
 
 def _climb(index: int, case: Any, kind: int, effort: Effort) -> float:
-    worst = ffi.new(f"int32_t[{scenes.ELECTRODES}]")
-    return float(lib.bt_kernel_climb(index, case, kind, SEED, effort.restarts, effort.steps, worst))
+    return float(compiled().bt_kernel_climb(index, case, kind, SEED, effort.restarts, effort.steps))
 
 
-def _ratios(case: Any, e_q4: scenes.Signals) -> list[float]:
+def _ratios(case: Any, e_q4: signals.Signals) -> list[float]:
     """Per variant, its median time over that of the shipped kernel."""
-    buffer = ffi.from_buffer("int32_t[]", e_q4)
-    every = range(lib.bt_kernel_variants())
-    times: list[list[int]] = [[] for _ in every]
-    for _ in range(ROUNDS):
-        for index in every:
-            lib.bt_kernel_run(index, case, len(e_q4), buffer)  # its own caches, not its neighbour's
-            start = time.perf_counter_ns()
-            lib.bt_kernel_run(index, case, len(e_q4), buffer)
-            times[index].append(time.perf_counter_ns() - start)
-    medians = [float(np.median(t)) for t in times]
-    return [median / medians[names().index(SHIPPED)] for median in medians]
+    taken = (case, len(e_q4), ffi.from_buffer("int32_t[]", e_q4))
+    runs = [partial(compiled().bt_kernel_run, index, *taken) for index in range(len(names()))]
+    rows = timed([Contestant(name, len(e_q4), run) for name, run in zip(names(), runs, strict=True)], ROUNDS)
+    return [row.median_ns / rows[names().index(SHIPPED)].median_ns for row in rows]

@@ -1,0 +1,52 @@
+"""What tools/bench/front runs: count on the emulated boards, look for errors, write the front."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import boards
+
+from . import front, measure, picture
+
+
+def main() -> int:
+    effort = measure.Effort()
+    parser = argparse.ArgumentParser(prog="tools/bench/front", description="Every kernel's cost and accuracy.")
+    parser.add_argument("--out", type=Path, default=boards.BUILD / "front", help="default build/bench/front")
+    parser.add_argument("--commit", action="store_true", help="refresh host/docs/front.png, which README.md shows")
+    parser.add_argument("--errors", action="store_true", help="errors and host times only, no boards and no picture")
+    parser.add_argument("--json", action="store_true", help="print front.json in place of front.md")
+    parser.add_argument("--frames", type=int, default=effort.frames, help="per class (default %(default)s)")
+    parser.add_argument("--restarts", type=int, default=effort.restarts, help="of the climbing (default %(default)s)")
+    parser.add_argument("--steps", type=int, default=effort.steps, help="of each restart (default %(default)s)")
+    args = parser.parse_args()
+    if args.frames < 1 or args.restarts < 1 or args.steps < 1:
+        parser.error("--frames, --restarts and --steps must be 1 or more")
+    if args.commit and args.errors:
+        parser.error("--commit needs what --errors leaves out: the picture")
+    args.out.mkdir(parents=True, exist_ok=True)
+    cores = {}
+    if not args.errors:
+        boards.need()
+        cores = boards.counts()
+    facts = front.facts(measure.measure(measure.Effort(args.frames, args.restarts, args.steps)), cores)
+    table, text = front.page(facts), json.dumps(facts, indent=1) + "\n"
+    (args.out / "front.md").write_text(table, encoding="utf-8")
+    (args.out / "front.json").write_text(text, encoding="utf-8")
+    if cores:
+        picture.draw(facts, args.out / "front.png")
+    if args.commit:
+        shutil.copy(args.out / "front.png", boards.ROOT / "host" / "docs" / "front.png")
+    print(text if args.json else table, end="")
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except (boards.Failed, OSError) as error:
+        sys.exit(f"tools/bench/front: {error}")
