@@ -111,8 +111,10 @@
 #define USB_ADDR_ENDP          REG32(0x50110000u)
 #define USB_MAIN_CTRL          REG32(0x50110040u)
 #define USB_SIE_CTRL           REG32(0x5011004Cu)
+#define USB_SOF_RD             REG32(0x50110048u) // number of the frame
 #define USB_SIE_STATUS         REG32(0x50110050u)
 #define USB_BUFF_STATUS        REG32(0x50110058u) // bit 2 ep: IN, bit 2 ep + 1: OUT
+#define USB_EP0_BUFFERS        3u
 #define USB_EP_STALL_ARM       REG32(0x50110068u)
 #define USB_USB_MUXING         REG32(0x50110074u)
 #define USB_USB_PWR            REG32(0x50110078u)
