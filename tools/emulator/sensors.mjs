@@ -7,7 +7,7 @@ const SCK = 18
 const MOSI = 19
 export const CHIP_SELECTS = [17, 20, 21, 22, 26] // of fingers 0 to 4: firmware/boards/pico
 const SPI_FUNCTION = 1
-const WORD_BITS = 16
+const WIDTHS = [8, 16] // of a property's byte; of all else
 const FASTEST_HZ = 10e6 // data sheet
 
 /** The sensors, whatever board they are wired to. Throws an Error that says what is wrong with the tape. */
@@ -64,18 +64,18 @@ export class Sensors {
       if (mask & (mask - 1)) this.overlaps++
       word = this.#answer(mcu, spi, mosi, nanos())
       // As published a transfer takes no time at all.
-      done.schedule(Math.max(1, Math.round(WORD_BITS * (mcu.clkSys / spi.clockFrequency))) * (1e9 / mcu.clkSys))
+      done.schedule(Math.max(1, Math.round(spi.dataBits * (mcu.clkSys / spi.clockFrequency))) * (1e9 / mcu.clkSys))
     }
   }
 
   #answer(mcu, spi, mosi, nanos) {
     const wired = [MISO, SCK, MOSI].every((pin) => mcu.gpio[pin].functionSelect === SPI_FUNCTION)
-    const right = spi.enabled && spi.dataBits === WORD_BITS && spi.spiMode === 0 && spi.clockFrequency <= FASTEST_HZ
+    const right = spi.enabled && WIDTHS.includes(spi.dataBits) && spi.spiMode === 0 && spi.clockFrequency <= FASTEST_HZ
     if (!wired || !right) {
       this.misconfigured++ // the sensor would make something of it; nobody knows what
       return 0xffff
     }
-    return this.calls.transfer(mosi, nanos)
+    return spi.dataBits === 8 ? this.calls.transfer_byte(mosi, nanos) : this.calls.transfer(mosi, nanos)
   }
 
   #bytes() {
