@@ -34,6 +34,9 @@ void port_spi_select(uint8_t mask);
 // Exchange 16 bits, MSB first, mode 0, BT_SPI_HZ. Returns what MISO carried.
 uint16_t port_spi_transfer16(uint16_t mosi);
 
+// The same with 8 bits: a property's bytes come one by one.
+uint8_t port_spi_transfer8(uint8_t mosi);
+
 // ---- link to the host -----------------------------------------------------------------------
 // Takes all bytes or none; false means no room, or nobody there.
 bool port_link_write(const uint8_t *data, size_t bytes);

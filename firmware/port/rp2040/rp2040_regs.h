@@ -145,6 +145,7 @@
 #define SPI0_SSPDR     REG32(0x4003C008u)
 #define SPI0_SSPSR     REG32(0x4003C00Cu)
 #define SPI0_SSPCPSR   REG32(0x4003C010u)
+#define SSPCR0_DSS_8   7u
 #define SSPCR0_DSS_16  15u // data size less one; FRF, SPO and SPH are 0: Motorola, mode 0
 #define SSPCR0_SCR_LSB 8
 #define SSPCR1_SSE     (1u << 1)

@@ -58,10 +58,28 @@ IN_SRAM void port_spi_select(uint8_t mask)
     SIO_GPIO_OUT_CLR = low;
 }
 
-IN_SRAM uint16_t port_spi_transfer16(uint16_t mosi)
+static IN_SRAM uint32_t transfer(uint32_t mosi)
 {
     SPI0_SSPDR = mosi;
     // Not busy is later than received: the clock has gone low by then, and the select may rise.
     bool done = wait_for(&SPI0_SSPSR, SSPSR_RNE | SSPSR_BSY, SSPSR_RNE, WAIT_SPI_TURNS);
-    return done ? (uint16_t)SPI0_SSPDR : 0; // 0 reads as a sensor that is not there
+    return done ? SPI0_SSPDR : 0; // 0 reads as a sensor that is not there
+}
+
+IN_SRAM uint16_t port_spi_transfer16(uint16_t mosi)
+{
+    return (uint16_t)transfer(mosi);
+}
+
+IN_SRAM uint8_t port_spi_transfer8(uint8_t mosi)
+{
+    // The width changes while the block is off (PL022 manual, 3.3.1); the clock stays low.
+    SPI0_SSPCR1 = 0;
+    SPI0_SSPCR0 = SSPCR0_DSS_8 | SCR << SSPCR0_SCR_LSB;
+    SPI0_SSPCR1 = SSPCR1_SSE;
+    uint8_t miso = (uint8_t)transfer(mosi);
+    SPI0_SSPCR1 = 0;
+    SPI0_SSPCR0 = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
+    SPI0_SSPCR1 = SSPCR1_SSE;
+    return miso;
 }
