@@ -37,22 +37,17 @@ static void begin(bt_property *property, uint8_t selector, uint8_t bytes)
 
 void bt_serial_query_begin(bt_serial_query *query)
 {
-    query->read = 0;
-    begin(&query->now, BT_PROPERTY_SOFTWARE_VERSION, VERSION_BYTES); // thrown away
+    query->whole = 0;
+    begin(&query->read[0], BT_PROPERTY_SOFTWARE_VERSION, VERSION_BYTES);
+    begin(&query->read[1], BT_PROPERTY_SERIAL, BT_SERIAL_CHARS);
+    begin(&query->read[2], BT_PROPERTY_SERIAL, BT_SERIAL_CHARS);
 }
 
 void bt_serial_query_step(bt_serial_query *query, uint8_t finger)
 {
-    if (query->read == QUERY_READS || !bt_property_step(&query->now, finger)) {
-        return;
+    if (query->whole < QUERY_READS && bt_property_step(&query->read[query->whole], finger)) {
+        query->whole++;
     }
-    if (query->read > 0) {
-        for (unsigned k = 0; k < BT_SERIAL_CHARS; k++) {
-            query->serial[query->read - 1][k] = query->now.got[k];
-        }
-    }
-    query->read++;
-    begin(&query->now, BT_PROPERTY_SERIAL, BT_SERIAL_CHARS);
 }
 
 // ---- what may be taken for a property ---------------------------------------------------------------
@@ -76,8 +71,8 @@ static bool trim_serial(uint8_t serial[BT_SERIAL_CHARS])
 
 bool bt_serial_query_answer(const bt_serial_query *query, uint8_t serial[BT_SERIAL_CHARS])
 {
-    memcpy(serial, query->serial[0], BT_SERIAL_CHARS);
-    return query->read == QUERY_READS && memcmp(query->serial[0], query->serial[1], BT_SERIAL_CHARS) == 0
+    memcpy(serial, query->read[1].got, BT_SERIAL_CHARS);
+    return query->whole == QUERY_READS && memcmp(serial, query->read[2].got, BT_SERIAL_CHARS) == 0
            && trim_serial(serial);
 }
 

@@ -31,9 +31,8 @@ bool bt_property_step(bt_property *property, uint8_t finger);
 // Who is there, asked in as many steps as a round has slots at most: of the sampler's interrupt, instead of a
 // sample.
 typedef struct {
-    bt_property now;
-    uint8_t read; // of the three
-    uint8_t serial[2][BT_SERIAL_CHARS];
+    bt_property read[3]; // one to throw away, and the serial number twice
+    uint8_t whole;       // of them
 } bt_serial_query;
 
 void bt_serial_query_begin(bt_serial_query *query);

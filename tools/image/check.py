@@ -23,7 +23,7 @@ from image.symbols import FLOAT_SYMBOL, LIBRARY_SYMBOL
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PORT = ROOT / "firmware" / "port" / "rp2040"
-FLASH_BUDGET = 48 * 1024
+FLASH_BUDGET = 56 * 1024
 RAM_BUDGET = 24 * 1024
 SRAM = 0x20000000
 
