@@ -75,6 +75,7 @@ export class Rig {
       // A main loop that nothing wakes any more: the watchdog's business.
       'lose interrupts': () => (this.machine.mcu.core.enabledInterrupts = 0),
       'touch at 1200 baud': () => this.usb.touch(1200),
+      'stretch a word': () => (this.sensors.stretched = true),
       'corrupt a handshake': () => (this.usb.corrupting = true),
       'wear the flash out': () => (this.board.worn = true),
       unplug: () => this.#cable(false),

@@ -150,6 +150,7 @@
 #define SSPCR0_SCR_LSB 8
 #define SSPCR1_SSE     (1u << 1)
 #define SSPSR_RNE      (1u << 2)
+#define SPI_FIFO_WORDS 8
 #define SSPSR_BSY      (1u << 4)
 
 // ---- 4.6 timer
