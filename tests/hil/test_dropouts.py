@@ -82,7 +82,7 @@ def test_a_held_force_is_back_within_50_ms_when_the_same_sensor_is(
     whole, _ = play(rig, tmp_path, seconds, None, calibrated=True)
     frames, hand = play(rig, tmp_path, seconds, kind, calibrated=True)
     assert of(frames, 0).tobytes() == of(whole, 0).tobytes()
-    before, after = split(of(frames, 1))
+    _, after = split(of(frames, 1))
     back = after[np.argmax(np.all(after["counts"] != wire.INVALID_COUNT, axis=1)) :]  # from the first good round
     sure = back["t_us"] >= back["t_us"][0] + BACK_ROUNDS * 10_000
     assert np.all(back["flags"][sure] & (FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER) == 0)

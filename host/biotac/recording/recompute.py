@@ -181,8 +181,8 @@ def _through_the_machine(
         )
     if np.any(recording.wire["flags"] & wire.FrameFlags.SENSOR_OTHER):
         raise InputError(
-            f"{recording.path} has a sensor that was plugged in while recording, whose tare began anew; add --keep-tare "
-            "to recompute from the tares it recorded"
+            f"{recording.path} has a sensor that was plugged in while recording, whose tare began anew; add "
+            "--keep-tare to recompute from the tares it recorded"
         )
     new = np.empty_like(recording.wire)
     tares: dict[int, wire.Tare] = {}
