@@ -11,7 +11,7 @@ from rig import Rig
 
 import biotac
 from biotac import Calibration, CalibrationState, FrameFlags, PocWeights
-from biotac import _wire as wire
+from biotac.wire import messages_gen as wire
 
 AWAY_S = 2.5  # world time; the hold began at 1.5 s
 HELD_N = 3.0

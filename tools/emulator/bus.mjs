@@ -35,7 +35,7 @@ export class UsbBus {
     this.view = mcu.usbDPRAMView
     this.toggles = new Map() // what the host expects or sends next: endpoint*2 + out -> 0 or 1
     this.written = new Map()
-    this.counters = { toggle_errors: 0, available_not_last: 0, in_packets: 0, out_packets: 0, hangs: 0 }
+    this.counters = { toggle_errors: 0, available_not_last: 0, in_packets: 0, out_packets: 0, hangs: 0, resets: 0 }
     this.onArmed = () => {}
     this.onSetupSeen = () => {}
     this.onReset = () => {}
@@ -186,6 +186,7 @@ export class UsbBus {
   #resetBlock() {
     const { usb } = this
     this.abort()
+    this.counters.resets++
     this.hungAt = null
     usb.mainCtrl = usb.sieCtrl = usb.sieStatus = usb.buffStatus = usb.intEnable = usb.addrEndp = usb.epStallArm = 0
     usb.intRaw = 0
