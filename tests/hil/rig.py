@@ -14,7 +14,7 @@ import pytest
 import tomllib
 
 import biotac
-from biotac.link.ports import start_board
+from biotac.sim.ports import start_board
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimBoard
 
