@@ -4,6 +4,7 @@
 #include "port.h"
 #include "properties.h"
 #include "talk/host.h"
+#include "talk/sensors.h"
 #include "talk/streams.h"
 #include "word.h"
 
@@ -124,6 +125,9 @@ void bt_gateway_init(bt_gateway *gateway)
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         bt_properties_read(f, &gateway->session.info[f]);
         gateway->session.finger[f].present = gateway->session.info[f].present;
+        if (!gateway->session.info[f].present) {
+            bt_sensors_doubt(&gateway->session, f);
+        }
     }
     load_settings(&gateway->session); // now that it is known which sensors a calibration can be for
     gateway->round_open = false;
@@ -158,28 +162,51 @@ static void count_word(bt_word_counts *counts, enum bt_word kind, uint16_t word)
     }
 }
 
+// An asking takes effect a round later than it could where the main loop is quick: then it does so on every
+// board.
+#define ASK_AHEAD_ROUNDS 2
+
+static void close_round(bt_gateway *gateway)
+{
+    bt_session *session = &gateway->session;
+    uint8_t serial[BT_SERIAL_BYTES];
+    bt_session_round(session);
+    for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
+        if (session->asked >> f & 1) {
+            bool told = bt_serial_query_answer(&gateway->sampler.query[f], serial);
+            bt_sensors_answer(session, f, told ? serial : NULL);
+        }
+    }
+    uint8_t ask = bt_sensors_to_ask(session);
+    if (ask != 0) {
+        (void)bt_sampler_ask(&gateway->sampler, ask, gateway->round + ASK_AHEAD_ROUNDS);
+    }
+    gateway->round_open = false;
+}
+
 static void take_slot(bt_gateway *gateway, const bt_slot *slot)
 {
     bt_session *session = &gateway->session;
     // A new round number closes the one before, even when its last slots were lost.
     if (gateway->round_open && slot->round != gateway->round) {
-        bt_session_round(session);
-        gateway->round_open = false;
+        close_round(gateway);
     }
     if (!gateway->round_open) {
         bt_session_begin(session, slot->t_us - slot->slot * 1000000u / BT_SLOT_HZ);
         gateway->round = slot->round;
         gateway->round_open = true;
+        session->asked = slot->asked;
     }
     uint16_t count[BT_MAX_FINGERS];
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         enum bt_word kind = bt_word_decode(slot->word[f], &count[f]);
-        count_word(&session->finger[f].words, kind, slot->word[f]);
+        if (!(slot->asked >> f & 1)) {
+            count_word(&session->finger[f].words, kind, slot->word[f]);
+        }
     }
     bt_session_slot(session, slot->slot, count, slot->t_us);
     if (slot->slot == BT_SLOTS - 1) {
-        bt_session_round(session);
-        gateway->round_open = false;
+        close_round(gateway);
     }
 }
 

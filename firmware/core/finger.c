@@ -79,22 +79,34 @@ bool bt_finger_put(bt_finger *finger, uint8_t slot, uint16_t count)
 static void fall_silent(bt_finger *finger)
 {
     finger->present = false;
-    // What is plugged in next may be another sensor: the tare must not outlive this one. One that
-    // the host set for a sensor that never answered yet is not this one's.
-    if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS && ++finger->silent_rounds == BT_UNPLUGGED_ROUNDS
-        && finger->answered) {
-        bt_tare_reset(&finger->tare);
-        finger->answered = false;
+    if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS) {
+        finger->silent_rounds++;
     }
 }
 
-bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
+void bt_finger_forget(bt_finger *finger)
+{
+    bt_tare_reset(&finger->tare);
+    finger->answered = false;
+}
+
+static void close_round(bt_finger *finger)
 {
     if (finger->next_slot < BT_SLOTS) {
         (void)fill(finger, BT_SLOTS);
     }
     finger->next_slot = 0; // POINT between two rounds is of the coming one, of which nothing has come yet
     bt_pressure_add(&finger->pressure, finger->round.pdc);
+}
+
+void bt_finger_pass(bt_finger *finger)
+{
+    close_round(finger);
+}
+
+bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
+{
+    close_round(finger);
     if (finger->round.good_words == 0) {
         fall_silent(finger);
         return false;

@@ -35,8 +35,8 @@ typedef struct {
     bt_word_counts words;
 } bt_finger;
 
-// A quarter of a second without one good word is an unplugged sensor; less may be a bus fault or
-// a late main loop, after which the tare still holds.
+// A quarter of a second without one good word is an unplugged sensor; less may be a bus fault or a late main
+// loop. The tare holds in either case: whose it is, talk/sensors.h finds out.
 #define BT_UNPLUGGED_ROUNDS 25
 
 void bt_finger_reset(bt_finger *finger, uint8_t index);
@@ -51,6 +51,12 @@ bool bt_finger_put(bt_finger *finger, uint8_t slot, uint16_t count);
 // The round is over. False when no word of it was good: the sensor is absent, and nothing else of it
 // is to be read.
 bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings);
+
+// The round is over in which this finger was not sampled; nothing of it counts.
+void bt_finger_pass(bt_finger *finger);
+
+// Another sensor is there: its tare begins anew.
+void bt_finger_forget(bt_finger *finger);
 
 // Nothing touches, nothing changed, and nobody asked for FRAMEs all the same: nothing to compute.
 bool bt_finger_idle(const bt_finger *finger);

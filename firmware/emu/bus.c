@@ -29,13 +29,19 @@ void bt_emu_bus_select(bt_emu_bus *bus, uint8_t mask, uint64_t t_ns)
     bus->selected = mask;
 }
 
-uint16_t bt_emu_bus_transfer16(bt_emu_bus *bus, uint16_t mosi, uint64_t t_ns)
+uint8_t bt_emu_bus_transfer8(bt_emu_bus *bus, uint8_t mosi, uint64_t t_ns)
 {
-    uint16_t miso = 0;
+    uint8_t miso = 0;
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         if (bus->selected >> f & 1) {
-            miso |= bt_emu_transfer16(&bus->sensor[f], mosi, t_ns);
+            miso |= bt_emu_transfer8(&bus->sensor[f], mosi, t_ns);
         }
     }
     return miso;
+}
+
+uint16_t bt_emu_bus_transfer16(bt_emu_bus *bus, uint16_t mosi, uint64_t t_ns)
+{
+    uint8_t high = bt_emu_bus_transfer8(bus, (uint8_t)(mosi >> 8), t_ns);
+    return (uint16_t)(high << 8 | bt_emu_bus_transfer8(bus, (uint8_t)mosi, t_ns));
 }

@@ -23,6 +23,7 @@ void bt_emu_bus_select(bt_emu_bus *bus, uint8_t mask, uint64_t t_ns);
 
 // What MISO carries while the master sends mosi. Several that are selected drive at once:
 // contention.
+uint8_t bt_emu_bus_transfer8(bt_emu_bus *bus, uint8_t mosi, uint64_t t_ns);
 uint16_t bt_emu_bus_transfer16(bt_emu_bus *bus, uint16_t mosi, uint64_t t_ns);
 
 #endif

@@ -6,9 +6,9 @@
 
 enum pending {
     NOTHING,  // nothing was asked for, or its answer was already taken
-    SAMPLE,   // word holds a sample that settles until released_ns + 50 us
+    SAMPLE,   // word holds a sample, which settles
     PROPERTY, // property bytes
-    REFUSAL,  // word holds an error word, under the same 50 us
+    REFUSAL,  // word holds an error word
 };
 
 static unsigned ones(uint8_t byte)
@@ -43,28 +43,47 @@ void bt_emu_init(bt_emu_device *device, uint8_t finger, bool present, const char
     strncpy(device->serial, serial, sizeof device->serial - 1);
 }
 
-void bt_emu_select(bt_emu_device *device, bool low, uint64_t t_ns)
+// Unplugged, and so without power: what was asked for is forgotten.
+static void lose_power(bt_emu_device *device, bool swapped)
 {
-    if (device->selected && !low) {
-        device->released_ns = t_ns;
+    device->pending = NOTHING;
+    device->has_last = false;
+    device->mute = true;
+    if (!device->unplugged && swapped && device->serial[0] != '\0') {
+        char *mark = &device->serial[strlen(device->serial) - 1];
+        *mark = *mark == 'X' ? 'Y' : 'X';
     }
-    if (low && !device->selected) {
-        device->transfers = 0;
+    device->unplugged = true;
+}
+
+// A fault of the line as it is now, or 0.
+static uint16_t line_fault(bt_emu_device *device, uint16_t said)
+{
+    if (said == BT_EMU_SWAPPED || said == BT_EMU_UNPLUGGED) {
+        lose_power(device, said == BT_EMU_SWAPPED);
+        return BT_EMU_UNPLUGGED;
     }
-    device->selected = low;
+    device->unplugged = false;
+    return said > BT_FULL_SCALE_COUNT ? said : 0;
+}
+
+static uint16_t line_now(bt_emu_device *device, uint64_t t_ns)
+{
+    return line_fault(device, device->source(device->context, device->finger, BT_EMU_LINE, t_ns));
 }
 
 static void latch_sample(bt_emu_device *device, uint8_t channel, uint64_t t_ns)
 {
     uint16_t count = device->source(device->context, device->finger, channel, t_ns);
     device->pending = SAMPLE;
-    switch (count) {
+    switch (line_fault(device, count)) {
     case BT_EMU_NO_CHANNEL:
         device->word = BT_ERROR_WORD_NO_CHANNEL;
         break;
     case BT_EMU_BAD_PARITY:
         device->word = data_word(2048) ^ 0x0010;
         break;
+    case BT_EMU_UNPLUGGED:
     case BT_EMU_STUCK_LOW:
         device->word = 0x0000;
         break;
@@ -75,10 +94,26 @@ static void latch_sample(bt_emu_device *device, uint8_t channel, uint64_t t_ns)
         device->word = BT_ERROR_WORD_SAMPLING_DELAY;
         break;
     default:
-        device->word = data_word(count & BT_FULL_SCALE_COUNT);
+        device->word = device->mute ? 0x0000 : data_word(count & BT_FULL_SCALE_COUNT);
         break;
     }
+    device->last_word = device->word;
+    device->has_last = true;
 }
+
+static void resend(bt_emu_device *device)
+{
+    device->pending = device->has_last ? SAMPLE : REFUSAL;
+    device->word = device->has_last ? device->last_word : BT_ERROR_WORD_NO_DATA;
+}
+
+static void refuse(bt_emu_device *device, uint16_t word)
+{
+    device->pending = REFUSAL;
+    device->word = word;
+}
+
+// ---- properties -------------------------------------------------------------------------------------
 
 static void put_number(bt_emu_device *device, uint16_t value)
 {
@@ -94,10 +129,23 @@ static void put_text(bt_emu_device *device, const char *text)
     device->property_bytes = (uint8_t)bytes;
 }
 
-static void look_up_property(bt_emu_device *device, uint8_t selector)
+static void put_pattern(bt_emu_device *device)
 {
+    for (int slot = 0; slot < BT_SLOTS; slot++) {
+        device->property[2 * slot] = bt_channel_command[bt_slot_channel[slot]];
+        device->property[2 * slot + 1] = slot == BT_SLOTS - 1 ? 0xFE : 0x01;
+    }
+    device->property_bytes = 2 * BT_SLOTS;
+}
+
+static void look_up_property(bt_emu_device *device, uint8_t selector, uint64_t t_ns)
+{
+    if (line_now(device, t_ns) == BT_EMU_UNPLUGGED) {
+        return;
+    }
     device->pending = PROPERTY;
-    device->property_bytes = 0;
+    device->property_at = 0;
+    device->mute = false;
     switch (selector) {
     case BT_PROPERTY_FLEX_VERSION:
         put_text(device, "BD");
@@ -114,79 +162,118 @@ static void look_up_property(bt_emu_device *device, uint8_t selector)
     case BT_PROPERTY_SAMPLING_HZ:
         put_number(device, BT_SLOT_HZ);
         break;
+    case BT_PROPERTY_SAMPLING_PATTERN:
+        put_pattern(device);
+        break;
     default:
-        device->pending = REFUSAL;
-        device->word = BT_ERROR_WORD_UNKNOWN_COMMAND;
+        refuse(device, BT_ERROR_WORD_UNKNOWN_COMMAND);
         break;
     }
 }
 
-static void take_command(bt_emu_device *device, uint16_t mosi, uint64_t t_ns)
-{
-    uint8_t command = (uint8_t)(mosi >> 8);
-    if (command & 0x80) {
-        if (ones(command) % 2 == 1) {
-            latch_sample(device, (uint8_t)((command & 0x7E) >> 1), t_ns);
-        } else {
-            device->pending = REFUSAL;
-            device->word = BT_ERROR_WORD_COMMAND_PARITY;
-        }
-    } else if (command == BT_PROPERTY_READ_COMMAND) {
-        look_up_property(device, (uint8_t)mosi);
-    } else {
-        device->pending = REFUSAL;
-        device->word = BT_ERROR_WORD_UNKNOWN_COMMAND;
-    }
-}
+// ---- the shift register -----------------------------------------------------------------------------
 
-static uint16_t property_word(bt_emu_device *device)
+// What the line makes of a byte that is no sample's.
+static uint8_t through_the_line(bt_emu_device *device, uint8_t byte, uint64_t t_ns)
 {
-    // Bytes after the text's end read as zero.
-    uint16_t word = 0;
-    for (int k = 0; k < 2; k++) {
-        uint8_t byte = device->property_bytes > 0 ? device->property[0] : 0;
-        word = (uint16_t)(word << 8 | byte);
-        if (device->property_bytes > 0) {
-            device->property_bytes--;
-            memmove(device->property, device->property + 1, device->property_bytes);
-        }
-    }
-    return word;
-}
-
-static uint16_t answer(bt_emu_device *device, uint64_t t_ns)
-{
-    bool first = device->transfers == 0;
-    bool early = first && t_ns - device->released_ns < BT_SETTLE_US * 1000ull;
-    if (early && device->pending != NOTHING) {
-        device->early_reads++;
-        return device->pending == PROPERTY ? BT_ERROR_WORD_DELAY : BT_ERROR_WORD_SAMPLING_DELAY;
-    }
-    switch (device->pending) {
-    case SAMPLE:
-    case REFUSAL:
-        // One sample is given once: a driver that reads without sampling must not see old data.
-        device->pending = NOTHING;
-        return device->word;
-    case PROPERTY:
-        return property_word(device);
+    unsigned low = device->position & 1;
+    switch (line_now(device, t_ns)) {
+    case 0:
+        return byte;
+    case BT_EMU_STUCK_HIGH:
+        return 0xFF;
+    case BT_EMU_BAD_PARITY:
+        return byte ^ 0x10;
+    case BT_EMU_TOO_EARLY:
+        return (uint8_t)(BT_ERROR_WORD_DELAY >> (low ? 0 : 8));
+    case BT_EMU_NO_CHANNEL:
+        return (uint8_t)(BT_ERROR_WORD_NO_CHANNEL >> (low ? 0 : 8));
     default:
-        return BT_ERROR_WORD_NO_DATA;
+        return 0x00;
     }
+}
+
+// Two bytes, as of the moment at which the first of them begins; they count as given.
+static uint16_t answer(bt_emu_device *device)
+{
+    if (device->pending == NOTHING) {
+        return device->unplugged ? 0x0000 : BT_ERROR_WORD_NO_DATA;
+    }
+    if (!device->settled) {
+        return device->pending == SAMPLE ? BT_ERROR_WORD_SAMPLING_DELAY : BT_ERROR_WORD_DELAY;
+    }
+    device->pending = NOTHING;
+    return device->word;
+}
+
+static uint8_t shift_out(bt_emu_device *device, uint64_t t_ns)
+{
+    if (device->pending == PROPERTY && device->settled) {
+        bool more = device->property_at < device->property_bytes;
+        return through_the_line(device, more ? device->property[device->property_at++] : 0, t_ns);
+    }
+    if (device->position % 2 == 0) {
+        uint16_t word = answer(device);
+        device->out[0] = (uint8_t)(word >> 8);
+        device->out[1] = (uint8_t)word;
+    }
+    return device->out[device->position % 2];
+}
+
+static void take_first_byte(bt_emu_device *device, uint8_t mosi, uint64_t t_ns)
+{
+    device->command = mosi;
+    if (mosi == BT_LISTEN_WORD >> 8) {
+        device->early_reads += device->pending != NOTHING && !device->settled;
+        return;
+    }
+    device->settled = false;
+    if (mosi & 0x80) {
+        if (ones(mosi) % 2 == 1) {
+            latch_sample(device, (uint8_t)((mosi & 0x7E) >> 1), t_ns);
+        } else {
+            refuse(device, BT_ERROR_WORD_COMMAND_PARITY);
+        }
+    } else if (mosi == BT_RESEND_COMMAND_1 || mosi == BT_RESEND_COMMAND_2) {
+        resend(device);
+    } else if (mosi == BT_PROPERTY_WRITE_COMMAND) {
+        refuse(device, BT_ERROR_WORD_READ_ONLY);
+    } else {
+        refuse(device, BT_ERROR_WORD_UNKNOWN_COMMAND);
+    }
+}
+
+void bt_emu_select(bt_emu_device *device, bool low, uint64_t t_ns)
+{
+    if (device->selected && !low) {
+        device->released_ns = t_ns;
+    }
+    if (low && !device->selected) {
+        device->position = 0;
+        // Of an answer that had its 50 us once, the rest has no need of them.
+        device->settled = device->settled || t_ns - device->released_ns >= BT_SETTLE_US * 1000ull;
+    }
+    device->selected = low;
+}
+
+uint8_t bt_emu_transfer8(bt_emu_device *device, uint8_t mosi, uint64_t t_ns)
+{
+    if (!device->present) {
+        return 0x00;
+    }
+    // The first bit is out before the master's first is in.
+    uint8_t miso = shift_out(device, t_ns);
+    if (device->position % 2 == 0) {
+        take_first_byte(device, mosi, t_ns);
+    } else if (device->command == BT_PROPERTY_READ_COMMAND) {
+        look_up_property(device, mosi, t_ns);
+    }
+    device->position++;
+    return miso;
 }
 
 uint16_t bt_emu_transfer16(bt_emu_device *device, uint16_t mosi, uint64_t t_ns)
 {
-    if (!device->present) {
-        return 0x0000;
-    }
-    uint16_t miso;
-    if (mosi == BT_LISTEN_WORD || mosi == 0) {
-        miso = answer(device, t_ns);
-    } else {
-        miso = 0;
-        take_command(device, mosi, t_ns);
-    }
-    device->transfers++;
-    return miso;
+    uint8_t high = bt_emu_transfer8(device, (uint8_t)(mosi >> 8), t_ns);
+    return (uint16_t)(high << 8 | bt_emu_transfer8(device, (uint8_t)mosi, t_ns));
 }

@@ -1,42 +1,75 @@
-// One emulated BioTac as its SPI bus sees it: chip select edges and 16-bit transfers in, words out.
+// One emulated BioTac as its SPI bus sees it: chip select edges and bytes in, bytes out.
 //
-// Written against the data sheet's rules, not against the driver: it refuses a read that comes
-// earlier than 50 us after the sample command's chip select edge, never answers twice with one
-// sample, checks command parity, and answers property reads. Where the counts come from is a
-// function; faults are counts too, see enum bt_emu_fault.
-// Times are ns since the emulation began.
+// Written against what the sensor's makers and users say of it, not against the driver. Sources: SPM, the
+// BioTac SP product manual V2; CLIB, SynTouch's C library for the Cheetah adapter.
+// - The answer is in the shift register when the chip select falls: its bits do not depend on what the master
+// sends
+//   meanwhile. A public PIC32 driver (mattmongeon/finger_force_control) listens with 0x0100, CLIB with
+//   0x0000, SPM asks for 0x0001, and all of them have read real sensors.
+// - An answer needs 50 us with the chip select high (SPM 8.2, CLIB, PIC32); before, and as long as it stays
+// low, there
+//   are error words: 0xA52D after a sample command, 0xA52E after any other (SPM, CLIB).
+// - One sample is given once; resend (SPM 0x50, CLIB 0x20) gives the last two bytes again, or 0xA55F (CLIB).
+// - Write (0x40) answers 0xA552, read-only: SPM documents no variable that is not. Property 0x73 is the list
+// of
+//   channels as pairs of command and 0x01, the last pair's second byte 0xFE (SPM 8.4).
+// - Property bytes have no parity. They go on from chip select to chip select until the next command (CLIB
+// reads
+//   them one by one); behind the last come zeros.
+// - `mute`: some sensors "sent all zeroes" until a property had been read (users of CLIB), so with power
+// coming back. What a real sensor says to a read that nothing asked for is not known: here 0xA55F, so that no
+// old data is taken for new. Where the counts come from is a function; faults are counts too, see enum
+// bt_emu_fault. Times are ns since the emulation began.
 #ifndef BIOTAC_EMU_DEVICE_H
 #define BIOTAC_EMU_DEVICE_H
+
+#include "wire/sensor_gen.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
 // What a source may return instead of 0..4095: the fault of this one sample.
 enum bt_emu_fault {
+    BT_EMU_SWAPPED = 0xFFF9,    // unplugged, and it will be another sensor that is plugged in
+    BT_EMU_UNPLUGGED = 0xFFFA,  // no sensor, or no power: MISO low, and afterwards it is mute
     BT_EMU_TOO_EARLY = 0xFFFB,  // answers as if the 50 us had not passed
     BT_EMU_STUCK_HIGH = 0xFFFC, // MISO high throughout
-    BT_EMU_STUCK_LOW = 0xFFFD,  // MISO low throughout: no sensor, or no power
+    BT_EMU_STUCK_LOW = 0xFFFD,  // MISO low throughout
     BT_EMU_BAD_PARITY = 0xFFFE, // one bit of the word flipped
     BT_EMU_NO_CHANNEL = 0xFFFF, // the sensor has no such channel
 };
 
+// The channel that stands for the line itself, of which a source is asked where no sample is taken: 0, or the
+// fault that it has now.
+#define BT_EMU_LINE 64
+
 // Count of a channel (its number on the bus, 0..63) of one finger at a time; 0..4095 or a fault.
 typedef uint16_t (*bt_emu_source)(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns);
 
+#define BT_EMU_PROPERTY_BYTES (2 * BT_SLOTS) // the list of channels
+
 typedef struct {
     bool present;
+    bool mute; // says only zeros until it is asked for a property
     uint8_t finger;
     char serial[17];
     bt_emu_source source;
     void *context;
 
     bool selected;
-    uint8_t transfers;    // since the chip select fell
-    uint64_t released_ns; // when it last rose
+    bool unplugged;
+    uint8_t position;     // bytes since the chip select fell
+    uint8_t command;      // the first of them
+    uint8_t out[2];       // what they shift out
+    uint64_t released_ns; // when the chip select last rose
     uint8_t pending;      // what the next read gives: see device.c
+    bool settled;         // the chip select has risen since it was asked for
     uint16_t word;        // the latched sample
-    uint8_t property[16];
+    uint16_t last_word;   // what resend gives
+    bool has_last;
+    uint8_t property[BT_EMU_PROPERTY_BYTES];
     uint8_t property_bytes;
+    uint8_t property_at;
     uint32_t early_reads; // reads that broke the 50 us rule
 } bt_emu_device;
 
@@ -45,7 +78,8 @@ void bt_emu_init(bt_emu_device *device, uint8_t finger, bool present, const char
 
 void bt_emu_select(bt_emu_device *device, bool low, uint64_t t_ns);
 
-// Returns what this device drives on MISO. Call for selected devices only.
+// Returns what this device drives on MISO. Call for selected devices only. A word is two bytes, MSB first.
+uint8_t bt_emu_transfer8(bt_emu_device *device, uint8_t mosi, uint64_t t_ns);
 uint16_t bt_emu_transfer16(bt_emu_device *device, uint16_t mosi, uint64_t t_ns);
 
 #endif

@@ -44,6 +44,9 @@ static uint64_t slot_number(const bt_tape *tape, uint64_t t_ns)
 uint16_t bt_tape_count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
     bt_tape *tape = context;
+    if (channel == BT_EMU_LINE && (!tape->started || finger >= tape->fingers)) {
+        return 0;
+    }
     if (!tape->started) {
         tape->started = true;
         tape->start_ns = t_ns;
@@ -55,6 +58,11 @@ uint16_t bt_tape_count(void *context, uint8_t finger, uint8_t channel, uint64_t 
     uint64_t frame = number / BT_SLOTS;
     if (frame >= tape->frames) {
         frame = tape->frames - 1;
+    }
+    if (channel == BT_EMU_LINE) {
+        size_t at = (size_t)((frame * tape->fingers + finger) * BT_SLOTS + number % BT_SLOTS) * 2;
+        uint16_t now = (uint16_t)(tape->samples[at] | tape->samples[at + 1] << 8);
+        return now > BT_FULL_SCALE_COUNT ? now : 0;
     }
     // In the default sequence the slot tells the channel. Another sequence gets its channel's next
     // sample of the same frame.

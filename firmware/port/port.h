@@ -28,11 +28,15 @@ void bt_port_alarm(void);
 void port_idle(void);
 
 // ---- SPI ------------------------------------------------------------------------------------
-// Pull low the chip selects of the sensors in mask, release all others.
+// Pull low the chip selects of the sensors in mask, release all others. A board's constants say how long before a word
+// and after it (its pins.h); when it returns, a word may be sent.
 void port_spi_select(uint8_t mask);
 
 // Exchange 16 bits, MSB first, mode 0, BT_SPI_HZ. Returns what MISO carried.
 uint16_t port_spi_transfer16(uint16_t mosi);
+
+// The same with 8 bits: a property's bytes come one by one.
+uint8_t port_spi_transfer8(uint8_t mosi);
 
 // ---- link to the host -----------------------------------------------------------------------
 // Takes all bytes or none; false means no room, or nobody there.

@@ -5,51 +5,127 @@
 
 #include <string.h>
 
-// Property bytes carry no parity; 0x00 and 0xFF end a text (CLIB).
-static void read_property(uint8_t finger, uint8_t selector, uint8_t *out, int bytes)
+#define TRIES         3
+#define ERROR_HIGH    (BT_ERROR_WORD_UNKNOWN_COMMAND >> 8)
+#define VERSION_BYTES 4
+#define QUERY_READS   3
+#define QUERY_STEPS   (1 + VERSION_BYTES + 2 * (1 + BT_SERIAL_CHARS))
+_Static_assert(QUERY_STEPS <= BT_SLOTS, "a round is enough to ask who is there");
+
+bool bt_property_step(bt_property *property, uint8_t finger)
 {
     port_spi_select((uint8_t)(1u << finger));
-    (void)port_spi_transfer16((uint16_t)(BT_PROPERTY_READ_COMMAND << 8 | selector));
-    port_spi_select(0);
-    port_delay_us(BT_SETTLE_US + 1);
-    port_spi_select((uint8_t)(1u << finger));
-    for (int k = 0; k < bytes; k += 2) {
-        uint16_t word = port_spi_transfer16(BT_LISTEN_WORD);
-        out[k] = (uint8_t)(word >> 8);
-        out[k + 1] = (uint8_t)word;
+    if (!property->asked) {
+        property->asked = true;
+        (void)port_spi_transfer16((uint16_t)(BT_PROPERTY_READ_COMMAND << 8 | property->selector));
+    } else {
+        property->got[property->at++] = port_spi_transfer8(BT_LISTEN_WORD >> 8);
     }
     port_spi_select(0);
-    port_delay_us(BT_GAP_US);
+    return property->at == property->bytes;
 }
 
-static void read_text(uint8_t finger, uint8_t selector, uint8_t *out, int bytes)
+// ---- who is there -----------------------------------------------------------------------------------
+
+static void begin(bt_property *property, uint8_t selector, uint8_t bytes)
 {
-    read_property(finger, selector, out, bytes);
-    int end = 0;
-    while (end < bytes && out[end] >= 0x20 && out[end] < 0x7F) {
+    property->selector = selector;
+    property->bytes = bytes;
+    property->at = 0;
+    property->asked = false;
+}
+
+void bt_serial_query_begin(bt_serial_query *query)
+{
+    query->whole = 0;
+    begin(&query->read[0], BT_PROPERTY_SOFTWARE_VERSION, VERSION_BYTES);
+    begin(&query->read[1], BT_PROPERTY_SERIAL, BT_SERIAL_CHARS);
+    begin(&query->read[2], BT_PROPERTY_SERIAL, BT_SERIAL_CHARS);
+}
+
+void bt_serial_query_step(bt_serial_query *query, uint8_t finger)
+{
+    if (query->whole < QUERY_READS && bt_property_step(&query->read[query->whole], finger)) {
+        query->whole++;
+    }
+}
+
+// ---- what may be taken for a property ---------------------------------------------------------------
+
+// 0x00 and 0xFF end a text (CLIB); what stands behind is cut off. False when it is none.
+static bool trim_text(uint8_t *text, unsigned bytes)
+{
+    unsigned end = 0;
+    while (end < bytes && text[end] >= 0x20 && text[end] < 0x7F) {
         end++;
     }
-    memset(out + end, 0, (size_t)(bytes - end));
+    bool ends = end == bytes || text[end] == 0x00 || text[end] == 0xFF;
+    memset(text + end, 0, bytes - end);
+    return ends && end > 0;
+}
+
+static bool trim_serial(uint8_t serial[BT_SERIAL_CHARS])
+{
+    return trim_text(serial, BT_SERIAL_CHARS) && serial[0] == 'B' && serial[1] == 'T';
+}
+
+bool bt_serial_query_answer(const bt_serial_query *query, uint8_t serial[BT_SERIAL_CHARS])
+{
+    memcpy(serial, query->read[1].got, BT_SERIAL_CHARS);
+    return query->whole == QUERY_READS && memcmp(serial, query->read[2].got, BT_SERIAL_CHARS) == 0
+           && trim_serial(serial);
+}
+
+// ---- all of them ------------------------------------------------------------------------------------
+
+static void read_once(uint8_t finger, bt_property *property, uint8_t selector, uint8_t bytes)
+{
+    begin(property, selector, bytes);
+    while (!bt_property_step(property, finger)) {
+        port_delay_us((property->at == 0 ? BT_SETTLE_US : BT_PROPERTY_GAP_US) + 1);
+    }
+    port_delay_us(BT_PROPERTY_GAP_US + 1);
+}
+
+static bool read_alike(uint8_t finger, uint8_t selector, uint8_t *out, size_t bytes)
+{
+    bt_property first, second;
+    for (int k = 0; k < TRIES; k++) {
+        read_once(finger, &first, selector, (uint8_t)bytes);
+        read_once(finger, &second, selector, (uint8_t)bytes);
+        if (memcmp(first.got, second.got, bytes) == 0 && first.got[0] != ERROR_HIGH && first.got[0] != 0xFF) {
+            memcpy(out, first.got, bytes);
+            return true;
+        }
+    }
+    memset(out, 0, bytes);
+    return false;
+}
+
+static void read_text(uint8_t finger, uint8_t selector, uint8_t *out, size_t bytes)
+{
+    if (!read_alike(finger, selector, out, bytes) || !trim_text(out, (unsigned)bytes)) {
+        memset(out, 0, bytes);
+    }
 }
 
 static uint16_t read_number(uint8_t finger, uint8_t selector)
 {
     uint8_t bytes[2];
-    read_property(finger, selector, bytes, 2);
+    (void)read_alike(finger, selector, bytes, sizeof bytes);
     return (uint16_t)(bytes[0] << 8 | bytes[1]);
 }
 
 void bt_properties_read(uint8_t finger, bt_msg_sensor_info *info)
 {
+    bt_property thrown_away;
     memset(info, 0, sizeof *info);
     info->finger = finger;
-    // SynTouch's library throws the first read after power-up away; so do we.
-    read_text(finger, BT_PROPERTY_SOFTWARE_VERSION, info->software_version, sizeof info->software_version);
+    read_once(finger, &thrown_away, BT_PROPERTY_SOFTWARE_VERSION, VERSION_BYTES);
     read_text(finger, BT_PROPERTY_SERIAL, info->serial, sizeof info->serial);
-    info->present = info->serial[0] == 'B' && info->serial[1] == 'T';
+    info->present = trim_serial(info->serial);
     if (!info->present) {
-        memset(info, 0, sizeof *info);
-        info->finger = finger;
+        memset(info->serial, 0, sizeof info->serial);
         return;
     }
     read_text(finger, BT_PROPERTY_SOFTWARE_VERSION, info->software_version, sizeof info->software_version);

@@ -49,6 +49,32 @@ bool bt_sampler_pop(bt_sampler *sampler, bt_slot *slot)
     return true;
 }
 
+bool bt_sampler_ask(bt_sampler *sampler, uint8_t fingers, uint32_t round)
+{
+    if (atomic_load_explicit(&sampler->ask, memory_order_acquire) != 0) {
+        return false;
+    }
+    sampler->ask_round = round;
+    atomic_store_explicit(&sampler->ask, fingers, memory_order_release);
+    return true;
+}
+
+static void begin_round(bt_sampler *sampler)
+{
+    uint8_t ask = atomic_load_explicit(&sampler->ask, memory_order_acquire);
+    sampler->current.asked = 0;
+    if (ask == 0 || (int32_t)(sampler->current.round - sampler->ask_round) < 0) {
+        return;
+    }
+    sampler->current.asked = ask;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (ask >> f & 1) {
+            bt_serial_query_begin(&sampler->query[f]);
+        }
+    }
+    atomic_store_explicit(&sampler->ask, 0, memory_order_release);
+}
+
 static void advance(bt_sampler *sampler)
 {
     // 1/4400 s is 227.27 us: the fraction is carried, or the rate would drift by 0.1 %.
@@ -61,6 +87,7 @@ static void advance(bt_sampler *sampler)
     if (++sampler->current.slot == BT_SLOTS) {
         sampler->current.slot = 0;
         sampler->current.round++;
+        begin_round(sampler);
     }
 }
 
@@ -68,7 +95,7 @@ static void send_command(bt_sampler *sampler)
 {
     uint8_t command = bt_channel_command[bt_slot_channel[sampler->current.slot]];
     sampler->current.t_us = port_now_us();
-    port_spi_select(sampler->fingers);
+    port_spi_select((uint8_t)(sampler->fingers & ~sampler->current.asked));
     // All selected sensors drive MISO at once here; whatever it carries means nothing.
     (void)port_spi_transfer16((uint16_t)(command << 8));
     port_spi_select(0);
@@ -84,6 +111,10 @@ static void read_sensors(bt_sampler *sampler)
                 port_delay_us(BT_GAP_US);
             }
             first = false;
+            if (sampler->current.asked >> f & 1) {
+                bt_serial_query_step(&sampler->query[f], (uint8_t)f);
+                continue;
+            }
             port_spi_select((uint8_t)(1u << f));
             sampler->current.word[f] = port_spi_transfer16(BT_LISTEN_WORD);
             port_spi_select(0);

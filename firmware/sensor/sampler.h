@@ -9,6 +9,7 @@
 #ifndef BIOTAC_SAMPLER_H
 #define BIOTAC_SAMPLER_H
 
+#include "properties.h"
 #include "wire/sensor_gen.h"
 
 #include <stdatomic.h>
@@ -21,6 +22,8 @@ typedef struct {
     uint32_t round; // frame number since start
     uint32_t t_us;  // when the sample command was sent
     uint8_t slot;
+    uint8_t
+        asked; // bit mask: these were not sampled, but asked who they are; the same in all slots of a round
     uint16_t word[BT_MAX_FINGERS];
 } bt_slot;
 
@@ -29,7 +32,10 @@ typedef struct {
     bool settling;   // the command is out, the read is due
     bt_slot current;
     uint32_t slot_start_us;
-    uint32_t fraction; // of slot_start_us, in 1/BT_SLOT_HZ us
+    uint32_t fraction;                     // of slot_start_us, in 1/BT_SLOT_HZ us
+    atomic_uchar ask;                      // whom to ask; set by the main loop when 0, taken by the interrupt
+    uint32_t ask_round;                    // from this round on; written before ask
+    bt_serial_query query[BT_MAX_FINGERS]; // of the fingers asked last; whole when their round is
     bt_slot ring[BT_SLOT_RING];
     atomic_uchar head;     // written by the interrupt only
     atomic_uchar tail;     // written by the main loop only
@@ -41,6 +47,11 @@ void bt_sampler_start(bt_sampler *sampler, uint8_t fingers, uint32_t start_us);
 
 // Interrupt context: do what is due. Returns when to be called next.
 uint32_t bt_sampler_alarm(bt_sampler *sampler);
+
+// Main loop: ask these fingers who they are instead of sampling them, for one whole round, the given one or
+// the first after it. The answers are theirs in query, once that round's slots have come. False: another
+// asking is still to come.
+bool bt_sampler_ask(bt_sampler *sampler, uint8_t fingers, uint32_t round);
 
 // Main loop: take the oldest slot. False when there is none.
 bool bt_sampler_pop(bt_sampler *sampler, bt_slot *slot);

@@ -1,8 +1,7 @@
 // How spidev's bus differs from a microcontroller's, and what is done about it:
 // - It selects one sensor at a time. A word for several is sent to one after the other, so fingers sample
 //   not at once but one transfer apart; the 50 us run from the last of them.
-// - It raises the chip select after every call, and a property's bytes come within one period. The first word
-//   that is listened to after a property command therefore fetches all that a property can have.
+// - It raises the chip select after every call: nothing here has more than one transfer in a period.
 #include "sbc.h"
 
 #include "gateway.h"
@@ -11,9 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define PROPERTY_BYTES sizeof(((bt_msg_sensor_info *)NULL)->serial) // no property is longer
-#define PROPERTY_WORDS ((uint8_t)(PROPERTY_BYTES / 2))
-
 struct bt_sbc {
     bt_gateway gateway;
     void *python;
@@ -21,11 +17,7 @@ struct bt_sbc {
     uint32_t boot_id;
     uint32_t due_us;
     uint8_t selected;
-    bool asked;    // the last word of the period before was a property command
-    bool unsent;   // the last word was for sensors that are not wired
-    uint8_t taken; // words of `ahead` that were given out
-    uint8_t ahead_words;
-    uint8_t ahead[PROPERTY_BYTES];
+    bool unsent; // the last word was for sensors that are not wired
     _Alignas(4) uint8_t maps[BT_MAPS_BYTES];
 };
 
@@ -98,44 +90,29 @@ void port_spi_select(uint8_t mask)
 {
     board->selected = mask & board->devices;
     board->unsent = mask != 0 ? board->selected == 0 : board->unsent;
-    board->taken = 0;
-    board->ahead_words = 0;
-}
-
-static uint16_t exchange(uint8_t finger, uint16_t mosi, uint8_t words)
-{
-    uint8_t *bytes = board->ahead;
-    for (int k = 0; k < words; k++) {
-        bytes[2 * k] = (uint8_t)(mosi >> 8);
-        bytes[2 * k + 1] = (uint8_t)mosi;
-    }
-    bt_sbc_exchange(board->python, finger, bytes, (size_t)words * 2);
-    return (uint16_t)(bytes[0] << 8 | bytes[1]);
-}
-
-static uint16_t listen(uint8_t finger)
-{
-    if (board->taken == 0) {
-        board->ahead_words = board->asked ? PROPERTY_WORDS : 1;
-        board->asked = false;
-        (void)exchange(finger, BT_LISTEN_WORD, board->ahead_words);
-    }
-    if (board->taken == board->ahead_words) {
-        return 0;
-    }
-    const uint8_t *at = board->ahead + 2 * board->taken++;
-    return (uint16_t)(at[0] << 8 | at[1]);
 }
 
 uint16_t port_spi_transfer16(uint16_t mosi)
 {
     uint16_t miso = 0;
-    if (mosi != BT_LISTEN_WORD) {
-        board->asked = mosi >> 8 == BT_PROPERTY_READ_COMMAND;
-    }
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         if (board->selected >> f & 1) {
-            miso |= mosi == BT_LISTEN_WORD ? listen(f) : exchange(f, mosi, 1);
+            uint8_t bytes[2] = {(uint8_t)(mosi >> 8), (uint8_t)mosi};
+            bt_sbc_exchange(board->python, f, bytes, sizeof bytes);
+            miso |= (uint16_t)(bytes[0] << 8 | bytes[1]);
+        }
+    }
+    return miso;
+}
+
+uint8_t port_spi_transfer8(uint8_t mosi)
+{
+    uint8_t miso = 0;
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        if (board->selected >> f & 1) {
+            uint8_t byte = mosi;
+            bt_sbc_exchange(board->python, f, &byte, 1);
+            miso |= byte;
         }
     }
     return miso;

@@ -126,6 +126,19 @@ uint16_t port_spi_transfer16(uint16_t mosi)
     return miso;
 }
 
+uint8_t port_spi_transfer8(uint8_t mosi)
+{
+    uint8_t miso = 0;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (selected >> f & 1) {
+            miso |= bt_emu_transfer8(&fake.sensor[f], mosi, fake.now_ns);
+        }
+    }
+    fake.now_ns += TRANSFER_NS / 2;
+    fake.bytes++;
+    return miso;
+}
+
 bool port_link_write(const uint8_t *data, size_t bytes)
 {
     return fake_host_takes(data, bytes);

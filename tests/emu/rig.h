@@ -35,6 +35,9 @@ static uint64_t first_command_ns;
 static inline uint16_t source(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
     (void)context;
+    if (channel == BT_EMU_LINE) {
+        return finger == trouble.finger && trouble.one_in == 1 ? trouble.fault : 0;
+    }
     if (first_command_ns == 0) {
         first_command_ns = t_ns;
     }

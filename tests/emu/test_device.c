@@ -16,6 +16,9 @@ static uint16_t source(void *context, uint8_t finger, uint8_t channel, uint64_t 
     (void)t_ns;
     assert_ptr_equal(context, &device);
     assert_int_equal(finger, 2);
+    if (channel == BT_EMU_LINE) {
+        return next_count > 4095 ? next_count : 0;
+    }
     asked_channel = channel;
     samples++;
     return next_count;
@@ -184,8 +187,99 @@ static void the_second_byte_of_a_sample_command_is_ignored(void **state)
 static void unknown_commands_are_refused_by_word(void **state)
 {
     (void)state;
-    assert_int_equal(sample(0x40, 0), 0xA53F);
+    assert_int_equal(sample(0x60, 0), 0xA53F);
     assert_int_equal(sample(0x61, 1000000), 0xA53F); // property 0x00
+}
+
+static void the_answer_does_not_depend_on_what_is_sent_meanwhile(void **state)
+{
+    (void)state;
+    for (unsigned mosi = 0; mosi <= 0xFFFF; mosi += 0x55) {
+        (void)new_device(NULL);
+        (void)transfer(0xA200, 1000000);
+        assert_int_equal(transfer((uint16_t)mosi, 1050000), 0x8001 | (2048 >> 5) << 9);
+    }
+}
+
+// As mattmongeon/finger_force_control reads: 0x0100 while it listens, 50 us between, no look at the parity.
+static void a_driver_that_listens_with_0x0100_reads_every_channel(void **state)
+{
+    (void)state;
+    uint64_t t_ns = 1000000;
+    for (int round = 0; round < 3; round++) {
+        for (unsigned c = 0; c < 23; c++) {
+            next_count = (uint16_t)(100 * c + 7 + (unsigned)round);
+            (void)transfer((uint16_t)(bt_channel_command[c] << 8 | 0x01), t_ns);
+            uint16_t v = transfer(0x0100, t_ns + 60000);
+            assert_int_equal((v & 0xFF) >> 3 | (v & 0xFE00) >> 4, next_count);
+            t_ns += 100000;
+        }
+    }
+}
+
+static void a_read_with_the_chip_select_still_low_has_no_answer(void **state)
+{
+    (void)state;
+    bt_emu_select(&device, true, 0);
+    (void)bt_emu_transfer16(&device, 0xA200, 0);
+    assert_int_equal(bt_emu_transfer16(&device, BT_LISTEN_WORD, 60000), 0xA52D);
+    assert_int_equal(bt_emu_transfer16(&device, BT_LISTEN_WORD, 900000), 0xA52D);
+    bt_emu_select(&device, false, 900000);
+    assert_int_equal(transfer(BT_LISTEN_WORD, 950000) >> 9, 2048 >> 5);
+}
+
+static void resend_gives_the_last_word_again(void **state)
+{
+    (void)state;
+    static const uint8_t commands[] = {0x50, 0x20}; // the manual's, and SynTouch's library's
+    assert_int_equal(sample(0x50, 0), 0xA55F);
+    uint16_t first = sample(0xA2, 1000000);
+    next_count = 99;
+    for (unsigned k = 0; k < 4; k++) {
+        assert_int_equal(sample(commands[k % 2], 2000000 + k * 1000000), first);
+    }
+    assert_int_equal(samples, 1);
+}
+
+static void nothing_can_be_written(void **state)
+{
+    (void)state;
+    (void)transfer(0x4017, 0); // variable 1, odd parity
+    assert_int_equal(transfer(BT_LISTEN_WORD, 50000), 0xA552);
+}
+
+static void a_mute_sensor_says_zeros_until_it_is_asked_for_a_property(void **state)
+{
+    (void)state;
+    device.mute = true;
+    for (unsigned k = 0; k < 100; k++) {
+        assert_int_equal(sample(0xA2, k * 1000000), 0x0000);
+    }
+    (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x13, 200000000);
+    assert_int_equal(sample(0xA2, 201000000) >> 9, 2048 >> 5);
+}
+
+static void a_sensor_without_power_forgets_and_may_come_back_as_another(void **state)
+{
+    (void)state;
+    static const struct {
+        uint16_t fault;
+        const char *serial;
+    } table[] = {{BT_EMU_UNPLUGGED, "BT0123456789ABCD"}, {BT_EMU_SWAPPED, "BT0123456789ABCX"}};
+    for (size_t k = 0; k < 2; k++) {
+        (void)new_device(NULL);
+        next_count = table[k].fault;
+        for (unsigned n = 0; n < 5; n++) {
+            assert_int_equal(sample(0xA2, n * 1000000), 0x0000);
+        }
+        (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x15, 6000000); // there is nobody to hear it
+        assert_int_equal(transfer(BT_LISTEN_WORD, 6060000), 0x0000);
+        next_count = 2048;
+        assert_int_equal(sample(0xA2, 7000000), 0x0000); // mute
+        assert_string_equal(device.serial, table[k].serial);
+        (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x15, 8000000);
+        assert_int_not_equal(sample(0xA2, 9000000), 0x0000);
+    }
 }
 
 static void every_fault_shows_on_the_bus_as_itself(void **state)
@@ -242,6 +336,34 @@ static void properties_are_plain_bytes_padded_with_zeros(void **state)
     assert_int_equal(transfer(BT_LISTEN_WORD, 49999), 0xA52E); // too early, by another word
 }
 
+static uint8_t one_byte(uint64_t t_ns)
+{
+    bt_emu_select(&device, true, t_ns);
+    uint8_t miso = bt_emu_transfer8(&device, 0, t_ns);
+    bt_emu_select(&device, false, t_ns);
+    return miso;
+}
+
+static void property_bytes_may_come_one_by_one(void **state)
+{
+    (void)state;
+    (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x15, 0);
+    for (unsigned k = 0; k < 18; k++) {
+        assert_int_equal(one_byte(50000 + 10000 * k), k < 16 ? "BT0123456789ABCD"[k] : 0);
+    }
+}
+
+static void the_list_of_channels_is_pairs_and_an_end(void **state)
+{
+    (void)state;
+    (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x73, 0);
+    for (unsigned slot = 0; slot < 44; slot++) {
+        assert_int_equal(one_byte(50000 + 30000 * slot), bt_channel_command[bt_slot_channel[slot]]);
+        assert_int_equal(one_byte(60000 + 30000 * slot), slot < 43 ? 0x01 : 0xFE);
+    }
+    assert_int_equal(one_byte(9000000), 0);
+}
+
 #define T(name) cmocka_unit_test_setup(name, new_device)
 int main(void)
 {
@@ -256,8 +378,17 @@ int main(void)
         T(only_odd_command_bytes_are_obeyed),
         T(the_second_byte_of_a_sample_command_is_ignored),
         T(unknown_commands_are_refused_by_word),
+        T(the_answer_does_not_depend_on_what_is_sent_meanwhile),
+        T(a_driver_that_listens_with_0x0100_reads_every_channel),
+        T(a_read_with_the_chip_select_still_low_has_no_answer),
+        T(resend_gives_the_last_word_again),
+        T(nothing_can_be_written),
+        T(a_mute_sensor_says_zeros_until_it_is_asked_for_a_property),
+        T(a_sensor_without_power_forgets_and_may_come_back_as_another),
         T(every_fault_shows_on_the_bus_as_itself),
         T(properties_are_plain_bytes_padded_with_zeros),
+        T(property_bytes_may_come_one_by_one),
+        T(the_list_of_channels_is_pairs_and_an_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,6 +12,7 @@ from biotac import FrameFlags
 from biotac.wire import messages_gen as wire
 
 INVALID = 0xFFFF
+ASKED = 3  # of 30 rounds
 
 HEALTHY = """
 name = "healthy"
@@ -75,10 +76,12 @@ def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(play, kind:
     for finger in (0, 2):
         assert of(faulty, finger).tobytes() == of(healthy, finger).tobytes()
         assert getattr(after[finger], counter) == getattr(before[finger], counter) == 0
-    # 0.3 s are 30 rounds of 44 words. A round without one good word is not sent at all.
-    assert getattr(after[1], counter) == 30 * 44
-    assert len(of(healthy, 1)) - len(of(faulty, 1)) == 30
+    # 0.3 s are 30 rounds of 44 words. A round without one good word is not sent at all, nor one in which the sensor is
+    # asked who it is: three of those 30, and one when it is back.
+    assert getattr(after[1], counter) == (30 - ASKED) * 44
+    assert len(of(healthy, 1)) - len(of(faulty, 1)) == 31
     assert np.count_nonzero(np.diff(of(faulty, 1)["t_us"]) == 31 * 10_000) == 1
+    assert np.count_nonzero(np.diff(of(faulty, 1)["t_us"]) == 2 * 10_000) == 1
 
 
 def test_an_error_word_is_kept_for_the_user(play) -> None:
@@ -162,3 +165,29 @@ def test_a_host_that_leaves_and_returns_finds_a_stopped_board(rig) -> None:
         hand._streams.streaming = False  # as if this host had been killed: no STOP is sent
     with biotac.open(board.path) as hand:
         assert hand.status().streams == 0
+
+
+def test_a_word_that_comes_too_late_is_lost_and_shifts_no_other(rig, tmp_path: Path) -> None:
+    rig.need("cable")
+    path = tmp_path / "case.toml"
+    path.write_text(HEALTHY)
+
+    def played(*at_s: float) -> np.ndarray:
+        hand = rig.open(str(path))
+        hand.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)
+        for t_s in at_s:
+            hand.link.board.plan(t_s, "stretch a word")
+        return hand.read(100)
+
+    healthy, hurt = played(), played(0.70011, 0.90023, 1.10037)
+    assert len(healthy) == len(hurt)
+    lost = hurt["counts"] == INVALID
+    assert 1 <= lost.sum() <= 3 * 5
+    assert np.array_equal(hurt["counts"][~lost], healthy["counts"][~lost])
+
+
+def test_a_chip_select_falls_in_time_before_a_word(rig) -> None:
+    rig.need("counters")
+    hand = rig.open("press.toml?fingers=5&seconds=0.5")
+    hand.read(10)
+    assert hand.link.board.counters()["sensors"]["select_setup_ns"] >= 1800  # as SynTouch's library leaves

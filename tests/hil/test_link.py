@@ -9,6 +9,7 @@ import pytest
 
 import biotac
 from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
 
 BOARDS = {"posix": wire.Board.POSIX_SIM, "pico": wire.Board.PICO}
 # What a test of silicon would not forgive, and the emulator counts.
@@ -94,6 +95,7 @@ def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(
     assert hand.stats.frames_lost > 100  # half a second of five fingers, less what the ring holds
     assert (hand.stats.crc_errors, hand.stats.other_errors) == (0, 0)
     assert status.slots_late == 0  # sampling does not care
+    # Nor is the controller taken for hung (RP2040-E15): the stream goes on where it was.
     assert len(frames) + hand.stats.frames_lost == 5 * 200
 
 
@@ -109,6 +111,41 @@ def test_a_cable_pulled_in_mid_frame_stops_the_stream_and_a_new_host_is_served(r
     assert status.streams == 0
     assert status.slots_late == 0
     assert hand.sensor_status(4).words_good == 200 * 44
+
+
+def test_windows_takes_it_for_a_device_of_several_interfaces(rig) -> None:
+    # An interface association wants this triple (its ECN, table 1); Windows goes by it.
+    rig.need("counters")
+    hand = rig.open()
+    assert hand.link.board.counters()["usb"]["device"]["class"] == [0xEF, 0x02, 0x01]
+
+
+def test_a_setup_is_answered_whenever_it_comes_after_another_one(rig) -> None:
+    rig.need("counters")
+    board = rig.open("press.toml?fingers=1&seconds=1").link.board
+    gaps_ns = [*range(100, 12_000, 100), *range(12_000, 60_000, 1000)]
+    for gap_ns in gaps_ns:
+        board.say(f"two setups {gap_ns}")
+    usb = board.until(2, usb={"hurried": {"asked": len(gaps_ns)}})["usb"]
+    assert usb["hurried"] == {"asked": len(gaps_ns), "wrong": 0}
+    assert usb["failed"] == []
+    assert {key: usb[key] for key in BREACHES} == dict.fromkeys(BREACHES, 0)
+
+
+def test_a_hung_usb_controller_is_reset_and_the_host_served_again(rig) -> None:
+    # RP2040-E15: after a corrupt handshake of a bulk IN the controller hears nothing, not even a bus reset.
+    rig.need("cable")
+    board = rig.on_a_pty("press.toml", pace=0)
+    with biotac.open(board.path) as hand:
+        before = board.counters()["usb"]["resets"]
+        board.do("corrupt a handshake")
+        hand.link.write(encode(wire.Ping.ID, wire.Ping(req_id=1).pack()))  # the reply is that bulk IN
+        # Silent for 100 ms, off the bus for 20, and found again by its host.
+        usb = board.until(1, usb={"hangs": 1, "resets": before + 1, "state": "configured"})["usb"]
+        assert usb["failed"] == []
+    with biotac.open(board.path) as hand:
+        assert hand.status().streams == 0
+        assert len(hand.read(0.1)) > 0
 
 
 def test_a_board_that_lost_power_is_another_boot(rig, tmp_path: Path) -> None:

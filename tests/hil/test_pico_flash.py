@@ -16,6 +16,8 @@ import biotac
 from biotac import Setting
 from biotac.wire import messages_gen as wire
 
+ROOT = Path(__file__).resolve().parents[2]
+XIP = 0x10000000  # where the flash begins for the program
 PAGE = 256
 SECTOR = 4096
 RECORDS = SECTOR // PAGE - 1
@@ -131,3 +133,35 @@ def test_a_board_that_hangs_starts_again_as_another_boot(pico: Pico) -> None:
 def test_the_flashs_number_is_the_boards_and_the_usb_serial(pico: Pico) -> None:
     assert bytes(pico.hand.info.board_serial).hex() == "e6605838831f5b2c" + "00000000"
     assert pico.counters()["usb"]["device"]["serial"] == "E6605838831F5B2C"
+
+
+def test_picotool_finds_name_version_and_pins_in_the_image(rig: Rig) -> None:
+    # The layout as pico-sdk documents it (pico_binary_info/structure.h), read here from the file alone.
+    rig.need("flash")
+    image = (ROOT / "build/pico/biotac-pico.bin").read_bytes()
+
+    def word(at: int) -> int:
+        return int.from_bytes(image[at : at + 4], "little")
+
+    def text(address: int) -> str:
+        at = address - XIP
+        return image[at : image.index(b"\0", at)].decode()
+
+    marks = [at for at in range(0x100, 0x200, 4) if word(at) == 0x7188EBF2 and word(at + 16) == 0xE71AA390]
+    assert len(marks) == 1
+    first, end, copies = (word(marks[0] + 4 * k) - XIP for k in (1, 2, 3))
+    assert word(copies) == 0
+    records = [word(at) - XIP for at in range(first, end, 4)]
+    kinds = [(word(at) & 0xFFFF, word(at) >> 16) for at in records]
+    assert {tag for _, tag in kinds} == {0x5052}
+    said = {word(at + 4): text(word(at + 8)) for at, (kind, _) in zip(records, kinds, strict=True) if kind == 6}
+    pins = {word(at + 4): text(word(at + 8)) for at, (kind, _) in zip(records, kinds, strict=True) if kind == 9}
+    assert said[0x02031C86] == "biotac-gateway"
+    assert said[0x11A9BC3A].endswith(f"wire {wire.WIRE_MAJOR}.{wire.WIRE_MINOR}")
+    assert said[0xB63CFFBB] == "pico"
+    assert pins == {
+        1 << 16: "SPI0 MISO",
+        1 << 18: "SPI0 SCK",
+        1 << 19: "SPI0 MOSI",
+        **{1 << pin: f"chip select of finger {f}" for f, pin in enumerate((17, 20, 21, 22, 26))},
+    }

@@ -105,17 +105,16 @@ class FakeSpi:
         bus, emu = self._bus, self._bus.sensors[self.device]
         assert (self.mode, self.max_speed_hz, self.bits_per_word) == (0, SPI_HZ, 8)
         assert not self.closed
-        assert values and len(values) % 2 == 0
+        assert len(values) in (1, 2)
         assert all(type(v) is int and 0 <= v <= 255 for v in values)
         if bus.fault is not None:
             raise bus.fault
-        bus.log.append((self.device, values[0] << 8 | values[1], bus.clock.ns))
+        bus.log.append((self.device, values[0] << 8 | values[-1], bus.clock.ns))
         lib.bt_emu_select(emu, True, bus.clock.ns)
         answer = []
-        for high, low in zip(values[::2], values[1::2], strict=True):
-            word = lib.bt_emu_transfer16(emu, high << 8 | low, bus.clock.ns)
-            bus.clock.ns += bus.transfer_ns
-            answer += [word >> 8, word & 0xFF]
+        for value in values:
+            answer.append(lib.bt_emu_transfer8(emu, value, bus.clock.ns))
+            bus.clock.ns += bus.transfer_ns // 2
         lib.bt_emu_select(emu, False, bus.clock.ns)
         bus.clock.ns += bus.overhead_ns
         return answer

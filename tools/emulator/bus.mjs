@@ -21,6 +21,9 @@ const DATA_SEQ_ERROR = 1 << 31
 const SETUP_REC = 1 << 17
 const SUSPENDED = 1 << 4
 const SOF_RD = 0x48
+const RESETS = 0x4000c
+const RESET = 0
+const RESET_USBCTRL = 1 << 24
 const FRAME_NS = 1e6
 const OVERHEAD_BYTES = 13 // token, handshake, sync, CRC, gaps: what leaves 19 bulk packets of 64 bytes a frame
 const BITS_PER_S = 12e6
@@ -32,8 +35,11 @@ export class UsbBus {
     this.view = mcu.usbDPRAMView
     this.toggles = new Map() // what the host expects or sends next: endpoint*2 + out -> 0 or 1
     this.written = new Map()
-    this.counters = { toggle_errors: 0, available_not_last: 0, in_packets: 0, out_packets: 0 }
+    this.counters = { toggle_errors: 0, available_not_last: 0, in_packets: 0, out_packets: 0, hangs: 0, resets: 0 }
     this.onArmed = () => {}
+    this.onSetupSeen = () => {}
+    this.onReset = () => {}
+    this.hungAt = null // ns: the controller has met RP2040-E15, and hears nothing until its block is reset
     this.wire = mcu.clock.createAlarm(() => {
       const finish = this.finish
       this.finish = null
@@ -60,15 +66,29 @@ export class UsbBus {
     this.finish = null
   }
 
+  get hung() {
+    return this.hungAt !== null
+  }
+
+  /** Bus errors in an IN transfer, a corrupt handshake among them, can stop the controller (RP2040-E15). */
+  hang() {
+    this.hungAt = this.mcu.clock.nanos
+    this.counters.hangs++
+  }
+
   control(endpoint, out) {
     return this.view.getUint32(CONTROLS + endpoint * 8 + (out ? 4 : 0), true)
   }
 
   armed(endpoint, out) {
+    // Judged, not documented: endpoint 0 says NAK until the program has seen the SETUP. Were it not so, no program
+    // could keep a stale answer from the host.
+    if (this.hung || (endpoint === 0 && this.usb.sieStatus & SETUP_REC)) return false
     return !!(this.control(endpoint, out) & AVAILABLE) && (endpoint === 0 || this.#enabled(endpoint, out))
   }
 
   stalled(endpoint, out) {
+    if (this.hung) return false
     const armed = endpoint !== 0 || this.usb.epStallArm & (out ? 2 : 1)
     return !!(this.control(endpoint, out) & STALL) && !!armed
   }
@@ -82,6 +102,7 @@ export class UsbBus {
   }
 
   setup(packet) {
+    if (this.hung) return
     this.mcu.usbDPRAM.set(packet)
     this.usb.epStallArm &= ~3
     this.setToggle(0, false, 1)
@@ -90,11 +111,15 @@ export class UsbBus {
     this.usb.sieStatusUpdated()
   }
 
-  /** Take an armed IN buffer; null when its toggle says that the host has had it already. */
-  takeIn(endpoint) {
+  /** What an armed IN buffer holds as the host's token comes: that travels, whatever is written to it later. */
+  beginIn(endpoint) {
     const control = this.control(endpoint, false)
     const at = this.#buffer(endpoint, false)
-    const data = this.mcu.usbDPRAM.slice(at, at + (control & LENGTH))
+    return { control, data: this.mcu.usbDPRAM.slice(at, at + (control & LENGTH)) }
+  }
+
+  /** The host has it; null when its toggle says that it is one that it had already. */
+  takeIn(endpoint, { control, data }) {
     const fresh = this.#toggled(endpoint, false, control)
     this.counters.in_packets++
     this.#done(endpoint, false, control & ~(AVAILABLE | FULL))
@@ -157,17 +182,37 @@ export class UsbBus {
     this.onArmed()
   }
 
+  /** As published the block keeps its state over its reset. */
+  #resetBlock() {
+    const { usb } = this
+    this.abort()
+    this.counters.resets++
+    this.hungAt = null
+    usb.mainCtrl = usb.sieCtrl = usb.sieStatus = usb.buffStatus = usb.intEnable = usb.addrEndp = usb.epStallArm = 0
+    usb.intRaw = 0
+    usb.checkInterrupts()
+    this.onReset()
+  }
+
   #correctRegisters() {
     const { usb } = this
+    const resets = this.mcu.peripherals[RESETS]
+    const writeReset = resets.writeUint32.bind(resets)
+    resets.writeUint32 = (offset, value) => {
+      writeReset(offset, value)
+      if (offset === RESET && value & RESET_USBCTRL) this.#resetBlock()
+    }
     const write = usb.writeUint32.bind(usb)
     const read = usb.readUint32.bind(usb)
     usb.writeUint32 = (offset, value) => {
       // SUSPENDED is cleared by writing it, which rp2040js leaves out.
       if (offset === SIE_STATUS && usb.rawWriteValue & SUSPENDED) usb.sieStatus &= ~SUSPENDED
+      const seen = offset === SIE_STATUS && usb.rawWriteValue & usb.sieStatus & SETUP_REC
       write(offset, value)
+      if (seen) this.onSetupSeen()
     }
     usb.readUint32 = (offset) =>
       // A device reads the host's frame number there.
-      offset === SOF_RD ? Math.floor(this.mcu.clock.nanos / FRAME_NS) & 0x7ff : read(offset)
+      offset === SOF_RD ? Math.floor((this.hungAt ?? this.mcu.clock.nanos) / FRAME_NS) & 0x7ff : read(offset)
   }
 }

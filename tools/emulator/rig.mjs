@@ -75,6 +75,8 @@ export class Rig {
       // A main loop that nothing wakes any more: the watchdog's business.
       'lose interrupts': () => (this.machine.mcu.core.enabledInterrupts = 0),
       'touch at 1200 baud': () => this.usb.touch(1200),
+      'stretch a word': () => (this.sensors.stretched = true),
+      'corrupt a handshake': () => (this.usb.corrupting = true),
       'wear the flash out': () => (this.board.worn = true),
       unplug: () => this.#cable(false),
       plug: () => this.#cable(true),
@@ -88,6 +90,8 @@ export class Rig {
       this.board.cutAfter = Number(cut[1])
       return
     }
+    const two = /^two setups (\d+)$/.exec(verb) // so many ns apart
+    if (two) return this.usb.hurry(Number(two[1]))
     const file = /^write uf2 (.+)$/.exec(verb)
     if (file) {
       if (this.loader === null) throw new Error('no drive to write a UF2 to: the board is not in its loader')
@@ -115,7 +119,14 @@ export class Rig {
       latency: this.latency.counters(),
       timing: this.timing.counters(),
       sensors: this.sensors.counters(),
-      usb: { state: usb.state, device: usb.device, failed: usb.failed, received: this.received, ...usb.bus.counters },
+      usb: {
+        state: usb.state,
+        device: usb.device,
+        failed: usb.failed,
+        hurried: usb.hurried,
+        received: this.received,
+        ...usb.bus.counters,
+      },
     }
   }
 

@@ -36,7 +36,7 @@ EXPORT("serials") char *serials_at(void)
 static uint16_t count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
     // The tape's last sample is over when somebody asks for the next one.
-    sampled_behind_the_end = sampled_behind_the_end || bt_tape_over(&tape, t_ns);
+    sampled_behind_the_end = sampled_behind_the_end || (channel != BT_EMU_LINE && bt_tape_over(&tape, t_ns));
     return bt_tape_count(context, finger, channel, t_ns);
 }
 
@@ -64,6 +64,11 @@ EXPORT("select") void select_sensors(uint32_t mask, double t_ns)
 EXPORT("transfer") uint32_t transfer(uint32_t mosi, double t_ns)
 {
     return bt_emu_bus_transfer16(&bus, (uint16_t)mosi, (uint64_t)t_ns);
+}
+
+EXPORT("transfer_byte") uint32_t transfer_byte(uint32_t mosi, double t_ns)
+{
+    return bt_emu_bus_transfer8(&bus, (uint8_t)mosi, (uint64_t)t_ns);
 }
 
 EXPORT("started") int started(void)

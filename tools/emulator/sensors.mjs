@@ -7,7 +7,8 @@ const SCK = 18
 const MOSI = 19
 export const CHIP_SELECTS = [17, 20, 21, 22, 26] // of fingers 0 to 4: firmware/boards/pico
 const SPI_FUNCTION = 1
-const WORD_BITS = 16
+const WIDTHS = [8, 16] // of a property's byte; of all else
+const STRETCH_NS = 150e3
 const FASTEST_HZ = 10e6 // data sheet
 
 /** The sensors, whatever board they are wired to. Throws an Error that says what is wrong with the tape. */
@@ -24,6 +25,9 @@ export class Sensors {
     this.transfers = 0
     this.overlaps = 0 // transfers with more than one chip select low: commands to all, else contention
     this.misconfigured = 0
+    this.stretched = false // the next word takes longer than any driver waits
+    this.selected = 0 // ns, when a chip select last fell
+    this.shortestSetup = Infinity // ns from there to a word
   }
 
   /** Somebody has asked for a sample. */
@@ -39,7 +43,7 @@ export class Sensors {
   counters() {
     const early = CHIP_SELECTS.map((_, finger) => this.calls.early_reads(finger))
     const { transfers, overlaps, misconfigured } = this
-    return { transfers, overlaps, misconfigured, early_reads: early }
+    return { transfers, overlaps, misconfigured, early_reads: early, select_setup_ns: this.shortestSetup }
   }
 
   powerCycle() {
@@ -54,6 +58,7 @@ export class Sensors {
       mcu.gpio[pin].addListener((state) => {
         // A pin that is not driven is pulled up at the sensor.
         mask = state === GPIOPinState.Low ? mask | (1 << finger) : mask & ~(1 << finger)
+        if (state === GPIOPinState.Low) this.selected = mcu.clock.nanos
         this.calls.select(mask, nanos())
       })
     })
@@ -61,21 +66,24 @@ export class Sensors {
     const done = mcu.clock.createAlarm(() => spi.completeTransmit(word))
     spi.onTransmit = (mosi) => {
       this.transfers++
+      this.shortestSetup = Math.min(this.shortestSetup, mcu.clock.nanos - this.selected)
+      const late = this.stretched ? STRETCH_NS : 0
+      this.stretched = false
       if (mask & (mask - 1)) this.overlaps++
       word = this.#answer(mcu, spi, mosi, nanos())
       // As published a transfer takes no time at all.
-      done.schedule(Math.max(1, Math.round(WORD_BITS * (mcu.clkSys / spi.clockFrequency))) * (1e9 / mcu.clkSys))
+      done.schedule(Math.max(1, Math.round(spi.dataBits * (mcu.clkSys / spi.clockFrequency))) * (1e9 / mcu.clkSys) + late)
     }
   }
 
   #answer(mcu, spi, mosi, nanos) {
     const wired = [MISO, SCK, MOSI].every((pin) => mcu.gpio[pin].functionSelect === SPI_FUNCTION)
-    const right = spi.enabled && spi.dataBits === WORD_BITS && spi.spiMode === 0 && spi.clockFrequency <= FASTEST_HZ
+    const right = spi.enabled && WIDTHS.includes(spi.dataBits) && spi.spiMode === 0 && spi.clockFrequency <= FASTEST_HZ
     if (!wired || !right) {
       this.misconfigured++ // the sensor would make something of it; nobody knows what
       return 0xffff
     }
-    return this.calls.transfer(mosi, nanos)
+    return spi.dataBits === 8 ? this.calls.transfer_byte(mosi, nanos) : this.calls.transfer(mosi, nanos)
   }
 
   #bytes() {

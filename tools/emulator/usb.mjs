@@ -47,7 +47,11 @@ export class UsbHost {
     this.timer = mcu.clock.createAlarm(() => this.later())
     this.deadline = mcu.clock.createAlarm(() => this.#fail('was not answered'))
     this.later = () => {}
-    this.bus.onArmed = () => this.poke()
+    this.bus.onArmed = this.bus.onSetupSeen = () => this.poke()
+    this.bus.onReset = () => this.#lose()
+    this.corrupting = false // the next handshake to the device
+    this.hurried = { asked: 0, wrong: 0 } // requests that came before the one before was answered
+    this.second = mcu.clock.createAlarm(() => this.#secondSetup())
     this.#watchPullup()
   }
 
@@ -65,20 +69,38 @@ export class UsbHost {
     this.request(TO_INTERFACE, SET_CONTROL_LINE_STATE, 0, 0, [])
   }
 
+  /** A SETUP, and so many ns later another one, which is the one to be answered (USB 2.0, 8.4.6.4). */
+  hurry(nanos) {
+    const abandoned = Uint8Array.from([IN, GET_DESCRIPTOR, 0, CONFIGURATION, 0, 0, 255, 0])
+    this.request(IN, GET_DESCRIPTOR, DEVICE << 8, 0, 18, (data) => {
+      this.hurried.asked++
+      if (data === null || data.length !== 18 || data[0] !== 18 || data[1] !== DEVICE) this.hurried.wrong++
+    })
+    Object.assign(this.transfers.at(-1), { abandoned, nanos })
+  }
+
   /** Pull the cable, in whatever the wire was doing; true puts it back. */
   setPlugged(plugged) {
     if (plugged === this.plugged) return
     this.plugged = plugged
     if (plugged) return this.#attach()
     this.bus.abort()
-    this.deadline.cancel()
-    this.transfers = []
-    this.state = 'detached'
+    this.#lose()
     this.usb.sieStatus &= ~CONNECTED
     this.#after(SUSPEND_NS, () => {
       this.usb.sieStatus |= SUSPENDED
       this.usb.sieStatusUpdated()
     })
+  }
+
+  /** The device is gone. */
+  #lose() {
+    this.deadline.cancel()
+    this.second.cancel()
+    this.timer.cancel()
+    this.transfers = []
+    this.state = 'detached'
+    this.isGone()
   }
 
   /** Start the next transaction, if there is one to do and the wire is free. */
@@ -100,8 +122,13 @@ export class UsbHost {
       }
     }
     if (this.open && bus.armed(device.in, false) && this.canTake()) {
-      bus.transact(bus.length(device.in, false), () => {
-        const data = bus.takeIn(device.in)
+      const packet = bus.beginIn(device.in)
+      bus.transact(packet.data.length, () => {
+        if (this.corrupting) {
+          this.corrupting = false
+          return bus.hang()
+        }
+        const data = bus.takeIn(device.in, packet)
         if (data !== null && data.length > 0) this.onData(data)
         this.poke()
       })
@@ -121,9 +148,15 @@ export class UsbHost {
 
   #control(t) {
     const { bus } = this
+    if (t.stage === 'between') return
     if (t.stage === 'setup') {
       this.deadline.schedule(ANSWER_NS)
       return bus.transact(8, () => {
+        if (t.abandoned) {
+          bus.setup(t.abandoned)
+          t.stage = 'between'
+          return this.second.schedule(t.nanos)
+        }
         bus.setup(Uint8Array.from(t.packet))
         t.stage = t.length > 0 ? 'data' : 'status'
         this.poke()
@@ -134,13 +167,20 @@ export class UsbHost {
     const out = t.stage === 'status' && t.length === 0 ? false : toDevice
     if (bus.stalled(0, out)) return this.#fail('was refused')
     if (!bus.armed(0, out)) return
-    const bytes = out ? this.#nextOut(t) : bus.length(0, false)
-    bus.transact(out ? bytes.length : bytes, () => {
-      if (out) bus.putOut(0, bytes)
-      else this.#gotIn(t, bus.takeIn(0))
+    const packet = out ? { data: this.#nextOut(t) } : bus.beginIn(0)
+    bus.transact(packet.data.length, () => {
+      if (out) bus.putOut(0, packet.data)
+      else this.#gotIn(t, bus.takeIn(0, packet))
       this.#nextStage(t, out)
       this.poke()
     })
+  }
+
+  #secondSetup() {
+    const t = this.transfers[0]
+    this.bus.setup(Uint8Array.from(t.packet))
+    t.stage = 'data'
+    this.poke()
   }
 
   #nextOut(t) {
@@ -197,6 +237,7 @@ export class UsbHost {
       if (this.state === 'reset') this.#after(DEBOUNCE_NS, () => this.#enumerate())
     }
     this.isPulled = () => pulled
+    this.isGone = () => (pulled = false)
   }
 
   #attach() {
@@ -233,6 +274,7 @@ export class UsbHost {
     if (all === null) return
     const word = (at) => device[at] | (device[at + 1] << 8)
     this.device = { vendor: word(8), product: word(10), release: word(12), address: this.usb.addrEndp & 0x7f }
+    this.device.class = [...device.slice(4, 7)]
     this.device.configuration_bytes = all.length
     for (let at = 0; at < all.length && all[at] > 0; at += all[at]) {
       if (all[at + 1] !== ENDPOINT_DESCRIPTOR || (all[at + 3] & 3) !== BULK) continue

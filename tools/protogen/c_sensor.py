@@ -59,10 +59,16 @@ def header(contract: Contract) -> str:
         f"#define BT_SPI_HZ {bus['spi_hz']}",
         f"#define BT_SETTLE_US {bus['settle_us']}",
         f"#define BT_GAP_US {bus['gap_us']}",
+        f"#define BT_PROPERTY_GAP_US {bus['property_gap_us']}",
         f"#define BT_SLOT_HZ {bus['slot_hz']}",
         f"#define BT_FRAME_MS {frame_ms(contract)} // one round of slots",
         f"#define BT_POWER_ON_MS {bus['power_on_ms']}",
         f"#define BT_LISTEN_WORD 0x{bus['listen_word']:04X}",
+        *(
+            f"#define BT_RESEND_COMMAND_{k + 1} 0x{command:02X}"
+            for k, command in enumerate(sensor["resend"]["commands"])
+        ),
+        f"#define BT_PROPERTY_WRITE_COMMAND 0x{sensor['property_write']['command']:02X}",
         f"#define BT_PROPERTY_READ_COMMAND 0x{sensor['property_read']['command']:02X}",
         "",
         "enum bt_channel {",

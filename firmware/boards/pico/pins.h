@@ -14,7 +14,20 @@
 #define PIN_SELECT_3 22
 #define PIN_SELECT_4 26
 
+// How long before a word's first clock a chip select falls, and after its last one rises, at least.
+// SynTouch's library for the Cheetah adapter leaves about 1.8 us before; the product manual names no figure.
+// After: the PIC in the sensor needs none that is known; a bit's time keeps long wires apart.
+#define SELECT_SETUP_NS 1800
+#define SELECT_HOLD_NS  230
+
+#ifdef BIOTAC_PICO_W
+// GPIO 23 is the radio's power switch there, and the regulator's mode is the radio's to set (Pico W data
+// sheet, 2.1): it stays off, and the sensors' supply ripples more under light load.
+#define PINS_BOARD "pico_w"
+#else
+#define PINS_BOARD   "pico"
 // The Pico's own regulator, not on a board pin: high keeps it from its power-save mode, which ripples more.
 #define PIN_SMPS_PWM 23
+#endif
 
 #endif

@@ -1,6 +1,7 @@
 #include "talk/commands.h"
 
 #include "talk/map_commands.h"
+#include "talk/sensors.h"
 #include "talk/status.h"
 
 #include <string.h>
@@ -119,6 +120,7 @@ static void sensor_info(bt_session *session, uint8_t req_id, uint8_t finger)
     bt_sensor_info info = session->info[finger];
     info.req_id = req_id;
     info.finger = finger;
+    info.present = info.present && session->finger[finger].silent_rounds < BT_UNPLUGGED_ROUNDS;
     bt_msg_sensor_info_pack(&info, payload);
     bt_session_send(session, BT_SENSOR_INFO_ID, payload);
 }
@@ -308,6 +310,10 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         error = BT_ERROR_NO_SUCH_FINGER;
         break;
     case BT_GET_POINT_ID:
+        if (payload[1] < BT_MAX_FINGERS && bt_sensors_refused(session, payload[1])) {
+            error = BT_ERROR_OTHER_SENSOR;
+            break;
+        }
         if (payload[1] < BT_MAX_FINGERS && session->finger[payload[1]].present) {
             point(session, req_id, payload[1]);
             return;

@@ -33,14 +33,25 @@ static uint8_t state_of(const uint8_t *made_for, const bt_sensor_info *info)
                                                   : BT_CALIBRATION_STATE_OTHER_SENSOR;
 }
 
+static uint8_t calibration_state(const bt_session *session, int f)
+{
+    const bt_calibration *its = &session->calibration[f];
+    return state_of(its->present ? its->serial : NULL, &session->info[f]);
+}
+
+static uint8_t map_state(const bt_session *session, int f)
+{
+    const bt_finger_map *its = &session->map[f];
+    return state_of(its->place.bytes != 0 ? its->map.serial : NULL, &session->info[f]);
+}
+
 static void use_finger_settings(bt_session *session, int f)
 {
     bt_settings own = session->settings;
     const bt_calibration *calibration = &session->calibration[f];
     const bt_finger_map *map = &session->map[f];
-    session->calibration_state[f] =
-        state_of(calibration->present ? calibration->serial : NULL, &session->info[f]);
-    session->map_state[f] = state_of(map->place.bytes != 0 ? map->map.serial : NULL, &session->info[f]);
+    session->calibration_state[f] = calibration_state(session, f);
+    session->map_state[f] = map_state(session, f);
     if (session->calibration_state[f] == BT_CALIBRATION_STATE_IN_FORCE) {
         (void)bt_calibration_apply(calibration, &own); // its ranges were seen to when it came
     }
@@ -85,15 +96,22 @@ void bt_session_stop(bt_session *session)
     session->streams = 0;
     session->keepalive_ms = 0;
     session->upload.open = false;
+    session->other = session->refused = 0;
     bt_session_use_settings(session);
 }
 
-void bt_session_forget_sensor(bt_session *session, int f)
+void bt_session_sensor_changed(bt_session *session, unsigned f, bool other)
 {
-    if (session->info[f].present) {
-        memset(&session->info[f], 0, sizeof session->info[f]);
-        if (session->streams == 0) {
-            use_finger_settings(session, f);
-        }
+    if (session->streams == 0) {
+        use_finger_settings(session, (int)f);
+        return;
     }
+    if (!other) {
+        return; // until now it was not known who it is: what START had holds
+    }
+    uint8_t bit = (uint8_t)(1u << f);
+    bool differs = calibration_state(session, (int)f) != session->calibration_state[f]
+                   || map_state(session, (int)f) != session->map_state[f];
+    session->other |= bit;
+    session->refused = (uint8_t)((session->refused & ~bit) | (differs ? bit : 0));
 }

@@ -41,9 +41,23 @@ typedef struct {
     uint32_t sigma;
 } bt_skips;
 
+// What is known of who is there, for sensors.c.
+typedef struct {
+    uint8_t bad_words; // in a row, at most BT_AWAY_WORDS
+    uint8_t to_wait;   // rounds until it is asked again
+    uint8_t times;     // that it was asked, as far as that matters
+    bool answered;     // in the last round
+} bt_who;
+
 typedef struct {
     bt_finger finger[BT_MAX_FINGERS];
     bt_sensor_info info[BT_MAX_FINGERS];
+    bt_who who[BT_MAX_FINGERS];
+    uint8_t
+        asked; // these are bit masks of fingers: in this round asked for the serial number, and not sampled
+    uint8_t unsure;  // may be another sensor than info says
+    uint8_t other;   // is another one than at START
+    uint8_t refused; // and calibration or map are not its own
     bt_settings settings;
     bt_calibration calibration[BT_MAX_FINGERS];
     uint8_t calibration_state[BT_MAX_FINGERS]; // enum; these follow from what is above, once per change
@@ -88,8 +102,8 @@ void bt_session_use_settings(bt_session *session);
 // End every stream. What waited for that, a sensor unplugged meanwhile, then counts.
 void bt_session_stop(bt_session *session);
 
-// The sensor of finger f is gone: what is plugged in next may be another.
-void bt_session_forget_sensor(bt_session *session, int f);
+// Finger f's sensor has said its serial number; other: it is not the one that was there before.
+void bt_session_sensor_changed(bt_session *session, unsigned f, bool other);
 
 // Bit mask of the fingers whose sensor answers.
 uint8_t bt_session_present(const bt_session *session);

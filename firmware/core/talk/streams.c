@@ -1,5 +1,7 @@
 #include "talk/streams.h"
 
+#include "talk/sensors.h"
+
 static bool streams(const bt_session *session, const bt_finger *finger, uint8_t what)
 {
     return (session->streams & what) && (session->fingers >> finger->index & 1);
@@ -32,6 +34,7 @@ static void send_touch(bt_session *session, const bt_finger *finger, uint8_t slo
 void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_MAX_FINGERS], uint32_t t_us)
 {
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_sensors_word(session, (unsigned)f, count[f] != BT_INVALID_COUNT);
         if (bt_finger_put(&session->finger[f], slot, count[f])) {
             send_touch(session, &session->finger[f], slot, t_us);
         }
@@ -52,6 +55,7 @@ static void send_idle(bt_session *session, bt_finger *finger, bool frame_follows
     uint8_t payload[BT_IDLE_BYTES];
     bt_msg_idle msg;
     bt_finger_idle_message(finger, frame_follows, &msg);
+    msg.flags |= bt_sensors_flags(session, finger->index);
     bt_msg_idle_pack(&msg, payload);
     bt_session_send(session, BT_IDLE_ID, payload);
     finger->unsent = 0;
@@ -74,7 +78,11 @@ static void send_frame(bt_session *session, bt_finger *finger)
     if (finger->tare_unsent) {
         send_tare(session, finger);
     }
+    uint8_t quantities = finger->quantities;
+    finger->quantities = bt_sensors_refused(session, finger->index) ? 0 : quantities;
     bt_finger_frame(finger, &session->kernel[finger->index], &msg);
+    finger->quantities = quantities;
+    msg.flags |= bt_sensors_flags(session, finger->index);
     bt_msg_frame_pack(&msg, payload);
     bt_session_send(session, BT_FRAME_ID, payload);
     count_skips(&session->skips, finger->quantities);
@@ -117,9 +125,15 @@ void bt_session_round(bt_session *session)
     uint32_t answering = 0; // bit mask
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         bt_finger *finger = &session->finger[f];
+        if (session->asked >> f & 1) {
+            bt_finger_pass(finger);
+            continue;
+        }
         if (!bt_finger_end(finger, &session->tare[f])) {
-            if (finger->silent_rounds == BT_UNPLUGGED_ROUNDS) {
-                bt_session_forget_sensor(session, f); // the next one may be another
+            // One that never said who it is cannot be told from the next one by anything else.
+            if (finger->silent_rounds == BT_UNPLUGGED_ROUNDS && finger->answered
+                && !session->info[f].present) {
+                bt_finger_forget(finger);
             }
             continue;
         }

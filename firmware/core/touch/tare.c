@@ -269,6 +269,9 @@ static BT_NOINLINE void end_sweep(bt_tare *tare, const bt_tare_settings *setting
 // Nothing of a faulty round may reach a tare: the sweep starts over when it clears.
 static BT_NOINLINE void fault(bt_tare *tare)
 {
+    if (tare->state != BT_TARE_STATE_FAULT) {
+        tare->before_fault = tare->state;
+    }
     if (tare->state == BT_TARE_STATE_REST) {
         bt_thermal_begin(&tare->thermal); // the tare that is frozen now holds for the temperature of now
     }
@@ -327,9 +330,9 @@ void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings)
         meet(tare);
     }
     if (tare->state == BT_TARE_STATE_FAULT) {
-        // A tare from before the fault still holds, but what touched meanwhile is unknown:
-        // CONTACT freezes it until the release rules have seen quiet signals.
-        tare->state = tare->reason == BT_TARE_REASON_NONE ? BT_TARE_STATE_INIT : BT_TARE_STATE_CONTACT;
+        // A tare from before the fault still holds, and the gate sees by the coming words whether something touches
+        // now: lost words are no touch.
+        tare->state = tare->reason == BT_TARE_REASON_NONE ? BT_TARE_STATE_INIT : tare->before_fault;
         tare->release.quiet_sweeps = 0;
     } else if (tare->state == BT_TARE_STATE_REST) {
         if (tare->gate.room < 0) {

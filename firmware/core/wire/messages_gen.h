@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 #define BT_WIRE_MAJOR 1
-#define BT_WIRE_MINOR 4
-#define BT_SCHEMA_HASH 0xE209A07Fu
+#define BT_WIRE_MINOR 5
+#define BT_SCHEMA_HASH 0xE65CBA00u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -95,7 +95,9 @@ enum bt_calibration_state {
 #define BT_FRAME_FLAG_TEMP (1u << 16) // since the contact began the temperature has moved by over a degree: the tare is doubtful
 #define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to and marked invalid (SUBSCRIBE)
 #define BT_FRAME_FLAG_MAPPED (1u << 18) // force, and torque and torsion where it has them, come from the finger's wrench map
-#define BT_FRAME_FLAGS 0x7FFFFu // all there are
+#define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not said its serial number since: tare, calibration and map may be another's
+#define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with a tare of its own; no results where it has not the same calibration and map
+#define BT_FRAME_FLAGS 0x187FFFFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME messages
@@ -209,13 +211,13 @@ typedef struct {
 void bt_msg_setting_pack(const bt_msg_setting *msg, uint8_t out[BT_SETTING_BYTES]);
 void bt_msg_setting_unpack(bt_msg_setting *msg, const uint8_t in[BT_SETTING_BYTES]);
 
-// What a sensor says of itself, read once at power-up and forgotten when it is unplugged. Reply to GET_SENSOR_INFO.
+// What a sensor says of itself, read at power-up, and the serial number again whenever it was away; of one that came later it is all that is known. What was not read twice alike is zero. Reply to GET_SENSOR_INFO.
 #define BT_SENSOR_INFO_ID 0x04
 #define BT_SENSOR_INFO_BYTES 29
 typedef struct {
     uint8_t req_id; // [1] of the command
     uint8_t finger; // [1] chip select index
-    uint8_t present; // [bool] 1 when its serial number began with BT
+    uint8_t present; // [bool] 1 when its serial number began with BT and it is not unplugged
     uint8_t flex_version[2]; // [ASCII] MN means M.N
     uint8_t software_version[4]; // [ASCII] MMNN means MM.NN
     uint8_t serial[16]; // [ASCII] serial number

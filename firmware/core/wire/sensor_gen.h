@@ -18,10 +18,14 @@
 #define BT_SPI_HZ 4400000
 #define BT_SETTLE_US 50
 #define BT_GAP_US 5
+#define BT_PROPERTY_GAP_US 10
 #define BT_SLOT_HZ 4400
 #define BT_FRAME_MS 10 // one round of slots
 #define BT_POWER_ON_MS 100
 #define BT_LISTEN_WORD 0x0001
+#define BT_RESEND_COMMAND_1 0x50
+#define BT_RESEND_COMMAND_2 0x20
+#define BT_PROPERTY_WRITE_COMMAND 0x40
 #define BT_PROPERTY_READ_COMMAND 0x61
 
 enum bt_channel {
@@ -72,6 +76,7 @@ enum bt_property {
     BT_PROPERTY_SERIAL = 0x15, // 16 bytes
     BT_PROPERTY_CPU_SPEED = 0x61, // 2 bytes
     BT_PROPERTY_SAMPLING_HZ = 0x70, // 2 bytes
+    BT_PROPERTY_SAMPLING_PATTERN = 0x73, // 88 bytes
 };
 
 // Largest possible sums over all electrodes with |e| <= 4095 counts in 1/16 count (q4).

@@ -206,6 +206,13 @@ uint16_t port_spi_transfer16(uint16_t mosi)
     return miso;
 }
 
+uint8_t port_spi_transfer8(uint8_t mosi)
+{
+    uint8_t miso = bt_emu_bus_transfer8(&bus, mosi, clock_now_ns());
+    clock_advance_ns(TRANSFER_NS / 2);
+    return miso;
+}
+
 // ---- link -------------------------------------------------------------------------------------
 
 bool port_link_write(const uint8_t *data, size_t bytes)

@@ -85,6 +85,7 @@ void port_idle(void)
     if (leaving && since_us >= LEAVE_AFTER_US && (usb_all_sent() || since_us >= LEAVE_LATEST_US)) {
         rom_enter_loader();
     }
+    usb_watch();
     watchdog_feed(); // nowhere else but before a flash erase: a main loop that hangs ends in a reset
     timer_sleep();
 }

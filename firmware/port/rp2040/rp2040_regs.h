@@ -111,8 +111,10 @@
 #define USB_ADDR_ENDP          REG32(0x50110000u)
 #define USB_MAIN_CTRL          REG32(0x50110040u)
 #define USB_SIE_CTRL           REG32(0x5011004Cu)
+#define USB_SOF_RD             REG32(0x50110048u) // number of the frame
 #define USB_SIE_STATUS         REG32(0x50110050u)
 #define USB_BUFF_STATUS        REG32(0x50110058u) // bit 2 ep: IN, bit 2 ep + 1: OUT
+#define USB_EP0_BUFFERS        3u
 #define USB_EP_STALL_ARM       REG32(0x50110068u)
 #define USB_USB_MUXING         REG32(0x50110074u)
 #define USB_USB_PWR            REG32(0x50110078u)
@@ -143,10 +145,12 @@
 #define SPI0_SSPDR     REG32(0x4003C008u)
 #define SPI0_SSPSR     REG32(0x4003C00Cu)
 #define SPI0_SSPCPSR   REG32(0x4003C010u)
+#define SSPCR0_DSS_8   7u
 #define SSPCR0_DSS_16  15u // data size less one; FRF, SPO and SPH are 0: Motorola, mode 0
 #define SSPCR0_SCR_LSB 8
 #define SSPCR1_SSE     (1u << 1)
 #define SSPSR_RNE      (1u << 2)
+#define SPI_FIFO_WORDS 8
 #define SSPSR_BSY      (1u << 4)
 
 // ---- 4.6 timer

@@ -29,9 +29,11 @@ void spi_start(void)
 {
     static const uint8_t selects[BT_MAX_FINGERS] = {PIN_SELECT_0, PIN_SELECT_1, PIN_SELECT_2, PIN_SELECT_3,
                                                     PIN_SELECT_4};
+#ifdef PIN_SMPS_PWM
     SIO_GPIO_OUT_SET = 1u << PIN_SMPS_PWM; // the sensors' supply: less than 20 mV of ripple
     SIO_GPIO_OE_SET = 1u << PIN_SMPS_PWM;
     output(PIN_SMPS_PWM, GPIO_FUNC_SIO);
+#endif
     // High before they become outputs: no sensor may see a select on the way up.
     SIO_GPIO_OUT_SET = ALL_SELECTS;
     SIO_GPIO_OE_SET = ALL_SELECTS;
@@ -54,14 +56,43 @@ IN_SRAM void port_spi_select(uint8_t mask)
     uint32_t low = (uint32_t)(mask & 1) << PIN_SELECT_0 | (uint32_t)(mask >> 1 & 1) << PIN_SELECT_1
                    | (uint32_t)(mask >> 2 & 1) << PIN_SELECT_2 | (uint32_t)(mask >> 3 & 1) << PIN_SELECT_3
                    | (uint32_t)(mask >> 4 & 1) << PIN_SELECT_4;
+    wait_short_ns(SELECT_HOLD_NS); // whatever was selected; its last word is out
     SIO_GPIO_OUT_SET = ALL_SELECTS & ~low;
-    SIO_GPIO_OUT_CLR = low;
+    if (low != 0) {
+        SIO_GPIO_OUT_CLR = low;
+        wait_short_ns(SELECT_SETUP_NS);
+    }
+}
+
+// Returns 0, which reads as a sensor that is not there, for a word that did not come in time. It may come
+// still: were it left where it is, every later word would be taken for the one before it, and so for another
+// finger's.
+static IN_SRAM uint32_t transfer(uint32_t mosi)
+{
+    if (!wait_for(&SPI0_SSPSR, SSPSR_BSY, 0, WAIT_SPI_TURNS)) {
+        return 0;
+    }
+    drain(&SPI0_SSPSR, SSPSR_RNE, &SPI0_SSPDR, SPI_FIFO_WORDS);
+    SPI0_SSPDR = mosi;
+    // Not busy is later than received: the clock has gone low by then, and the select may rise.
+    bool done = wait_for(&SPI0_SSPSR, SSPSR_RNE | SSPSR_BSY, SSPSR_RNE, WAIT_SPI_TURNS);
+    return done ? SPI0_SSPDR : 0;
 }
 
 IN_SRAM uint16_t port_spi_transfer16(uint16_t mosi)
 {
-    SPI0_SSPDR = mosi;
-    // Not busy is later than received: the clock has gone low by then, and the select may rise.
-    bool done = wait_for(&SPI0_SSPSR, SSPSR_RNE | SSPSR_BSY, SSPSR_RNE, WAIT_SPI_TURNS);
-    return done ? (uint16_t)SPI0_SSPDR : 0; // 0 reads as a sensor that is not there
+    return (uint16_t)transfer(mosi);
+}
+
+IN_SRAM uint8_t port_spi_transfer8(uint8_t mosi)
+{
+    // The width changes while the block is off (PL022 manual, 3.3.1); the clock stays low.
+    SPI0_SSPCR1 = 0;
+    SPI0_SSPCR0 = SSPCR0_DSS_8 | SCR << SSPCR0_SCR_LSB;
+    SPI0_SSPCR1 = SSPCR1_SSE;
+    uint8_t miso = (uint8_t)transfer(mosi);
+    SPI0_SSPCR1 = 0;
+    SPI0_SSPCR0 = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
+    SPI0_SSPCR1 = SSPCR1_SSE;
+    return miso;
 }

@@ -24,7 +24,7 @@ static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, uint32_t
     return true;
 }
 
-static bool take_out_of_reset(uint32_t blocks)
+bool take_out_of_reset(uint32_t blocks)
 {
     REG_SET(RESETS_RESET) = blocks;
     REG_CLR(RESETS_RESET) = blocks;

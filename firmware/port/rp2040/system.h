@@ -13,6 +13,9 @@
 // ---- system.c: clocks, watchdog, reset
 // CLK_SYS_HZ from the crystal, 48 MHz for USB, the 1 us tick; false when the crystal or a PLL never came up.
 bool clocks_start(void);
+
+// Into reset and out again: every register of theirs is as after power-on. False when they do not come back.
+bool take_out_of_reset(uint32_t blocks);
 void watchdog_start(void);
 void watchdog_feed(void);
 void system_reset(void) __attribute__((noreturn));
@@ -46,6 +49,9 @@ bool flash_unique_id(uint8_t id[FLASH_ID_BYTES]);
 // serial: text that stays; what the host shows as the serial number.
 void usb_start(const char *serial);
 void usb_interrupt(void);
+
+// In the main loop, often: start over a controller that hears nothing any more.
+void usb_watch(void);
 bool usb_all_sent(void);
 
 // Once: a host set 1200 baud and let DTR go, the customary sign to enter the loader.

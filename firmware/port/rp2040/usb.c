@@ -26,6 +26,12 @@ _Static_assert((TX_RING & (TX_RING - 1)) == 0 && (RX_RING & (RX_RING - 1)) == 0,
 
 #define TOUCH_BITS_PER_S 1200
 
+// RP2040-E15: bus errors in an IN transfer, of which a corrupt handshake behind a hub is one, can stop the
+// controller for good: it hears neither tokens nor bus resets, and so no start of frame, which a host sends
+// every millisecond even while nobody reads. Only a reset of the block helps.
+#define HEARS_NOTHING_US 100000u
+#define OFF_THE_BUS_US   20000u // so that a hub sees it leave
+
 static uint8_t tx[TX_RING];
 static _Atomic uint32_t tx_head; // main loop; counts bytes ever put in
 static _Atomic uint32_t tx_tail; // interrupt
@@ -39,6 +45,7 @@ static volatile bool dtr;
 static volatile bool touched;
 static volatile bool in_busy; // the controller holds a packet for the host
 static volatile bool out_armed;
+static const char *serial_number;
 static bool last_was_full;
 static bool delimiter_due;
 static uint32_t in_toggle;
@@ -218,12 +225,11 @@ void usb_interrupt(void)
         buffers_done();
     }
     if (status & USB_INT_SETUP_REQ) {
-        USB_SIE_STATUS = USB_SIE_SETUP_REC; // writing 1 clears, here and below
         suspended = false;
         usb_control_setup();
     }
     if (status & USB_INT_BUS_RESET) {
-        USB_SIE_STATUS = USB_SIE_BUS_RESET;
+        USB_SIE_STATUS = USB_SIE_BUS_RESET; // writing 1 clears, here and below
         suspended = false;
         usb_control_bus_reset();
     }
@@ -240,6 +246,7 @@ void usb_interrupt(void)
 
 void usb_start(const char *serial)
 {
+    serial_number = serial;
     usb_control_start(serial);
     for (uint32_t offset = 0; offset < USB_EP0_BUFFER; offset += 4) {
         REG32(USB_DPRAM_BASE + offset) = 0; // it comes up with anything in it
@@ -259,6 +266,30 @@ void usb_start(const char *serial)
     NVIC_ISER = 1u << USBCTRL_IRQ;
     USB_MAIN_CTRL = USB_CONTROLLER_EN;
     REG_SET(USB_SIE_CTRL) = USB_SIE_PULLUP_EN; // now the host sees a device
+}
+
+void usb_watch(void)
+{
+    static uint32_t frame, since_us;
+    static bool off;
+    uint32_t now_us = port_now_us();
+    if (off) {
+        if (now_us - since_us >= OFF_THE_BUS_US) {
+            off = false;
+            usb_start(serial_number);
+        }
+        return;
+    }
+    if (!in_busy || suspended || frame != USB_SOF_RD) {
+        frame = USB_SOF_RD;
+        since_us = now_us;
+    } else if (now_us - since_us >= HEARS_NOTHING_US) {
+        NVIC_ICER = 1u << USBCTRL_IRQ;
+        usb_control_bus_reset();
+        (void)take_out_of_reset(RESETS_USBCTRL);
+        off = true;
+        since_us = now_us;
+    }
 }
 
 bool usb_all_sent(void)

@@ -30,6 +30,7 @@ enum { DESCRIPTOR_DEVICE = 1, DESCRIPTOR_CONFIGURATION = 2, DESCRIPTOR_STRING = 
 #define STRING_BYTES      64
 #define ENGLISH           0x0409
 #define LINE_STATE_DTR    1
+#define SETUP_TRIES       4 // at full speed the next one is 10 us away
 
 static const char *serial_number;
 static const uint8_t *sending; // what is left of the answer
@@ -60,8 +61,18 @@ void usb_control_bus_reset(void)
 
 // ---- the stages of a request -----------------------------------------------------------------------------
 
+// The host has begun another request: what would be said to the one before must not reach it. The interrupt
+// comes again.
+static bool superseded(void)
+{
+    return USB_SIE_STATUS & USB_SIE_SETUP_REC;
+}
+
 static void send_packet(void)
 {
+    if (superseded()) {
+        return;
+    }
     uint32_t bytes = sending_bytes < USB_PACKET_BYTES ? sending_bytes : USB_PACKET_BYTES;
     volatile uint8_t *out = usb_memory(USB_EP0_BUFFER);
     for (uint32_t k = 0; k < bytes; k++) {
@@ -76,6 +87,9 @@ static void send_packet(void)
 
 static void receive(uint32_t bytes)
 {
+    if (superseded()) {
+        return;
+    }
     usb_hand_over(&USB_BUFFER_OUT(0), bytes | USB_BUFFER_DATA1);
 }
 
@@ -99,6 +113,9 @@ static void accept(void)
 
 static void refuse(void)
 {
+    if (superseded()) {
+        return;
+    }
     USB_EP_STALL_ARM = USB_STALL_EP0_IN | USB_STALL_EP0_OUT;
     USB_BUFFER_IN(0) = USB_BUFFER_STALL;
     USB_BUFFER_OUT(0) = USB_BUFFER_STALL;
@@ -148,13 +165,28 @@ static void set_configuration(uint32_t value)
     accept();
 }
 
+static void take_setup(uint8_t setup[8])
+{
+    // A host may begin another request at any time (USB 2.0, 8.4.6.4). What is armed for the one before goes
+    // first, while SETUP_REC still holds the host off; and a packet that comes while it is read is read anew.
+    USB_BUFFER_IN(0) = 0;
+    USB_BUFFER_OUT(0) = 0;
+    USB_BUFF_STATUS = USB_EP0_BUFFERS;
+    sending_bytes = 0;
+    empty_packet_due = false;
+    for (int tries = 0; superseded() && tries < SETUP_TRIES; tries++) {
+        USB_SIE_STATUS = USB_SIE_SETUP_REC; // writing 1 clears
+        for (int k = 0; k < 8; k++) {
+            setup[k] = usb_memory(0)[k];
+        }
+    }
+}
+
 void usb_control_setup(void)
 {
     static const uint8_t zeros[2];
-    uint8_t setup[8];
-    for (int k = 0; k < 8; k++) {
-        setup[k] = usb_memory(0)[k];
-    }
+    uint8_t setup[8] = {0};
+    take_setup(setup);
     uint32_t value = setup[2] | (uint32_t)setup[3] << 8;
     uint32_t index = setup[4] | (uint32_t)setup[5] << 8;
     uint32_t asked = setup[6] | (uint32_t)setup[7] << 8;

@@ -16,7 +16,7 @@ _Static_assert(BT_VERSION_MAJOR < 10 && BT_VERSION_MINOR < 10 && BT_VERSION_PATC
 const uint8_t usb_device_descriptor[USB_DEVICE_BYTES] = {
     USB_DEVICE_BYTES, 1, // a device
     0x00, 0x02, // USB 2.0
-    2, 0, 0, // class: communications
+    0xEF, 2, 1, // class: by interface associations (their ECN, table 1); Windows wants it with one
     USB_PACKET_BYTES, // of endpoint 0
     LOW(BT_USB_VENDOR), HIGH(BT_USB_VENDOR),
     LOW(BT_USB_PRODUCT), HIGH(BT_USB_PRODUCT),

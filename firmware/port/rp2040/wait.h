@@ -27,10 +27,29 @@ static inline bool wait_for(const volatile uint32_t *reg, uint32_t mask, uint32_
 // few that a wait on the timer, which ticks once in a us, would lengthen by up to two.
 #define WAIT_TURN_CYCLES  3u
 #define WAIT_TURNS_PER_US (CLK_SYS_HZ / 1000000u / WAIT_TURN_CYCLES + 1)
+static inline void wait_turns(uint32_t turns)
+{
+    __asm volatile("1: sub %0, #1\n bne 1b" : "+l"(turns) : : "cc");
+}
+
 static inline void wait_short_us(uint32_t us)
 {
-    uint32_t turns = us * WAIT_TURNS_PER_US;
-    __asm volatile("1: sub %0, #1\n bne 1b" : "+l"(turns) : : "cc");
+    wait_turns(us * WAIT_TURNS_PER_US);
+}
+
+// The same in nanoseconds, of a constant.
+static inline void wait_short_ns(uint32_t ns)
+{
+    wait_turns(ns * WAIT_TURNS_PER_US / 1000 + 1);
+}
+
+// Read data away while (*status & more), words at most.
+static inline void drain(const volatile uint32_t *status, uint32_t more, const volatile uint32_t *data,
+                         uint32_t words)
+{
+    while ((*status & more) && words-- != 0) {
+        (void)*data;
+    }
 }
 
 // At least us microseconds; not for more than a second. The timer ticks while clk_ref runs, so the bound in

@@ -120,7 +120,10 @@ def _with_kept_tares(
     """FRAME messages as recorded, with what the kernels make of their counts and tares now."""
     new: StructArray = recording.wire.copy()
     for finger in np.unique(new["finger"]):
-        at = np.flatnonzero((new["finger"] == finger) & ((new["flags"] & wire.FrameFlags.UNTARED) == 0))
+        # Another sensor's, of which nothing was computed: the settings are not its own.
+        refused = wire.FrameFlags.SENSOR_OTHER | wire.FrameFlags.NOT_ASKED
+        known = (new["flags"] & wire.FrameFlags.UNTARED == 0) & (new["flags"] & refused != refused)
+        at = np.flatnonzero((new["finger"] == finger) & known)
         new[at] = _recomputed(new[at], own.get(int(finger), settings), maps.get(int(finger)))
     # A standard deviation follows from the gains and the noise, which a frame does not hold.
     for name in ("poc_sigma_um", "force_sigma_100un"):
@@ -176,6 +179,11 @@ def _through_the_machine(
             f"{recording.path} has {seen}, and the tare machine needs the counts of every round; add --keep-tare to "
             "recompute from the tares it recorded"
         )
+    if np.any(recording.wire["flags"] & wire.FrameFlags.SENSOR_OTHER):
+        raise InputError(
+            f"{recording.path} has a sensor that was plugged in while recording, whose tare began anew; add "
+            "--keep-tare to recompute from the tares it recorded"
+        )
     new = np.empty_like(recording.wire)
     tares: dict[int, wire.Tare] = {}
     ran = 0
@@ -192,6 +200,7 @@ def _through_the_machine(
         if len(frames) != len(at):
             raise InputError(f"{recording.path}: finger {finger} has frames without one good count; add --keep-tare")
         frames["seq"] = recording.wire["seq"][at]
+        frames["flags"] |= recording.wire["flags"][at] & np.uint32(wire.FrameFlags.SENSOR_UNSURE)  # counts do not tell
         new[at] = frames
         for row, message in changes.items():
             tares[int(at[row])] = dataclasses.replace(message, seq=int(frames["seq"][row]))

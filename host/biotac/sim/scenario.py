@@ -48,6 +48,8 @@ FAULT_CODES = {
     "stuck_high": tape.STUCK_HIGH,
     "error_word": tape.ERROR_WORD,
     "no_channel": tape.NO_CHANNEL,
+    "unplugged": tape.UNPLUGGED,
+    "swapped": tape.SWAPPED,
 }
 
 STEP_KEYS: dict[str, tuple[str, ...]] = {

@@ -1,7 +1,7 @@
 """The tape: counts for the C simulator's sensors, one uint16 a slot.
 
 Little-endian: 8 bytes ``BTTAPE01``; u32 fingers, u32 frames, u32 slots (44), u32 reserved (0); then
-uint16 samples [frame][finger][slot]. 0..4095 are counts; five codes above say what else the sensor
+uint16 samples [frame][finger][slot]. 0..4095 are counts; the codes above say what else the sensor
 puts on the bus. Nothing in between is legal.
 """
 
@@ -19,10 +19,12 @@ from .source import Source
 
 NO_CHANNEL = 0xFFFF  # the sensor has no such channel: error word 0xA558
 BAD_PARITY = 0xFFFE  # a word with a flipped parity bit
-STUCK_LOW = 0xFFFD  # line stuck low: absent sensor
+STUCK_LOW = 0xFFFD  # line stuck low
 STUCK_HIGH = 0xFFFC  # line stuck high
 ERROR_WORD = 0xFFFB  # error word 0xA52D: insufficient sampling delay
-CODES = (NO_CHANNEL, BAD_PARITY, STUCK_LOW, STUCK_HIGH, ERROR_WORD)
+UNPLUGGED = 0xFFFA  # no sensor or no power; afterwards it is mute until asked for a property
+SWAPPED = 0xFFF9  # likewise, and it is another sensor that comes back
+CODES = (NO_CHANNEL, BAD_PARITY, STUCK_LOW, STUCK_HIGH, ERROR_WORD, UNPLUGGED, SWAPPED)
 
 MAGIC = b"BTTAPE01"
 _HEADER = struct.Struct("<8sIIII")

@@ -12,8 +12,8 @@ from enum import IntEnum, IntFlag
 from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
-WIRE_MINOR = 4
-SCHEMA_HASH = 0xE209A07F
+WIRE_MINOR = 5
+SCHEMA_HASH = 0xE65CBA00
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -111,6 +111,8 @@ class FrameFlags(IntFlag):
     TEMP = 1 << 16  # since the contact began the temperature has moved by over a degree: the tare is doubtful
     NOT_ASKED = 1 << 17  # some quantity is not subscribed to and marked invalid (SUBSCRIBE)
     MAPPED = 1 << 18  # force, and torque and torsion where it has them, come from the finger's wrench map
+    SENSOR_UNSURE = 1 << 23  # the sensor was away and has not said its serial number since: tare, calibration and map may be another's
+    SENSOR_OTHER = 1 << 24  # another sensor than at START, with a tare of its own; no results where it has not the same calibration and map
 
 
 class StreamFlags(IntFlag):
@@ -211,6 +213,8 @@ FRAME_FLAG_DOC: dict[int, str] = {
     65536: "since the contact began the temperature has moved by over a degree: the tare is doubtful",
     131072: "some quantity is not subscribed to and marked invalid (SUBSCRIBE)",
     262144: "force, and torque and torsion where it has them, come from the finger's wrench map",
+    8388608: "the sensor was away and has not said its serial number since: tare, calibration and map may be another's",
+    16777216: "another sensor than at START, with a tare of its own; no results where it has not the same calibration and map",
 }
 
 
@@ -445,7 +449,7 @@ class SettingValue:
 
 @dataclass(frozen=True, slots=True)
 class SensorInfo:
-    """What a sensor says of itself, read once at power-up and forgotten when it is unplugged. Reply to GET_SENSOR_INFO."""
+    """What a sensor says of itself, read at power-up, and the serial number again whenever it was away; of one that came later it is all that is known. What was not read twice alike is zero. Reply to GET_SENSOR_INFO."""
 
     req_id: int
     finger: int

@@ -157,6 +157,16 @@ static void every_value_keeps_its_settings_range(void **state)
     }
 }
 
+static const uint8_t another[BT_SERIAL_BYTES] = "BT-another-one";
+
+static void unplug(int f, int rounds)
+{
+    (void)f;
+    for (int k = 0; k < rounds; k++) {
+        host_round(&session, 0, 0);
+    }
+}
+
 static void nothing_changes_while_streaming(void **state)
 {
     (void)state;
@@ -166,11 +176,9 @@ static void nothing_changes_while_streaming(void **state)
     assert_int_equal(start(BT_STREAM_FLAG_PAC, 1, 0), BT_ERROR_OK);
     assert_int_equal(set_error(0, "", values), BT_ERROR_BUSY);
     assert_int_equal(clear(0), BT_ERROR_BUSY);
-    for (int k = 0; k < 2 * BT_UNPLUGGED_ROUNDS; k++) {
-        host_round(&session, 0, 0);
-    }
-    // Unplugged, what comes next may be another sensor; but one recording has one set of values.
-    assert_false(session.info[0].present);
+    // Another sensor is plugged in; but one recording has one set of values.
+    unplug(0, 2 * BT_UNPLUGGED_ROUNDS);
+    bt_sensors_answer(&session, 0, another);
     assert_int_equal(get(0).state, BT_CALIBRATION_STATE_IN_FORCE);
     assert_works_by(0, values);
     assert_int_equal(stop(), BT_ERROR_OK);
@@ -181,17 +189,28 @@ static void nothing_changes_while_streaming(void **state)
     assert_memory_equal(get(0).value, values, sizeof values); // it is kept
 }
 
-static void a_sensor_unplugged_at_rest_takes_its_calibration_along_at_once(void **state)
+static void a_sensor_that_comes_back_keeps_its_calibration_and_another_has_none(void **state)
 {
     (void)state;
     plug(0, SENSOR);
+    plug(1, SENSOR);
     assert_int_equal(set_error(0, SENSOR, values), BT_ERROR_OK);
     assert_int_equal(set_error(1, "", values), BT_ERROR_OK);
     host_round(&session, 3, 2000);
-    for (int k = 0; k < BT_UNPLUGGED_ROUNDS; k++) {
-        assert_int_equal(session.calibration_state[0], BT_CALIBRATION_STATE_IN_FORCE);
-        host_round(&session, 0, 0);
+    for (int again = 0; again < 3; again++) {
+        unplug(0, 1 << (5 * again));
+        assert_int_equal(get(0).state, BT_CALIBRATION_STATE_IN_FORCE);
+        assert_int_equal(session.unsure & 3, 3);
+        assert_int_equal(bt_sensors_to_ask(&session) & 3, 3);
+        bt_sensors_answer(&session, 0, NULL); // nothing that could be read
+        assert_int_equal(session.unsure & 3, 3);
+        bt_sensors_answer(&session, 0, session.info[0].serial);
+        bt_sensors_answer(&session, 1, session.info[1].serial);
+        assert_int_equal(session.unsure & 3, 0);
+        assert_int_equal(get(0).state, BT_CALIBRATION_STATE_IN_FORCE);
     }
+    bt_sensors_answer(&session, 0, another);
+    bt_sensors_answer(&session, 1, another);
     assert_int_equal(get(0).state, BT_CALIBRATION_STATE_OTHER_SENSOR);
     assert_int_equal(get(1).state, BT_CALIBRATION_STATE_IN_FORCE); // for any sensor
 }
@@ -204,9 +223,8 @@ static void every_end_of_a_stream_counts(void **state)
         assert_int_equal(set_error(0, SENSOR, values), BT_ERROR_OK);
         host_round(&session, 1, 2000);
         assert_int_equal(start(BT_STREAM_FLAG_PAC, 1, way == 2 ? 100 : 0), BT_ERROR_OK);
-        for (int k = 0; k < BT_UNPLUGGED_ROUNDS; k++) {
-            host_round(&session, 0, 0);
-        }
+        unplug(0, 1);
+        bt_sensors_answer(&session, 0, another);
         if (way == 0) {
             assert_int_equal(stop(), BT_ERROR_OK);
         } else if (way == 1) {
@@ -306,7 +324,7 @@ int main(void)
         T(another_sensors_is_refused_unless_it_is_forced),
         T(every_value_keeps_its_settings_range),
         T(nothing_changes_while_streaming),
-        T(a_sensor_unplugged_at_rest_takes_its_calibration_along_at_once),
+        T(a_sensor_that_comes_back_keeps_its_calibration_and_another_has_none),
         T(every_end_of_a_stream_counts),
         T(only_what_has_changed_is_stored),
         T(a_record_is_read_back_and_a_strange_one_passed_over),

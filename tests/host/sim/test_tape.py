@@ -15,7 +15,7 @@ from biotac.sim.source import Source
 
 def small() -> Source:
     samples = (np.arange(3 * 2 * 44) % 4096).astype(np.uint16).reshape(3, 2, 44)
-    samples[0, 1, 5:10] = tape.CODES
+    samples[0, 1, 5:12] = tape.CODES
     return Source(name="small", samples=samples)
 
 
@@ -28,12 +28,12 @@ def test_bytes_are_those_of_the_format(tmp_path: Path) -> None:
     # frame 0, finger 0 begins with 0, 1; finger 1 of frame 0 is next, at 44
     assert data[24:28] == b"\x00\x00\x01\x00"
     assert data[24 + 88 : 24 + 90] == struct.pack("<H", 44)
-    assert data[24 + 88 + 10 : 24 + 88 + 20] == b"\xff\xff\xfe\xff\xfd\xff\xfc\xff\xfb\xff"
+    assert data[24 + 88 + 10 : 24 + 88 + 24] == bytes.fromhex("ffff feff fdff fcff fbff faff f9ff")
 
 
 def test_codes_are_those_of_the_c_simulator() -> None:
     codes = (tape.NO_CHANNEL, tape.BAD_PARITY, tape.STUCK_LOW, tape.STUCK_HIGH, tape.ERROR_WORD)
-    assert codes == (0xFFFF, 0xFFFE, 0xFFFD, 0xFFFC, 0xFFFB)
+    assert (*codes, tape.UNPLUGGED, tape.SWAPPED) == (0xFFFF, 0xFFFE, 0xFFFD, 0xFFFC, 0xFFFB, 0xFFFA, 0xFFF9)
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def damaged(data: bytes, at: int, new: bytes) -> bytes:
         (lambda d: damaged(d, 20, b"\x01"), "reserved 1"),
         (lambda d: damaged(d, 12, b"\x00")[:24], "0 frames"),
         (lambda d: damaged(d, 24 + 2 * 3, b"\x00\x10"), "frame 0, finger 0, slot 3 holds 4096"),
-        (lambda d: damaged(d, 24 + 2 * 47, b"\xfa\xff"), "frame 0, finger 1, slot 3 holds 65530"),
+        (lambda d: damaged(d, 24 + 2 * 47, b"\xf8\xff"), "frame 0, finger 1, slot 3 holds 65528"),
     ],
 )
 def test_a_damaged_tape_is_refused(tmp_path: Path, damage: object, words: str) -> None:

@@ -1,0 +1,93 @@
+#include "talk/sensors.h"
+
+#include <string.h>
+
+// How often one that does not answer is asked, in rounds: each time costs a round of its samples, if it has
+// any.
+#define ASK_PERIOD      10
+#define ASK_PERIOD_LATE 100
+#define LATE_AFTER      10 // times
+
+void bt_sensors_doubt(bt_session *session, unsigned f)
+{
+    if (!(session->unsure >> f & 1)) {
+        session->unsure |= (uint8_t)(1u << f);
+        session->who[f] = (bt_who){.to_wait = 0};
+    }
+}
+
+void bt_sensors_word(bt_session *session, unsigned f, bool good)
+{
+    bt_who *who = &session->who[f];
+    if (session->asked >> f & 1) {
+        return;
+    }
+    if (good) {
+        who->bad_words = 0;
+    } else if (who->bad_words < BT_AWAY_WORDS && ++who->bad_words == BT_AWAY_WORDS) {
+        bt_sensors_doubt(session, f);
+        who->bad_words = BT_AWAY_WORDS;
+    }
+}
+
+static bool wants(bt_session *session, unsigned f)
+{
+    bt_who *who = &session->who[f];
+    bool answers = session->finger[f].present;
+    bool back = answers && !who->answered;
+    who->answered = answers;
+    if (back || who->to_wait == 0) {
+        if (who->times < LATE_AFTER) {
+            who->times++;
+        }
+        who->to_wait = who->times < LATE_AFTER ? ASK_PERIOD : ASK_PERIOD_LATE;
+        return true;
+    }
+    who->to_wait--;
+    return false;
+}
+
+uint8_t bt_sensors_to_ask(bt_session *session)
+{
+    uint8_t mask = 0;
+    for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
+        bool asked = session->asked >> f & 1; // its round says nothing of whether it answers
+        if (!asked && session->unsure >> f & 1 && wants(session, f)) {
+            mask = (uint8_t)(mask | 1u << f);
+        }
+    }
+    return mask;
+}
+
+void bt_sensors_answer(bt_session *session, unsigned f, const uint8_t serial[BT_SERIAL_BYTES])
+{
+    bt_sensor_info *info = &session->info[f];
+    if (serial == NULL) {
+        return;
+    }
+    session->unsure &= (uint8_t)~(1u << f);
+    session->who[f].bad_words = 0;
+    if (info->present && memcmp(info->serial, serial, BT_SERIAL_BYTES) == 0) {
+        return;
+    }
+    bool other = info->present;
+    memset(info, 0, sizeof *info);
+    info->finger = (uint8_t)f;
+    info->present = 1;
+    memcpy(info->serial, serial, BT_SERIAL_BYTES);
+    if (other) {
+        bt_finger_forget(&session->finger[f]);
+    }
+    bt_session_sensor_changed(session, f, other);
+}
+
+uint32_t bt_sensors_flags(const bt_session *session, unsigned f)
+{
+    uint32_t unsure = session->unsure >> f & 1, other = session->other >> f & 1;
+    return (unsure ? BT_FRAME_FLAG_SENSOR_UNSURE : 0) | (other ? BT_FRAME_FLAG_SENSOR_OTHER : 0);
+}
+
+bool bt_sensors_refused(const bt_session *session, unsigned f)
+{
+    return session->refused >> f & 1;
+}

@@ -1,0 +1,141 @@
+// Properties at power-up: read twice, with gaps, and nothing taken for a value that is none.
+#include "rig.h"
+
+#include "properties.h"
+
+static const uint64_t flip_ns = 1000000;
+
+// Faults of the line by time since it was first asked; NULL: none.
+static uint16_t (*line)(uint64_t n);
+static uint64_t asked;
+
+static uint16_t faulty_source(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
+{
+    (void)context;
+    (void)finger;
+    (void)t_ns;
+    return channel == BT_EMU_LINE ? (line == NULL ? 0 : line(asked++)) : 2048;
+}
+
+static int new_bus(void **state)
+{
+    (void)state;
+    line = NULL;
+    asked = 0;
+    fake_reset(faulty_source, flip_ns);
+    return 0;
+}
+
+static void all_are_read_with_gaps_between_the_bytes(void **state)
+{
+    (void)state;
+    bt_msg_sensor_info info;
+    bt_properties_read(0, &info);
+    assert_int_equal(info.present, 1);
+    assert_memory_equal(info.serial, "BTEMU00000000001", 16);
+    assert_memory_equal(info.software_version, "0301", 4);
+    assert_memory_equal(info.flex_version, "BD", 2);
+    assert_int_equal(info.cpu_khz, 16000);
+    assert_int_equal(info.sampling_hz, 4400);
+    // Once for nothing, and each of them twice.
+    assert_int_equal(fake.bytes, 4 + 2 * (16 + 4 + 2 + 2 + 2));
+    assert_true(fake.shortest_gap_ns >= 10000);
+    assert_int_equal(fake.sensor[0].early_reads, 0);
+}
+
+static uint64_t flipped;
+
+static uint16_t one_bit(uint64_t n)
+{
+    return n == flipped ? BT_EMU_BAD_PARITY : 0;
+}
+
+static void one_flipped_bit_anywhere_changes_nothing(void **state)
+{
+    (void)state;
+    for (flipped = 0; flipped < 80; flipped++) {
+        bt_msg_sensor_info info;
+        (void)new_bus(NULL);
+        line = one_bit;
+        bt_properties_read(0, &info);
+        assert_memory_equal(info.serial, "BTEMU00000000001", 16);
+        assert_memory_equal(info.software_version, "0301", 4);
+        assert_memory_equal(info.flex_version, "BD", 2);
+        assert_int_equal(info.cpu_khz, 16000);
+        assert_int_equal(info.sampling_hz, 4400);
+    }
+}
+
+static uint16_t error_words(uint64_t n)
+{
+    return n > 50 ? BT_EMU_NO_CHANNEL : 0;
+}
+
+static void an_error_word_is_no_value(void **state)
+{
+    (void)state;
+    bt_msg_sensor_info info;
+    line = error_words; // from the property behind the serial number on
+    bt_properties_read(0, &info);
+    assert_int_equal(info.present, 1);
+    assert_int_equal(info.cpu_khz, 0);
+    assert_int_equal(info.sampling_hz, 0);
+    static const uint8_t none[4];
+    assert_memory_equal(info.flex_version, none, 2);
+}
+
+static void a_line_that_is_stuck_is_nobody(void **state)
+{
+    (void)state;
+    bt_msg_sensor_info info;
+    fake.sensor[0].present = false;
+    bt_properties_read(0, &info);
+    static const uint8_t none[16];
+    assert_int_equal(info.present, 0);
+    assert_memory_equal(info.serial, none, 16);
+}
+
+static void a_mute_sensor_finds_its_voice(void **state)
+{
+    (void)state;
+    bt_msg_sensor_info info;
+    fake.sensor[0].mute = true;
+    bt_properties_read(0, &info);
+    assert_int_equal(info.present, 1);
+    assert_false(fake.sensor[0].mute);
+}
+
+// At start the whole serial number is garbled; it is asked for again while sampling goes on.
+static void a_serial_number_that_could_not_be_read_is_read_later(void **state)
+{
+    (void)state;
+    trouble.finger = 2;
+    trouble.one_in = 1;
+    trouble.fault = BT_EMU_BAD_PARITY;
+    boot(START_NS);
+    assert_int_equal(gateway.session.info[2].present, 0);
+    trouble.one_in = 0;
+    run_rounds(30);
+    assert_int_equal(gateway.session.info[2].present, 1);
+    assert_memory_equal(gateway.session.info[2].serial, "BTEMU00000000003", 16);
+    assert_int_equal(gateway.session.unsure, 0);
+    assert_int_equal(gateway.session.slots_late, 0);
+    assert_true(fake.shortest_gap_ns >= 5000);
+    int last = host.frames[2] - 1;
+    assert_false(host.frame[2][last].flags & (BT_FRAME_FLAG_SENSOR_UNSURE | BT_FRAME_FLAG_SENSOR_OTHER));
+    assert_true(host.frame[2][0].flags & BT_FRAME_FLAG_SENSOR_UNSURE);
+}
+
+#define T(name) cmocka_unit_test_setup(name, new_bus)
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        T(all_are_read_with_gaps_between_the_bytes),
+        T(one_flipped_bit_anywhere_changes_nothing),
+        T(an_error_word_is_no_value),
+        T(a_line_that_is_stuck_is_nobody),
+        T(a_mute_sensor_finds_its_voice),
+        T(a_serial_number_that_could_not_be_read_is_read_later),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
