@@ -76,6 +76,8 @@ export class Rig {
       'lose interrupts': () => (this.machine.mcu.core.enabledInterrupts = 0),
       'touch at 1200 baud': () => this.usb.touch(1200),
       'wear the flash out': () => (this.board.worn = true),
+      'switch off quad reads': () => (this.board.quad = false),
+      'silence the flash': () => (this.board.quad = null),
       unplug: () => this.#cable(false),
       plug: () => this.#cable(true),
       'cut power': () => {
