@@ -96,7 +96,7 @@ static void load_settings(bt_session *session)
         }
         bytes = bt_storage_read(&flash, map_id(f), &version, record, sizeof record);
         if (bytes > 0) {
-            bt_finger_map_load(&session->map[f], session->board.maps, version, record, (size_t)bytes);
+            bt_finger_map_load(&session->map[f], session->board.maps, f, version, record, (size_t)bytes);
         }
     }
     bt_session_use_settings(session);
@@ -111,7 +111,7 @@ void bt_gateway_init(bt_gateway *gateway)
         .reboot_bootloader = reboot_bootloader,
         .maps = &gateway->map_flash,
     };
-    gateway->map_flash = (bt_map_flash){erase_map_sector, program_map_page, port_flash_maps()};
+    gateway->map_flash = (bt_map_flash){erase_map_sector, program_map_page, port_flash_maps(), gateway->map_ram};
     bt_identity identity = {
         .board = port_board(),
         .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},

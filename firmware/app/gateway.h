@@ -9,6 +9,7 @@ typedef struct {
     bt_sampler sampler;
     bt_session session;
     bt_map_flash map_flash;
+    _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES]; // what is in force
     uint32_t round; // that the fingers are assembling
     bool round_open;
     bool link_was_up;

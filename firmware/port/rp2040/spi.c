@@ -48,9 +48,8 @@ void spi_start(void)
     IO_BANK0_GPIO_CTRL(PIN_MISO) = GPIO_FUNC_SPI;
 }
 
-IN_SRAM void port_spi_select(uint8_t mask)
+void port_spi_select(uint8_t mask)
 {
-    // No table: it would be in flash.
     uint32_t low = (uint32_t)(mask & 1) << PIN_SELECT_0 | (uint32_t)(mask >> 1 & 1) << PIN_SELECT_1
                    | (uint32_t)(mask >> 2 & 1) << PIN_SELECT_2 | (uint32_t)(mask >> 3 & 1) << PIN_SELECT_3
                    | (uint32_t)(mask >> 4 & 1) << PIN_SELECT_4;
@@ -58,7 +57,7 @@ IN_SRAM void port_spi_select(uint8_t mask)
     SIO_GPIO_OUT_CLR = low;
 }
 
-IN_SRAM uint16_t port_spi_transfer16(uint16_t mosi)
+uint16_t port_spi_transfer16(uint16_t mosi)
 {
     SPI0_SSPDR = mosi;
     // Not busy is later than received: the clock has gone low by then, and the select may rise.

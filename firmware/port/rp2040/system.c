@@ -11,7 +11,7 @@
 
 #define WATCHDOG_US 1000000u // longer than a flash sector's erase, 0.4 s at most
 
-static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, uint32_t postdiv2)
+AT_BOOT static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, uint32_t postdiv2)
 {
     PLL_CS(base) = 1; // reference divider
     PLL_FBDIV_INT(base) = fbdiv;
@@ -24,14 +24,14 @@ static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, uint32_t
     return true;
 }
 
-static bool take_out_of_reset(uint32_t blocks)
+AT_BOOT static bool take_out_of_reset(uint32_t blocks)
 {
     REG_SET(RESETS_RESET) = blocks;
     REG_CLR(RESETS_RESET) = blocks;
     return wait_for(&RESETS_RESET_DONE, blocks, blocks, WAIT_CLOCKS_TURNS);
 }
 
-bool clocks_start(void)
+AT_BOOT bool clocks_start(void)
 {
     CLK_SYS_RESUS_CTRL = 0;
     XOSC_STARTUP = XOSC_STARTUP_DELAY;

@@ -6,9 +6,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Code that runs from SRAM: interrupts that must not wait for the flash, and whatever runs while the flash
-// cannot be read. noinline, or it would end up in its caller's flash.
-#define IN_SRAM __attribute__((section(".sram_code"), noinline))
+// Code that runs from flash, before all other is copied to SRAM. noinline, or it would end up in its caller, or
+// what it calls in it.
+#define AT_BOOT __attribute__((section(".boot_code"), noinline))
 
 // ---- system.c: clocks, watchdog, reset
 #define CLK_SYS_HZ 125000000u
