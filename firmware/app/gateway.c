@@ -110,6 +110,7 @@ void bt_gateway_init(bt_gateway *gateway)
         .save_map = save_map,
         .reboot_bootloader = reboot_bootloader,
         .maps = &gateway->map_flash,
+        .now_us = port_now_us,
     };
     gateway->map_flash = (bt_map_flash){erase_map_sector, program_map_page, port_flash_maps(), gateway->map_ram};
     bt_identity identity = {
@@ -197,8 +198,9 @@ void bt_gateway_poll(bt_gateway *gateway)
     if ((n = port_link_read(bytes, sizeof bytes)) > 0) {
         bt_session_receive(session, bytes, n, port_now_us());
     }
+    // A round's worth and no more: whoever is behind must still hear the host, and feed what watches over him.
     bt_slot slot;
-    while (bt_sampler_pop(&gateway->sampler, &slot)) {
+    for (int n = 0; n < BT_SLOTS && bt_sampler_pop(&gateway->sampler, &slot); n++) {
         take_slot(gateway, &slot);
     }
     session->slots_late = gateway->sampler.late;

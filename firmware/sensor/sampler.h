@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define BT_SLOT_RING 64 // a power of two; 64 slots are 14.5 ms of main loop delay
+#define BT_SLOT_RING 128 // a power of two; 128 slots are 29 ms of main loop delay
 
 typedef struct {
     uint32_t round; // frame number since start

@@ -38,6 +38,7 @@ POINTERS = {
     "board.save_calibration(": ("save_calibration",),
     "board.save_map(": ("save_map",),
     "board.reboot_bootloader(": ("reboot_bootloader",),
+    "board.now_us(": ("port_now_us",),
     "flash->erase(": ("port_flash_erase", "erase_map_sector"),
     "flash->program(": ("port_flash_program", "program_map_page"),
     "flash->read(": ("port_flash_read",),

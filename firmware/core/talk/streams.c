@@ -1,5 +1,12 @@
 #include "talk/streams.h"
 
+// How late a finger's FRAME may be, after its round's last slot, until something is left out. At full load the
+// last of five is begun 8 ms late; slots wait for 29 ms (BT_SLOT_RING).
+#define SIGMA_LATE_US      9000
+#define MAP_LATE_US        11000
+#define FRAME_LATE_US      22000
+#define SIGMA_PAUSE_ROUNDS 50 // for all fingers, or the first ones' would cost the last ones more than theirs
+
 static bool streams(const bt_session *session, const bt_finger *finger, uint8_t what)
 {
     return (session->streams & what) && (session->fingers >> finger->index & 1);
@@ -67,6 +74,33 @@ static void count_skips(bt_skips *skips, uint32_t quantities)
     skips->sigma += !(quantities & BT_QUANTITY_FLAG_SIGMA);
 }
 
+// How long ago the round's last slot was over. A round that is still to end, by a clock that stands, is not late.
+static int32_t late_us(const bt_session *session, const bt_finger *finger)
+{
+    if (session->board.now_us == NULL) {
+        return 0;
+    }
+    return (int32_t)(session->board.now_us() - (finger->round.t_us + BT_FRAME_MS * 1000));
+}
+
+static uint32_t to_shed(bt_session *session, const bt_finger *finger, int32_t late)
+{
+    uint32_t age = bt_finger_wrench_age(finger, &session->kernel[finger->index]);
+    if (late > SIGMA_LATE_US) {
+        session->sigma_pause = SIGMA_PAUSE_ROUNDS;
+    }
+    return (session->sigma_pause > 0 ? BT_SHED_SIGMA : 0)
+           | (late > MAP_LATE_US && age <= BT_REPEAT_MAX_ROUNDS ? BT_SHED_MAP : 0);
+}
+
+// Whoever goes without comes first in the next round.
+static void went_without(bt_session *session, uint8_t finger)
+{
+    if (session->first_next == BT_MAX_FINGERS) {
+        session->first_next = finger;
+    }
+}
+
 static void send_frame(bt_session *session, bt_finger *finger)
 {
     uint8_t payload[BT_FRAME_BYTES];
@@ -74,7 +108,20 @@ static void send_frame(bt_session *session, bt_finger *finger)
     if (finger->tare_unsent) {
         send_tare(session, finger);
     }
-    bt_finger_frame(finger, &session->kernel[finger->index], &msg);
+    int32_t late = late_us(session, finger);
+    if (late > FRAME_LATE_US) {
+        finger->shed = true;
+        session->sheds.frames++;
+        went_without(session, finger->index);
+        return;
+    }
+    uint32_t shed = to_shed(session, finger, late);
+    session->sheds.sigma += shed & BT_SHED_SIGMA && finger->quantities & BT_QUANTITY_FLAG_SIGMA;
+    if (shed & BT_SHED_MAP) {
+        session->sheds.wrench++;
+        went_without(session, finger->index);
+    }
+    bt_finger_frame(finger, &session->kernel[finger->index], shed, &msg);
     bt_msg_frame_pack(&msg, payload);
     bt_session_send(session, BT_FRAME_ID, payload);
     count_skips(&session->skips, finger->quantities);
@@ -92,6 +139,7 @@ static void send_round(bt_session *session, bt_finger *finger)
         if (finger->unsent > 0) {
             send_idle(session, finger, true);
         }
+        finger->kept.valid = finger->kept.valid && !finger->fresh;
         finger->fresh = false;
         send_frame(session, finger);
         return;
@@ -115,7 +163,11 @@ static void send_pac(bt_session *session, const bt_finger *finger)
 void bt_session_round(bt_session *session)
 {
     uint32_t answering = 0; // bit mask
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+    const int first = session->first;
+    session->first_next = BT_MAX_FINGERS;
+    session->sigma_pause = (uint8_t)(session->sigma_pause - (session->sigma_pause > 0));
+    for (int k = 0; k < BT_MAX_FINGERS; k++) {
+        const int f = first + k < BT_MAX_FINGERS ? first + k : first + k - BT_MAX_FINGERS;
         bt_finger *finger = &session->finger[f];
         if (!bt_finger_end(finger, &session->tare[f])) {
             if (finger->silent_rounds == BT_UNPLUGGED_ROUNDS) {
@@ -128,6 +180,7 @@ void bt_session_round(bt_session *session)
             send_round(session, finger);
         }
     }
+    session->first = (uint8_t)(session->first_next % BT_MAX_FINGERS);
     // Vibration after all fingers' forces: who closes a grip waits for those.
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         if (answering >> f & 1 && streams(session, &session->finger[f], BT_STREAM_FLAG_PAC)) {

@@ -342,6 +342,7 @@ void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
     at = put(at, (uint32_t)msg->pdc_filtered_q4, 2);
     at = put(at, (uint32_t)msg->pressure_force_100un, 4);
     at = put(at, (uint32_t)msg->torsion_mnmm, 4);
+    at = put(at, (uint32_t)msg->wrench_age_ms, 2);
     (void)at;
 }
 
@@ -399,6 +400,8 @@ void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
     msg->pressure_force_100un = (int32_t)value;
     at = get(at, &value, 4);
     msg->torsion_mnmm = (int32_t)value;
+    at = get(at, &value, 2);
+    msg->wrench_age_ms = (uint16_t)value;
     (void)at;
 }
 
@@ -491,6 +494,9 @@ void bt_msg_status_pack(const bt_msg_status *msg, uint8_t out[BT_STATUS_BYTES])
     at = put(at, (uint32_t)msg->force_skipped, 4);
     at = put(at, (uint32_t)msg->torque_skipped, 4);
     at = put(at, (uint32_t)msg->sigma_skipped, 4);
+    at = put(at, (uint32_t)msg->sigma_shed, 4);
+    at = put(at, (uint32_t)msg->wrench_repeated, 4);
+    at = put(at, (uint32_t)msg->frames_shed, 4);
     (void)at;
 }
 
@@ -530,6 +536,12 @@ void bt_msg_status_unpack(bt_msg_status *msg, const uint8_t in[BT_STATUS_BYTES])
     msg->torque_skipped = (uint32_t)value;
     at = get(at, &value, 4);
     msg->sigma_skipped = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->sigma_shed = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->wrench_repeated = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->frames_shed = (uint32_t)value;
     (void)at;
 }
 

@@ -14,8 +14,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 WIRE_MAJOR = 1
-WIRE_MINOR = 4
-SCHEMA_HASH = 0xE209A07F
+WIRE_MINOR = 5
+SCHEMA_HASH = 0xB6D6E45B
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -113,6 +113,8 @@ class FrameFlags(IntFlag):
     TEMP = 1 << 16  # since the contact began the temperature has moved by over a degree: the tare is doubtful
     NOT_ASKED = 1 << 17  # some quantity is not subscribed to and marked invalid (SUBSCRIBE)
     MAPPED = 1 << 18  # force, and torque and torsion where it has them, come from the finger's wrench map
+    REPEATED = 1 << 21  # the board was short of time: force, torque and torsion are those of wrench_age_ms before, from the same map
+    SHED = 1 << 22  # the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out
 
 
 class StreamFlags(IntFlag):
@@ -213,6 +215,8 @@ FRAME_FLAG_DOC: dict[int, str] = {
     65536: "since the contact began the temperature has moved by over a degree: the tare is doubtful",
     131072: "some quantity is not subscribed to and marked invalid (SUBSCRIBE)",
     262144: "force, and torque and torsion where it has them, come from the finger's wrench map",
+    2097152: "the board was short of time: force, torque and torsion are those of wrench_age_ms before, from the same map",
+    4194304: "the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out",
 }
 
 
@@ -666,12 +670,13 @@ class Frame:
     pdc_filtered_q4: int
     pressure_force_100un: int
     torsion_mnmm: int
+    wrench_age_ms: int
 
     ID: ClassVar[int] = 0x10
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHii")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHiiH")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 144 bytes."""
+        """Payload without id and CRC, 146 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -692,6 +697,7 @@ class Frame:
             self.pdc_filtered_q4,
             self.pressure_force_100un,
             self.torsion_mnmm,
+            self.wrench_age_ms,
         )
 
     @classmethod
@@ -718,6 +724,7 @@ class Frame:
             v[60],
             v[61],
             v[62],
+            v[63],
         )
 
 
@@ -819,12 +826,15 @@ class Status:
     force_skipped: int
     torque_skipped: int
     sigma_skipped: int
+    sigma_shed: int
+    wrench_repeated: int
+    frames_shed: int
 
     ID: ClassVar[int] = 0x13
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIIIIIIII")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIIIIIIIIIII")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 53 bytes."""
+        """Payload without id and CRC, 65 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -842,6 +852,9 @@ class Status:
             self.force_skipped,
             self.torque_skipped,
             self.sigma_skipped,
+            self.sigma_shed,
+            self.wrench_repeated,
+            self.frames_shed,
         )
 
     @classmethod
@@ -865,6 +878,9 @@ class Status:
             v[13],
             v[14],
             v[15],
+            v[16],
+            v[17],
+            v[18],
         )
 
 
@@ -1873,6 +1889,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("pdc_filtered_q4", "<u2"),
             ("pressure_force_100un", "<i4"),
             ("torsion_mnmm", "<i4"),
+            ("wrench_age_ms", "<u2"),
         ]
     ),
     Pac.ID: np.dtype(
@@ -1913,6 +1930,9 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("force_skipped", "<u4"),
             ("torque_skipped", "<u4"),
             ("sigma_skipped", "<u4"),
+            ("sigma_shed", "<u4"),
+            ("wrench_repeated", "<u4"),
+            ("frames_shed", "<u4"),
         ]
     ),
     SensorStatus.ID: np.dtype(
