@@ -90,6 +90,11 @@ export class Rig {
       this.board.cutAfter = Number(cut[1])
       return
     }
+    const slow = /^slow the core ([0-9.]+) times$/.exec(verb)
+    if (slow) {
+      this.machine.slowness = Number(slow[1])
+      return
+    }
     const file = /^write uf2 (.+)$/.exec(verb)
     if (file) {
       if (this.loader === null) throw new Error('no drive to write a UF2 to: the board is not in its loader')
@@ -175,7 +180,11 @@ export class Rig {
         this.port.put(bytes)
       },
       canTake: () => this.reading && (this.lossless || this.port.hasRoom),
-      take: (n) => this.port.take(n),
+      take: (n) => {
+        const bytes = this.port.take(n)
+        if (bytes.length > 0) this.latency.asked(machine.time.nanos)
+        return bytes
+      },
     })
     this.usb.setPlugged(this.plugged)
     this.usb.setOpen(this.port.up)
