@@ -182,7 +182,7 @@ export class Rig {
       canTake: () => this.reading && (this.lossless || this.port.hasRoom),
       take: (n) => {
         const bytes = this.port.take(n)
-        if (bytes.length > 0) this.latency.asked(machine.time.nanos)
+        if (bytes?.length > 0) this.latency.asked(machine.time.nanos)
         return bytes
       },
     })
