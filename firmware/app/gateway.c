@@ -135,9 +135,10 @@ void bt_gateway_init(bt_gateway *gateway)
     port_alarm_at(start_us);
 }
 
-void bt_gateway_alarm(bt_gateway *gateway)
+bool bt_gateway_alarm(bt_gateway *gateway)
 {
     port_alarm_at(bt_sampler_alarm(&gateway->sampler));
+    return !gateway->sampler.commanded && !gateway->sampler.under_way;
 }
 
 static void count_word(bt_word_counts *counts, enum bt_word kind, uint16_t word)

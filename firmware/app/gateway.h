@@ -21,7 +21,7 @@ void bt_gateway_init(bt_gateway *gateway);
 // Main loop: host bytes, finished slots, periodic work.
 void bt_gateway_poll(bt_gateway *gateway);
 
-// Interrupt: the sampler's alarm.
-void bt_gateway_alarm(bt_gateway *gateway);
+// Interrupt: the sampler's alarm. True when a slot is over: there is something to poll for.
+bool bt_gateway_alarm(bt_gateway *gateway);
 
 #endif

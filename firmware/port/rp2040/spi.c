@@ -57,10 +57,21 @@ void port_spi_select(uint8_t mask)
     SIO_GPIO_OUT_CLR = low;
 }
 
-uint16_t port_spi_transfer16(uint16_t mosi)
+bool port_spi_begin16(uint16_t mosi)
 {
     SPI0_SSPDR = mosi;
+    return false;
+}
+
+uint16_t port_spi_end16(void)
+{
     // Not busy is later than received: the clock has gone low by then, and the select may rise.
     bool done = wait_for(&SPI0_SSPSR, SSPSR_RNE | SSPSR_BSY, SSPSR_RNE, WAIT_SPI_TURNS);
     return done ? (uint16_t)SPI0_SSPDR : 0; // 0 reads as a sensor that is not there
+}
+
+uint16_t port_spi_transfer16(uint16_t mosi)
+{
+    (void)port_spi_begin16(mosi);
+    return port_spi_end16();
 }

@@ -4,6 +4,8 @@
 #include "system.h"
 #include "wait.h"
 
+#define NAPS 64 // until the main loop looks around all the same: a slot has twelve interrupts
+
 static volatile bool woken;
 
 void timer_start(void)
@@ -47,15 +49,16 @@ void timer_interrupt(void)
 {
     REG_CLR(TIMER_INTF) = TIMER_ALARM0_BIT;
     TIMER_INTR = TIMER_ALARM0_BIT; // writing 1 clears
-    bt_port_alarm();
-    timer_wake();
+    if (bt_port_alarm()) {
+        timer_wake();
+    }
 }
 
 // Interrupts are held off, and still one of them ends WFI: none can slip in between looking and sleeping.
 void timer_sleep(void)
 {
     __asm volatile("cpsid i" ::: "memory");
-    if (!woken) {
+    for (int k = 0; k < NAPS && !woken; k++) { // most interrupts are the bus's own
         __asm volatile("dsb\n wfi\n cpsie i\n isb\n cpsid i" ::: "memory"); // its handler runs here
     }
     woken = false;
