@@ -2,6 +2,7 @@
 // random bit. Modelled from the RP2040 data sheet (2.8.3, 2.17). The ROM's calls are real calls, to two
 // instructions: BKPT, which comes here, and BX LR.
 import { Flash } from './flash.mjs'
+import { addSniffer } from './sniffer.mjs'
 
 const FUNC_TABLE = 0x40
 const LOOKUP = 0x20
@@ -62,6 +63,7 @@ export class BootRom {
     this.onLoader = onLoader
     this.onCut = onCut
     this.flash = new Flash(mcu, board, (what) => this.#wrong(what))
+    addSniffer(mcu, (what) => this.#wrong(what))
     this.#install()
     this.#randomBit()
   }

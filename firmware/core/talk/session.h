@@ -106,6 +106,9 @@ void bt_session_forget_sensor(bt_session *session, int f);
 // Bit mask of the fingers whose sensor answers.
 uint8_t bt_session_present(const bt_session *session);
 
+// Send what lies at frame + BT_PAYLOAD_AT as one message, see bt_frame_seal.
+void bt_session_send_sealed(bt_session *session, uint8_t id, uint8_t *frame);
+
 // Send one message, counting it as sent or dropped.
 void bt_session_send(bt_session *session, uint8_t id, const uint8_t *payload);
 #endif

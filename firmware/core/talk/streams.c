@@ -103,7 +103,7 @@ static void went_without(bt_session *session, uint8_t finger)
 
 static void send_frame(bt_session *session, bt_finger *finger)
 {
-    uint8_t payload[BT_FRAME_BYTES];
+    _Alignas(4) uint16_t frame[(BT_ENCODED_MAX_BYTES + 1) / 2];
     bt_msg_frame msg;
     if (finger->tare_unsent) {
         send_tare(session, finger);
@@ -122,8 +122,8 @@ static void send_frame(bt_session *session, bt_finger *finger)
         went_without(session, finger->index);
     }
     bt_finger_frame(finger, &session->kernel[finger->index], shed, &msg);
-    bt_msg_frame_pack(&msg, payload);
-    bt_session_send(session, BT_FRAME_ID, payload);
+    bt_msg_frame_pack_even(&msg, frame + BT_PAYLOAD_AT / 2);
+    bt_session_send_sealed(session, BT_FRAME_ID, (uint8_t *)frame);
     count_skips(&session->skips, finger->quantities);
 }
 

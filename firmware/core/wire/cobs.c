@@ -1,5 +1,35 @@
 #include "wire/cobs.h"
 
+#include <stdint.h>
+
+// A byte of the word is zero; exact for whether, not for which.
+static inline int has_zero(uint32_t word)
+{
+    return ((word - 0x01010101u) & ~word & 0x80808080u) != 0;
+}
+
+typedef uint32_t __attribute__((may_alias)) any_word;
+
+// From the end, so that each distance is known when it is needed. Most words have no zero: these are passed by
+// four bytes at a time.
+void bt_cobs_in_place(uint8_t *block, size_t bytes)
+{
+    uint8_t *next = block + bytes;
+    uint8_t *at = next;
+    while (at > block + 1) {
+        if (((uintptr_t)at & 3) == 0 && at >= block + 5 && !has_zero(((const any_word *)(const void *)at)[-1])) {
+            at -= 4;
+            continue;
+        }
+        at--;
+        if (*at == 0) {
+            *at = (uint8_t)(next - at);
+            next = at;
+        }
+    }
+    *block = (uint8_t)(next - block);
+}
+
 int bt_cobs_decode(const uint8_t *in, size_t bytes, uint8_t *out)
 {
     size_t at = 0;

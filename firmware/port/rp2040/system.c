@@ -59,7 +59,7 @@ AT_BOOT bool clocks_start(void)
     CLK_PERI_CTRL = CLK_ENABLE; // from clk_sys
     CLK_USB_CTRL = CLK_ENABLE;  // from PLL_USB
     WATCHDOG_TICK = CRYSTAL_MHZ | WATCHDOG_TICK_ENABLE;
-    return take_out_of_reset(RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_SPI0 | RESETS_TIMER
+    return take_out_of_reset(RESETS_DMA | RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_SPI0 | RESETS_TIMER
                              | RESETS_USBCTRL);
 }
 
