@@ -16,17 +16,29 @@ void bt_cobs_in_place(uint8_t *block, size_t bytes)
 {
     uint8_t *next = block + bytes;
     uint8_t *at = next;
+#define PATCH(zero, byte)                                                                                    \
+    if (zero) {                                                                                              \
+        *(byte) = (uint8_t)(next - (byte));                                                                  \
+        next = (byte);                                                                                       \
+    }
+    uint8_t *const whole = block + 5; // from here on down words end before the block does
     while (at > block + 1) {
-        if (((uintptr_t)at & 3) == 0 && at >= block + 5 && !has_zero(((const any_word *)(const void *)at)[-1])) {
-            at -= 4;
+        if (((uintptr_t)at & 3) != 0 || at < whole) {
+            at--;
+            PATCH(*at == 0, at)
             continue;
         }
-        at--;
-        if (*at == 0) {
-            *at = (uint8_t)(next - at);
-            next = at;
-        }
+        uint32_t word;
+        do {
+            at -= 4;
+            word = *(const any_word *)(const void *)at;
+        } while (!has_zero(word) && at >= whole);
+        PATCH(word >> 24 == 0, at + 3) // its bytes in memory's order: see wire/messages_gen.c
+        PATCH((uint8_t)(word >> 16) == 0, at + 2)
+        PATCH((uint8_t)(word >> 8) == 0, at + 1)
+        PATCH((uint8_t)word == 0, at)
     }
+#undef PATCH
     *block = (uint8_t)(next - block);
 }
 
