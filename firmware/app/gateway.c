@@ -97,7 +97,7 @@ static void load_settings(bt_session *session)
         }
         bytes = bt_storage_read(&flash, map_id(f), &version, record, sizeof record);
         if (bytes > 0) {
-            bt_finger_map_load(&session->map[f], session->board.maps, version, record, (size_t)bytes);
+            bt_finger_map_load(&session->map[f], session->board.maps, f, version, record, (size_t)bytes);
         }
     }
     bt_session_use_settings(session);
@@ -111,8 +111,10 @@ void bt_gateway_init(bt_gateway *gateway)
         .save_map = save_map,
         .reboot_bootloader = reboot_bootloader,
         .maps = &gateway->map_flash,
+        .now_us = port_now_us,
     };
-    gateway->map_flash = (bt_map_flash){erase_map_sector, program_map_page, port_flash_maps()};
+    gateway->map_flash =
+        (bt_map_flash){erase_map_sector, program_map_page, port_flash_maps(), gateway->map_ram};
     bt_identity identity = {
         .board = port_board(),
         .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},
@@ -138,9 +140,10 @@ void bt_gateway_init(bt_gateway *gateway)
     port_alarm_at(start_us);
 }
 
-void bt_gateway_alarm(bt_gateway *gateway)
+bool bt_gateway_alarm(bt_gateway *gateway)
 {
     port_alarm_at(bt_sampler_alarm(&gateway->sampler));
+    return !gateway->sampler.commanded && !gateway->sampler.under_way;
 }
 
 static void count_word(bt_word_counts *counts, enum bt_word kind, uint16_t word)
@@ -224,8 +227,10 @@ void bt_gateway_poll(bt_gateway *gateway)
     if ((n = port_link_read(bytes, sizeof bytes)) > 0) {
         bt_session_receive(session, bytes, n, port_now_us());
     }
+    // A round's worth and no more: whoever is behind must still hear the host, and feed what watches over
+    // him.
     bt_slot slot;
-    while (bt_sampler_pop(&gateway->sampler, &slot)) {
+    for (int n = 0; n < BT_SLOTS && bt_sampler_pop(&gateway->sampler, &slot); n++) {
         take_slot(gateway, &slot);
     }
     session->slots_late = gateway->sampler.late;

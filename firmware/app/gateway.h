@@ -9,7 +9,8 @@ typedef struct {
     bt_sampler sampler;
     bt_session session;
     bt_map_flash map_flash;
-    uint32_t round; // that the fingers are assembling
+    _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES]; // what is in force
+    uint32_t round;                                                // that the fingers are assembling
     bool round_open;
     bool link_was_up;
 } bt_gateway;
@@ -20,7 +21,7 @@ void bt_gateway_init(bt_gateway *gateway);
 // Main loop: host bytes, finished slots, periodic work.
 void bt_gateway_poll(bt_gateway *gateway);
 
-// Interrupt: the sampler's alarm.
-void bt_gateway_alarm(bt_gateway *gateway);
+// Interrupt: the sampler's alarm. True when a slot is over: there is something to poll for.
+bool bt_gateway_alarm(bt_gateway *gateway);
 
 #endif

@@ -3,9 +3,9 @@
 
 static bt_gateway gateway;
 
-void bt_port_alarm(void)
+bool bt_port_alarm(void)
 {
-    bt_gateway_alarm(&gateway);
+    return bt_gateway_alarm(&gateway);
 }
 
 int main(int argc, char **argv)

@@ -155,7 +155,56 @@ static void tell_pressure(const bt_finger *finger, bt_msg_frame *msg)
     msg->pressure_force_100un = bt_pressure_force(msg->pdc_filtered_q4, msg->pdc_tare_q4, pressure->gain_nn);
 }
 
-void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, bt_msg_frame *msg)
+uint32_t bt_finger_wrench_age(const bt_finger *finger, const bt_solve_settings *settings)
+{
+    bool there = finger->kept.valid && settings->map != NULL && finger->tare.reason != BT_TARE_REASON_NONE;
+    return there ? (uint16_t)(seq_of(finger) - finger->kept.seq) : BT_REPEAT_MAX_ROUNDS + 1;
+}
+
+static void keep_wrench(bt_finger *finger, const bt_msg_frame *msg)
+{
+    bt_kept_wrench *kept = &finger->kept;
+    kept->valid = !(msg->flags & BT_FRAME_FLAG_UNTARED);
+    kept->seq = msg->seq;
+    memcpy(kept->force_100un, msg->force_100un, sizeof kept->force_100un);
+    memcpy(kept->torque_mnmm, msg->torque_mnmm, sizeof kept->torque_mnmm);
+    kept->torsion_mnmm = msg->torsion_mnmm;
+}
+
+static void repeat_wrench(const bt_finger *finger, bt_msg_frame *msg)
+{
+    const bt_kept_wrench *kept = &finger->kept;
+    if (finger->quantities & BT_QUANTITY_FLAG_FORCE) {
+        memcpy(msg->force_100un, kept->force_100un, sizeof msg->force_100un);
+    }
+    if (finger->quantities & BT_QUANTITY_FLAG_TORQUE) {
+        memcpy(msg->torque_mnmm, kept->torque_mnmm, sizeof msg->torque_mnmm);
+        msg->torsion_mnmm = kept->torsion_mnmm;
+    }
+    msg->flags |= BT_FRAME_FLAG_REPEATED;
+    msg->wrench_age_ms = (uint16_t)((uint16_t)(msg->seq - kept->seq) * BT_FRAME_MS);
+}
+
+// The results, but for what is left out; flags tell that from what nobody asked for.
+static void tell_results(bt_finger *finger, const bt_solve_settings *settings, uint32_t shed,
+                         bt_msg_frame *msg)
+{
+    const uint32_t wrench = BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE;
+    uint32_t without = shed & BT_SHED_SIGMA ? BT_QUANTITY_FLAG_SIGMA & finger->quantities : 0;
+    without |= shed & BT_SHED_MAP ? wrench : 0;
+    bt_results(&finger->round, &finger->tare, settings, finger->quantities & ~without, msg);
+    msg->wrench_age_ms = 0;
+    if (shed & BT_SHED_MAP) {
+        msg->flags = (msg->flags & ~BT_FRAME_FLAG_NOT_ASKED) | bt_not_asked(finger->quantities);
+        repeat_wrench(finger, msg);
+    } else if (settings->map != NULL) {
+        keep_wrench(finger, msg);
+    }
+    msg->flags |= finger->shed || without & BT_QUANTITY_FLAG_SIGMA ? BT_FRAME_FLAG_SHED : 0;
+    finger->shed = false;
+}
+
+void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint32_t shed, bt_msg_frame *msg)
 {
     const bt_round *round = &finger->round;
     msg->seq = seq_of(finger);
@@ -168,7 +217,7 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, bt_ms
     msg->pdc_tare_q4 = bt_tare_q4(finger->tare.base.pdc_q16);
     memcpy(msg->counts, round->electrode, sizeof msg->counts);
     memcpy(msg->tare_q4, finger->tare.electrode_q4, sizeof msg->tare_q4);
-    bt_results(round, &finger->tare, settings, finger->quantities, msg);
+    tell_results(finger, settings, shed, msg);
     tell_pressure(finger, msg);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
     finger->sent = finger->tare.gate.smooth;

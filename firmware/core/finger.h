@@ -17,6 +17,21 @@ typedef struct {
     uint16_t last_error_word;
 } bt_word_counts;
 
+// The latest wrench of a map, for rounds in which there is no time for another.
+typedef struct {
+    bool valid;
+    uint16_t seq; // of its round
+    int32_t force_100un[3];
+    int32_t torque_mnmm[3];
+    int32_t torsion_mnmm;
+} bt_kept_wrench;
+
+// What a FRAME does without, for want of time; a mask.
+enum bt_shed { BT_SHED_SIGMA = 1, BT_SHED_MAP = 2 };
+
+// A wrench is repeated for so long and no longer: a tenth of a second.
+#define BT_REPEAT_MAX_ROUNDS 10
+
 typedef struct {
     uint8_t index;
     bool present; // the last whole frame had at least one good word
@@ -32,6 +47,8 @@ typedef struct {
     bt_tare tare;
     bt_pressure pressure;
     bt_lanes sent; // filtered counts when the last FRAME was sent
+    bt_kept_wrench kept;
+    bool shed; // FRAMEs were left out for want of time since the last one
     bt_word_counts words;
 } bt_finger;
 
@@ -64,9 +81,14 @@ bool bt_finger_idle(const bt_finger *finger);
 // The filtered counts have moved beyond noise since the last FRAME that was sent.
 bool bt_finger_moved(const bt_finger *finger);
 
-// The round that has ended as messages. PoC, force and torque are computed in the first. An IDLE stands for
-// `unsent` rounds, of which the round that has ended is the last or, when its FRAME follows, not one.
-void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, bt_msg_frame *msg);
+// How old the latest wrench of the finger's map is; more than BT_REPEAT_MAX_ROUNDS when there is none to
+// repeat.
+uint32_t bt_finger_wrench_age(const bt_finger *finger, const bt_solve_settings *settings);
+
+// The round that has ended as messages. PoC, force and torque are computed in the first, less what is to be
+// shed: BT_SHED_MAP only where bt_finger_wrench_age allows it. An IDLE stands for `unsent` rounds, of which
+// the round that has ended is the last or, when its FRAME follows, not one.
+void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint32_t shed, bt_msg_frame *msg);
 void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg);
 void bt_finger_pac(const bt_finger *finger, bt_msg_pac *msg);
 

@@ -21,15 +21,15 @@ void port_delay_us(uint32_t us);
 // Call bt_port_alarm() from interrupt context once `at_us` has come; replaces an earlier alarm.
 void port_alarm_at(uint32_t at_us);
 
-// Defined by the app. Runs in interrupt context.
-void bt_port_alarm(void);
+// Defined by the app. Runs in interrupt context. True when the main loop has something to do.
+bool bt_port_alarm(void);
 
 // Sleep until an interrupt may have brought work.
 void port_idle(void);
 
 // ---- SPI ------------------------------------------------------------------------------------
-// Pull low the chip selects of the sensors in mask, release all others. A board's constants say how long before a word
-// and after it (its pins.h); when it returns, a word may be sent.
+// Pull low the chip selects of the sensors in mask, release all others. A board's constants say how long
+// before a word and after it (its pins.h); when it returns, a word may be sent.
 void port_spi_select(uint8_t mask);
 
 // Exchange 16 bits, MSB first, mode 0, BT_SPI_HZ. Returns what MISO carried.
@@ -37,6 +37,11 @@ uint16_t port_spi_transfer16(uint16_t mosi);
 
 // The same with 8 bits: a property's bytes come one by one.
 uint8_t port_spi_transfer8(uint8_t mosi);
+// The same in two steps, for whom the core has better to do meanwhile. begin returns true where the exchange
+// is over by then, as it is everywhere but on a bus of its own (spi_at_once.h); false: it is in 16 /
+// BT_SPI_HZ, and end waits for what is left of it.
+bool port_spi_begin16(uint16_t mosi);
+uint16_t port_spi_end16(void);
 
 // ---- link to the host -----------------------------------------------------------------------
 // Takes all bytes or none; false means no room, or nobody there.

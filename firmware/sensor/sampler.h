@@ -1,11 +1,11 @@
 // Slot sampling of one to five sensors, driven by one timer alarm.
 //
 // A slot: all chip selects low, sample command to every sensor at once, chip selects high; at least
-// 50 us later each sensor is read by its own chip select. Two alarms per slot, so that nothing
-// spins through the 50 us. Words go to the main loop undecoded through a single-producer,
-// single-consumer ring; when the main loop is late, whole slots are lost and counted, and the
-// channels they held are missing from their frame. A word stays with the finger whose chip select
-// was low, whatever its neighbours answered.
+// 50 us later each sensor is read by its own chip select. Nothing spins through the 50 us, nor, where the bus
+// works by itself, through words and the gaps between them: an alarm comes for each. Words go to the main
+// loop undecoded through a single-producer, single-consumer ring; when the main loop is late, whole slots are
+// lost and counted, and the channels they held are missing from their frame. A word stays with the finger
+// whose chip select was low, whatever its neighbours answered.
 #ifndef BIOTAC_SAMPLER_H
 #define BIOTAC_SAMPLER_H
 
@@ -16,7 +16,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define BT_SLOT_RING 64 // a power of two; 64 slots are 14.5 ms of main loop delay
+#define BT_SLOT_RING 128 // a power of two; 128 slots are 29 ms of main loop delay
 
 typedef struct {
     uint32_t round; // frame number since start
@@ -29,7 +29,10 @@ typedef struct {
 
 typedef struct {
     uint8_t fingers; // bit mask of the sensors that are read
-    bool settling;   // the command is out, the read is due
+    bool commanded;  // the command is out, the reads are due
+    bool under_way;  // a word is on the bus
+    bool waits;      // words take their time, see port_spi_begin16
+    uint8_t finger;  // read next
     bt_slot current;
     uint32_t slot_start_us;
     uint32_t fraction;                     // of slot_start_us, in 1/BT_SLOT_HZ us
@@ -45,7 +48,8 @@ typedef struct {
 // The first slot begins at start_us. The caller arms the alarm for start_us.
 void bt_sampler_start(bt_sampler *sampler, uint8_t fingers, uint32_t start_us);
 
-// Interrupt context: do what is due. Returns when to be called next.
+// Interrupt context: do what is due. Returns when to be called next; `commanded` is false when a slot is
+// over.
 uint32_t bt_sampler_alarm(bt_sampler *sampler);
 
 // Main loop: ask these fingers who they are instead of sampling them, for one whole round, the given one or

@@ -6,6 +6,7 @@
 
 #include "gateway.h"
 #include "port.h"
+#include "spi_at_once.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -55,7 +56,7 @@ void bt_sbc_poll(bt_sbc *sbc)
 void bt_sbc_alarm(bt_sbc *sbc)
 {
     board = sbc;
-    bt_gateway_alarm(&sbc->gateway);
+    (void)bt_gateway_alarm(&sbc->gateway);
 }
 
 uint32_t bt_sbc_due_us(const bt_sbc *sbc)

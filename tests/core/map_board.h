@@ -36,7 +36,8 @@ static inline bool program(uint32_t offset, const uint8_t *page)
     return true;
 }
 
-static const bt_map_flash map_flash = {erase, program, slots};
+static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
+static const bt_map_flash map_flash = {erase, program, slots, map_ram};
 
 static inline uint8_t save_map(uint8_t finger, const bt_map_place *place)
 {
@@ -68,7 +69,7 @@ static inline void power_on(void)
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         uint8_t bytes[BT_MAP_RECORD_BYTES];
         size_t n = bt_map_place_pack(&record[f], bytes);
-        bt_finger_map_load(&session.map[f], &map_flash, BT_MAP_RECORD_VERSION, bytes, n);
+        bt_finger_map_load(&session.map[f], &map_flash, f, BT_MAP_RECORD_VERSION, bytes, n);
     }
     bt_session_use_settings(&session);
 }

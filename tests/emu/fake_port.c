@@ -1,6 +1,7 @@
 #include "fake_port.h"
 
 #include "port.h"
+#include "spi_at_once.h"
 #include "wire/messages_gen.h"
 
 #include <string.h>
@@ -57,7 +58,7 @@ bool fake_next_interrupt(void)
     fake.held_off_ns = 0;
     fake.now_ns = at_ns > fake.now_ns ? at_ns : fake.now_ns;
     armed = false;
-    bt_port_alarm();
+    (void)bt_port_alarm();
     return true;
 }
 

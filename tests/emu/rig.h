@@ -16,9 +16,9 @@
 
 static bt_gateway gateway;
 
-void bt_port_alarm(void)
+bool bt_port_alarm(void)
 {
-    bt_gateway_alarm(&gateway);
+    return bt_gateway_alarm(&gateway);
 }
 
 // ---- sensors -------------------------------------------------------------------------------------

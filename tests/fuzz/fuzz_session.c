@@ -50,7 +50,8 @@ static uint8_t save_map(uint8_t finger, const bt_map_place *place)
     return finger < BT_MAX_FINGERS && place->slot < BT_MAP_SLOTS ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
 }
 
-static const bt_map_flash map_flash = {erase, program, slots};
+static _Alignas(4) uint8_t map_ram[BT_MAX_FINGERS][BT_MAP_MAX_BYTES];
+static const bt_map_flash map_flash = {erase, program, slots, map_ram};
 static const bt_board_actions actions = {.save_settings = keep_settings,
                                          .save_calibration = keep_calibration,
                                          .save_map = save_map,

@@ -1,9 +1,11 @@
-// How long after a round's last electrode was sampled the last byte of its FRAMEs is with the host, in device time.
-// Watches the bus for sample commands and the USB for FRAMEs; the image knows nothing of it.
+// How long after a round's last electrode was sampled the last byte of its FRAMEs is with the host, and how long after
+// the host's latest bytes a REPLY is, in device time. Watches the bus for sample commands and the USB for messages; the
+// image knows nothing of it.
 import fs from 'node:fs'
 
 const SCHEMA = JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url)))
 const FRAME_ID = SCHEMA.link.message.FRAME.id
+const REPLY_ID = SCHEMA.link.message.REPLY.id
 const command = (name) => SCHEMA.sensor.channel.find((channel) => channel.name === name).command << 8
 const SLOTS = SCHEMA.sensor.frame.slots
 const SLOT_US = 1e6 / SCHEMA.sensor.bus.slot_hz
@@ -32,6 +34,8 @@ export class Latency {
     this.rounds = [] // [device us of the first slot, of the last electrode]
     this.unfinished = []
     this.us = [] // one a FRAME
+    this.askedUs = null // when bytes last went to the board
+    this.replyUs = 0 // the longest
     this.unmatched = 0 // FRAMEs whose round was not seen on the bus
   }
 
@@ -44,6 +48,11 @@ export class Latency {
     }
   }
 
+  /** Bytes have gone to the board. */
+  asked(nanos) {
+    this.askedUs = nanos / 1000
+  }
+
   /** Bytes that the host has got by now. */
   received(bytes, nanos) {
     for (const byte of bytes) {
@@ -53,6 +62,10 @@ export class Latency {
       }
       const start = head(this.unfinished, T_US_AT + 4)
       if (start.length === T_US_AT + 4 && start[0] === FRAME_ID) this.#frame(start, nanos / 1000)
+      if (start[0] === REPLY_ID && this.askedUs !== null) {
+        this.replyUs = Math.max(this.replyUs, nanos / 1000 - this.askedUs)
+        this.askedUs = null
+      }
       this.unfinished = []
     }
   }
@@ -60,7 +73,7 @@ export class Latency {
   counters() {
     const sorted = [...this.us].sort((a, b) => a - b)
     const at = (share) => sorted[Math.floor(share * (sorted.length - 1))] ?? null
-    return { frames: sorted.length, unmatched: this.unmatched, median_us: at(0.5), p99_us: at(0.99), worst_us: at(1) }
+    return { frames: sorted.length, unmatched: this.unmatched, reply_us: this.replyUs, median_us: at(0.5), p99_us: at(0.99), worst_us: at(1) }
   }
 
   #frame(start, us) {

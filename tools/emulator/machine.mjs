@@ -47,6 +47,7 @@ export class Machine {
     this.watchdogResets = 0
     this.instructions = 0
     this.sleptNanos = 0
+    this.slowness = 1 // how many times as long the core takes for what it does: a load beside the program's own
     this.#start(0, 0)
   }
 
@@ -82,7 +83,7 @@ export class Machine {
     const { core, clock } = this.mcu
     let instructions = 0
     while (!core.waiting && clock.nanos < nanos && this.resetAsked === null) {
-      clock.tick(execute(core) * this.nanosPerCycle)
+      clock.tick(execute(core) * this.nanosPerCycle * this.slowness)
       instructions++
     }
     this.instructions += instructions

@@ -78,6 +78,8 @@ export class Rig {
       'stretch a word': () => (this.sensors.stretched = true),
       'corrupt a handshake': () => (this.usb.corrupting = true),
       'wear the flash out': () => (this.board.worn = true),
+      'switch off quad reads': () => (this.board.quad = false),
+      'silence the flash': () => (this.board.quad = null),
       unplug: () => this.#cable(false),
       plug: () => this.#cable(true),
       'cut power': () => {
@@ -92,6 +94,11 @@ export class Rig {
     }
     const two = /^two setups (\d+)$/.exec(verb) // so many ns apart
     if (two) return this.usb.hurry(Number(two[1]))
+    const slow = /^slow the core ([0-9.]+) times$/.exec(verb)
+    if (slow) {
+      this.machine.slowness = Number(slow[1])
+      return
+    }
     const file = /^write uf2 (.+)$/.exec(verb)
     if (file) {
       if (this.loader === null) throw new Error('no drive to write a UF2 to: the board is not in its loader')
@@ -184,7 +191,11 @@ export class Rig {
         this.port.put(bytes)
       },
       canTake: () => this.reading && (this.lossless || this.port.hasRoom),
-      take: (n) => this.port.take(n),
+      take: (n) => {
+        const bytes = this.port.take(n)
+        if (bytes?.length > 0) this.latency.asked(machine.time.nanos)
+        return bytes
+      },
     })
     this.usb.setPlugged(this.plugged)
     this.usb.setOpen(this.port.up)

@@ -1,6 +1,8 @@
-// What surrounds the program on a real chip and rp2040js has not: the boot ROM's functions, the flash chip's
-// own commands, and the ring oscillator's random bit. Modelled from the RP2040 data sheet (2.8.3, 2.17, 4.10) and
-// the W25Q16JV's. The ROM's calls are real calls, to two instructions: BKPT, which comes here, and BX LR.
+// What surrounds the program on a real chip and rp2040js has not: the boot ROM's functions and the ring oscillator's
+// random bit. Modelled from the RP2040 data sheet (2.8.3, 2.17). The ROM's calls are real calls, to two
+// instructions: BKPT, which comes here, and BX LR.
+import { Flash } from './flash.mjs'
+import { addSniffer } from './sniffer.mjs'
 
 const FUNC_TABLE = 0x40
 const LOOKUP = 0x20
@@ -9,8 +11,6 @@ const BKPT = 0xbe00
 const BX_LR = 0x4770
 const WFI_FOREVER = [0xbf30, 0xe7fd] // wfi; b back to it
 const THUMB = 1
-const XIP = 0x10000000
-const XIP_END = 0x14000000
 const SECTOR = 4096
 const PAGE = 256
 const ERASE_NS = 45e6 // typical
@@ -19,20 +19,8 @@ const WORN_ERASE_NS = 400e6 // the most that the data sheet allows
 const WORN_PROGRAM_NS = 3e6
 const CYCLE_NS = 8
 
-const SSI = 0x18000
-const SSI_SSIENR = 0x08
-const SSI_SR = 0x28
-const SSI_DR0 = 0x60
-const SR_TFNF = 2
-const SR_RFNE = 8
-const IO_QSPI = 0x40018
-const IO_QSPI_SS_CTRL = 0x0c
-const OUTOVER_LOW = 2 << 8
-const OUTOVER = 3 << 8
 const ROSC = 0x40060
 const ROSC_RANDOMBIT = 0x1c
-const READ_UNIQUE_ID = 0x4b
-const UNIQUE_ID_DUMMIES = 4
 
 /** What outlives a power cycle, for the rig to keep. */
 export class Board {
@@ -41,7 +29,8 @@ export class Board {
     this.random = seed
     this.cutAfter = null // bytes erased or programmed until power fails
     this.worn = false // its flash takes the longest that it may
-    this.counters = { erases: 0, programs: 0, bytes: 0, wrong: [] }
+    this.quad = true // its flash has all four lines switched on; null: it does not even say
+    this.counters = { erases: 0, programs: 0, bytes: 0, misses: 0, wrong: [] }
   }
 
   randomBit() {
@@ -73,18 +62,15 @@ export class BootRom {
     this.board = board
     this.onLoader = onLoader
     this.onCut = onCut
-    this.readable = true // the flash, as memory
-    this.answer = []
-    this.command = null
+    this.flash = new Flash(mcu, board, (what) => this.#wrong(what))
+    addSniffer(mcu, (what) => this.#wrong(what))
     this.#install()
-    this.#unreadable(false)
-    this.#flashInterface()
     this.#randomBit()
   }
 
   #install() {
     const names = ['IF', 'EX', 'FC', 'RE', 'RP', 'UB']
-    this.actions = [() => this.#lookup(), () => {}, () => this.#unreadable(true), () => {}]
+    this.actions = [() => this.#lookup(), () => {}, () => this.flash.leaveXip(), () => this.flash.flush()]
     this.actions.push(() => this.#erase(), () => this.#program(), () => this.#loader())
     const words = new Uint16Array(0x200)
     words[0x14 / 2] = FUNC_TABLE
@@ -117,28 +103,12 @@ export class BootRom {
 
   // ---- flash ---------------------------------------------------------------------------------------
 
-  /** From leaving XIP on, until boot2 has set the interface up again, nothing may be read from flash. */
-  #unreadable(yes) {
-    const { mcu } = this
-    this.readable = !yes
-    // Assigned both ways, never deleted: an object that lost a property runs several times slower.
-    for (const name of ['readUint16', 'readUint32']) {
-      const read = Object.getPrototypeOf(mcu)[name]
-      mcu[name] = !yes
-        ? read
-        : (address) => {
-            if (address >>> 0 >= XIP && address >>> 0 < XIP_END) this.#wrong('flash read while it is no memory')
-            return read.call(mcu, address)
-          }
-    }
-  }
-
   #change(at, bytes, value) {
     if (!this.board.change(this.mcu.flash, at, bytes, value)) this.onCut()
   }
 
   #allowed(at, bytes, unit, what) {
-    if (this.readable) this.#wrong(`${what} without leaving XIP`)
+    if (this.flash.readable) this.#wrong(`${what} without leaving XIP`)
     else if (!this.mcu.core.PM) this.#wrong(`${what} with interrupts on`)
     else if (at % unit !== 0 || bytes % unit !== 0) this.#wrong(`${what} of ${bytes} bytes at ${at}`)
     else return true
@@ -163,41 +133,6 @@ export class BootRom {
 
   #spend(nanos) {
     this.mcu.core.owedCycles += Math.round(nanos / CYCLE_NS)
-  }
-
-  /** The serial interface by hand, as a program reads the unique number; and boot2's setting it up. */
-  #flashInterface() {
-    const { mcu } = this
-    const ssi = mcu.peripherals[SSI]
-    const read = ssi.readUint32.bind(ssi)
-    const write = ssi.writeUint32.bind(ssi)
-    let select = 0
-    ssi.readUint32 = (offset) => {
-      if (offset === SSI_SR) return SR_TFNF | (this.answer.length > 0 ? SR_RFNE : 0)
-      if (offset === SSI_DR0) return this.answer.shift() ?? 0
-      return read(offset)
-    }
-    ssi.writeUint32 = (offset, value) => {
-      write(offset, value)
-      if (offset === SSI_SSIENR && value === 1) this.#unreadable(false)
-      if (offset === SSI_DR0) this.answer.push((select & OUTOVER) === OUTOVER_LOW ? this.#byte(value & 0xff) : 0xff)
-    }
-    const pins = mcu.peripherals[IO_QSPI]
-    pins.readUint32 = (offset) => (offset === IO_QSPI_SS_CTRL ? select : 0)
-    pins.writeUint32 = (offset, value) => {
-      if (offset !== IO_QSPI_SS_CTRL) return
-      if ((value & OUTOVER) !== OUTOVER_LOW) this.command = null
-      select = value
-    }
-  }
-
-  #byte(value) {
-    if (this.command === null) {
-      this.command = { code: value, at: 0 }
-      return 0xff
-    }
-    const k = this.command.at++ - UNIQUE_ID_DUMMIES
-    return this.command.code === READ_UNIQUE_ID && k >= 0 ? (this.board.uniqueId[k] ?? 0xff) : 0xff
   }
 
   // ---- the rest ----------------------------------------------------------------------------------------

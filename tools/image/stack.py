@@ -1,7 +1,8 @@
 """How deep a linked image's stack can get: frames from gcc's -fstack-usage, calls from the disassembly.
 
-Library functions have no .su file; theirs are the sum of all they push. A call through a pointer must be
-named in the board's list, or the depth is unknown and the build fails.
+Library functions have no .su file; theirs are the sum of all they push. A call through a pointer is known by the
+source line that it comes from, whatever function the compiler put that line into. What such a line may call must
+be in the board's list, or the depth is unknown and the build fails.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ LINE = re.compile(r"^\s*[0-9a-f]+:\t[0-9a-f ]+\t(\S+)\s*(.*)$")
 TARGET = re.compile(r"[0-9a-f]+ <([^+>]+)>")
 CLONE = re.compile(r"\.(isra|constprop|part|cold|lto_priv)(\.\d+)?")
 VENEER = re.compile(r"__(.+)_veneer$")
+WHERE = re.compile(r"^(/.+):(\d+)(?: \(discriminator \d+\))?$")
 BRANCHES = re.compile(r"(bl|b(eq|ne|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le)?)(\.[nw])?$")
 
 
@@ -29,23 +31,26 @@ class Function:
     address: int
     pushed: int = 0
     calls: set[str] = field(default_factory=set)
-    indirect: bool = False
+    indirect: set[str] = field(default_factory=set)  # where it calls through a pointer: FILE:LINE
 
 
 def read_functions(listing: Iterable[str]) -> dict[str, Function]:
-    """Functions of an `objdump -d`, by name; those of one name are taken together."""
+    """Functions of an `objdump -dl`, by name; those of one name are taken together."""
     functions: dict[str, Function] = {}
-    name = ""
+    name = where = ""
     for line in listing:
         if head := HEAD.match(line):
-            name = head.group(2)
+            name, where = head.group(2), ""
             functions.setdefault(name, Function(int(head.group(1), 16)))
+        elif place := WHERE.match(line):
+            where = f"{place.group(1)}:{place.group(2)}"
         elif name and (found := LINE.match(line)):
-            read_line(functions[name], name, found.group(1), found.group(2).split("@")[0].split(";")[0].strip())
+            operands = found.group(2).split("@")[0].split(";")[0].strip()
+            read_line(functions[name], name, where, found.group(1), operands)
     return functions
 
 
-def read_line(function: Function, name: str, instruction: str, operands: str) -> None:
+def read_line(function: Function, name: str, where: str, instruction: str, operands: str) -> None:
     if instruction == "push":
         function.pushed += 4 * count_registers(operands)
     elif instruction == "sub" and operands.startswith("sp,"):
@@ -55,11 +60,17 @@ def read_line(function: Function, name: str, instruction: str, operands: str) ->
         if target and target.group(1) != name:
             function.calls.add(target.group(1))
     elif instruction == "blx" or (instruction == "bx" and operands not in ("lr", "pc")):
-        function.indirect = not VENEER.match(name)
+        if not VENEER.match(name):
+            function.indirect.add(where)
     if instruction == "bx" and operands == "pc" and (veneer := VENEER.match(name)):
         function.calls.add(veneer.group(1))
     if (veneer := VENEER.match(name)) and not function.calls:
         function.calls.add(veneer.group(1))
+
+
+def source_line(where: str) -> str:
+    path, _, line = where.rpartition(":")
+    return Path(path).read_text(encoding="utf-8").splitlines()[int(line) - 1].strip() if path else ""
 
 
 def count_registers(operands: str) -> int:
@@ -87,7 +98,7 @@ def read_usage(folder: Path) -> dict[str, int]:
 class Program:
     functions: dict[str, Function]
     frames: Mapping[str, int]
-    pointers: Mapping[str, tuple[str, ...]]  # what a function calls through pointers
+    pointers: Mapping[str, tuple[str, ...]]  # what may be called where a line of source has this in it
 
     def named(self, name: str) -> str:
         """The function as it is called in the image, where the compiler may have made a variant of it."""
@@ -101,10 +112,14 @@ class Program:
 
     def callees(self, name: str) -> set[str]:
         function = self.functions[name]
-        base = CLONE.sub("", name)
-        if function.indirect and base not in self.pointers:
-            raise Unknown(f"{name} calls through a pointer; tools/image/check.py must list what it may call")
-        return function.calls | set(self.pointers.get(base, ()))
+        return function.calls.union(*(self.through_pointer(name, where) for where in function.indirect))
+
+    def through_pointer(self, name: str, where: str) -> tuple[str, ...]:
+        line = source_line(where)
+        for call, targets in self.pointers.items():
+            if call in line:
+                return targets
+        raise Unknown(f"{name} calls through a pointer at {where}: {line}; tools/image/check.py must list what that is")
 
     def deepest(self, name: str, above: tuple[str, ...] = ()) -> tuple[int, tuple[str, ...]]:
         """Bytes, and the chain of calls that needs them."""
@@ -131,5 +146,5 @@ class Program:
 
 def load(elf: Path, objdump: str, usage: Path, pointers: Mapping[str, tuple[str, ...]]) -> Program:
     """A Program from an ELF file and the .su files of its build."""
-    done = subprocess.run([objdump, "-d", str(elf)], capture_output=True, text=True, check=True)
+    done = subprocess.run([objdump, "-dl", str(elf)], capture_output=True, text=True, check=True)
     return Program(read_functions(done.stdout.splitlines()), read_usage(usage), pointers)

@@ -1,7 +1,10 @@
 #include "map/store.h"
 
+#include "keep/calibration.h"
 #include "wire/crc32.h"
 #include "wire/little_endian.h"
+
+#include <string.h>
 
 _Static_assert(BT_MAP_SLOT_BYTES % BT_FLASH_SECTOR_BYTES == 0, "a slot is erased without touching another");
 _Static_assert(BT_MAP_MAX_BYTES <= UINT16_MAX, "the size of a map fits its field");
@@ -27,7 +30,36 @@ const uint8_t *bt_map_bytes(const bt_map_flash *flash, const bt_map_place *place
     return flash->bytes + (size_t)place->slot * BT_MAP_SLOT_BYTES;
 }
 
-void bt_finger_map_load(bt_finger_map *its, const bt_map_flash *flash, uint16_t version,
+// NOT_WHOLE or OUT_OF_RANGE, see bt_finger_map_use.
+static uint8_t copy_to_ram(bt_map *map, const bt_map_flash *flash, uint8_t finger, const bt_map_place *place)
+{
+    uint8_t *ram = flash->ram[finger];
+    memcpy(ram, bt_map_bytes(flash, place), place->bytes);
+    if (bt_crc32(ram, place->bytes) != place->crc32) {
+        return BT_ERROR_NOT_WHOLE;
+    }
+    return bt_map_open(map, ram, place->bytes) == BT_ERROR_OK ? BT_ERROR_OK : BT_ERROR_OUT_OF_RANGE;
+}
+
+uint8_t bt_finger_map_use(bt_finger_map *its, const bt_map_flash *flash, uint8_t finger,
+                          const bt_map_place *place, const uint8_t *serial)
+{
+    bt_map map;
+    uint8_t error = copy_to_ram(&map, flash, finger, place);
+    if (error == BT_ERROR_OK && !bt_serial_fits(map.serial, serial)) {
+        error = BT_ERROR_OTHER_SENSOR;
+    }
+    if (error == BT_ERROR_OK) {
+        its->map = map;
+        its->place = *place;
+    } else if (its->place.bytes != 0 && copy_to_ram(&its->map, flash, finger, &its->place) != BT_ERROR_OK) {
+        its->place.bytes = 0; // the flash does not hold what it held: no map, rather than half of two
+        bt_map_close(&its->map);
+    }
+    return error;
+}
+
+void bt_finger_map_load(bt_finger_map *its, const bt_map_flash *flash, uint8_t finger, uint16_t version,
                         const uint8_t *record, size_t bytes)
 {
     bt_finger_map_reset(its);
@@ -43,8 +75,7 @@ void bt_finger_map_load(bt_finger_map *its, const bt_map_flash *flash, uint16_t 
         return;
     }
     bt_map_place place = {.slot = its->stored_slot, .bytes = (uint16_t)size, .crc32 = crc32};
-    const uint8_t *blob = bt_map_bytes(flash, &place);
-    if (bt_crc32(blob, size) == crc32 && bt_map_open(&its->map, blob, size) == BT_ERROR_OK) {
+    if (copy_to_ram(&its->map, flash, finger, &place) == BT_ERROR_OK) {
         its->place = place;
     }
 }

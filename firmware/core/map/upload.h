@@ -25,7 +25,7 @@ void bt_upload_begin(bt_upload *upload, uint8_t finger, const bt_map_place *plac
 uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t offset,
                         const uint8_t data[BT_MAP_PART_BYTES]);
 
-// Every part has come, and together they have the CRC-32.
-bool bt_upload_whole(const bt_upload *upload, const bt_map_flash *flash);
+// Every part has come.
+bool bt_upload_whole(const bt_upload *upload);
 
 #endif

@@ -130,9 +130,7 @@ static uint32_t mapped(const bt_round *round, const bt_tare *tare, const int32_t
 void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,
                 uint32_t quantities, bt_msg_frame *msg)
 {
-    uint32_t flags = bt_channel_flags(round, tare);
-    uint32_t every = BT_WANT_ALL | BT_QUANTITY_FLAG_PRESSURE; // sigma is asked for by few
-    flags |= (quantities & every) != every ? BT_FRAME_FLAG_NOT_ASKED : 0;
+    uint32_t flags = bt_channel_flags(round, tare) | bt_not_asked(quantities);
     bt_sigma_unknown(msg);
     msg->torsion_mnmm = BT_INVALID_I32; // but by a map
     if (flags & BT_FRAME_FLAG_UNTARED) {

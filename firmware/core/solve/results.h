@@ -13,6 +13,15 @@
 void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,
                 uint32_t quantities, bt_msg_frame *msg);
 
+#ifndef BT_CDEF
+// NOT_ASKED, or none: sigma is asked for by few, and does not count.
+static inline uint32_t bt_not_asked(uint32_t quantities)
+{
+    uint32_t every = BT_WANT_ALL | BT_QUANTITY_FLAG_PRESSURE;
+    return (quantities & every) != every ? BT_FRAME_FLAG_NOT_ASKED : 0;
+}
+#endif
+
 // The flags that need no computing.
 uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare);
 

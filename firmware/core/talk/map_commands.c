@@ -102,19 +102,14 @@ static uint8_t end_map(bt_session *session, const uint8_t *payload)
         bool has_it = its->place.bytes != 0 && its->place.crc32 == msg.crc32;
         return has_it ? BT_ERROR_OK : BT_ERROR_NOT_BEGUN;
     }
-    if (!bt_upload_whole(upload, session->board.maps)) {
+    if (!bt_upload_whole(upload)) {
         return BT_ERROR_NOT_WHOLE;
     }
-    bt_map map;
-    const uint8_t *blob = bt_map_bytes(session->board.maps, &upload->place);
-    if (bt_map_open(&map, blob, upload->place.bytes) != BT_ERROR_OK) {
-        return BT_ERROR_OUT_OF_RANGE; // whatever is wrong with it: the command's own length is right
+    error = bt_finger_map_use(its, session->board.maps, msg.finger, &upload->place,
+                              session->info[msg.finger].serial);
+    if (error != BT_ERROR_OK) {
+        return error;
     }
-    if (!bt_serial_fits(map.serial, session->info[msg.finger].serial)) {
-        return BT_ERROR_OTHER_SENSOR;
-    }
-    its->map = map;
-    its->place = upload->place;
     its->unsaved = true;
     upload->open = false;
     bt_session_use_settings(session);

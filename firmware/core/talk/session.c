@@ -71,15 +71,21 @@ void bt_session_use_settings(bt_session *session)
     session->idle_rounds = (uint16_t)(bt_settings_get(settings, BT_SETTING_IDLE_PERIOD_MS) / BT_FRAME_MS);
 }
 
-void bt_session_send(bt_session *session, uint8_t id, const uint8_t *payload)
+void bt_session_send_sealed(bt_session *session, uint8_t id, uint8_t *frame)
 {
-    uint8_t encoded[BT_ENCODED_MAX_BYTES];
-    size_t bytes = bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), encoded);
-    if (session->write(encoded, bytes)) {
+    size_t bytes = bt_frame_seal(id, (size_t)bt_wire_payload_bytes(id), frame);
+    if (session->write(frame, bytes)) {
         session->messages_sent++;
     } else {
         session->messages_dropped++;
     }
+}
+
+void bt_session_send(bt_session *session, uint8_t id, const uint8_t *payload)
+{
+    _Alignas(4) uint8_t frame[BT_ENCODED_MAX_BYTES];
+    memcpy(frame + BT_PAYLOAD_AT, payload, (size_t)bt_wire_payload_bytes(id));
+    bt_session_send_sealed(session, id, frame);
 }
 
 uint8_t bt_session_present(const bt_session *session)

@@ -30,7 +30,15 @@ typedef struct {
     uint8_t (*save_map)(uint8_t finger, const bt_map_place *place);
     uint8_t (*reboot_bootloader)(void); // OK: it happens once the reply is out
     const bt_map_flash *maps;           // where wrench maps are kept; NULL: nowhere
+    uint32_t (*now_us)(void);           // device time; NULL: a board that is never short of it
 } bt_board_actions;
+
+// What FRAMEs did without for want of time, in the order in which it goes; wrap at 2^32.
+typedef struct {
+    uint32_t sigma;
+    uint32_t wrench; // repeated
+    uint32_t frames;
+} bt_sheds;
 
 // Finger-rounds of a FRAME stream in which something was not done because nobody needed it; wrap at 2^32.
 typedef struct {
@@ -86,6 +94,10 @@ typedef struct {
     uint32_t messages_sent;
     uint32_t messages_dropped;
     bt_skips skips;
+    bt_sheds sheds;
+    uint8_t sigma_pause; // rounds in which nobody gets one
+    uint8_t first;       // finger of the next round: 0, or who went without in this one
+    uint8_t first_next;  // of the round under way; BT_MAX_FINGERS: nobody yet
     uint32_t slots_late;
     uint32_t rx_frames;
     uint32_t rx_errors;
@@ -107,6 +119,9 @@ void bt_session_sensor_changed(bt_session *session, unsigned f, bool other);
 
 // Bit mask of the fingers whose sensor answers.
 uint8_t bt_session_present(const bt_session *session);
+
+// Send what lies at frame + BT_PAYLOAD_AT as one message, see bt_frame_seal.
+void bt_session_send_sealed(bt_session *session, uint8_t id, uint8_t *frame);
 
 // Send one message, counting it as sent or dropped.
 void bt_session_send(bt_session *session, uint8_t id, const uint8_t *payload);

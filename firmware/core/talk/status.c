@@ -20,6 +20,9 @@ void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us
         .force_skipped = session->skips.force,
         .torque_skipped = session->skips.torque,
         .sigma_skipped = session->skips.sigma,
+        .sigma_shed = session->sheds.sigma,
+        .wrench_repeated = session->sheds.wrench,
+        .frames_shed = session->sheds.frames,
     };
     bt_msg_status_pack(&msg, payload);
     bt_session_send(session, BT_STATUS_ID, payload);

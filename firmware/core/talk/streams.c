@@ -2,6 +2,13 @@
 
 #include "talk/sensors.h"
 
+// How late a finger's FRAME may be, after its round's last slot, until something is left out. At full load
+// the last of five is begun 8 ms late; slots wait for 29 ms (BT_SLOT_RING).
+#define SIGMA_LATE_US      9000
+#define MAP_LATE_US        11000
+#define FRAME_LATE_US      22000
+#define SIGMA_PAUSE_ROUNDS 50 // for all fingers, or the first ones' would cost the last ones more than theirs
+
 static bool streams(const bt_session *session, const bt_finger *finger, uint8_t what)
 {
     return (session->streams & what) && (session->fingers >> finger->index & 1);
@@ -71,20 +78,61 @@ static void count_skips(bt_skips *skips, uint32_t quantities)
     skips->sigma += !(quantities & BT_QUANTITY_FLAG_SIGMA);
 }
 
+// How long ago the round's last slot was over. A round that is still to end, by a clock that stands, is not
+// late.
+static int32_t late_us(const bt_session *session, const bt_finger *finger)
+{
+    if (session->board.now_us == NULL) {
+        return 0;
+    }
+    return (int32_t)(session->board.now_us() - (finger->round.t_us + BT_FRAME_MS * 1000));
+}
+
+static uint32_t to_shed(bt_session *session, const bt_finger *finger, int32_t late)
+{
+    uint32_t age = bt_finger_wrench_age(finger, &session->kernel[finger->index]);
+    if (late > SIGMA_LATE_US) {
+        session->sigma_pause = SIGMA_PAUSE_ROUNDS;
+    }
+    return (session->sigma_pause > 0 ? BT_SHED_SIGMA : 0)
+           | (late > MAP_LATE_US && age <= BT_REPEAT_MAX_ROUNDS ? BT_SHED_MAP : 0);
+}
+
+// Whoever goes without comes first in the next round.
+static void went_without(bt_session *session, uint8_t finger)
+{
+    if (session->first_next == BT_MAX_FINGERS) {
+        session->first_next = finger;
+    }
+}
+
 static void send_frame(bt_session *session, bt_finger *finger)
 {
-    uint8_t payload[BT_FRAME_BYTES];
+    _Alignas(4) uint16_t frame[(BT_ENCODED_MAX_BYTES + 1) / 2];
     bt_msg_frame msg;
     if (finger->tare_unsent) {
         send_tare(session, finger);
     }
+    int32_t late = late_us(session, finger);
+    if (late > FRAME_LATE_US) {
+        finger->shed = true;
+        session->sheds.frames++;
+        went_without(session, finger->index);
+        return;
+    }
+    uint32_t shed = to_shed(session, finger, late);
+    session->sheds.sigma += shed & BT_SHED_SIGMA && finger->quantities & BT_QUANTITY_FLAG_SIGMA;
+    if (shed & BT_SHED_MAP) {
+        session->sheds.wrench++;
+        went_without(session, finger->index);
+    }
     uint8_t quantities = finger->quantities;
     finger->quantities = bt_sensors_refused(session, finger->index) ? 0 : quantities;
-    bt_finger_frame(finger, &session->kernel[finger->index], &msg);
+    bt_finger_frame(finger, &session->kernel[finger->index], shed, &msg);
     finger->quantities = quantities;
     msg.flags |= bt_sensors_flags(session, finger->index);
-    bt_msg_frame_pack(&msg, payload);
-    bt_session_send(session, BT_FRAME_ID, payload);
+    bt_msg_frame_pack_even(&msg, frame + BT_PAYLOAD_AT / 2);
+    bt_session_send_sealed(session, BT_FRAME_ID, (uint8_t *)frame);
     count_skips(&session->skips, finger->quantities);
 }
 
@@ -100,6 +148,7 @@ static void send_round(bt_session *session, bt_finger *finger)
         if (finger->unsent > 0) {
             send_idle(session, finger, true);
         }
+        finger->kept.valid = finger->kept.valid && !finger->fresh;
         finger->fresh = false;
         send_frame(session, finger);
         return;
@@ -123,7 +172,11 @@ static void send_pac(bt_session *session, const bt_finger *finger)
 void bt_session_round(bt_session *session)
 {
     uint32_t answering = 0; // bit mask
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+    const int first = session->first;
+    session->first_next = BT_MAX_FINGERS;
+    session->sigma_pause = (uint8_t)(session->sigma_pause - (session->sigma_pause > 0));
+    for (int k = 0; k < BT_MAX_FINGERS; k++) {
+        const int f = first + k < BT_MAX_FINGERS ? first + k : first + k - BT_MAX_FINGERS;
         bt_finger *finger = &session->finger[f];
         if (session->asked >> f & 1) {
             bt_finger_pass(finger);
@@ -142,6 +195,7 @@ void bt_session_round(bt_session *session)
             send_round(session, finger);
         }
     }
+    session->first = (uint8_t)(session->first_next % BT_MAX_FINGERS);
     // Vibration after all fingers' forces: who closes a grip waits for those.
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         if (answering >> f & 1 && streams(session, &session->finger[f], BT_STREAM_FLAG_PAC)) {

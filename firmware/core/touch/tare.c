@@ -330,8 +330,8 @@ void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings)
         meet(tare);
     }
     if (tare->state == BT_TARE_STATE_FAULT) {
-        // A tare from before the fault still holds, and the gate sees by the coming words whether something touches
-        // now: lost words are no touch.
+        // A tare from before the fault still holds, and the gate sees by the coming words whether something
+        // touches now: lost words are no touch.
         tare->state = tare->reason == BT_TARE_REASON_NONE ? BT_TARE_STATE_INIT : tare->before_fault;
         tare->release.quiet_sweeps = 0;
     } else if (tare->state == BT_TARE_STATE_REST) {

@@ -10,6 +10,11 @@ extern const uint32_t bt_crc32_table[256];
 
 uint32_t bt_crc32(const uint8_t *data, size_t bytes);
 
+// The same, by a board's hardware where its build defines it; for frames that go out.
+#ifndef BT_CRC32
+#define BT_CRC32(data, bytes) bt_crc32(data, bytes)
+#endif
+
 // The same byte by byte, for who looks at each byte anyway: start, one step for each, end.
 #define BT_CRC32_START 0xFFFFFFFFu
 #ifndef BT_CDEF

@@ -1,29 +1,27 @@
 #include "wire/framing.h"
 
 #include "wire/crc32.h"
+#include "wire/little_endian.h"
 
 #include <string.h>
 
 // COBS then adds exactly one byte, so a frame never needs a second overhead byte.
 _Static_assert(BT_FRAME_MAX_BYTES <= BT_COBS_BLOCK_BYTES, "a frame must fit one COBS block");
 
-// Each byte is looked at once, for CRC and COBS together: a board spends more on this than on the maths.
+size_t bt_frame_seal(uint8_t id, size_t payload_bytes, uint8_t *out)
+{
+    uint8_t *crc_at = out + BT_PAYLOAD_AT + payload_bytes;
+    out[1] = id;
+    bt_put_u32(crc_at, BT_CRC32(out + 1, 1 + payload_bytes));
+    crc_at[BT_CRC_BYTES] = 0;
+    bt_cobs_in_place(out, (size_t)(crc_at + BT_CRC_BYTES - out));
+    return (size_t)(crc_at + BT_CRC_BYTES + 1 - out);
+}
+
 size_t bt_frame_encode(uint8_t id, const uint8_t *payload, size_t payload_bytes, uint8_t *out)
 {
-    bt_cobs_block block = bt_cobs_begin(out);
-    bt_cobs_put(&block, id);
-    uint32_t crc = bt_crc32_step(BT_CRC32_START, id);
-    for (size_t k = 0; k < payload_bytes; k++) {
-        bt_cobs_put(&block, payload[k]);
-        crc = bt_crc32_step(crc, payload[k]);
-    }
-    crc = bt_crc32_end(crc);
-    for (int k = 0; k < BT_CRC_BYTES; k++) {
-        bt_cobs_put(&block, (uint8_t)(crc >> (8 * k)));
-    }
-    uint8_t *end = bt_cobs_end(&block);
-    *end++ = 0;
-    return (size_t)(end - out);
+    memcpy(out + BT_PAYLOAD_AT, payload, payload_bytes);
+    return bt_frame_seal(id, payload_bytes, out);
 }
 
 void bt_deframer_reset(bt_deframer *deframer)

@@ -342,7 +342,87 @@ void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES])
     at = put(at, (uint32_t)msg->pdc_filtered_q4, 2);
     at = put(at, (uint32_t)msg->pressure_force_100un, 4);
     at = put(at, (uint32_t)msg->torsion_mnmm, 4);
+    at = put(at, (uint32_t)msg->wrench_age_ms, 2);
     (void)at;
+}
+
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "halfwords are stored as they are");
+
+void bt_msg_frame_pack_even(const bt_msg_frame *msg, uint16_t out[BT_FRAME_BYTES / 2])
+{
+    out[0] = (uint16_t)msg->seq;
+    out[1] = (uint16_t)msg->t_us;
+    out[2] = (uint16_t)((uint32_t)msg->t_us >> 16);
+    out[3] = (uint16_t)(msg->finger | msg->tare_state << 8);
+    out[4] = (uint16_t)msg->flags;
+    out[5] = (uint16_t)((uint32_t)msg->flags >> 16);
+    out[6] = (uint16_t)msg->counts[0];
+    out[7] = (uint16_t)msg->counts[1];
+    out[8] = (uint16_t)msg->counts[2];
+    out[9] = (uint16_t)msg->counts[3];
+    out[10] = (uint16_t)msg->counts[4];
+    out[11] = (uint16_t)msg->counts[5];
+    out[12] = (uint16_t)msg->counts[6];
+    out[13] = (uint16_t)msg->counts[7];
+    out[14] = (uint16_t)msg->counts[8];
+    out[15] = (uint16_t)msg->counts[9];
+    out[16] = (uint16_t)msg->counts[10];
+    out[17] = (uint16_t)msg->counts[11];
+    out[18] = (uint16_t)msg->counts[12];
+    out[19] = (uint16_t)msg->counts[13];
+    out[20] = (uint16_t)msg->counts[14];
+    out[21] = (uint16_t)msg->counts[15];
+    out[22] = (uint16_t)msg->counts[16];
+    out[23] = (uint16_t)msg->counts[17];
+    out[24] = (uint16_t)msg->counts[18];
+    out[25] = (uint16_t)msg->pdc;
+    out[26] = (uint16_t)msg->tac;
+    out[27] = (uint16_t)msg->tdc;
+    out[28] = (uint16_t)msg->poc_um[0];
+    out[29] = (uint16_t)msg->poc_um[1];
+    out[30] = (uint16_t)msg->poc_um[2];
+    out[31] = (uint16_t)msg->force_100un[0];
+    out[32] = (uint16_t)((uint32_t)msg->force_100un[0] >> 16);
+    out[33] = (uint16_t)msg->force_100un[1];
+    out[34] = (uint16_t)((uint32_t)msg->force_100un[1] >> 16);
+    out[35] = (uint16_t)msg->force_100un[2];
+    out[36] = (uint16_t)((uint32_t)msg->force_100un[2] >> 16);
+    out[37] = (uint16_t)msg->torque_mnmm[0];
+    out[38] = (uint16_t)((uint32_t)msg->torque_mnmm[0] >> 16);
+    out[39] = (uint16_t)msg->torque_mnmm[1];
+    out[40] = (uint16_t)((uint32_t)msg->torque_mnmm[1] >> 16);
+    out[41] = (uint16_t)msg->torque_mnmm[2];
+    out[42] = (uint16_t)((uint32_t)msg->torque_mnmm[2] >> 16);
+    out[43] = (uint16_t)msg->tare_q4[0];
+    out[44] = (uint16_t)msg->tare_q4[1];
+    out[45] = (uint16_t)msg->tare_q4[2];
+    out[46] = (uint16_t)msg->tare_q4[3];
+    out[47] = (uint16_t)msg->tare_q4[4];
+    out[48] = (uint16_t)msg->tare_q4[5];
+    out[49] = (uint16_t)msg->tare_q4[6];
+    out[50] = (uint16_t)msg->tare_q4[7];
+    out[51] = (uint16_t)msg->tare_q4[8];
+    out[52] = (uint16_t)msg->tare_q4[9];
+    out[53] = (uint16_t)msg->tare_q4[10];
+    out[54] = (uint16_t)msg->tare_q4[11];
+    out[55] = (uint16_t)msg->tare_q4[12];
+    out[56] = (uint16_t)msg->tare_q4[13];
+    out[57] = (uint16_t)msg->tare_q4[14];
+    out[58] = (uint16_t)msg->tare_q4[15];
+    out[59] = (uint16_t)msg->tare_q4[16];
+    out[60] = (uint16_t)msg->tare_q4[17];
+    out[61] = (uint16_t)msg->tare_q4[18];
+    out[62] = (uint16_t)msg->pdc_tare_q4;
+    out[63] = (uint16_t)msg->poc_sigma_um;
+    out[64] = (uint16_t)msg->force_sigma_100un[0];
+    out[65] = (uint16_t)msg->force_sigma_100un[1];
+    out[66] = (uint16_t)msg->force_sigma_100un[2];
+    out[67] = (uint16_t)msg->pdc_filtered_q4;
+    out[68] = (uint16_t)msg->pressure_force_100un;
+    out[69] = (uint16_t)((uint32_t)msg->pressure_force_100un >> 16);
+    out[70] = (uint16_t)msg->torsion_mnmm;
+    out[71] = (uint16_t)((uint32_t)msg->torsion_mnmm >> 16);
+    out[72] = (uint16_t)msg->wrench_age_ms;
 }
 
 void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
@@ -399,6 +479,8 @@ void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES])
     msg->pressure_force_100un = (int32_t)value;
     at = get(at, &value, 4);
     msg->torsion_mnmm = (int32_t)value;
+    at = get(at, &value, 2);
+    msg->wrench_age_ms = (uint16_t)value;
     (void)at;
 }
 
@@ -491,6 +573,9 @@ void bt_msg_status_pack(const bt_msg_status *msg, uint8_t out[BT_STATUS_BYTES])
     at = put(at, (uint32_t)msg->force_skipped, 4);
     at = put(at, (uint32_t)msg->torque_skipped, 4);
     at = put(at, (uint32_t)msg->sigma_skipped, 4);
+    at = put(at, (uint32_t)msg->sigma_shed, 4);
+    at = put(at, (uint32_t)msg->wrench_repeated, 4);
+    at = put(at, (uint32_t)msg->frames_shed, 4);
     (void)at;
 }
 
@@ -530,6 +615,12 @@ void bt_msg_status_unpack(bt_msg_status *msg, const uint8_t in[BT_STATUS_BYTES])
     msg->torque_skipped = (uint32_t)value;
     at = get(at, &value, 4);
     msg->sigma_skipped = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->sigma_shed = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->wrench_repeated = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->frames_shed = (uint32_t)value;
     (void)at;
 }
 

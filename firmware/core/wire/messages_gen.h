@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0xE65CBA00u
+#define BT_SCHEMA_HASH 0xFFDCEECBu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -95,9 +95,11 @@ enum bt_calibration_state {
 #define BT_FRAME_FLAG_TEMP (1u << 16) // since the contact began the temperature has moved by over a degree: the tare is doubtful
 #define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to and marked invalid (SUBSCRIBE)
 #define BT_FRAME_FLAG_MAPPED (1u << 18) // force, and torque and torsion where it has them, come from the finger's wrench map
+#define BT_FRAME_FLAG_REPEATED (1u << 21) // the board was short of time: force, torque and torsion are those of wrench_age_ms before, from the same map
+#define BT_FRAME_FLAG_SHED (1u << 22) // the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out
 #define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not said its serial number since: tare, calibration and map may be another's
 #define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with a tare of its own; no results where it has not the same calibration and map
-#define BT_FRAME_FLAGS 0x187FFFFu // all there are
+#define BT_FRAME_FLAGS 0x1E7FFFFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME messages
@@ -284,7 +286,7 @@ void bt_msg_map_data_unpack(bt_msg_map_data *msg, const uint8_t in[BT_MAP_DATA_B
 
 // One finger, one round of slots: counts, the tare that was subtracted, and the results.
 #define BT_FRAME_ID 0x10
-#define BT_FRAME_BYTES 144
+#define BT_FRAME_BYTES 146
 typedef struct {
     uint16_t seq; // [1] counts this finger's frames, sent or not
     uint32_t t_us; // [us] device time at which slot 0 was sampled; slot k is k/4400 s later
@@ -305,8 +307,11 @@ typedef struct {
     uint16_t pdc_filtered_q4; // [count q4] static pressure through the filter of pressure_filter_milli; 0xFFFF without a good word or when not asked for
     int32_t pressure_force_100un; // [100 uN] magnitude of the force from pdc_filtered_q4 - pdc_tare_q4, negative below rest; invalid when either is, or without pressure_gain_nn
     int32_t torsion_mnmm; // [mN*mm] torque about the outward normal at the contact, of a finger whose wrench map has it; else invalid
+    uint16_t wrench_age_ms; // [ms] how much older than this FRAME force, torque and torsion are; 0 unless REPEATED, saturating
 } bt_msg_frame;
 void bt_msg_frame_pack(const bt_msg_frame *msg, uint8_t out[BT_FRAME_BYTES]);
+// The same into aligned halfwords, in a third of the time; little-endian cores only.
+void bt_msg_frame_pack_even(const bt_msg_frame *msg, uint16_t out[BT_FRAME_BYTES / 2]);
 void bt_msg_frame_unpack(bt_msg_frame *msg, const uint8_t in[BT_FRAME_BYTES]);
 
 // The 22 dynamic pressure samples of one finger and one round of slots.
@@ -339,7 +344,7 @@ void bt_msg_tare_unpack(bt_msg_tare *msg, const uint8_t in[BT_TARE_BYTES]);
 
 // Health of the board and the link. Periodic, and reply to GET_STATUS.
 #define BT_STATUS_ID 0x13
-#define BT_STATUS_BYTES 53
+#define BT_STATUS_BYTES 65
 typedef struct {
     uint16_t seq; // [1] counts STATUS messages
     uint32_t t_us; // [us] device time of packing
@@ -357,6 +362,9 @@ typedef struct {
     uint32_t force_skipped; // [1] the same of force
     uint32_t torque_skipped; // [1] the same of torque
     uint32_t sigma_skipped; // [1] the same of the standard deviations
+    uint32_t sigma_shed; // [1] FRAMEs without standard deviations that were asked for, for want of time: the first to go
+    uint32_t wrench_repeated; // [1] FRAMEs that repeat the wrench of the finger's map, likewise: the second to go
+    uint32_t frames_shed; // [1] FRAMEs that were not sent, likewise: the last to go
 } bt_msg_status;
 void bt_msg_status_pack(const bt_msg_status *msg, uint8_t out[BT_STATUS_BYTES]);
 void bt_msg_status_unpack(bt_msg_status *msg, const uint8_t in[BT_STATUS_BYTES]);
@@ -677,10 +685,10 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_CALIBRATION_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(value, i32, 8)
 #define BT_MAP_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(state, u8, 1) X(serial, u8, 16) X(made_s, u32, 1) X(size_bytes, u16, 1) X(crc32, u32, 1)
 #define BT_MAP_DATA_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1) X(data, u8, 128)
-#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1)
+#define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1) X(wrench_age_ms, u16, 1)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
 #define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
-#define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1)
+#define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1) X(sigma_shed, u32, 1) X(wrench_repeated, u32, 1) X(frames_shed, u32, 1)
 #define BT_SENSOR_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(tare_state, u8, 1) X(tare_reason, u8, 1) X(tare_age_ms, u32, 1) X(noise_count2, u32, 1) X(words_good, u32, 1) X(words_stuck, u32, 1) X(words_error, u32, 1) X(words_parity, u32, 1) X(last_error_word, u16, 1)
 #define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1)
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)

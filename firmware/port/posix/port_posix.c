@@ -9,6 +9,7 @@
 // --hold: device time stands still until "run" comes on stdin. End of stdin ends the process.
 #define _DEFAULT_SOURCE
 #include "port.h"
+#include "spi_at_once.h"
 
 #include "bus.h"
 #include "clock.h"
@@ -189,7 +190,7 @@ void port_idle(void)
         clock_advance_ns(next_ns - clock_now_ns());
     }
     armed = false;
-    bt_port_alarm();
+    (void)bt_port_alarm();
 }
 
 // ---- SPI --------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 // The flash chip itself: settings in its last two sectors, wrench maps before them, and its unique number.
-// While it erases, programs or answers commands, no program can be read from it. So that code is in SRAM,
-// calls nothing but the chip's ROM, and runs with interrupts off.
+// While it erases, programs or answers commands it is no memory. The program is in SRAM and does not mind;
+// that interrupts are off all the same keeps a handler that might one day read flash from a fault.
 #include "port.h"
 
 #include "system.h"
@@ -51,7 +51,7 @@ void flash_start(void)
              && rom.program != NULL;
 }
 
-IN_SRAM static uint32_t leave_xip(void)
+static uint32_t leave_xip(void)
 {
     uint32_t primask;
     __asm volatile("mrs %0, primask\n cpsid i" : "=r"(primask)::"memory");
@@ -60,14 +60,14 @@ IN_SRAM static uint32_t leave_xip(void)
     return primask;
 }
 
-IN_SRAM static void back_to_xip(uint32_t primask)
+static void back_to_xip(uint32_t primask)
 {
     rom.flush();
     ((rom_action)((uintptr_t)boot2_copy | 1))(); // Thumb
     __asm volatile("msr primask, %0" ::"r"(primask) : "memory");
 }
 
-IN_SRAM static void erase_sector(uint32_t offset)
+static void erase_sector(uint32_t offset)
 {
     uint32_t primask = leave_xip();
     rom.erase(offset, BT_FLASH_SECTOR_BYTES, BT_FLASH_SECTOR_BYTES, SECTOR_ERASE);
@@ -75,7 +75,7 @@ IN_SRAM static void erase_sector(uint32_t offset)
 }
 
 // page must not be in flash.
-IN_SRAM static void program_page(uint32_t offset, const uint8_t *page)
+static void program_page(uint32_t offset, const uint8_t *page)
 {
     uint32_t primask = leave_xip();
     rom.program(offset, page, BT_FLASH_PAGE_BYTES);
@@ -119,7 +119,7 @@ const uint8_t *port_flash_maps(void)
 
 // Sends a command and takes as many bytes as it sends, chip select held low throughout. False when the
 // serial interface stopped in the middle.
-IN_SRAM static bool exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
+static bool exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
 {
     uint32_t sent = 0;
     uint32_t come = 0;

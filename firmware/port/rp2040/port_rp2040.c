@@ -65,9 +65,6 @@ void port_init(int argc, char **argv)
     (void)argv;
     flash_start();
     has_id = flash_unique_id(unique_id);
-    if (!clocks_start()) {
-        system_reset(); // without its crystal the board can neither keep time nor speak USB
-    }
     watchdog_start();
     make_serial_text();
     make_boot_id();

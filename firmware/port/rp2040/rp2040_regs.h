@@ -30,6 +30,27 @@
 #define TIMER_IRQ_0 0
 #define USBCTRL_IRQ 5
 
+// ---- 2.5 DMA
+#define DMA_READ_ADDR(channel)        REG32(0x50000000u + 0x40u * (channel))
+#define DMA_WRITE_ADDR(channel)       REG32(0x50000004u + 0x40u * (channel))
+#define DMA_TRANS_COUNT(channel)      REG32(0x50000008u + 0x40u * (channel))
+#define DMA_CTRL_TRIG(channel)        REG32(0x5000000Cu + 0x40u * (channel))
+#define DMA_BUSY                      (1u << 24)
+#define DMA_SNIFF_THIS                (1u << 23)
+#define DMA_QUIET                     (1u << 21) // no interrupt
+#define DMA_UNPACED                   (0x3Fu << 15)
+#define DMA_CHAIN_TO_ITSELF(channel)  ((channel) << 11) // that is, to none
+#define DMA_INCR_READ                 (1u << 4)
+#define DMA_CHANNEL_EN                (1u << 0) // DATA_SIZE is 0: bytes
+#define DMA_SNIFF_CTRL                REG32(0x50000434u)
+#define DMA_SNIFF_DATA                REG32(0x50000438u)
+#define DMA_SNIFF_OUT_INV             (1u << 11)
+#define DMA_SNIFF_OUT_REV             (1u << 10)
+#define DMA_SNIFF_CALC_CRC32_REVERSED (1u << 5) // polynomial 0x04C11DB7, each byte's lowest bit first
+#define DMA_SNIFF_CHANNEL_0           (0u << 1)
+#define DMA_SNIFF_EN                  (1u << 0)
+#define DMA_CHAN_ABORT                REG32(0x50000444u)
+
 // ---- 2.13 power-on state machine
 #define PSM_WDSEL      REG32(0x40010008u)
 #define PSM_WDSEL_ROSC (1u << 0)
@@ -39,6 +60,7 @@
 // ---- 2.14 resets
 #define RESETS_RESET      REG32(0x4000C000u)
 #define RESETS_RESET_DONE REG32(0x4000C008u)
+#define RESETS_DMA        (1u << 2)
 #define RESETS_IO_BANK0   (1u << 5)
 #define RESETS_PADS_BANK0 (1u << 8)
 #define RESETS_PLL_SYS    (1u << 12)

@@ -50,9 +50,8 @@ void spi_start(void)
     IO_BANK0_GPIO_CTRL(PIN_MISO) = GPIO_FUNC_SPI;
 }
 
-IN_SRAM void port_spi_select(uint8_t mask)
+void port_spi_select(uint8_t mask)
 {
-    // No table: it would be in flash.
     uint32_t low = (uint32_t)(mask & 1) << PIN_SELECT_0 | (uint32_t)(mask >> 1 & 1) << PIN_SELECT_1
                    | (uint32_t)(mask >> 2 & 1) << PIN_SELECT_2 | (uint32_t)(mask >> 3 & 1) << PIN_SELECT_3
                    | (uint32_t)(mask >> 4 & 1) << PIN_SELECT_4;
@@ -64,33 +63,49 @@ IN_SRAM void port_spi_select(uint8_t mask)
     }
 }
 
+static void begin(uint32_t mosi)
+{
+    if (wait_for(&SPI0_SSPSR, SSPSR_BSY, 0, WAIT_SPI_TURNS)) {
+        drain(&SPI0_SSPSR, SSPSR_RNE, &SPI0_SSPDR, SPI_FIFO_WORDS);
+        SPI0_SSPDR = mosi;
+    }
+}
+
 // Returns 0, which reads as a sensor that is not there, for a word that did not come in time. It may come
 // still: were it left where it is, every later word would be taken for the one before it, and so for another
 // finger's.
-static IN_SRAM uint32_t transfer(uint32_t mosi)
+static uint32_t end(void)
 {
-    if (!wait_for(&SPI0_SSPSR, SSPSR_BSY, 0, WAIT_SPI_TURNS)) {
-        return 0;
-    }
-    drain(&SPI0_SSPSR, SSPSR_RNE, &SPI0_SSPDR, SPI_FIFO_WORDS);
-    SPI0_SSPDR = mosi;
     // Not busy is later than received: the clock has gone low by then, and the select may rise.
     bool done = wait_for(&SPI0_SSPSR, SSPSR_RNE | SSPSR_BSY, SSPSR_RNE, WAIT_SPI_TURNS);
     return done ? SPI0_SSPDR : 0;
 }
 
-IN_SRAM uint16_t port_spi_transfer16(uint16_t mosi)
+bool port_spi_begin16(uint16_t mosi)
 {
-    return (uint16_t)transfer(mosi);
+    begin(mosi);
+    return false;
 }
 
-IN_SRAM uint8_t port_spi_transfer8(uint8_t mosi)
+uint16_t port_spi_end16(void)
+{
+    return (uint16_t)end();
+}
+
+uint16_t port_spi_transfer16(uint16_t mosi)
+{
+    begin(mosi);
+    return (uint16_t)end();
+}
+
+uint8_t port_spi_transfer8(uint8_t mosi)
 {
     // The width changes while the block is off (PL022 manual, 3.3.1); the clock stays low.
     SPI0_SSPCR1 = 0;
     SPI0_SSPCR0 = SSPCR0_DSS_8 | SCR << SSPCR0_SCR_LSB;
     SPI0_SSPCR1 = SSPCR1_SSE;
-    uint8_t miso = (uint8_t)transfer(mosi);
+    begin(mosi);
+    uint8_t miso = (uint8_t)end();
     SPI0_SSPCR1 = 0;
     SPI0_SSPCR0 = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
     SPI0_SSPCR1 = SSPCR1_SSE;

@@ -11,7 +11,7 @@
 
 #define WATCHDOG_US 1000000u // longer than a flash sector's erase, 0.4 s at most
 
-static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, uint32_t postdiv2)
+AT_BOOT static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, uint32_t postdiv2)
 {
     PLL_CS(base) = 1; // reference divider
     PLL_FBDIV_INT(base) = fbdiv;
@@ -24,14 +24,7 @@ static bool start_pll(uint32_t base, uint32_t fbdiv, uint32_t postdiv1, uint32_t
     return true;
 }
 
-bool take_out_of_reset(uint32_t blocks)
-{
-    REG_SET(RESETS_RESET) = blocks;
-    REG_CLR(RESETS_RESET) = blocks;
-    return wait_for(&RESETS_RESET_DONE, blocks, blocks, WAIT_CLOCKS_TURNS);
-}
-
-bool clocks_start(void)
+AT_BOOT bool clocks_start(void)
 {
     CLK_SYS_RESUS_CTRL = 0;
     XOSC_STARTUP = XOSC_STARTUP_DELAY;
@@ -59,7 +52,7 @@ bool clocks_start(void)
     CLK_PERI_CTRL = CLK_ENABLE; // from clk_sys
     CLK_USB_CTRL = CLK_ENABLE;  // from PLL_USB
     WATCHDOG_TICK = CRYSTAL_MHZ | WATCHDOG_TICK_ENABLE;
-    return take_out_of_reset(RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_SPI0 | RESETS_TIMER
+    return take_out_of_reset(RESETS_DMA | RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_SPI0 | RESETS_TIMER
                              | RESETS_USBCTRL);
 }
 

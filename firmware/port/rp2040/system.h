@@ -6,16 +6,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Code that runs from SRAM: interrupts that must not wait for the flash, and whatever runs while the flash
-// cannot be read. noinline, or it would end up in its caller's flash.
-#define IN_SRAM __attribute__((section(".sram_code"), noinline))
+// Code that runs from flash, before all other is copied to SRAM. noinline, or it would end up in its caller,
+// or what it calls in it.
+#define AT_BOOT __attribute__((section(".boot_code"), noinline))
 
 // ---- system.c: clocks, watchdog, reset
 // CLK_SYS_HZ from the crystal, 48 MHz for USB, the 1 us tick; false when the crystal or a PLL never came up.
 bool clocks_start(void);
-
-// Into reset and out again: every register of theirs is as after power-on. False when they do not come back.
-bool take_out_of_reset(uint32_t blocks);
 void watchdog_start(void);
 void watchdog_feed(void);
 void system_reset(void) __attribute__((noreturn));

@@ -4,6 +4,8 @@
 #include "system.h"
 #include "wait.h"
 
+#define NAPS 64 // until the main loop looks around all the same: a slot has twelve interrupts
+
 static volatile bool woken;
 
 void timer_start(void)
@@ -12,14 +14,14 @@ void timer_start(void)
     NVIC_ISER = 1u << TIMER_IRQ_0;
 }
 
-IN_SRAM uint32_t port_now_us(void)
+uint32_t port_now_us(void)
 {
     return TIMER_TIMERAWL;
 }
 
 #define SHORT_US 10 // the gap between two reads of the bus, four times a slot
 
-IN_SRAM void port_delay_us(uint32_t us)
+void port_delay_us(uint32_t us)
 {
     if (us <= SHORT_US) {
         wait_short_us(us);
@@ -28,7 +30,7 @@ IN_SRAM void port_delay_us(uint32_t us)
     }
 }
 
-IN_SRAM void port_alarm_at(uint32_t at_us)
+void port_alarm_at(uint32_t at_us)
 {
     TIMER_ALARM0 = at_us;
     // It fires when the clock is equal to it: one that is already past would wait for 71 minutes.
@@ -38,24 +40,25 @@ IN_SRAM void port_alarm_at(uint32_t at_us)
     }
 }
 
-IN_SRAM void timer_wake(void)
+void timer_wake(void)
 {
     woken = true;
 }
 
-IN_SRAM void timer_interrupt(void)
+void timer_interrupt(void)
 {
     REG_CLR(TIMER_INTF) = TIMER_ALARM0_BIT;
     TIMER_INTR = TIMER_ALARM0_BIT; // writing 1 clears
-    bt_port_alarm();
-    timer_wake();
+    if (bt_port_alarm()) {
+        timer_wake();
+    }
 }
 
 // Interrupts are held off, and still one of them ends WFI: none can slip in between looking and sleeping.
 void timer_sleep(void)
 {
     __asm volatile("cpsid i" ::: "memory");
-    if (!woken) {
+    for (int k = 0; k < NAPS && !woken; k++) { // most interrupts are the bus's own
         __asm volatile("dsb\n wfi\n cpsie i\n isb\n cpsid i" ::: "memory"); // its handler runs here
     }
     woken = false;

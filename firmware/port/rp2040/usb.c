@@ -6,6 +6,7 @@
 #include "system.h"
 #include "usb.h"
 #include "usb_descriptors.h"
+#include "wait.h"
 
 #include <stdatomic.h>
 #include <string.h>

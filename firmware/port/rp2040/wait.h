@@ -23,6 +23,15 @@ static inline bool wait_for(const volatile uint32_t *reg, uint32_t mask, uint32_
     return true;
 }
 
+// Into reset and out again: every register of these blocks is as after power-on. False when they do not come
+// back. Inline, because boot calls it before there is code in SRAM, and the USB's guard after.
+static inline bool take_out_of_reset(uint32_t blocks)
+{
+    REG_SET(RESETS_RESET) = blocks;
+    REG_CLR(RESETS_RESET) = blocks;
+    return wait_for(&RESETS_RESET_DONE, blocks, blocks, WAIT_CLOCKS_TURNS);
+}
+
 // At least us microseconds, and hardly more at the image's clock; on a slower one it takes longer. For the
 // few that a wait on the timer, which ticks once in a us, would lengthen by up to two.
 #define WAIT_TURN_CYCLES  3u

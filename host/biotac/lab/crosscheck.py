@@ -99,6 +99,8 @@ class CrossCheck:
         a board would refuse.
         """
         own, maps = own or {}, maps or {}
+        # A repeated wrench is that of an earlier FRAME, which is judged where it stands.
+        messages = messages[(messages["flags"] & wire.FrameFlags.REPEATED) == 0]
         mapped = (messages["flags"] & wire.FrameFlags.MAPPED) != 0
         for finger in np.unique(messages["finger"][mapped]).tolist():
             its = messages[mapped & (messages["finger"] == finger)]

@@ -115,6 +115,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("pdc_filtered_q4", "<u2"),
             ("pressure_force_100un", "<i4"),
             ("torsion_mnmm", "<i4"),
+            ("wrench_age_ms", "<u2"),
         ]
     ),
     wire.Pac.ID: np.dtype(
@@ -155,6 +156,9 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("force_skipped", "<u4"),
             ("torque_skipped", "<u4"),
             ("sigma_skipped", "<u4"),
+            ("sigma_shed", "<u4"),
+            ("wrench_repeated", "<u4"),
+            ("frames_shed", "<u4"),
         ]
     ),
     wire.SensorStatus.ID: np.dtype(

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0xE65CBA00
+SCHEMA_HASH = 0xFFDCEECB
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -111,6 +111,8 @@ class FrameFlags(IntFlag):
     TEMP = 1 << 16  # since the contact began the temperature has moved by over a degree: the tare is doubtful
     NOT_ASKED = 1 << 17  # some quantity is not subscribed to and marked invalid (SUBSCRIBE)
     MAPPED = 1 << 18  # force, and torque and torsion where it has them, come from the finger's wrench map
+    REPEATED = 1 << 21  # the board was short of time: force, torque and torsion are those of wrench_age_ms before, from the same map
+    SHED = 1 << 22  # the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out
     SENSOR_UNSURE = 1 << 23  # the sensor was away and has not said its serial number since: tare, calibration and map may be another's
     SENSOR_OTHER = 1 << 24  # another sensor than at START, with a tare of its own; no results where it has not the same calibration and map
 
@@ -213,6 +215,8 @@ FRAME_FLAG_DOC: dict[int, str] = {
     65536: "since the contact began the temperature has moved by over a degree: the tare is doubtful",
     131072: "some quantity is not subscribed to and marked invalid (SUBSCRIBE)",
     262144: "force, and torque and torsion where it has them, come from the finger's wrench map",
+    2097152: "the board was short of time: force, torque and torsion are those of wrench_age_ms before, from the same map",
+    4194304: "the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out",
     8388608: "the sensor was away and has not said its serial number since: tare, calibration and map may be another's",
     16777216: "another sensor than at START, with a tare of its own; no results where it has not the same calibration and map",
 }
@@ -668,12 +672,13 @@ class Frame:
     pdc_filtered_q4: int
     pressure_force_100un: int
     torsion_mnmm: int
+    wrench_age_ms: int
 
     ID: ClassVar[int] = 0x10
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHii")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBI19HHHH3h3i3i19HHH3HHiiH")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 144 bytes."""
+        """Payload without id and CRC, 146 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -694,6 +699,7 @@ class Frame:
             self.pdc_filtered_q4,
             self.pressure_force_100un,
             self.torsion_mnmm,
+            self.wrench_age_ms,
         )
 
     @classmethod
@@ -720,6 +726,7 @@ class Frame:
             v[60],
             v[61],
             v[62],
+            v[63],
         )
 
 
@@ -821,12 +828,15 @@ class Status:
     force_skipped: int
     torque_skipped: int
     sigma_skipped: int
+    sigma_shed: int
+    wrench_repeated: int
+    frames_shed: int
 
     ID: ClassVar[int] = 0x13
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIIIIIIII")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIIIIIIIIIII")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 53 bytes."""
+        """Payload without id and CRC, 65 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -844,6 +854,9 @@ class Status:
             self.force_skipped,
             self.torque_skipped,
             self.sigma_skipped,
+            self.sigma_shed,
+            self.wrench_repeated,
+            self.frames_shed,
         )
 
     @classmethod
@@ -867,6 +880,9 @@ class Status:
             v[13],
             v[14],
             v[15],
+            v[16],
+            v[17],
+            v[18],
         )
 
 

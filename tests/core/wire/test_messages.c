@@ -169,6 +169,20 @@ static void lengths_by_id_are_those_of_the_fields(void **state)
     assert_int_equal(known, MESSAGES);
 }
 
+static void a_frame_packed_as_halfwords_is_the_same(void **state)
+{
+    (void)state;
+    uint8_t payload[BT_FRAME_BYTES];
+    uint16_t halfwords[BT_FRAME_BYTES / 2];
+    bt_msg_frame frame;
+    for (int k = 0; k < BT_FRAME_BYTES; k++) {
+        payload[k] = (uint8_t)(k * 37 + 11); // no two alike
+    }
+    bt_msg_frame_unpack(&frame, payload);
+    bt_msg_frame_pack_even(&frame, halfwords);
+    assert_memory_equal(halfwords, payload, sizeof halfwords);
+}
+
 static void invalid_marks_are_the_types_minimum(void **state)
 {
     (void)state;
@@ -188,6 +202,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(unpack_gives_the_fields_and_pack_the_payload),
         cmocka_unit_test(lengths_by_id_are_those_of_the_fields),
+        cmocka_unit_test(a_frame_packed_as_halfwords_is_the_same),
         cmocka_unit_test(invalid_marks_are_the_types_minimum),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

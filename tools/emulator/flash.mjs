@@ -1,0 +1,214 @@
+// The flash chip as the program sees it: memory behind a serial interface that takes its time. rp2040js reads it for
+// nothing. Modelled from the RP2040 data sheet (2.6.3, 4.10), the W25Q16JV's, and pico-sdk issue 1182 for how the cache
+// fills: 16 KiB, two ways, lines of 8 bytes of which a miss fetches the half that was asked for.
+//
+// A miss costs what the interface's registers say: clocks for command, address, waiting and 32 bits of data, times its
+// divider. That is 256 cycles for 03h at clk_sys / 4, and 40 for EBh without its command at clk_sys / 2.
+
+const XIP = 0x10000000
+const XIP_END = 0x14000000
+const NO_ALLOCATE = 1 << 24 // in the address: nothing is kept
+const NO_CACHE = 1 << 25 // nothing is looked up
+const OFFSET = 0xffffff
+const SRAM = 0x20000000
+const SETS = 1024
+const LINE_BITS = 3
+
+const SSI = 0x18000
+const CTRLR0 = 0x00
+const SSIENR = 0x08
+const BAUDR = 0x14
+const SR = 0x28
+const DR0 = 0x60
+const SPI_CTRLR0 = 0xf4
+const SR_TFNF = 2
+const SR_TFE = 4
+const SR_RFNE = 8
+const FORMAT_QUAD = 2
+const IO_QSPI = 0x40018
+const IO_QSPI_SS_CTRL = 0x0c
+const OUTOVER_LOW = 2 << 8
+const OUTOVER = 3 << 8
+
+const READ = 0x03
+const READ_STATUS_2 = 0x35
+const READ_UNIQUE_ID = 0x4b
+const READ_QUAD = 0xeb
+const UNIQUE_ID_DUMMIES = 4
+const QUAD_ENABLE = 2 // in status register 2
+const NOTHING = 0xff // a line that nobody drives
+
+/** Two ways of 1024 lines of two words, the less recently used way replaced. */
+class Cache {
+  constructor() {
+    this.tags = new Int32Array(2 * SETS)
+    this.halves = new Uint8Array(2 * SETS) // bit 0: the line's first word is here, bit 1: its second
+    this.older = new Uint8Array(SETS)
+  }
+
+  flush() {
+    this.halves.fill(0)
+  }
+
+  /** Whether the word at this offset is here; with keep, it is afterwards. */
+  look(offset, keep) {
+    const set = (offset >>> LINE_BITS) & (SETS - 1)
+    const tag = offset >>> (LINE_BITS + 10)
+    const half = offset & 4 ? 2 : 1
+    for (let way = 0; way < 2; way++) {
+      const line = 2 * set + way
+      if (this.halves[line] === 0 || this.tags[line] !== tag) continue
+      this.older[set] = 1 - way
+      const here = (this.halves[line] & half) !== 0
+      if (keep) this.halves[line] |= half
+      return here
+    }
+    if (keep) {
+      const way = this.older[set]
+      this.tags[2 * set + way] = tag
+      this.halves[2 * set + way] = half
+      this.older[set] = 1 - way
+    }
+    return false
+  }
+}
+
+export class Flash {
+  /** board: what outlives a power cycle. wrong(what): the program did something that the chip would not forgive. */
+  constructor(mcu, board, wrong) {
+    this.mcu = mcu
+    this.board = board
+    this.wrong = wrong
+    this.cache = new Cache()
+    this.readable = true
+    this.missCycles = 0 // boot2's first instructions are in SRAM: it sets up the interface before anything is read
+    this.continuous = false // the chip takes an address for a quad read, without a command
+    this.answer = []
+    this.sent = [] // since chip select went low
+    this.#memory()
+    this.#interface()
+  }
+
+  /** The ROM's function of this name: out of any read mode, and the pins as the ROM wants them. */
+  leaveXip() {
+    this.readable = false
+    this.continuous = false
+  }
+
+  /** Another: what the cache holds is forgotten. */
+  flush() {
+    this.cache.flush()
+  }
+
+  #memory() {
+    const { mcu } = this
+    const { core, sram, sramView } = mcu
+    const end = SRAM + sram.length
+    // Methods are replaced once and for all: an object whose properties change runs several times slower.
+    const [read32, read16, read8] = [mcu.readUint32.bind(mcu), mcu.readUint16.bind(mcu), mcu.readUint8.bind(mcu)]
+    const spend = (address) => {
+      if (address < XIP || address >= XIP_END) return
+      if (!this.readable) this.wrong('flash read while it is no memory')
+      const cached = !(address & NO_CACHE) && this.cache.look(address & OFFSET, !(address & NO_ALLOCATE))
+      if (cached) return
+      core.owedCycles += this.missCycles
+      this.board.counters.misses++
+    }
+    mcu.readUint16 = (address) => {
+      if (address >= SRAM && address + 1 < end) return sramView.getUint16(address - SRAM, true)
+      spend(address)
+      return read16(address)
+    }
+    mcu.readUint32 = (address) => {
+      const at = address >>> 0
+      spend(at)
+      return at >= XIP && at < XIP_END && !this.#answers() ? 0xffffffff : read32(at)
+    }
+    mcu.readUint8 = (address) => {
+      spend(address)
+      return read8(address)
+    }
+  }
+
+  /** Reads come out right: a quad read of a chip that has its four lines switched off gives ones. */
+  #answers() {
+    return this.quad !== true || this.continuous
+  }
+
+  #interface() {
+    const ssi = this.mcu.peripherals[SSI]
+    const read = ssi.readUint32.bind(ssi)
+    const write = ssi.writeUint32.bind(ssi)
+    const registers = { [CTRLR0]: 0, [BAUDR]: 0, [SPI_CTRLR0]: 0 }
+    let select = 0
+    ssi.readUint32 = (offset) => {
+      if (offset === SR) {
+        // Whoever looks has nothing more to send: what chip select the interface makes by itself goes high.
+        if ((select & OUTOVER) !== OUTOVER_LOW) this.sent = []
+        return SR_TFNF | SR_TFE | (this.answer.length > 0 ? SR_RFNE : 0)
+      }
+      if (offset === DR0) return this.answer.shift() ?? 0
+      return read(offset)
+    }
+    ssi.writeUint32 = (offset, value) => {
+      write(offset, value)
+      if (offset in registers) registers[offset] = value
+      if (offset === SSIENR) {
+        this.answer = []
+        this.sent = []
+        if (value === 1) this.#setUp(registers)
+      }
+      if (offset === DR0) this.#send(registers, value, select)
+    }
+    const pins = this.mcu.peripherals[IO_QSPI]
+    pins.readUint32 = (offset) => (offset === IO_QSPI_SS_CTRL ? select : 0)
+    pins.writeUint32 = (offset, value) => {
+      if (offset !== IO_QSPI_SS_CTRL) return
+      if ((value & OUTOVER) !== OUTOVER_LOW) this.sent = []
+      select = value
+    }
+  }
+
+  /** What a read of the window is from now on. */
+  #setUp(registers) {
+    const quad = ((registers[CTRLR0] >>> 21) & 3) === FORMAT_QUAD
+    const control = registers[SPI_CTRLR0]
+    const instruction = [0, 4, 8, 16][(control >>> 8) & 3]
+    const transfer = control & 3 // 0: all serial; 1: address wide; 2: command, too
+    const wide = quad ? 4 : 1
+    const clocks =
+      instruction / (transfer === 2 ? wide : 1) +
+      (4 * ((control >>> 2) & 15)) / (transfer >= 1 ? wide : 1) +
+      ((control >>> 11) & 31) +
+      32 / wide
+    this.missCycles = clocks * registers[BAUDR]
+    this.quad = quad
+    const command = control >>> 24
+    this.readable = quad ? instruction === 0 : instruction === 8 && command === READ && !this.continuous
+  }
+
+  #send(registers, value, select) {
+    const quad = ((registers[CTRLR0] >>> 21) & 3) === FORMAT_QUAD
+    this.sent.push(value)
+    if (quad) {
+      // Command, then address and mode in one: only a chip that has its four lines on takes it.
+      const [command, mode] = this.sent
+      if (this.sent.length < 2) return
+      if (command === READ_QUAD && (mode & 0x30) === 0x20 && this.board.quad) this.continuous = true
+      this.answer.push(0xffffffff)
+      return
+    }
+    if (this.continuous && (value & 0xff) === 0xff) this.continuous = false // its mode bits: go back to commands
+    const listens = this.readable || (select & OUTOVER) === OUTOVER_LOW || !this.continuous
+    this.answer.push(listens ? this.#byte() : NOTHING)
+  }
+
+  #byte() {
+    const at = this.sent.length - 2
+    if (at < 0) return NOTHING
+    const command = this.sent[0] & 0xff
+    if (command === READ_STATUS_2) return this.board.quad === null ? NOTHING : this.board.quad ? QUAD_ENABLE : 0
+    if (command === READ_UNIQUE_ID && at >= UNIQUE_ID_DUMMIES) return this.board.uniqueId[at - UNIQUE_ID_DUMMIES] ?? NOTHING
+    return NOTHING
+  }
+}
