@@ -19,7 +19,7 @@
 #define FALL           4    // what has fallen to a quarter is no longer the press it was
 #define STILL_SWEEPS   5    // 400 ms
 #define QUIET_SWEEPS   12   // 960 ms
-#define LEVEL_SWEEPS   16   // 1.3 s
+#define LEVEL_SWEEPS   18   // 1.4 s
 #define STUCK_SWEEPS   25   // 2 s
 #define EVEN_SWEEPS    100  // 8 s
 #define RISE           2    // pressure above where it was that a slow load makes in a second
@@ -34,26 +34,35 @@ void bt_release_pressure(bt_release *release, int32_t above)
     release->pdc_peak = above > release->pdc_peak ? above : release->pdc_peak;
 }
 
+// A press that the pressure did not see is none of which the pressure can tell.
+static bool has_witness(const bt_release *release, const bt_release_sweep *sweep)
+{
+    return sweep->pressure && (release->pdc_peak >= PRESSED || release->energy_peak < FALL * RESIDUE_ENERGY);
+}
+
 static int32_t clamped(int32_t value, int32_t low, int32_t high)
 {
     return value < low ? low : value > high ? high : value;
 }
 
-// Without pressure only electrodes that are back say that nothing touches.
+// Without a witness only electrodes that are back say that nothing touches.
 static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
 {
-    uint32_t left = sweep->pressure ? release->energy_peak / RESIDUE_SHARE : 0;
-    left = (left > CALM_ENERGY ? left : CALM_ENERGY) + sweep->forgiven_count2;
+    bool witness = has_witness(release, sweep);
+    uint32_t left = witness ? release->energy_peak / RESIDUE_SHARE : 0;
+    uint32_t forgiven = witness ? sweep->forgiven_count2 : 0;
+    left = (left > CALM_ENERGY ? left : CALM_ENERGY) + forgiven;
     int32_t rest = clamped(release->pdc_peak / PDC_REST_SHARE, PDC_QUIET, PDC_REST_MAX);
-    bool back = sweep->pressure ? sweep->above < rest : release->quiet_sweeps >= QUIET_SWEEPS;
-    return back && sweep->still_sweeps >= STILL_SWEEPS && sweep->uneven_count2 < left;
+    bool back = witness ? sweep->above < rest : release->quiet_sweeps >= QUIET_SWEEPS;
+    bool gone = sweep->energy_count2 < left || sweep->uneven_count2 < EVEN_ENERGY + forgiven;
+    return back && gone && sweep->still_sweeps >= STILL_SWEEPS;
 }
 
 static bool is_untouched(const bt_release *release, const bt_release_sweep *sweep)
 {
-    return sweep->pressure && release->pdc_peak <= BT_PDC_HIT && release->quiet_sweeps >= QUIET_SWEEPS
+    return has_witness(release, sweep) && release->pdc_peak <= BT_PDC_HIT && release->quiet_sweeps >= QUIET_SWEEPS
            && sweep->still_sweeps >= QUIET_SWEEPS
-           && sweep->uneven_count2 < RESIDUE_ENERGY + sweep->forgiven_count2;
+           && sweep->energy_count2 < RESIDUE_ENERGY + sweep->forgiven_count2;
 }
 
 static void count_even(bt_release *release, const bt_release_sweep *sweep)
@@ -82,7 +91,7 @@ static bool is_doubtful(const bt_release *release, const bt_release_sweep *sweep
     bool pressed = sweep->pressure && release->pdc_peak >= PRESSED;
     bool fallen = pressed ? sweep->above < release->pdc_peak / FALL
                           : sweep->energy_count2 < release->energy_peak / FALL;
-    bool stuck = sweep->pressure && release->quiet_sweeps >= STUCK_SWEEPS;
+    bool stuck = has_witness(release, sweep) && release->quiet_sweeps >= STUCK_SWEEPS;
     return sweep->still_sweeps >= STILL_SWEEPS && (fallen || stuck);
 }
 

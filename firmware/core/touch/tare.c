@@ -100,6 +100,7 @@ static void forget_contact(bt_tare *tare)
     tare->let_go = false;
     bt_release_begin(&tare->release);
     bt_thermal_begin(&tare->thermal);
+    bt_watch_begin(&tare->watch);
 }
 
 // The host's word, or what the machine did.
@@ -267,7 +268,7 @@ static void serve_touched(bt_tare *tare, unsigned i, uint16_t mean_q3)
     if (tare->thermal.step_q16 != 0) {
         warm_electrode(tare, i);
     }
-    if (tare->sweep.still_sweeps >= WATCH_SWEEPS) {
+    if (tare->watch.wait_sweeps == 0 && tare->sweep.still_sweeps >= WATCH_SWEEPS) {
         uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
         bt_watch_side(&tare->watch, mean_q16, tare->watch.base.electrode_q16[i]);
         if (tare->watch.drifts) {
@@ -329,6 +330,7 @@ static BT_NOINLINE void count_hit(bt_tare *tare)
     }
     tare->let_go = false;
     if (tare->state == BT_TARE_STATE_DOUBT) {
+        bt_watch_begin(&tare->watch);
         enter_contact(tare); // against the tare that was in doubt
         return;
     }
@@ -422,10 +424,14 @@ static void judge_release(bt_tare *tare)
 static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
 {
     bt_thermal_follow(&tare->thermal, settings->thermal_gain_q16);
-    if (tare->sweep.still_sweeps < WATCH_SWEEPS) {
-        tare->watch.drifts = false;
-    } else if (tare->sweep.still_sweeps == WATCH_SWEEPS
-               && !bt_watch_is_near(&tare->watch, &tare->sweep, SPAN_Q3)) {
+    bool rests = tare->sweep.still_sweeps >= WATCH_SWEEPS;
+    tare->watch.drifts = tare->watch.drifts && rests && tare->watch.wait_sweeps == 0;
+    if (tare->watch.wait_sweeps > 1) {
+        tare->watch.wait_sweeps--;
+    }
+    bool due = tare->watch.wait_sweeps == 1 && rests;
+    if (due || (tare->sweep.still_sweeps == WATCH_SWEEPS
+                && !bt_watch_is_near(&tare->watch, &tare->sweep, SPAN_Q3))) {
         bt_watch_take(&tare->watch, &tare->sweep, tare->gate.unknown);
     }
     if (!tare->partial) { // sums over electrodes that were not all served in one state say nothing

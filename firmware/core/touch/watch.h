@@ -14,12 +14,16 @@
 
 typedef struct {
     bt_baseline base;     // where the signals came to rest
+    uint8_t wait_sweeps;  // until what is read now is that; 0 once it was
     uint16_t level_q3;    // the pressure's mean when it last moved
     uint8_t level_sweeps; // for which it has stayed near that; saturates
     int8_t side;          // electrodes whose mean of this sweep is above the watched baseline, less those below
     int16_t one_way_q2;   // the same through a low-pass of four sweeps
     bool drifts;          // the last whole sweep says: what moves is drift
 } bt_watch;
+
+// A contact begins, or the load changes: what was watched before says nothing.
+void bt_watch_begin(bt_watch *watch);
 
 // The signals have come to rest: their means are the baseline. Lanes in `unknown` have none.
 void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown);
