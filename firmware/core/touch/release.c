@@ -37,7 +37,7 @@ void bt_release_pressure(bt_release *release, int32_t above)
 // A press that the pressure did not see is none of which the pressure can tell.
 static bool has_witness(const bt_release *release, const bt_release_sweep *sweep)
 {
-    return sweep->pressure && (release->pdc_peak >= PRESSED || release->energy_peak < FALL * RESIDUE_ENERGY);
+    return sweep->pressure && (release->pdc_peak >= PRESSED || release->uneven_peak < FALL * RESIDUE_ENERGY);
 }
 
 static int32_t clamped(int32_t value, int32_t low, int32_t high)
@@ -50,7 +50,7 @@ static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
 {
     bool witness = has_witness(release, sweep);
     uint32_t left = witness ? release->energy_peak / RESIDUE_SHARE : 0;
-    uint32_t forgiven = witness ? sweep->forgiven_count2 : 0;
+    uint32_t forgiven = witness || !sweep->pressure ? sweep->forgiven_count2 : 0;
     left = (left > CALM_ENERGY ? left : CALM_ENERGY) + forgiven;
     int32_t rest = clamped(release->pdc_peak / PDC_REST_SHARE, PDC_QUIET, PDC_REST_MAX);
     bool back = witness ? sweep->above < rest : release->quiet_sweeps >= QUIET_SWEEPS;
@@ -99,6 +99,8 @@ bt_release_verdict bt_release_judge(bt_release *release, const bt_release_sweep 
 {
     uint32_t energy = sweep->energy_count2;
     release->energy_peak = energy > release->energy_peak ? energy : release->energy_peak;
+    uint32_t uneven = sweep->uneven_count2;
+    release->uneven_peak = uneven > release->uneven_peak ? uneven : release->uneven_peak;
     // Without pressure the energy itself must have fallen, or the first second of a slow load would
     // pass for a residue.
     bool quiet = sweep->pressure ? sweep->above < PDC_QUIET : energy < release->energy_peak / FALL;

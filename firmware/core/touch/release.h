@@ -24,6 +24,7 @@ typedef enum {
 // Since the tare was taken.
 typedef struct {
     uint32_t energy_peak;
+    uint32_t uneven_peak;
     int32_t pdc_peak;
     uint8_t quiet_sweeps; // in a row, with the pressure (without one: the energy) back
     uint8_t even_sweeps;  // in a row, with nothing but a shift on the electrodes while the pressure did not rise

@@ -16,8 +16,7 @@
 #define STILL_SWEEPS 2         // to tare from; the first one may hold what came before it
 #define WATCH_SWEEPS 5         // after which what is read is where the signals came to rest
 
-#define DRIFT_ROUNDS_PER_COUNT 400  // 15 counts/min, the worst drift measured
-#define DRIFT_LIMIT_BLIND      6000 // 60 s
+#define DRIFT_ROUNDS_PER_COUNT 400 // 15 counts/min, the worst drift measured
 #define DRIFT_LIMIT            60000
 
 _Static_assert((uint64_t)DRIFT_LIMIT *DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
@@ -371,15 +370,14 @@ static BT_NOINLINE void look_inverted(bt_tare *tare)
     }
 }
 
-// Where drift and temperature went untracked: 15 counts a minute, the worst drift measured; without pressure
-// a minute of it is all that may be forgiven. Of what temperature was followed by, a third may be wrong.
+// Where drift and temperature went untracked: 15 counts a minute, the worst drift measured, while there is pressure
+// to tell it from a load; and a third of what temperature was followed by may be wrong.
 static uint32_t forgiven_count2(const bt_tare *tare)
 {
-    uint32_t limit = tare->pressure_seen ? DRIFT_LIMIT : DRIFT_LIMIT_BLIND;
-    uint32_t rounds = tare->contact_rounds < limit ? tare->contact_rounds : limit;
+    uint32_t rounds = tare->contact_rounds < DRIFT_LIMIT ? tare->contact_rounds : DRIFT_LIMIT;
     uint32_t drift_count2 = BT_DIVIDE_U32(rounds * rounds, DRIFT_ROUNDS_PER_COUNT * DRIFT_ROUNDS_PER_COUNT);
     uint32_t warm_count = bt_abs32(tare->thermal.applied_q16) >> 16;
-    return BT_ELECTRODES * (drift_count2 + BT_DIVIDE_U32(warm_count * warm_count, 9));
+    return BT_ELECTRODES * ((tare->pressure_seen ? drift_count2 : 0) + BT_DIVIDE_U32(warm_count * warm_count, 9));
 }
 
 // What is left of the energy when every electrode loses what all have moved. A 19th is a product and a shift;
