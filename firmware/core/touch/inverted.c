@@ -3,11 +3,11 @@
 #include "fixed_point.h"
 
 // Real skin leaves the pressure up to 9 counts low after a press; 12 counts are 0.1 to 0.2 N.
-#define BELOW_UNDO     12
-#define BELOW_LOSE     20
-#define ENERGY_UNDO    300
-#define ENERGY_LOSE    2000
-#define ROUNDS         3
+#define BELOW_UNDO  12
+#define BELOW_LOSE  20
+#define ENERGY_UNDO 300
+#define ENERGY_LOSE 2000
+#define ROUNDS      3
 
 _Static_assert(BT_FULL_SCALE_COUNT * 8 <= INT16_MAX, "a change of a count must fit its type");
 
@@ -61,7 +61,7 @@ static sums sums_of(const bt_tare_change *change, const bt_lanes *smooth, const 
 // The signals are the last change of the tare upside down: within 45 degrees of it.
 static bool is_the_change(const sums *s)
 {
-    uint64_t along = s->along < 0 ? (uint64_t) - (int64_t)s->along : 0;
+    uint64_t along = s->along < 0 ? (uint64_t)-(int64_t)s->along : 0;
     return 2 * along * along > (uint64_t)s->energy * s->changed;
 }
 
@@ -84,7 +84,8 @@ bt_tare_doubt bt_inverted_judge(bt_tare_change *change, const bt_lanes *smooth, 
 void bt_inverted_undo(const bt_tare_change *change, bt_baseline *base)
 {
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        base->electrode_q16[i] = bt_baseline_moved(base->electrode_q16[i], -change->electrode_q3[i] * (1 << 13));
+        base->electrode_q16[i] =
+            bt_baseline_moved(base->electrode_q16[i], -change->electrode_q3[i] * (1 << 13));
     }
     base->pdc_q16 = bt_baseline_moved(base->pdc_q16, -change->pdc_q3 * (1 << 13));
 }

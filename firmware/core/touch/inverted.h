@@ -19,8 +19,8 @@ typedef enum { BT_TARE_STANDS, BT_TARE_UNDO, BT_TARE_LOSE } bt_tare_doubt;
 
 void bt_inverted_note(bt_tare_change *change, const bt_baseline *before, const bt_baseline *now);
 
-// A round with a good pressure word. UNDO: the tare before the last one explains what is read. LOSE: it does not,
-// or there is none, and yet this cannot be a touch.
+// A round with a good pressure word. UNDO: the tare before the last one explains what is read. LOSE: it does
+// not, or there is none, and yet this cannot be a touch.
 bt_tare_doubt bt_inverted_judge(bt_tare_change *change, const bt_lanes *smooth, const bt_baseline *base);
 
 // The tare before the last one, as it would have drifted.

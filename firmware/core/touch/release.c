@@ -4,9 +4,9 @@
 
 #include <string.h>
 
-// Pressure above the last tare, from 27 presses of two recordings: what a press left was 5.6 at most (median 1), what
-// was left of it in a hold at a tenth of its peak 11 at least (median 56). Pressure undershoots at a release, so that
-// only too much of it speaks.
+// Pressure above the last tare, from 27 presses of two recordings: what a press left was 5.6 at most (median
+// 1), what was left of it in a hold at a tenth of its peak 11 at least (median 56). Pressure undershoots at a
+// release, so that only too much of it speaks.
 #define PDC_QUIET      4
 #define PDC_REST_MAX   10
 #define PDC_REST_SHARE 24               // of the peak
@@ -60,8 +60,8 @@ static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
 
 static bool is_untouched(const bt_release *release, const bt_release_sweep *sweep)
 {
-    return has_witness(release, sweep) && release->pdc_peak <= BT_PDC_HIT && release->quiet_sweeps >= QUIET_SWEEPS
-           && sweep->still_sweeps >= QUIET_SWEEPS
+    return has_witness(release, sweep) && release->pdc_peak <= BT_PDC_HIT
+           && release->quiet_sweeps >= QUIET_SWEEPS && sweep->still_sweeps >= QUIET_SWEEPS
            && sweep->energy_count2 < RESIDUE_ENERGY + sweep->forgiven_count2;
 }
 
@@ -76,8 +76,8 @@ static void count_even(bt_release *release, const bt_release_sweep *sweep)
     }
 }
 
-// A load makes a pattern. Without one and with little pressure, what was never a press is no touch after a second,
-// and what was one is over after eight: the pressure that a long press leaves takes minutes to go.
+// A load makes a pattern. Without one and with little pressure, what was never a press is no touch after a
+// second, and what was one is over after eight: the pressure that a long press leaves takes minutes to go.
 static bool is_shift(const bt_release *release, const bt_release_sweep *sweep)
 {
     bool pressed = release->pdc_peak >= PRESSED;

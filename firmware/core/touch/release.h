@@ -1,8 +1,8 @@
-// Has a contact ended? Judged after each sweep of eight rounds, on the strongest moment since the tare was taken
-// and on what the signals are now.
+// Has a contact ended? Judged after each sweep of eight rounds, on the strongest moment since the tare was
+// taken and on what the signals are now.
 //
-// What a press leaves in the skin looks like a light hold: its size, its pattern and its stillness do not tell
-// them apart. Pressure against the last tare does. Where it does not, either, the answer is DOUBT.
+// What a press leaves in the skin looks like a light hold: its size, its pattern and its stillness do not
+// tell them apart. Pressure against the last tare does. Where it does not, either, the answer is DOUBT.
 //
 // Units: counts; pressure above its tare in whole counts; energies in count^2 over all electrodes.
 #ifndef BIOTAC_RELEASE_H
@@ -27,14 +27,15 @@ typedef struct {
     uint32_t uneven_peak;
     int32_t pdc_peak;
     uint8_t quiet_sweeps; // in a row, with the pressure (without one: the energy) back
-    uint8_t even_sweeps;  // in a row, with nothing but a shift on the electrodes while the pressure did not rise
-    int32_t even_above;   // pressure when those began
+    uint8_t
+        even_sweeps; // in a row, with nothing but a shift on the electrodes while the pressure did not rise
+    int32_t even_above; // pressure when those began
 } bt_release;
 
 // What a sweep has shown.
 typedef struct {
-    uint32_t energy_count2; // of the means from the tare
-    uint32_t uneven_count2; // the same without what all electrodes share
+    uint32_t energy_count2;   // of the means from the tare
+    uint32_t uneven_count2;   // the same without what all electrodes share
     uint32_t forgiven_count2; // of it, what drift and temperature may have made
     bool pressure;            // at least one pressure word was good
     int32_t above; // pressure over its tare: what it is now or its mean of eight rounds, whichever is more

@@ -370,14 +370,15 @@ static BT_NOINLINE void look_inverted(bt_tare *tare)
     }
 }
 
-// Where drift and temperature went untracked: 15 counts a minute, the worst drift measured, while there is pressure
-// to tell it from a load; and a third of what temperature was followed by may be wrong.
+// Where drift and temperature went untracked: 15 counts a minute, the worst drift measured, while there is
+// pressure to tell it from a load; and a third of what temperature was followed by may be wrong.
 static uint32_t forgiven_count2(const bt_tare *tare)
 {
     uint32_t rounds = tare->contact_rounds < DRIFT_LIMIT ? tare->contact_rounds : DRIFT_LIMIT;
     uint32_t drift_count2 = BT_DIVIDE_U32(rounds * rounds, DRIFT_ROUNDS_PER_COUNT * DRIFT_ROUNDS_PER_COUNT);
     uint32_t warm_count = bt_abs32(tare->thermal.applied_q16) >> 16;
-    return BT_ELECTRODES * ((tare->pressure_seen ? drift_count2 : 0) + BT_DIVIDE_U32(warm_count * warm_count, 9));
+    return BT_ELECTRODES
+           * ((tare->pressure_seen ? drift_count2 : 0) + BT_DIVIDE_U32(warm_count * warm_count, 9));
 }
 
 // What is left of the energy when every electrode loses what all have moved. A 19th is a product and a shift;
@@ -428,8 +429,9 @@ static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
         tare->watch.wait_sweeps--;
     }
     bool due = tare->watch.wait_sweeps == 1 && rests;
-    if (due || (tare->sweep.still_sweeps == WATCH_SWEEPS
-                && !bt_watch_is_near(&tare->watch, &tare->sweep, SPAN_Q3))) {
+    if (due
+        || (tare->sweep.still_sweeps == WATCH_SWEEPS
+            && !bt_watch_is_near(&tare->watch, &tare->sweep, SPAN_Q3))) {
         bt_watch_take(&tare->watch, &tare->sweep, tare->gate.unknown);
     }
     if (!tare->partial) { // sums over electrodes that were not all served in one state say nothing

@@ -4,20 +4,20 @@
 // grows slower than about 5 N/s and locks out after the first contact. This machine follows drift
 // at a bounded rate while nothing touches, freezes on contact, takes the tare back to before the
 // contact began, and re-tares after release once the signals are quiet and the pressure says that it was one.
-// Where a light hold and a press's residue cannot be told apart the tare stays, and a second baseline (watch.h)
-// detects the next contact (protocol/SPEC.md, Tare).
+// Where a light hold and a press's residue cannot be told apart the tare stays, and a second baseline
+// (watch.h) detects the next contact (protocol/SPEC.md, Tare).
 //
 // Units: counts; baselines in 1/65536 count (q16); energies in count^2; time in rounds of 10 ms and
 // sweeps of eight rounds. Baselines round half away from zero when published in 1/16 count.
 #ifndef BIOTAC_TARE_H
 #define BIOTAC_TARE_H
 
+#include "keep/settings.h"
 #include "touch/baseline.h"
 #include "touch/gate.h"
 #include "touch/inverted.h"
 #include "touch/noise.h"
 #include "touch/release.h"
-#include "keep/settings.h"
 #include "touch/sweep.h"
 #include "touch/thermal.h"
 #include "touch/watch.h"
@@ -87,7 +87,8 @@ void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings);
 uint8_t bt_tare_now(bt_tare *tare);
 uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base);
 
-// The host's word: the finger holds something; it holds nothing any more; or the host has been silent too long.
+// The host's word: the finger holds something; it holds nothing any more; or the host has been silent too
+// long.
 void bt_tare_hold(bt_tare *tare);
 void bt_tare_release(bt_tare *tare);
 void bt_tare_lapse(bt_tare *tare);

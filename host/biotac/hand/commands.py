@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
 import numpy as np
 
 from ..core.board_map import BoardMap
-from ..errors import CommandRefusedError, WireVersionError
+from ..errors import CommandRefusedError, DeviceLostError, WireVersionError
 from ..keep import map_blob as maps
 from ..keep.values import Calibration, own_settings
 from ..wire import messages_gen as wire
 from ..wire.frames import tare_to_q4
 from ..wire.sensor_gen import MAX_SENSORS
 from . import map_transfer as transfer
+from .views import finger_index
 
 ALL_FINGERS = (1 << MAX_SENSORS) - 1
 CALIBRATION_SINCE_MINOR = 3  # of wire 1.x
 MAP_SINCE_MINOR = 4
 PRESSURE_SINCE_MINOR = 4
+HOLD_SINCE_MINOR = 5
 
 Reply = TypeVar("Reply")
 
@@ -30,6 +33,7 @@ class Commands(ABC):
     """The commands of a Hand. Each raises CommandRefusedError with the board's reason, or DeviceLostError."""
 
     info: wire.Hello
+    _names: dict[str, int]
 
     @abstractmethod
     def _next_req_id(self) -> int: ...
@@ -91,6 +95,38 @@ class Commands(ABC):
         tare_q4 = tuple(int(v) for v in tare_to_q4(tare))
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
         self._command(wire.TareSet(self._next_req_id(), finger, tare_q4, pdc_q4))
+
+    def hold(self, *fingers: str | int) -> None:
+        """These fingers (names or chip selects; none: all) hold something: no new tare until ``release``.
+
+        The board forgets it when it has heard nothing for ``hold_timeout_ms`` (2 s by default): a Hand with
+        callbacks speaks by itself; one that is pulled calls this again, or ``ping``. Raises KeyError for a finger
+        that there is not, WireVersionError for a board whose firmware knows of no holds.
+        """
+        self._command(wire.Hold(self._next_req_id(), self._mask(fingers)))
+
+    def release(self, *fingers: str | int) -> None:
+        """These fingers hold nothing any more: what a press left in the skin is tared without doubt. See ``hold``."""
+        self._command(wire.Release(self._next_req_id(), self._mask(fingers)))
+
+    @contextmanager
+    def grasp(self, *fingers: str | int) -> Iterator[None]:
+        """``with hand.grasp("thumb", "index"):`` is ``hold`` and, however it ends, ``release``."""
+        self.hold(*fingers)
+        try:
+            yield
+        finally:
+            with suppress(DeviceLostError):  # it is not there to be told; its hold lapses
+                self.release(*fingers)
+
+    def _mask(self, fingers: tuple[str | int, ...]) -> int:
+        if self.info.wire_minor < HOLD_SINCE_MINOR:
+            raise WireVersionError(
+                f"the board's firmware knows no HOLD, expected wire 1.{HOLD_SINCE_MINOR}; update it: biotac flash"
+            )
+        if not fingers:
+            return ALL_FINGERS
+        return sum({1 << finger_index(self._names, finger) for finger in fingers})
 
     def setting(self, setting: wire.Setting | int) -> int:
         """Value of a setting, in its own unit (see wire.SETTINGS)."""
