@@ -9,7 +9,7 @@
 // release, so that only too much of it speaks.
 #define PDC_QUIET      4
 #define PDC_REST_MAX   10
-#define PDC_REST_SHARE 24               // of the peak
+#define PDC_REST_SHARE 40               // of the peak
 #define PRESSED        (4 * BT_PDC_HIT) // pressure that was a press
 // Electrodes: what a press left was .053 of its signal at most, in energy a 356th.
 #define CALM_ENERGY    400

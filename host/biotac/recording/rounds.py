@@ -47,7 +47,8 @@ class HostTare:
 class Rounds:
     """A finger's rounds: ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,), ``t_us`` (n,) device time.
 
-    ``tares``: by the round from which on each holds; ``words``: HOST_HOLD, HOST_RELEASE or HOLD_LAPSED, likewise. ``wrench_map``: in force all along.
+    ``tares``: by the round from which on each holds; ``words``: HOST_HOLD, HOST_RELEASE or HOLD_LAPSED, likewise.
+    ``wrench_map``: in force all along.
     """
 
     finger: int

@@ -39,7 +39,7 @@ RELEASES = (wire.TareReason.RELEASE, wire.TareReason.RESIDUE, wire.TareReason.SH
 
 @dataclass(frozen=True)
 class Press:
-    """Rows of a press: its first, that of its peak, and where the next begins; PDC at rest before it and at its peak."""
+    """Rows of a press: its first, its peak, where the next begins; PDC at rest before it and at its peak."""
 
     first: int
     peak: int
@@ -217,8 +217,8 @@ def page(facts: Facts) -> list[str]:
     for case in facts["cases"]:
         forces = [f for f in case["rezero_force_n"] if f is not None]
         lines += [
-            f"{case['sensor']}: {case['presses']} presses, {case['seen']} seen; {case['rezeros']} re-zeros, with at most "
-            f"{text(max(forces, default=float('nan')), 2)} N before.",
+            f"{case['sensor']}: {case['presses']} presses, {case['seen']} seen; {case['rezeros']} re-zeros, "
+            f"with at most {text(max(forces, default=float('nan')), 2)} N before.",
             "",
             *table(["hold", "holds", "tared", "in doubt", "contact"],
                    [[f"{its['share']:.0%}", *[str(its[k]) for k in ("holds", "tared", "doubt", "contact")]]
