@@ -21,7 +21,8 @@ void bt_inverted_note(bt_tare_change *change, const bt_baseline *before, const b
 
 // A round with a good pressure word. UNDO: the tare before the last one explains what is read. LOSE: it does
 // not, or there is none, and yet this cannot be a touch.
-bt_tare_doubt bt_inverted_judge(bt_tare_change *change, const bt_lanes *smooth, const bt_baseline *base);
+bt_tare_doubt bt_inverted_judge(bt_tare_change *change, const bt_lanes *smooth, const bt_baseline *base,
+                                int32_t pdc_peak);
 
 // The tare before the last one, as it would have drifted.
 void bt_inverted_undo(const bt_tare_change *change, bt_baseline *base);

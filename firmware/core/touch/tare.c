@@ -359,7 +359,8 @@ static void lose_tare(bt_tare *tare)
 // A tare that was taken of a hold shows when that ends.
 static BT_NOINLINE void look_inverted(bt_tare *tare)
 {
-    bt_tare_doubt doubt = bt_inverted_judge(&tare->last, &tare->gate.smooth, &tare->base);
+    bt_tare_doubt doubt =
+        bt_inverted_judge(&tare->last, &tare->gate.smooth, &tare->base, tare->release.pdc_peak);
     if (doubt == BT_TARE_UNDO) {
         bt_baseline before = tare->base;
         bt_inverted_undo(&tare->last, &before);
