@@ -262,7 +262,7 @@ void bt_finger_point(bt_finger *finger, const bt_solve_settings *settings, bt_ms
     int32_t e_q4[BT_ELECTRODES];
     bt_point point = {.um = {BT_INVALID_I16, BT_INVALID_I16, BT_INVALID_I16}};
     bt_signals_q4(finger->round.electrode, finger->tare.electrode_q4, e_q4);
-    if (finger->tare.reason != BT_TARE_REASON_NONE) {
+    if (finger->tare.tared) {
         (void)bt_poc(e_q4, settings->poc_weights, &point);
     }
     msg->finger = finger->index;

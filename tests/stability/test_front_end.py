@@ -146,7 +146,11 @@ def test_a_released_finger_is_tared_though_it_creeps(profile: str, force_n: floa
     released = int(np.flatnonzero(course.force_n > 0)[-1])
     rows = course.run()
     state = rows["tare_state"][released:]
-    assert (state[: TARED_WITHIN + 1] == TareState.REST).any()
+    # Tared, or in doubt for as long as the model's pressure creeps: after half a minute at 5 N by 29 counts.
+    assert np.isin(state[: TARED_WITHIN + 1], (TareState.REST, TareState.DOUBT)).any()
+    if state[-1] == TareState.DOUBT:
+        assert course.words["pdc"][-100:].mean() - rows["pdc_tare_q4"][-1] / 16 > 10
+        return
     # The skin creeps back by up to 150 counts. Where that passes the threshold it looks like touches; none of them
     # may last: after a minute the finger rests. Its tare was last set to what it read then, creep and all, and has
     # followed the creep at the slew since.
@@ -204,15 +208,23 @@ def test_faster_warming_looks_like_touches_and_ends_in_a_tare(profile: str, cels
     assert course.tare_error(rows)[-1] <= 5 * course.sensor.noise_counts / 8**0.5 + 1
 
 
-def test_a_jump_of_temperature_locks_the_finger_until_the_host_tares() -> None:
-    # The stated limit, so that nobody is surprised: at 2 degrees a second nothing is ever still, and what the
-    # thermal term leaves of eight degrees is more than any residue.
-    course = without_drift(script(2, "worn")).warm(8, 4).rest(60).make()
-    finger = Finger()
-    rows = finger.feed(**course.words)
-    assert rows["tare_state"][-1] == TareState.CONTACT
-    finger.tare_now()
-    assert np.abs(finger.tare_counts - course.rest[-1]).max() <= 5 * course.sensor.noise_counts / 8**0.5
+@pytest.mark.parametrize("profile", ["new", "worn"])
+@pytest.mark.parametrize("celsius", [8.0, -8.0])
+def test_a_jump_of_temperature_is_no_touch_five_seconds_after_it_began(profile: str, celsius: float) -> None:
+    course = without_drift(script(2, profile)).warm(celsius, 4).rest(30).make()
+    rows = course.run()
+    assert (rows["tare_state"][1000 + 500 :] == TareState.REST).all()
+    assert course.tare_error(rows)[-1] <= 5 * course.sensor.noise_counts / 8**0.5 + 1
+
+
+@pytest.mark.parametrize("profile", ["new", "worn"])
+@pytest.mark.parametrize(("pdc", "electrodes", "seconds"), [(8, 0, 2.0), (0, 20, 5.0), (5, 20, 5.0)])
+def test_a_shift_is_no_touch(profile: str, pdc: int, electrodes: int, seconds: float) -> None:
+    words = {name: its.copy() for name, its in script(5, profile).rest(20).make().words.items()}
+    words["pdc"][1500:] += pdc
+    words["counts"][1500:] += electrodes
+    state = Finger().feed(**words)["tare_state"][1500:]
+    assert (state[round(100 * seconds) :] == TareState.REST).all()
 
 
 def thermal_error(course: Course, gain_milli: int, before: slice, after: slice) -> float:

@@ -73,7 +73,9 @@ def misplaced(program: stack.Program) -> list[str]:
     early = program.reached("clocks_start") | {"image_reset"}
     late = program.reached("main").union(*(program.reached(name) for name in INTERRUPTS)) - {ROM}
     wrong = [f"{name} in flash" for name in late if program.functions[name].address < SRAM]
-    return sorted(wrong + [f"{name} in SRAM before it is copied" for name in early if program.functions[name].address >= SRAM])
+    return sorted(
+        wrong + [f"{name} in SRAM before it is copied" for name in early if program.functions[name].address >= SRAM]
+    )
 
 
 def check(elf: Path, objdump: str) -> list[str]:
@@ -86,7 +88,9 @@ def check(elf: Path, objdump: str) -> list[str]:
     program.functions[ROM] = stack.Function(0, ROM_STACK_BYTES)
     depth, chains = stack_depth(program)
     print(f"flash {flash} of {FLASH_BUDGET} bytes")
-    print(f"RAM   {ram} of {RAM_BUDGET} bytes: program {size['.text']}, data {size['.data']}, bss {size['.bss']}, stack {size['.stack']}")
+    print(
+        f"RAM   {ram} of {RAM_BUDGET} bytes: program {size['.text']}, data {size['.data']}, bss {size['.bss']}, stack {size['.stack']}"
+    )
     print(f"stack {depth} of {size['.stack']} bytes: {chains}")
     wrong = [f"{flash} bytes of flash"] if flash > FLASH_BUDGET else []
     wrong += [f"{ram} bytes of RAM"] if ram > RAM_BUDGET else []

@@ -85,11 +85,12 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
     if (counts > BT_FULL_SCALE_COUNT || tare->gate.missing + tare->gate.railed > 0) {
         flags |= trouble(round, tare);
     }
-    if (tare->reason == BT_TARE_REASON_NONE) {
+    if (!tare->tared) {
         flags |= BT_FRAME_FLAG_UNTARED | BT_FRAME_FLAG_POC_INVALID;
     }
-    if (tare->state == BT_TARE_STATE_CONTACT) {
-        flags |= BT_FRAME_FLAG_CONTACT;
+    flags |= tare->held ? BT_FRAME_FLAG_HELD : 0;
+    if (tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT) {
+        flags |= tare->state == BT_TARE_STATE_DOUBT ? BT_FRAME_FLAG_DOUBT : BT_FRAME_FLAG_CONTACT;
         flags |= tare->contact_rounds > BASE_OLD_FRAMES ? BT_FRAME_FLAG_BASE_OLD : 0;
         flags |= bt_thermal_warmed(&tare->thermal) ? BT_FRAME_FLAG_TEMP : 0;
     }

@@ -114,6 +114,24 @@ static uint8_t tare_set(bt_session *session, const uint8_t *payload)
     return bt_tare_set(&session->finger[msg.finger].tare, &base);
 }
 
+// HOLD and RELEASE.
+static uint8_t tell_fingers(bt_session *session, const uint8_t *payload, void (*word)(bt_tare *tare))
+{
+    bt_msg_hold msg;
+    bt_msg_hold_unpack(&msg, payload);
+    if (msg.fingers >> BT_MAX_FINGERS != 0) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (msg.fingers >> f & 1) {
+            word(&session->finger[f].tare);
+        }
+    }
+    return BT_ERROR_OK;
+}
+
+_Static_assert(BT_HOLD_BYTES == BT_RELEASE_BYTES, "HOLD and RELEASE are read alike");
+
 static void sensor_info(bt_session *session, uint8_t req_id, uint8_t finger)
 {
     uint8_t payload[BT_SENSOR_INFO_BYTES];
@@ -291,6 +309,12 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         break;
     case BT_TARE_SET_ID:
         error = tare_set(session, payload);
+        break;
+    case BT_HOLD_ID:
+        error = tell_fingers(session, payload, bt_tare_hold);
+        break;
+    case BT_RELEASE_ID:
+        error = tell_fingers(session, payload, bt_tare_release);
         break;
     case BT_GET_STATUS_ID:
         bt_session_send_status(session, req_id, now_us);

@@ -21,6 +21,19 @@ void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, 
     }
 }
 
+// A hand whose controller is gone holds on for a while, and is then judged by its signals again.
+static void lapse_holds(bt_session *session, uint32_t now_us)
+{
+    if (session->hold_timeout_us == 0 || now_us - session->heard_us <= session->hold_timeout_us) {
+        return;
+    }
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (session->finger[f].tare.held) {
+            bt_tare_lapse(&session->finger[f].tare);
+        }
+    }
+}
+
 void bt_session_tick(bt_session *session, uint32_t now_us)
 {
     while (now_us - session->second_us >= 1000000) {
@@ -30,6 +43,7 @@ void bt_session_tick(bt_session *session, uint32_t now_us)
     if (session->keepalive_ms != 0 && now_us - session->heard_us > session->keepalive_ms * 1000u) {
         bt_session_stop(session);
     }
+    lapse_holds(session, now_us);
     if (now_us - session->status_us < session->status_period_us) {
         return;
     }

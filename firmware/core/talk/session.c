@@ -68,6 +68,7 @@ void bt_session_use_settings(bt_session *session)
         use_finger_settings(session, f);
     }
     session->status_period_us = (uint32_t)bt_settings_get(settings, BT_SETTING_STATUS_PERIOD_MS) * 1000;
+    session->hold_timeout_us = (uint32_t)bt_settings_get(settings, BT_SETTING_HOLD_TIMEOUT_MS) * 1000;
     session->idle_rounds = (uint16_t)(bt_settings_get(settings, BT_SETTING_IDLE_PERIOD_MS) / BT_FRAME_MS);
 }
 

@@ -75,6 +75,7 @@ typedef struct {
     bt_solve_settings kernel[BT_MAX_FINGERS];
     bt_tare_settings tare[BT_MAX_FINGERS];
     uint32_t status_period_us;
+    uint32_t hold_timeout_us; // 0: HOLD never lapses
     uint16_t idle_rounds;
     bt_identity identity;
     bt_link_write write;

@@ -43,6 +43,17 @@ static inline uint32_t bt_baseline_follow(uint32_t base_q16, uint32_t target_q16
     return base_q16 + (uint32_t)change_q16;
 }
 
+// A value moved by step_q16; it stays within 0..full scale, and an unknown one stays unknown.
+static inline uint32_t bt_baseline_moved(uint32_t base_q16, int32_t step_q16)
+{
+    if (base_q16 == BT_TARE_UNKNOWN) {
+        return base_q16;
+    }
+    int32_t moved_q16 = (int32_t)base_q16 + step_q16;
+    int32_t top_q16 = BT_FULL_SCALE_COUNT << 16;
+    return (uint32_t)(moved_q16 < 0 ? 0 : moved_q16 > top_q16 ? top_q16 : moved_q16);
+}
+
 // As it is subtracted and published: 1/16 count; BT_INVALID_COUNT when unknown.
 static inline uint16_t bt_tare_q4(uint32_t base_q16)
 {

@@ -3,7 +3,9 @@
 // Lin's rule (re-tare whenever the sum of squares stays under 1000 count^2) zeroes every load that
 // grows slower than about 5 N/s and locks out after the first contact. This machine follows drift
 // at a bounded rate while nothing touches, freezes on contact, takes the tare back to before the
-// contact began, and re-tares after release once the signals are quiet (protocol/SPEC.md, Tare).
+// contact began, and re-tares after release once the signals are quiet and the pressure says that it was one.
+// Where a light hold and a press's residue cannot be told apart the tare stays, and a second baseline
+// (watch.h) detects the next contact (protocol/SPEC.md, Tare).
 //
 // Units: counts; baselines in 1/65536 count (q16); energies in count^2; time in rounds of 10 ms and
 // sweeps of eight rounds. Baselines round half away from zero when published in 1/16 count.
@@ -13,10 +15,12 @@
 #include "keep/settings.h"
 #include "touch/baseline.h"
 #include "touch/gate.h"
+#include "touch/inverted.h"
 #include "touch/noise.h"
 #include "touch/release.h"
 #include "touch/sweep.h"
 #include "touch/thermal.h"
+#include "touch/watch.h"
 
 // What the machine needs of the settings.
 typedef struct {
@@ -29,16 +33,21 @@ bt_tare_settings bt_tare_settings_from(const bt_settings *settings);
 typedef struct {
     bt_gate gate;
     bt_sweep sweep;
-    uint8_t state;        // enum bt_tare_state
-    uint8_t reason;       // enum bt_tare_reason of the last change
+    uint8_t state;  // enum bt_tare_state
+    uint8_t reason; // enum bt_tare_reason of the last change
     uint8_t before_fault; // the state to go back to
-    bool changed;         // the last round changed the tare by more than drift tracking
+    bool changed;   // the last round changed the tare by more than drift tracking, or the host's word did
+    bool tared;     // there is one
+    bool held;      // the host says so: no new tare is taken
+    bool let_go;    // the host says so: what is in doubt is residue
     bt_baseline base;
     uint16_t electrode_q4[BT_ELECTRODES]; // base as it is subtracted; BT_INVALID_COUNT when unknown
     uint32_t threshold_count2;            // energy above which a round counts as touched
     uint32_t age_rounds;                  // since the last change
     uint32_t contact_rounds;              // since the contact was seen
 
+    bt_watch watch;
+    bt_tare_change last; // what the latest new tare changed
     bt_rollback rollback;
     bt_noise noise;
     bt_thermal thermal;
@@ -50,6 +59,8 @@ typedef struct {
     bool partial_before;    // nor did the one before
     uint32_t deviation_q6;  // count^2; of this sweep: filtered counts from their means
     uint32_t energy_count2; // of this sweep: means from the tare
+    int32_t sum_q4;         // of the same distances
+    bool pressure_seen;     // in this sweep at least one pressure word was good
 } bt_tare;
 
 void bt_tare_reset(bt_tare *tare);
@@ -62,7 +73,7 @@ bool bt_tare_touch(bt_tare *tare);
 #ifndef BT_CDEF
 static inline bool bt_tare_electrode(bt_tare *tare, unsigned electrode, uint16_t count)
 {
-    if (tare->state != BT_TARE_STATE_REST) {
+    if (tare->state != BT_TARE_STATE_REST && tare->state != BT_TARE_STATE_DOUBT) {
         bt_gate_follow(&tare->gate, electrode, count);
         return false;
     }
@@ -76,6 +87,12 @@ void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings);
 // Host commands; enum bt_error. NOW needs two sweeps that hold still; both are refused in FAULT.
 uint8_t bt_tare_now(bt_tare *tare);
 uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base);
+
+// The host's word: the finger holds something; it holds nothing any more; or the host has been silent too
+// long.
+void bt_tare_hold(bt_tare *tare);
+void bt_tare_release(bt_tare *tare);
+void bt_tare_lapse(bt_tare *tare);
 
 // More electrodes of this round were missing or railed than results can do without.
 #ifndef BT_CDEF

@@ -1252,6 +1252,44 @@ void bt_msg_clear_map_unpack(bt_msg_clear_map *msg, const uint8_t in[BT_CLEAR_MA
     (void)at;
 }
 
+void bt_msg_hold_pack(const bt_msg_hold *msg, uint8_t out[BT_HOLD_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->fingers, 1);
+    (void)at;
+}
+
+void bt_msg_hold_unpack(bt_msg_hold *msg, const uint8_t in[BT_HOLD_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->fingers = (uint8_t)value;
+    (void)at;
+}
+
+void bt_msg_release_pack(const bt_msg_release *msg, uint8_t out[BT_RELEASE_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->fingers, 1);
+    (void)at;
+}
+
+void bt_msg_release_unpack(bt_msg_release *msg, const uint8_t in[BT_RELEASE_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->fingers = (uint8_t)value;
+    (void)at;
+}
+
 int bt_wire_payload_bytes(uint8_t id)
 {
     switch (id) {
@@ -1333,6 +1371,10 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_END_MAP_BYTES;
     case BT_CLEAR_MAP_ID:
         return BT_CLEAR_MAP_BYTES;
+    case BT_HOLD_ID:
+        return BT_HOLD_BYTES;
+    case BT_RELEASE_ID:
+        return BT_RELEASE_BYTES;
     default:
         return -1;
     }
@@ -1351,6 +1393,7 @@ const bt_setting_spec bt_setting_specs[BT_SETTINGS] = {
     {BT_SETTING_THERMAL_GAIN_MILLI, -5000, 5000, 500},
     {BT_SETTING_PRESSURE_GAIN_NN, 0, 100000000, 0},
     {BT_SETTING_PRESSURE_FILTER_MILLI, 10, 1000, 500},
+    {BT_SETTING_HOLD_TIMEOUT_MS, 0, 3600000, 2000},
 };
 
 const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES] = {

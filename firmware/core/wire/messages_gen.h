@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0xFFDCEECBu
+#define BT_SCHEMA_HASH 0x2788E1AAu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -39,8 +39,9 @@ enum bt_error {
 enum bt_tare_state {
     BT_TARE_STATE_INIT = 0, // no tare yet: waiting for still frames
     BT_TARE_STATE_REST = 1, // tared, nothing touches; the tare follows slow drift
-    BT_TARE_STATE_CONTACT = 2, // touched; the tare is frozen
+    BT_TARE_STATE_CONTACT = 2, // touched; the tare is frozen but for temperature and drift that all electrodes share
     BT_TARE_STATE_FAULT = 3, // railed or dead electrodes; the tare is frozen and no new one is taken
+    BT_TARE_STATE_DOUBT = 4, // still, and either a light hold or what a press left in the skin: the tare stays, and the next contact is seen
 };
 
 // Why the tare last changed by more than drift tracking.
@@ -52,6 +53,12 @@ enum bt_tare_reason {
     BT_TARE_REASON_ROLL_BACK = 4, // contact began: tare taken from at least one second before
     BT_TARE_REASON_HOST_NOW = 5, // TARE_NOW command
     BT_TARE_REASON_HOST_SET = 6, // TARE_SET command
+    BT_TARE_REASON_SHIFT = 7, // pressure alone or all electrodes alike had moved: no touch; the tare moved by that and nothing else
+    BT_TARE_REASON_UNDONE = 8, // inverted signals proved the tare wrong: the one before it holds again
+    BT_TARE_REASON_INVERTED = 9, // inverted signals proved the tare wrong and there is none before it: untared until still
+    BT_TARE_REASON_HOST_HOLD = 10, // HOLD command: the tare is as it was, and stays
+    BT_TARE_REASON_HOST_RELEASE = 11, // RELEASE command: the tare is as it was, until still
+    BT_TARE_REASON_HOLD_LAPSED = 12, // the host that said HOLD has been silent for hold_timeout_ms: the tare is as it was
 };
 
 // How electrode signals weigh in the point of contact (Lin Eq 1). On real plates compression does best.
@@ -89,17 +96,19 @@ enum bt_calibration_state {
 #define BT_FRAME_FLAG_FX_WEAK (1u << 10) // force x has two to three times the noise of y and z (always)
 #define BT_FRAME_FLAG_TORSION_OK (1u << 11) // PoC normal within 60 deg of -z, energy over the threshold, four electrodes active
 #define BT_FRAME_FLAG_SHEAR_MIX (1u << 12) // more than half the energy is bulge: the PoC is likely biased
-#define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s: drift has gone untracked
-#define BT_FRAME_FLAG_TARE_CHANGED (1u << 14) // this frame is the first with a new tare (see the TARE message)
+#define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s: only drift that all electrodes share was followed
+#define BT_FRAME_FLAG_TARE_CHANGED (1u << 14) // this frame is the first with a new tare, or after HOLD or RELEASE (see the TARE message)
 #define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes railed or missing: do not trust the results
 #define BT_FRAME_FLAG_TEMP (1u << 16) // since the contact began the temperature has moved by over a degree: the tare is doubtful
 #define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to and marked invalid (SUBSCRIBE)
 #define BT_FRAME_FLAG_MAPPED (1u << 18) // force, and torque and torsion where it has them, come from the finger's wrench map
+#define BT_FRAME_FLAG_DOUBT (1u << 19) // the force may be a light hold or what a press left in the skin: the tare stays (tare state DOUBT)
+#define BT_FRAME_FLAG_HELD (1u << 20) // the host said HOLD: no new tare is taken
 #define BT_FRAME_FLAG_REPEATED (1u << 21) // the board was short of time: force, torque and torsion are those of wrench_age_ms before, from the same map
 #define BT_FRAME_FLAG_SHED (1u << 22) // the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out
 #define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not said its serial number since: tare, calibration and map may be another's
 #define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with a tare of its own; no results where it has not the same calibration and map
-#define BT_FRAME_FLAGS 0x1E7FFFFu // all there are
+#define BT_FRAME_FLAGS 0x1FFFFFFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME messages
@@ -130,8 +139,9 @@ enum bt_setting {
     BT_SETTING_THERMAL_GAIN_MILLI = 10, // [count/1000 per TDC count]
     BT_SETTING_PRESSURE_GAIN_NN = 11, // [nN/count]
     BT_SETTING_PRESSURE_FILTER_MILLI = 12, // [1/1000]
+    BT_SETTING_HOLD_TIMEOUT_MS = 13, // [ms]
 };
-#define BT_SETTINGS 12
+#define BT_SETTINGS 13
 
 // Ranges, for the bounds that the core asserts.
 #define BT_SETTING_POC_WEIGHTS_MIN (0)
@@ -158,6 +168,8 @@ enum bt_setting {
 #define BT_SETTING_PRESSURE_GAIN_NN_MAX 100000000
 #define BT_SETTING_PRESSURE_FILTER_MILLI_MIN (10)
 #define BT_SETTING_PRESSURE_FILTER_MILLI_MAX 1000
+#define BT_SETTING_HOLD_TIMEOUT_MS_MIN (0)
+#define BT_SETTING_HOLD_TIMEOUT_MS_MAX 3600000
 
 typedef struct {
     uint8_t id;
@@ -672,6 +684,26 @@ typedef struct {
 void bt_msg_clear_map_pack(const bt_msg_clear_map *msg, uint8_t out[BT_CLEAR_MAP_BYTES]);
 void bt_msg_clear_map_unpack(bt_msg_clear_map *msg, const uint8_t in[BT_CLEAR_MAP_BYTES]);
 
+// These fingers hold something: no new tare is taken until RELEASE, or until the host has been silent for hold_timeout_ms. Again is harmless.
+#define BT_HOLD_ID 0x98
+#define BT_HOLD_BYTES 2
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t fingers; // [bit mask] which fingers; others stay as they are
+} bt_msg_hold;
+void bt_msg_hold_pack(const bt_msg_hold *msg, uint8_t out[BT_HOLD_BYTES]);
+void bt_msg_hold_unpack(bt_msg_hold *msg, const uint8_t in[BT_HOLD_BYTES]);
+
+// These fingers hold nothing any more: where a light hold and a press's residue cannot be told apart, it is residue, until the next contact.
+#define BT_RELEASE_ID 0x99
+#define BT_RELEASE_BYTES 2
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t fingers; // [bit mask] which fingers; others stay as they are
+} bt_msg_release;
+void bt_msg_release_pack(const bt_msg_release *msg, uint8_t out[BT_RELEASE_BYTES]);
+void bt_msg_release_unpack(bt_msg_release *msg, const uint8_t in[BT_RELEASE_BYTES]);
+
 // Payload length of a message id, without id and CRC; -1 when the id is unknown.
 int bt_wire_payload_bytes(uint8_t id);
 
@@ -716,7 +748,9 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_WRITE_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(offset, u16, 1) X(data, u8, 128)
 #define BT_END_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(crc32, u32, 1)
 #define BT_CLEAR_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map)
+#define BT_HOLD_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
+#define BT_RELEASE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release)
 #endif
 
 #endif

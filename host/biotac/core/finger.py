@@ -164,6 +164,18 @@ class Finger:
         base.pdc_q16 = TARE_UNKNOWN_Q16 if pdc is None else q16[_ELECTRODES]
         _accept("TARE_SET", lib.bt_tare_set(ffi.addressof(self._finger, "tare"), base))
 
+    def hold(self) -> None:
+        """HOLD: no new tare is taken until release() or lapse()."""
+        lib.bt_tare_hold(ffi.addressof(self._finger, "tare"))
+
+    def release(self) -> None:
+        """RELEASE: nothing is held any more; what is in doubt is a press's residue."""
+        lib.bt_tare_release(ffi.addressof(self._finger, "tare"))
+
+    def lapse(self) -> None:
+        """What the board does when the host that said HOLD has been silent for too long."""
+        lib.bt_tare_lapse(ffi.addressof(self._finger, "tare"))
+
     def tare_message(self) -> wire.Tare:
         """The TARE message a board sends when the latest round changed the tare; ``seq`` counts from reset."""
         tare = self._finger.tare

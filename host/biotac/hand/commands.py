@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
 
 from ..core.board_map import BoardMap
-from ..errors import CommandRefusedError, WireVersionError
+from ..errors import CommandRefusedError, DeviceLostError, WireVersionError
 from ..keep import map_blob as maps
 from ..keep.values import Calibration, own_settings
 from ..wire import messages_gen as wire
@@ -15,18 +17,21 @@ from ..wire.frames import tare_to_q4
 from ..wire.sensor_gen import MAX_SENSORS
 from . import map_transfer as transfer
 from .board import Board
+from .views import DEFAULT_NAMES, finger_index
 
 ALL_FINGERS = (1 << MAX_SENSORS) - 1
 CALIBRATION_SINCE_MINOR = 3  # of wire 1.x
 MAP_SINCE_MINOR = 4
 PRESSURE_SINCE_MINOR = 4
+HOLD_SINCE_MINOR = 5
 
 
 class Commands:
     """Each raises CommandRefusedError with the board's reason, or DeviceLostError."""
 
-    def __init__(self, board: Board) -> None:
+    def __init__(self, board: Board, names: Mapping[str, int] = DEFAULT_NAMES) -> None:
         self._board = board
+        self._names = names
 
     def ping(self) -> None:
         """Wait for the board; everything it sent before has arrived afterwards."""
@@ -71,6 +76,38 @@ class Commands:
         tare_q4 = tuple(int(v) for v in tare_to_q4(tare))
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
         self._board.tell(wire.TareSet(0, finger, tare_q4, pdc_q4))
+
+    def hold(self, *fingers: str | int) -> None:
+        """These fingers (names or chip selects; none: all) hold something: no new tare until ``release``.
+
+        The board forgets it when it has heard nothing for ``hold_timeout_ms`` (2 s by default): a Hand with
+        callbacks speaks by itself; one that is pulled calls this again, or ``ping``. Raises KeyError for a finger
+        that there is not, WireVersionError for a board whose firmware knows of no holds.
+        """
+        self._board.tell(wire.Hold(0, self._mask(fingers)))
+
+    def release(self, *fingers: str | int) -> None:
+        """These fingers hold nothing any more: what a press left in the skin is tared without doubt. See ``hold``."""
+        self._board.tell(wire.Release(0, self._mask(fingers)))
+
+    @contextmanager
+    def grasp(self, *fingers: str | int) -> Iterator[None]:
+        """``with hand.grasp("thumb", "index"):`` is ``hold`` and, however it ends, ``release``."""
+        self.hold(*fingers)
+        try:
+            yield
+        finally:
+            with suppress(DeviceLostError):  # it is not there to be told; its hold lapses
+                self.release(*fingers)
+
+    def _mask(self, fingers: tuple[str | int, ...]) -> int:
+        if self._board.info.wire_minor < HOLD_SINCE_MINOR:
+            raise WireVersionError(
+                f"the board's firmware knows no HOLD, expected wire 1.{HOLD_SINCE_MINOR}; update it: biotac flash"
+            )
+        if not fingers:
+            return ALL_FINGERS
+        return sum({1 << finger_index(self._names, finger) for finger in fingers})
 
     def setting(self, setting: wire.Setting | int) -> int:
         """Value of a setting, in its own unit (see wire.SETTINGS)."""

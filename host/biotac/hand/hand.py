@@ -71,7 +71,7 @@ class Hand:
         host_clock = host_clock or SystemClock()
         self._latest = Latest(host_clock, fingers)
         self._board = Board(link, host_clock=host_clock)
-        self._commands = Commands(self._board)
+        self._commands = Commands(self._board, self._latest.names)
         self._streams = Streams(self._board, self._latest)
         if reconnect:
             Reconnection(self._board, self._latest.last_t_us, self._resume)
@@ -170,6 +170,9 @@ class Hand:
     point = _of("_commands", Commands.point)
     tare = _of("_commands", Commands.tare)
     set_tare = _of("_commands", Commands.set_tare)
+    hold = _of("_commands", Commands.hold)
+    release = _of("_commands", Commands.release)
+    grasp = _of("_commands", Commands.grasp)
     setting = _of("_commands", Commands.setting)
     set_setting = _of("_commands", Commands.set_setting)
     settings = _of("_commands", Commands.settings)

@@ -68,7 +68,7 @@ class Latest:
 
     def __init__(self, host_clock: HostClock, names: Mapping[str, int] | None = None) -> None:
         self._monotonic_s = host_clock.monotonic_s
-        self._names = checked_names(names)
+        self.names = checked_names(names)
         self._unseen: deque[tuple[Batch, float]] = deque()
         self._unseen_fingers = 0  # bit mask
         # finger: (batch, row, row is a heartbeat, arrival in s)
@@ -77,8 +77,8 @@ class Latest:
 
     def __getitem__(self, key: str | int) -> FingerView:
         """A finger by name or chip select; KeyError in words."""
-        index = finger_index(self._names, key)
-        names = {number: name for name, number in self._names.items()}
+        index = finger_index(self.names, key)
+        names = {number: name for name, number in self.names.items()}
         return FingerView(names.get(index, str(index)), index, self)
 
     def update(self, batch: Batch, when_s: float) -> None:

@@ -221,10 +221,28 @@ def _rounds(recording: Recording, at: NDArray[np.int64], its: BoardMap | None, n
         q4 = np.append(sent["tare_q4"][0], sent["pdc_tare_q4"][0])
         _give(tares, 0, np.where(q4 == wire.INVALID_COUNT, np.nan, q4 / 16), False)
         notes.append(f"finger {finger} was tared before the recording began; it starts with its first frame's tare")
+    words = _host_words(recording, sent, row_of)
     sigma = (sent["poc_sigma_um"] != wire.INVALID_COUNT).any()
     quantities = RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags(wire.QuantityFlags.SIGMA if sigma else 0)
     t_us = recording.frames["t_us"][at]
-    return Rounds(finger, sent["counts"], sent["pdc"], sent["tac"], sent["tdc"], t_us, tares, quantities, its)
+    return Rounds(finger, sent["counts"], sent["pdc"], sent["tac"], sent["tdc"], t_us, tares, words, quantities, its)
+
+
+def _host_words(recording: Recording, sent: StructArray, row_of: Mapping[int, int]) -> dict[int, wire.TareReason]:
+    """What the host, or its silence, said of a finger, by row: from the flag HELD, and RELEASE from its message."""
+    held = (sent["flags"] & wire.FrameFlags.HELD) != 0
+    edges = np.diff(held.astype(np.int8), prepend=np.int8(0))
+    words = {
+        int(row): wire.TareReason.HOST_HOLD if edges[row] > 0 else wire.TareReason.HOLD_LAPSED
+        for row in np.flatnonzero(edges)
+    }
+    finger = int(sent["finger"][0])
+    for message in recording.messages:
+        if isinstance(message, wire.Tare) and message.finger == finger:
+            row = row_of.get(message.seq)
+            if row is not None and message.reason == wire.TareReason.HOST_RELEASE:
+                words[row] = wire.TareReason.HOST_RELEASE
+    return words
 
 
 def _give(tares: dict[int, HostTare], row: int | None, values: NDArray[np.float64], now: bool) -> None:

@@ -17,6 +17,11 @@ from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray
 
 _FRAME_FIELDS = list(DTYPES[wire.Frame.ID].names or ())
+_WORDS = {
+    wire.TareReason.HOST_HOLD: Finger.hold,
+    wire.TareReason.HOST_RELEASE: Finger.release,
+    wire.TareReason.HOLD_LAPSED: Finger.lapse,
+}
 _ROWS = 2000  # between two calls of show
 
 
@@ -43,7 +48,8 @@ class HostTare:
 class Rounds:
     """A finger's rounds: ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,), ``t_us`` (n,) device time.
 
-    ``tares``: by the round from which on each holds. ``wrench_map``: in force all along.
+    ``tares``: by the round from which on each holds; ``words``: HOST_HOLD, HOST_RELEASE or HOLD_LAPSED, likewise.
+    ``wrench_map``: in force all along.
     """
 
     finger: int
@@ -53,6 +59,7 @@ class Rounds:
     tdc: NDArray[np.uint16]
     t_us: NDArray[np.int64]
     tares: dict[int, HostTare] = field(default_factory=dict)
+    words: dict[int, wire.TareReason] = field(default_factory=dict)
     quantities: wire.QuantityFlags | None = None
     wrench_map: BoardMap | None = None
 
@@ -87,10 +94,12 @@ def frames_and_tares(
 def _run(rounds: Rounds, finger: Finger, ends: list[int], show: Callable[[int], None]) -> Iterator[StructArray]:
     """Rows in parts, which end at ``ends``, before tares from the host, and every _ROWS rounds."""
     n = len(rounds.counts)
-    cuts = sorted({0, n, *ends, *rounds.tares, *range(0, n, _ROWS)})
+    cuts = sorted({0, n, *ends, *rounds.tares, *rounds.words, *range(0, n, _ROWS)})
     for begin, end in pairwise(cuts):
         if begin in rounds.tares:
             rounds.tares[begin].give(finger)
+        if begin in rounds.words:
+            _WORDS[rounds.words[begin]](finger)
         part = slice(begin, end)
         yield finger.feed(
             rounds.counts[part], rounds.pdc[part], rounds.tac[part], rounds.tdc[part], t_us=rounds.t_us[part]

@@ -356,4 +356,16 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("finger", "u1"),
         ]
     ),
+    wire.Hold.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("fingers", "u1"),
+        ]
+    ),
+    wire.Release.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("fingers", "u1"),
+        ]
+    ),
 }

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0xFFDCEECB
+SCHEMA_HASH = 0x2788E1AA
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -49,8 +49,9 @@ class TareState(IntEnum):
 
     INIT = 0  # no tare yet: waiting for still frames
     REST = 1  # tared, nothing touches; the tare follows slow drift
-    CONTACT = 2  # touched; the tare is frozen
+    CONTACT = 2  # touched; the tare is frozen but for temperature and drift that all electrodes share
     FAULT = 3  # railed or dead electrodes; the tare is frozen and no new one is taken
+    DOUBT = 4  # still, and either a light hold or what a press left in the skin: the tare stays, and the next contact is seen
 
 
 class TareReason(IntEnum):
@@ -63,6 +64,12 @@ class TareReason(IntEnum):
     ROLL_BACK = 4  # contact began: tare taken from at least one second before
     HOST_NOW = 5  # TARE_NOW command
     HOST_SET = 6  # TARE_SET command
+    SHIFT = 7  # pressure alone or all electrodes alike had moved: no touch; the tare moved by that and nothing else
+    UNDONE = 8  # inverted signals proved the tare wrong: the one before it holds again
+    INVERTED = 9  # inverted signals proved the tare wrong and there is none before it: untared until still
+    HOST_HOLD = 10  # HOLD command: the tare is as it was, and stays
+    HOST_RELEASE = 11  # RELEASE command: the tare is as it was, until still
+    HOLD_LAPSED = 12  # the host that said HOLD has been silent for hold_timeout_ms: the tare is as it was
 
 
 class PocWeights(IntEnum):
@@ -105,12 +112,14 @@ class FrameFlags(IntFlag):
     FX_WEAK = 1 << 10  # force x has two to three times the noise of y and z (always)
     TORSION_OK = 1 << 11  # PoC normal within 60 deg of -z, energy over the threshold, four electrodes active
     SHEAR_MIX = 1 << 12  # more than half the energy is bulge: the PoC is likely biased
-    BASE_OLD = 1 << 13  # in contact for over 60 s: drift has gone untracked
-    TARE_CHANGED = 1 << 14  # this frame is the first with a new tare (see the TARE message)
+    BASE_OLD = 1 << 13  # in contact for over 60 s: only drift that all electrodes share was followed
+    TARE_CHANGED = 1 << 14  # this frame is the first with a new tare, or after HOLD or RELEASE (see the TARE message)
     FAULT = 1 << 15  # more than two electrodes railed or missing: do not trust the results
     TEMP = 1 << 16  # since the contact began the temperature has moved by over a degree: the tare is doubtful
     NOT_ASKED = 1 << 17  # some quantity is not subscribed to and marked invalid (SUBSCRIBE)
     MAPPED = 1 << 18  # force, and torque and torsion where it has them, come from the finger's wrench map
+    DOUBT = 1 << 19  # the force may be a light hold or what a press left in the skin: the tare stays (tare state DOUBT)
+    HELD = 1 << 20  # the host said HOLD: no new tare is taken
     REPEATED = 1 << 21  # the board was short of time: force, torque and torsion are those of wrench_age_ms before, from the same map
     SHED = 1 << 22  # the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out
     SENSOR_UNSURE = 1 << 23  # the sensor was away and has not said its serial number since: tare, calibration and map may be another's
@@ -158,8 +167,9 @@ ERROR_DOC: dict[int, str] = {
 TARE_STATE_DOC: dict[int, str] = {
     0: "no tare yet: waiting for still frames",
     1: "tared, nothing touches; the tare follows slow drift",
-    2: "touched; the tare is frozen",
+    2: "touched; the tare is frozen but for temperature and drift that all electrodes share",
     3: "railed or dead electrodes; the tare is frozen and no new one is taken",
+    4: "still, and either a light hold or what a press left in the skin: the tare stays, and the next contact is seen",
 }
 
 
@@ -171,6 +181,12 @@ TARE_REASON_DOC: dict[int, str] = {
     4: "contact began: tare taken from at least one second before",
     5: "TARE_NOW command",
     6: "TARE_SET command",
+    7: "pressure alone or all electrodes alike had moved: no touch; the tare moved by that and nothing else",
+    8: "inverted signals proved the tare wrong: the one before it holds again",
+    9: "inverted signals proved the tare wrong and there is none before it: untared until still",
+    10: "HOLD command: the tare is as it was, and stays",
+    11: "RELEASE command: the tare is as it was, until still",
+    12: "the host that said HOLD has been silent for hold_timeout_ms: the tare is as it was",
 }
 
 
@@ -209,12 +225,14 @@ FRAME_FLAG_DOC: dict[int, str] = {
     1024: "force x has two to three times the noise of y and z (always)",
     2048: "PoC normal within 60 deg of -z, energy over the threshold, four electrodes active",
     4096: "more than half the energy is bulge: the PoC is likely biased",
-    8192: "in contact for over 60 s: drift has gone untracked",
-    16384: "this frame is the first with a new tare (see the TARE message)",
+    8192: "in contact for over 60 s: only drift that all electrodes share was followed",
+    16384: "this frame is the first with a new tare, or after HOLD or RELEASE (see the TARE message)",
     32768: "more than two electrodes railed or missing: do not trust the results",
     65536: "since the contact began the temperature has moved by over a degree: the tare is doubtful",
     131072: "some quantity is not subscribed to and marked invalid (SUBSCRIBE)",
     262144: "force, and torque and torsion where it has them, come from the finger's wrench map",
+    524288: "the force may be a light hold or what a press left in the skin: the tare stays (tare state DOUBT)",
+    1048576: "the host said HOLD: no new tare is taken",
     2097152: "the board was short of time: force, torque and torsion are those of wrench_age_ms before, from the same map",
     4194304: "the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out",
     8388608: "the sensor was away and has not said its serial number since: tare, calibration and map may be another's",
@@ -255,6 +273,7 @@ class Setting(IntEnum):
     THERMAL_GAIN_MILLI = 10
     PRESSURE_GAIN_NN = 11
     PRESSURE_FILTER_MILLI = 12
+    HOLD_TIMEOUT_MS = 13
 
 
 class SettingSpec(NamedTuple):
@@ -315,6 +334,10 @@ SETTINGS: dict[Setting, SettingSpec] = {
     Setting.PRESSURE_FILTER_MILLI: SettingSpec(
         "1/1000", 10, 1000, 500,
         "alpha of Navarro 2015 Eq 3, the weight of a new pressure word in the filter; 1000: no filter",
+    ),
+    Setting.HOLD_TIMEOUT_MS: SettingSpec(
+        "ms", 0, 3600000, 2000,
+        "how long HOLD outlives the host's last word; 0: for ever",
     ),
 }
 
@@ -1714,7 +1737,61 @@ class ClearMap:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """These fingers hold something: no new tare is taken until RELEASE, or until the host has been silent for hold_timeout_ms. Again is harmless."""
+
+    req_id: int
+    fingers: int
+
+    ID: ClassVar[int] = 0x98
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 2 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.fingers,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Hold:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """These fingers hold nothing any more: where a light hold and a press's residue cannot be told apart, it is residue, until the next contact."""
+
+    req_id: int
+    fingers: int
+
+    ID: ClassVar[int] = 0x99
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BB")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 2 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.fingers,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Release:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+        )
+
+
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -1756,6 +1833,8 @@ MESSAGES: dict[int, type[Any]] = {
     WriteMap.ID: WriteMap,
     EndMap.ID: EndMap,
     ClearMap.ID: ClearMap,
+    Hold.ID: Hold,
+    Release.ID: Release,
 }
 
 # What each command is answered by.
@@ -1784,4 +1863,6 @@ ANSWERS: dict[type[Any], type[Any]] = {
     WriteMap: Reply,
     EndMap: MapInfo,
     ClearMap: Reply,
+    Hold: Reply,
+    Release: Reply,
 }

@@ -1,0 +1,264 @@
+"""Light holds against what presses leave in the skin: does the board keep the one and tare the other?
+
+A recording of presses in which nobody holds anything has only residues. Holds are made of it: the last row of an
+unloading whose pressure is still at least a share of the press's peak is repeated for two seconds. It is a real
+finger's, but as still as no hand is: what the board tares of it, it would tare of a hold. Without a recording the
+same is done to an emulated finger, new and worn, whose pressure creeps and undershoots (sim/sampling.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...core.finger import Finger
+from ...core.geometry import Floats
+from ...errors import RecordingError
+from ...sim.physics import Profile
+from ...wire import messages_gen as wire
+from ...wire.frames import StructArray
+from . import recorded
+from .outcome import Facts, Options, check, claim, number, table, text
+from .plate_normal import emulated
+from .trial import Words
+
+RECORDING = "E and PDC of presses"
+MAPS = False
+
+SHARES = (0.5, 0.3, 0.2, 0.1, 0.05, 0.04, 0.03)
+SAFE_SHARE = 0.1  # holds of this and more are never tared
+LIGHT_LIMIT = 0.1  # share of the lighter ones that may be
+HOLD_ROWS = 200  # 2 s of rounds
+PRESSED_COUNTS, PRESSED_ROWS = 60, 8  # what counts as a press: above rest, for so long
+REST_ROWS = (25, 8)  # before a press, whose median is its rest
+
+RELEASES = (wire.TareReason.RELEASE, wire.TareReason.RESIDUE, wire.TareReason.SHIFT)
+
+
+@dataclass(frozen=True)
+class Press:
+    """Rows of a press: its first, its peak, where the next begins; PDC at rest before it and at its peak."""
+
+    first: int
+    peak: int
+    end: int
+    rest: float
+    top: float
+
+
+@dataclass(frozen=True)
+class Hold:
+    """What became of one spliced hold; ``above`` is its PDC over the tare then in force, counts."""
+
+    press: int
+    share: float
+    above: float
+    outcome: str  # "tared", "doubt" or "contact"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One finger: its rows as they were, re-zeros among them, and the holds spliced in."""
+
+    name: str
+    pdc: Words
+    rows: StructArray
+    presses: list[Press]
+    holds: list[Hold]
+
+    @property
+    def rezeros(self) -> list[int]:
+        """Rows at which a contact ended in a tare."""
+        changed = (self.rows["flags"] & wire.FrameFlags.TARE_CHANGED) != 0
+        return [int(k) for k in np.flatnonzero(changed & np.isin(self.rows["tare_reason"], RELEASES))]
+
+    def above(self, row: int) -> float:
+        """PDC over what it is at rest around ``row``, whatever the board thinks: the 5th percentile of 20 s."""
+        near = self.pdc[max(row - 1000, 0) : row + 1000].astype(float)
+        return float(self.pdc[row] - np.percentile(near, 5))
+
+    @property
+    def seen(self) -> list[bool]:
+        """Which presses had the board in contact all along from their fourth row on to their peak."""
+        state = self.rows["tare_state"]
+        return [bool((state[p.first + 3 : p.peak + 1] == wire.TareState.CONTACT).all()) for p in self.presses]
+
+
+@dataclass(frozen=True)
+class Result:
+    """A case a sensor."""
+
+    source: str
+    cases: list[Case]
+    notes: list[str]
+
+
+def presses_of(pdc: Words) -> list[Press]:
+    """Where PDC is PRESSED_COUNTS over what it rests at around there, for PRESSED_ROWS and more."""
+    known = np.where(pdc == wire.INVALID_COUNT, np.nan, pdc.astype(float))
+    rest = np.array([np.nanpercentile(known[max(k - 1000, 0) : k + 1000], 5) for k in range(0, len(pdc), 50)])
+    over = known - np.repeat(rest, 50)[: len(pdc)] > PRESSED_COUNTS
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], over.astype(int), [0]])))
+    runs = [(int(a), int(b)) for a, b in zip(edges[0::2], edges[1::2], strict=True) if b - a >= PRESSED_ROWS]
+    out = []
+    for k, (a, b) in enumerate(runs):
+        end = runs[k + 1][0] - REST_ROWS[1] if k + 1 < len(runs) else len(pdc)
+        peak = a + int(np.nanargmax(known[a:b]))
+        before = known[max(a - REST_ROWS[0], 0) : max(a - REST_ROWS[1], 1)]
+        quiet = float(np.nanmin([np.nanmedian(before), rest[peak // 50]]))
+        out.append(Press(a, peak, end, quiet, float(known[peak])))
+    return out
+
+
+def spliced(counts: Words, pdc: Words, press: Press, share: float) -> int | None:
+    """The last row of the unloading with at least this share of the press's peak; None where it never falls below."""
+    above = pdc[press.peak : press.end].astype(float) - press.rest
+    low = np.flatnonzero(above < share * (press.top - press.rest))
+    return press.peak + int(low[0]) - 1 if len(low) and low[0] > 0 else None
+
+
+def _hold(counts: Words, pdc: Words, row: int) -> tuple[str, float]:
+    finger = Finger()
+    before = finger.feed(counts[: row + 1], pdc[: row + 1])
+    held = finger.feed(np.repeat(counts[row : row + 1], HOLD_ROWS, axis=0), np.repeat(pdc[row], HOLD_ROWS))
+    above = float(pdc[row]) - float(before["pdc_tare_q4"][-1]) / 16
+    state = held["tare_state"]
+    if np.isin(held["tare_reason"][(held["flags"] & wire.FrameFlags.TARE_CHANGED) != 0], RELEASES).any():
+        return "tared", above
+    return ("doubt" if state[-1] == wire.TareState.DOUBT else "contact"), above
+
+
+def judge(name: str, counts: Words, pdc: Words) -> Case:
+    """Run the rows as they are, and once more with every hold that can be made of them."""
+    presses = presses_of(pdc)
+    holds = []
+    for k, press in enumerate(presses):
+        for share in SHARES:
+            row = spliced(counts, pdc, press, share)
+            if row is not None:
+                outcome, above = _hold(counts, pdc, row)
+                holds.append(Hold(k, share, above, outcome))
+    return Case(name, pdc, Finger().feed(counts, pdc), presses, holds)
+
+
+def run(options: Options) -> Result:
+    """On a recording; or on an emulated finger, new and worn."""
+    if options.recording is not None:
+        theirs = recorded.load(options.recording, options.finger, needs=("PDC",))
+        case = judge("recorded", theirs.trial.counts, theirs.trial.pdc)
+        if not case.presses:
+            raise RecordingError(
+                f"{options.recording}: PDC is never {PRESSED_COUNTS} counts above rest for {PRESSED_ROWS} rows: "
+                "expected presses; is it counts?"
+            )
+        return Result(str(options.recording), [case], list(theirs.notes))
+    profiles: tuple[Profile, ...] = ("new", "worn")
+    cases = []
+    for profile in profiles:
+        options.show(f"presses on the {profile} sensor")
+        trial = emulated(options.seed, profile)
+        cases.append(judge(profile, trial.counts, trial.pdc))
+    return Result(
+        f"emulated finger, seed {options.seed}", cases, ["emulated: the model's pressure creeps and undershoots"]
+    )
+
+
+def _shares(case: Case) -> list[Facts]:
+    out = []
+    for share in SHARES:
+        its = [hold.outcome for hold in case.holds if hold.share == share]
+        out.append(
+            {"share": share, "holds": len(its), **{name: its.count(name) for name in ("tared", "doubt", "contact")}}
+        )
+    return out
+
+
+def facts(result: Result) -> Facts:
+    """All figures."""
+    cases, checks = [], []
+    for case in result.cases:
+        pressed = [row for row in case.rezeros if case.above(row) > PRESSED_COUNTS]
+        safe = [hold for hold in case.holds if hold.share >= SAFE_SHARE]
+        light = [hold for hold in case.holds if hold.share < SAFE_SHARE]
+        tared = sum(hold.outcome == "tared" for hold in light)
+        cases.append(
+            {
+                "sensor": case.name,
+                "presses": len(case.presses),
+                "seen": sum(case.seen),
+                "rezeros": len(case.rezeros),
+                "rezero_rows": case.rezeros,
+                "rezero_force_n": [number(_force_n(case.rows, row - 1)) for row in case.rezeros],
+                "shares": _shares(case),
+            }
+        )
+        checks += [
+            claim(f"{case.name}: every press is seen", all(case.seen)),
+            check(f"{case.name}: re-zeros with PDC more than {PRESSED_COUNTS} over rest", len(pressed), 0, ""),
+            check(f"{case.name}: holds of {SAFE_SHARE:.0%} and more that are tared",
+                  sum(hold.outcome == "tared" for hold in safe), 0, f"of {len(safe)}"),
+            check(f"{case.name}: share of the lighter holds that is tared",
+                  tared / len(light) if light else float("nan"), LIGHT_LIMIT, f"of {len(light)}"),
+        ]  # fmt: skip
+    return {"experiment": "hold", "source": result.source, "cases": cases, "checks": checks, "notes": [
+        f"a hold is one row repeated for {HOLD_ROWS / 100:g} s, and shares are of a press's peak of PDC over its rest",
+        *result.notes]}  # fmt: skip
+
+
+def _force_n(rows: StructArray, row: int) -> float:
+    return float(np.linalg.norm(rows["force_100un"][row].astype(float)) / 1e4)
+
+
+def page(facts: Facts) -> list[str]:
+    """What became of the holds, then the re-zeros."""
+    lines = []
+    for case in facts["cases"]:
+        forces = [f for f in case["rezero_force_n"] if f is not None]
+        lines += [
+            f"{case['sensor']}: {case['presses']} presses, {case['seen']} seen; {case['rezeros']} re-zeros, "
+            f"with at most {text(max(forces, default=float('nan')), 2)} N before.",
+            "",
+            *table(["hold", "holds", "tared", "in doubt", "contact"],
+                   [[f"{its['share']:.0%}", *[str(its[k]) for k in ("holds", "tared", "doubt", "contact")]]
+                    for its in case["shares"]]),
+        ]  # fmt: skip
+    return lines
+
+
+def draw(result: Result, path: Path) -> None:
+    """Pressure with the board's states and re-zeros; holds by their share and what became of them."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(len(result.cases), 2, figsize=(13, 4.2 * len(result.cases)), layout="constrained",
+                                squeeze=False)  # fmt: skip
+    figure.suptitle(f"Hold or residue: {result.source}")
+    colors = {"tared": "#b91c1c", "doubt": "#c2410c", "contact": "#1d4ed8"}
+    for (left, right), case in zip(axes, result.cases, strict=True):
+        time_s: Floats = np.arange(len(case.pdc)) / 100.0
+        left.plot(time_s, case.pdc, color="#111111", linewidth=0.6, label="PDC")
+        left.plot(time_s, case.rows["pdc_tare_q4"] / 16.0, color="#15803d", linewidth=1, label="its tare")
+        doubt = case.rows["tare_state"] == wire.TareState.DOUBT
+        left.fill_between(time_s, *left.get_ylim(), where=doubt, color="#c2410c", alpha=0.25, label="in doubt")
+        left.plot(time_s[case.rezeros], case.pdc[case.rezeros], "v", color="#15803d", markersize=5, label="re-zero")
+        known = case.pdc[case.pdc != wire.INVALID_COUNT]
+        left.set(
+            xlabel="rounds of 10 ms [s]", ylabel="PDC [counts]", title=case.name, ylim=(known.min() - 20, known.max())
+        )
+        left.legend(fontsize=8)
+        for outcome, color in colors.items():
+            its = [hold for hold in case.holds if hold.outcome == outcome]
+            right.plot([hold.share for hold in its], [max(hold.above, 0.5) for hold in its], "o", color=color,
+                       markersize=4, label=f"{outcome}: {len(its)}")  # fmt: skip
+        right.set(
+            xlabel="share of the press's peak", ylabel="PDC over the last tare [counts]", xscale="log", yscale="log"
+        )
+        right.legend(fontsize=8)
+        for axis in (left, right):
+            axis.grid(alpha=0.25)
+    figure.savefig(path, dpi=90)
+    plt.close(figure)

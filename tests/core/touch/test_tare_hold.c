@@ -1,0 +1,236 @@
+// What a hand holds is never zeroed: doubt, the host's word, and the way back from a tare that was wrong.
+#include "emulated_finger.h"
+
+// Squeezed, then let down to a light hold of which neither size nor pattern tells what it is.
+static emulated_finger light_hold(double load, double pdc_load)
+{
+    emulated_finger finger = touched_finger(400, 300);
+    run_seconds(&finger, 2);
+    finger.load = load;
+    finger.pdc_load = pdc_load;
+    (void)run_until(&finger, BT_TARE_STATE_DOUBT, 80);
+    return finger;
+}
+
+// ---- doubt -------------------------------------------------------------------------------------
+
+static void a_light_hold_is_in_doubt_and_keeps_its_force_for_an_hour(void **state)
+{
+    (void)state;
+    emulated_finger finger = light_hold(40, 30);
+    bt_baseline before = finger.tare.base;
+    run_seconds(&finger, 3600);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_DOUBT);
+    assert_memory_equal(&finger.tare.base, &before, sizeof before);
+    finger.load = 0;
+    finger.pdc_load = -5;
+    assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 100), 10, 60);
+    assert_true(tare_error(&finger) < 0.01);
+}
+
+static void the_next_contact_is_seen_after_any_number_of_doubtful_ones(void **state)
+{
+    (void)state;
+    emulated_finger finger = light_hold(40, 30);
+    bt_baseline before = finger.tare.base;
+    for (int press = 0; press < 100; press++) {
+        finger.load = 300;
+        finger.pdc_load = 250;
+        assert_in_range(run_until(&finger, BT_TARE_STATE_CONTACT, 10), 1, 6);
+        run_seconds(&finger, 1);
+        finger.load = 40;
+        finger.pdc_load = 30 + press / 3; // it creeps up
+        (void)run_until(&finger, BT_TARE_STATE_DOUBT, 80);
+        assert_memory_equal(&finger.tare.base, &before, sizeof before);
+    }
+}
+
+static void pressure_that_returns_from_its_undershoot_is_no_contact(void **state)
+{
+    (void)state;
+    emulated_finger finger = light_hold(100, -9); // the electrodes keep it in doubt
+    finger.pdc_load = 3;
+    run_seconds(&finger, 10);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_DOUBT);
+}
+
+// ---- shifts ------------------------------------------------------------------------------------
+
+static void pressure_alone_is_no_touch_after_two_seconds(void **state)
+{
+    (void)state;
+    for (int step_count = 8; step_count <= 20; step_count += 4) {
+        emulated_finger finger = resting_finger();
+        finger.pdc_sigma = 1;
+        finger.sigma = 5;
+        finger.pdc_load = step_count;
+        (void)run_until(&finger, BT_TARE_STATE_CONTACT, 6);
+        (void)run_until(&finger, BT_TARE_STATE_REST, 195);
+        assert_int_equal(finger.tare.reason, BT_TARE_REASON_SHIFT);
+    }
+}
+
+static void what_all_electrodes_share_is_no_touch(void **state)
+{
+    (void)state;
+    for (int pdc = 0; pdc <= 5; pdc += 5) {
+        emulated_finger finger = resting_finger();
+        for (int k = 0; k < 500; k++) {
+            bt_round round = next_frame(&finger);
+            for (int i = 0; i < BT_ELECTRODES; i++) {
+                round.electrode[i] = (uint16_t)(round.electrode[i] + 20);
+            }
+            round.pdc = (uint16_t)(round.pdc + pdc);
+            (void)feed(&finger, &round);
+        }
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+        assert_true(fabs(tare_error(&finger) - 20) < 0.01);
+    }
+}
+
+static void a_pattern_is_kept_where_the_pressure_is_shifted(void **state)
+{
+    (void)state;
+    emulated_finger finger = touched_finger(10, 20); // 100 count^2
+    (void)run_until(&finger, BT_TARE_STATE_REST, 200);
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_SHIFT);
+    assert_int_equal(finger.tare.base.pdc_q16 >> 16, PDC_REST + 20);
+    assert_true(share_kept(&finger, 10) > 0.3); // its mean is gone with the shift
+}
+
+static void a_press_that_the_pressure_does_not_see_is_not_judged_by_it(void **state)
+{
+    (void)state;
+    emulated_finger finger = touched_finger(800, 0); // the channel is dead
+    run_seconds(&finger, 3);
+    bt_baseline before = finger.tare.base;
+    finger.load = 60;
+    run_seconds(&finger, 60);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_DOUBT);
+    assert_memory_equal(&finger.tare.base, &before, sizeof before);
+}
+
+// ---- the host's word ---------------------------------------------------------------------------
+
+static void while_held_nothing_is_tared_down_to_nothing(void **state)
+{
+    (void)state;
+    emulated_finger finger = touched_finger(400, 300);
+    run_seconds(&finger, 2);
+    bt_tare_hold(&finger.tare);
+    assert_true(finger.tare.changed);
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_HOST_HOLD);
+    bt_baseline before = finger.tare.base;
+    finger.load = 3;
+    finger.pdc_load = 1;
+    run_seconds(&finger, 3600);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    assert_memory_equal(&finger.tare.base, &before, sizeof before);
+    bt_tare_release(&finger.tare);
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_HOST_RELEASE);
+    assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 100), 1, 50);
+}
+
+static void release_settles_what_was_in_doubt(void **state)
+{
+    (void)state;
+    emulated_finger finger = light_hold(60, 30);
+    bt_tare_release(&finger.tare);
+    assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 100), 1, 20);
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_RESIDUE);
+}
+
+static void a_lapsed_hold_is_judged_by_its_signals(void **state)
+{
+    (void)state;
+    emulated_finger finger = touched_finger(400, 300);
+    bt_tare_hold(&finger.tare);
+    run_seconds(&finger, 2);
+    finger.load = 60;
+    finger.pdc_load = 30;
+    run_seconds(&finger, 10);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    bt_tare_lapse(&finger.tare);
+    (void)run_until(&finger, BT_TARE_STATE_DOUBT, 20);
+    run_seconds(&finger, 10);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_DOUBT);
+}
+
+static void a_held_finger_takes_no_first_tare(void **state)
+{
+    (void)state;
+    emulated_finger finger;
+    finger_init(&finger);
+    bt_tare_hold(&finger.tare);
+    run_seconds(&finger, 10);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_INIT);
+    assert_false(finger.tare.tared);
+    bt_tare_release(&finger.tare);
+    (void)run_until(&finger, BT_TARE_STATE_REST, 20);
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_START);
+}
+
+// ---- a tare that was wrong ---------------------------------------------------------------------
+
+static void a_tare_taken_of_a_hold_is_undone_when_it_ends(void **state)
+{
+    (void)state;
+    for (int frames = 5; frames <= 200; frames += 39) { // let go within so many
+        emulated_finger finger = touched_finger(400, 300);
+        run_seconds(&finger, 2);
+        finger.load = 200;
+        finger.pdc_load = 150;
+        run_seconds(&finger, 1);
+        assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_OK);
+        run_seconds(&finger, 3);
+        int inverted = 0;
+        for (int k = 1; k <= frames + 100; k++) {
+            double left = k < frames ? 1 - (double)k / frames : 0;
+            finger.load = 200 * left;
+            finger.pdc_load = 150 * left - 5;
+            step(&finger);
+            double kept = share_kept(&finger, 1) - 1; // counts that the tare adds to any load
+            inverted += finger.load + kept < -40;
+        }
+        assert_true(inverted <= 10);
+        assert_true(tare_error(&finger) < 20); // count^2 below 400 are calm, and followed
+    }
+}
+
+static void a_first_tare_taken_of_a_hold_is_lost_when_it_ends(void **state)
+{
+    (void)state;
+    emulated_finger finger;
+    finger_init(&finger);
+    finger.load = 400;
+    finger.pdc_load = 300;
+    run_seconds(&finger, 5);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+    finger.load = 0;
+    finger.pdc_load = 0;
+    run_frames(&finger, 10);
+    assert_false(finger.tare.tared);
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_INVERTED);
+    (void)run_until(&finger, BT_TARE_STATE_REST, 40);
+    assert_true(tare_error(&finger) < 0.01);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_light_hold_is_in_doubt_and_keeps_its_force_for_an_hour),
+        cmocka_unit_test(the_next_contact_is_seen_after_any_number_of_doubtful_ones),
+        cmocka_unit_test(pressure_that_returns_from_its_undershoot_is_no_contact),
+        cmocka_unit_test(pressure_alone_is_no_touch_after_two_seconds),
+        cmocka_unit_test(what_all_electrodes_share_is_no_touch),
+        cmocka_unit_test(a_pattern_is_kept_where_the_pressure_is_shifted),
+        cmocka_unit_test(a_press_that_the_pressure_does_not_see_is_not_judged_by_it),
+        cmocka_unit_test(while_held_nothing_is_tared_down_to_nothing),
+        cmocka_unit_test(release_settles_what_was_in_doubt),
+        cmocka_unit_test(a_lapsed_hold_is_judged_by_its_signals),
+        cmocka_unit_test(a_held_finger_takes_no_first_tare),
+        cmocka_unit_test(a_tare_taken_of_a_hold_is_undone_when_it_ends),
+        cmocka_unit_test(a_first_tare_taken_of_a_hold_is_lost_when_it_ends),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
