@@ -52,7 +52,7 @@ static void untouched(bt_finger *finger)
 static void pressed(bt_finger *finger, const bt_solve_settings *settings, uint32_t quantities)
 {
     front_end(finger, press_lane);
-    bt_results(&finger->frame, &finger->tare, settings, quantities, &message);
+    bt_results(&finger->round, &finger->tare, settings, quantities, &message);
 }
 
 static void one_word(const bt_solve_settings *settings)
@@ -132,7 +132,7 @@ static void sent(const bt_solve_settings *settings)
 static void mapped(const bt_map *map)
 {
     int32_t force_100un[3], torque_mnmm[3], torsion_mnmm;
-    bt_map_wrench(map, press_whole.frame.electrode, press_whole.tare.electrode_q4, 400, force_100un,
+    bt_map_wrench(map, press_whole.round.electrode, press_whole.tare.electrode_q4, 400, force_100un,
                   torque_mnmm, &torsion_mnmm);
     sink = (uint32_t)force_100un[0];
 }
