@@ -227,8 +227,8 @@ static void residue_is_tared_once_the_pressure_is_back_and_nothing_moves(void **
     (void)state;
     emulated_finger finger = touched_finger(400, 300);
     run_seconds(&finger, 3);
-    finger.load = 45; // 2,025 count^2 of 160,000; and a 35th of the pressure
-    finger.pdc_load = 8;
+    finger.load = 45; // 2,025 count^2 of 160,000; and a 50th of the pressure
+    finger.pdc_load = 6;
     assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 100), 40, 70);
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_RESIDUE);
     assert_true(fabs(share_kept(&finger, 45)) < 0.01);

@@ -1,0 +1,122 @@
+"""A hand squeezes, relaxes and holds: is the force kept, is it said where it is in doubt, and is the finger let go?
+
+The sensor model, new and worn, at ten places; drift, creep, noise and the pressure's creep and undershoot are on. What
+the finger reads without load is the model's own word.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from biotac import Finger, FrameFlags, TareReason, TareState
+from biotac.sim.timeline import Pose
+from stability.courses import Course, script
+
+NIGHTLY = bool(os.environ.get("BIOTAC_NIGHTLY"))
+HOLD_S = 600.0 if NIGHTLY else 60.0
+PLACES = [(-2.8, 0, 2.0), (-8, 0, 2.0), (-13, 1, 2.0), (1, 0, 2.0), (3, 0, 2.0),
+          (-2, 2.5, 2.0), (-2, -2.5, 2.0), (-6, 3.5, 1.0), (0, -3, 1.8), (-10, -2, 3.5)]  # fmt: skip
+GRASPS = [(3, 0.1), (3, 0.5), (5, 0.25), (8, 0.1), (8, 0.5), (4, 0.15)]  # N, and the share of it that is held
+CASES = [
+    (profile, place, *GRASPS[(place + k) % len(GRASPS)])
+    for profile in ("new", "worn")
+    for place in range(len(PLACES))
+    for k in range(len(GRASPS) if NIGHTLY else 1)
+]
+MEAN_ROWS = 100  # a second: a worn sensor's noise is 0.03 N a round
+INVERTED_N, INVERTED_ROWS = 0.15, 10
+# Known to miss, with the figure: drift of 10 counts a minute goes unfollowed while the model's pressure creeps.
+MISSED = {
+    ("worn", 2, 5, 0.25): "0.109 N of 0.1",
+    ("worn", 8, 5, 0.25): "0.112 N of 0.1",
+    ("worn", 4, 8, 0.5): "let go, 0.15 N and more the wrong way for 2.3 s, in doubt",
+}
+RELEASES = (TareReason.RELEASE, TareReason.RESIDUE, TareReason.SHIFT, TareReason.UNDONE, TareReason.INVERTED)
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """A course, and the rows at which the hold begins, ends, and the finger is free."""
+
+    course: Course
+    begin: int
+    end: int
+    free: int
+
+
+def grasp(profile: str, place: int, squeeze_n: float, share: float, hold_s: float) -> Grasp:
+    begun = script(10 + place, profile)
+    x_mm, y_mm, tip_mm = PLACES[place]
+    begun.load(squeeze_n, 10, Pose(x_mm=x_mm, y_mm=y_mm, tip_mm=tip_mm)).hold(1).load(squeeze_n * share, 10)
+    rows = [round(100 * begun.track.seconds)]
+    rows.append(round(100 * begun.hold(hold_s).track.seconds))
+    rows.append(round(100 * begun.load(0, 20).track.seconds))
+    return Grasp(begun.rest(180).make(), *rows)
+
+
+def means(values: np.ndarray) -> np.ndarray:
+    """Of each whole second of (n, 3)."""
+    whole = len(values) // MEAN_ROWS * MEAN_ROWS
+    return values[:whole].reshape(-1, MEAN_ROWS, 3).mean(axis=1)
+
+
+def longest(mask: np.ndarray) -> int:
+    """How many rows in a row."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return int((edges[1::2] - edges[0::2]).max(initial=0))
+
+
+def cases() -> list:
+    return [
+        pytest.param(*case, marks=pytest.mark.xfail(reason=MISSED[case], strict=False)) if case in MISSED else case
+        for case in CASES
+    ]
+
+
+@pytest.mark.parametrize(("profile", "place", "squeeze_n", "share"), cases())
+@pytest.mark.parametrize("held", [False, True])
+def test_a_hold_keeps_its_force(profile: str, place: int, squeeze_n: float, share: float, held: bool) -> None:
+    if held and not NIGHTLY and place % 5:
+        pytest.skip("with HOLD every fifth place by day; all of them with BIOTAC_NIGHTLY=1")
+    # down to the noise: with HOLD nothing is too light
+    case = grasp(profile, place, squeeze_n, 0.02 if held else share, HOLD_S)
+    finger = Finger()
+    parts = []
+    for first, end, say in (
+        (0, 1000, None),
+        (1000, case.free, finger.hold),
+        (case.free, len(case.course), finger.release),
+    ):
+        if held and say is not None:
+            say()
+        parts.append(finger.feed(**{name: its[first:end] for name, its in case.course.words.items()}))
+    rows = np.concatenate(parts)
+
+    force = rows["force_100un"] / 1e4
+    during = means(force[case.begin + 30 : case.end])
+    assert (np.linalg.norm(during - during[0], axis=1) <= max(0.1, 0.15 * np.linalg.norm(during[0]))).all()
+    hold = rows[case.begin + 30 : case.end]
+    new_tare = (hold["flags"] & FrameFlags.TARE_CHANGED) != 0
+    assert not np.isin(hold["tare_reason"][new_tare], RELEASES).any()
+    sure = (hold["flags"] & (FrameFlags.CONTACT | FrameFlags.DOUBT)) != 0
+    assert sure.all()
+
+    # Against the hold's own direction, once the load is gone. The means of three rounds: noise is no pull.
+    direction = during.mean(axis=0) / np.linalg.norm(during.mean(axis=0))
+    along = np.convolve(force[case.free :] @ direction, np.ones(3) / 3, "valid")
+    assert longest(along < -INVERTED_N) <= INVERTED_ROWS
+
+    after = rows["tare_state"][case.free :]
+    above = case.course.words["pdc"][case.free :] - rows["pdc_tare_q4"][case.free :] / 16.0
+    if not (after[:100] == TareState.REST).any():
+        assert not held, "RELEASE is the host's word that nothing is held"
+        assert (after[100:150] == TareState.DOUBT).any() and above[
+            50:100
+        ].mean() > 4  # the model's pressure still creeps
+        gone = np.flatnonzero(np.convolve(above, np.ones(100) / 100, "valid") < 4)
+        if len(gone) and gone[0] + 1100 < len(after):
+            assert (after[: gone[0] + 1100] == TareState.REST).any()
