@@ -293,7 +293,7 @@ def test_the_caption_of_figure_3_can_be_wrong() -> None:
     [
         ("M", None, "save M too"),
         ("M", np.zeros((7, 3)), r"field M is float64 \(7, 3\)"),
-        ("F", np.full((5300, 3), np.nan), "field F is not finite in row 0"),
+        ("F", np.full((5300, 3), np.nan), "field F is not finite in 5300 of 5300 rows, first in row 0"),
         ("t", np.zeros((5300, 2)), "field t is float64"),
         ("t", np.r_[0:5299, 7.0], "field t goes back in row 5299"),
         ("z_dir", np.zeros((5300, 3)), "field z_dir has length 0 in row 0"),

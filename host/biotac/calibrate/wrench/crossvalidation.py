@@ -112,12 +112,14 @@ class _Trainer:
         size = sums.shape[1]
         folds = self._folds(of, strips)
         total = sums[strips].sum(axis=0)
-        air_share = self._air_share(sums, total, folds)
+        # each is a sum over tens of large matrices: made once
+        gone = [sums[strips].sum(axis=0) for strips, _ in folds]
+        tested = [sums[out].sum(axis=0) for _, out in folds]
+        air_share = self._air_share(total, gone, tested)
         if self._air is not None:
             # another recording than the run: it is in every training and in no test
             total = total + air_share * self._air
-        kept = [total - sums[gone].sum(axis=0) for gone, _ in folds]
-        tested = [sums[out].sum(axis=0) for _, out in folds]
+        kept = [total - out for out in gone]
         rows = sum(float(test[-self.axes - 1, -self.axes - 1]) for test in tested)
         by_model: dict[str, tuple[Choice, ...]] = {}
         inner: dict[str, list[Floats]] = {}
@@ -163,15 +165,15 @@ class _Trainer:
             whole[index[: -self.axes], axis] = fits[k, :, axis]
         return whole
 
-    def _air_share(self, sums: Floats, total: Floats, folds: list[tuple[Strips, Strips]]) -> float:
+    def _air_share(self, total: Floats, gone: list[Floats], tested: list[Floats]) -> float:
         """By a model that bends as the chosen one will, and costs a tenth."""
         if self._air is None:
             return 0.0
-        index = used(GATED, sums.shape[1], self.axes)
+        index = used(GATED, len(total), self.axes)
         grid = np.ix_(index, index)
         air = self._air[grid]
-        kept = [(total - sums[gone].sum(axis=0))[grid] for gone, _ in folds]
-        tested = [sums[out].sum(axis=0)[grid] for _, out in folds]
+        kept = [(total - out)[grid] for out in gone]
+        tested = [test[grid] for test in tested]
 
         def error(share: float) -> Floats:
             fits = [solve(GATED, part + share * air, self.axes, self.run.tare) for part in kept]

@@ -142,7 +142,7 @@ def numbers(path: Path, name: str, array: npt.NDArray[Any], shape: tuple[int, ..
     bad = ~np.isfinite(array.reshape(len(array), -1)).all(axis=1)
     if bad.any():
         raise RecordingError(
-            f"{path}: field {name} is not finite in row {int(np.argmax(bad))}, and in {bad.sum()} of {len(bad)} rows: "
+            f"{path}: field {name} is not finite in {bad.sum()} of {len(bad)} rows, first in row {np.argmax(bad)}: "
             f"expected {unit} in every row; leave those rows out of all fields"
         )
     return array.astype(np.float64)
