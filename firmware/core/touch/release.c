@@ -67,8 +67,10 @@ static bool is_untouched(const bt_release *release, const bt_release_sweep *swee
 
 static void count_even(bt_release *release, const bt_release_sweep *sweep)
 {
-    bool even = sweep->pressure && sweep->above < PRESSED && sweep->uneven_count2 < EVEN_ENERGY;
-    if (!even || release->even_sweeps == 0 || sweep->above > release->even_above + RISE) {
+    bool low = !sweep->pressure || sweep->above < PRESSED;
+    bool even = low && sweep->uneven_count2 < EVEN_ENERGY;
+    bool rose = sweep->pressure && sweep->above > release->even_above + RISE;
+    if (!even || release->even_sweeps == 0 || rose) {
         release->even_above = sweep->above;
         release->even_sweeps = even;
     } else if (release->even_sweeps < UINT8_MAX) {
@@ -77,10 +79,11 @@ static void count_even(bt_release *release, const bt_release_sweep *sweep)
 }
 
 // A load makes a pattern. Without one and with little pressure, what was never a press is no touch after a
-// second, and what was one is over after eight: the pressure that a long press leaves takes minutes to go.
+// second, and what was one, or may have been where pressure is not known, is over after eight: the pressure
+// that a long press leaves takes minutes to go.
 static bool is_shift(const bt_release *release, const bt_release_sweep *sweep)
 {
-    bool pressed = release->pdc_peak >= PRESSED;
+    bool pressed = !sweep->pressure || release->pdc_peak >= PRESSED;
     bool level = pressed ? release->even_sweeps >= EVEN_SWEEPS
                          : sweep->level_sweeps >= LEVEL_SWEEPS && release->even_sweeps >= QUIET_SWEEPS;
     return level && sweep->still_sweeps >= QUIET_SWEEPS;

@@ -140,7 +140,7 @@ static void what_is_not_asked_for_changes_nothing_that_is(void **state)
             }
         }
     }
-    finger.tare.reason = BT_TARE_REASON_NONE;
+    finger.tare.tared = false;
     bt_msg_frame msg = published(&finger, &map, 1400, BT_WANT_ALL);
     assert_true(msg.flags & BT_FRAME_FLAG_UNTARED && !(msg.flags & BT_FRAME_FLAG_MAPPED));
     assert_int_equal(msg.force_100un[2], BT_INVALID_I32);
