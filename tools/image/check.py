@@ -26,6 +26,7 @@ PORT = ROOT / "firmware" / "port" / "rp2040"
 FLASH_BUDGET = 64 * 1024  # of 1820 KiB: what boot has to copy
 RAM_BUDGET = 200 * 1024  # of 256 KiB: the image, five maps of 20 KiB, 16 KiB of data and the stack
 SRAM = 0x20000000
+RAM_PARTS = (("program", ".text"), ("data", ".data"), ("bss", ".bss"), ("stack", ".stack"))
 
 ROM = "(boot ROM)"
 ROM_STACK_BYTES = 256  # an allowance: the ROM does not tell
@@ -88,9 +89,8 @@ def check(elf: Path, objdump: str) -> list[str]:
     program.functions[ROM] = stack.Function(0, ROM_STACK_BYTES)
     depth, chains = stack_depth(program)
     print(f"flash {flash} of {FLASH_BUDGET} bytes")
-    print(
-        f"RAM   {ram} of {RAM_BUDGET} bytes: program {size['.text']}, data {size['.data']}, bss {size['.bss']}, stack {size['.stack']}"
-    )
+    parts = ", ".join(f"{name} {size[section]}" for name, section in RAM_PARTS)
+    print(f"RAM   {ram} of {RAM_BUDGET} bytes: {parts}")
     print(f"stack {depth} of {size['.stack']} bytes: {chains}")
     wrong = [f"{flash} bytes of flash"] if flash > FLASH_BUDGET else []
     wrong += [f"{ram} bytes of RAM"] if ram > RAM_BUDGET else []

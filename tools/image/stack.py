@@ -59,9 +59,8 @@ def read_line(function: Function, name: str, where: str, instruction: str, opera
         target = TARGET.search(operands)
         if target and target.group(1) != name:
             function.calls.add(target.group(1))
-    elif instruction == "blx" or (instruction == "bx" and operands not in ("lr", "pc")):
-        if not VENEER.match(name):
-            function.indirect.add(where)
+    elif (instruction == "blx" or (instruction == "bx" and operands not in ("lr", "pc"))) and not VENEER.match(name):
+        function.indirect.add(where)
     if instruction == "bx" and operands == "pc" and (veneer := VENEER.match(name)):
         function.calls.add(veneer.group(1))
     if (veneer := VENEER.match(name)) and not function.calls:

@@ -33,13 +33,13 @@ bt_tare_settings bt_tare_settings_from(const bt_settings *settings);
 typedef struct {
     bt_gate gate;
     bt_sweep sweep;
-    uint8_t state;  // enum bt_tare_state
-    uint8_t reason; // enum bt_tare_reason of the last change
+    uint8_t state;        // enum bt_tare_state
+    uint8_t reason;       // enum bt_tare_reason of the last change
     uint8_t before_fault; // the state to go back to
-    bool changed;   // the last round changed the tare by more than drift tracking, or the host's word did
-    bool tared;     // there is one
-    bool held;      // the host says so: no new tare is taken
-    bool let_go;    // the host says so: what is in doubt is residue
+    bool changed; // the last round changed the tare by more than drift tracking, or the host's word did
+    bool tared;   // there is one
+    bool held;    // the host says so: no new tare is taken
+    bool let_go;  // the host says so: what is in doubt is residue
     bt_baseline base;
     uint16_t electrode_q4[BT_ELECTRODES]; // base as it is subtracted; BT_INVALID_COUNT when unknown
     uint32_t threshold_count2;            // energy above which a round counts as touched

@@ -9,18 +9,18 @@ same is done to an emulated finger, new and worn, whose pressure creeps and unde
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from ...core.finger import Finger
 from ...core.geometry import Floats
 from ...errors import RecordingError
+from ...markdown import table
 from ...sim.physics import Profile
 from ...wire import messages_gen as wire
 from ...wire.frames import StructArray
-from . import recorded
-from .outcome import Facts, Options, check, claim, number, table, text
+from . import laboratory
+from .outcome import Facts, Options, check, claim, number, text
 from .plate_normal import emulated
 from .trial import Words
 
@@ -146,7 +146,7 @@ def judge(name: str, counts: Words, pdc: Words) -> Case:
 def run(options: Options) -> Result:
     """On a recording; or on an emulated finger, new and worn."""
     if options.recording is not None:
-        theirs = recorded.load(options.recording, options.finger, needs=("PDC",))
+        theirs = laboratory.load(options.recording, options.finger, needs=("PDC",))
         case = judge("recorded", theirs.trial.counts, theirs.trial.pdc)
         if not case.presses:
             raise RecordingError(
@@ -227,15 +227,11 @@ def page(facts: Facts) -> list[str]:
     return lines
 
 
-def draw(result: Result, path: Path) -> None:
+def draw(result: Result, figure: Any) -> None:
     """Pressure with the board's states and re-zeros; holds by their share and what became of them."""
-    import matplotlib
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(len(result.cases), 2, figsize=(13, 4.2 * len(result.cases)), layout="constrained",
-                                squeeze=False)  # fmt: skip
+    figure.set_size_inches(13, 4.2 * len(result.cases))
+    axes = figure.subplots(len(result.cases), 2, squeeze=False)
     figure.suptitle(f"Hold or residue: {result.source}")
     colors = {"tared": "#b91c1c", "doubt": "#c2410c", "contact": "#1d4ed8"}
     for (left, right), case in zip(axes, result.cases, strict=True):
@@ -260,5 +256,3 @@ def draw(result: Result, path: Path) -> None:
         right.legend(fontsize=8)
         for axis in (left, right):
             axis.grid(alpha=0.25)
-    figure.savefig(path, dpi=90)
-    plt.close(figure)
