@@ -9,6 +9,7 @@ same is done to an emulated finger, new and worn, whose pressure creeps and unde
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
