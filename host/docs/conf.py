@@ -87,7 +87,7 @@ def explain(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[
 
 def comment(name: str) -> list[str]:
     """The comment above a constant, in whichever module defines it."""
-    for module in ("frames", "batch", "finger"):
+    for module in ("wire.frames", "core.compute", "core.finger"):
         found = ModuleAnalyzer.for_module(f"biotac.{module}").find_attr_docs().get(("", name))
         if found:
             return list(found)
