@@ -165,7 +165,7 @@ static void adopt_after_press(bt_tare *tare, uint8_t reason)
 static void adopt_shift(bt_tare *tare)
 {
     bt_baseline base = tare->base;
-    int32_t shift_q16 = (int32_t)bt_div_round((int64_t)tare->sum_q4 << 12, BT_ELECTRODES);
+    int32_t shift_q16 = (int32_t)bt_div_round((int64_t)tare->sum_q4 * (1 << 12), BT_ELECTRODES);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         base.electrode_q16[i] = bt_baseline_moved(base.electrode_q16[i], shift_q16);
     }
