@@ -59,7 +59,8 @@ def time_passes(monkeypatch: pytest.MonkeyPatch) -> Callable[[], bytes]:
         return b"\0"
 
     clock = SimpleNamespace(monotonic=lambda: time.monotonic() + ahead_s, time=time.time)
-    monkeypatch.setattr("biotac.hand.board.time", clock)
+    for module in ("board", "handshake"):
+        monkeypatch.setattr(f"biotac.hand.{module}.time", clock)
     return jump
 
 

@@ -276,7 +276,7 @@ static void a_sensor_without_power_forgets_and_may_come_back_as_another(void **s
         assert_int_equal(transfer(BT_LISTEN_WORD, 6060000), 0x0000);
         next_count = 2048;
         assert_int_equal(sample(0xA2, 7000000), 0x0000); // mute
-        assert_string_equal(device.serial, table[k].serial);
+        assert_int_equal(strcmp(device.serial, table[k].serial), 0);
         (void)transfer(BT_PROPERTY_READ_COMMAND << 8 | 0x15, 8000000);
         assert_int_not_equal(sample(0xA2, 9000000), 0x0000);
     }
