@@ -115,7 +115,7 @@ static uint8_t tare_set(bt_session *session, const uint8_t *payload)
 }
 
 // HOLD and RELEASE.
-static uint8_t tell_fingers(bt_session *session, const uint8_t *payload, void (*word)(bt_tare *tare))
+static uint8_t hold_fingers(bt_session *session, const uint8_t *payload, bool held)
 {
     bt_msg_hold msg;
     bt_msg_hold_unpack(&msg, payload);
@@ -124,7 +124,7 @@ static uint8_t tell_fingers(bt_session *session, const uint8_t *payload, void (*
     }
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         if (msg.fingers >> f & 1) {
-            word(&session->finger[f].tare);
+            held ? bt_tare_hold(&session->finger[f].tare) : bt_tare_release(&session->finger[f].tare);
         }
     }
     return BT_ERROR_OK;
@@ -311,10 +311,10 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         error = tare_set(session, payload);
         break;
     case BT_HOLD_ID:
-        error = tell_fingers(session, payload, bt_tare_hold);
+        error = hold_fingers(session, payload, true);
         break;
     case BT_RELEASE_ID:
-        error = tell_fingers(session, payload, bt_tare_release);
+        error = hold_fingers(session, payload, false);
         break;
     case BT_GET_STATUS_ID:
         bt_session_send_status(session, req_id, now_us);
