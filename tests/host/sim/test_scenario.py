@@ -257,7 +257,7 @@ def test_drift_never_touches_and_keeps_below_the_tares_slew() -> None:
 def test_faults_shows_each_kind_once_on_one_of_three_fingers() -> None:
     samples = load_source("faults.toml").samples
     assert samples.shape[1] == 3 and (samples[:, [0, 2]] < 4096).all()
-    for code in tape.CODES:
+    for code in set(tape.CODES) - {tape.UNPLUGGED, tape.SWAPPED}:  # a sensor that is away is no fault of a word
         frames = np.flatnonzero((samples[:, 1] == code).any(axis=1))
         assert len(frames) > 0 and (np.diff(frames) == 1).all()  # one stretch
 
