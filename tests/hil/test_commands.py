@@ -25,6 +25,8 @@ COMMANDS = {
     wire.Subscribe: ((1, int(wire.QuantityFlags.POC)), wire.Reply),
     wire.GetPoint: ((0,), wire.Point),
     wire.TareNow: ((0,), wire.Reply),
+    wire.Hold: ((1,), wire.Reply),
+    wire.Release: ((1,), wire.Reply),
     wire.TareSet: ((0, TARE_Q4, wire.INVALID_COUNT), wire.Reply),
     wire.GetStatus: ((), wire.Status),
     wire.GetSensorStatus: ((0,), wire.SensorStatus),

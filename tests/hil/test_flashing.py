@@ -186,8 +186,9 @@ def test_a_wrong_image_leaves_the_board_alone(bench: Bench, tmp_path: Path) -> N
         boot_id = hand.info.boot_id
     with pytest.raises(InputError, match="second-stage boot"):
         read_image(spoiled(tmp_path, 1, 0xEE))
-    note = BUILT.read_bytes().index(b"BIOTAC image")
-    board_at = (note // 512) * PAGE + note % 512 - 32 + 14
+    uf2 = BUILT.read_bytes()
+    flash = b"".join(uf2[at + 32 : at + 32 + PAGE] for at in range(0, len(uf2), 512))
+    board_at = flash.index(b"BIOTAC image") + 14
     other = read_image(spoiled(tmp_path, board_at, wire.Board.LINUX_SBC))
     with pytest.raises(InputError, match="is for LINUX_SBC, but PICO answers"):
         bench.flash(other)
