@@ -87,7 +87,7 @@ def split(mine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             10.0,
             marks=pytest.mark.xfail(
                 strict=True,
-                reason="missed by 9 %: in 10 s the model's skin creeps, and nothing follows it while the sensor is away",
+                reason="missed by 9 %: the model's skin creeps, and nothing follows it while the sensor is away",
             ),
         ),
     ],
