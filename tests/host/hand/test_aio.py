@@ -5,11 +5,21 @@ from __future__ import annotations
 import asyncio
 import subprocess
 import sys
+from collections.abc import Coroutine
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import biotac
+
+
+def run(main: Coroutine[Any, Any, Any]) -> Any:
+    """In a thread of its own: the browser's tests leave a loop running in this one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, main).result()
+
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "host" / "docs" / "examples"
 SAYS = {
@@ -43,7 +53,7 @@ def test_all_of_a_simulated_source_arrives_and_the_loop_goes_on() -> None:
         assert turns > 10
         return frames, lost, touched
 
-    assert asyncio.run(main()) == (5 * 2000, 0, True)
+    assert run(main()) == (5 * 2000, 0, True)
 
 
 def test_two_loops_over_one_hand_each_get_all() -> None:
@@ -60,7 +70,7 @@ def test_two_loops_over_one_hand_each_get_all() -> None:
 
             return await asyncio.gather(first(200), first(300))
 
-    assert asyncio.run(main()) == [200, 300]
+    assert run(main()) == [200, 300]
 
 
 def test_commands_are_awaited_and_errors_come_up() -> None:
@@ -70,7 +80,7 @@ def test_commands_are_awaited_and_errors_come_up() -> None:
                 await hand.ask(lambda h: h.sensor_status(5))
             return await hand.ask(lambda h: h.setting(biotac.Setting.POC_WEIGHTS))
 
-    assert asyncio.run(main()) == 1
+    assert run(main()) == 1
     with pytest.raises(biotac.DeviceLostError, match="not open yet"):
         _ = biotac.aio.open("sim:drift.toml").hand
 
@@ -82,7 +92,7 @@ def test_a_lost_board_ends_the_iteration_in_words() -> None:
                 async for _ in hand.batches():
                     hand.hand.link.board._process.kill()
 
-    asyncio.run(main())
+    run(main())
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.py")))

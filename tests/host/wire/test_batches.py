@@ -34,6 +34,7 @@ def frame(finger: int, seq: int, t_us: int, **changes: object) -> bytes:
         "pdc_filtered_q4": 2412 * 16 + 8,
         "pressure_force_100un": -1250,
         "torsion_mnmm": -4750,
+        "wrench_age_ms": 0,
     }
     return encode(wire.Frame.ID, wire.Frame(**(facts | changes)).pack())  # type: ignore[arg-type]
 
@@ -230,7 +231,7 @@ def test_a_status_keeps_device_time_when_nothing_streams() -> None:
     decoder.feed(frame(0, 0, 0))
     half_hour_us = 30 * 60 * 10**6
     for k in range(1, 10):
-        status = wire.Status(k, k * half_hour_us % 2**32, *[0] * 14)
+        status = wire.Status(k, k * half_hour_us % 2**32, *[0] * 17)
         decoder.feed(encode(wire.Status.ID, status.pack()))
     assert decoder.unwrap_t_us(9 * half_hour_us % 2**32) == 9 * half_hour_us
     assert decoder.unwrap_t_us((9 * half_hour_us + 5) % 2**32) == 9 * half_hour_us + 5
