@@ -87,7 +87,7 @@ def split(mine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             10.0,
             marks=pytest.mark.xfail(
                 strict=True,
-                reason="missed by 9 %: the model's skin creeps, and nothing follows it while the sensor is away",
+                reason="missed: 10 % off the finger that stayed, whose tare followed drift meanwhile",
             ),
         ),
     ],
@@ -98,14 +98,14 @@ def test_a_held_force_is_back_within_50_ms_when_the_same_sensor_is(
     whole, _ = play(rig, tmp_path, seconds, None, calibrated=True)
     frames, hand = play(rig, tmp_path, seconds, kind, calibrated=True)
     assert of(frames, 0).tobytes() == of(whole, 0).tobytes()
-    before, after = split(of(frames, 1))
+    _, after = split(of(frames, 1))
     back = after[np.argmax(np.all(after["counts"] != wire.INVALID_COUNT, axis=1)) :]  # from the first good round
     sure = back["t_us"] >= back["t_us"][0] + BACK_ROUNDS * 10_000
     assert np.all(back["flags"][sure] & (FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER) == 0)
-    assert sure.sum() > 100
-    held, again = before["force_n"][-20:].mean(axis=0), back["force_n"][sure][:20].mean(axis=0)  # noise is 7 %
-    assert np.linalg.norm(held) > 0.5  # it does hold something
-    assert np.linalg.norm(again - held) <= 0.05 * np.linalg.norm(held)
+    held = of(whole, 1)["force_n"][np.isin(of(whole, 1)["t_us"], back["t_us"][sure])]
+    assert len(held) == sure.sum() > 100
+    assert np.linalg.norm(held, axis=1).min() > 0.5  # it does hold something
+    assert np.all(np.linalg.norm(back["force_n"][sure] - held, axis=1) <= 0.05 * np.linalg.norm(held, axis=1))
     assert np.all(back["flags"][sure] & FrameFlags.CONTACT != 0)
     assert hand.calibration_state(1) == CalibrationState.IN_FORCE
 
