@@ -144,7 +144,7 @@ void bt_gateway_init(bt_gateway *gateway)
 bool bt_gateway_alarm(bt_gateway *gateway)
 {
     port_alarm_at(bt_sampler_alarm(&gateway->sampler));
-    return !gateway->sampler.commanded && !gateway->sampler.under_way;
+    return !gateway->sampler.commanded;
 }
 
 static void count_word(bt_word_counts *counts, enum bt_word kind, uint16_t word)

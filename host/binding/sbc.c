@@ -6,7 +6,7 @@
 
 #include "gateway.h"
 #include "port.h"
-#include "spi_at_once.h"
+#include "spi_word_by_word.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 #include "fake_port.h"
 
 #include "port.h"
-#include "spi_at_once.h"
+#include "spi_word_by_word.h"
 #include "wire/messages_gen.h"
 
 #include <string.h>

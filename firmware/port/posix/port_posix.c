@@ -9,7 +9,7 @@
 // --hold: device time stands still until "run" comes on stdin. End of stdin ends the process.
 #define _DEFAULT_SOURCE
 #include "port.h"
-#include "spi_at_once.h"
+#include "spi_word_by_word.h"
 
 #include "bus.h"
 #include "clock.h"
