@@ -119,6 +119,7 @@ void bt_gateway_init(bt_gateway *gateway)
         .board = port_board(),
         .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},
         .boot_id = port_boot_id(),
+        .image_crc32 = port_image_crc32(),
     };
     port_board_serial(identity.board_serial);
     port_delay_us(BT_POWER_ON_MS * 1000);
