@@ -6,7 +6,7 @@ Wire integers become mm, N and N*mm here and nowhere else.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -69,9 +69,9 @@ IDLE_DTYPE = np.dtype(
 StructArray = NDArray[np.void]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One finger, one round of slots (10 ms).
+    """One finger, one round of slots (10 ms). Equal to another when all values are, NaN to NaN.
 
     Shapes: counts (19,) uint16; poc_mm, force_n, torque_nmm (3,) float64; the rest are numbers. Units and
     invalid marks as in FRAME_DTYPE. Force and torque act on the finger; x to the tip, y to E11's side, z dorsal.
@@ -90,6 +90,15 @@ class Frame:
     flags: FrameFlags
     pressure_force_n: float = math.nan
     torsion_nmm: float = math.nan
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Frame):
+            return NotImplemented
+        pairs = [(getattr(self, field.name), getattr(other, field.name)) for field in fields(self)]
+        return all(np.array_equal(mine, its, equal_nan=np.asarray(mine).dtype.kind == "f") for mine, its in pairs)
+
+    def __hash__(self) -> int:
+        return hash((self.finger, self.seq, self.t_us))
 
     @classmethod
     def from_row(cls, row: Any) -> Frame:
