@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 
 from . import contact as calibrate_contact
+from . import population as calibrate_population
 from . import pressure as calibrate_pressure
 from . import wrench as calibrate_wrench
 
 EXAMPLE = calibrate_wrench.EXAMPLE
 
-WHATS = (calibrate_wrench, calibrate_pressure, calibrate_contact)
+WHATS = (calibrate_wrench, calibrate_population, calibrate_pressure, calibrate_contact)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
