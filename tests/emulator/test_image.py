@@ -96,24 +96,43 @@ LISTING = """
 10000122:\t4760      \tbx\tip
 
 20000000 <in_sram>:
+SOURCE:2 (discriminator 1)
 20000000:\t4798      \tblx\tr3
+SOURCE:3
+20000002:\t4770      \tbx\tlr
 """
+CALL = "port->answer("
 
 
-def program(**pointers: tuple[str, ...]) -> stack.Program:
-    return stack.Program(stack.read_functions(LISTING.splitlines()), {"helper": 24}, pointers)
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    path = tmp_path / "sram.c"
+    path.write_text("void in_sram(void) {\n    port->answer(0);\n}\n")
+    return path
 
 
-def test_the_stack_is_that_of_the_deepest_chain() -> None:
-    depth, chain = program(in_sram=()).deepest("main")
+def program(source: str | Path, pointers: dict[str, tuple[str, ...]]) -> stack.Program:
+    listing = LISTING.replace("SOURCE", str(source)).splitlines()
+    return stack.Program(stack.read_functions(listing), {"helper": 24}, pointers)
+
+
+def test_the_stack_is_that_of_the_deepest_chain(source: Path) -> None:
+    depth, chain = program(source, {CALL: ()}).deepest("main")
     assert (depth, chain) == (28 + 24 + 4, ("main", "helper", "__in_sram_veneer", "in_sram"))
 
 
-def test_what_cannot_be_bounded_is_refused() -> None:
-    with pytest.raises(stack.Unknown, match="in_sram calls through a pointer"):
-        program().deepest("main")
+def test_what_cannot_be_bounded_is_refused(source: Path) -> None:
+    for others in ({}, {"port->ask(": ()}):
+        with pytest.raises(stack.Unknown, match=rf"in_sram calls through a pointer at {source}:2: port->answer\(0\);"):
+            program(source, others).deepest("main")
     with pytest.raises(stack.Unknown, match="recursion: main -> helper"):
-        program(in_sram=("helper",)).deepest("main")
+        program(source, {CALL: ("helper",)}).deepest("main")
+
+
+@pytest.mark.parametrize("where", ["", "/no/such/folder/sram.c"])
+def test_a_call_through_a_pointer_from_a_line_nobody_can_read_is_refused(where: str) -> None:
+    with pytest.raises(stack.Unknown, match=r"in_sram calls through a pointer.*no line of source"):
+        program(where, {"": (), CALL: ()}).deepest("main")
 
 
 def test_forbidden_symbols() -> None:

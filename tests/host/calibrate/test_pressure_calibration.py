@@ -25,6 +25,21 @@ from biotac.sim.process import SimBoard
 FORCES = (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)
 FINGERS = range(5)
 
+# The emulated pressure is 100 N^-1 F (1 + 0.15 tanh(x / 8 mm)) with two lags that no K can follow
+# (biotac/sim/sampling.py): up to U = 9 counts too low while it is pressed, and 0.15 of a lag of 60 s too high. Least
+# squares over presses of f counts turn the first into at most U sum(f) / sum(f^2) of K, where the place's factor is
+# least, 1 - 0.15; the second, over the 1.8 s of a ramp and a hold since the tare, into 0.15 * 1.8 / 60. A tare that is
+# taken in the 1.5 s of rest may still be low by U exp(-1.1 / 0.8): 0.3 s of 1.5 settle, and 0.8 s is the lag.
+_COUNTS = np.array(CALIBRATION_FORCES_N) * 100 * (1 - 0.15)
+_PER_COUNT = _COUNTS.sum() / (_COUNTS**2).sum()
+K_HIGH = 9 * _PER_COUNT
+K_LOW = 0.15 * 1.8 / 60 + 9 * np.exp(-1.1 / 0.8) * _PER_COUNT
+
+
+def gain_at(x_mm: float) -> float:
+    """N per count of the emulated sensor's law without its lags; E17 is at x = -2.8 mm."""
+    return float(0.01 / (1 + 0.15 * np.tanh(x_mm / 8)))
+
 
 class Silent:
     """Nobody is there; the steps are kept."""
@@ -57,8 +72,7 @@ def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
     facts = json.loads(said.out)
     assert [one["finger"] for one in facts["fingers"]] == [0, 1, 2, 3, 4]
     for one in facts["fingers"]:
-        # The emulated sensor's law at E17, x = -2.8 mm: 100 (1 + 0.15 tanh(x / 8)) counts per N.
-        assert one["gain_n"] == pytest.approx(0.01 / (1 + 0.15 * np.tanh(-2.8 / 8)), rel=0.005)
+        assert -K_LOW <= one["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
         assert one["rest_counts"] == pytest.approx(1326, abs=1)
         assert one["verification"]["board_error"] <= 0.059
         assert one["verification"]["board_error"] == pytest.approx(one["verification"]["float_error"], abs=1e-4)
@@ -183,7 +197,7 @@ def test_a_recording_with_a_plate(pressed: Path, tmp_path: Path, capsys) -> None
     assert run(pressed, "--reference", str(pressed / "plate.csv"), "--json", "--out", str(tmp_path)) == 0
     (zero, one) = json.loads(capsys.readouterr().out)["fingers"]
     for facts in (zero, one):
-        assert facts["gain_n"] == pytest.approx(0.01 / (1 + 0.15 * np.tanh(-2.8 / 8)), rel=0.005)
+        assert -K_LOW <= facts["gain_n"] / gain_at(-2.8) - 1 <= K_HIGH
         assert facts["verification"]["board_error"] <= 0.059
         assert abs(facts["lag_rows"]) <= 1
     assert file.load(tmp_path / "two-finger1.json").serial == "BTSIM00000000012"
@@ -227,7 +241,7 @@ def changed_csv(pressed: Path, tmp_path: Path, change: str) -> Path:
     ("change", "words"),
     [
         ("mN", "forces up to 5000, expected newtons, 200 at most"),
-        ("grams", "K is 0.211 N/count, expected 0.0009 to 0.1; is the reference in newtons?"),
+        ("grams", "N/count, expected 0.0009 to 0.1; is the reference in newtons?"),
         ("late", "they agree best with pressure -59 rows after the force"),
         ("elsewhere", "covers none of"),
         ("nan", "1 of 3110 rows with NaN"),
@@ -292,9 +306,11 @@ def test_k_holds_where_it_was_found_and_elsewhere_by_the_sensors_law(result: nav
     places = result.places
     errors = np.array(places["errors"]) / 100
     law = 1 + 0.15 * np.tanh(np.array(places["x_mm"]) / 8)
-    np.testing.assert_allclose(np.array(places["gain_n"]) / 1e3 * 100 * law, 1.0, rtol=0.01)
+    off = np.array(places["gain_n"]) / 1e3 * 100 * law - 1
+    assert (off >= -K_LOW).all() and (off <= K_HIGH).all()
     wanted = np.abs(law[None, :] / law[:, None] - 1)
-    np.testing.assert_allclose(errors, wanted, atol=0.01)
+    # K of the one place and what pressure says at the other are each off by the lags
+    assert (np.abs(errors - wanted) <= (K_HIGH + K_LOW) * (1 + wanted)).all()
     assert np.diag(errors).max() < 0.01 < 0.2 < errors.max()
 
 

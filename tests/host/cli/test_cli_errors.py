@@ -129,7 +129,7 @@ CASES: list[tuple[int, str, str]] = [
     (3, "`biotac list`", f"calibrate pressure {NO_PORT}"),
     (2, "check the path", "calibrate pressure +no.mcap"),
     (2, "expected a reference file", "calibrate pressure @rec.mcap"),
-    (2, "expected CSV with t_s and force_n", "calibrate pressure @rec.mcap --reference +no.csv"),
+    (2, "expected a CSV file of a force/torque sensor", "calibrate pressure @rec.mcap --reference +no.csv"),
     (2, "t_s and force_n, or", "calibrate pressure @rec.mcap --reference @list.json"),
     (2, "press harder", "calibrate pressure @rec.mcap --forces 2,3,4,3"),
     (2, "expected 4 or more", "calibrate pressure @rec.mcap --forces 2,3,4"),

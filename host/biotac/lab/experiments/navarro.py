@@ -266,8 +266,8 @@ def facts(result: Result) -> Facts:
         "notes": [
             f"presses of {', '.join(f'{f:g}' for f in CALIBRATION_FORCES_N)} N, then "
             f"{VERIFICATION_FORCES_N[0]:g} N, with a 7 mm flat at {PLACE}; the force is the scenario's, without error",
-            "the emulated sensor's pressure is the same linear law in every finger, with a factor that depends on the "
-            "place along the finger: real fingers differ more in K, and their pressure creeps",
+            "the emulated sensor's pressure is the same law in every finger, with a factor that depends on the "
+            "place along the finger: real fingers differ more in K",
             "a worn emulated sensor differs in its electrodes alone: for pressure it is five fingers more",
             "relative error: |told - F| / |F|, Euclidean norms over the held rows; the paper gives no formula",
             "P0 is the tare in each frame; the one in the table is the mean at rest before the first press",
