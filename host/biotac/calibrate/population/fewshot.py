@@ -10,7 +10,7 @@ from ...core.geometry import Floats
 from ...errors import InputError
 from .training import Population, Sums
 
-LEAST_PRESSES, MOST_PRESSES = 3, 50
+LEAST_PRESSES = 3
 # How much fingers differ in the two numbers, and how far the map is off in one press: F1 and F2, each by the other's.
 GAIN_SPREAD = 0.04
 BALANCE_SPREAD = 0.1
@@ -36,14 +36,14 @@ class Scale:
         return replace(its, coefficients=self.applied(its.coefficients))
 
 
-def scale_of(said: Floats, shown_n: Floats) -> Scale:
+def scale_of(said: Floats, shown_n: Floats, *, least: int = LEAST_PRESSES) -> Scale:
     """From presses straight down: the map's force (k, 3) in each, N, and what the scale showed (k,), N.
 
     Each number is pulled to what it is on most fingers, by how far the map is off in one press. Raises InputError for
     presses that say nothing.
     """
-    if len(said) != len(shown_n) or len(said) < LEAST_PRESSES:
-        raise InputError(f"{len(said)} presses and {len(shown_n)} readings: expected {LEAST_PRESSES} or more of each")
+    if len(said) != len(shown_n) or len(said) < least:
+        raise InputError(f"{len(said)} presses and {len(shown_n)} readings: expected {least} or more of each")
     z = said[:, 2]
     size = float(z @ z)
     if not np.isfinite(said).all() or (shown_n <= 0.0).any() or (z <= 0.0).any():
