@@ -41,8 +41,8 @@ class Outlet:
     """Two streams for each finger of ``hand``; use as a context manager, and push every batch.
 
     ``BioTac finger0``: a sample a round, 100 a second, of force (N), torque (N*mm), point of contact (mm), flags,
-    counts of E1..E19, PDC, TAC and TDC; NaN and 65535 where invalid, as in exports. ``BioTac finger0 PAC``: 2200 a second,
-    counts. All are double64; labels, units and meanings stand in the streams' descriptions.
+    counts of E1..E19, PDC, TAC and TDC; NaN and 65535 where invalid, as in exports. ``BioTac finger0 PAC``: 2200 a
+    second, counts. All are double64; labels, units and meanings stand in the streams' descriptions.
 
     Stamps are device times on ``local_clock()``, by ``hand.clock``: of a frame the beginning of its round, of PAC
     each sample's own. Where the clock knows nothing (a simulated board's time is none), a batch is stamped by its
