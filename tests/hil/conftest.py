@@ -31,10 +31,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What is marked ``long`` is for the night on a rig that is slower than a board."""
     for item in items:
-        callspec = getattr(item, "callspec", None)
-        if callspec is not None and item.get_closest_marker("long") is not None:
-            if RIGS.get(callspec.params.get("rig_name"), {}).get("slow"):
-                item.add_marker("nightly")
+        params = item.callspec.params if hasattr(item, "callspec") else {}
+        slow = RIGS.get(params.get("rig_name"), {}).get("slow", False)
+        if slow and item.get_closest_marker("long") is not None:
+            item.add_marker("nightly")
 
 
 @pytest.fixture
