@@ -117,7 +117,7 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
     finger->silent_rounds = 0;
     // A TARE command between two rounds has changed the tare already.
     finger->tare_unsent = finger->tare.changed;
-    bt_tare_end(&finger->tare, settings);
+    bt_tare_end(&finger->tare, finger->round.t_us, settings);
     finger->tare_unsent = finger->tare_unsent || finger->tare.changed;
     finger->tare.changed = false;
     return true;

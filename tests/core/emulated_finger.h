@@ -67,6 +67,7 @@ static inline bt_round next_frame(emulated_finger *finger)
     bt_round frame;
     bt_round_clear(&frame);
     finger->t_s += 1.0 / FRAMES_PER_S;
+    frame.t_us = (uint32_t)llround(finger->t_s * 1e6);
     for (int i = 0; i < BT_ELECTRODES; i++) {
         double value =
             rest_count(finger, i) + finger->load * load_shape(i) + finger->sigma * gauss(&finger->seed);
@@ -118,7 +119,7 @@ static inline int feed(emulated_finger *finger, const bt_round *frame)
         touched = BT_LANE_PDC;
     }
     bt_tare_temperature(&finger->tare, frame->tdc);
-    bt_tare_end(&finger->tare, &finger->settings);
+    bt_tare_end(&finger->tare, frame->t_us, &finger->settings);
     return touched;
 }
 

@@ -44,6 +44,8 @@ finger = 1
 kind = "{kind}"
 """
 
+_undisturbed: dict[tuple[str, float], np.ndarray] = {}  # frames by rig and duration of the fault
+
 
 def for_finger(hand: biotac.Hand, finger: int) -> Calibration:
     return replace(OWN, serial=bytes(hand.sensor_info(finger).serial).rstrip(b"\0").decode())
@@ -74,33 +76,29 @@ def split(mine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mine[:cut], mine[cut:]
 
 
-@pytest.mark.parametrize("kind", ["stuck_low", "unplugged"])  # the latter is mute until it is asked
-@pytest.mark.parametrize(
-    "seconds",
-    [
-        0.010,
-        0.014,
-        0.1,
-        0.4,
-        pytest.param(
-            1.0,
-            marks=pytest.mark.xfail(
-                strict=False,
-                reason="missed when unplugged: 5.3 %; level pressure is waited for anew, drift meanwhile goes on",
-            ),
-        ),
-        pytest.param(
-            10.0,
-            marks=pytest.mark.xfail(
-                strict=True, reason="missed: 19 % off the finger that stayed, whose tare followed drift meanwhile"
-            ),
-        ),
-    ],
-)
+def undisturbed(rig: Rig, tmp_path: Path, seconds: float) -> np.ndarray:
+    """Frames of the scenario without a fault: the same for every kind."""
+    if (rig.name, seconds) not in _undisturbed:
+        frames, hand = play(rig, tmp_path, seconds, None, calibrated=True)
+        hand.close()
+        _undisturbed[rig.name, seconds] = frames
+    return _undisturbed[rig.name, seconds]
+
+
+# "unplugged" is mute until it is asked. By day a slow rig plays one of each.
+BY_DAY = [(0.1, "stuck_low"), (1.0, "unplugged")]
+DROPOUTS = [
+    pytest.param(seconds, kind, marks=() if (seconds, kind) in BY_DAY else pytest.mark.long)
+    for kind in ("stuck_low", "unplugged")
+    for seconds in (0.010, 0.014, 0.1, 0.4, 1.0, 2.0, 4.0, 10.0)
+]
+
+
+@pytest.mark.parametrize(("seconds", "kind"), DROPOUTS)
 def test_a_held_force_is_back_within_50_ms_when_the_same_sensor_is(
     rig: Rig, tmp_path: Path, seconds: float, kind: str
 ) -> None:
-    whole, _ = play(rig, tmp_path, seconds, None, calibrated=True)
+    whole = undisturbed(rig, tmp_path, seconds)
     frames, hand = play(rig, tmp_path, seconds, kind, calibrated=True)
     assert of(frames, 0).tobytes() == of(whole, 0).tobytes()
     _, after = split(of(frames, 1))
@@ -115,9 +113,11 @@ def test_a_held_force_is_back_within_50_ms_when_the_same_sensor_is(
     assert hand.calibration_state(1) == CalibrationState.IN_FORCE
 
 
-@pytest.mark.parametrize("seconds", [0.010, 0.1, 1.0])
+@pytest.mark.parametrize(
+    "seconds", [pytest.param(0.010, marks=pytest.mark.long), 0.1, pytest.param(1.0, marks=pytest.mark.long)]
+)
 def test_another_sensor_is_refused_and_that_is_said(rig: Rig, tmp_path: Path, seconds: float) -> None:
-    whole, _ = play(rig, tmp_path, seconds, None, calibrated=True)
+    whole = undisturbed(rig, tmp_path, seconds)
     frames, hand = play(rig, tmp_path, seconds, "swapped", calibrated=True)
     assert of(frames, 0).tobytes() == of(whole, 0).tobytes()
     before, after = split(of(frames, 1))

@@ -39,7 +39,7 @@ static void front_end(bt_finger *finger, const uint16_t count[LANES])
         touched |= bt_tare_electrode(&finger->tare, i, count[i]);
     }
     touched |= bt_tare_pressure(&finger->tare, count[BT_LANE_PDC]);
-    bt_tare_end(&finger->tare, &tare_settings);
+    bt_tare_end(&finger->tare, 0, &tare_settings);
     sink = touched;
 }
 

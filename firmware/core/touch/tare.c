@@ -245,18 +245,30 @@ static bool tracks(const bt_tare *tare)
 }
 
 // Drift moves the tare as it moves the watched baseline.
-static BT_NOINLINE void follow_drift(bt_tare *tare, unsigned i, uint32_t mean_q16)
+static void follow_drift(bt_tare *tare, unsigned i, int32_t step_q16)
 {
     uint32_t watched_q16 = tare->watch.base.electrode_q16[i];
     if (watched_q16 == BT_TARE_UNKNOWN) {
         return;
     }
-    int32_t step_q16 = bt_watch_step_q16(&tare->watch, mean_q16, watched_q16);
     uint32_t moved_q16 = bt_baseline_moved(watched_q16, step_q16);
     tare->watch.base.electrode_q16[i] = moved_q16;
     tare->sweep.settled_q3.lane[i] = (uint16_t)(moved_q16 >> 13); // or drift would look like motion
     tare->base.electrode_q16[i] = bt_baseline_moved(tare->base.electrode_q16[i], step_q16);
     use_electrode(tare, i);
+}
+
+// Back from a silence. All electrodes alike: what each has of its own is less than the noise of so few
+// rounds.
+static BT_NOINLINE void resume(bt_tare *tare)
+{
+    bool touched = tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT;
+    int32_t step_q16 =
+        touched && tare->gate.pressure_now ? bt_watch_resume(&tare->watch, &tare->silence, SPAN_Q3) : 0;
+    for (unsigned i = 0; i < BT_ELECTRODES && step_q16 != 0; i++) {
+        follow_drift(tare, i, step_q16);
+        tare->partial = true;
+    }
 }
 
 static void serve_touched(bt_tare *tare, unsigned i, uint16_t mean_q3)
@@ -271,7 +283,8 @@ static void serve_touched(bt_tare *tare, unsigned i, uint16_t mean_q3)
         uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
         bt_watch_side(&tare->watch, mean_q16, tare->watch.base.electrode_q16[i]);
         if (tare->watch.drifts) {
-            follow_drift(tare, i, mean_q16);
+            uint32_t base_q16 = tare->watch.base.electrode_q16[i];
+            follow_drift(tare, i, bt_watch_step_q16(&tare->watch, mean_q16, base_q16));
         }
     }
 }
@@ -515,7 +528,7 @@ bool bt_tare_pressure(bt_tare *tare, uint16_t count)
     return bt_gate_pressure(&tare->gate, count, BT_PDC_HIT) < 0 && bt_tare_touch(tare);
 }
 
-void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings)
+void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
 {
     tare->changed = false;
     tare->age_rounds++;
@@ -546,6 +559,9 @@ void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings)
         follow_contact(tare);
     }
     tare->pressure_seen = tare->pressure_seen || tare->gate.pressure_now;
+    if (bt_silence_add(&tare->silence, t_us, &tare->gate.smooth)) {
+        resume(tare);
+    }
     bt_sweep_add(&tare->sweep, &tare->gate.smooth);
     serve(tare);
     if (bt_sweep_next(&tare->sweep)) {

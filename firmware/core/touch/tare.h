@@ -18,6 +18,7 @@
 #include "touch/inverted.h"
 #include "touch/noise.h"
 #include "touch/release.h"
+#include "touch/silence.h"
 #include "touch/sweep.h"
 #include "touch/thermal.h"
 #include "touch/watch.h"
@@ -46,6 +47,7 @@ typedef struct {
     uint32_t age_rounds;                  // since the last change
     uint32_t contact_rounds;              // since the contact was seen
 
+    bt_silence silence;
     bt_watch watch;
     bt_tare_change last; // what the latest new tare changed
     bt_rollback rollback;
@@ -66,7 +68,7 @@ typedef struct {
 void bt_tare_reset(bt_tare *tare);
 
 // A round: begin, then each electrode's and the pressure's word as it comes, then end.
-// Every channel is given once in a round, BT_INVALID_COUNT where no good word came.
+// Every channel is given once in a round, BT_INVALID_COUNT where no good word came. t_us: device time.
 // A word's function returns true in the slot in which a resting finger is first touched.
 void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings);
 bool bt_tare_touch(bt_tare *tare);
@@ -82,7 +84,7 @@ static inline bool bt_tare_electrode(bt_tare *tare, unsigned electrode, uint16_t
 #endif
 bool bt_tare_pressure(bt_tare *tare, uint16_t count);
 void bt_tare_temperature(bt_tare *tare, uint16_t tdc);
-void bt_tare_end(bt_tare *tare, const bt_tare_settings *settings);
+void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings);
 
 // Host commands; enum bt_error. NOW needs two sweeps that hold still; both are refused in FAULT.
 uint8_t bt_tare_now(bt_tare *tare);

@@ -4,15 +4,25 @@
 
 #include <stddef.h>
 
-#define LEVEL_Q3     16        // two counts: four sigmas; a load of 0.02 N/s is past it in one second
-#define LEVEL_SWEEPS 32        // 2.6 s
-#define WAIT_SWEEPS  5         // until means say nothing of before
-#define ONE_WAY_Q2   26        // thirteen electrodes one way for six the other: three sigmas of noise
-#define SLEW_Q16     (8 * 328) // a sweep; 0.5 count/s, as at rest
-#define EACH_Q16     (8192 / BT_ELECTRODES) // of a sum over all electrodes in 1/8 count
+#define LEVEL_Q3     16 // two counts: four sigmas; a load of 0.02 N/s is past it in one second
+#define LEVEL_SWEEPS 32 // 2.6 s
+#define WAIT_SWEEPS  5  // until means say nothing of before
+#define ONE_WAY_Q2   26 // thirteen electrodes one way for six the other: three sigmas of noise
+#define CREEP_Q3                                                                                             \
+    (5 * LEVEL_Q3)           // of a silence, however long: what skin creeps by at the pace of level in 13 s
+#define SLEW_Q16   (8 * 328) // a sweep; 0.5 count/s, as at rest
+#define MISSED_Q16 (SLEW_Q16 / 2)         // 15 counts/min, the worst drift measured: few rounds are noisy
+#define EACH_Q16   (8192 / BT_ELECTRODES) // of a sum over all electrodes in 1/8 count
 
 _Static_assert((int64_t)BT_ELECTRODES * BT_SWEEP_UNREAD_Q3 * EACH_Q16 <= INT32_MAX,
                "a sum of distances must fit its type");
+_Static_assert((int64_t)UINT16_MAX *SLEW_Q16 <= INT32_MAX,
+               "what is due of the longest silence must fit its type");
+
+static int32_t clamped(int32_t value, int32_t low, int32_t high)
+{
+    return value < low ? low : value > high ? high : value;
+}
 
 void bt_watch_pause(bt_watch *watch)
 {
@@ -85,8 +95,58 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
     watch->one_way_q2 = (int16_t)(watch->one_way_q2 + watch->side - bt_shift_down(watch->one_way_q2, 2));
     bool one_way = watch->one_way_q2 >= ONE_WAY_Q2 || watch->one_way_q2 <= -ONE_WAY_Q2;
     watch->drifts = one_way && (watch->slow || watch->level_sweeps >= LEVEL_SWEEPS);
-    int32_t step_q16 = watch->away_q3 * EACH_Q16;
-    watch->step_q16 = step_q16 > SLEW_Q16 ? SLEW_Q16 : step_q16 < -SLEW_Q16 ? -SLEW_Q16 : step_q16;
+    watch->step_q16 = clamped(watch->away_q3 * EACH_Q16, -SLEW_Q16, SLEW_Q16);
     watch->side = 0;
     watch->away_q3 = 0;
+}
+
+// Would the pressure have been level all along? `due` becomes the sweeps in which drift would have been
+// followed.
+static bool resume_level(bt_watch *watch, const bt_silence *silence, int32_t *due)
+{
+    int32_t pressure_q3 = silence->sum.lane[BT_LANE_PDC] * 8 / BT_SILENCE_ROUNDS;
+    int32_t sweeps = watch->level_sweeps + silence->sweeps;
+    int32_t change_q3 = pressure_q3 - watch->level_q3;
+    int32_t creep_q3 = clamped(sweeps * LEVEL_Q3 / LEVEL_SWEEPS, LEVEL_Q3, CREEP_Q3);
+    if (change_q3 > creep_q3 || change_q3 < -creep_q3) {
+        return false;
+    }
+    bool level = watch->slow || watch->level_sweeps >= LEVEL_SWEEPS;
+    *due = level ? silence->sweeps : clamped(sweeps - LEVEL_SWEEPS, 0, silence->sweeps);
+    if (change_q3 > LEVEL_Q3 || change_q3 < -LEVEL_Q3) {
+        watch->slow = true;
+        watch->level_q3 = (uint16_t)pressure_q3;
+        sweeps = 0;
+    }
+    watch->level_sweeps = (uint8_t)clamped(sweeps, 0, UINT8_MAX);
+    return true;
+}
+
+int32_t bt_watch_resume(bt_watch *watch, const bt_silence *silence, int span_q3)
+{
+    int32_t due = 0;
+    if (!resume_level(watch, silence, &due) || watch->wait_sweeps != 0) {
+        return 0;
+    }
+    int32_t away_q3[BT_ELECTRODES];
+    int32_t sum_q3 = 0;
+    int32_t side = 0;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        bool known = watch->base.electrode_q16[i] != BT_TARE_UNKNOWN;
+        int32_t now_q3 = silence->sum.lane[i] * 8 / BT_SILENCE_ROUNDS;
+        away_q3[i] = known ? now_q3 - (int32_t)(watch->base.electrode_q16[i] >> 13) : 0;
+        sum_q3 += away_q3[i];
+        side += (away_q3[i] > 0) - (away_q3[i] < 0);
+    }
+    bool even = 4 * side >= ONE_WAY_Q2 || 4 * side <= -ONE_WAY_Q2;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        int32_t apart_q3 = away_q3[i] - sum_q3 / BT_ELECTRODES;
+        bool known = watch->base.electrode_q16[i] != BT_TARE_UNKNOWN;
+        even = even && (!known || (apart_q3 <= span_q3 && apart_q3 >= -span_q3));
+    }
+    // Of this sweep's lanes so far, against what is now to move; and what the others would be moved by twice.
+    watch->side = 0;
+    watch->away_q3 = 0;
+    watch->step_q16 = 0;
+    return even ? clamped(sum_q3 * EACH_Q16, -due * MISSED_Q16, due * MISSED_Q16) : 0;
 }

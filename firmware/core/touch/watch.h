@@ -11,6 +11,7 @@
 #define BIOTAC_WATCH_H
 
 #include "touch/baseline.h"
+#include "touch/silence.h"
 #include "touch/sweep.h"
 
 typedef struct {
@@ -42,6 +43,11 @@ void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, i
 
 // After a sweep; pressure_mean_q3 is NULL without a good pressure word in it.
 void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3);
+
+// A finger that was silent is back, with a good pressure word: as if it had answered all along, the time
+// counts as level if pressure moved by no more than what creeps. Returns what all electrodes would have been
+// followed by, in counts as q16: 0 if any has moved by more than span_q3 that not all share.
+int32_t bt_watch_resume(bt_watch *watch, const bt_silence *silence, int span_q3);
 
 // An electrode's step of drift: a quarter more than all have where it lags behind them, else a quarter less.
 int32_t bt_watch_step_q16(const bt_watch *watch, uint32_t mean_q16, uint32_t base_q16);

@@ -105,9 +105,9 @@ class Finger:
 
         ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,) and ``pac`` (n, 22) are integers 0..4095, 0xFFFF where no
         good word came; a channel that is not given has none. PAC takes no part in any result. ``t_us`` (n,), the
-        rounds' device times, wraps at 2^32 as the board's; by default each is 10 ms after the one before. The
-        board's machine counts rounds, not times. Raises ValueError for other shapes, types and ranges, before any
-        round is taken.
+        rounds' device times, wraps at 2^32 as the board's; by default each is 10 ms after the one before. A
+        jump of 90 ms and more is a silence, in which drift went on. Raises ValueError for other shapes, types and
+        ranges, before any round is taken.
         """
         electrodes = _words("counts", counts, None, _ELECTRODES)
         n = len(electrodes)
