@@ -21,6 +21,11 @@ def test_courses_that_once_broke_something_do_not_again(seed: int) -> None:
     assert fuzz.judge(fuzz.draw(seed)).broken == []
 
 
+@pytest.mark.parametrize("seed", [8, 37])
+def test_what_comes_back_of_an_undershoot_is_no_touch(seed: int) -> None:
+    assert fuzz.judge(fuzz.draw(seed)).idle_touches == 0
+
+
 def test_hours_of_rest_without_glitches_have_no_contact() -> None:
     assert sum(fuzz.rest(seed, 600.0, worn=False) for seed in range(12)) == 0
 

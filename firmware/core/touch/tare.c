@@ -6,15 +6,18 @@
 #include <string.h>
 
 // Bounds of the machine, measured on real sensors; the settling rule comes from real recordings.
-#define HITS         3         // rounds over the threshold that make a contact
-#define SLEW_Q16     (8 * 328) // a sweep; 0.5 count/s: drift is followed no faster, so a load is not
-#define PDC_SLEW_Q16 (8 * 131) // 0.2 count/s
-#define PDC_SINK_Q16 (8 * 655) // 1 count/s: no load takes pressure away
-#define UNDERSHOOT   16        // pressure that may be missing right after a press (9 seen); it comes back
-#define SPAN_Q3      (12 * 8)  // means of still signals stay this close to where they came to rest
-#define NOW_SPAN_Q3  (32 * 8)  // and their latest filtered count this close to the mean: ten sigmas
-#define STILL_SWEEPS 2         // to tare from; the first one may hold what came before it
-#define WATCH_SWEEPS 5         // after which what is read is where the signals came to rest
+#define HITS         3          // rounds over the threshold that make a contact
+#define SLEW_Q16     (8 * 328)  // a sweep; 0.5 count/s: drift is followed no faster, so a load is not
+#define PDC_SLEW_Q16 (8 * 131)  // 0.2 count/s
+#define PDC_SINK_Q16 (8 * 655)  // 1 count/s: no load takes pressure away
+#define PDC_BACK_Q16 (8 * 2621) // 4 counts/s: an undershoot comes back within seconds
+#define BACK_ROUNDS  400        // and after these is over
+#define BACK_SHARE   64         // of the press's peak; a hundredth seen
+#define UNDERSHOOT   16         // pressure that may be missing right after a press (9 seen); it comes back
+#define SPAN_Q3      (12 * 8)   // means of still signals stay this close to where they came to rest
+#define NOW_SPAN_Q3  (32 * 8)   // and their latest filtered count this close to the mean: ten sigmas
+#define STILL_SWEEPS 2          // to tare from; the first one may hold what came before it
+#define WATCH_SWEEPS 5          // after which what is read is where the signals came to rest
 
 #define DRIFT_ROUNDS_PER_COUNT 400 // 15 counts/min, the worst drift measured
 #define DRIFT_LIMIT            60000
@@ -115,6 +118,7 @@ static void adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t
     tare->base = *base;
     tare->state = state;
     tare->tared = true;
+    tare->comes_back_q16 = 0;
     tell(tare, reason);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         use_electrode(tare, i);
@@ -153,7 +157,9 @@ static void adopt_after_press(bt_tare *tare, uint8_t reason)
 {
     uint32_t rest_q16 = tare->base.pdc_q16;
     uint32_t present = present_q16(tare, BT_LANE_PDC);
+    int32_t undershoot = tare->release.pdc_peak / BACK_SHARE;
     adopt_present(tare, reason);
+    tare->comes_back_q16 = (undershoot < UNDERSHOOT ? undershoot : UNDERSHOOT) << 16;
     if (rest_q16 != BT_TARE_UNKNOWN && present < rest_q16 && rest_q16 - present < UNDERSHOOT << 16) {
         tare->base.pdc_q16 = rest_q16;
         bt_rollback_start(&tare->rollback, &tare->base);
@@ -314,8 +320,12 @@ static void serve_pressure(bt_tare *tare)
 {
     uint32_t mean_q16 = (uint32_t)bt_sweep_close(&tare->sweep, BT_LANE_PDC, SPAN_Q3) << 13;
     if (tracks(tare) && pdc_known(tare)) {
-        int32_t slew_q16 = mean_q16 < tare->base.pdc_q16 ? PDC_SINK_Q16 : PDC_SLEW_Q16;
-        tare->base.pdc_q16 = bt_baseline_follow(tare->base.pdc_q16, mean_q16, slew_q16);
+        uint32_t before_q16 = tare->base.pdc_q16;
+        bool back = tare->age_rounds < BACK_ROUNDS && tare->comes_back_q16 > 0;
+        int32_t slew_q16 = mean_q16 < before_q16 ? PDC_SINK_Q16 : back ? PDC_BACK_Q16 : PDC_SLEW_Q16;
+        tare->base.pdc_q16 = bt_baseline_follow(before_q16, mean_q16, slew_q16);
+        tare->comes_back_q16 -=
+            mean_q16 > before_q16 && back ? (int32_t)(tare->base.pdc_q16 - before_q16) : 0;
         aim_pressure(tare);
     }
 }

@@ -55,6 +55,7 @@ typedef struct {
     bt_thermal thermal;
     bt_release release;
 
+    int32_t comes_back_q16; // of the pressure that the latest press has left missing, at most
     uint8_t hits;           // consecutive rounds in which the gate opened
     bool touched;           // in this round the gate opened, or before it and it is open still
     bool partial;           // this sweep did not serve all electrodes in one state
