@@ -10,6 +10,7 @@ import pytest
 from live_board import Clock, Firmware, frame, point
 
 import biotac
+import biotac.recording.writer
 from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
