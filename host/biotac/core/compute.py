@@ -38,7 +38,7 @@ _one_frame = lib.bt_one_frame
 
 def compute(
     counts: Any,
-    tare: Any,
+    tare: Any = None,
     settings: Settings | None = None,
     out: StructArray | None = None,
     *,
@@ -60,10 +60,15 @@ def compute(
     one number, in counts, NaN where missing, is what it may need. Raises InputError for a blob that a board
     would refuse.
 
+    ``compute(rows)``, with rows of FRAME_DTYPE as ``load`` and ``Hand.read`` give them, takes counts, tare and pressure
+    from them; an electrode whose tare is unknown weighs nothing.
+
     NaN where there is no answer: poc_mm and torque_nmm x if nothing weighs. Where the board rounds to
     its wire units this does not, and it never saturates. Raises ValueError for other shapes, types and
     ranges, with the first bad row, what was seen and what was expected; ``out`` then holds no results.
     """
+    if tare is None:
+        counts, tare, pdc_above_rest = _of_rows(counts, pdc_above_rest)
     if wrench_map is not None:
         from .map_float64 import by_map  # here: everybody would wait for it at `import biotac`
 
@@ -99,6 +104,19 @@ def compute(
     if bad != _ALL_GOOD:
         raise ValueError(_explain(bad, raw, base))
     return out
+
+
+def _of_rows(rows: Any, pdc_above_rest: Any) -> tuple[NDArray[np.uint16], NDArray[np.float64], Any]:
+    """Counts (n, 19), tare (n, 19) and pressure above rest (n,) of rows that have them."""
+    names = getattr(getattr(rows, "dtype", None), "names", None) or ()
+    if "counts" not in names or "tare" not in names:
+        raise ValueError("no tare: expected compute(counts, tare), or compute(rows) with fields counts and tare")
+    unknown = np.isnan(rows["tare"])
+    counts = np.where(unknown, np.uint16(wire.INVALID_COUNT), rows["counts"])
+    tare = np.where(unknown, 0.0, rows["tare"]).astype(np.float64)
+    if pdc_above_rest is None and {"pdc", "pdc_tare"} <= set(names):
+        pdc_above_rest = np.where(rows["pdc"] == wire.INVALID_COUNT, np.nan, rows["pdc"] - rows["pdc_tare"])
+    return counts, tare, pdc_above_rest
 
 
 def per_frame(tare: Any, settings: Settings | None = None) -> Callable[[NDArray[np.uint16]], StructArray]:

@@ -237,7 +237,7 @@ class StreamDecoder:
             sent = _frombuffer(raw, IDLE, idles, at)
             batch.idle = idle = np.empty(idles, IDLE_DTYPE)
             idle["seq"], idle["t_us"] = _frombuffer(raw, _INT64, 2 * idles, 16 * (n + pacs)).reshape(2, idles)
-            for name in ("finger", "frames", "energy_count2", "pdc", "tdc", "flags"):
+            for name in ("finger", "frames", "energy_count2", "pdc", "tdc", "tare_state", "flags"):
                 idle[name] = sent[name]
         if others:
             batch.messages = known(pairs(raw[size - others :]))
