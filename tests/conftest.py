@@ -120,6 +120,7 @@ def hello_for(request: bytes, **changes: int) -> bytes:
         "boot_id": 1,
         "slot_hz": 4400,
         "fingers_present": 1,
+        "image_crc32": 0xFFFFFFFF,
     }
     return encode(wire.Hello.ID, wire.Hello(**(facts | changes)).pack())
 

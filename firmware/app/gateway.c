@@ -16,7 +16,6 @@ _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS
 _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS <= BT_RECORD_MAP
                    && BT_RECORD_MAP + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS,
                "every finger's map must have a record of its own");
-_Static_assert(BT_STORAGE_BYTES + BT_MAPS_BYTES == BT_FLASH_BYTES, "port.h says where they lie");
 
 #define ALL_FINGERS ((1u << BT_MAX_FINGERS) - 1)
 
@@ -119,6 +118,7 @@ void bt_gateway_init(bt_gateway *gateway)
         .board = port_board(),
         .firmware_version = {BT_VERSION_MAJOR, BT_VERSION_MINOR, BT_VERSION_PATCH},
         .boot_id = port_boot_id(),
+        .image_crc32 = port_image_crc32(),
     };
     port_board_serial(identity.board_serial);
     port_delay_us(BT_POWER_ON_MS * 1000);
@@ -143,7 +143,7 @@ void bt_gateway_init(bt_gateway *gateway)
 bool bt_gateway_alarm(bt_gateway *gateway)
 {
     port_alarm_at(bt_sampler_alarm(&gateway->sampler));
-    return !gateway->sampler.commanded && !gateway->sampler.under_way;
+    return !gateway->sampler.commanded;
 }
 
 static void count_word(bt_word_counts *counts, enum bt_word kind, uint16_t word)

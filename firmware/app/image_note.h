@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-#define BT_IMAGE_NOTE_LAYOUT 1
+#define BT_IMAGE_NOTE_LAYOUT 2
 
 // Little-endian, without gaps. A later layout may append fields; these stay where they are.
 typedef struct {
@@ -20,8 +20,14 @@ typedef struct {
     uint8_t wire_major;
     uint8_t wire_minor;
     uint8_t zero[3];
+    // Of the whole image from its first byte on, the four of crc32 taken as zeros. Written by
+    // tools/image/note.py once the image is linked, held against the file by `biotac flash` before the first
+    // byte is written, and against what the board computes of its own flash when it is back (HELLO's
+    // image_crc32).
+    uint32_t image_bytes;
+    uint32_t crc32;
 } bt_image_note;
-_Static_assert(sizeof(bt_image_note) == 24, "the flasher reads it byte by byte");
+_Static_assert(sizeof(bt_image_note) == 32, "the flasher reads it byte by byte");
 
 // The same constants as HELLO's, so that what an image claims is what it will answer.
 #define BT_IMAGE_NOTE(board_)                                                                                \

@@ -3,8 +3,6 @@
 #ifndef BIOTAC_PORT_H
 #define BIOTAC_PORT_H
 
-#include "map/store.h"
-
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -37,11 +35,14 @@ uint16_t port_spi_transfer16(uint16_t mosi);
 
 // The same with 8 bits: a property's bytes come one by one.
 uint8_t port_spi_transfer8(uint8_t mosi);
-// The same in two steps, for whom the core has better to do meanwhile. begin returns true where the exchange
-// is over by then, as it is everywhere but on a bus of its own (spi_at_once.h); false: it is in 16 /
-// BT_SPI_HZ, and end waits for what is left of it.
-bool port_spi_begin16(uint16_t mosi);
-uint16_t port_spi_end16(void);
+
+// A whole slot, where the board's hardware can: the command to the sensors of mask at once, BT_SETTLE_US
+// later BT_LISTEN_WORD to each of them, BT_GAP_US apart. Returns how many us until it is over and
+// port_spi_slot_end may be called; 0 where the core must do it word by word (spi_word_by_word.h).
+uint32_t port_spi_slot_begin(uint16_t command, uint8_t mask);
+
+// What they said: BT_MAX_FINGERS words, 0 of those not in mask, and of all when a word was late.
+void port_spi_slot_end(uint16_t *word);
 
 // ---- link to the host -----------------------------------------------------------------------
 // Takes all bytes or none; false means no room, or nobody there.
@@ -54,9 +55,9 @@ size_t port_link_read(uint8_t *data, size_t bytes);
 bool port_link_up(void);
 
 // ---- flash for settings and maps ------------------------------------------------------------
-// Two sectors for settings (storage.h), behind them the slots for maps (map_store.h). Interrupts may be held
-// off while erasing and programming, for up to 0.4 s. False when the flash did not do it.
-#define BT_FLASH_BYTES (BT_STORAGE_BYTES + BT_MAPS_BYTES)
+// What the core wants kept, as one run of bytes: settings (keep/storage.h), behind them the slots for maps
+// (map/store.h, which has the sum). Where that lies in which chip is the port's affair. Interrupts may be
+// held off while erasing and programming, for up to 0.4 s. False when the flash did not do it.
 bool port_flash_erase(uint32_t sector_offset);
 bool port_flash_program(uint32_t page_offset, const uint8_t *page);
 void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes);
@@ -72,5 +73,7 @@ bool port_reboot_bootloader(void);
 uint16_t port_board(void); // enum bt_board
 void port_board_serial(uint8_t serial[12]);
 uint32_t port_boot_id(void); // random at each boot
+// CRC-32 of the image that runs, read where it is stored; 0xFFFFFFFF where there is no image.
+uint32_t port_image_crc32(void);
 
 #endif

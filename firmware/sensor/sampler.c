@@ -6,8 +6,6 @@
 
 // port_now_us() truncates, so a time that must not be short needs one us more.
 #define SETTLE_TICKS_US (BT_SETTLE_US + 1)
-#define GAP_TICKS_US    (BT_GAP_US + 1)
-#define WORD_TICKS_US   (16 * 1000000 / BT_SPI_HZ + 2) // 16 bits take between one us less and half a one
 
 _Static_assert((BT_SLOT_RING & (BT_SLOT_RING - 1)) == 0 && BT_SLOT_RING <= 128,
                "ring indices wrap in a byte");
@@ -93,81 +91,65 @@ static void advance(bt_sampler *sampler)
     }
 }
 
-// To every sensor at once. Returns when to go on.
+// To every sensor at once. Returns when to go on: when they have settled, or been read.
 static uint32_t command(bt_sampler *sampler)
 {
-    if (!sampler->under_way) {
-        uint8_t code = bt_channel_command[bt_slot_channel[sampler->current.slot]];
-        sampler->current.t_us = port_now_us();
-        port_spi_select((uint8_t)(sampler->fingers & ~sampler->current.asked));
-        sampler->under_way = true;
-        sampler->waits = !port_spi_begin16((uint16_t)(code << 8));
-        if (sampler->waits) {
-            return port_now_us() + WORD_TICKS_US;
-        }
-    }
-    // All selected sensors drive MISO at once here; whatever it carries means nothing.
-    (void)port_spi_end16();
-    port_spi_select(0);
-    sampler->under_way = false;
+    uint8_t code = bt_channel_command[bt_slot_channel[sampler->current.slot]];
+    uint8_t mask = (uint8_t)(sampler->fingers & ~sampler->current.asked);
     sampler->commanded = true;
-    sampler->finger = 0;
+    sampler->current.t_us = port_now_us();
+    uint32_t busy_us = port_spi_slot_begin((uint16_t)(code << 8), mask);
+    sampler->by_itself = busy_us != 0;
+    if (sampler->by_itself) {
+        return port_now_us() + busy_us;
+    }
+    port_spi_select(mask);
+    // All selected sensors drive MISO at once here; whatever it carries means nothing.
+    (void)port_spi_transfer16((uint16_t)(code << 8));
+    port_spi_select(0);
     return port_now_us() + SETTLE_TICKS_US;
 }
 
-static bool is_read(const bt_sampler *sampler)
+static uint16_t read_one(uint8_t f)
 {
-    return sampler->fingers >> sampler->finger & 1;
+    port_spi_select((uint8_t)(1u << f));
+    uint16_t word = port_spi_transfer16(BT_LISTEN_WORD);
+    port_spi_select(0);
+    return word;
 }
 
-// One by one; those that are not there read as silent. False: there is more to do at *at_us.
-static bool read_sensors(bt_sampler *sampler, uint32_t *at_us)
+// One by one; those that are not there read as silent.
+static void read_sensors(bt_sampler *sampler)
 {
-    for (; sampler->finger < BT_MAX_FINGERS; sampler->finger++) {
-        uint8_t f = sampler->finger;
-        if (!is_read(sampler)) {
-            sampler->current.word[f] = 0;
+    if (sampler->by_itself) {
+        port_spi_slot_end(sampler->current.word);
+    }
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        bool asked = sampler->current.asked >> f & 1;
+        if (sampler->by_itself && !asked) {
             continue;
         }
-        if (sampler->current.asked >> f & 1) {
-            sampler->current.word[f] = 0;
+        sampler->current.word[f] = 0;
+        if (!(sampler->fingers >> f & 1)) {
+            continue;
+        }
+        if (asked) {
             bt_serial_query_step(&sampler->query[f], f); // waits for its byte: one round in a long while
         } else {
-            if (!sampler->under_way) {
-                port_spi_select((uint8_t)(1u << f));
-                sampler->under_way = true;
-                sampler->waits = !port_spi_begin16(BT_LISTEN_WORD);
-                if (sampler->waits) {
-                    *at_us = port_now_us() + WORD_TICKS_US;
-                    return false;
-                }
-            }
-            sampler->current.word[f] = port_spi_end16();
-            port_spi_select(0);
-            sampler->under_way = false;
+            sampler->current.word[f] = read_one(f);
         }
-        if (sampler->fingers >> f == 1) { // the last of them
-            continue;
+        if (sampler->fingers >> f != 1) { // not the last of them
+            port_delay_us(BT_GAP_US);
         }
-        if (sampler->waits) {
-            sampler->finger++;
-            *at_us = port_now_us() + GAP_TICKS_US;
-            return false;
-        }
-        port_delay_us(BT_GAP_US);
     }
-    return true;
 }
 
 uint32_t bt_sampler_alarm(bt_sampler *sampler)
 {
-    uint32_t at_us;
     if (!sampler->commanded) {
         return command(sampler);
     }
-    if (!read_sensors(sampler, &at_us)) {
-        return at_us;
-    }
+    read_sensors(sampler);
     sampler->commanded = false;
     push(sampler);
     advance(sampler);

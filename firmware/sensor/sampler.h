@@ -1,8 +1,8 @@
 // Slot sampling of one to five sensors, driven by one timer alarm.
 //
 // A slot: all chip selects low, sample command to every sensor at once, chip selects high; at least
-// 50 us later each sensor is read by its own chip select. Nothing spins through the 50 us, nor, where the bus
-// works by itself, through words and the gaps between them: an alarm comes for each. Words go to the main
+// 50 us later each sensor is read by its own chip select. Nothing spins through the 50 us; where the board's
+// hardware does the whole slot, the core only begins and ends it. Words go to the main
 // loop undecoded through a single-producer, single-consumer ring; when the main loop is late, whole slots are
 // lost and counted, and the channels they held are missing from their frame. A word stays with the finger
 // whose chip select was low, whatever its neighbours answered.
@@ -30,9 +30,7 @@ typedef struct {
 typedef struct {
     uint8_t fingers; // bit mask of the sensors that are read
     bool commanded;  // the command is out, the reads are due
-    bool under_way;  // a word is on the bus
-    bool waits;      // words take their time, see port_spi_begin16
-    uint8_t finger;  // read next
+    bool by_itself;  // the slot under way is the hardware's, see port_spi_slot_begin
     bt_slot current;
     uint32_t slot_start_us;
     uint32_t fraction;                     // of slot_start_us, in 1/BT_SLOT_HZ us

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import pytest
@@ -47,7 +48,7 @@ def test_uf2_refuses_an_image_that_the_chip_would_not_start() -> None:
         uf2.uf2(bytes(image))
 
 
-NOTE = b"BIOTAC image" + struct.pack("<HH3BBB3x", 1, 2, 3, 4, 5, 6, 7)
+NOTE = b"BIOTAC image" + struct.pack("<HH3BBB3xII", 2, 2, 3, 4, 5, 6, 7, 0, 0)  # size and CRC still to come
 
 
 def told_by_the_build(folder: Path, image: bytes) -> subprocess.CompletedProcess[str]:
@@ -59,8 +60,14 @@ def told_by_the_build(folder: Path, image: bytes) -> subprocess.CompletedProcess
 
 
 def test_the_note_of_an_image_is_told(tmp_path: Path) -> None:
+    size = 320 + len(NOTE) + 7
     told = told_by_the_build(tmp_path, bytes(320) + NOTE + b"program")
-    assert (told.returncode, told.stdout) == (0, "note  board 2, firmware 3.4.5, wire 6.7\n")
+    # Of the image with its size in it, and zeros for the CRC itself.
+    sized = bytes(320) + NOTE[:-8] + struct.pack("<II", size, 0) + b"program"
+    crc32 = zlib.crc32(sized)
+    assert (told.returncode, told.stdout) == (0, f"note  board 2, firmware 3.4.5, wire 6.7, CRC-32 {crc32:08x}\n")
+    sealed = bytes(320) + NOTE[:-8] + struct.pack("<II", size, crc32) + b"program"
+    assert (tmp_path / "image.bin").read_bytes() == sealed
 
 
 @pytest.mark.parametrize(
@@ -70,7 +77,7 @@ def test_the_note_of_an_image_is_told(tmp_path: Path) -> None:
         (bytes(321) + NOTE, "says 0 times"),  # not where a linker puts it: somebody's text
         (NOTE + NOTE, "says 2 times"),
         (NOTE[:-1], "says 0 times"),
-        (NOTE[:12] + b"\2" + NOTE[13:], "layout 2"),
+        (NOTE[:12] + b"\3" + NOTE[13:], "layout 3"),
     ],
 )
 def test_an_image_that_does_not_say_what_it_is_is_not_built(tmp_path: Path, image: bytes, why: str) -> None:
@@ -96,24 +103,43 @@ LISTING = """
 10000122:\t4760      \tbx\tip
 
 20000000 <in_sram>:
+SOURCE:2 (discriminator 1)
 20000000:\t4798      \tblx\tr3
+SOURCE:3
+20000002:\t4770      \tbx\tlr
 """
+CALL = "port->answer("
 
 
-def program(**pointers: tuple[str, ...]) -> stack.Program:
-    return stack.Program(stack.read_functions(LISTING.splitlines()), {"helper": 24}, pointers)
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    path = tmp_path / "sram.c"
+    path.write_text("void in_sram(void) {\n    port->answer(0);\n}\n")
+    return path
 
 
-def test_the_stack_is_that_of_the_deepest_chain() -> None:
-    depth, chain = program(in_sram=()).deepest("main")
+def program(source: str | Path, pointers: dict[str, tuple[str, ...]]) -> stack.Program:
+    listing = LISTING.replace("SOURCE", str(source)).splitlines()
+    return stack.Program(stack.read_functions(listing), {"helper": 24}, pointers)
+
+
+def test_the_stack_is_that_of_the_deepest_chain(source: Path) -> None:
+    depth, chain = program(source, {CALL: ()}).deepest("main")
     assert (depth, chain) == (28 + 24 + 4, ("main", "helper", "__in_sram_veneer", "in_sram"))
 
 
-def test_what_cannot_be_bounded_is_refused() -> None:
-    with pytest.raises(stack.Unknown, match="in_sram calls through a pointer"):
-        program().deepest("main")
+def test_what_cannot_be_bounded_is_refused(source: Path) -> None:
+    for others in ({}, {"port->ask(": ()}):
+        with pytest.raises(stack.Unknown, match=rf"in_sram calls through a pointer at {source}:2: port->answer\(0\);"):
+            program(source, others).deepest("main")
     with pytest.raises(stack.Unknown, match="recursion: main -> helper"):
-        program(in_sram=("helper",)).deepest("main")
+        program(source, {CALL: ("helper",)}).deepest("main")
+
+
+@pytest.mark.parametrize("where", ["", "/no/such/folder/sram.c"])
+def test_a_call_through_a_pointer_from_a_line_nobody_can_read_is_refused(where: str) -> None:
+    with pytest.raises(stack.Unknown, match=r"in_sram calls through a pointer.*no line of source"):
+        program(where, {"": (), CALL: ()}).deepest("main")
 
 
 def test_forbidden_symbols() -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fake_flash_board import uf2
 from maps import BIG, make_map
 from rig import ROOT, Rig
 
@@ -22,6 +23,7 @@ from biotac.cli.main import main
 from biotac.errors import FlashError, InputError, NotAGatewayError
 from biotac.flash import Image, Outcome, flash, read_backup, read_image
 from biotac.flash.loader_emulated import EmulatedLoader
+from biotac.flash.note import seal
 from biotac.flash.target_emulated import EmulatedTarget
 from biotac.wire import messages_gen as wire
 
@@ -165,18 +167,20 @@ def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_releas
     assert outcome.after.firmware_patch == next_release.note.firmware[2] != outcome.before.firmware_patch
     assert outcome.settings is not None
     assert outcome.settings.changed == ()
-    back = bench.flash(read_image(BUILT))
+    with pytest.raises(InputError, match=r"runs .*; --downgrade if you mean it"):
+        bench.flash(read_image(BUILT))
+    back = bench.flash(read_image(BUILT), downgrade=True)
     assert back.after.firmware_patch == outcome.before.firmware_patch
     assert bench.setting_after_a_power_cut(Setting.IDLE_PERIOD_MS) == 250
 
 
-def spoiled(folder: Path, at: int, value: int) -> Path:
-    """The built image with one byte of its flash changed."""
-    data = bytearray(BUILT.read_bytes())
-    block, offset = divmod(at, PAGE)
-    data[block * 512 + 32 + offset] = value
-    path = folder / "spoiled.uf2"
-    path.write_bytes(data)
+def changed(folder: Path, at: int, value: int, *, sealed: bool = False) -> Path:
+    """The built image with one byte of its flash changed; sealed: and a note that knows of it."""
+    flash = bytearray((ROOT / "build/pico/biotac-pico.bin").read_bytes())
+    assert flash[at] != value
+    flash[at] = value
+    path = folder / "changed.uf2"
+    path.write_bytes(uf2.uf2(seal(bytes(flash)) if sealed else bytes(flash)))
     return path
 
 
@@ -184,12 +188,10 @@ def test_a_wrong_image_leaves_the_board_alone(bench: Bench, tmp_path: Path) -> N
     before = bench.counters()
     with bench.target.open() as hand:
         boot_id = hand.info.boot_id
-    with pytest.raises(InputError, match="second-stage boot"):
-        read_image(spoiled(tmp_path, 1, 0xEE))
-    uf2 = BUILT.read_bytes()
-    flash = b"".join(uf2[at + 32 : at + 32 + PAGE] for at in range(0, len(uf2), 512))
-    board_at = flash.index(b"BIOTAC image") + 14
-    other = read_image(spoiled(tmp_path, board_at, wire.Board.LINUX_SBC))
+    with pytest.raises(InputError, match="CRC-32"):
+        read_image(changed(tmp_path, 5000, 0xEE))
+    board_at = (ROOT / "build/pico/biotac-pico.bin").read_bytes().index(b"BIOTAC image") + 14
+    other = read_image(changed(tmp_path, board_at, wire.Board.LINUX_SBC, sealed=True))
     with pytest.raises(InputError, match="is for LINUX_SBC, but PICO answers"):
         bench.flash(other)
     with bench.target.open() as hand:

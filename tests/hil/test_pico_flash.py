@@ -130,7 +130,6 @@ def test_a_board_that_hangs_starts_again_as_another_boot(pico: Pico) -> None:
     assert pico.boot_id() != first
 
 
-@pytest.mark.xfail(strict=False, reason="a defect: since the image runs from SRAM the number is read as none")
 def test_the_flashs_number_is_the_boards_and_the_usb_serial(pico: Pico) -> None:
     assert bytes(pico.hand.info.board_serial).hex() == "e6605838831f5b2c" + "00000000"
     assert pico.counters()["usb"]["device"]["serial"] == "E6605838831F5B2C"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
 from maps import BIG, make_map
 from rig import Rig
 
@@ -14,9 +13,6 @@ FINGERS = 5
 SECONDS = 2
 
 
-@pytest.mark.xfail(
-    strict=False, reason="never seen green since bus, tare and load were merged; see the note of issue 13"
-)
 def test_five_fingers_with_the_largest_map_lose_nothing(rig: Rig) -> None:
     rig.need("counters")
     hand = rig.open(f"press.toml?fingers={FINGERS}&seconds={SECONDS}&pace=fast")
@@ -30,9 +26,6 @@ def test_five_fingers_with_the_largest_map_lose_nothing(rig: Rig) -> None:
     assert counters["slept"] >= 0.2
 
 
-@pytest.mark.xfail(
-    strict=False, reason="never seen green since bus, tare and load were merged; see the note of issue 13"
-)
 def test_at_150_percent_work_is_shed_in_order_and_slots_and_commands_are_kept(rig: Rig) -> None:
     """The core is slowed down until what it has to do takes half as long again as there is time."""
     rig.need("counters")

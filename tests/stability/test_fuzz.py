@@ -51,6 +51,14 @@ def never_release(rows: np.ndarray) -> None:
     rows["tare_state"][2000:] = TareState.CONTACT
 
 
+def doubt_for_ever(rows: np.ndarray) -> None:
+    rows["tare_state"][2000:] = TareState.DOUBT
+
+
+def no_such_state(rows: np.ndarray) -> None:
+    rows["tare_state"][2000] = max(TareState) + 1
+
+
 def tare_a_load(rows: np.ndarray) -> None:
     first = int(np.flatnonzero(rows["tare_state"] == TareState.CONTACT)[0])
     begins = rows["tare_state"] == TareState.CONTACT
@@ -75,7 +83,9 @@ def lose_a_number(rows: np.ndarray) -> None:
     ("change", "words"),
     [
         (forget_contacts, "the finger is at rest"),
-        (never_release, "not tared within"),
+        (never_release, "in contact for more than"),
+        (doubt_for_ever, "not tared within"),
+        (no_such_state, "the state is none"),
         (tare_a_load, "was tared away"),
         (touch_at_rest, "contact without load"),
         (wrong_force, "force y off by"),

@@ -14,6 +14,7 @@ from serial.tools.list_ports_common import ListPortInfo
 from biotac.errors import DeviceLostError, PortError
 from biotac.flash import waiting
 from biotac.flash.image import Image
+from biotac.flash.note import seal
 from biotac.hand.hand import Hand
 from biotac.link import discovery
 from biotac.link.serial_port import SerialLink
@@ -30,12 +31,20 @@ NEW_SETTING = max(wire.Setting) + 1  # one that this library does not know yet
 def note(
     board: int = wire.Board.PICO, version: tuple[int, int, int] = (0, 2, 0), major: int = wire.WIRE_MAJOR
 ) -> bytes:
-    return b"BIOTAC image" + struct.pack("<HH3BBB3x", 1, board, *version, major, 0)
+    return b"BIOTAC image" + struct.pack("<HH3BBB3x8x", 2, board, *version, major, 0)
 
 
 def program(said: bytes, pages: int = 20) -> bytes:
     """The bytes of a flash that a chip would boot."""
-    return (boot2.block(b"boot") + bytes(64) + said).ljust(pages * 256, b"\x5a")
+    return sealed((boot2.block(b"boot") + bytes(64) + said).ljust(pages * 256, b"\x5a"))
+
+
+def sealed(image: bytes) -> bytes:
+    """As the build leaves it; as it was where it has not one note."""
+    try:
+        return seal(image)
+    except ValueError:
+        return image
 
 
 def make_image(folder: Path, said: bytes | None = None, name: str = "new.uf2") -> Path:
@@ -58,6 +67,7 @@ class FakeBoard:
         self.board = int(wire.Board.PICO)
         self.version = (0, 1, 0)
         self.boot_id = 7
+        self.image_crc32 = 0
         self.settings = {int(s): spec.default for s, spec in wire.SETTINGS.items()} | {NEW_SETTING: 42}
         self.stored = dict(self.settings)
         self.in_loader = False
@@ -77,7 +87,8 @@ class FakeBoard:
         if message_id == wire.HelloRequest.ID:
             names = ("firmware_major", "firmware_minor", "firmware_patch")
             version = dict(zip(names, self.version, strict=True))
-            return self._hello(payload, board=self.board, boot_id=self.boot_id, board_serial=self.serial, **version)
+            facts = {"board": self.board, "boot_id": self.boot_id, "image_crc32": self.image_crc32}
+            return self._hello(payload, board_serial=self.serial, **facts, **version)
         if message_id in (wire.GetSetting.ID, wire.SetSetting.ID):
             return self._setting(message_id, payload)
         if message_id == wire.GetCalibration.ID:
@@ -144,6 +155,7 @@ class FakeBoard:
         self.settings = dict(self.stored)
         if self.takes:
             self.version = image.note.firmware
+            self.image_crc32 = image.note.crc32
 
 
 def no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:

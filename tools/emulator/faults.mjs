@@ -66,6 +66,8 @@ export class DeviceTime {
     this.clock = mcu.clock
     this.lost = mcu.clock.nanos // counts from the reset
     this.heldAt = null
+    this.onHold = [] // what else is to stand still
+    this.onRelease = []
     this.timer = mcu.peripherals[0x40054]
     this.watchdog = mcu.peripherals[0x40058]
     this.#correctAlarms()
@@ -86,6 +88,7 @@ export class DeviceTime {
     this.heldAt = this.clock.nanos
     for (const alarm of this.timer.alarms) alarm.clockAlarm.cancel()
     this.#stopWatchdog()
+    for (const stop of this.onHold) stop()
   }
 
   release() {
@@ -93,6 +96,7 @@ export class DeviceTime {
     this.lost += this.clock.nanos - this.heldAt
     this.heldAt = null
     for (const alarm of this.timer.alarms) if (alarm.armed) this.#schedule(alarm)
+    for (const go of this.onRelease) go()
     this.watchdog.timer.enable = this.watchdog.alarm.enable = this.watchdog.enable && this.watchdog.tickEnable
   }
 

@@ -25,6 +25,7 @@ const SR_TFNF = 2
 const SR_TFE = 4
 const SR_RFNE = 8
 const FORMAT_QUAD = 2
+const SERIAL_BYTES = 7 << 16
 const IO_QSPI = 0x40018
 const IO_QSPI_SS_CTRL = 0x0c
 const OUTOVER_LOW = 2 << 8
@@ -83,14 +84,22 @@ export class Flash {
     this.readable = true
     this.missCycles = 0 // boot2's first instructions are in SRAM: it sets up the interface before anything is read
     this.continuous = false // the chip takes an address for a quad read, without a command
+    this.registers = { [CTRLR0]: 0, [BAUDR]: 0, [SPI_CTRLR0]: 0 }
     this.answer = []
     this.sent = [] // since chip select went low
     this.#memory()
     this.#interface()
   }
 
-  /** The ROM's function of this name: out of any read mode, and the pins as the ROM wants them. */
+  /**
+   * The ROM's function of this name: the interface is serial, a byte a frame and both ways, at clk_sys / 6, and the
+   * flash out of any read mode (flash_exit_xip in the boot ROM's published source; data sheet 2.8.3.1.3, 4.10).
+   */
   leaveXip() {
+    this.registers[BAUDR] = 6
+    this.registers[CTRLR0] = SERIAL_BYTES
+    this.answer = []
+    this.sent = []
     this.readable = false
     this.continuous = false
   }
@@ -139,7 +148,7 @@ export class Flash {
     const ssi = this.mcu.peripherals[SSI]
     const read = ssi.readUint32.bind(ssi)
     const write = ssi.writeUint32.bind(ssi)
-    const registers = { [CTRLR0]: 0, [BAUDR]: 0, [SPI_CTRLR0]: 0 }
+    const { registers } = this
     let select = 0
     ssi.readUint32 = (offset) => {
       if (offset === SR) {

@@ -170,7 +170,7 @@ export class Rig {
   /** After each power-up and reset of the chip. */
   #attach(machine) {
     this.loader = null
-    this.rom = new BootRom(machine.mcu, this.board, {
+    this.rom = new BootRom(machine, this.board, {
       onLoader: () => this.#enterLoader(machine),
       onCut: () => this.#failPower(machine),
     })

@@ -1,8 +1,8 @@
 // What surrounds the program on a real chip and rp2040js has not: the boot ROM's functions and the ring oscillator's
 // random bit. Modelled from the RP2040 data sheet (2.8.3, 2.17). The ROM's calls are real calls, to two
 // instructions: BKPT, which comes here, and BX LR.
+import { correctDma } from './dma.mjs'
 import { Flash } from './flash.mjs'
-import { addSniffer } from './sniffer.mjs'
 
 const FUNC_TABLE = 0x40
 const LOOKUP = 0x20
@@ -57,13 +57,13 @@ export class Board {
 
 export class BootRom {
   /** onLoader(): the program asked for the UF2 loader. onCut(): power fails in the middle of a flash write. */
-  constructor(mcu, board, { onLoader, onCut }) {
+  constructor({ mcu, time }, board, { onLoader, onCut }) {
     this.mcu = mcu
     this.board = board
     this.onLoader = onLoader
     this.onCut = onCut
     this.flash = new Flash(mcu, board, (what) => this.#wrong(what))
-    addSniffer(mcu, (what) => this.#wrong(what))
+    correctDma(mcu, time, (what) => this.#wrong(what))
     this.#install()
     this.#randomBit()
   }

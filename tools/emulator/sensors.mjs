@@ -10,6 +10,9 @@ const SPI_FUNCTION = 1
 const WIDTHS = [8, 16] // of a property's byte; of all else
 const STRETCH_NS = 150e3
 const FASTEST_HZ = 10e6 // data sheet
+const RESETS = 0x4000c
+const RESET = 0
+const RESET_SPI0 = 1 << 16
 
 /** The sensors, whatever board they are wired to. Throws an Error that says what is wrong with the tape. */
 export class Sensors {
@@ -64,6 +67,18 @@ export class Sensors {
     })
     let word = 0
     const done = mcu.clock.createAlarm(() => spi.completeTransmit(word))
+    // As published the block keeps what it was about over its reset.
+    const resets = mcu.peripherals[RESETS]
+    const write = resets.writeUint32.bind(resets)
+    resets.writeUint32 = (offset, value) => {
+      write(offset, value)
+      if (offset !== RESET || !(value & RESET_SPI0)) return
+      done.cancel()
+      spi.busy = false
+      spi.rxFIFO.reset()
+      spi.txFIFO.reset()
+      spi.fifosUpdated()
+    }
     spi.onTransmit = (mosi) => {
       this.transfers++
       this.shortestSetup = Math.min(this.shortestSetup, mcu.clock.nanos - this.selected)

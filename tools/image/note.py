@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Say what an image says of itself (firmware/app/image_note.h): board, firmware, wire.
+"""Complete what an image says of itself (firmware/app/image_note.h): its size and CRC-32, beside what it is for.
 
     note.py IMAGE.bin
 
@@ -12,22 +12,26 @@ import importlib.util
 import sys
 from pathlib import Path
 
-READER = Path(__file__).resolve().parents[2] / "host/biotac/flash/note.py"
+CODE = Path(__file__).resolve().parents[2] / "host/biotac/flash/note.py"
 
 
 def main() -> int:
     if len(sys.argv) != 2:
         sys.exit((__doc__ or "").strip())
-    spec = importlib.util.spec_from_file_location("biotac_image_note", READER)
+    spec = importlib.util.spec_from_file_location("biotac_image_note", CODE)
     assert spec is not None and spec.loader is not None
-    reader = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = reader  # dataclasses look their module up
-    spec.loader.exec_module(reader)
+    code = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = code  # dataclasses look their module up
+    spec.loader.exec_module(code)
+    path = Path(sys.argv[1])
     try:
-        note = reader.find(Path(sys.argv[1]).read_bytes())
+        image = code.seal(path.read_bytes())
+        note = code.find(image)
     except ValueError as error:
-        sys.exit(f"note.py: {sys.argv[1]}: {error}")
-    print(f"note  board {note.board}, firmware {note.version}, wire {'.'.join(map(str, note.wire))}")
+        sys.exit(f"note.py: {path}: {error}")
+    path.write_bytes(image)
+    wire = ".".join(map(str, note.wire))
+    print(f"note  board {note.board}, firmware {note.version}, wire {wire}, CRC-32 {note.crc32:08x}")
     return 0
 
 

@@ -67,9 +67,13 @@ def read_line(function: Function, name: str, where: str, instruction: str, opera
         function.calls.add(veneer.group(1))
 
 
-def source_line(where: str) -> str:
+def source_line(where: str) -> str | None:
+    """None where objdump named none (no -g) or the file is not here (a library's)."""
     path, _, line = where.rpartition(":")
-    return Path(path).read_text(encoding="utf-8").splitlines()[int(line) - 1].strip() if path else ""
+    try:
+        return Path(path).read_text(encoding="utf-8").splitlines()[int(line) - 1].strip()
+    except (OSError, ValueError, IndexError):
+        return None
 
 
 def count_registers(operands: str) -> int:
@@ -115,6 +119,8 @@ class Program:
 
     def through_pointer(self, name: str, where: str) -> tuple[str, ...]:
         line = source_line(where)
+        if line is None:
+            raise Unknown(f"{name} calls through a pointer at '{where}', no line of source that can be read here")
         for call, targets in self.pointers.items():
             if call in line:
                 return targets

@@ -38,7 +38,8 @@ class Course:
 
     ``force_n`` (n,): the greatest normal force within the frame. ``rest`` (n, 19): counts without load at the
     frame's middle, with drift and temperature; ``reads`` (n, 19): counts with load and creep, without noise;
-    ``signal`` (n, 19): what the load alone makes of ``rest``.
+    ``signal`` (n, 19): what the load alone makes of ``rest``; ``pressure`` (n,): PDC with load, undershoot and creep,
+    without noise.
     """
 
     sensor: physics.Finger
@@ -47,6 +48,7 @@ class Course:
     rest: Floats
     reads: Floats
     signal: Floats
+    pressure: Floats
 
     def __len__(self) -> int:
         return len(self.force_n)
@@ -124,6 +126,7 @@ class Script:
             rest=_middle(rest),
             reads=_middle(loaded + creep + drift),
             signal=_middle(loaded - still),
+            pressure=sampling.PDC_REST + _middle(sampling.pressure(states)),
         )
 
 

@@ -13,15 +13,18 @@ import numpy as np
 from biotac import FrameFlags, Setting, TareReason, TareState
 from biotac.core.finger import Finger
 from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM, CrossCheck
+from biotac.sim import sampling
 from biotac.sim.timeline import Pose
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import StructArray
 
 from .courses import LEAD_S, Course, Script, Sensor, resting
 
-#: With pressure: 14 sweeps of 80 ms for a residue, and 1.4 s until creep of 150 counts (5 % of the largest
-#: signal, 10 s) moves by less than the 12 counts that count as still.
-TARED_WITHIN = 300
+# With pressure, and nothing held any more: within a second at rest, or in doubt while what the press has left is still
+# shown; and at rest within ten seconds of that falling below what counts as a touch.
+LET_GO_WITHIN = 100
+TARED_WITHIN = 1000
+PDC_HIT, PDC_NOISE = 6, 3 * sampling.PDC_NOISE  # counts above rest that are a touch; what three rounds may add to them
 HELD_N = 1.0  # what is pressed harder than this is never tared away
 LATE = 10  # frames after a touch in which it is still its cause: three hits, a glitch, one lost word
 RELEASES = (TareReason.RELEASE, TareReason.RESIDUE)
@@ -51,7 +54,8 @@ class Outcome:
     poc_um: float = 0.0
     force_mn: float = 0.0
     torque_share: float = 0.0
-    release_frames: int = 0  # the longest from a release to the tare, with pressure
+    let_go_frames: int = 0  # the longest from a release to rest or doubt, with pressure
+    tared_frames: int = 0  # and from what the press has left being no touch any more to rest
     releases: int = 0
     held_frames: int = 0  # over HELD_N with pressure
     tared_away: int = 0  # re-zeroed with a load of that
@@ -60,7 +64,7 @@ class Outcome:
 
 
 def draw(seed: int) -> Recipe:
-    """A random course of one to two minutes."""
+    """A random course of one and a half to two and a half minutes."""
     rng = np.random.default_rng([seed, 99])
 
     def log_uniform(low: float, high: float) -> float:
@@ -76,6 +80,7 @@ def draw(seed: int) -> Recipe:
         steps.append(("rest", {"seconds": float(rng.uniform(4.0, 10.0))}))
         if rng.random() < 0.3:
             steps.append(("warm", {"celsius": float(rng.uniform(-0.05, 0.05)), "seconds": 5.0}))
+    steps.append(("rest", {"seconds": 25.0}))  # what was in doubt has had its ten seconds
     return Recipe(
         seed=seed,
         profile=str(rng.choice(["new", "worn"])),
@@ -174,7 +179,7 @@ def _judge_ranges(rows: StructArray, settings: dict[Setting, int], outcome: Outc
         (bool((rows["energy_count2"] <= 19 * 4095**2).all()), "an energy wrapped"),
         (bool((rows["threshold_count2"] <= 3 * limit).all()), "the threshold passed three times the setting"),
         (bool((np.diff(rows["seq"].astype(np.int64)) == rows["present"][1:]).all()), "the sequence has a gap"),
-        (bool((rows["tare_state"] <= TareState.FAULT).all()), "the state is none"),
+        (bool(np.isin(rows["tare_state"], list(TareState)).all()), "the state is none"),
     ):
         if not held:
             outcome.broken.append(what)
@@ -190,7 +195,8 @@ def _judge_touches(course: Course, rows: StructArray, outcome: Outcome) -> None:
             continue
         outcome.idle_touches += 1
         away = np.linalg.norm(course.reads[k] - rows["tare_q4"][k - 1] / 16.0)
-        if away + noise < np.sqrt(rows["threshold_count2"][k]):
+        above = course.pressure[k] - rows["pdc_tare_q4"][k - 1] / 16.0  # by the undershoot that comes back
+        if away + noise < np.sqrt(rows["threshold_count2"][k]) and above + PDC_NOISE < PDC_HIT:
             outcome.broken.append(f"frame {k}: contact without load, {away:.1f} counts from the tare")
 
 
@@ -209,17 +215,39 @@ def _judge_loads(course: Course, rows: StructArray, outcome: Outcome) -> None:
         lasting[:back] = False
     for k in np.flatnonzero(lasting & (rows["tare_state"] == TareState.REST))[:1].tolist():
         outcome.broken.append(f"frame {k}: {course.force_n[k]:.2f} N for {LATE} frames, and the finger is at rest")
-    force = course.force_n
-    for k in (np.flatnonzero((force[:-1] > 0) & (force[1:] == 0)) + 1).tolist():
-        after = rows["tare_state"][k : k + TARED_WITHIN]
-        if len(after) < TARED_WITHIN or force[k : k + TARED_WITHIN].max() > 0:
+    _judge_releases(course, rows, outcome)
+
+
+def _judge_releases(course: Course, rows: StructArray, outcome: Outcome) -> None:
+    loaded = course.force_n > 0
+    touch = _is_touch(course, rows)
+    ends = [*np.flatnonzero(~loaded[:-1] & loaded[1:]).tolist(), len(rows) - 1]
+    for k in (np.flatnonzero(loaded[:-1] & ~loaded[1:]) + 1).tolist():
+        end = next(e for e in ends if e >= k) + 1
+        state = rows["tare_state"][k:end]
+        if len(state) < LET_GO_WITHIN:
             continue
-        at_rest = np.flatnonzero(after == TareState.REST)
         outcome.releases += 1
-        if len(at_rest):
-            outcome.release_frames = max(outcome.release_frames, int(at_rest[0]))
-        else:
-            outcome.broken.append(f"frame {k}: released, and not tared within {TARED_WITHIN} frames")
+        free = np.flatnonzero(np.isin(state, (TareState.REST, TareState.DOUBT)))
+        outcome.let_go_frames = max(outcome.let_go_frames, int(free[0]) if len(free) else len(state))
+        if not len(free) or free[0] > LET_GO_WITHIN:
+            outcome.broken.append(f"frame {k}: released, and in contact for more than {LET_GO_WITHIN} frames")
+        at_rest = np.flatnonzero(state == TareState.REST)
+        over = np.flatnonzero(~touch[k:end])
+        if not len(over) or (not len(at_rest) and over[0] + TARED_WITHIN > len(state)):
+            continue
+        waited = int(at_rest[0] - over[0]) if len(at_rest) else len(state)
+        outcome.tared_frames = max(outcome.tared_frames, waited)
+        if waited > TARED_WITHIN:
+            outcome.broken.append(f"frame {k}: released, and not tared within {TARED_WITHIN} frames of no touch")
+
+
+def _is_touch(course: Course, rows: StructArray) -> np.ndarray:
+    """What the finger reads by the model, against the tare in force, would be a touch (n,)."""
+    above = course.pressure - rows["pdc_tare_q4"] / 16.0
+    away = course.reads - rows["tare_q4"] / 16.0
+    touch: np.ndarray = (above > PDC_HIT) | ((away**2).sum(axis=1) > rows["threshold_count2"])
+    return touch
 
 
 def rest(seed: int, seconds: float, *, worn: bool) -> int:
@@ -248,4 +276,5 @@ def shortest(recipe: Recipe) -> Recipe:
     return recipe
 
 
-BOUNDS = {"poc_um": POC_BOUND_UM, "force_mn": FORCE_BOUND_MN, "torque_share": 1.0, "release_frames": TARED_WITHIN}
+BOUNDS = {"poc_um": POC_BOUND_UM, "force_mn": FORCE_BOUND_MN, "torque_share": 1.0, "let_go_frames": LET_GO_WITHIN,
+          "tared_frames": TARED_WITHIN}  # fmt: skip

@@ -33,6 +33,7 @@ static void hello(bt_session *session, const uint8_t *payload)
         .boot_id = identity->boot_id,
         .slot_hz = BT_SLOT_HZ,
         .fingers_present = bt_session_present(session),
+        .image_crc32 = identity->image_crc32,
     };
     for (int k = 0; k < 12; k++) {
         msg.board_serial[k] = identity->board_serial[k];

@@ -15,6 +15,7 @@ typedef struct {
     uint8_t firmware_version[3];
     uint8_t board_serial[12];
     uint32_t boot_id;
+    uint32_t image_crc32; // 0xFFFFFFFF: unknown
 } bt_identity;
 
 // What a sensor says of itself, as it is sent.

@@ -36,6 +36,7 @@ void bt_msg_hello_pack(const bt_msg_hello *msg, uint8_t out[BT_HELLO_BYTES])
     at = put(at, (uint32_t)msg->boot_id, 4);
     at = put(at, (uint32_t)msg->slot_hz, 2);
     at = put(at, (uint32_t)msg->fingers_present, 1);
+    at = put(at, (uint32_t)msg->image_crc32, 4);
     (void)at;
 }
 
@@ -71,6 +72,8 @@ void bt_msg_hello_unpack(bt_msg_hello *msg, const uint8_t in[BT_HELLO_BYTES])
     msg->slot_hz = (uint16_t)value;
     at = get(at, &value, 1);
     msg->fingers_present = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->image_crc32 = (uint32_t)value;
     (void)at;
 }
 

@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0x2788E1AAu
+#define BT_SCHEMA_HASH 0x07B0840Fu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -184,7 +184,7 @@ extern const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES]; // enum bt_s
 
 // Who is there. Reply to HELLO_REQUEST.
 #define BT_HELLO_ID 0x01
-#define BT_HELLO_BYTES 35
+#define BT_HELLO_BYTES 39
 typedef struct {
     uint8_t req_id; // [1] of the request
     uint32_t nonce; // [1] echo of the request's, so that an old HELLO in a buffer is not taken for this one
@@ -199,6 +199,7 @@ typedef struct {
     uint32_t boot_id; // [1] random at each boot: a change means the board restarted
     uint16_t slot_hz; // [Hz] channels sampled per second and sensor
     uint8_t fingers_present; // [bit mask] sensors that answer
+    uint32_t image_crc32; // [1] of the flash image it runs, computed at boot as the image's note says (firmware/app/image_note.h); 0xFFFFFFFF where there is none
 } bt_msg_hello;
 void bt_msg_hello_pack(const bt_msg_hello *msg, uint8_t out[BT_HELLO_BYTES]);
 void bt_msg_hello_unpack(bt_msg_hello *msg, const uint8_t in[BT_HELLO_BYTES]);
@@ -709,7 +710,7 @@ int bt_wire_payload_bytes(uint8_t id);
 
 #ifndef BT_CDEF // the rest is macros for the C tests
 // X(name, type, count) for every field, so that tests can compare by name.
-#define BT_HELLO_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1) X(wire_major, u8, 1) X(wire_minor, u8, 1) X(schema_hash, u32, 1) X(firmware_major, u8, 1) X(firmware_minor, u8, 1) X(firmware_patch, u8, 1) X(board, u16, 1) X(board_serial, u8, 12) X(boot_id, u32, 1) X(slot_hz, u16, 1) X(fingers_present, u8, 1)
+#define BT_HELLO_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1) X(wire_major, u8, 1) X(wire_minor, u8, 1) X(schema_hash, u32, 1) X(firmware_major, u8, 1) X(firmware_minor, u8, 1) X(firmware_patch, u8, 1) X(board, u16, 1) X(board_serial, u8, 12) X(boot_id, u32, 1) X(slot_hz, u16, 1) X(fingers_present, u8, 1) X(image_crc32, u32, 1)
 #define BT_REPLY_FIELDS(X) X(req_id, u8, 1) X(command, u8, 1) X(error, u8, 1)
 #define BT_SETTING_FIELDS(X) X(req_id, u8, 1) X(setting, u8, 1) X(value, i32, 1)
 #define BT_SENSOR_INFO_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(flex_version, u8, 2) X(software_version, u8, 4) X(serial, u8, 16) X(cpu_khz, u16, 1) X(sampling_hz, u16, 1)

@@ -3,6 +3,8 @@
 // that interrupts are off all the same keeps a handler that might one day read flash from a fault.
 #include "port.h"
 
+#include "map/store.h"
+
 #include "system.h"
 
 #include "rp2040_regs.h"
@@ -90,7 +92,7 @@ static uint32_t on_chip(uint32_t offset)
 
 bool port_flash_erase(uint32_t sector_offset)
 {
-    if (!usable || sector_offset >= BT_FLASH_BYTES) {
+    if (!usable || sector_offset >= BT_KEPT_BYTES) {
         return false;
     }
     watchdog_feed(); // at the beginning of 0.4 s in which the main loop cannot
@@ -100,7 +102,7 @@ bool port_flash_erase(uint32_t sector_offset)
 
 bool port_flash_program(uint32_t page_offset, const uint8_t *page)
 {
-    if (!usable || page_offset >= BT_FLASH_BYTES) {
+    if (!usable || page_offset >= BT_KEPT_BYTES) {
         return false;
     }
     program_page(on_chip(page_offset), page);
@@ -118,7 +120,9 @@ const uint8_t *port_flash_maps(void)
 }
 
 // Sends a command and takes as many bytes as it sends, chip select held low throughout. False when the
-// serial interface stopped in the middle.
+// serial interface stopped in the middle. boot2 has left the interface in quad reads (4.10.3 of the data
+// sheet); the ROM's exit_xip, which leave_xip() calls, makes it serial with a byte a frame both ways
+// (2.8.3.1.3; its flash_init_spi sets CTRLR0, BAUDR and SER), and leaves nothing to be read.
 static bool exchange(uint8_t command, volatile uint8_t *answer, uint32_t bytes)
 {
     uint32_t sent = 0;

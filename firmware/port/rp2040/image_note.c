@@ -1,4 +1,27 @@
-// This image's note. Nothing in the program reads it: the linker script keeps it.
+// This image's note; the linker script keeps it. And whether flash holds the image that the note was made
+// for.
 #include "image_note.h"
 
-__attribute__((section(".image_note"), used)) static const bt_image_note note = BT_IMAGE_NOTE(BT_BOARD_PICO);
+#include "port.h"
+
+#include "wire/crc32.h"
+
+#include "rp2040_regs.h"
+
+// volatile: the build fills in size and CRC after the compiler has seen them as zeros.
+__attribute__((section(".image_note"), used)) static const volatile bt_image_note note =
+    BT_IMAGE_NOTE(BT_BOARD_PICO);
+
+#define FLASH_MAX_BYTES (2u * 1024 * 1024)
+
+uint32_t port_image_crc32(void)
+{
+    const uint8_t *image = (const uint8_t *)(uintptr_t)XIP_BASE;
+    const uint32_t crc_at = (uint32_t)(uintptr_t)&note.crc32 - XIP_BASE;
+    const uint32_t bytes = note.image_bytes < FLASH_MAX_BYTES ? note.image_bytes : 0;
+    uint32_t crc = BT_CRC32_START;
+    for (uint32_t k = 0; k < bytes; k++) {
+        crc = bt_crc32_step(crc, k - crc_at < sizeof note.crc32 ? 0 : image[k]);
+    }
+    return bt_crc32_end(crc);
+}

@@ -69,6 +69,7 @@ void port_init(int argc, char **argv)
     make_serial_text();
     make_boot_id();
     spi_start();
+    slot_start();
     timer_start();
     usb_start(serial_text);
 }

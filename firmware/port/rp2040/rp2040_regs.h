@@ -31,25 +31,35 @@
 #define USBCTRL_IRQ 5
 
 // ---- 2.5 DMA
-#define DMA_READ_ADDR(channel)        REG32(0x50000000u + 0x40u * (channel))
-#define DMA_WRITE_ADDR(channel)       REG32(0x50000004u + 0x40u * (channel))
-#define DMA_TRANS_COUNT(channel)      REG32(0x50000008u + 0x40u * (channel))
-#define DMA_CTRL_TRIG(channel)        REG32(0x5000000Cu + 0x40u * (channel))
-#define DMA_BUSY                      (1u << 24)
-#define DMA_SNIFF_THIS                (1u << 23)
-#define DMA_QUIET                     (1u << 21) // no interrupt
-#define DMA_UNPACED                   (0x3Fu << 15)
-#define DMA_CHAIN_TO_ITSELF(channel)  ((channel) << 11) // that is, to none
-#define DMA_INCR_READ                 (1u << 4)
-#define DMA_CHANNEL_EN                (1u << 0) // DATA_SIZE is 0: bytes
-#define DMA_SNIFF_CTRL                REG32(0x50000434u)
-#define DMA_SNIFF_DATA                REG32(0x50000438u)
-#define DMA_SNIFF_OUT_INV             (1u << 11)
-#define DMA_SNIFF_OUT_REV             (1u << 10)
-#define DMA_SNIFF_CALC_CRC32_REVERSED (1u << 5) // polynomial 0x04C11DB7, each byte's lowest bit first
-#define DMA_SNIFF_CHANNEL_0           (0u << 1)
-#define DMA_SNIFF_EN                  (1u << 0)
-#define DMA_CHAN_ABORT                REG32(0x50000444u)
+#define DMA_READ_ADDR(channel)   REG32(0x50000000u + 0x40u * (channel))
+#define DMA_WRITE_ADDR(channel)  REG32(0x50000004u + 0x40u * (channel))
+#define DMA_TRANS_COUNT(channel) REG32(0x50000008u + 0x40u * (channel))
+#define DMA_CTRL_TRIG(channel)   REG32(0x5000000Cu + 0x40u * (channel))
+#define DMA_CTRL(channel)        REG32(0x50000010u + 0x40u * (channel)) // alias 1: without starting it
+#define DMA_READ_THEN_WRITE_TRIG(channel) REG32(0x50000028u + 0x40u * (channel)) // alias 2: of two words
+#define DMA_TREQS_DUE(channel)            REG32(0x50000800u + 0x40u * (channel)) // CTDREQ; any write: none
+#define DMA_BUSY                          (1u << 24)
+#define DMA_SNIFF_THIS                    (1u << 23)
+#define DMA_QUIET                         (1u << 21) // no interrupt
+#define DMA_UNPACED                       (0x3Fu << 15)
+#define DMA_BY_TIMER0                     (0x3Bu << 15)
+#define DMA_CHAIN_TO_ITSELF(channel)      ((uint32_t)(channel) << 11) // that is, to none
+#define DMA_WRITES_WRAP                   (1u << 10)
+#define DMA_WRAP_BYTES(bits)              ((uint32_t)(bits) << 6)
+#define DMA_INCR_WRITE                    (1u << 5)
+#define DMA_INCR_READ                     (1u << 4)
+#define DMA_WORDS                         (2u << 2) // DATA_SIZE; 0: bytes
+#define DMA_HIGH_PRIORITY                 (1u << 1)
+#define DMA_CHANNEL_EN                    (1u << 0)
+#define DMA_TIMER0                        REG32(0x50000420u) // ticks: clk_sys times upper over lower half
+#define DMA_SNIFF_CTRL                    REG32(0x50000434u)
+#define DMA_SNIFF_DATA                    REG32(0x50000438u)
+#define DMA_SNIFF_OUT_INV                 (1u << 11)
+#define DMA_SNIFF_OUT_REV                 (1u << 10)
+#define DMA_SNIFF_CALC_CRC32_REVERSED     (1u << 5) // polynomial 0x04C11DB7, each byte's lowest bit first
+#define DMA_SNIFF_CHANNEL_0               (0u << 1)
+#define DMA_SNIFF_EN                      (1u << 0)
+#define DMA_CHAN_ABORT                    REG32(0x50000444u)
 
 // ---- 2.13 power-on state machine
 #define PSM_WDSEL      REG32(0x40010008u)
@@ -104,6 +114,8 @@
 #define IO_BANK0_GPIO_CTRL(n) REG32(0x40014004u + 8u * (n))
 #define GPIO_FUNC_SPI         1u
 #define GPIO_FUNC_SIO         5u
+#define GPIO_OUTOVER_LOW      (2u << 8) // whatever the function says
+#define GPIO_OUTOVER_HIGH     (3u << 8)
 #define PADS_BANK0_GPIO(n)    REG32(0x4001C004u + 4u * (n))
 #define PADS_IE               (1u << 6)
 #define PADS_DRIVE_4MA        (1u << 4)

@@ -25,6 +25,19 @@ static void output(uint32_t pin, uint32_t function)
     IO_BANK0_GPIO_CTRL(pin) = function;
 }
 
+static void configure(void)
+{
+    SPI0_SSPCPSR = CPSDVSR;
+    SPI0_SSPCR0 = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
+    SPI0_SSPCR1 = SSPCR1_SSE;
+}
+
+void spi_reset(void)
+{
+    (void)take_out_of_reset(RESETS_SPI0);
+    configure();
+}
+
 void spi_start(void)
 {
     static const uint8_t selects[BT_MAX_FINGERS] = {PIN_SELECT_0, PIN_SELECT_1, PIN_SELECT_2, PIN_SELECT_3,
@@ -40,9 +53,7 @@ void spi_start(void)
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         output(selects[f], GPIO_FUNC_SIO);
     }
-    SPI0_SSPCPSR = CPSDVSR;
-    SPI0_SSPCR0 = SSPCR0_DSS_16 | SCR << SSPCR0_SCR_LSB;
-    SPI0_SSPCR1 = SSPCR1_SSE;
+    configure();
     output(PIN_SCK, GPIO_FUNC_SPI);
     output(PIN_MOSI, GPIO_FUNC_SPI);
     // Pulled down: where no sensor drives the line, words read 0x0000, which the driver takes for absent.
@@ -50,15 +61,20 @@ void spi_start(void)
     IO_BANK0_GPIO_CTRL(PIN_MISO) = GPIO_FUNC_SPI;
 }
 
-void port_spi_select(uint8_t mask)
+void spi_select_at_once(uint8_t mask)
 {
     uint32_t low = (uint32_t)(mask & 1) << PIN_SELECT_0 | (uint32_t)(mask >> 1 & 1) << PIN_SELECT_1
                    | (uint32_t)(mask >> 2 & 1) << PIN_SELECT_2 | (uint32_t)(mask >> 3 & 1) << PIN_SELECT_3
                    | (uint32_t)(mask >> 4 & 1) << PIN_SELECT_4;
-    wait_short_ns(SELECT_HOLD_NS); // whatever was selected; its last word is out
     SIO_GPIO_OUT_SET = ALL_SELECTS & ~low;
-    if (low != 0) {
-        SIO_GPIO_OUT_CLR = low;
+    SIO_GPIO_OUT_CLR = low;
+}
+
+void port_spi_select(uint8_t mask)
+{
+    wait_short_ns(SELECT_HOLD_NS); // whatever was selected; its last word is out
+    spi_select_at_once(mask);
+    if (mask != 0) {
         wait_short_ns(SELECT_SETUP_NS);
     }
 }
@@ -79,17 +95,6 @@ static uint32_t end(void)
     // Not busy is later than received: the clock has gone low by then, and the select may rise.
     bool done = wait_for(&SPI0_SSPSR, SSPSR_RNE | SSPSR_BSY, SSPSR_RNE, WAIT_SPI_TURNS);
     return done ? SPI0_SSPDR : 0;
-}
-
-bool port_spi_begin16(uint16_t mosi)
-{
-    begin(mosi);
-    return false;
-}
-
-uint16_t port_spi_end16(void)
-{
-    return (uint16_t)end();
 }
 
 uint16_t port_spi_transfer16(uint16_t mosi)

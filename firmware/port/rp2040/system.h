@@ -29,6 +29,11 @@ void timer_wake(void);
 
 // ---- spi.c
 void spi_start(void);
+void spi_reset(void);                  // whatever it was about
+void spi_select_at_once(uint8_t mask); // port_spi_select without its waits
+
+// ---- slot.c
+void slot_start(void);
 
 // ---- rom.c: functions of the chip's boot ROM; NULL when it has none of that name
 void *rom_function(char first, char second);

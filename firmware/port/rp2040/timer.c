@@ -4,7 +4,7 @@
 #include "system.h"
 #include "wait.h"
 
-#define NAPS 64 // until the main loop looks around all the same: a slot has twelve interrupts
+#define NAPS 64 // interrupts until the main loop looks around all the same: a slot has two, and the bus some
 
 static volatile bool woken;
 

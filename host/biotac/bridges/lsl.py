@@ -105,7 +105,7 @@ class Outlet:
         self._outlets[finger, suffix] = lsl.StreamOutlet(info)
 
     def _push(self, finger: int, suffix: str, values: NDArray[Any], t_us: NDArray[np.float64]) -> None:
-        stamps_s = self._stamps.of(t_us)
+        stamps_s = self._stamps.of(t_us, (finger, suffix))
         self._outlets[finger, suffix].push_chunk(values.astype(np.float64), stamps_s.tolist())
 
     @property

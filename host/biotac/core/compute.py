@@ -50,8 +50,9 @@ def compute(
     ``counts`` are integers 0..4095, 0xFFFF where missing, which weighs nothing; uint16 is read in place,
     also from a field of a structured array. ``tare`` is (19,) or of the shape of ``counts``, 0..4095
     counts, rounded to 1/16 count as the board does. ``settings`` are those of a board; what they do not
-    name has its default. ``out``, a contiguous RESULT_DTYPE array of the result's shape, is filled and
-    returned: a buffer that was used before spares the page faults of a new one.
+    name has its default, and what is no biotac.Setting is refused with ValueError. ``out``, a contiguous
+    RESULT_DTYPE array of the result's shape, is filled and returned: a buffer that was used before spares the page
+    faults of a new one.
 
     ``wrench_map``, or its blob, gives the force in place of the gains, and the torque where it has six
     axes; else torque x is made of its force. The result, and ``out``, are MAPPED_RESULT_DTYPE then: with
@@ -149,6 +150,9 @@ _DEFAULTS = default_settings()
 
 
 def _plan(settings: Settings) -> Any:
+    for key in settings:
+        if key not in _DEFAULTS:
+            raise ValueError(f"settings have {key!r}, expected members of biotac.Setting, such as FORCE_GAIN_Z_NN")
     return _plan_of(tuple(int(settings.get(key, _DEFAULTS[key])) for key in _PLAN_SETTINGS))
 
 

@@ -21,7 +21,6 @@ HEAD = struct.Struct("<8I")
 PAGE_BYTES = 256
 MAGIC = (0x0A324655, 0x9E5D5157, 0x0AB16F30)
 FLAG_FAMILY = 0x2000
-FLAG_NOT_FLASH = 0x0001
 FAMILY_RP2040 = 0xE48BFF56
 
 FLASH_AT = 0x10000000
@@ -78,9 +77,12 @@ def join_payloads(blocks: tuple[bytes, ...]) -> bytes:
         first, second, flags, address, size, number, count, family = HEAD.unpack_from(block)
         if (first, second, *struct.unpack_from("<I", block, BLOCK_BYTES - 4)) != MAGIC:
             raise ValueError(f"block {k} has not the marks of UF2; take the build's .uf2 file")
-        if not flags & FLAG_FAMILY or flags & FLAG_NOT_FLASH or family != FAMILY_RP2040:
-            seen = f"of family 0x{family:08X}" if flags & FLAG_FAMILY else "of no family"
-            raise ValueError(f"block {k} is {seen}; expected 0x{FAMILY_RP2040:08X}, the RP2040's flash")
+        if flags != FLAG_FAMILY or family != FAMILY_RP2040:
+            seen = f"of family 0x{family:08X}, flags 0x{flags:X}" if flags & FLAG_FAMILY else "of no family"
+            raise ValueError(
+                f"block {k} is {seen}; expected family "
+                f"0x{FAMILY_RP2040:08X}, the RP2040's flash, flags 0x{FLAG_FAMILY:X}"
+            )
         if size != PAGE_BYTES:
             raise ValueError(f"block {k} carries {size} bytes; the RP2040 takes {PAGE_BYTES}")
         if (number, count) != (k, len(blocks)):
@@ -92,6 +94,10 @@ def join_payloads(blocks: tuple[bytes, ...]) -> bytes:
         if address != FLASH_AT + k * PAGE_BYTES:
             # A gap would be legal UF2, but RP2040-E14 makes the boot ROM erase sectors wrongly around it.
             raise ValueError(f"block {k} goes to 0x{address:08X}; expected 0x{FLASH_AT + k * PAGE_BYTES:08X}, no gaps")
+        if any(block[HEAD.size + PAGE_BYTES : -4]):
+            raise ValueError(
+                f"block {k} has something behind its {PAGE_BYTES} bytes: the file is damaged, take it again"
+            )
         pages.append(block[HEAD.size : HEAD.size + PAGE_BYTES])
     return b"".join(pages)
 

@@ -1,4 +1,4 @@
-"""What an image says of itself: the reader of firmware/app/image_note.h, for flashing and for the build.
+"""What an image says of itself: reads and writes firmware/app/image_note.h, for flashing and for the build.
 
 Nothing but the standard library: tools/image/note.py loads this file where the package is not installed.
 """
@@ -6,11 +6,15 @@ Nothing but the standard library: tools/image/note.py loads this file where the 
 from __future__ import annotations
 
 import struct
+import zlib
 from dataclasses import dataclass
 
 MAGIC = b"BIOTAC image"
-LAYOUT = 1
+LAYOUT = 2
 FIELDS = struct.Struct("<12sHH3BBB3x")
+PROOF = struct.Struct("<II")  # behind them: how many bytes the image has, and their CRC-32
+CRC_AT = FIELDS.size + 4
+CRC_BYTES = 4
 ALIGNMENT = 4
 
 
@@ -21,6 +25,7 @@ class Note:
     board: int
     firmware: tuple[int, int, int]
     wire: tuple[int, int]
+    crc32: int
 
     @property
     def version(self) -> str:
@@ -29,12 +34,41 @@ class Note:
 
 
 def find(image: bytes) -> Note:
-    """Raises ValueError for an image that has not exactly one note, or one of another layout."""
-    places = range(0, len(image) - FIELDS.size + 1, ALIGNMENT)
+    """The note of an image that may be followed by zeros.
+
+    Raises ValueError unless it has exactly one note, of this layout, and the bytes are those it was made of.
+    """
+    at = _place(image)
+    _, layout, board, *numbers = FIELDS.unpack_from(image, at)
+    if layout != LAYOUT:
+        raise ValueError(f"its note has layout {layout}, this library knows {LAYOUT}: take the image of this release")
+    size, crc32 = PROOF.unpack_from(image, at + FIELDS.size)
+    if not at + CRC_AT + CRC_BYTES <= size <= len(image) or any(image[size:]):
+        raise ValueError(f"its note says {size} bytes, it has {len(image)}: the file is damaged, take it again")
+    seen = _crc32(image[:size], at)
+    if seen != crc32:
+        raise ValueError(f"its bytes have CRC-32 {seen:08x}, its note says {crc32:08x}: take the file again")
+    return Note(board, (numbers[0], numbers[1], numbers[2]), (numbers[3], numbers[4]), crc32)
+
+
+def seal(image: bytes) -> bytes:
+    """The same image, its note filled in with its size and CRC-32; ValueError unless it has exactly one note."""
+    at = _place(image)
+    sized = bytearray(image)
+    PROOF.pack_into(sized, at + FIELDS.size, len(image), 0)
+    PROOF.pack_into(sized, at + FIELDS.size, len(image), _crc32(bytes(sized), at))
+    return bytes(sized)
+
+
+def _place(image: bytes) -> int:
+    places = range(0, len(image) - FIELDS.size - PROOF.size + 1, ALIGNMENT)
     notes = [at for at in places if image.startswith(MAGIC, at)]
     if len(notes) != 1:
         raise ValueError(f"it says {len(notes)} times which board it is for; expected once: is it this gateway's?")
-    _, layout, board, *numbers = FIELDS.unpack_from(image, notes[0])
-    if layout != LAYOUT:
-        raise ValueError(f"its note has layout {layout}, this library knows {LAYOUT}; update biotac-gateway")
-    return Note(board, (numbers[0], numbers[1], numbers[2]), (numbers[3], numbers[4]))
+    return notes[0]
+
+
+def _crc32(image: bytes, note_at: int) -> int:
+    """Of all bytes, those of the CRC itself taken as zeros."""
+    field = note_at + CRC_AT
+    return zlib.crc32(image[field + CRC_BYTES :], zlib.crc32(bytes(CRC_BYTES), zlib.crc32(image[:field])))

@@ -42,6 +42,7 @@ def flash(
     backup_path: Path | None = None,
     keep: bool = True,
     restore_from: Backup | None = None,
+    downgrade: bool = False,
     say: Say = lambda text: None,
     show: ShowBlocks = lambda done, of: None,
 ) -> Outcome:
@@ -49,7 +50,8 @@ def flash(
 
     The settings go to ``backup_path`` (default: a new file in the working directory) first; without ``keep`` they
     do not, and a board whose firmware does not answer is flashed too. A board that is in its loader already cannot
-    be asked for its settings; ``restore_from`` is what it gets then, and otherwise too.
+    be asked for its settings; ``restore_from`` is what it gets then, and otherwise too. An image older than what
+    runs is refused without ``downgrade``.
 
     Raises InputError before anything is touched for an image that is not the board's, FlashError for whatever fails
     from then on.
@@ -63,7 +65,7 @@ def flash(
     before: wire.Hello | None = None
     written: Backup | None = None
     if loader is None:
-        before, written = leave(image, target, backup_path=backup_path, keep=keep, say=say)
+        before, written = leave(image, target, backup_path=backup_path, keep=keep, downgrade=downgrade, say=say)
     elif target.there():
         raise InputError(
             f"{target.port} is there, and another board is in its loader ({loader.name}); unplug one of them"
@@ -90,7 +92,7 @@ def first_ready(loaders: Sequence[Loader]) -> Loader | None:
 
 
 def leave(
-    image: Image, target: Target, *, backup_path: Path | None, keep: bool, say: Say
+    image: Image, target: Target, *, backup_path: Path | None, keep: bool, downgrade: bool, say: Say
 ) -> tuple[wire.Hello | None, Backup | None]:
     """Ask the board who it is, save its settings, and send it to its loader."""
     try:
@@ -106,6 +108,11 @@ def leave(
             raise InputError(
                 f"{image.path} is for {board_text(image.note.board)}, but {board_text(hand.info.board)} answers on "
                 f"{target.port}; take that board's image"
+            )
+        if not downgrade and image.note.firmware < firmware(hand.info):
+            raise InputError(
+                f"{image.path} has firmware {image.note.version}, {target.port} runs {version_text(hand.info)}: an "
+                "older one may not know what newer settings mean; --downgrade if you mean it"
             )
         say(f"{target.port} runs firmware {version_text(hand.info)}, serial {serial_text(hand.info)}")
         backup = save(hand, backup_path) if keep else None
@@ -130,17 +137,26 @@ def command_loader(hand: Hand) -> bool:
     return True
 
 
+def firmware(hello: wire.Hello) -> tuple[int, int, int]:
+    """Its release, to compare with another."""
+    return hello.firmware_major, hello.firmware_minor, hello.firmware_patch
+
+
 def check(image: Image, before: wire.Hello | None, after: wire.Hello) -> None:
     """Only what the board itself says counts as success."""
-    version = (after.firmware_major, after.firmware_minor, after.firmware_patch)
     if before is not None and after.board_serial != before.board_serial:
         raise FlashError(
             f"serial {serial_text(after)} came back, not {serial_text(before)}; leave only one board plugged in"
         )
-    if (after.board, version) != (image.note.board, image.note.firmware):
+    if (after.board, firmware(after)) != (image.note.board, image.note.firmware):
         raise FlashError(
             f"the board that came back is {board_text(after.board)}, firmware {version_text(after)}; expected "
             f"{note_text(image.note)}: the image was not taken, flash again"
+        )
+    if after.image_crc32 != image.note.crc32:
+        raise FlashError(
+            f"the board's flash has CRC-32 {after.image_crc32:08x}, the image {image.note.crc32:08x}: it was not "
+            "written whole, flash again"
         )
     if before is not None and after.boot_id == before.boot_id:
         raise FlashError(f"the board still has boot id {after.boot_id:08x}: it has not restarted; plug it in again")

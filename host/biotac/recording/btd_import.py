@@ -14,6 +14,7 @@ from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire import slots
 from ..wire.framing import encode
+from ..wire.identity import NO_IMAGE
 from .btd_file import read_btd
 from .file import RecordingFile
 from .rounds import Rounds, frames_and_tares
@@ -74,6 +75,7 @@ def _write(
         req_id=0, nonce=0, wire_major=wire.WIRE_MAJOR, wire_minor=wire.WIRE_MINOR, schema_hash=wire.SCHEMA_HASH,
         firmware_major=major, firmware_minor=minor, firmware_patch=patch, board=NO_BOARD, board_serial=(0,) * 12,
         boot_id=0, slot_hz=sensor.SLOT_HZ, fingers_present=(1 << fingers) - 1,
+        image_crc32=NO_IMAGE,
     )  # fmt: skip
     unknown = wire.SensorInfo(0, 0, 1, (0,) * 2, (0,) * 4, (0,) * 16, 0, 0)
     sensors = [dataclasses.replace(unknown, finger=finger) for finger in range(fingers)]

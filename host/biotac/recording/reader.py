@@ -22,6 +22,7 @@ from ..keep.values import own_settings
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, StreamDecoder, join
 from ..wire.frames import StructArray
+from ..wire.identity import NO_IMAGE
 from . import layout
 from .block import FRAME, IDLE, PAC, as_sent
 from .blocks import Blocks, is_lossless
@@ -178,7 +179,7 @@ class Recording:
                 "install the biotac-gateway it was recorded with"
             )
         self.metadata = metadata
-        hello: dict[str, Any] = json.loads(metadata["hello"])
+        hello: dict[str, Any] = {"image_crc32": NO_IMAGE} | json.loads(metadata["hello"])
         self.info = wire.Hello(**_tuples(hello))
         self.sensors = [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))]
         named = json.loads(metadata["settings"])

@@ -26,7 +26,7 @@ from .file import RecordingFile
 from .layout import maps_text
 from .pieces import split
 from .reader import Recording
-from .rounds import HostTare, Rounds, frames_and_tares
+from .rounds import HostTare, Rounds, frames_and_tares, with_silence
 
 Settings = dict[wire.Setting, int]
 Show = Callable[[float], None]
@@ -195,7 +195,7 @@ def _through_the_machine(
 
     for finger in np.unique(recording.wire["finger"]):
         at = np.flatnonzero(recording.wire["finger"] == finger)
-        rounds = _rounds(recording, at, maps.get(int(finger)), notes)
+        rounds = with_silence(_rounds(recording, at, maps.get(int(finger)), notes))
         frames, changes = frames_and_tares(rounds, own.get(int(finger), settings), ran_rows)
         if len(frames) != len(at):
             raise InputError(f"{recording.path}: finger {finger} has frames without one good count; add --keep-tare")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.board_map import BoardMap
-from ..core.finger import FINGER_DTYPE, Finger
+from ..core.finger import FINGER_DTYPE, ROUND_US, Finger
 from ..errors import CommandRefusedError
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
@@ -62,6 +62,31 @@ class Rounds:
     words: dict[int, wire.TareReason] = field(default_factory=dict)
     quantities: wire.QuantityFlags | None = None
     wrench_map: BoardMap | None = None
+
+
+def with_silence(rounds: Rounds) -> Rounds:
+    """``rounds`` with one without words wherever time jumps: the sensor was silent there, or was asked who it is.
+
+    The gate and the pressure's filter forget in such a round; how many there were makes no difference.
+    """
+    late = np.flatnonzero(np.diff(rounds.t_us) > 3 * ROUND_US // 2) + 1
+
+    def filled(words: NDArray[np.uint16]) -> NDArray[np.uint16]:
+        return np.insert(words, late, np.uint16(wire.INVALID_COUNT), axis=0)
+
+    def at(row: int) -> int:
+        return row + int(np.searchsorted(late, row, "right"))
+
+    return replace(
+        rounds,
+        counts=filled(rounds.counts),
+        pdc=filled(rounds.pdc),
+        tac=filled(rounds.tac),
+        tdc=filled(rounds.tdc),
+        t_us=np.insert(rounds.t_us, late, rounds.t_us[late] - ROUND_US),
+        tares={at(row): tare for row, tare in rounds.tares.items()},
+        words={at(row): word for row, word in rounds.words.items()},
+    )
 
 
 def frames_and_tares(

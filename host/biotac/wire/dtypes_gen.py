@@ -27,6 +27,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("boot_id", "<u4"),
             ("slot_hz", "<u2"),
             ("fingers_present", "u1"),
+            ("image_crc32", "<u4"),
         ]
     ),
     wire.Reply.ID: np.dtype(

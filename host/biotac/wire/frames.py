@@ -6,7 +6,7 @@ Wire integers become mm, N and N*mm here and nowhere else.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -41,9 +41,9 @@ def _no_sigma() -> NDArray[np.float64]:
     return np.full(3, np.nan)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One finger, one round of slots (10 ms).
+    """One finger, one round of slots (10 ms). Equal to another when all values are, NaN to NaN.
 
     Shapes: counts (19,) uint16; tare (19,) float32; poc_mm, force_n, torque_nmm, force_sigma_n (3,) float64; the rest
     are numbers. Names, units and invalid marks as in FRAME_DTYPE. Force and torque act on the finger; x to the tip, y
@@ -70,6 +70,15 @@ class Frame:
     pressure_force_n: float = math.nan
     torsion_nmm: float = math.nan
     wrench_age_ms: int = 0
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Frame):
+            return NotImplemented
+        pairs = [(getattr(self, its.name), getattr(other, its.name)) for its in fields(self)]
+        return all(np.array_equal(mine, its, equal_nan=np.asarray(mine).dtype.kind == "f") for mine, its in pairs)
+
+    def __hash__(self) -> int:
+        return hash((self.finger, self.seq, self.t_us))
 
     @classmethod
     def from_row(cls, row: Any) -> Frame:

@@ -6,6 +6,9 @@ from collections.abc import Iterable
 
 from . import messages_gen as wire
 
+# What HELLO says where there is no image, or one from before it said so.
+NO_IMAGE = 0xFFFFFFFF
+
 # A Pico's number has 8 bytes; HELLO leaves room for 12 and fills up with zeros.
 SERIAL_BYTES = 8
 

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0x2788E1AA
+SCHEMA_HASH = 0x07B0840F
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -371,12 +371,13 @@ class Hello:
     boot_id: int
     slot_hz: int
     fingers_present: int
+    image_crc32: int
 
     ID: ClassVar[int] = 0x01
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIBBIBBBH12BIHB")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIBBIBBBH12BIHBI")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 35 bytes."""
+        """Payload without id and CRC, 39 bytes."""
         return self.STRUCT.pack(
             self.req_id,
             self.nonce,
@@ -391,6 +392,7 @@ class Hello:
             self.boot_id,
             self.slot_hz,
             self.fingers_present,
+            self.image_crc32,
         )
 
     @classmethod
@@ -411,6 +413,7 @@ class Hello:
             v[21],
             v[22],
             v[23],
+            v[24],
         )
 
 

@@ -42,12 +42,21 @@ def test_every_bit_is_the_one_that_the_simulated_board_sends(name: str) -> None:
     tares = [m for m in sent.messages if isinstance(m, wire.Tare)]
     for index in np.unique(sent.wire["finger"]):
         board = sent.wire[sent.wire["finger"] == index]
-        rows = Finger(settings, index=int(index), quantities=ALL_ROUNDS).feed(**words_of(name, int(index)))
-        rows = rows[rows["present"] != 0][: len(board)]
+        words = words_of(name, int(index))
         assert len(board) > 500
         # Both count 10 ms rounds; only where the board's clock stood at the first one is its own affair.
-        start_us = int(board["t_us"][0]) - int(rows["t_us"][0])
+        good = np.any([(its != wire.INVALID_COUNT).reshape(len(its), -1).any(axis=1) for its in words.values()], axis=0)
+        start_us = int(board["t_us"][0]) - ROUND_US * int(np.argmax(good))
+        sent_rounds = (board["t_us"] - np.uint32(start_us)) // ROUND_US
+        # A sensor that comes back is asked who it is, and not sampled in that round.
+        asked = np.setdiff1d(np.flatnonzero(good[: sent_rounds[-1] + 1]), sent_rounds)
+        assert len(asked) == (3 if (name, index) == ("faults.toml", 1) else 0)
+        for its in words.values():
+            its[asked] = wire.INVALID_COUNT
+        rows = Finger(settings, index=int(index), quantities=ALL_ROUNDS).feed(**words)
+        rows = rows[rows["present"] != 0][: len(board)]
         rows["t_us"] += np.uint32(start_us)
+        board["flags"] &= ~np.uint32(FrameFlags.SENSOR_UNSURE)  # until it has answered; counts do not tell
         for field in WIRE_FIELDS:
             np.testing.assert_array_equal(rows[field], board[field], err_msg=f"{name} finger {index} {field}")
         # The reasons travel in TARE messages.
@@ -90,10 +99,10 @@ def test_a_silent_sensor_leaves_rows_without_numbers() -> None:
     gap = finger.feed(np.full((24, 19), 0xFFFF))
     assert not gap["present"].any() and (gap["seq"] == 39).all()
     assert (gap["force_100un"] == wire.INVALID_I32).all() and (gap["counts"] == 0xFFFF).all()
+    # However long: the same sensor has its tare again. Whose it is, a board asks; words do not tell.
+    finger.feed(np.full((2000, 19), 0xFFFF))
     back = finger.feed(rest[:1])
-    assert back["seq"][0] == 40 and back["tare_state"][0] == TareState.REST  # a gap this short is no unplugging
-    finger.feed(np.full((25, 19), 0xFFFF))
-    assert finger.feed(rest[:1])["tare_state"][0] == TareState.INIT
+    assert back["seq"][0] == 40 and back["tare_state"][0] == TareState.REST
     assert len(to_frames(gap)) == 0
 
 

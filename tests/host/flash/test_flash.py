@@ -113,6 +113,12 @@ def test_the_old_version_coming_back_is_no_success(fake: FakeBoard, tmp_path: Pa
     assert str(backups(tmp_path)[0]) in message
 
 
+def test_other_bytes_in_flash_are_no_success(fake: FakeBoard, tmp_path: Path) -> None:
+    hello = fake._hello
+    fake._hello = lambda payload, **facts: hello(payload, **facts | {"image_crc32": 0x1234})
+    assert "flash has CRC-32 00001234, the image " in fails(fake, tmp_path)
+
+
 def test_the_same_boot_is_no_success(fake: FakeBoard, tmp_path: Path) -> None:
     fake.boot_id -= 1
     hello = fake._hello

@@ -55,8 +55,10 @@ def test_an_image_says_what_it_is(tmp_path: Path) -> None:
         (lambda data: data[:-1], "no UF2"),
         (changed(508, "<I", 7), "block 3 has not the marks"),
         (changed(8, "<I", 0), "block 3 is of no family"),
-        (changed(8, "<I", 0x2001), "block 3 is of family 0xE48BFF56"),
-        (changed(28, "<I", 0xE48BFF59), "family 0xE48BFF59; expected 0xE48BFF56"),
+        (changed(8, "<I", 0x2001), "block 3 is of family 0xE48BFF56, flags 0x2001"),
+        (changed(100, "<I", 0), "CRC-32"),
+        (changed(300, "<B", 1), "block 3 has something behind its 256 bytes"),
+        (changed(28, "<I", 0xE48BFF59), "family 0xE48BFF59, flags 0x2000; expected family 0xE48BFF56"),
         (changed(16, "<I", 476), "carries 476 bytes"),
         (dropped(19, 20), "block 0 of 19 says it is 0 of 20"),
         (dropped(4, 5), "the file is cut or mixed up"),
@@ -84,12 +86,23 @@ def test_an_image_that_a_board_would_not_take_whole_is_refused(
     [
         (b"", "0 times which board"),
         (note() + note(), "2 times which board"),
-        (note()[:12] + b"\x02" + note()[13:], "layout 2"),
+        (note()[:12] + b"\x03" + note()[13:], "layout 3"),
     ],
 )
 def test_an_image_that_does_not_say_its_board_is_refused(tmp_path: Path, said: bytes, why: str) -> None:
     with pytest.raises(InputError, match=why):
         read_image(make_image(tmp_path, said))
+
+
+def test_no_flipped_bit_is_overlooked(tmp_path: Path) -> None:
+    path = make_image(tmp_path)
+    whole = path.read_bytes()
+    for bit in range(0, 8 * len(whole), 101):  # 101 has no factor with 8: every bit of a byte, every part of a block
+        flipped = bytearray(whole)
+        flipped[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(flipped)
+        with pytest.raises(InputError):
+            read_image(path)
 
 
 def test_settings_and_maps_are_where_the_firmware_has_them() -> None:

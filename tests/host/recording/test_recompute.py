@@ -55,6 +55,14 @@ def test_without_a_change_it_is_what_the_board_sent_bit_for_bit(folder, source: 
     (folder / "same.mcap").unlink()
 
 
+def test_where_a_sensor_was_silent_the_filters_begin_anew(folder) -> None:
+    # Unplugged twice, and asked who it is when it comes back: rounds that no FRAME tells of.
+    was = record(folder / "silent.mcap", "sim:faults.toml", pressure_filter_milli=100)
+    assert (np.diff(was.frames["t_us"][was.wire["finger"] == 1]) > 400_000).sum() == 2
+    assert main(["recompute", str(folder / "silent.mcap"), str(folder / "silent_again.mcap")]) == 0
+    assert biotac.Recording(folder / "silent_again.mcap").wire.tobytes() == was.wire.tobytes()
+
+
 @pytest.mark.parametrize("timeout_ms", [0, 300])
 def test_what_the_host_said_of_a_hold_is_heard_again(folder, timeout_ms: int) -> None:
     for name in ("grasp.mcap", "grasp_again.mcap"):

@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--backup", type=Path, metavar="FILE", help="new file for the settings (default: one in this folder)"
     )
     parser.add_argument("--no-backup", action="store_true", help="flash even a board whose firmware does not answer")
+    parser.add_argument("--downgrade", action="store_true", help="flash an image older than the firmware that runs")
     parser.add_argument(
         "--restore", type=Path, metavar="FILE", help="settings from this backup in place of the board's own"
     )
@@ -58,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
             backup_path=args.backup,
             keep=not args.no_backup,
             restore_from=kept,
+            downgrade=args.downgrade,
             say=say,
             show=lambda done, of: progress.show(f"{done} of {of} blocks"),
         )

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 
 from . import contact as calibrate_contact
+from . import population as calibrate_population
 from . import pressure as calibrate_pressure
+from . import scale as calibrate_scale
 from . import wrench as calibrate_wrench
 
 EXAMPLE = calibrate_wrench.EXAMPLE
 
-WHATS = (calibrate_wrench, calibrate_pressure, calibrate_contact)
+WHATS = (calibrate_wrench, calibrate_population, calibrate_scale, calibrate_pressure, calibrate_contact)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

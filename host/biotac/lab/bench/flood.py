@@ -25,6 +25,7 @@ from ...wire import messages_gen as wire
 from ...wire.decoder import Decoder
 from ...wire.dtypes_gen import DTYPES
 from ...wire.framing import encode
+from ...wire.identity import NO_IMAGE
 
 FINGERS = 5
 RING_BYTES = 16_384
@@ -90,7 +91,9 @@ def answer(message: Any) -> bytes:
     """HELLO or yes."""
     if isinstance(message, wire.HelloRequest):
         versions = (wire.WIRE_MAJOR, wire.WIRE_MINOR, wire.SCHEMA_HASH, 0, 0, 0)
-        hello = wire.Hello(message.req_id, message.nonce, *versions, wire.Board.POSIX_SIM, (1,) * 12, 1, 4400, 31)
+        hello = wire.Hello(
+            message.req_id, message.nonce, *versions, wire.Board.POSIX_SIM, (1,) * 12, 1, 4400, 31, NO_IMAGE
+        )
         return encode(hello.ID, hello.pack())
     return encode(wire.Reply.ID, wire.Reply(message.req_id, message.ID, 0).pack())
 

@@ -1,5 +1,6 @@
-// The DMA's sniffer (data sheet 2.5.5), which rp2040js declares and does not run, and the time that transfers take: a
-// cycle each where nothing paces them. Bytes and CRC-32 only; whatever else a program asks of it is wrong here.
+// What rp2040js declares of the DMA and does not run, from the data sheet: the sniffer (2.5.5.2), pacing timers (2.5.5.1;
+// as published their period is upside down), and the time that transfers take, a cycle each where nothing paces them.
+// The sniffer takes bytes and CRC-32 only; whatever else a program asks of it is wrong here.
 const SNIFF_CTRL = 0x434
 const SNIFF_DATA = 0x438
 const EN = 1
@@ -7,6 +8,9 @@ const OUT_REV = 1 << 10
 const OUT_INV = 1 << 11
 const CHANNEL_SNIFF_EN = 1 << 23
 const UNPACED = 0x3f
+const TIMER0 = 0x3b
+const TIMER3 = 0x3e
+const TIMERS = 0x420
 const POLYNOMIAL = 0x04c11db7
 
 export function reversed(value, bits) {
@@ -22,10 +26,24 @@ export function step(crc, byte) {
   return next >>> 0
 }
 
-/** Have the chip's DMA sniff. wrong(what): the program asked for what is not modelled. */
-export function addSniffer(mcu, wrong) {
+/** time: DeviceTime, with which its timers stand still. wrong(what): the program asked for what is not modelled. */
+export function correctDma(mcu, time, wrong) {
   const { dma } = mcu
   const [read, write] = [dma.readUint32.bind(dma), dma.writeUint32.bind(dma)]
+  const paced = new Set() // channels that a timer has paced
+  const waiting = new Set() // for time to go on
+  time.onHold.push(() => {
+    for (const channel of paced) {
+      if (!channel.active || channel.treqValue < TIMER0 || channel.treqValue > TIMER3) continue
+      channel.transferAlarm.cancel()
+      waiting.add(channel)
+    }
+  })
+  time.onRelease.push(() => {
+    const those = [...waiting]
+    waiting.clear()
+    for (const channel of those) if (channel.active) tick(channel)
+  })
   let control = 0
   let data = 0
   dma.readUint32 = (offset) => {
@@ -54,8 +72,21 @@ export function addSniffer(mcu, wrong) {
     }
     channel.transferAlarm = mcu.clock.createAlarm(channel.transfer)
     channel.scheduleTransfer = () => {
-      if (channel.treqValue !== UNPACED) schedule()
-      else channel.transferAlarm.schedule(1e9 / mcu.clkSys)
+      const { treqValue } = channel
+      if (treqValue === UNPACED) channel.transferAlarm.schedule(1e9 / mcu.clkSys)
+      else if (treqValue >= TIMER0 && treqValue <= TIMER3) tick(channel)
+      else schedule()
     }
+  }
+
+  /** At the timer's next tick: it runs whether or not somebody waits for it. */
+  function tick(channel) {
+    if (time.held) return waiting.add(channel)
+    const ratio = read(TIMERS + 4 * (channel.treqValue - TIMER0))
+    const period = ((ratio & 0xffff) / (ratio >>> 16)) * (1e9 / mcu.clkSys)
+    const now = mcu.clock.nanos
+    if (!(period > 0) || !Number.isFinite(period)) return wrong('a DMA channel paced by a timer that stands')
+    paced.add(channel)
+    channel.transferAlarm.schedule((Math.floor(now / period) + 1) * period - now)
   }
 }

@@ -1,0 +1,100 @@
+"""A population map as JSON, with where it comes from; and the one that comes with the package.
+
+Coefficients have seven digits, a thousandth of what the map is off by: short, and the same wherever it is made.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.geometry import Floats
+from ...errors import InputError
+from ...version import __version__
+from ..wrench import features
+from .training import AXES, COLUMNS, FAMILIES, Population
+
+FORMAT = "biotac-population-map/1"
+SHIPPED = "population.json"
+DIGITS = 7
+NOTHING = 1e-9
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A map, one sigma (3,) in N of a new finger's force by it, the same after five presses, and its provenance."""
+
+    its: Population
+    sigma_n: Floats
+    sigma_scale5_n: Floats
+    provenance: dict[str, Any]
+
+
+def provenance_of(files: Sequence[Path], source: str, *, symmetric: bool) -> dict[str, Any]:
+    """Names and SHA-256 of the recordings, and ``source``: where they are from and under which licence."""
+    hashes = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+    return {"source": source, "files": hashes, "symmetric": symmetric, "software": f"biotac-gateway {__version__}"}
+
+
+def dumps(kept: Kept) -> str:
+    """As JSON, a line a column."""
+    head = {
+        "format": FORMAT,
+        "provenance": kept.provenance,
+        "axes": list(AXES),
+        "sigma_n": _short(kept.sigma_n),
+        "sigma_scale5_n": _short(kept.sigma_scale5_n),
+        "blocks": _block_names(),
+    }
+    lines = [f" {json.dumps(key)}: {json.dumps(value)}," for key, value in head.items()]
+    rows = np.column_stack([kept.its.coefficients, kept.its.variance])
+    columns = ",\n".join(f"  {json.dumps(_short(row))}" for row in rows)
+    return "\n".join(["{", *lines, ' "coefficients_n_and_variance": [', columns, " ]", "}", ""])
+
+
+def loads(text: str, where: str) -> Kept:
+    """Inverse of dumps, but for the digits. Raises InputError naming what is wrong with it."""
+    try:
+        facts = json.loads(text)
+        if facts["format"] != FORMAT:
+            raise ValueError(f"format {facts['format']!r}")
+        if facts["blocks"] != _block_names():
+            raise ValueError(f"blocks {facts['blocks']}")
+        rows = np.array(facts["coefficients_n_and_variance"], dtype=np.float64)
+        sigmas = [np.array(facts[key], dtype=np.float64) for key in ("sigma_n", "sigma_scale5_n")]
+        if rows.shape != (COLUMNS, len(AXES) + 1) or any(one.shape != (len(AXES),) for one in sigmas):
+            raise ValueError(f"coefficients {rows.shape}")
+        if not all(np.isfinite(one).all() for one in (rows, *sigmas)) or (rows[:, -1] <= 0.0).any():
+            raise ValueError("a coefficient that is no number, or a variance that is not above 0")
+        return Kept(Population(rows[:, :-1], rows[:, -1]), sigmas[0], sigmas[1], dict(facts["provenance"]))
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        seen = str(error) or type(error).__name__
+        cure = "expected a " + FORMAT + " as `biotac calibrate population --out` writes it"
+        raise InputError(f"{where}: {seen}: {cure}") from None
+
+
+def load(path: Path | None) -> Kept:
+    """From a file, or the package's own where ``path`` is None. Raises InputError."""
+    if path is None:
+        return loads(resources.files(__package__).joinpath(SHIPPED).read_text(encoding="utf-8"), SHIPPED)
+    try:
+        return loads(path.read_text(encoding="utf-8"), str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read ({error}); check the path") from None
+
+
+def _short(values: Floats) -> list[float]:
+    # what cancels between mirror images is not quite 0, and another computer's is another
+    return [float(f"{value:.{DIGITS}g}") if abs(value) > NOTHING else 0.0 for value in values]
+
+
+def _block_names() -> list[list[str]]:
+    own = features.blocks(with_pdc=False)
+    return [[block.kind.name, block.gate.name] for family in FAMILIES for block in own if block in family.blocks]

@@ -1,0 +1,152 @@
+"""The population map: two families of columns, ridge, drift and mirrored fingers, their mean (field.md 9).
+
+Columns have no offset and are 0 where counts are at their tare, so that rest is 0 N on any finger. A finger's mirror
+image (left and right electrodes exchanged, F_y turned) is another finger that could be, and is trained on as such; for
+F_y only when asked, as fingers of one rig share what is not symmetric. A plate is never quite parallel to the finger:
+what of F_x goes with F_z on the whole is that recording's mounting and habit, and is taken out before training.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core import geometry as surface
+from ...core.geometry import Floats
+from ...core.map_columns import Signals
+from ..wrench import features
+from ..wrench.blocks import Blocks
+from ..wrench.fitted import WrenchMap
+from ..wrench.lag import check, lag_moments
+from ..wrench.moments import DRIFT_NODES, DRIFT_SIGMA_COUNTS
+from ..wrench.run import Run
+
+FAMILIES = (features.GATED, features.CONDUCTANCE_QUADRATIC)
+ALL_COLUMNS = features.width(with_pdc=False)
+INDEX: tuple[npt.NDArray[np.intp], ...] = tuple(family.index(ALL_COLUMNS) for family in FAMILIES)
+COLUMNS = sum(len(index) for index in INDEX)
+_STACKED = np.concatenate(INDEX)
+_PARTS = tuple(np.split(np.arange(COLUMNS), np.cumsum([len(index) for index in INDEX])[:-1]))
+
+RIDGE = 2e-3  # of each column's variance
+VARIANCE_FLOOR = 0.3  # of the median: what hardly moves in training must not decide in use
+ROWS_AT_ONCE = 4096
+AXES = ("Fx", "Fy", "Fz")
+MODEL = "population"
+
+_MM = np.asarray(surface.ELECTRODE_MM)
+#: The electrode that lies where each one's mirror image does.
+MIRROR: npt.NDArray[np.intp] = (
+    ((_MM[:, None] * [1.0, -1.0, 1.0] - _MM[None]) ** 2).sum(axis=2).argmin(axis=1).astype(np.intp)
+)
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Means a row over drift: ``gram`` (323, 323), ``cross`` (323, 3) with force in N, ``mean`` (323,)."""
+
+    gram: Floats
+    cross: Floats
+    mean: Floats
+
+
+@dataclass(frozen=True)
+class FingerSums:
+    """Of one finger, and of its mirror image."""
+
+    own: Sums
+    mirrored: Sums
+
+
+@dataclass(frozen=True)
+class Population:
+    """``coefficients`` (323, 3) of columns(), N; ``variance`` (323,) of the columns in training, floored."""
+
+    coefficients: Floats
+    variance: Floats
+
+    def force(self, counts: Floats, tare: Floats) -> Floats:
+        """Force (n, 3) in N on the finger, of counts (n, 19) with ``tare`` (19,)."""
+        return by_columns(counts, tare, lambda z: z @ self.coefficients)
+
+    def wrench_map(self, tare: Floats) -> WrenchMap:
+        """The same as a calibrated finger's map, for ``tare`` (19,), with an offset of 0."""
+        every = np.zeros((ALL_COLUMNS + 1, len(AXES)))
+        every[_STACKED] = self.coefficients
+        return WrenchMap(MODEL, AXES, np.asarray(tare, dtype=np.float64), 1, 0, every)
+
+
+def columns(e: Floats, tare: Floats) -> Floats:
+    """What the map is linear in (n, 323): e (n, 19) counts above ``tare`` (19,)."""
+    stacked: Floats = features.columns(Signals(e, tare))[:, _STACKED]
+    return stacked
+
+
+def by_columns(counts: Floats, tare: Floats, of: Callable[[Floats], Floats]) -> Floats:
+    """``of`` the columns (n, 323) of counts (n, 19), so many rows at a time that they fit the cache."""
+    rows = range(0, len(counts), ROWS_AT_ONCE)
+    return np.concatenate([of(columns(counts[at : at + ROWS_AT_ONCE] - tare, tare)) for at in rows])
+
+
+def mirrored(run: Run) -> Run:
+    """The finger's mirror image under the mirrored load."""
+    truth = run.truth[:, :3] * [1.0, -1.0, 1.0]
+    return replace(
+        run, counts=run.counts[:, MIRROR], tare=run.tare[MIRROR], drift=run.drift[MIRROR], truth=truth, pdc=None
+    )
+
+
+def sums_of(run: Run) -> FingerSums:
+    """What training needs of a run. Raises RecordingError when force and counts do not follow each other."""
+    blocks = Blocks(run.rest, run.contact)
+    lag, _ = (0, 0.0) if run.by_clocks else check(run, blocks, lag_moments(run, blocks))
+    truth = run.truth[:, :3].copy()
+    truth[:, 0] -= truth[:, 0].sum() / truth[:, 2].sum() * truth[:, 2]
+    rows = np.arange(max(-lag, 0), len(truth) - max(lag, 0))
+    level = replace(run, counts=run.counts[rows + lag], truth=truth[rows], pdc=None)
+    return FingerSums(sums(level), sums(mirrored(level)))
+
+
+def sums(run: Run) -> Sums:
+    """Of counts and force row by row, at the three drifts of moments.py."""
+    gram = np.zeros((COLUMNS, COLUMNS))
+    cross = np.zeros((COLUMNS, len(AXES)))
+    mean = np.zeros(COLUMNS)
+    for at, weight in DRIFT_NODES:
+        drift = at * DRIFT_SIGMA_COUNTS * run.drift
+        for start in range(0, len(run.counts), ROWS_AT_ONCE):
+            rows = slice(start, start + ROWS_AT_ONCE)
+            z = columns(run.counts[rows] - run.tare + drift, run.tare)
+            gram += weight * (z.T @ z)
+            cross += weight * (z.T @ run.truth[rows, :3])
+            mean += weight * z.sum(axis=0)
+    n = len(run.counts)
+    return Sums(gram / n, cross / n, mean / n)
+
+
+def train(fingers: Sequence[FingerSums], *, symmetric: bool = False, mirror: bool = True) -> Population:
+    """The map of several fingers, each weighing alike. ``symmetric``: F_y too is trained on mirror images.
+
+    ``mirror`` False trains on the fingers as they are, which is for judging a map on their mirror images.
+    """
+    own = [finger.own for finger in fingers]
+    every = [*own, *[finger.mirrored for finger in fingers]] if mirror else own
+    even, variance = _solve(every)
+    if not symmetric:
+        even = even.copy()
+        even[:, 1] = _solve(own)[0][:, 1]
+    return Population(even, variance)
+
+
+def _solve(of: Sequence[Sums]) -> tuple[Floats, Floats]:
+    gram, cross, mean = (np.mean([getattr(one, name) for one in of], axis=0) for name in ("gram", "cross", "mean"))
+    found, variance = np.zeros_like(cross), np.zeros(COLUMNS)
+    for part in _PARTS:
+        its = np.diag(gram)[part] - mean[part] ** 2
+        variance[part] = np.maximum(its, VARIANCE_FLOOR * np.median(its))
+        penalty = RIDGE * np.diag(variance[part])
+        found[part] = np.linalg.solve(gram[np.ix_(part, part)] + penalty, cross[part]) / len(_PARTS)
+    return found, variance

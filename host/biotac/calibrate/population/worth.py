@@ -1,0 +1,142 @@
+"""What the population map, and little of a new finger added to it, leave on a finger it has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...core.geometry import Floats
+from ..wrench.run import Run
+from .fewshot import Scale, pulled, scale_of
+from .training import FingerSums, Population, mirrored, sums, train
+
+ROWS_PER_S = 100  # of the recordings that have no time
+PRESSES = 5
+DRAWS = 200
+PRESS_ROWS = 75
+STRAIGHT = 0.08  # of F_z, shear that a hand on a scale does not notice
+FIRM_N = 1.5
+APART_ROWS = 100
+MINUTE_S = 60
+MINUTES = 4  # of the recording, spread over it; each is tried alone
+SIGMAS = (1.0, 2.0)
+
+
+@dataclass(frozen=True)
+class Worth:
+    """RMSE (3,) in N: of the map as it is, after five straight presses, after a minute on a plate; None: not found.
+
+    ``error_n`` (n, 3) is the map's as it is, ``scale5_error_n`` that of the draw in the middle.
+    """
+
+    rmse_n: Floats
+    rmse_scale5_n: Floats | None
+    rmse_60s_n: Floats | None
+    error_n: Floats
+    scale5_error_n: Floats | None
+
+
+def worth(its: Population, run: Run) -> Worth:
+    """Of a map on a run whose finger is new to it."""
+    truth = run.truth[:, :3]
+    said = its.force(run.counts, run.tare)
+    draws = _scaled(said, truth)
+    error = said - truth
+    middle = None
+    scale5 = None
+    if draws:
+        each = np.array([((scale.applied(said) - truth) ** 2).mean(axis=0) for scale in draws])
+        scale5 = np.sqrt(each.mean(axis=0))
+        middle = draws[int(np.argsort(each.sum(axis=1))[len(each) // 2])].applied(said) - truth
+    return Worth(_rms(error), scale5, _minute(its, run), error, middle)
+
+
+def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: bool = False) -> tuple[Floats, Floats]:
+    """One sigma (3,) in N of a new finger's force, as the map is and after five presses.
+
+    Of several fingers, what the others' map leaves on each; of one, what its map leaves on its mirror image, the one
+    other finger there is.
+    """
+    if len(fingers) == 1:
+        alone = train(fingers, mirror=False)
+        found = [worth_of_force(alone, mirrored(runs[0]))]
+    else:
+        found = []
+        for k, run in enumerate(runs):
+            others = [finger for j, finger in enumerate(fingers) if j != k]
+            found.append(worth_of_force(train(others, symmetric=symmetric), run))
+    raw, scaled = (np.sqrt(np.mean([one[k] ** 2 for one in found], axis=0)) for k in (0, 1))
+    return raw, scaled
+
+
+def worth_of_force(its: Population, run: Run) -> tuple[Floats, Floats]:
+    """RMSE (3,) in N as it is and after five presses; the former again where the run has none."""
+    truth = run.truth[:, :3]
+    said = its.force(run.counts, run.tare)
+    raw = _rms(said - truth)
+    each = [((scale.applied(said) - truth) ** 2).mean(axis=0) for scale in _scaled(said, truth)]
+    return raw, np.sqrt(np.mean(each, axis=0)) if each else raw
+
+
+def coverage(error_n: Floats, sigma_n: Floats) -> list[float]:
+    """Share of errors (n, 3) within one and two sigma (3,), all axes together."""
+    return [float((np.abs(error_n) <= sigmas * sigma_n).mean()) for sigmas in SIGMAS]
+
+
+def facts(its: Worth, sigma: tuple[Floats, Floats]) -> dict[str, Any]:
+    """As JSON types."""
+    result: dict[str, Any] = {
+        "rmse_n": its.rmse_n.tolist(),
+        "rmse_scale5_n": None if its.rmse_scale5_n is None else its.rmse_scale5_n.tolist(),
+        "rmse_60s_n": None if its.rmse_60s_n is None else its.rmse_60s_n.tolist(),
+        "coverage": coverage(its.error_n, sigma[0]),
+    }
+    if its.scale5_error_n is not None:
+        result["coverage_scale5"] = coverage(its.scale5_error_n, sigma[1])
+    return result
+
+
+def _scaled(said: Floats, truth: Floats) -> list[Scale]:
+    """Scales from draws of five presses, each a stretch of the run that is firm and straight."""
+    ends = np.arange(PRESS_ROWS, len(truth) + 1)
+    total = np.concatenate([np.zeros((1, 6)), np.cumsum(np.column_stack([said, truth]), axis=0)])
+    mean = (total[ends] - total[ends - PRESS_ROWS]) / PRESS_ROWS
+    shear = np.hypot(mean[:, 3], mean[:, 4])
+    good = np.flatnonzero((mean[:, 5] > FIRM_N) & (shear < STRAIGHT * mean[:, 5]))
+    rng = np.random.default_rng(0)
+    result = []
+    for _ in range(DRAWS):
+        chosen: list[int] = []
+        for at in rng.permutation(good):
+            if all(abs(int(at) - other) >= APART_ROWS for other in chosen):
+                chosen.append(int(at))
+            if len(chosen) == PRESSES:
+                result.append(scale_of(mean[chosen, :3], mean[chosen, 5]))
+                break
+        else:
+            return []  # no five presses are in it
+    return result
+
+
+def _minute(its: Population, run: Run) -> Floats | None:
+    """After a minute of the run, judged on what is a second and more away from it."""
+    rows, n = MINUTE_S * ROWS_PER_S, len(run.counts)
+    if n < 2 * rows:
+        return None
+    found = []
+    for start in np.linspace(0, n - rows, MINUTES).astype(int):
+        minute = slice(start, start + rows)
+        part = replace(run, counts=run.counts[minute], truth=run.truth[minute, :3], pdc=None)
+        moved = pulled(its, sums(part), MINUTE_S)
+        rest = np.r_[: max(start - ROWS_PER_S, 0), min(start + rows + ROWS_PER_S, n) : n]
+        found.append(((moved.force(run.counts[rest], run.tare) - run.truth[rest, :3]) ** 2).mean(axis=0))
+    result: Floats = np.sqrt(np.mean(found, axis=0))
+    return result
+
+
+def _rms(error: Floats) -> Floats:
+    result: Floats = np.sqrt((error**2).mean(axis=0))
+    return result

@@ -1,0 +1,94 @@
+"""biotac calibrate population REC..."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from ...calibrate.population import keeping, training, worth
+from ...calibrate.wrench.run import Run
+from ...calibrate.wrench.sources import load
+from ...errors import InputError
+from ...partial_file import whole
+
+NAME = "population"
+HELP = "A force map for fingers that nobody has calibrated, learnt from other fingers on a force plate."
+EXAMPLE = "biotac calibrate population F1.npz F2.npz --out population.json"
+# The whole fit is a few products of large matrices; more threads than cores in use wait for each other.
+THREADS = 2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """From which recordings, judged on which, and where it goes."""
+    parser.add_argument("files", metavar="REC", nargs="+", type=Path, help="a finger each, as for calibrate wrench")
+    parser.add_argument("--test", metavar="REC", type=Path, help="a finger that is not trained on, to judge the map by")
+    parser.add_argument(
+        "--symmetric", action="store_true", help="F_y too from mirrored fingers: for use on another rig than theirs"
+    )
+    parser.add_argument("--out", metavar="FILE", type=Path, help="the map goes here (.json)")
+    parser.add_argument(
+        "--source", metavar="TEXT", default="not said", help="where they come from and their licence, for its file"
+    )
+    parser.add_argument("--force", action="store_true", help="overwrite what is there")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Train, judge, write."""
+    if args.test is not None and args.test.resolve() in [path.resolve() for path in args.files]:
+        raise InputError(f"{args.test} is trained on and judged by: expected another finger's; leave it out of one")
+    if args.out is not None and args.out.exists() and not args.force:
+        raise InputError(f"{args.out} exists and would be overwritten; choose another name or say --force")
+    runs = [load(path).run for path in args.files]
+    tested = None if args.test is None else load(args.test).run
+    with threadpool_limits(limits=THREADS, user_api="blas"):
+        facts, kept = _calibrated(args, runs, tested)
+    if args.out is not None:
+        with whole(args.out, overwrite=args.force) as place:
+            place.write_text(keeping.dumps(kept), encoding="utf-8")
+        facts["written"] = str(args.out)
+    print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
+    return 0
+
+
+def _calibrated(args: argparse.Namespace, runs: list[Run], tested: Run | None) -> tuple[dict[str, Any], keeping.Kept]:
+    fingers = [training.sums_of(run) for run in runs]
+    its = training.train(fingers, symmetric=args.symmetric)
+    sigma = worth.sigma_of(fingers, runs, symmetric=args.symmetric)
+    facts: dict[str, Any] = {
+        "files": [path.name for path in args.files],
+        "symmetric": args.symmetric,
+        "columns": training.COLUMNS,
+        "sigma_n": sigma[0].tolist(),
+        "sigma_scale5_n": sigma[1].tolist(),
+    }
+    if tested is not None:
+        facts["test"] = args.test.name
+        facts |= worth.facts(worth.worth(its, tested), sigma)
+    source = keeping.provenance_of(args.files, args.source, symmetric=args.symmetric)
+    return facts, keeping.Kept(its, sigma[0], sigma[1], source)
+
+
+def _lines(facts: dict[str, Any]) -> list[str]:
+    def numbers(values: list[float] | None) -> str:
+        return "    -" if values is None else "  ".join(f"{value:5.3f}" for value in values)
+
+    lines = [
+        f"{', '.join(facts['files'])}: {facts['columns']} columns an axis",
+        f"  a new finger, one sigma, x y z:   {numbers(facts['sigma_n'])} N",
+        f"  after five presses on a scale:    {numbers(facts['sigma_scale5_n'])} N",
+    ]
+    if "test" in facts:
+        within = ", ".join(f"{share:.0%}" for share in facts["coverage"])
+        lines += [
+            f"{facts['test']}, RMSE as it is:          {numbers(facts['rmse_n'])} N",
+            f"  five straight presses on a scale: {numbers(facts['rmse_scale5_n'])} N",
+            f"  a minute on a force plate:        {numbers(facts['rmse_60s_n'])} N",
+            f"  within one and two sigma:         {within}",
+        ]
+    if "written" in facts:
+        lines.append(f"  written: {facts['written']}")
+    return lines

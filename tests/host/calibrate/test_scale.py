@@ -1,0 +1,90 @@
+"""`biotac calibrate scale`: guided on the emulated hand, from its recording, and what presses are worth held out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biotac.calibrate.population import keeping
+from biotac.calibrate.population.presses import Held, found
+from biotac.calibrate.population.training import Population
+from biotac.calibrate.wrench import fitted
+from biotac.cli.main import main
+from biotac.errors import InputError
+
+TARE = np.full(19, 2800.0)
+
+
+def held(its: Population, gain: float, balance: float) -> Held:
+    """Presses on a finger that is softer than the map by ``gain``, its plate tilted by ``balance``."""
+    rng = np.random.default_rng(5)
+    patterns = -np.abs(rng.normal(300.0, 80.0, (6, 19)))
+    said = its.force(TARE + patterns, TARE)
+    # the tilt is in what the map says, so that it is taken out of presses that were straight
+    tilted = Population(its.coefficients.copy(), its.variance)
+    tilted.coefficients[:, 0] = balance * its.coefficients[:, 2]
+    return Held(TARE + patterns, TARE, np.arange(6), gain * said[:, 2]), tilted
+
+
+@pytest.fixture
+def firm() -> Population:
+    """A map that says 10 to 100 N to such patterns, so that a press says more than what is known of fingers."""
+    its = keeping.load(None).its
+    coefficients = np.zeros_like(its.coefficients)
+    coefficients[:38, 2] = -5.0  # compressions and bulges
+    return Population(coefficients, its.variance)
+
+
+def test_presses_are_judged_each_by_the_others(firm: Population) -> None:
+    presses, tilted = held(firm, 1.3, 0.08)
+    its = found(tilted, presses)
+    assert its.scale.gain == pytest.approx(1.3, abs=0.02)
+    assert its.scale.balance == pytest.approx(0.08, abs=0.005)
+    assert (its.held_out_n < 0.1 * its.before_n).all()
+    assert its.worth_it(np.full(3, 100.0))
+    assert not its.worth_it(np.full(3, 1e-3))  # a finger unlike those that the map is of
+
+
+def test_a_reading_that_is_wrong_shows_held_out(firm: Population) -> None:
+    presses, tilted = held(firm, 1.0, 0.0)
+    presses.shown_n[2] *= 5.0
+    assert not found(tilted, presses).worth_it(np.full(3, 100.0))
+
+
+def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "own.wrench.json"
+    words = ["calibrate", "scale", "sim:fingers.toml", "--finger", "thumb", "--presses", "3", "--json"]
+    assert main([*words, "--out", str(out)]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["shown_n"] == [2.0, 3.5, 5.0]
+    assert fitted.load(out).axes == ("Fx", "Fy", "Fz")
+    # the emulated finger is poked by a point and no flat: nothing for a map of flat plates
+    assert not facts["worth_it"] and "board" not in facts
+    assert main([*words, "--force"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["board"]["frames_bit_for_bit"] > 0 and facts["board"]["outside"] == 0
+
+
+def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = tmp_path / "presses.mcap"
+    assert main(["record", "sim:fingers.toml", str(recording)]) == 0
+    capsys.readouterr()
+    # four presses of the first finger are in it: 2, 3.5, 5 and 4 N; in grams
+    grams = ",".join(f"{1000 * force / 9.80665:.2f}" for force in (2.0, 3.5, 5.0, 4.0))
+    words = ["calibrate", "scale", str(recording), "--finger", "0", "--unit", "g", "--json", "--readings", grams]
+    assert main(words) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["shown_n"] == pytest.approx([2.0, 3.5, 5.0, 4.0], abs=1e-4)
+    assert facts["serial"] == "BTSIM00000000001"
+    assert main(words[:-2]) != 0
+    assert "--readings" in capsys.readouterr().err
+
+
+def test_too_few_presses_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["calibrate", "scale", "sim:fingers.toml", "--finger", "0", "--presses", "2"]) != 0
+    assert "expected 3 or more" in capsys.readouterr().err
+    with pytest.raises(InputError):
+        keeping.load(Path("nowhere.json"))
