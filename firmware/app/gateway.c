@@ -16,7 +16,6 @@ _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS
 _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS <= BT_RECORD_MAP
                    && BT_RECORD_MAP + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS,
                "every finger's map must have a record of its own");
-_Static_assert(BT_STORAGE_BYTES + BT_MAPS_BYTES == BT_FLASH_BYTES, "port.h says where they lie");
 
 #define ALL_FINGERS ((1u << BT_MAX_FINGERS) - 1)
 

@@ -3,8 +3,6 @@
 #ifndef BIOTAC_PORT_H
 #define BIOTAC_PORT_H
 
-#include "map/store.h"
-
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -43,8 +41,8 @@ uint8_t port_spi_transfer8(uint8_t mosi);
 // port_spi_slot_end may be called; 0 where the core must do it word by word (spi_word_by_word.h).
 uint32_t port_spi_slot_begin(uint16_t command, uint8_t mask);
 
-// What they said; 0 of those not in mask, and of all when a word was late.
-void port_spi_slot_end(uint16_t word[BT_MAX_FINGERS]);
+// What they said: BT_MAX_FINGERS words, 0 of those not in mask, and of all when a word was late.
+void port_spi_slot_end(uint16_t *word);
 
 // ---- link to the host -----------------------------------------------------------------------
 // Takes all bytes or none; false means no room, or nobody there.
@@ -57,9 +55,9 @@ size_t port_link_read(uint8_t *data, size_t bytes);
 bool port_link_up(void);
 
 // ---- flash for settings and maps ------------------------------------------------------------
-// Two sectors for settings (storage.h), behind them the slots for maps (map_store.h). Interrupts may be held
-// off while erasing and programming, for up to 0.4 s. False when the flash did not do it.
-#define BT_FLASH_BYTES (BT_STORAGE_BYTES + BT_MAPS_BYTES)
+// What the core wants kept, as one run of bytes: settings (keep/storage.h), behind them the slots for maps
+// (map/store.h, which has the sum). Where that lies in which chip is the port's affair. Interrupts may be
+// held off while erasing and programming, for up to 0.4 s. False when the flash did not do it.
 bool port_flash_erase(uint32_t sector_offset);
 bool port_flash_program(uint32_t page_offset, const uint8_t *page);
 void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes);

@@ -11,7 +11,7 @@ uint32_t port_spi_slot_begin(uint16_t command, uint8_t mask)
     return 0;
 }
 
-void port_spi_slot_end(uint16_t word[BT_MAX_FINGERS])
+void port_spi_slot_end(uint16_t *word)
 {
     (void)word;
 }

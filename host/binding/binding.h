@@ -15,6 +15,7 @@
 #include "lin2013.h"
 #include "map/map.h"
 #include "numbering.h"
+#include "rebuild.h"
 #include "record.h"
 #include "replay.h"
 #include "sbc.h"

@@ -5,6 +5,7 @@
 #include "sbc.h"
 
 #include "gateway.h"
+#include "map/store.h"
 #include "port.h"
 #include "spi_word_by_word.h"
 

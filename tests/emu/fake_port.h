@@ -4,6 +4,7 @@
 #define BIOTAC_TEST_FAKE_PORT_H
 
 #include "device.h"
+#include "map/store.h"
 #include "port.h"
 #include "wire/sensor_gen.h"
 
@@ -33,7 +34,7 @@ typedef struct {
 
     bool link_up;
 
-    _Alignas(4) uint8_t flash[BT_FLASH_BYTES];
+    _Alignas(4) uint8_t flash[BT_KEPT_BYTES];
     bool flash_broken; // programs nothing
     long flash_left;   // bytes that are still erased or programmed before power fails; -1: it holds
     bool flash_ragged; // of the byte at which it fails some bits are done

@@ -101,7 +101,7 @@ static bool upload_and_save_with_cut(uint32_t number, int blocks, long cut)
 // Finger 0 has this map and gets the next ones, all of this size; finger 1 keeps its own.
 static void cut_everywhere(int blocks, uint32_t first, uint32_t saves, long at_least)
 {
-    static uint8_t before[BT_FLASH_BYTES];
+    static uint8_t before[BT_KEPT_BYTES];
     long cuts = 0;
     for (uint32_t number = first + 1; number <= first + saves; number++) {
         memcpy(before, fake.flash, sizeof before);
@@ -155,7 +155,7 @@ static void nor_do_half_done_bytes_matter(void **state)
 static void nor_while_the_records_sector_changes(void **state)
 {
     (void)state;
-    static uint8_t before[BT_FLASH_BYTES];
+    static uint8_t before[BT_KEPT_BYTES];
     uint32_t number = 1;
     int erases;
     upload_and_save(0, number, 1);

@@ -1,4 +1,4 @@
-"""rclpy as far as our node uses it, for rclpy is on no package registry; its messages are ROS 2 Humble's definitions.
+"""rclpy as far as our node uses it; test_ros2_real.py has the real one. Its messages are ROS 2 Humble's definitions.
 
 The messages come from rosbags: a field that does not exist raises, and what is published is serialised to CDR
 and back, so a value that ROS would not carry raises too. What the real executor, QoS and discovery do is not here.

@@ -124,7 +124,7 @@ static void all_words(const bt_solve_settings *settings)
 // From the finished round to bytes for the link.
 static void sent(const bt_solve_settings *settings)
 {
-    bt_finger_frame(&press_sent, settings, &message);
+    bt_finger_frame(&press_sent, settings, 0, &message);
     bt_msg_frame_pack(&message, payload);
     sink = (uint32_t)bt_frame_encode(BT_FRAME_ID, payload, sizeof payload, encoded);
 }

@@ -14,6 +14,7 @@
 #define BT_MAP_SLOT_BYTES BT_MAP_MAX_BYTES // a multiple of the sector
 #define BT_MAP_SLOTS      (2 * BT_MAX_FINGERS + 1)
 #define BT_MAPS_BYTES     (BT_MAP_SLOTS * BT_MAP_SLOT_BYTES)
+#define BT_KEPT_BYTES     (BT_STORAGE_BYTES + BT_MAPS_BYTES) // all that a board keeps: settings, then maps
 
 // Offsets count bytes from the first slot. erase and program as in bt_flash; bytes is all slots as memory,
 // which changes with them. ram: room for what each finger has in force, aligned to 4 bytes.

@@ -3,6 +3,8 @@
 
 #include "port.h"
 
+#include "map/store.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
@@ -10,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static _Alignas(4) uint8_t memory[BT_FLASH_BYTES];
+static _Alignas(4) uint8_t memory[BT_KEPT_BYTES];
 static uint8_t *flash = memory;
 
 const char *flash_open(const char *path)
@@ -25,14 +27,14 @@ const char *flash_open(const char *path)
         return strerror(errno);
     }
     // One of settings alone is of a release that had no maps.
-    if (s.st_size != 0 && s.st_size != BT_STORAGE_BYTES && s.st_size != BT_FLASH_BYTES) {
+    if (s.st_size != 0 && s.st_size != BT_STORAGE_BYTES && s.st_size != BT_KEPT_BYTES) {
         return "is no flash file: its size is not that of the simulated board's flash";
     }
-    size_t missing = BT_FLASH_BYTES - (size_t)s.st_size;
+    size_t missing = BT_KEPT_BYTES - (size_t)s.st_size;
     if (pwrite(fd, memory, missing, s.st_size) != (ssize_t)missing) {
         return "cannot be filled; is the disk full?";
     }
-    void *bytes = mmap(NULL, BT_FLASH_BYTES, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+    void *bytes = mmap(NULL, BT_KEPT_BYTES, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
     (void)close(fd);
     if (bytes == MAP_FAILED) {
         return strerror(errno);

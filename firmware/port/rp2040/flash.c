@@ -3,6 +3,8 @@
 // that interrupts are off all the same keeps a handler that might one day read flash from a fault.
 #include "port.h"
 
+#include "map/store.h"
+
 #include "system.h"
 
 #include "rp2040_regs.h"
@@ -90,7 +92,7 @@ static uint32_t on_chip(uint32_t offset)
 
 bool port_flash_erase(uint32_t sector_offset)
 {
-    if (!usable || sector_offset >= BT_FLASH_BYTES) {
+    if (!usable || sector_offset >= BT_KEPT_BYTES) {
         return false;
     }
     watchdog_feed(); // at the beginning of 0.4 s in which the main loop cannot
@@ -100,7 +102,7 @@ bool port_flash_erase(uint32_t sector_offset)
 
 bool port_flash_program(uint32_t page_offset, const uint8_t *page)
 {
-    if (!usable || page_offset >= BT_FLASH_BYTES) {
+    if (!usable || page_offset >= BT_KEPT_BYTES) {
         return false;
     }
     program_page(on_chip(page_offset), page);

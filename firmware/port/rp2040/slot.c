@@ -107,7 +107,7 @@ uint32_t port_spi_slot_begin(uint16_t mosi, uint8_t mask)
     return SLOT_US;
 }
 
-void port_spi_slot_end(uint16_t word[BT_MAX_FINGERS])
+void port_spi_slot_end(uint16_t *word)
 {
     bool in_time = !(DMA_CTRL_TRIG(DEALER) & DMA_BUSY) && !(SPI0_SSPSR & (SSPSR_RNE | SSPSR_BSY));
     if (!in_time) {

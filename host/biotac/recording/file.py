@@ -1,7 +1,8 @@
 """The MCAP file below every recording, live, recomputed or imported.
 
-A second is two chunks: the wire first, which nothing else can replace, then what is for plotting. Each
-chunk is closed and handed to the operating system at once.
+A second is a chunk a finger, one with what else came and in which order, which nothing else can replace, and one for
+plotting. Each chunk is closed and handed to the operating system at once. A second that cannot be taken apart so that
+it could be put together again to the byte (it holds damaged messages, or another version's) is kept as it came.
 """
 
 from __future__ import annotations
@@ -13,7 +14,10 @@ from typing import BinaryIO
 from mcap.writer import CompressionType, IndexType, Writer
 
 from ..version import __version__
+from ..wire.batches import StreamDecoder
 from . import layout
+from .block import schema as schema_of_parts
+from .block import take_apart
 from .plots import Plots
 
 # Chunks are closed by flush() alone; the library would do it by size.
@@ -38,29 +42,60 @@ class RecordingFile:
             self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD, index_types=IndexType.ALL
         )
         self._writer.start(profile="", library=f"biotac-gateway {__version__}")
+        self._last = (0, 0)
+        self._tail = b""  # of a message whose end has not come
+        self._decoder = StreamDecoder()
+        self._decoder.accept_newer_minor()
         schema = resources.files("biotac").joinpath("schema.json").read_bytes()
-        schema_id = self._writer.register_schema(layout.SCHEMA_NAME, layout.SCHEMA_ENCODING, schema)
-        self._channel = self._writer.register_channel(layout.TOPIC, layout.MESSAGE_ENCODING, schema_id)
+        self._wire_schema = self._writer.register_schema(layout.SCHEMA_NAME, layout.SCHEMA_ENCODING, schema)
+        self._parts_schema = self._writer.register_schema(layout.PARTS_SCHEMA, layout.PARTS_ENCODING, schema_of_parts())
+        self._channels: dict[str, int] = {}
         self._plots = Plots(self._writer)
-        self._writer.add_metadata(layout.METADATA_NAME, metadata)
+        self._metadata = layout.signed(metadata)
+        self._writer.add_metadata(layout.METADATA_NAME, self._metadata)
         self._writer.flush()  # type: ignore[no-untyped-call]
 
     def add(self, block: bytes, arrived_ns: int, all_here_ns: int | None = None) -> None:
         """Append wire bytes; ``arrived_ns`` is when their first byte came, by the host's clock (Unix).
 
-        ``all_here_ns`` is when all of them had come; None where nobody knows.
+        ``all_here_ns`` is when all of them had come; None where nobody knows. What follows the last delimiter waits for
+        the next block.
         """
-        if not block:
+        data = self._tail + block
+        end = data.rfind(b"\0") + 1
+        data, self._tail = data[:end], data[end:]
+        if not data:
             return
-        self._writer.add_message(self._channel, all_here_ns or arrived_ns, block, arrived_ns, self._sequence)
+        batch = self._decoder.feed(data)
+        apart = take_apart(data, batch)
+        stamps = all_here_ns or arrived_ns, arrived_ns
+        if apart is None:
+            self._put(layout.TOPIC, data, stamps)
+        else:
+            for finger, part in sorted(apart.parts.items()):
+                self._put(f"{layout.PARTS}{finger}", part, stamps)
+            self._put(layout.REST, apart.rest.pack(), stamps)
         self._sequence += 1
-        self._writer.flush()  # type: ignore[no-untyped-call]
-        if self._plots.add(block, arrived_ns):
+        self._last = stamps
+        if self._plots.add(batch, arrived_ns):
             self._writer.flush()  # type: ignore[no-untyped-call]
+
+    def _put(self, topic: str, data: bytes, stamps: tuple[int, int]) -> None:
+        """A message in a chunk of its own, so that whoever wants no other opens no other."""
+        if topic not in self._channels:
+            encoding, schema = (
+                (layout.MESSAGE_ENCODING, self._wire_schema)
+                if topic == layout.TOPIC
+                else (layout.PARTS_ENCODING, self._parts_schema)
+            )
+            self._channels[topic] = self._writer.register_channel(topic, encoding, schema)
+        all_here_ns, arrived_ns = stamps
+        self._writer.add_message(self._channels[topic], all_here_ns, data, arrived_ns, self._sequence)
+        self._writer.flush()  # type: ignore[no-untyped-call]
 
     def mark(self, what: str, facts: dict[str, str]) -> None:
         """Append a metadata record ``biotac.WHAT``."""
-        self._writer.add_metadata(f"{layout.METADATA_NAME}.{what}", facts)
+        self._writer.add_metadata(f"{layout.METADATA_NAME}.{what}", layout.signed(facts))
         self._writer.flush()  # type: ignore[no-untyped-call]
 
     @property
@@ -77,6 +112,9 @@ class RecordingFile:
         if self._stream.closed:
             return
         try:
+            if self._tail:
+                self._put(layout.TOPIC, self._tail, self._last)
+            self._writer.add_metadata(layout.METADATA_NAME, self._metadata)  # once more, for whom the first is damaged
             self._writer.finish()  # type: ignore[no-untyped-call]
         finally:
             self._stream.close()  # also on a full disk, or the interpreter would try once more at its end

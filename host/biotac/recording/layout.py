@@ -4,11 +4,21 @@ from __future__ import annotations
 
 import base64
 import json
+import zlib
 from collections.abc import Mapping
 
 # Additions that an older reader may ignore (topics, metadata keys) do not change it.
-FORMAT_VERSION = "1"
+FORMAT_VERSION = "2"
+KNOWN_VERSIONS = ("1", "2")
+# 1: blocks of the wire. 2: blocks taken apart (block.py), a message a finger and one for the rest, which comes last and
+# has the same sequence number; those that cannot be are as in 1.
 TOPIC = "/biotac/wire"
+PARTS = "/biotac/parts/finger"
+REST = "/biotac/parts/rest"
+PARTS_ENCODING = "biotac-parts"
+PARTS_SCHEMA = "biotac.Parts"
+NAMES = "names"  # metadata key: JSON, fingers by name
+CHECKSUM = "crc32"  # metadata key: of all others
 MESSAGE_ENCODING = "biotac-wire"
 SCHEMA_NAME = "biotac.link"
 SCHEMA_ENCODING = "biotac-schema"
@@ -29,3 +39,32 @@ def maps_text(maps: Mapping[int, bytes]) -> str:
 def maps_of(text: str) -> dict[int, bytes]:
     """Inverse of maps_text; ValueError for what is none."""
     return {int(finger): base64.b64decode(its, validate=True) for finger, its in json.loads(text).items()}
+
+
+def names_of(metadata: Mapping[str, str]) -> dict[str, int]:
+    """Fingers by name; TypeError or ValueError for other than that."""
+    return {str(name): int(finger) for name, finger in json.loads(metadata.get(NAMES, "{}")).items()}
+
+
+def finger_of(finger: int | str, names: Mapping[str, int]) -> int:
+    """KeyError for a name that was not recorded."""
+    if isinstance(finger, str) and finger not in names:
+        raise KeyError(f"no finger {finger!r}: expected one of {', '.join(names) or 'the numbers 0 to 4'}")
+    return names[finger] if isinstance(finger, str) else int(finger)
+
+
+def signed(facts: Mapping[str, str]) -> dict[str, str]:
+    """Metadata with its checksum."""
+    return {**facts, CHECKSUM: _checksum(facts)}
+
+
+def unsigned(facts: Mapping[str, str]) -> dict[str, str]:
+    """Inverse of ``signed``; ValueError when the checksum is wrong. Format 1 had none, and is taken as it is."""
+    rest = {key: value for key, value in facts.items() if key != CHECKSUM}
+    if facts.get(CHECKSUM, _checksum(rest)) != _checksum(rest):
+        raise ValueError("wrong checksum")
+    return rest
+
+
+def _checksum(facts: Mapping[str, str]) -> str:
+    return f"{zlib.crc32(json.dumps(facts, sort_keys=True).encode()):08x}"

@@ -15,7 +15,7 @@ import numpy as np
 from mcap.writer import Writer
 
 from ..wire import messages_gen as wire
-from ..wire.batches import StreamDecoder
+from ..wire.batches import Batch
 from ..wire.frames import StructArray
 from . import layout
 
@@ -98,16 +98,13 @@ class Plots:
 
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
-        self._decoder = StreamDecoder()
-        self._decoder.accept_newer_minor()
         self._anchor: _Anchor | None = None
         self._channels: dict[tuple[str, int], int] = {}
         self._schemas: dict[str, int] = {}
         self._due_us: dict[tuple[str, int], int] = {}
 
-    def add(self, block: bytes, arrived_ns: int) -> bool:
-        """Write what the next wire bytes are good for; true if that was anything."""
-        batch = self._decoder.feed(block)
+    def add(self, batch: Batch, arrived_ns: int) -> bool:
+        """Write what the next rows are good for; true if that was anything."""
         begin_us = batch.first_t_us()
         if self._anchor is None and begin_us is not None:
             self._anchor = _Anchor(begin_us, arrived_ns)

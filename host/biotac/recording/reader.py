@@ -4,27 +4,30 @@ from __future__ import annotations
 
 import json
 import os
-import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.exceptions import InvalidMagic, McapError
-from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
-from mcap.stream_reader import StreamReader, breakup_chunk
+from numpy.typing import NDArray
 
 from ..clock import LAST_SAMPLE_US, DeviceClock
 from ..errors import InputError, RecordingError
-from ..hand.gap import GAP, Gap
+from ..hand.gap import Gap
 from ..keep.calibration_file import from_dict
 from ..keep.map_blob import as_blob
 from ..keep.values import own_settings
 from ..wire import messages_gen as wire
-from ..wire.batches import StreamDecoder, join
+from ..wire.batches import Batch, StreamDecoder, join
 from ..wire.frames import StructArray
 from ..wire.identity import NO_IMAGE
 from . import layout
+from .block import FRAME, IDLE, PAC, as_sent
+from .blocks import Blocks, is_lossless
+from .layout import finger_of
+from .tabular import to_pandas, to_xarray
 
 
 class Recording:
@@ -32,7 +35,8 @@ class Recording:
 
     ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``idle`` (IDLE_DTYPE)
     heartbeats, ``wire`` the FRAME messages as sent, ``messages`` the rest (tare changes, status). ``settings`` are the
-    board's, ``calibrations`` and ``maps`` (bytes, as the board holds them) those in force, by finger, when it began.
+    board's, ``calibrations`` and ``maps`` (bytes, as the board holds them) those in force, by finger, when it began,
+    ``names`` what fingers were called: ``recording["index"]`` is that finger's frames.
     ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its
     index; ``damaged_chunks``: seconds that were left out; ``gaps``: times in which the board was away. ``blocks`` are
     the wire's bytes as they came, about one a second, and ``arrived_ns`` when each began, by the host's clock (Unix).
@@ -41,50 +45,98 @@ class Recording:
 
     def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] = lambda share: None) -> None:
         self.path = Path(path)
-        self.problems: list[str] = []
-        self.cut_off = False
-        self.damaged_chunks = 0
         self.gaps: list[Gap] = []
-        metadata: dict[str, str] | None = None
-        self.blocks: list[bytes] = []
-        self.arrived_ns: list[int] = []
-        all_here_s: list[float] = []
-        for record in self._records():
-            if isinstance(record, Metadata) and record.name == layout.METADATA_NAME:
-                metadata = record.metadata
-            elif isinstance(record, Metadata) and record.name == f"{layout.METADATA_NAME}.{GAP}":
-                self._take_gap(record.metadata)
-            elif isinstance(record, Message):
-                self.blocks.append(record.data)
-                self.arrived_ns.append(record.publish_time)
-                all_here_s.append(record.log_time / 1e9)
-        if metadata is None:
-            raise RecordingError(self._without_metadata())
-        try:
-            self._take_metadata(metadata)
-        except (KeyError, TypeError, ValueError) as error:
-            raise RecordingError(f"{self.path} has damaged metadata ({error}); its frames cannot be judged") from error
+        blocks = Blocks(self.path)
+        self._pieces = list(blocks)
+        self._take_facts(blocks)
+        self.arrived_ns: list[int] = [piece.arrived_ns for piece in self._pieces]
         decoder = StreamDecoder()
         decoder.accept_newer_minor()
-        parts = []
-        for k, block in enumerate(self.blocks):
-            parts.append(decoder.feed(block))
-            show((k + 1) / len(self.blocks))
-        batch = join(parts)
-        ends_us = [part.last_t_us() for part in parts]
-        self._arrivals = [(t_us, at_s) for t_us, at_s in zip(ends_us, all_here_s, strict=True) if t_us is not None]
-        self.frames: StructArray = batch.frames
+        batch = self._rows(decoder) or self._decoded(decoder, show)
+        show(1.0)
+        self._batch = batch
         self.wire: StructArray = batch.wire
         self.pac: StructArray = batch.pac
         self.idle: StructArray = batch.idle
         self.messages: list[Any] = batch.messages
-        self.counts = decoder.counts
         self.frames_lost = decoder.lost
         self.pac_lost = decoder.lost_pac
         self.disordered = decoder.disordered
-        if self.cut_off and not len(self.frames):
+        if self.cut_off and not len(self.wire):
             raise RecordingError(f"{self.path} was cut off before its first second was whole; record it again")
         self._describe_losses(decoder)
+
+    def _take_facts(self, blocks: Blocks) -> None:
+        self.problems: list[str] = blocks.scan.problems
+        self.cut_off = blocks.scan.cut_off
+        self.damaged_chunks = blocks.scan.damaged_chunks
+        for facts in blocks.gaps:
+            self._take_gap(facts)
+        if blocks.metadata is None:
+            raise RecordingError(self._without_metadata(blocks.damaged_metadata > 0))
+        try:
+            self._take_metadata(blocks.metadata)
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
+            raise RecordingError(f"{self.path} has damaged metadata ({error}); its frames cannot be judged") from error
+        numbers = {piece.number for piece in self._pieces}
+        missing = max(numbers, default=-1) + 1 - len(numbers) - self.damaged_chunks
+        if self.metadata["format"] != "1" and missing > 0:
+            self.problems.append(
+                f"{missing} second(s) of {self.path.name} are missing: it is damaged beyond recognition"
+            )
+
+    def _rows(self, decoder: StreamDecoder) -> Batch | None:
+        """What the pieces hold as rows; None when a decoder has to say what is missing."""
+        pieces = self._pieces
+        if not pieces or any(piece.rest is None or not piece.whole for piece in pieces):
+            return None
+        sent, pac, idle = (np.concatenate([piece.rows[kind] for piece in pieces]) for kind in (FRAME, PAC, IDLE))
+        if not is_lossless(sent, pac, idle):
+            return None
+        others = decoder.feed(b"".join(piece.rest.raw for piece in pieces if piece.rest))
+        if len(others.wire) or len(others.pac) or len(others.idle):
+            return None
+        self._arrivals = [(p.rest.last_us, p.all_here_ns / 1e9) for p in pieces if p.rest and p.rest.last_us]
+        self.counts = replace(decoder.counts, good=decoder.counts.good + len(sent) + len(pac) + len(idle))
+        rows = Batch(as_sent(sent, FRAME), sent["seq"].astype(np.int64), sent["t_us"], pac, idle, others.messages)
+        return rows
+
+    def _decoded(self, decoder: StreamDecoder, show: Callable[[float], None]) -> Batch:
+        parts = []
+        for k, piece in enumerate(self._pieces):
+            parts.append(decoder.feed(piece.bytes()))
+            show((k + 1) / len(self._pieces))
+        ends = [(part.last_t_us(), piece.all_here_ns / 1e9) for part, piece in zip(parts, self._pieces, strict=True)]
+        self._arrivals = [(t_us, at_s) for t_us, at_s in ends if t_us is not None]
+        self.counts = decoder.counts
+        return join(parts)
+
+    @property
+    def frames(self) -> StructArray:
+        """The FRAMEs in user units, FRAME_DTYPE (n,), in the order of arrival."""
+        return self._batch.frames
+
+    @cached_property
+    def blocks(self) -> list[bytes]:
+        """The wire's bytes as they came, about a second each."""
+        return [piece.bytes() for piece in self._pieces]
+
+    def to_pandas(self) -> Any:
+        """The frames as a pandas DataFrame (tabular.py), in the order of arrival. Needs the extra ``pandas``."""
+        return to_pandas(self.frames, self._stamp_ns())
+
+    def to_xarray(self) -> Any:
+        """The frames as an xarray Dataset (tabular.py). Needs the extra ``pandas``."""
+        return to_xarray(self.frames, self._stamp_ns())
+
+    def _stamp_ns(self) -> NDArray[np.int64]:
+        stamps: NDArray[np.int64] = self.begin_ns + (self.frames["t_us"] - self.begin_us) * 1000
+        return stamps
+
+    def __getitem__(self, finger: int | str) -> StructArray:
+        """The frames of one finger, by its number or its name when it was recorded. KeyError for none."""
+        rows: StructArray = self.frames[self.frames["finger"] == finger_of(finger, self.names)]
+        return rows
 
     def clock(self, promised_delay_s: float = 0.01) -> DeviceClock:
         """The board's clock against the recording computer's; its host_time_s is in seconds since 1970.
@@ -107,16 +159,18 @@ class Recording:
         self.gaps.append(gap)
         self.problems.append(gap.words())
 
-    def _without_metadata(self) -> str:
+    def _without_metadata(self, damaged: bool) -> str:
+        if damaged:
+            return f"{self.path} has damaged metadata (wrong checksum); its frames cannot be judged"
         if self.problems:
             return f"{self.path} was cut off before its first record; nothing can be read: record it again"
         return f"{self.path} is an MCAP file, but no biotac recording; expected one that `biotac record` wrote"
 
     def _take_metadata(self, metadata: dict[str, str]) -> None:
-        if metadata.get("format") != layout.FORMAT_VERSION:
+        if metadata.get("format") not in layout.KNOWN_VERSIONS:
             raise RecordingError(
                 f"{self.path} has recording format {metadata.get('format')}, this version reads "
-                f"{layout.FORMAT_VERSION}; install a newer biotac-gateway"
+                f"{' and '.join(layout.KNOWN_VERSIONS)}; install a newer biotac-gateway"
             )
         major = metadata["wire"].partition(".")[0]
         if int(major) != wire.WIRE_MAJOR:
@@ -133,58 +187,13 @@ class Recording:
         # A setting or a calibration that this recording's firmware did not have yet: the default, and none.
         self.calibrations = {int(finger): from_dict(its) for finger, its in own.items()}
         self.maps = _maps(metadata.get("maps", "{}"))
+        self.names = layout.names_of(metadata)
         self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting}
 
     @property
     def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
         """All settings that a finger's results come from, for the fingers that had a calibration in force."""
         return own_settings(self.settings, self.calibrations)
-
-    def _records(self) -> Iterator[McapRecord]:
-        try:
-            size = self.path.stat().st_size
-            stream = self.path.open("rb")
-        except OSError as error:
-            raise RecordingError(f"{self.path} cannot be read ({error.strerror}); check the path") from error
-        with stream:
-            topics: dict[int, str] = {}
-            whole = False
-            begun = False
-            good_until = 0
-            try:
-                for record in StreamReader(stream, emit_chunks=True).records:
-                    begun = True
-                    inner = self._open_chunk(record) if isinstance(record, Chunk) else [record]
-                    for item in inner:
-                        if isinstance(item, Channel):
-                            topics[item.id] = item.topic
-                        if not isinstance(item, Message) or topics.get(item.channel_id) == layout.TOPIC:
-                            yield item
-                    good_until = stream.tell()
-                whole = True
-            except (McapError, struct.error, ValueError, EOFError, MemoryError, OverflowError) as error:
-                # Cut off in the middle of a record, and what came before it is good; unless it
-                # never was such a file.
-                if isinstance(error, InvalidMagic) and not begun:
-                    raise RecordingError(
-                        f"{self.path} is no MCAP file ({size} bytes, wrong first bytes); expected a file that "
-                        "`biotac record` wrote"
-                    ) from error
-            if not whole:
-                self.cut_off = True
-                unread = size - good_until
-                self.problems.append(
-                    f"{self.path.name} ends without its index, as after a kill or a full disk: its last {unread} bytes "
-                    "are missing or unreadable, what came before them is read"
-                )
-
-    def _open_chunk(self, chunk: Chunk) -> list[McapRecord]:
-        try:
-            return list(breakup_chunk(chunk, validate_crc=True))
-        except Exception as error:  # mcap, zstandard and struct each raise their own kinds
-            self.damaged_chunks += 1
-            self.problems.append(f"one second of {self.path.name} is damaged and left out ({error})")
-            return []
 
     @property
     def fingers(self) -> list[int]:
@@ -231,12 +240,3 @@ def _maps(text: str) -> dict[int, bytes]:
 def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
     """A message's fields as JSON had them."""
     return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}
-
-
-def load(path: str | os.PathLike[str]) -> StructArray:
-    """Return a recording's frames as one FRAME_DTYPE array (n,), in order of arrival.
-
-    Raises RecordingError when the file is no recording. A recording that was cut off gives what is
-    whole; use Recording to learn what is missing.
-    """
-    return Recording(path).frames

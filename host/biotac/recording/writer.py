@@ -24,6 +24,7 @@ FLUSH_S = 0.9
 # Of a full stream. A simulated board may live faster than the host's clock: then it is bytes that close a block.
 FINGER_BYTES_PER_S = 100 * sum(DTYPES[m].itemsize + OVERHEAD_BYTES for m in (wire.Frame.ID, wire.Pac.ID))
 NO_MAPS: Mapping[int, bytes] = {}
+NO_NAMES: Mapping[str, int] = {}
 
 
 class Recorder:
@@ -44,6 +45,7 @@ class Recorder:
         port: str,
         *,
         maps: Mapping[int, bytes] = NO_MAPS,
+        names: Mapping[str, int] = NO_NAMES,
         overwrite: bool = False,
         mid_stream: bool = False,
         clock_s: Callable[[], float] = time.monotonic,
@@ -60,7 +62,8 @@ class Recorder:
         self._arrived_ns = 0
         self._block_bytes = int(FLUSH_S * FINGER_BYTES_PER_S * max(1, hello.fingers_present.bit_count()))
         self._skip_to_delimiter = mid_stream
-        metadata = describe(hello, settings, calibrations, sensors, port, maps)
+        self._names = names
+        metadata = describe(hello, settings, calibrations, sensors, port, maps, names)
         self._file = RecordingFile(create(path, overwrite=overwrite), metadata)
 
     def go_on(
@@ -78,7 +81,7 @@ class Recorder:
         self.close()
         first = self.paths[0]
         path = first.with_name(f"{first.stem}.{len(self.paths) + 1}{first.suffix}")
-        metadata = describe(hello, settings, calibrations, sensors, self._port, maps)
+        metadata = describe(hello, settings, calibrations, sensors, self._port, maps, self._names)
         metadata[layout.CONTINUES] = self.path.name
         self._file = RecordingFile(create(path, overwrite=self._overwrite), metadata)
         self._skip_to_delimiter = False
@@ -162,6 +165,7 @@ def describe(
     sensors: list[wire.SensorInfo],
     port: str,
     maps: Mapping[int, bytes] = NO_MAPS,
+    names: Mapping[str, int] = NO_NAMES,
 ) -> dict[str, str]:
     """The metadata record: everything needed to read and judge the wire later."""
     return {
@@ -174,5 +178,6 @@ def describe(
         "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
         "calibrations": json.dumps({finger: to_dict(its) for finger, its in calibrations.items()}),
         "maps": layout.maps_text(maps),
+        layout.NAMES: json.dumps(dict(names)),
         "sensors": json.dumps([dataclasses.asdict(s) for s in sensors]),
     }

@@ -418,7 +418,7 @@ def test_torsion_goes_wherever_results_go(tmp_path: Path) -> None:
     assert mapped.sum() > 100 and len(np.unique(sent[mapped])) > 10
     np.testing.assert_array_equal(sent != wire.INVALID_I32, mapped)
     np.testing.assert_array_equal(recording.frames["torsion_nmm"], np.where(mapped, sent / 1e3, np.nan))
-    np.testing.assert_array_equal(tables(recording)[0].arrays["torsion_nm"], np.where(mapped, sent / 1e6, np.nan))
+    np.testing.assert_array_equal(tables(recording)[0].arrays["torsion_nmm"], np.where(mapped, sent / 1e3, np.nan))
     bodies = 0
     with path.open("rb") as stream:
         for _, _, message in make_reader(stream).iter_messages(["/biotac/finger0/results"]):

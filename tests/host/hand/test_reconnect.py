@@ -10,6 +10,7 @@ import pytest
 from live_board import Clock, Firmware, frame, point
 
 import biotac
+import biotac.recording.writer
 from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
 from biotac.wire import messages_gen as wire
@@ -134,6 +135,7 @@ def test_a_silent_board_that_answers_again_streams_again(world) -> None:
     hand.run(queue=True)
     send(there, frame(5))
     until(hand, lambda: hand[0].t_us == 50_000)
+    hand.ping()  # all that it was asked is answered: no late answer breaks the silence
     world.clock.now_s += hand._streams._silence_s() + 0.5
     there.firmware.wait_for(wire.Start, 2)
     send(there, frame(300))

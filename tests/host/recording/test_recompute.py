@@ -184,7 +184,7 @@ def test_out_may_be_an_export(folder, recorded) -> None:
     with np.load(out) as arrays:
         about = json.loads(str(arrays["columns"]))
         assert json.loads(about["metadata"]["settings"])["poc_weights"] == 0
-        assert len(arrays["finger1/frames/poc_m"]) == len(recorded.frames) // 2
+        assert len(arrays["finger1/frames/poc_mm"]) == len(recorded.frames) // 2
 
 
 def test_a_finger_says_the_tare_message_that_a_board_sends(recorded) -> None:

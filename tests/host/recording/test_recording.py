@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from deframer import Deframer
-from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
-from mcap.writer import CompressionType, Writer
+from mcap.writer import Writer
 
 import biotac
-from biotac.recording import layout
+from biotac.recording.file import RecordingFile
 from biotac.wire import messages_gen as wire
 from biotac.wire.dtypes_gen import DTYPES
 from biotac.wire.framing import encode
@@ -35,19 +34,12 @@ def recorded(tmp_path_factory) -> tuple[Path, np.ndarray, np.ndarray]:
 
 
 def rewrite(path: Path, target: Path, change: Callable[[bytes], bytes]) -> None:
-    """Copy a recording through the mcap library, wire bytes going through ``change``."""
-    with path.open("rb") as stream, target.open("wb") as out:
-        reader = make_reader(stream)
-        writer = Writer(out, chunk_size=1, compression=CompressionType.ZSTD)
-        writer.start()
-        for schema, channel, message in reader.iter_messages():
-            schema_id = writer.register_schema(schema.name, schema.encoding, schema.data)
-            channel_id = writer.register_channel(channel.topic, channel.message_encoding, schema_id)
-            data = change(message.data) if channel.topic == layout.TOPIC else message.data
-            writer.add_message(channel_id, message.log_time, data, message.publish_time)
-        for metadata in reader.iter_metadata():
-            writer.add_metadata(metadata.name, metadata.metadata)
-        writer.finish()
+    """Copy a recording, its blocks of the wire going through ``change``."""
+    whole = biotac.Recording(path)
+    file = RecordingFile(target.open("wb"), whole.metadata)
+    for block, arrived_ns in zip(whole.blocks, whole.arrived_ns, strict=True):
+        file.add(change(block), arrived_ns)
+    file.close()
 
 
 def alter(seq: int, finger: int, edit: Callable[[np.ndarray], None]) -> Callable[[bytes], bytes]:
@@ -97,9 +89,7 @@ def frames_equal(a: np.ndarray, b: np.ndarray) -> bool:
 
 def test_load_has_the_documented_fields(recorded) -> None:
     frames = biotac.load(recorded[0])
-    names = "finger seq t_us counts pdc tac tdc poc_mm force_n torque_nmm poc_sigma_mm force_sigma_n"
-    names += " pdc_filtered pressure_force_n torsion_nmm flags"
-    assert list(frames.dtype.names) == names.split()
+    assert frames.dtype == biotac.FRAME_DTYPE
     assert frames["counts"].shape == (800, 19)
     assert frames["poc_mm"].shape == frames["force_n"].shape == frames["torque_nmm"].shape == (800, 3)
 
@@ -149,12 +139,21 @@ def test_a_flag_that_contradicts_its_poc_fails(recorded, tmp_path) -> None:
 
 
 def test_damaged_metadata_is_a_recording_error(recorded, tmp_path) -> None:
+    """Or none, as it stands in the file twice; a flipped bit never passes for another setting."""
+    good = biotac.Recording(recorded[0])
     whole = recorded[0].read_bytes()
-    at = whole.index(b'"nonce"')
     damaged = tmp_path / "meta.mcap"
-    for k, byte in ((at, b"{"), (at + 1, b"N"), (whole.index(b"format") + 10, b"9")):
-        damaged.write_bytes(whole[:k] + byte + whole[k + 1 :])
-        with pytest.raises(biotac.RecordingError):
+    for words, change in (
+        (b'"nonce"', b'"nOnce"'),
+        (b'"force_gain_z_nn": ', b'"force_gain_z_nn":-'),
+        (b"format", b"forma9"),
+    ):
+        damaged.write_bytes(whole.replace(words, change, 1))
+        recording = biotac.Recording(damaged)
+        assert (recording.info, recording.settings) == (good.info, good.settings)
+        assert recording.problems == ["'biotac' of meta.mcap is damaged and left out"]
+        damaged.write_bytes(whole.replace(words, change))
+        with pytest.raises(biotac.RecordingError, match="damaged metadata"):
             biotac.Recording(damaged)
 
 

@@ -37,7 +37,7 @@ def messages(path: Path) -> tuple[dict[str, list[tuple[int, dict[str, Any]]]], d
     schemas: dict[str, dict[str, Any]] = {}
     with path.open("rb") as stream:
         for schema, channel, message in make_reader(stream, validate_crcs=True).iter_messages():
-            if channel.topic == "/biotac/wire":
+            if channel.topic.startswith(("/biotac/wire", "/biotac/parts/")):
                 continue
             assert schema is not None and (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
             schemas[channel.topic] = json.loads(schema.data)

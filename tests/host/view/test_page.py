@@ -192,11 +192,13 @@ def test_every_flag_is_told_in_the_contracts_words(make_player, view_of, open_pa
     player.script.put(touch)
     page = open_page(view_of(lambda: player))
     page.wait_for_selector("#flags [data-flag=FAULT]")
-    shown = dict(page.eval_on_selector_all("#flags li", "all => all.map(e => [e.dataset.flag, e.textContent])"))
+    shown = dict(
+        page.eval_on_selector_all("#flags li, #notices li", "all => all.map(e => [e.dataset.flag, e.textContent])")
+    )
     wanted = {k: k.replace("_", " ") + flag["doc"] for k, flag in FLAGS.items() if k != "doc"}
     assert shown == wanted
     assert page.get_attribute("#flags [data-flag=FAULT]", "data-kind") == "warn"
-    assert page.get_attribute("#flags [data-flag=CONTACT]", "data-kind") == "calm"
+    assert page.get_attribute("#notices [data-flag=CONTACT]", "data-kind") == "calm"
 
 
 def test_health_of_the_link(make_player, view_of, open_page, touch) -> None:
@@ -400,3 +402,42 @@ def test_the_fingertip_is_drawn_in_the_scales_colours(make_player, view_of, open
         colour = page.evaluate(style, name).strip()
         # beside the electrode's number, inside its disc
         assert page.evaluate(pixel, [across, along + 0.6]) == [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
+
+
+def test_five_fingers_and_the_link_are_seen_at_once_on_a_small_screen(view, open_page) -> None:
+    page = open_page(view("sim:drift.toml?fingers=5"))
+    page.set_viewport_size({"width": 1280, "height": 800})
+    until(page, FIVE)
+    for place in (".finger[data-finger='0']", ".finger[data-finger='4']", "[data-key=framesPerS]", "#health", "#link"):
+        box = page.locator(place).bounding_box()
+        assert box["y"] >= 0 and box["y"] + box["height"] <= 800, place
+        assert box["x"] >= 0 and box["x"] + box["width"] <= 1280, place
+
+
+@pytest.mark.parametrize(("contact", "heavy"), [(biotac.FrameFlags.CONTACT, "600"), (biotac.FrameFlags(0), "400")])
+def test_without_contact_numbers_are_dim_and_notices_are_apart(
+    make_player, view_of, open_page, touch, contact: biotac.FrameFlags, heavy: str
+) -> None:
+    player = make_player()
+    touch = replace(touch, wire=touch.wire.copy())
+    flags = biotac.FrameFlags
+    touch.wire["flags"] = int(contact | flags.MX_DERIVED | flags.FX_WEAK | flags.FAULT)
+    player.script.put(touch)
+    page = open_page(view_of(lambda: player))
+    page.wait_for_selector("#flags [data-flag=FAULT]")
+    until(page, f"() => getComputedStyle(document.querySelector('[data-key=forceN]')).fontWeight === '{heavy}'")
+    named = "place => [...document.querySelectorAll(`${place} li`)].map(e => e.dataset.flag).sort().join()"
+    assert page.evaluate(named, "#flags") == "FAULT"
+    assert page.evaluate(named, "#notices").replace("CONTACT,", "") == "FX_WEAK,MX_DERIVED"
+
+
+def test_nothing_moves_when_a_command_is_refused(make_player, view_of, open_page, touch) -> None:
+    player = make_player()
+    player.refusal = biotac.CommandRefusedError("finger 0: " + "the signals move too much to tare, and more words " * 4)
+    player.script.put(touch)
+    page = open_page(view_of(lambda: player), expect="409")
+    page.wait_for_selector(".finger")
+    before = page.locator("main").bounding_box()
+    page.click("#tare")
+    until(page, "() => told.dataset.kind === 'bad'")
+    assert page.locator("main").bounding_box() == before

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import biotac
 
 from .. import values
 from ..progress import Progress
+from .table import LiveTable, is_possible
 
 EXAMPLE = "biotac record /dev/ttyACM0 grasp.mcap --seconds 30"
 
@@ -26,22 +28,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record until the time is over, the source ends or Ctrl-C; what came until then is kept."""
-    progress = Progress()
+    progress = Progress(enabled=not is_possible())
     first_us: int | None = None
     last_us = 0
     with biotac.open(args.port) as hand:
-        hand.record(args.out, overwrite=args.force)
-        try:
+        recorder = hand.record(args.out, overwrite=args.force)
+        table = None
+        with ExitStack() as shown, suppress(KeyboardInterrupt):  # the usual way to stop a recording
+            if not args.json and is_possible():
+                table = shown.enter_context(LiveTable(hand, f"{hand.port} to {args.out}"))
             for batch in hand.batches():
                 if not len(batch.frames):
                     continue
                 last_us = int(batch.frames["t_us"][-1])
                 first_us = int(batch.frames["t_us"][0]) if first_us is None else first_us
-                progress.show(f"{(last_us - first_us) / 1e6:.1f} s, {hand.stats.frames} frames, Ctrl-C stops")
+                words = f"{(last_us - first_us) / 1e6:.1f} s, {hand.stats.frames} frames"
+                progress.show(f"{words}, Ctrl-C stops")
+                if table is not None:
+                    table.show(f"{words}, {recorder.path.stat().st_size / 1e6:.1f} MB, Ctrl-C stops")
                 if args.seconds is not None and last_us - first_us >= args.seconds * 1e6:
                     break
-        except KeyboardInterrupt:
-            pass  # the usual way to stop a recording
         progress.done()
         stats = hand.stats
     facts = {

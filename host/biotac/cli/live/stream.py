@@ -13,6 +13,7 @@ from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame
 from ...wire.messages_gen import FrameFlags
 from .. import values
+from .table import LiveTable, is_possible
 
 EXAMPLE = "biotac stream sim:press.toml --rate 5"
 
@@ -37,12 +38,36 @@ def run(args: argparse.Namespace) -> int:
             print(f"biotac: {warning.text}", file=sys.stderr)
         if args.touched:
             hand.subscribe(RESULTS)
-        show(hand, rate=args.rate, seconds=args.seconds, as_json=args.json)
+        if not args.json and is_possible():
+            watch(hand, seconds=args.seconds)
+        else:
+            show(hand, rate=args.rate, seconds=args.seconds, as_json=args.json)
+        lost = hand.stats.frames_lost
+        if lost:
+            print(f"biotac: {lost} frame(s) lost; close other programs, or use a faster computer", file=sys.stderr)
     return 0
 
 
+def watch(hand: biotac.Hand, *, seconds: float | None) -> None:
+    """A table that stands still."""
+    first_us: int | None = None
+    words = ""
+    with LiveTable(hand, hand.port) as table:
+        for batch in hand.batches():
+            last_us = batch.last_t_us()
+            if last_us is None:
+                continue
+            first_us = batch.first_t_us() if first_us is None else first_us
+            passed_s = (last_us - (first_us or 0)) / 1e6
+            words = f"{passed_s:.1f} s, {hand.stats.frames} frames, Ctrl-C stops"
+            table.show(words)
+            if seconds is not None and passed_s >= seconds:
+                break
+        table.show(words, now=True)
+
+
 def show(hand: biotac.Hand, *, rate: float, seconds: float | None = None, as_json: bool = False) -> None:
-    """Print ``rate`` frames a second and finger, and at the end how many were lost."""
+    """Print ``rate`` frames a second and finger."""
     due_us: dict[int, int] = {}
     step_us = int(1e6 / rate) if rate > 0 else 0
     end_us: int | None = None
@@ -56,9 +81,6 @@ def show(hand: biotac.Hand, *, rate: float, seconds: float | None = None, as_jso
         due_us[frame.finger] = frame.t_us + step_us
         print(json.dumps(row_as_json(frame)) if as_json else as_line(frame))
         sys.stdout.flush()
-    lost = hand.stats.frames_lost
-    if lost:
-        print(f"biotac: {lost} frame(s) lost; close other programs, or use a faster computer", file=sys.stderr)
 
 
 def as_line(frame: Frame) -> str:

@@ -45,8 +45,10 @@ export class HandRow {
   }
 
   read(fingers) {
-    for (const [index, { force }] of this.entries) {
-      const newtons = Math.hypot(...fingers.get(index).latest.forceN);
+    for (const [index, { button, force }] of this.entries) {
+      const { latest } = fingers.get(index);
+      button.toggleAttribute("data-untouched", !latest.touched);
+      const newtons = Math.hypot(...latest.forceN);
       force.textContent = Number.isFinite(newtons) ? `${number(newtons, 1)} N` : "no tare";
     }
   }

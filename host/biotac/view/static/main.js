@@ -201,6 +201,7 @@ class Page {
     const touched = byId("touched");
     touched.textContent = frame.flags & this.masks.CONTACT ? "contact" : "no contact";
     touched.dataset.kind = frame.flags & this.masks.CONTACT ? "on" : "calm";
+    byId("numbers").toggleAttribute("data-untouched", !(frame.flags & this.masks.CONTACT));
   }
 }
 

@@ -5,6 +5,7 @@ import { HISTORY_S } from "./model.js";
 
 const MARGIN = { left: 46, right: 10, top: 8, bottom: 22 };
 const GAP_S = 0.05; // a line breaks where frames are missing
+const DASHES = [[], [7, 4], [2, 3]]; // of x, y and z, for whoever does not see their colours
 const FONT = '11px system-ui, "DejaVu Sans", sans-serif';
 
 // A plot's frame: where it is, and how values become pixels.
@@ -75,6 +76,7 @@ export class TimePlot {
     c.lineJoin = "round";
     this.names.forEach((name, line) => {
       c.strokeStyle = theme[this.colours[line]];
+      c.setLineDash(DASHES[line]);
       c.beginPath();
       let before = -Infinity;
       for (const k of shown) {
@@ -92,6 +94,7 @@ export class TimePlot {
       }
       c.stroke();
     });
+    c.setLineDash([]);
   }
 
   span(finger, shown) {

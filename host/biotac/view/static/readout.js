@@ -100,12 +100,14 @@ export class Flags {
     if (flags === this.shown) return;
     this.shown = flags;
     const active = this.flags.filter(({ mask }) => flags & mask);
-    active.sort((a, b) => b.warns - a.warns || a.mask - b.mask);
-    byId("flags").replaceChildren(...active.map(({ name, words, warns }) => {
+    active.sort((a, b) => a.mask - b.mask);
+    const items = (wanted) => active.filter(({ warns }) => warns === wanted).map(({ name, words, warns }) => {
       const item = make("li", {}, { flag: name, kind: warns ? "warn" : "calm" });
       item.append(make("b", { textContent: name.replaceAll("_", " ") }), words);
       return item;
-    }));
+    });
+    byId("flags").replaceChildren(...items(true));
+    byId("notices").replaceChildren(...items(false));
   }
 }
 

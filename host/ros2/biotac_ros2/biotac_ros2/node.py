@@ -97,14 +97,14 @@ def fill(vector: Any, values: Any) -> None:
 def spin(node: Fingers) -> None:
     """Publish until the source ends or ROS shuts down. One thread has board and node: a Hand is for one."""
     for batch in node.hand.batches():
-        node.publish(batch)
-        rclpy.spin_once(node, timeout_sec=0.0)
         if not rclpy.ok():
             return
+        node.publish(batch)
+        rclpy.spin_once(node, timeout_sec=0.0)
 
 
 def main() -> None:
-    """The node, until Ctrl-C. Without a board it ends with one line and the exit code of the command line."""
+    """The node, until Ctrl-C or SIGTERM. Without a board it ends with one line and the command line's exit code."""
     rclpy.init()
     node = None
     try:
@@ -115,6 +115,10 @@ def main() -> None:
     except biotac.BiotacError as error:
         print(f"biotac: {error}", file=sys.stderr)
         raise SystemExit(error.exit_code) from None
+    except Exception:
+        # A signal shuts ROS down at any moment, and then whatever is asked of it raises something.
+        if rclpy.ok():
+            raise
     finally:
         if node is not None:
             node.hand.close()

@@ -1,0 +1,23 @@
+// Messages that were taken apart by kind, finger and field (recording/block.py): their columns, and the
+// wire's bytes again.
+#ifndef BIOTAC_REBUILD_H
+#define BIOTAC_REBUILD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum bt_rebuild_code {
+    BT_REBUILD_RAW = 0xFF, // the next bytes of rest, up to and with a delimiter
+};
+
+// For each of n codes, the next row of tables[code], of row_bytes[code] bytes, as a frame of id[code]; or the
+// next of rest. Tables end where their codes do, which is the caller's word. Returns how many bytes are in
+// out: at most 256 a code and those of rest.
+size_t bt_rebuild(const uint8_t *codes, size_t n, const uint8_t *const *tables, const uint32_t *row_bytes,
+                  const uint8_t *id, const uint8_t *rest, size_t rest_bytes, uint8_t *out);
+
+// A column of n rows of parts values of size bytes (1, 2, 4 or 8), from byte planes of zigzag changes:
+// component j of row k goes to out + k stride + j size.
+void bt_column(const uint8_t *planes, size_t n, size_t parts, size_t size, uint8_t *out, size_t stride);
+
+#endif

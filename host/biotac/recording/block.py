@@ -1,0 +1,218 @@
+"""A block of the wire, about a second, taken apart by finger and field, and put together again to the byte.
+
+A finger's part holds its FRAMEs, PACs and heartbeats, a column a field: the change from row to row (the first row's is
+from 0), zigzag so that small ones are small numbers, and byte planes, lowest first. That is what makes zstd good at
+them, and what lets one field be read without the others. ``seq`` and ``t_us`` are unwrapped. The rest of a block is
+which message came when, and the other messages as they came.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..wire import messages_gen as wire
+from ..wire.batches import Batch
+from ..wire.dtypes_gen import DTYPES
+from ..wire.frames import StructArray
+from ..wire.native import ffi, lib
+
+KINDS = (wire.Frame.ID, wire.Pac.ID, wire.Idle.ID)
+FRAME, PAC, IDLE = range(len(KINDS))
+_RAW = int(lib.BT_REBUILD_RAW)
+_FINGER_BITS = 3  # a code is a kind and a finger
+_ROWS = struct.Struct("<3I")
+_HEAD = struct.Struct("<qqI")  # first and last t_us of a FRAME or heartbeat, and how many codes follow
+_MOST_PER_MESSAGE = 256
+
+#: Name, type of a value and values a row.
+Column = tuple[str, np.dtype[Any], int]
+
+
+def _columns(message_id: int) -> dict[str, np.dtype[Any]]:
+    """Of one kind: the message's fields but for the finger, seq and t_us unwrapped."""
+    fields = {name: DTYPES[message_id][name] for name in DTYPES[message_id].names or () if name != "finger"}
+    return fields | {"seq": np.dtype("<u4"), "t_us": np.dtype("<i8")}
+
+
+COLUMNS = tuple(_columns(message_id) for message_id in KINDS)
+
+
+def schema() -> bytes:
+    """Which columns a finger's part has, as the recording says it of itself."""
+    kinds = {
+        wire.MESSAGES[message_id].__name__.upper(): [
+            [name, dtype.base.str, int(np.prod(dtype.shape))] for name, dtype in columns.items()
+        ]
+        for message_id, columns in zip(KINDS, COLUMNS, strict=True)
+    }
+    return json.dumps(kinds).encode()
+
+
+@dataclass(frozen=True)
+class Rest:
+    """The order of a block's messages, as codes, and what is no row, as it came."""
+
+    first_us: int
+    last_us: int
+    codes: NDArray[np.uint8]
+    raw: bytes
+
+    def pack(self) -> bytes:
+        """Inverse of ``unpack``."""
+        return _HEAD.pack(self.first_us, self.last_us, len(self.codes)) + self.codes.tobytes() + self.raw
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Rest:
+        """ValueError or struct.error for what is none."""
+        first_us, last_us, n = _HEAD.unpack_from(data)
+        return cls(first_us, last_us, np.frombuffer(data, np.uint8, n, _HEAD.size), data[_HEAD.size + n :])
+
+    def fingers(self, kind: int) -> NDArray[np.uint8]:
+        """The finger of each message of ``kind``, in order."""
+        mine = self.codes[(self.codes != _RAW) & (self.codes >> _FINGER_BITS == kind)]
+        fingers: NDArray[np.uint8] = mine & ((1 << _FINGER_BITS) - 1)
+        return fingers
+
+    def without(self, fingers: Collection[int]) -> Rest:
+        """The same without the rows of ``fingers``."""
+        gone = np.isin(self.codes & ((1 << _FINGER_BITS) - 1), list(fingers)) & (self.codes != _RAW)
+        return Rest(self.first_us, self.last_us, self.codes[~gone], self.raw)
+
+    @property
+    def all_fingers(self) -> set[int]:
+        """Those of which there is a row."""
+        there = np.bincount(self.codes, minlength=256)[:_RAW].nonzero()[0]
+        return set((there & ((1 << _FINGER_BITS) - 1)).tolist())
+
+
+@dataclass(frozen=True)
+class Block:
+    """``parts`` by finger, encoded; see ``read_part``."""
+
+    parts: dict[int, bytes]
+    rest: Rest
+
+
+def take_apart(data: bytes, batch: Batch) -> Block | None:
+    """``data``, whole messages, whose decoded rows are ``batch``; None when it could not be put together again."""
+    pieces = data.split(b"\0")[:-1]
+    ids = np.array([piece[1] if len(piece) > 1 else 0 for piece in pieces], np.intp)  # the id, behind COBS's first
+    codes = np.full(len(pieces), _RAW, np.uint8)
+    tables = _tables(batch)
+    for kind, rows in enumerate(tables):
+        at = np.flatnonzero(ids == KINDS[kind])
+        if len(at) != len(rows) or (rows["finger"] >= 1 << _FINGER_BITS).any():
+            return None
+        codes[at] = kind << _FINGER_BITS | rows["finger"]
+    raw = b"".join(pieces[k] + b"\0" for k in np.flatnonzero(codes == _RAW).tolist())
+    ends = [rows["t_us"] for rows in (tables[FRAME], tables[IDLE]) if len(rows)]
+    first_us, last_us = (min(int(t.min()) for t in ends), max(int(t.max()) for t in ends)) if ends else (0, 0)
+    rest = Rest(first_us, last_us, codes, raw)
+    if together(rest, [as_sent(rows, kind) for kind, rows in enumerate(tables)]) != data:
+        return None
+    parts = {
+        finger: b"".join(_encoded([rows[rows["finger"] == finger] for rows in tables])) for finger in rest.all_fingers
+    }
+    return Block(parts, rest)
+
+
+def _tables(batch: Batch) -> list[StructArray]:
+    """FRAMEs as sent, with unwrapped seq and t_us; PAC and heartbeats have theirs."""
+    frames = np.empty(len(batch.wire), table_dtype(FRAME))
+    for name in frames.dtype.names or ():
+        frames[name] = batch.seq if name == "seq" else batch.t_us if name == "t_us" else batch.wire[name]
+    return [frames, batch.pac, batch.idle]
+
+
+def table_dtype(kind: int) -> np.dtype[Any]:
+    return np.dtype([("finger", "u1"), *((name, dtype) for name, dtype in COLUMNS[kind].items())])
+
+
+def as_sent(rows: StructArray, kind: int) -> StructArray:
+    """Messages of a kind, seq and t_us wrapped again."""
+    out = np.empty(len(rows), DTYPES[KINDS[kind]])
+    for name in out.dtype.names or ():
+        out[name] = rows[name] & np.iinfo(out.dtype[name]).max if name in ("seq", "t_us") else rows[name]
+    return out
+
+
+def together(rest: Rest, sent: list[StructArray]) -> bytes:
+    """The wire's bytes of messages by kind, each in the order of arrival."""
+    n = 1 << _FINGER_BITS
+    tables, sizes, ids = (ffi.new(f"{kind}[64]") for kind in ("uint8_t const *", "uint32_t", "uint8_t"))
+    keep = []
+    for kind, rows in enumerate(sent):
+        finger = rows["finger"]
+        for one in np.unique(finger).tolist():
+            mine = rows[finger == one]
+            keep.append(ffi.from_buffer("uint8_t[]", mine))
+            code = kind * n + one
+            tables[code], sizes[code], ids[code] = keep[-1], rows.dtype.itemsize, KINDS[kind]
+    out = ffi.new("uint8_t[]", _MOST_PER_MESSAGE * len(rest.codes) + len(rest.raw) + 1)
+    codes = rest.codes.tobytes()
+    size = lib.bt_rebuild(codes, len(codes), tables, sizes, ids, rest.raw, len(rest.raw), out)
+    data: bytes = ffi.buffer(out, size)[:]
+    return data
+
+
+# ---- columns ----------------------------------------------------------------------------------------
+
+
+def _encoded(tables: list[StructArray]) -> Iterator[bytes]:
+    yield _ROWS.pack(*map(len, tables))
+    for columns, rows in zip(COLUMNS, tables, strict=True):
+        for name, dtype in columns.items() if len(rows) else ():
+            values = np.ascontiguousarray(rows[name].astype(dtype.base, copy=False)).reshape(len(rows), -1)
+            yield _planes(values)
+
+
+def _planes(values: NDArray[Any]) -> bytes:
+    unsigned = values.view(f"<u{values.itemsize}")
+    change = unsigned.copy()
+    change[1:] -= unsigned[:-1]
+    signed = change.view(f"<i{values.itemsize}")
+    zigzag = (change << 1) ^ (signed >> (8 * values.itemsize - 1)).view(change.dtype)
+    planes: NDArray[np.uint8] = zigzag.T.copy().reshape(-1, 1).view(np.uint8).T
+    return planes.tobytes()
+
+
+def read_part(data: bytes, layout: list[list[Column]], wanted: Mapping[int, Collection[str]]) -> list[StructArray]:
+    """Rows by kind, of the fields ``wanted`` of each. ValueError or struct.error for other sizes."""
+    counts = _ROWS.unpack_from(data)
+    expected = _ROWS.size + sum(
+        n * dtype.itemsize * parts for n, columns in zip(counts, layout, strict=True) for _, dtype, parts in columns
+    )
+    if expected != len(data):
+        raise ValueError(f"a finger's part of {len(data)} bytes, expected {expected}")
+    at, out = _ROWS.size, []
+    planes = ffi.from_buffer("uint8_t[]", data)
+    for kind, (n, columns) in enumerate(zip(counts, layout, strict=True)):
+        of_kind = [column for column in columns if column[0] in wanted.get(kind, ())]
+        rows = np.empty(n, np.dtype([(name, dtype, (parts,) if parts > 1 else ()) for name, dtype, parts in of_kind]))
+        for name, dtype, parts in columns if n else ():
+            if name in wanted.get(kind, ()):
+                assert rows.dtype.fields is not None
+                begin = ffi.from_buffer("uint8_t[]", rows) + rows.dtype.fields[name][1]
+                lib.bt_column(planes + at, n, parts, dtype.itemsize, begin, rows.dtype.itemsize)
+            at += n * dtype.itemsize * parts
+        out.append(rows)
+    return out
+
+
+def layout_of(text: bytes) -> list[list[Column]]:
+    """What ``schema`` says. ValueError, KeyError or TypeError for what it never says."""
+    kinds = json.loads(text)
+    out = []
+    for message_id in KINDS:
+        columns = [(str(n), np.dtype(d), int(p)) for n, d, p in kinds[wire.MESSAGES[message_id].__name__.upper()]]
+        if any(dtype.kind not in "iu" or not 0 < parts <= 64 for _, dtype, parts in columns):
+            raise ValueError("columns that are no integers")
+        out.append(columns)
+    return out

@@ -1,0 +1,155 @@
+"""The blocks of a recording, one by one: rows of the fields and fingers that are wanted, or the wire's bytes."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mcap.records import Message, Metadata
+
+from ..hand.gap import GAP
+from ..wire.fields import WIRE_INVALID
+from ..wire.frames import StructArray
+from . import layout
+from .block import KINDS, Column, Rest, as_sent, layout_of, read_part, table_dtype, together
+from .scan import Scan
+
+ALL = {kind: table_dtype(kind).names or () for kind in range(len(KINDS))}
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One block. ``rows`` by kind, in the order of arrival, of the fingers and fields that were wanted.
+
+    Without ``rest`` it is ``raw``: bytes of the wire as they came. ``whole``: nothing of it is damaged.
+    """
+
+    arrived_ns: int
+    all_here_ns: int
+    number: int
+    rows: list[StructArray]
+    rest: Rest | None = None
+    raw: bytes = b""
+    whole: bool = True
+
+    def bytes(self) -> bytes:
+        """As they came, of a piece of all fields and fingers."""
+        if self.rest is None:
+            return self.raw
+        return together(self.rest, [as_sent(rows, kind) for kind, rows in enumerate(self.rows)])
+
+
+class Blocks:
+    """Iterating gives Pieces; ``metadata`` (None until seen), ``gaps`` and ``problems`` are known afterwards."""
+
+    def __init__(
+        self,
+        path: Path,
+        wanted: Mapping[int, Collection[str]] = ALL,
+        fingers: Collection[int] | None = None,
+        *,
+        check: bool = True,
+    ) -> None:
+        self.metadata: dict[str, str] | None = None
+        self.damaged_metadata = 0
+        self.gaps: list[dict[str, str]] = []
+        self._wanted = wanted
+        self._fingers = fingers
+        self.scan = Scan(path, self._is_wanted, check=check)
+        self._layout: list[list[Column]] | None = None
+
+    def __iter__(self) -> Iterator[Piece]:
+        parts: dict[int, bytes] = {}
+        number = 0
+        for record in self.scan:
+            if isinstance(record, Metadata):
+                self._take_metadata(record)
+                continue
+            topic, message = record
+            if message.sequence != number:
+                parts, number = {}, message.sequence
+            if topic == layout.TOPIC:
+                none = [np.empty(0, table_dtype(kind)) for kind in range(len(KINDS))]
+                yield Piece(message.publish_time, message.log_time, number, none, raw=message.data)
+            elif topic == layout.REST:
+                piece = self._piece(message, parts)
+                if piece is not None:
+                    yield piece
+                parts = {}
+            else:
+                parts[int(topic.removeprefix(layout.PARTS))] = message.data
+
+    def _is_wanted(self, topic: str) -> bool:
+        if topic.startswith(layout.PARTS):
+            finger = topic.removeprefix(layout.PARTS)
+            return finger.isdigit() and (self._fingers is None or int(finger) in self._fingers)
+        return topic in (layout.TOPIC, layout.REST)
+
+    def _take_metadata(self, record: Metadata) -> None:
+        try:
+            facts = layout.unsigned(record.metadata)
+        except ValueError:
+            self.damaged_metadata += 1
+            self.scan.problems.append(f"{record.name!r} of {self.scan.path.name} is damaged and left out")
+            return
+        if record.name == layout.METADATA_NAME and self.metadata is None:
+            self.metadata = facts
+        elif record.name == f"{layout.METADATA_NAME}.{GAP}":
+            self.gaps.append(facts)
+
+    def _piece(self, message: Message, parts: dict[int, bytes]) -> Piece | None:
+        try:
+            rest = Rest.unpack(message.data)
+            if self._layout is None:
+                self._layout = layout_of(self.scan.schemas[layout.REST])
+            read = {finger: read_part(data, self._layout, self._wanted) for finger, data in parts.items()}
+            wanted = rest.all_fingers if self._fingers is None else rest.all_fingers & set(self._fingers)
+            whole = set(read) >= wanted
+            if not whole:
+                rest = rest.without(wanted - set(read))
+            rows = [self._joined(kind, rest, read) for kind in range(len(KINDS))]
+        except (KeyError, TypeError, ValueError, struct.error, IndexError) as error:
+            self.scan.damaged_chunks += 1
+            self.scan.problems.append(f"one second of {self.scan.path.name} is damaged and left out ({error})")
+            return None
+        return Piece(message.publish_time, message.log_time, message.sequence, rows, rest, whole=whole)
+
+    def _joined(self, kind: int, rest: Rest, read: dict[int, list[StructArray]]) -> StructArray:
+        if kind not in self._wanted:
+            return np.empty(0, np.dtype([("finger", "u1")]))
+        wanted = self._wanted[kind]
+        full = table_dtype(kind)
+        dtype = np.dtype([(name, full[name]) for name in full.names or () if name in wanted or name == "finger"])
+        finger = rest.fingers(kind)
+        if self._fingers is not None:
+            chosen = np.zeros(256, np.bool_)
+            chosen[list(self._fingers)] = True
+            finger = finger[chosen[finger]]
+        out = np.empty(len(finger), dtype)
+        out["finger"] = finger
+        for one, tables in read.items():
+            mine = np.flatnonzero(finger == one)
+            for name in dtype.names or ():
+                if name in (tables[kind].dtype.names or ()):
+                    out[name][mine] = tables[kind][name]
+                elif name != "finger":  # of a version that did not have it
+                    out[name][mine] = WIRE_INVALID.get(dtype[name].base.str[1:], 0)
+        return out
+
+
+def is_lossless(frames: StructArray, pac: StructArray, idle: StructArray) -> bool:
+    """Every round of every finger is there once, as a FRAME or in a heartbeat, and every PAC block."""
+    for finger in range(8):
+        mine, waits = frames["seq"][frames["finger"] == finger], idle[idle["finger"] == finger]
+        ends = np.concatenate([mine, waits["seq"]]).astype(np.int64)
+        rounds = np.concatenate([np.ones(len(mine), np.int64), waits["frames"]])
+        order = np.argsort(ends, kind="stable")
+        blocks = pac["seq"][pac["finger"] == finger].astype(np.int64)
+        if (np.diff(ends[order]) != rounds[order][1:]).any() or (np.diff(blocks) != 1).any():
+            return False
+        if (np.diff(mine.astype(np.int64)) <= 0).any():
+            return False
+    return True

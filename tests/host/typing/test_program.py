@@ -1,0 +1,35 @@
+"""What a type checker of a user's program makes of the installed package."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import biotac
+
+PROGRAM = Path(__file__).with_name("program.py")
+WRONG = PROGRAM.read_text().replace("hand.tare(", "hand.tear(").replace("fresh=True", "fersh=True")
+CHECKERS = {
+    "mypy": [sys.executable, "-m", "mypy", "--strict", "--no-incremental"],
+    "pyright": [sys.executable, "-m", "pyright", "--pythonpath", sys.executable],
+}
+
+
+@pytest.mark.parametrize("checker", CHECKERS)
+def test_a_users_program_is_typed_and_a_wrong_one_is_found(checker: str, tmp_path: Path) -> None:
+    good, bad = tmp_path / "good.py", tmp_path / "bad.py"
+    good.write_text(PROGRAM.read_text())
+    bad.write_text(WRONG)
+    done = subprocess.run([*CHECKERS[checker], str(good)], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    done = subprocess.run([*CHECKERS[checker], str(bad)], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "tear" in done.stdout and "fersh" in done.stdout
+
+
+def test_all_that_a_program_may_name_is_there() -> None:
+    assert {"Batch", "Touch", "Tare", "Status", "per_frame"} <= set(biotac.__all__)
+    assert all(hasattr(biotac, name) for name in biotac.__all__)
