@@ -26,8 +26,8 @@ static const struct {
     {BT_FRAME_ID, 12, {0xFF, 0xFF, 0, 0, 0, 0x80, 0, 0, 0, 0x80, 0, 0}},
     {BT_FRAME_ID, 2, {0}},
     {BT_HELLO_ID, 4, {0xFF, 0xFF, 0xFF, 0xFF}}, // image_crc32: unknown
-    {BT_STATUS_ID, 12, {0}},     // sigma_shed, wrench_repeated, frames_shed: nothing was
-    {BT_CALIBRATION_ID, 4, {0}}, // pressure_gain_nn: not calibrated
+    {BT_STATUS_ID, 12, {0}},                    // sigma_shed, wrench_repeated, frames_shed: nothing was
+    {BT_CALIBRATION_ID, 4, {0}},                // pressure_gain_nn: not calibrated
 };
 _Static_assert(BT_FRAME_BYTES == FRAME_1_3_BYTES + 12 && BT_STATUS_BYTES == STATUS_1_4_BYTES + 12
                    && BT_CALIBRATION_BYTES == 51 + 4 && BT_HELLO_BYTES == 35 + 4,
@@ -39,7 +39,8 @@ _Static_assert((int64_t)(BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1) * BT_FRAME_BY
 _Static_assert((int64_t)(BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1) * (2 + BT_STATUS_BYTES)
                    <= (int64_t)BT_DECODE_ROOM * (STATUS_1_4_BYTES + AROUND),
                "and these with id and length");
-_Static_assert(2 + BT_CALIBRATION_BYTES <= 51 + AROUND && 2 + BT_HELLO_BYTES <= 35 + AROUND, "and nothing else may be longer than what came");
+_Static_assert(2 + BT_CALIBRATION_BYTES <= 51 + AROUND && 2 + BT_HELLO_BYTES <= 35 + AROUND,
+               "and nothing else may be longer than what came");
 
 void bt_decoder_reset(bt_decoder *decoder)
 {

@@ -2,6 +2,7 @@
 
 #include "descriptor.h"
 #include "wire/little_endian.h"
+#include "wire/sensor_gen.h"
 
 #include <string.h>
 
@@ -10,6 +11,9 @@ _Static_assert(BT_PAC_BYTES >= 16 && BT_IDLE_BYTES >= 16 && BT_FRAME_BYTES >= 16
                "two of their own size suffice");
 _Static_assert(BT_IDLE_BYTES > 16 && BT_FRAME_BYTES > 16, "each row may have a gap before it");
 _Static_assert(BT_DECODED_FRAME == 0 && BT_DECODED_PAC == 1 && BT_DECODED_IDLE == 2, "rows come first");
+
+#define ROUND_US   (1000000 * BT_SLOTS / BT_SLOT_HZ)
+#define UNHEARD_US 60000000 // a board sends at least a STATUS a second; numbers wrap after 655 s
 
 static const uint32_t row_bytes[BT_INTAKE_ROW_KINDS] = {BT_FRAME_BYTES, BT_PAC_BYTES, BT_IDLE_BYTES};
 
@@ -20,6 +24,7 @@ void bt_intake_reset(bt_intake *intake)
     bt_numbering_reset(&intake->rounds);
     bt_numbering_reset(&intake->pacs);
     intake->t_us = (bt_unwrapper){0, 0};
+    intake->unheard = 0;
 }
 
 // The three kinds of rows begin alike: u16 seq, u32 t_us, u8 finger (test_stream.py holds it against the
@@ -60,6 +65,17 @@ static int is_start(const uint8_t *other)
     return reply.command == BT_START_ID && reply.error == BT_ERROR_OK;
 }
 
+// Device time goes on, and says how long nothing was heard when that is long.
+static int64_t hear(bt_intake *intake, uint32_t t_us)
+{
+    int64_t before_us = intake->t_us.seen ? intake->t_us.last : t_us;
+    int64_t now_us = bt_unwrap(&intake->t_us, t_us);
+    if (now_us - before_us > UNHEARD_US) {
+        intake->unheard += (now_us - before_us) / ROUND_US;
+    }
+    return now_us;
+}
+
 // Message by message in the order of arrival; seq and t_us have room for the rows of their kind.
 static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t *t_us[BT_INTAKE_ROW_KINDS])
 {
@@ -83,21 +99,22 @@ static void number(bt_intake *intake, int64_t *seq[BT_INTAKE_ROW_KINDS], int64_t
             if (other[0] == BT_STATUS_ID) {
                 bt_msg_status status;
                 bt_msg_status_unpack(&status, other + 2);
-                bt_unwrap(&intake->t_us, status.t_us);
+                hear(intake, status.t_us);
             }
             other += 2 + other[1];
             continue;
         }
         const uint8_t *row = rows[kind];
         rows[kind] += row_bytes[kind];
-        int64_t now_us = bt_unwrap(&intake->t_us, t_us_of(row));
+        int64_t now_us = hear(intake, t_us_of(row));
         *t_us[kind]++ = now_us;
         if (kind == BT_DECODED_PAC) {
-            *seq[kind]++ = bt_number(&intake->pacs, finger_of(row), seq_of(row), 1, NULL);
+            *seq[kind]++ = bt_number(&intake->pacs, finger_of(row), seq_of(row), 1, intake->unheard, NULL);
             continue;
         }
         bt_gap *gap = &intake->gaps[found];
-        *seq[kind]++ = bt_number(&intake->rounds, finger_of(row), seq_of(row), rounds_of(kind, row), gap);
+        *seq[kind]++ = bt_number(&intake->rounds, finger_of(row), seq_of(row), rounds_of(kind, row),
+                                 intake->unheard, gap);
         found += gap->missing > 0;
         last_us = now_us > last_us ? now_us : last_us;
         fingers |= finger_of(row) < 63 ? INT64_C(1) << finger_of(row) : -1;

@@ -36,6 +36,7 @@ typedef struct {
     bt_numbering rounds; // FRAMEs and IDLEs share one numbering: together they account for every round
     bt_numbering pacs;
     bt_unwrapper t_us; // one clock for all, STATUS too: a finger plugged in late is not early
+    int64_t unheard;   // rounds, in all, of stretches without a message of any finger
     uint8_t in[BT_DECODE_BYTES];
 } bt_intake;
 

@@ -2,9 +2,17 @@
 
 #include <string.h>
 
-static int64_t nearest(int64_t raw, int64_t near, int64_t half)
+#define RECENT 64 // numbers that bt_numbering.recent tells of
+
+// Of all numbers that a counter of ``bits`` bits shows as ``raw``, the first that is not below ``from``.
+static int64_t first_from(int64_t from, int64_t raw, int bits)
 {
-    return near + ((raw - near + half) & (2 * half - 1)) - half;
+    return from + ((raw - from) & ((INT64_C(1) << bits) - 1));
+}
+
+static uint64_t newest(int64_t numbers)
+{
+    return numbers < RECENT ? (UINT64_C(1) << numbers) - 1 : UINT64_MAX;
 }
 
 void bt_numbering_reset(bt_numbering *numbering)
@@ -17,19 +25,46 @@ void bt_numbering_rejoin(bt_numbering *numbering)
     memset(numbering->joined, 0, sizeof numbering->joined);
 }
 
-int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_t rounds, bt_gap *gap)
+// One that is not after the last: late, so it was counted as lost, or here twice.
+static void take_late(bt_numbering *numbering, uint8_t finger, int64_t behind, uint16_t rounds)
+{
+    uint64_t its = behind < RECENT ? newest(rounds) << behind : 0;
+    numbering->disordered++;
+    for (uint64_t late = its & ~numbering->recent[finger]; late != 0; late &= late - 1) {
+        numbering->lost--;
+    }
+    numbering->recent[finger] |= its;
+}
+
+int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_t rounds, int64_t unheard,
+                  bt_gap *gap)
 {
     int64_t before = numbering->seen[finger] ? numbering->last[finger] : seq;
-    int64_t number = nearest(seq, before, 1 << 15);
-    int64_t missing = numbering->joined[finger] ? number - rounds - before : 0;
-    if (missing > 0) {
+    int64_t near = before + (numbering->seen[finger] ? unheard - numbering->unheard[finger] : 0);
+    int64_t number = first_from(near - (1 << 15), seq, 16);
+    int64_t missing = 0;
+    if (gap != NULL) {
+        *gap = (bt_gap){finger, before, 0};
+    }
+    numbering->unheard[finger] = unheard;
+    if (numbering->joined[finger] && number <= before && before - number < RECENT) {
+        take_late(numbering, finger, before - number, rounds);
+        return number;
+    }
+    if (!numbering->joined[finger] || number <= before) {
+        numbering->disordered += numbering->joined[finger];
+        numbering->recent[finger] = UINT64_MAX; // what came before is none of our business
+    } else {
+        missing = number - rounds - before;
+        numbering->disordered += missing < 0;
+        missing = missing > 0 ? missing : 0;
         numbering->lost += missing;
-    } else if (missing < 0) {
-        numbering->disordered++;
-        missing = 0;
+        int64_t step = number - before;
+        numbering->recent[finger] =
+            (step < RECENT ? numbering->recent[finger] << step : 0) | newest(step < rounds ? step : rounds);
     }
     if (gap != NULL) {
-        *gap = (bt_gap){finger, before, missing};
+        gap->missing = missing;
     }
     numbering->last[finger] = number;
     numbering->seen[finger] = numbering->joined[finger] = 1;
@@ -38,7 +73,7 @@ int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_
 
 int64_t bt_unwrapped(const bt_unwrapper *unwrapper, uint32_t raw)
 {
-    return unwrapper->seen ? nearest(raw, unwrapper->last, INT64_C(1) << 31) : raw;
+    return unwrapper->seen ? first_from(unwrapper->last - BT_CLOCK_BACK_US, raw, 32) : raw;
 }
 
 int64_t bt_unwrap(bt_unwrapper *unwrapper, uint32_t raw)

@@ -8,11 +8,13 @@
 
 // Sequence numbers of one kind of message, 16 bits on the wire, each finger for itself.
 typedef struct {
-    int64_t lost;                       // what the numbers say was made and never came
-    int64_t disordered;                 // numbers that repeat or step back
-    int64_t last[BT_FINGERS_ON_WIRE];   // unwrapped
-    uint8_t seen[BT_FINGERS_ON_WIRE];   // last has a value
-    uint8_t joined[BT_FINGERS_ON_WIRE]; // the next number is expected to follow the last
+    int64_t lost;                        // what the numbers say was made and never came
+    int64_t disordered;                  // numbers that repeat or step back
+    int64_t last[BT_FINGERS_ON_WIRE];    // unwrapped
+    int64_t unheard[BT_FINGERS_ON_WIRE]; // bt_number's at that time
+    uint64_t recent[BT_FINGERS_ON_WIRE]; // bit k: last - k came, or is from before this numbering joined
+    uint8_t seen[BT_FINGERS_ON_WIRE];    // last has a value
+    uint8_t joined[BT_FINGERS_ON_WIRE];  // the next number is expected to follow the last
 } bt_numbering;
 
 // Of ``finger``, ``missing`` messages after number ``before``.
@@ -33,11 +35,18 @@ void bt_numbering_reset(bt_numbering *numbering);
 // Whatever numbers come next, nothing was lost before them.
 void bt_numbering_rejoin(bt_numbering *numbering);
 
-// Returns ``seq`` unwrapped, the nearest to this finger's last. The message stands for ``rounds`` numbers up
-// to its own. gap->missing is 0 when there is none; NULL if nobody asks where.
-int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_t rounds, bt_gap *gap);
+// Returns ``seq`` unwrapped, the nearest to where this finger's numbers should be. The message stands for
+// ``rounds`` numbers up to its own. ``unheard``: for how many rounds, in all, device time went on with no
+// message of any finger; seq itself wraps every 65 536 rounds, 11 min. gap->missing is 0 when there is none;
+// NULL if nobody asks where.
+int64_t bt_number(bt_numbering *numbering, uint8_t finger, uint16_t seq, uint16_t rounds, int64_t unheard,
+                  bt_gap *gap);
 
-// The value that a counter shows as ``raw``, of all such the one nearest to the last.
+// A clock goes forward, over its wrap after 71.6 min, too; a message is at most this much older than the
+// last.
+#define BT_CLOCK_BACK_US (INT64_C(1) << 26)
+
+// The value that a clock shows as ``raw``.
 int64_t bt_unwrapped(const bt_unwrapper *unwrapper, uint32_t raw);
 
 // The same, and it is the last from now on.

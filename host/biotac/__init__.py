@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .core.compute import MAPPED_RESULT_DTYPE as MAPPED_RESULT_DTYPE
     from .core.compute import RESULT_DTYPE as RESULT_DTYPE
     from .core.compute import compute as compute
+    from .core.compute import per_frame as per_frame
     from .core.finger import FINGER_DTYPE as FINGER_DTYPE
     from .core.finger import Finger as Finger
     from .errors import BiotacError as BiotacError
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from .recording import Recording as Recording
     from .recording import load as load
     from .version import __version__ as __version__
+    from .wire.batches import Batch as Batch
     from .wire.batches import LinkStats as LinkStats
     from .wire.frames import FRAME_DTYPE as FRAME_DTYPE
     from .wire.frames import IDLE_DTYPE as IDLE_DTYPE
@@ -50,12 +52,15 @@ if TYPE_CHECKING:
     from .wire.messages_gen import PocWeights as PocWeights
     from .wire.messages_gen import QuantityFlags as QuantityFlags
     from .wire.messages_gen import Setting as Setting
+    from .wire.messages_gen import Status as Status
+    from .wire.messages_gen import Tare as Tare
     from .wire.messages_gen import TareReason as TareReason
     from .wire.messages_gen import TareState as TareState
+    from .wire.messages_gen import Touch as Touch
 
 #: Where each name is; its module is imported when somebody asks for the first name in it.
 _HOMES = {
-    ".core.compute": "MAPPED_RESULT_DTYPE RESULT_DTYPE compute",
+    ".core.compute": "MAPPED_RESULT_DTYPE RESULT_DTYPE compute per_frame",
     ".core.finger": "FINGER_DTYPE Finger",
     ".errors": "BiotacError CallbackError CommandRefusedError DeviceLostError FlashError InputError "
     "NotAGatewayError PortError RecordingError ScenarioError WireVersionError",
@@ -68,9 +73,10 @@ _HOMES = {
     ".keep": "Calibration",
     ".recording": "Recorder Recording load",
     ".version": "__version__",
-    ".wire.batches": "LinkStats",
+    ".wire.batches": "Batch LinkStats",
     ".wire.frames": "FRAME_DTYPE IDLE_DTYPE PAC_DTYPE Frame",
-    ".wire.messages_gen": "CalibrationState FrameFlags PocWeights QuantityFlags Setting TareReason TareState",
+    ".wire.messages_gen": "CalibrationState FrameFlags PocWeights QuantityFlags Setting Status Tare TareReason "
+    "TareState Touch",
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
 

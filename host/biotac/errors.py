@@ -6,11 +6,16 @@ Each message is one line: what was seen, what was expected, and the cure. The co
 
 from __future__ import annotations
 
+LONGEST = 1000  # characters of a message
+
 
 class BiotacError(Exception):
     """Base of all errors of this package."""
 
     exit_code = 70
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(printable(message))
 
 
 class InputError(BiotacError):
@@ -69,3 +74,10 @@ class FlashError(BiotacError):
     """Writing an image to a board did not come to its end; the message says where the settings are."""
 
     exit_code = 8
+
+
+def printable(text: str) -> str:
+    """``text`` as one line of bounded length: what was seen may be a damaged file's, or made to move a terminal."""
+    if len(text) > LONGEST:
+        text = f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
+    return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

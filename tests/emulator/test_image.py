@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import pytest
@@ -47,7 +48,7 @@ def test_uf2_refuses_an_image_that_the_chip_would_not_start() -> None:
         uf2.uf2(bytes(image))
 
 
-NOTE = b"BIOTAC image" + struct.pack("<HH3BBB3x", 1, 2, 3, 4, 5, 6, 7)
+NOTE = b"BIOTAC image" + struct.pack("<HH3BBB3xII", 2, 2, 3, 4, 5, 6, 7, 0, 0)  # size and CRC still to come
 
 
 def told_by_the_build(folder: Path, image: bytes) -> subprocess.CompletedProcess[str]:
@@ -59,8 +60,14 @@ def told_by_the_build(folder: Path, image: bytes) -> subprocess.CompletedProcess
 
 
 def test_the_note_of_an_image_is_told(tmp_path: Path) -> None:
+    size = 320 + len(NOTE) + 7
     told = told_by_the_build(tmp_path, bytes(320) + NOTE + b"program")
-    assert (told.returncode, told.stdout) == (0, "note  board 2, firmware 3.4.5, wire 6.7\n")
+    # Of the image with its size in it, and zeros for the CRC itself.
+    sized = bytes(320) + NOTE[:-8] + struct.pack("<II", size, 0) + b"program"
+    crc32 = zlib.crc32(sized)
+    assert (told.returncode, told.stdout) == (0, f"note  board 2, firmware 3.4.5, wire 6.7, CRC-32 {crc32:08x}\n")
+    sealed = bytes(320) + NOTE[:-8] + struct.pack("<II", size, crc32) + b"program"
+    assert (tmp_path / "image.bin").read_bytes() == sealed
 
 
 @pytest.mark.parametrize(
@@ -70,7 +77,7 @@ def test_the_note_of_an_image_is_told(tmp_path: Path) -> None:
         (bytes(321) + NOTE, "says 0 times"),  # not where a linker puts it: somebody's text
         (NOTE + NOTE, "says 2 times"),
         (NOTE[:-1], "says 0 times"),
-        (NOTE[:12] + b"\2" + NOTE[13:], "layout 2"),
+        (NOTE[:12] + b"\3" + NOTE[13:], "layout 3"),
     ],
 )
 def test_an_image_that_does_not_say_what_it_is_is_not_built(tmp_path: Path, image: bytes, why: str) -> None:

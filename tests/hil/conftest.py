@@ -27,6 +27,16 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize("rig_name", chosen, scope="session")
 
 
+@pytest.hookimpl(tryfirst=True)  # before -m is applied
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What is marked ``long`` is for the night on a rig that is slower than a board."""
+    for item in items:
+        params = item.callspec.params if hasattr(item, "callspec") else {}
+        slow = RIGS.get(params.get("rig_name"), {}).get("slow", False)
+        if slow and item.get_closest_marker("long") is not None:
+            item.add_marker("nightly")
+
+
 @pytest.fixture
 def rig(rig_name: str, request: pytest.FixtureRequest) -> Iterator[Rig]:
     """The board under test; whatever was opened on it is closed after the test."""

@@ -23,3 +23,14 @@ def test_slots_are_on_time_and_the_bus_rules_kept_while_five_fingers_stream(rig:
     assert seen["gap_us"] >= 5
     assert seen["interrupt_us"] < SLOT_US / 2
     assert counters["slept"] > 0.5
+
+
+def test_every_frames_arrival_is_told_and_none_comes_before_its_round_is_over(rig: Rig) -> None:
+    rig.need("counters")
+    hand = rig.open("press.toml?fingers=2&seconds=1")
+    frames = hand.read(10)
+    arrivals = hand.link.board.arrivals()  # type: ignore[attr-defined]
+    assert [(t_us, finger) for t_us, finger, _ in arrivals] == list(zip(frames["t_us"], frames["finger"], strict=True))
+    late_us = [us - (t_us + 43 * SLOT_US) for t_us, _, us in arrivals]  # after the command of the round's last slot
+    assert min(late_us) > 50  # what the sensor needs before it is read
+    assert max(late_us) < 10_000

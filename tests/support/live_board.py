@@ -43,14 +43,14 @@ class Firmware:
             return encode(answer.ID, answer.pack())
         return encode(wire.Reply.ID, wire.Reply(message.req_id, message_id, 0).pack())
 
-    def of(self, kind: type[Any]) -> list[Any]:
+    def of(self, kind: type[Any] | tuple[type[Any], ...]) -> list[Any]:
         """What it was told of a kind."""
         return [m for m in self.told if isinstance(m, kind)]
 
-    def wait_for(self, kind: type[Any], count: int = 1) -> None:
+    def wait_for(self, kind: type[Any] | tuple[type[Any], ...], count: int = 1) -> None:
         """Until it was told so many of a kind."""
         with self.heard:
-            assert self.heard.wait_for(lambda: len(self.of(kind)) >= count, 600), f"no {kind.__name__}: {self.told}"
+            assert self.heard.wait_for(lambda: len(self.of(kind)) >= count, 600), f"no {kind}: {self.told}"
 
 
 class Clock:

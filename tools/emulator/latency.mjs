@@ -13,6 +13,8 @@ const MARK_AT = SLOTS.findIndex((name) => name !== 'PAC') // the first slot that
 const MARK = command(SLOTS[MARK_AT])
 const LAST = command(SLOTS.findLast((name) => /^E\d+$/.test(name)))
 const T_US_AT = 3 // in a FRAME: id, seq, then the time of its first slot
+const FINGER_AT = T_US_AT + 4
+const HEAD_BYTES = FINGER_AT + 1
 const SAME_ROUND_US = 200 // t_us is read shortly before the command goes out
 const ROUNDS = 8 // that are remembered: no FRAME is later than that
 
@@ -34,6 +36,7 @@ export class Latency {
     this.rounds = [] // [device us of the first slot, of the last electrode]
     this.unfinished = []
     this.us = [] // one a FRAME
+    this.arrivals = [] // likewise [t_us, finger, device us with the host]
     this.askedUs = null // when bytes last went to the board
     this.replyUs = 0 // the longest
     this.unmatched = 0 // FRAMEs whose round was not seen on the bus
@@ -60,8 +63,8 @@ export class Latency {
         this.unfinished.push(byte)
         continue
       }
-      const start = head(this.unfinished, T_US_AT + 4)
-      if (start.length === T_US_AT + 4 && start[0] === FRAME_ID) this.#frame(start, nanos / 1000)
+      const start = head(this.unfinished, HEAD_BYTES)
+      if (start.length === HEAD_BYTES && start[0] === FRAME_ID) this.#frame(start, nanos / 1000)
       if (start[0] === REPLY_ID && this.askedUs !== null) {
         this.replyUs = Math.max(this.replyUs, nanos / 1000 - this.askedUs)
         this.askedUs = null
@@ -78,6 +81,7 @@ export class Latency {
 
   #frame(start, us) {
     const t_us = new DataView(start.buffer).getUint32(T_US_AT, true)
+    this.arrivals.push([t_us, start[FINGER_AT], us])
     const round = this.rounds.find(([first]) => Math.abs((first % 2 ** 32) - t_us) < SAME_ROUND_US)
     if (!round || round[1] === null) {
       this.unmatched++

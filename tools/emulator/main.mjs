@@ -9,6 +9,7 @@
 //   [@SECONDS] VERB   stop reading, go on reading, unplug, plug, cut power, write uf2 FILE: now, or at a time of the
 //                     sensors' world
 //   counters          answers "counters JSON"
+//   arrivals          answers "counters [[t_us, finger, device us when its last byte was with the host], ...]", one a FRAME
 //   until SECONDS JSON  answers likewise once the counters are those of JSON, or "never JSON" with what they are when
 //                     so much emulated time has passed or nothing will happen any more
 import fs from 'node:fs'
@@ -133,6 +134,8 @@ function line(words) {
     asked = true
   } else if (words === 'counters') {
     answer('counters')
+  } else if (words === 'arrivals') {
+    console.log(`counters ${JSON.stringify(rig.latency.arrivals)}`)
   } else if (words.startsWith('until ')) {
     const [, seconds, counters] = words.match(/^until ([0-9.]+) (.*)$/)
     awaited = { counters: JSON.parse(counters), nanos: rig.machine.nanos + Number(seconds) * 1e9 }

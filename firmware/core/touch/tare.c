@@ -251,10 +251,10 @@ static BT_NOINLINE void follow_drift(bt_tare *tare, unsigned i, uint32_t mean_q1
     if (watched_q16 == BT_TARE_UNKNOWN) {
         return;
     }
-    uint32_t moved_q16 = bt_baseline_follow(watched_q16, mean_q16, SLEW_Q16);
+    int32_t step_q16 = bt_watch_step_q16(&tare->watch, mean_q16, watched_q16);
+    uint32_t moved_q16 = bt_baseline_moved(watched_q16, step_q16);
     tare->watch.base.electrode_q16[i] = moved_q16;
     tare->sweep.settled_q3.lane[i] = (uint16_t)(moved_q16 >> 13); // or drift would look like motion
-    int32_t step_q16 = (int32_t)(moved_q16 - watched_q16);
     tare->base.electrode_q16[i] = bt_baseline_moved(tare->base.electrode_q16[i], step_q16);
     use_electrode(tare, i);
 }
@@ -329,7 +329,7 @@ static BT_NOINLINE void count_hit(bt_tare *tare)
     }
     tare->let_go = false;
     if (tare->state == BT_TARE_STATE_DOUBT) {
-        bt_watch_begin(&tare->watch);
+        bt_watch_pause(&tare->watch);
         enter_contact(tare); // against the tare that was in doubt
         return;
     }
@@ -430,10 +430,8 @@ static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
         tare->watch.wait_sweeps--;
     }
     bool due = tare->watch.wait_sweeps == 1 && rests;
-    if (due
-        || (tare->sweep.still_sweeps == WATCH_SWEEPS
-            && !bt_watch_is_near(&tare->watch, &tare->sweep, SPAN_Q3))) {
-        bt_watch_take(&tare->watch, &tare->sweep, tare->gate.unknown);
+    if (due || tare->sweep.still_sweeps == WATCH_SWEEPS) {
+        bt_watch_return(&tare->watch, &tare->sweep, tare->gate.unknown, SPAN_Q3);
     }
     if (!tare->partial) { // sums over electrodes that were not all served in one state say nothing
         judge_release(tare);

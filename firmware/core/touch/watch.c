@@ -4,17 +4,35 @@
 
 #include <stddef.h>
 
-#define LEVEL_Q3     16 // two counts: four sigmas; a load of 0.02 N/s is past it in one second
-#define LEVEL_SWEEPS 32 // 2.6 s
-#define JUMP_SWEEPS  6  // a level that was left so soon is a load's doing
-#define WAIT_SWEEPS  5  // until means say nothing of before
-#define ONE_WAY_Q2   26 // thirteen electrodes one way for six the other: three sigmas of noise
+#define LEVEL_Q3     16        // two counts: four sigmas; a load of 0.02 N/s is past it in one second
+#define LEVEL_SWEEPS 32        // 2.6 s
+#define WAIT_SWEEPS  5         // until means say nothing of before
+#define ONE_WAY_Q2   26        // thirteen electrodes one way for six the other: three sigmas of noise
+#define SLEW_Q16     (8 * 328) // a sweep; 0.5 count/s, as at rest
+#define EACH_Q16     (8192 / BT_ELECTRODES) // of a sum over all electrodes in 1/8 count
 
-void bt_watch_begin(bt_watch *watch)
+_Static_assert((int64_t)BT_ELECTRODES * BT_SWEEP_UNREAD_Q3 * EACH_Q16 <= INT32_MAX,
+               "a sum of distances must fit its type");
+
+void bt_watch_pause(bt_watch *watch)
 {
     watch->wait_sweeps = WAIT_SWEEPS;
     watch->drifts = false;
     watch->one_way_q2 = 0;
+}
+
+void bt_watch_begin(bt_watch *watch)
+{
+    bt_watch_pause(watch);
+    watch->base.electrode_q16[0] = BT_TARE_UNKNOWN; // nothing is near to that
+}
+
+int32_t bt_watch_step_q16(const bt_watch *watch, uint32_t mean_q16, uint32_t base_q16)
+{
+    int32_t step_q16 = watch->step_q16;
+    bool lags = step_q16 > 0 ? mean_q16 > base_q16 : mean_q16 < base_q16;
+    int32_t quarter_q16 = bt_shift_down(step_q16, 2);
+    return step_q16 + (lags ? quarter_q16 : -quarter_q16);
 }
 
 void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
@@ -30,31 +48,45 @@ void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
     }
 }
 
-bool bt_watch_is_near(const bt_watch *watch, const bt_sweep *sweep, int span_q3)
+void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, int span_q3)
 {
+    int32_t sum_q3 = 0;
+    int32_t farthest_q3 = 0;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        int away_q3 = sweep->mean_q3.lane[i] - (int)(watch->base.electrode_q16[i] >> 13);
-        if (away_q3 > span_q3 || away_q3 < -span_q3) {
-            return false;
-        }
+        int32_t away_q3 = sweep->mean_q3.lane[i] - (int32_t)(watch->base.electrode_q16[i] >> 13);
+        int32_t far_q3 = away_q3 < 0 ? -away_q3 : away_q3;
+        farthest_q3 = far_q3 > farthest_q3 ? far_q3 : farthest_q3;
+        sum_q3 += away_q3;
     }
-    return true;
+    watch->wait_sweeps = 0;
+    if (farthest_q3 <= span_q3) {
+        return;
+    }
+    bt_watch_take(watch, sweep, unknown);
+    for (unsigned i = 0; i < BT_ELECTRODES && farthest_q3 <= 2 * span_q3; i++) {
+        watch->base.electrode_q16[i] = bt_baseline_moved(watch->base.electrode_q16[i], -sum_q3 * EACH_Q16);
+    }
 }
 
 void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
 {
     int change_q3 = pressure_mean_q3 == NULL ? LEVEL_Q3 + 1 : *pressure_mean_q3 - watch->level_q3;
     if (change_q3 > LEVEL_Q3 || change_q3 < -LEVEL_Q3) {
+        // Skin creeps: what took so long to move by so little goes on as level.
+        watch->slow = pressure_mean_q3 != NULL && watch->level_sweeps >= LEVEL_SWEEPS;
         watch->level_q3 = pressure_mean_q3 == NULL ? 0 : *pressure_mean_q3;
-        if (watch->level_sweeps < JUMP_SWEEPS) {
+        watch->level_sweeps = 0;
+        if (!watch->slow) {
             bt_watch_begin(watch);
         }
-        watch->level_sweeps = 0;
     } else if (watch->level_sweeps < UINT8_MAX) {
         watch->level_sweeps++;
     }
     watch->one_way_q2 = (int16_t)(watch->one_way_q2 + watch->side - bt_shift_down(watch->one_way_q2, 2));
     bool one_way = watch->one_way_q2 >= ONE_WAY_Q2 || watch->one_way_q2 <= -ONE_WAY_Q2;
-    watch->drifts = one_way && watch->level_sweeps >= LEVEL_SWEEPS;
+    watch->drifts = one_way && (watch->slow || watch->level_sweeps >= LEVEL_SWEEPS);
+    int32_t step_q16 = watch->away_q3 * EACH_Q16;
+    watch->step_q16 = step_q16 > SLEW_Q16 ? SLEW_Q16 : step_q16 < -SLEW_Q16 ? -SLEW_Q16 : step_q16;
     watch->side = 0;
+    watch->away_q3 = 0;
 }

@@ -3,7 +3,8 @@
 //
 // A load moves the static pressure, and presses some electrodes while others bulge. Drift moves nearly all
 // electrodes one way while the pressure stays level. So a tare may follow what is drift by that word, even
-// under a load; without pressure nothing is followed.
+// under a load; without pressure nothing is followed. What is followed is what all electrodes share: a real
+// sensor's drift is one rate, times .82 to 1.16 for each of them.
 //
 // Units: counts in 1/65536 (q16) and 1/8 (q3); time in sweeps of 80 ms.
 #ifndef BIOTAC_WATCH_H
@@ -17,29 +18,43 @@ typedef struct {
     uint8_t wait_sweeps;  // until what is read now is that; 0 once it was
     uint16_t level_q3;    // the pressure's mean when it last moved
     uint8_t level_sweeps; // for which it has stayed near that; saturates
+    bool slow;            // and it had stayed long before it moved
     int8_t side;        // electrodes whose mean of this sweep is above the watched baseline, less those below
     int16_t one_way_q2; // the same through a low-pass of four sweeps
+    int32_t away_q3;    // sum of the distances of this sweep's means from the watched baseline
+    int32_t step_q16;   // what the coming sweep adds to each electrode that is followed
     bool drifts;        // the last whole sweep says: what moves is drift
 } bt_watch;
 
 // A contact begins, or the load changes: what was watched before says nothing.
 void bt_watch_begin(bt_watch *watch);
 
+// A touch that may prove none: what was watched holds on, if the signals come back to it.
+void bt_watch_pause(bt_watch *watch);
+
 // The signals have come to rest: their means are the baseline. Lanes in `unknown` have none.
 void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown);
 
-// The means are within span_q3 of the baseline: a glitch or a knock is over, and what has drifted is not
-// lost.
-bool bt_watch_is_near(const bt_watch *watch, const bt_sweep *sweep, int span_q3);
+// The same, of signals that may have come back to where they were: within span_q3 of it nothing changes, and
+// what has drifted is not lost; within twice that skin has crept, and what all electrodes share is still to
+// be followed.
+void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, int span_q3);
 
 // After a sweep; pressure_mean_q3 is NULL without a good pressure word in it.
 void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3);
+
+// An electrode's step of drift: a quarter more than all have where it lags behind them, else a quarter less.
+int32_t bt_watch_step_q16(const bt_watch *watch, uint32_t mean_q16, uint32_t base_q16);
 
 #ifndef BT_CDEF
 // An electrode's mean of this sweep, against the baseline that it is to be compared with.
 static inline void bt_watch_side(bt_watch *watch, uint32_t mean_q16, uint32_t base_q16)
 {
+    if (base_q16 == BT_TARE_UNKNOWN) {
+        return;
+    }
     watch->side = (int8_t)(watch->side + (mean_q16 > base_q16) - (mean_q16 < base_q16));
+    watch->away_q3 += (int32_t)(mean_q16 >> 13) - (int32_t)(base_q16 >> 13);
 }
 #endif
 

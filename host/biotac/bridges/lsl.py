@@ -21,16 +21,17 @@ from numpy.typing import NDArray
 from ..clock import electrode_t_us, pac_t_us
 from ..clock.stamps import Stamps
 from ..errors import InputError
-from ..export.columns import COLUMNS, PAC_COLUMNS, Column
+from ..export.columns import COLUMNS, PAC_COLUMNS
 from ..hand.hand import Hand
 from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch
+from ..wire.fields import Field
 from ..wire.frames import StructArray
 from ..wire.identity import serial_text
 from ..wire.sensor_gen import SLOTS
 
 TYPE = "Tactile"
-_SENT = ("force_n", "torque_nm", "poc_m", "flags", "counts", "pdc", "tac", "tdc")
+_SENT = ("force_n", "torque_nmm", "poc_mm", "flags", "counts", "pdc", "tac", "tdc")
 _FRAME_COLUMNS = tuple(column for name in _SENT for column in COLUMNS if column.name == name)
 _PAC_COLUMN = PAC_COLUMNS[-1]
 _PAC_PER_ROUND = len(_PAC_COLUMN.parts)
@@ -39,9 +40,9 @@ _PAC_PER_ROUND = len(_PAC_COLUMN.parts)
 class Outlet:
     """Two streams for each finger of ``hand``; use as a context manager, and push every batch.
 
-    ``BioTac finger0``: a sample a round, 100 a second, of force (N), torque (N*m), point of contact (m), flags, counts
-    of E1..E19, PDC, TAC and TDC; NaN and 65535 where invalid, as in exports. ``BioTac finger0 PAC``: 2200 a second,
-    counts. All are double64; labels, units and meanings stand in the streams' descriptions.
+    ``BioTac finger0``: a sample a round, 100 a second, of force (N), torque (N*mm), point of contact (mm), flags,
+    counts of E1..E19, PDC, TAC and TDC; NaN and 65535 where invalid, as in exports. ``BioTac finger0 PAC``: 2200 a
+    second, counts. All are double64; labels, units and meanings stand in the streams' descriptions.
 
     Stamps are device times on ``local_clock()``, by ``hand.clock``: of a frame the beginning of its round, of PAC
     each sample's own. Where the clock knows nothing (a simulated board's time is none), a batch is stamped by its
@@ -87,7 +88,7 @@ class Outlet:
     ) -> None:
         self.close()
 
-    def _add(self, finger: int, suffix: str, columns: tuple[Column, ...], rate_hz: float) -> None:
+    def _add(self, finger: int, suffix: str, columns: tuple[Field, ...], rate_hz: float) -> None:
         lsl = self._lsl
         labels = [c for column in columns for c in channels(column)] if not suffix else [("PAC", columns[0])]
         source = f"biotac-{serial_text(self._hand.info)}-{finger}{suffix.replace(' ', '-')}"
@@ -104,7 +105,7 @@ class Outlet:
         self._outlets[finger, suffix] = lsl.StreamOutlet(info)
 
     def _push(self, finger: int, suffix: str, values: NDArray[Any], t_us: NDArray[np.float64]) -> None:
-        stamps_s = self._stamps.of(t_us)
+        stamps_s = self._stamps.of(t_us, (finger, suffix))
         self._outlets[finger, suffix].push_chunk(values.astype(np.float64), stamps_s.tolist())
 
     @property
@@ -114,14 +115,13 @@ class Outlet:
 
 
 def samples(frames: StructArray) -> NDArray[np.float64]:
-    """FRAME_DTYPE (n,) as the rows (n, 31) of a frame stream, SI units."""
-    si = {"torque_nm": frames["torque_nmm"] / 1e3, "poc_m": frames["poc_mm"] / 1e3}
-    return np.column_stack([si[name] if name in si else frames[name].astype(np.float64) for name in _SENT])
+    """FRAME_DTYPE (n,) as the rows (n, 31) of a frame stream."""
+    return np.column_stack([frames[name].astype(np.float64) for name in _SENT])
 
 
-def channels(column: Column) -> list[tuple[str, Column]]:
+def channels(column: Field) -> list[tuple[str, Field]]:
     """Label and column of each component, named as in flat exports."""
-    return [(f"{column.name}_{part}", column) for part in column.parts] or [(column.name, column)]
+    return [(name, column) for name in column.flat_names()]
 
 
 def describe(hand: Hand, finger: int) -> dict[str, str]:

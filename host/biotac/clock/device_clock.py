@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +39,7 @@ class DeviceClock:
         self.quickest_round_trip_s = math.inf
         self._promised_delay_s = promised_delay_s
         self._because = ""
+        self._lock = threading.RLock()  # one thread reads, others ask
 
     # ---- observations ----------------------------------------------------------------------------
 
@@ -46,18 +48,20 @@ class DeviceClock:
 
         Of a chunk the newest message is enough. Of a round's messages take t_us + LAST_SAMPLE_US.
         """
-        self._segment(t_us, -math.inf, host_s).arrive(t_us, host_s)
-        if self.segments[-1].contradicted:
-            self._begin(t_us, host_s, "no course of the clocks agrees with what was observed")
-            self.segments[-1].arrive(t_us, host_s)
+        with self._lock:
+            self._segment(t_us, -math.inf, host_s).arrive(t_us, host_s)
+            if self.segments[-1].contradicted:
+                self._begin(t_us, host_s, "no course of the clocks agrees with what was observed")
+                self.segments[-1].arrive(t_us, host_s)
 
     def round_trip(self, sent_s: float, t_us: int, received_s: float) -> None:
         """A question sent at ``sent_s`` was answered at device time ``t_us``; the answer was here at ``received_s``."""
         if not sent_s <= received_s:
             raise ValueError(f"received_s is {received_s}, before sent_s {sent_s}; both are of one steady clock")
-        self._segment(t_us, sent_s, received_s).send(t_us, sent_s)
-        self.quickest_round_trip_s = min(self.quickest_round_trip_s, received_s - sent_s)
-        self.arrived(t_us, received_s)
+        with self._lock:
+            self._segment(t_us, sent_s, received_s).send(t_us, sent_s)
+            self.quickest_round_trip_s = min(self.quickest_round_trip_s, received_s - sent_s)
+            self.arrived(t_us, received_s)
 
     def restart(self, because: str = "the board restarted") -> None:
         """What comes next is of another run of the device, as after another boot_id."""
@@ -105,15 +109,22 @@ class DeviceClock:
             raise ValueError("unix_offset_s is not set; it is time.time() - time.monotonic()")
         return self.host_time_s(t_us, segment=segment) + self.unix_offset_s
 
+    def estimate_s(self, t_us: float) -> float:
+        """About the host time of one device time, at no cost; NaN while nothing is known."""
+        with self._lock:
+            return self.segments[-1].estimate_s(t_us) if self.segments else math.nan
+
     def now(self) -> Fit:
         """Offset and drift at the newest device time; ``known`` is false while nothing is."""
-        if not self.segments:
-            return Fit(math.nan)
-        return self.segments[-1].fit(self.segments[-1].last_t_us)
+        with self._lock:
+            if not self.segments:
+                return Fit(math.nan)
+            return self.segments[-1].fit(self.segments[-1].last_t_us)
 
     def _times(self, t_us: ArrayLike, segment: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         at = np.asarray(t_us, np.float64)
         if not self.segments:
             return np.full(at.shape, np.nan), np.full(at.shape, np.inf)
-        host_s, bound_s = self.segments[segment].times(at.ravel())
+        with self._lock:
+            host_s, bound_s = self.segments[segment].times(at.ravel())
         return host_s.reshape(at.shape), bound_s.reshape(at.shape)

@@ -161,6 +161,11 @@ class Segment:
             self._fresh[t_us] = self._fit(t_us)
         return self._fresh[t_us]
 
+    def estimate_s(self, t_us: float) -> float:
+        """Along the line of a second ago at most; NaN while nothing is known."""
+        fit = self._latest if self._latest.known else self.fit(self.last_t_us)
+        return fit.host_s + (t_us - fit.t_us) / 1e6 * (1.0 - fit.drift_ppm / 1e6) if fit.known else math.nan
+
     def times(self, t_us: Array) -> tuple[Array, Array]:
         """Host times and their bounds at ``t_us`` (n,); NaN and infinity where nothing is known.
 

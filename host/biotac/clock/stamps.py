@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Protocol
 
 import numpy as np
@@ -32,12 +33,15 @@ class Stamps:
     """Stamps for what ``board`` streams, in seconds of the clock that ``now_s`` reads.
 
     By ``board.clock``, which ``keep`` feeds. Where that knows nothing, as of a simulated board, whose time is no
-    clock, what is stamped together is stamped by its arrival; ``by_arrival`` counts.
+    clock, what is stamped together is stamped by its arrival; ``by_arrival`` counts. The stamps of one ``stream``
+    never step back, unless the clock itself does: where an estimate is earlier than the one before, it waits.
     """
 
     def __init__(self, board: Board, now_s: Callable[[], float]) -> None:
         self._board = board
         self._now_s = now_s
+        self._asked_of_s = -math.inf
+        self._last_s: dict[Hashable, float] = {}  # by stream
         self.by_arrival = 0
         board.sync()
         self._asked_s = time.monotonic()
@@ -49,11 +53,22 @@ class Stamps:
             self._board.sync(1)
             self._asked_s = time.monotonic()
 
-    def of(self, t_us: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of(self, t_us: NDArray[np.float64], stream: Hashable = None) -> NDArray[np.float64]:
         """Stamps (n,) in s of unwrapped device times (n,) in us that came together; the last is the newest."""
+        if not len(t_us):
+            return np.empty(0)
+        stamps_s: NDArray[np.float64] = np.maximum(self._estimated(t_us), self._last_s.get(stream, -math.inf))
+        np.maximum.accumulate(stamps_s, out=stamps_s)
+        self._last_s[stream] = float(stamps_s[-1])
+        return stamps_s
+
+    def _estimated(self, t_us: NDArray[np.float64]) -> NDArray[np.float64]:
         # The two clocks may be stepped against each other at any time: the offset is taken anew.
         before_s = time.monotonic()
         now_s = self._now_s()
+        if now_s < self._asked_of_s:
+            self._last_s.clear()  # it was set back
+        self._asked_of_s = now_s
         offset_s = now_s - (before_s + time.monotonic()) / 2
         stamps_s: NDArray[np.float64] = self._board.clock.host_time_s(t_us) + offset_s
         if np.isfinite(stamps_s).all():

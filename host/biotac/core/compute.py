@@ -38,7 +38,7 @@ _one_frame = lib.bt_one_frame
 
 def compute(
     counts: Any,
-    tare: Any,
+    tare: Any = None,
     settings: Settings | None = None,
     out: StructArray | None = None,
     *,
@@ -50,8 +50,9 @@ def compute(
     ``counts`` are integers 0..4095, 0xFFFF where missing, which weighs nothing; uint16 is read in place,
     also from a field of a structured array. ``tare`` is (19,) or of the shape of ``counts``, 0..4095
     counts, rounded to 1/16 count as the board does. ``settings`` are those of a board; what they do not
-    name has its default. ``out``, a contiguous RESULT_DTYPE array of the result's shape, is filled and
-    returned: a buffer that was used before spares the page faults of a new one.
+    name has its default, and what is no biotac.Setting is refused with ValueError. ``out``, a contiguous
+    RESULT_DTYPE array of the result's shape, is filled and returned: a buffer that was used before spares the page
+    faults of a new one.
 
     ``wrench_map``, or its blob, gives the force in place of the gains, and the torque where it has six
     axes; else torque x is made of its force. The result, and ``out``, are MAPPED_RESULT_DTYPE then: with
@@ -59,10 +60,15 @@ def compute(
     one number, in counts, NaN where missing, is what it may need. Raises InputError for a blob that a board
     would refuse.
 
+    ``compute(rows)``, with rows of FRAME_DTYPE as ``load`` and ``Hand.read`` give them, takes counts, tare and pressure
+    from them; an electrode whose tare is unknown weighs nothing.
+
     NaN where there is no answer: poc_mm and torque_nmm x if nothing weighs. Where the board rounds to
     its wire units this does not, and it never saturates. Raises ValueError for other shapes, types and
     ranges, with the first bad row, what was seen and what was expected; ``out`` then holds no results.
     """
+    if tare is None:
+        counts, tare, pdc_above_rest = _of_rows(counts, pdc_above_rest)
     if wrench_map is not None:
         from .map_float64 import by_map  # here: everybody would wait for it at `import biotac`
 
@@ -100,6 +106,19 @@ def compute(
     return out
 
 
+def _of_rows(rows: Any, pdc_above_rest: Any) -> tuple[NDArray[np.uint16], NDArray[np.float64], Any]:
+    """Counts (n, 19), tare (n, 19) and pressure above rest (n,) of rows that have them."""
+    names = getattr(getattr(rows, "dtype", None), "names", None) or ()
+    if "counts" not in names or "tare" not in names:
+        raise ValueError("no tare: expected compute(counts, tare), or compute(rows) with fields counts and tare")
+    unknown = np.isnan(rows["tare"])
+    counts = np.where(unknown, np.uint16(wire.INVALID_COUNT), rows["counts"])
+    tare = np.where(unknown, 0.0, rows["tare"]).astype(np.float64)
+    if pdc_above_rest is None and {"pdc", "pdc_tare"} <= set(names):
+        pdc_above_rest = np.where(rows["pdc"] == wire.INVALID_COUNT, np.nan, rows["pdc"] - rows["pdc_tare"])
+    return counts, tare, pdc_above_rest
+
+
 def per_frame(tare: Any, settings: Settings | None = None) -> Callable[[NDArray[np.uint16]], StructArray]:
     """compute() for a live stream: a function from one frame's counts, uint16 (19,), to its results.
 
@@ -131,6 +150,9 @@ _DEFAULTS = default_settings()
 
 
 def _plan(settings: Settings) -> Any:
+    for key in settings:
+        if key not in _DEFAULTS:
+            raise ValueError(f"settings have {key!r}, expected members of biotac.Setting, such as FORCE_GAIN_Z_NN")
     return _plan_of(tuple(int(settings.get(key, _DEFAULTS[key])) for key in _PLAN_SETTINGS))
 
 

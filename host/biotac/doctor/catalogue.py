@@ -129,6 +129,20 @@ CATALOGUE: dict[str, Entry] = {
         "A sensor that answered at first gave no data, or stopped: a loose plug, or a supply that gives way.",
         "Reseat the flex connector; measure V+ at the sensor while all are running.",
     ),
+    "sensor_unsure": Entry(
+        W,
+        "A sensor was away while the board streamed, and has not said its serial number since: tare, calibration and "
+        "map may be another sensor's. Results go on as before, with the flag SENSOR_UNSURE.",
+        "Reseat the flex connector, and take the strain off its cable. If it never says who it is, see words_error and "
+        "words_parity, and plug it in again.",
+    ),
+    "sensor_other": Entry(
+        E,
+        "Another sensor answers than when the stream began. It has a tare of its own, and no results where it has not "
+        "the same calibration and map; the flag SENSOR_OTHER says so.",
+        "If you changed it: open the board again, and give this sensor its own calibration and map. If not, look for a "
+        "wire of SS that goes to two sensors, or to another one than you think.",
+    ),
     "same_serial": Entry(
         E,
         "Two fingers give the same serial number: one sensor listens to two chip selects, or two are shorted.",

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
+from ..wire import messages_gen as wire
 from ..wire.identity import ascii_text
 from .catalogue import Finding
 from .facts import BoardFacts, Facts
 
 
 def check(facts: Facts) -> Iterator[Finding]:
-    """Absent, fewer than expected, lost on the way, of one serial number, of different versions."""
+    """Absent, fewer than expected, lost or changed on the way, of one serial number, of different versions."""
     board = facts.board
     if board is None:
         return
@@ -22,6 +25,7 @@ def check(facts: Facts) -> Iterator[Finding]:
         there = ", ".join(map(str, board.present))
         yield Finding("sensor_missing", f"{len(board.present)} of {expected} sensors answer: finger {there}")
     yield from _lost(board)
+    yield from _changed(board)
     yield from _serials(board)
 
 
@@ -32,6 +36,20 @@ def _lost(board: BoardFacts) -> Iterator[Finding]:
             yield Finding("sensor_lost", f"finger {finger} sent no frame")
         elif not board.after.fingers_present >> finger & 1:
             yield Finding("sensor_lost", f"finger {finger} stopped answering")
+
+
+def _changed(board: BoardFacts) -> Iterator[Finding]:
+    for finger in board.present:
+        rows = [some[some["finger"] == finger] for some in (board.frames, board.idle)]
+        t_us = np.concatenate([some["t_us"] for some in rows])
+        flags = np.concatenate([some["flags"] for some in rows])[np.argsort(t_us, kind="stable")]
+        unsure = flags & wire.FrameFlags.SENSOR_UNSURE != 0
+        other = flags & wire.FrameFlags.SENSOR_OTHER != 0
+        if other.any():
+            yield Finding("sensor_other", f"finger {finger}: another sensor answers than when the stream began")
+        elif unsure[-1:].any():  # one that has said who it is by now is told by the words that were lost
+            seen = f"finger {finger} was away and has not said who it is since"
+            yield Finding("sensor_unsure", f"{seen}: {unsure.sum()} of {len(flags)} messages are unsure")
 
 
 def _serials(board: BoardFacts) -> Iterator[Finding]:

@@ -1,12 +1,12 @@
 """Recordings as files for other programs, one format a module.
 
-SI units (m, N, N*m, s), a frame_id per finger, invalid results as NaN, flags beside them; the columns stand
-in columns.py and in host/docs/recording.md.
+The rows' own names and units, a frame_id per finger, flags beside them, invalid values as the format has them; the
+columns stand in wire/fields.py and in host/docs/rows.md. A ROS 2 bag has its own messages and SI units.
 """
 
 from __future__ import annotations
 
-from .columns import COLUMNS, PAC_COLUMNS, Column, Table, tables
+from .columns import COLUMNS, PAC_COLUMNS, Table, tables
 from .formats import FORMATS, export
 
-__all__ = ["COLUMNS", "FORMATS", "PAC_COLUMNS", "Column", "Table", "export", "tables"]
+__all__ = ["COLUMNS", "FORMATS", "PAC_COLUMNS", "Table", "export", "tables"]

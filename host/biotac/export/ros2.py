@@ -51,8 +51,12 @@ class _Topics:
             name: (bag.add_connection(f"/biotac/finger{table.finger}/{name}", kind, typestore=self._store), kind)
             for name, kind in kinds.items()
         }
-        columns = ("stamp_ns", *(("force_n", "torque_nm", "poc_m", "flags") if table.kind == "frames" else ()))
-        self._lists = {name: table.arrays[name].tolist() for name in columns}
+        columns = ("stamp_ns", *(("force_n", "torque_nmm", "poc_mm", "flags") if table.kind == "frames" else ()))
+        # as REP 103 has it: m and N*m
+        self._lists = {
+            name: (table.arrays[name] / 1000 if name.endswith("mm") else table.arrays[name]).tolist()
+            for name in columns
+        }
         slow = [table.arrays[name] for name in ("pdc", "tac", "tdc")] if table.kind == "frames" else []
         self._counts = np.column_stack([table.arrays["counts" if slow else "pac"], *slow]).astype(np.uint16)
 
@@ -68,11 +72,11 @@ class _Topics:
             self._table.frame_id,
         )
         force, torque = (
-            self._make("geometry_msgs/msg/Vector3", *self._lists[n][row]) for n in ("force_n", "torque_nm")
+            self._make("geometry_msgs/msg/Vector3", *self._lists[n][row]) for n in ("force_n", "torque_nmm")
         )
         wrench = self._make("geometry_msgs/msg/Wrench", force, torque)
         self._write("wrench", stamp_ns, self._make("geometry_msgs/msg/WrenchStamped", header, wrench))
-        point = self._make("geometry_msgs/msg/Point", *self._lists["poc_m"][row])
+        point = self._make("geometry_msgs/msg/Point", *self._lists["poc_mm"][row])
         self._write("poc", stamp_ns, self._make("geometry_msgs/msg/PointStamped", header, point))
         self._write("flags", stamp_ns, self._make("std_msgs/msg/UInt32", self._lists["flags"][row]))
         self._write("counts", stamp_ns, self._array(row))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
+from ..documents import read_json
 from ..errors import CommandRefusedError, InputError
 from ..hand.commands import CALIBRATION_SINCE_MINOR, MAP_SINCE_MINOR
 from ..hand.hand import Hand
@@ -91,7 +92,7 @@ def save(hand: Hand, path: Path | None) -> Backup:
 def read_backup(path: Path) -> Backup:
     """Read what save() wrote."""
     try:
-        facts = json.loads(path.read_text(encoding="utf-8"))
+        facts = read_json(path)
         if facts["format"] != FORMAT:
             raise ValueError(f"its format is {facts['format']!r}")
         values = {int(one["id"]): int(one["value"]) for one in facts["settings"]}
@@ -101,7 +102,7 @@ def read_backup(path: Path) -> Backup:
         raise InputError(
             f"{path} cannot be read ({error.strerror}); expected a file written by biotac flash"
         ) from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise InputError(f"{path} holds no settings ({error}); expected a file written by biotac flash") from error
     return Backup(path.resolve(), values, calibrations, maps)
 

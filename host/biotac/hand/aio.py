@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import asyncio
 import os
+import threading
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import suppress
 from types import TracebackType
-from typing import TypeVar
+from typing import NoReturn, TypeVar
 
 from ..errors import DeviceLostError
 from ..wire.batches import Batch, LinkStats
@@ -30,8 +31,30 @@ class AsyncHand:
         self._hand: Hand | None = None
 
     async def __aenter__(self) -> AsyncHand:
-        self._hand = await asyncio.to_thread(self._opener)
+        given_up = False
+        taking = threading.Lock()
+
+        def open_it() -> None:
+            hand = self._opener()
+            with taking:
+                if not given_up:
+                    self._hand = hand
+                    return
+            hand.close()
+
+        try:
+            await asyncio.to_thread(open_it)
+        except asyncio.CancelledError:
+            # The other thread cannot be interrupted; what it opens yet is nobody's.
+            with taking:
+                given_up, hand, self._hand = True, self._hand, None
+            if hand is not None:
+                hand.close()
+            raise
         return self
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(f"{self!r} is of this process and cannot be sent to another; open the board there")
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import cycle
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from ..clock import LAST_SAMPLE_US, Arrivals, DeviceClock
 from ..clock.host_clock import HostClock, SystemClock
@@ -25,6 +25,9 @@ from .handshake import handshake
 
 REPLY_TIMEOUT_S = 1.0
 REPLY_TRIES = 3
+UNANSWERED = 8  # questions for the time that are remembered
+# How long a link is waited for at most before other things are looked at, such as whether all is to end.
+POLL_S = 0.2
 
 Got = TypeVar("Got")
 Reply = TypeVar("Reply")
@@ -51,16 +54,19 @@ class Board:
         self.lost: Callable[[DeviceLostError, Reason], None] = self._lost
         #: Whether the caller's thread reads the link; others wait for what it reads.
         self.is_read_here: Callable[[], bool] = lambda: True
+        self.is_pulled = True  #: no thread reads by itself
         self.connected = True  #: it can be talked to; false while it is looked for
         self.closing = threading.Event()  #: set when everything is to come to its end
         self.closed = False
-        self.failure: BaseException | None = None  #: what the thread that reads has died of
+        self._failure: BaseException | None = None
+        self._told = False
         self.trouble: Exception | None = None  #: what ended a recording, until it is told
         self.awaiting = 0  #: replies
         self.gap: Gap | None = None  #: to go with the next rows
         self._gaps = self._bytes = self._frames = 0
         self._past: list[LinkStats] = []  # of decoders before a reboot
         self._arrivals = Arrivals(self.clock)
+        self._time_asked: dict[int, float] = {}  # when each request left that has no answer yet
         self._replies: deque[Any] = deque()
         self._lasting: dict[tuple[str, int], Callable[[], object]] = {}
         self._req_ids = cycle(range(1, 256))
@@ -108,18 +114,70 @@ class Board:
         return decoder
 
     def _lost(self, error: DeviceLostError, reason: Reason) -> None:
+        self.fail(error)
+        self._told = self.is_pulled  # else it is a thread of ours that is told
         raise error
 
+    @property
+    def failure(self) -> BaseException | None:
+        """What has ended all reading for good."""
+        return self._failure
+
+    def fail(self, error: BaseException) -> None:
+        """It is over: every call from now on raises ``error``, the first of several."""
+        self._failure = self._failure or error
+        self.connected = False
+        self.notify()
+
+    def check(self) -> None:
+        """Raise what it has failed of, if it has."""
+        if self._failure is not None:
+            self._told = True
+            raise self._failure
+
+    def report(self) -> None:
+        """The same, unless somebody was told already."""
+        if not self._told:
+            self.check()
+
+    def is_away(self) -> bool:
+        """It is being looked for; raises what it has failed of."""
+        self.check()
+        return not (self.connected or self.closed)
+
+    def is_closed(self) -> NoReturn:
+        """Raise that, or what it has failed of."""
+        self.check()
+        raise DeviceLostError(f"this Hand on {self.link.port} was closed; open the port again")
+
     def close(self) -> None:
-        """Give the port back."""
-        self.closed = True
-        self.link.close()
+        """Give the port back, once nobody reads it any more."""
+        self.closing.set()
+        with self._reading:
+            self.closed = True
+            self.connected = False
+            self.link.close()
+
+    def forked(self) -> None:
+        """This process is a child of the one that opened the board, which alone may use it."""
+        # Whoever held these locks is in the other process.
+        self._reading, self._writing, self._asking = threading.RLock(), threading.Lock(), threading.RLock()
+        self._changed, self.closing = threading.Condition(), threading.Event()
+        self.closing.set()
+        self.closed, self.connected, self.record = True, False, None
+        self._failure = DeviceLostError(
+            f"this Hand on {self.link.port} belongs to the process that opened it, not to a fork of it; open boards "
+            "in the process that reads them"
+        )
+        self.link.abandon()
 
     # ---- reading -------------------------------------------------------------------------------
 
     def read(self, timeout_s: float) -> bool:
         """Read once; False when nothing came within timeout_s. Raises what ``lost`` raises."""
         with self._reading:
+            if self.closed:
+                self.is_closed()
             decoder, fd = self._decoder, self.link.fd
             try:
                 if fd is None:
@@ -171,6 +229,8 @@ class Board:
             return
         if self.gap is not None:
             self._end_gap(self.gap, batch)
+        if self._time_asked and batch.messages:
+            self._time_told(batch, arrived_s)
         if self.awaiting:
             self._replies.extend(batch.messages)
         self.deliver(batch)
@@ -187,6 +247,22 @@ class Board:
         self._gaps += 1
         batch.messages.insert(0, gap)
         self.record_gap(gap)
+
+    # ---- its time ------------------------------------------------------------------------------
+
+    def ask_time(self) -> None:
+        """Ask what time it is, and go on: the answer goes to ``clock``, and nowhere else."""
+        req_id = next(self._req_ids)
+        if len(self._time_asked) >= UNANSWERED:
+            self._time_asked = {}  # it does not answer, or restarted
+        self._time_asked[req_id] = time.monotonic()
+        self._write(wire.GetStatus(req_id))
+
+    def _time_told(self, batch: Batch, arrived_s: float) -> None:
+        for answer in [m for m in batch.messages if isinstance(m, wire.Status) and m.req_id in self._time_asked]:
+            sent_s = self._time_asked.pop(answer.req_id)
+            batch.messages.remove(answer)
+            self.clock.round_trip(sent_s, self._decoder.unwrap_t_us(answer.t_us), max(sent_s, arrived_s))
 
     # ---- waiting -------------------------------------------------------------------------------
 
@@ -210,7 +286,8 @@ class Board:
             left_s = 1.0
             while (got := done()) is None and left_s > 0:
                 left_s = deadline_s - time.monotonic()
-                self.read(max(0.0, left_s))  # once more when time is over: it may be this side that was late
+                # Once more when time is over: it may be this side that was late.
+                self.read(max(0.0, min(left_s, POLL_S)))
             return got
         found: list[Got] = []
 
@@ -218,11 +295,11 @@ class Board:
             got = done()
             if got is not None:
                 found.append(got)
-            return bool(found) or self.failure is not None or not self.connected or self.closing.is_set()
+            return bool(found) or not self.connected or self.closing.is_set()
 
         self.wait_for(so, max(0.0, deadline_s - time.monotonic()))
-        if not found and self.failure is not None:
-            raise self.failure
+        if not found:
+            self.check()
         return found[0] if found else None
 
     # ---- commands ------------------------------------------------------------------------------
@@ -233,7 +310,7 @@ class Board:
 
     def _write(self, message: Any) -> None:
         if self.closed:
-            raise DeviceLostError(f"this Hand on {self.link.port} was closed; open the port again")
+            self.is_closed()
         try:
             payload = message.pack()
         except struct.error as error:
@@ -269,6 +346,7 @@ class Board:
         def answers(m: Any) -> bool:
             return isinstance(m, (reply, wire.Reply)) and bool(getattr(m, "req_id", 0) == request.req_id)
 
+        self.check()
         with self._asking:
             request = replace(request, req_id=next(self._req_ids))
             self._replies.clear()

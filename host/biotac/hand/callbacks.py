@@ -26,7 +26,7 @@ class Callbacks:
         self._next: Batch | None = None  # before all that waits in the queue
         self._lock = threading.Lock()
         self._wanted: list[tuple[type[Any], Callable[[Any], Any]]] = []  # replaced, never changed
-        self._error: Exception | None = None
+        self._error: BaseException | None = None
         self._culprit = ""
         self._more = 0
 
@@ -41,6 +41,10 @@ class Callbacks:
         with self._lock:
             self._wanted = [*self._wanted, entry]
         return unsubscribe
+
+    def wants(self, kind: type[Any]) -> bool:
+        """Somebody is called with such messages."""
+        return any(one is kind for one, _ in self._wanted)
 
     def put(self, batch: Batch) -> None:
         """It has arrived."""
@@ -64,11 +68,11 @@ class Callbacks:
                 if type(one) is kind:
                     try:
                         fn(one)
-                    except Exception as error:
+                    except BaseException as error:  # SystemExit too: a thread that ended would look like silence
                         self._keep(fn, error)
         return True
 
-    def _keep(self, fn: Callable[[Any], Any], error: Exception) -> None:
+    def _keep(self, fn: Callable[[Any], Any], error: BaseException) -> None:
         with self._lock:
             if self._error is None:
                 self._error, self._culprit = error, getattr(fn, "__qualname__", repr(fn))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from typing import Any
+from operator import index
+from typing import Any, SupportsIndex, TypeAlias
 
 import numpy as np
 
@@ -19,6 +20,8 @@ from . import map_transfer as transfer
 from .board import Board
 from .views import DEFAULT_NAMES, finger_index
 
+Finger: TypeAlias = str | SupportsIndex
+
 ALL_FINGERS = (1 << MAX_SENSORS) - 1
 CALIBRATION_SINCE_MINOR = 3  # of wire 1.x
 MAP_SINCE_MINOR = 4
@@ -27,11 +30,18 @@ HOLD_SINCE_MINOR = 5
 
 
 class Commands:
-    """Each raises CommandRefusedError with the board's reason, or DeviceLostError."""
+    """Each raises CommandRefusedError with the board's reason, or DeviceLostError.
+
+    A finger is a name or a chip select; KeyError for a name that there is not.
+    """
 
     def __init__(self, board: Board, names: Mapping[str, int] = DEFAULT_NAMES) -> None:
         self._board = board
         self._names = names
+
+    def _index(self, finger: Finger) -> int:
+        # Of numbers the board knows best which there are.
+        return finger_index(self._names, finger) if isinstance(finger, str) else index(finger)
 
     def ping(self) -> None:
         """Wait for the board; everything it sent before has arrived afterwards."""
@@ -46,26 +56,26 @@ class Commands:
         for _ in range(round_trips):
             self.status()
 
-    def sensor_status(self, finger: int) -> wire.SensorStatus:
+    def sensor_status(self, finger: Finger) -> wire.SensorStatus:
         """Counters and tare state of one sensor."""
-        return self._board.ask(wire.GetSensorStatus(0, finger), wire.SensorStatus)
+        return self._board.ask(wire.GetSensorStatus(0, self._index(finger)), wire.SensorStatus)
 
-    def sensor_info(self, finger: int) -> wire.SensorInfo:
+    def sensor_info(self, finger: Finger) -> wire.SensorInfo:
         """What the sensor says of itself."""
-        return self._board.ask(wire.GetSensorInfo(0, finger), wire.SensorInfo)
+        return self._board.ask(wire.GetSensorInfo(0, self._index(finger)), wire.SensorInfo)
 
-    def point(self, finger: int) -> wire.Point:
+    def point(self, finger: Finger) -> wire.Point:
         """Where ``finger`` is touched right now (``poc_um``), without waiting for the end of a round.
 
         INVALID_I16 throughout without a touch or a tare. CommandRefusedError when no sensor answers there.
         """
-        return self._board.ask(wire.GetPoint(0, finger), wire.Point)
+        return self._board.ask(wire.GetPoint(0, self._index(finger)), wire.Point)
 
-    def tare(self, finger: int) -> None:
+    def tare(self, finger: Finger) -> None:
         """Tare now; CommandRefusedError while the signals move."""
-        self._board.tell(wire.TareNow(0, finger))
+        self._board.tell(wire.TareNow(0, self._index(finger)))
 
-    def set_tare(self, finger: int, tare_counts: Any, pdc_counts: float | None = None) -> None:
+    def set_tare(self, finger: Finger, tare_counts: Any, pdc_counts: float | None = None) -> None:
         """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, kept to 1/16 count.
 
         Raises ValueError for another shape or range.
@@ -75,9 +85,9 @@ class Commands:
             raise ValueError(f"tare_counts has shape {tare.shape}; expected 19 values of 0..4095 counts")
         tare_q4 = tuple(int(v) for v in tare_to_q4(tare))
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
-        self._board.tell(wire.TareSet(0, finger, tare_q4, pdc_q4))
+        self._board.tell(wire.TareSet(0, self._index(finger), tare_q4, pdc_q4))
 
-    def hold(self, *fingers: str | int) -> None:
+    def hold(self, *fingers: Finger) -> None:
         """These fingers (names or chip selects; none: all) hold something: no new tare until ``release``.
 
         The board forgets it when it has heard nothing for ``hold_timeout_ms`` (2 s by default): a Hand with
@@ -86,12 +96,12 @@ class Commands:
         """
         self._board.tell(wire.Hold(0, self._mask(fingers)))
 
-    def release(self, *fingers: str | int) -> None:
+    def release(self, *fingers: Finger) -> None:
         """These fingers hold nothing any more: what a press left in the skin is tared without doubt. See ``hold``."""
         self._board.tell(wire.Release(0, self._mask(fingers)))
 
     @contextmanager
-    def grasp(self, *fingers: str | int) -> Iterator[None]:
+    def grasp(self, *fingers: Finger) -> Iterator[None]:
         """``with hand.grasp("thumb", "index"):`` is ``hold`` and, however it ends, ``release``."""
         self.hold(*fingers)
         try:
@@ -100,7 +110,7 @@ class Commands:
             with suppress(DeviceLostError):  # it is not there to be told; its hold lapses
                 self.release(*fingers)
 
-    def _mask(self, fingers: tuple[str | int, ...]) -> int:
+    def _mask(self, fingers: tuple[Finger, ...]) -> int:
         if self._board.info.wire_minor < HOLD_SINCE_MINOR:
             raise WireVersionError(
                 f"the board's firmware knows no HOLD, expected wire 1.{HOLD_SINCE_MINOR}; update it: biotac flash"
@@ -142,16 +152,16 @@ class Commands:
 
     # ---- calibrations --------------------------------------------------------------------------
 
-    def calibration(self, finger: int) -> Calibration | None:
+    def calibration(self, finger: Finger) -> Calibration | None:
         """The finger's own values in place of the settings, None without; see calibration_state."""
         told = self._calibration(finger)
         return None if told.state == wire.CalibrationState.NONE else _known(told)
 
-    def calibration_state(self, finger: int) -> wire.CalibrationState:
+    def calibration_state(self, finger: Finger) -> wire.CalibrationState:
         """Whether the finger's results come from its calibration, or the sensor is another than its own."""
         return wire.CalibrationState(self._calibration(finger).state)
 
-    def set_calibration(self, finger: int, calibration: Calibration) -> None:
+    def set_calibration(self, finger: Finger, calibration: Calibration) -> None:
         """Give a finger values of its own until the next reboot, or for good with save_settings.
 
         Refused while streaming, and for another sensor's serial number than the one that answered there when
@@ -164,12 +174,14 @@ class Commands:
                 "the board's firmware knows no pressure_gain_nn, expected wire "
                 f"1.{PRESSURE_SINCE_MINOR}; update it: biotac flash"
             )
-        request = wire.SetCalibration(0, finger, its.wire_serial(), its.made_s, its.wire_values())
-        self._board.tell(request, lasting=("calibration", finger))
+        number = self._index(finger)
+        request = wire.SetCalibration(0, number, its.wire_serial(), its.made_s, its.wire_values())
+        self._board.tell(request, lasting=("calibration", number))
 
-    def clear_calibration(self, finger: int) -> None:
+    def clear_calibration(self, finger: Finger) -> None:
         """Return a finger to the board's settings, until the next reboot or, with save_settings, for good."""
-        self._board.tell(wire.ClearCalibration(0, finger), lasting=("calibration", finger))
+        number = self._index(finger)
+        self._board.tell(wire.ClearCalibration(0, number), lasting=("calibration", number))
 
     def calibrations(self) -> dict[int, Calibration]:
         """The calibrations in force, by finger; none on a board whose firmware knows of none."""
@@ -184,18 +196,18 @@ class Commands:
 
     # ---- wrench maps ---------------------------------------------------------------------------
 
-    def get_map(self, finger: int) -> bytes | None:
+    def get_map(self, finger: Finger) -> bytes | None:
         """The finger's wrench map as the board holds it, None without; see map_state.
 
         Raises PortError when its bytes do not come whole.
         """
-        return transfer.read(self._board, finger)
+        return transfer.read(self._board, self._index(finger))
 
-    def map_state(self, finger: int) -> wire.CalibrationState:
+    def map_state(self, finger: Finger) -> wire.CalibrationState:
         """Whether the finger's force comes from its map, or the sensor is another than its own."""
-        return wire.CalibrationState(transfer.info(self._board, finger).state)
+        return wire.CalibrationState(transfer.info(self._board, self._index(finger)).state)
 
-    def set_map(self, finger: int, its: bytes | BoardMap, *, force: bool = False) -> None:
+    def set_map(self, finger: Finger, its: bytes | BoardMap, *, force: bool = False) -> None:
         """Upload a wrench map and read it back; it is in force until the next reboot, or for good with save_settings.
 
         Refused while streaming, and for another sensor's serial number than the one that answered there when the
@@ -204,12 +216,14 @@ class Commands:
         than a board takes (20 KiB), and PortError when other bytes come back.
         """
         blob = maps.for_any_sensor(maps.as_blob(its)) if force else maps.as_blob(its)
-        transfer.write(self._board, finger, blob)
-        self._board.remember(("map", finger), lambda: transfer.restore(self._board, finger, blob))
+        number = self._index(finger)
+        transfer.write(self._board, number, blob)
+        self._board.remember(("map", number), lambda: transfer.restore(self._board, number, blob))
 
-    def clear_map(self, finger: int) -> None:
+    def clear_map(self, finger: Finger) -> None:
         """Return a finger to its gains, until the next reboot or, with save_settings, for good."""
-        self._board.tell(wire.ClearMap(0, finger), lasting=("map", finger))
+        number = self._index(finger)
+        self._board.tell(wire.ClearMap(0, number), lasting=("map", number))
 
     def maps(self) -> dict[int, bytes]:
         """The maps in force, by finger; none on a board whose firmware knows of none."""
@@ -219,8 +233,8 @@ class Commands:
         held = {m.finger: self.get_map(m.finger) for m in told if m.state == wire.CalibrationState.IN_FORCE}
         return {finger: blob for finger, blob in held.items() if blob is not None}
 
-    def _calibration(self, finger: int) -> wire.Calibration:
-        return self._board.ask(wire.GetCalibration(0, finger), wire.Calibration)
+    def _calibration(self, finger: Finger) -> wire.Calibration:
+        return self._board.ask(wire.GetCalibration(0, self._index(finger)), wire.Calibration)
 
 
 def _known(told: wire.Calibration) -> Calibration:

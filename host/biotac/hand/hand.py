@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
 import os
+import threading
+import weakref
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
-from functools import wraps
+from contextlib import ExitStack, suppress
+from functools import partial, wraps
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
+from typing import Any, Concatenate, NoReturn, ParamSpec, SupportsIndex, TypeVar, cast
 
 from ..clock import DeviceClock
 from ..clock.host_clock import HostClock, SystemClock
-from ..errors import InputError
 from ..link import Link
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
@@ -23,28 +23,14 @@ from . import compatibility
 from .board import Board
 from .commands import Commands
 from .compatibility import HandWarning
-from .gap import GAP
 from .pull import take
 from .reconnect import Reconnection
+from .recorded import Recorded, Recorder
 from .streams import SILENCE_S, Streams
-from .views import FingerView, Latest
+from .views import FingerView, Latest, checked_names, finger_index
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-
-class Recorder(Protocol):
-    """What Hand.record returns: a recording.Recorder, of which nothing else is needed here."""
-
-    path: Path
-    paths: list[Path]
-
-    @property
-    def closed(self) -> bool: ...
-    def write(self, chunk: bytes) -> None: ...
-    def mark(self, what: str, facts: dict[str, str]) -> None: ...
-    def go_on(self, *board: Any) -> None: ...
-    def close(self) -> None: ...
 
 
 def _of(part: str, method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Hand, P], R]:
@@ -69,13 +55,18 @@ class Hand:
         host_clock: HostClock | None = None,
     ) -> None:
         host_clock = host_clock or SystemClock()
-        self._latest = Latest(host_clock, fingers)
+        names = checked_names(fingers)
         self._board = Board(link, host_clock=host_clock)
+        self._latest = Latest(host_clock, names, device_clock=self._board.clock)
+        self._latest.is_away = self._board.is_away
         self._commands = Commands(self._board, self._latest.names)
         self._streams = Streams(self._board, self._latest)
+        self._recorded = Recorded(self._board, self._commands)
         if reconnect:
-            Reconnection(self._board, self._latest.last_t_us, self._resume)
-        self._recorder: Recorder | None = None
+            Reconnection(self._board, self._latest.last_t_us, partial(_resume, self._recorded, self._streams))
+        # The parts know nothing of this object, and neither do their threads: so it can go.
+        self._finalizer = weakref.finalize(self, _end, self._board, self._streams, self._recorded)
+        _HANDS.add(self)
         #: What carries the bytes.
         self.link = link
         #: Device time as host time, fed by whatever is read; known after a first ``status`` or ``sync``.
@@ -124,9 +115,26 @@ class Hand:
         """A simulated source has played to its end and everything of it has arrived."""
         return self._streams.ended
 
-    def __getitem__(self, finger: str | int) -> FingerView:
+    def __getitem__(self, finger: str | SupportsIndex) -> FingerView:
         """The latest of one finger, by name or chip select; KeyError in words. Follows what is read: see ``run``."""
-        return self._latest[finger]
+        return FingerView((its := self._latest[finger]).name, its.finger, self._latest, self)
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the fingers whose sensor answered; a chip select as text where it has none."""
+        return iter([self._latest.name(finger) for finger in self.fingers])
+
+    def __len__(self) -> int:
+        """How many fingers' sensors answered."""
+        return len(self.fingers)
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __contains__(self, finger: object) -> bool:
+        """Whether the sensor of that name or chip select answered."""
+        with suppress(KeyError):
+            return finger_index(self._latest.names, cast(Any, finger)) in self.fingers
+        return False
 
     def __repr__(self) -> str:
         return f"<biotac.Hand on {self.port}, fingers {self.fingers}{', closed' if self._board.closed else ''}>"
@@ -143,22 +151,29 @@ class Hand:
         if error is None:
             self._streams.report()
 
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            f"{self!r} is of this process and cannot be sent to another; open the board there, or send arrays"
+        )
+
     def close(self) -> None:
         """Stop the stream, finish a recording, give the port back. Safe to call twice.
 
-        Raises CallbackError, after all that, for what a callback has raised and nobody was told yet.
+        Raises, after all that, what nobody was told yet: DeviceLostError for a board that was lost meanwhile,
+        CallbackError for what a callback has raised. A ``with`` block ends the same way, unless by an error of its
+        own. A hand that nobody refers to any more, and one that is left open when its program ends, is closed too.
         """
         self._end()
         self._streams.report()
 
     def _end(self) -> None:
-        if self._board.closed:
-            return
-        with ExitStack() as last:  # whatever fails before
-            last.callback(self._board.close)
-            if self._recorder is not None:
-                last.callback(self._recorder.close)
-            self._streams.close()
+        _end(self._board, self._streams, self._recorded)
+
+    def _forked(self) -> None:
+        """This process is a child of the one that opened the board."""
+        self._board.forked()
+        self._recorded.forked()
+        self._latest.forked()
 
     # ---- commands (commands.py) ----------------------------------------------------------------
 
@@ -196,7 +211,6 @@ class Hand:
     stop = _of("_streams", Streams.stop)
     subscribe = _of("_streams", Streams.subscribe)
     want = _of("_streams", Streams.want)
-    batches = _of("_streams", Streams.batches)
     on_batch = _of("_streams", Streams.on_batch)
     on_touch = _of("_streams", Streams.on_touch)
     on_tare = _of("_streams", Streams.on_tare)
@@ -215,22 +229,34 @@ class Hand:
         self._streams.run(queue=queue)
         return self
 
+    def batches(self) -> Iterator[Batch]:
+        """Yield batches as they arrive, starting the stream if need be.
+
+        Ends with a simulated source, and when ``stop`` is called. All such iterations, ``frames`` and ``read`` share
+        one queue, so that one thread at a time may be in the middle of them: InputError in another.
+        """
+        yield from self._streams.batches()  # in here, for this hand is to last as long as its iteration
+
     def frames(self) -> Iterator[Frame]:
         """Yield typed frames as they arrive; ends only with a simulated source."""
         for batch in self.batches():
             for row in batch.frames:
                 yield Frame.from_row(row)
 
-    def read(self, seconds: float) -> StructArray:
+    def read(self, seconds: float, *, fresh: bool = False) -> StructArray:
         """Return the frames of the next ``seconds`` of device time as one FRAME_DTYPE array (n,).
 
+        They follow those of the read before: after a pause they are as old as the pause, as far as buffers reach,
+        and none is left out unknown to ``stats``. With ``fresh`` they are of now: what was made before is let go.
         Shorter when a simulated source ends first; empty when it has ended before, or when no sensor
         answered in that time. Raises ValueError unless seconds is a number above 0.
         """
-        return self.read_batch(seconds).frames
+        return self.read_batch(seconds, fresh=fresh).frames
 
-    def read_batch(self, seconds: float) -> Batch:
+    def read_batch(self, seconds: float, *, fresh: bool = False) -> Batch:
         """Like read, with the wire messages, PAC and events of the same time."""
+        if fresh:
+            self._streams.skip_old()
         batch, later = take(self.batches(), seconds, silence_s=SILENCE_S)
         if later is not None:
             self._streams.put_back(later)
@@ -243,44 +269,41 @@ class Hand:
 
         Frames that have arrived already and wait to be read are not in it; call it before ``start`` or
         the first read to have all. A board that restarts (reconnect) begins a further file (Recorder.paths).
+        A program that ends without ``close`` loses nothing that has arrived; one that is killed, a second.
 
         Raises InputError when the file exists and may not be overwritten, cannot be written, or when
         another recording of this hand is still open.
         """
-        if self._recorder is not None and not self._recorder.closed:
-            raise InputError(f"this hand is being recorded to {self._recorder.path}; close that recorder first")
-        hello, settings, calibrations, sensors, maps = self._to_be_recorded()
-        # The one way up from this room.
-        writer = importlib.import_module("...recording.writer", __name__)
-        recorder: Recorder = writer.Recorder(
-            Path(path),
-            hello,
-            settings,
-            calibrations,
-            sensors,
-            self.port,
-            maps=maps,
-            overwrite=overwrite,
-            mid_stream=self.streaming,
-        )
-        self._record_to(recorder)
-        return recorder
+        return self._recorded.record(Path(path), self.streaming, overwrite=overwrite)
 
-    def _to_be_recorded(self) -> tuple[Any, ...]:
-        """HELLO, settings, calibrations, sensors and maps: what a recording's results rest on."""
-        sensors = [self.sensor_info(finger) for finger in self.fingers]
-        return self.info, self.settings(), self.calibrations(), sensors, self.maps()
 
-    def _record_to(self, recorder: Recorder) -> None:
-        self._recorder = recorder
-        self._board.record = recorder.write
-        self._board.record_gap = lambda gap: recorder.mark(GAP, gap.as_text())
+def _resume(recorded: Recorded, streams: Streams, restarted: bool) -> None:
+    """The board is back."""
+    if restarted:
+        recorded.go_on()
+    streams.resume()
 
-    def _resume(self, restarted: bool) -> None:
-        """The board is back; a restarted one's rows go into a file of their own."""
-        if restarted and self._recorder is not None and not self._recorder.closed:
-            try:
-                self._recorder.go_on(*self._to_be_recorded())
-            except (OSError, InputError) as error:
-                self._recorder, self._board.record, self._board.trouble = None, None, error
-        self._streams.resume()
+
+def _end(board: Board, streams: Streams, recorded: Recorded) -> None:
+    """What is left to do for a hand that is gone, or whose program ends."""
+    if board.closed:
+        return
+    if streams.is_read_here():  # the collector may run on any thread, and this one is to be waited for
+        threading.Thread(target=_end, args=(board, streams, recorded), name="biotac end").start()
+        return
+    with ExitStack() as last:  # whatever fails before
+        last.callback(board.close)
+        last.callback(recorded.close)
+        streams.close()
+
+
+_HANDS: weakref.WeakSet[Hand] = weakref.WeakSet()
+
+
+def _forked() -> None:
+    for hand in list(_HANDS):
+        hand._forked()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forked)

@@ -54,6 +54,11 @@ class BatchQueue:
             self._batches.appendleft(batch)
             self.rows += weight(batch)
 
+    def clear(self) -> None:
+        """Forget what waits; the consumer wants none of it."""
+        while self.take() is not None:
+            pass
+
     def take(self) -> Batch | None:
         """The oldest; None when there is none."""
         if not self._batches:

@@ -7,16 +7,19 @@ the other way round: reading waits for slow consumers, and nothing is dropped.
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Callable
 from typing import Protocol
 
+from .board import POLL_S
 from .callbacks import Callbacks
 
-# How long a link is waited for at most before other things are looked at.
-POLL_S = 0.2
 # A callback that runs for two of these is relieved. The Pico's ring holds 16 KiB, of five fingers 0.2 s.
 RELIEF_S = 0.04
+# What waits for callbacks at the end has so long to be handed out; the rest is left.
+BACKLOG_S = 1.0
 
 
 class Source(Protocol):
@@ -45,6 +48,7 @@ class Reader:
         ]
         self._dispatched = 0
         self._dispatching = False
+        self._give_up_s = math.inf
 
     def start(self) -> None:
         """Begin."""
@@ -52,9 +56,10 @@ class Reader:
             thread.start()
 
     def join(self) -> None:
-        """Wait for the end, unless this is a callback of it."""
-        if not self.is_here():
-            for thread in self._threads:
+        """Wait for the end; in a callback only for the other thread's."""
+        self._give_up_s = time.monotonic() + BACKLOG_S
+        for thread in self._threads:
+            if thread is not threading.current_thread():
                 thread.join()
 
     def is_here(self) -> bool:
@@ -73,7 +78,7 @@ class Reader:
         while not is_closing():
             read(POLL_S)
             self._dispatching = True
-            while dispatch():
+            while time.monotonic() < self._give_up_s and dispatch():
                 self._dispatched += 1
             self._dispatching = False
 

@@ -8,22 +8,24 @@ biotac.aio, threads of this package read always (reader.py), and a slow caller l
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
-from ..errors import DeviceLostError
+from ..errors import DeviceLostError, InputError
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
 from ..wire.sensor_gen import MAX_SENSORS
-from .board import Board
+from .board import POLL_S, Board
 from .callbacks import Callbacks, Unsubscribe
 from .commands import ALL_FINGERS, PRESSURE_SINCE_MINOR
 from .gap import Gap
 from .queue import LIMIT_ROWS, BatchQueue
 from .reader import Reader
 from .subscription import Wants
-from .views import Latest
+from .views import Fingers, Latest
 
 #: What a FRAME can say of a contact, for Hand.subscribe.
 RESULTS = wire.QuantityFlags.POC | wire.QuantityFlags.FORCE | wire.QuantityFlags.TORQUE | wire.QuantityFlags.PRESSURE
@@ -33,6 +35,8 @@ SILENCE_S = 3.0
 # A board whose live host has died stops streaming after this long.
 KEEPALIVE_S = 1.0
 PINGS_PER_KEEPALIVE = 3
+# Every so often a ping is a question for the board's time.
+ASK_TIME_S = 0.5
 
 
 class Streams:
@@ -51,12 +55,18 @@ class Streams:
         self._reader: Reader | None = None
         self._has_pulled = False
         self._pulled: BatchQueue | None = self._new_queue()  # for whoever pulls; without threads always
+        self._puller: threading.Thread | None = None  # in the middle of ``batches``
+        self._pulling = 0
         self._queues: list[BatchQueue] = []  # for others, such as biotac.aio
+        self._skipped = [0, 0]  # batches and frames, of queues that are closed
+        self._hints = False  # somebody waits for TOUCH or TARE
         self._wants: Wants | None = None
         self._quantities = dict.fromkeys(range(MAX_SENSORS), AT_FIRST)
         self._started: wire.Start | None = None
         self._heard_s = self._ping_due_s = self._monotonic_s()
         self._due_s = -math.inf  # until when there is nothing to do but read while it streams
+        self._ask_due_s = -math.inf
+        self._claiming = threading.Lock()
         board.deliver = self._deliver
 
     @property
@@ -65,22 +75,26 @@ class Streams:
         queues = [self._callbacks.queue, *self._all_queues()]
         return replace(
             self._board.stats,
-            batches_skipped=sum(queue.batches_skipped for queue in queues),
-            frames_skipped=sum(queue.frames_skipped for queue in queues),
+            batches_skipped=self._skipped[0] + sum(queue.batches_skipped for queue in queues),
+            frames_skipped=self._skipped[1] + sum(queue.frames_skipped for queue in queues),
         )
 
     def check(self) -> None:
         """Raise what the reading threads, callbacks or a recording have come to, if anything."""
-        if self._board.failure is not None:
-            raise self._board.failure
+        self._board.check()
         self.report()
 
     def report(self) -> None:
-        """Raise what nobody was told yet of a recording or of callbacks."""
+        """Raise what nobody was told yet of the board, a recording or callbacks."""
+        self._board.report()
         trouble, self._board.trouble = self._board.trouble, None
         if trouble is not None:
             raise trouble
         self._callbacks.report()
+
+    def is_read_here(self) -> bool:
+        """The caller runs on a reading thread."""
+        return self._reader is not None and self._reader.is_here()
 
     def close(self) -> None:
         """Stop the stream and the threads."""
@@ -100,21 +114,24 @@ class Streams:
 
     # ---- what the board sends ------------------------------------------------------------------
 
-    def start(self, *, pac: bool = True, fingers: int = ALL_FINGERS) -> None:
-        """Start streaming frames, status and, unless told otherwise, PAC; ``fingers`` is a bit mask."""
+    def start(self, *, pac: bool = True, fingers: Fingers = ALL_FINGERS) -> None:
+        """Start streaming frames, status and, unless told otherwise, PAC; ``fingers`` are names, or a bit mask."""
         streams = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
         if pac:
             streams |= wire.StreamFlags.PAC
-        self._start(self._wants.streams if self._wants else streams, fingers)
+        self._start(self._wants.streams if self._wants else streams, self._latest.mask(fingers))
 
     def _start(self, streams: int, fingers: int) -> None:
         # Pull alone has no keep-alive: it reads, and so could ping, only when its caller asks.
+        if self._hints:
+            streams |= wire.StreamFlags.FRAMES  # which they come with
         self._started = wire.Start(0, int(streams), fingers, self._keepalive_ms())
         self._board.tell(self._started)
         self._heard_s = self._monotonic_s()
         self._due_s = self._ping_due_s = self._heard_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
         self.streaming = True
         self._link.release()
+        self._ask_time()
 
     def resume(self) -> None:
         """Have a board that was away stream again, if it did."""
@@ -128,8 +145,8 @@ class Streams:
         self._started = None
         self._wake_all()
 
-    def subscribe(self, quantities: wire.QuantityFlags, *, fingers: int = ALL_FINGERS) -> None:
-        """Choose what the board computes and sends of ``fingers`` (a bit mask) in its frames.
+    def subscribe(self, quantities: wire.QuantityFlags, *, fingers: Fingers = ALL_FINGERS) -> None:
+        """Choose what the board computes and sends of ``fingers`` (names, or a bit mask) in its frames.
 
         What is left out is not computed; it arrives as NaN, under the flag NOT_ASKED. Without REST_FRAMES
         an untouched finger sends heartbeats (``Batch.idle``) in place of frames, without loss of a touch:
@@ -139,8 +156,11 @@ class Streams:
         asked = quantities
         if self._board.info.wire_minor < PRESSURE_SINCE_MINOR:
             asked &= ~wire.QuantityFlags.PRESSURE
-        self._board.tell(wire.Subscribe(0, fingers, int(asked)), lasting=("subscription", fingers))
-        self._quantities.update({f: quantities for f in range(MAX_SENSORS) if fingers >> f & 1})
+        if self._callbacks.wants(wire.Touch):
+            asked |= wire.QuantityFlags.TOUCH
+        mask = self._latest.mask(fingers)
+        self._board.tell(wire.Subscribe(0, mask, int(asked)), lasting=("subscription", mask))
+        self._quantities.update({f: asked for f in range(MAX_SENSORS) if mask >> f & 1})
 
     def want(self, *names: str, rest: bool = True, rate_hz: float | None = None) -> None:
         """Choose what the board computes and sends.
@@ -150,8 +170,8 @@ class Streams:
         it is the link's sign of life, whether ``status`` is named or not. With ``rest=False`` an untouched finger
         sends heartbeats in place of frames. ``rate_hz``, above 0 to 100, takes every n-th frame with n = 100 /
         rate_hz rounded, by seq: on this side only, for boards cannot leave frames out; a recording has them all, and
-        PAC and messages are not thinned. Holds for all fingers until the next ``want``. Raises InputError for a name
-        or rate that there is not.
+        PAC and messages are not thinned. Holds for all fingers until the next ``want``; what ``on_touch`` and
+        ``on_tare`` need comes besides. Raises InputError for a name or rate that there is not.
         """
         wants = Wants.of(names, rest=rest, rate_hz=rate_hz)
         self.subscribe(wants.quantities)
@@ -162,22 +182,49 @@ class Streams:
     # ---- pull ----------------------------------------------------------------------------------
 
     def batches(self) -> Iterator[Batch]:
-        """Yield batches as they arrive, starting the stream if need be.
+        """See Hand.batches."""
+        with self._by_one_thread():
+            self._has_pulled = True
+            queue = self._pulled = self._pulled or self._new_queue()
+            if not self.streaming and not self.ended:
+                self.check()
+                self.start()
+            while True:
+                while (batch := queue.take()) is not None:
+                    yield batch
+                self.check()
+                if self.ended:
+                    return
+                if self._board.closing.is_set():
+                    self._board.is_closed()
+                if not self.streaming:
+                    return
+                self._await_batch(queue)
 
-        Ends with a simulated source, and when ``stop`` is called.
-        """
-        self._has_pulled = True
-        queue = self._pulled = self._pulled or self._new_queue()
-        if not self.streaming and not self.ended:
-            self.check()
-            self.start()
-        while True:
-            while (batch := queue.take()) is not None:
-                yield batch
-            self.check()
-            if self.ended or not self.streaming:
-                return
-            self._await_batch(queue)
+    @contextmanager
+    def _by_one_thread(self) -> Iterator[None]:
+        with self._claiming:
+            here, there = threading.current_thread(), self._puller
+            if self._pulling and there is not here and there is not None and there.is_alive():
+                raise InputError(
+                    f"thread {there.name!r} is reading this hand, and {here.name!r} would get the other half; read in "
+                    "one thread, or have each called by on_batch"
+                )
+            self._pulling = 1 if there is not here else self._pulling + 1
+            self._puller = here
+        try:
+            yield
+        finally:
+            with self._claiming:
+                if self._puller is here:
+                    self._pulling -= 1
+
+    def skip_old(self) -> None:
+        """Forget what has come, and what was on its way until now."""
+        if self.streaming:
+            self._board.tell(wire.Ping(0))  # a barrier: its reply comes behind all that was made before
+        if self._pulled is not None:
+            self._pulled.clear()
 
     def _await_batch(self, queue: BatchQueue) -> None:
         """Wait until there may be one."""
@@ -186,8 +233,21 @@ class Streams:
             board.wait_for(lambda: queue.rows or not self.streaming or board.failure or board.closing.is_set(), 1.0)
         elif self._link.ended:
             self._finish()
-        elif not board.read(self._silence_s()) and not self._link.ended:
-            board.lost(self._silent(), "silence")
+        else:
+            if self._monotonic_s() >= self._ask_due_s:
+                self._ask_time()
+            silent_s = 0.0
+            while not board.read(POLL_S) and not self._link.ended:
+                silent_s += POLL_S
+                if silent_s >= self._silence_s():
+                    board.lost(self._silent(), "silence")
+                    return
+
+    def _ask_time(self) -> None:
+        """A round trip for the clock, and a sign of life."""
+        self._ask_due_s = self._monotonic_s() + ASK_TIME_S
+        if self._link.keeps_time:
+            self._board.ask_time()
 
     def put_back(self, batch: Batch) -> None:
         """Return what ``batches`` has given and was not used."""
@@ -205,17 +265,17 @@ class Streams:
             self.start()
 
     def _read_always(self, *, pulled: bool = False) -> None:
-        self.report()
+        self.check()
         board = self._board
         if board.closed:
-            raise DeviceLostError(f"this Hand on {self._link.port} was closed; open the port again")
+            board.is_closed()
         if self._reader is not None:
             return
         if not (pulled or self._has_pulled):
             # Nobody takes them: kept, they would be stale later, or hold up a board that waits for room.
             self._pulled = None
         self._reader = Reader(self, self._callbacks, board.closing, self._link.port)
-        board.is_read_here = self._reader.is_here
+        board.is_read_here, board.is_pulled = self._reader.is_here, False
         for queue in (self._callbacks.queue, *self._all_queues()):
             queue.bound(self._limit_rows())
         self._heard_s = self._monotonic_s()
@@ -237,15 +297,23 @@ class Streams:
 
         Subscribes every finger to TOUCH besides what it is subscribed to.
         """
-        touch = wire.QuantityFlags.TOUCH
-        for quantities in {q for q in self._quantities.values() if touch not in q}:
+        unsubscribe = self._on(wire.Touch, fn)
+        for quantities in {q for q in self._quantities.values() if wire.QuantityFlags.TOUCH not in q}:
             mask = sum(1 << f for f, q in self._quantities.items() if q == quantities)
-            self.subscribe(quantities | touch, fingers=mask)
-        return self._on(wire.Touch, fn)
+            self.subscribe(quantities, fingers=mask)
+        self._hint()
+        return unsubscribe
 
     def on_tare(self, fn: Callable[[wire.Tare], Any]) -> Unsubscribe:
         """Call ``fn`` with every change of a tare."""
-        return self._on(wire.Tare, fn)
+        unsubscribe = self._on(wire.Tare, fn)
+        self._hint()
+        return unsubscribe
+
+    def _hint(self) -> None:
+        self._hints = True
+        if self.streaming and self._started is not None and not self._started.streams & wire.StreamFlags.FRAMES:
+            self._start(self._started.streams, self._started.fingers)
 
     def on_status(self, fn: Callable[[wire.Status], Any]) -> Unsubscribe:
         """Call ``fn`` with the board's counters, every second."""
@@ -268,7 +336,10 @@ class Streams:
 
     def close_queue(self, queue: BatchQueue) -> None:
         """End what open_queue began."""
-        self._queues = [one for one in self._queues if one is not queue]
+        if queue in self._queues:
+            self._queues = [one for one in self._queues if one is not queue]
+            self._skipped[0] += queue.batches_skipped
+            self._skipped[1] += queue.frames_skipped
         self._board.notify()
 
     # ---- queues --------------------------------------------------------------------------------
@@ -328,7 +399,10 @@ class Streams:
             if now_s >= self._ping_due_s:
                 self._ping_due_s = now_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
                 try:
-                    self._board.send(wire.Ping(0))
+                    if now_s >= self._ask_due_s and self._link.keeps_time:
+                        self._ask_time()
+                    else:
+                        self._board.send(wire.Ping(0))
                 except DeviceLostError as error:
                     self._board.lost(error, "unplugged")
             self._due_s = min(self._ping_due_s, self._due_s)
@@ -357,7 +431,7 @@ class Streams:
     def fail(self, error: BaseException) -> None:
         """See reader.Source."""
         if not self._board.closing.is_set():
-            self._board.failure = self._board.failure or error
+            self._board.fail(error)
             self.streaming = False
             self._wake_all()
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from typing import Any, TypeVar, cast
+from operator import index
+from typing import Any, NoReturn, SupportsIndex, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clock import LAST_SAMPLE_US, DeviceClock
 from ..clock.host_clock import HostClock
 from ..errors import InputError
 from ..wire.batches import Batch
@@ -20,6 +22,8 @@ from ..wire.messages_gen import INVALID_COUNT, FrameFlags
 from ..wire.sensor_gen import MAX_SENSORS
 
 T = TypeVar("T")
+#: Several fingers: a bit mask of chip selects, a name, or names and chip selects.
+Fingers: TypeAlias = int | str | Iterable[str | int]
 
 #: Chip selects by name, unless ``biotac.open(..., fingers=...)`` says otherwise.
 DEFAULT_NAMES = {"index": 0, "middle": 1, "ring": 2, "little": 3, "thumb": 4}
@@ -46,12 +50,13 @@ def checked_names(names: Mapping[str, int] | None) -> dict[str, int]:
     return chosen
 
 
-def finger_index(names: Mapping[str, int], key: str | int) -> int:
-    """Chip select of a name or number; KeyError in words."""
-    if isinstance(key, str) and key in names:
-        return names[key]
-    if isinstance(key, int) and 0 <= key < MAX_SENSORS:
-        return key
+def finger_index(names: Mapping[str, int], key: str | SupportsIndex) -> int:
+    """Chip select of a name or number, NumPy's too; KeyError in words."""
+    if isinstance(key, str):
+        if key in names:
+            return names[key]
+    elif hasattr(key, "__index__") and 0 <= (number := index(key)) < MAX_SENSORS:
+        return number
     raise KeyError(f"no finger {key!r}; expected one of {', '.join(map(repr, names))}, or 0 to {MAX_SENSORS - 1}")
 
 
@@ -66,20 +71,40 @@ class Latest:
     looked at.
     """
 
-    def __init__(self, host_clock: HostClock, names: Mapping[str, int] | None = None) -> None:
+    def __init__(
+        self, host_clock: HostClock, names: Mapping[str, int] | None = None, *, device_clock: DeviceClock | None = None
+    ) -> None:
         self._monotonic_s = host_clock.monotonic_s
+        self._device_clock = device_clock or DeviceClock()
         self.names = checked_names(names)
+        #: Whether the board is looked for, so that what it said last says nothing of now; raises when it is lost.
+        self.is_away: Callable[[], bool] = lambda: False
         self._unseen: deque[tuple[Batch, float]] = deque()
         self._unseen_fingers = 0  # bit mask
         # finger: (batch, row, row is a heartbeat, arrival in s)
         self._entries: dict[int, tuple[Batch, int, bool, float]] = {}
         self._looking = threading.Lock()
 
-    def __getitem__(self, key: str | int) -> FingerView:
+    def __getitem__(self, key: str | SupportsIndex) -> FingerView:
         """A finger by name or chip select; KeyError in words."""
-        index = finger_index(self.names, key)
-        names = {number: name for name, number in self.names.items()}
-        return FingerView(names.get(index, str(index)), index, self)
+        finger = finger_index(self.names, key)
+        return FingerView(self.name(finger), finger, self)
+
+    def name(self, finger: int) -> str:
+        """Of a chip select; the number as text where it has none."""
+        return next((name for name, number in self.names.items() if number == finger), str(finger))
+
+    def mask(self, fingers: Fingers) -> int:
+        """Bit mask of several; KeyError in words."""
+        if isinstance(fingers, str):
+            return 1 << finger_index(self.names, fingers)
+        if isinstance(fingers, Iterable):
+            return sum({1 << finger_index(self.names, finger) for finger in fingers})
+        return index(fingers)
+
+    def forked(self) -> None:
+        """Whoever looked is in the other process."""
+        self._looking = threading.Lock()
 
     def update(self, batch: Batch, when_s: float) -> None:
         """Take note of it. One thread at a time."""
@@ -111,13 +136,17 @@ class Latest:
 
     def last_t_us(self) -> int | None:
         """Device time of the latest of all; None before any."""
-        rows = [self.row(finger)["t_us"][0] for finger in list(self._look())]
-        return int(max(rows)) if rows else None
+        return max((self._t_us(*entry[:3]) for entry in list(self._look().values())), default=None)
+
+    @staticmethod
+    def _t_us(batch: Batch, row: int, idle: bool) -> int:
+        return int(batch.idle["t_us"][row] if idle else batch.t_us[row])
 
     def row(self, finger: int) -> StructArray:
         """FRAME_DTYPE (1,): the frame, or what a heartbeat says, or nothing: all invalid, t_us -1."""
+        is_away = self.is_away()
         entry = self._look().get(finger)
-        if entry is None:
+        if entry is None or is_away:
             return _empty(finger, -1, 0, NOTHING_YET)
         batch, row, idle, _ = entry
         if not idle:
@@ -130,9 +159,15 @@ class Latest:
         return out
 
     def age_s(self, finger: int) -> float:
-        """Since the row came; inf before any."""
+        """Since its samples were taken, or at least since the row came; inf before any."""
         entry = self._look().get(finger)
-        return math.inf if entry is None else self._monotonic_s() - entry[3]
+        if entry is None:
+            return math.inf
+        now_s = self._monotonic_s()
+        since_arrival_s = now_s - entry[3]
+        # NaN where the clock knows nothing. A row was there when it came, whatever a clock's estimate says.
+        taken_s = self._device_clock.estimate_s(self._t_us(*entry[:3]) + LAST_SAMPLE_US)
+        return max(since_arrival_s, now_s - taken_s)  # NaN is never larger
 
 
 def _last_of(batch: Batch) -> dict[int, tuple[int, bool]]:
@@ -180,13 +215,18 @@ class FingerView:
 
     Values are those of the latest frame, NaN or 65535 where invalid, as in FRAME_DTYPE. Of an untouched finger
     that sends heartbeats they are the latest heartbeat's: results are NaN, ``flags`` has NOT_ASKED. Before anything
-    came everything is invalid, ``t_us`` is -1 and ``age_s`` inf. Two properties may be of two frames; ``frame`` is one.
+    came, and while a board that went away is looked for, everything is invalid and ``t_us`` is -1. Two properties may
+    be of two frames; ``frame`` is one. DeviceLostError when the board is lost for good.
     """
 
-    def __init__(self, name: str, finger: int, latest: Latest) -> None:
+    def __init__(self, name: str, finger: int, latest: Latest, keeps: object = None) -> None:
         self.name = name
         self.finger = finger
         self._latest = latest
+        self._keeps = keeps  # the Hand, which would end with its last reference
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(f"{self!r} is of this process and cannot be sent to another; open the board there")
 
     def __repr__(self) -> str:
         return f"<biotac finger {self.name!r}, chip select {self.finger}, {self.age_s:.3f} s old>"
@@ -216,5 +256,8 @@ class FingerView:
 
     @property
     def age_s(self) -> float:
-        """How long ago this computer received it, in s; inf before anything came."""
+        """How long ago the round's last sample was taken, in s, by ``Hand.clock``; inf before anything came.
+
+        Where that knows nothing, as with a simulated board that is not in real time, how long ago it was read.
+        """
         return self._latest.age_s(self.finger)

@@ -7,6 +7,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
+from ..documents import parse_json
 from ..errors import InputError
 from ..wire import messages_gen as wire
 from .values import Calibration
@@ -96,8 +97,8 @@ def dumps(calibration: Calibration, provenance: Provenance | None = None) -> str
 def loads(text: str, where: str) -> Calibration:
     """Read a file's text; InputError beginning with ``where`` says what is wrong with it."""
     try:
-        return from_dict(json.loads(text))
-    except (ValueError, RecursionError) as error:
+        return from_dict(parse_json(text))
+    except ValueError as error:
         raise InputError(
             f"{where} is no calibration that can be used: {error}; `biotac calibration get` writes one"
         ) from error

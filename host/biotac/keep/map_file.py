@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.board_map import from_blob
+from ..documents import read_json
 from ..errors import InputError
 from . import map_blob as of
 from .calibration_file import Provenance, when
@@ -57,10 +58,10 @@ def from_dict(tree: Any) -> bytes:
 def load(path: Path) -> bytes:
     """Read a file; InputError when it cannot be read or used."""
     try:
-        return from_dict(json.loads(path.read_text(encoding="utf-8")))
+        return from_dict(read_json(path))
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from error
-    except (ValueError, RecursionError, InputError) as error:
+    except (ValueError, InputError) as error:
         raise InputError(
             f"{path} is no wrench map that can be used: {error}; `biotac map get` writes one that can"
         ) from error

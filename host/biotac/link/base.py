@@ -52,6 +52,9 @@ class Link(Protocol):
     #: that is as slow as the computer is busy, and its end is noticed at once.
     patience: float
 
+    #: Its device time is a clock's, which GET_STATUS tells: a recording's is not, nor a time that waits for its reader.
+    keeps_time: bool
+
     #: What can be read in place of ``read``: a file descriptor that gives the same bytes, and OSError when the board
     #: goes away. None where there is none, or ``read`` does more.
     fd: int | None
@@ -70,6 +73,9 @@ class Link(Protocol):
 
     def reopen(self, place: str) -> None:
         """Open one of ``places`` in place of the lost port. Raises PortError."""
+
+    def abandon(self) -> None:
+        """In a child of the process that opened it: let go of what the parent goes on using. Nobody is told."""
 
     def close(self) -> None:
         """Give the port back. Safe to call twice."""

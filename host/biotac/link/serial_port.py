@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import select
+from contextlib import suppress
 from typing import Any
 
 import serial
@@ -23,6 +24,7 @@ class SerialLink:
     """A byte pipe over USB-serial. The bit rate is meaningless on USB and left at a common one."""
 
     patience = 1.0
+    keeps_time = True
 
     def __init__(self, path: str) -> None:
         self.port = path
@@ -106,6 +108,11 @@ class SerialLink:
     def release(self) -> None:
         """A real board's time always runs."""
 
+    def abandon(self) -> None:
+        """See Link.abandon."""
+        with suppress(OSError, serial.SerialException, AttributeError):  # there is none to let go of
+            nowhere(self._serial.fileno())
+
     def close(self) -> None:
         """See Link.close."""
         self._close_port()
@@ -123,6 +130,13 @@ def open_path(path: str, pace: float) -> SerialLink:
 def went_away(port: str, error: Exception) -> DeviceLostError:
     """What to raise for what reading an open port has come to."""
     return DeviceLostError(f"{port} went away while it was open ({error}); plug the board in and open it again")
+
+
+def nowhere(fd: int) -> None:
+    """Have a descriptor lead to nowhere, in this process only; its number stays in use."""
+    null = os.open(os.devnull, os.O_RDWR)
+    os.dup2(null, fd)
+    os.close(null)
 
 
 def usb_serial(path: str) -> str | None:

@@ -124,6 +124,7 @@ class SpidevLink:
         self.port = port
         self.source: Played | None = None
         self.patience = 1.0
+        self.keeps_time = True
         self.ended = False
         self.fd: int | None = None
         self.pace = 1.0
@@ -171,6 +172,9 @@ class SpidevLink:
     def reopen(self, place: str) -> None:
         """Never asked for: there are no places."""
         raise PortError(f"{self.port} cannot be opened again; make a new one")
+
+    def abandon(self) -> None:
+        """See Link.abandon. The thread that is the board was not forked."""
 
     def close(self) -> None:
         """See Link.close."""

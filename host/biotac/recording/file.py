@@ -68,6 +68,10 @@ class RecordingFile:
         """Nothing is written any more."""
         return self._stream.closed
 
+    def fileno(self) -> int:
+        """Of the file."""
+        return self._stream.fileno()
+
     def close(self) -> None:
         """Write the file's index. Safe to call twice."""
         if self._stream.closed:

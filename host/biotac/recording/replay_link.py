@@ -88,6 +88,7 @@ class ReplayLink:
         self.patience = 1.0
         self.ended = False
         self.fd: int | None = None
+        self.keeps_time = False
         self.pace = pace
         self._clock = clock or SystemClock()
         self._pacer = Pacer(playback, pace, self._clock)
@@ -141,6 +142,9 @@ class ReplayLink:
 
     def release(self) -> None:
         """See Link.release."""
+
+    def abandon(self) -> None:
+        """See Link.abandon."""
 
     def close(self) -> None:
         """See Link.close."""

@@ -129,6 +129,10 @@ class Recorder:
         """Nothing is written any more."""
         return self._file.closed
 
+    def fileno(self) -> int:
+        """Of the file being written."""
+        return self._file.fileno()
+
     def close(self) -> None:
         """Write what is left and the file's index. Safe to call twice."""
         if self._file.closed:

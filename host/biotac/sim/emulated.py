@@ -71,7 +71,13 @@ class EmulatedBoard(SimBoard):
     def counters(self) -> dict[str, Any]:
         """What the emulator counted: time, resets, transfers, USB packets, breaches of the rules."""
         self.say("counters")
-        return self._counted()[1]
+        facts: dict[str, Any] = self._counted()[1]
+        return facts
+
+    def arrivals(self) -> list[tuple[int, int, float]]:
+        """Of each FRAME its t_us, its finger, and the board's time in us when its last byte was with the host."""
+        self.say("arrivals")
+        return [tuple(one) for one in self._counted()[1]]
 
     def until(self, seconds: float, **counters: Any) -> dict[str, Any]:
         """Wait until these counters are so, and return all of them then.
@@ -80,13 +86,14 @@ class EmulatedBoard(SimBoard):
         whoever has the link open to read, does not pass.
         """
         self.say(f"until {seconds:.6f} {json.dumps(counters)}")
-        word, facts = self._counted()
+        word, told = self._counted()
+        facts: dict[str, Any] = told
         if word == "never":
             seen = {name: facts.get(name) for name in counters}
             raise DeviceLostError(f"within {seconds:g} s of its time the emulated board came to {seen}, not {counters}")
         return facts
 
-    def _counted(self) -> tuple[str, dict[str, Any]]:
+    def _counted(self) -> tuple[str, Any]:
         while not self._answers:
             self.hear()
         word, _, text = self._answers.pop(0).partition(" ")

@@ -14,7 +14,7 @@ from importlib import resources
 from pathlib import Path
 
 from ..errors import DeviceLostError, PortError
-from ..link.serial_port import SerialLink
+from ..link.serial_port import SerialLink, nowhere
 from .source import Source
 from .tape import write_tape
 
@@ -96,6 +96,13 @@ class SimBoard:
             self.hear()
         return self.over
 
+    def abandon(self) -> None:
+        """In a fork of the process that started it: nothing of it is ours."""
+        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
+            if pipe is not None and not pipe.closed:
+                nowhere(pipe.fileno())
+        self._process.returncode = 0  # its parent is to wait for it
+
     def close(self) -> None:
         """End the process and remove its files. Safe to call twice."""
         if self._process.poll() is None:
@@ -128,6 +135,7 @@ class SimLink(SerialLink):
         self.port = port
         self.source = board.source
         self.pace = board.pace
+        self.keeps_time = board.pace == 1.0
 
     def places(self) -> list[str]:
         """The same pty: it stays while its board is unplugged or without power."""
@@ -146,6 +154,11 @@ class SimLink(SerialLink):
             self.board.hear()
         self.ended = self.board.over
         return self._serial.fileno() in ready
+
+    def abandon(self) -> None:
+        """See Link.abandon."""
+        super().abandon()
+        self.board.abandon()
 
     def release(self) -> None:
         """See Link.release."""

@@ -8,8 +8,8 @@ from datetime import datetime
 from pathlib import Path
 
 from ..errors import CommandRefusedError, InputError
-from ..hand.hand import Recorder
 from ..hand.opening import open as open_hand
+from ..hand.recorded import Recorder
 from ..hand.streams import RESULTS
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats

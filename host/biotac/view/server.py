@@ -7,7 +7,6 @@ name are refused: a name that its owner points at 127.0.0.1 would make our page 
 
 from __future__ import annotations
 
-import json
 import secrets
 import socket
 import sys
@@ -16,6 +15,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
 from typing import Any
 
+from ..documents import parse_json
 from ..errors import BiotacError, PortError
 from .reader import Reader
 from .rows import compact, facts
@@ -164,7 +164,7 @@ class Handler(BaseHTTPRequestHandler):
 
 def parse_command(body: bytes) -> tuple[str, int | None]:
     """Name and finger of a command's JSON; ValueError for anything else."""
-    wish = json.loads(body)
+    wish = parse_json(body)
     name = wish.get("do") if isinstance(wish, dict) else None
     finger = wish.get("finger") if isinstance(wish, dict) else None
     if not isinstance(name, str) or not (finger is None or type(finger) is int):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import struct
+import threading
 import time
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -103,6 +104,7 @@ class StreamDecoder:
     def __init__(self) -> None:
         self._state: Any = new("bt_intake *")
         lib.bt_intake_reset(self._state)
+        self._alone = threading.Lock()  # C works without Python's lock
         # Views of the state; they do not keep it alive, self._state does.
         self._facts = ffi.buffer(self._state.facts)
         self._out = ffi.buffer(self._state.out)
@@ -156,7 +158,18 @@ class StreamDecoder:
         return int(lib.bt_unwrapped(ffi.addressof(self._state, "t_us"), t_us))
 
     def feed(self, chunk: Buffer) -> Batch:
-        """Take any number of bytes; return what they complete."""
+        """Take any number of bytes; return what they complete.
+
+        Raises RuntimeError when another thread is in here: bytes of two threads have no order.
+        """
+        if not self._alone.acquire(blocking=False):
+            raise RuntimeError("another thread feeds this decoder; give each thread a decoder of its own")
+        try:
+            return self._feed(chunk)
+        finally:
+            self._alone.release()
+
+    def _feed(self, chunk: Buffer) -> Batch:
         size = len(chunk)
         if type(chunk) is bytes and size <= ONE_STEP_BYTES:
             # cffi hands the bytes' address over, which is faster than to borrow a buffer.
@@ -224,7 +237,7 @@ class StreamDecoder:
             sent = _frombuffer(raw, IDLE, idles, at)
             batch.idle = idle = np.empty(idles, IDLE_DTYPE)
             idle["seq"], idle["t_us"] = _frombuffer(raw, _INT64, 2 * idles, 16 * (n + pacs)).reshape(2, idles)
-            for name in ("finger", "frames", "energy_count2", "pdc", "tdc", "flags"):
+            for name in ("finger", "frames", "energy_count2", "pdc", "tdc", "tare_state", "flags"):
                 idle[name] = sent[name]
         if others:
             batch.messages = known(pairs(raw[size - others :]))

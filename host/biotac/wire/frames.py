@@ -6,75 +6,48 @@ Wire integers become mm, N and N*mm here and nowhere else.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .messages_gen import INVALID_COUNT, INVALID_I16, INVALID_I32, FrameFlags
+from .fields import FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, WIRE_INVALID, dtype_of, values_of
+from .messages_gen import INVALID_COUNT, FrameFlags, TareState
 
 UM_PER_MM = 1_000
 FORCE_LSB_PER_N = 10_000  # force_100un
 MNMM_PER_NMM = 1_000
 Q4_PER_COUNT = 16
 
-#: One row per finger and round of slots. ``counts``, ``pdc``, ``tac`` and ``tdc`` are raw counts
-#: 0..4095, 0xFFFF where no good word came. ``poc_mm``, ``force_n`` and ``torque_nmm`` are NaN where
-#: invalid; ``flags`` (FrameFlags) says why. ``t_us`` is device time, unwrapped from the first value seen
-#: (a board that was up for over 71.6 minutes by then began earlier). ``poc_sigma_mm`` and
-#: ``force_sigma_n`` are one standard deviation, from the noise measured at rest; NaN unless subscribed to.
-#: ``pdc_filtered`` is pressure in counts through the board's filter, NaN without a good word; ``pressure_force_n``
-#: the magnitude of the force it tells of, negative below rest, NaN for a finger without a pressure calibration.
-#: ``torsion_nmm`` is torque about the outward normal at the contact, NaN for a finger without a wrench map that has it.
-FRAME_DTYPE = np.dtype(
-    [
-        ("finger", "u1"),
-        ("seq", "<u4"),
-        ("t_us", "<i8"),
-        ("counts", "<u2", (19,)),
-        ("pdc", "<u2"),
-        ("tac", "<u2"),
-        ("tdc", "<u2"),
-        ("poc_mm", "<f8", (3,)),
-        ("force_n", "<f8", (3,)),
-        ("torque_nmm", "<f8", (3,)),
-        ("poc_sigma_mm", "<f8"),
-        ("force_sigma_n", "<f8", (3,)),
-        ("pdc_filtered", "<f8"),
-        ("pressure_force_n", "<f8"),
-        ("torsion_nmm", "<f8"),
-        ("flags", "<u4"),
-    ]
-)
+StructArray = NDArray[np.void]
+
+#: One row per finger and round of slots; names, units and marks in fields.FRAME_FIELDS and host/docs/rows.md.
+FRAME_DTYPE = dtype_of(FRAME_FIELDS)
 
 #: Twenty-two dynamic pressure samples, 1/2200 s apart from ``t_us`` on; 0xFFFF where missing.
-PAC_DTYPE = np.dtype([("finger", "u1"), ("seq", "<u4"), ("t_us", "<i8"), ("pac", "<u2", (22,))])
+PAC_DTYPE = dtype_of(PAC_FIELDS)
 
 #: Heartbeats of untouched fingers (Hand.subscribe): a row stands for ``frames`` rounds of which no FRAME
 #: was sent; ``seq`` is the last of them. ``energy_count2`` is the sum of squared signals.
-IDLE_DTYPE = np.dtype(
-    [
-        ("finger", "u1"),
-        ("seq", "<u4"),
-        ("t_us", "<i8"),
-        ("frames", "<u2"),
-        ("energy_count2", "<u4"),
-        ("pdc", "<u2"),
-        ("tdc", "<u2"),
-        ("flags", "<u4"),
-    ]
-)
-
-StructArray = NDArray[np.void]
+IDLE_DTYPE = dtype_of(IDLE_FIELDS)
 
 
-@dataclass(frozen=True, slots=True)
+def _no_tare() -> NDArray[np.float32]:
+    return np.full(19, np.nan, np.float32)
+
+
+def _no_sigma() -> NDArray[np.float64]:
+    return np.full(3, np.nan)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One finger, one round of slots (10 ms).
+    """One finger, one round of slots (10 ms). Equal to another when all values are, NaN to NaN.
 
-    Shapes: counts (19,) uint16; poc_mm, force_n, torque_nmm (3,) float64; the rest are numbers. Units and
-    invalid marks as in FRAME_DTYPE. Force and torque act on the finger; x to the tip, y to E11's side, z dorsal.
+    Shapes: counts (19,) uint16; tare (19,) float32; poc_mm, force_n, torque_nmm, force_sigma_n (3,) float64; the rest
+    are numbers. Names, units and invalid marks as in FRAME_DTYPE. Force and torque act on the finger; x to the tip, y
+    to E11's side, z dorsal.
     """
 
     finger: int
@@ -88,52 +61,46 @@ class Frame:
     force_n: NDArray[np.float64]
     torque_nmm: NDArray[np.float64]
     flags: FrameFlags
+    tare: NDArray[np.float32] = field(default_factory=_no_tare)
+    pdc_tare: float = math.nan
+    tare_state: int = TareState.INIT
+    poc_sigma_mm: float = math.nan
+    force_sigma_n: NDArray[np.float64] = field(default_factory=_no_sigma)
+    pdc_filtered: float = math.nan
     pressure_force_n: float = math.nan
     torsion_nmm: float = math.nan
+    wrench_age_ms: int = 0
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Frame):
+            return NotImplemented
+        pairs = [(getattr(self, its.name), getattr(other, its.name)) for its in fields(self)]
+        return all(np.array_equal(mine, its, equal_nan=np.asarray(mine).dtype.kind == "f") for mine, its in pairs)
+
+    def __hash__(self) -> int:
+        return hash((self.finger, self.seq, self.t_us))
 
     @classmethod
     def from_row(cls, row: Any) -> Frame:
         """Build from one row of a FRAME_DTYPE array."""
-        return cls(
-            finger=int(row["finger"]),
-            seq=int(row["seq"]),
-            t_us=int(row["t_us"]),
-            counts=row["counts"].copy(),
-            pdc=int(row["pdc"]),
-            tac=int(row["tac"]),
-            tdc=int(row["tdc"]),
-            poc_mm=row["poc_mm"].copy(),
-            force_n=row["force_n"].copy(),
-            torque_nmm=row["torque_nmm"].copy(),
-            flags=FrameFlags(int(row["flags"])),
-            pressure_force_n=float(row["pressure_force_n"]),
-            torsion_nmm=float(row["torsion_nmm"]),
-        )
+        values = {name: row[name].copy() if row[name].shape else row[name].item() for name in FRAME_DTYPE.names or ()}
+        return cls(**values | {"flags": FrameFlags(values["flags"])})
 
 
 def to_units(raw: NDArray[Any], per_unit: int) -> NDArray[np.float64]:
     """Divide integers by ``per_unit``; invalid (the type's minimum, or 0xFFFF unsigned) becomes NaN."""
-    invalid = {"u2": INVALID_COUNT, "i2": INVALID_I16, "i4": INVALID_I32}[raw.dtype.str[1:]]
     out = raw / float(per_unit)
-    out[raw == invalid] = np.nan
+    out[raw == WIRE_INVALID[raw.dtype.str[1:]]] = np.nan
     return np.asarray(out, dtype=np.float64)
 
 
 def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]) -> StructArray:
     """Convert FRAME messages (n,) with unwrapped seq and t_us to FRAME_DTYPE (n,)."""
     out = np.empty(len(messages), FRAME_DTYPE)
-    out["seq"] = seq
-    out["t_us"] = t_us
-    for name in ("finger", "counts", "pdc", "tac", "tdc", "flags"):
-        out[name] = messages[name]
-    out["poc_mm"] = to_units(messages["poc_um"], UM_PER_MM)
-    out["force_n"] = to_units(messages["force_100un"], FORCE_LSB_PER_N)
-    out["torque_nmm"] = to_units(messages["torque_mnmm"], MNMM_PER_NMM)
-    out["poc_sigma_mm"] = to_units(messages["poc_sigma_um"], UM_PER_MM)
-    out["force_sigma_n"] = to_units(messages["force_sigma_100un"], FORCE_LSB_PER_N)
-    out["pdc_filtered"] = to_units(messages["pdc_filtered_q4"], Q4_PER_COUNT)
-    out["pressure_force_n"] = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
-    out["torsion_nmm"] = to_units(messages["torsion_mnmm"], MNMM_PER_NMM)
+    out["finger"], out["seq"], out["t_us"] = messages["finger"], seq, t_us
+    for its in FRAME_FIELDS:
+        if its.sent:
+            out[its.name] = values_of(its, messages[its.sent])
     return out
 
 

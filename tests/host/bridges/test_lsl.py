@@ -79,9 +79,9 @@ def test_the_description_names_channels_units_and_rate(inlet) -> None:
         channel = channel.next_sibling("channel")
     assert len(listed) == info.channel_count() == samples(batch.frames).shape[1]
     assert listed[:9] == [
-        *((f"force_n_{axis}", "N") for axis in "xyz"),
-        *((f"torque_nm_{axis}", "N*m") for axis in "xyz"),
-        *((f"poc_m_{axis}", "m") for axis in "xyz"),
+        *((f"force_{axis}_n", "N") for axis in "xyz"),
+        *((f"torque_{axis}_nmm", "N*mm") for axis in "xyz"),
+        *((f"poc_{axis}_mm", "mm") for axis in "xyz"),
     ]
     units = dict(listed)
     assert units["counts_E19"] == units["pdc"] == "count"
@@ -92,9 +92,9 @@ def test_the_description_names_channels_units_and_rate(inlet) -> None:
     assert info.desc().child_value("finger") == "0"
 
 
-def test_columns_are_si() -> None:
+def test_columns_are_the_rows() -> None:
     row = np.zeros(1, biotac.FRAME_DTYPE)
-    row["force_n"], row["torque_nmm"], row["poc_mm"] = (1, 2, 3), (4000, 5000, 6000), (7000, 8000, 9000)
+    row["force_n"], row["torque_nmm"], row["poc_mm"] = (1, 2, 3), (4, 5, 6), (7, 8, 9)
     row["flags"], row["counts"], row["pdc"], row["tac"], row["tdc"] = 10, np.arange(11, 30), 30, 31, 32
     np.testing.assert_array_equal(samples(row), [np.arange(1, 33)])
 

@@ -12,6 +12,7 @@ import pytest
 
 import biotac
 from biotac.calibrate.pressure import guided
+from biotac.calibrate.pressure.force_source import load_csv
 from biotac.calibrate.pressure.presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Step
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
@@ -318,3 +319,13 @@ def test_the_picture_is_drawn(result: navarro.Result, tmp_path: Path) -> None:
     with picture(tmp_path / "navarro.png") as figure:
         navarro.draw(result, figure)
     assert (tmp_path / "navarro.png").read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.parametrize(
+    "head", ["t_s,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm", "time [s],Fx [N],Fy [N],Fz [N],Tx [Nm],Ty [Nm],Tz [Nm]"]
+)
+def test_the_csv_of_a_wrench_calibration_is_a_reference_for_pressure_too(head: str, tmp_path: Path) -> None:
+    path = tmp_path / "plate.csv"
+    path.write_text(f"# sensor: Nano17\n{head}\n0,3,0,4,1,2,3\n1,0,0,2,1,2,3\n2,0,0,1,1,2,3\n")
+    at = load_csv(path).at(np.zeros(3, np.uint8), np.array([0, 500_000, 1_000_000]))
+    np.testing.assert_allclose(at, [5.0, 3.5, 2.0])

@@ -152,6 +152,16 @@ CASES: list[tuple[str, Facts, str]] = [
     ("sensor_lost", board(frames=rounds((0,))), "finger 1 sent no frame"),
     ("sensor_lost", board(after=message(wire.Status, **AFTER | {"fingers_present": 1})), "finger 1 stopped"),
     (
+        "sensor_unsure",
+        frames(lambda rows: mark("flags", int(wire.FrameFlags.SENSOR_UNSURE))(rows[60:])),
+        "finger 1 was away and has not said who it is since: 40 of 100",
+    ),
+    (
+        "sensor_other",
+        frames(lambda rows: mark("flags", int(wire.FrameFlags.SENSOR_OTHER | wire.FrameFlags.SENSOR_UNSURE))(rows[9:])),
+        "finger 1: another sensor answers",
+    ),
+    (
         "same_serial",
         board(sensors=[info(0, "BT00001"), info(1, "BT00001")]),
         "fingers 0, 1 all call themselves BT00001",
@@ -211,6 +221,8 @@ def test_what_is_healthy_is_left_alone() -> None:
     few = rounds()
     few["counts"][:20, 3] = wire.INVALID_COUNT
     few["counts"][20:40, 3] = 4095
+    # Who was away and has said since that he is the same one is told by his lost words.
+    few["flags"][40:60] = wire.FrameFlags.SENSOR_UNSURE
     assert judge(board(frames=few)) == []
 
 
@@ -352,6 +364,30 @@ def test_a_fault_on_the_bus_is_found_on_its_finger_only(capsys, tmp_path: Path, 
     assert [f["code"] for f in out["findings"]] == [code]
     # In every 11th of these 30 rounds it is asked who it is (talk/sensors.c), and words of an answer are no samples.
     assert out["findings"][0]["seen"].startswith(f"finger 1: {(30 - 3) * 44} of ")
+
+
+@pytest.mark.parametrize(
+    ("kind", "seconds", "codes"),
+    [
+        ("unplugged", 0.3, ["words_stuck"]),  # the same one, which has said so
+        ("swapped", 0.3, ["sensor_other", "words_stuck"]),
+        ("stuck_low", 1.485, ["sensor_unsure", "words_stuck"]),  # back for the last two rounds that are listened to
+    ],
+)
+def test_a_sensor_that_was_away_is_told_with_who_it_is(
+    capsys, tmp_path: Path, kind: str, seconds: float, codes: list[str]
+) -> None:
+    fault = FAULT.format(at_s=1.5, seconds=seconds, kind=kind, more="")
+    exit_code, out = diagnose(capsys, tmp_path, SCENE.format(fingers=3) + fault)
+    assert exit_code == 1
+    assert [f["code"] for f in out["findings"]] == codes
+    assert all(f["seen"].startswith("finger 1") for f in out["findings"])
+
+
+def test_a_sensor_that_stays_away_is_lost(capsys, tmp_path: Path) -> None:
+    fault = FAULT.format(at_s=1.5, seconds=2.5, kind="unplugged", more="")
+    _, out = diagnose(capsys, tmp_path, SCENE.format(fingers=3) + fault)
+    assert {"sensor_lost", "words_stuck"} <= {f["code"] for f in out["findings"]}
 
 
 def test_a_model_without_a_channel_is_told(capsys, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -19,8 +20,8 @@ from rosbags.typesys import Stores, get_typestore
 import biotac
 from biotac.cli.main import main
 from biotac.export import COLUMNS, FORMATS, PAC_COLUMNS
-from biotac.export.columns import flat_name
-from biotac.wire import messages_gen as wire
+from biotac.export.columns import STAMP
+from biotac.wire.fields import FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS
 
 FINGERS = 2
 
@@ -38,31 +39,34 @@ def recorded(tmp_path_factory) -> biotac.Recording:
 
 
 def expected(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
-    """SI columns from what biotac.load gives; the wire's integers and the stamps are the recording's."""
+    """What biotac.load gives, from the wire's integers by MESSAGES.md's units; the stamps are the recording's."""
     mine = recording.frames["finger"] == finger
     frames, sent = recording.frames[mine], recording.wire[mine]
+
+    def scaled(name: str, per_unit: int, invalid: int) -> np.ndarray:
+        return np.where(sent[name] == invalid, np.nan, sent[name] / per_unit)
+
     return {
         "seq": frames["seq"],
         "t_us": frames["t_us"],
         "stamp_ns": recording.arrived_ns[0] + (frames["t_us"] - recording.frames["t_us"].min()) * 1000,
-        "force_n": frames["force_n"],
-        "torque_nm": frames["torque_nmm"] / 1000,
-        "poc_m": frames["poc_mm"] / 1000,
-        "force_sigma_n": frames["force_sigma_n"],
-        "poc_sigma_m": frames["poc_sigma_mm"] / 1000,
-        "pressure_force_n": np.where(
-            sent["pressure_force_100un"] == -(2**31), np.nan, sent["pressure_force_100un"] / 1e4
-        ),
-        "torsion_nm": np.where(sent["torsion_mnmm"] == -(2**31), np.nan, sent["torsion_mnmm"] / 1e6),
-        "flags": frames["flags"],
+        "counts": sent["counts"],
+        "pdc": sent["pdc"],
+        "tac": sent["tac"],
+        "tdc": sent["tdc"],
+        "tare": scaled("tare_q4", 16, 65535),
+        "pdc_tare": scaled("pdc_tare_q4", 16, 65535),
         "tare_state": sent["tare_state"],
-        "counts": frames["counts"],
-        "tare": np.where(sent["tare_q4"] == 65535, np.nan, sent["tare_q4"] / 16),
-        "pdc": frames["pdc"],
-        "tac": frames["tac"],
-        "tdc": frames["tdc"],
-        "pdc_tare": np.where(sent["pdc_tare_q4"] == 65535, np.nan, sent["pdc_tare_q4"] / 16),
-        "pdc_filtered": np.where(sent["pdc_filtered_q4"] == 65535, np.nan, sent["pdc_filtered_q4"] / 16),
+        "poc_mm": scaled("poc_um", 1000, -(2**15)),
+        "force_n": scaled("force_100un", 10_000, -(2**31)),
+        "torque_nmm": scaled("torque_mnmm", 1000, -(2**31)),
+        "poc_sigma_mm": scaled("poc_sigma_um", 1000, 65535),
+        "force_sigma_n": scaled("force_sigma_100un", 10_000, 65535),
+        "pdc_filtered": scaled("pdc_filtered_q4", 16, 65535),
+        "pressure_force_n": scaled("pressure_force_100un", 10_000, -(2**31)),
+        "torsion_nmm": scaled("torsion_mnmm", 1000, -(2**31)),
+        "wrench_age_ms": sent["wrench_age_ms"],
+        "flags": sent["flags"],
     }
 
 
@@ -73,11 +77,8 @@ def expected_pac(recording: biotac.Recording, finger: int) -> dict[str, np.ndarr
 
 
 def same(got: Any, wanted: np.ndarray) -> bool:
-    """Equal, NaN at the same places; SI factors may differ in the last bit."""
-    got = np.asarray(got)
-    if wanted.dtype.kind != "f":
-        return bool(np.array_equal(got, wanted))
-    return got.shape == wanted.shape and np.allclose(got, wanted, rtol=1e-15, atol=0, equal_nan=True)
+    """Equal to the bit, NaN at the same places."""
+    return bool(np.array_equal(np.asarray(got), wanted, equal_nan=wanted.dtype.kind == "f"))
 
 
 def export(recording: biotac.Recording, out: Path, *options: str) -> int:
@@ -85,11 +86,15 @@ def export(recording: biotac.Recording, out: Path, *options: str) -> int:
 
 
 def test_every_column_is_documented_and_has_a_unit() -> None:
-    text = (Path(__file__).parents[3] / "host" / "docs" / "recording.md").read_text()
-    for column in (*COLUMNS, *PAC_COLUMNS):
-        assert column.unit and column.what
-        assert f"| `{column.name}` | {column.unit} |" in text, column.name
+    docs = Path(__file__).parents[3] / "host" / "docs"
+    text = (docs / "recording.md").read_text()
     assert all(f"`{suffix}`" in text for suffix in FORMATS)
+    page = (docs / "rows.md").read_text()
+    assert re.findall(r"^\| `.*$", page, re.MULTILINE) == [
+        f"| `{f.name}` | {f.unit} | {' to '.join(f.parts[:: len(f.parts) - 1]) if f.parts else ''} "
+        f"| {np.dtype(f.dtype)} | {f.what} |"
+        for f in (*FRAME_FIELDS, *PAC_FIELDS, *IDLE_FIELDS, STAMP)
+    ]
 
 
 def test_csv_has_every_number_of_every_frame(recorded, tmp_path, capsys) -> None:
@@ -104,7 +109,7 @@ def test_csv_has_every_number_of_every_frame(recorded, tmp_path, capsys) -> None
             mine = [row for row in rows if row["frame_id"] == f"biotac_finger{finger}"]
             assert {row["finger"] for row in mine} == {str(finger)}
             for column in columns:
-                names = [flat_name(column, part) for part in column.parts] or [column.name]
+                names = column.flat_names()
                 wanted = wanted_of(recorded, finger)[column.name].reshape(len(mine), -1)
                 got = np.array([[float(row[n]) for n in names] for row in mine])
                 assert same(got, wanted.astype(float)), column.name
@@ -113,7 +118,7 @@ def test_csv_has_every_number_of_every_frame(recorded, tmp_path, capsys) -> None
 def test_units_stand_at_the_end_of_flat_names(recorded, tmp_path) -> None:
     export(recorded, tmp_path / "a.csv")
     names = (tmp_path / "a.csv").read_text().partition("\n")[0].split(",")
-    assert {"force_x_n", "torque_z_nm", "poc_y_m", "force_sigma_z_n", "poc_sigma_m", "counts_E1", "tare_E19"} <= set(
+    assert {"force_x_n", "torque_z_nmm", "poc_y_mm", "force_sigma_z_n", "poc_sigma_mm", "counts_E1", "tare_E19"} <= set(
         names
     )
 
@@ -127,8 +132,10 @@ def test_parquet_says_units_and_frames(recorded, tmp_path) -> None:
             assert set(mine["finger"].to_pylist()) == {finger}
             for column in columns:
                 wanted = wanted_of(recorded, finger)[column.name].reshape(len(mine), -1)
-                for k, flat in enumerate([flat_name(column, part) for part in column.parts] or [column.name]):
-                    assert same(mine[flat].to_numpy(), wanted[:, k]), flat
+                for k, flat in enumerate(column.flat_names()):
+                    missing = np.isnan(wanted[:, k]) if wanted.dtype.kind == "f" else wanted[:, k] == column.invalid
+                    assert mine[flat].is_null().to_numpy().tolist() == missing.tolist(), flat
+                    assert same(mine[flat].drop_null().to_numpy(), wanted[:, k][~missing]), flat
                     assert table.schema.field(flat).metadata[b"unit"].decode() == column.unit
 
 
@@ -152,7 +159,7 @@ def test_npz_says_what_its_columns_are(recorded, tmp_path) -> None:
     with np.load(tmp_path / "a.npz") as arrays:
         about = json.loads(str(arrays["columns"]))
         assert about["frame_id"]["finger1"] == "biotac_finger1"
-        assert {c["name"]: c["unit"] for c in about["frames"]}["torque_nm"] == "N*m"
+        assert {c["name"]: c["unit"] for c in about["frames"]}["torque_nmm"] == "N*mm"
         for finger in range(FINGERS):
             for kind, wanted in (("frames", expected(recorded, finger)), ("pac", expected_pac(recorded, finger))):
                 for name, values in wanted.items():
@@ -170,10 +177,11 @@ def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
         topics = {name: got[f"/biotac/finger{finger}/{name}"] for name in ("wrench", "poc", "flags", "counts", "pac")}
         for name, vectors in (
             ("force_n", [m.wrench.force for _, m in topics["wrench"]]),
-            ("torque_nm", [m.wrench.torque for _, m in topics["wrench"]]),
-            ("poc_m", [m.point for _, m in topics["poc"]]),
+            ("torque_nmm", [m.wrench.torque for _, m in topics["wrench"]]),
+            ("poc_mm", [m.point for _, m in topics["poc"]]),
         ):
-            assert same([[v.x, v.y, v.z] for v in vectors], wanted[name]), name
+            si = wanted[name] / 1000 if name.endswith("mm") else wanted[name]  # m and N*m (REP 103)
+            assert same([[v.x, v.y, v.z] for v in vectors], si), name
         for name in ("wrench", "poc"):
             stamps = [stamp for stamp, _ in topics[name]]
             assert stamps == wanted["stamp_ns"].tolist()
@@ -268,6 +276,6 @@ def test_a_cut_recording_is_exported_as_far_as_it_goes(recorded, tmp_path, capsy
 def test_flags_say_why_a_result_is_nan(recorded, tmp_path) -> None:
     export(recorded, tmp_path / "a.npz", "--force")
     with np.load(tmp_path / "a.npz") as arrays:
-        invalid = np.isnan(arrays["finger0/frames/poc_m"]).any(axis=1)
-        flagged = (arrays["finger0/frames/flags"] & int(wire.FrameFlags.POC_INVALID)) != 0
+        invalid = np.isnan(arrays["finger0/frames/poc_mm"]).any(axis=1)
+        flagged = (arrays["finger0/frames/flags"] & int(biotac.FrameFlags.POC_INVALID)) != 0
     assert np.array_equal(invalid, flagged) and invalid.any()

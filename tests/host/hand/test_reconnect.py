@@ -175,7 +175,7 @@ def test_a_recording_goes_on_and_holds_the_gap(world, tmp_path) -> None:
     there = world.plug(boot_id=1)
     hand = world.opened()
     recorder = biotac.recording.writer.Recorder(tmp_path / "a.mcap", hand.info, {}, {}, [], hand.port)
-    hand._record_to(recorder)
+    hand._recorded.to(recorder)
     hand.run()
     send(there, frame(10), frame(11), b"\x05half")
     until(hand, lambda: hand[0].t_us == 110_000)

@@ -259,12 +259,15 @@ def test_start_carries_the_keep_alive_and_pings_come_in_time(live: Live) -> None
     assert live.firmware.of(wire.Start)[-1].keepalive_ms == 0  # pulled: nobody would ping
     live.hand.run()  # streaming already: told again
     assert live.firmware.of(wire.Start)[-1].keepalive_ms == 1000
-    for pings in range(1, 6):
-        live.send(frame(pings))  # so that nothing is silent, and the reader has a turn
+    signs = (wire.Ping, wire.GetStatus)  # some of them ask for the time
+    before = len(live.firmware.of(signs))
+    for more in range(1, 6):
+        live.send(frame(more))  # so that nothing is silent, and the reader has a turn
         live.clock.now_s += 0.34
-        live.firmware.wait_for(wire.Ping, pings)
+        live.firmware.wait_for(signs, before + more)
     live.hand.stop()
-    assert len(live.firmware.of(wire.Ping)) == 5
+    assert len(live.firmware.of(signs)) == before + 5
+    assert len(live.firmware.of(wire.GetStatus)) >= 4
 
 
 def test_a_board_whose_time_waits_has_no_keep_alive_and_a_fast_one_a_longer() -> None:
@@ -308,7 +311,7 @@ def test_a_full_disk_ends_the_recording_and_is_told_not_the_reading(live: Live, 
 
     recorder.write = full
     live.hand.run()
-    live.hand._record_to(recorder)
+    live.hand._recorded.to(recorder)
     live.send(frame(0), frame(1))
     live.until(lambda: live.hand[0].t_us == 10_000)
     with pytest.raises(OSError, match="No space left"):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 from tests.support.deframer import Deframer
@@ -235,3 +237,23 @@ def test_a_status_keeps_device_time_when_nothing_streams() -> None:
         decoder.feed(encode(wire.Status.ID, status.pack()))
     assert decoder.unwrap_t_us(9 * half_hour_us % 2**32) == 9 * half_hour_us
     assert decoder.unwrap_t_us((9 * half_hour_us + 5) % 2**32) == 9 * half_hour_us + 5
+
+
+def test_threads_cannot_share_a_decoder() -> None:
+    decoder, data = StreamDecoder(), bytes(1 << 22)
+    refused, fed = [], []
+
+    def feed() -> None:
+        for _ in range(20):
+            try:
+                fed.append(decoder.feed(data))
+            except RuntimeError as error:
+                refused.append(str(error))
+
+    threads = [threading.Thread(target=feed) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(fed) + len(refused) == 160 and fed and refused
+    assert set(refused) == {"another thread feeds this decoder; give each thread a decoder of its own"}

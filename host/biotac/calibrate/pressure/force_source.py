@@ -11,10 +11,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import InputError, RecordingError
 from ...link.base import Played
 from ...wire.slots import FRAME_HZ
-from ..reference.csv_file import open_table
+from ..reference.csv_file import columns, open_table
 from . import formulas
 from .formulas import Floats
 
@@ -125,17 +125,23 @@ def check_alignment(where: str, above_rest: Floats, force_n: Floats) -> int:
 
 
 def load_csv(path: Path) -> Series:
-    """A file with a head: ``t_s`` (seconds of the board's time) and ``force_n``, or ``fx_n``, ``fy_n``, ``fz_n``.
+    """A file with a head: ``t_s`` (seconds of the board's time) and ``force_n``, or the three axes of a force.
 
+    The axes may also be named as `calibrate wrench` has them, ``Fx_N`` or ``Fx [N]``; other columns are passed over.
     Raises InputError naming what is wrong with it.
     """
     _, head, read = open_table(path)
-    axes = ["force_n"] if "force_n" in head else ["fx_n", "fy_n", "fz_n"]
-    missing = [name for name in ("t_s", *axes) if name not in head]
-    if missing:
-        raise InputError(
-            f"{path} has columns {', '.join(head) or 'none'}; expected t_s and force_n, or t_s, fx_n, fy_n and fz_n, "
-            "in seconds and newtons"
-        )
-    values = read([head.index(name) for name in ("t_s", *axes)])
+    for axes in (["force_n"], ["fx_n", "fy_n", "fz_n"]):
+        if {"t_s", *axes} <= set(head):
+            places = [head.index(name) for name in ("t_s", *axes)]
+            break
+    else:
+        try:
+            places, _ = columns(path, head, torque=False)
+        except RecordingError as error:
+            raise InputError(
+                f"{path} has columns {', '.join(head) or 'none'}; expected t_s and force_n, or t_s, fx_n, fy_n and "
+                f"fz_n, in seconds and newtons, or a wrench ({error})"
+            ) from None
+    values = read(places)
     return Series(str(path), values[:, 0], formulas.magnitude(values[:, 1:]))

@@ -45,7 +45,7 @@ def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
             f"{path}: says nothing of how the sensor is fixed to the finger: expected --mounting FILE.toml, or "
             "--mounting lin where axes and origin are Lin's already"
         )
-    use, scale = _columns(path, head)
+    use, scale = columns(path, head)
     table = read(use)
     wrench = table[:, 1:] * scale
     samples = from_wrench(table[:, 0], wrench)
@@ -97,8 +97,11 @@ def _split(text: str) -> tuple[dict[str, str], str | None, str]:
     return own, None, ""
 
 
-def _columns(path: Path, names: list[str]) -> tuple[list[int], Floats]:
-    """Which columns are t, F and M, and what they are multiplied by."""
+def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[int], Floats]:
+    """Which columns are t, F and, with ``torque``, M if there are any, and what the latter two are multiplied by.
+
+    Raises RecordingError.
+    """
     found: dict[str, tuple[int, float]] = {}
     for place, cell in enumerate(names):
         match = _COLUMN.match(cell)
@@ -115,7 +118,7 @@ def _columns(path: Path, names: list[str]) -> tuple[list[int], Floats]:
         if name in found:
             raise RecordingError(f"{path}: column {cell!r} is there twice: expected it once; remove one")
         found[name] = (place, factor)
-    torques = [name for name in _NAMES[4:] if name in found]
+    torques = torque and [name for name in _NAMES[4:] if name in found]
     wanted = _NAMES if torques else _NAMES[:4]
     missing = [COLUMNS[_NAMES.index(name)] for name in wanted if name not in found]
     if missing:

@@ -5,18 +5,16 @@ ROS fixes the units, N and N m (REP 103), and the message has its own stamp, so 
 
 from __future__ import annotations
 
-import json
-import struct
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from mcap.exceptions import McapError
 from mcap.reader import make_reader
 
-from ...errors import InputError, RecordingError
+from ...documents import parse_json
+from ...errors import BiotacError, InputError, RecordingError
 from .mounting import Mounting
 from .samples import Reference, check, from_wrench
 
@@ -48,7 +46,9 @@ def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -
                 if channel.topic not in decoders:
                     decoders[channel.topic] = _decoder(path, channel.message_encoding)
                 rows.setdefault(channel.topic, []).append(_row(decoders[channel.topic](message.data)))
-    except (OSError, McapError, struct.error, KeyError, TypeError, ValueError, AttributeError) as error:
+    except BiotacError:
+        raise
+    except Exception as error:  # a damaged file fails in as many ways as the packages that read it
         raise RecordingError(f"{path}: cannot be read ({error}): expected an MCAP file with {SCHEMAS[0]}") from None
     if len(rows) != 1:
         known = ", ".join(sorted(rows)) or ", ".join(sorted(seen)[:6]) or "no message"
@@ -64,7 +64,7 @@ def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -
 def _decoder(path: Path, encoding: str) -> Callable[[bytes], Any]:
     """From a message's bytes to its fields as attributes."""
     if encoding == "json":
-        return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
+        return lambda data: parse_json(data, lambda fields: SimpleNamespace(**fields))
     if encoding != "cdr":
         raise RecordingError(f"{path}: messages are {encoding!r}: expected json or cdr (ROS 2); convert the bag")
     try:

@@ -10,8 +10,6 @@ offset hold for the whole run. A file says it in TOML:
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,11 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
+from ...documents import TOML_BYTES, parse_json, parse_toml, read_text
 from ...errors import InputError
 
 Floats = npt.NDArray[np.float64]
@@ -51,6 +45,10 @@ class Mounting:
             raise InputError(f"rotation has shape {rotation.shape}: expected 3 rows of 3 numbers")
         if offset.shape != (3,) or not np.isfinite(offset).all() or np.abs(offset).max() > MAX_OFFSET_MM:
             raise InputError(f"offset_mm is {offset.tolist()}: expected 3 numbers of up to {MAX_OFFSET_MM:g} mm")
+        if not np.abs(rotation).max() <= 1.0 + MAX_SKEW:
+            raise InputError(
+                f"rotation holds {np.abs(rotation).max():.3g}: expected at most 1; its rows are unit vectors"
+            )
         skew = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
         if skew > MAX_SKEW:
             raise InputError(
@@ -95,7 +93,7 @@ def of(facts: Mapping[str, Any], where: str) -> Mounting:
     try:
         rotation = np.array(facts["rotation"], dtype=np.float64)
         offset = np.array(facts["offset_mm"], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{where}: rotation or offset_mm holds no numbers: expected 3 by 3 and 3 of them") from None
     try:
         return Mounting(rotation, offset, 1.0 if facts["reads"] == READS[0] else -1.0)
@@ -109,8 +107,8 @@ def read_mounting(text: str) -> Mounting:
         return LIN
     path = Path(text)
     try:
-        facts = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        facts = parse_toml(read_text(path, TOML_BYTES))
+    except (OSError, ValueError) as error:
         seen = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{path}: {seen}: expected a mounting in TOML, with {', '.join(KEYS)}, or lin") from None
     return of(facts, str(path))
@@ -119,7 +117,7 @@ def read_mounting(text: str) -> Mounting:
 def from_json(text: str, where: str) -> Mounting:
     """From one line of JSON, as a recorded reference has it."""
     try:
-        facts = json.loads(text)
+        facts = parse_json(text)
     except ValueError as error:
         raise InputError(f"{where}: {error}: expected a mounting as JSON") from None
     if not isinstance(facts, dict):

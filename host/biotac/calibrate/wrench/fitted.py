@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.geometry import Floats
 from ...core.map_columns import ELECTRODES, Signals
+from ...documents import read_json
 from ...errors import InputError
 from . import features
 from .crossvalidation import Validation
@@ -77,7 +78,7 @@ def dumps(its: WrenchMap) -> str:
 def load(path: Path) -> WrenchMap:
     """A map from its file. Raises InputError naming what is wrong with it."""
     try:
-        facts = json.loads(path.read_text(encoding="utf-8"))
+        facts = read_json(path)
         if facts["format"] != FORMAT:
             raise ValueError(f"format {facts['format']!r}")
         its = WrenchMap(
@@ -95,7 +96,7 @@ def load(path: Path) -> WrenchMap:
             raise ValueError(f"blocks {facts['blocks']}")
         if not np.isfinite(its.coefficients).all() or not np.isfinite(its.tare).all():
             raise ValueError("a coefficient that is no number")
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
         seen = str(error) or type(error).__name__
         raise InputError(f"{path}: {seen}: expected a {FORMAT} as `biotac calibrate wrench --out` writes it") from None
     return its

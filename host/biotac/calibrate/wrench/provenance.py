@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from ...documents import read_json
 from ...errors import InputError
 from ...version import __version__
 
@@ -71,7 +72,7 @@ def embed(map_text: str, provenance: Provenance) -> str:
 def read(path: Path) -> Provenance | None:
     """A map file's provenance; None for one that has none. Raises InputError for a damaged one."""
     try:
-        facts = json.loads(path.read_text(encoding="utf-8")).get(KEY)
+        facts = read_json(path).get(KEY)
         if facts is None:
             return None
         return Provenance(**{**facts, "files": tuple(facts["files"])})

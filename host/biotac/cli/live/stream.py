@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from typing import Any
 
 import biotac
 
 from ...hand.streams import RESULTS
+from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame
 from ...wire.messages_gen import FrameFlags
 from .. import values
@@ -54,7 +54,7 @@ def show(hand: biotac.Hand, *, rate: float, seconds: float | None = None, as_jso
         if frame.t_us < due_us.get(frame.finger, frame.t_us):
             continue
         due_us[frame.finger] = frame.t_us + step_us
-        print(json.dumps(as_dict(frame)) if as_json else as_line(frame))
+        print(json.dumps(row_as_json(frame)) if as_json else as_line(frame))
         sys.stdout.flush()
     lost = hand.stats.frames_lost
     if lost:
@@ -70,25 +70,3 @@ def as_line(frame: Frame) -> str:
     return (
         f"{frame.t_us / 1e6:9.3f} s finger {frame.finger}  poc {poc} mm  force {force} N  torque {torque} N*mm  {flags}"
     )
-
-
-def as_dict(frame: Frame) -> dict[str, Any]:
-    """JSON has no NaN: an invalid result is null."""
-    return {
-        "finger": frame.finger,
-        "seq": frame.seq,
-        "t_us": frame.t_us,
-        "counts": frame.counts.tolist(),
-        "pdc": frame.pdc,
-        "tac": frame.tac,
-        "tdc": frame.tdc,
-        "poc_mm": or_null(frame.poc_mm),
-        "force_n": or_null(frame.force_n),
-        "torque_nmm": or_null(frame.torque_nmm),
-        "flags": int(frame.flags),
-    }
-
-
-def or_null(values: Any) -> list[float | None]:
-    """Numbers, with None for NaN."""
-    return [None if v != v else float(v) for v in values]

@@ -11,8 +11,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ...errors import InputError
+from ...link.discovery import choose
 from ...view import DEFAULT_PORT
-from ..ports import only_port
 
 EXAMPLE = "biotac view 'sim:press.toml?fingers=5'"
 
@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "source",
         metavar="PORT|RECORDING",
         nargs="?",
-        help="as in other verbs, or a .mcap; default: the only serial port",
+        help="as in other verbs, or a .mcap; default: the only board on USB",
     )
     parser.add_argument("--port", type=int, help=f"of the page (default {DEFAULT_PORT}, or a free one; 0: a free one)")
     parser.add_argument("--folder", type=Path, default=Path(), help="where recordings go (default: here)")
@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
         return _check(as_json=args.json)
     if args.port is not None and not 0 <= args.port <= 65535:
         raise InputError(f"--port is {args.port}, expected 0 to 65535")
-    source = args.source or only_port()
+    source = args.source or choose()
     from ...view.serving import Viewing  # here, for the other verbs need no HTTP server
 
     with Viewing(source, port=args.port, folder=args.folder, again=not args.once) as viewing:

@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from ...documents import read_json
 from ...errors import InputError
 from ...export import export
 from ...partial_file import whole
@@ -69,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
 def read_settings(path: Path) -> dict[wire.Setting, int]:
     """Settings by name from a JSON file. Raises InputError naming what is wrong in it."""
     try:
-        named = json.loads(path.read_text(encoding="utf-8"))
+        named = read_json(path)
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read as JSON ({error}); expected an object of settings") from error
     # What `biotac info --json` prints has them under "settings".

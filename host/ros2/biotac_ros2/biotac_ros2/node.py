@@ -54,7 +54,10 @@ class Fingers(Node):
         if not len(batch.frames):
             return
         first = self._stamps.by_arrival == 0
-        stamps_s = self._stamps.of(batch.frames["t_us"].astype(np.float64))
+        stamps_s = np.empty(len(batch.frames))
+        for finger in np.unique(batch.frames["finger"]).tolist():
+            its = batch.frames["finger"] == finger
+            stamps_s[its] = self._stamps.of(batch.frames["t_us"][its].astype(np.float64), finger)
         if first and self._stamps.by_arrival:
             self.get_logger().warning("the board's clock is not known (yet): frames are stamped by their arrival")
         for row, stamp_s in zip(batch.frames, stamps_s.tolist(), strict=True):

@@ -1,0 +1,164 @@
+"""What a row is made of: the one table of names, units and marks for live rows, recordings, views and exports.
+
+``FRAME_DTYPE``, ``Frame``, JSON, every export's columns and the page host/docs/rows.md are made of it, or held to it
+by tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .messages_gen import INVALID_COUNT, INVALID_I16, INVALID_I32
+from .sensor_gen import ELECTRODE_NAMES
+
+AXES = ("x", "y", "z")
+PAC_SAMPLES = tuple(str(k) for k in range(22))
+_ELECTRODES = tuple(ELECTRODE_NAMES)
+
+#: Marks of no value in the wire's integers, by type.
+WIRE_INVALID = {"u2": INVALID_COUNT, "i2": INVALID_I16, "i4": INVALID_I32}
+
+
+@dataclass(frozen=True)
+class Field:
+    """A column. ``dtype`` is NumPy's; ``parts`` name the components of a vector, in flat formats a column each.
+
+    ``sent`` is the FRAME message's field that it is made of, ``per_unit`` of whose steps are one ``unit``, and None
+    where the value is sent as it is. ``invalid`` marks no value in an integer column; in a float column it is NaN.
+    """
+
+    name: str
+    dtype: str
+    unit: str
+    what: str
+    parts: tuple[str, ...] = ()
+    sent: str = ""
+    per_unit: int | None = None
+    invalid: int | None = None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of one row's value."""
+        return (len(self.parts),) if self.parts else ()
+
+    def flat_names(self) -> tuple[str, ...]:
+        """Names in a flat table: ``force_x_n`` for force_n, x (the unit stays at the end), ``counts_E1``."""
+        stem, _, unit = self.name.rpartition("_")
+        named = stem and unit in _UNITS
+        return tuple(f"{stem}_{part}_{unit}" if named else f"{self.name}_{part}" for part in self.parts) or (self.name,)
+
+
+_UNITS = ("n", "nmm", "mm")
+
+_FINGER = Field("finger", "u1", "1", "chip select, 0 to 4")
+_TIME = (
+    Field("seq", "<u4", "1", "number of the round, counted by the board, unwrapped"),
+    Field("t_us", "<i8", "us", "device time, unwrapped from the first value seen"),
+)
+
+
+def _count(name: str, what: str, parts: tuple[str, ...] = ()) -> Field:
+    return Field(name, "<u2", "count", f"{what}, 0 to 4095; 65535 where missing", parts, name, None, INVALID_COUNT)
+
+
+#: A row a finger and round of slots (10 ms).
+FRAME_FIELDS = (
+    _FINGER,
+    *_TIME,
+    _count("counts", "electrodes as read", _ELECTRODES),
+    _count("pdc", "static pressure"),
+    _count("tac", "thermal flux"),
+    _count("tdc", "temperature"),
+    Field("tare", "<f4", "count", "what of counts is rest, in 1/16; NaN where unknown", _ELECTRODES, "tare_q4", 16),
+    Field("pdc_tare", "<f8", "count", "pressure at rest, in 1/16; NaN where unknown", (), "pdc_tare_q4", 16),
+    Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state"),
+    Field("poc_mm", "<f8", "mm", "point of contact on the core's surface; NaN where invalid", AXES, "poc_um", 1_000),
+    Field("force_n", "<f8", "N", "force on the finger; NaN where invalid", AXES, "force_100un", 10_000),
+    Field(
+        "torque_nmm",
+        "<f8",
+        "N*mm",
+        "torque on the finger about the origin; NaN where invalid",
+        AXES,
+        "torque_mnmm",
+        1_000,
+    ),
+    Field("poc_sigma_mm", "<f8", "mm", "one standard deviation; NaN unless wanted", (), "poc_sigma_um", 1_000),
+    Field("force_sigma_n", "<f8", "N", "one standard deviation; NaN unless wanted", AXES, "force_sigma_100un", 10_000),
+    Field(
+        "pdc_filtered", "<f8", "count", "pressure, filtered by the board; NaN where missing", (), "pdc_filtered_q4", 16
+    ),
+    Field(
+        "pressure_force_n",
+        "<f8",
+        "N",
+        "magnitude of the force from static pressure, negative below rest; NaN unless calibrated",
+        (),
+        "pressure_force_100un",
+        10_000,
+    ),
+    Field(
+        "torsion_nmm",
+        "<f8",
+        "N*mm",
+        "torque about the outward normal at the contact; NaN unless a wrench map has it",
+        (),
+        "torsion_mnmm",
+        1_000,
+    ),
+    Field(
+        "wrench_age_ms",
+        "<u2",
+        "ms",
+        "by which force, torque, torsion are older; 0 unless REPEATED",
+        (),
+        "wrench_age_ms",
+    ),
+    Field("flags", "<u4", "1", "bits of flags frame in MESSAGES.md; they say why a result is invalid", (), "flags"),
+)
+
+#: A row a finger and round: 22 samples, the k-th k/2200 s after t_us.
+PAC_FIELDS = (_FINGER, *_TIME, _count("pac", "dynamic pressure", PAC_SAMPLES))
+
+#: Heartbeats of untouched fingers: a row stands for ``frames`` rounds of which no FRAME was sent; ``seq`` is the last.
+IDLE_FIELDS = (
+    _FINGER,
+    *_TIME,
+    Field("frames", "<u2", "1", "rounds that it stands for", (), "frames"),
+    Field("energy_count2", "<u4", "count^2", "sum of squared signals", (), "energy_count2"),
+    _count("pdc", "static pressure"),
+    _count("tdc", "temperature"),
+    Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state"),
+    Field("flags", "<u4", "1", "bits of flags frame in MESSAGES.md", (), "flags"),
+)
+
+
+def dtype_of(fields: Sequence[Field]) -> np.dtype[np.void]:
+    """A structured dtype of rows of ``fields``."""
+    return np.dtype([(field.name, field.dtype, field.shape) for field in fields])
+
+
+def values_of(field: Field, sent: Any) -> Any:
+    """The column of ``field`` made of what was sent, (n,) or (n, parts): in its unit and type, NaN where invalid."""
+    if field.per_unit is None:
+        return sent.astype(field.dtype, copy=False)
+    out = np.divide(sent, field.per_unit, dtype=np.float64)
+    out[sent == WIRE_INVALID[sent.dtype.str[1:]]] = np.nan
+    return out.astype(field.dtype, copy=False)
+
+
+def as_json(row: Any, fields: Sequence[Field] = FRAME_FIELDS) -> dict[str, Any]:
+    """One row, of a structured array or with the fields as attributes, of JSON types only: invalid is None."""
+    of = row.__getitem__ if isinstance(row, np.void) else lambda name: getattr(row, name)
+    return {field.name: _json_value(np.asarray(of(field.name)), field) for field in fields}
+
+
+def _json_value(value: Any, field: Field) -> Any:
+    missing = np.isnan(value) if field.dtype[1] == "f" else value == field.invalid
+    if not field.parts:
+        return None if missing else value.item()
+    return [None if gone else its for its, gone in zip(value.tolist(), missing.tolist(), strict=True)]

@@ -1,0 +1,205 @@
+"""Every file that somebody can hand to us, damaged or made to hurt: one BiotacError, in time and memory, or it is read.
+
+The mutations are drawn with stated seeds; what they may do is said by the library's contract, not by its code.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import random
+import resource
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from maps import make_map
+
+import biotac
+from biotac.calibrate.reference.csv_file import read_csv
+from biotac.calibrate.reference.mcap_file import read_mcap
+from biotac.calibrate.reference.mounting import LIN, from_json, read_mounting
+from biotac.calibrate.wrench import fitted, provenance
+from biotac.cli.recordings.recompute import read_settings
+from biotac.errors import BiotacError
+from biotac.flash import read_backup
+from biotac.flash.backup import FORMAT as BACKUP
+from biotac.keep import calibration_file, map_file
+from biotac.keep.values import Calibration
+from biotac.sim.loading import load_source
+from biotac.wire import messages_gen as wire
+
+MORE_BYTES = 500 << 20
+
+CALIBRATION = json.loads(
+    calibration_file.dumps(Calibration(wire.PocWeights.COMPRESS_N2, (1, 2, 3), (4, 5), 0, "BT1", 1_763_731_310))
+)
+MAP = map_file.to_dict(make_map(1))
+WIDTH = fitted.features.width(with_pdc=False)
+WRENCH = {
+    "format": fitted.FORMAT, "model": "all", "axes": ["Fx", "Fy", "Fz"], "tare_counts": [2000.0] * 19,
+    "window_rows": 5, "lag_rows": 1, "blocks": fitted._block_names(with_pdc=False),
+    "coefficients": [[0.5] * 3] * (WIDTH + 1), "provenance": None,
+}  # fmt: skip
+SETTINGS = {"settings": {"poc_weights": 2}}
+KEPT = {
+    "format": BACKUP, "settings": [{"id": 1, "value": 2}], "calibrations": {"0": CALIBRATION}, "maps": {"0": MAP},
+}  # fmt: skip
+MOUNTING = {"rotation": [[0, 1, 0], [1, 0, 0], [0, 0, -1]], "offset_mm": [1.0, 0.0, 2.0], "reads": "force on finger"}
+
+JSON: dict[str, tuple[Callable[[Path], Any], Any]] = {
+    "calibration": (calibration_file.load, CALIBRATION),
+    "map": (map_file.load, MAP),
+    "wrench map": (fitted.load, WRENCH),
+    "provenance": (provenance.read, WRENCH),
+    "settings": (read_settings, SETTINGS),
+    "backup": (read_backup, KEPT),
+    "mounting": (lambda path: from_json(path.read_text(errors="replace"), "here"), MOUNTING),
+}
+STRANGE: list[Any] = [
+    None, True, -1, 0, 2**63, -(2**70), 10**400, 1.5, 1e300, "", "x" * 10_000, "\x1b[2J\n", "\ud800", [], [[]], {},
+    {"a": {}}, [1e308, "1"], {"0": None}, "NaN", float("nan"), float("inf"),
+]  # fmt: skip
+
+
+def refused_or_read(read: Callable[[Path], Any], path: Path) -> bool:
+    """Whether it was refused; anything but a BiotacError of one line fails the test."""
+    try:
+        read(path)
+    except BiotacError as error:
+        text = str(error)
+        assert "\n" not in text and text.isprintable() and len(text) < 2000, text
+        return True
+    return False
+
+
+def changed(tree: Any, draw: random.Random) -> Any:
+    """A copy in which one value, at any depth, is a strange one or gone."""
+    if not isinstance(tree, dict | list) or not tree or draw.random() < 0.2:
+        return draw.choice(STRANGE)
+    copy = dict(tree) if isinstance(tree, dict) else list(tree)
+    key = draw.choice(list(copy)) if isinstance(copy, dict) else draw.randrange(len(copy))
+    if draw.random() < 0.15:
+        del copy[key]
+    else:
+        copy[key] = changed(copy[key], draw)
+    return copy
+
+
+def damaged(data: bytes, draw: random.Random) -> bytes:
+    """Cut, flipped, repeated or overwritten at a random place."""
+    spoilt, at = bytearray(data), draw.randrange(len(data))
+    kind = draw.randrange(5)
+    if kind == 0:
+        return data[:at]
+    if kind == 1:
+        for _ in range(draw.randint(1, 8)):
+            spoilt[draw.randrange(len(spoilt))] ^= 1 << draw.randrange(8)
+    elif kind == 2:
+        spoilt[at:at] = spoilt[at : at + draw.randrange(1, 200)]
+    elif kind == 3:
+        spoilt[at : at + 8] = draw.randbytes(8)
+    else:
+        del spoilt[at : at + draw.randrange(1, 200)]
+    return bytes(spoilt)
+
+
+@pytest.mark.parametrize("kind", JSON)
+def test_json_with_one_strange_value_is_refused_in_a_line_or_read(tmp_path: Path, kind: str) -> None:
+    read, good = JSON[kind]
+    path, draw = tmp_path / "file.json", random.Random(1)
+    path.write_text(json.dumps(good))
+    assert not refused_or_read(read, path)
+    refused = 0
+    for _ in range(300):
+        path.write_text(json.dumps(changed(good, draw)), encoding="utf-8", errors="surrogatepass")
+        refused += refused_or_read(read, path)
+    assert refused > 30
+
+
+@pytest.mark.parametrize("kind", JSON)
+def test_damaged_json_is_refused_in_a_line_or_read(tmp_path: Path, kind: str) -> None:
+    read, good = JSON[kind]
+    path, draw, data = tmp_path / "file.json", random.Random(2), json.dumps(good).encode()
+    refused = 0
+    for _ in range(150):
+        path.write_bytes(damaged(data, draw))
+        refused += refused_or_read(read, path)
+    assert refused > 30
+
+
+@pytest.mark.parametrize("text", ["[" * 200_000, '{"a":' * 200_000, "1e999", "9" * 100_000, "", "\0", "\ufeff{}"])
+@pytest.mark.parametrize("kind", JSON)
+def test_json_made_to_hurt_is_refused(tmp_path: Path, kind: str, text: str) -> None:
+    path = tmp_path / "file.json"
+    path.write_text(text, encoding="utf-8")
+    assert refused_or_read(JSON[kind][0], path)
+
+
+def npz(**fields: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, **fields)
+    return file.getvalue()
+
+
+def binaries() -> Iterator[tuple[str, str, Callable[[Path], Any], bytes]]:
+    """Name, suffix, reader and a good file."""
+    rows = "\n".join(f"{k / 100},{k % 7},0.5,1,0,0,0" for k in range(300))
+    yield (
+        "reference",
+        ".csv",
+        lambda path: read_csv(path, LIN),
+        f"t_s,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm\n{rows}\n".encode(),
+    )
+    yield "finger", ".npz", load_source, npz(E=np.full((50, 19), 2000), PDC=np.full(50, 1000))
+    scenario = b'name = "a"\n[[step]]\ndo = "press"\nseconds = 1.0\nat = "E17"\nforce_n = 3.0\n'
+    yield "scenario", ".toml", load_source, scenario
+    mounting = b'rotation = [[0, 1, 0], [1, 0, 0], [0, 0, -1]]\noffset_mm = [1, 0, 2]\nreads = "force on finger"\n'
+    yield "mounting", ".toml", lambda path: read_mounting(str(path)), mounting
+
+
+@pytest.mark.parametrize(("suffix", "read", "good"), [pytest.param(*its, id=name) for name, *its in binaries()])
+def test_a_damaged_file_is_refused_in_a_line_or_read(
+    tmp_path: Path, suffix: str, read: Callable[[Path], Any], good: bytes
+) -> None:
+    path, draw = tmp_path / f"file{suffix}", random.Random(3)
+    path.write_bytes(good)
+    assert not refused_or_read(read, path)
+    refused = 0
+    for _ in range(200):
+        path.write_bytes(damaged(good, draw))
+        refused += refused_or_read(read, path)
+    assert refused > 20
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("recorded") / "rec.mcap"
+    with biotac.open("sim:press.toml?seconds=1") as hand:
+        hand.record(path)
+        hand.read(2.0)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("read", [biotac.load, biotac.Recording, lambda path: read_mcap(path, LIN)])
+def test_a_damaged_recording_is_refused_in_a_line_or_read(
+    tmp_path: Path, recorded: bytes, read: Callable[[Path], Any]
+) -> None:
+    path, draw = tmp_path / "rec.mcap", random.Random(4)
+    for _ in range(60):
+        path.write_bytes(damaged(recorded, draw))
+        refused_or_read(read, path)
+
+
+@pytest.mark.parametrize(
+    "line", ["a." * 400_000 + "a = 1", "x = " + "[" * 400_000, "x = {" + "a." * 100_000 + "b = 1}"]
+)
+def test_toml_made_to_hurt_is_refused_in_little_memory(tmp_path: Path, line: str) -> None:
+    path = tmp_path / "bomb.toml"
+    path.write_text(line)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert refused_or_read(load_source, path)
+    assert refused_or_read(lambda its: read_mounting(str(its)), path)
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MORE_BYTES

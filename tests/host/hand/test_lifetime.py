@@ -1,0 +1,245 @@
+"""How a hand ends: forgotten, with its program, in a fork, in a cancelled task. Nothing leaks, nothing is lost."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import weakref
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from live_board import Firmware, frame
+
+import biotac
+from biotac.hand.hand import Hand
+from biotac.link.serial_port import SerialLink
+from biotac.wire import messages_gen as wire
+
+WAIT_S = 600.0
+
+
+def held() -> tuple[int, int]:
+    """Threads and descriptors of this process."""
+    return threading.active_count(), len(os.listdir("/proc/self/fd"))
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts descriptors where /proc has them")
+def test_a_running_hand_that_nobody_knows_any_more_is_gone() -> None:
+    def cell() -> None:
+        hand = biotac.open("sim:press.toml?seconds=1000")
+        hand.on_batch(lambda batch: None)
+        hand.run()
+        for _, _batch in zip(range(3), hand.batches(), strict=False):
+            pass
+
+    cell()
+    gc.collect()
+    before = held()
+    for _ in range(3):
+        cell()
+    gc.collect()
+    assert held() == before
+
+
+def test_a_finger_and_an_iteration_keep_their_hand() -> None:
+    finger = biotac.open("sim:press.toml?seconds=1000").run(queue=True)["index"]
+    gc.collect()
+    assert finger._keeps.streaming
+    alive = weakref.ref(finger._keeps)
+    batches = finger._keeps.batches()
+    next(batches)
+    del finger
+    gc.collect()
+    assert alive() is not None and len(next(b for b in batches if len(b.wire)).wire)
+    del batches
+    gc.collect()
+    assert alive() is None
+
+
+def test_a_hand_collected_on_its_own_reading_thread_ends_too(scripted_board, hello) -> None:
+    firmware = Firmware(hello)
+    board = scripted_board(firmware)
+    hands = [Hand(SerialLink(board.path))]
+    inner, gone = hands[0]._board, threading.Event()
+
+    def forgets(batch: biotac.Batch) -> None:
+        if hands and len(batch.wire):
+            hands.clear()
+            gc.collect()
+            gone.set()
+
+    hands[0].on_batch(forgets)
+    hands[0].run()
+    os.write(board._master, frame(1))
+    assert gone.wait(WAIT_S)
+    firmware.wait_for(wire.Stop, 2)
+    for thread in threading.enumerate():
+        if thread.name == "biotac end":
+            thread.join()
+    assert inner.closed
+
+
+# ---- the end of a program ------------------------------------------------------------------------
+
+ENDS = {
+    "just ends": ("", 0),
+    "sys.exit": ("sys.exit(3)", 3),
+    "an error": ("raise ZeroDivisionError", 1),
+    "SystemExit in a callback": ("hand.on_batch(lambda b: sys.exit(1)); time.sleep(0.1)", 0),
+}
+RECORDS = """
+import sys, time
+import biotac
+hand = biotac.open("sim:press.toml?seconds=1000", pace=1.0)
+hand.record(sys.argv[1])
+seen = 0
+{run}
+for batch in hand.batches():
+    seen += len(batch.wire)
+    if seen >= 120:
+        break
+print(seen, flush=True)
+{end}
+"""
+
+
+@pytest.mark.parametrize("run", ["", "hand.run(queue=True)"])
+@pytest.mark.parametrize("end", ENDS)
+def test_a_program_that_ends_without_close_loses_nothing_that_came(end: str, run: str, tmp_path: Path) -> None:
+    text, code = ENDS[end]
+    program = [sys.executable, "-c", RECORDS.format(run=run, end=text), str(tmp_path / "a.mcap")]
+    done = subprocess.run(program, capture_output=True, text=True)
+    assert done.returncode == code, done.stderr
+    recording = biotac.Recording(tmp_path / "a.mcap")
+    assert recording.problems == []
+    assert len(recording.frames) >= int(done.stdout)
+
+
+# ---- other processes -----------------------------------------------------------------------------
+
+FORKS = """
+import os, sys
+import biotac
+hand = biotac.open("sim:press.toml?seconds=1000", pace=1.0)
+hand.record(sys.argv[1])
+hand.run(queue=True)
+hand.read(0.3)
+view = hand["index"]
+if os.fork() == 0:
+    told = []
+    for use in (hand.ping, lambda: hand.read(1.0), lambda: view.force_n, hand.run, hand.start, hand.status,
+                lambda: hand.on_batch(print), lambda: list(hand.batches()), hand.check):
+        try:
+            use()
+        except biotac.DeviceLostError as error:
+            told.append("belongs to the process that opened it" in str(error))
+    print("child", told.count(True), hand.connected, flush=True)
+    with open("/proc/self/fd/%d" % hand.link._serial.fileno(), "wb", buffering=0) as port:
+        port.write(b"to nobody")
+    try:
+        hand.close()
+    except biotac.DeviceLostError:
+        print("close tells, too", flush=True)
+    {leave}
+os.wait()
+frames = hand.read(0.5)
+print("parent", len(frames), hand.stats.frames_lost, hand.stats.crc_errors, hand.streaming, flush=True)
+hand.status()
+hand.close()
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+@pytest.mark.parametrize("leave", ["sys.exit(0)", "os._exit(0)", "del hand, view; sys.exit(0)"])
+def test_a_fork_is_told_and_the_parent_reads_on(leave: str, tmp_path: Path) -> None:
+    program = [sys.executable, "-W", "ignore", "-c", FORKS.format(leave=leave), str(tmp_path / "a.mcap")]
+    done = subprocess.run(program, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines() == ["child 9 False", "parent 50 0 0 True"]
+    recording = biotac.Recording(tmp_path / "a.mcap")
+    assert recording.problems == [] and len(recording.frames) >= 80
+
+
+def test_a_hand_cannot_be_sent_to_another_process() -> None:
+    with biotac.open("sim:press.toml?seconds=1") as hand:
+        for thing in (hand, hand["index"], biotac.aio.open("sim:press.toml")):
+            with pytest.raises(TypeError, match="is of this process and cannot be sent to another; open the board"):
+                pickle.dumps(thing)
+
+
+# ---- asyncio -------------------------------------------------------------------------------------
+
+
+def test_a_time_out_around_open_leaves_nothing_open() -> None:
+    opening, go_on = threading.Event(), threading.Event()
+    opened: list[biotac.Hand] = []
+
+    def slowly() -> biotac.Hand:
+        opening.set()
+        assert go_on.wait(WAIT_S)
+        opened.append(biotac.open("sim:press.toml?seconds=1000"))
+        return opened[0]
+
+    async def main() -> None:
+        async def use() -> None:
+            async with biotac.hand.aio.AsyncHand(slowly):
+                raise AssertionError("it was given up")
+
+        task = asyncio.create_task(use())
+        await asyncio.to_thread(opening.wait)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        go_on.set()
+
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(asyncio.run, main()).result()
+    assert opened[0]._board.closed
+
+
+def test_a_cancelled_iteration_and_command_leave_the_hand_usable() -> None:
+    async def main() -> int:
+        async with biotac.aio.open("sim:press.toml?seconds=1000") as hand:
+
+            async def forever() -> None:
+                async for _ in hand.batches():
+                    pass
+
+            task = asyncio.create_task(forever())
+            while hand.stats.frames < 10:
+                await asyncio.sleep(0.001)
+            task.cancel()
+            command = asyncio.create_task(hand.ask(lambda h: h.status()))
+            await asyncio.sleep(0)
+            command.cancel()
+            for one in (task, command):
+                with pytest.raises(asyncio.CancelledError):
+                    await one
+            assert hand.hand._streams._queues == []
+            async for batch in hand.batches():
+                if len(batch.wire):
+                    return (await hand.ask(lambda h: h.status())).fingers_present
+
+        return 0
+
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(asyncio.run, main()).result() == 1
+
+
+def test_a_program_that_is_terminated_loses_less_than_a_second(tmp_path: Path) -> None:
+    # SIGTERM ends Python without a word to anybody: what stands in the file is what was flushed.
+    text = RECORDS.format(run="", end="print('up', flush=True); list(hand.batches())")
+    program = subprocess.Popen([sys.executable, "-c", text, str(tmp_path / "a.mcap")], stdout=subprocess.PIPE)
+    assert program.stdout is not None
+    assert int(program.stdout.readline()) >= 120 and program.stdout.readline() == b"up\n"
+    program.send_signal(signal.SIGTERM)
+    program.wait()
+    program.stdout.close()
+    assert len(biotac.Recording(tmp_path / "a.mcap").frames) >= 30
