@@ -23,6 +23,12 @@ void bt_map_frames(int64_t n, const bt_map *map, const uint16_t *counts, const u
                    const int32_t *pdc_above_rest_q4, int32_t *force_100un, int32_t *torque_mnmm,
                    int32_t *torsion_mnmm);
 
+// The population map and its share of the force, mixed with the settings' gains: force_100un (n, 3), share
+// (n,). map_100un (n, 3) is the map's alone.
+void bt_population_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
+                          const bt_solve_settings *settings, int32_t *map_100un, int32_t *force_100un,
+                          uint32_t *share);
+
 // The same of pressure. filtered_q4, tare_q4, force_100un: (n,).
 void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *tare_q4, int32_t gain_nn,
                         int32_t *force_100un);
