@@ -1,10 +1,7 @@
 #include "batch.h"
 
-#include "map/population.h"
 #include "touch/round.h"
 #include "touch/signals.h"
-
-#include <string.h>
 
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                       const bt_solve_settings *settings, int16_t *poc_um, int32_t *force_100un,
@@ -12,9 +9,13 @@ void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
 {
     for (int64_t k = 0; k < n; k++) {
         int32_t e_q4[BT_ELECTRODES];
-        bt_signals_q4(counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, e_q4);
-        flags[k] =
-            bt_solve(e_q4, settings, BT_WANT_ALL, poc_um + 3 * k, force_100un + 3 * k, torque_mnmm + 3 * k);
+        bt_map_input frame = {counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, BT_INVALID_I32};
+        int16_t *poc = poc_um + 3 * k;
+        int32_t *force = force_100un + 3 * k, *torque = torque_mnmm + 3 * k;
+        bt_signals_q4(frame.counts, frame.tare_q4, e_q4);
+        flags[k] = settings->population
+                       ? bt_solve_uncalibrated(e_q4, &frame, settings, BT_WANT_ALL, poc, force, torque)
+                       : bt_solve(e_q4, settings, BT_WANT_ALL, poc, force, torque);
     }
 }
 
@@ -41,21 +42,6 @@ void bt_map_frames(int64_t n, const bt_map *map, const uint16_t *counts, const u
             BT_INVALID_I32;
         bt_map_wrench(map, counts + k * BT_ELECTRODES, tare_q4 + k * BT_ELECTRODES, pdc_above_rest_q4[k],
                       force_100un + 3 * k, torque_mnmm + 3 * k, torsion_mnmm + k);
-    }
-}
-
-void bt_population_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
-                          const bt_solve_settings *settings, int32_t *map_100un, int32_t *force_100un,
-                          uint32_t *share)
-{
-    for (int64_t k = 0; k < n; k++, counts += BT_ELECTRODES, tare_q4 += BT_ELECTRODES) {
-        int32_t e_q4[BT_ELECTRODES], lin_100un[3];
-        bt_signals_q4(counts, tare_q4, e_q4);
-        bt_force(e_q4, &settings->gains, lin_100un);
-        bt_population_force(e_q4, counts, tare_q4, map_100un + 3 * k);
-        memcpy(force_100un + 3 * k, map_100un + 3 * k, sizeof lin_100un);
-        share[k] = bt_population_share(e_q4);
-        bt_population_mix(share[k], lin_100un, force_100un + 3 * k);
     }
 }
 

@@ -6,8 +6,9 @@
 #include "solve/pressure.h"
 #include "solve/solve.h"
 
-// counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). flags: (n,), POC_INVALID
-// only. Every row goes through bt_signals_q4 and bt_solve as on the board.
+// counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). flags: (n,), POC_INVALID,
+// POPULATION and OUTSIDE only. Every row goes through bt_signals_q4 and bt_solve, or bt_solve_uncalibrated, as
+// on the board.
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                       const bt_solve_settings *settings, int16_t *poc_um, int32_t *force_100un,
                       int32_t *torque_mnmm, uint32_t *flags);
@@ -22,12 +23,6 @@ void bt_mapped_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4
 void bt_map_frames(int64_t n, const bt_map *map, const uint16_t *counts, const uint16_t *tare_q4,
                    const int32_t *pdc_above_rest_q4, int32_t *force_100un, int32_t *torque_mnmm,
                    int32_t *torsion_mnmm);
-
-// The population map and its share of the force, mixed with the settings' gains: force_100un (n, 3), share
-// (n,). map_100un (n, 3) is the map's alone.
-void bt_population_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
-                          const bt_solve_settings *settings, int32_t *map_100un, int32_t *force_100un,
-                          uint32_t *share);
 
 // The same of pressure. filtered_q4, tare_q4, force_100un: (n,).
 void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *tare_q4, int32_t gain_nn,

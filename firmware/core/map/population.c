@@ -6,6 +6,8 @@
 
 #include <stdbool.h>
 
+const uint16_t bt_population_sigma_100un[3] = BT_POPULATION_SIGMA_100UN;
+
 // ---- bounds --------------------------------------------------------------------------------------------
 
 #define SIGNAL_MAX ((int64_t)BT_FULL_SCALE_COUNT << BT_POPULATION_SIGNAL_Q)

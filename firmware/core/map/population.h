@@ -24,6 +24,10 @@ void bt_population_force(const int32_t e_q4[BT_ELECTRODES], const uint16_t count
 uint32_t bt_population_share(const int32_t e_q4[BT_ELECTRODES]);
 #define BT_POPULATION_ALL 256
 
+// One sigma of the map's force on a finger that it was not made of, in 100 uN: what maps of the other fingers
+// left on each, so that it holds noise too.
+extern const uint16_t bt_population_sigma_100un[3];
+
 // A map's force and Lin's in these shares, in place of force_100un. share <= BT_POPULATION_ALL.
 void bt_population_mix(uint32_t share, const int32_t lin_100un[3], int32_t force_100un[3]);
 
