@@ -60,10 +60,10 @@ pico() {
     tools/emulator/prepare
 }
 
-m4f_tests() {
+m4f_tests() { # arguments go to ctest
     cmake -S firmware --preset m4f >/dev/null
     cmake --build build/m4f >build/m4f/log || { cat build/m4f/log; return 1; }
-    ctest --test-dir build/m4f -j2 --output-on-failure
+    ctest --test-dir build/m4f -j2 --output-on-failure "$@"
 }
 
 python_tests() { # arguments go to pytest; two processes, each with whole files, for what tests of a file share

@@ -61,7 +61,7 @@ class Hand:
         self._latest.is_away = self._board.is_away
         self._commands = Commands(self._board, self._latest.names)
         self._streams = Streams(self._board, self._latest)
-        self._recorded = Recorded(self._board, self._commands)
+        self._recorded = Recorded(self._board, self._commands, self._latest.names)
         if reconnect:
             Reconnection(self._board, self._latest.last_t_us, partial(_resume, self._recorded, self._streams))
         # The parts know nothing of this object, and neither do their threads: so it can go.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -32,7 +33,8 @@ class Recorder(Protocol):
 class Recorded:
     """Begins a recording of ``board``, carries it over restarts, ends it."""
 
-    def __init__(self, board: Board, commands: Commands) -> None:
+    def __init__(self, board: Board, commands: Commands, names: Mapping[str, int]) -> None:
+        self._names = names
         self._board = board
         self._commands = commands
         self._recorder: Recorder | None = None
@@ -52,6 +54,7 @@ class Recorded:
             sensors,
             self._board.link.port,
             maps=maps,
+            names=self._names,
             overwrite=overwrite,
             mid_stream=mid_stream,
         )

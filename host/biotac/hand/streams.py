@@ -367,7 +367,8 @@ class Streams:
     def _deliver(self, batch: Batch) -> None:
         if self._wants is not None:
             batch = self._wants.thin(batch)
-        self._latest.update(batch, self._monotonic_s())
+        self._heard_s = now_s = self._monotonic_s()  # before anybody is woken by it
+        self._latest.update(batch, now_s)
         if self._pulled is not None:
             self._pulled.put(batch)
         self._callbacks.put(batch)
@@ -380,8 +381,7 @@ class Streams:
             self._wait_for_room()
         if self.streaming:
             at_most_s = min(at_most_s, self._keep_alive())
-        if self._board.read(at_most_s):
-            self._heard_s = self._monotonic_s()
+        self._board.read(at_most_s)
 
     def _keep_alive(self) -> float:
         """Do what is due while it streams; returns for how many s there is nothing more to do."""

@@ -66,7 +66,8 @@ def test_a_subscriber_hears_the_wrench_in_the_order_of_time(tmp_path: Path) -> N
 def test_a_signal_ends_the_node_without_a_word(how: signal.Signals, tmp_path: Path) -> None:
     code = (
         "from biotac_ros2 import node\nown = node.spin\n"
-        "def spin(its):\n print('spins', flush=True)\n own(its)\nnode.spin = spin\nnode.main()"
+        "def spin(its):\n node.rclpy.spin_once(its, timeout_sec=0)\n print('spins', flush=True)\n own(its)\n"
+        "node.spin = spin\nnode.main()"
     )
     program = started(code, "sim:press.toml?seconds=600", tmp_path)
     assert program.stdout is not None and program.stdout.readline() == "spins\n"

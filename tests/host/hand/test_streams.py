@@ -281,6 +281,7 @@ def test_a_board_whose_time_waits_has_no_keep_alive_and_a_fast_one_a_longer() ->
 
 def test_silence_ends_the_reader_in_words(live: Live) -> None:
     live.hand.run(queue=True)
+    live.hand.ping()  # all that it was asked is answered: no late answer breaks the silence
     live.hand.link.patience = 1.0
     live.clock.now_s += 3.1
     with pytest.raises(biotac.DeviceLostError, match=r"silent for 3 s.*check the cable"):

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from deframer import Deframer, encode
+from plain_numbering import Loop
 
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch, StreamDecoder, join
@@ -67,31 +68,25 @@ def nearest(raw: int, near: int, span: int) -> int:
 
 def expected(data: bytes) -> dict[str, Any]:
     """Message by message: (kind, finger, seq, t_us), gaps of FRAMEs and IDLEs, PACs lost, disorder, answers."""
-    last: dict[tuple[bool, int], int] = {}
-    joined: set[tuple[bool, int]] = set()
+    loops = {is_pac: Loop() for is_pac in (False, True)}
     clock: int | None = None
-    out: dict[str, Any] = {"rows": [], "gaps": [], "lost_pac": 0, "disordered": 0, "messages": []}
+    out: dict[str, Any] = {"rows": [], "messages": []}
     for message_id, payload in Deframer().feed(data):
         if message_id not in STREAMED:
             out["messages"].append(wire.MESSAGES[message_id].unpack(payload))
             if out["messages"][-1] == wire.MESSAGES[START[0]].unpack(START[1]):
-                joined.clear()
+                for loop in loops.values():
+                    loop.joined.clear()
             continue
         row = wire.MESSAGES[message_id].unpack(payload)
         clock = row.t_us if clock is None else nearest(row.t_us, clock, 2**32)
-        is_pac = message_id == wire.Pac.ID
-        who = (is_pac, row.finger)
-        before = last.get(who, row.seq)
-        whole = nearest(row.seq, before, 2**16)
-        missing = whole - (row.frames if message_id == wire.Idle.ID else 1) - before if who in joined else 0
-        out["disordered"] += missing < 0
-        if missing > 0 and is_pac:
-            out["lost_pac"] += missing
-        elif missing > 0:
-            out["gaps"].append((row.finger, before, missing))
-        last[who] = whole
-        joined.add(who)
+        whole = loops[message_id == wire.Pac.ID].extend(
+            row.finger, row.seq, row.frames if message_id == wire.Idle.ID else 1
+        )
         out["rows"].append((message_id, row.finger, whole, clock))
+    out["gaps"], out["lost"] = loops[False].gaps, loops[False].lost
+    out["lost_pac"] = loops[True].lost
+    out["disordered"] = loops[False].disordered + loops[True].disordered
     return out
 
 
@@ -107,7 +102,7 @@ def assert_is(decoder: StreamDecoder, batches: list[Batch], data: bytes) -> None
         assert list(zip(finger.tolist(), seq.tolist(), t_us.tolist(), strict=True)) == rows
     assert got.messages == want["messages"]
     assert decoder.lost_after == want["gaps"]
-    assert decoder.lost == sum(lost for *_, lost in want["gaps"])
+    assert decoder.lost == want["lost"]
     assert (decoder.lost_pac, decoder.disordered) == (want["lost_pac"], want["disordered"])
 
 

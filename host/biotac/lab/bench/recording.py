@@ -108,7 +108,8 @@ def mcap_parts(path: Path) -> dict[str, int]:
     from mcap.records import Channel, Chunk, Message
     from mcap.stream_reader import StreamReader, breakup_chunk
 
-    from ...recording.layout import PARTS, REST, TOPIC
+    from ...recording.layout import PARTS as FINGERS
+    from ...recording.layout import REST, TOPIC
 
     topics: dict[int, str] = {}
     sizes = dict.fromkeys(PARTS, 0)
@@ -119,6 +120,6 @@ def mcap_parts(path: Path) -> dict[str, int]:
                 topics |= {r.id: r.topic for r in inner if isinstance(r, Channel)}
                 first = next(r for r in inner if isinstance(r, Message))
                 topic = topics[first.channel_id]
-                sizes["wire" if topic in (TOPIC, REST) or topic.startswith(PARTS) else "plots"] += len(record.data)
+                sizes["wire" if topic in (TOPIC, REST) or topic.startswith(FINGERS) else "plots"] += len(record.data)
     sizes["index and headers"] = path.stat().st_size - sizes["wire"] - sizes["plots"]
     return sizes
