@@ -6,8 +6,9 @@
 #include "solve/pressure.h"
 #include "solve/solve.h"
 
-// counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). flags: (n,), POC_INVALID
-// only. Every row goes through bt_signals_q4 and bt_solve as on the board.
+// counts, tare_q4: (n, 19). poc_um, force_100un, torque_mnmm: (n, 3). flags: (n,), POC_INVALID,
+// POPULATION and OUTSIDE only. Every row goes through bt_signals_q4 and bt_solve, or bt_solve_uncalibrated,
+// as on the board.
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                       const bt_solve_settings *settings, int16_t *poc_um, int32_t *force_100un,
                       int32_t *torque_mnmm, uint32_t *flags);

@@ -3,8 +3,10 @@
 #ifndef BIOTAC_BENCH_BITS_H
 #define BIOTAC_BENCH_BITS_H
 
+#include "map/population.h"
 #include "maps.h"
 #include "solve/solve.h"
+#include "touch/signals.h"
 #include "wire/crc32.h"
 
 #define BITS_FRAMES 100000
@@ -17,7 +19,8 @@ static inline uint32_t bits_step(uint32_t *seed)
 
 #define BITS_MAP_FRAMES 2000
 
-// A wrench map of all seven axes, over counts and tares of the whole range, missing ones among them.
+// A wrench map of all seven axes, and the population map, over counts and tares of the whole range, missing
+// ones among them.
 static inline uint32_t bits_map_hash(void)
 {
     static bench_map whole;
@@ -40,6 +43,11 @@ static inline uint32_t bits_map_hash(void)
         int32_t pdc_q4 = (int32_t)(bits_step(&seed) % 65521u) - 20000;
         bt_map_wrench(&whole.map, counts, tare_q4, pdc_q4, (int32_t *)chain + 1, (int32_t *)chain + 4,
                       (int32_t *)chain + 7);
+        int32_t e_q4[BT_ELECTRODES], population_100un[3];
+        bt_signals_q4(counts, tare_q4, e_q4);
+        bt_population_force(e_q4, counts, tare_q4, population_100un);
+        bt_population_mix(bt_population_share(e_q4), (const int32_t *)chain + 1, population_100un);
+        chain[0] = bt_crc32((const uint8_t *)population_100un, sizeof population_100un) ^ chain[0];
         chain[0] = bt_crc32((const uint8_t *)chain, sizeof chain);
     }
     return chain[0];

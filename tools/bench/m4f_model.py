@@ -27,8 +27,8 @@ OTHERS = (*FP_ACCUMULATE, "sdiv", "udiv", "vdiv", "vsqrt", "ldrd", "strd", "vldr
 # one cycle each
 ONE_CYCLE = """
 adc add addw and asr bfi bic clz cmn cmp eor it lsl lsr mla mls mov movt movw mul mvn neg nop orn orr rbit rev
-ror rrx rsb sbc sbfx smlal smlabb smulbb smull sub subw sxtb sxth teq tst ubfx uadd8 umlal umull uxtb uxth vabs
-vadd vcmp vcmpe vcvt vmov vmrs vmul vneg vnmul vsub
+ror rrx rsb sbc sbfx smlal smlabb smulbb smull sub subw sxtb sxth teq tst ubfx uadd8 umlal umull uxtab uxtah uxtb uxth
+vabs vadd vcmp vcmpe vcvt vmov vmrs vmul vneg vnmul vsub
 """
 PLAIN = frozenset(ONE_CYCLE.split())
 

@@ -3,7 +3,9 @@
 #include "scenes.h"
 
 #include "finger.h"
+#include "map/population.h"
 #include "maps.h"
+#include "touch/signals.h"
 #include "wire/framing.h"
 
 #define LANES BT_LANES // a round's words that the front end looks at: electrodes, then pressure
@@ -161,6 +163,19 @@ static void map_pooled_7(const bt_solve_settings *settings)
     mapped(&pooled_7.map);
 }
 
+static void population(const bt_solve_settings *settings)
+{
+    int32_t force_100un[3], lin_100un[3], e_q4[BT_ELECTRODES];
+    bt_signals_q4(press_whole.round.electrode, press_whole.tare.electrode_q4, e_q4);
+    bt_population_force(e_q4, press_whole.round.electrode, press_whole.tare.electrode_q4, force_100un);
+    uint32_t share = bt_population_share(e_q4);
+    if (share < BT_POPULATION_ALL) { // a press is none of these
+        bt_force(e_q4, &settings->gains, lin_100un);
+        bt_population_mix(share, lin_100un, force_100un);
+    }
+    sink = (uint32_t)force_100un[0];
+}
+
 static void map_opened(const bt_solve_settings *settings)
 {
     (void)settings;
@@ -184,6 +199,7 @@ const bench_scene bench_scenes[BENCH_SCENES] = {
     {"wrench map", "pooled, 6 axes", map_pooled_6},
     {"wrench map", "pooled, 7 axes", map_pooled_7},
     {"wrench map", "pooled, 3 axes, judged", map_opened},
+    {"population map", "and Lin's, mixed", population},
     {"link", "44 words taken in, at rest", all_words},
     {"link", "FRAME computed, packed, framed", sent},
 };

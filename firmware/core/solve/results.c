@@ -115,7 +115,7 @@ static bool enough_active(const int32_t e_q4[BT_ELECTRODES])
     return false;
 }
 
-static uint32_t mapped(const bt_round *round, const bt_tare *tare, const int32_t e_q4[BT_ELECTRODES],
+static uint32_t by_map(const bt_round *round, const bt_tare *tare, const int32_t e_q4[BT_ELECTRODES],
                        const bt_solve_settings *settings, uint32_t quantities, bt_msg_frame *msg)
 {
     bt_map_input input = {
@@ -123,6 +123,10 @@ static uint32_t mapped(const bt_round *round, const bt_tare *tare, const int32_t
         .tare_q4 = tare->electrode_q4,
         .pdc_above_rest_q4 = bt_pdc_above_rest_q4(round->pdc, bt_tare_q4(tare->base.pdc_q16)),
     };
+    if (settings->map == NULL) {
+        return bt_solve_uncalibrated(e_q4, &input, settings, quantities, msg->poc_um, msg->force_100un,
+                                     msg->torque_mnmm);
+    }
     return BT_FRAME_FLAG_MAPPED
            | bt_solve_mapped(e_q4, &input, settings, quantities, msg->poc_um, msg->force_100un,
                              msg->torque_mnmm, &msg->torsion_mnmm);
@@ -142,8 +146,8 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
     }
     int32_t e_q4[BT_ELECTRODES];
     signal_shape shape = signals(round, tare, e_q4);
-    if (settings->map != NULL) {
-        flags |= mapped(round, tare, e_q4, settings, quantities, msg);
+    if (settings->map != NULL || settings->population) {
+        flags |= by_map(round, tare, e_q4, settings, quantities, msg);
     } else {
         flags |= bt_solve(e_q4, settings, quantities, msg->poc_um, msg->force_100un, msg->torque_mnmm);
     }

@@ -1,6 +1,7 @@
 #include "solve/solve.h"
 
 #include "fixed_point.h"
+#include "map/population.h"
 #include "solve/poc.h"
 
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
@@ -10,6 +11,20 @@ static uint32_t force_per_count(int32_t gain_nn, int axis)
 {
     uint64_t product = (uint64_t)bt_abs32(gain_nn) * bt_normal_length_milli[axis];
     return (uint32_t)((product << 16) / 100000000u);
+}
+
+// Whoever gave a finger, or the board, force gains knows more of it than what fingers have in common.
+static bool wants_population(const bt_settings *settings)
+{
+    static const uint8_t gains[3] = {BT_SETTING_FORCE_GAIN_X_NN, BT_SETTING_FORCE_GAIN_Y_NN,
+                                     BT_SETTING_FORCE_GAIN_Z_NN};
+    bt_settings defaults;
+    bt_settings_reset(&defaults);
+    bool wanted = bt_settings_get(settings, BT_SETTING_FORCE_MODEL) == BT_FORCE_MODEL_POPULATION;
+    for (int d = 0; d < 3; d++) {
+        wanted = wanted && bt_settings_get(settings, gains[d]) == bt_settings_get(&defaults, gains[d]);
+    }
+    return wanted;
 }
 
 bt_solve_settings bt_solve_settings_from(const bt_settings *settings)
@@ -22,6 +37,7 @@ bt_solve_settings bt_solve_settings_from(const bt_settings *settings)
     bt_solve_settings kernel = {
         .poc_weights = (int)bt_settings_get(settings, BT_SETTING_POC_WEIGHTS),
         .gains = bt_gains_from(force_nn, torque_nn),
+        .population = wants_population(settings),
     };
     for (int d = 0; d < 3; d++) {
         kernel.force_per_count_100un_q16[d] = force_per_count(force_nn[d], d);
@@ -102,4 +118,46 @@ uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *
         mark(force_100un);
     }
     return asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0;
+}
+
+static uint32_t population_force(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
+                                 const bt_gains *gains, int32_t force_100un[3])
+{
+    uint32_t share = bt_population_share(e_q4);
+    int32_t lin_100un[3];
+    if (share == 0) {
+        bt_force(e_q4, gains, force_100un);
+        return BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
+    }
+    bt_population_force(e_q4, frame->counts, frame->tare_q4, force_100un);
+    if (share == BT_POPULATION_ALL) {
+        return BT_FRAME_FLAG_POPULATION;
+    }
+    bt_force(e_q4, gains, lin_100un);
+    bt_population_mix(share, lin_100un, force_100un);
+    return BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
+}
+
+uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
+                               const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
+                               int32_t force_100un[3], int32_t torque_mnmm[3])
+{
+    bt_point point;
+    uint32_t flags = 0;
+    bool asked = wanted & (BT_WANT_POC | BT_WANT_TORQUE);
+    bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
+    give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
+    if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
+        flags = population_force(e_q4, frame, &settings->gains, force_100un);
+    }
+    if (wanted & BT_WANT_TORQUE) {
+        bt_torque_yz(e_q4, &settings->gains, torque_mnmm + 1);
+        torque_mnmm[0] = located ? bt_torque_x_derived(point.lever_yz, force_100un) : BT_INVALID_I32;
+    } else {
+        mark(torque_mnmm);
+    }
+    if (!(wanted & BT_WANT_FORCE)) {
+        mark(force_100un);
+    }
+    return flags | (asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0);
 }

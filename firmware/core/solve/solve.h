@@ -9,6 +9,7 @@
 #include "solve/wrench.h"
 #include "wire/sensor_gen.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 // What the kernels need of the settings, looked up once per change.
@@ -17,6 +18,7 @@ typedef struct {
     bt_gains gains;
     uint32_t force_per_count_100un_q16[3]; // by which one count of noise on every electrode moves the force
     const bt_map *map;                     // in force instead of the gains; NULL: none
+    bool population;                       // without a map: force comes from the population map
 } bt_solve_settings;
 
 // Without a map: that is the caller's to set.
@@ -45,5 +47,12 @@ typedef struct {
 uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
                          const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
                          int32_t force_100un[3], int32_t torque_mnmm[3], int32_t *torsion_mnmm);
+
+// The same without a map, as settings->population says: force of the population map, with the gains' in the
+// share that bt_population_share leaves them. Torque y and z are Eq 4's, and x is derived from that force.
+// Returns POPULATION too, and OUTSIDE where the gains have a share; neither where there is no force.
+uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
+                               const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
+                               int32_t force_100un[3], int32_t torque_mnmm[3]);
 
 #endif

@@ -1,6 +1,7 @@
 #include "solve/uncertainty.h"
 
 #include "fixed_point.h"
+#include "map/population.h"
 
 #include <stdbool.h>
 
@@ -146,9 +147,24 @@ static uint16_t poc_sigma_um(const int32_t e_q4[BT_ELECTRODES], int weights, con
     return saturate((root(square_q16) + 128ull) >> 8);
 }
 
+static void force_sigma(const bt_solve_settings *settings, uint32_t sigma_q8, bt_msg_frame *msg)
+{
+    for (int d = 0; d < 3; d++) {
+        uint64_t sigma = times(settings->force_per_count_100un_q16[d], sigma_q8);
+        msg->force_sigma_100un[d] = saturate((sigma + (1 << 23)) >> 24);
+    }
+}
+
 void bt_sigma(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t noise_count2,
               bt_msg_frame *msg)
 {
+    bool forced = msg->force_100un[0] != BT_INVALID_I32;
+    const uint32_t its = BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
+    if (forced && (msg->flags & its) == BT_FRAME_FLAG_POPULATION) {
+        msg->force_sigma_100un[0] = bt_population_sigma_100un[0];
+        msg->force_sigma_100un[1] = bt_population_sigma_100un[1];
+        msg->force_sigma_100un[2] = bt_population_sigma_100un[2];
+    }
     if (noise_count2 == 0) {
         return; // not measured yet
     }
@@ -156,11 +172,7 @@ void bt_sigma(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settin
     if (msg->poc_um[0] != BT_INVALID_I16) {
         msg->poc_sigma_um = poc_sigma_um(e_q4, settings->poc_weights, msg->poc_um, sigma_q8);
     }
-    if (msg->force_100un[0] != BT_INVALID_I32
-        && settings->map == NULL) { // a map's depends on where it is touched
-        for (int d = 0; d < 3; d++) {
-            uint64_t sigma = times(settings->force_per_count_100un_q16[d], sigma_q8);
-            msg->force_sigma_100un[d] = saturate((sigma + (1 << 23)) >> 24);
-        }
+    if (forced && settings->map == NULL && !settings->population) { // a map's depends on where it is touched
+        force_sigma(settings, sigma_q8, msg);
     }
 }

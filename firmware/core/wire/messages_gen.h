@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0x07B0840Fu
+#define BT_SCHEMA_HASH 0x0CE1D802u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -68,6 +68,12 @@ enum bt_poc_weights {
     BT_POC_WEIGHTS_COMPRESS_N2 = 2, // min(e, 0)^2
 };
 
+// What the force of a finger without a wrench map comes from.
+enum bt_force_model {
+    BT_FORCE_MODEL_LIN = 0, // Lin's three scales, force_gain_*_nn
+    BT_FORCE_MODEL_POPULATION = 1, // the population map, made of other fingers (host/docs/population.md), while the force gains are the defaults; with others it is LIN
+};
+
 // What the firmware runs on.
 enum bt_board {
     BT_BOARD_POSIX_SIM = 1, // a process on a pty with emulated sensors
@@ -108,7 +114,9 @@ enum bt_calibration_state {
 #define BT_FRAME_FLAG_SHED (1u << 22) // the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out
 #define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not said its serial number since: tare, calibration and map may be another's
 #define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with a tare of its own; no results where it has not the same calibration and map
-#define BT_FRAME_FLAGS 0x1FFFFFFu // all there are
+#define BT_FRAME_FLAG_POPULATION (1u << 25) // force comes from the population map, or in part
+#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // fewer electrodes carry the signal than on any plate that the population map was made of: force is pulled towards Lin's, or is Lin's
+#define BT_FRAME_FLAGS 0x7FFFFFFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME messages
@@ -140,8 +148,9 @@ enum bt_setting {
     BT_SETTING_PRESSURE_GAIN_NN = 11, // [nN/count]
     BT_SETTING_PRESSURE_FILTER_MILLI = 12, // [1/1000]
     BT_SETTING_HOLD_TIMEOUT_MS = 13, // [ms]
+    BT_SETTING_FORCE_MODEL = 14, // [enum force_model]
 };
-#define BT_SETTINGS 13
+#define BT_SETTINGS 14
 
 // Ranges, for the bounds that the core asserts.
 #define BT_SETTING_POC_WEIGHTS_MIN (0)
@@ -170,6 +179,8 @@ enum bt_setting {
 #define BT_SETTING_PRESSURE_FILTER_MILLI_MAX 1000
 #define BT_SETTING_HOLD_TIMEOUT_MS_MIN (0)
 #define BT_SETTING_HOLD_TIMEOUT_MS_MAX 3600000
+#define BT_SETTING_FORCE_MODEL_MIN (0)
+#define BT_SETTING_FORCE_MODEL_MAX 1
 
 typedef struct {
     uint8_t id;

@@ -79,6 +79,13 @@ def compute(
             out[name] = plain[name]
         return by_map(out, opened(wrench_map), counts, tare, pdc_above_rest)
     plan = _DEFAULT_PLAN if settings is None else _plan(settings)
+    if settings is not None and wire.Setting.FORCE_MODEL in settings:
+        from . import population  # here: as above
+
+        if population.in_force(settings):
+            out = compute(counts, tare, {**settings, wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}, out)
+            population.into(out, counts, tare)
+            return out
     # One frame in the types that frames have, as on the live path, where the checks would take longer
     # than the maths. Copying 38 and 152 bytes is faster than borrowing two buffers.
     try:
@@ -130,6 +137,8 @@ def per_frame(tare: Any, settings: Settings | None = None) -> Callable[[NDArray[
     base = _checked_tare(tare, _ONE)
     out = np.empty((), RESULT_DTYPE)
     compute(np.zeros(_ONE, _COUNT), base, settings, out)  # refuses a tare that is out of range
+    if settings is not None and settings.get(wire.Setting.FORCE_MODEL) == wire.ForceModel.POPULATION:
+        return lambda counts: compute(counts, base, settings, out)
     base_bytes, result, one_frame, dtype, shape = base.tobytes(), _buffer(out), lib.bt_one_frame, _COUNT, _ONE
 
     def results(counts: NDArray[np.uint16]) -> StructArray:

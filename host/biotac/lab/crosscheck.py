@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.pressure.check import FORCE_BOUND_N, PressureCheck
 from ..calibrate.wrench import board
+from ..core import population
 from ..core.board_map import BoardMap, opened, pdc_above_rest_q4
 from ..core.compiled import TORQUE_GAINS, Results, Settings, reference_q4
 from ..core.map_float64 import exact, replace_gains
@@ -24,6 +25,7 @@ from ..wire import messages_gen as wire
 from ..wire.frames import UM_PER_MM, StructArray, electrode_signals, to_units
 from ..wire.native import ffi, lib
 from ..wire.sensor_gen import CORE_RADIUS_UM
+from .population_bound import force_bound_n
 
 #: The PoC's distance and the force of each axis, see firmware/reference/kernel_bounds.h.
 POC_BOUND_UM: float = lib.bt_poc_bound_um()
@@ -62,7 +64,7 @@ class CrossCheck:
     wire_minor: int = wire.WIRE_MINOR  # of the board: before 1.4 none told a force from pressure
     pressure: PressureCheck = field(default_factory=PressureCheck)
     mapped: int = 0  # frames by a wrench map, whose force has a bound of its own
-    mapped_force_mn_bound: float = 0.0  # the largest of those
+    mapped_force_mn_bound: float = 0.0  # the largest of those, and of frames by the population map
     findings: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
@@ -123,7 +125,11 @@ class CrossCheck:
         truth = reference_q4(messages["counts"], messages["tare_q4"], settings)
         force_bound: NDArray[np.float64] | float = FORCE_BOUND_MN
         torsion, torsion_bound = (np.full((len(messages), 1), value) for value in (np.nan, 0.0))
-        if its is None:
+        if its is None and population.in_force(settings):
+            force_bound, torque_bound = _by_population(messages, truth, settings)
+            self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
+            self._judge_model(messages)
+        elif its is None:
             torque_bound = torque_bound_nmm(messages, truth, settings)
         else:
             force_bound, torque_bound, torsion, torsion_bound = _by_map(messages, its, truth, settings)
@@ -168,6 +174,16 @@ class CrossCheck:
         skipped = not_asked(messages, messages["poc_um"])
         for k in np.flatnonzero((flagged != marked) & ~skipped):
             self._find(messages, int(k), "the POC_INVALID flag contradicts the PoC")
+
+    def _judge_model(self, messages: StructArray) -> None:
+        """POPULATION and OUTSIDE must stand exactly where force was made, and the map had not all of it."""
+        made = (messages["force_100un"] != wire.INVALID_I32).all(axis=1)
+        signals = population.tared(messages["counts"], messages["tare_q4"])
+        outside = np.where(population.share(signals) < population.ALL, wire.FrameFlags.OUTSIDE, 0)
+        wanted = wire.FrameFlags.POPULATION | outside
+        seen = messages["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE)
+        for k in np.flatnonzero(made & (seen != wanted)):
+            self._find(messages, int(k), "POPULATION or OUTSIDE contradicts the signals")
 
     def _find(self, messages: StructArray, k: int, what: str) -> None:
         self.violations += 1
@@ -216,6 +232,18 @@ def _by_map(
         torque_off = torque_bound_nmm(messages, truth, settings)
         torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * force_off[:, 1:].sum(axis=1)
     return 1e3 * force_off, torque_off, torsion, torsion_off
+
+
+def _by_population(
+    messages: StructArray, truth: Results, settings: Settings
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Put the population map's force into ``truth``. Bounds of force, mN, and torque, N*mm, (n, 3)."""
+    counts, tare_q4 = messages["counts"], messages["tare_q4"]
+    off = force_bound_n(population.tared(counts, tare_q4), FORCE_BOUND_MN / 1e3)
+    population.replace_force(counts, tare_q4, truth.poc_mm, truth.force_n, truth.torque_nmm)
+    torque_off = torque_bound_nmm(messages, truth, settings)
+    torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * off[:, 1:].sum(axis=1)
+    return 1e3 * off, torque_off
 
 
 def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:

@@ -41,8 +41,10 @@ RESULT_SETTINGS = frozenset(
         wire.Setting.TORQUE_GAIN_Y_NN,
         wire.Setting.TORQUE_GAIN_Z_NN,
         wire.Setting.PRESSURE_GAIN_NN,
+        wire.Setting.FORCE_MODEL,
     }
 )
+_KERNEL_FLAGS = wire.FrameFlags.POC_INVALID | wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE
 _HOST_REASONS = (wire.TareReason.HOST_NOW, wire.TareReason.HOST_SET)
 _UNKNOWN_Q16 = 0xFFFFFFFF
 _ACTIVE_COUNTS = 15
@@ -143,10 +145,10 @@ def _recomputed(frames: StructArray, settings: Settings, its: BoardMap | None) -
         frames["pdc_filtered_q4"], frames["pdc_tare_q4"], settings[wire.Setting.PRESSURE_GAIN_NN]
     )
     flags = frames["flags"] & ~np.uint32(
-        wire.FrameFlags.POC_INVALID | wire.FrameFlags.TORSION_OK | wire.FrameFlags.NOT_ASKED | wire.FrameFlags.MAPPED
+        _KERNEL_FLAGS | wire.FrameFlags.TORSION_OK | wire.FrameFlags.NOT_ASKED | wire.FrameFlags.MAPPED
     )
     flags |= np.uint32(0 if its is None else wire.FrameFlags.MAPPED)
-    flags |= kernel_flags & np.uint32(wire.FrameFlags.POC_INVALID)
+    flags |= kernel_flags & np.uint32(_KERNEL_FLAGS)
     flags |= np.where(_torsion_ok(frames, poc_um), np.uint32(wire.FrameFlags.TORSION_OK), np.uint32(0))
     frames["flags"] = flags
     return frames

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0x07B0840F
+SCHEMA_HASH = 0x0CE1D802
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -80,6 +80,13 @@ class PocWeights(IntEnum):
     COMPRESS_N2 = 2  # min(e, 0)^2
 
 
+class ForceModel(IntEnum):
+    """What the force of a finger without a wrench map comes from."""
+
+    LIN = 0  # Lin's three scales, force_gain_*_nn
+    POPULATION = 1  # the population map, made of other fingers (host/docs/population.md), while the force gains are the defaults; with others it is LIN
+
+
 class Board(IntEnum):
     """What the firmware runs on."""
 
@@ -124,6 +131,8 @@ class FrameFlags(IntFlag):
     SHED = 1 << 22  # the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out
     SENSOR_UNSURE = 1 << 23  # the sensor was away and has not said its serial number since: tare, calibration and map may be another's
     SENSOR_OTHER = 1 << 24  # another sensor than at START, with a tare of its own; no results where it has not the same calibration and map
+    POPULATION = 1 << 25  # force comes from the population map, or in part
+    OUTSIDE = 1 << 26  # fewer electrodes carry the signal than on any plate that the population map was made of: force is pulled towards Lin's, or is Lin's
 
 
 class StreamFlags(IntFlag):
@@ -197,6 +206,12 @@ POC_WEIGHTS_DOC: dict[int, str] = {
 }
 
 
+FORCE_MODEL_DOC: dict[int, str] = {
+    0: "Lin's three scales, force_gain_*_nn",
+    1: "the population map, made of other fingers (host/docs/population.md), while the force gains are the defaults; with others it is LIN",
+}
+
+
 BOARD_DOC: dict[int, str] = {
     1: "a process on a pty with emulated sensors",
     2: "Raspberry Pi Pico (RP2040)",
@@ -237,6 +252,8 @@ FRAME_FLAG_DOC: dict[int, str] = {
     4194304: "the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out",
     8388608: "the sensor was away and has not said its serial number since: tare, calibration and map may be another's",
     16777216: "another sensor than at START, with a tare of its own; no results where it has not the same calibration and map",
+    33554432: "force comes from the population map, or in part",
+    67108864: "fewer electrodes carry the signal than on any plate that the population map was made of: force is pulled towards Lin's, or is Lin's",
 }
 
 
@@ -274,6 +291,7 @@ class Setting(IntEnum):
     PRESSURE_GAIN_NN = 11
     PRESSURE_FILTER_MILLI = 12
     HOLD_TIMEOUT_MS = 13
+    FORCE_MODEL = 14
 
 
 class SettingSpec(NamedTuple):
@@ -338,6 +356,10 @@ SETTINGS: dict[Setting, SettingSpec] = {
     Setting.HOLD_TIMEOUT_MS: SettingSpec(
         "ms", 0, 3600000, 2000,
         "how long HOLD outlives the host's last word; 0: for ever",
+    ),
+    Setting.FORCE_MODEL: SettingSpec(
+        "enum force_model", 0, 1, 0,
+        "force of a finger that has neither a wrench map nor force gains of its own",
     ),
 }
 

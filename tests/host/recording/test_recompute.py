@@ -10,7 +10,7 @@ import pytest
 
 import biotac
 from biotac.cli.main import main
-from biotac.core.compiled import reference_q4
+from biotac.core.compiled import FORCE_GAINS, reference_q4
 from biotac.hand.streams import RESULTS
 from biotac.wire import messages_gen as wire
 
@@ -103,6 +103,22 @@ def test_other_weights_give_what_a_board_with_them_sends(folder, recorded, weigh
     assert np.array_equal(new.wire["flags"] & ~unsure, expected.wire["flags"] & ~unsure)
     assert new.settings == expected.settings
     assert main(["check", str(folder / "new.mcap")]) == 0
+
+
+@pytest.mark.parametrize("options", [[], ["--keep-tare"]])
+def test_the_population_map_gives_what_a_board_with_it_sends(tmp_path, options: list[str]) -> None:
+    # the emulated finger has gains of its own, which would take precedence
+    gains = {s.name.lower(): wire.SETTINGS[s].default for s in FORCE_GAINS}
+    model = tmp_path / "model.json"
+    model.write_text('{"force_model": 1}', encoding="utf-8")
+    names = [tmp_path / f"{name}.mcap" for name in ("lin", "population", "new")]
+    record(names[0], "sim:press.toml", **gains)
+    sent = record(names[1], "sim:press.toml", force_model=wire.ForceModel.POPULATION, **gains)
+    forced = (sent.wire["flags"] & wire.FrameFlags.UNTARED) == 0
+    assert forced.any() and (sent.wire["flags"][forced] & wire.FrameFlags.POPULATION).all()
+    assert main(["recompute", str(names[0]), str(names[2]), "--settings", str(model), *options]) == 0
+    assert biotac.Recording(names[2]).wire.tobytes() == sent.wire.tobytes()
+    assert main(["check", str(names[1])]) == 0
 
 
 def test_settings_come_from_a_file(folder, recorded, capsys) -> None:

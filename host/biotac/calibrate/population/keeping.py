@@ -9,20 +9,19 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...core.geometry import Floats
+from ...core.population import SHIPPED, shipped
 from ...errors import InputError
 from ...version import __version__
 from ..wrench import features
 from .training import AXES, COLUMNS, FAMILIES, Population
 
 FORMAT = "biotac-population-map/1"
-SHIPPED = "population.json"
 DIGITS = 7
 NOTHING = 1e-9
 
@@ -83,7 +82,7 @@ def loads(text: str, where: str) -> Kept:
 def load(path: Path | None) -> Kept:
     """From a file, or the package's own where ``path`` is None. Raises InputError."""
     if path is None:
-        return loads(resources.files(__package__).joinpath(SHIPPED).read_text(encoding="utf-8"), SHIPPED)
+        return loads(shipped(), SHIPPED)
     try:
         return loads(path.read_text(encoding="utf-8"), str(path))
     except (OSError, UnicodeDecodeError) as error:

@@ -1,0 +1,110 @@
+"""The force of a finger that nobody has calibrated, in float64: the population map that comes with the package.
+
+The board's own is firmware/core/map/population.c, of the same coefficients in 16 bits. This reads them as they were
+trained, and makes the columns as training does. SPEC.md, Population map.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..wire import messages_gen as wire
+from ..wire.frames import tare_to_q4
+from ..wire.map_gen import Gate, Kind
+from .compiled import FORCE_GAINS
+from .geometry import Floats
+from .map_columns import Signals, gates, kinds
+
+SHIPPED = "population.json"
+Block = tuple[Kind, Gate, Floats]
+
+ALL = 256  # a share
+_NOISE_Q4 = 8 * 16
+_SHARE_BITS = 11
+_CHUNK_ROWS = 4096
+
+
+def in_force(settings: Mapping[wire.Setting, int]) -> bool:
+    """Whether force of a finger with these settings, without a wrench map, comes from the population map."""
+    model = settings.get(wire.Setting.FORCE_MODEL, wire.SETTINGS[wire.Setting.FORCE_MODEL].default)
+    own = any(settings.get(gain, wire.SETTINGS[gain].default) != wire.SETTINGS[gain].default for gain in FORCE_GAINS)
+    return model == wire.ForceModel.POPULATION and not own
+
+
+def shipped() -> str:
+    """The package's population map as JSON (biotac.calibrate.population.keeping)."""
+    return resources.files(__package__).joinpath(SHIPPED).read_text(encoding="utf-8")
+
+
+@cache
+def blocks() -> list[Block]:
+    """Kind, gate and coefficients (columns, 3) in N of each block."""
+    facts = json.loads(shipped())
+    rows = np.array(facts["coefficients_n_and_variance"], dtype=np.float64)[:, :3]
+    one_row = kinds(Signals(np.zeros((1, 19)), np.full(19, 2000.0)))
+    named = [(Kind[kind], Gate[gate]) for kind, gate in facts["blocks"]]
+    ends = np.cumsum([one_row[kind].shape[1] for kind, _ in named])
+    return [(*name, its) for name, its in zip(named, np.split(rows, ends[:-1]), strict=True)]
+
+
+def tared(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Signals:
+    """Signals (n, 19) of a FRAME's integers (n, 19); what is missing is as its tare."""
+    missing = (counts == wire.INVALID_COUNT) | (tare_q4 == wire.INVALID_COUNT)
+    tare = np.where(missing, 0.0, tare_q4 / 16)
+    return Signals(np.where(missing, 0.0, counts - tare), tare)
+
+
+def alone(signals: Signals) -> Floats:
+    """The map's force (n, 3) in N, whatever it has seen."""
+    columns, gate = kinds(signals), gates(signals.e)
+    total = np.zeros((len(signals.e), 3))
+    for kind, its_gate, coefficients in blocks():
+        total += columns[kind] @ coefficients * gate[its_gate]
+    return total
+
+
+def share(signals: Signals) -> npt.NDArray[np.int64]:
+    """How much of the force the map makes (n,), in 1/256: defined in whole numbers, so that all boards agree.
+
+    All where |e| less 8 counts spreads over 4.5 electrodes, (sum s)^2 / sum s^2, and nothing below 3.
+    """
+    size = np.rint(16 * np.abs(signals.e)).astype(np.int64)
+    beyond = np.maximum(size - _NOISE_Q4, 0)
+    largest = beyond.max(axis=1, initial=0)
+    bits = np.ceil(np.log2(largest + 1.0)).astype(np.int64)
+    beyond >>= np.maximum(bits - _SHARE_BITS, 0)[:, None]
+    square, energy = beyond.sum(axis=1) ** 2, (beyond**2).sum(axis=1)
+    divisor = np.maximum((3 * energy + 63) >> 6, 1)
+    part = np.minimum((8 * (square - 3 * energy) + divisor // 2) // divisor, ALL)
+    enough = (square // 2 >= 9 * energy // 4) & (square > 0)
+    return np.where(enough, ALL, np.where(square <= 3 * energy, 0, part))
+
+
+def replace_force(
+    counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], poc_mm: Floats, force_n: Floats, torque_nmm: Floats
+) -> None:
+    """Put the map's force, where it has a share, in place of Lin's ``force_n``, and the torque x that it makes.
+
+    Arrays are of n rows. In place; NaN in ``poc_mm`` makes a torque x of NaN.
+    """
+    for start in range(0, len(counts), _CHUNK_ROWS):
+        rows = slice(start, start + _CHUNK_ROWS)
+        signals = tared(counts[rows], tare_q4[rows])
+        part = (share(signals) / ALL)[:, None]
+        force_n[rows] = part * alone(signals) + (1 - part) * force_n[rows]
+    torque_nmm[:, 0] = poc_mm[:, 1] * force_n[:, 2] - poc_mm[:, 2] * force_n[:, 1]
+
+
+def into(results: Any, counts: Any, tare: Any) -> None:
+    """replace_force of ``results`` of biotac.compute, of the shapes that it knows."""
+    rows = results.reshape(-1)
+    raw = np.asarray(counts).reshape(len(rows), -1).astype(np.uint16)
+    tare_q4 = tare_to_q4(np.broadcast_to(np.asarray(tare, dtype=np.float64), raw.shape))
+    replace_force(raw, tare_q4, rows["poc_mm"], rows["force_n"], rows["torque_nmm"])

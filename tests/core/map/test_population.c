@@ -1,0 +1,177 @@
+// The population map: nothing overflows, rest is 0, mirrored fingers feel mirrored forces, and a poke gets
+// Lin's.
+#include "keep/settings.h"
+#include "map/population.h"
+#include "solve/wrench.h"
+#include "support.h"
+#include "touch/signals.h"
+
+static const uint8_t mirror[BT_ELECTRODES] = {10, 11, 12, 13, 14, 15, 6,  8,  7, 9,
+                                              0,  1,  2,  3,  4,  5,  16, 17, 18};
+
+static void force_of(const uint16_t counts[BT_ELECTRODES], uint16_t tare_q4, int32_t force_100un[3])
+{
+    uint16_t tares_q4[BT_ELECTRODES];
+    int32_t e_q4[BT_ELECTRODES];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        tares_q4[i] = tare_q4;
+    }
+    bt_signals_q4(counts, tares_q4, e_q4);
+    bt_population_force(e_q4, counts, tares_q4, force_100un);
+}
+
+static void rest_is_no_force(void **state)
+{
+    (void)state;
+    for (uint32_t count = 0; count <= BT_FULL_SCALE_COUNT; count += 5) {
+        uint16_t counts[BT_ELECTRODES];
+        int32_t force[3];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            counts[i] = (uint16_t)count;
+        }
+        force_of(counts, (uint16_t)(16 * count), force);
+        for (int d = 0; d < 3; d++) {
+            assert_int_equal(force[d], 0);
+        }
+    }
+}
+
+// Every choice of extremes that a sign pattern makes; the sanitizer looks for what the bounds missed.
+static void extremes_do_not_overflow(void **state)
+{
+    (void)state;
+    static const uint16_t tares_q4[] = {0, 16, 800, 32000, 65440, 65520};
+    uint32_t seed = 1;
+    for (int k = 0; k < 60000; k++) {
+        uint16_t counts[BT_ELECTRODES];
+        int32_t force[3];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            seed = seed * 1664525u + 1013904223u;
+            uint32_t draw = seed >> 16;
+            counts[i] = (uint16_t)(draw % 4 == 0   ? 0
+                                   : draw % 4 == 1 ? BT_FULL_SCALE_COUNT
+                                   : draw % 4 == 2 ? draw % 4096
+                                                   : 4090);
+        }
+        force_of(counts, tares_q4[seed >> 28 < 12 ? (seed >> 28) % 6 : 3], force);
+        for (int d = 0; d < 3; d++) {
+            assert_true(force[d] > -200000000 && force[d] < 200000000);
+        }
+    }
+}
+
+static void a_missing_electrode_counts_as_rest(void **state)
+{
+    (void)state;
+    uint16_t counts[BT_ELECTRODES];
+    int32_t missing[3], still[3];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        counts[i] = (uint16_t)(2600 - 11 * i);
+    }
+    counts[4] = BT_INVALID_COUNT;
+    force_of(counts, 16 * 2800, missing);
+    counts[4] = 2800;
+    force_of(counts, 16 * 2800, still);
+    for (int d = 0; d < 3; d++) {
+        assert_int_equal(missing[d], still[d]);
+    }
+}
+
+// The map is symmetric, but a product is in the row of the electrode that comes first, which its mirror image
+// need not. A row is rounded by half of 2^(17 - 11) of 100 uN, and met by a factor below 1: 19 rows, twice.
+#define ROWS_100UN (2 * BT_ELECTRODES * 32 + 40)
+
+static void a_mirrored_finger_feels_the_mirrored_force(void **state)
+{
+    (void)state;
+    uint32_t seed = 7;
+    int32_t most = 0;
+    for (int k = 0; k < 500; k++) {
+        uint16_t counts[BT_ELECTRODES], other[BT_ELECTRODES];
+        int32_t force[3], image[3];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            seed = seed * 1664525u + 1013904223u;
+            counts[i] = (uint16_t)(2900 - (seed >> 16) % 900);
+        }
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            other[i] = counts[mirror[i]];
+        }
+        force_of(counts, 16 * 2800, force);
+        force_of(other, 16 * 2800, image);
+        assert_in_range(force[0] - image[0] + ROWS_100UN, 0, 2 * ROWS_100UN);
+        assert_in_range(force[1] + image[1] + ROWS_100UN, 0, 2 * ROWS_100UN);
+        assert_in_range(force[2] - image[2] + ROWS_100UN, 0, 2 * ROWS_100UN);
+        most = force[2] > most ? force[2] : most;
+    }
+    assert_true(most > 10 * ROWS_100UN);
+}
+
+static void a_poke_keeps_lins_sign_and_size_and_is_told(void **state)
+{
+    (void)state;
+    bt_settings all;
+    bt_settings_reset(&all);
+    const int32_t gain_nn[3] = {bt_settings_get(&all, BT_SETTING_FORCE_GAIN_X_NN),
+                                bt_settings_get(&all, BT_SETTING_FORCE_GAIN_Y_NN),
+                                bt_settings_get(&all, BT_SETTING_FORCE_GAIN_Z_NN)};
+    const int32_t torque_nn[2] = {0, 0};
+    const bt_gains gains = bt_gains_from(gain_nn, torque_nn);
+    uint32_t seed = 3;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        for (int deep = 50; deep <= 600; deep += 10) {
+            int32_t e_q4[BT_ELECTRODES], lin[3], force[3];
+            uint16_t counts[BT_ELECTRODES];
+            for (int j = 0; j < BT_ELECTRODES; j++) {
+                seed = seed * 1664525u + 1013904223u;
+                int32_t noise = deep >= 100 ? (int32_t)(seed >> 29) - 4 : 0; // a sensor's own
+                counts[j] = (uint16_t)(2800 + noise - (i == j ? deep : 0));
+                e_q4[j] = 16 * ((int32_t)counts[j] - 2800);
+            }
+            force_of(counts, 16 * 2800, force);
+            bt_force(e_q4, &gains, lin);
+            uint32_t share = bt_population_share(e_q4);
+            assert_true(share < BT_POPULATION_ALL);
+            bt_population_mix(share, lin, force);
+            assert_true(force[2] > 0 && lin[2] > 0);
+            assert_true(3 * force[2] >= lin[2] && force[2] <= 3 * lin[2]);
+        }
+    }
+}
+
+// By division, as it is defined: (sum |e|)^2 / sum e^2 from 3 to 4.5.
+static void the_share_is_what_it_is_defined_as(void **state)
+{
+    (void)state;
+    uint32_t seed = 5;
+    for (int k = 0; k < 20000; k++) {
+        int32_t e_q4[BT_ELECTRODES];
+        double sum = 0, energy = 0;
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            seed = seed * 1664525u + 1013904223u;
+            int32_t size = i < k % 8 ? 8000 + (int32_t)(seed >> 18) : (int32_t)(seed >> 22);
+            e_q4[i] = seed & 1 << 12 ? size : -size;
+            double beyond = size > 128 ? size - 128 : 0;
+            sum += beyond;
+            energy += beyond * beyond;
+        }
+        double wanted = (sum * sum / energy - 3.0) / 1.5;
+        wanted = wanted < 0 ? 0 : wanted > 1 ? 1 : wanted;
+        double got = bt_population_share(e_q4) / 256.0;
+        assert_true(got - wanted < 0.05 && wanted - got < 0.05);
+    }
+    const int32_t none[BT_ELECTRODES] = {0};
+    assert_int_equal(bt_population_share(none), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rest_is_no_force),
+        cmocka_unit_test(extremes_do_not_overflow),
+        cmocka_unit_test(a_missing_electrode_counts_as_rest),
+        cmocka_unit_test(a_mirrored_finger_feels_the_mirrored_force),
+        cmocka_unit_test(a_poke_keeps_lins_sign_and_size_and_is_told),
+        cmocka_unit_test(the_share_is_what_it_is_defined_as),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

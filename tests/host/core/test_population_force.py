@@ -1,0 +1,136 @@
+"""The population map end to end: the board's core beside float64, and who takes precedence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac.calibrate.population import keeping
+from biotac.core import population
+from biotac.core.compiled import on_board, on_board_q4
+from biotac.core.finger import Finger
+from biotac.lab.crosscheck import CrossCheck
+from biotac.wire import messages_gen as wire
+
+POPULATION = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.POPULATION)}
+TARE = np.linspace(2500.0, 3200.0, 19).round()
+
+
+def pressed(n: int, seed: int) -> np.ndarray:
+    """Counts (n, 19): from a breath to a slam, over one electrode to all of them."""
+    rng = np.random.default_rng(seed)
+    size = 10 ** rng.uniform(0.5, 3.2, (n, 1))
+    width = rng.uniform(0.3, 12.0, (n, 1))
+    along = np.abs(np.arange(19) - rng.integers(0, 19, (n, 1)))
+    e = -size * np.exp(-((along / width) ** 2)) * rng.uniform(-0.3, 1.0, (n, 19))
+    return np.clip(TARE + e, 0, 4095).astype(np.uint16)
+
+
+def rows_of(settings: dict, counts: np.ndarray) -> np.ndarray:
+    finger = Finger(settings, quantities=wire.QuantityFlags(0x7F))
+    finger.feed(np.tile(TARE.astype(int), (50, 1)))
+    finger.set_tare(TARE)
+    finger.hold()
+    return finger.feed(counts)
+
+
+def test_on_plates_it_is_the_trained_map_to_what_16_bits_leave() -> None:
+    counts = pressed(4000, 1)
+    its = population.tared(counts, np.broadcast_to((16 * TARE).astype(np.uint16), counts.shape))
+    inside = population.share(its) == population.ALL
+    assert 500 < inside.sum() < 3900
+    got = biotac.compute(counts, TARE, POPULATION)["force_n"][inside]
+    wanted = keeping.load(None).its.force(counts[inside], TARE)
+    np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-9)
+
+
+def test_the_board_keeps_the_bound_and_says_what_it_did() -> None:
+    outcome = CrossCheck()
+    for seed in range(5):
+        rows = rows_of(POPULATION, pressed(4000, seed))
+        assert (rows["flags"] & wire.FrameFlags.POPULATION).all()
+        outcome.add(rows, population_settings())
+    assert outcome.violations == 0, outcome.findings
+    assert outcome.force_mn_max > 0.1
+    facts = outcome.as_dict()
+    assert facts["force_mn_max"] <= facts["force_mn_bound"]
+
+
+def population_settings() -> dict:
+    return {s: spec.default for s, spec in wire.SETTINGS.items()} | POPULATION
+
+
+def test_a_wrong_flag_and_a_wrong_force_are_found() -> None:
+    rows = rows_of(POPULATION, pressed(100, 3))
+    rows["flags"][5] ^= wire.FrameFlags.OUTSIDE
+    rows["force_100un"][7, 2] += 30000
+    outcome = CrossCheck()
+    outcome.add(rows, population_settings())
+    assert outcome.violations == 2, outcome.findings
+
+
+def test_own_gains_take_precedence() -> None:
+    counts = pressed(200, 4)
+    own = {wire.Setting.FORCE_GAIN_Z_NN: 2_000_000}
+    rows = rows_of(POPULATION | own, counts)
+    assert not (rows["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE)).any()
+    assert not population.in_force(POPULATION | own)
+    np.testing.assert_array_equal(
+        biotac.compute(counts, TARE, POPULATION | own)["force_n"], biotac.compute(counts, TARE, own)["force_n"]
+    )
+
+
+@pytest.mark.parametrize("electrode", range(19))
+def test_a_poke_is_lins(electrode: int) -> None:
+    counts = np.tile(TARE, (20, 1))
+    counts[:, electrode] -= np.linspace(50, 600, 20)
+    counts = counts.astype(np.uint16)
+    lin, new = (on_board(counts, TARE, {**population_settings(), wire.Setting.FORCE_MODEL: m}) for m in (0, 1))
+    np.testing.assert_array_equal(new.force_n, lin.force_n)
+    rows = rows_of(POPULATION, counts)
+    assert (rows["flags"] & wire.FrameFlags.OUTSIDE).all()
+    assert (rows["force_sigma_100un"] == wire.INVALID_COUNT).all()
+
+
+def test_sigma_is_what_a_new_finger_leaves() -> None:
+    rows = rows_of(POPULATION, pressed(500, 6))
+    inside = rows["flags"] & wire.FrameFlags.OUTSIDE == 0
+    assert inside.any()
+    told, wanted = rows["force_sigma_100un"][inside] / 1e4, keeping.load(None).sigma_n
+    np.testing.assert_allclose(told, np.broadcast_to(wanted, told.shape), rtol=0, atol=5.1e-5)
+
+
+def test_torque_x_follows_the_force_and_the_rest_stays() -> None:
+    counts = pressed(300, 7)
+    lin, new = (biotac.compute(counts, TARE, {wire.Setting.FORCE_MODEL: model}) for model in (0, 1))
+    c, f = new["poc_mm"], new["force_n"]
+    np.testing.assert_array_equal(new["poc_mm"], lin["poc_mm"])
+    np.testing.assert_array_equal(new["torque_nmm"][:, 1:], lin["torque_nmm"][:, 1:])
+    np.testing.assert_allclose(new["torque_nmm"][:, 0], c[:, 1] * f[:, 2] - c[:, 2] * f[:, 1], atol=1e-9)
+
+
+def test_one_frame_and_a_live_stream_are_as_many() -> None:
+    counts = pressed(5, 8)
+    every = biotac.compute(counts, TARE, POPULATION)
+    live = biotac.per_frame(TARE, POPULATION)
+    for k in range(5):
+        for name in every.dtype.names:
+            # BLAS adds one row in another order than many
+            np.testing.assert_allclose(biotac.compute(counts[k], TARE, POPULATION)[name], every[name][k], rtol=1e-10)
+            np.testing.assert_allclose(live(counts[k])[name], every[name][k], rtol=1e-10)
+
+
+def test_missing_electrodes_are_at_rest() -> None:
+    counts = pressed(50, 9)
+    counts[:, 4] = wire.INVALID_COUNT
+    whole = counts.copy()
+    whole[:, 4] = TARE[4]
+    q4 = np.broadcast_to((16 * TARE).astype(np.uint16), counts.shape)
+    for a, b in zip(
+        on_board_q4(counts, q4, population_settings()), on_board_q4(whole, q4, population_settings()), strict=True
+    ):
+        np.testing.assert_array_equal(a, b)
+    np.testing.assert_array_equal(
+        biotac.compute(counts, TARE, POPULATION)["force_n"], biotac.compute(whole, TARE, POPULATION)["force_n"]
+    )
