@@ -63,11 +63,11 @@ def of(frames: np.ndarray, finger: int) -> np.ndarray:
 @pytest.mark.parametrize(
     ("kind", "counter"),
     [
-        ("bad_parity", "words_parity"),
+        pytest.param("bad_parity", "words_parity", marks=pytest.mark.long),
         ("stuck_low", "words_stuck"),
-        ("stuck_high", "words_stuck"),
+        pytest.param("stuck_high", "words_stuck", marks=pytest.mark.long),
         ("error_word", "words_error"),
-        ("no_channel", "words_error"),
+        pytest.param("no_channel", "words_error", marks=pytest.mark.long),
     ],
 )
 def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(play, kind: str, counter: str) -> None:
@@ -102,6 +102,7 @@ def test_a_single_bad_channel_is_marked_missing_and_never_stale(play) -> None:
     assert ((mine["flags"][180:] & FrameFlags.CONTACT) != 0).all()
 
 
+@pytest.mark.long
 def test_a_missing_temperature_is_flagged_and_hurts_nothing_else(play) -> None:
     fault = FAULT.format(kind="no_channel") + 'channel = "TDC"\n'
     healthy, _ = play(HEALTHY)
@@ -113,6 +114,7 @@ def test_a_missing_temperature_is_flagged_and_hurts_nothing_else(play) -> None:
     assert mine["force_n"].tobytes() == other["force_n"].tobytes()
 
 
+@pytest.mark.long
 def test_absent_sensors_send_nothing_and_read_as_stuck(play) -> None:
     frames, status = play(HEALTHY)
     assert set(frames["finger"]) == {0, 1, 2}
@@ -129,6 +131,7 @@ def test_every_slot_of_every_finger_was_read(play) -> None:
         assert words.words_parity == words.words_stuck == words.words_error == 0
 
 
+@pytest.mark.long
 def test_the_bundled_fault_scenario_runs_clean_on_its_neighbours(board) -> None:
     hand = board("faults.toml")
     frames = hand.read(100)
@@ -145,6 +148,7 @@ def test_only_the_named_fingers_are_streamed(board) -> None:
     assert len(batch.pac) == 0
 
 
+@pytest.mark.long
 def test_device_time_and_slots_are_exact_over_a_minute(board) -> None:
     hand = board("drift.toml?fingers=5")
     frames = hand.read(100)
@@ -167,6 +171,7 @@ def test_a_host_that_leaves_and_returns_finds_a_stopped_board(rig) -> None:
         assert hand.status().streams == 0
 
 
+@pytest.mark.long
 def test_a_word_that_comes_too_late_is_lost_and_shifts_no_other(rig, tmp_path: Path) -> None:
     rig.need("cable")
     path = tmp_path / "case.toml"

@@ -122,6 +122,7 @@ def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:
     assert hand.status().streams == 0
 
 
+@pytest.mark.long
 def test_a_press_brings_its_tare_and_contact_events(board) -> None:
     batch = board("press.toml?fingers=2").read_batch(20)
     for finger in range(2):

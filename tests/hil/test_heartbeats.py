@@ -74,6 +74,7 @@ def test_heartbeats_stand_for_the_frames_that_are_not_sent_and_no_value_changes(
         assert np.count_nonzero(spans < 10) <= 8
 
 
+@pytest.mark.long
 def test_what_nobody_asked_for_is_marked_and_counted(play) -> None:
     full, _, _ = play(EVERYTHING)
     force, stats, status = play(QuantityFlags.FORCE)
@@ -87,6 +88,7 @@ def test_what_nobody_asked_for_is_marked_and_counted(play) -> None:
     assert status.poc_skipped == status.torque_skipped == status.frames_idle + sent
 
 
+@pytest.mark.long
 def test_a_sigma_comes_with_the_noise_that_was_measured(play) -> None:
     batch, _, _ = play(EVERYTHING | QuantityFlags.SIGMA | QuantityFlags.REST_FRAMES)
     touched = batch.wire["tare_state"] == wire.TareState.CONTACT

@@ -160,6 +160,7 @@ def test_a_board_that_lost_power_is_another_boot(rig, tmp_path: Path) -> None:
     assert board.counters()["boots"] == 2
 
 
+@pytest.mark.long
 def test_recorded_counts_give_the_same_results_as_the_simulated_board(board, shared_data: Path) -> None:
     trial = shared_data / "robotic_finger" / "trial_15330.npz"
     here = board(f"{trial}?seconds=20").read_batch(1000).wire

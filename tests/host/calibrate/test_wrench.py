@@ -167,6 +167,7 @@ def test_idle_noise_has_no_direction(tmp_path: Path) -> None:
     assert "no E_idle" in loaded(tmp_path, arrays).notes[-1]
 
 
+@pytest.mark.nightly
 def test_training_with_drift_is_what_withstands_it(validation: Validation, monkeypatch: pytest.MonkeyPatch) -> None:
     truth = validation.run.truth
     trained = [figures.rmse(p, truth) for p in validation.predicted]
@@ -224,6 +225,7 @@ def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tm
             fitted.load(place)
 
 
+@pytest.mark.nightly
 def test_torque_and_pressure_are_used_where_recorded(tmp_path: Path) -> None:
     run = loaded(tmp_path, wrench_run.fields(4000, seed=3, moment=True, pdc=True))
     truth = wrench_run.states(4000, 3, rests=True).wrench()

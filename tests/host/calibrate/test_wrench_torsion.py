@@ -181,6 +181,7 @@ def test_a_tare_that_follows_the_thermometer_is_all_a_map_needs(result: shear_to
 # ---- air ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_the_finger_in_air_is_trained_in_where_contact_does_not_pay_for_it(tmp_path: Path) -> None:
     run = loaded(tmp_path, wrench_run.fields(4000, rests=False))
     assert run.air is not None

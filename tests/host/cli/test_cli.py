@@ -104,7 +104,10 @@ def test_record_into_no_folder_is_refused(capsys, tmp_path: Path) -> None:
 @pytest.mark.parametrize("verb", ["info", "stream"])
 def test_an_unknown_port_exits_3(capsys, verb: str) -> None:
     assert "`biotac list`" in fails(capsys, 3, verb, "/dev/ttyNOWHERE7")
-    expected = "expected a device path, serial:NUMBER, spidev:BUS.DEVICE, sim:SOURCE, emu:pico or replay:REC"
+    expected = (
+        "expected a device path, serial:NUMBER, spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, "
+        "sim:SOURCE, emu:pico or replay:REC"
+    )
     assert expected in fails(capsys, 3, verb, "telnet:1")
 
 

@@ -13,10 +13,10 @@ import sys
 import tty
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from fake_flash_board import plug_in
 from maps import make_map
 
 import biotac
@@ -365,11 +365,11 @@ def test_a_refusal_is_7(capsys, scripted_board, hello, files, tmp_path, monkeypa
 
 
 @pytest.mark.parametrize(
-    ("ports", "cure"), [([], "try a simulated one"), (["/dev/ttyACM0", "/dev/ttyACM1"], "name one")]
+    ("numbers", "cure"),
+    [({}, "try `biotac demo`"), ({"/dev/ttyACM0": "A", "/dev/ttyACM1": "B"}, "name the one you mean")],
 )
-def test_view_without_a_port_needs_exactly_one(capsys, monkeypatch, ports: list[str], cure: str) -> None:
-    found = [SimpleNamespace(device=device) for device in ports]
-    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: found)
+def test_view_without_a_port_needs_exactly_one_board(capsys, monkeypatch, numbers: dict[str, str], cure: str) -> None:
+    plug_in(monkeypatch).update(numbers)  # beside a serial port that is none of ours
     assert cure in line_of(capsys, 3, ["view", "--no-browser"])
 
 
