@@ -130,6 +130,7 @@ def give_map(hand: Hand, finger: int, its: bytes) -> None:
     hand.set_map(finger, its, force=finger == 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("give", "name", "what", "kept", "new"),
     [

@@ -76,6 +76,7 @@ def test_the_bus_is_driven_by_the_data_sheets_rules(rig) -> None:
     assert bus["overlaps"] == 50 * 44 + 1
 
 
+@pytest.mark.long
 def test_the_same_scenario_gives_the_same_bytes(board) -> None:
     def played():
         batch = board("press.toml?seconds=2").read_batch(10)

@@ -181,6 +181,7 @@ def opened(rig: Rig) -> biotac.Hand:
     return hand
 
 
+@pytest.mark.long
 def test_a_saved_map_holds_after_power_was_off(rig: Rig) -> None:
     hand = opened(rig)
     mine, anyones = make_map(1, serial=serial_of(hand, 0), blocks=BIG), make_map(2)
@@ -197,6 +198,7 @@ def test_a_saved_map_holds_after_power_was_off(rig: Rig) -> None:
     assert hand.maps() == {1: anyones}
 
 
+@pytest.mark.long
 def test_a_power_cut_in_the_middle_leaves_the_old_map_or_the_new(rig: Rig) -> None:
     hand = opened(rig)
     kept = make_map(1)

@@ -409,6 +409,7 @@ def test_calibrate_writes_report_picture_and_map(
     assert "would be written twice" in capsys.readouterr().err
 
 
+@pytest.mark.nightly
 def test_calibrate_in_words_and_as_recorded(finger: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "wrench", str(finger), "--as-recorded"]) == 0
     said = capsys.readouterr().out
