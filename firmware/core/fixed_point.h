@@ -66,6 +66,11 @@ static inline int64_t bt_shift_round(int64_t value, int bits)
     return value < 0 ? -(int64_t)magnitude : (int64_t)magnitude;
 }
 
+static inline int32_t bt_limited(int32_t value, int32_t low, int32_t high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
 // Without a branch. magnitude < 2^31.
 static inline int32_t bt_with_sign(uint32_t magnitude, int32_t sign)
 {

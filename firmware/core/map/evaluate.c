@@ -4,6 +4,7 @@
 #include "map/map.h"
 
 #include "fixed_point.h"
+#include "map/conductance.h"
 #include "map/words.h"
 #include "touch/signals.h"
 
@@ -44,18 +45,10 @@ typedef struct {
     int32_t gate[BT_MAP_GATES];
 } features;
 
-static int32_t limited(int32_t value, int32_t low, int32_t high)
-{
-    return value < low ? low : value > high ? high : value;
-}
-
 // ---- conductance ---------------------------------------------------------------------------------------
 
-#define COUNT_MIN_Q4 (16 * BT_MAP_COUNT_MIN)
-#define COUNT_MAX_Q4 (16 * BT_MAP_COUNT_MAX)
-#define DIGIT_BITS   12
+#define DIGIT_BITS 12
 
-_Static_assert((int64_t)COUNT_MAX_Q4 *BT_FULL_SCALE_COUNT < 1 << 28, "both terms must have 28 bits");
 _Static_assert(BT_MAP_RATIO_MAX < 4 && 2 * DIGIT_BITS == BT_MAP_CONDUCTANCE_Q, "two digits must do");
 
 // num / den in 2^-24, at most 1.15 units too small, for num < 4 den, both below 2^28. Two digits of a
@@ -80,18 +73,13 @@ static uint32_t ratio_q24(uint32_t num, uint32_t den)
     return quotient;
 }
 
-// G(count) / G(tare) - 1 = e 4095 / ((4095 - count) tare), e = count - tare; tare in 1/16 count.
 static int32_t conductance_q24(int32_t count, int32_t tare_q4)
 {
-    int32_t at_rest_q4 = limited(tare_q4, COUNT_MIN_Q4, COUNT_MAX_Q4);
-    int32_t now = limited(count, BT_MAP_COUNT_MIN, BT_MAP_COUNT_MAX);
-    int32_t e_q4 = 16 * now - at_rest_q4;
-    uint32_t num = bt_abs32(e_q4) * BT_FULL_SCALE_COUNT;
-    uint32_t den = (uint32_t)(BT_FULL_SCALE_COUNT - now) * (uint32_t)at_rest_q4;
-    if (num >= BT_MAP_RATIO_MAX * den) {
+    bt_conductance its = bt_conductance_of(count, tare_q4);
+    if (its.num >= BT_MAP_RATIO_MAX * its.den) {
         return BT_MAP_RATIO_MAX << BT_MAP_CONDUCTANCE_Q; // a loss of conductance is never more than all of it
     }
-    return bt_with_sign(ratio_q24(num, den), e_q4);
+    return bt_with_sign(ratio_q24(its.num, its.den), its.e_q4);
 }
 
 static void conductances(const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
@@ -296,7 +284,7 @@ static void prepare(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
     of->factors[BT_MAP_KIND_CONDUCTANCE] = of->factors[BT_MAP_KIND_CONDUCTANCE_PAIRS] =
         (factors){of->conductance, of->conductance_fine};
     of->single[BT_MAP_KIND_OFFSET] = 1 << BT_MAP_ONE_Q;
-    of->single[BT_MAP_KIND_PRESSURE] = limited(pdc_above_rest_q4, -BT_MAP_FEATURE_MAX, BT_MAP_FEATURE_MAX);
+    of->single[BT_MAP_KIND_PRESSURE] = bt_limited(pdc_above_rest_q4, -BT_MAP_FEATURE_MAX, BT_MAP_FEATURE_MAX);
 }
 
 // A block's sum of torsion, which is alone.

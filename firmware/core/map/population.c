@@ -1,6 +1,7 @@
 #include "map/population.h"
 
 #include "fixed_point.h"
+#include "map/conductance.h"
 #include "map/map_gen.h"
 #include "map/population_gen.h"
 
@@ -26,26 +27,13 @@ _Static_assert(((BT_POPULATION_ROWS_MAX >> BT_POPULATION_ROW_SHIFT) + BT_ELECTRO
 
 // ---- what it is linear in ------------------------------------------------------------------------------
 
-#define COUNT_MIN_Q4 (16 * BT_MAP_COUNT_MIN)
-#define COUNT_MAX_Q4 (16 * BT_MAP_COUNT_MAX)
-
-static int32_t limited(int32_t value, int32_t low, int32_t high)
-{
-    return value < low ? low : value > high ? high : value;
-}
-
 // num < 3 den and den < 2^28 + 2^12: a divisor of 16 bits is off by 2^-15, a unit at most.
-_Static_assert((int64_t)COUNT_MAX_Q4 *BT_FULL_SCALE_COUNT < 1 << 28, "both terms must have 28 bits");
 _Static_assert(BT_MAP_RATIO_MAX == 3 && BT_POPULATION_CONDUCTANCE_Q == 13, "6 * 2^28 must fit 32 bits");
 
-// G(count) / G(tare) - 1 = e 4095 / ((4095 - count) tare), e = count - tare.
 static int32_t conductance(uint16_t count, uint16_t tare_q4)
 {
-    int32_t at_rest_q4 = limited(tare_q4, COUNT_MIN_Q4, COUNT_MAX_Q4);
-    int32_t now = limited(count, BT_MAP_COUNT_MIN, BT_MAP_COUNT_MAX);
-    int32_t e_q4 = 16 * now - at_rest_q4;
-    uint32_t num = bt_abs32(e_q4) * BT_FULL_SCALE_COUNT;
-    uint32_t den = (uint32_t)(BT_FULL_SCALE_COUNT - now) * (uint32_t)at_rest_q4;
+    bt_conductance its = bt_conductance_of(count, tare_q4);
+    uint32_t num = its.num, den = its.den;
     if (num >= BT_MAP_RATIO_MAX * den) {
         return (int32_t)FACTOR_MAX; // a loss of conductance is never more than all of it
     }
@@ -55,7 +43,7 @@ static int32_t conductance(uint16_t count, uint16_t tare_q4)
     }
     uint32_t divisor = (den + (1u << 11)) >> 12;
     uint32_t u = BT_DIVIDE_U32(2 * num + divisor / 2, divisor);
-    return bt_with_sign(u < FACTOR_MAX ? u : (uint32_t)FACTOR_MAX, e_q4);
+    return bt_with_sign(u < FACTOR_MAX ? u : (uint32_t)FACTOR_MAX, its.e_q4);
 }
 
 _Static_assert((int64_t)BT_ELECTRODES *(BT_FULL_SCALE_COUNT + BT_MAP_FLOOR_Q4 / 16 + 1) * BT_ELECTRODE_MAX_UM

@@ -71,15 +71,40 @@ static inline void give_poc(bool valid, const bt_point *point, int16_t poc_um[3]
     }
 }
 
-uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t wanted,
-                  int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
+static uint32_t population_force(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
+                                 const bt_gains *gains, int32_t force_100un[3])
+{
+    uint32_t share = bt_population_share(e_q4);
+    int32_t lin_100un[3];
+    if (share == 0) {
+        bt_force(e_q4, gains, force_100un);
+        return BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
+    }
+    bt_population_force(e_q4, frame->counts, frame->tare_q4, force_100un);
+    if (share == BT_POPULATION_ALL) {
+        return BT_FRAME_FLAG_POPULATION;
+    }
+    bt_force(e_q4, gains, lin_100un);
+    bt_population_mix(share, lin_100un, force_100un);
+    return BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
+}
+
+// Force by the gains, or where there is a frame by the population map; the rest of both is one.
+static inline uint32_t solve_without_map(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
+                                         const bt_solve_settings *settings, uint32_t wanted,
+                                         int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
 {
     bt_point point;
+    uint32_t flags = 0;
     bool asked = wanted & (BT_WANT_POC | BT_WANT_TORQUE);
     bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
     give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
     if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
-        bt_force(e_q4, &settings->gains, force_100un);
+        if (frame != NULL) {
+            flags = population_force(e_q4, frame, &settings->gains, force_100un);
+        } else {
+            bt_force(e_q4, &settings->gains, force_100un);
+        }
     }
     if (wanted & BT_WANT_TORQUE) {
         bt_torque_yz(e_q4, &settings->gains, torque_mnmm + 1);
@@ -90,7 +115,20 @@ uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *se
     if (!(wanted & BT_WANT_FORCE)) {
         mark(force_100un);
     }
-    return asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0;
+    return flags | (asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0);
+}
+
+uint32_t bt_solve(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settings, uint32_t wanted,
+                  int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])
+{
+    return solve_without_map(e_q4, NULL, settings, wanted, poc_um, force_100un, torque_mnmm);
+}
+
+uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
+                               const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
+                               int32_t force_100un[3], int32_t torque_mnmm[3])
+{
+    return solve_without_map(e_q4, frame, settings, wanted, poc_um, force_100un, torque_mnmm);
 }
 
 uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
@@ -118,46 +156,4 @@ uint32_t bt_solve_mapped(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *
         mark(force_100un);
     }
     return asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0;
-}
-
-static uint32_t population_force(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
-                                 const bt_gains *gains, int32_t force_100un[3])
-{
-    uint32_t share = bt_population_share(e_q4);
-    int32_t lin_100un[3];
-    if (share == 0) {
-        bt_force(e_q4, gains, force_100un);
-        return BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
-    }
-    bt_population_force(e_q4, frame->counts, frame->tare_q4, force_100un);
-    if (share == BT_POPULATION_ALL) {
-        return BT_FRAME_FLAG_POPULATION;
-    }
-    bt_force(e_q4, gains, lin_100un);
-    bt_population_mix(share, lin_100un, force_100un);
-    return BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
-}
-
-uint32_t bt_solve_uncalibrated(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
-                               const bt_solve_settings *settings, uint32_t wanted, int16_t poc_um[3],
-                               int32_t force_100un[3], int32_t torque_mnmm[3])
-{
-    bt_point point;
-    uint32_t flags = 0;
-    bool asked = wanted & (BT_WANT_POC | BT_WANT_TORQUE);
-    bool located = asked && bt_poc(e_q4, settings->poc_weights, &point);
-    give_poc(located && wanted & BT_WANT_POC, &point, poc_um);
-    if (wanted & (BT_WANT_FORCE | BT_WANT_TORQUE)) {
-        flags = population_force(e_q4, frame, &settings->gains, force_100un);
-    }
-    if (wanted & BT_WANT_TORQUE) {
-        bt_torque_yz(e_q4, &settings->gains, torque_mnmm + 1);
-        torque_mnmm[0] = located ? bt_torque_x_derived(point.lever_yz, force_100un) : BT_INVALID_I32;
-    } else {
-        mark(torque_mnmm);
-    }
-    if (!(wanted & BT_WANT_FORCE)) {
-        mark(force_100un);
-    }
-    return flags | (asked && !located ? BT_FRAME_FLAG_POC_INVALID : 0);
 }

@@ -40,11 +40,6 @@ static bool has_witness(const bt_release *release, const bt_release_sweep *sweep
     return sweep->pressure && (release->pdc_peak >= PRESSED || release->uneven_peak < FALL * RESIDUE_ENERGY);
 }
 
-static int32_t clamped(int32_t value, int32_t low, int32_t high)
-{
-    return value < low ? low : value > high ? high : value;
-}
-
 // Without a witness only electrodes that are back say that nothing touches.
 static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
 {
@@ -52,7 +47,7 @@ static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
     uint32_t left = witness ? release->energy_peak / RESIDUE_SHARE : 0;
     uint32_t forgiven = witness || !sweep->pressure ? sweep->forgiven_count2 : 0;
     left = (left > CALM_ENERGY ? left : CALM_ENERGY) + forgiven;
-    int32_t rest = clamped(release->pdc_peak / PDC_REST_SHARE, PDC_QUIET, PDC_REST_MAX);
+    int32_t rest = bt_limited(release->pdc_peak / PDC_REST_SHARE, PDC_QUIET, PDC_REST_MAX);
     bool back = witness ? sweep->above < rest : release->quiet_sweeps >= QUIET_SWEEPS;
     bool gone = sweep->energy_count2 < left || sweep->uneven_count2 < EVEN_ENERGY + forgiven;
     return back && gone && sweep->still_sweeps >= STILL_SWEEPS;

@@ -19,11 +19,6 @@ _Static_assert((int64_t)BT_ELECTRODES * BT_SWEEP_UNREAD_Q3 * EACH_Q16 <= INT32_M
 _Static_assert((int64_t)UINT16_MAX *SLEW_Q16 <= INT32_MAX,
                "what is due of the longest silence must fit its type");
 
-static int32_t clamped(int32_t value, int32_t low, int32_t high)
-{
-    return value < low ? low : value > high ? high : value;
-}
-
 void bt_watch_pause(bt_watch *watch)
 {
     watch->wait_sweeps = WAIT_SWEEPS;
@@ -95,7 +90,7 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
     watch->one_way_q2 = (int16_t)(watch->one_way_q2 + watch->side - bt_shift_down(watch->one_way_q2, 2));
     bool one_way = watch->one_way_q2 >= ONE_WAY_Q2 || watch->one_way_q2 <= -ONE_WAY_Q2;
     watch->drifts = one_way && (watch->slow || watch->level_sweeps >= LEVEL_SWEEPS);
-    watch->step_q16 = clamped(watch->away_q3 * EACH_Q16, -SLEW_Q16, SLEW_Q16);
+    watch->step_q16 = bt_limited(watch->away_q3 * EACH_Q16, -SLEW_Q16, SLEW_Q16);
     watch->side = 0;
     watch->away_q3 = 0;
 }
@@ -107,18 +102,18 @@ static bool resume_level(bt_watch *watch, const bt_silence *silence, int32_t *du
     int32_t pressure_q3 = silence->sum.lane[BT_LANE_PDC] * 8 / BT_SILENCE_ROUNDS;
     int32_t sweeps = watch->level_sweeps + silence->sweeps;
     int32_t change_q3 = pressure_q3 - watch->level_q3;
-    int32_t creep_q3 = clamped(sweeps * LEVEL_Q3 / LEVEL_SWEEPS, LEVEL_Q3, CREEP_Q3);
+    int32_t creep_q3 = bt_limited(sweeps * LEVEL_Q3 / LEVEL_SWEEPS, LEVEL_Q3, CREEP_Q3);
     if (change_q3 > creep_q3 || change_q3 < -creep_q3) {
         return false;
     }
     bool level = watch->slow || watch->level_sweeps >= LEVEL_SWEEPS;
-    *due = level ? silence->sweeps : clamped(sweeps - LEVEL_SWEEPS, 0, silence->sweeps);
+    *due = level ? silence->sweeps : bt_limited(sweeps - LEVEL_SWEEPS, 0, silence->sweeps);
     if (change_q3 > LEVEL_Q3 || change_q3 < -LEVEL_Q3) {
         watch->slow = true;
         watch->level_q3 = (uint16_t)pressure_q3;
         sweeps = 0;
     }
-    watch->level_sweeps = (uint8_t)clamped(sweeps, 0, UINT8_MAX);
+    watch->level_sweeps = (uint8_t)bt_limited(sweeps, 0, UINT8_MAX);
     return true;
 }
 
@@ -148,5 +143,5 @@ int32_t bt_watch_resume(bt_watch *watch, const bt_silence *silence, int span_q3)
     watch->side = 0;
     watch->away_q3 = 0;
     watch->step_q16 = 0;
-    return even ? clamped(sum_q3 * EACH_Q16, -due * MISSED_Q16, due * MISSED_Q16) : 0;
+    return even ? bt_limited(sum_q3 * EACH_Q16, -due * MISSED_Q16, due * MISSED_Q16) : 0;
 }
