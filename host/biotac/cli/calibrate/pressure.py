@@ -19,6 +19,7 @@ from ...keep import calibration_file as file
 from ...wire.sensor_gen import MAX_SENSORS
 from .. import outputs
 from ..recordings.loading import load
+from .typed import reading_n
 
 NAME = "pressure"
 HELP = "Pressure to force, one gain a finger: press a plate or scale, guided; or from recordings of that."
@@ -117,17 +118,7 @@ class _Terminal:
 
     def force_n(self, step: Step) -> float:
         """See guided.Face."""
-        while True:
-            which = f"finger {step.finger}, press {step.press}"
-            print(f"{which}: the scale shows [N] ", end="", file=sys.stderr, flush=True)
-            try:
-                value = float(input())
-            except ValueError:
-                continue
-            except EOFError as error:
-                raise InputError("no force was typed in; expected newtons") from error
-            if 0 < value < 100:
-                return value
+        return reading_n(f"finger {step.finger}, press {step.press}")
 
 
 def _tell(args: argparse.Namespace, outcome: report.Outcome, name: str | None) -> None:

@@ -20,6 +20,7 @@ from ...hand.hand import Hand
 from ...partial_file import whole
 from ...wire.identity import ascii_text
 from ..recordings.loading import load
+from .typed import reading_n
 from .wrench import finger_number
 
 NAME = "scale"
@@ -88,16 +89,7 @@ class _Terminal:
 
     def force_n(self, step: Step) -> float:
         """See guided.Face."""
-        while True:
-            print(f"press {step.press}: the scale shows [{self._unit}] ", end="", file=sys.stderr, flush=True)
-            try:
-                value = float(input()) * self._newtons
-            except ValueError:
-                continue
-            except EOFError as error:
-                raise InputError("no reading was typed in; expected a number") from error
-            if 0 < value < 100:
-                return value
+        return reading_n(f"press {step.press}", self._unit, self._newtons)
 
 
 def _tell(
