@@ -29,7 +29,6 @@ from protogen import (
 def outputs(root: Path) -> dict[Path, str]:
     """Map every generated path to the text it must have."""
     contract = schema.load(root / "protocol")
-    population = c_population.header(contract, *c_population.load(root))
     return {
         root / "firmware/core/wire/sensor_gen.h": c_sensor.header(contract),
         root / "firmware/core/wire/sensor_gen.c": c_sensor.source(contract),
@@ -39,7 +38,7 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "firmware/core/solve/rsqrt_gen.h": c_rsqrt.header(contract),
         root / "firmware/core/solve/rsqrt_gen.c": c_rsqrt.source(contract),
         root / "firmware/core/map/map_gen.h": c_map.header(contract),
-        root / "firmware/core/map/population_gen.h": population,
+        root / "firmware/core/map/population_gen.h": c_population.header(root),
         root / "tools/bench/variants/mirrored_f32_gen.h": c_variants.mirrored(contract, c_variants.F32),
         root / "tools/bench/variants/mirrored_i64_gen.h": c_variants.mirrored(contract, c_variants.I64),
         root / "tools/bench/variants/tables_gen.h": c_variants.tables(contract),
@@ -49,7 +48,6 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "host/biotac/wire/messages_gen.py": python_code.wire(contract),
         root / "host/biotac/wire/dtypes_gen.py": python_code.dtypes(contract),
         root / "host/biotac/wire/map_gen.py": python_code.wrench_map(contract),
-        root / "host/biotac/wire/population_gen.py": c_population.python(population),
         root / "protocol/MESSAGES.md": docs.messages(contract),
         root / "protocol/schema.json": schema.canonical(contract, with_docs=True),
     }

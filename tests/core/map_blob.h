@@ -8,47 +8,60 @@
 
 #include <string.h>
 
-// blocks: the first one is an offset, every later one 19 signals times a gate, at most 7 of both. serial: of
-// the sensor; "" for any. Returns its size.
-static inline size_t make_map(uint8_t *blob, uint32_t number, int blocks, const char *serial)
+// A head, blocks of these kinds and gates, coefficients by a number; the last column behind 19 or one is 0.
+// Returns the map's size.
+static inline size_t put_map(uint8_t *blob, uint32_t number, uint8_t axes, const uint8_t (*blocks)[2],
+                             int count)
 {
+    static const uint8_t columns[BT_MAP_KINDS] = BT_MAP_KIND_COLUMNS,
+                         halves[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
     size_t at = BT_MAP_HEADER_BYTES;
-    int coefficients = 3 * (1 + 19 * (blocks - 1));
+    uint32_t step = 0;
     memset(blob, 0, BT_MAP_MAX_BYTES);
     blob[0] = BT_MAP_VERSION;
-    blob[1] = 3;
-    blob[2] = (uint8_t)blocks;
-    memcpy(blob + 4, serial, strlen(serial));
+    blob[1] = axes;
+    blob[2] = (uint8_t)count;
     bt_put_u32(blob + 20, number);
-    for (int k = 0; k < blocks; k++, at += BT_MAP_BLOCK_BYTES) {
-        blob[at] = k == 0 ? BT_MAP_KIND_OFFSET : BT_MAP_KIND_SIGNAL;
-        blob[at + 1] = (uint8_t)(k == 0 ? BT_MAP_GATE_ONE : k - 1);
+    for (int k = 0; k < count; k++, at += BT_MAP_BLOCK_BYTES) {
+        memcpy(blob + at, blocks[k], 2);
+        memset(blob + at + 2, 8, axes);
     }
-    for (int k = 0; k < coefficients; k++, at += 4) {
-        bt_put_u32(blob + at, (number * 2654435761u + (uint32_t)k * 40503u) & 0xFFFFFF);
+    for (int k = 0; k < count; k++) {
+        for (int group = 0; group < axes; group += 3) { // of 3 axes, or 6
+            for (int c = 0; c < 3 * halves[blocks[k][0]]; c++, at += 2, step++) {
+                uint32_t value = c < 3 * columns[blocks[k][0]] ? number * 2654435761u + step * 40503u : 0;
+                blob[at] = (uint8_t)(value >> 8);
+                blob[at + 1] = (uint8_t)(value >> 16 & 7);
+            }
+        }
     }
     return at;
 }
 
-// One of 6 axes that fills its room but for less than a row.
+// blocks: the first one is an offset, every later one 19 signals times a gate, at most 7 of both. serial: of
+// the sensor; "" for any. Returns its size.
+static inline size_t make_map(uint8_t *blob, uint32_t number, int blocks, const char *serial)
+{
+    uint8_t its[7][2] = {{BT_MAP_KIND_OFFSET, BT_MAP_GATE_ONE}};
+    for (int k = 1; k < blocks; k++) {
+        its[k][0] = BT_MAP_KIND_SIGNAL;
+        its[k][1] = (uint8_t)(k - 1);
+    }
+    size_t bytes = put_map(blob, number, 3, its, blocks);
+    memcpy(blob + 4, serial, strlen(serial));
+    return bytes;
+}
+
+// One of 6 axes that fills its room but for less than a block of 19: eight of pairs, then eight of these.
 static inline size_t make_big_map(uint8_t *blob, uint32_t number)
 {
-    static const uint8_t kind[5] = {BT_MAP_KIND_SIGNAL_PAIRS, BT_MAP_KIND_SIGNAL_PAIRS,
-                                    BT_MAP_KIND_SIGNAL_PAIRS, BT_MAP_KIND_SIGNAL_PAIRS, BT_MAP_KIND_SIGNAL};
-    size_t at = BT_MAP_HEADER_BYTES;
-    memset(blob, 0, BT_MAP_MAX_BYTES);
-    blob[0] = BT_MAP_VERSION;
-    blob[1] = 6;
-    blob[2] = sizeof kind;
-    bt_put_u32(blob + 20, number);
-    for (size_t k = 0; k < sizeof kind; k++, at += BT_MAP_BLOCK_BYTES) {
-        blob[at] = kind[k];
-        blob[at + 1] = (uint8_t)k;
+    static const uint8_t kinds[16] = {4, 4, 4, 4, 4, 4, 6, 6, 1, 1, 1, 1, 1, 1, 2, 2};
+    uint8_t its[16][2];
+    for (uint8_t k = 0; k < 16; k++) {
+        its[k][0] = kinds[k];
+        its[k][1] = (uint8_t)(k < 6 ? k : k < 8 ? k - 6 : k < 14 ? k - 8 : k - 14);
     }
-    for (int k = 0; k < 6 * (4 * 190 + 19); k++, at += 4) {
-        bt_put_u32(blob + at, (number * 2654435761u + (uint32_t)k * 40503u) & 0xFFFFFF);
-    }
-    return at;
+    return put_map(blob, number, 6, its, 16);
 }
 
 #endif

@@ -5,16 +5,15 @@
 #include "map/map.h"
 #include "support.h"
 
-#define WORD(high, low) ((uint32_t)(uint16_t)(high) << 16 | (uint16_t)(low))
-
 static const uint32_t columns_of[BT_MAP_KINDS] = BT_MAP_KIND_COLUMNS;
+static const uint32_t halves_of[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
 static const uint32_t axes_of[] = {3, 6, 7};
 
 #define SOME_AXES (sizeof axes_of / sizeof *axes_of)
 
 // Of a map of one block: words of the blob.
 #define HEAD  (BT_MAP_HEADER_BYTES / 4)
-#define FIRST (HEAD + BT_MAP_BLOCK_BYTES / 4) // coefficient
+#define FIRST (2 * HEAD + BT_MAP_BLOCK_BYTES / 2) // coefficient, in half words
 
 // A blob under construction, in words, so that it lies as a board keeps it.
 typedef struct {
@@ -43,20 +42,36 @@ static inline void block(blob *its, uint32_t kind, uint32_t gate, uint32_t expon
     its->word[its->words++] = its->axes == 7 ? exponent : 0;
 }
 
-static inline void fill(blob *its, uint32_t kind, uint32_t value)
+// The half word of a column's coefficient in a block that begins at `first`: three axes side by side, then
+// the others.
+typedef int16_t __attribute__((may_alias)) half_word;
+static inline half_word *half(blob *its, uint32_t first, uint32_t kind, uint32_t column, uint32_t axis)
 {
-    for (uint32_t k = 0; k < columns_of[kind] * its->axes; k++) {
-        its->word[its->words++] = value;
+    half_word *halves = (half_word *)its->word + first;
+    return axis < 3 ? halves + 3 * column + axis
+                    : halves + 3 * halves_of[kind] + (its->axes - 3) * column + axis - 3;
+}
+
+// Coefficients of a block, all one and the same; where they begin.
+static inline uint32_t fill(blob *its, uint32_t kind, int16_t value)
+{
+    uint32_t first = 2 * its->words;
+    its->words += halves_of[kind] * its->axes / 2;
+    for (uint32_t column = 0; column < columns_of[kind]; column++) {
+        for (uint32_t axis = 0; axis < its->axes; axis++) {
+            *half(its, first, kind, column, axis) = value;
+        }
     }
+    return first;
 }
 
 // A block of one kind whose coefficients all are one.
 static inline void one_block(blob *its, uint32_t axes, uint32_t kind, uint32_t gate, uint32_t exponent,
-                             uint32_t value)
+                             int16_t value)
 {
     begin(its, axes, 1);
     block(its, kind, gate, exponent);
-    fill(its, kind, value);
+    (void)fill(its, kind, value);
 }
 
 static inline uint8_t opened(blob *its, bt_map *map)

@@ -148,8 +148,8 @@ static void nor_do_half_done_bytes_matter(void **state)
 {
     (void)state;
     fake.flash_ragged = true;
-    upload_and_save(0, 1, 3);
-    cut_everywhere(3, 1, 2, 2 * (BT_FLASH_SECTOR_BYTES + 5 * BT_FLASH_PAGE_BYTES));
+    upload_and_save(0, 1, 5);
+    cut_everywhere(5, 1, 2, 2 * (BT_FLASH_SECTOR_BYTES + 5 * BT_FLASH_PAGE_BYTES));
 }
 
 static void nor_while_the_records_sector_changes(void **state)

@@ -9,54 +9,44 @@
 #include <string.h>
 
 static const uint32_t columns_of[BT_MAP_KINDS] = BT_MAP_KIND_COLUMNS;
+static const uint32_t halves_of[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
 static uint32_t blob[BT_MAP_MAX_BYTES / 4 + 64];
-static int64_t values[BT_MAP_MAX_BYTES / 4];
 
 #define BLOCKS_MAX 4
 
-static int32_t low_of(int64_t value)
-{
-    return (int16_t)(uint16_t)value;
-}
-
-// s(f, c) of SPEC.md, without splitting anything.
-static int64_t sum_of(const int64_t *f, const int64_t *c, int columns, int stride)
-{
-    int64_t sum = columns >> 1;
-    for (int k = 0; k < columns; k++) {
-        sum += (f[k] * c[k * stride] - ((f[k] * c[k * stride]) & 0xFFFF)) / 65536; // floor
-    }
-    return sum;
-}
-
+// Half up, as every cut is.
 static int64_t rounded(int64_t value, int bits)
 {
-    uint64_t magnitude = ((value < 0 ? 0 - (uint64_t)value : (uint64_t)value) + (1ull << (bits - 1))) >> bits;
-    return value < 0 ? -(int64_t)magnitude : (int64_t)magnitude;
+    int64_t up = value + ((int64_t)1 << (bits - 1));
+    return (up - (up & (((int64_t)1 << bits) - 1))) / ((int64_t)1 << bits);
 }
 
-static int64_t block_of(int kind, const int64_t e[BT_ELECTRODES], int64_t pressure, const int64_t *c,
-                        int axes)
+// What SPEC.md has a block come to: c is the first coefficient of its axis, of width side by side.
+static int64_t block_of(int kind, const int64_t e[BT_ELECTRODES], int64_t pressure, const int16_t *c,
+                        int width)
 {
-    int64_t f[BT_ELECTRODES], rows[BT_ELECTRODES];
-    int64_t one = 1 << BT_MAP_ONE_Q;
+    int64_t sum = 0;
     switch (kind) {
     case BT_MAP_KIND_OFFSET:
-        return sum_of(&one, c, 1, axes);
+        return c[0] * ((int64_t)1 << BT_MAP_ONE_Q);
     case BT_MAP_KIND_PRESSURE:
-        return sum_of(&pressure, c, 1, axes);
+        return c[0] * pressure;
     case BT_MAP_KIND_SIGNAL_PAIRS:
         for (int i = 0; i < BT_ELECTRODES; i++) {
-            rows[i] = sum_of(e + i, c, BT_ELECTRODES - i, axes);
-            c += axes * (BT_ELECTRODES - i);
+            int64_t row = 0;
+            for (int k = 0; k < 10; k++) {
+                row += e[(i + k) % BT_ELECTRODES] * c[(10 * i + k) * width];
+            }
+            int64_t product = row * e[i];
+            sum += (product - (product & 0xFFFF)) / (1 << BT_MAP_ROW_CUT); // floor
         }
-        return sum_of(e, rows, BT_ELECTRODES, 1);
+        return sum;
     default:
         for (int i = 0; i < BT_ELECTRODES; i++) {
             bool taken = kind == BT_MAP_KIND_SIGNAL || (kind == BT_MAP_KIND_BULGE) == (e[i] > 0);
-            f[i] = taken ? e[i] : 0;
+            sum += taken ? e[i] * c[i * width] : 0;
         }
-        return sum_of(f, c, BT_ELECTRODES, axes);
+        return sum;
     }
 }
 
@@ -82,18 +72,24 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         head[0] = take_u8(&in) % BT_MAP_KINDS;
         head[1] = take_u8(&in) % BT_MAP_GATES;
         for (int a = 0; a < axes; a++) {
-            head[2 + a] = take_u8(&in) % (BT_MAP_EXPONENT_MAX + 1);
+            head[2 + a] = 1 + take_u8(&in) % BT_MAP_EXPONENT_MAX;
         }
         plain = plain && head[1] == BT_MAP_GATE_ONE && head[0] != BT_MAP_KIND_CONDUCTANCE
                 && head[0] != BT_MAP_KIND_CONDUCTANCE_PAIRS;
         uint32_t coefficient = take_u32(&in), step = take_u32(&in);
-        for (uint32_t k = 0; k < columns_of[head[0]] * (uint32_t)axes; k++) {
-            int64_t value = (int32_t)coefficient / (1 + (int32_t)(step & 31));
-            if (words < BT_MAP_MAX_BYTES / 4) {
-                values[words] = value;
-                blob[words++] = (uint32_t)(value - low_of(value)) | (uint16_t)low_of(value);
+        for (int group = 0; group < axes; group += group == 0 ? 3 : 4) {
+            uint32_t width = group == 0 ? 3 : (uint32_t)axes - 3;
+            for (uint32_t k = 0; k < halves_of[head[0]] * width; k += 2) {
+                uint32_t both = 0;
+                for (uint32_t h = 0; h < 2; h++) {
+                    int32_t value = (int16_t)(coefficient >> 16) / (1 + (int32_t)(step & 31));
+                    both |= k + h < columns_of[head[0]] * width ? (uint32_t)(uint16_t)value << 16 * h : 0;
+                    coefficient += step;
+                }
+                if (words < BT_MAP_MAX_BYTES / 4) {
+                    blob[words++] = both;
+                }
             }
-            coefficient += step;
         }
     }
     size_t length = 4 * words;
@@ -109,13 +105,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
     int64_t e[BT_ELECTRODES];
-    int32_t pdc_q4 = take_within(&in, BT_MAP_FEATURE_MAX);
+    int32_t pdc_q4 = take_within(&in, BT_E_MAX_Q4);
     for (int i = 0; i < BT_ELECTRODES; i++) {
         uint32_t both = take_u32(&in);
         counts[i] = both & 0xF000 ? (uint16_t)(both & BT_FULL_SCALE_COUNT) : BT_INVALID_COUNT;
         tare_q4[i] = (uint16_t)(both >> 16) > 65520 ? BT_INVALID_COUNT : (uint16_t)(both >> 16);
         bool missing = counts[i] == BT_INVALID_COUNT || tare_q4[i] == BT_INVALID_COUNT;
-        e[i] = missing ? 0 : 16 * (int64_t)counts[i] - tare_q4[i];
+        e[i] = missing ? 0 : rounded(16 * (int64_t)counts[i] - tare_q4[i], 4 - BT_MAP_SIGNAL_Q);
     }
     int32_t result[BT_MAP_AXES_MAX] = {0}, force[3];
     bt_map_wrench(&map, counts, tare_q4, pdc_q4, result, result + 3, result + 6);
@@ -128,18 +124,19 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             fail("a result beyond its limit");
         }
         int64_t total = 0;
-        uint32_t at = (BT_MAP_HEADER_BYTES + BT_MAP_BLOCK_BYTES * (uint32_t)map.block_count) / 4;
+        const int16_t *its = (const int16_t *)(const void *)map.coefficients;
         for (int b = 0; plain && b < map.block_count; b++) {
             const uint8_t *head = map.blocks + b * BT_MAP_BLOCK_BYTES;
-            uint32_t group = at + (uint32_t)(a / 3 * 3) * columns_of[head[0]];
-            int width = a < 6 ? 3 : 1;
-            total +=
-                block_of(head[0], e, pdc_q4, values + group + a % 3, width) * ((int64_t)1 << head[2 + a]);
-            at += columns_of[head[0]] * (uint32_t)map.axes;
+            int width = a < 3 ? 3 : map.axes - 3;
+            const int16_t *c = its + (a < 3 ? a : 3 * (int)halves_of[head[0]] + a - 3);
+            int64_t pressure = pdc_q4 < 0 ? -((1 - pdc_q4) / 2) : pdc_q4 / 2; // floor
+            total += rounded(block_of(head[0], e, pressure, c, width), head[2 + a]);
+            its += halves_of[head[0]] * (uint32_t)map.axes;
         }
-        int64_t limit = (int64_t)BT_MAP_RESULT_MAX << BT_MAP_RESULT_Q;
-        total = total > limit ? limit : total < -limit ? -limit : total;
-        if (plain && result[a] != rounded(total, BT_MAP_RESULT_Q)) {
+        total = total > BT_MAP_RESULT_MAX    ? BT_MAP_RESULT_MAX
+                : total < -BT_MAP_RESULT_MAX ? -BT_MAP_RESULT_MAX
+                                             : total;
+        if (plain && result[a] != total) {
             fail("a result that is not the specification's");
         }
     }

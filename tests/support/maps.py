@@ -11,15 +11,23 @@ AXES = 6
 
 
 def make_map(number: int, *, serial: str = "", blocks: int = 3, axes: int = AXES) -> bytes:
-    """An offset and three blocks of 19 signals, then four of their pairs; the first ``blocks`` of these, up to BIG."""
+    """An offset and three blocks of 19 signals, then their pairs and conductances'; the first ``blocks``, up to BIG."""
     gates = list(_map.Gate)
     kinds = [(_map.Kind.OFFSET, _map.Gate.ONE), *((_map.Kind.SIGNAL, gate) for gate in gates[:3])]
-    kinds = [*kinds, *((_map.Kind.SIGNAL_PAIRS, gate) for gate in gates[:4])][:blocks]
+    kinds += [(_map.Kind.SIGNAL_PAIRS, gate) for gate in gates] + [(_map.Kind.CONDUCTANCE_PAIRS, g) for g in gates[:2]]
+    kinds = kinds[:blocks]
     head = struct.pack("<BBBB16sI", _map.VERSION, axes, len(kinds), 0, serial.encode(), number)
-    rows = b"".join(struct.pack(f"<BB{_map.EXPONENTS}x", kind, gate) for kind, gate in kinds)
+    exponents = bytes(8 if axis < axes else 0 for axis in range(_map.EXPONENTS))
+    rows = b"".join(bytes([kind, gate]) + exponents for kind, gate in kinds)
     numbers = random.Random(number)
-    count = axes * sum(_map.KINDS[kind].columns for kind, _ in kinds)
-    return head + rows + struct.pack(f"<{count}i", *(numbers.randrange(-(2**20), 2**20) for _ in range(count)))
+    parts = [head, rows]
+    for kind, _ in kinds:
+        spec = _map.KINDS[kind]
+        for width in (3, axes - 3):
+            its = [numbers.randrange(-2000, 2001) for _ in range(width * spec.columns)]
+            its += [0] * (width * (spec.halves - spec.columns))
+            parts.append(struct.pack(f"<{len(its)}h", *its))
+    return b"".join(parts)
 
 
-BIG = 8  # blocks: over 19 KiB
+BIG = 12  # blocks: nearly 19 KiB

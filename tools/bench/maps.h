@@ -34,7 +34,7 @@ static inline uint32_t bench_map_step(uint32_t *seed)
 // False when the core refuses it: then nothing that follows means anything.
 static inline bool bench_map_make(bench_map *out, const uint8_t (*blocks)[2], uint32_t count, uint32_t axes)
 {
-    static const uint32_t columns[BT_MAP_KINDS] = BT_MAP_KIND_COLUMNS;
+    static const uint32_t halves[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
     uint32_t seed = 3;
     uint32_t words = BT_MAP_HEADER_BYTES / 4;
     for (uint32_t k = 0; k < words; k++) {
@@ -42,15 +42,23 @@ static inline bool bench_map_make(bench_map *out, const uint8_t (*blocks)[2], ui
     }
     out->blob[0] = BT_MAP_VERSION | axes << 8 | count << 16;
     for (uint32_t b = 0; b < count; b++) { // both builds are little-endian
-        uint32_t exponents = bench_map_step(&seed) & 0x07070707;
+        uint32_t exponents = 0x0A0A0A0A + (bench_map_step(&seed) & 0x03030303);
         out->blob[words++] = blocks[b][0] | (uint32_t)blocks[b][1] << 8 | exponents << 16;
         out->blob[words++] = axes >= 6 ? exponents : exponents & 0xFF;
         out->blob[words++] = axes == 7 ? exponents & 0xFF : 0;
     }
     for (uint32_t b = 0; b < count; b++) {
-        for (uint32_t k = 0; k < columns[blocks[b][0]] * axes; k++) {
-            uint32_t high = bench_map_step(&seed) % 3001 - 1500; // 19 of them stay in bounds
-            out->blob[words++] = high << 16 | (bench_map_step(&seed) & 0xFFFF);
+        bool pairs = halves[blocks[b][0]] == 190;
+        for (uint32_t axis = 0; axis < axes; axis += axis == 0 ? 3 : axes) {
+            uint32_t width = axis == 0 ? 3 : axes - 3; // of the group
+            uint32_t its = halves[blocks[b][0]] * width;
+            for (uint32_t k = 0; k < its; k += 2) {
+                uint32_t first = bench_map_step(&seed) % 2001 - 1000; // a row of ten stays in bounds
+                uint32_t second = bench_map_step(&seed) % 2001 - 1000;
+                first = pairs || k < its - width ? first & 0xFFFF : 0; // behind 19 columns, or one
+                second = pairs || k + 1 < its - width ? second << 16 : 0;
+                out->blob[words++] = first | second;
+            }
         }
     }
     out->bytes = 4 * words;

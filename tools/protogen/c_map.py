@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
-from .c_sensor import E_MAX_Q4, electrodes
+from .c_sensor import electrodes
 from .schema import GENERATED, Contract
 
 HEADER_BYTES = 24  # u8 version, axes, blocks, 0; serial; u32 made_s
@@ -27,10 +28,40 @@ def gate_max(contract: Contract) -> int:
     return math.ceil(largest * 2 ** contract.map["fixed"]["gate_q"]) + 8
 
 
+def halves(contract: Contract, kind: dict[str, Any]) -> int:
+    """Coefficients of a kind and axis as they lie in the blob: two a word, a sum of an even number of columns."""
+    n = len(electrodes(contract))
+    return {"one": 2, "electrodes": n + n % 2, "pairs": n * ((n + 1) // 2)}[str(kind["columns"])]
+
+
+def places(contract: Contract) -> list[list[int]]:
+    """Each electrode's x and y over their reaches, in 2^-place_q."""
+    centroid, q = contract.map["centroid"], contract.map["fixed"]["place_q"]
+    reach = centroid["reach_x_um"], centroid["reach_y_um"]
+    return [[round(r[d] * 2**q / reach[d]) for d in range(2)] for _, r, _ in electrodes(contract)]
+
+
+#: The reciprocal's first guess is by this many bits of the divisor.
+GUESS_BITS = 6
+
+
+def reciprocal(contract: Contract) -> tuple[list[int], int]:
+    """Guesses t and a constant c: t (c - d t) is 2^46 full/(full + 1) / d but for 2^-14, d in 2^15..2^16.
+
+    Newton's step t (2 K - d t) / K for K / d, with K / 2^31 taken into both numbers: that is the full scale's share,
+    and what centres the errors of guess and cuts, all of which fall to one side.
+    """
+    full = contract.sensor["bus"]["full_scale_count"]
+    centred = 3.6e-5
+    guess = 2.0**31 * math.sqrt(full / (full + 1) * (1.0 + centred))
+    edges = [2**15 + k * 2 ** (15 - GUESS_BITS) for k in range(2**GUESS_BITS + 1)]
+    return [round(2.0 * guess / (low + high)) for low, high in pairwise(edges)], round(2.0 * guess)
+
+
 def header(contract: Contract) -> str:
     its = contract.map
     blob, fixed, centroid, conductance = its["blob"], its["fixed"], its["centroid"], its["conductance"]
-    pairs = len(electrodes(contract)) * (len(electrodes(contract)) + 1) // 2
+    guesses, twice = reciprocal(contract)
     lines = [
         f"// {GENERATED}",
         "// The wrench map: its blocks' kinds and gates, and the formats of its numbers (SPEC.md, Wrench maps).",
@@ -47,7 +78,6 @@ def header(contract: Contract) -> str:
         *(f"#define BT_MAP_AXES_{name} {count}" for name, count in its["axes"].items()),
         f"#define BT_MAP_AXES_MAX {max(its['axes'].values())}",
         f"#define BT_MAP_EXPONENTS {EXPONENTS}",
-        f"#define BT_MAP_PAIRS {pairs}",
         "",
         "enum bt_map_kind {",
         *(f"    BT_MAP_KIND_{name} = {k['value']}, // {k['doc']}" for name, k in its["kind"].items()),
@@ -55,6 +85,8 @@ def header(contract: Contract) -> str:
         f"#define BT_MAP_KINDS {len(its['kind'])}",
         "// Columns of each kind, in this order.",
         f"#define BT_MAP_KIND_COLUMNS {{{', '.join(str(columns(contract, k)) for k in its['kind'].values())}}}",
+        "// Coefficients of each as they lie in the blob, of an axis.",
+        f"#define BT_MAP_KIND_HALVES {{{', '.join(str(halves(contract, k)) for k in its['kind'].values())}}}",
         "",
         "enum bt_map_gate {",
         *(f"    BT_MAP_GATE_{name} = {g['value']}, // {g['doc']}" for name, g in its["gate"].items()),
@@ -68,18 +100,17 @@ def header(contract: Contract) -> str:
         f"#define BT_MAP_COUNT_MAX {conductance['count_max']}",
         f"#define BT_MAP_RATIO_MAX {conductance['ratio_max']}",
         "",
-        f"#define BT_MAP_ONE_Q {fixed['one_q']}",
-        f"#define BT_MAP_CONDUCTANCE_Q {fixed['conductance_q']}",
-        f"#define BT_MAP_FINE_BITS {fixed['conductance_fine_bits']}",
-        f"#define BT_MAP_GATE_Q {fixed['gate_q']}",
-        f"#define BT_MAP_RESULT_Q {fixed['result_q']}",
-        f"#define BT_MAP_EXPONENT_MAX {fixed['exponent_max']}",
-        f"#define BT_MAP_COEFFICIENT_SUM_MAX {fixed['coefficient_sum_max']}u",
-        f"#define BT_MAP_RESULT_MAX {fixed['result_max']}",
+        *(f"#define BT_MAP_{name.upper()} {value}" for name, value in fixed.items()),
         "",
-        "// Largest magnitudes, for the bounds that map.c asserts.",
-        f"#define BT_MAP_GATE_MAX {gate_max(contract)} // of every gate, in 2^-{fixed['gate_q']}",
-        f"#define BT_MAP_FEATURE_MAX {E_MAX_Q4} // of every 16-bit factor of a column",
+        "// Places of the electrodes along and across, over their reaches in 2^-PLACE_Q.",
+        f"#define BT_MAP_PLACES {{{', '.join(f'{{{x}, {y}}}' for x, y in places(contract))}}}",
+        f"#define BT_MAP_PLACE_SUM {max(sum(abs(place[d]) for place in places(contract)) for d in range(2))}",
+        f"#define BT_MAP_GATE_MAX {gate_max(contract)} // of every gate, in 2^-GATE_Q",
+        "",
+        f"// A reciprocal's guesses by {GUESS_BITS} bits behind the divisor's first, and its step's constant.",
+        f"#define BT_MAP_GUESS_BITS {GUESS_BITS}",
+        f"#define BT_MAP_GUESSES {{{', '.join(map(str, guesses))}}}",
+        f"#define BT_MAP_GUESS_TWICE {twice}u",
         "",
         "#endif",
         "",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from .c_map import BLOCK_BYTES, EXPONENTS, HEADER_BYTES, columns
+from .c_map import BLOCK_BYTES, EXPONENTS, HEADER_BYTES, columns, gate_max, halves
 from .schema import GENERATED, Contract, Field, Message
 
 STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
@@ -58,6 +58,7 @@ def wrench_map(contract: Contract) -> str:
         f"EXPONENTS = {EXPONENTS}",
         f"HEADER_BYTES = {HEADER_BYTES}",
         f"BLOCK_BYTES = {BLOCK_BYTES}",
+        f"GATE_MAX = {gate_max(contract)}",
     ]
     for name in ("blob", "centroid", "conductance", "fixed"):
         out += [f"{key.upper()} = {value}" for key, value in its[name].items()]
@@ -65,10 +66,14 @@ def wrench_map(contract: Contract) -> str:
         out += ["", "", f"class {table_name.capitalize()}(IntEnum):", f'    """{title}"""', ""]
         out += [f"    {name} = {entry['value']}  # {entry['doc']}" for name, entry in its[table_name].items()]
     out += ["", "", "class KindSpec(NamedTuple):", '    """How many columns, in what shape, of what."""', ""]
-    out += ["    columns: int", '    shape: Literal["one", "electrodes", "pairs"]']
+    out += [
+        "    columns: int",
+        "    halves: int  # an axis's coefficients in the blob",
+        '    shape: Literal["one", "electrodes", "pairs"]',
+    ]
     out += ['    of: Literal["one", "signal", "conductance", "pressure"]', "", "", "KINDS: dict[Kind, KindSpec] = {"]
     for name, kind in its["kind"].items():
-        spec = f'{columns(contract, kind)}, "{kind["columns"]}", "{kind["of"]}"'
+        spec = f'{columns(contract, kind)}, {halves(contract, kind)}, "{kind["columns"]}", "{kind["of"]}"'
         out.append(f"    Kind.{name}: KindSpec({spec}),")
     return "\n".join([*out, "}"]) + "\n"
 

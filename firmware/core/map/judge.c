@@ -1,5 +1,6 @@
 #include "map/map.h"
 
+#include "map/bounds.h"
 #include "map/words.h"
 #include "wire/little_endian.h"
 
@@ -19,7 +20,7 @@ void bt_map_close(bt_map *map)
 // Bytes of all coefficients, or 0 when the list of blocks breaks a rule.
 static size_t judge_blocks(bt_map *map)
 {
-    size_t columns = 0;
+    size_t halves = 0;
     uint8_t seen[BT_MAP_KINDS] = {0}; // the gates that each kind has had
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *block = map->blocks + b * BT_MAP_BLOCK_BYTES;
@@ -32,27 +33,69 @@ static size_t judge_blocks(bt_map *map)
         map->kinds = (uint16_t)(map->kinds | 1u << kind);
         map->gates = (uint16_t)(map->gates | 1u << gate);
         for (int a = 0; a < BT_MAP_EXPONENTS; a++) {
-            if (block[2 + a] > (a < map->axes ? BT_MAP_EXPONENT_MAX : 0)) {
+            bool its = a < map->axes;
+            if (block[2 + a] < its || block[2 + a] > (its ? BT_MAP_EXPONENT_MAX : 0)) {
                 return 0;
             }
         }
-        columns += bt_map_columns[kind];
+        halves += bt_map_halves[kind];
     }
-    return 4 * columns * map->axes;
+    return 2 * halves * map->axes;
 }
 
-// Whether in each axis of so many columns, width axes side by side, the magnitudes' sum stays in bounds.
-static bool bounded(const bt_map_word *words, int columns, int width)
+// The largest magnitude of an axis's sum over so many columns with factors up to most. its: the axis's first
+// coefficient, of width side by side.
+static uint64_t largest(const bt_map_half *its, int columns, int width, uint32_t most)
 {
-    for (int a = 0; a < width; a++) {
-        uint32_t sum = 0;
-        for (int k = 0; k < columns; k++) {
-            int64_t value = bt_map_value(words[width * k + a]);
-            uint64_t magnitude = (uint64_t)(value < 0 ? -value : value);
-            if (magnitude > BT_MAP_COEFFICIENT_SUM_MAX - sum) {
-                return false;
+    uint32_t sum = 0;
+    for (int k = 0; k < columns; k++) {
+        sum += bt_abs32(its[k * width]);
+    }
+    return (uint64_t)sum * most;
+}
+
+// What cut leaves of a sum, one more for its rounding.
+static uint64_t left(uint64_t sum, int cut)
+{
+    return (sum >> cut) + 1;
+}
+
+#define REFUSED UINT64_MAX
+
+// The largest magnitude of what an axis of a block comes to, or REFUSED where a sum on the way may not fit.
+static uint64_t block_largest(const uint8_t *head, const bt_map_half *its, int width, int exponent)
+{
+    static const uint16_t factor_max[BT_MAP_KINDS] = BT_MAP_FACTOR_MAX;
+    int halves = bt_map_halves[head[0]];
+    uint32_t most = factor_max[head[0]];
+    uint64_t sum = 0;
+    if (halves == BT_MAP_PAIR_HALVES) {
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            uint64_t row = largest(its + i * BT_MAP_ROW * width, BT_MAP_ROW, width, most);
+            if (row > INT32_MAX) {
+                return REFUSED;
             }
-            sum += (uint32_t)magnitude;
+            sum += left(row, BT_MAP_ROW_CUT) * most;
+        }
+    } else {
+        sum = largest(its, halves, width, most);
+    }
+    if (sum > INT32_MAX - (1 << BT_MAP_GATE_CUT)) {
+        return REFUSED;
+    }
+    if (head[1] != BT_MAP_GATE_ONE) {
+        sum = left(sum, BT_MAP_GATE_CUT) * BT_MAP_GATE_MAX;
+    }
+    return sum + (1u << (exponent - 1)) > INT32_MAX ? REFUSED : left(sum, exponent);
+}
+
+// Columns are an even number: a last one is behind 19 electrodes, and behind a single column.
+static bool last_is_zero(uint8_t kind, const bt_map_half *its, int width)
+{
+    int halves = bt_map_halves[kind];
+    for (int a = 0; a < width && halves != BT_MAP_PAIR_HALVES; a++) {
+        if (its[width * (halves - 1) + a] != 0) {
+            return false;
         }
     }
     return true;
@@ -60,20 +103,23 @@ static bool bounded(const bt_map_word *words, int columns, int width)
 
 static bool coefficients_bounded(const bt_map *map)
 {
-    const bt_map_word *words = bt_map_words(map);
+    const bt_map_half *its = (const bt_map_half *)bt_map_words(map);
+    uint64_t total[BT_MAP_AXES_MAX] = {0};
     for (int b = 0; b < map->block_count; b++) {
-        uint8_t kind = map->blocks[b * BT_MAP_BLOCK_BYTES];
-        for (int axis = 0; axis < map->axes; axis += 3) {
-            int width = bt_map_group_width(map, axis);
-            // Pairs are summed row by row, so that each row has bounds of its own.
-            int columns = bt_map_columns[kind] == BT_MAP_PAIRS ? BT_ELECTRODES : bt_map_columns[kind];
-            int last = bt_map_columns[kind] == BT_MAP_PAIRS ? 1 : columns;
-            for (; columns >= last; columns--) {
-                if (!bounded(words, columns, width)) {
+        const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;
+        for (int axis = 0, width; axis < map->axes; axis += width) {
+            width = bt_map_group_width(map, axis);
+            if (!last_is_zero(head[0], its, width)) {
+                return false;
+            }
+            for (int a = 0; a < width; a++) {
+                uint64_t most = block_largest(head, its + a, width, head[2 + axis + a]);
+                if (most == REFUSED || total[axis + a] + most > INT32_MAX) {
                     return false;
                 }
-                words += width * columns;
+                total[axis + a] += most;
             }
+            its += width * bt_map_halves[head[0]];
         }
     }
     return true;

@@ -3,8 +3,8 @@
 // the contact is), with a coefficient per column and axis. A map is read where it lies, as a rule in flash;
 // nothing is copied.
 //
-// No input overflows: what the formats do not bound by themselves, bt_map_open bounds by the sums of the
-// coefficients' magnitudes. Results saturate at BT_MAP_RESULT_MAX.
+// Factors and coefficients have 16 bits, sums 32. No input overflows: bt_map_open bounds every sum that a map
+// can come to, by its coefficients' magnitudes. Results saturate at BT_MAP_RESULT_MAX.
 #ifndef BIOTAC_MAP_H
 #define BIOTAC_MAP_H
 
@@ -37,6 +37,12 @@ uint8_t bt_map_open(bt_map *map, const uint8_t *blob, size_t bytes);
 
 // Whether results need PDC.
 bool bt_map_needs_pdc(const bt_map *map);
+
+// One frame's results in axes of the map's, 3 or all, of which those of torque are in mN*mm. e_q4: of
+// bt_signals_q4; the rest as below. Pressure counts as none where it is unknown.
+void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
+                    const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
+                    int32_t pdc_above_rest_q4, int axes, int32_t result[]);
 
 // One frame's results. counts: 0..4095 or BT_INVALID_COUNT; an electrode without a count or without a tare
 // counts as signal 0. pdc_above_rest_q4: BT_INVALID_I32 where it is unknown; then a map that needs it gives

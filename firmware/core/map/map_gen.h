@@ -3,7 +3,7 @@
 #ifndef BIOTAC_MAP_GEN_H
 #define BIOTAC_MAP_GEN_H
 
-#define BT_MAP_VERSION 1
+#define BT_MAP_VERSION 2
 #define BT_MAP_MAX_BYTES 20480
 #define BT_MAP_HEADER_BYTES 24
 #define BT_MAP_BLOCK_BYTES 12
@@ -15,21 +15,22 @@
 #define BT_MAP_AXES_TORSION 7
 #define BT_MAP_AXES_MAX 7
 #define BT_MAP_EXPONENTS 10
-#define BT_MAP_PAIRS 190
 
 enum bt_map_kind {
     BT_MAP_KIND_OFFSET = 0, // 1
     BT_MAP_KIND_SIGNAL = 1, // e = count - tare
     BT_MAP_KIND_COMPRESSION = 2, // min(e, 0)
     BT_MAP_KIND_BULGE = 3, // max(e, 0)
-    BT_MAP_KIND_SIGNAL_PAIRS = 4, // e_i e_j, i <= j
+    BT_MAP_KIND_SIGNAL_PAIRS = 4, // e_i e_j
     BT_MAP_KIND_CONDUCTANCE = 5, // u = G(count) / G(tare) - 1, G(c) = c / (4095 - c)
-    BT_MAP_KIND_CONDUCTANCE_PAIRS = 6, // u_i u_j, i <= j
+    BT_MAP_KIND_CONDUCTANCE_PAIRS = 6, // u_i u_j
     BT_MAP_KIND_PRESSURE = 7, // PDC above rest
 };
 #define BT_MAP_KINDS 8
 // Columns of each kind, in this order.
 #define BT_MAP_KIND_COLUMNS {1, 19, 19, 19, 190, 19, 190, 1}
+// Coefficients of each as they lie in the blob, of an axis.
+#define BT_MAP_KIND_HALVES {2, 20, 20, 20, 190, 20, 190, 2}
 
 enum bt_map_gate {
     BT_MAP_GATE_ONE = 0, // 1
@@ -48,17 +49,25 @@ enum bt_map_gate {
 #define BT_MAP_COUNT_MAX 4090
 #define BT_MAP_RATIO_MAX 3
 
-#define BT_MAP_ONE_Q 15
-#define BT_MAP_CONDUCTANCE_Q 24
-#define BT_MAP_FINE_BITS 10
-#define BT_MAP_GATE_Q 19
-#define BT_MAP_RESULT_Q 16
-#define BT_MAP_EXPONENT_MAX 16
-#define BT_MAP_COEFFICIENT_SUM_MAX 2147418112u
+#define BT_MAP_ONE_Q 13
+#define BT_MAP_SIGNAL_Q 2
+#define BT_MAP_PRESSURE_Q 3
+#define BT_MAP_CONDUCTANCE_Q 13
+#define BT_MAP_GATE_Q 13
+#define BT_MAP_PLACE_Q 12
+#define BT_MAP_ROW_CUT 16
+#define BT_MAP_GATE_CUT 15
+#define BT_MAP_EXPONENT_MAX 30
 #define BT_MAP_RESULT_MAX 49000000
 
-// Largest magnitudes, for the bounds that map.c asserts.
-#define BT_MAP_GATE_MAX 1515201 // of every gate, in 2^-19
-#define BT_MAP_FEATURE_MAX 65520 // of every 16-bit factor of a column
+// Places of the electrodes along and across, over their reaches in 2^-PLACE_Q.
+#define BT_MAP_PLACES {{508, -4972}, {-1382, -3597}, {-3174, -3597}, {-4096, -5075}, {-5376, -3597}, {-6861, -5075}, {2439, 0}, {1552, -1997}, {1552, 1997}, {665, 0}, {508, 4972}, {-1382, 3597}, {-3174, 3597}, {-4096, 5075}, {-5376, 3597}, {-6861, 5075}, {-1434, 0}, {-5018, 0}, {-6963, 0}}
+#define BT_MAP_PLACE_SUM 62417
+#define BT_MAP_GATE_MAX 23683 // of every gate, in 2^-GATE_Q
+
+// A reciprocal's guesses by 6 bits behind the divisor's first, and its step's constant.
+#define BT_MAP_GUESS_BITS 6
+#define BT_MAP_GUESSES {65021, 64029, 63066, 62131, 61224, 60343, 59487, 58655, 57846, 57059, 56294, 55548, 54822, 54114, 53425, 52753, 52098, 51458, 50835, 50226, 49632, 49051, 48484, 47930, 47388, 46859, 46341, 45835, 45339, 44854, 44380, 43915, 43460, 43014, 42577, 42149, 41730, 41319, 40916, 40520, 40133, 39752, 39379, 39013, 38653, 38300, 37954, 37613, 37279, 36950, 36628, 36311, 35999, 35692, 35391, 35095, 34804, 34517, 34236, 33958, 33686, 33417, 33153, 32893}
+#define BT_MAP_GUESS_TWICE 4294520275u
 
 #endif

@@ -1,5 +1,5 @@
 // The population map: the force on a finger that nobody has calibrated, by what other fingers have in common
-// (host/docs/population.md). Its coefficients are the firmware's own: population_gen.h.
+// (host/docs/population.md): a wrench map that the firmware carries, population_gen.h.
 //
 // It was learnt on a flat plate. Where few electrodes carry the signal, a poke or an edge, it does not know
 // what it says: there bt_population_share tells the caller to take Lin's pull instead, which keeps the sign
@@ -7,10 +7,10 @@
 #ifndef BIOTAC_POPULATION_H
 #define BIOTAC_POPULATION_H
 
-#include "wire/messages_gen.h"
-#include "wire/sensor_gen.h"
+#include "map/map.h"
 
-#include <stdint.h>
+// The map itself, of so many bytes from 4 before its serial number on.
+const bt_map *bt_population_map(size_t *bytes);
 
 // Force in 100 uN on the finger. e_q4: of bt_signals_q4; counts: 0..4095 or BT_INVALID_COUNT; an electrode
 // without a count or without a tare counts as signal 0. No input overflows.

@@ -25,13 +25,28 @@ from .compiled import Settings, board_settings
 Integers = NDArray[np.int64]
 BoardResults = tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]
 
-_HEADER = struct.Struct(f"<BBBB{_map.SERIAL_BYTES}sI")
-_BLOCK = struct.Struct(f"<BB{_map.EXPONENTS}B")
+HEADER = struct.Struct(f"<BBBB{_map.SERIAL_BYTES}sI")
+BLOCK = struct.Struct(f"<BB{_map.EXPONENTS}B")
+_ELECTRODES = _map.KINDS[Kind.SIGNAL].columns
+
+
+def _ring() -> NDArray[np.intp]:
+    """Of each pair in the blob's order, its place in i <= j, row by row: an electrode with itself and nine behind."""
+    place = np.zeros((_ELECTRODES, _ELECTRODES), np.intp)
+    upper = np.triu_indices(_ELECTRODES)
+    place[upper] = np.arange(len(upper[0]))
+    first, behind = np.indices((_ELECTRODES, (_ELECTRODES + 1) // 2)).reshape(2, -1)
+    second = (first + behind) % _ELECTRODES
+    ring: NDArray[np.intp] = place[np.minimum(first, second), np.maximum(first, second)]
+    return ring
+
+
+RING = _ring()
 
 
 @dataclass(frozen=True)
 class BoardBlock:
-    """``coefficients`` (columns, axes) of ``kind``'s columns, times 2^``exponent`` of each axis (axes,)."""
+    """``coefficients`` (columns, axes) of ``kind``'s columns, over 2^``exponent`` (axes,); pairs i <= j, row by row."""
 
     kind: Kind
     gate: Gate
@@ -55,15 +70,12 @@ class BoardMap:
     def blob(self) -> bytes:
         """What a board stores. Raises InputError when the board would refuse it."""
         serial = self.serial.encode("ascii")
-        head = _HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s)
+        head = HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s)
         blocks, coefficients = b"", b""
         for block in self.blocks:
             unused = (0,) * (_map.EXPONENTS - self.axes)
-            blocks += _BLOCK.pack(block.kind, block.gate, *block.exponent, *unused)
-            coefficients += b"".join(
-                np.ascontiguousarray(_words(block.coefficients[:, axis : axis + 3])).tobytes()
-                for axis in range(0, self.axes, 3)
-            )
+            blocks += BLOCK.pack(block.kind, block.gate, *block.exponent, *unused)
+            coefficients += b"".join(_halves(block.kind, group) for group in np.split(block.coefficients, [3], axis=1))
         blob = head + blocks + coefficients
         _judged(blob)
         return blob
@@ -107,25 +119,21 @@ class BoardMap:
         return force, torque, torsion
 
 
-def opened(its: BoardMap | bytes) -> BoardMap:
-    """A map, or the one that a blob holds. Raises InputError when a board would refuse it."""
-    return its if isinstance(its, BoardMap) else from_blob(its)
-
-
 def from_blob(blob: bytes) -> BoardMap:
     """Inverse of BoardMap.blob, to the bit. Raises InputError when a board would refuse it."""
     _judged(blob)
-    _, axes, count, _, serial, made_s = _HEADER.unpack_from(blob)
-    heads = [_BLOCK.unpack_from(blob, _map.HEADER_BYTES + k * _map.BLOCK_BYTES) for k in range(count)]
+    _, axes, count, _, serial, made_s = HEADER.unpack_from(blob)
+    heads = [BLOCK.unpack_from(blob, _map.HEADER_BYTES + k * _map.BLOCK_BYTES) for k in range(count)]
     at = _map.HEADER_BYTES + count * _map.BLOCK_BYTES
     blocks = []
     for kind, gate, *exponent in heads:
-        columns = _map.KINDS[Kind(kind)].columns
-        words = np.frombuffer(blob, "<i2", 2 * columns * axes, at).astype(np.int64).reshape(-1, 2)
-        groups = np.split(words[:, 1] * 65536 + words[:, 0], [3 * columns * k for k in range(1, axes // 3 + axes % 3)])
-        values = np.concatenate([group.reshape(columns, -1) for group in groups], axis=1)
+        groups = []
+        for width in (3, axes - 3):
+            halves = _map.KINDS[Kind(kind)].halves * width
+            groups.append(_columns(Kind(kind), np.frombuffer(blob, "<i2", halves, at).reshape(-1, width or 1)))
+            at += 2 * halves
+        values = np.concatenate(groups if axes > 3 else groups[:1], axis=1)
         blocks.append(BoardBlock(Kind(kind), Gate(gate), tuple(exponent[:axes]), values))
-        at += 4 * columns * axes
     return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s)
 
 
@@ -159,10 +167,25 @@ def pdc_above_rest_q4(frames: StructArray) -> NDArray[np.int32]:
     return np.where(missing, wire.INVALID_I32, above).astype(np.int32)
 
 
-def _words(values: Integers) -> NDArray[Any]:
-    """i16 low, i16 high of each value, so that high * 2^16 + low is it."""
-    low = (values + 0x8000) % 0x10000 - 0x8000
-    return np.stack([low, (values - low) // 0x10000], axis=-1).astype("<i2")
+def _halves(kind: Kind, values: Integers) -> bytes:
+    """A group of axes (columns, width) as it lies in the blob. Raises InputError beyond 16 bits."""
+    spec = _map.KINDS[kind]
+    if np.any(np.abs(values) > 2**15 - 1):
+        raise InputError(
+            f"a coefficient of {kind.name} is {int(np.abs(values).max())}, expected 16 bits; quantise the map again"
+        )
+    laid = np.zeros((spec.halves, values.shape[1]), "<i2")
+    laid[: spec.columns] = values[RING] if spec.shape == "pairs" else values
+    return laid.tobytes()
+
+
+def _columns(kind: Kind, laid: NDArray[Any]) -> Integers:
+    """Inverse of _halves, of what is read already."""
+    spec = _map.KINDS[kind]
+    values = np.zeros((spec.columns, laid.shape[1]), np.int64)
+    if len(laid):
+        values[RING if spec.shape == "pairs" else slice(None)] = laid[: spec.columns]
+    return values
 
 
 def _judged(blob: bytes) -> tuple[Any, Any]:

@@ -16,8 +16,9 @@ from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.frames import StructArray
 from ..wire.native import ffi, lib
-from .board_map import BoardMap, opened
+from .board_map import BoardMap
 from .compiled import FORCE_GAINS, TORQUE_GAINS, Settings, default_settings, formula_settings
+from .map_versions import opened
 
 #: poc_mm, force_n and torque_nmm of one frame, named, in units and with axes as in FRAME_DTYPE.
 RESULT_DTYPE = np.dtype([("poc_mm", "<f8", (3,)), ("force_n", "<f8", (3,)), ("torque_nmm", "<f8", (3,))])

@@ -17,8 +17,9 @@ from ..wire import sensor_gen as sensor
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
 from ..wire.native import ffi, lib
-from .board_map import BoardMap, opened
+from .board_map import BoardMap
 from .compiled import Settings, board_settings, default_settings
+from .map_versions import opened
 
 ROUND_US = 10_000
 NO_TOUCH = 255

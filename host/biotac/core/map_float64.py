@@ -11,20 +11,15 @@ import numpy.typing as npt
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, StructArray, tare_to_q4
-from ..wire.map_gen import Kind
+from ..wire.map_gen import Gate, Kind
 from . import map_columns as columns
-from .board_map import BoardMap
+from .board_map import BoardBlock, BoardMap
 from .geometry import Floats
 from .map_columns import Signals
+from .map_quantise import unit
 
 Q4 = 16
-# What 1 in a column of features is as the board's factor, of which 2^16 is a coefficient's unit.
-FACTOR = {
-    "one": 2.0**_map.ONE_Q,
-    "signal": Q4 * columns.SIGNAL_COUNTS,
-    "conductance": 2.0 ** (_map.CONDUCTANCE_Q - _map.CONDUCTANCE_FINE_BITS),
-    "pressure": Q4 * columns.PRESSURE_COUNTS,
-}
+Unrounded = dict[tuple[Kind, Gate], Floats]  # of each block, as unrounded()
 _CHUNK_ROWS = 4096
 
 
@@ -32,12 +27,6 @@ def result_units(axes: int) -> Floats:
     """The board's units of a result (axes,) in 1 N and 1 N mm."""
     units: Floats = np.array([FORCE_LSB_PER_N] * 3 + [MNMM_PER_NMM] * 4, dtype=np.float64)
     return units[:axes]
-
-
-def factor_product(kind: Kind) -> float:
-    """What 1 in a column of features is in the board's block, per unit of a coefficient."""
-    spec = _map.KINDS[kind]
-    return float((FACTOR[spec.of] / 2.0**16) ** (2 if spec.shape == "pairs" else 1))
 
 
 def by_map(results: StructArray, its: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
@@ -98,11 +87,16 @@ def tared(
         yield Signals(e[rows], tare[rows], pressure[rows])
 
 
+def unrounded(block: BoardBlock) -> Floats:
+    """What a block's coefficients mean (columns, axes), in the results' units per 1 of a column of features."""
+    scale = unit(block.kind, block.gate) / 2.0 ** np.array(block.exponent)
+    return np.asarray(block.coefficients * scale, dtype=np.float64)
+
+
 def _sum(its: BoardMap, signals: Signals) -> Floats:
     """What all blocks add up to (n, axes), in the result's units."""
     kinds, gates = columns.kinds(signals), columns.gates(signals.e)
     total = np.zeros((len(signals.e), its.axes))
     for block in its.blocks:
-        scale = 2.0 ** (np.array(block.exponent) - _map.RESULT_Q) * factor_product(block.kind)
-        total += kinds[block.kind] @ block.coefficients * scale * gates[block.gate]
+        total += kinds[block.kind] @ unrounded(block) * gates[block.gate]
     return total

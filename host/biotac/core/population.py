@@ -1,6 +1,6 @@
 """The force of a finger that nobody has calibrated, in float64: the population map that comes with the package.
 
-The board's own is firmware/core/map/population.c, of the same coefficients in 16 bits. This reads them as they were
+The board's own is board_map() of them, in 16 bits (firmware/core/map/population.c). This reads them as they were
 trained, and makes the columns as training does. SPEC.md, Population map.
 """
 
@@ -16,8 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..wire import messages_gen as wire
-from ..wire.frames import tare_to_q4
-from ..wire.map_gen import Gate, Kind
+from ..wire.frames import FORCE_LSB_PER_N, tare_to_q4
+from ..wire.map_gen import KINDS, Gate, Kind
+from . import map_quantise
+from .board_map import BoardMap
 from .compiled import FORCE_GAINS
 from .geometry import Floats
 from .map_columns import Signals, gates, kinds
@@ -27,7 +29,7 @@ Block = tuple[Kind, Gate, Floats]
 
 ALL = 256  # a share
 _NOISE_Q4 = 8 * 16
-_SHARE_BITS = 11
+_SUM_BITS = 15
 _CHUNK_ROWS = 4096
 
 
@@ -47,11 +49,20 @@ def shipped() -> str:
 def blocks() -> list[Block]:
     """Kind, gate and coefficients (columns, 3) in N of each block."""
     facts = json.loads(shipped())
-    rows = np.array(facts["coefficients_n_and_variance"], dtype=np.float64)[:, :3]
-    one_row = kinds(Signals(np.zeros((1, 19)), np.full(19, 2000.0)))
     named = [(Kind[kind], Gate[gate]) for kind, gate in facts["blocks"]]
-    ends = np.cumsum([one_row[kind].shape[1] for kind, _ in named])
-    return [(*name, its) for name, its in zip(named, np.split(rows, ends[:-1]), strict=True)]
+    return split(named, np.array(facts["coefficients_n_and_variance"], dtype=np.float64)[:, :3])
+
+
+def split(named: list[tuple[Kind, Gate]], coefficients: Floats) -> list[Block]:
+    """Coefficients (columns, 3) of blocks one behind the other, block by block."""
+    ends = np.cumsum([KINDS[kind].columns for kind, _ in named])
+    return [(*name, its) for name, its in zip(named, np.split(coefficients, ends[:-1]), strict=True)]
+
+
+def board_map(of: list[Block]) -> BoardMap:
+    """As the board computes it. Raises InputError when it is beyond a board's formats."""
+    made = (map_quantise.block(kind, gate, its * FORCE_LSB_PER_N, ("Fx", "Fy", "Fz")) for kind, gate, its in of)
+    return BoardMap(3, tuple(made))
 
 
 def tared(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Signals:
@@ -76,11 +87,10 @@ def share(signals: Signals) -> npt.NDArray[np.int64]:
     All where |e| less 8 counts spreads over 4.5 electrodes, (sum s)^2 / sum s^2, and nothing below 3.
     """
     size = np.rint(16 * np.abs(signals.e)).astype(np.int64)
-    beyond = np.maximum(size - _NOISE_Q4, 0)
-    largest = beyond.max(axis=1, initial=0)
-    bits = np.ceil(np.log2(largest + 1.0)).astype(np.int64)
-    beyond >>= np.maximum(bits - _SHARE_BITS, 0)[:, None]
-    square, energy = beyond.sum(axis=1) ** 2, (beyond**2).sum(axis=1)
+    beyond = np.maximum(size - _NOISE_Q4, 0) >> 3  # half counts
+    total, energy = beyond.sum(axis=1), (beyond**2).sum(axis=1)
+    shift = np.maximum(np.ceil(np.log2(total + 1.0)).astype(np.int64) - _SUM_BITS, 0)
+    square, energy = (total >> shift) ** 2, energy >> 2 * shift
     divisor = np.maximum((3 * energy + 63) >> 6, 1)
     part = np.minimum((8 * (square - 3 * energy) + divisor // 2) // divisor, ALL)
     enough = (square // 2 >= 9 * energy // 4) & (square > 0)

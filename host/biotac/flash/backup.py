@@ -16,6 +16,7 @@ from ..hand.commands import CALIBRATION_SINCE_MINOR, MAP_SINCE_MINOR
 from ..hand.hand import Hand
 from ..keep import Calibration, map_file
 from ..keep.calibration_file import from_dict, to_dict
+from ..keep.map_blob import as_blob
 from ..wire import messages_gen as wire
 from ..wire.identity import board_text, serial_text, version_text
 
@@ -68,7 +69,7 @@ def default_path(hello: wire.Hello) -> Path:
 def save(hand: Hand, path: Path | None) -> Backup:
     """All of the board's settings, and the calibrations and maps in force, into a new file; never over another."""
     hello = hand.info
-    its = Backup((path or default_path(hello)).resolve(), read_settings(hand), hand.calibrations(), hand.maps())
+    its = Backup((path or default_path(hello)).resolve(), read_settings(hand), hand.calibrations(), _maps(hand))
     facts = {
         "format": FORMAT,
         "board": board_text(hello.board),
@@ -87,6 +88,11 @@ def save(hand: Hand, path: Path | None) -> Backup:
     except OSError as error:
         raise InputError(f"{its.path} cannot be written ({error.strerror}); choose another --backup") from error
     return its
+
+
+def _maps(hand: Hand) -> dict[int, bytes]:
+    """As the new firmware takes them: an older one's are made into maps of today."""
+    return {finger: as_blob(blob) for finger, blob in hand.maps().items()}
 
 
 def read_backup(path: Path) -> Backup:

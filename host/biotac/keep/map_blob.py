@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 
 from ..core.board_map import BoardMap
+from ..core.map_versions import current
 from ..errors import InputError
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
@@ -15,8 +16,11 @@ MADE_AT = SERIAL_AT + _map.SERIAL_BYTES
 
 
 def as_blob(its: bytes | BoardMap) -> bytes:
-    """The bytes of a map. InputError for what cannot be one by its size; the board judges the rest."""
-    blob = its.blob if isinstance(its, BoardMap) else bytes(its)
+    """The bytes of a map, of today's version. InputError for what cannot be one by its size, or is none of version 1.
+
+    The board judges the rest.
+    """
+    blob = its.blob if isinstance(its, BoardMap) else current(bytes(its))
     if not _map.HEADER_BYTES <= len(blob) <= _map.MAX_BYTES:
         raise InputError(
             f"the map has {len(blob)} bytes, expected {_map.HEADER_BYTES} to {_map.MAX_BYTES}; is it a map's file?"

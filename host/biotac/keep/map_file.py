@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.board_map import from_blob
+from ..core.map_versions import opened
 from ..documents import read_json
 from ..errors import InputError
 from . import map_blob as of
@@ -34,7 +35,7 @@ def to_dict(blob: bytes, provenance: Provenance | None = None) -> dict[str, Any]
 
 
 def from_dict(tree: Any) -> bytes:
-    """Inverse of to_dict, provenance left out.
+    """Inverse of to_dict, provenance left out; a map of version 1 comes out as one of today.
 
     ValueError says what is wrong with the file, InputError that no board would take the map.
     """
@@ -51,8 +52,7 @@ def from_dict(tree: Any) -> bytes:
     for key, value in to_dict(blob).items():
         if key != "provenance" and tree.get(key) != value:
             raise ValueError(f"{key} is {tree.get(key)!r}, but its map's is {value!r}: it was changed or cut")
-    from_blob(blob)
-    return blob
+    return opened(blob).blob
 
 
 def load(path: Path) -> bytes:

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from ..calibrate.pressure.check import FORCE_BOUND_N, PressureCheck
 from ..calibrate.wrench import board
 from ..core import population
-from ..core.board_map import BoardMap, opened, pdc_above_rest_q4
+from ..core.board_map import BoardMap, pdc_above_rest_q4
 from ..core.compiled import TORQUE_GAINS, Results, Settings, reference_q4
 from ..core.map_float64 import exact, replace_gains
+from ..core.map_versions import opened
 from ..hand.commands import PRESSURE_SINCE_MINOR
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..core import board_map
 from ..core.board_map import BoardMap
 from ..core.compiled import on_board_q4, pressure_force_100un
+from ..core.map_versions import opened
 from ..errors import InputError
 from ..hand.streams import RESULTS
 from ..keep.calibration_file import to_dict
@@ -78,7 +79,7 @@ def recompute(
     settings = recording.settings | changes
     calibrations = {finger: its.changed(changes) for finger, its in recording.calibrations.items()}
     own = own_settings(settings, calibrations)
-    in_force = {f: board_map.opened(its) for f, its in (recording.maps if maps is None else maps).items()}
+    in_force = {f: opened(its) for f, its in (recording.maps if maps is None else maps).items()}
     _check_maps(recording, in_force)
     notes: list[str] = []
     if keep_tare:

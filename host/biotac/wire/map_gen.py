@@ -12,7 +12,8 @@ AXES_TORSION = 7
 EXPONENTS = 10
 HEADER_BYTES = 24
 BLOCK_BYTES = 12
-VERSION = 1
+GATE_MAX = 23683
+VERSION = 2
 MAX_BYTES = 20480
 SERIAL_BYTES = 16
 FLOOR_COUNTS = 5
@@ -21,13 +22,15 @@ REACH_Y_UM = 4000
 COUNT_MIN = 1
 COUNT_MAX = 4090
 RATIO_MAX = 3
-ONE_Q = 15
-CONDUCTANCE_Q = 24
-CONDUCTANCE_FINE_BITS = 10
-GATE_Q = 19
-RESULT_Q = 16
-EXPONENT_MAX = 16
-COEFFICIENT_SUM_MAX = 2147418112
+ONE_Q = 13
+SIGNAL_Q = 2
+PRESSURE_Q = 3
+CONDUCTANCE_Q = 13
+GATE_Q = 13
+PLACE_Q = 12
+ROW_CUT = 16
+GATE_CUT = 15
+EXPONENT_MAX = 30
 RESULT_MAX = 49000000
 
 
@@ -38,9 +41,9 @@ class Kind(IntEnum):
     SIGNAL = 1  # e = count - tare
     COMPRESSION = 2  # min(e, 0)
     BULGE = 3  # max(e, 0)
-    SIGNAL_PAIRS = 4  # e_i e_j, i <= j
+    SIGNAL_PAIRS = 4  # e_i e_j
     CONDUCTANCE = 5  # u = G(count) / G(tare) - 1, G(c) = c / (4095 - c)
-    CONDUCTANCE_PAIRS = 6  # u_i u_j, i <= j
+    CONDUCTANCE_PAIRS = 6  # u_i u_j
     PRESSURE = 7  # PDC above rest
 
 
@@ -59,17 +62,18 @@ class KindSpec(NamedTuple):
     """How many columns, in what shape, of what."""
 
     columns: int
+    halves: int  # an axis's coefficients in the blob
     shape: Literal["one", "electrodes", "pairs"]
     of: Literal["one", "signal", "conductance", "pressure"]
 
 
 KINDS: dict[Kind, KindSpec] = {
-    Kind.OFFSET: KindSpec(1, "one", "one"),
-    Kind.SIGNAL: KindSpec(19, "electrodes", "signal"),
-    Kind.COMPRESSION: KindSpec(19, "electrodes", "signal"),
-    Kind.BULGE: KindSpec(19, "electrodes", "signal"),
-    Kind.SIGNAL_PAIRS: KindSpec(190, "pairs", "signal"),
-    Kind.CONDUCTANCE: KindSpec(19, "electrodes", "conductance"),
-    Kind.CONDUCTANCE_PAIRS: KindSpec(190, "pairs", "conductance"),
-    Kind.PRESSURE: KindSpec(1, "one", "pressure"),
+    Kind.OFFSET: KindSpec(1, 2, "one", "one"),
+    Kind.SIGNAL: KindSpec(19, 20, "electrodes", "signal"),
+    Kind.COMPRESSION: KindSpec(19, 20, "electrodes", "signal"),
+    Kind.BULGE: KindSpec(19, 20, "electrodes", "signal"),
+    Kind.SIGNAL_PAIRS: KindSpec(190, 190, "pairs", "signal"),
+    Kind.CONDUCTANCE: KindSpec(19, 20, "electrodes", "conductance"),
+    Kind.CONDUCTANCE_PAIRS: KindSpec(190, 190, "pairs", "conductance"),
+    Kind.PRESSURE: KindSpec(1, 2, "one", "pressure"),
 }

@@ -6,7 +6,7 @@ static void a_blob_is_read_where_it_lies(void **state)
     (void)state;
     static blob its;
     bt_map map;
-    one_block(&its, 3, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_X, 2, WORD(1, -1));
+    one_block(&its, 3, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_X, 2, -7);
     memcpy(bytes_of(&its) + 4, "BTEMU00000000042", 16);
     its.word[5] = 1763731310;
     assert_int_equal(opened(&its, &map), BT_ERROR_OK);
@@ -32,11 +32,12 @@ static void every_byte_of_the_head_is_judged(void **state)
         uint8_t value, error;
     } wrong[] = {
         {0, BT_MAP_VERSION + 1, BT_ERROR_OUT_OF_RANGE},
+        {0, 1, BT_ERROR_OUT_OF_RANGE}, // as boards kept them once: the host makes them into today's
         {1, 0, BT_ERROR_OUT_OF_RANGE},
         {1, 4, BT_ERROR_OUT_OF_RANGE},
         {1, 5, BT_ERROR_OUT_OF_RANGE},
-        {1, 6, BT_ERROR_BAD_LENGTH}, // twice the coefficients
-        {1, 7, BT_ERROR_BAD_LENGTH},
+        {1, 6, BT_ERROR_OUT_OF_RANGE}, // whose exponents are not there
+        {1, 7, BT_ERROR_OUT_OF_RANGE},
         {1, 8, BT_ERROR_OUT_OF_RANGE},
         {2, 0, BT_ERROR_BAD_LENGTH},
         {2, 2, BT_ERROR_OUT_OF_RANGE}, // coefficients for a block: no such kind
@@ -48,6 +49,9 @@ static void every_byte_of_the_head_is_judged(void **state)
         {25, BT_MAP_GATES, BT_ERROR_OUT_OF_RANGE},
         {26, BT_MAP_EXPONENT_MAX + 1, BT_ERROR_OUT_OF_RANGE},
         {28, 255, BT_ERROR_OUT_OF_RANGE},
+        {27, 0, BT_ERROR_OUT_OF_RANGE},
+        {36 + 2 * 3 * 19, 1, BT_ERROR_OUT_OF_RANGE}, // a twentieth column
+        {36 + 2 * 3 * 19 + 5, 128, BT_ERROR_OUT_OF_RANGE},
         {29, 1, BT_ERROR_OUT_OF_RANGE}, // of an axis that is not there
         {32, 1, BT_ERROR_OUT_OF_RANGE},
         {35, 1, BT_ERROR_OUT_OF_RANGE}, // and of none that may be
@@ -55,7 +59,7 @@ static void every_byte_of_the_head_is_judged(void **state)
     static blob its;
     bt_map map;
     for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
-        one_block(&its, 3, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, BT_MAP_EXPONENT_MAX, WORD(100, 0x77));
+        one_block(&its, 3, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, BT_MAP_EXPONENT_MAX, 100);
         assert_int_equal(opened(&its, &map), BT_ERROR_OK);
         bytes_of(&its)[wrong[k].at] = wrong[k].value;
         assert_refused(&its, wrong[k].error);
@@ -69,7 +73,7 @@ static void every_length_but_one_is_refused(void **state)
     bt_map map;
     for (size_t k = 0; k < SOME_AXES; k++) {
         one_block(&its, axes_of[k], BT_MAP_KIND_BULGE, BT_MAP_GATE_YY, 1, 5);
-        assert_int_equal(4 * its.words, 24 + 12 + 4 * 19 * axes_of[k]);
+        assert_int_equal(4 * its.words, 24 + 12 + 2 * 20 * axes_of[k]);
         for (size_t bytes = 0; bytes <= sizeof its.word; bytes++) {
             uint8_t error = bt_map_open(&map, bytes_of(&its), bytes);
             assert_int_equal(error, bytes == 4 * its.words ? BT_ERROR_OK : BT_ERROR_BAD_LENGTH);
@@ -86,47 +90,98 @@ static void a_block_comes_once(void **state)
     bt_map map;
     for (uint32_t second = 0; second < BT_MAP_GATES; second++) {
         begin(&its, 3, 2);
-        block(&its, BT_MAP_KIND_OFFSET, BT_MAP_GATE_XY, 0);
-        block(&its, BT_MAP_KIND_OFFSET, second, 0);
-        fill(&its, BT_MAP_KIND_OFFSET, 9);
-        fill(&its, BT_MAP_KIND_OFFSET, 9);
+        block(&its, BT_MAP_KIND_OFFSET, BT_MAP_GATE_XY, 1);
+        block(&its, BT_MAP_KIND_OFFSET, second, 1);
+        (void)fill(&its, BT_MAP_KIND_OFFSET, 9);
+        (void)fill(&its, BT_MAP_KIND_OFFSET, 9);
         assert_int_equal(opened(&its, &map), second == BT_MAP_GATE_XY ? BT_ERROR_OUT_OF_RANGE : BT_ERROR_OK);
     }
 }
 
-// Which coefficients stand in one sum: all of a block, or a row of pairs. 2^31 - 2^16 fits, one more does
-// not.
+// Magnitudes that add up to sum over columns [first, first + 10), signs by turns.
+static void spread(blob *its, uint32_t kind, uint32_t axis, uint32_t first, int32_t sum)
+{
+    for (uint32_t k = 0; k < 10 && first + k < columns_of[kind]; k++) {
+        int32_t part = sum > 32767 ? 32767 : sum;
+        sum -= part;
+        *half(its, FIRST, kind, first + k, axis) = (int16_t)(k & 1 ? -part : part);
+    }
+    assert_int_equal(sum, 0);
+}
+
+// The largest factors: 4095 counts in quarters, a conductance of 3 in 2^-13. Sums fit 31 bits with half a
+// unit of what is cut off them: 15 bits of a block, 17 of a row of pairs.
+#define LINE_MAX(factor) ((INT32_MAX - (1 << 15)) / (factor))
+#define ROW_MAX(factor)  (INT32_MAX / (factor))
+#define SIGNAL           (4095 << 2)
+#define CONDUCTANCE      (3 << 13)
+
 static void coefficients_are_bounded_sum_by_sum(void **state)
 {
     (void)state;
+    static const int32_t most[BT_MAP_KINDS] = {[BT_MAP_KIND_SIGNAL] = LINE_MAX(SIGNAL),
+                                               [BT_MAP_KIND_COMPRESSION] = LINE_MAX(SIGNAL),
+                                               [BT_MAP_KIND_BULGE] = LINE_MAX(SIGNAL),
+                                               [BT_MAP_KIND_SIGNAL_PAIRS] = ROW_MAX(SIGNAL),
+                                               [BT_MAP_KIND_CONDUCTANCE] = LINE_MAX(CONDUCTANCE),
+                                               [BT_MAP_KIND_CONDUCTANCE_PAIRS] = ROW_MAX(CONDUCTANCE)};
     static blob its;
+    bt_map map;
     for (uint32_t kind = 0; kind < BT_MAP_KINDS; kind++) {
-        uint32_t first = 0, row = BT_ELECTRODES;
-        while (first < columns_of[kind]) {
-            uint32_t last = columns_of[kind] == BT_MAP_PAIRS ? first + row - 1 : columns_of[kind] - 1;
-            for (uint32_t axis = 0; axis < 7; axis++) {
-                uint32_t width = axis < 6 ? 3 : 1; // of the group that the axis is in
-                one_block(&its, 7, kind, BT_MAP_GATE_ONE, 0, 0);
-                uint32_t *group = its.word + its.words - (7 - axis / 3 * 3) * columns_of[kind];
-                bt_map map;
-                // All but 1, or all but 2^16; the rest of the sum stands in its last word.
-                group[width * first + axis % 3] = axis & 1 ? WORD(32766, 0) : WORD(-32767, 1);
-                if (last > first) {
-                    group[width * last + axis % 3] = axis & 1 ? WORD(-1, 0) : WORD(0, -1);
-                    assert_int_equal(opened(&its, &map), BT_ERROR_OK);
-                    group[width * last + axis % 3] = axis & 1 ? WORD(-1, -1) : WORD(0, -2);
-                } else {
-                    group[width * first + axis % 3] = axis & 1 ? WORD(32767, 0) : WORD(-32767, 0);
-                    assert_int_equal(opened(&its, &map), BT_ERROR_OK);
-                    group[width * first + axis % 3] = axis & 1 ? WORD(32767, 1) : WORD(-32767, -1);
-                }
-                assert_refused(&its, BT_ERROR_OUT_OF_RANGE);
-                group[width * first + axis % 3] = WORD(-32768, -32768); // the largest there is
-                assert_refused(&its, BT_ERROR_OUT_OF_RANGE);
+        for (uint32_t axis = 0; axis < 7; axis++) {
+            one_block(&its, 7, kind, BT_MAP_GATE_ONE, 1, 0);
+            if (most[kind] == 0) { // of one column: nothing of 16 bits is too large
+                *half(&its, FIRST, kind, 0, axis) = INT16_MIN;
+                assert_int_equal(opened(&its, &map), BT_ERROR_OK);
+                continue;
             }
-            first = last + 1;
-            row--;
+            for (uint32_t first = 0; first < columns_of[kind]; first += 10) {
+                spread(&its, kind, axis, first, most[kind]);
+                assert_int_equal(opened(&its, &map), BT_ERROR_OK);
+                spread(&its, kind, axis, first, most[kind] + 1);
+                assert_refused(&its, BT_ERROR_OUT_OF_RANGE);
+                spread(&its, kind, axis, first, 0);
+            }
         }
+    }
+}
+
+// Every row may be small enough, and what they come to together not: 19 of (row >> 16) + 1 times a factor.
+static void rows_are_bounded_together(void **state)
+{
+    (void)state;
+    static blob its;
+    bt_map map;
+    for (uint32_t axis = 0; axis < 7; axis++) {
+        one_block(&its, 7, BT_MAP_KIND_SIGNAL_PAIRS, BT_MAP_GATE_YY, 1, 0);
+        for (int sum = 27606; sum <= 27607;
+             sum++) { // 27606 * 16380 >> 16 is 6899, and 19 * 6901 * 16380 > 2^31
+            for (uint32_t first = 0; first < 190; first += 10) {
+                spread(&its, BT_MAP_KIND_SIGNAL_PAIRS, axis, first, sum);
+            }
+            assert_int_equal(opened(&its, &map), sum == 27606 ? BT_ERROR_OK : BT_ERROR_OUT_OF_RANGE);
+        }
+    }
+}
+
+// Two blocks of 2^30 fit, a third does not.
+static void blocks_are_bounded_together(void **state)
+{
+    (void)state;
+    static blob its;
+    for (uint32_t count = 2; count <= 3; count++) {
+        bt_map map;
+        begin(&its, 3, count);
+        for (uint32_t b = 0; b < count; b++) {
+            block(&its, BT_MAP_KIND_SIGNAL + b, BT_MAP_GATE_ONE, 1);
+        }
+        for (uint32_t b = 0; b < count; b++) {
+            uint32_t first = fill(&its, BT_MAP_KIND_SIGNAL + b, 0);
+            for (uint32_t k = 0; k < 4; k++) {
+                *half(&its, first, BT_MAP_KIND_SIGNAL + b, k, 1) = 32767;
+            }
+        }
+        assert_int_equal(opened(&its, &map), count == 2 ? BT_ERROR_OK : BT_ERROR_OUT_OF_RANGE);
     }
 }
 
@@ -136,7 +191,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         T(a_blob_is_read_where_it_lies),        T(every_byte_of_the_head_is_judged),
         T(every_length_but_one_is_refused),     T(a_block_comes_once),
-        T(coefficients_are_bounded_sum_by_sum),
+        T(coefficients_are_bounded_sum_by_sum), T(rows_are_bounded_together),
+        T(blocks_are_bounded_together),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -38,11 +38,13 @@ static void mixed_map(blob *its, bt_map *map, uint32_t axes)
     begin(its, axes, 2);
     block(its, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, 6);
     block(its, BT_MAP_KIND_PRESSURE, BT_MAP_GATE_X, 4);
+    uint32_t signal = fill(its, BT_MAP_KIND_SIGNAL, 0), pressure = fill(its, BT_MAP_KIND_PRESSURE, 0);
     for (uint32_t k = 0; k < columns_of[BT_MAP_KIND_SIGNAL] * axes; k++) {
-        its->word[its->words++] = WORD(40 + 13 * (k % 7) - (k % axes == 1 ? 400 : 0), 77 * k);
+        *half(its, signal, BT_MAP_KIND_SIGNAL, k / axes, k % axes) =
+            (int16_t)(40 + 13 * (k % 7) - (k % axes == 1 ? 400 : 0));
     }
     for (uint32_t k = 0; k < axes; k++) {
-        its->word[its->words++] = WORD(100 + k, 3);
+        *half(its, pressure, BT_MAP_KIND_PRESSURE, 0, k) = (int16_t)(100 + k);
     }
     assert_int_equal(opened(its, map), BT_ERROR_OK);
 }
@@ -113,7 +115,7 @@ static void without_pressure_a_map_that_needs_it_gives_nothing(void **state)
         assert_int_equal(msg.force_100un[0], BT_INVALID_I32);
         finger.tare.base.pdc_q16 = known;
     }
-    one_block(&its, 3, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, 6, WORD(30, 0)); // needs none
+    one_block(&its, 3, BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE, 6, 30); // needs none
     assert_int_equal(opened(&its, &map), BT_ERROR_OK);
     assert_int_not_equal(published(&finger, &map, BT_INVALID_COUNT, BT_WANT_ALL).force_100un[0],
                          BT_INVALID_I32);

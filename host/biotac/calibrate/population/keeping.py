@@ -5,6 +5,7 @@ Coefficients have seven digits, a thousandth of what the map is off by: short, a
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 from collections.abc import Sequence
@@ -14,10 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from ...core import population
+from ...core.board_map import BoardMap
 from ...core.geometry import Floats
 from ...core.population import SHIPPED, shipped
 from ...errors import InputError
 from ...version import __version__
+from ...wire.map_gen import Gate, Kind
 from ..wrench import features
 from .training import AXES, COLUMNS, FAMILIES, Population
 
@@ -51,6 +55,7 @@ def dumps(kept: Kept) -> str:
         "sigma_n": _short(kept.sigma_n),
         "sigma_scale5_n": _short(kept.sigma_scale5_n),
         "blocks": _block_names(),
+        "board_map": base64.b64encode(_board_map(kept.its).blob).decode("ascii"),
     }
     lines = [f" {json.dumps(key)}: {json.dumps(value)}," for key, value in head.items()]
     rows = np.column_stack([kept.its.coefficients, kept.its.variance])
@@ -92,6 +97,12 @@ def load(path: Path | None) -> Kept:
 def _short(values: Floats) -> list[float]:
     # what cancels between mirror images is not quite 0, and another computer's is another
     return [float(f"{value:.{DIGITS}g}") if abs(value) > NOTHING else 0.0 for value in values]
+
+
+def _board_map(its: Population) -> BoardMap:
+    """Of the digits that are kept, so that whoever reads them makes the same."""
+    named = [(Kind[kind], Gate[gate]) for kind, gate in _block_names()]
+    return population.board_map(population.split(named, np.array([_short(row) for row in its.coefficients])))
 
 
 def _block_names() -> list[list[str]]:

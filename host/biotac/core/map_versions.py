@@ -1,0 +1,63 @@
+"""Maps as boards kept them up to wire 1.4 (version 1): read, and made into ones of today.
+
+Coefficients had 32 bits, x y and z of a column side by side, torsion's behind them; pairs came row by row. Rounded to
+16 bits a map means the same within some mN.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..wire import map_gen as _map
+from ..wire.map_gen import Gate, Kind
+from . import map_quantise
+from .board_map import BLOCK, HEADER, BoardMap, from_blob
+from .map_columns import PRESSURE_COUNTS, SIGNAL_COUNTS
+
+VERSION = 1
+# What 1 in a column of features was as a factor, of which 2^16 was a coefficient's unit.
+_FACTOR = {"one": 2.0**15, "signal": 16 * SIGNAL_COUNTS, "conductance": 2.0**14, "pressure": 16 * PRESSURE_COUNTS}
+
+
+def current(blob: bytes) -> bytes:
+    """``blob`` itself, or the map of today that one of version 1 means. Raises InputError when that one is no map."""
+    if blob[:1] != bytes([VERSION]):
+        return blob
+    try:
+        return _read(blob).blob
+    except (ValueError, ArithmeticError) as error:
+        raise InputError(
+            f"a wrench map of version {VERSION} and {len(blob)} bytes cannot be read ({error}): expected one as "
+            f"`biotac map get` wrote it; calibrate the finger again"
+        ) from error
+
+
+def opened(its: BoardMap | bytes) -> BoardMap:
+    """A map, or the one that a blob of any version holds. Raises InputError when a board would refuse it."""
+    return its if isinstance(its, BoardMap) else from_blob(current(its))
+
+
+def _read(blob: bytes) -> BoardMap:
+    if len(blob) < _map.HEADER_BYTES:
+        raise ValueError("its head is cut off")
+    _, axes, count, _, serial, made_s = HEADER.unpack_from(blob)
+    at = _map.HEADER_BYTES + count * _map.BLOCK_BYTES
+    if axes not in (_map.AXES_FORCE, _map.AXES_TORQUE, _map.AXES_TORSION) or len(blob) < at:
+        raise ValueError(f"{axes} axes, {count} blocks")
+    names = ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")[:axes]
+    blocks = []
+    for k in range(count):
+        kind_value, gate_value, *exponent = BLOCK.unpack_from(blob, _map.HEADER_BYTES + k * _map.BLOCK_BYTES)
+        kind, gate = Kind(kind_value), Gate(gate_value)
+        spec = _map.KINDS[kind]
+        words = np.frombuffer(blob, "<i2", 2 * spec.columns * axes, at).astype(np.int64).reshape(-1, 2)
+        groups = np.split(words[:, 1] * 65536 + words[:, 0], [3 * spec.columns, 6 * spec.columns])
+        values = np.concatenate([g.reshape(spec.columns, -1) for g in groups if len(g)], axis=1)
+        factor = (_FACTOR[spec.of] / 2.0**16) ** (2 if spec.shape == "pairs" else 1)
+        real = values * factor * 2.0 ** (np.array(exponent[:axes]) - 16.0)
+        blocks.append(map_quantise.block(kind, gate, real, names))
+        at += 4 * spec.columns * axes
+    if at != len(blob):
+        raise ValueError(f"{len(blob)} bytes, {at} by its head")
+    return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s)
