@@ -183,6 +183,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
+@pytest.mark.filterwarnings("ignore::biotac.RecordingWarning")
 @pytest.mark.parametrize("read", [biotac.load, biotac.Recording, lambda path: read_mcap(path, LIN)])
 def test_a_damaged_recording_is_refused_in_a_line_or_read(
     tmp_path: Path, recorded: bytes, read: Callable[[Path], Any]

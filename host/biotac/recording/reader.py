@@ -38,8 +38,9 @@ class Recording:
     board's, ``calibrations`` and ``maps`` (bytes, as the board holds them) those in force, by finger, when it began,
     ``names`` what fingers were called: ``recording["index"]`` is that finger's frames.
     ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its
-    index; ``damaged_chunks``: seconds that were left out; ``gaps``: times in which the board was away. ``blocks`` are
-    the wire's bytes as they came, about one a second, and ``arrived_ns`` when each began, by the host's clock (Unix).
+    index; ``damaged_chunks``: seconds that were left out; ``wrong_checksums``: over the file's records and its index;
+    ``gaps``: times in which the board was away. ``blocks`` are the wire's bytes as they came, about one a second, and
+    ``arrived_ns`` when each began, by the host's clock (Unix).
     Raises RecordingError when nothing can be read. ``show`` is told the share of the work that is done.
     """
 
@@ -70,6 +71,7 @@ class Recording:
         self.problems: list[str] = blocks.scan.problems
         self.cut_off = blocks.scan.cut_off
         self.damaged_chunks = blocks.scan.damaged_chunks
+        self.wrong_checksums = blocks.scan.wrong_checksums
         for facts in blocks.gaps:
             self._take_gap(facts)
         if blocks.metadata is None:

@@ -72,7 +72,7 @@ def test_what_the_host_said_of_a_hold_is_heard_again(folder, timeout_ms: int) ->
         hand.record(folder / "grasp.mcap")
         hand.read(0.5)
         with hand.grasp("index"):
-            hand.read(1.5)  # a hand that is pulled says nothing meanwhile
+            hand.read(1.5, fresh=True)  # a hand that is pulled says nothing meanwhile
         hand.read_batch(100)
     was = biotac.Recording(folder / "grasp.mcap")
     reasons = [m.reason for m in tares(was)]
