@@ -1,13 +1,14 @@
 """JSON messages beside the wire, for Foxglove and PlotJuggler: SI units, a frame_id, fewer than the wire has.
 
 The wire is the truth; these are derived from it, thinned so that a long recording stays small, and no
-reader of ours looks at them. A value that is invalid is left out, as JSON has no NaN and these tools no
-union types.
+reader of ours looks at them. A value that is invalid is left out, and is null in a list: JSON has no NaN. (The schemas
+name a list's type alone, as these tools know no union types.)
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,12 +16,14 @@ import numpy as np
 from mcap.writer import Writer
 
 from ..wire import messages_gen as wire
-from ..wire.batches import Batch
+from ..wire.batches import Batch, StreamDecoder
 from ..wire.frames import StructArray
 from . import layout
+from .stamps import Stamps
 
 RESULTS_US = 40_000  # 25 a second
 COUNTS_US = 200_000  # 5 a second
+_NO_TARE = 0xFFFFFFFF
 
 
 def _number(what: str) -> dict[str, Any]:
@@ -62,11 +65,15 @@ COUNTS_SCHEMA = {
     "type": "object",
     "properties": _HEAD
     | {
-        "electrodes": {"type": "array", "items": {"type": "integer"}, "description": "E1..E19; 65535 where missing"},
+        "electrodes": {"type": "array", "items": {"type": "integer"}, "description": "E1..E19; null where missing"},
         "pdc": _number("static pressure, count"),
         "tac": _number("thermal flux, count"),
         "tdc": _number("temperature, count"),
-        "pac": {"type": "array", "items": {"type": "integer"}, "description": "22 samples, 1/2200 s apart, count"},
+        "pac": {
+            "type": "array",
+            "items": {"type": "integer"},
+            "description": "22 samples, 1/2200 s apart, count; null where missing",
+        },
     },
 }
 TARE_SCHEMA = {
@@ -76,21 +83,21 @@ TARE_SCHEMA = {
     | {
         "reason": {"type": "string", "description": "enum tare_reason in MESSAGES.md"},
         "state": {"type": "string", "description": "enum tare_state in MESSAGES.md"},
-        "tare": {"type": "array", "items": {"type": "number"}, "description": "E1..E19, count; -1 where unknown"},
+        "tare": {"type": "array", "items": {"type": "number"}, "description": "E1..E19, count; null where unknown"},
     },
 }
 _TOPICS = {"results": RESULTS_SCHEMA, "counts": COUNTS_SCHEMA, "tare": TARE_SCHEMA}
 
 
 @dataclass(frozen=True)
-class _Anchor:
-    """Where device time meets the host's clock."""
+class _Message:
+    """One to be written; ``body`` still without its head."""
 
+    topic: str
+    finger: int
     t_us: int
-    host_ns: int
-
-    def ns(self, t_us: int) -> int:
-        return self.host_ns + (t_us - self.t_us) * 1000
+    seq: int
+    body: dict[str, Any]
 
 
 class Plots:
@@ -98,34 +105,52 @@ class Plots:
 
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
-        self._anchor: _Anchor | None = None
+        self._stamps: Stamps | None = None
         self._channels: dict[tuple[str, int], int] = {}
         self._schemas: dict[str, int] = {}
         self._due_us: dict[tuple[str, int], int] = {}
 
-    def add(self, batch: Batch, arrived_ns: int) -> bool:
-        """Write what the next rows are good for; true if that was anything."""
-        begin_us = batch.first_t_us()
-        if self._anchor is None and begin_us is not None:
-            self._anchor = _Anchor(begin_us, arrived_ns)
-        if self._anchor is None:
+    def add(self, batch: Batch, decoder: StreamDecoder, arrived_ns: int, all_here_ns: int | None) -> bool:
+        """Write what the next rows are good for; true if that was anything.
+
+        ``decoder`` is theirs; their first byte was here at ``arrived_ns``, all at ``all_here_ns`` if anybody knows.
+        """
+        begin_us, end_us = batch.first_t_us(), batch.last_t_us()
+        if self._stamps is None and begin_us is not None:
+            self._stamps = Stamps(begin_us, arrived_ns)
+        if self._stamps is None:
             return False
-        pac = {(int(row["finger"]), int(row["seq"])): row["pac"] for row in batch.pac[self._thinned("pac", batch.pac)]}
-        messages: list[tuple[int, str, int, dict[str, Any]]] = []
+        if end_us is not None and all_here_ns is not None:
+            self._stamps.arrived(end_us, all_here_ns)
+        messages = [*self._results(batch), *self._counts(batch)]
+        messages += [
+            _Message("tare", tare.finger, decoder.unwrap_t_us(tare.t_us), tare.seq, tare_change(tare))
+            for tare in batch.messages
+            if isinstance(tare, wire.Tare)
+        ]
+        messages.sort(key=lambda message: message.t_us)
+        stamps = self._stamps(np.array([message.t_us for message in messages], np.int64))
+        for message, stamp_ns in zip(messages, np.maximum(stamps, 0).tolist(), strict=True):
+            head = {
+                "timestamp": {"sec": stamp_ns // 10**9, "nsec": stamp_ns % 10**9},
+                "frame_id": layout.frame_id(message.finger),
+                "seq": message.seq,
+            }
+            data = json.dumps(head | message.body, separators=(",", ":")).encode()
+            channel = self._channel(message.topic, message.finger)
+            self._writer.add_message(channel, stamp_ns, data, stamp_ns, message.seq)
+        return bool(messages)
+
+    def _results(self, batch: Batch) -> Iterator[_Message]:
         for k in self._thinned("results", batch.frames):
-            messages.append(self._message("results", batch.frames[k], results(batch.wire[k])))
+            yield _of_row("results", batch.frames[k], results(batch.wire[k]))
+
+    def _counts(self, batch: Batch) -> Iterator[_Message]:
+        pac = {(int(row["finger"]), int(row["seq"])): row["pac"] for row in batch.pac[self._thinned("pac", batch.pac)]}
         for k in self._thinned("counts", batch.frames):
             row = batch.frames[k]
-            block_of = pac.get((int(row["finger"]), int(row["seq"])))
-            extra = {} if block_of is None else {"pac": block_of.tolist()}
-            messages.append(self._message("counts", row, counts(row) | extra))
-        for message in batch.messages:
-            if isinstance(message, wire.Tare):
-                messages.append(self._tare(message))
-        for stamp_ns, topic, finger, body in sorted(messages, key=lambda m: m[0]):
-            data = json.dumps(body, separators=(",", ":")).encode()
-            self._writer.add_message(self._channel(topic, finger), stamp_ns, data, stamp_ns, body["seq"])
-        return bool(messages)
+            block = pac.get((int(row["finger"]), int(row["seq"])))
+            yield _of_row("counts", row, counts(row) | ({} if block is None else {"pac": _count_list(block)}))
 
     def _thinned(self, what: str, rows: StructArray) -> list[int]:
         """Rows to show: of each finger the first of every period of device time."""
@@ -138,33 +163,6 @@ class Plots:
             self._due_us[what, int(finger)] = int(slot[-1])
             chosen += mine[fresh].tolist()
         return chosen
-
-    def _message(self, topic: str, row: Any, body: dict[str, Any]) -> tuple[int, str, int, dict[str, Any]]:
-        return self._stamped(topic, int(row["finger"]), int(row["t_us"]), int(row["seq"]), body)
-
-    def _tare(self, tare: wire.Tare) -> tuple[int, str, int, dict[str, Any]]:
-        assert self._anchor is not None
-        # Its 32-bit time, unwrapped to the half cycle around where the stream stands.
-        elapsed_us = (tare.t_us - self._anchor.t_us) % 2**32
-        unknown = 0xFFFFFFFF
-        body = {
-            "reason": _name(wire.TareReason, tare.reason),
-            "state": _name(wire.TareState, tare.tare_state),
-            "tare": [-1 if value == unknown else round(value / 65536, 4) for value in tare.tare_q16],
-        }
-        return self._stamped("tare", tare.finger, self._anchor.t_us + elapsed_us, tare.seq, body)
-
-    def _stamped(
-        self, topic: str, finger: int, t_us: int, seq: int, body: dict[str, Any]
-    ) -> tuple[int, str, int, dict[str, Any]]:
-        assert self._anchor is not None
-        stamp_ns = max(0, self._anchor.ns(t_us))
-        head = {
-            "timestamp": {"sec": stamp_ns // 10**9, "nsec": stamp_ns % 10**9},
-            "frame_id": layout.frame_id(finger),
-            "seq": seq,
-        }
-        return stamp_ns, topic, finger, head | body
 
     def _channel(self, topic: str, finger: int) -> int:
         if topic not in self._schemas:
@@ -199,9 +197,26 @@ def results(row: Any) -> dict[str, Any]:
 
 
 def counts(row: Any) -> dict[str, Any]:
-    """Raw counts of one frame, missing slow channels left out."""
+    """Raw counts of one frame, missing electrodes null, missing slow channels left out."""
     slow = {name: int(row[name]) for name in ("pdc", "tac", "tdc") if row[name] != wire.INVALID_COUNT}
-    return {"electrodes": row["counts"].tolist()} | slow
+    return {"electrodes": _count_list(row["counts"])} | slow
+
+
+def tare_change(tare: wire.Tare) -> dict[str, Any]:
+    """What a TARE message says, electrodes without a tare null."""
+    return {
+        "reason": _name(wire.TareReason, tare.reason),
+        "state": _name(wire.TareState, tare.tare_state),
+        "tare": [None if value == _NO_TARE else round(value / 65536, 4) for value in tare.tare_q16],
+    }
+
+
+def _count_list(values: Any) -> list[int | None]:
+    return [None if value == wire.INVALID_COUNT else value for value in values.tolist()]
+
+
+def _of_row(topic: str, row: Any, body: dict[str, Any]) -> _Message:
+    return _Message(topic, int(row["finger"]), int(row["t_us"]), int(row["seq"]), body)
 
 
 def _name(kind: Any, value: int) -> str:
