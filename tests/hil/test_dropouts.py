@@ -61,6 +61,7 @@ def play(rig: Rig, tmp_path: Path, seconds: float, kind: str | None, *, calibrat
     path.write_text(text)
     hand = rig.open(str(path))
     hand.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)
+    hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)  # which the emulated finger's physics follow
     if calibrated:
         hand.set_calibration(1, for_finger(hand, 1))
     return hand.read(100), hand

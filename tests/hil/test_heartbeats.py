@@ -48,6 +48,7 @@ def play(board, tmp_path: Path):
         path = tmp_path / "case.toml"
         path.write_text(TOUCHED_TWICE)
         hand = board(str(path))
+        hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)  # whose sigma is of the noise
         hand.subscribe(quantities)
         batch = hand.read_batch(100)
         return batch, hand.stats, hand.status()

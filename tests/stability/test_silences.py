@@ -12,6 +12,7 @@ from stability.courses import Course, script
 LEAD_S, HELD_S = 3.0, 6.0
 SETTLED = 5  # rounds, 50 ms
 NEAR = 0.05
+LIN = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.LIN)}  # which the emulated finger's physics follow
 
 
 def held(seed: int, later_n: float = 3.0) -> tuple[Course, int]:
@@ -23,7 +24,7 @@ def held(seed: int, later_n: float = 3.0) -> tuple[Course, int]:
 
 def silent(course: Course, begin: int, end: int, silent_rounds: int) -> np.ndarray:
     """Rows from ``end`` on, after as many rounds without a word; device time says how long it was."""
-    finger = Finger()
+    finger = Finger(LIN)
     t_us = 10_000 * np.arange(len(course))
     finger.feed(**{name: words[:begin] for name, words in course.words.items()}, t_us=t_us[:begin])
     finger.feed(np.full((silent_rounds, 19), wire.INVALID_COUNT), t_us=t_us[end - silent_rounds : end])
@@ -38,7 +39,7 @@ def greatest_error(rows: np.ndarray, undisturbed: np.ndarray) -> float:
 @pytest.mark.parametrize("seed", range(8))
 def test_a_hold_comes_back_with_its_force(seed: int) -> None:
     course, row = held(seed)
-    undisturbed = course.run()
+    undisturbed = course.run(LIN)
     for rounds in (8, 40, 100, 200, 500, 1000):
         back = silent(course, row, row + rounds, rounds)
         assert (back["flags"] & FrameFlags.CONTACT != 0).all()
@@ -49,7 +50,7 @@ def test_a_hold_comes_back_with_its_force(seed: int) -> None:
 def test_a_load_that_changed_meanwhile_is_no_drift(later_n: float) -> None:
     course, row = held(5, later_n)
     back = silent(course, row, row + 500, 500)
-    before = course.run()["tare_q4"][row - 1]
+    before = course.run(LIN)["tare_q4"][row - 1]
     assert (back["tare_q4"][: 2 * SETTLED] == before).all()
 
 

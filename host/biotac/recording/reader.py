@@ -207,11 +207,11 @@ class Recording:
         self.sensors = [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))]
         named = json.loads(metadata["settings"])
         own = json.loads(metadata.get("calibrations", "{}"))
-        # A setting or a calibration that this recording's firmware did not have yet: the default, and none.
+        # A setting or a calibration that this recording's firmware did not have yet: what it did, and none.
         self.calibrations = {int(finger): from_dict(its) for finger, its in own.items()}
         self.maps = _maps(metadata.get("maps", "{}"))
         self.names = layout.names_of(metadata)
-        self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting}
+        self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].before)) for s in wire.Setting}
 
     @property
     def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
