@@ -24,10 +24,11 @@ from mcap.writer import MCAP0_MAGIC
 
 from ..errors import RecordingError
 
-# A second of five fingers is 0.1 MB and compresses to a fifth, one of fingers at rest to a fiftieth.
-_CHUNK_MAX_BYTES = 1 << 26
-_RATIO_MAX = 1000
-_FREE_BYTES = 1 << 26
+# A second of five fingers is 0.1 MB. Files have a quarter of what they unpack to; those of format 1, with fingers at
+# rest, a fiftieth. In memory it becomes ten times that.
+_CHUNK_MAX_BYTES = 1 << 23
+_RATIO_MAX = 100
+_FREE_BYTES = 1 << 24
 
 _HEAD = struct.Struct("<BQ")
 _CHANNEL = struct.Struct("<H")
