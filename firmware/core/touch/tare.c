@@ -19,7 +19,8 @@
 #define STILL_SWEEPS 2          // to tare from; the first one may hold what came before it
 #define WATCH_SWEEPS 5          // after which what is read is where the signals came to rest
 
-#define DRIFT_ROUNDS_PER_COUNT 400 // 15 counts/min, the worst drift measured
+#define FAINT_Q16              (1 << 16) // what all electrodes have moved by, that may be drift
+#define DRIFT_ROUNDS_PER_COUNT 400       // 15 counts/min, the worst drift measured
 #define DRIFT_LIMIT            60000
 
 _Static_assert((uint64_t)DRIFT_LIMIT *DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
@@ -232,9 +233,9 @@ void bt_tare_temperature(bt_tare *tare, uint16_t tdc)
     bt_thermal_add(&tare->thermal, tdc, tare->sweep.round == BT_SWEEP_ROUNDS - 1);
 }
 
-static BT_NOINLINE void warm_electrode(bt_tare *tare, unsigned i)
+// By what moves the tare and the watched baseline alike.
+static BT_NOINLINE void shift_electrode(bt_tare *tare, unsigned i, int32_t step_q16)
 {
-    int32_t step_q16 = tare->thermal.step_q16;
     tare->base.electrode_q16[i] = bt_baseline_moved(tare->base.electrode_q16[i], step_q16);
     tare->watch.base.electrode_q16[i] = bt_baseline_moved(tare->watch.base.electrode_q16[i], step_q16);
     use_electrode(tare, i);
@@ -243,25 +244,24 @@ static BT_NOINLINE void warm_electrode(bt_tare *tare, unsigned i)
 // ---- the lanes whose turn it is -------------------------------------------------------------
 
 // Only in a sweep that began at rest: a tare that was just set stays as given for a round at least, and
-// of a touch nothing is followed. Where the host says that something is held, only what is drift.
-static bool tracks(const bt_tare *tare)
+// of a touch nothing is followed.
+static bool rests(const bt_tare *tare)
 {
-    bool free = !tare->held || tare->watch.drifts;
-    return tare->state == BT_TARE_STATE_REST && tare->hits == 0 && !tare->partial && free;
+    return tare->state == BT_TARE_STATE_REST && tare->hits == 0 && !tare->partial;
 }
 
-// Drift moves the tare as it moves the watched baseline.
-static void follow_drift(bt_tare *tare, unsigned i, int32_t step_q16)
+// Where the host says that something is held, only drift.
+static bool tracks(const bt_tare *tare)
 {
-    uint32_t watched_q16 = tare->watch.base.electrode_q16[i];
-    if (watched_q16 == BT_TARE_UNKNOWN) {
-        return;
+    return rests(tare) && !tare->held;
+}
+
+static void shift_all(bt_tare *tare, int32_t step_q16)
+{
+    for (unsigned i = 0; i < BT_ELECTRODES && step_q16 != 0; i++) {
+        shift_electrode(tare, i, step_q16);
+        tare->partial = true;
     }
-    uint32_t moved_q16 = bt_baseline_moved(watched_q16, step_q16);
-    tare->watch.base.electrode_q16[i] = moved_q16;
-    tare->sweep.settled_q3.lane[i] = (uint16_t)(moved_q16 >> 13); // or drift would look like motion
-    tare->base.electrode_q16[i] = bt_baseline_moved(tare->base.electrode_q16[i], step_q16);
-    use_electrode(tare, i);
 }
 
 // Back from a silence. All electrodes alike: what each has of its own is less than the noise of so few
@@ -269,11 +269,11 @@ static void follow_drift(bt_tare *tare, unsigned i, int32_t step_q16)
 static BT_NOINLINE void resume(bt_tare *tare)
 {
     bool touched = tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT;
-    int32_t step_q16 =
-        touched && tare->gate.pressure_now ? bt_watch_resume(&tare->watch, &tare->silence, SPAN_Q3) : 0;
-    for (unsigned i = 0; i < BT_ELECTRODES && step_q16 != 0; i++) {
-        follow_drift(tare, i, step_q16);
-        tare->partial = true;
+    bool known = bt_drift_known(&tare->drift);
+    shift_all(tare, bt_drift_unseen(&tare->drift, tare->silence.sweeps));
+    if (touched && tare->gate.pressure_now) {
+        int32_t step_q16 = bt_watch_resume(&tare->watch, &tare->silence, SPAN_Q3);
+        shift_all(tare, known ? 0 : step_q16);
     }
 }
 
@@ -282,15 +282,20 @@ static void serve_touched(bt_tare *tare, unsigned i, uint16_t mean_q3)
     int32_t away_q4 = 2 * mean_q3 - tare->electrode_q4[i];
     tare->energy_count2 += square(away_q4);
     tare->sum_q4 += away_q4;
-    if (tare->thermal.step_q16 != 0) {
-        warm_electrode(tare, i);
+    int32_t drift_q16 = tare->drift_q16;
+    bool watched = tare->watch.wait_sweeps == 0 && tare->sweep.still_sweeps >= WATCH_SWEEPS;
+    if (watched) {
+        uint32_t watched_q16 = tare->watch.base.electrode_q16[i];
+        bt_watch_side(&tare->watch, (uint32_t)mean_q3 << 13, watched_q16);
+        drift_q16 = bt_watch_step_q16(&tare->watch, drift_q16, (uint32_t)mean_q3 << 13, watched_q16);
     }
-    if (tare->watch.wait_sweeps == 0 && tare->sweep.still_sweeps >= WATCH_SWEEPS) {
-        uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
-        bt_watch_side(&tare->watch, mean_q16, tare->watch.base.electrode_q16[i]);
-        if (tare->watch.drifts) {
-            uint32_t base_q16 = tare->watch.base.electrode_q16[i];
-            follow_drift(tare, i, bt_watch_step_q16(&tare->watch, mean_q16, base_q16));
+    tare->drift.moved_q16 += drift_q16;
+    drift_q16 += tare->thermal.step_q16;
+    if (drift_q16 != 0) {
+        shift_electrode(tare, i, drift_q16);
+        if (watched
+            && tare->watch.base.electrode_q16[i] != BT_TARE_UNKNOWN) { // or drift would look like motion
+            tare->sweep.settled_q3.lane[i] = (uint16_t)(tare->watch.base.electrode_q16[i] >> 13);
         }
     }
 }
@@ -310,8 +315,17 @@ static void serve_electrode(bt_tare *tare, unsigned i)
     int32_t away_q3 = 8 * tare->gate.smooth.lane[i] - mean_q3;
     tare->deviation_q6 += (uint32_t)(away_q3 * away_q3);
     bt_watch_side(&tare->watch, (uint32_t)mean_q3 << 13, *base_q16);
+    uint32_t before_q16 = *base_q16;
     if (tracks(tare)) {
         *base_q16 = bt_baseline_follow(*base_q16, (uint32_t)mean_q3 << 13, SLEW_Q16);
+    }
+    if (rests(tare)) {
+        int32_t drift_q16 = tare->drift_q16;
+        if (tare->held) {
+            drift_q16 = bt_watch_step_q16(&tare->watch, drift_q16, (uint32_t)mean_q3 << 13, *base_q16);
+        }
+        *base_q16 = bt_baseline_moved(*base_q16, drift_q16);
+        tare->drift.moved_q16 += (int32_t)(*base_q16 - before_q16);
         use_electrode(tare, i);
     }
 }
@@ -357,6 +371,11 @@ static BT_NOINLINE void count_hit(bt_tare *tare)
         return;
     }
     bt_baseline before = *bt_rollback_before(&tare->rollback);
+    bt_drift_revert(&tare->drift);
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        int32_t since_q16 = bt_drift_over(&tare->drift, bt_rollback_sweeps(&tare->rollback));
+        before.electrode_q16[i] = bt_baseline_moved(before.electrode_q16[i], since_q16);
+    }
     adopt(tare, &before, BT_TARE_STATE_CONTACT, BT_TARE_REASON_ROLL_BACK);
 }
 
@@ -448,11 +467,13 @@ static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
 {
     bt_thermal_follow(&tare->thermal, settings->thermal_gain_q16);
     bool rests = tare->sweep.still_sweeps >= WATCH_SWEEPS;
-    tare->watch.drifts = tare->watch.drifts && rests && tare->watch.wait_sweeps == 0;
     if (tare->watch.wait_sweeps > 1) {
         tare->watch.wait_sweeps--;
     }
     bool due = tare->watch.wait_sweeps == 1 && rests;
+    if (bt_watch_crept(&tare->watch)) {
+        tare->drift.settled = 0;
+    }
     if (due || tare->sweep.still_sweeps == WATCH_SWEEPS) {
         bt_watch_return(&tare->watch, &tare->sweep, tare->gate.unknown, SPAN_Q3);
     }
@@ -461,9 +482,38 @@ static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
     }
 }
 
+// What of the sweep was drift, and what the next one follows by. While pressure is level; of a touch, or what
+// the host says is one, only once skin no longer creeps, and either what is faint or what has clearly gone
+// one way: shear makes no pressure, either. Until then it goes on as it was, or is followed as well as may be
+// if that is not known.
+static void judge_drift(bt_tare *tare, int32_t warming_q16)
+{
+    bt_watch *watch = &tare->watch;
+    bool rests = tare->state == BT_TARE_STATE_REST;
+    bool touched = tare->held || !rests;
+    bool valid = rests || (watch->wait_sweeps == 0 && tare->sweep.still_sweeps >= WATCH_SWEEPS);
+    bool level = valid && !tare->partial && bt_watch_level(watch);
+    bool creeps = touched && bt_watch_creeps(watch);
+    if (level && !creeps) {
+        bt_drift_learn(&tare->drift, touched ? 0 : warming_q16);
+    } else if (!bt_watch_level(watch)) {
+        bt_drift_revert(&tare->drift);
+    }
+    tare->drift.moved_q16 = 0;
+    watch->follows = level && touched && !(creeps && bt_drift_known(&tare->drift));
+    int32_t away_q16 = level && !creeps ? watch->shared_q16 : 0;
+    if (touched && (away_q16 > FAINT_Q16 || away_q16 < -FAINT_Q16)) {
+        away_q16 = 0;
+    }
+    tare->drift_q16 = level ? bt_drift_step_q16(&tare->drift, away_q16) : bt_drift_unseen(&tare->drift, 1);
+    tare->drift_q16 += watch->follows ? bt_watch_drifts_q16(watch) : 0;
+    tare->drift_q16 += touched ? 0 : warming_q16; // of a touch the thermal term tells
+}
+
 static BT_NOINLINE void end_sweep(bt_tare *tare, const bt_tare_settings *settings)
 {
     bt_watch_end(&tare->watch, tare->pressure_seen ? &tare->sweep.mean_q3.lane[BT_LANE_PDC] : NULL);
+    judge_drift(tare, bt_thermal_rate_q16(&tare->thermal, settings->thermal_gain_q16));
     if (tare->state == BT_TARE_STATE_INIT) {
         if (tare->sweep.still_sweeps >= STILL_SWEEPS && !tare->held) {
             // Measured before there is a threshold: a worn sensor's noise must not look like a touch.

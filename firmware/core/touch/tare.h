@@ -14,6 +14,7 @@
 
 #include "keep/settings.h"
 #include "touch/baseline.h"
+#include "touch/drift.h"
 #include "touch/gate.h"
 #include "touch/inverted.h"
 #include "touch/noise.h"
@@ -52,6 +53,8 @@ typedef struct {
     bt_tare_change last; // what the latest new tare changed
     bt_rollback rollback;
     bt_noise noise;
+    bt_drift drift;
+    int32_t drift_q16; // what it adds to each electrode in this sweep
     bt_thermal thermal;
     bt_release release;
 
