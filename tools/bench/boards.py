@@ -107,7 +107,7 @@ def build(board: Board, name: str, *sources: object) -> Path:
     link += ["--specs=rdimon.specs" if board.machine == M4F else "--specs=nosys.specs"]
     apart = []
     for source in APART:
-        apart.append(elf.with_suffix(f".{source.stem}.o"))
+        apart.append(elf.with_suffix(f".{source.parent.name}_{source.stem}.o"))
         command(*compiler, *OPTIONS[source.name], "-c", source, "-o", apart[-1])
     command(*compiler, "-O3", *link, "-T", board.script, *board.start, *sources, *CORE, *JUDGED, *apart,
             "-lm", "-o", elf)  # fmt: skip
