@@ -19,7 +19,7 @@ static int32_t mean_sweeps(const bt_drift *drift)
     return drift->sweeps > FIRST_SWEEPS ? drift->sweeps : FIRST_SWEEPS;
 }
 
-void bt_drift_learn(bt_drift *drift, int32_t warming_q16)
+void bt_drift_learn(bt_drift *drift)
 {
     if (drift->settled < SETTLE_SWEEPS) {
         drift->settled++;
@@ -28,7 +28,7 @@ void bt_drift_learn(bt_drift *drift, int32_t warming_q16)
     if (drift->sweeps < MEAN_SWEEPS) {
         drift->sweeps++;
     }
-    int32_t change_q20 = (drift->moved_q16 / BT_ELECTRODES - warming_q16) * 16 - drift->rate_q20;
+    int32_t change_q20 = drift->moved_q16 / BT_ELECTRODES * 16 - drift->rate_q20;
     int32_t rate_q20 = drift->rate_q20 + change_q20 / mean_sweeps(drift);
     drift->rate_q20 = bt_limited(rate_q20, -16 * RATE_Q16, 16 * RATE_Q16);
     if (++drift->since_commit >= COMMIT_SWEEPS) {
@@ -43,6 +43,16 @@ void bt_drift_revert(bt_drift *drift)
     drift->rate_q20 = drift->sure_q20;
     drift->waiting_q20 = drift->sure_q20;
     drift->since_commit = 0;
+}
+
+void bt_drift_cool(bt_drift *drift, int32_t warming_q16)
+{
+    int32_t rate_q16 = (int32_t)bt_shift_round(drift->rate_q20, 4);
+    int32_t least = rate_q16 < 0 ? rate_q16 : 0;
+    int32_t most = rate_q16 > 0 ? rate_q16 : 0;
+    drift->rate_q20 -= 16 * bt_limited(warming_q16, least, most);
+    drift->waiting_q20 = drift->rate_q20;
+    drift->sure_q20 = drift->rate_q20;
 }
 
 bool bt_drift_known(const bt_drift *drift)

@@ -20,9 +20,11 @@ typedef struct {
     uint8_t sweeps;       // it was learned in; saturates
 } bt_drift;
 
-// A sweep in which the electrodes have followed by moved_q16, and all of it was drift but what each got
-// warmer by.
-void bt_drift_learn(bt_drift *drift, int32_t warming_q16);
+// A sweep in which the electrodes have followed by moved_q16, and all of it was drift.
+void bt_drift_learn(bt_drift *drift);
+
+// From now on temperature is followed by itself, by so much in a sweep: that is no drift any more.
+void bt_drift_cool(bt_drift *drift, int32_t warming_q16);
 
 // A load is seen: what was learned of it is forgotten.
 void bt_drift_revert(bt_drift *drift);

@@ -14,6 +14,8 @@
 #include "touch/silence.h"
 #include "touch/sweep.h"
 
+#define BT_WATCH_SWEEPS 5 // of still signals, after which what is read is where they came to rest
+
 typedef struct {
     bt_baseline base;     // where the signals came to rest
     uint8_t wait_sweeps;  // until what is read now is that; 0 once it was
