@@ -14,6 +14,7 @@ import pytest
 
 from biotac import Finger, FrameFlags, TareReason, TareState
 from biotac.sim.timeline import Pose
+from biotac.wire import messages_gen as wire
 from stability.courses import Course, script
 
 NIGHTLY = bool(os.environ.get("BIOTAC_NIGHTLY"))
@@ -27,6 +28,7 @@ CASES = [
     for place in range(len(PLACES))
     for k in range(len(GRASPS) if NIGHTLY else 1)
 ]
+LIN = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.LIN)}  # which the emulated finger's physics follow
 MEAN_ROWS = 100  # a second: a worn sensor's noise is 0.03 N a round
 INVERTED_N, INVERTED_ROWS = 0.15, 10
 RELEASES = (TareReason.RELEASE, TareReason.RESIDUE, TareReason.SHIFT, TareReason.UNDONE, TareReason.INVERTED)
@@ -89,7 +91,7 @@ def test_a_hold_keeps_its_force(profile: str, place: int, squeeze_n: float, shar
         pytest.skip("with HOLD every fifth place by day; all of them with BIOTAC_NIGHTLY=1")
     # down to the noise: with HOLD nothing is too light
     case = grasp(profile, place, squeeze_n, 0.02 if held else share, HOLD_S)
-    finger = Finger()
+    finger = Finger(LIN)
     parts = []
     for first, end, say in (
         (0, 1000, None),

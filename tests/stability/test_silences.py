@@ -12,6 +12,7 @@ from stability.courses import Course, script
 LEAD_S, HELD_S = 3.0, 6.0
 SETTLED = 5  # rounds, 50 ms
 NEAR = 0.05
+LIN = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.LIN)}  # which the emulated finger's physics follow
 
 
 WORN_LEAD_S = 10.0  # until the drift of all its electrodes is known
@@ -33,7 +34,7 @@ def held(
     return begun.hold(0.5).load(later_n, 10).hold(12).make(), row
 
 
-def silent(course: Course, begin: int, end: int, silent_rounds: int, settings=None) -> np.ndarray:
+def silent(course: Course, begin: int, end: int, silent_rounds: int, settings=LIN) -> np.ndarray:
     """Rows from ``end`` on, after as many rounds without a word; device time says how long it was."""
     finger = Finger(settings)
     t_us = 10_000 * np.arange(len(course))
@@ -50,7 +51,7 @@ def greatest_error(rows: np.ndarray, undisturbed: np.ndarray) -> float:
 @pytest.mark.parametrize("seed", range(8))
 def test_a_hold_comes_back_with_its_force(seed: int) -> None:
     course, row = held(seed)
-    undisturbed = course.run()
+    undisturbed = course.run(LIN)
     for rounds in (8, 40, 100, 200, 500, 1000):
         back = silent(course, row, row + rounds, rounds)
         assert (back["flags"] & FrameFlags.CONTACT != 0).all()
