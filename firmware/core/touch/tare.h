@@ -48,19 +48,6 @@ void bt_tare_hold(bt_tare *tare);
 void bt_tare_release(bt_tare *tare);
 void bt_tare_lapse(bt_tare *tare);
 
-// Static pressure above the tare, in whole counts, where both are known.
-#ifndef BT_CDEF
-static inline bool bt_tare_pdc_known(const bt_tare *tare)
-{
-    return tare->gate.pressure_now && tare->base.pdc_q16 != BT_TARE_UNKNOWN;
-}
-
-static inline int32_t bt_tare_pdc_above(const bt_tare *tare)
-{
-    return tare->gate.smooth.lane[BT_LANE_PDC] - (int32_t)((tare->base.pdc_q16 + (1 << 15)) >> 16);
-}
-#endif
-
 // More electrodes of this round were missing or railed than results can do without.
 #ifndef BT_CDEF
 static inline bool bt_tare_faulty(const bt_tare *tare)
