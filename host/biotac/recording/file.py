@@ -81,7 +81,7 @@ class RecordingFile:
             self._put(layout.REST, apart.rest.pack(), stamps)
         self._sequence += 1
         self._last = stamps
-        if self._plots.add(batch, arrived_ns):
+        if self._plots.add(batch, self._decoder, arrived_ns, all_here_ns):
             self._writer.flush()  # type: ignore[no-untyped-call]
 
     def _put(self, topic: str, data: bytes, stamps: tuple[int, int]) -> None:
