@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .errors import NotAGatewayError as NotAGatewayError
     from .errors import PortError as PortError
     from .errors import RecordingError as RecordingError
+    from .errors import RecordingWarning as RecordingWarning
     from .errors import ScenarioError as ScenarioError
     from .errors import WireVersionError as WireVersionError
     from .hand import aio as aio
@@ -64,7 +65,7 @@ _HOMES = {
     ".core.compute": "MAPPED_RESULT_DTYPE RESULT_DTYPE compute per_frame",
     ".core.finger": "FINGER_DTYPE Finger",
     ".errors": "BiotacError CallbackError CommandRefusedError DeviceLostError FlashError InputError "
-    "NotAGatewayError PortError RecordingError ScenarioError WireVersionError",
+    "NotAGatewayError PortError RecordingError RecordingWarning ScenarioError WireVersionError",
     ".hand.aio": "aio",
     ".hand.compatibility": "HandWarning",
     ".hand.gap": "Gap",

@@ -56,6 +56,7 @@ def play(board, tmp_path: Path):
     return run
 
 
+@pytest.mark.long
 def test_heartbeats_stand_for_the_frames_that_are_not_sent_and_no_value_changes(play) -> None:
     eager, eager_stats, _ = play(EVERYTHING | QuantityFlags.REST_FRAMES)
     lazy, lazy_stats, status = play(EVERYTHING)

@@ -68,12 +68,12 @@ def test_where_a_sensor_was_silent_the_filters_begin_anew(folder) -> None:
 def test_what_the_host_said_of_a_hold_is_heard_again(folder, timeout_ms: int) -> None:
     for name in ("grasp.mcap", "grasp_again.mcap"):
         (folder / name).unlink(missing_ok=True)
-    with biotac.open("sim:press.toml") as hand:
+    with biotac.open("sim:press.toml?seconds=30") as hand:  # a board that runs ahead is not over before the release
         hand.set_setting(wire.Setting.HOLD_TIMEOUT_MS, timeout_ms)
         hand.record(folder / "grasp.mcap")
         hand.read(0.5)
         with hand.grasp("index"):
-            hand.read(1.5)  # a hand that is pulled says nothing meanwhile
+            hand.read(1.5, fresh=True)  # a hand that is pulled says nothing meanwhile
         hand.read_batch(100)
     was = biotac.Recording(folder / "grasp.mcap")
     reasons = [m.reason for m in tares(was)]
