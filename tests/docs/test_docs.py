@@ -122,6 +122,11 @@ seconds = 1.0
 """
 
 
+def test_the_controllers_page_has_every_flag() -> None:
+    table = (ROOT / "host/docs/controller.md").read_text(encoding="utf-8")
+    assert [flag.name for flag in biotac.FrameFlags if f"`{flag.name}`" not in table] == []
+
+
 def test_the_drawings_signs_are_what_a_board_measures(tmp_path: Path, monkeypatch) -> None:
     drawing = tool("make_frames_drawing", monkeypatch)
     checked = 0

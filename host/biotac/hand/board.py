@@ -155,7 +155,7 @@ class Board:
     def close(self) -> None:
         """Give the port back, once nobody reads it any more."""
         self.closing.set()
-        with self._reading:
+        with self._reading, self._writing:
             self.closed = True
             self.connected = False
             self.link.close()
@@ -311,8 +311,6 @@ class Board:
         self._write(replace(request, req_id=next(self._req_ids)))
 
     def _write(self, message: Any) -> None:
-        if self.closed:
-            self.is_closed()
         try:
             payload = message.pack()
         except struct.error as error:
@@ -321,6 +319,8 @@ class Board:
         if message.ID in compatibility.APPENDED:
             payload = compatibility.cut(message.ID, payload, self.info.wire_minor)
         with self._writing:
+            if self.closed:
+                self.is_closed()
             self.link.write(encode(message.ID, payload))
 
     def next_message(self, wanted: Callable[[Any], bool], deadline_s: float) -> Any:

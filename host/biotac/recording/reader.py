@@ -39,9 +39,10 @@ class Recording:
     board's, ``calibrations`` and ``maps`` (bytes, as the board holds them) those in force, by finger, when it began,
     ``names`` what fingers were called: ``recording["index"]`` is that finger's frames.
     ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its
-    index; ``damaged_chunks``: seconds that were left out; ``gaps``: times in which the board was away. ``blocks`` are
-    the wire's bytes as they came, about one a second, and ``arrived_ns`` when each began, by the host's clock (Unix),
-    ``all_here_ns`` when it was whole (None where nobody knows).
+    index; ``damaged_chunks``: seconds that were left out; ``wrong_checksums``: over the file's records and its index;
+    ``gaps``: times in which the board was away. ``blocks`` are the wire's bytes as they came, about one a second,
+    ``arrived_ns`` when each began, by the host's clock (Unix), ``all_here_ns`` when it was whole (None where nobody
+    knows).
     Raises RecordingError when nothing can be read. ``show`` is told the share of the work that is done.
     """
 
@@ -76,6 +77,7 @@ class Recording:
         self.problems: list[str] = blocks.scan.problems
         self.cut_off = blocks.scan.cut_off
         self.damaged_chunks = blocks.scan.damaged_chunks
+        self.wrong_checksums = blocks.scan.wrong_checksums
         for facts in blocks.gaps:
             self._take_gap(facts)
         if blocks.metadata is None:
@@ -205,11 +207,11 @@ class Recording:
         self.sensors = [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))]
         named = json.loads(metadata["settings"])
         own = json.loads(metadata.get("calibrations", "{}"))
-        # A setting or a calibration that this recording's firmware did not have yet: the default, and none.
+        # A setting or a calibration that this recording's firmware did not have yet: what it did, and none.
         self.calibrations = {int(finger): from_dict(its) for finger, its in own.items()}
         self.maps = _maps(metadata.get("maps", "{}"))
         self.names = layout.names_of(metadata)
-        self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting}
+        self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].before)) for s in wire.Setting}
 
     @property
     def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
