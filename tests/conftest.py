@@ -11,6 +11,7 @@ import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from deframer import Deframer
@@ -65,9 +66,13 @@ def time_passes(monkeypatch: pytest.MonkeyPatch) -> Callable[[], bytes]:
 
 
 class ScriptedBoard:
-    """The far end of a pty: hands every good frame to a function and writes what that returns."""
+    """The far end of a pty: hands every good frame to a function and writes what that returns.
 
-    def __init__(self, answer: Answer, greeting: bytes = b"") -> None:
+    ``frames`` splits bytes in place of a Deframer, for a board whose messages have other lengths.
+    """
+
+    def __init__(self, answer: Answer, greeting: bytes = b"", frames: Any = None) -> None:
+        self._frames = frames or Deframer()
         self._master: int | None
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
@@ -80,12 +85,11 @@ class ScriptedBoard:
         self._thread.start()
 
     def _run(self) -> None:
-        deframer = Deframer()
         while True:
             ready, _, _ = select.select([self._master, self._stop_read], [], [])
             if self._stop_read in ready:
                 return
-            for message_id, payload in deframer.feed(os.read(self._master, 4096)):
+            for message_id, payload in self._frames.feed(os.read(self._master, 4096)):
                 reply = self._answer(message_id, payload)
                 if reply:
                     os.write(self._master, reply)
@@ -130,8 +134,8 @@ def scripted_board() -> Iterator[Callable[..., ScriptedBoard]]:
     """Factory of scripted boards that are closed after the test."""
     boards: list[ScriptedBoard] = []
 
-    def make(answer: Answer, greeting: bytes = b"") -> ScriptedBoard:
-        boards.append(ScriptedBoard(answer, greeting))
+    def make(answer: Answer, greeting: bytes = b"", frames: Any = None) -> ScriptedBoard:
+        boards.append(ScriptedBoard(answer, greeting, frames))
         return boards[-1]
 
     yield make

@@ -55,8 +55,9 @@ static bool is_mirrored(void)
     return good && bt_normal_milli[right_of[first_of_line[3]]][1] == 0;
 }
 
-int bt_block_plan_init(bt_block_plan *plan, const lin2013_settings *settings)
+int bt_block_plan_init(bt_block_plan *plan, const lin2013_settings *settings, const double *population)
 {
+    plan->population = (const double (*)[3])population;
     plan->poc_weights = settings->poc_weights;
     for (int p = 0; p < BT_ONE_SIDE; p++) {
         plan->x_um[p] = bt_electrode_um[right_of[p]][0];
@@ -272,6 +273,21 @@ SPECIALISED void store(const columns *restrict c, double *restrict results, int 
     }
 }
 
+// Of a frame in a column of the block.
+SPECIALISED void by_population(const bt_block_plan *plan, const uint16_t *counts, const int32_t *tare_q4,
+                               double *results, int width)
+{
+    for (int k = 0; k < width; k++) {
+        uint16_t its_counts[BT_ELECTRODES];
+        int32_t its_tare_q4[BT_ELECTRODES];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            its_counts[i] = counts[i * width + k];
+            its_tare_q4[i] = tare_q4[i * width + k];
+        }
+        bt_population_replace(plan->population, its_counts, its_tare_q4, results + BT_RESULTS * k);
+    }
+}
+
 // false if a count is out of range.
 SPECIALISED bool block(const bt_block_plan *plan, const uint8_t *rows, int64_t stride, const int32_t *tare_q4,
                        double *results, int width)
@@ -297,6 +313,9 @@ SPECIALISED bool block(const bt_block_plan *plan, const uint8_t *rows, int64_t s
     sums(plan, &f, &c, width);
     finish(plan, &c, width);
     store(&c, results, width);
+    if (plan->population != NULL) {
+        by_population(plan, counts, tare_q4, results, width);
+    }
     return true;
 }
 

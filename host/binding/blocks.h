@@ -7,6 +7,7 @@
 #define BIOTAC_BLOCKS_H
 
 #include "lin2013.h"
+#include "population_float64.h"
 
 #define BT_MIRRORED       7  // pairs of electrodes left and right of the midline
 #define BT_ONE_SIDE       12 // the pairs, and the electrodes on the midline
@@ -16,6 +17,7 @@
 
 // The settings and the generated geometry, mirrored at the midline.
 typedef struct {
+    const double (*population)[3]; // [BT_POPULATION_COLUMNS]; NULL: force is Lin's
     int poc_weights;
     double x_um[BT_ONE_SIDE];
     double arm_y_nm[BT_ONE_SIDE];
@@ -29,8 +31,9 @@ typedef struct {
     double torque_scale[2]; // N*mm per 1/16 count * nm
 } bt_block_plan;
 
-// 0 if the generated geometry is not mirrored as this file believes; the plan is not to be used then.
-int bt_block_plan_init(bt_block_plan *plan, const lin2013_settings *settings);
+// population: coefficients that outlive the plan, or NULL. 0 if the generated geometry is not mirrored as
+// this file believes; the plan is not to be used then.
+int bt_block_plan_init(bt_block_plan *plan, const lin2013_settings *settings, const double *population);
 
 // counts: n rows of 19 uint16, counts_stride bytes apart, of any alignment; 0..4095 or
 // BT_INVALID_COUNT. tare: n rows of 19 doubles in counts, 0..4095, tare_stride bytes apart, or one row

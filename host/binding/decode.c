@@ -13,31 +13,37 @@ _Static_assert(BT_DECODE_ROOM >= BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1, "the 
 #define COBS_MAX_BYTES (BT_FRAME_MAX_BYTES + 1)
 
 // What an older peer's message lacks at its end, and stands there then.
-#define FRAME_1_3_BYTES  134
+#define FRAME_1_0_BYTES  126
 #define AROUND           (1 + BT_CRC_BYTES + 2) // id, CRC, COBS byte, delimiter
-#define STATUS_1_4_BYTES 53
-#define LACKS_MAX_BYTES  12
+#define STATUS_1_0_BYTES 33
+#define LACKS_MAX_BYTES  32
 static const struct {
     uint8_t id;
     uint8_t bytes;
     uint8_t fill[LACKS_MAX_BYTES];
 } lacks[] = {
-    // pdc_filtered_q4, pressure_force_100un and torsion_mnmm: none; wrench_age_ms: never repeated
+    // poc_sigma_um, force_sigma_100un, pdc_filtered_q4, pressure_force_100un and torsion_mnmm: none;
+    // wrench_age_ms:
+    // never repeated
+    {BT_FRAME_ID,
+     20,
+     {0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 0x80, 0, 0, 0, 0x80}},
     {BT_FRAME_ID, 12, {0xFF, 0xFF, 0, 0, 0, 0x80, 0, 0, 0, 0x80, 0, 0}},
     {BT_FRAME_ID, 2, {0}},
     {BT_HELLO_ID, 4, {0xFF, 0xFF, 0xFF, 0xFF}}, // image_crc32: unknown
-    {BT_STATUS_ID, 12, {0}},                    // sigma_shed, wrench_repeated, frames_shed: nothing was
+    {BT_STATUS_ID, 32, {0}},                    // frames_idle, what was skipped, what was shed: nothing was
+    {BT_STATUS_ID, 12, {0}},                    // sigma_shed, wrench_repeated, frames_shed
     {BT_CALIBRATION_ID, 4, {0}},                // pressure_gain_nn: not calibrated
 };
-_Static_assert(BT_FRAME_BYTES == FRAME_1_3_BYTES + 12 && BT_STATUS_BYTES == STATUS_1_4_BYTES + 12
+_Static_assert(BT_FRAME_BYTES == FRAME_1_0_BYTES + 20 && BT_STATUS_BYTES == STATUS_1_0_BYTES + 32
                    && BT_CALIBRATION_BYTES == 51 + 4 && BT_HELLO_BYTES == 35 + 4,
                "who appends more says so above");
-// A FRAME or a STATUS filled up is a little longer than what came.
+// A FRAME or a STATUS filled up is longer than what came.
 _Static_assert((int64_t)(BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1) * BT_FRAME_BYTES
-                   <= (int64_t)BT_DECODE_ROOM * (FRAME_1_3_BYTES + AROUND),
+                   <= (int64_t)BT_DECODE_ROOM * (FRAME_1_0_BYTES + AROUND),
                "rows filled up must fit");
 _Static_assert((int64_t)(BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1) * (2 + BT_STATUS_BYTES)
-                   <= (int64_t)BT_DECODE_ROOM * (STATUS_1_4_BYTES + AROUND),
+                   <= (int64_t)BT_DECODE_ROOM * (STATUS_1_0_BYTES + AROUND),
                "and these with id and length");
 _Static_assert(2 + BT_CALIBRATION_BYTES <= 51 + AROUND && 2 + BT_HELLO_BYTES <= 35 + AROUND,
                "and nothing else may be longer than what came");

@@ -4,9 +4,9 @@
 // It rests on what framing.h asserts: a frame fits one COBS block. So COBS has put one byte in front and only
 // replaced zeros, and undoing it is one copy and a walk from zero to zero.
 //
-// One thing more than a board's own: a FRAME or a CALIBRATION of wire 1.3 ends before what 1.4 has appended,
-// and is filled up with the mark for invalid or the default. So a board that was not updated, and every
-// recording that was made with one, is still read.
+// One thing more than a board's own: a message of an older minor ends before what was appended since, and is
+// filled up with the mark for invalid or the default. So a board that was not updated, and every recording
+// that was made with one, is still read.
 #ifndef BIOTAC_DECODE_H
 #define BIOTAC_DECODE_H
 
@@ -14,8 +14,8 @@
 #include "wire/framing.h"
 
 #define BT_DECODE_BYTES    65536 // what one call takes
-// The call's bytes and the rest of the call before; an eighth more where messages are filled up.
-#define BT_DECODE_ROOM     (BT_DECODE_BYTES + BT_DECODE_BYTES / 8 + 512)
+// The call's bytes and the rest of the call before; three quarters more where messages are filled up.
+#define BT_DECODE_ROOM     (BT_DECODE_BYTES + BT_DECODE_BYTES / 4 * 3 + 512)
 #define BT_DECODE_OUTCOMES 6 // enum bt_deframed
 #define BT_UNKNOWN_ID      (-1)
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .errors import NotAGatewayError as NotAGatewayError
     from .errors import PortError as PortError
     from .errors import RecordingError as RecordingError
+    from .errors import RecordingWarning as RecordingWarning
     from .errors import ScenarioError as ScenarioError
     from .errors import WireVersionError as WireVersionError
     from .hand import aio as aio
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from .wire.frames import PAC_DTYPE as PAC_DTYPE
     from .wire.frames import Frame as Frame
     from .wire.messages_gen import CalibrationState as CalibrationState
+    from .wire.messages_gen import ForceModel as ForceModel
     from .wire.messages_gen import FrameFlags as FrameFlags
     from .wire.messages_gen import PocWeights as PocWeights
     from .wire.messages_gen import QuantityFlags as QuantityFlags
@@ -63,7 +65,7 @@ _HOMES = {
     ".core.compute": "MAPPED_RESULT_DTYPE RESULT_DTYPE compute per_frame",
     ".core.finger": "FINGER_DTYPE Finger",
     ".errors": "BiotacError CallbackError CommandRefusedError DeviceLostError FlashError InputError "
-    "NotAGatewayError PortError RecordingError ScenarioError WireVersionError",
+    "NotAGatewayError PortError RecordingError RecordingWarning ScenarioError WireVersionError",
     ".hand.aio": "aio",
     ".hand.compatibility": "HandWarning",
     ".hand.gap": "Gap",
@@ -75,8 +77,8 @@ _HOMES = {
     ".version": "__version__",
     ".wire.batches": "Batch LinkStats",
     ".wire.frames": "FRAME_DTYPE IDLE_DTYPE PAC_DTYPE Frame",
-    ".wire.messages_gen": "CalibrationState FrameFlags PocWeights QuantityFlags Setting Status Tare TareReason "
-    "TareState Touch",
+    ".wire.messages_gen": "CalibrationState ForceModel FrameFlags PocWeights QuantityFlags Setting Status Tare "
+    "TareReason TareState Touch",
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
 

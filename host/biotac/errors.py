@@ -32,6 +32,10 @@ class RecordingError(InputError):
     """A recording cannot be read."""
 
 
+class RecordingWarning(UserWarning):
+    """Something of a recording is missing or damaged, and the rest was read."""
+
+
 class PortError(BiotacError):
     """The port does not exist, is busy or may not be opened."""
 

@@ -49,7 +49,7 @@ def test_what_a_board_sends_is_never_called_wrong(gain_nn: int, weights: int) ->
     ("field", "axis", "words"), [("torque_mnmm", 1, "torque y off"), ("force_100un", 2, "force z off")]
 )
 def test_a_wrong_digit_is_named_with_its_axis_and_its_own_bound(field: str, axis: int, words: str) -> None:
-    settings = default_settings()
+    settings = default_settings() | {Setting.FORCE_MODEL: wire.ForceModel.LIN}  # frames() gives no flag of another
     sent = frames(50, settings)
     sent[field][17, axis] += 40
     outcome = CrossCheck()

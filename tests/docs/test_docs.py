@@ -6,6 +6,7 @@ tools/docs builds them with warnings as errors and checks their links; tools/tes
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 import shlex
 import subprocess
@@ -21,6 +22,7 @@ from biotac.cli.main import parser
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "host/docs").glob("*.md"))
+NOTEBOOK = ROOT / "host/docs/examples/press.ipynb"
 BLOCKS = [
     pytest.param(page.name, code, id=f"{page.stem}-{k}")
     for page in PAGES
@@ -51,6 +53,24 @@ def test_a_pages_python_runs(page: str, code: str, tmp_path: Path, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     exec(compile(code, page, "exec"), {"__name__": "__main__"})
     assert "print(" not in code or capsys.readouterr().out
+
+
+def test_the_notebook_runs_and_is_the_one_on_the_page(tmp_path: Path, monkeypatch) -> None:
+    """Ten lines from open to a plotted DataFrame, run as Jupyter would: cell after cell in one place."""
+    plt = pytest.importorskip("matplotlib.pyplot", reason="pip install 'biotac-gateway[plot,pandas]'")
+    monkeypatch.chdir(tmp_path)
+    plt.switch_backend("agg")
+    cells = ["".join(cell["source"]) for cell in json.loads(NOTEBOOK.read_text())["cells"]]
+    assert len([line for cell in cells for line in cell.splitlines() if line]) <= 10
+    assert "\n\n".join(cells) in (ROOT / "host/docs/quickstart.md").read_text()
+    place: dict[str, object] = {}
+    for cell in cells[:-1]:
+        exec(compile(cell, NOTEBOOK.name, "exec"), place)
+    axes = eval(compile(cells[-1], NOTEBOOK.name, "eval"), place)
+    frames = biotac.load("press.mcap")
+    for line, force_n in zip(axes.lines, frames["force_n"].T, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), force_n)
+    plt.close("all")
 
 
 def test_there_is_python_to_run_and_commands_to_parse() -> None:
@@ -100,6 +120,11 @@ force_n = 5.0
 do = "hold"
 seconds = 1.0
 """
+
+
+def test_the_controllers_page_has_every_flag() -> None:
+    table = (ROOT / "host/docs/controller.md").read_text(encoding="utf-8")
+    assert [flag.name for flag in biotac.FrameFlags if f"`{flag.name}`" not in table] == []
 
 
 def test_the_drawings_signs_are_what_a_board_measures(tmp_path: Path, monkeypatch) -> None:

@@ -183,6 +183,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
+@pytest.mark.filterwarnings("ignore::biotac.RecordingWarning")
 @pytest.mark.parametrize("read", [biotac.load, biotac.Recording, lambda path: read_mcap(path, LIN)])
 def test_a_damaged_recording_is_refused_in_a_line_or_read(
     tmp_path: Path, recorded: bytes, read: Callable[[Path], Any]
@@ -203,3 +204,27 @@ def test_toml_made_to_hurt_is_refused_in_little_memory(tmp_path: Path, line: str
     assert refused_or_read(load_source, path)
     assert refused_or_read(lambda its: read_mounting(str(its)), path)
     assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MORE_BYTES
+
+
+REST = 'name = "x"\n[[step]]\ndo = "rest"\nseconds = {}\n'
+FAULT = '[[fault]]\nat_s = 0\nseconds = {}\nfinger = 0\nkind = "stuck_low"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "most_s"),
+    [
+        (REST.format(3600) + FAULT.format(3600) * 2000, 10.0),
+        (REST.format(20) + FAULT.format(0.01) * 3_000, 10.0),
+        pytest.param("\n".join(f"k{k}" + ".b" * 30 + " = 1" for k in range(14_000)), 10.0, marks=pytest.mark.nightly),
+    ],
+)
+def test_a_scenario_made_to_take_long_does_not(tmp_path: Path, text: str, most_s: float) -> None:
+    """By the processor's time, not the wall's."""
+    path = tmp_path / "long.toml"
+    path.write_text(text)
+    assert len(text) < 1 << 20
+    before = resource.getrusage(resource.RUSAGE_SELF)
+    refused_or_read(load_source, path)
+    after = resource.getrusage(resource.RUSAGE_SELF)
+    assert after.ru_utime - before.ru_utime < most_s
+    assert (after.ru_maxrss - before.ru_maxrss) * 1024 < MORE_BYTES

@@ -67,11 +67,15 @@ static void put(int kind, const void *bytes, size_t count)
     want.filled[kind] += (uint32_t)count;
 }
 
-// What boards of wire 1.3 and 1.4 sent less than ours at a message's end, and what has to stand there
+// What boards of wire 1.0 to 1.4 sent less than ours at a message's end, and what has to stand there
 // instead. NULL: no board ever sent this length.
 static const char *fill_of_older(uint8_t id, size_t bytes)
 {
-    return id == BT_FRAME_ID && bytes == 134        ? "\xFF\xFF\0\0\0\x80\0\0\0\x80\0\0"
+    static const char nothing[32];
+    return id == BT_FRAME_ID && bytes == 126
+               ? "\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\0\0\0\x80\0\0\0\x80\0\0"
+           : id == BT_STATUS_ID && bytes == 33      ? nothing
+           : id == BT_FRAME_ID && bytes == 134      ? "\xFF\xFF\0\0\0\x80\0\0\0\x80\0\0"
            : id == BT_FRAME_ID && bytes == 144      ? "\0\0"
            : id == BT_HELLO_ID && bytes == 35       ? "\xFF\xFF\xFF\xFF"
            : id == BT_STATUS_ID && bytes == 53      ? "\0\0\0\0\0\0\0\0\0\0\0\0"

@@ -66,7 +66,7 @@ def of(frames: np.ndarray, finger: int) -> np.ndarray:
         pytest.param("bad_parity", "words_parity", marks=pytest.mark.long),
         ("stuck_low", "words_stuck"),
         pytest.param("stuck_high", "words_stuck", marks=pytest.mark.long),
-        ("error_word", "words_error"),
+        pytest.param("error_word", "words_error", marks=pytest.mark.long),
         pytest.param("no_channel", "words_error", marks=pytest.mark.long),
     ],
 )
@@ -123,6 +123,7 @@ def test_absent_sensors_send_nothing_and_read_as_stuck(play) -> None:
     assert status[3].words_stuck > 0
 
 
+@pytest.mark.long
 def test_every_slot_of_every_finger_was_read(play) -> None:
     _, status = play(HEALTHY)
     for finger in range(3):

@@ -115,6 +115,7 @@ def test_a_board_comes_back_with_its_settings(bench: Bench) -> None:
     assert after["flash"]["erases"] - before["flash"]["erases"] == -(-blocks * PAGE // SECTOR)
 
 
+@pytest.mark.long
 def test_saved_maps_outlive_another_image(bench: Bench, next_release: Image) -> None:
     blob = make_map(1, blocks=BIG)
     with bench.target.open() as hand:
@@ -221,6 +222,7 @@ def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path:
         assert hand.setting(Setting.IDLE_PERIOD_MS) == 250
 
 
+@pytest.mark.long
 def test_a_power_cut_before_the_first_byte_leaves_the_old_firmware(bench: Bench, next_release: Image) -> None:
     bench.target.board.do("cut power after 0 flash bytes")
     with pytest.raises(FlashError, match="the settings are in"):

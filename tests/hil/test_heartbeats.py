@@ -48,6 +48,7 @@ def play(board, tmp_path: Path):
         path = tmp_path / "case.toml"
         path.write_text(TOUCHED_TWICE)
         hand = board(str(path))
+        hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)  # whose sigma is of the noise
         hand.subscribe(quantities)
         batch = hand.read_batch(100)
         return batch, hand.stats, hand.status()
@@ -55,6 +56,7 @@ def play(board, tmp_path: Path):
     return run
 
 
+@pytest.mark.long
 def test_heartbeats_stand_for_the_frames_that_are_not_sent_and_no_value_changes(play) -> None:
     eager, eager_stats, _ = play(EVERYTHING | QuantityFlags.REST_FRAMES)
     lazy, lazy_stats, status = play(EVERYTHING)

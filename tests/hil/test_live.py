@@ -9,7 +9,11 @@ from biotac.wire import messages_gen as wire
 
 
 @pytest.mark.parametrize(
-    ("ability", "verbs", "reason"), [("cable", ["unplug", "plug"], "silence"), ("power", ["cut power"], "rebooted")]
+    ("ability", "verbs", "reason"),
+    [
+        pytest.param("cable", ["unplug", "plug"], "silence", marks=pytest.mark.long),
+        ("power", ["cut power"], "rebooted"),
+    ],
 )
 def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason: str) -> None:
     rig.need(ability)
@@ -40,6 +44,7 @@ def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason
         assert hand.stats.gaps == 1
 
 
+@pytest.mark.long
 def test_forces_by_name_follow_the_board(board) -> None:
     hand = board("press.toml?fingers=2&seconds=4")
     touches: list[int] = []

@@ -111,6 +111,7 @@ def test_an_upload_that_is_broken_off_leaves_the_old_map_and_nothing_in_the_way(
     assert hand.get_map(0) == new
 
 
+@pytest.mark.long
 def test_a_stream_runs_on_after_an_upload(board: Callable[[str], biotac.Hand]) -> None:
     hand = board("press.toml?fingers=2")
     hand.stop()
@@ -120,6 +121,7 @@ def test_a_stream_runs_on_after_an_upload(board: Callable[[str], biotac.Hand]) -
     assert hand.stats.frames_lost == 0
 
 
+@pytest.mark.long
 def test_a_recording_holds_the_maps_in_force(board: Callable[[str], biotac.Hand], tmp_path: Path) -> None:
     hand = board("press.toml?fingers=2&seconds=2")
     blob = make_map(1, serial=serial_of(hand, 1), blocks=BIG)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from maps import BIG, make_map
 from rig import Rig
 
@@ -13,6 +14,7 @@ FINGERS = 5
 SECONDS = 2
 
 
+@pytest.mark.long
 def test_five_fingers_with_the_largest_map_lose_nothing(rig: Rig) -> None:
     rig.need("counters")
     hand = rig.open(f"press.toml?fingers={FINGERS}&seconds={SECONDS}&pace=fast")

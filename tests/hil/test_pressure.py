@@ -31,6 +31,7 @@ def test_a_finger_without_a_gain_tells_pressure_and_no_force(board: Callable[[st
     assert not (frames["flags"] & biotac.FrameFlags.NOT_ASKED).any()
 
 
+@pytest.mark.long
 def test_the_force_is_the_gain_times_pressure_above_rest_and_right_in_every_frame(
     board: Callable[[str], biotac.Hand], tmp_path: Path
 ) -> None:

@@ -13,7 +13,12 @@ from biotac.wire.framing import FramingCounts
 
 CRC_BYTES = 4
 # What an older peer's message lacks at its end, and is filled up with (host/binding/decode.h).
-LACKS = {wire.Frame.ID: b"\xff\xff\0\0\0\x80", wire.Calibration.ID: bytes(4)}
+LACKS = {
+    wire.Frame.ID: (b"\xff" * 10 + b"\0\0\0\x80\0\0\0\x80\0\0", b"\xff\xff\0\0\0\x80\0\0\0\x80\0\0", bytes(2)),
+    wire.Hello.ID: (b"\xff" * 4,),
+    wire.Status.ID: (bytes(32), bytes(12)),
+    wire.Calibration.ID: (bytes(4),),
+}
 ENCODED_MAX_BYTES = wire.MAX_FRAME_BYTES + 1  # COBS adds exactly one byte to frames this short
 
 
@@ -70,9 +75,10 @@ class Deframer:
         message_id, payload = covered[0], covered[1:]
         known = wire.MESSAGES.get(message_id)
         if known is not None and len(payload) != known.STRUCT.size:
-            lacks = LACKS.get(message_id, b"")
-            if lacks and len(payload) + len(lacks) == known.STRUCT.size:
-                payload += lacks
+            missing = known.STRUCT.size - len(payload)
+            fills = [fill for fill in LACKS.get(message_id, ()) if len(fill) == missing]
+            if fills:
+                payload += fills[0]
             elif not (self.allow_longer and len(payload) > known.STRUCT.size):
                 self.counts.bad_length += 1
                 return None

@@ -14,9 +14,10 @@ static uint16_t rest_count[BT_SLOTS], press_count[BT_SLOTS];
 static uint16_t rest_lane[LANES], press_lane[LANES];
 static bt_tare_settings tare_settings;
 static bt_gate gate;
-static bt_finger rest_front, press_front, rest_whole, press_whole, press_force, press_poc, press_sigma;
+static bt_finger rest_front, press_front, rest_whole, press_whole, press_force, press_poc, press_sigma,
+    press_lin;
 static bt_finger rest_five[BT_MAX_FINGERS], press_five[BT_MAX_FINGERS], rest_words, press_sent;
-static bench_map pooled, pooled_6, pooled_7, affine;
+static bench_map pooled, pooled_6, pooled_7, affine, sign_split, gated, conductance, scaled_population;
 static bt_msg_frame message;
 static uint8_t payload[BT_FRAME_BYTES], encoded[BT_ENCODED_MAX_BYTES];
 
@@ -86,6 +87,13 @@ static void whole_in_contact(const bt_solve_settings *settings)
     pressed(&press_whole, settings, BT_WANT_ALL);
 }
 
+static void whole_by_lin(const bt_solve_settings *settings)
+{
+    bt_solve_settings lins = *settings;
+    lins.population = false;
+    pressed(&press_lin, &lins, BT_WANT_ALL);
+}
+
 static void force_only(const bt_solve_settings *settings)
 {
     pressed(&press_force, settings, BT_WANT_FORCE);
@@ -145,6 +153,30 @@ static void map_affine(const bt_solve_settings *settings)
     mapped(&affine.map);
 }
 
+static void map_sign_split(const bt_solve_settings *settings)
+{
+    (void)settings;
+    mapped(&sign_split.map);
+}
+
+static void map_gated(const bt_solve_settings *settings)
+{
+    (void)settings;
+    mapped(&gated.map);
+}
+
+static void map_conductance(const bt_solve_settings *settings)
+{
+    (void)settings;
+    mapped(&conductance.map);
+}
+
+static void map_scaled_population(const bt_solve_settings *settings)
+{
+    (void)settings;
+    mapped(&scaled_population.map);
+}
+
 static void map_pooled(const bt_solve_settings *settings)
 {
     (void)settings;
@@ -189,12 +221,17 @@ const bench_scene bench_scenes[BENCH_SCENES] = {
     {"front end", "in contact", front_in_contact},
     {"whole frame", "at rest", whole_at_rest},
     {"whole frame", "in contact", whole_in_contact},
+    {"whole frame", "in contact, Lin's scales", whole_by_lin},
     {"whole frame", "in contact, force only", force_only},
     {"whole frame", "in contact, PoC only", poc_only},
     {"whole frame", "in contact, with sigma", with_sigma},
     {"five fingers", "at rest", five_at_rest},
     {"five fingers", "in contact", five_in_contact},
     {"wrench map", "signals and offset, 3 axes", map_affine},
+    {"wrench map", "sign-split, 3 axes", map_sign_split},
+    {"wrench map", "gated sign-split, 3 axes", map_gated},
+    {"wrench map", "quadratic in conductance, 3 axes", map_conductance},
+    {"wrench map", "population and a scale, 3 axes", map_scaled_population},
     {"wrench map", "pooled, 3 axes", map_pooled},
     {"wrench map", "pooled, 6 axes", map_pooled_6},
     {"wrench map", "pooled, 7 axes", map_pooled_7},
@@ -215,7 +252,14 @@ static void run(bt_finger *finger, const uint16_t count[BT_SLOTS], int rounds)
 void bench_scenes_init(void)
 {
     bt_settings all;
-    (void)(BENCH_MAP_MAKE(&affine, bench_map_affine, 3) && BENCH_MAP_MAKE(&pooled, bench_map_pooled, 3)
+    (void)(BENCH_MAP_MAKE(&affine, bench_map_affine, 3)
+           && BENCH_MAP_MAKE(&pooled, bench_map_pooled, 3)
+           // Parts of it: models of `biotac calibrate wrench`, less a few cycles for the offset, and the
+           // population map as a finger's own.
+           && bench_map_make(&sign_split, bench_map_pooled + 4, 2, 3)
+           && bench_map_make(&gated, bench_map_pooled + 4, 6, 3)
+           && bench_map_make(&conductance, bench_map_pooled + 2, 2, 3)
+           && bench_map_make(&scaled_population, bench_map_pooled + 2, 8, 3)
            && BENCH_MAP_MAKE(&pooled_6, bench_map_pooled, 6)
            && BENCH_MAP_MAKE(&pooled_7, bench_map_pooled, 7));
     bt_settings_reset(&all);
@@ -234,7 +278,7 @@ void bench_scenes_init(void)
     rest_whole = rest_words = press_front = rest_front;
     run(&press_front, press_count, 50);
     press_front.tare.noise.count2 = 400; // exact counts have none
-    press_whole = press_force = press_poc = press_sigma = press_sent = press_front;
+    press_whole = press_lin = press_force = press_poc = press_sigma = press_sent = press_front;
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         rest_five[f] = rest_front;
         press_five[f] = press_front;

@@ -120,6 +120,12 @@ def per_finger(link: dict[str, Any]) -> list[str]:
     return [name for _, name in sorted(named)]
 
 
+def before(setting: dict[str, Any]) -> int:
+    """What firmware without the setting does, in the setting's value."""
+    value: int = setting.get("before", setting["default"])
+    return value
+
+
 def check_link(link: dict[str, Any], messages: tuple[Message, ...]) -> None:
     ids = [message.id for message in messages]
     if len(set(ids)) != len(ids):
@@ -130,8 +136,8 @@ def check_link(link: dict[str, Any], messages: tuple[Message, ...]) -> None:
         raise ValueError("link.toml: a setting id occurs twice")
     for name, setting in link["setting"].items():
         low, high = setting["range"]
-        if not low <= setting["default"] <= high:
-            raise ValueError(f"link.toml: default of {name} is outside its range")
+        if not (low <= setting["default"] <= high and low <= before(setting) <= high):
+            raise ValueError(f"link.toml: default of {name}, or what was before it, is outside its range")
     for message in messages:
         for field in message.fields:
             values = len(per_finger(link))

@@ -3,10 +3,29 @@
 #include "talk/commands.h"
 #include "talk/status.h"
 
+#include <string.h>
+
+// A host of wire 1.3 ends SET_CALIBRATION before pressure_gain_nn: 0, not calibrated, as it would have said.
+#define SET_CALIBRATION_1_3_BYTES 50
+_Static_assert(BT_SET_CALIBRATION_BYTES == SET_CALIBRATION_1_3_BYTES + 4,
+               "who appends more fills it up, too");
+
+static bool filled_up(bt_deframer *deframer)
+{
+    if (deframer->id != BT_SET_CALIBRATION_ID || deframer->payload_bytes != SET_CALIBRATION_1_3_BYTES) {
+        return false;
+    }
+    memset(deframer->buffer + 1 + SET_CALIBRATION_1_3_BYTES, 0, 4); // over its CRC
+    return true;
+}
+
 void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, uint32_t now_us)
 {
     for (size_t k = 0; k < bytes; k++) {
         enum bt_deframed outcome = bt_deframer_push(&session->deframer, data[k]);
+        if (outcome == BT_DEFRAMED_BAD_LENGTH && filled_up(&session->deframer)) {
+            outcome = BT_DEFRAMED_GOOD;
+        }
         if (outcome == BT_DEFRAMED_GOOD) {
             session->rx_frames++;
             bool empty = session->deframer.payload_bytes == 0; // of an unknown id; no req_id in it

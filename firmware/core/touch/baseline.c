@@ -41,8 +41,18 @@ void bt_rollback_meet(bt_rollback *rollback, unsigned lane, uint32_t first_q16)
     }
 }
 
+static int back_by(const bt_rollback *rollback)
+{
+    return rollback->count > ROLL_BACK ? ROLL_BACK : rollback->count - 1;
+}
+
+uint32_t bt_rollback_sweeps(const bt_rollback *rollback)
+{
+    return (uint32_t)(SNAPSHOT_SWEEPS * (back_by(rollback) + 1) - rollback->countdown);
+}
+
 const bt_baseline *bt_rollback_before(const bt_rollback *rollback)
 {
-    int back = rollback->count > ROLL_BACK ? ROLL_BACK : rollback->count - 1;
+    int back = back_by(rollback);
     return &rollback->snapshot[(rollback->head + BT_SNAPSHOTS - back) % BT_SNAPSHOTS];
 }

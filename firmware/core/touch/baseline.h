@@ -34,6 +34,9 @@ void bt_rollback_meet(bt_rollback *rollback, unsigned lane, uint32_t first_q16);
 // The baseline of at least a second ago, or the oldest there is.
 const bt_baseline *bt_rollback_before(const bt_rollback *rollback);
 
+// How many sweeps ago that was.
+uint32_t bt_rollback_sweeps(const bt_rollback *rollback);
+
 #ifndef BT_CDEF
 // A value that moves to its target by step_q16 at most.
 static inline uint32_t bt_baseline_follow(uint32_t base_q16, uint32_t target_q16, int32_t step_q16)

@@ -14,6 +14,7 @@
 
 #include "keep/settings.h"
 #include "touch/baseline.h"
+#include "touch/drift.h"
 #include "touch/gate.h"
 #include "touch/inverted.h"
 #include "touch/noise.h"
@@ -52,6 +53,8 @@ typedef struct {
     bt_tare_change last; // what the latest new tare changed
     bt_rollback rollback;
     bt_noise noise;
+    bt_drift drift;
+    int32_t drift_q16; // what it adds to each electrode in this sweep
     bt_thermal thermal;
     bt_release release;
 
@@ -96,6 +99,19 @@ uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base);
 void bt_tare_hold(bt_tare *tare);
 void bt_tare_release(bt_tare *tare);
 void bt_tare_lapse(bt_tare *tare);
+
+// Static pressure above the tare, in whole counts, where both are known.
+#ifndef BT_CDEF
+static inline bool bt_tare_pdc_known(const bt_tare *tare)
+{
+    return tare->gate.pressure_now && tare->base.pdc_q16 != BT_TARE_UNKNOWN;
+}
+
+static inline int32_t bt_tare_pdc_above(const bt_tare *tare)
+{
+    return tare->gate.smooth.lane[BT_LANE_PDC] - (int32_t)((tare->base.pdc_q16 + (1 << 15)) >> 16);
+}
+#endif
 
 // More electrodes of this round were missing or railed than results can do without.
 #ifndef BT_CDEF

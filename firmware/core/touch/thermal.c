@@ -3,7 +3,8 @@
 #include "fixed_point.h"
 #include "touch/round.h"
 
-#define TDC_SHIFT   3           // a low-pass of eight sweeps: TDC has steps of half an electrode count
+#define TDC_SHIFT   3 // a low-pass of eight sweeps: TDC has steps of half an electrode count
+#define SLOW_SHIFT  7
 #define APPLIED_MAX (500 << 16) // 15 degrees; more is a broken thermometer
 
 _Static_assert((int64_t)BT_SETTING_THERMAL_GAIN_MILLI_MAX * 65536 / 1000 <= INT32_MAX,
@@ -23,9 +24,19 @@ void bt_thermal_add(bt_thermal *thermal, uint16_t tdc, bool end_of_sweep)
     if (thermal->tdc_q8 == 0) {
         thermal->tdc_q8 = tdc_q8;
         thermal->tdc_then_q8 = tdc_q8;
+        thermal->slow_q14 = (int32_t)(tdc_q8 << 6);
     } else if (end_of_sweep) {
         thermal->tdc_q8 += (uint32_t)bt_shift_down((int32_t)(tdc_q8 - thermal->tdc_q8), TDC_SHIFT);
+        int32_t ahead_q14 = (int32_t)(thermal->tdc_q8 << 6) - thermal->slow_q14;
+        thermal->slow_q14 += bt_shift_down(ahead_q14, SLOW_SHIFT);
     }
+}
+
+// On a ramp the slow low-pass is 128 sweeps behind the other.
+int32_t bt_thermal_rate_q16(const bt_thermal *thermal, int32_t gain_q16)
+{
+    int32_t ahead_q14 = (int32_t)(thermal->tdc_q8 << 6) - thermal->slow_q14;
+    return (int32_t)((int64_t)ahead_q14 * gain_q16 / (1 << (14 + SLOW_SHIFT)));
 }
 
 void bt_thermal_begin(bt_thermal *thermal)

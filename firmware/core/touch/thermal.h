@@ -15,6 +15,7 @@
 
 typedef struct {
     uint32_t tdc_q8;      // low-passed over eight sweeps; 0 until read
+    int32_t slow_q14;     // the same over 128 more
     uint32_t tdc_then_q8; // when the contact began
     int32_t applied_q16;  // in the tare, or being added to it
     int32_t step_q16;     // what each electrode gets in this sweep
@@ -25,6 +26,9 @@ int32_t bt_thermal_gain_q16(int32_t gain_milli);
 
 // A round's TDC word, or none; taken in at the end of a sweep.
 void bt_thermal_add(bt_thermal *thermal, uint16_t tdc, bool end_of_sweep);
+
+// What temperature, by its pace of the last seconds, adds to every electrode in a sweep.
+int32_t bt_thermal_rate_q16(const bt_thermal *thermal, int32_t gain_q16);
 
 // A tare was adopted: it holds for the temperature of now.
 void bt_thermal_begin(bt_thermal *thermal);

@@ -9,20 +9,37 @@
 #define WAIT_SWEEPS  5  // until means say nothing of before
 #define ONE_WAY_Q2   26 // thirteen electrodes one way for six the other: three sigmas of noise
 #define CREEP_Q3                                                                                             \
-    (5 * LEVEL_Q3)           // of a silence, however long: what skin creeps by at the pace of level in 13 s
-#define SLEW_Q16   (8 * 328) // a sweep; 0.5 count/s, as at rest
-#define MISSED_Q16 (SLEW_Q16 / 2)         // 15 counts/min, the worst drift measured: few rounds are noisy
-#define EACH_Q16   (8192 / BT_ELECTRODES) // of a sum over all electrodes in 1/8 count
+    (5 * LEVEL_Q3)             // of a silence, however long: what skin creeps by at the pace of level in 13 s
+#define CREEP_SWEEPS 250       // 20 s, two of its time constants
+#define SLEW_Q16     (8 * 328) // a sweep; 0.5 count/s, as at rest
+#define MISSED_Q16   (SLEW_Q16 / 2)         // 15 counts/min, the worst drift measured: few rounds are noisy
+#define EACH_Q16     (8192 / BT_ELECTRODES) // of a sum over all electrodes in 1/8 count
 
 _Static_assert((int64_t)BT_ELECTRODES * BT_SWEEP_UNREAD_Q3 * EACH_Q16 <= INT32_MAX,
                "a sum of distances must fit its type");
 _Static_assert((int64_t)UINT16_MAX *SLEW_Q16 <= INT32_MAX,
                "what is due of the longest silence must fit its type");
 
+bool bt_watch_creeps(const bt_watch *watch)
+{
+    return watch->creeps < CREEP_SWEEPS;
+}
+
+bool bt_watch_crept(const bt_watch *watch)
+{
+    return watch->creeps == CREEP_SWEEPS;
+}
+
+bool bt_watch_level(const bt_watch *watch)
+{
+    return watch->slow || watch->level_sweeps >= LEVEL_SWEEPS;
+}
+
 void bt_watch_pause(bt_watch *watch)
 {
     watch->wait_sweeps = WAIT_SWEEPS;
-    watch->drifts = false;
+    watch->one_way = false;
+    watch->follows = false;
     watch->one_way_q2 = 0;
 }
 
@@ -30,14 +47,12 @@ void bt_watch_begin(bt_watch *watch)
 {
     bt_watch_pause(watch);
     watch->base.electrode_q16[0] = BT_TARE_UNKNOWN; // nothing is near to that
+    watch->creeps = 0;
 }
 
-int32_t bt_watch_step_q16(const bt_watch *watch, uint32_t mean_q16, uint32_t base_q16)
+int32_t bt_watch_drifts_q16(const bt_watch *watch)
 {
-    int32_t step_q16 = watch->step_q16;
-    bool lags = step_q16 > 0 ? mean_q16 > base_q16 : mean_q16 < base_q16;
-    int32_t quarter_q16 = bt_shift_down(step_q16, 2);
-    return step_q16 + (lags ? quarter_q16 : -quarter_q16);
+    return watch->one_way ? bt_limited(watch->shared_q16, -SLEW_Q16, SLEW_Q16) : 0;
 }
 
 void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
@@ -75,6 +90,7 @@ void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, i
 
 void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
 {
+    watch->creeps = (uint8_t)(watch->creeps + (watch->creeps < UINT8_MAX));
     int change_q3 = pressure_mean_q3 == NULL ? LEVEL_Q3 + 1 : *pressure_mean_q3 - watch->level_q3;
     if (change_q3 > LEVEL_Q3 || change_q3 < -LEVEL_Q3) {
         // Skin creeps: what took so long to move by so little goes on as level.
@@ -88,9 +104,8 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
         watch->level_sweeps++;
     }
     watch->one_way_q2 = (int16_t)(watch->one_way_q2 + watch->side - bt_shift_down(watch->one_way_q2, 2));
-    bool one_way = watch->one_way_q2 >= ONE_WAY_Q2 || watch->one_way_q2 <= -ONE_WAY_Q2;
-    watch->drifts = one_way && (watch->slow || watch->level_sweeps >= LEVEL_SWEEPS);
-    watch->step_q16 = bt_limited(watch->away_q3 * EACH_Q16, -SLEW_Q16, SLEW_Q16);
+    watch->one_way = watch->one_way_q2 >= ONE_WAY_Q2 || watch->one_way_q2 <= -ONE_WAY_Q2;
+    watch->shared_q16 = watch->away_q3 * EACH_Q16;
     watch->side = 0;
     watch->away_q3 = 0;
 }
@@ -106,8 +121,7 @@ static bool resume_level(bt_watch *watch, const bt_silence *silence, int32_t *du
     if (change_q3 > creep_q3 || change_q3 < -creep_q3) {
         return false;
     }
-    bool level = watch->slow || watch->level_sweeps >= LEVEL_SWEEPS;
-    *due = level ? silence->sweeps : bt_limited(sweeps - LEVEL_SWEEPS, 0, silence->sweeps);
+    *due = bt_watch_level(watch) ? silence->sweeps : bt_limited(sweeps - LEVEL_SWEEPS, 0, silence->sweeps);
     if (change_q3 > LEVEL_Q3 || change_q3 < -LEVEL_Q3) {
         watch->slow = true;
         watch->level_q3 = (uint16_t)pressure_q3;
@@ -142,6 +156,6 @@ int32_t bt_watch_resume(bt_watch *watch, const bt_silence *silence, int span_q3)
     // Of this sweep's lanes so far, against what is now to move; and what the others would be moved by twice.
     watch->side = 0;
     watch->away_q3 = 0;
-    watch->step_q16 = 0;
+    watch->shared_q16 = 0;
     return even ? bt_limited(sum_q3 * EACH_Q16, -due * MISSED_Q16, due * MISSED_Q16) : 0;
 }

@@ -14,17 +14,21 @@
 #include "touch/silence.h"
 #include "touch/sweep.h"
 
+#define BT_WATCH_SWEEPS 5 // of still signals, after which what is read is where they came to rest
+
 typedef struct {
     bt_baseline base;     // where the signals came to rest
     uint8_t wait_sweeps;  // until what is read now is that; 0 once it was
     uint16_t level_q3;    // the pressure's mean when it last moved
     uint8_t level_sweeps; // for which it has stayed near that; saturates
     bool slow;            // and it had stayed long before it moved
+    uint8_t creeps;       // sweeps since the load changed; saturates
     int8_t side;        // electrodes whose mean of this sweep is above the watched baseline, less those below
     int16_t one_way_q2; // the same through a low-pass of four sweeps
     int32_t away_q3;    // sum of the distances of this sweep's means from the watched baseline
-    int32_t step_q16;   // what the coming sweep adds to each electrode that is followed
-    bool drifts;        // the last whole sweep says: what moves is drift
+    int32_t shared_q16; // the mean of those of the last whole sweep
+    bool one_way;       // the last whole sweep says: nearly all have moved one way
+    bool follows;       // and each electrode follows what is drift at its own pace
 } bt_watch;
 
 // A contact begins, or the load changes: what was watched before says nothing.
@@ -44,13 +48,20 @@ void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, i
 // After a sweep; pressure_mean_q3 is NULL without a good pressure word in it.
 void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3);
 
+// The load changed not long ago, so that skin still creeps by more than it drifts.
+bool bt_watch_creeps(const bt_watch *watch);
+bool bt_watch_crept(const bt_watch *watch); // this was the last sweep of it
+
+// Pressure has stayed where it was for long enough to tell drift from a load.
+bool bt_watch_level(const bt_watch *watch);
+
 // A finger that was silent is back, with a good pressure word: as if it had answered all along, the time
 // counts as level if pressure moved by no more than what creeps. Returns what all electrodes would have been
 // followed by, in counts as q16: 0 if any has moved by more than span_q3 that not all share.
 int32_t bt_watch_resume(bt_watch *watch, const bt_silence *silence, int span_q3);
 
-// An electrode's step of drift: a quarter more than all have where it lags behind them, else a quarter less.
-int32_t bt_watch_step_q16(const bt_watch *watch, uint32_t mean_q16, uint32_t base_q16);
+// By what all electrodes have clearly moved one way, as a step of drift; 0 if they have not.
+int32_t bt_watch_drifts_q16(const bt_watch *watch);
 
 #ifndef BT_CDEF
 // An electrode's mean of this sweep, against the baseline that it is to be compared with.
@@ -61,6 +72,18 @@ static inline void bt_watch_side(bt_watch *watch, uint32_t mean_q16, uint32_t ba
     }
     watch->side = (int8_t)(watch->side + (mean_q16 > base_q16) - (mean_q16 < base_q16));
     watch->away_q3 += (int32_t)(mean_q16 >> 13) - (int32_t)(base_q16 >> 13);
+}
+
+// An electrode's step of drift: where each goes at its own pace, a quarter more than all have where it lags
+// behind them, else a quarter less.
+static inline int32_t bt_watch_step_q16(const bt_watch *watch, int32_t step_q16, uint32_t mean_q16,
+                                        uint32_t base_q16)
+{
+    if (!watch->follows) {
+        return step_q16;
+    }
+    bool lags = step_q16 > 0 ? mean_q16 > base_q16 : mean_q16 < base_q16;
+    return step_q16 + (lags ? step_q16 / 4 : -(step_q16 / 4));
 }
 #endif
 

@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0x0CE1D802u
+#define BT_SCHEMA_HASH 0x471C3819u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -71,7 +71,7 @@ enum bt_poc_weights {
 // What the force of a finger without a wrench map comes from.
 enum bt_force_model {
     BT_FORCE_MODEL_LIN = 0, // Lin's three scales, force_gain_*_nn
-    BT_FORCE_MODEL_POPULATION = 1, // the population map, made of other fingers (host/docs/population.md), while the force gains are the defaults; with others it is LIN
+    BT_FORCE_MODEL_POPULATION = 1, // the population map, made of other fingers (host/docs/population.md), while all three force gains are the defaults; with others it is LIN
 };
 
 // What the firmware runs on.
@@ -187,6 +187,7 @@ typedef struct {
     int32_t min;
     int32_t max;
     int32_t initial;
+    int32_t before; // what firmware that does not have it does
 } bt_setting_spec;
 extern const bt_setting_spec bt_setting_specs[BT_SETTINGS];
 

@@ -38,6 +38,25 @@ void clock_rebase(void)
     base_wall_ns = wall_ns();
 }
 
+void clock_catch_up(void)
+{
+    int64_t us;
+    while ((us = clock_wait_us(now_ns)) > 0) {
+        struct timespec t = {us / 1000000, us % 1000000 * 1000};
+        (void)nanosleep(&t, NULL);
+    }
+}
+
+void clock_follow(uint64_t until_ns)
+{
+    if (pace <= 0) {
+        return;
+    }
+    uint64_t due_ns = base_device_ns + (uint64_t)((double)(wall_ns() - base_wall_ns) * pace) + 1;
+    uint64_t to_ns = due_ns < until_ns ? due_ns : until_ns;
+    now_ns = to_ns > now_ns ? to_ns : now_ns;
+}
+
 int64_t clock_wait_us(uint64_t t_ns)
 {
     if (pace <= 0) {

@@ -177,9 +177,9 @@ class Segment:
         begin, end = (
             max(math.floor((min(t, last) - self.first_t_us) / step), 0) for t in (float(t_us.min()), float(t_us.max()))
         )
-        fits = [self._knot(self.first_t_us + k * step) for k in range(begin, end + 2)]
-        fits = [fit for fit in fits if fit.t_us < last and fit.known]
-        fits += [fit for fit in [self.fit(last)] if fit.known]
+        knots = [self.first_t_us + k * step for k in range(begin, end + 2)]
+        fits = [*(self._knot(at) for at in knots if at < last), self.fit(last)]
+        fits = [fit for fit in fits if fit.known]
         if not fits:
             return np.full(t_us.shape, np.nan), np.full(t_us.shape, np.inf)
         at = [fit.t_us for fit in fits]

@@ -20,7 +20,7 @@ from ..wire import messages_gen as wire
 from ..wire.frames import StructArray
 from ..wire.map_gen import Gate, Kind
 from ..wire.native import ffi, lib
-from .compiled import Settings, board_settings
+from .compiled import ELECTRODES, Settings, board_settings, integers
 
 Integers = NDArray[np.int64]
 BoardResults = tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]
@@ -54,19 +54,26 @@ class BoardMap:
     @cached_property
     def blob(self) -> bytes:
         """What a board stores. Raises InputError when the board would refuse it."""
+        try:
+            blob = self._packed()
+        except (struct.error, UnicodeEncodeError, ValueError) as error:
+            raise InputError(f"a wrench map cannot be stored ({error}); see protocol/SPEC.md, Wrench maps") from error
+        _judged(blob)
+        return blob
+
+    def _packed(self) -> bytes:
         serial = self.serial.encode("ascii")
+        if len(serial) > _map.SERIAL_BYTES:
+            raise ValueError(f"the serial {self.serial!r} has over {_map.SERIAL_BYTES} characters")
         head = _HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s)
         blocks, coefficients = b"", b""
         for block in self.blocks:
             unused = (0,) * (_map.EXPONENTS - self.axes)
             blocks += _BLOCK.pack(block.kind, block.gate, *block.exponent, *unused)
-            coefficients += b"".join(
-                np.ascontiguousarray(_words(block.coefficients[:, axis : axis + 3])).tobytes()
-                for axis in range(0, self.axes, 3)
-            )
-        blob = head + blocks + coefficients
-        _judged(blob)
-        return blob
+            shape = _map.KINDS[block.kind].columns, self.axes
+            values = integers(f"coefficients of {block.kind.name}", block.coefficients, np.int64, *shape)
+            coefficients += b"".join(_words(values[:, axis : axis + 3]).tobytes() for axis in range(0, self.axes, 3))
+        return head + blocks + coefficients
 
     @property
     def with_pdc(self) -> bool:
@@ -88,9 +95,11 @@ class BoardMap:
         """force_100un, torque_mnmm (n, 3), torsion_mnmm (n,) as on the board; counts, tare_q4 (n, 19), pressure (n,).
 
         -2^31 where invalid: what the map does not have, and all where pressure, -2^31 itself, is needed and missing.
+        Raises ValueError for other shapes or ranges.
         """
-        raw, tare = (np.ascontiguousarray(a, dtype=np.uint16) for a in (counts, tare_q4))
-        pdc = np.ascontiguousarray(pdc_above_rest_q4, dtype=np.int32)
+        raw = integers("counts", counts, np.uint16, None, ELECTRODES)
+        tare = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
+        pdc = integers("pdc_above_rest_q4", pdc_above_rest_q4, np.int32, len(raw))
         force = np.empty((len(raw), 3), np.int32)
         torque = np.empty((len(raw), 3), np.int32)
         torsion = np.empty(len(raw), np.int32)
@@ -131,9 +140,8 @@ def from_blob(blob: bytes) -> BoardMap:
 
 def on_board_q4(frames: StructArray, settings: Settings, its: BoardMap) -> BoardResults:
     """core.on_board_q4() with a map in force, on FRAME messages (n,), whose PDC it may need; and torsion_mnmm (n,)."""
-    raw, tare_q4, pdc, pdc_tare_q4 = (
-        np.ascontiguousarray(frames[name]) for name in ("counts", "tare_q4", "pdc", "pdc_tare_q4")
-    )
+    raw, tare_q4 = (integers(name, frames[name], np.uint16, len(frames), ELECTRODES) for name in ("counts", "tare_q4"))
+    pdc, pdc_tare_q4 = (integers(name, frames[name], np.uint16, len(frames)) for name in ("pdc", "pdc_tare_q4"))
     kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board_settings(settings)))
     kernel.map = its.handle
     n = len(frames)
@@ -160,9 +168,9 @@ def pdc_above_rest_q4(frames: StructArray) -> NDArray[np.int32]:
 
 
 def _words(values: Integers) -> NDArray[Any]:
-    """i16 low, i16 high of each value, so that high * 2^16 + low is it."""
+    """i16 low, i16 high of each value, so that high * 2^16 + low is it. ValueError for one that is too large."""
     low = (values + 0x8000) % 0x10000 - 0x8000
-    return np.stack([low, (values - low) // 0x10000], axis=-1).astype("<i2")
+    return integers("halves of coefficients", np.stack([low, (values - low) // 0x10000], axis=-1), "<i2", *[None] * 3)
 
 
 def _judged(blob: bytes) -> tuple[Any, Any]:

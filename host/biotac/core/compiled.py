@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, tare_to_q4, to_units
 from ..wire.native import ffi, lib
+from ..wire.sensor_gen import ELECTRODE_NAMES
 
 NN_PER_N = 1e9
+ELECTRODES = len(ELECTRODE_NAMES)
 Settings = dict[wire.Setting, int]
 
 
@@ -51,9 +53,10 @@ def on_board_q4(
 ) -> tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]:
     """on_board() on the integers of FRAME messages, both (n, 19), to such integers and the kernel's flags.
 
-    Returns poc_um, force_100un, torque_mnmm, each (n, 3), and flags (n,).
+    Returns poc_um, force_100un, torque_mnmm, each (n, 3), and flags (n,). Raises ValueError for other shapes or ranges.
     """
-    raw, tare_q4 = np.ascontiguousarray(counts), np.ascontiguousarray(tare_q4)
+    raw = integers("counts", counts, np.uint16, None, ELECTRODES)
+    tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
     board = board_settings(settings)
     kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board))
     n = len(raw)
@@ -77,8 +80,13 @@ def on_board_q4(
 def pressure_force_100un(
     filtered_q4: NDArray[np.uint16], tare_q4: NDArray[np.uint16], gain_nn: int
 ) -> NDArray[np.int32]:
-    """The board's force from pressure, of the integers of FRAME messages, all (n,); see core/solve/pressure.h."""
-    filtered_q4, tare_q4 = np.ascontiguousarray(filtered_q4), np.ascontiguousarray(tare_q4)
+    """The board's force from pressure, of the integers of FRAME messages, all (n,); see core/solve/pressure.h.
+
+    Raises ValueError for other shapes or ranges.
+    """
+    filtered_q4 = integers("filtered_q4", filtered_q4, np.uint16, None)
+    tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(filtered_q4))
+    board_settings({wire.Setting.PRESSURE_GAIN_NN: gain_nn})  # in its range, or ValueError
     out = np.empty(len(filtered_q4), np.int32)
     lib.bt_pressure_forces(
         len(out),
@@ -91,8 +99,12 @@ def pressure_force_100un(
 
 
 def pressure_filtered_q4(pdc: NDArray[np.uint16], filter_milli: int) -> NDArray[np.uint16]:
-    """The board's filter over the PDC words (n,) of consecutive rounds, from its beginning; 1/16 count."""
-    pdc = np.ascontiguousarray(pdc, np.uint16)
+    """The board's filter over the PDC words (n,) of consecutive rounds, from its beginning; 1/16 count.
+
+    Raises ValueError for other shapes or ranges.
+    """
+    pdc = integers("pdc", pdc, np.uint16, None)
+    board_settings({wire.Setting.PRESSURE_FILTER_MILLI: filter_milli})  # in its range, or ValueError
     out = np.empty(len(pdc), np.uint16)
     pointers = ffi.from_buffer("uint16_t[]", pdc), ffi.from_buffer("uint16_t[]", out)
     lib.bt_pressure_filter(len(out), pointers[0], filter_milli, pointers[1])
@@ -120,8 +132,9 @@ def reference(counts: Any, tare: Any, settings: Settings | None = None) -> Resul
 
 
 def reference_q4(counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settings: Settings) -> Results:
-    """reference() on the integers of FRAME messages, both (n, 19); no check, the wire had one."""
-    raw, tare_q4 = np.ascontiguousarray(counts), np.ascontiguousarray(tare_q4)
+    """reference() on the integers of FRAME messages, both (n, 19). Raises ValueError for other shapes or ranges."""
+    raw = integers("counts", counts, np.uint16, None, ELECTRODES)
+    tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
     gains = formula_settings(settings)
     out = [np.empty((len(raw), 3), np.float64) for _ in range(3)]
     lib.lin2013_frames(
@@ -148,6 +161,22 @@ def formula_settings(settings: Settings) -> Any:
 
 FORCE_GAINS = (wire.Setting.FORCE_GAIN_X_NN, wire.Setting.FORCE_GAIN_Y_NN, wire.Setting.FORCE_GAIN_Z_NN)
 TORQUE_GAINS = (wire.Setting.TORQUE_GAIN_Y_NN, wire.Setting.TORQUE_GAIN_Z_NN)
+
+
+def integers(name: str, values: Any, dtype: Any, *shape: int | None) -> NDArray[Any]:
+    """A contiguous array of ``shape`` (None: any length) and ``dtype`` for C, which looks at neither.
+
+    ValueError for another shape, for what is no integer, and for one that ``dtype`` would wrap.
+    """
+    array = np.asarray(values)
+    if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
+        wanted = ", ".join("n" if size is None else str(size) for size in shape)
+        raise ValueError(f"{name} have shape {array.shape}, expected ({wanted})")
+    if array.dtype != dtype:
+        limits = np.iinfo(dtype)
+        if array.dtype.kind not in "iu" or (array.size and not limits.min <= array.min() <= array.max() <= limits.max):
+            raise ValueError(f"{name} are {array.dtype}, expected integers {limits.min} to {limits.max}")
+    return np.ascontiguousarray(array, dtype)
 
 
 def checked(counts: Any, tare: Any) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:

@@ -1,12 +1,12 @@
 """Point of contact, force and torque of whole recordings, in float64.
 
-The same formulas as core.reference, sixteen frames at a time in C (host/binding/blocks.c).
+The same formulas as core.reference and core.population, in C: host/binding/blocks.c, population_float64.c.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..wire import sensor_gen as sensor
 from ..wire.frames import StructArray
 from ..wire.native import ffi, lib
 from .board_map import BoardMap, opened
-from .compiled import FORCE_GAINS, TORQUE_GAINS, Settings, default_settings, formula_settings
+from .compiled import FORCE_GAINS, TORQUE_GAINS, default_settings, formula_settings
 
 #: poc_mm, force_n and torque_nmm of one frame, named, in units and with axes as in FRAME_DTYPE.
 RESULT_DTYPE = np.dtype([("poc_mm", "<f8", (3,)), ("force_n", "<f8", (3,)), ("torque_nmm", "<f8", (3,))])
@@ -39,7 +39,7 @@ _one_frame = lib.bt_one_frame
 def compute(
     counts: Any,
     tare: Any = None,
-    settings: Settings | None = None,
+    settings: Mapping[wire.Setting, int] | None = None,
     out: StructArray | None = None,
     *,
     wrench_map: BoardMap | bytes | None = None,
@@ -50,7 +50,9 @@ def compute(
     ``counts`` are integers 0..4095, 0xFFFF where missing, which weighs nothing; uint16 is read in place,
     also from a field of a structured array. ``tare`` is (19,) or of the shape of ``counts``, 0..4095
     counts, rounded to 1/16 count as the board does. ``settings`` are those of a board; what they do not
-    name has its default, and what is no biotac.Setting is refused with ValueError. ``out``, a contiguous
+    name has its default, and what is no biotac.Setting is refused with ValueError. By default, then, force is the
+    population map's (host/docs/population.md); Lin's three scales are {Setting.FORCE_MODEL: ForceModel.LIN}, or
+    force gains of your own. ``out``, a contiguous
     RESULT_DTYPE array of the result's shape, is filled and returned: a buffer that was used before spares the page
     faults of a new one.
 
@@ -78,14 +80,7 @@ def compute(
         for name in RESULT_DTYPE.names or ():
             out[name] = plain[name]
         return by_map(out, opened(wrench_map), counts, tare, pdc_above_rest)
-    plan = _DEFAULT_PLAN if settings is None else _plan(settings)
-    if settings is not None and wire.Setting.FORCE_MODEL in settings:
-        from . import population  # here: as above
-
-        if population.in_force(settings):
-            out = compute(counts, tare, {**settings, wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}, out)
-            population.into(out, counts, tare)
-            return out
+    plan = _default_plan() if settings is None else _plan(settings)
     # One frame in the types that frames have, as on the live path, where the checks would take longer
     # than the maths. Copying 38 and 152 bytes is faster than borrowing two buffers.
     try:
@@ -126,19 +121,19 @@ def _of_rows(rows: Any, pdc_above_rest: Any) -> tuple[NDArray[np.uint16], NDArra
     return counts, tare, pdc_above_rest
 
 
-def per_frame(tare: Any, settings: Settings | None = None) -> Callable[[NDArray[np.uint16]], StructArray]:
+def per_frame(
+    tare: Any, settings: Mapping[wire.Setting, int] | None = None
+) -> Callable[[NDArray[np.uint16]], StructArray]:
     """compute() for a live stream: a function from one frame's counts, uint16 (19,), to its results.
 
     Tare and settings are looked at once, and every call fills and returns the same RESULT_DTYPE array of
     shape (): copy what has to last. compute() spends half of its time for one frame on just that. Raises
     ValueError as compute().
     """
-    plan = _DEFAULT_PLAN if settings is None else _plan(settings)
+    plan = _default_plan() if settings is None else _plan(settings)
     base = _checked_tare(tare, _ONE)
     out = np.empty((), RESULT_DTYPE)
     compute(np.zeros(_ONE, _COUNT), base, settings, out)  # refuses a tare that is out of range
-    if settings is not None and settings.get(wire.Setting.FORCE_MODEL) == wire.ForceModel.POPULATION:
-        return lambda counts: compute(counts, base, settings, out)
     base_bytes, result, one_frame, dtype, shape = base.tobytes(), _buffer(out), lib.bt_one_frame, _COUNT, _ONE
 
     def results(counts: NDArray[np.uint16]) -> StructArray:
@@ -154,29 +149,41 @@ def per_frame(tare: Any, settings: Settings | None = None) -> Callable[[NDArray[
     return results
 
 
-_PLAN_SETTINGS = (wire.Setting.POC_WEIGHTS, *FORCE_GAINS, *TORQUE_GAINS)
+_PLAN_SETTINGS = (wire.Setting.POC_WEIGHTS, *FORCE_GAINS, *TORQUE_GAINS, wire.Setting.FORCE_MODEL)
 _DEFAULTS = default_settings()
 
 
-def _plan(settings: Settings) -> Any:
-    for key in settings:
-        if key not in _DEFAULTS:
-            raise ValueError(f"settings have {key!r}, expected members of biotac.Setting, such as FORCE_GAIN_Z_NN")
-    return _plan_of(tuple(int(settings.get(key, _DEFAULTS[key])) for key in _PLAN_SETTINGS))
+@cache
+def _default_plan() -> Any:
+    return _plan(_DEFAULTS)
+
+
+def _plan(settings: Mapping[wire.Setting, int]) -> Any:
+    return _plan_of(tuple(settings.items()))
 
 
 @lru_cache(maxsize=16)
-def _plan_of(values: tuple[int, ...]) -> Any:
-    """The bt_block_plan of _PLAN_SETTINGS' values. It is only read, so that calls may share it."""
-    chosen = dict(zip(_PLAN_SETTINGS, values, strict=True))
+def _plan_of(items: tuple[tuple[Any, Any], ...]) -> Any:
+    """The bt_block_plan of settings. It is only read, so that calls may share it."""
+    settings = dict(items)
+    for key in settings:
+        if key not in _DEFAULTS:
+            raise ValueError(f"settings have {key!r}, expected members of biotac.Setting, such as FORCE_GAIN_Z_NN")
+    chosen = {key: int(settings.get(key, _DEFAULTS[key])) for key in _PLAN_SETTINGS}
     for key, value in chosen.items():
         spec = wire.SETTINGS[key]
         if not spec.low <= value <= spec.high:
             raise ValueError(f"{key.name} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
     plan = ffi.new("bt_block_plan *")
-    if not lib.bt_block_plan_init(plan, formula_settings(chosen)):
+    if not lib.bt_block_plan_init(plan, formula_settings(chosen), _population(chosen)):
         raise RuntimeError("host/binding/blocks.c mirrors another geometry than the one that was generated")
     return plan
+
+
+def _population(settings: Mapping[wire.Setting, int]) -> Any:
+    from . import population  # here: everybody would wait for it at `import biotac`
+
+    return population.compiled_coefficients() if population.in_force(settings) else ffi.NULL
 
 
 def _checked_counts(counts: Any) -> NDArray[np.uint16]:
@@ -241,6 +248,3 @@ def _explain(row: int, counts: NDArray[Any], tare: NDArray[Any]) -> str:
         f"the counts{where} have {sensor.ELECTRODE_NAMES[first]} = {values[first]}, expected "
         f"0..{sensor.FULL_SCALE_COUNT}, or {wire.INVALID_COUNT} for a missing electrode"
     )
-
-
-_DEFAULT_PLAN = _plan(_DEFAULTS)

@@ -6,6 +6,7 @@ the board's own code, bit for bit, with other settings if need be.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -68,7 +69,7 @@ class Finger:
 
     def __init__(
         self,
-        settings: Settings | None = None,
+        settings: Mapping[wire.Setting, int] | None = None,
         *,
         index: int = 0,
         quantities: wire.QuantityFlags | None = None,
@@ -76,7 +77,7 @@ class Finger:
     ) -> None:
         if not 0 <= index < sensor.MAX_SENSORS:
             raise ValueError(f"index is {index}, expected 0 to {sensor.MAX_SENSORS - 1}")
-        self.settings: Settings = default_settings() | (settings or {})
+        self.settings: Settings = {**default_settings(), **(settings or {})}
         self._settings = board_settings(self.settings)
         self._finger = ffi.new("bt_finger *")
         self._index = index

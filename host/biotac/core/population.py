@@ -1,7 +1,8 @@
 """The force of a finger that nobody has calibrated, in float64: the population map that comes with the package.
 
 The board's own is firmware/core/map/population.c, of the same coefficients in 16 bits. This reads them as they were
-trained, and makes the columns as training does. SPEC.md, Population map.
+trained, and makes the columns as training does: what a board is held against. biotac.compute runs the same formulas in
+host/binding/population_float64.c. SPEC.md, Population map.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ..wire import messages_gen as wire
-from ..wire.frames import tare_to_q4
 from ..wire.map_gen import Gate, Kind
+from ..wire.native import ffi
 from .compiled import FORCE_GAINS
 from .geometry import Floats
-from .map_columns import Signals, gates, kinds
+from .map_columns import SIGNAL_COUNTS, Signals, gates, kinds
 
 SHIPPED = "population.json"
 Block = tuple[Kind, Gate, Floats]
@@ -29,6 +30,11 @@ ALL = 256  # a share
 _NOISE_Q4 = 8 * 16
 _SHARE_BITS = 11
 _CHUNK_ROWS = 4096
+_COMPILED = [
+    *((kind, gate) for gate in (Gate.ONE, Gate.X, Gate.Y) for kind in (Kind.COMPRESSION, Kind.BULGE)),
+    (Kind.CONDUCTANCE, Gate.ONE),
+    (Kind.CONDUCTANCE_PAIRS, Gate.ONE),
+]
 
 
 def in_force(settings: Mapping[wire.Setting, int]) -> bool:
@@ -102,9 +108,13 @@ def replace_force(
     torque_nmm[:, 0] = poc_mm[:, 1] * force_n[:, 2] - poc_mm[:, 2] * force_n[:, 1]
 
 
-def into(results: Any, counts: Any, tare: Any) -> None:
-    """replace_force of ``results`` of biotac.compute, of the shapes that it knows."""
-    rows = results.reshape(-1)
-    raw = np.asarray(counts).reshape(len(rows), -1).astype(np.uint16)
-    tare_q4 = tare_to_q4(np.broadcast_to(np.asarray(tare, dtype=np.float64), raw.shape))
-    replace_force(raw, tare_q4, rows["poc_mm"], rows["force_n"], rows["torque_nmm"])
+@cache
+def compiled_coefficients() -> Any:
+    """The coefficients as host/binding/population_float64.h wants them, for the life of the process."""
+    its = blocks()
+    if [(kind, gate) for kind, gate, _ in its] != _COMPILED:
+        raise ValueError(
+            f"{SHIPPED} has other blocks than host/binding/population_float64.c; train it with this version"
+        )
+    per_count = [c / SIGNAL_COUNTS if kind in (Kind.COMPRESSION, Kind.BULGE) else c for kind, _, c in its]
+    return ffi.new("double[]", np.concatenate(per_count).ravel().tolist())

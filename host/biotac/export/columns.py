@@ -16,9 +16,7 @@ from ..wire.frames import StructArray
 #: Told a share 0..1 of the work that is done.
 Show = Callable[[float], None]
 
-STAMP = Field(
-    "stamp_ns", "<i8", "ns", "device time on the host's clock (Unix): the recording's start plus elapsed device time"
-)
+STAMP = Field("stamp_ns", "<i8", "ns", "device time on the host's clock (Unix), by the drift that the recording shows")
 
 
 def _stamped(fields: Sequence[Field]) -> tuple[Field, ...]:
@@ -75,5 +73,5 @@ def tables(recording: Recording) -> list[Table]:
 
 
 def _arrays(recording: Recording, columns: Sequence[Field], rows: StructArray) -> dict[str, NDArray[Any]]:
-    stamps = recording.begin_ns + (rows["t_us"] - recording.begin_us) * 1000
+    stamps = recording.stamp_ns(rows["t_us"])
     return {column.name: stamps if column is STAMP else rows[column.name] for column in columns}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -53,11 +54,11 @@ def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Sh
     if not any(len(table) for table in made):
         raise InputError(f"{recording.path} holds no frame and no PAC; there is nothing to export")
     written: list[Path] = []
-    for path, part in parts(out, made, apart=module.PAC_APART):
-        write: Write = module.write
-        with whole(path, overwrite=overwrite) as place:
-            write(place, part, recording, show)
-        written.append(path)
+    write: Write = module.write
+    with ExitStack() as together:  # none is in its place before all are whole
+        for path, part in parts(out, made, apart=module.PAC_APART):
+            write(together.enter_context(whole(path, overwrite=overwrite)), part, recording, show)
+            written.append(path)
     return written
 
 

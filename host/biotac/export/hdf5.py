@@ -13,8 +13,11 @@ PAC_APART = False
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """Units and meanings as attributes of the datasets, frame_id of the groups, metadata of the file."""
-    with h5py.File(place, "w") as file:
+    """Units and meanings as attributes of the datasets, frame_id of the groups, metadata of the file.
+
+    It is made in memory and written by Python: on a full disk HDF5 itself ends the process (SIGSEGV as it closes).
+    """
+    with h5py.File(place.name, "w", driver="core", backing_store=False, block_size=1 << 22) as file:
         file.attrs.update(recording.metadata)
         for k, table in enumerate(made):
             group = file.create_group(f"finger{table.finger}/{table.kind}")
@@ -28,3 +31,5 @@ def write(place: Path, made: list[Table], recording: Recording, show: Show) -> N
                 if column.parts:
                     data.attrs["parts"] = list(column.parts)
             show((k + 1) / len(made))
+        file.flush()
+        place.write_bytes(file.id.get_file_image())

@@ -21,6 +21,8 @@ from ..wire.identity import board_text, serial_text, version_text
 
 FORMAT = "biotac settings 1"
 LAST_ID = 255
+#: Settings by id whose default is not what firmware without them does, and that.
+_BEFORE = {int(key): spec.before for key, spec in wire.SETTINGS.items() if spec.before != spec.default}
 
 
 @dataclass(frozen=True)
@@ -110,13 +112,15 @@ def read_backup(path: Path) -> Backup:
 def restore(hand: Hand, wanted: Backup) -> Restored:
     """Set and save what differs, and read all back.
 
-    What the firmware does not know is left out. Raises CommandRefusedError for a value
+    What the firmware does not know is left out; of what the backup's firmware did not know, it goes on doing what that
+    did. Raises CommandRefusedError for a value
     that it does not take, and InputError when a value does not read back.
     """
     found = read_settings(hand)
-    changed = [key for key, value in wanted.values.items() if key in found and found[key] != value]
+    values = {key: value for key, value in _BEFORE.items() if key in found} | wanted.values
+    changed = [key for key, value in values.items() if key in found and found[key] != value]
     for key in changed:
-        hand.set_setting(key, wanted.values[key])
+        hand.set_setting(key, values[key])
     knows_calibrations = hand.info.wire_minor >= CALIBRATION_SINCE_MINOR
     knows_maps = hand.info.wire_minor >= MAP_SINCE_MINOR
     calibrations = wanted.calibrations if knows_calibrations else {}
@@ -132,7 +136,7 @@ def restore(hand: Hand, wanted: Backup) -> Restored:
     if changed or given or uploaded:
         hand.save_settings()
         found = read_settings(hand)
-    for key, value in wanted.values.items():
+    for key, value in values.items():
         if found.get(key, value) != value:
             raise InputError(f"{setting_name(key)} reads {found[key]} after {value} was restored; set it by hand")
     unknown = [setting_name(key) for key in wanted.values if key not in found]

@@ -25,6 +25,8 @@ from .handshake import handshake
 
 REPLY_TIMEOUT_S = 1.0
 REPLY_TRIES = 3
+#: What a board says to what only the other side knows.
+NOT_KNOWN = (wire.Error.UNKNOWN_COMMAND, wire.Error.UNKNOWN_SETTING, wire.Error.BAD_LENGTH)
 UNANSWERED = 8  # questions for the time that are remembered
 # How long a link is waited for at most before other things are looked at, such as whether all is to end.
 POLL_S = 0.2
@@ -153,7 +155,7 @@ class Board:
     def close(self) -> None:
         """Give the port back, once nobody reads it any more."""
         self.closing.set()
-        with self._reading:
+        with self._reading, self._writing:
             self.closed = True
             self.connected = False
             self.link.close()
@@ -309,8 +311,6 @@ class Board:
         self._write(replace(request, req_id=next(self._req_ids)))
 
     def _write(self, message: Any) -> None:
-        if self.closed:
-            self.is_closed()
         try:
             payload = message.pack()
         except struct.error as error:
@@ -319,6 +319,8 @@ class Board:
         if message.ID in compatibility.APPENDED:
             payload = compatibility.cut(message.ID, payload, self.info.wire_minor)
         with self._writing:
+            if self.closed:
+                self.is_closed()
             self.link.write(encode(message.ID, payload))
 
     def next_message(self, wanted: Callable[[Any], bool], deadline_s: float) -> Any:
@@ -344,6 +346,8 @@ class Board:
         """
 
         def answers(m: Any) -> bool:
+            if isinstance(m, wire.Reply) and (m.req_id, m.command) == (0, request.ID):
+                return True  # of another length than the board knows, so that it read no number in it
             return isinstance(m, (reply, wire.Reply)) and bool(getattr(m, "req_id", 0) == request.req_id)
 
         self.check()
@@ -365,7 +369,7 @@ class Board:
                             self.clock.round_trip(sent_s, self._decoder.unwrap_t_us(answer.t_us), time.monotonic())
                         return answer
                     if answer is not None:
-                        raise CommandRefusedError(describe_refusal(request, answer), answer.error)
+                        raise CommandRefusedError(describe_refusal(request, answer, self.info), answer.error)
             finally:
                 self.awaiting -= 1
         raise DeviceLostError(
@@ -395,7 +399,10 @@ class Board:
             again()
 
 
-def describe_refusal(request: Any, reply: wire.Reply) -> str:
-    """One line naming the command and the board's reason."""
+def describe_refusal(request: Any, reply: wire.Reply, board: wire.Hello) -> str:
+    """One line naming the command and the board's reason; where their versions may be it, also those and the cure."""
     name = wire.Error(reply.error).name if reply.error in list(wire.Error) else f"error {reply.error}"
-    return f"the board refused {type(request).__name__}: {name} ({wire.ERROR_DOC.get(reply.error, 'unknown')})"
+    text = f"the board refused {type(request).__name__}: {name} ({wire.ERROR_DOC.get(reply.error, 'unknown')})"
+    if reply.error in NOT_KNOWN and (board.wire_major, board.wire_minor) != (wire.WIRE_MAJOR, wire.WIRE_MINOR):
+        text += f"; its firmware speaks {compatibility.describe_mismatch(board)}"
+    return text

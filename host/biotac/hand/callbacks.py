@@ -72,6 +72,13 @@ class Callbacks:
                         self._keep(fn, error)
         return True
 
+    def leave(self) -> None:
+        """What waits is handed out to nobody any more."""
+        if self._next is not None:
+            self.queue.put_back(self._next)
+            self._next = None
+        self.queue.leave()
+
     def _keep(self, fn: Callable[[Any], Any], error: BaseException) -> None:
         with self._lock:
             if self._error is None:

@@ -139,7 +139,7 @@ class Commands:
         self._board.tell(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
 
     def settings(self) -> dict[wire.Setting, int]:
-        """All settings; of one that the board's firmware does not have yet, the default, which is what it does."""
+        """All settings; of one that the board's firmware does not have yet, what it does."""
         return {setting: self._known_setting(setting) for setting in wire.Setting}
 
     def _known_setting(self, setting: wire.Setting) -> int:
@@ -148,7 +148,7 @@ class Commands:
         except CommandRefusedError as error:
             if error.error != wire.Error.UNKNOWN_SETTING:
                 raise
-            return wire.SETTINGS[setting].default
+            return wire.SETTINGS[setting].before
 
     # ---- calibrations --------------------------------------------------------------------------
 

@@ -161,7 +161,9 @@ class Hand:
 
         Raises, after all that, what nobody was told yet: DeviceLostError for a board that was lost meanwhile,
         CallbackError for what a callback has raised. A ``with`` block ends the same way, unless by an error of its
-        own. A hand that nobody refers to any more, and one that is left open when its program ends, is closed too.
+        own. Callbacks get what has come for one more second, and a callback that runs is waited for; what is left is
+        counted (``stats.batches_skipped``). A hand that nobody refers to any more, and one that is left open when its
+        program ends, is closed too.
         """
         self._end()
         self._streams.report()

@@ -39,9 +39,12 @@ class BatchQueue:
             while self._limit_rows is not None and self.rows > self._limit_rows and len(self._batches) > 1:
                 oldest = self._batches.popleft()
                 self.rows -= weight(oldest)
-                self.batches_skipped += 1
-                self.frames_skipped += len(oldest.wire)
+                self._skip(oldest)
         self.wake()
+
+    def _skip(self, batch: Batch) -> None:
+        self.batches_skipped += 1
+        self.frames_skipped += len(batch.wire)
 
     def wake(self) -> None:
         """Tell the consumer to look."""
@@ -58,6 +61,11 @@ class BatchQueue:
         """Forget what waits; the consumer wants none of it."""
         while self.take() is not None:
             pass
+
+    def leave(self) -> None:
+        """Count what waits as skipped: the consumer has no more time for it."""
+        while (batch := self.take()) is not None:
+            self._skip(batch)
 
     def take(self) -> Batch | None:
         """The oldest; None when there is none."""

@@ -1,8 +1,9 @@
 """A board's streams, and who reads them.
 
 Two ways to read. Pull: whoever wants batches reads the link, one thread, the same every time; a slow caller makes the
-operating system's buffer fill and then the board drop whole frames. Live: after ``run``, or with callbacks or
-biotac.aio, threads of this package read always (reader.py), and a slow caller loses the oldest batches on this side.
+operating system's buffer fill and then the board drop whole frames, and one who gives commands alone loses the oldest.
+Live: after ``run``, or with callbacks or biotac.aio, threads of this package read always (reader.py), and a slow caller
+loses the oldest batches on this side.
 """
 
 from __future__ import annotations
@@ -111,6 +112,7 @@ class Streams:
         finally:
             if self._reader is not None:
                 self._reader.join()
+                self._callbacks.leave()
 
     # ---- what the board sends ------------------------------------------------------------------
 
@@ -276,8 +278,7 @@ class Streams:
             self._pulled = None
         self._reader = Reader(self, self._callbacks, board.closing, self._link.port)
         board.is_read_here, board.is_pulled = self._reader.is_here, False
-        for queue in (self._callbacks.queue, *self._all_queues()):
-            queue.bound(self._limit_rows())
+        self._callbacks.queue.bound(self._limit_rows())
         self._heard_s = self._monotonic_s()
         self._reader.start()
         if self.streaming and self._started is not None:
@@ -351,7 +352,7 @@ class Streams:
         return queue
 
     def _limit_rows(self) -> int | None:
-        return LIMIT_ROWS if self._reader and self._link.pace else None
+        return LIMIT_ROWS if self._link.pace else None  # a board that waits for its reader can be let wait
 
     def _all_queues(self) -> list[BatchQueue]:
         return self._queues if self._pulled is None else [self._pulled, *self._queues]

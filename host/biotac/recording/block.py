@@ -30,6 +30,7 @@ _FINGER_BITS = 3  # a code is a kind and a finger
 _ROWS = struct.Struct("<3I")
 _HEAD = struct.Struct("<qqI")  # first and last t_us of a FRAME or heartbeat, and how many codes follow
 _MOST_PER_MESSAGE = 256
+_MOST_MESSAGES = 1 << 16  # of a block; a second of five fingers is some 1100
 
 #: Name, type of a value and values a row.
 Column = tuple[str, np.dtype[Any], int]
@@ -72,6 +73,8 @@ class Rest:
     def unpack(cls, data: bytes) -> Rest:
         """ValueError or struct.error for what is none."""
         first_us, last_us, n = _HEAD.unpack_from(data)
+        if n > _MOST_MESSAGES:
+            raise ValueError(f"a block of {n} messages, expected at most {_MOST_MESSAGES}")
         return cls(first_us, last_us, np.frombuffer(data, np.uint8, n, _HEAD.size), data[_HEAD.size + n :])
 
     def fingers(self, kind: int) -> NDArray[np.uint8]:
@@ -102,6 +105,8 @@ class Block:
 
 def take_apart(data: bytes, batch: Batch) -> Block | None:
     """``data``, whole messages, whose decoded rows are ``batch``; None when it could not be put together again."""
+    if data.count(0) > _MOST_MESSAGES:
+        return None
     pieces = data.split(b"\0")[:-1]
     ids = np.array([piece[1] if len(piece) > 1 else 0 for piece in pieces], np.intp)  # the id, behind COBS's first
     codes = np.full(len(pieces), _RAW, np.uint8)

@@ -39,7 +39,11 @@ class RecordingFile:
 
     def _begin(self, metadata: dict[str, str]) -> None:
         self._writer = Writer(
-            self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD, index_types=IndexType.ALL
+            self._stream,
+            chunk_size=_CHUNK_BYTES,
+            compression=CompressionType.ZSTD,
+            index_types=IndexType.ALL,
+            enable_data_crcs=True,
         )
         self._writer.start(profile="", library=f"biotac-gateway {__version__}")
         self._last = (0, 0)
@@ -77,7 +81,7 @@ class RecordingFile:
             self._put(layout.REST, apart.rest.pack(), stamps)
         self._sequence += 1
         self._last = stamps
-        if self._plots.add(batch, arrived_ns):
+        if self._plots.add(batch, self._decoder, arrived_ns, all_here_ns):
             self._writer.flush()  # type: ignore[no-untyped-call]
 
     def _put(self, topic: str, data: bytes, stamps: tuple[int, int]) -> None:
@@ -115,6 +119,7 @@ class RecordingFile:
             if self._tail:
                 self._put(layout.TOPIC, self._tail, self._last)
             self._writer.add_metadata(layout.METADATA_NAME, self._metadata)  # once more, for whom the first is damaged
+            self._writer.flush()  # type: ignore[no-untyped-call]  # what finish() writes is not in its checksum
             self._writer.finish()  # type: ignore[no-untyped-call]
         finally:
             self._stream.close()  # also on a full disk, or the interpreter would try once more at its end

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, RecordingError
+from ..errors import InputError, RecordingError, RecordingWarning, printable
 from ..wire.batches import StreamDecoder
 from ..wire.fields import FRAME_FIELDS, Field, dtype_of, values_of
 from ..wire.frames import StructArray
@@ -34,7 +35,8 @@ def load(
     ``fingers`` are chip selects or names that were recorded; ``start_s`` and ``stop_s`` are device seconds since the
     first row, from start on and before stop. What is left out takes no memory, and, in recordings of format 2, little
     time. Raises RecordingError when the file is no recording, and InputError for an unknown field or finger. Of a
-    recording that was cut off it gives what is whole; use Recording to learn what is missing.
+    recording that was cut off or is damaged it gives what is whole, and warns (RecordingWarning); Recording.problems
+    say more.
     """
     place = Path(path)
     chosen = _fields(fields)
@@ -132,3 +134,7 @@ def _checked(pieces: Blocks, place: Path) -> None:
             f"{place} has recording format {pieces.metadata.get('format')}, this version reads "
             f"{' and '.join(layout.KNOWN_VERSIONS)}; install a newer biotac-gateway"
         )
+    problems = pieces.scan.problems
+    if problems:
+        more = f", and {len(problems) - 1} more: see Recording(...).problems" if len(problems) > 1 else ""
+        warnings.warn(printable(f"{problems[0]}{more}"), RecordingWarning, stacklevel=3)

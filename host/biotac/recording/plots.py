@@ -1,96 +1,42 @@
-"""JSON messages beside the wire, for Foxglove and PlotJuggler: SI units, a frame_id, fewer than the wire has.
+"""Messages beside the wire, for other programs: SI units, a frame_id, fewer than the wire has.
 
-The wire is the truth; these are derived from it, thinned so that a long recording stays small, and no
-reader of ours looks at them. A value that is invalid is left out, as JSON has no NaN and these tools no
-union types.
+The wire is the truth; these are derived from it, thinned so that a long recording stays small, and no reader of ours
+looks at them. JSON (plot_json.py) says all in words; messages of ROS 2 types (plot_ros.py) are drawn without a word.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from mcap.writer import Writer
 
 from ..wire import messages_gen as wire
-from ..wire.batches import Batch
-from ..wire.frames import StructArray
-from . import layout
+from ..wire.batches import Batch, StreamDecoder
+from ..wire.frames import StructArray, electrode_signals
+from . import plot_json, plot_ros
+from .stamps import Stamps
 
 RESULTS_US = 40_000  # 25 a second
+CONTACT_US = 100_000  # 10 a second: seven numbers that hardly compress
 COUNTS_US = 200_000  # 5 a second
-
-
-def _number(what: str) -> dict[str, Any]:
-    return {"type": "number", "description": what}
-
-
-def _vector(what: str) -> dict[str, Any]:
-    return {"type": "object", "description": what, "properties": {axis: {"type": "number"} for axis in "xyz"}}
-
-
-_HEAD = {
-    "timestamp": {
-        "type": "object",
-        "description": "device time on the host's clock (Unix)",
-        "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}},
-    },
-    "frame_id": {"type": "string"},
-    "seq": {"type": "integer", "description": "of the FRAME in /biotac/wire"},
-}
-RESULTS_SCHEMA = {
-    "title": "biotac.Results",
-    "type": "object",
-    "description": "x to the tip, y to E11's side, z dorsal; force and torque act on the finger",
-    "properties": _HEAD
-    | {
-        "force_n": _vector("N"),
-        "torque_nm": _vector("N*m, about the origin; x is derived"),
-        "poc_m": _vector("m, point of contact"),
-        "pressure_force_n": _number("magnitude of the force from static pressure, N; left out unless calibrated"),
-        "torsion_nm": _number(
-            "torque about the outward normal at the contact, N*m; left out unless a wrench map has it"
-        ),
-        "contact": {"type": "boolean"},
-        "flags": {"type": "integer", "description": "flags frame in MESSAGES.md"},
-    },
-}
-COUNTS_SCHEMA = {
-    "title": "biotac.Counts",
-    "type": "object",
-    "properties": _HEAD
-    | {
-        "electrodes": {"type": "array", "items": {"type": "integer"}, "description": "E1..E19; 65535 where missing"},
-        "pdc": _number("static pressure, count"),
-        "tac": _number("thermal flux, count"),
-        "tdc": _number("temperature, count"),
-        "pac": {"type": "array", "items": {"type": "integer"}, "description": "22 samples, 1/2200 s apart, count"},
-    },
-}
-TARE_SCHEMA = {
-    "title": "biotac.Tare",
-    "type": "object",
-    "properties": _HEAD
-    | {
-        "reason": {"type": "string", "description": "enum tare_reason in MESSAGES.md"},
-        "state": {"type": "string", "description": "enum tare_state in MESSAGES.md"},
-        "tare": {"type": "array", "items": {"type": "number"}, "description": "E1..E19, count; -1 where unknown"},
-    },
-}
-_TOPICS = {"results": RESULTS_SCHEMA, "counts": COUNTS_SCHEMA, "tare": TARE_SCHEMA}
+_PERIOD_US = {"results": RESULTS_US, "contact": CONTACT_US, "counts": COUNTS_US, "pac": COUNTS_US}
+_ROS = {"force": plot_ros.ARRAY, "signals": plot_ros.ARRAY, "contact": plot_ros.POSE}
 
 
 @dataclass(frozen=True)
-class _Anchor:
-    """Where device time meets the host's clock."""
+class _Message:
+    """One to be written; ``encode`` makes it, told its stamp in ns."""
 
+    topic: str
+    finger: int
     t_us: int
-    host_ns: int
-
-    def ns(self, t_us: int) -> int:
-        return self.host_ns + (t_us - self.t_us) * 1000
+    seq: int
+    encode: Callable[[int], bytes]
 
 
 class Plots:
@@ -98,38 +44,40 @@ class Plots:
 
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
-        self._anchor: _Anchor | None = None
+        self._stamps: Stamps | None = None
         self._channels: dict[tuple[str, int], int] = {}
         self._schemas: dict[str, int] = {}
         self._due_us: dict[tuple[str, int], int] = {}
 
-    def add(self, batch: Batch, arrived_ns: int) -> bool:
-        """Write what the next rows are good for; true if that was anything."""
-        begin_us = batch.first_t_us()
-        if self._anchor is None and begin_us is not None:
-            self._anchor = _Anchor(begin_us, arrived_ns)
-        if self._anchor is None:
+    def add(self, batch: Batch, decoder: StreamDecoder, arrived_ns: int, all_here_ns: int | None) -> bool:
+        """Write what the next rows are good for; true if that was anything.
+
+        ``decoder`` is theirs; their first byte was here at ``arrived_ns``, all at ``all_here_ns`` if anybody knows.
+        """
+        begin_us, end_us = batch.first_t_us(), batch.last_t_us()
+        if self._stamps is None and begin_us is not None:
+            self._stamps = Stamps(begin_us, arrived_ns)
+        if self._stamps is None:
             return False
-        pac = {(int(row["finger"]), int(row["seq"])): row["pac"] for row in batch.pac[self._thinned("pac", batch.pac)]}
-        messages: list[tuple[int, str, int, dict[str, Any]]] = []
-        for k in self._thinned("results", batch.frames):
-            messages.append(self._message("results", batch.frames[k], results(batch.wire[k])))
-        for k in self._thinned("counts", batch.frames):
-            row = batch.frames[k]
-            block_of = pac.get((int(row["finger"]), int(row["seq"])))
-            extra = {} if block_of is None else {"pac": block_of.tolist()}
-            messages.append(self._message("counts", row, counts(row) | extra))
-        for message in batch.messages:
-            if isinstance(message, wire.Tare):
-                messages.append(self._tare(message))
-        for stamp_ns, topic, finger, body in sorted(messages, key=lambda m: m[0]):
-            data = json.dumps(body, separators=(",", ":")).encode()
-            self._writer.add_message(self._channel(topic, finger), stamp_ns, data, stamp_ns, body["seq"])
+        if end_us is not None and all_here_ns is not None:
+            self._stamps.arrived(end_us, all_here_ns)
+        messages = [*_results(batch, self._thinned("results", batch.frames))]
+        messages += _contacts(batch, self._thinned("contact", batch.frames))
+        messages += _counts(batch, self._thinned("counts", batch.frames), self._thinned("pac", batch.pac))
+        for tare in batch.messages:
+            if isinstance(tare, wire.Tare):
+                t_us = decoder.unwrap_t_us(tare.t_us)
+                messages.append(_json("tare", tare.finger, t_us, tare.seq, plot_json.tare_change(tare)))
+        messages.sort(key=lambda message: message.t_us)
+        stamps = self._stamps(np.array([message.t_us for message in messages], np.int64))
+        for message, stamp_ns in zip(messages, np.maximum(stamps, 0).tolist(), strict=True):
+            channel = self._channel(message.topic, message.finger)
+            self._writer.add_message(channel, stamp_ns, message.encode(stamp_ns), stamp_ns, message.seq)
         return bool(messages)
 
     def _thinned(self, what: str, rows: StructArray) -> list[int]:
         """Rows to show: of each finger the first of every period of device time."""
-        period_us = RESULTS_US if what == "results" else COUNTS_US
+        period_us = _PERIOD_US[what]
         chosen: list[int] = []
         for finger in np.unique(rows["finger"]):
             mine = np.flatnonzero(rows["finger"] == finger)
@@ -139,70 +87,53 @@ class Plots:
             chosen += mine[fresh].tolist()
         return chosen
 
-    def _message(self, topic: str, row: Any, body: dict[str, Any]) -> tuple[int, str, int, dict[str, Any]]:
-        return self._stamped(topic, int(row["finger"]), int(row["t_us"]), int(row["seq"]), body)
-
-    def _tare(self, tare: wire.Tare) -> tuple[int, str, int, dict[str, Any]]:
-        assert self._anchor is not None
-        # Its 32-bit time, unwrapped to the half cycle around where the stream stands.
-        elapsed_us = (tare.t_us - self._anchor.t_us) % 2**32
-        unknown = 0xFFFFFFFF
-        body = {
-            "reason": _name(wire.TareReason, tare.reason),
-            "state": _name(wire.TareState, tare.tare_state),
-            "tare": [-1 if value == unknown else round(value / 65536, 4) for value in tare.tare_q16],
-        }
-        return self._stamped("tare", tare.finger, self._anchor.t_us + elapsed_us, tare.seq, body)
-
-    def _stamped(
-        self, topic: str, finger: int, t_us: int, seq: int, body: dict[str, Any]
-    ) -> tuple[int, str, int, dict[str, Any]]:
-        assert self._anchor is not None
-        stamp_ns = max(0, self._anchor.ns(t_us))
-        head = {
-            "timestamp": {"sec": stamp_ns // 10**9, "nsec": stamp_ns % 10**9},
-            "frame_id": layout.frame_id(finger),
-            "seq": seq,
-        }
-        return stamp_ns, topic, finger, head | body
-
     def _channel(self, topic: str, finger: int) -> int:
-        if topic not in self._schemas:
-            schema = _TOPICS[topic]
-            data = json.dumps(schema).encode()
-            self._schemas[topic] = self._writer.register_schema(str(schema["title"]), "jsonschema", data)
         if (topic, finger) not in self._channels:
+            encoding = "cdr" if topic in _ROS else "json"
             name = f"/biotac/finger{finger}/{topic}"
-            self._channels[topic, finger] = self._writer.register_channel(name, "json", self._schemas[topic])
+            self._channels[topic, finger] = self._writer.register_channel(name, encoding, self._schema(topic))
         return self._channels[topic, finger]
 
-
-def results(row: Any) -> dict[str, Any]:
-    """What one FRAME message says of a contact, SI, invalid values left out."""
-    body: dict[str, Any] = {}
-    for name, field, per_unit, invalid in (
-        ("force_n", "force_100un", 10_000, wire.INVALID_I32),
-        ("torque_nm", "torque_mnmm", 1_000_000, wire.INVALID_I32),
-        ("poc_m", "poc_um", 1_000_000, wire.INVALID_I16),
-    ):
-        values = {
-            axis: value / per_unit for axis, value in zip("xyz", row[field].tolist(), strict=True) if value != invalid
-        }
-        if values:
-            body[name] = values
-    if row["pressure_force_100un"] != wire.INVALID_I32:
-        body["pressure_force_n"] = int(row["pressure_force_100un"]) / 10_000
-    if row["torsion_mnmm"] != wire.INVALID_I32:
-        body["torsion_nm"] = int(row["torsion_mnmm"]) / 1_000_000
-    flags = int(row["flags"])
-    return body | {"contact": bool(flags & wire.FrameFlags.CONTACT), "flags": flags}
+    def _schema(self, topic: str) -> int:
+        title = _ROS.get(topic) or str(plot_json.SCHEMAS[topic]["title"])
+        if title not in self._schemas:
+            encoding, text = (
+                ("ros2msg", plot_ros.SCHEMAS[title])
+                if topic in _ROS
+                else ("jsonschema", json.dumps(plot_json.SCHEMAS[topic]))
+            )
+            self._schemas[title] = self._writer.register_schema(title, encoding, text.encode())
+        return self._schemas[title]
 
 
-def counts(row: Any) -> dict[str, Any]:
-    """Raw counts of one frame, missing slow channels left out."""
-    slow = {name: int(row[name]) for name in ("pdc", "tac", "tdc") if row[name] != wire.INVALID_COUNT}
-    return {"electrodes": row["counts"].tolist()} | slow
+def _results(batch: Batch, chosen: list[int]) -> Iterator[_Message]:
+    for k in chosen:
+        row = batch.frames[k]
+        whose = int(row["finger"]), int(row["t_us"]), int(row["seq"])
+        yield _json("results", *whose, plot_json.results(batch.wire[k]))
+        yield _array("force", *whose, "force on the finger, N: x, y, z", row["force_n"])
 
 
-def _name(kind: Any, value: int) -> str:
-    return str(kind(value).name) if value in list(kind) else str(value)
+def _contacts(batch: Batch, chosen: list[int]) -> Iterator[_Message]:
+    for row in batch.frames[chosen]:
+        whose = int(row["finger"]), int(row["t_us"]), int(row["seq"])
+        poc_m = row["poc_mm"] / 1000
+        if not np.isnan(poc_m).any():
+            yield _Message("contact", *whose, partial(plot_ros.contact, whose[0], poc_m, row["force_n"]))
+
+
+def _counts(batch: Batch, chosen: list[int], pacs: list[int]) -> Iterator[_Message]:
+    pac = {(int(row["finger"]), int(row["seq"])): row["pac"] for row in batch.pac[pacs]}
+    signals = electrode_signals(batch.wire[chosen])
+    for row, its in zip(batch.frames[chosen], signals, strict=True):
+        whose = int(row["finger"]), int(row["t_us"]), int(row["seq"])
+        yield _json("counts", *whose, plot_json.counts(row, pac.get((whose[0], whose[2]))))
+        yield _array("signals", *whose, "above rest, count: E1 to E19", its)
+
+
+def _json(topic: str, finger: int, t_us: int, seq: int, body: dict[str, Any]) -> _Message:
+    return _Message(topic, finger, t_us, seq, partial(plot_json.encoded, body, finger, seq))
+
+
+def _array(topic: str, finger: int, t_us: int, seq: int, label: str, values: Any) -> _Message:
+    return _Message(topic, finger, t_us, seq, lambda stamp_ns: plot_ros.array(label, values))

@@ -27,6 +27,7 @@ from . import layout
 from .block import FRAME, IDLE, PAC, as_sent
 from .blocks import Blocks, is_lossless
 from .layout import finger_of
+from .stamps import Stamps
 from .tabular import to_pandas, to_xarray
 
 
@@ -38,8 +39,10 @@ class Recording:
     board's, ``calibrations`` and ``maps`` (bytes, as the board holds them) those in force, by finger, when it began,
     ``names`` what fingers were called: ``recording["index"]`` is that finger's frames.
     ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its
-    index; ``damaged_chunks``: seconds that were left out; ``gaps``: times in which the board was away. ``blocks`` are
-    the wire's bytes as they came, about one a second, and ``arrived_ns`` when each began, by the host's clock (Unix).
+    index; ``damaged_chunks``: seconds that were left out; ``wrong_checksums``: over the file's records and its index;
+    ``gaps``: times in which the board was away. ``blocks`` are the wire's bytes as they came, about one a second,
+    ``arrived_ns`` when each began, by the host's clock (Unix), ``all_here_ns`` when it was whole (None where nobody
+    knows).
     Raises RecordingError when nothing can be read. ``show`` is told the share of the work that is done.
     """
 
@@ -50,6 +53,10 @@ class Recording:
         self._pieces = list(blocks)
         self._take_facts(blocks)
         self.arrived_ns: list[int] = [piece.arrived_ns for piece in self._pieces]
+        # Imported ones say of both times that they are the first.
+        self.all_here_ns: list[int | None] = [
+            piece.all_here_ns if piece.all_here_ns != piece.arrived_ns else None for piece in self._pieces
+        ]
         decoder = StreamDecoder()
         decoder.accept_newer_minor()
         batch = self._rows(decoder) or self._decoded(decoder, show)
@@ -70,6 +77,7 @@ class Recording:
         self.problems: list[str] = blocks.scan.problems
         self.cut_off = blocks.scan.cut_off
         self.damaged_chunks = blocks.scan.damaged_chunks
+        self.wrong_checksums = blocks.scan.wrong_checksums
         for facts in blocks.gaps:
             self._take_gap(facts)
         if blocks.metadata is None:
@@ -96,7 +104,7 @@ class Recording:
         others = decoder.feed(b"".join(piece.rest.raw for piece in pieces if piece.rest))
         if len(others.wire) or len(others.pac) or len(others.idle):
             return None
-        self._arrivals = [(p.rest.last_us, p.all_here_ns / 1e9) for p in pieces if p.rest and p.rest.last_us]
+        self._take_arrivals([piece.rest.last_us if piece.rest else None for piece in pieces])
         self.counts = replace(decoder.counts, good=decoder.counts.good + len(sent) + len(pac) + len(idle))
         rows = Batch(as_sent(sent, FRAME), sent["seq"].astype(np.int64), sent["t_us"], pac, idle, others.messages)
         return rows
@@ -106,10 +114,14 @@ class Recording:
         for k, piece in enumerate(self._pieces):
             parts.append(decoder.feed(piece.bytes()))
             show((k + 1) / len(self._pieces))
-        ends = [(part.last_t_us(), piece.all_here_ns / 1e9) for part, piece in zip(parts, self._pieces, strict=True)]
-        self._arrivals = [(t_us, at_s) for t_us, at_s in ends if t_us is not None]
+        self._take_arrivals([part.last_t_us() for part in parts])
         self.counts = decoder.counts
         return join(parts)
+
+    def _take_arrivals(self, last_us: list[int | None]) -> None:
+        """``last_us``: of each block's rows, None or 0 without any."""
+        ends = zip(last_us, self.all_here_ns, strict=True)
+        self._arrivals = [(t_us, at_ns) for t_us, at_ns in ends if t_us and at_ns is not None]
 
     @property
     def frames(self) -> StructArray:
@@ -123,14 +135,25 @@ class Recording:
 
     def to_pandas(self) -> Any:
         """The frames as a pandas DataFrame (tabular.py), in the order of arrival. Needs the extra ``pandas``."""
-        return to_pandas(self.frames, self._stamp_ns())
+        return to_pandas(self.frames, self.stamp_ns(self.frames["t_us"]))
 
     def to_xarray(self) -> Any:
         """The frames as an xarray Dataset (tabular.py). Needs the extra ``pandas``."""
-        return to_xarray(self.frames, self._stamp_ns())
+        return to_xarray(self.frames, self.stamp_ns(self.frames["t_us"]))
 
-    def _stamp_ns(self) -> NDArray[np.int64]:
-        stamps: NDArray[np.int64] = self.begin_ns + (self.frames["t_us"] - self.begin_us) * 1000
+    def stamp_ns(self, t_us: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Device times (n,) in us on the host's clock, Unix ns (n,): ``begin_ns`` plus elapsed device time.
+
+        Elapsed by the host's clock, whose drift against the board's is measured from when each second had come; by the
+        board's own in recordings of less than ten seconds, and where a board did not keep pace with the host.
+        """
+        return self._stamps(t_us)
+
+    @cached_property
+    def _stamps(self) -> Stamps:
+        stamps = Stamps(self.begin_us, self.begin_ns)
+        for t_us, at_ns in self._arrivals:
+            stamps.arrived(t_us, at_ns)
         return stamps
 
     def __getitem__(self, finger: int | str) -> StructArray:
@@ -146,8 +169,8 @@ class Recording:
         from the board to the file.
         """
         clock = DeviceClock(promised_delay_s=promised_delay_s, unix_offset_s=0.0)
-        for t_us, at_s in self._arrivals:
-            clock.arrived(t_us + LAST_SAMPLE_US, at_s)
+        for t_us, at_ns in self._arrivals:
+            clock.arrived(t_us + LAST_SAMPLE_US, at_ns / 1e9)
         return clock
 
     def _take_gap(self, text: dict[str, str]) -> None:
@@ -184,11 +207,11 @@ class Recording:
         self.sensors = [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))]
         named = json.loads(metadata["settings"])
         own = json.loads(metadata.get("calibrations", "{}"))
-        # A setting or a calibration that this recording's firmware did not have yet: the default, and none.
+        # A setting or a calibration that this recording's firmware did not have yet: what it did, and none.
         self.calibrations = {int(finger): from_dict(its) for finger, its in own.items()}
         self.maps = _maps(metadata.get("maps", "{}"))
         self.names = layout.names_of(metadata)
-        self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting}
+        self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].before)) for s in wire.Setting}
 
     @property
     def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:

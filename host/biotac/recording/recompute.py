@@ -278,6 +278,6 @@ def _write(
     with out.open("xb") as stream:
         file = RecordingFile(stream, metadata)
         for k, block in enumerate(blocks):
-            file.add(bytes(block), recording.arrived_ns[k])
+            file.add(bytes(block), recording.arrived_ns[k], recording.all_here_ns[k])
             show((k + 1) / len(blocks))
         file.close()

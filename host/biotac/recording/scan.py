@@ -1,13 +1,15 @@
 """An MCAP file from its first byte to its last: what of it is whole, and only the chunks that are wanted.
 
-Every chunk has a checksum, and the file's own statistics say how many there were: a flipped bit shows in one or the
-other.
+Every chunk has a checksum, the two halves of the file have one each, and its statistics say how many chunks, notes and
+messages there were: a flipped bit shows in one or the other.
 """
 
 from __future__ import annotations
 
 import io
 import struct
+import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -16,24 +18,28 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema, Statistics
+from mcap.records import Channel, Chunk, DataEnd, Footer, McapRecord, Message, Metadata, Schema, Statistics
 from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from ..errors import RecordingError
 
-# A second of five fingers is 0.1 MB and compresses to a fifth, one of fingers at rest to a fiftieth.
-_CHUNK_MAX_BYTES = 1 << 26
-_RATIO_MAX = 1000
-_FREE_BYTES = 1 << 26
+# A second of five fingers is 0.1 MB. Files have a quarter of what they unpack to; those of format 1, with fingers at
+# rest, a fiftieth. In memory it becomes ten times that.
+_CHUNK_MAX_BYTES = 1 << 23
+_RATIO_MAX = 100
+_FREE_BYTES = 1 << 24
 
 _HEAD = struct.Struct("<BQ")
 _CHANNEL = struct.Struct("<H")
+_FOOTER_BYTES = _HEAD.size + 16  # that its checksum is over, too
 _READ: dict[int, Any] = {
     Opcode.METADATA: Metadata,
     Opcode.SCHEMA: Schema,
     Opcode.CHANNEL: Channel,
     Opcode.STATISTICS: Statistics,
+    Opcode.DATA_END: DataEnd,
+    Opcode.FOOTER: Footer,
 }
 
 
@@ -42,19 +48,31 @@ def _content(stream: BinaryIO, at: int, length: int) -> ReadDataStream:
     return ReadDataStream(io.BytesIO(stream.read(length)))
 
 
+def _crc32(stream: BinaryIO, begin: int, end: int) -> int:
+    """Of the file's bytes from begin to end; the stream stays where it is."""
+    here, crc = stream.tell(), 0
+    stream.seek(begin)
+    while begin < end and (data := stream.read(min(end - begin, 1 << 20))):
+        crc = zlib.crc32(data, crc)
+        begin += len(data)
+    stream.seek(here)
+    return crc
+
+
 class Scan:
     """Iterating gives Metadata, and the messages of ``wanted`` topics as (topic, Message).
 
     ``schemas`` by topic, as far as it has come. Afterwards ``problems`` in words, ``cut_off`` (the file ends without
-    its index) and ``damaged_chunks``. Chunks that nobody wants are checked only with ``check``. RecordingError for what
-    is no MCAP file, or unpacks to far more than recordings do.
+    its index), ``damaged_chunks`` and ``wrong_checksums`` (of the file's halves). Chunks that nobody wants, and the
+    halves, are checked only with ``check``. RecordingError for what is no MCAP file, or unpacks to far more than
+    recordings do.
     """
 
     def __init__(self, path: Path, wanted: Callable[[str], bool], *, check: bool = True) -> None:
         self.path = path
         self.problems: list[str] = []
         self.cut_off = False
-        self.damaged_chunks = 0
+        self.damaged_chunks = self.wrong_checksums = 0
         self.schemas: dict[str, bytes] = {}
         self._wanted = wanted
         self._check = check
@@ -62,7 +80,9 @@ class Scan:
         self._schema: dict[int, bytes] = {}
         self._unpacked = 0
         self._chunks = self._metadata = 0
+        self._messages: Counter[int] = Counter()  # of wanted topics, by channel
         self._counted = False
+        self._data_end = 0  # where the first half ends
 
     def __iter__(self) -> Iterator[Metadata | tuple[str, Message]]:
         try:
@@ -88,11 +108,13 @@ class Scan:
                 elif held is not None:
                     yield from self._open(stream, *held, channels)
                     held = None
+                if whole and opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                    self._prove(stream, opcode, at, length)
                 if not whole or opcode == Opcode.FOOTER:
                     break
                 if opcode == Opcode.CHUNK:
                     held, channels = (at, length), set()
-                elif opcode in _READ:
+                elif opcode in _READ and opcode != Opcode.DATA_END:
                     yield from self._one(opcode, _content(stream, at, length))
                 good_until = at + length
                 stream.seek(good_until)
@@ -102,14 +124,38 @@ class Scan:
                 f"{self.path.name} ends without its index, as after a kill or a full disk: its last "
                 f"{self._size - good_until} bytes are missing or unreadable, what came before them is read"
             )
-        elif not self._counted:
+        elif not self._counted or not self._data_end:
             self.problems.append(f"{self.path.name} is damaged: without its statistics nobody knows what is missing")
 
-    def _one(self, opcode: int, content: ReadDataStream) -> Iterator[Metadata | tuple[str, Message]]:
+    def _prove(self, stream: BinaryIO, opcode: int, at: int, length: int) -> None:
+        """Hold the checksum that a DataEnd or Footer has against what it is over; 0 is none, as in format 1."""
+        record = self._read(opcode, _content(stream, at, length))
+        if isinstance(record, DataEnd):
+            self._data_end = at + length
+            begin, end, told = 0, at - _HEAD.size, record.data_section_crc
+        elif isinstance(record, Footer):
+            begin, end, told = record.summary_start, at - _HEAD.size + _FOOTER_BYTES, record.summary_crc
+            if begin != self._data_end:
+                self.problems.append(f"{self.path.name} is damaged: its index is not where its end says")
+                return
+        else:
+            return
+        if self._check and told and _crc32(stream, begin, end) != told:
+            self.wrong_checksums += 1
+            what = "records" if opcode == Opcode.DATA_END else "index"
+            self.problems.append(f"{self.path.name} is damaged: the checksum over its {what} is wrong")
+
+    def _read(self, opcode: int, content: ReadDataStream) -> Any:
+        """A record; None, and a problem, for a damaged one."""
         try:
-            record = _READ[opcode].read(content)
+            return _READ[opcode].read(content)
         except (McapError, struct.error, ValueError, EOFError, MemoryError, OverflowError) as error:
             self.problems.append(f"a record of {self.path.name} is damaged and left out ({error})")
+            return None
+
+    def _one(self, opcode: int, content: ReadDataStream) -> Iterator[Metadata | tuple[str, Message]]:
+        record = self._read(opcode, content)
+        if record is None:
             return
         if isinstance(record, Metadata):
             self._metadata += 1
@@ -132,8 +178,19 @@ class Scan:
                         f"{self.path.name} has {seen[0]} chunks and {seen[1]} notes, and its statistics say {told[0]} "
                         f"and {told[1]}: some of it is damaged beyond recognition"
                     )
+                self._compare(record.channel_message_counts)
             elif isinstance(record, Message) and self._wanted(topic := self._topics.get(record.channel_id, "")):
+                self._messages[record.channel_id] += 1
                 yield topic, record
+
+    def _compare(self, told: dict[int, int]) -> None:
+        """Messages of wanted topics, unless damage that explains it was named."""
+        wanted = {channel for channel in {*told, *self._messages} if self._wanted(self._topics.get(channel, ""))}
+        if not self.damaged_chunks and any(told.get(channel, 0) != self._messages[channel] for channel in wanted):
+            self.problems.append(
+                f"{self.path.name} has {sum(self._messages.values())} blocks, and its statistics say "
+                f"{sum(told.get(channel, 0) for channel in wanted)}: some of it is damaged beyond recognition"
+            )
 
     def _open(self, stream: BinaryIO, at: int, length: int, channels: set[int]) -> Iterator[tuple[str, Message]]:
         self._chunks += 1

@@ -79,13 +79,13 @@ def _repeated(spec: FingerSpec, repetition: int) -> FingerSpec:
 def _lay(fault: Fault, words: sampling.Words, period: int) -> None:
     """Put the fault's code into ``words`` (frames, 44) at every slot that begins while it lasts."""
     frames, slots = words.shape
-    slot = np.arange(frames * slots).reshape(frames, slots)
     # in slot numbers: comparing seconds would let rounding decide at the edges
     begin, end = (round(t * _sensor.SLOT_HZ) for t in (fault.at_s, fault.at_s + fault.seconds))
-    hit = (slot % (period * slots) >= begin) & (slot % (period * slots) < end)
-    if fault.channel is not None:
-        hit &= np.array(_sensor.SLOTS) == fault.channel
-    words[hit] = fault.code
+    mine = np.ones(slots, np.bool_) if fault.channel is None else np.array(_sensor.SLOTS) == fault.channel
+    for first in range(begin // slots, frames, period):
+        rows = words[first : first + -(-end // slots) - begin // slots]
+        slot = np.arange(rows.size).reshape(rows.shape) + begin // slots * slots
+        rows[(slot >= begin) & (slot < end) & mine] = fault.code
 
 
 def _fit(scenario: Scenario, specs: list[FingerSpec], period: int) -> dict[str, int]:

@@ -41,6 +41,7 @@ FORCE_MAX_N = 50.0
 SHEAR_MAX_N = 20.0
 TORSION_MAX_NMM = 100.0
 SEED_MAX = 2**31 - 1
+FAULTS_MAX_S = 36_000.0  # all together; what they take to play goes by it
 
 FAULT_CODES = {
     "bad_parity": tape.BAD_PARITY,
@@ -113,12 +114,15 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
     tracks = tuple(Track() for _ in specs)
     for step in steps:
         _add_step(step, tracks)
+    faults = tuple(_fault(table, len(specs), tracks[0].seconds) for table in top.tables("fault"))
+    if sum(fault.seconds for fault in faults) > FAULTS_MAX_S:
+        raise top.error("fault", "lasts too long", f"{FAULTS_MAX_S:g} s in all at most", "leave some out")
     return Scenario(
         name=name,
         fit_gains="gains" in top,
         fingers=specs,
         tracks=tracks,
-        faults=tuple(_fault(table, len(specs), tracks[0].seconds) for table in top.tables("fault")),
+        faults=faults,
         seconds=tracks[0].seconds,
     )
 

@@ -27,10 +27,13 @@ class Lines:
             for number, line in enumerate(self._lines, 1)
             if (match := _HEADER.match(line)) is not None
         ]
+        self._tables: dict[str, list[int]] = {}
+        for number, header in self._headers:
+            self._tables.setdefault(header, []).append(number)
 
     def table(self, name: str, index: int) -> int:
         """Line of the header of the ``index``-th table called ``name``; 1 if it has no header."""
-        places = [number for number, header in self._headers if header == name]
+        places = self._tables.get(name, [])
         return places[index] if index < len(places) else 1
 
     def key(self, start: int, key: str) -> int:

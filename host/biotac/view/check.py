@@ -41,7 +41,7 @@ def check() -> Checked:
         problems += [f"nothing uses {name}" for name in missing]
         about, frames = first_frames(port)
         problems += judge(about, frames)
-        problems += judge_commands(port, about["token"])
+        problems += judge_commands(port, viewing.server.token)
         seen = {row["finger"] for row in frames}
         return Checked(len(viewing.server.files), sum(sizes), len(seen), len(frames), problems)
 

@@ -52,7 +52,8 @@ class Reader:
     def ask(self, name: str, finger: int | None) -> str:
         """Have the thread carry out a command; return what was done, in words.
 
-        Raises InputError for an unknown command or when nothing plays, else what the Player raises.
+        Raises InputError for an unknown command, when nothing plays, and when it was not begun in time: then it never
+        will be. Else what the Player raises.
         """
         if name not in COMMANDS:
             raise InputError(f"no command is called {name!r}; expected one of {', '.join(COMMANDS)}")
@@ -61,7 +62,11 @@ class Reader:
         try:
             return command.done.result(timeout=ANSWER_S)
         except TimeoutError:
-            raise InputError(f"no answer to {name} within {ANSWER_S:.0f} s; the board may be gone") from None
+            if not command.done.cancel():
+                raise InputError(
+                    f"{name} was begun and has taken over {ANSWER_S:.0f} s; look what came of it"
+                ) from None
+            raise InputError(f"{name} was not begun within {ANSWER_S:.0f} s, and will not be; try again") from None
 
     # ---- the thread ----------------------------------------------------------------------------
 
@@ -105,7 +110,7 @@ class Reader:
             self._state.take(batch, player)
             while not self._commands.empty():
                 command = self._commands.get()
-                if command is not None:
+                if command is not None and command.done.set_running_or_notify_cancel():
                     self._obey(player, command)
             if self._stop.is_set():
                 return False
@@ -138,7 +143,7 @@ class Reader:
                 command = self._commands.get(timeout=seconds)
             except queue.Empty:
                 return
-            if command is None:
+            if command is None or not command.done.set_running_or_notify_cancel():
                 continue
             if command.name == "again":
                 command.done.set_result("playing again" if link == "over" else "looking again")

@@ -1,15 +1,18 @@
 """HTTP on 127.0.0.1: static files, one stream of events, one address for commands.
 
-Any page that a browser shows can send requests here, so commands need a secret that only our own page can
-read (another origin's requests for it are answered, but not shown to it), and requests under a foreign
-name are refused: a name that its owner points at 127.0.0.1 would make our page his.
+Any page that a browser shows can send requests here, and so can any program of this computer: commands need a secret
+that stands in the page's address alone, behind a #, which browsers keep to themselves. Requests under a foreign name
+are refused: a name that its owner points at 127.0.0.1 would make our page his. Connections are few: of those that have
+not asked yet, the oldest makes room.
 """
 
 from __future__ import annotations
 
+import contextlib
 import secrets
 import socket
 import sys
+import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
@@ -29,6 +32,8 @@ QUIET_S = 1.0  # then a comment is sent, which is how a browser that left is not
 SEND_BUFFER_BYTES = 1 << 16
 SEND_TIMEOUT_S = 10.0
 MAX_BODY_BYTES = 1000
+MAX_CONNECTIONS = 32  # that ask or are answered; a browser has six
+MAX_PAGES = 16
 TYPES = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css; charset=utf-8",
@@ -55,6 +60,9 @@ class ViewServer(ThreadingHTTPServer):
         self.reader = reader
         self.token = secrets.token_urlsafe(24)
         self.files = static_files()
+        self._counting = threading.Lock()
+        self._asking: dict[Any, None] = {}  # connections, the oldest first
+        self._pages: set[Any] = set()  # those that get events
         try:
             super().__init__((HOST, port), Handler)
         except OSError as error:
@@ -63,8 +71,35 @@ class ViewServer(ThreadingHTTPServer):
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """Where the page is, for whoever only looks."""
         return f"http://{HOST}:{self.server_port}/"
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """See socketserver; makes room first."""
+        with self._counting:
+            while len(self._asking) >= MAX_CONNECTIONS:
+                oldest = next(iter(self._asking))
+                del self._asking[oldest]
+                with contextlib.suppress(OSError):
+                    oldest.shutdown(socket.SHUT_RDWR)  # its thread reads the end, and ends
+            self._asking[request] = None
+        super().process_request(request, client_address)
+
+    def begin_page(self, request: Any) -> bool:
+        """The connection gets events from now on, unless too many do."""
+        with self._counting:
+            if len(self._pages) >= MAX_PAGES:
+                return False
+            self._asking.pop(request, None)
+            self._pages.add(request)
+            return True
+
+    def shutdown_request(self, request: Any) -> None:
+        """See socketserver."""
+        with self._counting:
+            self._asking.pop(request, None)
+            self._pages.discard(request)
+        super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that goes away in the middle of an answer is nobody's error; anything else is ours."""
@@ -100,7 +135,7 @@ class Handler(BaseHTTPRequestHandler):
         if not self._known_name():
             return
         if not secrets.compare_digest(self.headers.get(TOKEN_HEADER, "").encode(), self.server.token.encode()):
-            self._words(403, "this page is of another run of the program; reload it")
+            self._words(403, "this page only shows; for commands open the address that `biotac view` printed")
             return
         if self.path != "/command":
             self._words(404, f"nothing is at {self.path}")
@@ -129,12 +164,15 @@ class Handler(BaseHTTPRequestHandler):
         return False
 
     def _events(self) -> None:
+        if not self.server.begin_page(self.connection):
+            self._words(503, f"{MAX_PAGES} pages are open already; close one")
+            return
         self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
         self.close_connection = True
         self._head(200, "text/event-stream", {"Connection": "close"})
         state = self.server.state
         cursor = state.cursor()
-        about = facts() | {"token": self.server.token, "token_header": TOKEN_HEADER}
+        about = facts() | {"token_header": TOKEN_HEADER}
         self._send(f"retry: 500\nevent: about\ndata: {compact(about)}\n\n")
         while not state.closed:
             begin_s = time.monotonic()

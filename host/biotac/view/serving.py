@@ -42,8 +42,8 @@ class Viewing:
 
     @property
     def url(self) -> str:
-        """Where the page is."""
-        return self.server.url
+        """Where the page is; with what commands need, which only its own reader is to have."""
+        return f"{self.server.url}#{self.server.token}"
 
     def wait(self) -> None:
         """Wait for a failure, which is raised; there is no other end."""

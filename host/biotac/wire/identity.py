@@ -33,5 +33,6 @@ def serial_text(hello: wire.Hello) -> str:
 
 
 def ascii_text(values: Iterable[int]) -> str:
-    """A sensor's zero-padded ASCII, such as its serial number."""
-    return bytes(values).rstrip(b"\0").decode("ascii", errors="replace")
+    """A sensor's zero-padded ASCII, such as its serial number; what is none, or would move a terminal, as U+FFFD."""
+    text = bytes(values).rstrip(b"\0").decode("ascii", errors="replace")
+    return "".join(c if c.isprintable() else "\ufffd" for c in text)

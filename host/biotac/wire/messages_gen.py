@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0x0CE1D802
+SCHEMA_HASH = 0x471C3819
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -84,7 +84,7 @@ class ForceModel(IntEnum):
     """What the force of a finger without a wrench map comes from."""
 
     LIN = 0  # Lin's three scales, force_gain_*_nn
-    POPULATION = 1  # the population map, made of other fingers (host/docs/population.md), while the force gains are the defaults; with others it is LIN
+    POPULATION = 1  # the population map, made of other fingers (host/docs/population.md), while all three force gains are the defaults; with others it is LIN
 
 
 class Board(IntEnum):
@@ -208,7 +208,7 @@ POC_WEIGHTS_DOC: dict[int, str] = {
 
 FORCE_MODEL_DOC: dict[int, str] = {
     0: "Lin's three scales, force_gain_*_nn",
-    1: "the population map, made of other fingers (host/docs/population.md), while the force gains are the defaults; with others it is LIN",
+    1: "the population map, made of other fingers (host/docs/population.md), while all three force gains are the defaults; with others it is LIN",
 }
 
 
@@ -301,65 +301,66 @@ class SettingSpec(NamedTuple):
     low: int
     high: int
     default: int
+    before: int  # what firmware that does not have it does
     doc: str
 
 
 SETTINGS: dict[Setting, SettingSpec] = {
     Setting.POC_WEIGHTS: SettingSpec(
-        "enum poc_weights", 0, 2, 1,
+        "enum poc_weights", 0, 2, 1, 1,
         "weights of the point of contact; compression n=1 is best on real plates",
     ),
     Setting.FORCE_GAIN_X_NN: SettingSpec(
-        "nN/count", -100000000, 100000000, 1063440,
+        "nN/count", -100000000, 100000000, 1063440, 1063440,
         "S_x of Lin Eq 3; default: one real finger, least squares without offset; calibrate yours",
     ),
     Setting.FORCE_GAIN_Y_NN: SettingSpec(
-        "nN/count", -100000000, 100000000, 252325,
+        "nN/count", -100000000, 100000000, 252325, 252325,
         "S_y of Lin Eq 3",
     ),
     Setting.FORCE_GAIN_Z_NN: SettingSpec(
-        "nN/count", -100000000, 100000000, 2262234,
+        "nN/count", -100000000, 100000000, 2262234, 2262234,
         "S_z of Lin Eq 3",
     ),
     Setting.TORQUE_GAIN_Y_NN: SettingSpec(
-        "nN/count", -100000000, 100000000, 2262234,
+        "nN/count", -100000000, 100000000, 2262234, 2262234,
         "scale of M_y, Lin Eq 4; default: S_z, whose force is its lever load; no torque truth exists for a real finger",
     ),
     Setting.TORQUE_GAIN_Z_NN: SettingSpec(
-        "nN/count", -100000000, 100000000, 252325,
+        "nN/count", -100000000, 100000000, 252325, 252325,
         "scale of M_z, Lin Eq 4; default: S_y",
     ),
     Setting.CONTACT_ENERGY_COUNT2: SettingSpec(
-        "count^2", 50, 1000000, 1000,
+        "count^2", 50, 1000000, 1000, 1000,
         "sum of e^2 above which a finger is touched (Lin IV.B); raised to three times the measured noise energy",
     ),
     Setting.STATUS_PERIOD_MS: SettingSpec(
-        "ms", 100, 60000, 1000,
+        "ms", 100, 60000, 1000, 1000,
         "between two periodic STATUS rounds",
     ),
     Setting.IDLE_PERIOD_MS: SettingSpec(
-        "ms", 20, 60000, 100,
+        "ms", 20, 60000, 100, 100,
         "between two IDLE heartbeats of an untouched finger",
     ),
     Setting.THERMAL_GAIN_MILLI: SettingSpec(
-        "count/1000 per TDC count", -5000, 5000, 500,
+        "count/1000 per TDC count", -5000, 5000, 500, 500,
         "how much a resting electrode gains per count of temperature: the tare follows it in contact; 700 to 970 seen on real fingers, where TDC alone does not tell all",
     ),
     Setting.PRESSURE_GAIN_NN: SettingSpec(
-        "nN/count", 0, 100000000, 0,
+        "nN/count", 0, 100000000, 0, 0,
         "K of Navarro 2015 Eq 1, force per count of static pressure; 0: not calibrated, and no force is told. 9 to 16 million there; `biotac calibrate pressure` finds yours",
     ),
     Setting.PRESSURE_FILTER_MILLI: SettingSpec(
-        "1/1000", 10, 1000, 500,
+        "1/1000", 10, 1000, 500, 500,
         "alpha of Navarro 2015 Eq 3, the weight of a new pressure word in the filter; 1000: no filter",
     ),
     Setting.HOLD_TIMEOUT_MS: SettingSpec(
-        "ms", 0, 3600000, 2000,
+        "ms", 0, 3600000, 2000, 2000,
         "how long HOLD outlives the host's last word; 0: for ever",
     ),
     Setting.FORCE_MODEL: SettingSpec(
-        "enum force_model", 0, 1, 0,
-        "force of a finger that has neither a wrench map nor force gains of its own",
+        "enum force_model", 0, 1, 1, 0,
+        "force of a finger that has neither a wrench map nor force gains of its own; firmware, records and recordings that do not know it: LIN",
     ),
 }
 

@@ -363,6 +363,23 @@ static void settings_come_back_and_others_keep_their_defaults(void **state)
     assert_memory_equal(&back, &settings, sizeof back);
 }
 
+// Whoever saved settings with a firmware before wire 1.5 goes on with the force that it computed.
+static void a_record_without_the_force_model_means_lins(void **state)
+{
+    (void)state;
+    bt_settings settings;
+    uint8_t record[BT_SETTINGS_RECORD_BYTES];
+    bt_settings_reset(&settings);
+    assert_int_equal(bt_settings_get(&settings, BT_SETTING_FORCE_MODEL), BT_FORCE_MODEL_POPULATION);
+    bt_settings_pack(&settings, record);
+    const size_t without = BT_SETTINGS_RECORD_BYTES - BT_SETTING_PAIR_BYTES;
+    assert_int_equal(record[without], BT_SETTING_FORCE_MODEL);
+    bt_settings_unpack(&settings, BT_SETTINGS_RECORD_VERSION, record, without);
+    assert_int_equal(bt_settings_get(&settings, BT_SETTING_FORCE_MODEL), BT_FORCE_MODEL_LIN);
+    bt_settings_unpack(&settings, BT_SETTINGS_RECORD_VERSION, record, sizeof record);
+    assert_int_equal(bt_settings_get(&settings, BT_SETTING_FORCE_MODEL), BT_FORCE_MODEL_POPULATION);
+}
+
 #define T(test) cmocka_unit_test_setup(test, new_flash)
 
 int main(void)
@@ -378,6 +395,7 @@ int main(void)
         T(nor_do_half_done_bytes),
         T(each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new),
         T(settings_come_back_and_others_keep_their_defaults),
+        T(a_record_without_the_force_model_means_lins),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

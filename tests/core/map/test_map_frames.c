@@ -7,6 +7,9 @@ static bt_msg_frame published(emulated_finger *finger, const bt_map *map, uint16
 {
     bt_settings all;
     bt_settings_reset(&all);
+    if (map == NULL) { // a map stands before the population map, with the flags and sigmas of Lin's scales
+        (void)bt_settings_set(&all, BT_SETTING_FORCE_MODEL, BT_FORCE_MODEL_LIN);
+    }
     bt_solve_settings settings = bt_solve_settings_from(&all);
     assert_true(settings.map == NULL);
     settings.map = map;

@@ -17,6 +17,7 @@ static bt_settings all_settings;
 static bt_solve_settings kernel_settings(int weights)
 {
     bt_settings_reset(&all_settings);
+    (void)bt_settings_set(&all_settings, BT_SETTING_FORCE_MODEL, BT_FORCE_MODEL_LIN); // whose sigma is noise
     assert_int_equal(bt_settings_set(&all_settings, BT_SETTING_POC_WEIGHTS, weights), BT_ERROR_OK);
     return bt_solve_settings_from(&all_settings);
 }

@@ -7,6 +7,8 @@ static course_log full, lean, short_of_room;
 #define WANTED_AT_ALL                                                                                        \
     (BT_QUANTITY_FLAG_POC | BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE | BT_QUANTITY_FLAG_PRESSURE)
 
+#define BY_POPULATION (BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE)
+
 static const uint8_t subscriptions[] = {
     0,
     BT_QUANTITY_FLAG_POC,
@@ -54,6 +56,7 @@ static void as_subscribed(bt_msg_frame *frame, uint8_t quantities)
     if (!poc && !torque && !(frame->flags & BT_FRAME_FLAG_UNTARED)) {
         frame->flags &= ~(uint32_t)BT_FRAME_FLAG_POC_INVALID;
     }
+    frame->flags &= force || torque ? ~0u : ~(uint32_t)BY_POPULATION;
     frame->pdc_filtered_q4 = pressure ? frame->pdc_filtered_q4 : 0xFFFF;
     frame->pressure_force_100un = pressure ? frame->pressure_force_100un : INT32_MIN;
     frame->torsion_mnmm = torque ? frame->torsion_mnmm : INT32_MIN;
@@ -121,7 +124,7 @@ static void the_course_has_everything_in_it(void **state)
         sigmas += frame.poc_sigma_um != 0xFFFF;
     }
     // All but a railed electrode, a minute of contact and a degree; and nobody asks who came back.
-    uint32_t all = ((1u << 18) - 1) | BT_FRAME_FLAG_SENSOR_UNSURE;
+    uint32_t all = ((1u << 18) - 1) | BT_FRAME_FLAG_SENSOR_UNSURE | BY_POPULATION;
     assert_int_equal(seen, all
                                & ~(uint32_t)(BT_FRAME_FLAG_RAIL | BT_FRAME_FLAG_BASE_OLD | BT_FRAME_FLAG_TEMP
                                              | BT_FRAME_FLAG_NOT_ASKED));
@@ -175,7 +178,7 @@ static int tile(const course_log *log, int finger, int idle_rounds)
             assert_true(after->id == BT_FRAME_ID && of_finger(after, finger) && seq_at(after) == next);
         }
         uint32_t computed = BT_FRAME_FLAG_POC_LOW | BT_FRAME_FLAG_SHEAR_MIX | BT_FRAME_FLAG_TORSION_OK
-                            | BT_FRAME_FLAG_TARE_CHANGED;
+                            | BT_FRAME_FLAG_TARE_CHANGED | BY_POPULATION;
         computed |= frame.flags & BT_FRAME_FLAG_UNTARED ? 0 : BT_FRAME_FLAG_POC_INVALID;
         assert_int_equal(idle.flags, (frame.flags & ~computed) | BT_FRAME_FLAG_NOT_ASKED);
         assert_int_equal(idle.t_us, frame.t_us);

@@ -155,6 +155,7 @@ static void the_roll_back_takes_the_tare_of_at_least_a_second_before(void **stat
     for (int phase = 0; phase < 24; phase++) {
         emulated_finger finger;
         finger_init(&finger);
+        finger.has_pdc = false;   // or what drift has made since would be added
         finger.drift_per_s = 0.4; // the tare follows, so each of its values has a time
         run_frames(&finger, 500 + phase);
         int frames = 0;
@@ -166,6 +167,7 @@ static void the_roll_back_takes_the_tare_of_at_least_a_second_before(void **stat
         // The same finger once more, recorded: which of its tares came back?
         emulated_finger twin;
         finger_init(&twin);
+        twin.has_pdc = false;
         twin.drift_per_s = 0.4;
         int age = -1;
         for (int k = 1; k <= 500 + phase; k++) {

@@ -56,7 +56,7 @@ def test_a_reading_that_is_wrong_shows_held_out(firm: Population) -> None:
 
 def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "own.wrench.json"
-    words = ["calibrate", "scale", "sim:fingers.toml", "--finger", "thumb", "--presses", "3", "--json"]
+    words = ["calibrate", "scale", "sim:fingers.toml?seconds=240", "--finger", "thumb", "--presses", "3", "--json"]
     assert main([*words, "--out", str(out)]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["shown_n"] == [2.0, 3.5, 5.0]

@@ -360,3 +360,13 @@ def test_what_came_before_a_restart_is_not_told_after_it() -> None:
     arrivals.forget()
     arrivals.note(1_000, 50.03)
     assert clock.told == [(10**9, 50.0), (1_000, 50.03)]
+
+
+def test_a_simulated_board_in_real_time_is_a_clock() -> None:
+    """However late this computer lets it run: it says nothing ahead of its time, and reads nothing behind it."""
+    with biotac.open("sim:press.toml?pace=real&fingers=2") as hand:
+        hand.start()
+        for _ in range(3):
+            last_us = int(hand.read(0.3)["t_us"][-1])
+            assert 0 < time.monotonic() - hand.clock.host_time_s(last_us) < 600
+        assert hand.clock.resets == 0

@@ -17,7 +17,7 @@ from biotac.calibrate.wrench.fitted import WrenchMap
 from biotac.calibrate.wrench.run import Run, load_run
 from biotac.core import board_map
 from biotac.core.board_map import BoardBlock, BoardMap, from_blob
-from biotac.core.compiled import default_settings
+from biotac.core.compiled import default_settings, on_board_q4, pressure_filtered_q4, pressure_force_100un
 from biotac.core.map_float64 import exact, result_units
 from biotac.errors import InputError
 from biotac.lab.crosscheck import CrossCheck
@@ -104,6 +104,50 @@ def test_what_a_board_would_refuse_is_refused_in_words() -> None:
             from_blob(bad)
     with pytest.raises(InputError, match="OUT_OF_RANGE"):
         biotac.Finger(wrench_map=b"\2" + blob[1:])
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"coefficients": [[2**31] * 3]}, "halves of coefficients are int64"),
+        ({"coefficients": [[-(2**31) - 40_000] * 3]}, "halves of coefficients are int64"),
+        ({"coefficients": [[1.5] * 3]}, "coefficients of OFFSET are float64, expected integers"),
+        ({"coefficients": [[1] * 4]}, r"coefficients of OFFSET have shape \(1, 4\), expected \(1, 3\)"),
+        ({"exponent": (300, 0, 0)}, "cannot be stored"),
+        ({"exponent": (0,)}, "cannot be stored"),
+    ],
+)
+def test_what_would_wrap_in_a_blob_is_refused(change: dict, words: str) -> None:
+    block = BoardBlock(Kind.OFFSET, Gate.ONE, (0, 0, 0), np.ones((1, 3), np.int64))
+    assert BoardMap(3, (block,)).blob
+    change = {name: np.array(its) if name == "coefficients" else its for name, its in change.items()}
+    with pytest.raises(InputError, match=words):
+        _ = BoardMap(3, (dataclasses.replace(block, **change),)).blob
+    for odd in ({"serial": "BT" * 9}, {"serial": "\xfc"}, {"made_s": -1}, {"made_s": 2**32}):
+        with pytest.raises(InputError, match="cannot be stored"):
+            _ = BoardMap(3, (block,), **odd).blob
+
+
+def test_c_is_given_what_it_expects_or_nothing() -> None:
+    its = board.quantise(random_map(4))
+    good = frames_of(1, 5)
+    for k, bad in [
+        (0, good[0][:, :18]), (0, good[0][0]), (1, good[1][:4]), (2, good[2][:4]), (2, good[2][:, None]),
+        (0, good[0].astype(float)), (0, good[0].astype(np.int64) - 5000), (2, good[2].astype(np.int64) + 2**32),
+    ]:  # fmt: skip
+        spoilt = list(good)
+        spoilt[k] = bad
+        with pytest.raises(ValueError, match="expected"):
+            its.results(*spoilt)
+        if k < 2:
+            with pytest.raises(ValueError, match="expected"):
+                on_board_q4(spoilt[0], spoilt[1], default_settings())
+    q4 = np.full(5, 16_000, np.uint16)
+    for one, other, gain_nn in [(q4, q4[:3], 1), (q4[:, None], q4, 1), (q4 / 2, q4, 1), (q4, q4, -1), (q4, q4, 2**31)]:
+        with pytest.raises((ValueError, OverflowError)):
+            pressure_force_100un(one, other, gain_nn)
+    with pytest.raises(ValueError, match="PRESSURE_FILTER_MILLI is 0, expected 10 to 1000"):
+        pressure_filtered_q4(q4, 0)
 
 
 def test_a_map_beyond_the_formats_is_refused_by_name() -> None:

@@ -22,20 +22,21 @@ from biotac.wire.dtypes_gen import DTYPES
 
 MISSING = 0xFFFF
 WEIGHTS = list(PocWeights)
+LIN = {Setting.FORCE_MODEL: wire.ForceModel.LIN}  # whom the reference knows; test_population_force has the default
 GAIN_MAX = 100_000_000  # nN/count, the largest setting
 # mm, N, N*mm at the largest gains, whose forces go to 5 kN: 13 digits. What was asked: 1e-5, 1e-5, 1e-4.
 BOUNDS = {"poc_mm": 1e-12, "force_n": 1e-10, "torque_nmm": 1e-9}
 
 
 def with_weights(weights: PocWeights, gain_nn: int | None = None) -> dict[Setting, int]:
-    chosen = default_settings() | {Setting.POC_WEIGHTS: int(weights)}
+    chosen = default_settings() | LIN | {Setting.POC_WEIGHTS: int(weights)}
     if gain_nn is not None:
         chosen |= {s: gain_nn for s in Setting if "GAIN" in s.name}
     return chosen
 
 
 def agrees(counts, tare, chosen=None, **given) -> np.ndarray:
-    got = biotac.compute(counts, tare, chosen, **given)
+    got = biotac.compute(counts, tare, LIN if chosen is None else chosen, **given)
     want = reference(counts, tare, chosen)
     assert got.dtype == RESULT_DTYPE
     assert got.shape == np.shape(counts)[:-1]
@@ -117,10 +118,12 @@ def test_a_frame_does_not_depend_on_its_neighbours(n) -> None:
     counts = random_counts(n, seed=n, missing=0.01)
     tares = np.random.default_rng(n).uniform(0, 4095, (n, 19))
     for tare in (TARE, tares):
-        together = agrees(counts, tare)
-        for k in range(n):
-            alone = biotac.compute(counts[k], tare if tare is TARE else tare[k])
-            assert alone.tobytes() == together[k].tobytes()
+        for chosen in (LIN, None):
+            together = biotac.compute(counts, tare, chosen)
+            for k in range(n):
+                alone = biotac.compute(counts[k], tare if tare is TARE else tare[k], chosen)
+                assert alone.tobytes() == together[k].tobytes()
+        agrees(counts, tare)
 
 
 def test_a_tare_is_rounded_as_on_the_board() -> None:
@@ -129,7 +132,7 @@ def test_a_tare_is_rounded_as_on_the_board() -> None:
     halfway = np.floor(TARE * 16) / 16 + 1 / 32
     assert np.array_equal(biotac.compute(counts, halfway), biotac.compute(counts, np.floor(TARE * 16 + 1) / 16))
     for tare in (TARE, halfway):
-        got, board = biotac.compute(counts, tare), on_board(counts, tare)
+        got, board = biotac.compute(counts, tare, LIN), on_board(counts, tare, LIN)
         assert np.linalg.norm(got["poc_mm"] - board.poc_mm, axis=1).max() * 1e3 <= POC_BOUND_UM
         assert np.abs(got["force_n"] - board.force_n).max() * 1e3 <= FORCE_BOUND_MN
 
@@ -142,7 +145,7 @@ def test_no_frames_and_no_tare() -> None:
 
 def test_memory_in_any_order() -> None:
     counts = random_counts(50, missing=0.01)
-    want = agrees(counts, TARE)
+    want = biotac.compute(counts, TARE)
     frames = np.zeros(50, FRAME_DTYPE)  # rows at odd addresses
     frames["counts"] = counts
     wide = np.zeros((100, 40), np.uint16)
@@ -258,7 +261,7 @@ def test_wrong_shapes_and_types_are_refused(counts, tare, message) -> None:
 def test_settings() -> None:
     counts = random_counts(20)
     doubled = {Setting.FORCE_GAIN_Z_NN: 2 * default_settings()[Setting.FORCE_GAIN_Z_NN]}
-    plain, changed = biotac.compute(counts, TARE), biotac.compute(counts, TARE, doubled)
+    plain, changed = biotac.compute(counts, TARE, LIN), biotac.compute(counts, TARE, doubled)
     assert np.array_equal(changed["force_n"][:, 2], 2 * plain["force_n"][:, 2])
     assert np.array_equal(changed["poc_mm"], plain["poc_mm"])
     for setting, value in ((Setting.POC_WEIGHTS, 3), (Setting.FORCE_GAIN_X_NN, GAIN_MAX + 1)):

@@ -14,6 +14,7 @@ from biotac.lab.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
 
 POPULATION = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.POPULATION)}
+LIN = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.LIN)}
 TARE = np.linspace(2500.0, 3200.0, 19).round()
 
 
@@ -86,7 +87,7 @@ def test_a_poke_is_lins(electrode: int) -> None:
     counts = np.tile(TARE, (20, 1))
     counts[:, electrode] -= np.linspace(50, 600, 20)
     counts = counts.astype(np.uint16)
-    lin, new = (on_board(counts, TARE, {**population_settings(), wire.Setting.FORCE_MODEL: m}) for m in (0, 1))
+    lin, new = (on_board(counts, TARE, population_settings() | {wire.Setting.FORCE_MODEL: m}) for m in (0, 1))
     np.testing.assert_array_equal(new.force_n, lin.force_n)
     rows = rows_of(POPULATION, counts)
     assert (rows["flags"] & wire.FrameFlags.OUTSIDE).all()
@@ -116,9 +117,31 @@ def test_one_frame_and_a_live_stream_are_as_many() -> None:
     live = biotac.per_frame(TARE, POPULATION)
     for k in range(5):
         for name in every.dtype.names:
-            # BLAS adds one row in another order than many
-            np.testing.assert_allclose(biotac.compute(counts[k], TARE, POPULATION)[name], every[name][k], rtol=1e-10)
-            np.testing.assert_allclose(live(counts[k])[name], every[name][k], rtol=1e-10)
+            np.testing.assert_array_equal(biotac.compute(counts[k], TARE, POPULATION)[name], every[name][k])
+            np.testing.assert_array_equal(live(counts[k])[name], every[name][k])
+
+
+def test_it_is_what_nobody_chose_and_lins_of_gains_that_somebody_did() -> None:
+    counts = pressed(50, 10)
+    default, population_s = biotac.compute(counts, TARE), biotac.compute(counts, TARE, POPULATION)
+    np.testing.assert_array_equal(default, population_s)
+    assert np.abs(default["force_n"] - biotac.compute(counts, TARE, LIN)["force_n"]).max() > 0.5
+    rows = rows_of({}, counts)
+    assert (rows["flags"] & wire.FrameFlags.POPULATION).all()
+    assert not (rows_of(LIN, counts)["flags"] & wire.FrameFlags.POPULATION).any()
+
+
+def test_compute_is_the_float64_that_boards_are_held_against() -> None:
+    """The formulas stand twice: in C for speed, and in NumPy as training makes its columns."""
+    counts = np.vstack([pressed(3000, seed) for seed in (11, 12)])
+    counts[np.random.default_rng(13).random(counts.shape) < 0.01] = wire.INVALID_COUNT
+    tare_q4 = np.broadcast_to((16 * TARE).astype(np.uint16), counts.shape)
+    lin = biotac.compute(counts, TARE, LIN)
+    wanted = {name: lin[name].copy() for name in lin.dtype.names}
+    population.replace_force(counts, tare_q4, *wanted.values())
+    got = biotac.compute(counts, TARE)
+    for name in lin.dtype.names:
+        np.testing.assert_allclose(got[name], wanted[name], rtol=0, atol=1e-9)
 
 
 def test_missing_electrodes_are_at_rest() -> None:

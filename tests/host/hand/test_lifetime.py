@@ -174,6 +174,41 @@ def test_a_hand_cannot_be_sent_to_another_process() -> None:
                 pickle.dumps(thing)
 
 
+SPAWNS = """
+import multiprocessing, sys
+import biotac
+
+def work(queue):
+    with biotac.open("sim:press.toml?seconds=2") as hand:
+        hand.run(queue=True)
+        queue.put(hand.read(1.0)["force_n"])
+
+if __name__ == "__main__":
+    processes = multiprocessing.get_context("spawn")
+    with biotac.open("sim:press.toml?seconds=2") as hand:
+        mine = hand.read(1.0)["force_n"]
+        queue = processes.Queue()
+        worker = processes.Process(target=work, args=(queue,))
+        worker.start()
+        theirs = queue.get(timeout=120)
+        worker.join()
+        print(worker.exitcode, mine.tobytes() == theirs.tobytes(), len(hand.read(0.5)))
+        refused = processes.Process(target=print, args=(hand,))
+        try:
+            refused.start()
+        except TypeError as error:
+            print("is of this process" in str(error))
+"""
+
+
+def test_a_spawned_process_has_hands_of_its_own_and_gets_none(tmp_path: Path) -> None:
+    """As on Windows and macOS, where multiprocessing knows nothing else."""
+    program = tmp_path / "spawns.py"
+    program.write_text(SPAWNS)
+    done = subprocess.run([sys.executable, str(program)], capture_output=True, text=True)
+    assert (done.returncode, done.stderr, done.stdout.splitlines()) == (0, "", ["0 True 50", "True"])
+
+
 # ---- asyncio -------------------------------------------------------------------------------------
 
 

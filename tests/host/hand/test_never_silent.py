@@ -303,6 +303,32 @@ def test_a_second_thread_that_reads_is_told_so(live) -> None:
     assert errors == ["first"]
 
 
+def test_a_port_is_not_closed_in_the_middle_of_a_command(live, monkeypatch) -> None:
+    """Else the serial port's own TypeErrors come up, of a file descriptor that is gone."""
+    writes, closed, seen = threading.Event(), threading.Event(), []
+    write, close = live.hand.link.write, live.hand.link.close
+
+    def slow_write(data: bytes) -> None:
+        writes.set()
+        seen.append(closed.wait(0.3))
+        write(data)
+
+    def noted_close() -> None:
+        closed.set()
+        close()
+
+    monkeypatch.setattr(live.hand.link, "write", slow_write)
+    monkeypatch.setattr(live.hand.link, "close", noted_close)
+    thread = threading.Thread(target=lambda: live.hand._board.send(wire.Ping(0)))
+    thread.start()
+    assert writes.wait(WAIT_S)
+    live.hand.close()
+    thread.join()
+    assert seen == [False] and closed.is_set()
+    with pytest.raises(biotac.DeviceLostError, match="was closed"):
+        live.hand._board.send(wire.Ping(0))
+
+
 def test_readers_may_take_turns(live) -> None:
     live.hand.start()
     live.send(frame(1), frame(2), frame(3), frame(4), frame(5))
@@ -336,3 +362,21 @@ def test_close_leaves_the_backlog_of_a_slow_callback(live, monkeypatch) -> None:
     go_on.set()
     closing.join()
     assert len(calls) < 5
+    stats = live.hand.stats
+    assert stats.frames == 100 and stats.frames_skipped == 100 - sum(len(batch.wire) for batch in calls)
+    assert stats.batches_skipped > 90
+
+
+def test_what_nobody_pulls_is_bounded_and_counted(live, monkeypatch) -> None:
+    """Commands read the link, too: what they find beside their answers waits for a reader who may never come."""
+    monkeypatch.setattr("biotac.hand.streams.LIMIT_ROWS", 100)
+    live.hand._streams._pulled = live.hand._streams._new_queue()
+    live.hand.start()
+    for begin in range(0, 1000, 20):
+        live.send(*(frame(seq) for seq in range(begin, begin + 20)))
+        live.hand.ping()
+    assert live.hand._streams._pulled.rows <= 100
+    rows = live.hand.read(0.5)
+    stats = live.hand.stats
+    assert rows["seq"][0] == stats.frames_skipped > 800
+    assert stats.frames == 1000 and stats.frames_lost == 0

@@ -197,8 +197,8 @@ def test_a_callback_may_give_commands(live: Live) -> None:
     assert [m.finger for m in live.firmware.of(wire.TareNow)] == [0]
 
 
-def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.streams.LIMIT_ROWS", 100)
+def test_a_slow_puller_loses_the_oldest_on_this_side_only(live: Live) -> None:
+    live.hand._streams._pulled.bound(100)
     live.hand.run(queue=True)
     for seq in range(1000):
         live.send(frame(seq))

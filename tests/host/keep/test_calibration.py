@@ -306,6 +306,7 @@ def test_a_board_of_before_pressure_is_spoken_to_in_its_own_words(scripted_board
         settings = hand.settings()
         assert settings[wire.Setting.THERMAL_GAIN_MILLI] == 7
         assert (settings[wire.Setting.PRESSURE_GAIN_NN], settings[wire.Setting.PRESSURE_FILTER_MILLI]) == (0, 500)
+        assert settings[wire.Setting.FORCE_MODEL] == wire.ForceModel.LIN  # all that it had
         hand.subscribe(biotac.QuantityFlags.FORCE | biotac.QuantityFlags.PRESSURE)
         (asked,) = (payload for message_id, payload in told if message_id == wire.Subscribe.ID)
         assert asked[2] == biotac.QuantityFlags.FORCE

@@ -17,7 +17,7 @@ from biotac.link.discovery import boards, choose, serial_ports
 from biotac.link.holders import Holder, holders
 from biotac.link.serial_port import describe_open_error
 from biotac.wire import messages_gen as wire
-from biotac.wire.identity import serial_text
+from biotac.wire.identity import ascii_text, serial_text
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -213,3 +213,7 @@ def test_another_schema_is_a_warning_and_no_error(scripted_board, hello, capsys,
     assert f"{wire.SCHEMA_HASH:08x}" in warning.text
     assert cure in warning.text
     assert capsys.readouterr() == ("", "")
+
+
+def test_a_sensors_text_moves_no_terminal() -> None:
+    assert ascii_text(b"BT00\x1b[2J\r\x07\xff\0\0") == "BT00\ufffd[2J\ufffd\ufffd\ufffd"

@@ -12,6 +12,7 @@ import biotac
 from biotac.cli.main import main
 from biotac.core.compiled import FORCE_GAINS, reference_q4
 from biotac.hand.streams import RESULTS
+from biotac.recording.file import RecordingFile
 from biotac.wire import messages_gen as wire
 
 
@@ -67,12 +68,12 @@ def test_where_a_sensor_was_silent_the_filters_begin_anew(folder) -> None:
 def test_what_the_host_said_of_a_hold_is_heard_again(folder, timeout_ms: int) -> None:
     for name in ("grasp.mcap", "grasp_again.mcap"):
         (folder / name).unlink(missing_ok=True)
-    with biotac.open("sim:press.toml") as hand:
+    with biotac.open("sim:press.toml?seconds=30") as hand:  # a board that runs ahead is not over before the release
         hand.set_setting(wire.Setting.HOLD_TIMEOUT_MS, timeout_ms)
         hand.record(folder / "grasp.mcap")
         hand.read(0.5)
         with hand.grasp("index"):
-            hand.read(1.5)  # a hand that is pulled says nothing meanwhile
+            hand.read(1.5, fresh=True)  # a hand that is pulled says nothing meanwhile
         hand.read_batch(100)
     was = biotac.Recording(folder / "grasp.mcap")
     reasons = [m.reason for m in tares(was)]
@@ -112,13 +113,30 @@ def test_the_population_map_gives_what_a_board_with_it_sends(tmp_path, options: 
     model = tmp_path / "model.json"
     model.write_text('{"force_model": 1}', encoding="utf-8")
     names = [tmp_path / f"{name}.mcap" for name in ("lin", "population", "new")]
-    record(names[0], "sim:press.toml", **gains)
+    record(names[0], "sim:press.toml", force_model=wire.ForceModel.LIN, **gains)
     sent = record(names[1], "sim:press.toml", force_model=wire.ForceModel.POPULATION, **gains)
     forced = (sent.wire["flags"] & wire.FrameFlags.UNTARED) == 0
     assert forced.any() and (sent.wire["flags"][forced] & wire.FrameFlags.POPULATION).all()
     assert main(["recompute", str(names[0]), str(names[2]), "--settings", str(model), *options]) == 0
     assert biotac.Recording(names[2]).wire.tobytes() == sent.wire.tobytes()
     assert main(["check", str(names[1])]) == 0
+
+
+def test_a_recording_from_before_the_force_model_means_lins(tmp_path) -> None:
+    gains = {s.name.lower(): wire.SETTINGS[s].default for s in FORCE_GAINS}
+    was = record(tmp_path / "a.mcap", "sim:press.toml", force_model=wire.ForceModel.LIN, **gains)
+    settings = json.loads(was.metadata["settings"])
+    del settings["force_model"]
+    with (tmp_path / "old.mcap").open("xb") as stream:
+        file = RecordingFile(stream, was.metadata | {"settings": json.dumps(settings)})
+        for block, arrived_ns in zip(was.blocks, was.arrived_ns, strict=True):
+            file.add(block, arrived_ns)
+        file.close()
+    old = biotac.Recording(tmp_path / "old.mcap")
+    assert old.settings[wire.Setting.FORCE_MODEL] == wire.ForceModel.LIN
+    assert main(["check", str(old.path)]) == 0
+    assert main(["recompute", str(old.path), str(tmp_path / "new.mcap")]) == 0
+    assert biotac.Recording(tmp_path / "new.mcap").wire.tobytes() == was.wire.tobytes()
 
 
 def test_settings_come_from_a_file(folder, recorded, capsys) -> None:

@@ -151,7 +151,10 @@ def test_damaged_metadata_is_a_recording_error(recorded, tmp_path) -> None:
         damaged.write_bytes(whole.replace(words, change, 1))
         recording = biotac.Recording(damaged)
         assert (recording.info, recording.settings) == (good.info, good.settings)
-        assert recording.problems == ["'biotac' of meta.mcap is damaged and left out"]
+        assert recording.problems == [
+            "'biotac' of meta.mcap is damaged and left out",
+            "meta.mcap is damaged: the checksum over its records is wrong",
+        ]
         damaged.write_bytes(whole.replace(words, change))
         with pytest.raises(biotac.RecordingError, match="damaged metadata"):
             biotac.Recording(damaged)

@@ -37,9 +37,9 @@ def messages(path: Path) -> tuple[dict[str, list[tuple[int, dict[str, Any]]]], d
     schemas: dict[str, dict[str, Any]] = {}
     with path.open("rb") as stream:
         for schema, channel, message in make_reader(stream, validate_crcs=True).iter_messages():
-            if channel.topic.startswith(("/biotac/wire", "/biotac/parts/")):
+            if channel.message_encoding != "json":
                 continue
-            assert schema is not None and (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+            assert schema is not None and schema.encoding == "jsonschema"
             schemas[channel.topic] = json.loads(schema.data)
             found[channel.topic].append((message.log_time, json.loads(message.data)))
     return found, schemas

@@ -139,7 +139,9 @@ def open_page(browser) -> Iterator[Callable[..., Any]]:
         page = context.new_page()
         page.on("console", lambda m: problems.append(m.text) if m.type in ("error", "warning") else None)
         page.on("pageerror", lambda e: problems.append(str(e)))
-        page.on("request", lambda r: None if r.url.startswith(viewing.url) else problems.append(f"asked for {r.url}"))
+        page.on(
+            "request", lambda r: None if r.url.startswith(viewing.server.url) else problems.append(f"asked for {r.url}")
+        )
         page.goto(viewing.url)
         return page
 

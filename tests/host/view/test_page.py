@@ -252,10 +252,11 @@ def test_the_page_finds_a_restarted_server(view, open_page) -> None:
     first.close()
     link_is(page, "gone")
     assert "does not answer" in page.text_content("#link-words")
-    view("sim:drift.toml", port=port)
+    second = view("sim:drift.toml", port=port)
     link_is(page, "live")
     page.wait_for_selector("#tare-state:text('REST')")
-    page.keyboard.press("t")  # with the new server's token
+    page.goto(second.url)  # commands need the new one's token
+    page.keyboard.press("t")
     told(page, "Tared finger 0.")
 
 

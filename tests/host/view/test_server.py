@@ -20,7 +20,7 @@ from biotac.cli.main import main
 from biotac.view import check as checking
 from biotac.view.recorded import RecordedPlayer
 from biotac.view.rows import FRAME_ROW, facts, frame_rows
-from biotac.view.server import TOKEN_HEADER
+from biotac.view.server import MAX_CONNECTIONS, MAX_PAGES, TOKEN_HEADER
 from biotac.view.serving import lasting
 from biotac.view.state import KEPT_ROWS, State, tared
 from biotac.wire import messages_gen as wire
@@ -49,14 +49,81 @@ def test_commands_need_the_secret_the_origin_and_sense(make_player, view_of) -> 
     assert ask(viewing, "POST", "/command", tare, **good, Origin="http://example.org")[0] == 403
     assert ask(viewing, "POST", "/command", tare, **good, Host="example.org")[0] == 403
     assert ask(viewing, "POST", "/elsewhere", tare, **good)[0] == 404
-    for nonsense in ("", "{", "[1]", '{"do": 1}', '{"do": "tare", "finger": "x"}', '{"do": "tare", "finger": true}'):
+    for nonsense in (
+        "",
+        "{",
+        "[1]",
+        '{"do": 1}',
+        '{"do": "tare", "finger": "x"}',
+        '{"do": "tare", "finger": true}',
+        "[" * 999,
+    ):
         assert ask(viewing, "POST", "/command", nonsense, **good)[0] == 400
     assert ask(viewing, "POST", "/command", {"do": "x" * 2000}, **good)[0] == 400
     assert ask(viewing, "POST", "/command", {"do": "fly"}, **good)[0] == 409
     assert player.commands == []
-    status, body = ask(viewing, "POST", "/command", tare, **good, Origin=viewing.url.rstrip("/"))
+    status, body = ask(viewing, "POST", "/command", tare, **good, Origin=viewing.server.url.rstrip("/"))
     assert (status, json.loads(body)) == (200, {"words": "done as told"})
     assert player.commands == [("tare", 3)]
+
+
+def test_the_secret_is_in_the_pages_address_and_nowhere_that_is_served(make_player, view_of) -> None:
+    viewing = view_of(lambda: make_player())
+    token = viewing.server.token
+    assert viewing.url == f"{viewing.server.url}#{token}" and len(token) >= 32
+    for name in ("", *viewing.server.files):
+        assert token.encode() not in ask(viewing, "GET", f"/{name}")[1]
+    stream = socket.create_connection(("127.0.0.1", viewing.server.server_port))
+    stream.sendall(f"GET /events HTTP/1.1\r\nHost: 127.0.0.1:{viewing.server.server_port}\r\n\r\n".encode())
+    with stream, stream.makefile("rb") as lines:
+        told = b"".join(next(lines) for _ in range(20))
+    assert b"token_header" in told and token.encode() not in told
+
+
+def test_connections_that_drip_make_room(make_player, view_of) -> None:
+    viewing = view_of(lambda: make_player())
+    port = viewing.server.server_port
+    dripping = []
+    for _ in range(3 * MAX_CONNECTIONS):
+        dripping.append(socket.create_connection(("127.0.0.1", port)))
+        dripping[-1].sendall(b"GET / HTTP/1.1\r\nHost: ")
+    assert ask(viewing, "GET", "/")[0] == 200
+    assert len(viewing.server._asking) <= MAX_CONNECTIONS
+    for one in dripping:
+        one.close()
+
+
+def test_pages_are_few(make_player, view_of) -> None:
+    viewing = view_of(lambda: make_player())
+    port = viewing.server.server_port
+    pages = []
+    for _ in range(MAX_PAGES):
+        pages.append(socket.create_connection(("127.0.0.1", port)))
+        pages[-1].sendall(f"GET /events HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+        assert pages[-1].recv(15) == b"HTTP/1.1 200 OK"
+    assert ask(viewing, "GET", "/events")[0] == 503
+    assert ask(viewing, "GET", "/")[0] == 200
+    for page in pages:
+        page.close()
+
+
+def test_a_command_that_was_told_to_have_failed_is_not_carried_out(make_player, view_of, touch, monkeypatch) -> None:
+    player, held = make_player(), threading.Event()
+    taken = State.take
+
+    def stuck(state: State, batch, its) -> None:
+        held.wait()
+        taken(state, batch, its)
+
+    monkeypatch.setattr(State, "take", stuck)
+    viewing = view_of(lambda: player)
+    monkeypatch.setattr("biotac.view.reader.ANSWER_S", 0.05)
+    with pytest.raises(biotac.InputError, match=r"tare was not begun within 0 s, and will not be"):
+        viewing.reader.ask("tare", 3)
+    monkeypatch.setattr("biotac.view.reader.ANSWER_S", 300)
+    held.set()
+    assert viewing.reader.ask("tare", 4) == "done as told"
+    assert player.commands == [("tare", 4)]
 
 
 def test_only_this_computer_is_served_and_only_the_pages_files(make_player, view_of) -> None:

@@ -26,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
     recording = load(args.recording, quiet=True)
     outcome = CrossCheck(wire_minor=recording.info.wire_minor)
     outcome.add(recording.wire, recording.settings, recording.finger_settings, recording.maps)
-    damaged = recording.counts.bad + recording.damaged_chunks
+    damaged = recording.counts.bad + recording.damaged_chunks + recording.wrong_checksums
     good = outcome.violations == 0 and damaged == 0 and len(recording.frames) > 0
     if args.json:
         facts = {

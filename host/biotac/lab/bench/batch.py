@@ -24,6 +24,7 @@ ROUNDS = 15
 SINGLE_FRAMES = 1000
 BLOCK_SIZES = (2048, 4096, 8192, 16384, 32768)
 EQUAL = 1e-9  # mm, N, N*mm
+LIN = {wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}  # what all contestants compute
 
 WARM, FRESH = "compute, out= reused", "compute, new result"
 WHOLE, BEST = "NumPy, whole-array matrix products", "NumPy, blocked, buffers reused"
@@ -67,17 +68,17 @@ def measure(frames: int, rounds: int = ROUNDS) -> Outcome:
     block = _best_block(counts, tare, arrays)
     best = Blocked(block)
     many = [
-        Contestant(WARM, frames, lambda: compute(counts, tare, out=out)),
-        Contestant(FRESH, frames, lambda: compute(counts, tare)),
+        Contestant(WARM, frames, lambda: compute(counts, tare, LIN, out)),
+        Contestant(FRESH, frames, lambda: compute(counts, tare, LIN)),
         Contestant(WHOLE, frames, lambda: whole_array(counts, tare)),
         Contestant(BEST, frames, lambda: best(counts, tare, arrays)),
     ]
     singles = list(counts[:SINGLE_FRAMES])  # taking a row out of the array is nobody's time
     one_out = np.zeros((), RESULT_DTYPE)
-    prepared = per_frame(tare)
+    prepared = per_frame(tare, LIN)
     ones: list[tuple[str, Callable[[NDArray[np.uint16]], Any]]] = [
         (ONE_PREPARED, prepared),
-        (ONE_WARM, lambda row: compute(row, tare, None, one_out)),
+        (ONE_WARM, lambda row: compute(row, tare, LIN, one_out)),
         (ONE_WHOLE, lambda row: whole_array(row[None], tare)),
         (ONE_OWN, lambda row: one_frame(row, tare)),
     ]

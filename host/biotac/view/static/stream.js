@@ -1,4 +1,5 @@
 // The one connection to the viewer program: events in, commands out. It finds its way back by itself.
+// What commands need stands behind the # of the page's address, which `biotac view` printed: the server tells it nobody.
 
 const RETRY_MS = 1000;
 
@@ -30,7 +31,7 @@ export class Stream {
     try {
       const answer = await fetch("command", {
         method: "POST",
-        headers: { "Content-Type": "application/json", [this.about.token_header]: this.about.token },
+        headers: { "Content-Type": "application/json", [this.about.token_header]: location.hash.slice(1) },
         body: JSON.stringify({ do: name, finger }),
       });
       return { good: answer.ok, words: (await answer.json()).words };

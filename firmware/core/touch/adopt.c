@@ -1,0 +1,165 @@
+#include "touch/adopt.h"
+
+#include "fixed_point.h"
+
+#define BACK_SHARE 64 // of the press's peak; a hundredth seen
+#define UNDERSHOOT 16 // pressure that may be missing right after a press (9 seen); it comes back
+
+void bt_adopt_aim_pressure(bt_tare *tare)
+{
+    uint32_t base_q16 = tare->base.pdc_q16;
+    uint32_t watched_q16 = bt_adopt_gate_base(tare)->pdc_q16;
+    // A press that ends in doubt has the pressure low for a second or two; its return is no touch.
+    if (base_q16 != BT_TARE_UNKNOWN && watched_q16 != BT_TARE_UNKNOWN && watched_q16 > base_q16) {
+        base_q16 = watched_q16;
+    }
+    if (!(tare->gate.unknown >> BT_LANE_PDC & 1)) {
+        tare->gate.rest.lane[BT_LANE_PDC] =
+            base_q16 == BT_TARE_UNKNOWN ? 0 : (uint16_t)((base_q16 + (1 << 15)) >> 16);
+    }
+}
+
+void bt_adopt_aim(bt_tare *tare)
+{
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        bt_adopt_aim_electrode(tare, i);
+    }
+    bt_adopt_aim_pressure(tare);
+}
+
+static void forget_contact(bt_tare *tare)
+{
+    tare->hits = 0;
+    tare->contact_rounds = 0;
+    tare->let_go = false;
+    bt_release_begin(&tare->release);
+    bt_thermal_begin(&tare->thermal);
+    bt_watch_begin(&tare->watch);
+}
+
+void bt_adopt_tell(bt_tare *tare, uint8_t reason)
+{
+    tare->reason = reason;
+    tare->changed = true;
+    tare->age_rounds = 0;
+}
+
+void bt_adopt(bt_tare *tare, const bt_baseline *base, uint8_t state, uint8_t reason)
+{
+    tare->base = *base;
+    tare->state = state;
+    tare->tared = true;
+    tare->comes_back_q16 = 0;
+    bt_adopt_tell(tare, reason);
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        bt_adopt_electrode(tare, i);
+    }
+    bt_adopt_aim_pressure(tare);
+    forget_contact(tare);
+    bt_rollback_start(&tare->rollback, base);
+    tare->partial = true;
+}
+
+void bt_adopt_in_place(bt_tare *tare, const bt_baseline *base, uint8_t reason)
+{
+    bt_inverted_note(&tare->last, &tare->base, base);
+    bt_adopt(tare, base, BT_TARE_STATE_REST, reason);
+}
+
+static uint32_t present_q16(const bt_tare *tare, unsigned lane)
+{
+    bool unknown = tare->gate.unknown >> lane & 1;
+    return unknown ? BT_TARE_UNKNOWN : (uint32_t)tare->sweep.mean_q3.lane[lane] << 13;
+}
+
+void bt_adopt_present(bt_tare *tare, uint8_t reason)
+{
+    bt_baseline base;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        base.electrode_q16[i] = present_q16(tare, i);
+    }
+    base.pdc_q16 = present_q16(tare, BT_LANE_PDC);
+    bt_adopt_in_place(tare, &base, reason);
+}
+
+void bt_adopt_after_press(bt_tare *tare, uint8_t reason)
+{
+    uint32_t rest_q16 = tare->base.pdc_q16;
+    uint32_t present = present_q16(tare, BT_LANE_PDC);
+    int32_t undershoot = tare->release.pdc_peak / BACK_SHARE;
+    bt_adopt_present(tare, reason);
+    tare->comes_back_q16 = (undershoot < UNDERSHOOT ? undershoot : UNDERSHOOT) << 16;
+    if (rest_q16 != BT_TARE_UNKNOWN && present < rest_q16 && rest_q16 - present < UNDERSHOOT << 16) {
+        tare->base.pdc_q16 = rest_q16;
+        bt_rollback_start(&tare->rollback, &tare->base);
+        bt_adopt_aim_pressure(tare);
+    }
+}
+
+void bt_adopt_shift(bt_tare *tare)
+{
+    bt_baseline base = tare->base;
+    int32_t shift_q16 = (int32_t)bt_div_round((int64_t)tare->sum_q4 * (1 << 12), BT_ELECTRODES);
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        base.electrode_q16[i] = bt_baseline_moved(base.electrode_q16[i], shift_q16);
+    }
+    base.pdc_q16 = present_q16(tare, BT_LANE_PDC);
+    bt_adopt_in_place(tare, &base, BT_TARE_REASON_SHIFT);
+}
+
+void bt_adopt_doubt(bt_tare *tare)
+{
+    bt_watch_take(&tare->watch, &tare->sweep, tare->gate.unknown);
+    tare->state = BT_TARE_STATE_DOUBT;
+    tare->hits = 0;
+    bt_adopt_aim(tare);
+}
+
+void bt_adopt_contact(bt_tare *tare)
+{
+    tare->state = BT_TARE_STATE_CONTACT;
+    tare->hits = 0;
+    bt_adopt_aim(tare);
+}
+
+// A channel whose first word comes only now begins at rest: against any other baseline it would
+// look like a contact. Not so one whose tare the host has set.
+static void meet_lane(bt_tare *tare, unsigned lane)
+{
+    uint32_t first_q16 = (uint32_t)tare->gate.smooth.lane[lane] << 16;
+    bt_sweep_meet(&tare->sweep, lane, tare->gate.smooth.lane[lane]);
+    if (lane < BT_ELECTRODES) {
+        if (tare->tared && tare->base.electrode_q16[lane] == BT_TARE_UNKNOWN) {
+            tare->base.electrode_q16[lane] = first_q16;
+            bt_rollback_meet(&tare->rollback, lane, first_q16);
+        }
+        bt_adopt_electrode(tare, lane);
+        return;
+    }
+    if (tare->state == BT_TARE_STATE_REST && tare->base.pdc_q16 == BT_TARE_UNKNOWN) {
+        tare->base.pdc_q16 = first_q16;
+        bt_rollback_meet(&tare->rollback, lane, first_q16);
+    }
+    bt_adopt_aim_pressure(tare);
+}
+
+BT_NOINLINE void bt_adopt_met(bt_tare *tare)
+{
+    for (unsigned lane = 0; tare->gate.met >> lane != 0; lane++) {
+        if (tare->gate.met >> lane & 1) {
+            meet_lane(tare, lane);
+        }
+    }
+    tare->gate.met = 0;
+}
+
+void bt_adopt_none(bt_tare *tare)
+{
+    bt_adopt_tell(tare, BT_TARE_REASON_INVERTED);
+    tare->state = BT_TARE_STATE_INIT;
+    tare->tared = false;
+    tare->last.known = false;
+    tare->hits = 0;
+    tare->partial = true;
+    bt_sweep_restart(&tare->sweep);
+}

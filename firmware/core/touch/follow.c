@@ -1,0 +1,137 @@
+#include "touch/follow.h"
+
+#include "touch/adopt.h"
+
+#include "fixed_point.h"
+
+#define SLEW_Q16     (8 * 328)  // a sweep; 0.5 count/s: drift is followed no faster, so a load is not
+#define PDC_SLEW_Q16 (8 * 131)  // 0.2 count/s
+#define PDC_SINK_Q16 (8 * 655)  // 1 count/s: no load takes pressure away
+#define PDC_BACK_Q16 (8 * 2621) // 4 counts/s: an undershoot comes back within seconds
+#define BACK_ROUNDS  400        // and after these is over
+
+// The square of a difference in count^2, rounded down. Differences are below 2^16 in 1/16 count: as unsigned,
+// the square fits, and so does the sum over all electrodes.
+static uint32_t square(int32_t difference_q4)
+{
+    return (uint32_t)difference_q4 * (uint32_t)difference_q4 >> 8;
+}
+
+// By what moves the tare and the watched baseline alike.
+static BT_NOINLINE void shift_electrode(bt_tare *tare, unsigned i, int32_t step_q16)
+{
+    tare->base.electrode_q16[i] = bt_baseline_moved(tare->base.electrode_q16[i], step_q16);
+    tare->watch.base.electrode_q16[i] = bt_baseline_moved(tare->watch.base.electrode_q16[i], step_q16);
+    bt_adopt_electrode(tare, i);
+}
+
+// Only in a sweep that began at rest: a tare that was just set stays as given for a round at least, and
+// of a touch nothing is followed.
+static bool rests(const bt_tare *tare)
+{
+    return tare->state == BT_TARE_STATE_REST && tare->hits == 0 && !tare->partial;
+}
+
+// Where the host says that something is held, only drift.
+static bool tracks(const bt_tare *tare)
+{
+    return rests(tare) && !tare->held;
+}
+
+static void shift_all(bt_tare *tare, int32_t step_q16)
+{
+    for (unsigned i = 0; i < BT_ELECTRODES && step_q16 != 0; i++) {
+        shift_electrode(tare, i, step_q16);
+        tare->partial = true;
+    }
+}
+
+BT_NOINLINE void bt_follow_resume(bt_tare *tare)
+{
+    bool touched = tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT;
+    bool known = bt_drift_known(&tare->drift);
+    shift_all(tare, bt_drift_unseen(&tare->drift, tare->silence.sweeps));
+    if (touched && tare->gate.pressure_now) {
+        int32_t step_q16 = bt_watch_resume(&tare->watch, &tare->silence, BT_STILL_SPAN_Q3);
+        shift_all(tare, known ? 0 : step_q16);
+    }
+}
+
+static void serve_touched(bt_tare *tare, unsigned i, uint16_t mean_q3)
+{
+    int32_t away_q4 = 2 * mean_q3 - tare->electrode_q4[i];
+    tare->energy_count2 += square(away_q4);
+    tare->sum_q4 += away_q4;
+    int32_t drift_q16 = tare->drift_q16;
+    bool watched = tare->watch.wait_sweeps == 0 && tare->sweep.still_sweeps >= BT_WATCH_SWEEPS;
+    if (watched) {
+        uint32_t watched_q16 = tare->watch.base.electrode_q16[i];
+        bt_watch_side(&tare->watch, (uint32_t)mean_q3 << 13, watched_q16);
+        drift_q16 = bt_watch_step_q16(&tare->watch, drift_q16, (uint32_t)mean_q3 << 13, watched_q16);
+    }
+    tare->drift.moved_q16 += drift_q16;
+    drift_q16 += tare->thermal.step_q16;
+    if (drift_q16 != 0) {
+        shift_electrode(tare, i, drift_q16);
+        if (watched
+            && tare->watch.base.electrode_q16[i] != BT_TARE_UNKNOWN) { // or drift would look like motion
+            tare->sweep.settled_q3.lane[i] = (uint16_t)(tare->watch.base.electrode_q16[i] >> 13);
+        }
+    }
+}
+
+static void serve_electrode(bt_tare *tare, unsigned i)
+{
+    uint16_t mean_q3 = bt_sweep_close(&tare->sweep, i, BT_STILL_SPAN_Q3);
+    uint32_t *base_q16 = &tare->base.electrode_q16[i];
+    if (mean_q3 == BT_SWEEP_UNREAD_Q3) {
+        return;
+    }
+    if (tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT) {
+        serve_touched(tare, i, mean_q3);
+        return;
+    }
+    // Where it is used, every round was below the threshold: the sum stays far below 2^32.
+    int32_t away_q3 = 8 * tare->gate.smooth.lane[i] - mean_q3;
+    tare->deviation_q6 += (uint32_t)(away_q3 * away_q3);
+    bt_watch_side(&tare->watch, (uint32_t)mean_q3 << 13, *base_q16);
+    uint32_t before_q16 = *base_q16;
+    if (tracks(tare)) {
+        *base_q16 = bt_baseline_follow(*base_q16, (uint32_t)mean_q3 << 13, SLEW_Q16);
+    }
+    if (rests(tare)) {
+        int32_t drift_q16 = tare->drift_q16;
+        if (tare->held) {
+            drift_q16 = bt_watch_step_q16(&tare->watch, drift_q16, (uint32_t)mean_q3 << 13, *base_q16);
+        }
+        *base_q16 = bt_baseline_moved(*base_q16, drift_q16);
+        tare->drift.moved_q16 += (int32_t)(*base_q16 - before_q16);
+        bt_adopt_electrode(tare, i);
+    }
+}
+
+static void serve_pressure(bt_tare *tare)
+{
+    uint32_t mean_q16 = (uint32_t)bt_sweep_close(&tare->sweep, BT_LANE_PDC, BT_STILL_SPAN_Q3) << 13;
+    if (tracks(tare) && bt_tare_pdc_known(tare)) {
+        uint32_t before_q16 = tare->base.pdc_q16;
+        bool back = tare->age_rounds < BACK_ROUNDS && tare->comes_back_q16 > 0;
+        int32_t slew_q16 = mean_q16 < before_q16 ? PDC_SINK_Q16 : back ? PDC_BACK_Q16 : PDC_SLEW_Q16;
+        tare->base.pdc_q16 = bt_baseline_follow(before_q16, mean_q16, slew_q16);
+        tare->comes_back_q16 -=
+            mean_q16 > before_q16 && back ? (int32_t)(tare->base.pdc_q16 - before_q16) : 0;
+        bt_adopt_aim_pressure(tare);
+    }
+}
+
+void bt_follow_turn(bt_tare *tare)
+{
+    unsigned end = bt_sweep_end(&tare->sweep);
+    for (unsigned lane = bt_sweep_first(&tare->sweep); lane < end; lane++) {
+        if (lane < BT_ELECTRODES) {
+            serve_electrode(tare, lane);
+        } else {
+            serve_pressure(tare);
+        }
+    }
+}

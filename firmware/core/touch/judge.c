@@ -1,0 +1,149 @@
+#include "touch/judge.h"
+
+#include "touch/adopt.h"
+
+#include "fixed_point.h"
+
+#include <stddef.h>
+
+#define FAINT_Q16              (1 << 16) // what all electrodes have moved by, that may be drift
+#define DRIFT_ROUNDS_PER_COUNT 400       // 15 counts/min, the worst drift measured
+#define DRIFT_LIMIT            60000
+
+_Static_assert((uint64_t)DRIFT_LIMIT *DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
+
+BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
+{
+    bt_tare_doubt doubt =
+        bt_inverted_judge(&tare->last, &tare->gate.smooth, &tare->base, tare->release.pdc_peak);
+    if (doubt == BT_TARE_UNDO) {
+        bt_baseline before = tare->base;
+        bt_inverted_undo(&tare->last, &before);
+        tare->last.known = false;
+        bt_adopt(tare, &before, BT_TARE_STATE_CONTACT, BT_TARE_REASON_UNDONE);
+    } else if (doubt == BT_TARE_LOSE) {
+        bt_adopt_none(tare);
+    }
+}
+
+// Where drift and temperature went untracked: 15 counts a minute, the worst drift measured, while there is
+// pressure to tell it from a load; and a third of what temperature was followed by may be wrong.
+static uint32_t forgiven_count2(const bt_tare *tare)
+{
+    uint32_t rounds = tare->contact_rounds < DRIFT_LIMIT ? tare->contact_rounds : DRIFT_LIMIT;
+    uint32_t drift_count2 = BT_DIVIDE_U32(rounds * rounds, DRIFT_ROUNDS_PER_COUNT * DRIFT_ROUNDS_PER_COUNT);
+    uint32_t warm_count = bt_abs32(tare->thermal.applied_q16) >> 16;
+    return BT_ELECTRODES
+           * ((tare->pressure_seen ? drift_count2 : 0) + BT_DIVIDE_U32(warm_count * warm_count, 9));
+}
+
+// What is left of the energy when every electrode loses what all have moved. A 19th is a product and a shift;
+// it is off by less than a millionth.
+static uint32_t uneven_count2(const bt_tare *tare)
+{
+    uint64_t sum_q4 = bt_abs32(tare->sum_q4);
+    uint32_t even_count2 = (uint32_t)((sum_q4 * sum_q4 >> 8) * 220753 >> 22);
+    return tare->energy_count2 > even_count2 ? tare->energy_count2 - even_count2 : 0;
+}
+
+// After a sweep in contact: has it ended? What would be tared are means, and in the rounds right after a
+// release they still are those of the press: the pressure and its mean must both have fallen.
+static void judge_release(bt_tare *tare)
+{
+    int32_t mean = tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3;
+    int32_t now = tare->gate.smooth.lane[BT_LANE_PDC];
+    bt_release_sweep sweep = {
+        .energy_count2 = tare->energy_count2,
+        .uneven_count2 = uneven_count2(tare),
+        .forgiven_count2 = forgiven_count2(tare),
+        .pressure = tare->pressure_seen && tare->base.pdc_q16 != BT_TARE_UNKNOWN,
+        .above = (mean > now ? mean : now) - (int32_t)((tare->base.pdc_q16 + (1 << 15)) >> 16),
+        .still_sweeps = tare->sweep.still_sweeps,
+        .level_sweeps = tare->watch.level_sweeps,
+    };
+    bt_release_verdict verdict = bt_release_judge(&tare->release, &sweep);
+    if (tare->held || verdict == BT_RELEASE_NO) {
+        return;
+    }
+    if (verdict == BT_RELEASE_SHIFT) {
+        bt_adopt_shift(tare);
+    } else if (verdict == BT_RELEASE_CLEAN) {
+        bt_adopt_after_press(tare, BT_TARE_REASON_RELEASE);
+    } else if (verdict == BT_RELEASE_RESIDUE || tare->let_go) {
+        bt_adopt_after_press(tare, BT_TARE_REASON_RESIDUE);
+    } else if (tare->state == BT_TARE_STATE_CONTACT) {
+        bt_adopt_doubt(tare);
+    }
+}
+
+static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
+{
+    bt_thermal_follow(&tare->thermal, settings->thermal_gain_q16);
+    bool rests = tare->sweep.still_sweeps >= BT_WATCH_SWEEPS;
+    if (tare->watch.wait_sweeps > 1) {
+        tare->watch.wait_sweeps--;
+    }
+    bool due = tare->watch.wait_sweeps == 1 && rests;
+    if (bt_watch_crept(&tare->watch)) {
+        tare->drift.settled = 0;
+    }
+    if (due || tare->sweep.still_sweeps == BT_WATCH_SWEEPS) {
+        bt_watch_return(&tare->watch, &tare->sweep, tare->gate.unknown, BT_STILL_SPAN_Q3);
+    }
+    if (!tare->partial) { // sums over electrodes that were not all served in one state say nothing
+        judge_release(tare);
+    }
+}
+
+// What of the sweep was drift, and what the next one follows by. While pressure is level; of a touch, or what
+// the host says is one, only once skin no longer creeps, and either what is faint or what has clearly gone
+// one way: shear makes no pressure, either. Until then it goes on as it was, or is followed as well as may be
+// if that is not known.
+static void judge_drift(bt_tare *tare)
+{
+    bt_watch *watch = &tare->watch;
+    bool rests = tare->state == BT_TARE_STATE_REST;
+    bool touched = tare->held || !rests;
+    bool valid = rests || (watch->wait_sweeps == 0 && tare->sweep.still_sweeps >= BT_WATCH_SWEEPS);
+    bool level = valid && !tare->partial && bt_watch_level(watch);
+    bool creeps = touched && bt_watch_creeps(watch);
+    if (level && !creeps) {
+        bt_drift_learn(&tare->drift);
+    } else if (!bt_watch_level(watch)) {
+        bt_drift_revert(&tare->drift);
+    }
+    tare->drift.moved_q16 = 0;
+    watch->follows = level && touched && !(creeps && bt_drift_known(&tare->drift));
+    int32_t away_q16 = level && !creeps ? watch->shared_q16 : 0;
+    if (touched && (away_q16 > FAINT_Q16 || away_q16 < -FAINT_Q16)) {
+        away_q16 = 0;
+    }
+    tare->drift_q16 = level ? bt_drift_step_q16(&tare->drift, away_q16) : bt_drift_unseen(&tare->drift, 1);
+    tare->drift_q16 += watch->follows ? bt_watch_drifts_q16(watch) : 0;
+}
+
+BT_NOINLINE void bt_judge_sweep(bt_tare *tare, const bt_tare_settings *settings)
+{
+    bt_watch_end(&tare->watch, tare->pressure_seen ? &tare->sweep.mean_q3.lane[BT_LANE_PDC] : NULL);
+    judge_drift(tare);
+    if (tare->state == BT_TARE_STATE_INIT) {
+        if (tare->sweep.still_sweeps >= BT_STILL_SWEEPS && !tare->held) {
+            // Measured before there is a threshold: a worn sensor's noise must not look like a touch.
+            bt_noise_add(&tare->noise, tare->deviation_q6, settings->contact_energy_count2);
+            bt_adopt_present(tare, BT_TARE_REASON_START);
+        }
+    } else if (tare->state == BT_TARE_STATE_REST && !tare->partial) {
+        bt_rollback_keep(&tare->rollback, &tare->base);
+        if (!tare->partial_before) { // or its windows reach back into a touch
+            bt_noise_add(&tare->noise, tare->deviation_q6, settings->contact_energy_count2);
+        }
+    } else if (tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT) {
+        end_touched_sweep(tare, settings);
+    }
+    tare->energy_count2 = 0;
+    tare->sum_q4 = 0;
+    tare->deviation_q6 = 0;
+    tare->pressure_seen = false;
+    tare->partial_before = tare->partial;
+    tare->partial = false;
+}

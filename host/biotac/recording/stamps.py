@@ -1,0 +1,56 @@
+"""Device time on the recording computer's clock, for what is derived from a recording: by the drift that it shows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..clock import LAST_SAMPLE_US, DeviceClock
+
+# In less the delays of single messages tell more than a crystal: 0.5 ms at 50 ppm.
+_LEAST_S = 10.0
+# What came this much too early or late did not keep pace: a simulated board, whose time is no clock, or a long stall.
+_PACE_S = 0.5
+_MAX_DRIFT = 500e-6
+_SETTLED_US = 600e6  # of the clock's course at a time, before it forgets what it was made of
+_REACH_US = 200e6
+
+
+class Stamps:
+    """Unix ns of unwrapped device times: ``begin_ns`` at ``begin_us``, and on from there as the two clocks ran.
+
+    By the plain difference of device times while the arrivals show no one course: in the first ten seconds, of a
+    board that does not keep pace with the host, and from when one of the clocks has stepped.
+    """
+
+    def __init__(self, begin_us: int, begin_ns: int) -> None:
+        self._begin_us = begin_us
+        self._begin_ns = begin_ns
+        self._clock = DeviceClock(promised_delay_s=0.01)
+        self._settled_us = float(begin_us)
+        self._first: tuple[int, float] | None = None
+        self._keeps_pace = False
+        self._begin_s = math.nan  # by the clock; once, so that its later views do not move everything
+
+    def arrived(self, t_us: int, at_ns: int) -> None:
+        """All of a block was here at ``at_ns``, whose last row is of ``t_us``."""
+        at_s = (at_ns - self._begin_ns) / 1e9
+        self._first = self._first or (t_us, at_s)
+        device_s, host_s = (t_us - self._first[0]) / 1e6, at_s - self._first[1]
+        self._keeps_pace = device_s >= _LEAST_S and abs(host_s - device_s) <= _PACE_S + device_s * _MAX_DRIFT
+        self._clock.arrived(t_us + LAST_SAMPLE_US, at_s)
+        if t_us - self._settled_us > _SETTLED_US:
+            self._clock.host_time_s(np.array([self._settled_us - _REACH_US, t_us]))
+            self._settled_us = t_us
+
+    def __call__(self, t_us: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Stamps (n,) in ns of device times (n,)."""
+        plain: NDArray[np.int64] = self._begin_ns + (t_us - self._begin_us) * 1000
+        if not self._keeps_pace or self._clock.resets or not len(t_us):
+            return plain
+        if math.isnan(self._begin_s):
+            self._begin_s = float(self._clock.host_time_s(self._begin_us))
+        since_s = self._clock.host_time_s(t_us) - self._begin_s
+        return self._begin_ns + np.round(since_s * 1e9).astype(np.int64)

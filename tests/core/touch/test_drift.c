@@ -1,0 +1,227 @@
+// Drift that all electrodes share: followed at rest without a lag, and taken to go on where nothing can be
+// seen of it. The truth is what the emulated finger reads at rest.
+#include "emulated_finger.h"
+
+#define WORST_PER_S 0.25 // 15 counts/min
+
+// Mean over the electrodes of what is missing in the tare.
+static double shared_error(const emulated_finger *finger)
+{
+    double error = 0;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        error += rest_count(finger, i) - finger->tare.base.electrode_q16[i] / 65536.0;
+    }
+    return error / BT_ELECTRODES;
+}
+
+static emulated_finger worn_finger(uint64_t seed, double drift_per_s, double rest_s)
+{
+    emulated_finger finger;
+    finger_init(&finger);
+    finger.seed = seed;
+    finger.sigma = 5;
+    finger.pdc_sigma = 1;
+    finger.glitch_chance = 0.005;
+    finger.drift_per_s = drift_per_s;
+    run_seconds(&finger, rest_s);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+    return finger;
+}
+
+static void press(emulated_finger *finger, double load, double pdc_load)
+{
+    finger->load = load;
+    finger->pdc_load = pdc_load;
+    (void)run_until(finger, BT_TARE_STATE_CONTACT, 20);
+}
+
+// ---- at rest -----------------------------------------------------------------------------------
+
+static void the_tare_of_a_worn_finger_does_not_lag_behind_its_drift(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 1; seed <= 4; seed++) {
+        emulated_finger finger = worn_finger(seed, seed % 2 ? WORST_PER_S : -WORST_PER_S, 20);
+        double sum = 0;
+        for (int k = 0; k < 20 * FRAMES_PER_S; k++) {
+            step(&finger);
+            assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+            sum += shared_error(&finger) / (20 * FRAMES_PER_S);
+        }
+        // Of one electrode's noise 1.2 counts would be the lag; of all together it is a quarter of that.
+        assert_true(fabs(sum) < 0.3);
+    }
+}
+
+static void without_pressure_nothing_is_learned(void **state)
+{
+    (void)state;
+    emulated_finger finger;
+    finger_init(&finger);
+    finger.has_pdc = false;
+    finger.drift_per_s = WORST_PER_S;
+    run_seconds(&finger, 60);
+    assert_int_equal(finger.tare.drift.rate_q20, 0);
+}
+
+static void a_slow_load_is_not_learned(void **state)
+{
+    (void)state;
+    emulated_finger finger = worn_finger(1, 0, 20);
+    for (int k = 0; finger.tare.state == BT_TARE_STATE_REST; k++) {
+        assert_true(k < 10 * FRAMES_PER_S);
+        finger.load += 1.6 / FRAMES_PER_S; // 0.02 N/s
+        finger.pdc_load += 2.0 / FRAMES_PER_S;
+        step(&finger);
+    }
+    // What it would make of a minute is no more than half a count.
+    assert_true(fabs(finger.tare.drift.rate_q20 / 1048576.0 * 750) < 1.5);
+}
+
+// ---- in a touch --------------------------------------------------------------------------------
+
+static void a_hold_drifts_on(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 1; seed <= 4; seed++) {
+        emulated_finger finger = worn_finger(seed, seed % 2 ? WORST_PER_S : -WORST_PER_S, 20);
+        press(&finger, 400, 300);
+        for (int second = 0; second < 60; second++) {
+            run_seconds(&finger, 1);
+            assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+            assert_true(fabs(shared_error(&finger)) < 2); // 15 counts, were it not followed
+        }
+    }
+}
+
+// Of each electrode: loadings as real sensors have them.
+static double loading(int i)
+{
+    return 0.82 + 0.34 * (7 * i % BT_ELECTRODES) / (BT_ELECTRODES - 1);
+}
+
+static void an_hour_of_hold_keeps_a_force_down_to_the_noise(void **state)
+{
+    (void)state;
+    for (int worn = 0; worn < 2; worn++) {
+        emulated_finger finger;
+        finger_init(&finger);
+        finger.sigma = worn ? 5 : 1.5;
+        finger.pdc_sigma = 1;
+        double worst_shared = 0, worst = 0;
+        for (int k = 1; k <= 3660 * FRAMES_PER_S; k++) {
+            finger.drift_per_s = -WORST_PER_S;
+            finger.load = k < 20 * FRAMES_PER_S   ? 0
+                          : k < 22 * FRAMES_PER_S ? 400
+                                                  : 12; // 0.1 N of 80 counts/N
+            finger.pdc_load = finger.load * 1.2;
+            if (k == 20 * FRAMES_PER_S) {
+                bt_tare_hold(&finger.tare);
+            }
+            bt_round frame = next_frame(&finger);
+            double drift = finger.drift_per_s * finger.t_s;
+            double shared = 0;
+            for (int i = 0; i < BT_ELECTRODES; i++) {
+                frame.electrode[i] = to_count(frame.electrode[i] + (loading(i) - 1) * drift);
+                double error = rest_count(&finger, i) + (loading(i) - 1) * drift
+                               - finger.tare.base.electrode_q16[i] / 65536.0;
+                shared += error / BT_ELECTRODES;
+                worst = k > 60 * FRAMES_PER_S && fabs(error) > worst ? fabs(error) : worst;
+            }
+            worst_shared = k > 60 * FRAMES_PER_S && fabs(shared) > worst_shared ? fabs(shared) : worst_shared;
+            (void)feed(&finger, &frame);
+            assert_true(k < 25 * FRAMES_PER_S || finger.tare.state == BT_TARE_STATE_CONTACT);
+        }
+        print_message("sigma %.1f: of 900 counts %.2f are missing at most, %.2f of one electrode\n",
+                      finger.sigma, worst_shared, worst);
+        // By the default gains 1.5 counts on every electrode are 0.1 N.
+        assert_true(worst_shared < 1.5);
+    }
+}
+
+static void drift_that_stops_in_a_hold_is_found_out(void **state)
+{
+    (void)state;
+    emulated_finger finger = worn_finger(3, WORST_PER_S, 20);
+    press(&finger, 400, 300);
+    double stopped = finger.drift_per_s * finger.t_s;
+    for (int second = 0; second < 300; second++) {
+        for (int k = 0; k < FRAMES_PER_S; k++) {
+            finger.drift_per_s = stopped / (finger.t_s + 1.0 / FRAMES_PER_S);
+            step(&finger);
+        }
+        assert_true(fabs(shared_error(&finger)) < 7); // 20 s of it while skin may creep, and the way back
+    }
+    assert_true(fabs(shared_error(&finger)) < 7);
+    assert_true(fabs(finger.tare.drift.rate_q20 / 1048576.0 * 12.5) < 0.05);
+}
+
+// ---- in a silence ------------------------------------------------------------------------------
+
+static void a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 1; seed <= 6; seed++) {
+        emulated_finger finger = worn_finger(seed, seed % 2 ? WORST_PER_S : -WORST_PER_S, 20);
+        press(&finger, 400, 300);
+        run_seconds(&finger, 1);
+        double before = shared_error(&finger);
+        finger.t_s += 10;
+        run_frames(&finger, BT_SILENCE_ROUNDS);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+        assert_true(fabs(shared_error(&finger) - before) < 0.5); // of 2.5
+    }
+}
+
+static void a_load_that_changed_in_a_silence_is_no_drift(void **state)
+{
+    (void)state;
+    emulated_finger finger = worn_finger(1, WORST_PER_S, 20);
+    press(&finger, 400, 300);
+    run_seconds(&finger, 5);
+    double before = shared_error(&finger);
+    finger.t_s += 10;
+    finger.load = 600;
+    finger.pdc_load = 450;
+    run_frames(&finger, BT_SILENCE_ROUNDS);
+    assert_true(fabs(shared_error(&finger) - before) < 0.5);
+}
+
+// ---- temperature -------------------------------------------------------------------------------
+
+static void what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch(void **state)
+{
+    (void)state;
+    const double tdc_per_s = 0.4;
+    emulated_finger finger;
+    finger_init(&finger);
+    finger.settings.thermal_gain_q16 = 1 << 15; // half a count for each of TDC
+    finger.drift_per_s = tdc_per_s / 2;
+    for (int k = 0; k < 60 * FRAMES_PER_S; k++) {
+        if (k == 40 * FRAMES_PER_S) {
+            finger.load = 400;
+            finger.pdc_load = 300;
+        }
+        bt_round frame = next_frame(&finger);
+        frame.tdc = to_count(1000 + tdc_per_s * finger.t_s);
+        (void)feed(&finger, &frame);
+    }
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    assert_true(fabs(shared_error(&finger)) < 0.5); // 4 counts, twice
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_tare_of_a_worn_finger_does_not_lag_behind_its_drift),
+        cmocka_unit_test(without_pressure_nothing_is_learned),
+        cmocka_unit_test(a_slow_load_is_not_learned),
+        cmocka_unit_test(a_hold_drifts_on),
+        cmocka_unit_test(an_hour_of_hold_keeps_a_force_down_to_the_noise),
+        cmocka_unit_test(drift_that_stops_in_a_hold_is_found_out),
+        cmocka_unit_test(a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it),
+        cmocka_unit_test(a_load_that_changed_in_a_silence_is_no_drift),
+        cmocka_unit_test(what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

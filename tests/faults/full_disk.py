@@ -1,0 +1,35 @@
+"""Run by test_exports.py: exports of a recording under growing limits of a file's size, as a disk that is nearly full.
+
+    python full_disk.py RECORDING FOLDER SUFFIX SIZE...
+
+A program that dies, as HDF5 did, has a process of its own to die in. Prints two lines a size: the error or what was
+written, and what lies in the folder.
+"""
+
+from __future__ import annotations
+
+import resource
+import signal
+import sys
+from pathlib import Path
+
+import biotac
+from biotac.export import export
+
+
+def main(path: str, folder: str, suffix: str, *sizes: str) -> None:
+    recording = biotac.Recording(path)
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # a write then fails with EFBIG
+    _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for size in sizes:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (int(size), hard))
+        try:
+            written = export(recording, Path(folder) / f"out{suffix}")
+        except biotac.InputError as error:
+            print(f"{size} InputError {error}", flush=True)
+        else:
+            print(f"{size} wrote {len(written)}", flush=True)
+        print(f"{size} left {sorted(its.name for its in Path(folder).iterdir())}", flush=True)
+
+
+main(*sys.argv[1:])

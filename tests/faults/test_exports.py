@@ -1,0 +1,44 @@
+"""A disk that gets full in the middle of an export: one line, nothing left behind, whatever library writes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import biotac
+from biotac.export import FORMATS, export
+
+LIMITS = [0, 700, 5_000, 20_000]  # bytes; the smallest of these exports has 40 000
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recorded") / "rec.mcap"
+    with biotac.open("sim:press.toml?seconds=3") as hand:
+        hand.record(path)
+        hand.read(5.0)
+    return path
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_full_disk_ends_an_export_in_a_line_and_leaves_nothing(tmp_path: Path, recorded: Path, suffix: str) -> None:
+    words = [sys.executable, Path(__file__).with_name("full_disk.py"), recorded, tmp_path, suffix, *map(str, LIMITS)]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert len(lines) == 2 * len(LIMITS)
+    for limit, said, left in zip(LIMITS, lines[::2], lines[1::2], strict=True):
+        assert said.startswith(f"{limit} InputError") and "cannot be written (" in said and "File too large" in said
+        assert left == f"{limit} left []"
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_an_export_of_two_files_writes_both_or_none(tmp_path: Path, recorded: Path, suffix: str) -> None:
+    recording, second = biotac.Recording(recorded), tmp_path / f"out.pac{suffix}"
+    second.write_text("precious")
+    with pytest.raises(biotac.InputError, match=r"out\.pac.* exists"):
+        export(recording, tmp_path / f"out{suffix}")
+    assert [its.name for its in tmp_path.iterdir()] == [second.name] and second.read_text() == "precious"

@@ -1,0 +1,132 @@
+"""One flipped bit in a recording: every one is told, or nothing that the library gives is another thing for it."""
+
+from __future__ import annotations
+
+import random
+import struct
+import warnings
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import biotac
+
+HEAD = struct.Struct("<BQ")  # opcode and length, of every MCAP record
+CHUNK, DATA_END = 0x06, 0x0F
+CHUNK_HEAD_BYTES = 50  # what of a chunk its own checksum is not over
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("recorded") / "rec.mcap"
+    with pytest.MonkeyPatch.context() as patch, biotac.open("sim:press.toml?seconds=0.6") as hand:
+        patch.setattr("biotac.recording.writer.FINGER_BYTES_PER_S", 8192)  # several blocks in little time
+        hand.record(path)
+        hand.read(1.0)
+    return path.read_bytes()
+
+
+def said(path: Path) -> tuple[dict[str, Any], list[str]]:
+    """All that a Recording gives, and its problems."""
+    its = biotac.Recording(path)
+    names = [
+        "settings",
+        "calibrations",
+        "maps",
+        "names",
+        "info",
+        "sensors",
+        "metadata",
+        "arrived_ns",
+        "messages",
+        "counts",
+        "frames_lost",
+    ]
+    facts = {name: getattr(its, name) for name in names} | {
+        name: getattr(its, name).tobytes() for name in ("frames", "pac", "idle", "wire")
+    }
+    return facts | {"blocks": its.blocks, "arrivals": its._arrivals}, its.problems
+
+
+def loaded(path: Path) -> tuple[bytes, bool]:
+    """What ``load`` gives, and whether it warned."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        return biotac.load(path).tobytes(), bool(caught)
+
+
+def records(data: bytes) -> list[tuple[int, int, int]]:
+    """Opcode, begin and end of every record."""
+    out, at = [], 8
+    while at < len(data) - 8:
+        opcode, length = HEAD.unpack_from(data, at)
+        out.append((opcode, at, at + HEAD.size + length))
+        at = out[-1][2]
+    return out
+
+
+def outcome(path: Path, good: tuple[dict[str, Any], bytes]) -> str:
+    """``told`` or ``silent`` where something is another, else ``harmless``."""
+    try:
+        facts, problems = said(path)
+        rows, warned = loaded(path)
+    except biotac.RecordingError:
+        return "told"
+    if (facts != good[0] and not problems) or (rows != good[1] and not warned):
+        return "silent"
+    return "told" if problems else "harmless"
+
+
+def tried(tmp_path: Path, recorded: bytes, bits: list[int]) -> Counter[str]:
+    path = tmp_path / "rec.mcap"
+    path.write_bytes(recorded)
+    facts, problems = said(path)
+    rows, warned = loaded(path)
+    assert not problems and not warned
+    counts: Counter[str] = Counter()
+    for bit in bits:
+        spoilt = bytearray(recorded)
+        spoilt[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(spoilt)
+        its = outcome(path, (facts, rows))
+        assert its != "silent", f"bit {bit % 8} of byte {bit // 8}"
+        counts[its] += 1
+    return counts
+
+
+def structure(data: bytes) -> list[int]:
+    """Every byte that no chunk's own checksum is over."""
+    kept: list[int] = []
+    for opcode, begin, end in records(data):
+        kept += range(begin, min(end, begin + CHUNK_HEAD_BYTES) if opcode == CHUNK else end)
+    return kept
+
+
+def test_a_flipped_bit_is_told(tmp_path: Path, recorded: bytes) -> None:
+    """Drawn from all of the file, and one in the head of every record."""
+    draw = random.Random(17)
+    bits = [8 * begin + draw.randrange(8 * HEAD.size) for _, begin, _ in records(recorded)]
+    bits += [8 * byte + draw.randrange(8) for byte in draw.sample(structure(recorded), 60)]
+    bits += [draw.randrange(8 * len(recorded)) for _ in range(60)]
+    counts = tried(tmp_path, recorded, bits)
+    assert counts["harmless"] == 0
+
+
+@pytest.mark.nightly
+def test_every_byte_of_the_structure_is_told(tmp_path: Path, recorded: bytes) -> None:
+    draw = random.Random(18)
+    tried(tmp_path, recorded, [8 * byte + draw.randrange(8) for byte in structure(recorded)])
+
+
+def test_a_block_that_is_cut_out_is_told(tmp_path: Path, recorded: bytes) -> None:
+    """Whole records gone, lengths right: only the checksums and statistics know."""
+    path = tmp_path / "rec.mcap"
+    path.write_bytes(recorded)
+    good = said(path)[0], loaded(path)[0]
+    until = next(begin for opcode, begin, _ in records(recorded) if opcode == DATA_END)
+    for _, begin, end in records(recorded):
+        if begin < until:
+            path.write_bytes(recorded[:begin] + recorded[end:])
+            assert outcome(path, good) == "told"

@@ -1,0 +1,136 @@
+"""The rows of tests/faults/matrix.toml that are played: every rig, the same verdict for all of them."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomllib
+from rig import ROOT, Rig
+
+import biotac
+from biotac import FrameFlags
+from biotac.wire import messages_gen as wire
+
+ROWS = [row for row in tomllib.loads((ROOT / "tests/faults/matrix.toml").read_text())["row"] if "play" in row]
+HEALTHY = """
+name = "healthy"
+seed = 5
+fingers = 2
+[[step]]
+do = "rest"
+seconds = 1.0
+[[step]]
+do = "press"
+seconds = 0.5
+at = "E17"
+force_n = 3.0
+[[step]]
+do = "hold"
+seconds = 1.0
+[[step]]
+do = "rest"
+seconds = 0.5
+"""
+HURT, WITNESS = 0, 1
+OFF_N = 0.1
+EDGE_ROUNDS = 3
+BACK_S = 0.15  # a sensor that was silent is asked who it is, for some rounds
+DOUBT = (
+    FrameFlags.UNTARED | FrameFlags.POC_INVALID | FrameFlags.ELECTRODE_MISSING | FrameFlags.RAIL | FrameFlags.FAULT
+    | FrameFlags.DOUBT | FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER
+)  # fmt: skip
+healthy_runs: dict[tuple[str, str], biotac.Batch] = {}
+
+
+def lasting(wrong: np.ndarray) -> np.ndarray:
+    """What lasts over EDGE_ROUNDS: where a touch begins or ends, one word more or less decides a round."""
+    out = wrong.copy()
+    edges = np.flatnonzero(np.diff(wrong, prepend=False, append=False))
+    for begin, end in edges.reshape(-1, 2):
+        out[begin:end] = end - begin > EDGE_ROUNDS
+    return out
+
+
+def faults_of(play: dict[str, Any]) -> list[tuple[float, float]]:
+    """When each begins, and for how long."""
+    if "noise" not in play:
+        return [(play["at_s"], play.get("seconds", 0.01))]
+    draw, millisecond = random.Random(17), 0.001
+    return [(k * millisecond, millisecond) for k in range(200, 2900) if draw.random() < play["noise"]]
+
+
+def scenario(play: dict[str, Any]) -> str:
+    channel = f'channel = "{play["channel"]}"\n' if "channel" in play else ""
+    tables = [
+        f'[[fault]]\nat_s = {at_s:.3f}\nseconds = {seconds}\nfinger = {HURT}\nkind = "{play["kind"]}"\n{channel}'
+        for at_s, seconds in faults_of(play)
+    ]
+    return HEALTHY + "".join(tables)
+
+
+def run(rig: Rig, source: Path) -> tuple[biotac.Batch, wire.SensorStatus]:
+    rig.need("scenarios")
+    hand = rig.open(str(source))
+    hand.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)  # results rest on the electrodes alone
+    batch = hand.read_batch(100)
+    assert hand.stats.frames_lost == hand.stats.crc_errors == 0
+    status = hand.sensor_status(HURT)
+    rig.close()
+    return batch, status
+
+
+def healthy(rig: Rig, tmp_path: Path, recorded: bool) -> biotac.Batch:
+    """Without the fault; ``recorded``: its counts, played from a file."""
+    key = rig.name, str(recorded)
+    if key not in healthy_runs:
+        path = tmp_path / "healthy.toml"
+        path.write_text(HEALTHY)
+        if recorded:
+            path = counts_file(tmp_path / "healthy.npz", healthy(rig, tmp_path, False).frames)
+        healthy_runs[key] = run(rig, path)[0]
+    return healthy_runs[key]
+
+
+def counts_file(path: Path, frames: np.ndarray, play: dict[str, Any] | None = None) -> Path:
+    """The hurt finger's counts, with words that have good parity and are wrong."""
+    mine = frames[frames["finger"] == HURT]
+    counts = mine["counts"].copy()
+    if play is not None:
+        counts[round(play["at_s"] * 100), : play["electrodes"]] = play["count"]
+    np.savez(path, E=counts, PDC=mine["pdc"], TAC=mine["tac"], TDC=mine["tdc"])
+    return path
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row["fault"])
+def test_what_is_wrong_is_told(rig: Rig, tmp_path: Path, row: dict[str, Any]) -> None:
+    play = row["play"]
+    recorded = "electrodes" in play
+    good = healthy(rig, tmp_path, recorded).frames
+    if recorded:
+        source = counts_file(tmp_path / "hurt.npz", healthy(rig, tmp_path, False).frames, play)
+    else:
+        source = tmp_path / "hurt.toml"
+        source.write_text(scenario(play))
+    batch, status = run(rig, source)
+    frames = batch.frames
+    assert frames[frames["finger"] == WITNESS].tobytes() == good[good["finger"] == WITNESS].tobytes()
+    good, mine = (its[its["finger"] == HURT] for its in (good, frames))
+    begin_us = good["t_us"][0]
+    missing_s = (np.setdiff1d(good["t_us"], mine["t_us"]) - begin_us) / 1e6
+    windows = [(at_s - 0.01, at_s + seconds + BACK_S) for at_s, seconds in faults_of(play)]
+    assert all(any(begin <= at_s <= end for begin, end in windows) for at_s in missing_s)
+    good = good[np.isin(good["t_us"], mine["t_us"])]
+    off_n = np.abs(mine["force_n"] - good["force_n"]).max(axis=1)  # NaN: nothing was told
+    touch = ((good["flags"] ^ mine["flags"]) & FrameFlags.CONTACT) != 0
+    wrong = (off_n > OFF_N) | lasting(touch)
+    unsaid = np.flatnonzero(wrong & ((mine["flags"] & DOUBT) == 0))
+    assert not len(unsaid), [(int(k), off_n[k], FrameFlags(int(mine["flags"][k]))) for k in unsaid[:5]]
+    for name in row.get("flags", []):
+        assert (mine["flags"] & FrameFlags[name]).any(), name
+    if "counter" in row:
+        assert getattr(status, row["counter"]) > 0

@@ -1,0 +1,113 @@
+"""Stamps of a recording on the host's clock: against a board whose clock is known to drift, for hours."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+import biotac
+from biotac.recording.file import RecordingFile
+from biotac.wire import messages_gen as wire
+from biotac.wire.dtypes_gen import DTYPES
+from biotac.wire.framing import encode
+
+BEGIN_NS = 1_700_000_000_000_000_000
+DRIFT_PPM = 50.0
+HOURS = 2.5  # longer than the clock remembers, and two wraps of the board's 32 bits
+EVERY_S = 30.0
+MISSING = 4  # an electrode that gives no word
+
+
+@pytest.fixture(scope="module")
+def metadata(tmp_path_factory) -> dict[str, str]:
+    path = tmp_path_factory.mktemp("facts") / "a.mcap"
+    with biotac.open("sim:press.toml?seconds=1") as hand:
+        hand.record(path)
+        hand.read_batch(100)
+    return biotac.Recording(path).metadata
+
+
+def rows(drift_ppm: float) -> Iterator[tuple[int, int, int]]:
+    """(seq, device time, true host time in ns) of a FRAME every few seconds."""
+    for k in range(int(HOURS * 3600 / EVERY_S)):
+        host_s = k * EVERY_S
+        yield k, round(host_s * (1 + drift_ppm / 1e6) * 1e6), BEGIN_NS + round(host_s * 1e9)
+
+
+@pytest.fixture(scope="module")
+def drifting(tmp_path_factory, metadata) -> Path:
+    """Frames that take 0.2 to 1.2 ms to the host, and a TARE with every fifteenth."""
+    path = tmp_path_factory.mktemp("drift") / "a.mcap"
+    rng = np.random.default_rng(3)
+    frame = np.zeros((), DTYPES[wire.Frame.ID])
+    frame["counts"][MISSING] = wire.INVALID_COUNT
+    fields = {name: getattr(wire.Tare.unpack(bytes(wire.Tare.STRUCT.size)), name) for name in wire.Tare.__slots__}
+    with path.open("wb") as stream:
+        file = RecordingFile(stream, metadata)
+        for seq, t_us, true_ns in rows(DRIFT_PPM):
+            frame["seq"], frame["t_us"] = seq, t_us % 2**32
+            block = encode(wire.Frame.ID, frame.tobytes())
+            if seq % 15 == 14:
+                block += encode(wire.Tare.ID, wire.Tare(**fields | {"seq": seq, "t_us": t_us % 2**32}).pack())
+            late_ns = int(10_000_000 + 1_000_000 * (0.2 + rng.random()))
+            file.add(block, true_ns + late_ns, true_ns + late_ns + 1000)
+        file.close()
+    return path
+
+
+def test_exports_follow_the_measured_drift(drifting: Path) -> None:
+    recording = biotac.Recording(drifting)
+    truth_ns = np.array([true_ns for _, _, true_ns in rows(DRIFT_PPM)])
+    stamps = recording.stamp_ns(recording.frames["t_us"])
+    assert stamps[0] == recording.begin_ns
+    # The start is as late as its first message was; from there on a message's way is all that can be mistaken.
+    error_ms = (stamps - stamps[0] - (truth_ns - truth_ns[0])) / 1e6
+    assert np.abs(error_ms).max() < 1.2
+    assert (np.diff(stamps) > 0).all()
+    plain_ms = ((recording.frames["t_us"] - recording.frames["t_us"][0]) * 1000 - (truth_ns - truth_ns[0])) / 1e6
+    assert np.abs(plain_ms).max() > 400  # what it would be otherwise
+    assert recording.to_pandas().index.asi8.tolist() == stamps.tolist()
+
+
+def test_topics_for_plotting_follow_it_too_and_tares_do_not_wrap(drifting: Path) -> None:
+    truth_ns = {seq: true_ns for seq, _, true_ns in rows(DRIFT_PPM)}
+    found: dict[str, list[tuple[int, int]]] = {}
+    with drifting.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            if channel.message_encoding == "json":
+                body = json.loads(message.data)
+                assert message.log_time == body["timestamp"]["sec"] * 10**9 + body["timestamp"]["nsec"]
+                found.setdefault(channel.topic, []).append((body["seq"], message.log_time))
+    assert len(found["/biotac/finger0/tare"]) == len(truth_ns) // 15
+    for stamps in found.values():
+        start_ns = found["/biotac/finger0/results"][0][1] - BEGIN_NS
+        errors_ms = [(stamp_ns - start_ns - truth_ns[seq]) / 1e6 for seq, stamp_ns in stamps]
+        assert max(map(abs, errors_ms)) < 1.2 + 0.01 * 100  # while little is known, 10 s at 100 ppm
+
+
+def test_a_missing_electrode_is_null(drifting: Path) -> None:
+    with drifting.open("rb") as stream:
+        messages = make_reader(stream).iter_messages(topics=["/biotac/finger0/counts"])
+        electrodes = json.loads(next(iter(messages))[2].data)["electrodes"]
+    assert electrodes[MISSING] is None and electrodes.count(None) == 1
+
+
+def test_where_nobody_knows_the_hosts_time_device_time_counts(tmp_path: Path, metadata) -> None:
+    """As in imported files: one time a block, which says nothing of a clock."""
+    with (tmp_path / "a.mcap").open("wb") as stream:
+        file = RecordingFile(stream, metadata)
+        frame = np.zeros((), DTYPES[wire.Frame.ID])
+        for seq, t_us, _ in rows(0.0):
+            frame["seq"], frame["t_us"] = seq, t_us % 2**32
+            file.add(encode(wire.Frame.ID, frame.tobytes()), t_us * 1000 // 10**9 * 10**9)
+            if seq == 20:
+                break
+        file.close()
+    recording = biotac.Recording(tmp_path / "a.mcap")
+    t_us = recording.frames["t_us"]
+    assert recording.stamp_ns(t_us).tolist() == (t_us * 1000).tolist()
