@@ -34,12 +34,11 @@ LIN = {wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}
 OWN = "its own force plate"
 #: A finger's own models, what the board runs for each, and what they are called.
 OWN_MODELS = (
-    ("lin-scales", "Lin's scales", "Lin's scales"),
-    ("lin-scales-offset", "signals and offset, 3 axes", "Lin's scales and offsets"),
-    ("affine", "signals and offset, 3 axes", "affine"),
-    ("sign-split", "sign-split, 3 axes", "sign-split"),
-    ("gated-sign-split", "gated sign-split, 3 axes", "small map"),
-    ("conductance-quadratic", "quadratic in conductance, 3 axes", "quadratic map"),
+    (models.LIN, "Lin's scales", "Lin's scales"),
+    (models.LIN_OFFSET, "signals and offset, 3 axes", "Lin's scales and offsets"),
+    (models.AFFINE.name, "signals and offset, 3 axes", "affine"),
+    (models.CONDUCTANCE.name, "quadratic in conductance, 3 axes", "small map"),
+    (models.JOINED.name, "population and a scale, 3 axes", "joined map"),  # of the same blocks
     (models.POOLED, "pooled, 3 axes", "large map"),
 )
 NEAREST = 0.05  # of the rows, those whose counts came back closest, stand for "the same pattern"

@@ -14,8 +14,8 @@ PANELS = (("Cortex-M0+", "m0plus_divider", "with the RP2040's divider"), ("Corte
 COLORS = {"nothing": "#c2410c", OWN: "#1d4ed8"}
 LITTLE = "#15803d"
 # Names stand right of their points and above, but for these.
-LEFT = ("affine", "sign-split", "small map", "population map")
-BELOW = ("Lin's scales, the firmware's", "sign-split", "small map", "quadratic map", "population map, pulled")
+LEFT = ("affine", "small map", "population map")
+BELOW = ("Lin's scales, the firmware's", "small map", "joined map", "population map, pulled")
 FLOORS = (("repeatability_n", "the plate again, same pattern", "--"), ("noise_n", "electrode noise, a frame", ":"))
 
 
