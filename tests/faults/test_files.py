@@ -40,7 +40,7 @@ MAP = map_file.to_dict(make_map(1))
 WIDTH = fitted.features.width(with_pdc=False)
 WRENCH = {
     "format": fitted.FORMAT, "model": "all", "axes": ["Fx", "Fy", "Fz"], "tare_counts": [2000.0] * 19,
-    "window_rows": 5, "lag_rows": 1, "blocks": fitted._block_names(with_pdc=False),
+    "window_rows": 5, "lag_rows": [1, 1, 1], "blocks": fitted._block_names(with_pdc=False),
     "coefficients": [[0.5] * 3] * (WIDTH + 1), "provenance": None,
 }  # fmt: skip
 SETTINGS = {"settings": {"poc_weights": 2}}

@@ -136,8 +136,10 @@ def check_link(link: dict[str, Any], messages: tuple[Message, ...]) -> None:
         raise ValueError("link.toml: a setting id occurs twice")
     for name, setting in link["setting"].items():
         low, high = setting["range"]
-        if not (low <= setting["default"] <= high and low <= before(setting) <= high):
-            raise ValueError(f"link.toml: default of {name}, or what was before it, is outside its range")
+        if not low <= setting["default"] <= high:
+            raise ValueError(f"link.toml: default of {name} is outside its range")
+        if not low <= before(setting) <= high:
+            raise ValueError(f"link.toml: what was before {name} is outside its range")
     for message in messages:
         for field in message.fields:
             values = len(per_finger(link))

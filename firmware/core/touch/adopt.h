@@ -4,7 +4,7 @@
 #ifndef BIOTAC_ADOPT_H
 #define BIOTAC_ADOPT_H
 
-#include "touch/tare.h"
+#include "touch/machine.h"
 
 // What the gate compares with: in doubt where the signals came to rest, else the tare.
 static inline const bt_baseline *bt_adopt_gate_base(const bt_tare *tare)

@@ -3,7 +3,7 @@
 #ifndef BIOTAC_FOLLOW_H
 #define BIOTAC_FOLLOW_H
 
-#include "touch/tare.h"
+#include "touch/machine.h"
 
 // A round's lanes, once its words are in the sweep.
 void bt_follow_turn(bt_tare *tare);

@@ -4,7 +4,7 @@
 #ifndef BIOTAC_JUDGE_H
 #define BIOTAC_JUDGE_H
 
-#include "touch/tare.h"
+#include "touch/machine.h"
 
 #define BT_STILL_SWEEPS 2 // to tare from; the first one may hold what came before it
 

@@ -38,6 +38,21 @@ def pace(text: str) -> float:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
+def finger(text: str) -> int:
+    """A chip select, by number or by name."""
+    from ..hand.views import DEFAULT_NAMES, finger_index
+
+    try:
+        return finger_index(DEFAULT_NAMES, int(text) if text.isdigit() else text)
+    except KeyError as error:
+        raise argparse.ArgumentTypeError(error.args[0]) from None
+
+
+def fingers(text: str) -> tuple[int, ...]:
+    """Several of them, with commas between."""
+    return tuple(finger(part) for part in text.split(","))
+
+
 def add_port(parser: argparse.ArgumentParser) -> None:
     """PORT, which may be left out."""
     parser.add_argument(

@@ -64,7 +64,8 @@ def compute(
     would refuse.
 
     ``compute(rows)``, with rows of FRAME_DTYPE as ``load`` and ``Hand.read`` give them, takes counts, tare and pressure
-    from them; an electrode whose tare is unknown weighs nothing.
+    from them; an electrode whose tare is unknown weighs nothing. They do not tell the board's settings: for what the
+    board made of them give its ``Recording.settings``.
 
     NaN where there is no answer: poc_mm and torque_nmm x if nothing weighs. Where the board rounds to
     its wire units this does not, and it never saturates. Raises ValueError for other shapes, types and

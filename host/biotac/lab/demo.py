@@ -24,6 +24,7 @@ from ..wire import messages_gen as wire
 from ..wire.batches import Batch, join
 from ..wire.slots import FRAME_HZ, PAC_SLOT
 from .crosscheck import CrossCheck
+from .demo_answers import answers_to
 
 Show = Callable[[str], None]
 
@@ -66,6 +67,9 @@ def run_demo(
     wall = time.monotonic()
     # The board's counts are made; from here on it is a host with a board, and its cost is measured.
     with shake_hands(SimLink(f"sim:{source.name}", SimBoard(source, pace=0.0, hold=True))) as hand:
+        # What is checked is the board's arithmetic on Lin's formulas, to a twentieth of a millinewton. What an
+        # uncalibrated board says by default, the population map, is computed below, and drawn beside it.
+        hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
         settings = hand.settings()
         has_pac = bool(np.any(source.samples[:, :, PAC_SLOT] <= 4095))
         recorder = hand.record(recording_path, overwrite=True)
@@ -82,6 +86,7 @@ def run_demo(
         stats = hand.stats
         status = hand.status()
     joined = join(batches)
+    answers = answers_to(joined, settings)
     rows, played_fingers = source.samples.shape[:2]
     device_s = rows / FRAME_HZ
     recorded = Recording(recording_path)
@@ -108,12 +113,15 @@ def run_demo(
         "recording_matches": bool(same),
         "tare_changes": tare_changes(joined.messages),
         "force_rmse_n": force_error(source, joined),
+        "lin_rmse_n": force_error(source, joined, answers.lin_n),
+        "calibrated_by": answers.calibrated_by,
+        "calibrated_rmse_n": force_error(source, joined, answers.calibrated_n),
         "crosscheck": outcome.as_dict(),
         "recording": str(recording_path),
         "report": str(folder / "report.md"),
         "picture": str(folder / "demo.png"),
     }
-    draw(source, joined, source_rows(source, joined), folder / "demo.png")
+    draw(source, joined, source_rows(source, joined), answers, folder / "demo.png")
     (folder / "report.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
     (folder / "report.md").write_text(report_text(facts), encoding="utf-8")
     return DemoRun(source, joined, facts)
@@ -146,8 +154,11 @@ def tare_changes(messages: list[Any]) -> list[dict[str, Any]]:
     ]
 
 
-def force_error(source: Source, batch: Batch) -> list[float] | None:
-    """RMS difference to the source's own force over contact frames, N per axis; None without one."""
+def force_error(source: Source, batch: Batch, force_n: NDArray[np.float64] | None = None) -> list[float] | None:
+    """RMS difference to the source's own force over contact frames, N per axis; None without one.
+
+    Of ``force_n`` (n, 3), or of what the board sent.
+    """
     truth = source.known_force_n
     if truth is None:
         return None
@@ -155,7 +166,8 @@ def force_error(source: Source, batch: Batch) -> list[float] | None:
     if not touched.any():
         return None
     frames, rows = batch.frames[touched], source_rows(source, batch)[touched]
-    difference = frames["force_n"] - truth[rows, frames["finger"]]
+    said = frames["force_n"] if force_n is None else force_n[touched]
+    difference = said - truth[rows, frames["finger"]]
     return [float(v) for v in np.sqrt(np.nanmean(difference**2, axis=0))]
 
 
@@ -184,8 +196,14 @@ def report_text(facts: dict[str, Any]) -> str:
         "formulas against a real force.",
     ]
     if facts["force_rmse_n"] is not None:
-        x, y, z = facts["force_rmse_n"]
-        lines.append(f"Against the source's own force, in contact: {x:.2f} / {y:.2f} / {z:.2f} N RMS in x / y / z.")
+        lines += ["", "Against the source's own force, in contact, N RMS in x / y / z:", ""]
+        for words, name in (
+            ("the board, by Lin's scales of its settings", "force_rmse_n"),
+            ("the firmware's own scales", "lin_rmse_n"),
+            (f"what it says by default: {facts['calibrated_by']}", "calibrated_rmse_n"),
+        ):
+            x, y, z = facts[name]
+            lines.append(f"* {words}: {x:.2f} / {y:.2f} / {z:.2f}")
     if facts["tare_changes"]:
         changes = [[str(t["finger"]), str(t["seq"]), t["reason"]] for t in facts["tare_changes"][:50]]
         lines += ["", *table(["finger", "frame", "tare changed because"], changes)[:-1]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,12 @@ from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch
 from ..wire.frames import electrode_signals
+from .demo_answers import Answers
 
 AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")  # x, y, z: dark enough for white paper
 
 
-def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], path: Path) -> None:
+def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], answers: Answers, path: Path) -> None:
     """Write a PNG of finger 0; ``source_rows`` (n,) says which row of the source each frame is."""
     mine = batch.frames["finger"] == 0
     frames, messages = batch.frames[mine], batch.wire[mine]
@@ -28,7 +30,8 @@ def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], path: Pat
         axes = figure.subplots(1, 2, width_ratios=(1, 1.9))
         figure.suptitle(f"{source.name}: finger 0 through the simulated board")
         draw_fingertip(figure, axes[0], frames, messages)
-        draw_force(axes[1], source, frames, source_rows[mine])
+        lin_n, calibrated_n = answers.lin_n[mine], answers.calibrated_n[mine]
+        draw_force(axes[1], source, frames, source_rows[mine], replace(answers, lin_n=lin_n, calibrated_n=calibrated_n))
 
 
 def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
@@ -60,20 +63,22 @@ def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
     figure.colorbar(dots, ax=axes, shrink=0.7, label="signal [count]: compressed < 0 < bulged")
 
 
-def draw_force(axes: Any, source: Source, frames: Any, rows: NDArray[np.int64]) -> None:
-    """Force on the finger over device time, with the source's own force behind it."""
+def draw_force(axes: Any, source: Source, frames: Any, rows: NDArray[np.int64], answers: Answers) -> None:
+    """Force on the finger over device time by both answers, with the source's own force behind them."""
     t_s = frames["t_us"] / 1e6
     truth_n = source.known_force_n
     for axis, color in enumerate(AXIS_COLORS):
         if truth_n is not None:
             truth = truth_n[rows, 0, axis]
             axes.plot(t_s, truth, color=color, linewidth=4, alpha=0.25, label=f"{'xyz'[axis]}, truth")
-        axes.plot(t_s, frames["force_n"][:, axis], color=color, linewidth=1, label=f"{'xyz'[axis]}, board")
+        axes.plot(t_s, answers.lin_n[:, axis], ":", color=color, linewidth=1, label=f"{'xyz'[axis]}, Lin")
+        axes.plot(t_s, answers.calibrated_n[:, axis], color=color, linewidth=1, label=f"{'xyz'[axis]}, calibrated")
     contact = (frames["flags"] & wire.FrameFlags.CONTACT) != 0
     axes.fill_between(
         t_s, 0, 1, where=contact, transform=axes.get_xaxis_transform(), color="#000000", alpha=0.06, label="contact"
     )
     axes.set(xlabel="device time [s]", ylabel="force on the finger [N]")
-    axes.set_title("force: board (thin) and truth (broad)" if truth_n is not None else "force", fontsize=10)
+    words = f"force: calibrated (thin: {answers.calibrated_by}), Lin's scales as shipped (dotted)"
+    axes.set_title(f"{words}, truth (broad)" if truth_n is not None else words, fontsize=10)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, ncols=2)
+    axes.legend(fontsize=8, ncols=5, loc="upper center", bbox_to_anchor=(0.5, -0.12), frameon=False)

@@ -196,26 +196,30 @@ def test_the_finger_in_air_is_trained_in_where_contact_does_not_pay_for_it(tmp_p
 
 
 def test_air_weighs_as_much_as_the_run_before_its_share(run: Run) -> None:
-    sums = moments.air_moments(run)
+    sums = moments.air_sums(run, 1, run.truth.shape[1])
     assert sums is not None
-    count = -1 - run.truth.shape[1]
-    assert sums[count, count] == pytest.approx(FRAMES)
-    assert not sums[:, count + 1 :].any()  # the truth is 0
+    assert sums.rows == pytest.approx(FRAMES)
+    assert not sums.cross.any()  # the truth is 0
+    assert not sums.square.any()
 
 
 # ---- ridge, with torque and pressure -----------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [model.name for model in models.MODELS if model.how == "ridge"])
-def test_ridge_shrinks_toward_lins_geometry_on_all_axes(name: str, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    model = next(model for model in models.MODELS if model.name == name)
-    sums = moments.moments(run, Blocks(run.rest, run.contact), 1, 0).sum(axis=0)
-    index = models.used(model, len(sums), 7)
-    monkeypatch.setattr(models, "LAMBDAS", np.array([1e12]))
-    found = models.solve(model, sums[np.ix_(index, index)], 7, run.tare)[0]
+def pulled_only(run: Run, model: models.Model, monkeypatch: pytest.MonkeyPatch, lam: float) -> np.ndarray:
+    """Coefficients at one lambda, on all rows."""
+    monkeypatch.setattr(models, "LAMBDAS", (lam, lam))
+    sums = moments.strip_sums(moments.smoothed(run, 1), run.truth, run.drift)
+    return models.pulled(sums, (models.lin, models.lin), [model.family])[0][0]
+
+
+@pytest.mark.parametrize("model", models.MODELS, ids=lambda model: model.name)
+def test_ridge_shrinks_toward_lins_geometry_on_all_axes(
+    model: models.Model, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = pulled_only(run, model, monkeypatch, 1e12)
     small = Signals(np.vstack([np.zeros(19), np.eye(19)]), run.tare, np.zeros(20))
-    own = model.family.index(features.width(with_pdc=True))
-    response = moments.with_one(features.columns(small)[:, own]) @ found
+    response = moments.with_one(features.columns(small)) @ found
     slope = response[1:] - response[0]
     arms = np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL)
     # about the middle of the pad, where the outward normal is -z
@@ -225,21 +229,18 @@ def test_ridge_shrinks_toward_lins_geometry_on_all_axes(name: str, run: Run, mon
         assert likeness > 0.999, f"axis {axis}"
     # pressure says nothing until a run says so
     pressed = Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 100.0]))
-    said = moments.with_one(features.columns(pressed)[:, own]) @ found
+    said = moments.with_one(features.columns(pressed)) @ found
     np.testing.assert_allclose(said[1], said[0], atol=1e-6)
 
 
-def test_pressure_that_never_moved_in_training_goes_nowhere_when_it_does(run: Run) -> None:
-    assert run.pdc is not None
+def test_pressure_that_never_moved_in_training_goes_nowhere_when_it_does(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     still = replace(run, pdc=np.full(FRAMES, 1e-9))
-    model = models.GATED
-    sums = moments.moments(still, Blocks(run.rest, run.contact), 1, 0).sum(axis=0)
-    index = models.used(model, len(sums), 7)
-    found = models.solve(model, sums[np.ix_(index, index)], 7, run.tare)
-    own = model.family.index(features.width(with_pdc=True))
+    found = pulled_only(still, models.JOINED, monkeypatch, models.LAMBDAS[0])
     pressed = Signals(np.zeros((2, 19)), run.tare, np.array([0.0, 500.0]))
-    said = moments.with_one(features.columns(pressed)[:, own]) @ found
-    assert np.abs(said[:, 1] - said[:, 0]).max() < 1e-3
+    said = moments.with_one(features.columns(pressed)) @ found
+    assert np.abs(said[1] - said[0]).max() < 1e-3
 
 
 # ---- template ----------------------------------------------------------------------------------
@@ -281,7 +282,7 @@ def test_a_touch_turned_and_pushed_the_other_way_changes_signs(run: Run) -> None
 def test_the_template_knows_more_than_the_papers_formulas_and_less_than_a_map(result: shear_torsion.Result) -> None:
     by_model = {name: errors[0] for name, errors in result.validation.by_model.items()}
     for axis in (1, 2, 6):
-        assert by_model["joined"][axis] < by_model["template"][axis] < by_model["lin-scales"][axis]
+        assert by_model["pooled"][axis] < by_model["template"][axis] < by_model["lin-scales"][axis]
 
 
 # ---- blocks of columns -------------------------------------------------------------------------

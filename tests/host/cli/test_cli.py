@@ -224,3 +224,22 @@ def test_sim_gives_a_pty_that_any_program_can_open(tmp_path: Path) -> None:
         process.terminate()
         process.wait()
         process.stdout.close()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "calibration get PORT out.json --finger nose",
+        "map clear PORT --finger 5",
+        "experiment poke rec.mcap --finger 7",
+        "calibrate wrench rec.mcap --finger nose",
+        "calibrate scale PORT --finger nose",
+        "calibrate pressure PORT --fingers thumb,9",
+    ],
+)
+def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> None:
+    with pytest.raises(SystemExit) as refused:
+        main(command.split())
+    told = capsys.readouterr().err
+    assert refused.value.code == 2
+    assert "expected one of 'index', 'middle', 'ring', 'little', 'thumb', or 0 to 4" in told

@@ -43,7 +43,7 @@ def random_map(seed: int, axes: int = 3, *, pdc: bool = True, unused: tuple[Kind
     ]
     names = ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")[:axes]
     coefficients = np.concatenate([*parts, rng.normal(0.0, 2.0, (1, axes))])
-    return WrenchMap("random", names, TARE, 1, 0, coefficients)
+    return WrenchMap("random", names, TARE, 1, (0,) * len(names), coefficients)
 
 
 def frames_of(seed: int, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -313,11 +313,11 @@ def fit(run: Run, lam: float) -> WrenchMap:
     penalty = lam * len(z) * np.maximum(variance, models.COLUMN_FLOOR * np.median(variance[:-1]))
     penalty[-1] = 0.0
     coefficients = np.linalg.solve(z.T @ z + np.diag(penalty), z.T @ run.truth)
-    return WrenchMap("all", run.axes, run.tare, 1, 0, coefficients)
+    return WrenchMap("all", run.axes, run.tare, 1, (0,) * len(run.axes), coefficients)
 
 
 # Less ridge than 1e-4 makes coefficients there that no board holds at full scale: refused in words, see below.
-@pytest.mark.parametrize("lam", models.LAMBDAS[[2, 4]])
+@pytest.mark.parametrize("lam", [1e-4, 1e-2])
 def test_on_the_emulated_sensor_every_row_is_right_force_and_torque(tmp_path: Path, lam: float) -> None:
     path = wrench_run.save(tmp_path / "run.npz", wrench_run.fields(6000, 3, moment=True, pdc=True))
     run = load_run(path)
@@ -328,7 +328,7 @@ def test_on_the_emulated_sensor_every_row_is_right_force_and_torque(tmp_path: Pa
     assert "on all 6000 rows" in board.words(facts)
 
 
-@pytest.mark.parametrize("lam", models.LAMBDAS[[1, 4]])
+@pytest.mark.parametrize("lam", [1e-5, 1e-2])
 def test_on_a_real_finger_every_row_is_right(lam: float) -> None:
     if not SHARED.exists():
         pytest.skip(f"{SHARED.name} is not at ../shared/data: real recordings are not part of the project")

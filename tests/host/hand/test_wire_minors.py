@@ -182,12 +182,12 @@ def test_an_old_board_is_told_of_and_streams(minor: int, board, tmp_path: Path) 
 
 
 @each_minor
-def test_an_old_boards_settings_are_its_own_and_the_rest_defaults(minor: int, board) -> None:
+def test_an_old_boards_settings_are_its_own_and_the_rest_as_before_them(minor: int, board) -> None:
     old, path = board(minor)
     with biotac.open(path) as hand:
         for setting, value in hand.settings().items():
             known = setting.name.lower() in old.settings
-            assert value == (100 + setting if known else wire.SETTINGS[setting].default)
+            assert value == (100 + setting if known else wire.SETTINGS[setting].before)
         hand.set_setting(biotac.Setting.STATUS_PERIOD_MS, 250)
         assert old.set == {int(biotac.Setting.STATUS_PERIOD_MS): 250}
         with pytest.raises(biotac.CommandRefusedError) as refused:

@@ -242,7 +242,7 @@ def test_a_map_is_given_the_board_s_tare_and_pressure(figure10: Trial) -> None:
     axes = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
     rows = features.columns(Signals(figure10.signal, figure10.tare, figure10.pressure))
     coefficients = np.random.default_rng(1).normal(0.0, 1.0, (rows.shape[1] + 1, 6))
-    its = WrenchMap("any", axes, np.full(19, 123.0), 1, 0, coefficients)
+    its = WrenchMap("any", axes, np.full(19, 123.0), 1, (0,) * len(axes), coefficients)
     found = estimates.by_map(figure10, its, "any")
     expected = rows @ coefficients[:-1] + coefficients[-1]
     known = np.isfinite(expected).all(axis=1)

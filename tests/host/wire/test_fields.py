@@ -17,6 +17,7 @@ from biotac.wire.fields import FRAME_FIELDS, IDLE_FIELDS, as_json
 @pytest.fixture(scope="module")
 def rows() -> np.ndarray:
     with biotac.open("sim:faults.toml?fingers=2&pace=fast") as hand:
+        hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
         return hand.read(seconds=3.0)
 
 
@@ -47,7 +48,8 @@ def test_json_says_null_where_there_is_no_value(rows) -> None:
 
 def test_compute_takes_rows(rows) -> None:
     """What it makes of them is what the board made, to the wire's rounding: half a step of each."""
-    its = biotac.compute(rows)
+    lin = {wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}  # whose arithmetic on the board is as fine as the wire
+    its = biotac.compute(rows, settings=lin)
     for name, step in (("poc_mm", 1e-3), ("force_n", 1e-4), ("torque_nmm", 1e-3)):
         good = ~np.isnan(rows[name]).any(axis=1) & ~np.isnan(its[name]).any(axis=1)
         assert good.sum() > 100

@@ -20,8 +20,8 @@ from ...core.map_columns import Signals
 from ..wrench import features
 from ..wrench.blocks import Blocks
 from ..wrench.fitted import WrenchMap
-from ..wrench.lag import check, lag_moments
-from ..wrench.moments import DRIFT_NODES, DRIFT_SIGMA_COUNTS
+from ..wrench.lag import Lags
+from ..wrench.moments import DRIFT_NODES
 from ..wrench.run import Run
 
 FAMILIES = (features.GATED, features.CONDUCTANCE_QUADRATIC)
@@ -31,6 +31,7 @@ COLUMNS = sum(len(index) for index in INDEX)
 _STACKED = np.concatenate(INDEX)
 _PARTS = tuple(np.split(np.arange(COLUMNS), np.cumsum([len(index) for index in INDEX])[:-1]))
 
+DRIFT_SIGMA_COUNTS = 100.0  # what a finger drifts by in about two minutes of warm-up (biotac.md finding 6)
 RIDGE = 2e-3  # of each column's variance
 VARIANCE_FLOOR = 0.3  # of the median: what hardly moves in training must not decide in use
 ROWS_AT_ONCE = 4096
@@ -76,7 +77,7 @@ class Population:
         """The same as a calibrated finger's map, for ``tare`` (19,), with an offset of 0."""
         every = np.zeros((ALL_COLUMNS + 1, len(AXES)))
         every[_STACKED] = self.coefficients
-        return WrenchMap(MODEL, AXES, np.asarray(tare, dtype=np.float64), 1, 0, every)
+        return WrenchMap(MODEL, AXES, np.asarray(tare, dtype=np.float64), 1, (0, 0, 0), every)
 
 
 def columns(e: Floats, tare: Floats) -> Floats:
@@ -102,7 +103,7 @@ def mirrored(run: Run) -> Run:
 def sums_of(run: Run) -> FingerSums:
     """What training needs of a run. Raises RecordingError when force and counts do not follow each other."""
     blocks = Blocks(run.rest, run.contact)
-    lag, _ = (0, 0.0) if run.by_clocks else check(run, blocks, lag_moments(run, blocks))
+    lag, _ = (0, 0.0) if run.by_clocks else Lags(run, blocks).check()
     truth = run.truth[:, :3].copy()
     truth[:, 0] -= truth[:, 0].sum() / truth[:, 2].sum() * truth[:, 2]
     rows = np.arange(max(-lag, 0), len(truth) - max(lag, 0))

@@ -1,15 +1,16 @@
-"""Which model, and what it is worth on rows it has never seen.
+"""What a calibration of this run is worth on rows it has never seen.
 
-Nested: each of the blocks is held out once, and everything that is chosen for it - lag, smoothing,
-lambda and model, per axis - is chosen by a second cross-validation inside the other blocks. What is
+Nested: each of the blocks is held out once, and everything that is chosen for it - lags, smoothing,
+lambdas and the models' weights, per axis - is chosen by a second cross-validation inside the other blocks. What is
 reported is therefore the procedure's error and not the luckiest of many.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
@@ -17,22 +18,25 @@ from threadpoolctl import threadpool_limits
 
 from ...core.geometry import Floats
 from ...core.map_columns import Signals
-from . import features
+from . import features, models
 from .blocks import BLOCKS, Blocks
-from .lag import best_lag, check, lag_moments
-from .models import AFFINE, GATED, LAMBDAS, MODELS, POOL, POOLED, TEMPLATE, solve, squared_errors, truth_variance, used
-from .moments import Rows, air_moments, drifted, linear_columns, moments, smoothed, with_one
+from .lag import Lags
+from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, TEMPLATE, Prior
+from .moments import Rows, Sums, air_sums, at, linear_columns, moved, smoothed, stacked, strip_sums, with_one
 from .run import Run
 from .template import Template
 
 INNER_FOLDS = 5
-WINDOWS_ROWS = (1, 5)  # as recorded, or the mean of five: half the noise for 20 ms of delay at 100 Hz
+WINDOWS_ROWS = (1, 5, 9)  # as recorded, or a mean: a third of the noise for 40 ms of delay at 100 Hz
 # What the frames in free air weigh against the run's. A finger that never rests leaves the map free to say half a
-# newton in air; but where light presses are scarce, holding it at zero bends the map in contact. So: the most that
-# costs no force axis more than a twentieth of its error.
-AIR_SHARES = (0.05, 0.01, 0.003)
+# newton in air, or more; but where light presses are scarce, holding it at zero bends the map in contact. So: the most
+# that costs no force axis more than a twentieth of its error, and never nothing.
+AIR_SHARES = (0.05, 0.01)
 AIR_COST = 1.1  # in squared error
+AIR_LAMBDA = 1e-4
 SHIFTS_COUNTS = (0.0, 100.0, -100.0)  # un-tared drift the result is tried with
+LESS = (0.25, 0.5)  # of the training blocks, for what more recording is worth
+THREADS = 2
 
 Show = Callable[[str], None]
 Strips = npt.NDArray[np.bool_]
@@ -43,7 +47,7 @@ class Choice:
     """What predicts one axis: ``coefficients`` (p + 1,) of features.columns, the offset last.
 
     ``inner_mse`` is the mean squared error of the inner cross-validation, over drift, in the truth's
-    unit squared. ``lam`` is NaN for the pool, whose parts have their own.
+    unit squared; NaN where nothing was chosen. ``lam`` is NaN for the pool, whose parts have their own.
     """
 
     model: str
@@ -54,209 +58,291 @@ class Choice:
 
 @dataclass(frozen=True)
 class Fit:
-    """One training: the choice per axis for every model by name, and ``best`` of them per axis.
+    """One training: the choice per axis for every model by name, of which ``best`` is the pool.
 
-    ``air_share`` is the weight of the frames in free air, of the run's; 0 without any.
+    ``lag_rows`` of each axis; ``weights`` (axes, m) of POOL's models, each with both LAMBDAS; ``air_share`` is the
+    weight of the frames in free air, of the run's, 0 without any; ``less`` are coefficients (p + 1, axes)
+    from LESS of its blocks.
     """
 
-    lag_rows: int
+    lag_rows: tuple[int, ...]
     window_rows: int
     air_share: float
     by_model: dict[str, tuple[Choice, ...]]
+    weights: Floats
+    less: tuple[Floats, ...]
 
     @property
     def best(self) -> tuple[Choice, ...]:
-        """The choice with the least inner error, per axis."""
-        return tuple(
-            min(axis, key=lambda choice: choice.inner_mse) for axis in zip(*self.by_model.values(), strict=True)
-        )
+        """The pool's, per axis."""
+        return self.by_model[POOLED]
 
 
 @dataclass(frozen=True)
 class Validation:
     """Everything held out; ``axes`` columns throughout.
 
-    ``predicted`` (3, n, axes) at SHIFTS_COUNTS by the best choice of each row's own fold; ``by_model``
-    name -> RMSE (3, axes), each with its own nested lambda, and TEMPLATE's; ``folds`` the 20 trainings;
-    ``final`` the training on the whole run; ``lag_rows`` of the whole run before any correction;
-    ``affine_r2`` held-out R2 of the affine model there.
+    ``predicted`` (3, n, axes) at SHIFTS_COUNTS by each row's own fold; ``by_model`` name -> RMSE (3, axes), each with
+    its own nested lambda, and TEMPLATE's; ``less`` (2, axes) the RMSE of LESS of the blocks; ``folds`` the 20
+    trainings; ``final`` the training on the whole run; ``lag_rows`` common to the axes, of the whole run before any
+    correction; ``affine_r2`` held-out R2 of the affine model there.
     """
 
     run: Run
     blocks: Blocks
     predicted: Floats
     by_model: dict[str, Floats]
+    less: Floats
     folds: tuple[Fit, ...]
     final: Fit
     lag_rows: int
     affine_r2: float
 
 
-class _Trainer:
-    """Trains on any choice of blocks; sums are kept per window and lag."""
+@dataclass(frozen=True)
+class _Training:
+    """What is trained on: inner folds over the blocks ``of``, and what was found about time on ``strips`` alone."""
 
-    def __init__(self, run: Run, blocks: Blocks, windows: tuple[int, ...]) -> None:
-        self.run, self.blocks, self.windows = run, blocks, windows
-        self.axes = run.truth.shape[1]
-        self._full: dict[tuple[int, int], Floats] = {}
-        self._linear: dict[tuple[int, int], Floats] = {}
-        self._air = air_moments(run)
-
-    def train(self, lag_rows: int, of: list[int], strips: Strips) -> Fit:
-        """Fit all models on ``strips``, with inner folds over the blocks ``of``."""
-        window = self._window(lag_rows, of, strips)
-        key = (window, lag_rows)
-        if key not in self._full:
-            self._full[key] = moments(self.run, self.blocks, *key)
-        sums = self._full[key]
-        size = sums.shape[1]
-        folds = self._folds(of, strips)
-        total = sums[strips].sum(axis=0)
-        # each is a sum over tens of large matrices: made once
-        gone = [sums[strips].sum(axis=0) for strips, _ in folds]
-        tested = [sums[out].sum(axis=0) for _, out in folds]
-        air_share = self._air_share(total, gone, tested)
-        if self._air is not None:
-            # another recording than the run: it is in every training and in no test
-            total = total + air_share * self._air
-        kept = [total - out for out in gone]
-        rows = sum(float(test[-self.axes - 1, -self.axes - 1]) for test in tested)
-        by_model: dict[str, tuple[Choice, ...]] = {}
-        inner: dict[str, list[Floats]] = {}
-        for model in MODELS:
-            index = used(model, size, self.axes)
-            grid = np.ix_(index, index)
-            fits = [solve(model, part[grid], self.axes, self.run.tare) for part in kept]
-            errors = sum(squared_errors(f, test[grid], self.axes) for f, test in zip(fits, tested, strict=True))
-            mse = np.asarray(errors) / rows
-            best = np.argmin(mse, axis=0)
-            whole = self._embed(solve(model, total[grid], self.axes, self.run.tare), best, index, size)
-            lam = [float(LAMBDAS[k]) if model.how == "ridge" else 0.0 for k in best]
-            by_model[model.name] = tuple(
-                Choice(model.name, lam[a], float(mse[best[a], a]), whole[:, a]) for a in range(self.axes)
-            )
-            if model.name in POOL:
-                inner[model.name] = [self._embed(f, best, index, size) for f in fits]
-        pooled = [np.mean(parts, axis=0) for parts in zip(*inner.values(), strict=True)]
-        errors = sum(squared_errors(f[None], test, self.axes)[0] for f, test in zip(pooled, tested, strict=True))
-        by_model[POOLED] = tuple(
-            Choice(
-                POOLED,
-                float("nan"),
-                float(np.asarray(errors)[a] / rows),
-                np.mean([by_model[name][a].coefficients for name in POOL], axis=0),
-            )
-            for a in range(self.axes)
-        )
-        return Fit(lag_rows, window, air_share, by_model)
-
-    def _folds(self, of: list[int], strips: Strips) -> list[tuple[Strips, Strips]]:
-        """Per inner fold the strips that are not trained on and those that are tested."""
-        result = []
-        for fold in range(INNER_FOLDS):
-            out = of[fold::INNER_FOLDS]
-            result.append((strips & ~self.blocks.kept_from(out), strips & self.blocks.own(out)))
-        return result
-
-    def _embed(self, fits: Floats, best: npt.NDArray[np.intp], index: npt.NDArray[np.intp], size: int) -> Floats:
-        """The best of each axis of fits (k, p + 1, axes) as coefficients of all columns (P + 1, axes)."""
-        whole = np.zeros((size - self.axes, self.axes))
-        for axis, k in enumerate(best):
-            whole[index[: -self.axes], axis] = fits[k, :, axis]
-        return whole
-
-    def _air_share(self, total: Floats, gone: list[Floats], tested: list[Floats]) -> float:
-        """By a model that bends as the chosen one will, and costs a tenth."""
-        if self._air is None:
-            return 0.0
-        index = used(GATED, len(total), self.axes)
-        grid = np.ix_(index, index)
-        air = self._air[grid]
-        kept = [(total - out)[grid] for out in gone]
-        tested = [test[grid] for test in tested]
-
-        def error(share: float) -> Floats:
-            fits = [solve(GATED, part + share * air, self.axes, self.run.tare) for part in kept]
-            errors = sum(squared_errors(f, test, self.axes) for f, test in zip(fits, tested, strict=True))
-            forces: Floats = np.asarray(errors).min(axis=0)[:3]
-            return forces
-
-        without = error(0.0)
-        return next((share for share in AIR_SHARES if (error(share) <= AIR_COST * without).all()), 0.0)
-
-    def _window(self, lag_rows: int, of: list[int], strips: Strips) -> int:
-        """By the affine model, which costs little: noise is noise whatever is fitted to it."""
-        error: dict[int, float] = {}
-        for window in self.windows:
-            key = (window, lag_rows)
-            if key not in self._linear:
-                self._linear[key] = moments(self.run, self.blocks, *key, linear_columns)
-            sums = self._linear[key]
-            total = sums[strips].sum(axis=0)
-            errors = np.zeros((len(LAMBDAS), self.axes))
-            for gone, out in self._folds(of, strips):
-                fit = solve(AFFINE, total - sums[gone].sum(axis=0), self.axes, self.run.tare)
-                errors += squared_errors(fit, sums[out].sum(axis=0), self.axes)
-            error[window] = float((errors.min(axis=0) / np.maximum(truth_variance(total, self.axes), 1e-12)).mean())
-        return min(error, key=lambda window: error[window])
+    of: list[int]
+    strips: Strips
+    lag_rows: tuple[int, ...]
+    window_rows: int
 
 
 def validate(
-    run: Run, *, align: bool = True, windows: tuple[int, ...] = WINDOWS_ROWS, show: Show | None = None
+    run: Run,
+    *,
+    align: bool = True,
+    windows: tuple[int, ...] = WINDOWS_ROWS,
+    priors: tuple[Prior, Prior] = (models.lin, models.lin),
+    show: Show | None = None,
 ) -> Validation:
     """Hold every block out once, then train on all. ``align`` False takes rows as they stand, lag 0.
 
-    BLAS runs on one thread meanwhile, in the whole process. Raises RecordingError when force and counts
-    do not follow each other.
+    ``priors`` is what ridge shrinks toward, with each of models.LAMBDAS. BLAS runs on one thread meanwhile, in the
+    whole process. Raises RecordingError when force and counts do not follow each other.
     """
     # Thousands of small systems: OpenBLAS's threads wait for each other, and on a busy computer for much longer.
-    with threadpool_limits(limits=1, user_api="blas"):
-        return _validate(run, align, windows, show)
+    threads = min(THREADS, os.cpu_count() or 1)
+    with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
+        return _validate(run, align, windows, priors, show, pool)
 
 
-def _validate(run: Run, align: bool, windows: tuple[int, ...], show: Show | None) -> Validation:
+def _validate(
+    run: Run,
+    align: bool,
+    windows: tuple[int, ...],
+    priors: tuple[Prior, Prior],
+    show: Show | None,
+    pool: ThreadPoolExecutor,
+) -> Validation:
     blocks = Blocks(run.rest, run.contact)
     axes = run.truth.shape[1]
-    at_lags = lag_moments(run, blocks)
-    lag_rows, affine_r2 = check(run, blocks, at_lags)
-    trainer = _Trainer(run, blocks, windows)
+    lags = Lags(run, blocks)
+    lag_rows, affine_r2 = lags.check()
+    every = list(range(BLOCKS))
+    timing = _Timing(run, blocks, windows)
+    trainings = []
+    for block in [*every, None]:
+        strips = blocks.own(every) if block is None else blocks.kept_from([block])
+        of = [other for other in every if other != block]
+        its = lags.of_axes(strips) if align else (0,) * axes
+        trainings.append(_Training(of, strips, its, timing.window(its, of, strips)))
+    trainer = _Trainer(run, blocks, trainings, priors, pool)
     template = Template(run)
     predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
     errors: dict[str, Floats] = {}
-    folds: list[Fit] = []
-    for block in range(BLOCKS):
+    less = np.zeros((len(LESS), axes))
+    fits: list[Fit] = []
+    for block, fit in enumerate(pool.map(trainer.train, trainings)):
+        fits.append(fit)
+        if block == BLOCKS:
+            break
         if show is not None:
             show(f"{run.name}: block {block + 1} of {BLOCKS} held out")
-        strips = blocks.kept_from([block])
-        others = [other for other in range(BLOCKS) if other != block]
-        fit = trainer.train(best_lag(run, at_lags, strips) if align else 0, others, strips)
-        folds.append(fit)
         rows = blocks.rows(block)
-        every_choice = [fit.best, *fit.by_model.values()]
+        tried = [np.column_stack([choice.coefficients for choice in its]) for its in fit.by_model.values()]
         # side by side: their columns cost more than their sums
-        said = np.split(predict(run, fit, tuple(chain(*every_choice)), rows), len(every_choice), axis=2)
-        predicted[:, rows] = said[0]
-        for name, guess in zip(fit.by_model, said[1:], strict=True):
-            errors[name] = errors.get(name, 0.0) + ((guess - run.truth[rows]) ** 2).sum(axis=1)
-        trained = np.concatenate([blocks.strips[k] for k in np.flatnonzero(strips)])
+        said = predict(run, fit, [*tried, *fit.less], rows)
+        truth = run.truth[rows]
+        predicted[:, rows] = said[:, :, list(fit.by_model).index(POOLED)]
+        error = ((said - truth[:, None]) ** 2).sum(axis=1)
+        for k, name in enumerate(fit.by_model):
+            errors[name] = errors.get(name, 0.0) + error[:, k]
+        less += error[0, len(tried) :]
+        trained = np.concatenate([blocks.strips[k] for k in np.flatnonzero(trainings[block].strips)])
         guess = template.held_out(fit.window_rows, fit.lag_rows, trained, rows, SHIFTS_COUNTS)
-        errors[TEMPLATE] = errors.get(TEMPLATE, 0.0) + ((guess - run.truth[rows]) ** 2).sum(axis=1)
-    every = list(range(BLOCKS))
-    final = trainer.train(lag_rows if align else 0, every, blocks.own(every))
-    by_model = {name: np.sqrt(total / len(run.truth)) for name, total in errors.items()}
-    return Validation(run, blocks, predicted, by_model, tuple(folds), final, lag_rows, affine_r2)
+        errors[TEMPLATE] = errors.get(TEMPLATE, 0.0) + ((guess - truth) ** 2).sum(axis=1)
+    by_model, less = {name: _rms(total, run) for name, total in errors.items()}, _rms(less, run)
+    return Validation(run, blocks, predicted, by_model, less, tuple(fits[:-1]), fits[-1], lag_rows, affine_r2)
 
 
-def predict(run: Run, fit: Fit, choices: tuple[Choice, ...], rows: Rows | None = None) -> Floats:
-    """What ``choices`` make of the run's ``rows`` at every drift of SHIFTS_COUNTS: (3, n, choices)."""
-    coefficients = np.column_stack([choice.coefficients for choice in choices])
-    index = np.arange(len(run.counts)) if rows is None else rows
+def predict(run: Run, fit: Fit, coefficients: Sequence[Floats], rows: Rows) -> Floats:
+    """What each of ``coefficients`` (p + 1, axes) makes of the run's ``rows`` at SHIFTS_COUNTS: (3, n, each, axes)."""
+    axes = len(fit.lag_rows)
+    late = np.clip(rows[:, None] + np.array(fit.lag_rows), 0, len(run.counts) - 1)
+    needed, place = np.unique(late, return_inverse=True)
+    place = place.reshape(late.shape)
+    signals = at(smoothed(run, fit.window_rows), needed)
+    every = np.concatenate(coefficients, axis=1)
+    found = np.empty((len(SHIFTS_COUNTS), len(rows), len(coefficients), axes))
+    for shift, counts in zip(found, SHIFTS_COUNTS, strict=True):
+        said = with_one(features.columns(signals.drifted(counts * run.drift))) @ every
+        for axis in range(axes):
+            shift[:, :, axis] = said[place[:, axis], axis::axes]
+    return found
 
-    def mapped(signals: Signals) -> Floats:
-        wrench: Floats = with_one(features.columns(signals)) @ coefficients
-        return wrench
 
-    at_shifts = [
-        smoothed(run, fit.window_rows, fit.lag_rows, index, drifted(run, counts, mapped)) for counts in SHIFTS_COUNTS
-    ]
-    return np.array(at_shifts)
+def _rms(total: Floats, run: Run) -> Floats:
+    result: Floats = np.sqrt(total / len(run.truth))
+    return result
+
+
+def _folds(blocks: Blocks, of: list[int], strips: Strips) -> list[tuple[Strips, Strips]]:
+    """Per inner fold the strips that are trained on and those that are tested."""
+    result = []
+    for fold in range(INNER_FOLDS):
+        out = of[fold::INNER_FOLDS]
+        result.append((strips & blocks.kept_from(out), strips & blocks.own(out)))
+    return result
+
+
+class _Timing:
+    """How many rows to average, by the affine model, which costs little: noise is noise whatever is fitted to it."""
+
+    def __init__(self, run: Run, blocks: Blocks, windows: tuple[int, ...]) -> None:
+        # rows that are not in time have no neighbours
+        self._run, self._blocks, self._windows = run, blocks, windows if run.contact is None else windows[:1]
+        self._sums: dict[tuple[int, tuple[int, ...]], Sums] = {}
+
+    def window(self, lag_rows: tuple[int, ...], of: list[int], strips: Strips) -> int:
+        """In rows, for a training."""
+        error = {}
+        for window in self._windows if len(self._windows) > 1 else ():
+            sums = self._of(window, lag_rows)
+            total = np.zeros(len(lag_rows))
+            for kept, out in _folds(self._blocks, of, strips):
+                total += sums.of(out).errors(models.solve(sums.of(kept), LAMBDAS[0]))
+            error[window] = float((total / np.maximum(sums.of(strips).variance(), 1e-12)).mean())
+        return min(error, key=lambda window: error[window], default=self._windows[0])
+
+    def _of(self, window: int, lag_rows: tuple[int, ...]) -> Sums:
+        key = (window, lag_rows)
+        if key not in self._sums:
+            run = self._run
+            signals, truth = smoothed(run, window), _late(run, list(enumerate(lag_rows)))
+            self._sums[key] = stacked(
+                strip_sums(at(signals, rows), truth[rows], run.drift, linear_columns) for rows in self._blocks.strips
+            )
+        return self._sums[key]
+
+
+def _late(run: Run, which: Sequence[tuple[int, int]]) -> Floats:
+    """The truth's axes, each moved by its lag in rows."""
+    return np.column_stack([moved(run.truth[:, axis], lag) for axis, lag in which])
+
+
+class _Trainer:
+    """Trains on any choice of blocks; sums are made once for each window, for all axes at all lags in use."""
+
+    def __init__(
+        self,
+        run: Run,
+        blocks: Blocks,
+        trainings: Sequence[_Training],
+        priors: tuple[Prior, Prior],
+        pool: ThreadPoolExecutor,
+    ) -> None:
+        self._blocks, self._priors = blocks, priors
+        self._late = sorted({late for its in trainings for late in enumerate(its.lag_rows)})
+        truth = _late(run, self._late)
+        self._sums: dict[int, Sums] = {}
+        self._air: dict[int, Sums | None] = {}
+        for window in sorted({its.window_rows for its in trainings}):
+            signals = smoothed(run, window)
+
+            def of(rows: Rows, signals: Signals = signals) -> Sums:
+                return strip_sums(at(signals, rows), truth[rows], run.drift)
+
+            self._sums[window] = stacked(pool.map(of, blocks.strips))
+            self._air[window] = air_sums(run, window, run.truth.shape[1])
+
+    def train(self, its: _Training) -> Fit:
+        """Fit all models."""
+        every, air = self._sums[its.window_rows], self._air[its.window_rows]
+        every = every.axes([self._late.index(late) for late in enumerate(its.lag_rows)])
+        folds = _folds(self._blocks, its.of, its.strips)
+        tested = [every.of(out) for _, out in folds]
+        kept = [every.of(strips) for strips, _ in folds]
+        total = every.of(its.strips)
+        share = 0.0
+        if air is not None:
+            # another recording than the run: it is in every training and in no test
+            share = self._air_share(kept, tested, air)
+            total, kept = total.plus(air, share), [one.plus(air, share) for one in kept]
+        rows = sum(one.rows for one in tested)
+        families = [model.family for model in MODELS]
+        inner = [
+            np.array(one) for one in zip(*(models.pulled(one, self._priors, families) for one in kept), strict=True)
+        ]
+        alone = models.pulled(total, self._priors, families)
+        choices = {
+            LIN: _choices(LIN, models.lin(total, offset=False)),
+            LIN_OFFSET: _choices(LIN_OFFSET, models.lin(total)),
+        }
+        for model, fits, whole in zip(MODELS, inner, alone, strict=True):
+            mse = np.sum([out.errors(fit) for fit, out in zip(fits, tested, strict=True)], axis=0) / rows
+            # for comparison: one lambda for all axes
+            best = int((mse / np.maximum(mse.min(axis=0), 1e-12)).mean(axis=1).argmin())
+            choices[model.name] = _choices(model.name, whole[best], LAMBDAS[best], mse[best])
+        weights, mse = _weights(np.concatenate(inner[-len(POOL) :], axis=1), tested, rows)
+        choices[POOLED] = _choices(POOLED, _mean(weights, alone[-len(POOL) :]), mse=mse)
+        less = []
+        for part in LESS:
+            sums = every.of(its.strips & self._blocks.own(its.of[:: round(1 / part)]))
+            sums = sums if air is None else sums.plus(air, share)
+            less.append(_mean(weights, models.pulled(sums, self._priors, [model.family for model in POOL])))
+        return Fit(its.lag_rows, its.window_rows, share, choices, weights, tuple(less))
+
+    def _air_share(self, kept: list[Sums], tested: list[Sums], air: Sums) -> float:
+        """By a model that bends as the pool will, and costs little."""
+        index = features.GATED.index(len(air.gram) - 1)
+        air = air.part(index)
+
+        def error(share: float) -> Floats:
+            fits = [models.solve(one.plus(air, share), AIR_LAMBDA) for one in small]
+            errors = [out.errors(fit) for fit, out in zip(fits, outs, strict=True)]
+            forces: Floats = np.sum(errors, axis=0)[:3]
+            return forces
+
+        small, outs = [one.part(index) for one in kept], [one.part(index) for one in tested]
+        without = error(0.0)
+        return next((share for share in AIR_SHARES if (error(share) <= AIR_COST * without).all()), AIR_SHARES[-1])
+
+
+def _choices(name: str, found: Floats, lam: float = float("nan"), mse: Floats | None = None) -> tuple[Choice, ...]:
+    errors = np.full(found.shape[1], np.nan) if mse is None else mse
+    return tuple(Choice(name, lam, float(error), its) for error, its in zip(errors, found.T, strict=True))
+
+
+def _mean(weights: Floats, members: Sequence[Floats]) -> Floats:
+    """Coefficients (p + 1, axes)."""
+    mean: Floats = np.einsum("am,mpa->pa", weights, np.concatenate(members))
+    return mean
+
+
+def _weights(inner: Floats, tested: list[Sums], rows: float) -> tuple[Floats, Floats]:
+    """Of the members (axes, m) by the errors of their inner folds, and the mean squared error (axes,) with them.
+
+    ``inner`` (folds, m, p + 1, axes) are their coefficients.
+    """
+    axes = inner.shape[3]
+    product = np.zeros((axes, inner.shape[1], inner.shape[1]))
+    for of, out in zip(inner, tested, strict=True):
+        for axis in range(axes):
+            its = of[:, :, axis]
+            cross = its @ out.cross[:, axis]
+            product[axis] += its @ out.gram @ its.T - cross[:, None] - cross + out.square[axis]
+    product /= rows
+    found = np.array([models.weights(its) for its in product])
+    return found, np.einsum("am,amn,an->a", found, product, found)

@@ -9,16 +9,15 @@ itself, because a fitted map has to mean the same on the next run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core.geometry import Floats
-from ...core.map_columns import ELECTRODES, SIGNAL_COUNTS, Signals, gates, kinds
+from ...core.map_columns import Signals, gates, kinds
 from ...wire import map_gen as _map
-from ...wire import sensor_gen as _sensor
 from ...wire.map_gen import Gate, Kind
 
 STRAIGHT = (Gate.ONE, Gate.X, Gate.Y)
@@ -47,10 +46,10 @@ _SIGNAL_PAIRS = _blocks([Kind.SIGNAL_PAIRS])
 _CONDUCTANCE = _blocks([Kind.CONDUCTANCE])
 _CONDUCTANCE_PAIRS = _blocks([Kind.CONDUCTANCE_PAIRS])
 _SPLIT = (Kind.COMPRESSION, Kind.BULGE)  # different physics (biotac.md finding 4)
-_PRESSURE = _blocks([Kind.PRESSURE], Gate)
+_PRESSURE = _blocks([Kind.PRESSURE], STRAIGHT)
 
 # PRESSURE last: a run without PDC has the columns before it
-BLOCKS = (*_SIGNAL, *_SIGNAL_PAIRS, *_CONDUCTANCE, *_CONDUCTANCE_PAIRS, *_blocks(_SPLIT, Gate), *_PRESSURE)
+BLOCKS = (*_SIGNAL, *_SIGNAL_PAIRS, *_CONDUCTANCE, *_CONDUCTANCE_PAIRS, *_blocks(_SPLIT, STRAIGHT), *_PRESSURE)
 
 
 def blocks(*, with_pdc: bool) -> tuple[Block, ...]:
@@ -65,36 +64,18 @@ def width(*, with_pdc: bool) -> int:
 
 @dataclass(frozen=True)
 class Family:
-    """The blocks that a model uses, in the order of BLOCKS; PRESSURE only where it was recorded.
-
-    The columns of ``straight``, blocks whose gate is ONE, are to first order e divided by ``scale(tare)``
-    (19,) counts; that is how Lin's sums are written in them, which is what ridge shrinks toward.
-    """
+    """The blocks that a model uses, in the order of BLOCKS; PRESSURE only where it was recorded."""
 
     blocks: tuple[Block, ...]
-    straight: tuple[Block, ...]
-    scale: Callable[[Floats], Floats]
 
     def index(self, columns: int) -> npt.NDArray[np.intp]:
         """Places of the family's columns among all ``columns`` of columns()."""
-        own = self._own(with_pdc=columns == width(with_pdc=True))
+        own = [block for block in blocks(with_pdc=columns == width(with_pdc=True)) if block in self.blocks]
         return np.concatenate([_place(block) for block in own])
-
-    def unit(self, tare: Floats, columns: int) -> Floats:
-        """(columns, 19): the family's own ``columns`` @ this is e in counts, to first order."""
-        with_pdc = columns == sum(block.width for block in self.blocks)
-        parts = [
-            np.diag(self.scale(tare)) if block in self.straight else np.zeros((block.width, ELECTRODES))
-            for block in self._own(with_pdc=with_pdc)
-        ]
-        return np.concatenate(parts)
-
-    def _own(self, *, with_pdc: bool) -> list[Block]:
-        return [block for block in blocks(with_pdc=with_pdc) if block in self.blocks]
 
 
 def columns(signals: Signals) -> Floats:
-    """All features (n, 646), or (n, 652) with PDC, in the order of blocks()."""
+    """All features (n, 532), or (n, 535) with PDC, in the order of blocks()."""
     found, at = kinds(signals), gates(signals.e)
     parts = []
     for block in blocks(with_pdc=signals.pdc is not None):
@@ -108,20 +89,8 @@ def _place(block: Block) -> npt.NDArray[np.intp]:
     return np.arange(start, start + block.width)
 
 
-def _counts_scale(tare: Floats) -> Floats:
-    return np.full(ELECTRODES, SIGNAL_COUNTS)
-
-
-def _conductance_scale(tare: Floats) -> Floats:
-    at_rest = np.clip(tare, _map.COUNT_MIN, _map.COUNT_MAX)
-    scale: Floats = at_rest * (1.0 - at_rest / _sensor.FULL_SCALE_COUNT)  # d ln(c / (4095 - c)) / dc, turned over
-    return scale
-
-
-LINEAR = Family(_SIGNAL, _SIGNAL, _counts_scale)
-SIGN_SPLIT = Family(_blocks(_SPLIT), _blocks(_SPLIT), _counts_scale)
-GATED = Family(_blocks((*_SPLIT, Kind.PRESSURE), STRAIGHT), _blocks(_SPLIT), _counts_scale)
-GATED_TWICE = Family(_blocks((*_SPLIT, Kind.PRESSURE), Gate), _blocks(_SPLIT), _counts_scale)
-QUADRATIC = Family((*_SIGNAL, *_SIGNAL_PAIRS, *_PRESSURE), _SIGNAL, _counts_scale)
-CONDUCTANCE_QUADRATIC = Family((*_CONDUCTANCE, *_CONDUCTANCE_PAIRS, *_PRESSURE), _CONDUCTANCE, _conductance_scale)
-JOINED = Family((*GATED_TWICE.blocks, *_CONDUCTANCE, *_CONDUCTANCE_PAIRS), _blocks(_SPLIT), _counts_scale)
+LINEAR = Family(_SIGNAL)
+GATED = Family(_blocks((*_SPLIT, Kind.PRESSURE), STRAIGHT))
+QUADRATIC = Family((*_SIGNAL, *_SIGNAL_PAIRS, *_PRESSURE))
+CONDUCTANCE_QUADRATIC = Family((*_CONDUCTANCE, *_CONDUCTANCE_PAIRS, *_PRESSURE))
+JOINED = Family((*GATED.blocks, *_CONDUCTANCE, *_CONDUCTANCE_PAIRS))

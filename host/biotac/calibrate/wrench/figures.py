@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from itertools import product
 from typing import Any
 
@@ -10,11 +9,13 @@ import numpy as np
 
 from ...core.geometry import Floats
 from ...core.map_columns import Signals, centroid_mm
-from .crossvalidation import SHIFTS_COUNTS, Validation
+from .blocks import BLOCKS
+from .crossvalidation import LESS, SHIFTS_COUNTS, Validation
 from .features import columns
-from .models import LIN
-from .moments import aligned, with_one
+from .models import LAMBDAS, LIN, POOL, POOLED
+from .moments import moved, with_one
 
+ROWS_PER_S = 100  # of a run that does not say
 ANGLE_MIN_N = 0.5  # a smaller force has a direction only on paper
 THIRDS = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
 
@@ -62,7 +63,7 @@ def regions(validation: Validation) -> list[dict[str, Any]]:
     Thirds along times thirds across of the run's own contacts; those with hardly a row are left out.
     """
     run, final = validation.run, validation.final
-    centre = centroid_mm(aligned(run, final.lag_rows).e)
+    centre = centroid_mm(moved(run.counts, -int(np.median(final.lag_rows))) - run.tare)
     error = ((validation.predicted[0][:, :3] - run.truth[:, :3]) ** 2).sum(axis=1)
     touched = ~run.rest
     edges = [np.quantile(centre[touched, axis], THIRDS) for axis in (0, 1)]
@@ -78,29 +79,44 @@ def regions(validation: Validation) -> list[dict[str, Any]]:
     return sorted(result, key=lambda region: -region["rmse_n"])
 
 
-def votes(validation: Validation) -> list[dict[str, int]]:
-    """Per axis: model -> how many of the folds chose it, the most first."""
-    axes = range(len(validation.run.axes))
-    return [dict(Counter(fit.best[axis].model for fit in validation.folds).most_common()) for axis in axes]
+def minutes(validation: Validation) -> list[dict[str, Any]]:
+    """Error against what there was to train on: ``minutes`` at ROWS_PER_S, and ``rmse`` per axis held out."""
+    rows = len(validation.run.truth) * (BLOCKS - 1) / BLOCKS
+    whole = rmse(validation.predicted[0], validation.run.truth)
+    steps = [*zip(LESS, validation.less, strict=True), (1.0, whole)]
+    return [{"minutes": part * rows / ROWS_PER_S / 60.0, "rmse": _list(error)} for part, error in steps]
 
 
-def model_name(validation: Validation) -> str:
-    """The chosen model, or one an axis where they differ."""
-    names = [choice.model for choice in validation.final.best]
-    if len(set(names)) == 1:
-        return names[0]
-    return ", ".join(f"{axis} {name}" for axis, name in zip(validation.run.axes, names, strict=True))
+def next_minute(validation: Validation) -> dict[str, Any]:
+    """The region where a further minute pays most: the one of regions(), and ``gain_n`` off its error by it.
+
+    A region's error is taken to fall with its own rows as the whole run's does with all: an estimate, to choose by.
+    """
+    full = np.linalg.norm(rmse(validation.predicted[0], validation.run.truth)[:3])
+    before = np.linalg.norm(validation.less[-1][:3])
+    power = max(float(np.log(before / full) / np.log(1.0 / LESS[-1])), 0.0)
+    result = []
+    for region in regions(validation):
+        share = region["rows"] / (region["rows"] + 60 * ROWS_PER_S)
+        result.append(region | {"gain_n": region["rmse_n"] * (1.0 - share**power)})
+    return max(result, key=lambda region: region["gain_n"])
+
+
+def weights(validation: Validation) -> list[dict[str, float]]:
+    """Per axis: model -> its weight in the pool, a mean over the folds."""
+    mean = np.mean([fit.weights for fit in validation.folds], axis=0).reshape(-1, len(POOL), len(LAMBDAS)).sum(axis=2)
+    return [{model.name: float(one) for model, one in zip(POOL, its, strict=True)} for its in mean]
 
 
 def summary(validation: Validation) -> dict[str, Any]:
     """All figures as JSON types; forces in N, torques in N mm, axes as in ``axes``."""
     run, truth, predicted = validation.run, validation.run.truth, validation.predicted
-    lin = validation.by_model[LIN.name][0]
+    lin = validation.by_model[LIN][0]
     of = [rmse(p, truth) for p in predicted]
     result: dict[str, Any] = {
         "file": run.name,
         "rows": len(truth),
-        "model": model_name(validation),
+        "model": POOLED,
         "axes": list(run.axes),
         "rmse_n": _list(of[0][:3]),
         "r2": _list(r2(predicted[0], truth)),
@@ -111,14 +127,16 @@ def summary(validation: Validation) -> dict[str, Any]:
         "rest_n": rest_n(validation),
         "air_share": validation.final.air_share,
         "lag_rows": validation.lag_rows,
-        "lag_corrected_rows": validation.final.lag_rows,
+        "lag_corrected_rows": list(validation.final.lag_rows),
         "window_rows": validation.final.window_rows,
         "affine_r2": validation.affine_r2,
-        "folds_chose": dict(zip(run.axes, votes(validation), strict=True)),
+        "weights": dict(zip(run.axes, weights(validation), strict=True)),
         "models": {name: _list(errors[0]) for name, errors in validation.by_model.items()},
         "models_drifted": {name: _list(errors[1:].max(axis=0)) for name, errors in validation.by_model.items()},
         "confusion": [_list(row) for row in confusion(predicted[0], truth)],
         "worst_region": regions(validation)[0],
+        "minutes": minutes(validation),
+        "next_minute": next_minute(validation),
         "contact_edges": validation.blocks.whole_contacts,
         "contacts": validation.blocks.contacts,
         "notes": list(run.notes),

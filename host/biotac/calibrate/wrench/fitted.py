@@ -14,10 +14,10 @@ from ...documents import read_json
 from ...errors import InputError
 from . import features
 from .crossvalidation import Validation
-from .figures import model_name
+from .models import POOLED
 from .moments import with_one
 
-FORMAT = "biotac-wrench-map/2"
+FORMAT = "biotac-wrench-map/3"
 
 
 @dataclass(frozen=True)
@@ -25,15 +25,15 @@ class WrenchMap:
     """One frame's counts to force on the finger; where calibrated, torque about Lin's origin and torsion.
 
     ``coefficients`` (p + 1, axes) of features.columns, block by block, the offset last; ``tare`` (19,)
-    counts. It was trained for the mean of its results to ``window_rows`` frames, counts coming ``lag_rows``
-    later than force.
+    counts. It was trained for mean counts of ``window_rows`` frames, those coming ``lag_rows`` (axes,) later than
+    force.
     """
 
     model: str
     axes: tuple[str, ...]
     tare: Floats
     window_rows: int
-    lag_rows: int
+    lag_rows: tuple[int, ...]
     coefficients: Floats
 
     @property
@@ -57,7 +57,7 @@ def of(validation: Validation) -> WrenchMap:
     """The map trained on the whole run."""
     final, run = validation.final, validation.run
     coefficients = np.column_stack([choice.coefficients for choice in final.best])
-    return WrenchMap(model_name(validation), run.axes, run.tare, final.window_rows, final.lag_rows, coefficients)
+    return WrenchMap(POOLED, run.axes, run.tare, final.window_rows, final.lag_rows, coefficients)
 
 
 def dumps(its: WrenchMap) -> str:
@@ -68,7 +68,7 @@ def dumps(its: WrenchMap) -> str:
         "axes": list(its.axes),
         "tare_counts": its.tare.tolist(),
         "window_rows": its.window_rows,
-        "lag_rows": its.lag_rows,
+        "lag_rows": list(its.lag_rows),
         "blocks": _block_names(with_pdc=its.with_pdc),
         "coefficients": its.coefficients.tolist(),
     }
@@ -86,12 +86,14 @@ def load(path: Path) -> WrenchMap:
             tuple(str(axis) for axis in facts["axes"]),
             np.array(facts["tare_counts"], dtype=np.float64),
             int(facts["window_rows"]),
-            int(facts["lag_rows"]),
+            tuple(int(lag) for lag in facts["lag_rows"]),
             np.array(facts["coefficients"], dtype=np.float64),
         )
         shapes = [(features.width(with_pdc=pdc) + 1, len(its.axes)) for pdc in (False, True)]
         if its.coefficients.shape not in shapes or its.tare.shape != (ELECTRODES,):
             raise ValueError(f"coefficients {its.coefficients.shape}, tare {its.tare.shape}")
+        if len(its.lag_rows) != len(its.axes):
+            raise ValueError(f"{len(its.lag_rows)} lags for {len(its.axes)} axes")
         if facts["blocks"] != _block_names(with_pdc=its.with_pdc):
             raise ValueError(f"blocks {facts['blocks']}")
         if not np.isfinite(its.coefficients).all() or not np.isfinite(its.tare).all():

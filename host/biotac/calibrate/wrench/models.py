@@ -1,57 +1,65 @@
 """The models, all linear in their coefficients, solved from sums alone.
 
-Ridge shrinks toward Lin's geometry and not toward zero: a coefficient the run says nothing about
-stays what the electrode's place on the finger makes it, and a hopeless run ends as Lin's three scales.
+Ridge shrinks toward what is known without the run and not toward zero: Lin's geometry, or a map learnt from other
+fingers. A coefficient the run says nothing about stays what that makes it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from ...core import geometry as surface
 from ...core.geometry import Floats
+from ...core.map_columns import ELECTRODES, SIGNAL_COUNTS
 from . import features
 from .features import Family
+from .moments import Sums
 
-LAMBDAS: Floats = np.logspace(-6, 1, 8)  # per row, in units of each column's own variance
+# Per row, in units of each column's own variance; every model is fitted with both: lightly pulled toward Lin's
+# geometry, and harder toward what other fingers taught.
+LAMBDAS = (3e-5, 1e-3)
 # A column that is constant in training has no variance to be measured in: without a floor it is free,
 # and a test row that moves it goes anywhere (the hinge model of biotac.md 5: R2 -34).
 COLUMN_FLOOR = 0.01
+EQUAL = 0.3  # how much of a member's own error is taken for chance: 0 trusts the inner folds, and follows their noise
 
 
 @dataclass(frozen=True)
 class Model:
-    """``how``: Lin's scales alone, scales and offsets, or every coefficient with ridge."""
+    """Every coefficient of a family, with ridge."""
 
     name: str
     family: Family
-    how: Literal["scales", "scales-offset", "ridge"]
     words: str
 
 
-MODELS = (
-    Model("lin-scales", features.LINEAR, "scales", "Lin's sums, one scale an axis"),
-    Model("lin-scales-offset", features.LINEAR, "scales-offset", "the same, with an offset an axis"),
-    Model("affine", features.LINEAR, "ridge", "every electrode to every axis"),
-    Model("sign-split", features.SIGN_SPLIT, "ridge", "compression and bulge apart"),
-    Model("gated-sign-split", features.GATED, "ridge", "sign-split, gains following the contact, PDC where recorded"),
-    Model("gated-twice", features.GATED_TWICE, "ridge", "the same, gains quadratic in the contact's place"),
-    Model("quadratic", features.QUADRATIC, "ridge", "all products of two electrodes, PDC where recorded"),
-    Model("conductance-quadratic", features.CONDUCTANCE_QUADRATIC, "ridge", "all products of two conductances, PDC"),
-    Model("joined", features.JOINED, "ridge", "gated-twice and conductance-quadratic in one"),
+AFFINE = Model("affine", features.LINEAR, "every electrode to every axis")
+QUADRATIC = Model("quadratic", features.QUADRATIC, "all products of two electrodes, PDC where recorded")
+CONDUCTANCE = Model(
+    "conductance-quadratic", features.CONDUCTANCE_QUADRATIC, "all products of two conductances, PDC where recorded"
 )
-LIN, AFFINE, GATED = MODELS[0], MODELS[2], MODELS[4]
+JOINED = Model("joined", features.JOINED, "that, and gains by sign that follow the contact")
+MODELS = (AFFINE, QUADRATIC, CONDUCTANCE, JOINED)
 
-# Which of the three is best changes from axis to axis and from block to block by less than what their mean gains.
+LIN, LIN_OFFSET = "lin-scales", "lin-scales-offset"
+# Which model and lambda is best changes from axis to axis and from block to block: to choose one costs more (F2: x
+# .43 N for .35) than to weigh all of them.
+POOL = (QUADRATIC, CONDUCTANCE, JOINED)
 POOLED = "pooled"
-POOLED_WORDS = "mean of gated-sign-split, quadratic and conductance-quadratic"
 TEMPLATE = "template"
-TEMPLATE_WORDS = "five shapes around the contact, a 5x5 solve a frame; host only, for comparison"
-POOL = ("gated-sign-split", "quadratic", "conductance-quadratic")
+WORDS = {
+    LIN: "Lin's sums, one scale an axis",
+    LIN_OFFSET: "the same, with an offset an axis",
+    **{model.name: model.words for model in MODELS},
+    POOLED: "weighted mean of " + ", ".join(model.name for model in POOL),
+    TEMPLATE: "five shapes around the contact, a 5x5 solve a frame; host only, for comparison",
+}
+
+# What ridge shrinks toward: coefficients (p + 1, axes) of all columns, by the sums that are trained on.
+Prior = Callable[[Sums], Floats]
 
 
 def lin_directions(axes: int) -> Floats:
@@ -65,64 +73,70 @@ def lin_directions(axes: int) -> Floats:
     return np.concatenate([surface.ELECTRODE_NORMAL, arms, torsion], axis=1)[:, :axes]
 
 
-def used(model: Model, size: int, axes: int) -> npt.NDArray[np.intp]:
-    """Rows of the sums (of ``size``) that the model is about: its columns, the offset, the truth."""
-    columns = size - axes - 1
-    return np.concatenate([model.family.index(columns), np.arange(columns, size)])
-
-
-def solve(model: Model, sums: Floats, axes: int, tare: Floats) -> Floats:
-    """Coefficients (k, p + 1, axes), the offset last, from the training strips' Z'Z of used() rows.
-
-    k is 1 for Lin's scales and one per entry of LAMBDAS for ridge.
-    """
-    q = len(sums) - axes
-    gram, cross = sums[:q, :q], sums[:q, q:]
-    lin = _lin(model, gram, cross, tare)
-    if model.how != "ridge":
-        return lin[None]
-    rows = gram[-1, -1]
-    variance = np.diag(gram) / rows - (gram[-1] / rows) ** 2
-    variance = np.maximum(variance, COLUMN_FLOOR * np.median(variance[:-1]))
-    variance[-1] = 0.0  # the offset is free
-    penalty = LAMBDAS[:, None, None] * np.diag(variance * rows)
-    left = np.broadcast_to(cross - gram @ lin, (len(LAMBDAS), q, axes))
-    found: Floats = lin + np.linalg.solve(gram + penalty, left)
-    return found
-
-
-def _lin(model: Model, gram: Floats, cross: Floats, tare: Floats) -> Floats:
-    """Lin's scales, least squares per axis, written in the family's columns (p + 1, axes)."""
-    columns, axes = len(gram) - 1, cross.shape[1]
-    directions = np.zeros((columns + 1, axes))
-    directions[:-1] = model.family.unit(tare, columns) @ lin_directions(axes)
-    result = np.zeros((columns + 1, axes))
-    for axis in range(axes):
-        basis = np.zeros((columns + 1, 1 if model.how == "scales" else 2))
-        basis[:, 0] = directions[:, axis]
-        if model.how != "scales":
+def lin(sums: Sums, *, offset: bool = True) -> Floats:
+    """Lin's scales, least squares per axis, as coefficients (p + 1, axes) of all columns."""
+    axes = sums.cross.shape[1]
+    index = features.LINEAR.index(len(sums.gram) - 1)
+    small = sums.part(index)
+    result = np.zeros(sums.cross.shape)
+    for axis, direction in enumerate(lin_directions(axes).T):
+        basis = np.zeros((ELECTRODES + 1, 1 + offset))
+        basis[:-1, 0] = direction * SIGNAL_COUNTS
+        if offset:
             basis[-1, 1] = 1.0
-        small = basis.T @ gram @ basis
+        gram = basis.T @ small.gram @ basis
         # M_x is the difference of two electrodes: where nothing reaches them its sum is 0 / 0
-        small[0, 0] += 1e-9 * max(float(small.max()), 1.0)
-        result[:, axis] = basis @ np.linalg.solve(small, basis.T @ cross[:, axis])
+        gram[0, 0] += 1e-9 * max(float(gram.max()), 1.0)
+        result[np.append(index, -1), axis] = basis @ np.linalg.solve(gram, basis.T @ small.cross[:, axis])
     return result
 
 
-def squared_errors(coefficients: Floats, sums: Floats, axes: int) -> Floats:
-    """Sum of squared errors (k, axes) of coefficients (k, p + 1, axes) over the rows in ``sums``."""
-    q = len(sums) - axes
-    gram, cross = sums[:q, :q], sums[:q, q:]
-    truth = np.diag(sums)[q:]
-    fitted = (coefficients * (gram @ coefficients - 2.0 * cross)).sum(axis=1)
-    # cancellation may leave a perfect fit a hair below zero
-    floored: Floats = np.maximum(truth + fitted, 0.0)
-    return floored
+def solve(sums: Sums, lam: float) -> Floats:
+    """Coefficients (q, axes), the offset last."""
+    mean, gram, cross, scale = _levelled(sums)
+    gram.flat[:: len(gram) + 1] += lam
+    found = np.linalg.solve(gram, cross) * scale[:, None]
+    return np.concatenate([found, (sums.cross[-1] / sums.rows - mean @ found)[None]])
 
 
-def truth_variance(sums: Floats, axes: int) -> Floats:
-    """Variance (axes,) of the truth over the rows in ``sums``."""
-    q = len(sums) - axes
-    rows = sums[q - 1, q - 1]
-    variance: Floats = np.diag(sums)[q:] / rows - (sums[q - 1, q:] / rows) ** 2
-    return variance
+def pulled(sums: Sums, priors: Sequence[Prior], families: Sequence[Family]) -> list[Floats]:
+    """Of each family, coefficients (2, p + 1, axes) of all columns, with each of LAMBDAS and of ``priors``."""
+    found = [np.empty((len(LAMBDAS), *sums.cross.shape)) for _ in families]
+    for k, (lam, prior) in enumerate(zip(LAMBDAS, priors, strict=True)):
+        known = prior(sums)
+        left = sums.left_by(known)
+        for family, its in zip(families, found, strict=True):
+            index = family.index(len(known) - 1)
+            its[k] = known
+            its[k, np.append(index, -1)] += solve(left.part(index), lam)
+    return found
+
+
+def _levelled(sums: Sums) -> tuple[Floats, Floats, Floats, Floats]:
+    """Without the offset, which is free, and with columns of variance 1: mean, gram, cross, and their scale."""
+    rows = sums.rows
+    mean = sums.gram[-1, :-1] / rows
+    gram = sums.gram[:-1, :-1] / rows - mean[:, None] * mean
+    cross = sums.cross[:-1] / rows - mean[:, None] * (sums.cross[-1] / rows)
+    variance = np.diag(gram)
+    scale = 1.0 / np.sqrt(np.maximum(variance, COLUMN_FLOOR * np.median(variance)))
+    return mean, gram * scale[:, None] * scale, cross * scale[:, None], scale
+
+
+def weights(error: Floats) -> Floats:
+    """Of members (m,), none below 0 and 1 together, for the least squared error of their mean, pulled to equal ones.
+
+    ``error`` (m, m) is the mean product of the errors of any two.
+    """
+    size = len(error)
+    error = error + EQUAL * np.trace(error) / size * np.eye(size)
+    some = np.arange(size)
+    while True:
+        its = np.linalg.solve(error[np.ix_(some, some)], np.ones(len(some)))
+        its /= its.sum()
+        if (its >= 0.0).all():
+            break
+        some = some[its > 0.0]
+    result = np.zeros(size)
+    result[some] = its
+    return result

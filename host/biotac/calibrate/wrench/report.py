@@ -12,7 +12,7 @@ from . import figures
 from .blocks import BLOCKS, GUARD_ROWS
 from .crossvalidation import INNER_FOLDS, SHIFTS_COUNTS, Validation
 from .lag import MAX_LAG_ROWS
-from .models import MODELS, POOLED, POOLED_WORDS, TEMPLATE, TEMPLATE_WORDS
+from .models import POOLED, WORDS
 
 AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")
 MAX_DOTS = 4000  # an axis; more only make the picture larger
@@ -25,11 +25,11 @@ def markdown(validation: Validation, picture: str) -> str:
     lines = [
         f"# Wrench calibration of {run.name}",
         "",
-        f"{facts['rows']} rows, {_cut(validation)}; lag, smoothing, lambda and model are chosen inside the other "
-        f"blocks ({INNER_FOLDS} folds of whole blocks). "
+        f"{facts['rows']} rows, {_cut(validation)}; lags, smoothing and the models' weights are chosen inside the "
+        f"other blocks ({INNER_FOLDS} folds of whole blocks). "
         "Frame: x to the tip, y to E11's side, z dorsal; force on the finger.",
         "",
-        f"Chosen on the whole run: **{facts['model']}**, median angle {facts['median_angle_deg']:.2f} deg.",
+        f"The map is the models' weighted mean; median angle {facts['median_angle_deg']:.2f} deg.",
         "",
         *_axes(validation),
         "## Models",
@@ -50,9 +50,9 @@ def markdown(validation: Validation, picture: str) -> str:
         *_confusion(validation),
         "## Taken for granted",
         "",
-        f"* force and counts: counts come {facts['lag_rows']} rows later, {facts['lag_corrected_rows']} corrected "
-        f"(at most {MAX_LAG_ROWS} are); an affine map explains R2 {facts['affine_r2']:.2f} held out",
-        f"* forces are the mean of what the map says to {facts['window_rows']} frames",
+        f"* force and counts: counts come {facts['lag_rows']} rows later (at most {MAX_LAG_ROWS} may be), corrected by "
+        f"axis: {_lags(validation)}; an affine map explains R2 {facts['affine_r2']:.2f} held out",
+        f"* forces are what the map says to the mean counts of {facts['window_rows']} frames",
         *_rest(validation, facts),
         *[f"* {note}" for note in facts["notes"]],
         *_contacts(validation),
@@ -66,7 +66,7 @@ def markdown(validation: Validation, picture: str) -> str:
 def draw(validation: Validation, figure: Any) -> None:
     """Prediction against truth per force axis, and the models' errors, in a matplotlib figure."""
     figure.set_size_inches(16, 4.4)
-    figure.suptitle(f"{validation.run.name}: {figures.model_name(validation)}, held out")
+    figure.suptitle(f"{validation.run.name}: {POOLED}, held out")
     axes = figure.subplots(1, 4)
     for axis in range(3):
         _draw_axis(axes[axis], validation, axis)
@@ -98,6 +98,10 @@ def _rest(validation: Validation, facts: dict[str, Any]) -> list[str]:
     return [line + f" counts of drift; E_base is trained in with force 0, {facts['air_share']:.1%} of the run's weight"]
 
 
+def _lags(validation: Validation) -> str:
+    return ", ".join(f"{axis} {lag}" for axis, lag in zip(validation.run.axes, validation.final.lag_rows, strict=True))
+
+
 def _unit(axis: str) -> str:
     return "N" if axis.startswith("F") else "N mm"
 
@@ -107,21 +111,20 @@ def _axes(validation: Validation) -> list[str]:
     errors = [figures.rmse(predicted, truth) for predicted in validation.predicted]
     explained = figures.r2(validation.predicted[0], truth)
     drifts = [f"at {c:+.0f} counts" for c in SHIFTS_COUNTS[1:]]
-    head = ["axis", "RMSE", *drifts, "R2", "spread of the truth", f"chosen by (of {BLOCKS} folds)"]
+    head = ["axis", "RMSE", *drifts, "R2", "spread of the truth", "weights of the models"]
     rows = []
-    for k, (name, votes) in enumerate(zip(validation.run.axes, figures.votes(validation), strict=True)):
-        chosen = ", ".join(f"{model} {folds}" for model, folds in votes.items())
+    for k, (name, weights) in enumerate(zip(validation.run.axes, figures.weights(validation), strict=True)):
+        chosen = ", ".join(f"{model} {weight:.2f}" for model, weight in weights.items())
         figures_here = [f"{e[k]:.3f} {_unit(name)}" for e in errors]
         rows.append([name, *figures_here, f"{explained[k]:.3f}", f"{truth[:, k].std():.3f} {_unit(name)}", chosen])
     return table(head, rows)
 
 
 def _models(validation: Validation) -> list[str]:
-    words = {model.name: model.words for model in MODELS} | {POOLED: POOLED_WORDS, TEMPLATE: TEMPLATE_WORDS}
     rows = []
     for name, errors in validation.by_model.items():
         drifted = errors[1:].max(axis=0)
-        rows.append([name, *[f"{a:.3f} ({b:.3f})" for a, b in zip(errors[0], drifted, strict=True)], words[name]])
+        rows.append([name, *[f"{a:.3f} ({b:.3f})" for a, b in zip(errors[0], drifted, strict=True)], WORDS[name]])
     return table(["model", *[f"{axis} [{_unit(axis)}]" for axis in validation.run.axes], ""], rows)
 
 
@@ -137,6 +140,7 @@ def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
         f"y {worst['y_mm'][0]:.1f} to {worst['y_mm'][1]:.1f} mm ({worst['rows']} rows): RMS length of the error "
         f"{worst['rmse_n']:.3f} N; best region {best['rmse_n']:.3f} N",
         f"* times better than Lin's three scales: {gain}",
+        *_more(facts),
     ]
     blocks = [validation.blocks.rows(k) for k in range(BLOCKS)]
     errors = np.array([figures.rmse(validation.predicted[0][r], validation.run.truth[r]) for r in blocks])
@@ -145,6 +149,18 @@ def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
         error = f"{of_axis[worst_block]:.3f} {_unit(name)}"
         lines.append(f"* {name}: worst block {worst_block + 1} of {BLOCKS}, RMSE {error}")
     return lines
+
+
+def _more(facts: dict[str, Any]) -> list[str]:
+    curve = "; ".join(
+        f"{one['minutes']:.1f} min " + "/".join(f"{error:.3f}" for error in one["rmse"][:3]) for one in facts["minutes"]
+    )
+    (x, y), gain = (facts["next_minute"][name] for name in ("x_mm", "y_mm")), facts["next_minute"]["gain_n"]
+    return [
+        f"* error along x/y/z in N by minutes trained on (100 rows a second): {curve}",
+        f"* a further minute pays most where the compression is centred at x {x[0]:.1f} to {x[1]:.1f} mm, "
+        f"y {y[0]:.1f} to {y[1]:.1f} mm: about {gain:.2f} N off its error",
+    ]
 
 
 def _confusion(validation: Validation) -> list[str]:

@@ -18,7 +18,7 @@ from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...core.map_columns import PRESSURE_COUNTS, Signals, conductance_change
 from ...wire import map_gen as _map
-from .moments import Rows, drifted, smoothed
+from .moments import Rows, smoothed
 from .run import Run
 
 FOOTPRINT_MM = 2.5  # between a probe's and a flat's
@@ -120,27 +120,28 @@ def predict(of: Floats, coefficients: Floats) -> Floats:
 
 
 class Template:
-    """The model on a run, for any lag and window: columns are computed once for each."""
+    """The model on a run, for any lags and window: columns are computed once for each window."""
 
     def __init__(self, run: Run) -> None:
         self.run = run
         self.axes = run.truth.shape[1]
-        self._columns: dict[tuple[int, int], Floats] = {}
+        self._columns: dict[int, Floats] = {}
 
-    def held_out(self, window_rows: int, lag_rows: int, trained: Rows, rows: Rows, shifts: Sequence[float]) -> Floats:
+    def held_out(
+        self, window_rows: int, lag_rows: tuple[int, ...], trained: Rows, rows: Rows, shifts: Sequence[float]
+    ) -> Floats:
         """Wrench (shifts, n, axes) of ``rows`` at each drift, by coefficients from the rows ``trained``."""
-        key = (window_rows, lag_rows)
-        if key not in self._columns:
-            self._columns[key] = np.array([self._mean(*key, counts) for counts in shifts])
-        of = self._columns[key]
-        coefficients = fit(of[0][trained], self.run.truth[trained])
-        return np.array([predict(shifted[rows], coefficients) for shifted in of])
-
-    def _mean(self, window_rows: int, lag_rows: int, counts: float) -> Floats:
-        every = np.arange(len(self.run.counts))
-
-        def flat(signals: Signals) -> Floats:
-            return columns(signals)[:, : self.axes].reshape(len(signals.e), -1)
-
-        mean = smoothed(self.run, window_rows, lag_rows, every, drifted(self.run, counts, flat))
-        return mean.reshape(len(every), self.axes, -1)
+        if window_rows not in self._columns:
+            signals = smoothed(self.run, window_rows)
+            self._columns[window_rows] = np.array(
+                [columns(signals.drifted(counts * self.run.drift))[:, : self.axes] for counts in shifts]
+            )
+        of = self._columns[window_rows]
+        last = len(self.run.truth) - 1
+        result = np.empty((len(shifts), len(rows), self.axes))
+        for axis, lag in enumerate(lag_rows):
+            late = of[:, :, axis : axis + 1]
+            coefficients = fit(late[0][np.clip(trained + lag, 0, last)], self.run.truth[trained, axis : axis + 1])
+            for shift, shifted in zip(result, late, strict=True):
+                shift[:, axis] = predict(shifted[np.clip(rows + lag, 0, last)], coefficients)[:, 0]
+        return result

@@ -12,7 +12,7 @@ import biotac
 
 from ...version import __version__
 from ...wire.identity import serial_text
-from ...wire.sensor_gen import MAX_SENSORS
+from .. import values
 
 
 def add(what: Any, verb: str, name: str, action: Any, text: str, example: str) -> argparse.ArgumentParser:
@@ -52,7 +52,7 @@ def add_get_put_clear(add: Any, get: Any, put: Any, clear: Any, cleared: str, ge
 
 def add_finger(parser: argparse.ArgumentParser) -> None:
     """Which finger; there is no default, as a wrong one would not be noticed."""
-    parser.add_argument("--finger", type=int, choices=range(MAX_SENSORS), required=True, metavar="N")
+    parser.add_argument("--finger", metavar="NAME", type=values.finger, required=True, help="name or chip select")
 
 
 def add_save(parser: argparse.ArgumentParser) -> None:

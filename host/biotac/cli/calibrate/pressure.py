@@ -17,7 +17,7 @@ from ...errors import InputError
 from ...hand.hand import Hand
 from ...keep import calibration_file as file
 from ...wire.sensor_gen import MAX_SENSORS
-from .. import outputs
+from .. import outputs, values
 from ..recordings.loading import load
 from .typed import reading_n
 
@@ -37,7 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="force over the board's time, for recordings: CSV with t_s and force_n (or fx_n, fy_n, fz_n)",
     )
-    parser.add_argument("--fingers", metavar="N,N", type=_fingers, default=(), help="which, in this order (all)")
+    parser.add_argument(
+        "--fingers", metavar="NAME,NAME", type=values.fingers, default=(), help="names or chip selects, in order (all)"
+    )
     asked = ",".join(f"{force:g}" for force in CALIBRATION_FORCES_N)
     parser.add_argument(
         "--forces",
@@ -150,13 +152,6 @@ def _write(args: argparse.Namespace, outcome: report.Outcome, name: str | None) 
         file.save(place, its, outcome.provenance[finger], overwrite=args.force)
         written.append(str(place))
     return written
-
-
-def _fingers(text: str) -> tuple[int, ...]:
-    fingers = tuple(int(part) for part in text.split(","))
-    if not all(0 <= finger < MAX_SENSORS for finger in fingers):
-        raise argparse.ArgumentTypeError(f"{text} is out of range; expected 0 to {MAX_SENSORS - 1}")
-    return fingers
 
 
 def _force(text: str) -> float:

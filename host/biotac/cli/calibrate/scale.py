@@ -19,9 +19,9 @@ from ...errors import InputError
 from ...hand.hand import Hand
 from ...partial_file import whole
 from ...wire.identity import ascii_text
+from .. import values
 from ..recordings.loading import load
 from .typed import reading_n
-from .wrench import finger_number
 
 NAME = "scale"
 HELP = "A finger's own force from presses on a kitchen scale: the population map with its gain and balance."
@@ -33,7 +33,7 @@ NEWTONS = {"N": 1.0, "g": 9.80665e-3, "kg": 9.80665}
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which finger, how many presses, and where the map goes."""
     parser.add_argument("where", metavar="PORT|REC", help="a board, or a recording (.mcap) of such presses")
-    parser.add_argument("--finger", metavar="NAME", required=True, help="name or chip select")
+    parser.add_argument("--finger", metavar="NAME", type=values.finger, required=True, help="name or chip select")
     parser.add_argument(
         "--presses", metavar="N", type=int, default=5, help="how many (default %(default)s; 20 are better)"
     )
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Press, fit, say what it is worth; then, and only if it is worth it, onto the board."""
-    finger = finger_number(args.finger)
+    finger = args.finger
     kept = keeping.load(args.population)
     if args.out is not None and args.out.exists() and not args.force:
         raise InputError(f"{args.out} exists and would be overwritten; choose another name or say --force")

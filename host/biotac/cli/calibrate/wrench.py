@@ -22,12 +22,11 @@ from ...calibrate.wrench.joined import choose_finger
 from ...calibrate.wrench.sources import Loaded, load
 from ...calibrate.wrench.upload import upload
 from ...errors import InputError
-from ...hand.views import checked_names, finger_index
 from ...partial_file import whole
 from ...picture import check_drawable
 from ...picture import picture as drawn
 from ...wire.identity import ascii_text
-from .. import outputs
+from .. import outputs, values
 from ..progress import Progress
 from . import live as calibrate_live
 
@@ -51,7 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "netft:HOST (ATI Net F/T), or nano17 (emulated, beside sim:)",
     )  # fmt: skip
     parser.add_argument("--mounting", metavar="M", help="how its sensor is fixed: a .toml, or lin (axes are Lin's)")
-    parser.add_argument("--finger", metavar="NAME", help="of a recording with several: name or chip select")
+    parser.add_argument(
+        "--finger", metavar="NAME", type=values.finger, help="of a recording with several: name or chip select"
+    )
     parser.add_argument("--serial", metavar="BT...", default="", help="refuse data of another sensor than this")
     parser.add_argument("--force", action="store_true", help="overwrite what is there; take another sensor's data")
     live = parser.add_argument_group("guided, on a board")
@@ -76,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
         _check_out(args.out, args.files, overwrite=args.force)
     references = _references(args.files, args.reference)
     mounting = None if args.mounting is None else read_mounting(args.mounting)
-    finger = None if args.finger is None else finger_number(args.finger)
+    finger = args.finger
     for path in args.files:
         its = references.get(path)
         beside = None if its is None else (Path(its), read_reference(its, mounting))
@@ -90,7 +91,7 @@ def _live(args: argparse.Namespace) -> int:
         raise InputError("--live calibrates one finger: expected --finger NAME")
     if args.out is None:
         raise InputError("--live keeps what it records: expected --out FOLDER")
-    finger = finger_number(args.finger)
+    finger = args.finger
     with calibrate_live.open_board(args) as hand:
         if finger not in hand.fingers:
             raise InputError(f"finger {finger} does not answer: expected one of {hand.fingers}; see to its cable")
@@ -140,14 +141,6 @@ def _put(
     if args.save:
         hand.save_settings()
     return found.facts() | {"saved": args.save}
-
-
-def finger_number(text: str) -> int:
-    """Chip select of a finger by name or number. Raises InputError."""
-    try:
-        return finger_index(checked_names(None), int(text) if text.isdigit() else text)
-    except KeyError as error:
-        raise InputError(str(error.args[0])) from None
 
 
 def _references(files: list[Path], references: list[str]) -> dict[Path, str]:

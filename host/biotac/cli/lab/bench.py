@@ -6,10 +6,12 @@ import argparse
 import json
 from collections.abc import Callable
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
-from ...lab.bench import batch, decode, idle, imports, live, recording, timing
+from ...lab.bench import batch, decode, idle, imports, live, newtons, recording, timing
+from ...picture import check_drawable
 from .. import values
 from ..progress import Progress
 
@@ -28,8 +30,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=list(WHAT),
         help="batch: whole recordings, biotac.compute; decode: the link's bytes to arrays, against pymavlink and "
         "Python; idle: bytes on the link at rest and in contact; imports: what starting costs; "
-        "live: reading thread to callback, against a pyserial thread; recording: sizes and load times of recordings",
+        "live: reading thread to callback, against a pyserial thread; newtons: cycles of a force against its error on "
+        "real fingers; recording: sizes and load times of recordings",
     )
+    parser.add_argument(
+        "files", metavar="REC", nargs="*", type=Path, help="newtons: fingers on a force plate, as for calibrate wrench"
+    )
+    parser.add_argument("--picture", metavar="FILE", type=Path, help="newtons: draw it here (.png)")
     parser.add_argument(
         "--frames",
         type=int,
@@ -56,6 +63,8 @@ def run(args: argparse.Namespace) -> int:
         low, high = FRAMES[args.what]
         if not low <= args.frames <= high:
             raise InputError(f"--frames is {args.frames}, expected {low} to {high} for bench {args.what}")
+    if args.what != "newtons" and (args.files or args.picture):
+        raise InputError(f"bench {args.what} takes no recording and draws no picture; leave them away")
     measure, show, more = WHAT[args.what]
     outcome = measure(args)
     if args.json:
@@ -166,6 +175,44 @@ def _record(args: argparse.Namespace) -> recording.Outcome:
         progress.done()
 
 
+def _newtons(args: argparse.Namespace) -> dict[str, Any]:
+    if args.picture is not None:
+        check_drawable()
+    progress = Progress()
+    try:
+        outcome = newtons.measure(args.files, progress.show)
+    finally:
+        progress.done()
+    facts = newtons.facts(outcome)
+    if args.picture is not None:
+        from ...lab.bench.newtons_picture import draw
+
+        draw(outcome, args.picture)
+        facts["picture"] = str(args.picture)
+    return facts
+
+
+def _newtons_table(facts: dict[str, Any]) -> None:
+    cores = facts["cores"]
+    files = list(facts["noise_n"])
+    print(f"{'':28}{'knows':26}" + "".join(f"{core:>15}" for core in cores) + "".join(f"{name:>20}" for name in files))
+    for point in facts["points"]:
+        cycles = "".join(f"{point['cycles'][core]:15,}" for core in cores)
+        print(f"{point['name']:28}{point['knows']:26}{cycles}" + _three(point["rmse_n"], files))
+    for words, name in (("electrode noise, a frame", "noise_n"), ("same pattern again", "repeatability_n")):
+        print(f"{words:{54 + 15 * len(cores)}}" + _three(facts[name], files))
+    print("N, RMSE in x/y/z, held out; cycles of one force:")
+    for core, about in cores.items():
+        print(f"  {core}: {about['title']}, {about['cycles_by']}")
+    for note in facts["notes"]:
+        print(note)
+
+
+def _three(rmse: dict[str, list[float]], files: list[str]) -> str:
+    cells = ("/".join(f"{value:.2f}" for value in rmse[name]) if name in rmse else "-" for name in files)
+    return "".join(f"{cell:>20}" for cell in cells)
+
+
 # What is measured, how it is printed, and what of its properties JSON has besides its fields.
 WHAT: dict[str, tuple[Callable[[argparse.Namespace], Any], Callable[[Any], None], tuple[str, ...]]] = {
     "batch": (lambda args: batch.measure(args.frames or BATCH_FRAMES), _batch, ()),
@@ -173,5 +220,6 @@ WHAT: dict[str, tuple[Callable[[argparse.Namespace], Any], Callable[[Any], None]
     "idle": (lambda args: idle.measure(args.source), _idle, ()),
     "imports": (lambda args: imports.measure(args.rounds), _imports, ()),
     "live": (lambda args: live.measure(rounds=args.rounds), _live, ()),
+    "newtons": (_newtons, _newtons_table, ()),
     "recording": (_record, _recording, ("faster",)),
 }

@@ -14,7 +14,7 @@ from ...lab.experiments.outcome import Experiment, Facts, Options, markdown, ver
 from ...partial_file import whole
 from ...picture import check_drawable
 from ...picture import picture as drawn
-from .. import outputs
+from .. import outputs, values
 from ..progress import Progress
 
 EXAMPLE = "biotac experiment poke --out poked --check"
@@ -36,7 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="a laboratory's own trial, .npz or .mcap, instead of the emulated finger",
     )
-    parser.add_argument("--finger", type=int, default=0, help="which finger of an .mcap (default 0)")
+    parser.add_argument(
+        "--finger", metavar="NAME", type=values.finger, default=0, help="of an .mcap: name or chip select (default 0)"
+    )
     parser.add_argument("--seed", type=int, help="which emulated finger (default 1)")
     parser.add_argument(
         "--map",

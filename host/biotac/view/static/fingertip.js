@@ -47,6 +47,7 @@ export class Fingertip {
     c.stroke();
     this.drawElectrodes(signal, theme, limit, scale);
     if (frame?.mapMm && frame.touched) this.drawContact(finger, frame, theme, scale);
+    if (this.large) this.drawNumbers(signal, theme, limit); // last: nothing hides them
     c.restore();
   }
 
@@ -86,10 +87,17 @@ export class Fingertip {
       c.setLineDash(dead ? [0.3, 0.3] : []);
       c.stroke();
       c.setLineDash([]);
-      if (this.large) {
-        const bright = colour[0] * 0.299 + colour[1] * 0.587 + colour[2] * 0.114 > 140;
-        label(c, dead ? "×" : name.slice(1), a, b, 0.92, dead ? theme.quiet : bright ? "#171b22" : "#ffffff");
-      }
+    });
+  }
+
+  drawNumbers(signal, theme, limit) {
+    this.electrodes.forEach(({ across_mm: a, along_mm: b, name }, k) => {
+      const value = signal ? signal[k] : NaN;
+      const dead = signal && Number.isNaN(value);
+      const at = 4 * shade(Number.isNaN(value) ? 0 : value / limit);
+      const [red, green, blue] = theme.shades.bytes.subarray(at, at + 3);
+      const bright = red * 0.299 + green * 0.587 + blue * 0.114 > 140;
+      label(this.context, dead ? "×" : name.slice(1), a, b, 0.92, dead ? theme.quiet : bright ? "#171b22" : "#ffffff");
     });
   }
 
@@ -99,8 +107,8 @@ export class Fingertip {
     const [xN, yN, zN] = frame.forceN;
     const torqueZ = frame.torqueNmm[2];
     const width = ((this.large ? 3 : 2) * devicePixelRatio) / scale;
-    const spot = this.large ? 0.3 : 0.45;
-    if (this.large) this.drawTrail(finger.trail, theme);
+    const spot = this.large ? 0.65 : 0.45; // a ring around an electrode's number; a dot where there are none
+    if (this.large) this.drawTrail(finger.trail, theme, a, b, spot);
     halo(c, theme, width, () => {
       if (zN > LIGHT_N) {
         disc(c, a, b, Math.min(RING_MM_PER_SQRT_N * Math.sqrt(zN), LONGEST_MM / 2));
@@ -109,14 +117,17 @@ export class Fingertip {
       disc(c, a, b, spot);
       c.stroke();
     });
-    c.fillStyle = theme.point;
-    disc(c, a, b, spot);
-    c.fill();
+    if (!this.large) {
+      c.fillStyle = theme.point;
+      disc(c, a, b, spot);
+      c.fill();
+    }
     // Seen from the palm's side x points up and y to the right, as on the map.
     const sideN = Math.hypot(xN, yN);
     if (sideN > LIGHT_N) {
       const mmPerN = Math.min(ARROW_MM_PER_N, LONGEST_MM / sideN);
-      halo(c, theme, width, () => arrow(c, a, b, a + yN * mmPerN, b + xN * mmPerN));
+      const from = this.large ? Math.min(spot / sideN, mmPerN / 2) : 0; // the ring's rim
+      halo(c, theme, width, () => arrow(c, a + yN * from, b + xN * from, a + yN * mmPerN, b + xN * mmPerN));
     }
     if (this.large && Math.abs(torqueZ) > LIGHT_NMM) {
       // z points away from who looks at the palm's side: a positive turn, x to y, is clockwise.
@@ -125,11 +136,11 @@ export class Fingertip {
     }
   }
 
-  drawTrail(trail, theme) {
+  drawTrail(trail, theme, a, b, free) {
     const c = this.context;
     c.fillStyle = theme.point;
     trail.forEach((place, k) => {
-      if (!place) return;
+      if (!place || Math.hypot(place[0] - a, place[1] - b) < free) return; // inside of the ring is a number's place
       c.globalAlpha = (k / trail.length) * 0.35;
       disc(c, place[0], place[1], 0.18);
       c.fill();

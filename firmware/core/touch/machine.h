@@ -1,0 +1,76 @@
+// What the tare machine (tare.h) knows of one finger; its rounds, what follows drift, what judges a sweep and
+// what adopts a tare all work on it.
+//
+// Units: counts; baselines in 1/65536 count (q16); energies in count^2; time in rounds of 10 ms and sweeps of
+// eight.
+#ifndef BIOTAC_MACHINE_H
+#define BIOTAC_MACHINE_H
+
+#include "touch/baseline.h"
+#include "touch/drift.h"
+#include "touch/gate.h"
+#include "touch/inverted.h"
+#include "touch/noise.h"
+#include "touch/release.h"
+#include "touch/silence.h"
+#include "touch/sweep.h"
+#include "touch/thermal.h"
+#include "touch/watch.h"
+
+// What the machine needs of the settings.
+typedef struct {
+    uint32_t contact_energy_count2;
+    int32_t thermal_gain_q16; // counts that a resting electrode gains per count of TDC
+} bt_tare_settings;
+
+typedef struct {
+    bt_gate gate;
+    bt_sweep sweep;
+    uint8_t state;        // enum bt_tare_state
+    uint8_t reason;       // enum bt_tare_reason of the last change
+    uint8_t before_fault; // the state to go back to
+    bool changed; // the last round changed the tare by more than drift tracking, or the host's word did
+    bool tared;   // there is one
+    bool held;    // the host says so: no new tare is taken
+    bool let_go;  // the host says so: what is in doubt is residue
+    bt_baseline base;
+    uint16_t electrode_q4[BT_ELECTRODES]; // base as it is subtracted; BT_INVALID_COUNT when unknown
+    uint32_t threshold_count2;            // energy above which a round counts as touched
+    uint32_t age_rounds;                  // since the last change
+    uint32_t contact_rounds;              // since the contact was seen
+
+    bt_silence silence;
+    bt_watch watch;
+    bt_tare_change last; // what the latest new tare changed
+    bt_rollback rollback;
+    bt_noise noise;
+    bt_drift drift;
+    int32_t drift_q16; // what it adds to each electrode in this sweep
+    bt_thermal thermal;
+    bt_release release;
+
+    int32_t comes_back_q16; // of the pressure that the latest press has left missing, at most
+    uint8_t hits;           // consecutive rounds in which the gate opened
+    bool touched;           // in this round the gate opened, or before it and it is open still
+    bool partial;           // this sweep did not serve all electrodes in one state
+    bool partial_before;    // nor did the one before
+    uint32_t deviation_q6;  // count^2; of this sweep: filtered counts from their means
+    uint32_t energy_count2; // of this sweep: means from the tare
+    int32_t sum_q4;         // of the same distances
+    bool pressure_seen;     // in this sweep at least one pressure word was good
+} bt_tare;
+
+// Static pressure above the tare, in whole counts, where both are known.
+#ifndef BT_CDEF
+static inline bool bt_tare_pdc_known(const bt_tare *tare)
+{
+    return tare->gate.pressure_now && tare->base.pdc_q16 != BT_TARE_UNKNOWN;
+}
+
+static inline int32_t bt_tare_pdc_above(const bt_tare *tare)
+{
+    return tare->gate.smooth.lane[BT_LANE_PDC] - (int32_t)((tare->base.pdc_q16 + (1 << 15)) >> 16);
+}
+#endif
+
+#endif
