@@ -179,14 +179,11 @@ def pdc_above_rest_q4(frames: StructArray) -> NDArray[np.int32]:
 
 
 def _halves(kind: Kind, values: Integers) -> bytes:
-    """A group of axes (columns, width) as it lies in the blob. Raises InputError beyond 16 bits."""
+    """A group of axes (columns, width) as it lies in the blob. Raises ValueError beyond 16 bits."""
     spec = _map.KINDS[kind]
-    if np.any(np.abs(values) > 2**15 - 1):
-        raise InputError(
-            f"a coefficient of {kind.name} is {int(np.abs(values).max())}, expected 16 bits; quantise the map again"
-        )
+    halves = integers(f"coefficients of {kind.name}", values, "<i2", None, None)
     laid = np.zeros((spec.halves, values.shape[1]), "<i2")
-    laid[: spec.columns] = values[RING] if spec.shape == "pairs" else values
+    laid[: spec.columns] = halves[RING] if spec.shape == "pairs" else halves
     return laid.tobytes()
 
 

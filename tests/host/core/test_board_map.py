@@ -122,8 +122,8 @@ def test_what_a_board_would_refuse_is_refused_in_words() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"coefficients": [[2**31] * 3]}, "halves of coefficients are int64"),
-        ({"coefficients": [[-(2**31) - 40_000] * 3]}, "halves of coefficients are int64"),
+        ({"coefficients": [[2**15] * 3]}, "coefficients of OFFSET are int64, expected integers -32768 to 32767"),
+        ({"coefficients": [[-(2**31) - 40_000] * 3]}, "coefficients of OFFSET are int64"),
         ({"coefficients": [[1.5] * 3]}, "coefficients of OFFSET are float64, expected integers"),
         ({"coefficients": [[1] * 4]}, r"coefficients of OFFSET have shape \(1, 4\), expected \(1, 3\)"),
         ({"exponent": (300, 0, 0)}, "cannot be stored"),
@@ -131,7 +131,7 @@ def test_what_a_board_would_refuse_is_refused_in_words() -> None:
     ],
 )
 def test_what_would_wrap_in_a_blob_is_refused(change: dict, words: str) -> None:
-    block = BoardBlock(Kind.OFFSET, Gate.ONE, (0, 0, 0), np.ones((1, 3), np.int64))
+    block = BoardBlock(Kind.OFFSET, Gate.ONE, (1, 1, 1), np.ones((1, 3), np.int64))
     assert BoardMap(3, (block,)).blob
     change = {name: np.array(its) if name == "coefficients" else its for name, its in change.items()}
     with pytest.raises(InputError, match=words):
