@@ -168,6 +168,7 @@ def test_the_packages_own_names_what_it_is_made_of() -> None:
     assert all(len(sha256) == 64 for sha256 in kept.provenance["files"].values())
 
 
+@pytest.mark.nightly
 def test_real_fingers_each_by_the_other() -> None:
     """The asked figures (issue 15), but for x after five presses: .45 asked of F2, .50 reached."""
     if not SHARED.exists():

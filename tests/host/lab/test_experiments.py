@@ -317,7 +317,10 @@ def test_every_name_has_a_module_and_others_are_refused_in_words(monkeypatch) ->
         catalogue.load("not-yet")
 
 
-@pytest.mark.parametrize("name", ["poke", "plate-normal", "shear", "torsion", "torsion-shear", "navarro"])
+@pytest.mark.parametrize(
+    "name",
+    ["poke", "plate-normal", "shear", "torsion", "torsion-shear", pytest.param("navarro", marks=pytest.mark.nightly)],
+)
 def test_page_and_json_hold_the_same_figures(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     assert main(["experiment", name, "--out", str(tmp_path / "out"), "--seed", "7", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)

@@ -177,7 +177,8 @@ def on_board(counts: Words, pdc: Words, *, given: Floats | None = None) -> tuple
 
 
 def _board(settings: Settings | None, given: Floats | None) -> Finger:
-    board = Finger(settings)
+    # The papers' own formulas are what is tried here; the population map knows real fingers on flat plates.
+    board = Finger({wire.Setting.FORCE_MODEL: wire.ForceModel.LIN} | (settings or {}))
     if given is not None:
         board.set_tare(given)
     return board
