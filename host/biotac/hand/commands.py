@@ -221,7 +221,7 @@ class Commands:
         self._board.remember(("map", number), lambda: transfer.restore(self._board, number, blob))
 
     def clear_map(self, finger: Finger) -> None:
-        """Return a finger to its gains, until the next reboot or, with save_settings, for good."""
+        """Return a finger to what its settings say, until the next reboot or, with save_settings, for good."""
         number = self._index(finger)
         self._board.tell(wire.ClearMap(0, number), lasting=("map", number))
 

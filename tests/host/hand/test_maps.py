@@ -366,13 +366,13 @@ def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) 
     assert "finger 1: in force, saved; force and torque, 3 block(s), 564 bytes, for any sensor" in said
     assert main(["map", "show", port]) == 0
     shown = capsys.readouterr().out.splitlines()
-    assert shown[0] == "finger 0: none, the gains hold"
+    assert shown[0] == "finger 0: none, the settings hold"
     assert shown[1].startswith("finger 1: in force; force and torque") and "made 2025-11-21" in shown[1]
     assert main(["map", "get", port, str(back), "--finger", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["crc32"] == f"{zlib.crc32(blob):08x}"
     assert map_file.load(back) == blob
     assert main(["map", "clear", port, "--finger", "1"]) == 0
-    assert "the gains hold, until the next reboot" in capsys.readouterr().out
+    assert "the settings hold, until the next reboot" in capsys.readouterr().out
     assert main(["map", "show", port, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["1"] == {"state": "NONE"}
 

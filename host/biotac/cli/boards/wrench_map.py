@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     show.add_argument("where", metavar="PORT|FILE")
 
     recorded = "replay:REC gets what a recording was made with"
-    subverbs.add_get_put_clear(add, _get, _put, _clear, "Back to the gains.", get_port_help=recorded)
+    subverbs.add_get_put_clear(add, _get, _put, _clear, "Back to what the settings say.", get_port_help=recorded)
 
 
 def _get(args: argparse.Namespace) -> None:
@@ -52,7 +52,7 @@ def _put(args: argparse.Namespace) -> None:
 
 
 def _clear(args: argparse.Namespace) -> None:
-    subverbs.clear(args, lambda hand: hand.clear_map(args.finger), "the gains")
+    subverbs.clear(args, lambda hand: hand.clear_map(args.finger), "the settings")
 
 
 def _show(args: argparse.Namespace) -> None:
@@ -72,7 +72,7 @@ def _show(args: argparse.Namespace) -> None:
         if its is not None:
             print(f"finger {finger}: {subverbs.state_words(state)}; {file.title(its)}")
         elif finger in present:
-            print(f"finger {finger}: none, the gains hold")
+            print(f"finger {finger}: none, the settings hold")
 
 
 def _say(args: argparse.Namespace, line: str, blob: bytes) -> None:
