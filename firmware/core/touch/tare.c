@@ -199,15 +199,22 @@ void bt_tare_hold(bt_tare *tare)
     bt_adopt_tell(tare, BT_TARE_REASON_HOST_HOLD);
 }
 
-void bt_tare_release(bt_tare *tare)
+// What is no longer held is judged by a whole sweep: a verdict in the coming round would take the place of
+// the reason that is still to be told, and nobody would hear of the host's word.
+static void let_judge(bt_tare *tare, uint8_t reason)
 {
     tare->held = false;
+    tare->partial = true;
+    bt_adopt_tell(tare, reason);
+}
+
+void bt_tare_release(bt_tare *tare)
+{
     tare->let_go = true;
-    bt_adopt_tell(tare, BT_TARE_REASON_HOST_RELEASE);
+    let_judge(tare, BT_TARE_REASON_HOST_RELEASE);
 }
 
 void bt_tare_lapse(bt_tare *tare)
 {
-    tare->held = false;
-    bt_adopt_tell(tare, BT_TARE_REASON_HOLD_LAPSED);
+    let_judge(tare, BT_TARE_REASON_HOLD_LAPSED);
 }

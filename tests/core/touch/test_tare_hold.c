@@ -156,6 +156,25 @@ static void a_lapsed_hold_is_judged_by_its_signals(void **state)
     assert_int_equal(finger.tare.state, BT_TARE_STATE_DOUBT);
 }
 
+// A TARE tells one reason, with the round after it: whenever the word comes, a verdict may not take its
+// place.
+static void the_hosts_word_is_told_before_what_follows_from_it(void **state)
+{
+    (void)state;
+    for (int rounds = 0; rounds < BT_SWEEP_ROUNDS; rounds++) {
+        emulated_finger finger = touched_finger(400, 300);
+        bt_tare_hold(&finger.tare);
+        finger.load = 0;
+        finger.pdc_load = 0;
+        run_seconds(&finger, 2 + rounds * 0.01);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+        bt_tare_release(&finger.tare);
+        run_seconds(&finger, 0.01);
+        assert_int_equal(finger.tare.reason, BT_TARE_REASON_HOST_RELEASE);
+        assert_in_range(run_until(&finger, BT_TARE_STATE_REST, 100), 1, 20);
+    }
+}
+
 static void a_held_finger_takes_no_first_tare(void **state)
 {
     (void)state;
@@ -228,6 +247,7 @@ int main(void)
         cmocka_unit_test(while_held_nothing_is_tared_down_to_nothing),
         cmocka_unit_test(release_settles_what_was_in_doubt),
         cmocka_unit_test(a_lapsed_hold_is_judged_by_its_signals),
+        cmocka_unit_test(the_hosts_word_is_told_before_what_follows_from_it),
         cmocka_unit_test(a_held_finger_takes_no_first_tare),
         cmocka_unit_test(a_tare_taken_of_a_hold_is_undone_when_it_ends),
         cmocka_unit_test(a_first_tare_taken_of_a_hold_is_lost_when_it_ends),
