@@ -162,6 +162,7 @@ def test_what_was_in_force_and_not_saved_is_put_back_and_saved(
         assert getattr(hand, what)() == {0: new, 1: kept}
 
 
+@pytest.mark.long
 def test_another_release_is_what_hello_says_afterwards(bench: Bench, next_release: Image) -> None:
     bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)
     outcome = bench.flash(next_release)

@@ -40,7 +40,7 @@ def test_usb_enumerates_and_breaks_no_rule(rig) -> None:
     assert usb["device"]["serial"]
 
 
-@pytest.mark.parametrize("fingers", range(1, 6))
+@pytest.mark.parametrize("fingers", [*(pytest.param(k, marks=pytest.mark.long) for k in range(1, 5)), 5])
 def test_every_slot_of_one_to_five_fingers_is_sampled_and_nothing_lost(board, fingers: int) -> None:
     hand = board(f"press.toml?fingers={fingers}&seconds=1")
     assert hand.fingers == list(range(fingers))

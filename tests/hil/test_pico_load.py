@@ -28,6 +28,7 @@ def test_five_fingers_with_the_largest_map_lose_nothing(rig: Rig) -> None:
     assert counters["slept"] >= 0.2
 
 
+@pytest.mark.long
 def test_at_150_percent_work_is_shed_in_order_and_slots_and_commands_are_kept(rig: Rig) -> None:
     """The core is slowed down until what it has to do takes half as long again as there is time."""
     rig.need("counters")

@@ -82,6 +82,7 @@ def test_ten_minutes_of_rest_have_no_contact(profile: str, noise: float, glitche
     assert error <= 5 * noise / 8**0.5 + abs(per_min) / 60 * 0.16 + 1 / 16
 
 
+@pytest.mark.nightly
 def test_ten_hours_of_a_worn_finger_have_no_contact() -> None:
     # White noise of sigma 5, glitches in 0.5 % of the words and never two in a row, 15 counts a minute.
     random = np.random.default_rng(5)

@@ -16,6 +16,8 @@ from biotac.cli.main import main
 from biotac.core.board_map import from_blob
 from biotac.errors import PortError
 
+pytestmark = pytest.mark.nightly  # a minute and a half of procedure and fits
+
 SERIAL = "BTSIM00000000006"
 
 
@@ -63,7 +65,6 @@ def test_the_map_is_on_the_board_and_does_there_what_was_fitted(
     assert again is not None and facts["data_sha256"] == again.data_sha256
 
 
-@pytest.mark.nightly
 def test_another_fingers_board_is_refused(calibrated: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(fit_again(calibrated, "--upload", "sim:press.toml")) == 2
     assert f"is of sensor {SERIAL}, and this is BTSIM00000000001: expected the same" in capsys.readouterr().err

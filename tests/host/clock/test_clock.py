@@ -52,7 +52,9 @@ def unseen_s(model: Model) -> float:
 # ---- what was promised ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("changes", [{}, WORST], ids=["steady", "worst"])
+@pytest.mark.parametrize(
+    "changes", [pytest.param({}, id="steady", marks=pytest.mark.nightly), pytest.param(WORST, id="worst")]
+)
 def test_a_crystal_50_ppm_off_behind_a_jittery_link(changes: dict[str, float]) -> None:
     residuals_s, after_a_minute_s = [], []
     for seed in SEEDS:

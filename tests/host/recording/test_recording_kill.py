@@ -85,7 +85,11 @@ def arrived_frames(stream: bytes) -> list[tuple[int, int]]:
     return found
 
 
-@pytest.mark.parametrize(("where", "at"), MOMENTS)
+@pytest.mark.parametrize(
+    ("where", "at"),
+    # by day every third
+    [pytest.param(*moment, marks=pytest.mark.nightly if k % 3 else ()) for k, moment in enumerate(MOMENTS)],
+)
 def test_a_killed_recorder_loses_at_most_the_last_second(tmp_path: Path, capsys, where: str, at: int) -> None:
     path, truth = tmp_path / "killed.mcap", tmp_path / "arrived.bin"
     program = [sys.executable, "-c", RECORDER, str(path), str(truth), where, str(at)]
