@@ -1,8 +1,8 @@
 #include "finger.h"
 
 #include "fixed_point.h"
+#include "signal/signals.h"
 #include "solve/poc.h"
-#include "touch/signals.h"
 
 #include <string.h>
 

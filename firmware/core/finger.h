@@ -3,9 +3,9 @@
 #ifndef BIOTAC_FINGER_H
 #define BIOTAC_FINGER_H
 
+#include "signal/round.h"
 #include "solve/pressure.h"
 #include "solve/results.h"
-#include "touch/round.h"
 #include "touch/tare.h"
 
 // Counts of what the bus delivered; wrap at 2^32.

@@ -1,7 +1,7 @@
 #include "batch.h"
 
-#include "touch/round.h"
-#include "touch/signals.h"
+#include "signal/round.h"
+#include "signal/signals.h"
 
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                       const bt_solve_settings *settings, int16_t *poc_um, int32_t *force_100un,

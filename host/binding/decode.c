@@ -22,9 +22,8 @@ static const struct {
     uint8_t bytes;
     uint8_t fill[LACKS_MAX_BYTES];
 } lacks[] = {
-    // poc_sigma_um, force_sigma_100un, pdc_filtered_q4, pressure_force_100un and torsion_mnmm: none;
-    // wrench_age_ms:
-    // never repeated
+    // poc_sigma_um, force_sigma_100un, pdc_filtered_q4, pressure_force_100un and torsion_mnmm: none.
+    // wrench_age_ms: never repeated.
     {BT_FRAME_ID,
      20,
      {0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 0x80, 0, 0, 0, 0x80}},

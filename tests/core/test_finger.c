@@ -2,7 +2,7 @@
 #include "support.h"
 
 #include "finger.h"
-#include "touch/signals.h"
+#include "signal/signals.h"
 
 static bt_finger finger;
 static bt_solve_settings settings;

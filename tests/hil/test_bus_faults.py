@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from held_press import fault, held_press, of
 
 import biotac
 from biotac import FrameFlags
@@ -14,30 +15,12 @@ from biotac.wire import messages_gen as wire
 INVALID = 0xFFFF
 ASKED = 3  # of 30 rounds
 
-HEALTHY = """
-name = "healthy"
-seed = 5
-fingers = 3
-[[step]]
-do = "rest"
-seconds = 1.0
-[[step]]
-do = "press"
-seconds = 0.5
-at = "E17"
-force_n = 3.0
-[[step]]
-do = "hold"
-seconds = 1.0
-"""
+HEALTHY = held_press(3)
 
-FAULT = """
-[[fault]]
-at_s = 1.8
-seconds = 0.3
-finger = 1
-kind = "{kind}"
-"""
+
+def hurt_by(kind: str, channel: str | None = None) -> str:
+    """The scenario with finger 1 hurt for 30 rounds."""
+    return HEALTHY + fault(kind, 1.8, 0.3, channel=channel)
 
 
 @pytest.fixture
@@ -56,10 +39,6 @@ def play(board, tmp_path: Path):
     return run
 
 
-def of(frames: np.ndarray, finger: int) -> np.ndarray:
-    return frames[frames["finger"] == finger]
-
-
 @pytest.mark.parametrize(
     ("kind", "counter"),
     [
@@ -72,7 +51,7 @@ def of(frames: np.ndarray, finger: int) -> np.ndarray:
 )
 def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(play, kind: str, counter: str) -> None:
     healthy, before = play(HEALTHY)
-    faulty, after = play(HEALTHY + FAULT.format(kind=kind))
+    faulty, after = play(hurt_by(kind))
     for finger in (0, 2):
         assert of(faulty, finger).tobytes() == of(healthy, finger).tobytes()
         assert getattr(after[finger], counter) == getattr(before[finger], counter) == 0
@@ -85,13 +64,12 @@ def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(play, kind:
 
 
 def test_an_error_word_is_kept_for_the_user(play) -> None:
-    _, status = play(HEALTHY + FAULT.format(kind="error_word"))
+    _, status = play(hurt_by("error_word"))
     assert status[1].last_error_word == 0xA52D
 
 
 def test_a_single_bad_channel_is_marked_missing_and_never_stale(play) -> None:
-    fault = FAULT.format(kind="bad_parity") + 'channel = "E5"\n'
-    frames, _ = play(HEALTHY + fault)
+    frames, _ = play(hurt_by("bad_parity", "E5"))
     mine = of(frames, 1)
     hurt = np.flatnonzero(mine["counts"][:, 4] == INVALID)
     assert hurt.tolist() == list(range(180, 210))
@@ -104,9 +82,8 @@ def test_a_single_bad_channel_is_marked_missing_and_never_stale(play) -> None:
 
 @pytest.mark.long
 def test_a_missing_temperature_is_flagged_and_hurts_nothing_else(play) -> None:
-    fault = FAULT.format(kind="no_channel") + 'channel = "TDC"\n'
     healthy, _ = play(HEALTHY)
-    frames, _ = play(HEALTHY + fault)
+    frames, _ = play(hurt_by("no_channel", "TDC"))
     mine, other = of(frames, 1), of(healthy, 1)
     hurt = slice(180, 210)
     assert (mine["tdc"][hurt] == INVALID).all()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from held_press import fault, held_press, of
 from rig import Rig
 
 import biotac
@@ -19,31 +20,6 @@ BACK_ROUNDS = 5  # 50 ms
 # Without thermal gain: the tare follows the temperature in contact, and a whole round without it would differ.
 OWN = Calibration(PocWeights.COMPRESS_N2, (9_000_000, 3_000_000, 26_000_000), (600_000, -500_000), 0, "", 1_763_731_310)
 
-SCENARIO = """
-name = "held"
-seed = 5
-fingers = 2
-[[step]]
-do = "rest"
-seconds = 1.0
-[[step]]
-do = "press"
-seconds = 0.5
-at = "E17"
-force_n = {held_n}
-[[step]]
-do = "hold"
-seconds = {hold_s}
-"""
-
-FAULT = """
-[[fault]]
-at_s = {at_s}
-seconds = {seconds}
-finger = 1
-kind = "{kind}"
-"""
-
 _undisturbed: dict[tuple[str, float], np.ndarray] = {}  # frames by rig and duration of the fault
 
 
@@ -54,9 +30,9 @@ def for_finger(hand: biotac.Hand, finger: int) -> Calibration:
 def play(rig: Rig, tmp_path: Path, seconds: float, kind: str | None, *, calibrated: bool = False):
     """Frames of the scenario, and the hand after it. Two seconds remain after the fault."""
     rig.need("scenarios")
-    text = SCENARIO.format(held_n=HELD_N, hold_s=AWAY_S - 1.5 + seconds + 2)
+    text = held_press(2, force_n=HELD_N, hold_s=AWAY_S - 1.5 + seconds + 2)
     if kind is not None:
-        text += FAULT.format(at_s=AWAY_S, seconds=seconds, kind=kind)
+        text += fault(kind, AWAY_S, seconds)
     path = tmp_path / "held.toml"
     path.write_text(text)
     hand = rig.open(str(path))
@@ -65,10 +41,6 @@ def play(rig: Rig, tmp_path: Path, seconds: float, kind: str | None, *, calibrat
     if calibrated:
         hand.set_calibration(1, for_finger(hand, 1))
     return hand.read(100), hand
-
-
-def of(frames: np.ndarray, finger: int) -> np.ndarray:
-    return frames[frames["finger"] == finger]
 
 
 def split(mine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +111,7 @@ def test_lost_rounds_and_words_at_rest_change_nothing(rig: Rig, tmp_path: Path) 
     text = 'name = "rest"\nseed = 5\n[[step]]\ndo = "rest"\nseconds = 4.0\n'
     for k, kind in enumerate(["bad_parity", "stuck_low", "error_word", "unplugged"]):
         for at_s, seconds in ((1.0 + k * 0.7, 0.004), (1.3 + k * 0.7, 0.02)):
-            text += FAULT.format(at_s=at_s, seconds=seconds, kind=kind).replace("finger = 1", "finger = 0")
+            text += fault(kind, at_s, seconds, finger=0)
     path = tmp_path / "rest.toml"
     path.write_text(text)
     hand = rig.open(str(path))

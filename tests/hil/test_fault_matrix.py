@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tomllib
+from held_press import fault, held_press, of
 from rig import ROOT, Rig
 
 import biotac
@@ -16,25 +17,7 @@ from biotac import FrameFlags
 from biotac.wire import messages_gen as wire
 
 ROWS = [row for row in tomllib.loads((ROOT / "tests/faults/matrix.toml").read_text())["row"] if "play" in row]
-HEALTHY = """
-name = "healthy"
-seed = 5
-fingers = 2
-[[step]]
-do = "rest"
-seconds = 1.0
-[[step]]
-do = "press"
-seconds = 0.5
-at = "E17"
-force_n = 3.0
-[[step]]
-do = "hold"
-seconds = 1.0
-[[step]]
-do = "rest"
-seconds = 0.5
-"""
+HEALTHY = held_press(2, rest_s=0.5)
 HURT, WITNESS = 0, 1
 OFF_N = 0.1
 EDGE_ROUNDS = 3
@@ -64,12 +47,8 @@ def faults_of(play: dict[str, Any]) -> list[tuple[float, float]]:
 
 
 def scenario(play: dict[str, Any]) -> str:
-    channel = f'channel = "{play["channel"]}"\n' if "channel" in play else ""
-    tables = [
-        f'[[fault]]\nat_s = {at_s:.3f}\nseconds = {seconds}\nfinger = {HURT}\nkind = "{play["kind"]}"\n{channel}'
-        for at_s, seconds in faults_of(play)
-    ]
-    return HEALTHY + "".join(tables)
+    its = play["kind"], play.get("channel")
+    return HEALTHY + "".join(fault(its[0], round(at_s, 3), seconds, HURT, its[1]) for at_s, seconds in faults_of(play))
 
 
 def run(rig: Rig, source: Path) -> tuple[biotac.Batch, wire.SensorStatus]:
@@ -97,7 +76,7 @@ def healthy(rig: Rig, tmp_path: Path, recorded: bool) -> biotac.Batch:
 
 def counts_file(path: Path, frames: np.ndarray, play: dict[str, Any] | None = None) -> Path:
     """The hurt finger's counts, with words that have good parity and are wrong."""
-    mine = frames[frames["finger"] == HURT]
+    mine = of(frames, HURT)
     counts = mine["counts"].copy()
     if play is not None:
         counts[round(play["at_s"] * 100), : play["electrodes"]] = play["count"]
@@ -118,8 +97,8 @@ def test_what_is_wrong_is_told(rig: Rig, tmp_path: Path, row: dict[str, Any]) ->
         source.write_text(scenario(play))
     batch, status = run(rig, source)
     frames = batch.frames
-    assert frames[frames["finger"] == WITNESS].tobytes() == good[good["finger"] == WITNESS].tobytes()
-    good, mine = (its[its["finger"] == HURT] for its in (good, frames))
+    assert of(frames, WITNESS).tobytes() == of(good, WITNESS).tobytes()
+    good, mine = of(good, HURT), of(frames, HURT)
     begin_us = good["t_us"][0]
     missing_s = (np.setdiff1d(good["t_us"], mine["t_us"]) - begin_us) / 1e6
     windows = [(at_s - 0.01, at_s + seconds + BACK_S) for at_s, seconds in faults_of(play)]

@@ -5,8 +5,8 @@
 
 #include "map/population.h"
 #include "maps.h"
+#include "signal/signals.h"
 #include "solve/solve.h"
-#include "touch/signals.h"
 #include "wire/crc32.h"
 
 #define BITS_FRAMES 100000

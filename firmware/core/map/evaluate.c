@@ -2,7 +2,7 @@
 #include "map/bounds.h"
 #include "map/map.h"
 #include "map/words.h"
-#include "touch/signals.h"
+#include "signal/signals.h"
 
 // What bt_map_open sees to: no row's, block's or pairs' sum is above INT32_MAX with its rounding, nor is the
 // sum of all blocks. What no coefficient has a say in:

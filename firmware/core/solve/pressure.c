@@ -1,7 +1,7 @@
 #include "solve/pressure.h"
 
 #include "fixed_point.h"
-#include "touch/round.h"
+#include "signal/round.h"
 
 #define NN_PER_100UN 100000
 #define MILLI        1000

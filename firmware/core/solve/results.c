@@ -1,8 +1,8 @@
 #include "solve/results.h"
 
 #include "fixed_point.h"
+#include "signal/signals.h"
 #include "solve/uncertainty.h"
-#include "touch/signals.h"
 
 #include <stddef.h>
 
@@ -89,7 +89,7 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
         flags |= BT_FRAME_FLAG_UNTARED | BT_FRAME_FLAG_POC_INVALID;
     }
     flags |= tare->held ? BT_FRAME_FLAG_HELD : 0;
-    if (tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT) {
+    if (bt_tare_touched(tare)) {
         flags |= tare->state == BT_TARE_STATE_DOUBT ? BT_FRAME_FLAG_DOUBT : BT_FRAME_FLAG_CONTACT;
         flags |= tare->contact_rounds > BASE_OLD_FRAMES ? BT_FRAME_FLAG_BASE_OLD : 0;
         flags |= bt_thermal_warmed(&tare->thermal) ? BT_FRAME_FLAG_TEMP : 0;

@@ -4,8 +4,8 @@
 #ifndef BIOTAC_RESULTS_H
 #define BIOTAC_RESULTS_H
 
+#include "signal/round.h"
 #include "solve/solve.h"
-#include "touch/round.h"
 #include "touch/tare.h"
 
 // Fill flags, poc_um, force_100un, torque_mnmm and their sigmas of msg. quantities is a mask of

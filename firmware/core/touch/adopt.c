@@ -15,7 +15,7 @@ void bt_adopt_aim_pressure(bt_tare *tare)
     }
     if (!(tare->gate.unknown >> BT_LANE_PDC & 1)) {
         tare->gate.rest.lane[BT_LANE_PDC] =
-            base_q16 == BT_TARE_UNKNOWN ? 0 : (uint16_t)((base_q16 + (1 << 15)) >> 16);
+            base_q16 == BT_TARE_UNKNOWN ? 0 : (uint16_t)bt_baseline_count(base_q16);
     }
 }
 

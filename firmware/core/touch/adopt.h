@@ -16,7 +16,7 @@ static inline void bt_adopt_aim_electrode(bt_tare *tare, unsigned i)
 {
     uint32_t base_q16 = bt_adopt_gate_base(tare)->electrode_q16[i];
     if (base_q16 != BT_TARE_UNKNOWN && !(tare->gate.unknown >> i & 1)) {
-        tare->gate.rest.lane[i] = (uint16_t)((base_q16 + (1 << 15)) >> 16);
+        tare->gate.rest.lane[i] = (uint16_t)bt_baseline_count(base_q16);
     }
 }
 

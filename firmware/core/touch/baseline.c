@@ -1,6 +1,6 @@
 #include "touch/baseline.h"
 
-#include "touch/sweep.h"
+#include "signal/sweep.h"
 
 #define SNAPSHOT_SWEEPS 3 // 240 ms
 #define ROLL_BACK       5 // snapshots

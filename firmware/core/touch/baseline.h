@@ -5,7 +5,7 @@
 #ifndef BIOTAC_BASELINE_H
 #define BIOTAC_BASELINE_H
 
-#include "touch/gate.h"
+#include "signal/gate.h"
 
 #define BT_TARE_UNKNOWN 0xFFFFFFFFu // of a channel that was never read
 #define BT_SNAPSHOTS    8
@@ -38,12 +38,12 @@ const bt_baseline *bt_rollback_before(const bt_rollback *rollback);
 uint32_t bt_rollback_sweeps(const bt_rollback *rollback);
 
 #ifndef BT_CDEF
+#include "fixed_point.h"
+
 // A value that moves to its target by step_q16 at most.
 static inline uint32_t bt_baseline_follow(uint32_t base_q16, uint32_t target_q16, int32_t step_q16)
 {
-    int32_t change_q16 = (int32_t)(target_q16 - base_q16);
-    change_q16 = change_q16 > step_q16 ? step_q16 : change_q16 < -step_q16 ? -step_q16 : change_q16;
-    return base_q16 + (uint32_t)change_q16;
+    return base_q16 + (uint32_t)bt_limited((int32_t)(target_q16 - base_q16), -step_q16, step_q16);
 }
 
 // A value moved by step_q16; it stays within 0..full scale, and an unknown one stays unknown.
@@ -52,9 +52,13 @@ static inline uint32_t bt_baseline_moved(uint32_t base_q16, int32_t step_q16)
     if (base_q16 == BT_TARE_UNKNOWN) {
         return base_q16;
     }
-    int32_t moved_q16 = (int32_t)base_q16 + step_q16;
-    int32_t top_q16 = BT_FULL_SCALE_COUNT << 16;
-    return (uint32_t)(moved_q16 < 0 ? 0 : moved_q16 > top_q16 ? top_q16 : moved_q16);
+    return (uint32_t)bt_limited((int32_t)base_q16 + step_q16, 0, BT_FULL_SCALE_COUNT << 16);
+}
+
+// In whole counts. Of a known one.
+static inline int32_t bt_baseline_count(uint32_t base_q16)
+{
+    return (int32_t)((base_q16 + (1 << 15)) >> 16);
 }
 
 // As it is subtracted and published: 1/16 count; BT_INVALID_COUNT when unknown.

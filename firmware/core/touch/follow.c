@@ -48,10 +48,9 @@ static void shift_all(bt_tare *tare, int32_t step_q16)
 
 BT_NOINLINE void bt_follow_resume(bt_tare *tare)
 {
-    bool touched = tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT;
     bool known = bt_drift_known(&tare->drift);
     shift_all(tare, bt_drift_unseen(&tare->drift, tare->silence.sweeps));
-    if (touched && tare->gate.pressure_now) {
+    if (bt_tare_touched(tare) && tare->gate.pressure_now) {
         int32_t step_q16 = bt_watch_resume(&tare->watch, &tare->silence, BT_STILL_SPAN_Q3);
         shift_all(tare, known ? 0 : step_q16);
     }
@@ -63,11 +62,12 @@ static void serve_touched(bt_tare *tare, unsigned i, uint16_t mean_q3)
     tare->energy_count2 += square(away_q4);
     tare->sum_q4 += away_q4;
     int32_t drift_q16 = tare->drift_q16;
-    bool watched = tare->watch.wait_sweeps == 0 && tare->sweep.still_sweeps >= BT_WATCH_SWEEPS;
+    bool watched = bt_watch_sees(&tare->watch, &tare->sweep);
     if (watched) {
+        uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
         uint32_t watched_q16 = tare->watch.base.electrode_q16[i];
-        bt_watch_side(&tare->watch, (uint32_t)mean_q3 << 13, watched_q16);
-        drift_q16 = bt_watch_step_q16(&tare->watch, drift_q16, (uint32_t)mean_q3 << 13, watched_q16);
+        bt_watch_side(&tare->watch, mean_q16, watched_q16);
+        drift_q16 = bt_watch_step_q16(&tare->watch, drift_q16, mean_q16, watched_q16);
     }
     tare->drift.moved_q16 += drift_q16;
     drift_q16 += tare->thermal.step_q16;
@@ -87,22 +87,23 @@ static void serve_electrode(bt_tare *tare, unsigned i)
     if (mean_q3 == BT_SWEEP_UNREAD_Q3) {
         return;
     }
-    if (tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT) {
+    if (bt_tare_touched(tare)) {
         serve_touched(tare, i, mean_q3);
         return;
     }
     // Where it is used, every round was below the threshold: the sum stays far below 2^32.
     int32_t away_q3 = 8 * tare->gate.smooth.lane[i] - mean_q3;
     tare->deviation_q6 += (uint32_t)(away_q3 * away_q3);
-    bt_watch_side(&tare->watch, (uint32_t)mean_q3 << 13, *base_q16);
+    uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
+    bt_watch_side(&tare->watch, mean_q16, *base_q16);
     uint32_t before_q16 = *base_q16;
     if (tracks(tare)) {
-        *base_q16 = bt_baseline_follow(*base_q16, (uint32_t)mean_q3 << 13, SLEW_Q16);
+        *base_q16 = bt_baseline_follow(*base_q16, mean_q16, SLEW_Q16);
     }
     if (rests(tare)) {
         int32_t drift_q16 = tare->drift_q16;
         if (tare->held) {
-            drift_q16 = bt_watch_step_q16(&tare->watch, drift_q16, (uint32_t)mean_q3 << 13, *base_q16);
+            drift_q16 = bt_watch_step_q16(&tare->watch, drift_q16, mean_q16, *base_q16);
         }
         *base_q16 = bt_baseline_moved(*base_q16, drift_q16);
         tare->drift.moved_q16 += (int32_t)(*base_q16 - before_q16);

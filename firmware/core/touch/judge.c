@@ -57,7 +57,7 @@ static void judge_release(bt_tare *tare)
         .uneven_count2 = uneven_count2(tare),
         .forgiven_count2 = forgiven_count2(tare),
         .pressure = tare->pressure_seen && tare->base.pdc_q16 != BT_TARE_UNKNOWN,
-        .above = (mean > now ? mean : now) - (int32_t)((tare->base.pdc_q16 + (1 << 15)) >> 16),
+        .above = (mean > now ? mean : now) - bt_baseline_count(tare->base.pdc_q16),
         .still_sweeps = tare->sweep.still_sweeps,
         .level_sweeps = tare->watch.level_sweeps,
     };
@@ -104,7 +104,7 @@ static void judge_drift(bt_tare *tare)
     bt_watch *watch = &tare->watch;
     bool rests = tare->state == BT_TARE_STATE_REST;
     bool touched = tare->held || !rests;
-    bool valid = rests || (watch->wait_sweeps == 0 && tare->sweep.still_sweeps >= BT_WATCH_SWEEPS);
+    bool valid = rests || bt_watch_sees(watch, &tare->sweep);
     bool level = valid && !tare->partial && bt_watch_level(watch);
     bool creeps = touched && bt_watch_creeps(watch);
     if (level && !creeps) {
@@ -137,7 +137,7 @@ BT_NOINLINE void bt_judge_sweep(bt_tare *tare, const bt_tare_settings *settings)
         if (!tare->partial_before) { // or its windows reach back into a touch
             bt_noise_add(&tare->noise, tare->deviation_q6, settings->contact_energy_count2);
         }
-    } else if (tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT) {
+    } else if (bt_tare_touched(tare)) {
         end_touched_sweep(tare, settings);
     }
     tare->energy_count2 = 0;

@@ -6,14 +6,14 @@
 #ifndef BIOTAC_MACHINE_H
 #define BIOTAC_MACHINE_H
 
+#include "signal/gate.h"
+#include "signal/noise.h"
+#include "signal/silence.h"
+#include "signal/sweep.h"
 #include "touch/baseline.h"
 #include "touch/drift.h"
-#include "touch/gate.h"
 #include "touch/inverted.h"
-#include "touch/noise.h"
 #include "touch/release.h"
-#include "touch/silence.h"
-#include "touch/sweep.h"
 #include "touch/thermal.h"
 #include "touch/watch.h"
 
@@ -60,8 +60,14 @@ typedef struct {
     bool pressure_seen;     // in this sweep at least one pressure word was good
 } bt_tare;
 
-// Static pressure above the tare, in whole counts, where both are known.
 #ifndef BT_CDEF
+// A contact, or what may be a light hold.
+static inline bool bt_tare_touched(const bt_tare *tare)
+{
+    return tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT;
+}
+
+// Static pressure above the tare, in whole counts, where both are known.
 static inline bool bt_tare_pdc_known(const bt_tare *tare)
 {
     return tare->gate.pressure_now && tare->base.pdc_q16 != BT_TARE_UNKNOWN;
@@ -69,7 +75,7 @@ static inline bool bt_tare_pdc_known(const bt_tare *tare)
 
 static inline int32_t bt_tare_pdc_above(const bt_tare *tare)
 {
-    return tare->gate.smooth.lane[BT_LANE_PDC] - (int32_t)((tare->base.pdc_q16 + (1 << 15)) >> 16);
+    return tare->gate.smooth.lane[BT_LANE_PDC] - bt_baseline_count(tare->base.pdc_q16);
 }
 #endif
 

@@ -42,8 +42,8 @@ static BT_NOINLINE void count_hit(bt_tare *tare, const bt_tare_settings *setting
     }
     bt_baseline before = *bt_rollback_before(&tare->rollback);
     bt_drift_revert(&tare->drift);
+    int32_t since_q16 = bt_drift_over(&tare->drift, bt_rollback_sweeps(&tare->rollback));
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        int32_t since_q16 = bt_drift_over(&tare->drift, bt_rollback_sweeps(&tare->rollback));
         before.electrode_q16[i] = bt_baseline_moved(before.electrode_q16[i], since_q16);
     }
     bt_drift_cool(&tare->drift, bt_thermal_rate_q16(&tare->thermal, settings->thermal_gain_q16));
@@ -137,7 +137,7 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
     if (tare->gate.pressure_now && tare->tared && bt_tare_pdc_above(tare) < 0) {
         bt_judge_inverted(tare);
     }
-    if (tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT) {
+    if (bt_tare_touched(tare)) {
         follow_contact(tare);
     }
     tare->pressure_seen = tare->pressure_seen || tare->gate.pressure_now;

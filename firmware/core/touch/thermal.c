@@ -1,7 +1,7 @@
 #include "touch/thermal.h"
 
 #include "fixed_point.h"
-#include "touch/round.h"
+#include "signal/round.h"
 
 #define TDC_SHIFT   3 // a low-pass of eight sweeps: TDC has steps of half an electrode count
 #define SLOW_SHIFT  7

@@ -74,7 +74,7 @@ void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, i
     int32_t farthest_q3 = 0;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         int32_t away_q3 = sweep->mean_q3.lane[i] - (int32_t)(watch->base.electrode_q16[i] >> 13);
-        int32_t far_q3 = away_q3 < 0 ? -away_q3 : away_q3;
+        int32_t far_q3 = (int32_t)bt_abs32(away_q3);
         farthest_q3 = far_q3 > farthest_q3 ? far_q3 : farthest_q3;
         sum_q3 += away_q3;
     }

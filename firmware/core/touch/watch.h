@@ -10,9 +10,9 @@
 #ifndef BIOTAC_WATCH_H
 #define BIOTAC_WATCH_H
 
+#include "signal/silence.h"
+#include "signal/sweep.h"
 #include "touch/baseline.h"
-#include "touch/silence.h"
-#include "touch/sweep.h"
 
 #define BT_WATCH_SWEEPS 5 // of still signals, after which what is read is where they came to rest
 
@@ -64,6 +64,12 @@ int32_t bt_watch_resume(bt_watch *watch, const bt_silence *silence, int span_q3)
 int32_t bt_watch_drifts_q16(const bt_watch *watch);
 
 #ifndef BT_CDEF
+// In a touch: signals have come to rest, so that their means tell what has moved since.
+static inline bool bt_watch_sees(const bt_watch *watch, const bt_sweep *sweep)
+{
+    return watch->wait_sweeps == 0 && sweep->still_sweeps >= BT_WATCH_SWEEPS;
+}
+
 // An electrode's mean of this sweep, against the baseline that it is to be compared with.
 static inline void bt_watch_side(bt_watch *watch, uint32_t mean_q16, uint32_t base_q16)
 {

@@ -2,9 +2,9 @@
 // Lin's.
 #include "keep/settings.h"
 #include "map/population.h"
+#include "signal/signals.h"
 #include "solve/wrench.h"
 #include "support.h"
-#include "touch/signals.h"
 
 static const uint8_t mirror[BT_ELECTRODES] = {10, 11, 12, 13, 14, 15, 6,  8,  7, 9,
                                               0,  1,  2,  3,  4,  5,  16, 17, 18};

@@ -3,9 +3,9 @@
 #include "support.h"
 
 #include "lin2013.h"
+#include "signal/signals.h"
 #include "solve/poc.h"
 #include "solve/solve.h"
-#include "touch/signals.h"
 
 #include <math.h>
 

@@ -10,6 +10,7 @@ from biotac.calibrate.population import keeping
 from biotac.core import population
 from biotac.core.compiled import on_board, on_board_q4
 from biotac.core.finger import Finger
+from biotac.core.map_columns import tared
 from biotac.lab.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
 
@@ -38,7 +39,7 @@ def rows_of(settings: dict, counts: np.ndarray) -> np.ndarray:
 
 def test_on_plates_it_is_the_trained_map_to_what_16_bits_leave() -> None:
     counts = pressed(4000, 1)
-    its = population.tared(counts, np.broadcast_to((16 * TARE).astype(np.uint16), counts.shape))
+    its = tared(counts, np.broadcast_to((16 * TARE).astype(np.uint16), counts.shape))
     inside = population.share(its) == population.ALL
     assert 500 < inside.sum() < 3900
     got = biotac.compute(counts, TARE, POPULATION)["force_n"][inside]

@@ -1,7 +1,7 @@
-#include "touch/silence.h"
+#include "signal/silence.h"
 
 #include "fixed_point.h"
-#include "touch/sweep.h"
+#include "signal/sweep.h"
 
 #include <string.h>
 

@@ -1,4 +1,4 @@
-#include "touch/sweep.h"
+#include "signal/sweep.h"
 
 #include "fixed_point.h"
 

@@ -1,6 +1,6 @@
 // How long a finger was away, by device time, and what its first rounds read: by counting, round for round.
+#include "signal/silence.h"
 #include "support.h"
-#include "touch/silence.h"
 
 #define ROUND_US 10000u
 #define SWEEP_US 80000u

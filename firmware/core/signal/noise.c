@@ -1,7 +1,7 @@
-#include "touch/noise.h"
+#include "signal/noise.h"
 
 #include "fixed_point.h"
-#include "touch/sweep.h"
+#include "signal/sweep.h"
 
 #define FACTOR      3 // white noise on 19 electrodes passes it once in 10^5 rounds, never three in a row
 #define MEAN_SWEEPS 16

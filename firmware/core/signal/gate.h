@@ -16,7 +16,7 @@
 #ifndef BIOTAC_GATE_H
 #define BIOTAC_GATE_H
 
-#include "touch/round.h"
+#include "signal/round.h"
 
 #define BT_LANES    (BT_ELECTRODES + 1) // what is filtered: the electrodes, then static pressure
 #define BT_LANE_PDC BT_ELECTRODES

@@ -1,4 +1,4 @@
-#include "touch/round.h"
+#include "signal/round.h"
 
 // The arrays follow the channel table; a new channel must be given a place (finger.c).
 _Static_assert(BT_CHANNEL_E19 - BT_CHANNEL_E1 + 1 == BT_ELECTRODES, "electrode channels must be consecutive");

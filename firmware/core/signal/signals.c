@@ -1,4 +1,4 @@
-#include "touch/signals.h"
+#include "signal/signals.h"
 
 #include <stdbool.h>
 

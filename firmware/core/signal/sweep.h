@@ -9,7 +9,7 @@
 #ifndef BIOTAC_SWEEP_H
 #define BIOTAC_SWEEP_H
 
-#include "touch/gate.h"
+#include "signal/gate.h"
 
 #define BT_SWEEP_ROUNDS 8
 #define BT_SWEEP_LANES  3 // served in one round

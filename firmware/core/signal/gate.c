@@ -1,4 +1,4 @@
-#include "touch/gate.h"
+#include "signal/gate.h"
 
 #include <string.h>
 
