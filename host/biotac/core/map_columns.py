@@ -6,12 +6,16 @@ of one; none is centred or standardised by the run itself, because a fitted map 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from ..wire import map_gen as _map
+from ..wire import messages_gen as wire
 from ..wire import sensor_gen as _sensor
+from ..wire.frames import Q4_PER_COUNT
 from ..wire.map_gen import Gate, Kind
 from . import geometry as surface
 from .geometry import Floats
@@ -19,6 +23,8 @@ from .geometry import Floats
 ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 SIGNAL_COUNTS = 500.0  # a firm press; only sets the columns' size
 PRESSURE_COUNTS = 100.0
+#: What a map can give, in the order in which it does: N, N mm.
+AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")
 REACH_MM = (_map.REACH_X_UM / 1000, _map.REACH_Y_UM / 1000)
 
 _UPPER = np.triu_indices(ELECTRODES)
@@ -35,6 +41,22 @@ class Signals:
     def drifted(self, counts: Floats) -> Signals:
         """As if every row had drifted by ``counts`` (19,)."""
         return Signals(self.e + counts, self.tare, self.pdc)
+
+
+def tared(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Signals:
+    """Signals (n, 19) of a FRAME's integers (n, 19); what is missing is as its tare."""
+    missing = (counts == wire.INVALID_COUNT) | (tare_q4 == wire.INVALID_COUNT)
+    tare = np.where(missing, 0.0, tare_q4 / Q4_PER_COUNT)
+    return Signals(np.where(missing, 0.0, counts - tare), tare)
+
+
+def summed(blocks: Iterable[tuple[Kind, Gate, Floats]], signals: Signals) -> Floats:
+    """What blocks add up to (n, axes), of coefficients (columns, axes) each."""
+    columns, gate = kinds(signals), gates(signals.e)
+    total: Floats = np.zeros(())
+    for kind, which, its in blocks:
+        total = total + columns[kind] @ its * gate[which]
+    return total
 
 
 def kinds(signals: Signals) -> dict[Kind, Floats]:

@@ -10,15 +10,13 @@ import numpy.typing as npt
 
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
-from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, StructArray, tare_to_q4
+from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, StructArray, tare_to_q4
 from ..wire.map_gen import Gate, Kind
-from . import map_columns as columns
 from .board_map import BoardBlock, BoardMap
 from .geometry import Floats
-from .map_columns import Signals
+from .map_columns import Signals, summed, tared
 from .map_quantise import unit
 
-Q4 = 16
 Unrounded = dict[tuple[Kind, Gate], Floats]  # of each block, as unrounded()
 _CHUNK_ROWS = 4096
 
@@ -60,43 +58,39 @@ def replace_gains(
     if its.axes > 3:
         torque_nmm[:] = wrench[:, 3:6]
     else:
-        torque_nmm[:, 0] = poc_mm[:, 1] * wrench[:, 2] - poc_mm[:, 2] * wrench[:, 1]
+        torque_nmm[:, 0] = derived_torque_x(poc_mm, wrench)
     torsion_nmm[:] = wrench[:, 6] if its.axes == _map.AXES_TORSION else np.nan
+
+
+def derived_torque_x(poc_mm: Floats, force_n: Floats) -> Floats:
+    """(n,) in N mm, of force (n, 3 or more) at ``poc_mm`` (n, 3)."""
+    return poc_mm[:, 1] * force_n[:, 2] - poc_mm[:, 2] * force_n[:, 1]
 
 
 def exact(
     its: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
 ) -> Floats:
     """What the integers mean, without any of the board's rounding: (n, axes) in N and N mm; arguments as results()."""
-    parts = [_sum(its, signals) for signals in tared(its, counts, tare_q4, pdc_q4)]
+    blocks = [(block.kind, block.gate, unrounded(block)) for block in its.blocks]
+    parts = [summed(blocks, signals) for signals in tared_chunks(its, counts, tare_q4, pdc_q4)]
     limit = _map.RESULT_MAX
     result: Floats = np.clip(np.concatenate(parts), -limit, limit) / result_units(its.axes)
     return result
 
 
-def tared(
+def tared_chunks(
     its: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
 ) -> Iterator[Signals]:
     """Signals of so many frames at a time that their columns fit memory; arguments as exact()."""
-    missing = (counts == wire.INVALID_COUNT) | (tare_q4 == wire.INVALID_COUNT)
-    tare = np.where(missing, 0.0, tare_q4 / Q4)
-    e = np.where(missing, 0.0, counts - tare)
-    pressure = np.where(pdc_q4 == wire.INVALID_I32, np.nan, pdc_q4 / Q4) if its.with_pdc else np.zeros(len(counts))
+    every = tared(counts, tare_q4)
+    known = np.where(pdc_q4 == wire.INVALID_I32, np.nan, pdc_q4 / Q4_PER_COUNT)
+    pressure = known if its.with_pdc else np.zeros(len(counts))
     for start in range(0, len(counts), _CHUNK_ROWS):
         rows = slice(start, start + _CHUNK_ROWS)
-        yield Signals(e[rows], tare[rows], pressure[rows])
+        yield Signals(every.e[rows], every.tare[rows], pressure[rows])
 
 
 def unrounded(block: BoardBlock) -> Floats:
     """What a block's coefficients mean (columns, axes), in the results' units per 1 of a column of features."""
     scale = unit(block.kind, block.gate) / 2.0 ** np.array(block.exponent)
     return np.asarray(block.coefficients * scale, dtype=np.float64)
-
-
-def _sum(its: BoardMap, signals: Signals) -> Floats:
-    """What all blocks add up to (n, axes), in the result's units."""
-    kinds, gates = columns.kinds(signals), columns.gates(signals.e)
-    total = np.zeros((len(signals.e), its.axes))
-    for block in its.blocks:
-        total += kinds[block.kind] @ unrounded(block) * gates[block.gate]
-    return total

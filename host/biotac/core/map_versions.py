@@ -13,7 +13,7 @@ from ..wire import map_gen as _map
 from ..wire.map_gen import Gate, Kind
 from . import map_quantise
 from .board_map import BLOCK, HEADER, BoardMap, from_blob
-from .map_columns import PRESSURE_COUNTS, SIGNAL_COUNTS
+from .map_columns import AXES, PRESSURE_COUNTS, SIGNAL_COUNTS
 
 VERSION = 1
 # What 1 in a column of features was as a factor, of which 2^16 was a coefficient's unit.
@@ -45,7 +45,6 @@ def _read(blob: bytes) -> BoardMap:
     at = _map.HEADER_BYTES + count * _map.BLOCK_BYTES
     if axes not in (_map.AXES_FORCE, _map.AXES_TORQUE, _map.AXES_TORSION) or len(blob) < at:
         raise ValueError(f"{axes} axes, {count} blocks")
-    names = ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")[:axes]
     blocks = []
     for k in range(count):
         kind_value, gate_value, *exponent = BLOCK.unpack_from(blob, _map.HEADER_BYTES + k * _map.BLOCK_BYTES)
@@ -56,7 +55,7 @@ def _read(blob: bytes) -> BoardMap:
         values = np.concatenate([g.reshape(spec.columns, -1) for g in groups if len(g)], axis=1)
         factor = (_FACTOR[spec.of] / 2.0**16) ** (2 if spec.shape == "pairs" else 1)
         real = values * factor * 2.0 ** (np.array(exponent[:axes]) - 16.0)
-        blocks.append(map_quantise.block(kind, gate, real, names))
+        blocks.append(map_quantise.block(kind, gate, real, AXES[:axes]))
         at += 4 * spec.columns * axes
     if at != len(blob):
         raise ValueError(f"{len(blob)} bytes, {at} by its head")

@@ -24,7 +24,8 @@ from . import map_quantise
 from .board_map import BoardMap
 from .compiled import FORCE_GAINS
 from .geometry import Floats
-from .map_columns import SIGNAL_COUNTS, Signals, gates, kinds
+from .map_columns import AXES, SIGNAL_COUNTS, Signals, summed, tared
+from .map_float64 import derived_torque_x
 
 SHIPPED = "population.json"
 Block = tuple[Kind, Gate, Floats]
@@ -68,24 +69,13 @@ def split(named: list[tuple[Kind, Gate]], coefficients: Floats) -> list[Block]:
 
 def board_map(of: list[Block]) -> BoardMap:
     """As the board computes it. Raises InputError when it is beyond a board's formats."""
-    made = (map_quantise.block(kind, gate, its * FORCE_LSB_PER_N, ("Fx", "Fy", "Fz")) for kind, gate, its in of)
+    made = (map_quantise.block(kind, gate, its * FORCE_LSB_PER_N, AXES[:3]) for kind, gate, its in of)
     return BoardMap(3, tuple(made))
-
-
-def tared(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Signals:
-    """Signals (n, 19) of a FRAME's integers (n, 19); what is missing is as its tare."""
-    missing = (counts == wire.INVALID_COUNT) | (tare_q4 == wire.INVALID_COUNT)
-    tare = np.where(missing, 0.0, tare_q4 / 16)
-    return Signals(np.where(missing, 0.0, counts - tare), tare)
 
 
 def alone(signals: Signals) -> Floats:
     """The map's force (n, 3) in N, whatever it has seen."""
-    columns, gate = kinds(signals), gates(signals.e)
-    total = np.zeros((len(signals.e), 3))
-    for kind, its_gate, coefficients in blocks():
-        total += columns[kind] @ coefficients * gate[its_gate]
-    return total
+    return summed(blocks(), signals)
 
 
 def share(signals: Signals) -> npt.NDArray[np.int64]:
@@ -116,7 +106,7 @@ def replace_force(
         signals = tared(counts[rows], tare_q4[rows])
         part = (share(signals) / ALL)[:, None]
         force_n[rows] = part * alone(signals) + (1 - part) * force_n[rows]
-    torque_nmm[:, 0] = poc_mm[:, 1] * force_n[:, 2] - poc_mm[:, 2] * force_n[:, 1]
+    torque_nmm[:, 0] = derived_torque_x(poc_mm, force_n)
 
 
 @cache

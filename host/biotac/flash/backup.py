@@ -119,8 +119,7 @@ def restore(hand: Hand, wanted: Backup) -> Restored:
     """Set and save what differs, and read all back.
 
     What the firmware does not know is left out; of what the backup's firmware did not know, it goes on doing what that
-    did. Raises CommandRefusedError for a value
-    that it does not take, and InputError when a value does not read back.
+    did. Raises CommandRefusedError for a value that it does not take, and InputError when one does not read back.
     """
     found = read_settings(hand)
     values = {key: value for key, value in _BEFORE.items() if key in found} | wanted.values

@@ -18,6 +18,7 @@ from ..calibrate.wrench import board
 from ..core import population
 from ..core.board_map import BoardMap, pdc_above_rest_q4
 from ..core.compiled import TORQUE_GAINS, Results, Settings, reference_q4
+from ..core.map_columns import tared
 from ..core.map_float64 import exact, replace_gains
 from ..core.map_versions import opened
 from ..hand.commands import PRESSURE_SINCE_MINOR
@@ -179,7 +180,7 @@ class CrossCheck:
     def _judge_model(self, messages: StructArray) -> None:
         """POPULATION and OUTSIDE must stand exactly where force was made, and the map had not all of it."""
         made = (messages["force_100un"] != wire.INVALID_I32).all(axis=1)
-        signals = population.tared(messages["counts"], messages["tare_q4"])
+        signals = tared(messages["counts"], messages["tare_q4"])
         outside = np.where(population.share(signals) < population.ALL, wire.FrameFlags.OUTSIDE, 0)
         wanted = wire.FrameFlags.POPULATION | outside
         seen = messages["flags"] & (wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE)
@@ -240,7 +241,7 @@ def _by_population(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Put the population map's force into ``truth``. Bounds of force, mN, and torque, N*mm, (n, 3)."""
     counts, tare_q4 = messages["counts"], messages["tare_q4"]
-    off = force_bound_n(population.tared(counts, tare_q4), FORCE_BOUND_MN / 1e3)
+    off = force_bound_n(tared(counts, tare_q4), FORCE_BOUND_MN / 1e3)
     population.replace_force(counts, tare_q4, truth.poc_mm, truth.force_n, truth.torque_nmm)
     torque_off = torque_bound_nmm(messages, truth, settings)
     torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * off[:, 1:].sum(axis=1)

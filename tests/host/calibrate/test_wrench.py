@@ -143,7 +143,7 @@ def test_ridge_shrinks_toward_lins_geometry(model: models.Model, finger: Path, m
     monkeypatch.setattr(models, "LAMBDAS", (1e12, 1e12))
     signals = Signals(run.counts - run.tare, run.tare)
     sums = moments.strip_sums(signals, run.truth, run.drift)
-    found = models.pulled(sums, (models.lin, models.lin), [model.family])[0][0]
+    found = models.pulled(sums, [model.family])[0][0]
     # a small signal through the map: proportional to the electrodes' normals, per axis
     small = Signals(np.vstack([np.zeros(19), np.eye(19)]), run.tare)
     response = moments.with_one(features.columns(small)) @ found

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import geometry as surface
+from ...core import map_columns
 from ...core.geometry import Floats
 from ...core.map_columns import Signals
 from ..wrench import features
@@ -35,7 +36,7 @@ DRIFT_SIGMA_COUNTS = 100.0  # what a finger drifts by in about two minutes of wa
 RIDGE = 2e-3  # of each column's variance
 VARIANCE_FLOOR = 0.3  # of the median: what hardly moves in training must not decide in use
 ROWS_AT_ONCE = 4096
-AXES = ("Fx", "Fy", "Fz")
+AXES = map_columns.AXES[:3]
 MODEL = "population"
 
 _MM = np.asarray(surface.ELECTRODE_MM)

@@ -17,10 +17,10 @@ from ...core import map_quantise
 from ...core.board_map import BoardMap
 from ...core.geometry import Floats
 from ...core.map_bound import bound_of
-from ...core.map_float64 import Q4, Unrounded, result_units, tared
+from ...core.map_float64 import Unrounded, result_units, tared_chunks
 from ...errors import InputError
 from ...wire import map_gen as _map
-from ...wire.frames import tare_to_q4
+from ...wire.frames import Q4_PER_COUNT, tare_to_q4
 from ...wire.map_gen import Gate, Kind
 from . import features
 from .fitted import WrenchMap
@@ -104,7 +104,7 @@ def bound(
 ) -> Floats:
     """How far the board's result may be off (n, axes) in N and N mm: from ``model``, or without one from exact()."""
     wanted = _merged(model) if model is not None else None
-    off = np.concatenate([bound_of(its, wanted, s) for s in tared(its, counts, tare_q4, pdc_q4)])
+    off = np.concatenate([bound_of(its, wanted, s) for s in tared_chunks(its, counts, tare_q4, pdc_q4)])
     result: Floats = off / result_units(its.axes)
     return result
 
@@ -119,9 +119,9 @@ def compare(model: WrenchMap, its: BoardMap, counts: Floats, pdc: Floats | None 
     """
     raw = np.rint(counts).astype(np.uint16)
     tare_q4 = tare_to_q4(np.broadcast_to(model.tare, raw.shape))
-    pdc_q4 = np.zeros(len(raw), np.int32) if pdc is None else np.rint(pdc * Q4).astype(np.int32)
-    on_frames = dataclasses.replace(model, tare=tare_q4[0] / Q4)
-    truth = on_frames.predict(raw.astype(np.float64), pdc_q4 / Q4 if model.with_pdc else None)
+    pdc_q4 = np.zeros(len(raw), np.int32) if pdc is None else np.rint(pdc * Q4_PER_COUNT).astype(np.int32)
+    on_frames = dataclasses.replace(model, tare=tare_q4[0] / Q4_PER_COUNT)
+    truth = on_frames.predict(raw.astype(np.float64), pdc_q4 / Q4_PER_COUNT if model.with_pdc else None)
     force, torque, torsion = its.results(raw, tare_q4, pdc_q4)
     got = np.column_stack([force, torque, torsion])[:, : its.axes] / result_units(its.axes)
     off = np.abs(got - truth)

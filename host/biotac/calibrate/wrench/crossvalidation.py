@@ -21,7 +21,7 @@ from ...core.map_columns import Signals
 from . import features, models
 from .blocks import BLOCKS, Blocks
 from .lag import Lags
-from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, TEMPLATE, Prior
+from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, TEMPLATE
 from .moments import Rows, Sums, air_sums, at, linear_columns, moved, smoothed, stacked, strip_sums, with_one
 from .run import Run
 from .template import Template
@@ -114,25 +114,23 @@ def validate(
     *,
     align: bool = True,
     windows: tuple[int, ...] = WINDOWS_ROWS,
-    priors: tuple[Prior, Prior] = (models.lin, models.lin),
     show: Show | None = None,
 ) -> Validation:
     """Hold every block out once, then train on all. ``align`` False takes rows as they stand, lag 0.
 
-    ``priors`` is what ridge shrinks toward, with each of models.LAMBDAS. BLAS runs on one thread meanwhile, in the
-    whole process. Raises RecordingError when force and counts do not follow each other.
+    BLAS runs on one thread meanwhile, in the whole process. Raises RecordingError when force and counts do not follow
+    each other.
     """
     # Thousands of small systems: OpenBLAS's threads wait for each other, and on a busy computer for much longer.
     threads = min(THREADS, os.cpu_count() or 1)
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
-        return _validate(run, align, windows, priors, show, pool)
+        return _validate(run, align, windows, show, pool)
 
 
 def _validate(
     run: Run,
     align: bool,
     windows: tuple[int, ...],
-    priors: tuple[Prior, Prior],
     show: Show | None,
     pool: ThreadPoolExecutor,
 ) -> Validation:
@@ -148,7 +146,7 @@ def _validate(
         of = [other for other in every if other != block]
         its = lags.of_axes(strips) if align else (0,) * axes
         trainings.append(_Training(of, strips, its, timing.window(its, of, strips)))
-    trainer = _Trainer(run, blocks, trainings, priors, pool)
+    trainer = _Trainer(run, blocks, trainings, pool)
     template = Template(run)
     predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
     errors: dict[str, Floats] = {}
@@ -250,10 +248,9 @@ class _Trainer:
         run: Run,
         blocks: Blocks,
         trainings: Sequence[_Training],
-        priors: tuple[Prior, Prior],
         pool: ThreadPoolExecutor,
     ) -> None:
-        self._blocks, self._priors = blocks, priors
+        self._blocks = blocks
         self._late = sorted({late for its in trainings for late in enumerate(its.lag_rows)})
         truth = _late(run, self._late)
         self._sums: dict[int, Sums] = {}
@@ -282,10 +279,8 @@ class _Trainer:
             total, kept = total.plus(air, share), [one.plus(air, share) for one in kept]
         rows = sum(one.rows for one in tested)
         families = [model.family for model in MODELS]
-        inner = [
-            np.array(one) for one in zip(*(models.pulled(one, self._priors, families) for one in kept), strict=True)
-        ]
-        alone = models.pulled(total, self._priors, families)
+        inner = [np.array(one) for one in zip(*(models.pulled(one, families) for one in kept), strict=True)]
+        alone = models.pulled(total, families)
         choices = {
             LIN: _choices(LIN, models.lin(total, offset=False)),
             LIN_OFFSET: _choices(LIN_OFFSET, models.lin(total)),
@@ -301,7 +296,7 @@ class _Trainer:
         for part in LESS:
             sums = every.of(its.strips & self._blocks.own(its.of[:: round(1 / part)]))
             sums = sums if air is None else sums.plus(air, share)
-            less.append(_mean(weights, models.pulled(sums, self._priors, [model.family for model in POOL])))
+            less.append(_mean(weights, models.pulled(sums, [model.family for model in POOL])))
         return Fit(its.lag_rows, its.window_rows, share, choices, weights, tuple(less))
 
     def _air_share(self, kept: list[Sums], tested: list[Sums], air: Sums) -> float:

@@ -1,12 +1,12 @@
 """The models, all linear in their coefficients, solved from sums alone.
 
-Ridge shrinks toward what is known without the run and not toward zero: Lin's geometry, or a map learnt from other
-fingers. A coefficient the run says nothing about stays what that makes it.
+Ridge shrinks toward what is known without the run and not toward zero: Lin's geometry. A coefficient the run says
+nothing about stays what that makes it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +18,7 @@ from . import features
 from .features import Family
 from .moments import Sums
 
-# Per row, in units of each column's own variance; every model is fitted with both: lightly pulled toward Lin's
-# geometry, and harder toward what other fingers taught.
+# Per row, in units of each column's own variance; every model is fitted with both.
 LAMBDAS = (3e-5, 1e-3)
 # A column that is constant in training has no variance to be measured in: without a floor it is free,
 # and a test row that moves it goes anywhere (the hinge model of biotac.md 5: R2 -34).
@@ -57,9 +56,6 @@ WORDS = {
     POOLED: "weighted mean of " + ", ".join(model.name for model in POOL),
     TEMPLATE: "five shapes around the contact, a 5x5 solve a frame; host only, for comparison",
 }
-
-# What ridge shrinks toward: coefficients (p + 1, axes) of all columns, by the sums that are trained on.
-Prior = Callable[[Sums], Floats]
 
 
 def lin_directions(axes: int) -> Floats:
@@ -99,17 +95,19 @@ def solve(sums: Sums, lam: float) -> Floats:
     return np.concatenate([found, (sums.cross[-1] / sums.rows - mean @ found)[None]])
 
 
-def pulled(sums: Sums, priors: Sequence[Prior], families: Sequence[Family]) -> list[Floats]:
-    """Of each family, coefficients (2, p + 1, axes) of all columns, with each of LAMBDAS and of ``priors``."""
-    found = [np.empty((len(LAMBDAS), *sums.cross.shape)) for _ in families]
-    for k, (lam, prior) in enumerate(zip(LAMBDAS, priors, strict=True)):
-        known = prior(sums)
-        left = sums.left_by(known)
-        for family, its in zip(families, found, strict=True):
-            index = family.index(len(known) - 1)
-            its[k] = known
-            its[k, np.append(index, -1)] += solve(left.part(index), lam)
-    return found
+def pulled(sums: Sums, families: Sequence[Family]) -> list[Floats]:
+    """Of each family, coefficients (2, p + 1, axes) of all columns, with each of LAMBDAS, pulled to Lin's scales."""
+    known = lin(sums)
+    left = sums.left_by(known)
+    result = []
+    for family in families:
+        index = family.index(len(known) - 1)
+        own = left.part(index)
+        found = np.repeat(known[None], len(LAMBDAS), axis=0)
+        for k, lam in enumerate(LAMBDAS):
+            found[k, np.append(index, -1)] += solve(own, lam)
+        result.append(found)
+    return result
 
 
 def _levelled(sums: Sums) -> tuple[Floats, Floats, Floats, Floats]:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.geometry import Floats
+from ...core.map_columns import AXES
 from ...errors import RecordingError
 from ...recording.npz_file import counts_field, read_npz, to_lin_frame
 from ...wire import sensor_gen as _sensor
@@ -67,7 +68,7 @@ class Run:
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the truth's columns."""
-        return ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")[: self.truth.shape[1]]
+        return AXES[: self.truth.shape[1]]
 
 
 def load_run(path: Path) -> Run:

@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from ...calibrate.population import keeping, training, worth
 from ...calibrate.population.training import Population
-from ...calibrate.wrench import fitted, models
+from ...calibrate.wrench import figures, fitted, models
 from ...calibrate.wrench.crossvalidation import Validation, validate
 from ...calibrate.wrench.run import Run
 from ...calibrate.wrench.sources import load
@@ -96,7 +96,7 @@ def measure(files: Sequence[Path], show: Show = lambda text: None) -> Outcome:
             for key, rmse in _untrained(others[name], run).items():
                 found.setdefault(key, {})[name] = rmse
         by_lin = compute(run.counts.astype(np.uint16), run.tare, LIN)["force_n"]
-        found.setdefault(LINS, {})[name] = _rms(by_lin - run.truth[:, :3])
+        found.setdefault(LINS, {})[name] = _rmse(by_lin, run.truth[:, :3])
         its = validate(run, show=show)
         for model, _, _ in OWN_MODELS:
             found.setdefault(model, {})[name] = its.by_model[model][0][:3].tolist()
@@ -152,8 +152,8 @@ def _noise(its: Validation) -> list[float]:
     map_of_all = fitted.of(its)
     counts = run.counts[rows]
     noisy = counts + rng.normal(size=counts.shape) * sigma
-    change = map_of_all.predict(noisy, pdc) - map_of_all.predict(counts, pdc)
-    return _rms(change[:, :3])
+    there, here = (map_of_all.predict(its, pdc)[:, :3] for its in (noisy, counts))
+    return _rmse(there, here)
 
 
 def _repeatability(its: Validation) -> list[float]:
@@ -163,7 +163,7 @@ def _repeatability(its: Validation) -> list[float]:
     rows = np.arange(0, len(run.counts), EVERY_ROW)
     near, distance = _nearest(run.counts - run.tare, rows)
     same = distance <= np.quantile(distance, NEAREST)
-    return [value / float(np.sqrt(2.0)) for value in _rms(error[rows[same]] - error[near[same]])]
+    return [value / float(np.sqrt(2.0)) for value in _rmse(error[rows[same]], error[near[same]])]
 
 
 def _nearest(e: Floats, rows: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
@@ -178,8 +178,8 @@ def _nearest(e: Floats, rows: NDArray[np.intp]) -> tuple[NDArray[np.intp], Float
     return near, distance
 
 
-def _rms(error: Floats) -> list[float]:
-    return [float(value) for value in np.sqrt((error**2).mean(axis=0))]
+def _rmse(one: Floats, other: Floats) -> list[float]:
+    return [float(value) for value in figures.rmse(one, other)]
 
 
 def facts(its: Outcome) -> dict[str, Any]:

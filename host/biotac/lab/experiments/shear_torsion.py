@@ -22,7 +22,7 @@ from ...calibrate.wrench.moments import with_one
 from ...calibrate.wrench.run import load_run
 from ...core import geometry as surface
 from ...core.geometry import Floats
-from ...core.map_columns import Signals
+from ...core.map_columns import AXES, Signals
 from ...markdown import table
 from ...sim import sampling
 from ...sim.physics import REST_CELSIUS, Finger, States
@@ -36,7 +36,6 @@ RECORDING = ""
 MAPS = False
 
 FRAMES = 9000
-AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")
 FY, TORSION = 1, 6
 PAPER, CALIBRATED = "paper", "calibrated"
 FY_LIMIT, TORSION_LIMIT = 0.4, 0.6  # of the paper's RMSE: issue 6
