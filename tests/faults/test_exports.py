@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from record_all import record_all
 
 import biotac
 from biotac.export import FORMATS, export
@@ -16,11 +17,7 @@ LIMITS = [0, 700, 5_000, 20_000]  # bytes; the smallest of these exports has 40 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("recorded") / "rec.mcap"
-    with biotac.open("sim:press.toml?seconds=3") as hand:
-        hand.record(path)
-        hand.read(5.0)
-    return path
+    return record_all("sim:press.toml?seconds=3", tmp_path_factory.mktemp("recorded") / "rec.mcap")
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from maps import make_map
+from record_all import record_all
 
 import biotac
 from biotac.calibrate.reference.csv_file import read_csv
@@ -176,11 +177,7 @@ def test_a_damaged_file_is_refused_in_a_line_or_read(
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    path = tmp_path_factory.mktemp("recorded") / "rec.mcap"
-    with biotac.open("sim:press.toml?seconds=1") as hand:
-        hand.record(path)
-        hand.read(2.0)
-    return path.read_bytes()
+    return record_all("sim:press.toml?seconds=1", tmp_path_factory.mktemp("recorded") / "rec.mcap").read_bytes()
 
 
 @pytest.mark.filterwarnings("ignore::biotac.RecordingWarning")

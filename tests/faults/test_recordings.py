@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from record_all import record_all
 
 import biotac
 
@@ -20,12 +21,9 @@ CHUNK_HEAD_BYTES = 50  # what of a chunk its own checksum is not over
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    path = tmp_path_factory.mktemp("recorded") / "rec.mcap"
-    with pytest.MonkeyPatch.context() as patch, biotac.open("sim:press.toml?seconds=0.6") as hand:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr("biotac.recording.writer.FINGER_BYTES_PER_S", 8192)  # several blocks in little time
-        hand.record(path)
-        hand.read(1.0)
-    return path.read_bytes()
+        return record_all("sim:press.toml?seconds=0.6", tmp_path_factory.mktemp("recorded") / "rec.mcap").read_bytes()
 
 
 def said(path: Path) -> tuple[dict[str, Any], list[str]]:

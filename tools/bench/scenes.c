@@ -5,7 +5,7 @@
 #include "finger.h"
 #include "map/population.h"
 #include "maps.h"
-#include "touch/signals.h"
+#include "signal/signals.h"
 #include "wire/framing.h"
 
 #define LANES BT_LANES // a round's words that the front end looks at: electrodes, then pressure
@@ -147,53 +147,21 @@ static void mapped(const bt_map *map)
     sink = (uint32_t)force_100un[0];
 }
 
-static void map_affine(const bt_solve_settings *settings)
-{
-    (void)settings;
-    mapped(&affine.map);
-}
+#define MAP_SCENE(its)                                                                                       \
+    static void map_##its(const bt_solve_settings *settings)                                                 \
+    {                                                                                                        \
+        (void)settings;                                                                                      \
+        mapped(&its.map);                                                                                    \
+    }
 
-static void map_sign_split(const bt_solve_settings *settings)
-{
-    (void)settings;
-    mapped(&sign_split.map);
-}
-
-static void map_gated(const bt_solve_settings *settings)
-{
-    (void)settings;
-    mapped(&gated.map);
-}
-
-static void map_conductance(const bt_solve_settings *settings)
-{
-    (void)settings;
-    mapped(&conductance.map);
-}
-
-static void map_scaled_population(const bt_solve_settings *settings)
-{
-    (void)settings;
-    mapped(&scaled_population.map);
-}
-
-static void map_pooled(const bt_solve_settings *settings)
-{
-    (void)settings;
-    mapped(&pooled.map);
-}
-
-static void map_pooled_6(const bt_solve_settings *settings)
-{
-    (void)settings;
-    mapped(&pooled_6.map);
-}
-
-static void map_pooled_7(const bt_solve_settings *settings)
-{
-    (void)settings;
-    mapped(&pooled_7.map);
-}
+MAP_SCENE(affine)
+MAP_SCENE(sign_split)
+MAP_SCENE(gated)
+MAP_SCENE(conductance)
+MAP_SCENE(scaled_population)
+MAP_SCENE(pooled)
+MAP_SCENE(pooled_6)
+MAP_SCENE(pooled_7)
 
 static void population(const bt_solve_settings *settings)
 {

@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from record_all import record_all
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
@@ -29,10 +30,7 @@ FINGERS = 2
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> biotac.Recording:
     """With faults in it, so that there are missing words and invalid results."""
-    path = tmp_path_factory.mktemp("export") / "a.mcap"
-    with biotac.open(f"sim:faults.toml?fingers={FINGERS}") as hand:
-        hand.record(path)
-        hand.read_batch(100)
+    path = record_all(f"sim:faults.toml?fingers={FINGERS}", tmp_path_factory.mktemp("export") / "a.mcap")
     recording = biotac.Recording(path)
     assert np.isnan(recording.frames["poc_mm"]).any() and (recording.frames["counts"] == 65535).any()
     return recording

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
+from record_all import record_all
 
 import biotac
 from biotac.recording import layout
@@ -21,11 +22,7 @@ OLD = Path(__file__).parents[2] / "data" / "recordings"
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("parts") / "a.mcap"
-    with biotac.open("sim:press.toml?fingers=5&seconds=20") as hand:
-        hand.record(path)
-        hand.read_batch(100)
-    return path
+    return record_all("sim:press.toml?fingers=5&seconds=20", tmp_path_factory.mktemp("parts") / "a.mcap")
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from record_all import record_all
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import biotac
@@ -21,11 +22,7 @@ STORE = get_typestore(Stores.ROS2_HUMBLE)
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("ros") / "a.mcap"
-    with biotac.open("sim:press.toml?fingers=2&seconds=3") as hand:
-        hand.record(path)
-        hand.read_batch(100)
-    return path
+    return record_all("sim:press.toml?fingers=2&seconds=3", tmp_path_factory.mktemp("ros") / "a.mcap")
 
 
 def of_topic(path: Path, topic: str) -> list[tuple[int, int, Any]]:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
+from record_all import record_all
 
 import biotac
 from biotac.recording import writer
@@ -24,11 +25,7 @@ SOURCE = "sim:press.toml?fingers=2&seconds=4"
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("plots") / "a.mcap"
-    with biotac.open(SOURCE) as hand:
-        hand.record(path)
-        hand.read_batch(100)
-    return path
+    return record_all(SOURCE, tmp_path_factory.mktemp("plots") / "a.mcap")
 
 
 def messages(path: Path) -> tuple[dict[str, list[tuple[int, dict[str, Any]]]], dict[str, dict[str, Any]]]:

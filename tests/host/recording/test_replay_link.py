@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from record_all import record_all
 
 import biotac
 from biotac.cli.main import main
@@ -25,10 +26,7 @@ SECONDS = 4
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> tuple[Path, biotac.Recording]:
-    path = tmp_path_factory.mktemp("replay") / "a.mcap"
-    with biotac.open(f"sim:press.toml?fingers=2&seconds={SECONDS}") as hand:
-        hand.record(path)
-        hand.read_batch(100)
+    path = record_all(f"sim:press.toml?fingers=2&seconds={SECONDS}", tmp_path_factory.mktemp("replay") / "a.mcap")
     return path, biotac.Recording(path)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from record_all import record_all
 
 import biotac
 from biotac.recording.file import RecordingFile
@@ -25,10 +26,7 @@ MISSING = 4  # an electrode that gives no word
 
 @pytest.fixture(scope="module")
 def metadata(tmp_path_factory) -> dict[str, str]:
-    path = tmp_path_factory.mktemp("facts") / "a.mcap"
-    with biotac.open("sim:press.toml?seconds=1") as hand:
-        hand.record(path)
-        hand.read_batch(100)
+    path = record_all("sim:press.toml?seconds=1", tmp_path_factory.mktemp("facts") / "a.mcap")
     return biotac.Recording(path).metadata
 
 

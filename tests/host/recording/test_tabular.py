@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from record_all import record_all
 
 import biotac
 from biotac.wire.fields import FRAME_FIELDS
@@ -13,10 +14,7 @@ from biotac.wire.fields import FRAME_FIELDS
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory) -> biotac.Recording:
-    path = tmp_path_factory.mktemp("tabular") / "a.mcap"
-    with biotac.open("sim:faults.toml?fingers=2") as hand:
-        hand.record(path)
-        hand.read_batch(100)
+    path = record_all("sim:faults.toml?fingers=2", tmp_path_factory.mktemp("tabular") / "a.mcap")
     its = biotac.Recording(path)
     assert np.isnan(its.frames["poc_mm"]).any() and (its.frames["counts"] == 65535).any()
     return its
