@@ -225,9 +225,8 @@ class Reading:
 
     def table(self, finger: NDArray[np.uint8]) -> StructArray:
         """Rows of these fingers, to be read; a field that the recording's version did not have is invalid."""
-        rows = np.empty(len(finger) if self.wanted else 0, self.dtype)
-        if self.wanted:
-            rows["finger"] = finger
+        rows = np.empty(len(finger), self.dtype)
+        rows["finger"] = finger
         for name in self._missing:
             rows[name] = WIRE_INVALID.get(self.dtype[name].base.str[1:], 0)
         return rows

@@ -124,8 +124,11 @@ class Blocks:
         if self._fingers is not None:
             chosen[:] = False
             chosen[list(self._fingers)] = True
-        fingers = [rest.fingers(kind) for kind in range(len(KINDS))]
-        return [reading.table(finger[chosen[finger]]) for reading, finger in zip(readings, fingers, strict=True)]
+        tables = []
+        for kind, reading in enumerate(readings):
+            fingers = rest.fingers(kind) if reading.wanted else np.empty(0, np.uint8)
+            tables.append(reading.table(fingers[chosen[fingers]]))
+        return tables
 
 
 def is_lossless(frames: StructArray, pac: StructArray, idle: StructArray) -> bool:

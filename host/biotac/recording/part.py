@@ -43,6 +43,7 @@ def load(
     numbers = None if fingers is None else _fingers(place, fingers)
     wanted = {FRAME: {"t_us", *(field.sent or field.name for field in chosen)}}
     pieces = Blocks(place, wanted, numbers, check=False)
+    dtype = dtype_of(chosen)
     parts, begin_us = [], None
     for piece in pieces:
         if piece.rest is None:
@@ -53,12 +54,12 @@ def load(
             continue
         rows = piece.rows[FRAME]
         rows = rows[_within(rows["t_us"], begin_us, start_s, stop_s)]
-        out = np.empty(len(rows), dtype_of(chosen))
+        out = np.empty(len(rows), dtype)
         for field in chosen:
             out[field.name] = values_of(field, rows[field.sent or field.name])
         parts.append(out)
     _checked(pieces, place)
-    return np.concatenate(parts) if parts else np.empty(0, dtype_of(chosen))
+    return np.concatenate(parts) if parts else np.empty(0, dtype)
 
 
 def _from_wire(

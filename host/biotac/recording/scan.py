@@ -11,6 +11,7 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -32,6 +33,7 @@ _FREE_BYTES = 1 << 24
 
 _HEAD = struct.Struct("<BQ")
 _CHANNEL = struct.Struct("<H")
+_MESSAGE_INDEX = int(Opcode.MESSAGE_INDEX)
 _FOOTER_BYTES = _HEAD.size + 16  # that its checksum is over, too
 _READ: dict[int, Any] = {
     Opcode.METADATA: Metadata,
@@ -74,7 +76,7 @@ class Scan:
         self.cut_off = False
         self.damaged_chunks = self.wrong_checksums = 0
         self.schemas: dict[str, bytes] = {}
-        self._wanted = wanted
+        self._wanted = cache(wanted)
         self._check = check
         self._topics: dict[int, str] = {}
         self._schema: dict[int, bytes] = {}
@@ -96,16 +98,21 @@ class Scan:
                     f"{self.path} is no MCAP file ({self._size} bytes, wrong first bytes); expected a file that "
                     "`biotac record` wrote"
                 )
-            good_until = stream.tell()
+            good_until = len(MCAP0_MAGIC)
             held: tuple[int, int] | None = None  # where a chunk is, until its indexes say which channels it has
             channels: set[int] = set()
             while True:
-                opcode, length = _HEAD.unpack(stream.read(_HEAD.size).ljust(_HEAD.size, b"\0"))
-                at = stream.tell()
+                # with what a message index begins with: which channel
+                start = stream.read(_HEAD.size + _CHANNEL.size).ljust(_HEAD.size + _CHANNEL.size, b"\0")
+                opcode, length = _HEAD.unpack_from(start)
+                at = good_until + _HEAD.size
                 whole = opcode != 0 and length <= self._size - at
-                if opcode == Opcode.MESSAGE_INDEX and whole:
-                    channels |= {_CHANNEL.unpack(stream.read(_CHANNEL.size).ljust(_CHANNEL.size, b"\0"))[0]}
-                elif held is not None:
+                if opcode == _MESSAGE_INDEX and whole:  # two of three records
+                    channels.add(_CHANNEL.unpack_from(start, _HEAD.size)[0])
+                    good_until = at + length
+                    stream.seek(good_until)
+                    continue
+                if held is not None:
                     yield from self._open(stream, *held, channels)
                     held = None
                 if whole and opcode in (Opcode.DATA_END, Opcode.FOOTER):
@@ -198,7 +205,6 @@ class Scan:
         unwanted = bool(topics) and all(topic is not None and not self._wanted(topic) for topic in topics)
         if unwanted and not self._check:
             return
-        here = stream.tell()
         try:
             chunk = Chunk.read(_content(stream, at, length))
             self._weigh(chunk)
@@ -212,8 +218,6 @@ class Scan:
             self.damaged_chunks += 1
             self.problems.append(f"one second of {self.path.name} is damaged and left out ({error})")
             return
-        finally:
-            stream.seek(here)
         yield from self._take(records)
 
     def _weigh(self, chunk: Chunk) -> None:
