@@ -75,7 +75,7 @@ static uint32_t begin_touch(bt_events *events)
     events->touched = true;
     events->landing = true;
     events->touch_began = events->now;
-    return TOLD(BT_EVENT_TOUCH);
+    return TOLD(BT_EVENT_KIND_TOUCH);
 }
 
 uint32_t bt_events_touch(bt_events *events, const bt_tare *tare)
@@ -105,7 +105,7 @@ uint32_t bt_events_watch(bt_events *events, const bt_tare *tare)
     }
     events->touched = false;
     events->watched = BT_EVENTS_NO_SLOT;
-    return TOLD(BT_EVENT_LIFT);
+    return TOLD(BT_EVENT_KIND_LIFT);
 }
 
 // The tare machine goes on to call it a contact, so its gate waits for no other.
@@ -256,7 +256,7 @@ static BT_NOINLINE void shake(bt_events *events, const uint16_t *pac, const uint
 
 static uint32_t end_slip(bt_events *events)
 {
-    uint32_t told = events->slips ? TOLD(BT_EVENT_STUCK) : 0;
+    uint32_t told = events->slips ? TOLD(BT_EVENT_KIND_STUCK) : 0;
     events->slips = false;
     return told;
 }
@@ -289,7 +289,7 @@ static BT_NOINLINE uint32_t judge(bt_events *events)
     }
     if (!events->jolted && events->rises + events->falls > JOLT * events->level_count2) {
         events->jolted = true;
-        told = TOLD(BT_EVENT_JOLT);
+        told = TOLD(BT_EVENT_KIND_JOLT);
     }
     if (!events->touched) {
         return told | end_slip(events);
@@ -297,7 +297,7 @@ static BT_NOINLINE uint32_t judge(bt_events *events)
     events->landing = events->landing && events->now - events->touch_began < LANDING_MAX;
     if (!events->slips && !events->landing && begins_to_slip(events)) {
         events->slips = true;
-        told |= TOLD(BT_EVENT_SLIP);
+        told |= TOLD(BT_EVENT_KIND_SLIP);
     }
     return told;
 }
@@ -360,19 +360,19 @@ static uint16_t root(uint32_t square)
 void bt_events_message(bt_events *events, uint8_t event, const bt_tare *tare, uint32_t t_us,
                        bt_msg_event *msg)
 {
-    const bool shaken = event >= BT_EVENT_JOLT;
-    msg->event = event;
+    const bool shaken = event >= BT_EVENT_KIND_JOLT;
+    msg->kind = event;
     msg->tare_state = tare->state;
     msg->t_us = t_us;
     msg->onset_us = t_us;
-    if (event == BT_EVENT_JOLT) {
+    if (event == BT_EVENT_KIND_JOLT) {
         msg->onset_us -= since_us(events, events->began);
-    } else if (event == BT_EVENT_SLIP) {
+    } else if (event == BT_EVENT_KIND_SLIP) {
         msg->onset_us = events->slip_us = t_us - since_us(events, events->slip_began);
-    } else if (event == BT_EVENT_STUCK) {
+    } else if (event == BT_EVENT_KIND_STUCK) {
         msg->onset_us = events->slip_us;
     }
     msg->energy_count2 = shaken ? UINT32_MAX : events->energy_count2;
-    msg->peak_count =
-        event == BT_EVENT_JOLT || event == BT_EVENT_SLIP ? root(events->most_count2) : BT_INVALID_COUNT;
+    msg->peak_count = event == BT_EVENT_KIND_JOLT || event == BT_EVENT_KIND_SLIP ? root(events->most_count2)
+                                                                                 : BT_INVALID_COUNT;
 }

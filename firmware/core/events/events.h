@@ -50,7 +50,7 @@ typedef struct {
 
 void bt_events_reset(bt_events *events);
 
-// Each after the slot's word went to the tare machine. They return events, a mask of 1 << BT_EVENT_*.
+// Each after the slot's word went to the tare machine. They return events, a mask of 1 << BT_EVENT_KIND_*.
 // This word opened a resting finger's gate.
 uint32_t bt_events_touch(bt_events *events, const bt_tare *tare);
 // This slot is `watched`.

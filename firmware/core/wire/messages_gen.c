@@ -757,7 +757,7 @@ void bt_msg_event_pack(const bt_msg_event *msg, uint8_t out[BT_EVENT_BYTES])
     at = put(at, (uint32_t)msg->t_us, 4);
     at = put(at, (uint32_t)msg->finger, 1);
     at = put(at, (uint32_t)msg->slot, 1);
-    at = put(at, (uint32_t)msg->event, 1);
+    at = put(at, (uint32_t)msg->kind, 1);
     at = put(at, (uint32_t)msg->tare_state, 1);
     at = put(at, (uint32_t)msg->onset_us, 4);
     at = put(at, (uint32_t)msg->energy_count2, 4);
@@ -778,7 +778,7 @@ void bt_msg_event_unpack(bt_msg_event *msg, const uint8_t in[BT_EVENT_BYTES])
     at = get(at, &value, 1);
     msg->slot = (uint8_t)value;
     at = get(at, &value, 1);
-    msg->event = (uint8_t)value;
+    msg->kind = (uint8_t)value;
     at = get(at, &value, 1);
     msg->tare_state = (uint8_t)value;
     at = get(at, &value, 4);

@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0xB4E365E5u
+#define BT_SCHEMA_HASH 0x74DE99CEu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -89,12 +89,12 @@ enum bt_calibration_state {
 };
 
 // What an EVENT tells (SPEC.md, Events).
-enum bt_event {
-    BT_EVENT_TOUCH = 1, // the sample of this slot shows that something touches a resting finger
-    BT_EVENT_LIFT = 2, // the sample of this slot shows that the finger is let go; one for each TOUCH
-    BT_EVENT_JOLT = 3, // dynamic pressure jolts: a tap on the finger or on what it holds, a quick squeeze, or a slip's beginning
-    BT_EVENT_SLIP = 4, // what is held slips: dynamic pressure vibrates to and fro
-    BT_EVENT_STUCK = 5, // the slip is over; one for each SLIP
+enum bt_event_kind {
+    BT_EVENT_KIND_TOUCH = 1, // the sample of this slot shows that something touches a resting finger
+    BT_EVENT_KIND_LIFT = 2, // the sample of this slot shows that the finger is let go; one for each TOUCH
+    BT_EVENT_KIND_JOLT = 3, // dynamic pressure jolts: a tap on the finger or on what it holds, a quick squeeze, or a slip's beginning
+    BT_EVENT_KIND_SLIP = 4, // what is held slips: dynamic pressure vibrates to and fro
+    BT_EVENT_KIND_STUCK = 5, // the slip is over; one for each SLIP
 };
 
 // State of one frame's results.
@@ -464,7 +464,7 @@ typedef struct {
     uint32_t t_us; // [us] device time at which the slot was sampled
     uint8_t finger; // [1] chip select index
     uint8_t slot; // [1] which slot of the round
-    uint8_t event; // [enum event] what happened; a host passes over one that it does not know
+    uint8_t kind; // [enum event_kind] what happened; a host passes over one that it does not know
     uint8_t tare_state; // [enum tare_state] after the round before
     uint32_t onset_us; // [us] device time at which it began: of SLIP and STUCK when the slip began, of JOLT when dynamic pressure left its noise, else t_us
     uint32_t energy_count2; // [count^2] of TOUCH and LIFT: sum of squares of the filtered signals, from the latest word of every electrode; invalid of others
@@ -764,7 +764,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_SENSOR_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(tare_state, u8, 1) X(tare_reason, u8, 1) X(tare_age_ms, u32, 1) X(noise_count2, u32, 1) X(words_good, u32, 1) X(words_stuck, u32, 1) X(words_error, u32, 1) X(words_parity, u32, 1) X(last_error_word, u16, 1)
 #define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1)
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
-#define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(event, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1)
+#define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1)
 #define BT_HELLO_REQUEST_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1)
 #define BT_START_FIELDS(X) X(req_id, u8, 1) X(streams, u8, 1) X(fingers, u8, 1) X(keepalive_ms, u16, 1)
 #define BT_STOP_FIELDS(X) X(req_id, u8, 1)

@@ -208,7 +208,7 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("t_us", "<u4"),
             ("finger", "u1"),
             ("slot", "u1"),
-            ("event", "u1"),
+            ("kind", "u1"),
             ("tare_state", "u1"),
             ("onset_us", "<u4"),
             ("energy_count2", "<u4"),

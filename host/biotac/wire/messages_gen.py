@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0xB4E365E5
+SCHEMA_HASH = 0x74DE99CE
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -103,7 +103,7 @@ class CalibrationState(IntEnum):
     OTHER_SENSOR = 2  # kept, but made for another sensor than the one read at start and there since: the settings, or gains, hold
 
 
-class Event(IntEnum):
+class EventKind(IntEnum):
     """What an EVENT tells (SPEC.md, Events)."""
 
     TOUCH = 1  # the sample of this slot shows that something touches a resting finger
@@ -237,7 +237,7 @@ CALIBRATION_STATE_DOC: dict[int, str] = {
 }
 
 
-EVENT_DOC: dict[int, str] = {
+EVENT_KIND_DOC: dict[int, str] = {
     1: "the sample of this slot shows that something touches a resting finger",
     2: "the sample of this slot shows that the finger is let go; one for each TOUCH",
     3: "dynamic pressure jolts: a tap on the finger or on what it holds, a quick squeeze, or a slip's beginning",
@@ -1111,7 +1111,7 @@ class Event:
     t_us: int
     finger: int
     slot: int
-    event: int
+    kind: int
     tare_state: int
     onset_us: int
     energy_count2: int
@@ -1127,7 +1127,7 @@ class Event:
             self.t_us,
             self.finger,
             self.slot,
-            self.event,
+            self.kind,
             self.tare_state,
             self.onset_us,
             self.energy_count2,

@@ -58,7 +58,7 @@ static bool due(uint8_t slot)
 
 static void take(uint32_t told, uint8_t slot)
 {
-    for (uint8_t event = BT_EVENT_TOUCH; event <= BT_EVENT_STUCK; event++) {
+    for (uint8_t event = BT_EVENT_KIND_TOUCH; event <= BT_EVENT_KIND_STUCK; event++) {
         if (told >> event & 1) {
             bt_msg_event *msg = &its.told[its.count++];
             assert_true(its.count < MAX_TOLD);
@@ -105,7 +105,7 @@ static int told(uint8_t event)
 {
     int n = 0;
     for (int k = 0; k < its.count; k++) {
-        n += its.told[k].event == event;
+        n += its.told[k].kind == event;
     }
     return n;
 }
@@ -113,7 +113,7 @@ static int told(uint8_t event)
 static const bt_msg_event *first(uint8_t event)
 {
     for (int k = 0; k < its.count; k++) {
-        if (its.told[k].event == event) {
+        if (its.told[k].kind == event) {
             return &its.told[k];
         }
     }
@@ -139,20 +139,20 @@ static void touch_and_lift_are_told_in_the_slot_that_shows_them(void **state)
     const uint32_t pressed_us = its.t_us;
     its.load = 200;
     play(20);
-    assert_int_equal(told(BT_EVENT_TOUCH), 1);
-    const bt_msg_event *touch = first(BT_EVENT_TOUCH);
+    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
+    const bt_msg_event *touch = first(BT_EVENT_KIND_TOUCH);
     assert_in_range(touch->t_us, pressed_us, pressed_us + 20000); // a far word waits for its second
     assert_int_equal(touch->onset_us, touch->t_us);
     assert_in_range(touch->energy_count2, SETTING_COUNT2, 200 * 200 * 2);
     assert_int_equal(touch->peak_count, BT_INVALID_COUNT);
-    assert_int_equal(told(BT_EVENT_LIFT), 0);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 0);
     const uint32_t released_us = its.t_us;
     its.load = 0;
     play(100);
-    assert_int_equal(told(BT_EVENT_LIFT), 1);
-    assert_in_range(first(BT_EVENT_LIFT)->t_us, released_us, released_us + 20000);
-    assert_in_range(first(BT_EVENT_LIFT)->energy_count2, 0, SETTING_COUNT2 / 2);
-    assert_int_equal(told(BT_EVENT_TOUCH), 1);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
+    assert_in_range(first(BT_EVENT_KIND_LIFT)->t_us, released_us, released_us + 20000);
+    assert_in_range(first(BT_EVENT_KIND_LIFT)->energy_count2, 0, SETTING_COUNT2 / 2);
+    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
 }
 
 // The tare machine waits for a whole sweep until it calls a contact over; a tap on the pad is shorter.
@@ -166,8 +166,8 @@ static void touches_in_quick_succession_are_all_told(void **state)
         its.load = 0;
         play(8);
     }
-    assert_int_equal(told(BT_EVENT_TOUCH), 10);
-    assert_int_equal(told(BT_EVENT_LIFT), 10);
+    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 10);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 10);
 }
 
 static void pressure_that_stays_is_no_lift(void **state)
@@ -176,10 +176,10 @@ static void pressure_that_stays_is_no_lift(void **state)
     hold();
     its.load = 0;
     play(20);
-    assert_int_equal(told(BT_EVENT_LIFT), 0);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 0);
     its.pdc = PDC_REST;
     play(3);
-    assert_int_equal(told(BT_EVENT_LIFT), 1);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
 }
 
 // A swing of 120 to 220 Hz: both ways of it take up to 4 ms to be seen.
@@ -194,16 +194,16 @@ static void a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds(voi
         hold();
         const uint32_t begins_us = its.t_us;
         shaken(30, 60, 120 + k / 2);
-        const bt_msg_event *slip = first(BT_EVENT_SLIP);
+        const bt_msg_event *slip = first(BT_EVENT_KIND_SLIP);
         told_late += slip->t_us - begins_us > 7000;
         onset_off += abs((int32_t)(slip->onset_us - begins_us)) > 5000;
         assert_in_range(slip->peak_count, 40, 160);
-        assert_int_equal(told(BT_EVENT_SLIP), 1);
-        assert_int_equal(told(BT_EVENT_JOLT), 1);
+        assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
+        assert_int_equal(told(BT_EVENT_KIND_JOLT), 1);
         assert_int_equal(slip->energy_count2, UINT32_MAX);
         play(60);
-        assert_int_equal(told(BT_EVENT_STUCK), 1);
-        assert_int_equal(first(BT_EVENT_STUCK)->onset_us, slip->onset_us);
+        assert_int_equal(told(BT_EVENT_KIND_STUCK), 1);
+        assert_int_equal(first(BT_EVENT_KIND_STUCK)->onset_us, slip->onset_us);
     }
     assert_in_range(told_late, 0, 10);
     assert_in_range(onset_off, 0, 10);
@@ -238,9 +238,9 @@ static void noise_at_rest_raises_what_it_takes(void **state)
     its.load = 120;
     its.pdc = PDC_REST + 60;
     shaken(300, 20, 150);
-    assert_int_equal(told(BT_EVENT_SLIP), 0);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
     shaken(20, 400, 150);
-    assert_int_equal(told(BT_EVENT_SLIP), 1);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
 }
 
 static void a_glitch_is_no_event(void **state)
@@ -266,9 +266,9 @@ static void a_light_tap_on_what_is_held_is_a_jolt_and_no_slip(void **state)
     play(1);
     memset(its.pac, 0, sizeof its.pac);
     play(50);
-    assert_int_equal(told(BT_EVENT_JOLT), 1);
-    assert_int_equal(told(BT_EVENT_SLIP), 0);
-    assert_in_range(first(BT_EVENT_JOLT)->peak_count, 20, 60);
+    assert_int_equal(told(BT_EVENT_KIND_JOLT), 1);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+    assert_in_range(first(BT_EVENT_KIND_JOLT)->peak_count, 20, 60);
 }
 
 // PAC of a ramp of pressure, as the sensor's high-pass of 10 Hz leaves it.
@@ -291,7 +291,7 @@ static void squeezing_harder_is_no_slip(void **state)
     hold();
     squeezed(50, 98.6 * 100 * 2); // 2 N/s
     squeezed(50, 0);
-    assert_int_equal(told(BT_EVENT_SLIP), 0);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
 }
 
 static void a_landing_is_no_slip(void **state)
@@ -302,10 +302,10 @@ static void a_landing_is_no_slip(void **state)
     its.pdc = PDC_REST + 60;
     shaken(20, 200, 130);
     play(100);
-    assert_int_equal(told(BT_EVENT_TOUCH), 1);
-    assert_int_equal(told(BT_EVENT_SLIP), 0);
+    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
     shaken(20, 200, 130);
-    assert_int_equal(told(BT_EVENT_SLIP), 1);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
 }
 
 static void nobody_slips_untouched(void **state)
@@ -313,8 +313,8 @@ static void nobody_slips_untouched(void **state)
     (void)state;
     play(300);
     shaken(20, 200, 130);
-    assert_int_equal(told(BT_EVENT_SLIP), 0);
-    assert_true(told(BT_EVENT_JOLT) > 0);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+    assert_true(told(BT_EVENT_KIND_JOLT) > 0);
 }
 
 // The slip is over in the PAC slot behind the word that showed the release.
@@ -323,12 +323,12 @@ static void a_slip_ends_with_the_hold(void **state)
     (void)state;
     hold();
     shaken(10, 100, 150);
-    assert_int_equal(told(BT_EVENT_SLIP), 1);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
     its.load = 0;
     its.pdc = PDC_REST;
     shaken(3, 100, 150);
-    assert_int_equal(told(BT_EVENT_LIFT), 1);
-    assert_int_equal(told(BT_EVENT_STUCK), 1);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
+    assert_int_equal(told(BT_EVENT_KIND_STUCK), 1);
 }
 
 static void missing_words_are_no_event(void **state)
@@ -357,8 +357,8 @@ static void the_rails_do_not_wrap(void **state)
     memset(its.pac, 0, sizeof its.pac);
     its.load = 0;
     play(400);
-    assert_int_equal(told(BT_EVENT_SLIP), told(BT_EVENT_STUCK));
-    assert_int_equal(told(BT_EVENT_TOUCH), told(BT_EVENT_LIFT));
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), told(BT_EVENT_KIND_STUCK));
+    assert_int_equal(told(BT_EVENT_KIND_TOUCH), told(BT_EVENT_KIND_LIFT));
 }
 
 int main(void)

@@ -67,7 +67,7 @@ static void who_subscribes_is_told_in_the_slot_that_shows_it(void **state)
             bt_msg_touch_unpack(&touch, host.message[k].payload);
         }
     }
-    assert_int_equal(event.event, BT_EVENT_TOUCH);
+    assert_int_equal(event.kind, BT_EVENT_KIND_TOUCH);
     assert_int_equal(event.finger, 3);
     assert_int_equal(event.slot, slot);
     assert_int_equal(event.slot, touch.slot);
@@ -83,7 +83,7 @@ static void who_subscribes_is_told_in_the_slot_that_shows_it(void **state)
             bt_msg_event_unpack(&event, host.message[k].payload);
         }
     }
-    assert_int_equal(event.event, BT_EVENT_LIFT);
+    assert_int_equal(event.kind, BT_EVENT_KIND_LIFT);
 }
 
 static void nobody_is_told_who_did_not_ask_or_does_not_stream(void **state)
