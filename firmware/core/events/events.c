@@ -14,6 +14,7 @@
 #define SLIP        20  // of each side; likewise
 #define MOST        100 // a slip is over when nothing has shaken for some 0.2 s
 #define DRAGGED     55  // samples of as much as counts, 25 ms: 20 to 30 ms do as well
+#define TOGETHER    18  // samples from rise to fall, 8 ms: of one vibration
 #define NOISE_LOG   6   // rounds that its mean is over, as a power of two
 #define LANDING_MIN 220 // samples, 0.1 s
 #define LANDING_MAX 2200
@@ -268,13 +269,15 @@ static uint32_t quiet(bt_events *events)
     return end_slip(events);
 }
 
-// Goes to and fro, since the later of the two; or has been dragged for so long, and slips from now on.
+// Goes to and fro, since the earlier of the two where it is one vibration, else since the later; or has been
+// dragged for so long, and slips from now on.
 static bool begins_to_slip(bt_events *events)
 {
     const uint32_t each = SLIP * events->level_count2;
     if (events->rises > each && events->falls > each) {
-        bool fell_later = (int32_t)(events->falls_since - events->rises_since) > 0;
-        events->slip_began = fell_later ? events->falls_since : events->rises_since;
+        const int32_t apart = (int32_t)(events->falls_since - events->rises_since);
+        const bool one = apart <= TOGETHER && apart >= -TOGETHER;
+        events->slip_began = (apart > 0) == one ? events->rises_since : events->falls_since;
         return true;
     }
     events->slip_began = events->now - 1;
