@@ -17,6 +17,7 @@ void bt_finger_reset(bt_finger *finger, uint8_t index)
     finger->index = index;
     finger->quantities = SUBSCRIBED_AT_FIRST;
     bt_tare_reset(&finger->tare);
+    bt_events_reset(&finger->events);
     bt_settings_reset(&initial);
     bt_pressure_use(&finger->pressure, &initial);
     bt_round_clear(&finger->round);
@@ -76,6 +77,29 @@ bool bt_finger_put(bt_finger *finger, uint8_t slot, uint16_t count)
     return place(finger, slot, count) || late;
 }
 
+uint32_t bt_finger_events(bt_finger *finger, uint8_t slot, bool touched)
+{
+    bt_events *events = &finger->events;
+    if (touched) {
+        return bt_events_touch(events, &finger->tare);
+    }
+    if (slot == events->watched) {
+        return bt_events_watch(events, &finger->tare);
+    }
+    if (bt_slot_channel[slot] == BT_CHANNEL_PAC) {
+        return bt_events_pac(events, &finger->tare, finger->round.pac, bt_slot_pac[slot] + 1u);
+    }
+    return 0;
+}
+
+void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_us, bt_msg_event *msg)
+{
+    bt_events_message(&finger->events, event, &finger->tare, t_us, msg);
+    msg->seq = finger->seq;
+    msg->finger = finger->index;
+    msg->slot = slot;
+}
+
 static void fall_silent(bt_finger *finger)
 {
     finger->present = false;
@@ -87,6 +111,7 @@ static void fall_silent(bt_finger *finger)
 void bt_finger_forget(bt_finger *finger)
 {
     bt_tare_reset(&finger->tare);
+    bt_events_reset(&finger->events);
     finger->answered = false;
 }
 

@@ -3,6 +3,7 @@
 #ifndef BIOTAC_FINGER_H
 #define BIOTAC_FINGER_H
 
+#include "events/events.h"
 #include "signal/round.h"
 #include "solve/pressure.h"
 #include "solve/results.h"
@@ -48,7 +49,8 @@ typedef struct {
     bt_pressure pressure;
     bt_lanes sent; // filtered counts when the last FRAME was sent
     bt_kept_wrench kept;
-    bool shed; // FRAMEs were left out for want of time since the last one
+    bt_events events; // kept up while somebody subscribes to them
+    bool shed;        // FRAMEs were left out for want of time since the last one
     bt_word_counts words;
 } bt_finger;
 
@@ -64,6 +66,14 @@ void bt_finger_begin(bt_finger *finger, uint32_t t_us, const bt_tare_settings *s
 // The word of one slot: 0..4095 or BT_INVALID_COUNT. Slots come in order; those left out are missing.
 // Returns true in the slot in which a resting finger is first touched, or in the next if that was left out.
 bool bt_finger_put(bt_finger *finger, uint8_t slot, uint16_t count);
+
+// The events that this word shows, a mask of 1 << BT_EVENT_KIND_*; `touched` is what bt_finger_put said of
+// it. Due where that is true, in slots of BT_FINGER_EVENT_SLOTS and in the slot that is watched (events.h).
+uint32_t bt_finger_events(bt_finger *finger, uint8_t slot, bool touched);
+void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_us, bt_msg_event *msg);
+
+// Of the 8th, 15th and 22nd PAC word.
+#define BT_FINGER_EVENT_SLOTS {14, 28, 42}
 
 // The round is over. False when no word of it was good: the sensor is absent, and nothing else of it
 // is to be read.

@@ -64,3 +64,64 @@ void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map
         memcpy(rest + 3, measures, sizeof measures);
     }
 }
+
+typedef struct {
+    uint8_t *next;
+    int64_t room;
+    int64_t told;
+} event_list;
+
+static void keep(event_list *list, uint32_t told, bt_finger *finger, uint8_t slot, uint32_t t_us)
+{
+    for (uint8_t kind = 0; told != 0; kind++, told >>= 1) {
+        bt_msg_event msg;
+        if (!(told & 1)) {
+            continue;
+        }
+        bt_finger_event(finger, kind, slot, t_us + slot * 1000000u / BT_SLOT_HZ, &msg);
+        if (list->told++ < list->room) {
+            bt_msg_event_pack(&msg, list->next);
+            list->next += BT_EVENT_BYTES;
+        }
+    }
+}
+
+int64_t bt_replay_events(bt_finger *finger, const bt_settings *settings, int64_t n, const uint16_t *words,
+                         const uint32_t *t_us, uint8_t *events, int64_t room)
+{
+    static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
+    bt_tare_settings tare_settings = bt_tare_settings_from(settings);
+    event_list list = {.next = events, .room = room};
+    for (int64_t k = 0; k < n; k++, words += BT_SLOTS) {
+        bt_finger_begin(finger, t_us[k], &tare_settings);
+        for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
+            bool touched = bt_finger_put(finger, slot, words[slot]);
+            bool due = memchr(pac_slot, slot, sizeof pac_slot) != NULL || slot == finger->events.watched;
+            if (touched || due) {
+                keep(&list, bt_finger_events(finger, slot, touched), finger, slot, t_us[k]);
+            }
+        }
+        (void)bt_finger_end(finger, &tare_settings);
+    }
+    return list.told;
+}
+
+int64_t bt_replay_pac(int64_t n, const uint16_t *pac, int held, uint8_t *slips, uint8_t *events, int64_t room)
+{
+    static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
+    bt_finger finger;
+    event_list list = {.next = events, .room = room};
+    bt_finger_reset(&finger, 0);
+    finger.events.touched = held != 0;
+    finger.tare.state = held ? BT_TARE_STATE_CONTACT : BT_TARE_STATE_REST;
+    for (int64_t k = 0; k < n; k++, pac += BT_PAC_PER_FRAME) {
+        finger.seq = (uint16_t)k;
+        memcpy(finger.round.pac, pac, sizeof finger.round.pac);
+        for (size_t p = 0; p < sizeof pac_slot; p++) {
+            uint32_t told = bt_finger_events(&finger, pac_slot[p], false);
+            keep(&list, told, &finger, pac_slot[p], (uint32_t)(k * BT_FRAME_MS * 1000));
+        }
+        slips[k] = finger.events.slips;
+    }
+    return list.told;
+}

@@ -17,4 +17,14 @@ int64_t bt_replay_row_bytes(void); // compared with the Python side's row when i
 void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map, int64_t n,
                const uint16_t *words, const uint32_t *t_us, uint8_t *rows);
 
+// The same words for their EVENTs, a finger of its own: EVENT payloads to events (room, BT_EVENT_BYTES).
+// Returns how many there were; beyond room they are counted and not written.
+int64_t bt_replay_events(bt_finger *finger, const bt_settings *settings, int64_t n, const uint16_t *words,
+                         const uint32_t *t_us, uint8_t *events, int64_t room);
+
+// Of PAC alone, (n, BT_PAC_PER_FRAME), of a finger that is held throughout, or not touched; t_us counts from
+// 0. slips (n): whether it slips at the end of each round.
+int64_t bt_replay_pac(int64_t n, const uint16_t *pac, int held, uint8_t *slips, uint8_t *events,
+                      int64_t room);
+
 #endif

@@ -77,8 +77,8 @@ _HOMES = {
     ".version": "__version__",
     ".wire.batches": "Batch LinkStats",
     ".wire.frames": "FRAME_DTYPE IDLE_DTYPE PAC_DTYPE Frame",
-    ".wire.messages_gen": "CalibrationState ForceModel FrameFlags PocWeights QuantityFlags Setting Status Tare "
-    "TareReason TareState Touch",
+    ".wire.messages_gen": "CalibrationState Event EventKind ForceModel FrameFlags PocWeights QuantityFlags Setting "
+    "Status Tare TareReason TareState Touch",
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
 

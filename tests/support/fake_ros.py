@@ -15,7 +15,12 @@ from typing import Any
 from rosbags.typesys import Stores, get_typestore
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
-USED = ("geometry_msgs/msg/PointStamped", "geometry_msgs/msg/WrenchStamped", "std_msgs/msg/UInt32")
+USED = (
+    "geometry_msgs/msg/PointStamped",
+    "geometry_msgs/msg/WrenchStamped",
+    "std_msgs/msg/String",
+    "std_msgs/msg/UInt32",
+)
 
 
 @dataclass

@@ -16,7 +16,8 @@ static bt_tare_settings tare_settings;
 static bt_gate gate;
 static bt_finger rest_front, press_front, rest_whole, press_whole, press_force, press_poc, press_sigma,
     press_lin;
-static bt_finger rest_five[BT_MAX_FINGERS], press_five[BT_MAX_FINGERS], rest_words;
+static bt_finger rest_five[BT_MAX_FINGERS], press_five[BT_MAX_FINGERS], rest_words, rest_events, press_events,
+    slip_events;
 static bench_map pooled, pooled_6, pooled_7, affine, sign_split, gated, conductance, scaled_population;
 static bt_msg_frame message;
 static bt_msg_frame sent;
@@ -132,6 +133,45 @@ static void all_words(const bt_solve_settings *settings)
     sink = bt_finger_end(&rest_words, &tare_settings);
 }
 
+// What EVENTs cost besides, of PAC that swings by so much.
+static void swing(bt_finger *finger, int counts)
+{
+    for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
+        finger->round.pac[k] = (uint16_t)(2038 + counts * ((k * 5 & 15) - 8) / 8);
+    }
+}
+
+static void events(bt_finger *finger)
+{
+    static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
+    uint32_t told = 0;
+    for (size_t k = 0; k < sizeof pac_slot; k++) {
+        told |= bt_finger_events(finger, pac_slot[k], false);
+    }
+    if (finger->events.watched != BT_EVENTS_NO_SLOT) {
+        told |= bt_finger_events(finger, finger->events.watched, false);
+    }
+    sink = told;
+}
+
+static void events_at_rest(const bt_solve_settings *settings)
+{
+    (void)settings;
+    events(&rest_events);
+}
+
+static void events_in_contact(const bt_solve_settings *settings)
+{
+    (void)settings;
+    events(&press_events);
+}
+
+static void events_slipping(const bt_solve_settings *settings)
+{
+    (void)settings;
+    events(&slip_events);
+}
+
 // A FRAME to bytes for the link, with the table's CRC: on an RP2040 the DMA makes it, in 1100 cycles less.
 static void framed(const bt_solve_settings *settings)
 {
@@ -206,6 +246,9 @@ const bench_scene bench_scenes[BENCH_SCENES] = {
     {"wrench map", "pooled, 7 axes", map_pooled_7},
     {"wrench map", "pooled, 3 axes, judged", map_opened},
     {"population map", "and Lin's, mixed", population},
+    {"events", "at rest", events_at_rest},
+    {"events", "in contact", events_in_contact},
+    {"events", "slipping", events_slipping},
     {"link", "44 words taken in, at rest", all_words},
     {"link", "FRAME packed, with CRC and COBS", framed},
 };
@@ -248,6 +291,16 @@ void bench_scenes_init(void)
     run(&press_front, press_count, 50);
     press_front.tare.noise.count2 = 400; // exact counts have none
     press_whole = press_lin = press_force = press_poc = press_sigma = press_front;
+    rest_events = rest_front;
+    press_events = slip_events = press_front;
+    sink = bt_finger_events(&press_events, 0, true);
+    sink = bt_finger_events(&slip_events, 0, true);
+    swing(&rest_events, 5);
+    swing(&press_events, 5);
+    swing(&slip_events, 200);
+    for (int k = 0; k < 110; k++) { // until it has landed
+        events(&slip_events);
+    }
     bt_finger finger = press_front;
     const bt_solve_settings settings = bt_solve_settings_from(&all);
     bt_finger_frame(&finger, &settings, 0, &sent);

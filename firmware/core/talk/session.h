@@ -83,8 +83,10 @@ typedef struct {
     bt_board_actions board;
     bt_deframer deframer;
 
-    uint8_t streams; // BT_STREAM_FLAG_*
-    uint8_t fingers; // bit mask of the fingers that START named
+    uint8_t streams;              // BT_STREAM_FLAG_*
+    uint8_t fingers;              // bit mask of the fingers that START named
+    uint8_t eventful;             // bit mask of those who tell EVENTs in this round
+    uint8_t events_due[BT_SLOTS]; // and of those for whom each slot may show one
     uint16_t keepalive_ms;
     uint32_t heard_us; // when the host last said anything
     uint32_t status_us;

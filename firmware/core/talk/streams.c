@@ -2,6 +2,8 @@
 
 #include "talk/sensors.h"
 
+#include <string.h>
+
 // How late a finger's FRAME may be, after its round's last slot, until something is left out. At full load
 // the last of five is begun 8 ms late; slots wait for 29 ms (BT_SLOT_RING).
 #define SIGMA_LATE_US      9000
@@ -14,8 +16,39 @@ static bool streams(const bt_session *session, const bt_finger *finger, uint8_t 
     return (session->streams & what) && (session->fingers >> finger->index & 1);
 }
 
+// Who begins knows nothing of what was before.
+static void begin_events(bt_session *session)
+{
+    static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
+    const uint8_t before = session->eventful;
+    uint8_t now = 0;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        const bool asked = session->finger[f].quantities & BT_QUANTITY_FLAG_EVENTS;
+        now = (uint8_t)(now | asked << f);
+    }
+    const bool streams = session->streams & (BT_STREAM_FLAG_FRAMES | BT_STREAM_FLAG_PAC);
+    now = streams ? now & session->fingers : 0;
+    if (now == before) {
+        return;
+    }
+    session->eventful = now;
+    memset(session->events_due, 0, sizeof session->events_due);
+    for (size_t k = 0; k < sizeof pac_slot; k++) {
+        session->events_due[pac_slot[k]] = now;
+    }
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_events *events = &session->finger[f].events;
+        if (now & ~before & 1 << f) {
+            bt_events_reset(events);
+        } else if (now >> f & 1 && events->watched != BT_EVENTS_NO_SLOT) {
+            session->events_due[events->watched] |= (uint8_t)(1u << f);
+        }
+    }
+}
+
 void bt_session_begin(bt_session *session, uint32_t t_us)
 {
+    begin_events(session);
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         bt_finger_begin(&session->finger[f], t_us, &session->tare[f]);
     }
@@ -38,13 +71,59 @@ static void send_touch(bt_session *session, const bt_finger *finger, uint8_t slo
     bt_session_send(session, BT_TOUCH_ID, payload);
 }
 
+static void send_event(bt_session *session, bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_us)
+{
+    uint8_t payload[BT_EVENT_BYTES];
+    bt_msg_event msg;
+    bt_finger_event(finger, event, slot, t_us, &msg);
+    bt_msg_event_pack(&msg, payload);
+    bt_session_send(session, BT_EVENT_ID, payload);
+}
+
+static void watch(bt_session *session, uint8_t finger, uint8_t before, uint8_t now)
+{
+    const uint8_t bit = (uint8_t)(1u << finger);
+    if (before != BT_EVENTS_NO_SLOT) {
+        session->events_due[before] &= (uint8_t)~bit;
+    }
+    if (now != BT_EVENTS_NO_SLOT) {
+        session->events_due[now] |= bit;
+    }
+}
+
+static void send_events(bt_session *session, uint8_t slot, uint32_t due, uint32_t touched, uint32_t t_us)
+{
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        if (!(due >> f & 1)) {
+            continue;
+        }
+        bt_finger *finger = &session->finger[f];
+        uint8_t watched = finger->events.watched;
+        uint32_t told = bt_finger_events(finger, slot, touched >> f & 1);
+        if (finger->events.watched != watched) {
+            watch(session, f, watched, finger->events.watched);
+        }
+        for (uint8_t event = 0; told != 0; event++, told >>= 1) {
+            if (told & 1) {
+                send_event(session, finger, event, slot, t_us);
+            }
+        }
+    }
+}
+
 void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_MAX_FINGERS], uint32_t t_us)
 {
+    uint32_t touched = 0; // bit mask
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         bt_sensors_word(session, (unsigned)f, count[f] != BT_INVALID_COUNT);
         if (bt_finger_put(&session->finger[f], slot, count[f])) {
+            touched |= 1u << f;
             send_touch(session, &session->finger[f], slot, t_us);
         }
+    }
+    uint32_t due = session->events_due[slot] | (touched & session->eventful);
+    if (due) {
+        send_events(session, slot, due, touched, t_us);
     }
 }
 

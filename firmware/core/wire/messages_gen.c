@@ -750,6 +750,46 @@ void bt_msg_touch_unpack(bt_msg_touch *msg, const uint8_t in[BT_TOUCH_BYTES])
     (void)at;
 }
 
+void bt_msg_event_pack(const bt_msg_event *msg, uint8_t out[BT_EVENT_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->seq, 2);
+    at = put(at, (uint32_t)msg->t_us, 4);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->slot, 1);
+    at = put(at, (uint32_t)msg->kind, 1);
+    at = put(at, (uint32_t)msg->tare_state, 1);
+    at = put(at, (uint32_t)msg->onset_us, 4);
+    at = put(at, (uint32_t)msg->energy_count2, 4);
+    at = put(at, (uint32_t)msg->peak_count, 2);
+    (void)at;
+}
+
+void bt_msg_event_unpack(bt_msg_event *msg, const uint8_t in[BT_EVENT_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 2);
+    msg->seq = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->t_us = (uint32_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->slot = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->kind = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->tare_state = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->onset_us = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->energy_count2 = (uint32_t)value;
+    at = get(at, &value, 2);
+    msg->peak_count = (uint16_t)value;
+    (void)at;
+}
+
 void bt_msg_hello_request_pack(const bt_msg_hello_request *msg, uint8_t out[BT_HELLO_REQUEST_BYTES])
 {
     uint8_t *at = out;
@@ -1326,6 +1366,8 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_IDLE_BYTES;
     case BT_TOUCH_ID:
         return BT_TOUCH_BYTES;
+    case BT_EVENT_ID:
+        return BT_EVENT_BYTES;
     case BT_HELLO_REQUEST_ID:
         return BT_HELLO_REQUEST_BYTES;
     case BT_START_ID:

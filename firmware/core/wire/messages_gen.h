@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0x04C2F5F2u
+#define BT_SCHEMA_HASH 0x74DE99CEu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
@@ -88,6 +88,15 @@ enum bt_calibration_state {
     BT_CALIBRATION_STATE_OTHER_SENSOR = 2, // kept, but made for another sensor than the one read at start and there since: the settings, or gains, hold
 };
 
+// What an EVENT tells (SPEC.md, Events).
+enum bt_event_kind {
+    BT_EVENT_KIND_TOUCH = 1, // the sample of this slot shows that something touches a resting finger
+    BT_EVENT_KIND_LIFT = 2, // the sample of this slot shows that the finger is let go; one for each TOUCH
+    BT_EVENT_KIND_JOLT = 3, // dynamic pressure jolts: a tap on the finger or on what it holds, a quick squeeze, or a slip's beginning
+    BT_EVENT_KIND_SLIP = 4, // what is held slips: dynamic pressure vibrates to and fro
+    BT_EVENT_KIND_STUCK = 5, // the slip is over; one for each SLIP
+};
+
 // State of one frame's results.
 #define BT_FRAME_FLAG_CONTACT (1u << 0) // the finger is touched
 #define BT_FRAME_FLAG_UNTARED (1u << 1) // no tare yet: PoC, force and torque are invalid
@@ -132,7 +141,8 @@ enum bt_calibration_state {
 #define BT_QUANTITY_FLAG_REST_FRAMES (1u << 4) // a FRAME in every round; without it an untouched finger sends IDLE heartbeats
 #define BT_QUANTITY_FLAG_TOUCH (1u << 5) // TOUCH messages
 #define BT_QUANTITY_FLAG_PRESSURE (1u << 6) // filtered static pressure, and the force that it tells of a calibrated finger
-#define BT_QUANTITY_FLAGS 0x7Fu // all there are
+#define BT_QUANTITY_FLAG_EVENTS (1u << 7) // EVENT messages, with FRAMEs or without
+#define BT_QUANTITY_FLAGS 0xFFu // all there are
 
 enum bt_setting {
     BT_SETTING_POC_WEIGHTS = 1, // [enum poc_weights]
@@ -446,6 +456,23 @@ typedef struct {
 void bt_msg_touch_pack(const bt_msg_touch *msg, uint8_t out[BT_TOUCH_BYTES]);
 void bt_msg_touch_unpack(bt_msg_touch *msg, const uint8_t in[BT_TOUCH_BYTES]);
 
+// Something has happened to a finger, told in the slot of the sample that shows it. Sent to who subscribes to EVENTS, while a stream of FRAMEs or PAC is on.
+#define BT_EVENT_ID 0x17
+#define BT_EVENT_BYTES 20
+typedef struct {
+    uint16_t seq; // [1] of the round that is under way
+    uint32_t t_us; // [us] device time at which the slot was sampled
+    uint8_t finger; // [1] chip select index
+    uint8_t slot; // [1] which slot of the round
+    uint8_t kind; // [enum event_kind] what happened; a host passes over one that it does not know
+    uint8_t tare_state; // [enum tare_state] after the round before
+    uint32_t onset_us; // [us] device time at which it began: of SLIP and STUCK when the slip began, of JOLT when dynamic pressure left its noise, else t_us
+    uint32_t energy_count2; // [count^2] of TOUCH and LIFT: sum of squares of the filtered signals, from the latest word of every electrode; invalid of others
+    uint16_t peak_count; // [count] of JOLT and SLIP: the most that dynamic pressure changed by within 3.6 ms since it began; 0xFFFF of others
+} bt_msg_event;
+void bt_msg_event_pack(const bt_msg_event *msg, uint8_t out[BT_EVENT_BYTES]);
+void bt_msg_event_unpack(bt_msg_event *msg, const uint8_t in[BT_EVENT_BYTES]);
+
 // First message of a host. Allowed at any time.
 #define BT_HELLO_REQUEST_ID 0x80
 #define BT_HELLO_REQUEST_BYTES 5
@@ -737,6 +764,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_SENSOR_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(tare_state, u8, 1) X(tare_reason, u8, 1) X(tare_age_ms, u32, 1) X(noise_count2, u32, 1) X(words_good, u32, 1) X(words_stuck, u32, 1) X(words_error, u32, 1) X(words_parity, u32, 1) X(last_error_word, u16, 1)
 #define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1)
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
+#define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1)
 #define BT_HELLO_REQUEST_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1)
 #define BT_START_FIELDS(X) X(req_id, u8, 1) X(streams, u8, 1) X(fingers, u8, 1) X(keepalive_ms, u16, 1)
 #define BT_STOP_FIELDS(X) X(req_id, u8, 1)
@@ -763,7 +791,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_CLEAR_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_HOLD_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
 #define BT_RELEASE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release)
 #endif
 
 #endif

@@ -23,14 +23,18 @@ from ..clock.stamps import Stamps
 from ..errors import InputError
 from ..export.columns import COLUMNS, PAC_COLUMNS
 from ..hand.hand import Hand
+from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch
+from ..wire.counters import nearest
+from ..wire.events import kind_name
 from ..wire.fields import Field
 from ..wire.frames import StructArray
 from ..wire.identity import serial_text
 from ..wire.sensor_gen import SLOTS
 
 TYPE = "Tactile"
+EVENTS = " events"
 _SENT = ("force_n", "torque_nmm", "poc_mm", "flags", "counts", "pdc", "tac", "tdc")
 _FRAME_COLUMNS = tuple(column for name in _SENT for column in COLUMNS if column.name == name)
 _PAC_COLUMN = PAC_COLUMNS[-1]
@@ -42,7 +46,9 @@ class Outlet:
 
     ``BioTac finger0``: a sample a round, 100 a second, of force (N), torque (N*mm), point of contact (mm), flags,
     counts of E1..E19, PDC, TAC and TDC; NaN and 65535 where invalid, as in exports. ``BioTac finger0 PAC``: 2200 a
-    second, counts. All are double64; labels, units and meanings stand in the streams' descriptions.
+    second, counts. ``BioTac finger0 events``: a marker, its kind's name (EventKind), for each EVENT, which are there
+    when the hand is subscribed to them. All others are double64; labels, units and meanings stand in the streams'
+    descriptions.
 
     Stamps are device times on ``local_clock()``, by ``hand.clock``: of a frame the beginning of its round, of PAC
     each sample's own. Where the clock knows nothing (a simulated board's time is none), a batch is stamped by its
@@ -62,6 +68,8 @@ class Outlet:
         for finger in hand.fingers:
             self._add(finger, "", _FRAME_COLUMNS, rounds_hz)
             self._add(finger, " PAC", (_PAC_COLUMN,), rounds_hz * _PAC_PER_ROUND)
+        for finger in hand.fingers:
+            self._add_markers(finger)
 
     def push(self, batch: Batch) -> None:
         """Send what ``batch`` holds. Raises DeviceLostError when the board no longer answers."""
@@ -74,6 +82,12 @@ class Outlet:
             pac = batch.pac[batch.pac["finger"] == finger]
             if len(pac):
                 self._push(finger, " PAC", pac["pac"].reshape(-1, 1), pac_t_us(pac["t_us"]).ravel())
+
+        for event in batch.messages:
+            if isinstance(event, wire.Event) and (event.finger, EVENTS) in self._outlets:
+                t_us = np.array([nearest(event.t_us, batch.last_t_us() or event.t_us, 32)], np.float64)
+                (stamp_s,) = self._stamps.of(t_us, (event.finger, EVENTS)).tolist()
+                self._outlets[event.finger, EVENTS].push_sample([kind_name(event)], stamp_s)
 
     def close(self) -> None:
         """Take the streams off the network. Safe to call twice."""
@@ -103,6 +117,14 @@ class Outlet:
                 channel.append_child_value(name, value)
         self.infos.append(info)
         self._outlets[finger, suffix] = lsl.StreamOutlet(info)
+
+    def _add_markers(self, finger: int) -> None:
+        lsl = self._lsl
+        source = f"biotac-{serial_text(self._hand.info)}-{finger}-events"
+        name = f"BioTac finger{finger}{EVENTS}"
+        info = lsl.StreamInfo(name, "Markers", 1, lsl.IRREGULAR_RATE, lsl.cf_string, source)
+        self.infos.append(info)
+        self._outlets[finger, EVENTS] = lsl.StreamOutlet(info)
 
     def _push(self, finger: int, suffix: str, values: NDArray[Any], t_us: NDArray[np.float64]) -> None:
         stamps_s = self._stamps.of(t_us, (finger, suffix))

@@ -20,11 +20,13 @@ from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
 from ..wire.native import ffi, lib
 from .board_map import BoardMap
 from .compiled import Settings, board_settings, default_settings
+from .events import EVENT_DTYPE
 from .map_versions import opened
 
 ROUND_US = 10_000
 NO_TOUCH = 255
 TARE_UNKNOWN_Q16 = 0xFFFFFFFF
+_EVENTS_A_ROUND = 24  # more than there can be: a touch and a lift in every other slot
 
 #: What Finger.feed returns: the fields of a FRAME message as the board sends them (protocol/MESSAGES.md:
 #: integers, tare in 1/16 count, invalid marks), then ``present`` (0: no word was good, the board sends nothing
@@ -111,6 +113,33 @@ class Finger:
         jump of 90 ms and more is a silence, in which drift went on. Raises ValueError for other shapes, types and
         ranges, before any round is taken.
         """
+        return self._run(*self._words_of(counts, pdc, tac, tdc, pac, t_us))
+
+    def events(
+        self, counts: Any, pdc: Any = None, tac: Any = None, tdc: Any = None, pac: Any = None, *, t_us: Any = None
+    ) -> StructArray:
+        """Give the finger n rounds, as ``feed`` does, and return the EVENTs that a board tells of them.
+
+        EVENT_DTYPE (k,) of biotac.core.events. The rounds are taken: their frames are not computed.
+        """
+        words, times = self._words_of(counts, pdc, tac, tdc, pac, t_us)
+        events = np.zeros(_EVENTS_A_ROUND * len(words), EVENT_DTYPE)
+        if not len(words):
+            return events
+        told = lib.bt_replay_events(
+            self._finger,
+            self._settings,
+            len(words),
+            ffi.from_buffer("uint16_t[]", words),
+            ffi.from_buffer("uint32_t[]", times),
+            ffi.from_buffer("uint8_t[]", events),
+            len(events),
+        )
+        return events[:told]
+
+    def _words_of(
+        self, counts: Any, pdc: Any, tac: Any, tdc: Any, pac: Any, t_us: Any
+    ) -> tuple[NDArray[np.uint16], NDArray[np.uint32]]:
         electrodes = _words("counts", counts, None, _ELECTRODES)
         n = len(electrodes)
         words = np.full((n, len(_SLOTS)), wire.INVALID_COUNT, np.uint16)
@@ -120,7 +149,7 @@ class Finger:
                 words[:, name == _SLOTS] = _words(name.lower(), channel, n, None)[:, None]
         if pac is not None:
             words[:, _SLOTS == "PAC"] = _words("pac", pac, n, int((_SLOTS == "PAC").sum()))
-        return self._run(words, self._times(t_us, n))
+        return words, self._times(t_us, n)
 
     def _times(self, t_us: Any, n: int) -> NDArray[np.uint32]:
         times = self._next_us + ROUND_US * np.arange(n, dtype=np.int64) if t_us is None else np.asarray(t_us)

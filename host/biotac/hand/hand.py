@@ -215,6 +215,8 @@ class Hand:
     want = _of("_streams", Streams.want)
     on_batch = _of("_streams", Streams.on_batch)
     on_touch = _of("_streams", Streams.on_touch)
+    on_event = _of("_streams", Streams.on_event)
+    on_slip = _of("_streams", Streams.on_slip)
     on_tare = _of("_streams", Streams.on_tare)
     on_status = _of("_streams", Streams.on_status)
     on_gap = _of("_streams", Streams.on_gap)

@@ -31,6 +31,9 @@ from .views import Fingers, Latest
 #: What a FRAME can say of a contact, for Hand.subscribe.
 RESULTS = wire.QuantityFlags.POC | wire.QuantityFlags.FORCE | wire.QuantityFlags.TORQUE | wire.QuantityFlags.PRESSURE
 AT_FIRST = RESULTS | wire.QuantityFlags.REST_FRAMES
+EVENTS_SINCE_MINOR = 5
+# What a board tells of only when somebody is called with it.
+_TOLD_OF = {wire.Touch: wire.QuantityFlags.TOUCH, wire.Event: wire.QuantityFlags.EVENTS}
 # A streaming board sends a status every second by default; three missing ones are a dead link.
 SILENCE_S = 3.0
 # A board whose live host has died stops streaming after this long.
@@ -60,7 +63,7 @@ class Streams:
         self._pulling = 0
         self._queues: list[BatchQueue] = []  # for others, such as biotac.aio
         self._skipped = [0, 0]  # batches and frames, of queues that are closed
-        self._hints = False  # somebody waits for TOUCH or TARE
+        self._hints = False  # somebody waits for TOUCH, EVENT or TARE
         self._wants: Wants | None = None
         self._quantities = dict.fromkeys(range(MAX_SENSORS), AT_FIRST)
         self._started: wire.Start | None = None
@@ -153,13 +156,16 @@ class Streams:
         What is left out is not computed; it arrives as NaN, under the flag NOT_ASKED. Without REST_FRAMES
         an untouched finger sends heartbeats (``Batch.idle``) in place of frames, without loss of a touch:
         a frame comes as soon as the signals move. At first it is POC | FORCE | TORQUE | PRESSURE | REST_FRAMES;
-        the choice lasts until the board restarts. A board that knows no PRESSURE is not asked for it.
+        the choice lasts until the board restarts. A board that knows no PRESSURE or EVENTS is not asked
+        for them.
         """
         asked = quantities
         if self._board.info.wire_minor < PRESSURE_SINCE_MINOR:
             asked &= ~wire.QuantityFlags.PRESSURE
-        if self._callbacks.wants(wire.Touch):
-            asked |= wire.QuantityFlags.TOUCH
+        if self._board.info.wire_minor < EVENTS_SINCE_MINOR:
+            asked &= ~wire.QuantityFlags.EVENTS
+        for kind, quantity in _TOLD_OF.items():
+            asked |= quantity if self._callbacks.wants(kind) else wire.QuantityFlags(0)
         mask = self._latest.mask(fingers)
         self._board.tell(wire.Subscribe(0, mask, int(asked)), lasting=("subscription", mask))
         self._quantities.update({f: asked for f in range(MAX_SENSORS) if mask >> f & 1})
@@ -167,13 +173,13 @@ class Streams:
     def want(self, *names: str, rest: bool = True, rate_hz: float | None = None) -> None:
         """Choose what the board computes and sends.
 
-        Names are force, poc, torque, pressure, sigma, touch, raw, pdc, temperature and pac. Electrodes' raw counts,
-        pdc and temperature travel in every FRAME, so each of them asks for frames and no more. Status always comes,
-        it is the link's sign of life, whether ``status`` is named or not. With ``rest=False`` an untouched finger
-        sends heartbeats in place of frames. ``rate_hz``, above 0 to 100, takes every n-th frame with n = 100 /
+        Names are force, poc, torque, pressure, sigma, touch, events, raw, pdc, temperature and pac. Electrodes' raw
+        counts, pdc and temperature travel in every FRAME, so each of them asks for frames and no more. Status always
+        comes, it is the link's sign of life, whether ``status`` is named or not. With ``rest=False`` an untouched
+        finger sends heartbeats in place of frames. ``rate_hz``, above 0 to 100, takes every n-th frame with n = 100 /
         rate_hz rounded, by seq: on this side only, for boards cannot leave frames out; a recording has them all, and
-        PAC and messages are not thinned. Holds for all fingers until the next ``want``; what ``on_touch`` and
-        ``on_tare`` need comes besides. Raises InputError for a name or rate that there is not.
+        PAC and messages are not thinned. Holds for all fingers until the next ``want``; what ``on_touch``,
+        ``on_event`` and ``on_tare`` need comes besides. Raises InputError for a name or rate that there is not.
         """
         wants = Wants.of(names, rest=rest, rate_hz=rate_hz)
         self.subscribe(wants.quantities)
@@ -298,8 +304,29 @@ class Streams:
 
         Subscribes every finger to TOUCH besides what it is subscribed to.
         """
-        unsubscribe = self._on(wire.Touch, fn)
-        for quantities in {q for q in self._quantities.values() if wire.QuantityFlags.TOUCH not in q}:
+        return self._on_told(wire.Touch, fn)
+
+    def on_event(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
+        """Call ``fn`` with every EVENT: touch, lift, jolt, slip and what ends it (EventKind), as soon as it is told.
+
+        Subscribes every finger to EVENTS besides what it is subscribed to. Raises InputError for a board that knows
+        none.
+        """
+        info = self._board.info
+        if info.wire_minor < EVENTS_SINCE_MINOR:
+            raise InputError(
+                f"the board speaks wire {info.wire_major}.{info.wire_minor}: expected 1.{EVENTS_SINCE_MINOR}, which "
+                "has events; update it with `biotac flash`"
+            )
+        return self._on_told(wire.Event, fn)
+
+    def on_slip(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
+        """Call ``fn`` when what a finger holds begins to slip: the events of ``on_event`` that are SLIP."""
+        return self.on_event(lambda event: fn(event) if event.kind == wire.EventKind.SLIP else None)
+
+    def _on_told(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
+        unsubscribe = self._on(kind, fn)
+        for quantities in {q for q in self._quantities.values() if _TOLD_OF[kind] not in q}:
             mask = sum(1 << f for f, q in self._quantities.items() if q == quantities)
             self.subscribe(quantities, fingers=mask)
         self._hint()

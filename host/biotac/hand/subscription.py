@@ -16,6 +16,7 @@ QUANTITIES = {
     "pressure": QuantityFlags.PRESSURE,
     "sigma": QuantityFlags.SIGMA,
     "touch": QuantityFlags.TOUCH,
+    "events": QuantityFlags.EVENTS,
 }
 IN_EVERY_FRAME = ("raw", "pdc", "temperature")
 NAMES = (*QUANTITIES, *IN_EVERY_FRAME, "pac", "status")

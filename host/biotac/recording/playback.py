@@ -25,6 +25,7 @@ _STREAM_OF = {
     wire.Idle.ID: wire.StreamFlags.FRAMES,
     wire.Tare.ID: wire.StreamFlags.FRAMES,
     wire.Touch.ID: wire.StreamFlags.FRAMES,
+    wire.Event.ID: wire.StreamFlags.FRAMES | wire.StreamFlags.PAC,
     wire.Pac.ID: wire.StreamFlags.PAC,
     wire.Status.ID: wire.StreamFlags.STATUS,
     wire.SensorStatus.ID: wire.StreamFlags.STATUS,

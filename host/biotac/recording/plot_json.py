@@ -10,6 +10,7 @@ import json
 from typing import Any
 
 from ..wire import messages_gen as wire
+from ..wire.events import INVALID_U32, event_age_s, kind_name
 from . import layout
 
 _NO_TARE = 0xFFFFFFFF
@@ -75,7 +76,18 @@ TARE_SCHEMA = {
         "tare": {"type": "array", "items": {"type": "number"}, "description": "E1..E19, count; null where unknown"},
     },
 }
-SCHEMAS = {"results": RESULTS_SCHEMA, "counts": COUNTS_SCHEMA, "tare": TARE_SCHEMA}
+EVENT_SCHEMA = {
+    "title": "biotac.Event",
+    "type": "object",
+    "properties": _HEAD
+    | {
+        "kind": {"type": "string", "description": "enum event_kind in MESSAGES.md"},
+        "age_s": _number("how long ago it began, s"),
+        "energy": _number("of a touch or lift: sum of squares of the signals, count^2"),
+        "peak": _number("of a jolt or slip: the most that dynamic pressure changed by within 3.6 ms, count"),
+    },
+}
+SCHEMAS = {"results": RESULTS_SCHEMA, "counts": COUNTS_SCHEMA, "tare": TARE_SCHEMA, "events": EVENT_SCHEMA}
 
 
 def encoded(body: dict[str, Any], finger: int, seq: int, stamp_ns: int) -> bytes:
@@ -123,6 +135,19 @@ def tare_change(tare: wire.Tare) -> dict[str, Any]:
         "state": _name(wire.TareState, tare.tare_state),
         "tare": [None if value == _NO_TARE else round(value / 65536, 4) for value in tare.tare_q16],
     }
+
+
+def event(told: wire.Event) -> dict[str, Any]:
+    """What an EVENT message says, what is invalid left out."""
+    body: dict[str, Any] = {
+        "kind": kind_name(told),
+        "age_s": event_age_s(told),
+    }
+    if told.energy_count2 != INVALID_U32:
+        body["energy"] = told.energy_count2
+    if told.peak_count != wire.INVALID_COUNT:
+        body["peak"] = told.peak_count
+    return body
 
 
 def _count_list(values: Any) -> list[int | None]:

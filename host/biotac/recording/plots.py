@@ -64,10 +64,13 @@ class Plots:
         messages = [*_results(batch, self._thinned("results", batch.frames))]
         messages += _contacts(batch, self._thinned("contact", batch.frames))
         messages += _counts(batch, self._thinned("counts", batch.frames), self._thinned("pac", batch.pac))
-        for tare in batch.messages:
-            if isinstance(tare, wire.Tare):
-                t_us = decoder.unwrap_t_us(tare.t_us)
-                messages.append(_json("tare", tare.finger, t_us, tare.seq, plot_json.tare_change(tare)))
+        for told in batch.messages:
+            if isinstance(told, wire.Tare):
+                t_us = decoder.unwrap_t_us(told.t_us)
+                messages.append(_json("tare", told.finger, t_us, told.seq, plot_json.tare_change(told)))
+            elif isinstance(told, wire.Event):
+                t_us = decoder.unwrap_t_us(told.t_us)
+                messages.append(_json("events", told.finger, t_us, told.seq, plot_json.event(told)))
         messages.sort(key=lambda message: message.t_us)
         stamps = self._stamps(np.array([message.t_us for message in messages], np.int64))
         for message, stamp_ns in zip(messages, np.maximum(stamps, 0).tolist(), strict=True):

@@ -52,7 +52,7 @@ class States:
     ``contact_mm`` (n, 3) lies on the core surface; ``force_n`` (n,) >= 0 is the normal force, 0 for
     no contact; ``shear_n`` (n, 3) is tangential; ``torsion_nmm`` (n,) is about the outward normal;
     ``tip_radius_mm`` (n,) is half the width of the flat that presses; ``warm_c`` (n,) is the
-    temperature above 30 C.
+    temperature above 30 C. ``slip_mm_s`` (n,) is how fast the surface slides over the skin; None: nowhere.
     """
 
     contact_mm: Floats
@@ -61,6 +61,7 @@ class States:
     torsion_nmm: Floats
     tip_radius_mm: Floats
     warm_c: Floats
+    slip_mm_s: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.force_n)

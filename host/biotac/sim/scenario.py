@@ -15,6 +15,7 @@ hold           keep everything as it is
 shear          ``shear_n = [x, y]``: tangential force to the tip and to E11's side
 twist          ``torsion_nmm``: about the outward normal
 slide          ``to = "E13"`` or ``to_mm = [x, y]``
+slip           ``mm_s``: what touches slides over the skin, as long as the step lasts; the contact stays where it is
 temperature    ``celsius``; contacts stay
 =============  ========================================================================
 
@@ -40,6 +41,7 @@ FLAT_MM = 7.0  # numerics.md 3.1: a flat surface leaves a footprint of 3.5 mm ra
 FORCE_MAX_N = 50.0
 SHEAR_MAX_N = 20.0
 TORSION_MAX_NMM = 100.0
+SLIP_MAX_MM_S = 200.0
 SEED_MAX = 2**31 - 1
 FAULTS_MAX_S = 36_000.0  # all together; what they take to play goes by it
 
@@ -60,6 +62,7 @@ STEP_KEYS: dict[str, tuple[str, ...]] = {
     "shear": ("shear_n",),
     "twist": ("torsion_nmm",),
     "slide": ("to", "to_mm"),
+    "slip": ("mm_s",),
     "temperature": ("celsius",),
 }
 
@@ -209,6 +212,11 @@ def _move(step: Table, do: str, track: Track, seconds: float, finger: int) -> No
     if do == "shear":
         x_n, y_n = step.pair("shear_n", SHEAR_MAX_N, "N")
         pose = replace(pose, shear_x_n=x_n, shear_y_n=y_n)
+    elif do == "slip":
+        slipping = replace(pose, slip_mm_s=step.number("mm_s", 0.1, SLIP_MAX_MM_S, "mm/s"))
+        track.ramp(seconds, slipping, start=slipping)
+        track.pose = pose
+        return
     elif do == "twist":
         torsion = step.number("torsion_nmm", -TORSION_MAX_NMM, TORSION_MAX_NMM, "N mm")
         pose = replace(pose, torsion_nmm=torsion)

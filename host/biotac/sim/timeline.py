@@ -17,7 +17,8 @@ class Pose:
 
     ``x_mm``, ``y_mm`` place the contact on the ventral surface; ``shear_x_n`` and ``shear_y_n`` are
     tangential, towards the tip and towards E11's side; ``torsion_nmm`` is about the outward normal;
-    ``tip_mm`` is the width of the flat that presses. ``force_n`` = 0: nothing touches.
+    ``tip_mm`` is the width of the flat that presses; ``slip_mm_s`` is how fast it slides over the skin.
+    ``force_n`` = 0: nothing touches.
     """
 
     x_mm: float = 0.0
@@ -28,12 +29,14 @@ class Pose:
     torsion_nmm: float = 0.0
     tip_mm: float = 0.0
     celsius: float = REST_CELSIUS
+    slip_mm_s: float = 0.0
 
     def row(self) -> list[float]:
         """As numbers, in field order."""
         return [
             self.x_mm, self.y_mm, self.force_n, self.shear_x_n, self.shear_y_n,
             self.torsion_nmm, self.tip_mm, self.celsius,
+            self.slip_mm_s,
         ]  # fmt: skip
 
     def released(self) -> Pose:
@@ -80,4 +83,5 @@ class Track:
             torsion_nmm=np.where(touched, pose[:, 5], 0.0),
             tip_radius_mm=pose[:, 6] / 2.0,
             warm_c=pose[:, 7] - REST_CELSIUS,
+            slip_mm_s=np.where(touched, pose[:, 8], 0.0),
         )

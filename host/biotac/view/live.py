@@ -31,7 +31,7 @@ class LivePlayer:
         self._hand = open_hand(port, pace=1.0)
         try:
             # An earlier program may have left the board with another choice: the page shows all of it.
-            self._hand.subscribe(RESULTS | wire.QuantityFlags.REST_FRAMES)
+            self._hand.subscribe(RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags.EVENTS)
         except BaseException:
             self._hand.close()
             raise

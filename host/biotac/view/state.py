@@ -15,12 +15,15 @@ from typing import Any
 
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
+from ..wire.counters import nearest
+from ..wire.events import kind_name
 from .player import Player
 from .rows import compact, frame_rows, pac_rows
 
 KEPT_ROWS = 300  # of each kind: 0.6 s of five fingers, more than a picture is ever late
 HEALTH_S = 0.25
 RATE_S = 2.0
+MARKS = 60  # more than ten seconds of plots can show
 
 
 class Ring:
@@ -75,6 +78,7 @@ class Health:
     status: dict[str, int] = field(default_factory=dict)
     fingers: dict[int, dict[str, Any]] = field(default_factory=dict)
     recording: dict[str, Any] | None = None
+    events: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=MARKS))  # marks, oldest first
 
 
 class State:
@@ -113,6 +117,7 @@ class State:
             self._pac.clear()
             self._health.board, self._health.live = player.board, player.live
             self._health.status, self._health.fingers = {}, {}
+            self._health.events.clear()
             self._arrived.clear()
 
     def take(self, batch: Batch, player: Player) -> None:
@@ -124,7 +129,7 @@ class State:
             self._pac.extend(pac)
             self._arrived.append((now_s, len(batch.frames)))
             for message in batch.messages:
-                self._take_message(message)
+                self._take_message(message, batch.last_t_us() or 0)
             for finger, t_us in zip(batch.frames["finger"].tolist(), batch.frames["t_us"].tolist(), strict=True):
                 self._finger(finger)["t_us"] = t_us
             if now_s >= self._health_due_s:
@@ -138,7 +143,7 @@ class State:
     def _finger(self, finger: int) -> dict[str, Any]:
         return self._health.fingers.setdefault(finger, {"present": 1})
 
-    def _take_message(self, message: Any) -> None:
+    def _take_message(self, message: Any, now_us: int) -> None:
         if isinstance(message, wire.Status):
             self._health.status = asdict(message)
         elif isinstance(message, wire.SensorStatus):
@@ -147,6 +152,10 @@ class State:
                 status_t_us=message.t_us,
                 t_us=message.t_us,
             )
+        elif isinstance(message, wire.Event):
+            t_us, name = nearest(message.t_us, now_us), kind_name(message).lower()
+            self._health.events.append({"finger": message.finger, "t_us": t_us, "name": name})
+            self._health_due_s = 0.0  # told at once
         elif isinstance(message, wire.Tare):
             self._finger(message.finger).update(
                 tare_state=message.tare_state, tare_reason=message.reason, tare_age_ms=0, status_t_us=message.t_us
@@ -163,6 +172,7 @@ class State:
 
     def _publish(self) -> None:
         health = asdict(self._health)
+        health["events"] = list(self._health.events)
         health["fingers"] = [tared(finger, facts) for finger, facts in sorted(self._health.fingers.items())]
         self._health_text = compact(health)
         self._health_number += 1

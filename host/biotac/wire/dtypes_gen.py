@@ -202,6 +202,19 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("energy_count2", "<u4"),
         ]
     ),
+    wire.Event.ID: np.dtype(
+        [
+            ("seq", "<u2"),
+            ("t_us", "<u4"),
+            ("finger", "u1"),
+            ("slot", "u1"),
+            ("kind", "u1"),
+            ("tare_state", "u1"),
+            ("onset_us", "<u4"),
+            ("energy_count2", "<u4"),
+            ("peak_count", "<u2"),
+        ]
+    ),
     wire.HelloRequest.ID: np.dtype(
         [
             ("req_id", "u1"),

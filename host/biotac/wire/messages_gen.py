@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0x04C2F5F2
+SCHEMA_HASH = 0x74DE99CE
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -103,6 +103,16 @@ class CalibrationState(IntEnum):
     OTHER_SENSOR = 2  # kept, but made for another sensor than the one read at start and there since: the settings, or gains, hold
 
 
+class EventKind(IntEnum):
+    """What an EVENT tells (SPEC.md, Events)."""
+
+    TOUCH = 1  # the sample of this slot shows that something touches a resting finger
+    LIFT = 2  # the sample of this slot shows that the finger is let go; one for each TOUCH
+    JOLT = 3  # dynamic pressure jolts: a tap on the finger or on what it holds, a quick squeeze, or a slip's beginning
+    SLIP = 4  # what is held slips: dynamic pressure vibrates to and fro
+    STUCK = 5  # the slip is over; one for each SLIP
+
+
 class FrameFlags(IntFlag):
     """State of one frame's results."""
 
@@ -153,6 +163,7 @@ class QuantityFlags(IntFlag):
     REST_FRAMES = 1 << 4  # a FRAME in every round; without it an untouched finger sends IDLE heartbeats
     TOUCH = 1 << 5  # TOUCH messages
     PRESSURE = 1 << 6  # filtered static pressure, and the force that it tells of a calibrated finger
+    EVENTS = 1 << 7  # EVENT messages, with FRAMEs or without
 
 
 ERROR_DOC: dict[int, str] = {
@@ -226,6 +237,15 @@ CALIBRATION_STATE_DOC: dict[int, str] = {
 }
 
 
+EVENT_KIND_DOC: dict[int, str] = {
+    1: "the sample of this slot shows that something touches a resting finger",
+    2: "the sample of this slot shows that the finger is let go; one for each TOUCH",
+    3: "dynamic pressure jolts: a tap on the finger or on what it holds, a quick squeeze, or a slip's beginning",
+    4: "what is held slips: dynamic pressure vibrates to and fro",
+    5: "the slip is over; one for each SLIP",
+}
+
+
 FRAME_FLAG_DOC: dict[int, str] = {
     1: "the finger is touched",
     2: "no tare yet: PoC, force and torque are invalid",
@@ -272,6 +292,7 @@ QUANTITY_FLAG_DOC: dict[int, str] = {
     16: "a FRAME in every round; without it an untouched finger sends IDLE heartbeats",
     32: "TOUCH messages",
     64: "filtered static pressure, and the force that it tells of a calibrated finger",
+    128: "EVENT messages, with FRAMEs or without",
 }
 
 
@@ -1083,6 +1104,54 @@ class Touch:
 
 
 @dataclass(frozen=True, slots=True)
+class Event:
+    """Something has happened to a finger, told in the slot of the sample that shows it. Sent to who subscribes to EVENTS, while a stream of FRAMEs or PAC is on."""
+
+    seq: int
+    t_us: int
+    finger: int
+    slot: int
+    kind: int
+    tare_state: int
+    onset_us: int
+    energy_count2: int
+    peak_count: int
+
+    ID: ClassVar[int] = 0x17
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBBBBIIH")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 20 bytes."""
+        return self.STRUCT.pack(
+            self.seq,
+            self.t_us,
+            self.finger,
+            self.slot,
+            self.kind,
+            self.tare_state,
+            self.onset_us,
+            self.energy_count2,
+            self.peak_count,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Event:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4],
+            v[5],
+            v[6],
+            v[7],
+            v[8],
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class HelloRequest:
     """First message of a host. Allowed at any time."""
 
@@ -1817,7 +1886,7 @@ class Release:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -1835,6 +1904,7 @@ MESSAGES: dict[int, type[Any]] = {
     SensorStatus.ID: SensorStatus,
     Idle.ID: Idle,
     Touch.ID: Touch,
+    Event.ID: Event,
     HelloRequest.ID: HelloRequest,
     Start.ID: Start,
     Stop.ID: Stop,

@@ -48,7 +48,8 @@ def test_every_sample_arrives_at_its_device_time_on_lsls_clock(inlet, monkeypatc
     monkeypatch.setattr("biotac.clock.stamps.time", types.SimpleNamespace(monotonic=lambda: 70.0))
     with biotac.open("sim:shear.toml?fingers=2&seconds=3") as hand, Outlet(hand) as outlet:
         names = [info.name() for info in outlet.infos]
-        assert names == ["BioTac finger0", "BioTac finger0 PAC", "BioTac finger1", "BioTac finger1 PAC"]
+        assert names[:4] == ["BioTac finger0", "BioTac finger0 PAC", "BioTac finger1", "BioTac finger1 PAC"]
+        assert names[4:] == ["BioTac finger0 events", "BioTac finger1 events"]
         frames_in, pac_in = inlet(outlet.infos[2]), inlet(outlet.infos[3])
         batch = hand.read_batch(10.0)
         frames = batch.frames[batch.frames["finger"] == 1]
@@ -71,7 +72,7 @@ def test_every_sample_arrives_at_its_device_time_on_lsls_clock(inlet, monkeypatc
 
 def test_the_description_names_channels_units_and_rate(inlet) -> None:
     with biotac.open("sim:press.toml?seconds=1") as hand, Outlet(hand) as outlet:
-        info, pac = (inlet(i).info(timeout=PATIENCE_S) for i in outlet.infos)
+        info, pac = (inlet(i).info(timeout=PATIENCE_S) for i in outlet.infos[:2])
         batch = hand.read_batch(10.0)
     listed, channel = [], info.desc().child("channels").child("channel")
     while channel.e and channel.name():
@@ -107,6 +108,17 @@ def test_invalid_stays_nan_on_the_way(inlet) -> None:
         values, _ = pull(stream, len(batch.frames))
     assert np.isnan(batch.frames["force_n"][0]).all()
     assert np.isnan(values[0, :9]).all()
+
+
+def test_events_are_markers_by_name(inlet) -> None:
+    with biotac.open("sim:press.toml?seconds=3") as hand, Outlet(hand) as outlet:
+        hand.subscribe(biotac.QuantityFlags.EVENTS | biotac.QuantityFlags.REST_FRAMES)
+        stream = inlet(outlet.infos[2])
+        batch = hand.read_batch(3.0)
+        outlet.push(batch)
+        told = [biotac.EventKind(m.kind).name for m in batch.messages if isinstance(m, biotac.Event)]
+        assert "TOUCH" in told
+        assert [stream.pull_sample(timeout=PATIENCE_S)[0] for _ in told] == [[name] for name in told]
 
 
 def test_a_simulated_boards_frames_are_stamped_by_arrival_and_counted(inlet) -> None:

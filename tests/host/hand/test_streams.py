@@ -6,6 +6,7 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -132,6 +133,29 @@ def test_callbacks_get_everything_until_they_unsubscribe(live: Live) -> None:
     live.hand.close()
     assert seen == [0, 1, 2]
     assert kinds == ["touch 2"]
+
+
+def test_events_are_called_with_slips_apart(live: Live) -> None:
+    seen: list[str] = []
+    live.hand.on_event(lambda event: seen.append(biotac.EventKind(event.kind).name))
+    stop = live.hand.on_slip(lambda event: seen.append(f"slip of {event.finger}, {event.peak_count}"))
+    live.hand.run()
+    asked = live.firmware.of(wire.Subscribe)
+    assert len(asked) == 1 and asked[0].quantities & wire.QuantityFlags.EVENTS
+    touch = wire.Event(3, 30_000, 2, 1, biotac.EventKind.TOUCH, 1, 30_000, 5000, wire.INVALID_COUNT)
+    slip = wire.Event(5, 52_000, 2, 28, biotac.EventKind.SLIP, 2, 50_000, 2**32 - 1, 120)
+    live.send(*(biotac.wire.framing.encode(event.ID, event.pack()) for event in (touch, slip)), frame(0))
+    live.until(lambda: len(seen) == 3)
+    stop()
+    assert seen == ["TOUCH", "SLIP", "slip of 2, 120"]
+
+
+def test_a_board_without_events_is_told_so(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live.hand._board, "info", replace(live.hand.info, wire_minor=4))
+    with pytest.raises(biotac.InputError, match="has events; update it"):
+        live.hand.on_event(print)
+    live.hand.subscribe(wire.QuantityFlags.EVENTS | wire.QuantityFlags.FORCE)
+    assert live.firmware.of(wire.Subscribe)[-1].quantities == wire.QuantityFlags.FORCE
 
 
 def test_what_a_callback_raises_comes_up_at_the_next_call_and_kills_nobody(live: Live) -> None:

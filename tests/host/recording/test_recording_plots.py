@@ -15,6 +15,7 @@ from mcap.writer import CompressionType, Writer
 from record_all import record_all
 
 import biotac
+from biotac.hand.streams import AT_FIRST
 from biotac.recording import writer
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
@@ -94,6 +95,22 @@ def test_tare_changes_are_told_in_words(recorded: Path) -> None:
     assert [body["seq"] for body in told] == [m.seq for m in sent]
     assert told[0]["reason"] == wire.TareReason(sent[0].reason).name == "START"
     assert told[0]["tare"] == pytest.approx([q16 / 65536 for q16 in sent[0].tare_q16], abs=1e-4)
+
+
+def test_events_are_recorded_told_and_read_again(tmp_path: Path) -> None:
+    with biotac.open("sim:press.toml?seconds=3") as hand:
+        hand.subscribe(AT_FIRST | biotac.QuantityFlags.EVENTS)
+        hand.record(tmp_path / "e.mcap")
+        live = [m for m in hand.read_batch(10.0).messages if isinstance(m, biotac.Event)]
+    assert [m for m in biotac.Recording(tmp_path / "e.mcap").messages if isinstance(m, biotac.Event)] == live
+    found, schemas = messages(tmp_path / "e.mcap")
+    bodies = [body for _, body in found["/biotac/finger0/events"]]
+    assert [body["kind"] for body in bodies] == [biotac.EventKind(m.kind).name for m in live]
+    touch = next(body for body in bodies if body["kind"] == "TOUCH")
+    assert touch["energy"] >= 0 and touch["age_s"] == 0 and "peak" not in touch
+    assert {*touch} <= {*schemas["/biotac/finger0/events"]["properties"]}
+    with biotac.open(f"replay:{tmp_path / 'e.mcap'}") as hand:
+        assert [m.kind for m in hand.read_batch(10.0).messages if isinstance(m, biotac.Event)] == [m.kind for m in live]
 
 
 def test_messages_hold_what_their_schemas_say_and_no_nan(recorded: Path) -> None:

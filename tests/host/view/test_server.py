@@ -168,6 +168,14 @@ def test_a_browser_that_reads_nothing_does_not_hold_the_reader(make_player, view
     stuck.close()
 
 
+def test_events_are_marks_in_their_fingers_time(make_player, touch) -> None:
+    event = wire.Event(3, int(touch.t_us[-1]) % 2**32, 1, 5, wire.EventKind.SLIP, 2, 0, 0, 99)
+    state = State("sim:")
+    state.take(replace(touch, messages=[event]), make_player())
+    health = json.loads(state.wait(state.cursor(), 1.0))["health"]
+    assert health["events"] == [{"finger": 1, "t_us": int(touch.t_us[-1]), "name": "slip"}]
+
+
 def test_rows_hold_the_wires_own_numbers(touch) -> None:
     touch = replace(touch, wire=touch.wire.copy())
     touch.wire["counts"][5, 3] = wire.INVALID_COUNT

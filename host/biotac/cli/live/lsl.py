@@ -8,6 +8,7 @@ import sys
 
 import biotac
 
+from ...hand.streams import AT_FIRST
 from .. import values
 
 EXAMPLE = "biotac lsl 'sim:press.toml?fingers=2'"
@@ -24,6 +25,7 @@ def run(args: argparse.Namespace) -> int:
     from ...bridges.lsl import Outlet  # here, for the other verbs need no liblsl
 
     with biotac.open(args.port, pace=1.0) as hand, Outlet(hand) as outlet:
+        hand.subscribe(AT_FIRST | biotac.QuantityFlags.EVENTS)
         streams = [{"name": info.name(), "rate_hz": info.nominal_srate()} for info in outlet.infos]
         if args.json:
             print(json.dumps({"streams": streams}))

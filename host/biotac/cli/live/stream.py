@@ -8,10 +8,11 @@ import sys
 
 import biotac
 
-from ...hand.streams import RESULTS
+from ...hand.streams import AT_FIRST, RESULTS
+from ...wire.events import INVALID_U32, event_age_s, kind_name
 from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame
-from ...wire.messages_gen import FrameFlags
+from ...wire.messages_gen import INVALID_COUNT, Event, FrameFlags, QuantityFlags
 from .. import values
 from .table import LiveTable, is_possible
 
@@ -26,6 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--rate", type=values.rate, default=10.0, help="lines per second and finger (default 10; 0: all)"
     )
     parser.add_argument(
+        "--events",
+        action="store_true",
+        help="a line for each touch, lift, jolt and slip, too; no table",
+    )
+    parser.add_argument(
         "--touched", action="store_true", help="only fingers that are touched; untouched ones send heartbeats"
     )
 
@@ -36,9 +42,10 @@ def run(args: argparse.Namespace) -> int:
     with biotac.open(args.port, pace=1.0) as hand:
         for warning in hand.warnings:
             print(f"biotac: {warning.text}", file=sys.stderr)
-        if args.touched:
-            hand.subscribe(RESULTS)
-        if not args.json and is_possible():
+        wanted = RESULTS if args.touched else AT_FIRST
+        if args.touched or args.events:
+            hand.subscribe(wanted | QuantityFlags.EVENTS if args.events else wanted)
+        if not args.json and not args.events and is_possible():
             watch(hand, seconds=args.seconds)
         else:
             show(hand, rate=args.rate, seconds=args.seconds, as_json=args.json)
@@ -71,16 +78,41 @@ def show(hand: biotac.Hand, *, rate: float, seconds: float | None = None, as_jso
     due_us: dict[int, int] = {}
     step_us = int(1e6 / rate) if rate > 0 else 0
     end_us: int | None = None
-    for frame in hand.frames():
-        if end_us is None and seconds is not None:
-            end_us = frame.t_us + round(seconds * 1e6)
-        if end_us is not None and frame.t_us >= end_us:
-            break
-        if frame.t_us < due_us.get(frame.finger, frame.t_us):
-            continue
-        due_us[frame.finger] = frame.t_us + step_us
-        print(json.dumps(row_as_json(frame)) if as_json else as_line(frame))
+    for batch in hand.batches():
+        for event in batch.messages:
+            if isinstance(event, Event):
+                print(json.dumps(event_as_json(event)) if as_json else event_as_line(event))
+        for frame in map(Frame.from_row, batch.frames):
+            if end_us is None and seconds is not None:
+                end_us = frame.t_us + round(seconds * 1e6)
+            if end_us is not None and frame.t_us >= end_us:
+                return
+            if frame.t_us < due_us.get(frame.finger, frame.t_us):
+                continue
+            due_us[frame.finger] = frame.t_us + step_us
+            print(json.dumps(row_as_json(frame)) if as_json else as_line(frame))
         sys.stdout.flush()
+
+
+def event_as_json(event: Event) -> dict[str, object]:
+    """Name and numbers of an event; what is invalid is null."""
+    return {
+        "event": kind_name(event).lower(),
+        "finger": event.finger,
+        "t_us": event.t_us,
+        "began_s_ago": event_age_s(event),
+        "energy_count2": None if event.energy_count2 == INVALID_U32 else event.energy_count2,
+        "peak_count": None if event.peak_count == INVALID_COUNT else event.peak_count,
+    }
+
+
+def event_as_line(event: Event) -> str:
+    """One line for a person."""
+    line = f"{event.t_us / 1e6:9.3f} s finger {event.finger}  {kind_name(event).lower()}"
+    if event.peak_count != INVALID_COUNT:
+        line += f", peak {event.peak_count} counts"
+    age_s = event_age_s(event)
+    return f"{line}, began {age_s * 1000:.1f} ms before" if age_s else line
 
 
 def as_line(frame: Frame) -> str:

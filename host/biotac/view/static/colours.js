@@ -1,6 +1,6 @@
 // Colours as numbers, read from the style sheet so that a theme is written down once.
 
-const NAMES = ["text", "quiet", "card", "x", "y", "z", "point", "grid", "skin-edge", "rest", "compressed", "bulged", "accent"];
+const NAMES = ["text", "quiet", "card", "x", "y", "z", "point", "grid", "skin-edge", "rest", "compressed", "bulged", "accent", "warn"];
 
 export function readTheme() {
   const style = getComputedStyle(document.documentElement);

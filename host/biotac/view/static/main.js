@@ -175,7 +175,8 @@ class Page {
     // What is small or slow takes turns: drawn in every second picture, it leaves a weak computer its 60 a second.
     this.turn = !this.turn;
     if (this.turn) {
-      for (const plot of this.plots) plot.draw(finger, this.theme);
+      const marks = (this.model.health?.events ?? []).filter((mark) => mark.finger === this.shown);
+      for (const plot of this.plots) plot.draw(finger, this.theme, marks);
     } else {
       this.hand.draw(fingers, this.theme, this.limit.counts);
       const pascals = finger?.pacIsFull ? amplitudes(finger.pac).map((v) => v * about.pac_pa_per_count) : null;

@@ -58,7 +58,8 @@ export class TimePlot {
     Object.assign(this, { canvas, names, colours, least, digits, zero });
   }
 
-  draw(finger, theme) {
+  // marks: events of this finger, { t_us, name }
+  draw(finger, theme, marks = []) {
     const area = new Area(this.canvas);
     const { c } = area;
     const order = finger ? [...finger.order()] : [];
@@ -72,6 +73,7 @@ export class TimePlot {
     for (let s = -HISTORY_S; s <= 0; s += 2) {
       area.tick(theme, { x: area.x(1 + s / HISTORY_S), text: s ? `−${-s}` : "0 s" });
     }
+    for (const mark of marks) this.mark(area, theme, 1 - (endS - mark.t_us / 1e6) / HISTORY_S, mark.name);
     c.lineWidth = 1.75;
     c.lineJoin = "round";
     this.names.forEach((name, line) => {
@@ -95,6 +97,21 @@ export class TimePlot {
       c.stroke();
     });
     c.setLineDash([]);
+  }
+
+  mark(area, theme, share, words) {
+    if (share < 0 || share > 1) return;
+    const { c } = area;
+    const x = Math.round(area.x(share)) + 0.5;
+    c.strokeStyle = c.fillStyle = words === "slip" ? theme.warn : theme.quiet;
+    c.lineWidth = words === "slip" ? 2 : 1;
+    c.beginPath();
+    c.moveTo(x, area.top);
+    c.lineTo(x, area.bottom);
+    c.stroke();
+    c.textAlign = "left";
+    c.textBaseline = "top";
+    c.fillText(words, x + 3, area.top);
   }
 
   span(finger, shown) {

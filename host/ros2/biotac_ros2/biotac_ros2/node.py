@@ -12,11 +12,12 @@ import numpy as np
 import rclpy
 from geometry_msgs.msg import PointStamped, WrenchStamped
 from rclpy.node import Node
-from std_msgs.msg import UInt32
+from std_msgs.msg import String, UInt32
 from std_srvs.srv import Trigger
 
 import biotac
 from biotac.clock.stamps import Stamps
+from biotac.hand.streams import AT_FIRST
 from biotac.recording.layout import frame_id
 
 #: Reliable, so that every subscriber's quality of service fits; half a second of rounds.
@@ -29,7 +30,8 @@ class Fingers(Node):
     Names, frames and values are those of `biotac export REC OUT.ros2`.
 
     ``biotac/finger0/wrench`` WrenchStamped in N and N*m, on the finger, about the origin of ``biotac_finger0``;
-    ``biotac/finger0/poc`` PointStamped in m; ``biotac/finger0/flags`` UInt32 (flags frame of MESSAGES.md). What is
+    ``biotac/finger0/poc`` PointStamped in m; ``biotac/finger0/flags`` UInt32 (flags frame of MESSAGES.md);
+    ``biotac/finger0/event`` String, an event's kind (EventKind: SLIP, ...) as soon as it is told. What is
     invalid is NaN, never an old value: look at it before a controller does. Stamps are the begin of the round on this
     node's clock. Service ``biotac/tare``, a Trigger: tares every finger now.
     """
@@ -39,8 +41,9 @@ class Fingers(Node):
         self.declare_parameter("port", "")
         # A simulated board in real time; others have no pace.
         self.hand = hand = biotac.open(self.get_parameter("port").value or None, pace=1.0)
+        hand.subscribe(AT_FIRST | biotac.QuantityFlags.EVENTS)
         self._stamps = Stamps(hand, lambda: self.get_clock().now().nanoseconds / 1e9)
-        kinds = {"wrench": WrenchStamped, "poc": PointStamped, "flags": UInt32}
+        kinds = {"wrench": WrenchStamped, "poc": PointStamped, "flags": UInt32, "event": String}
         self._topics = {
             (finger, name): self.create_publisher(kind, f"biotac/finger{finger}/{name}", DEPTH)
             for finger in hand.fingers
@@ -51,6 +54,10 @@ class Fingers(Node):
     def publish(self, batch: Any) -> None:
         """All frames of a batch. Raises DeviceLostError when the board no longer answers."""
         self._stamps.keep()
+        for message in batch.messages:
+            if isinstance(message, biotac.Event) and message.kind in list(biotac.EventKind):
+                said = String(data=biotac.EventKind(message.kind).name)
+                self._topics[message.finger, "event"].publish(said)
         if not len(batch.frames):
             return
         first = self._stamps.by_arrival == 0

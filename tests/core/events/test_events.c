@@ -1,0 +1,384 @@
+// Events of one finger, fed word by word: what is told, in which slot, and what is not.
+#include "../emulated_finger.h"
+
+#include "finger.h"
+
+#define MAX_TOLD      4096
+#define SLOT_US(slot) ((uint32_t)((slot) * 1000000u / BT_SLOT_HZ))
+
+typedef struct {
+    bt_finger finger;
+    bt_tare_settings settings;
+    uint64_t seed;
+    uint32_t t_us;
+    double sigma; // of electrodes and PAC
+    double pac_sigma;
+    double load; // counts, over all electrodes
+    uint16_t pdc;
+    double pac[BT_PAC_PER_FRAME]; // above rest, of the coming round
+    int good_until;               // words from this slot on are missing
+    bt_msg_event told[MAX_TOLD];
+    int count;
+} course;
+
+static course its;
+
+static int new_course(void **state)
+{
+    (void)state;
+    memset(&its, 0, sizeof its);
+    its.seed = 7;
+    its.pdc = PDC_REST;
+    its.pac_sigma = 4;
+    its.good_until = BT_SLOTS;
+    its.settings.contact_energy_count2 = SETTING_COUNT2;
+    bt_finger_reset(&its.finger, 2);
+    return 0;
+}
+
+static uint16_t word(unsigned slot)
+{
+    unsigned channel = bt_slot_channel[slot];
+    unsigned electrode = channel - BT_CHANNEL_E1;
+    if (electrode < BT_ELECTRODES) {
+        return to_count(2955 + 31 * electrode + its.load * load_shape((int)electrode)
+                        + its.sigma * gauss(&its.seed));
+    }
+    if (channel == BT_CHANNEL_PAC) {
+        return to_count(2038 + its.pac[bt_slot_pac[slot]] + its.pac_sigma * gauss(&its.seed));
+    }
+    return channel == BT_CHANNEL_PDC ? its.pdc : 2000;
+}
+
+static bool due(uint8_t slot)
+{
+    static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
+    return memchr(pac_slot, slot, sizeof pac_slot) != NULL || slot == its.finger.events.watched;
+}
+
+static void take(uint32_t told, uint8_t slot)
+{
+    for (uint8_t event = BT_EVENT_KIND_TOUCH; event <= BT_EVENT_KIND_STUCK; event++) {
+        if (told >> event & 1) {
+            bt_msg_event *msg = &its.told[its.count++];
+            assert_true(its.count < MAX_TOLD);
+            bt_finger_event(&its.finger, event, slot, its.t_us + SLOT_US(slot), msg);
+            assert_int_equal(msg->slot, slot);
+            assert_int_equal(msg->finger, 2);
+            assert_int_equal(msg->t_us, its.t_us + SLOT_US(slot));
+            told &= ~(1u << event);
+        }
+    }
+    assert_int_equal(told, 0);
+}
+
+static void play(int rounds)
+{
+    for (int k = 0; k < rounds; k++) {
+        bt_finger_begin(&its.finger, its.t_us, &its.settings);
+        for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
+            uint16_t count = slot < its.good_until ? word(slot) : BT_INVALID_COUNT;
+            bool touched = bt_finger_put(&its.finger, slot, count);
+            if (touched || due(slot)) {
+                take(bt_finger_events(&its.finger, slot, touched), slot);
+            }
+        }
+        (void)bt_finger_end(&its.finger, &its.settings);
+        its.t_us += BT_FRAME_MS * 1000;
+    }
+}
+
+// `rounds` in which PAC swings with this amplitude.
+static void shaken(int rounds, double counts, double hz)
+{
+    for (int k = 0; k < rounds; k++) {
+        for (int i = 0; i < BT_PAC_PER_FRAME; i++) {
+            double t_s = its.t_us * 1e-6 + i / 2200.0;
+            its.pac[i] = counts * sin(2 * 3.14159265358979324 * hz * t_s);
+        }
+        play(1);
+    }
+    memset(its.pac, 0, sizeof its.pac);
+}
+
+static int told(uint8_t event)
+{
+    int n = 0;
+    for (int k = 0; k < its.count; k++) {
+        n += its.told[k].kind == event;
+    }
+    return n;
+}
+
+static const bt_msg_event *first(uint8_t event)
+{
+    for (int k = 0; k < its.count; k++) {
+        if (its.told[k].kind == event) {
+            return &its.told[k];
+        }
+    }
+    fail_msg("event %d was not told", event);
+    return NULL;
+}
+
+// Tared, then held with half a second of quiet.
+static void hold(void)
+{
+    play(300);
+    its.load = 120;
+    its.pdc = PDC_REST + 60;
+    play(50);
+    its.count = 0;
+}
+
+static void touch_and_lift_are_told_in_the_slot_that_shows_them(void **state)
+{
+    (void)state;
+    play(300);
+    assert_int_equal(its.count, 0);
+    const uint32_t pressed_us = its.t_us;
+    its.load = 200;
+    play(20);
+    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
+    const bt_msg_event *touch = first(BT_EVENT_KIND_TOUCH);
+    assert_in_range(touch->t_us, pressed_us, pressed_us + 20000); // a far word waits for its second
+    assert_int_equal(touch->onset_us, touch->t_us);
+    assert_in_range(touch->energy_count2, SETTING_COUNT2, 200 * 200 * 2);
+    assert_int_equal(touch->peak_count, BT_INVALID_COUNT);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 0);
+    const uint32_t released_us = its.t_us;
+    its.load = 0;
+    play(100);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
+    assert_in_range(first(BT_EVENT_KIND_LIFT)->t_us, released_us, released_us + 20000);
+    assert_in_range(first(BT_EVENT_KIND_LIFT)->energy_count2, 0, SETTING_COUNT2 / 2);
+    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
+}
+
+// The tare machine waits for a whole sweep until it calls a contact over; a tap on the pad is shorter.
+static void touches_in_quick_succession_are_all_told(void **state)
+{
+    (void)state;
+    play(300);
+    for (int k = 0; k < 10; k++) {
+        its.load = 200;
+        play(8);
+        its.load = 0;
+        play(8);
+    }
+    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 10);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 10);
+}
+
+static void pressure_that_stays_is_no_lift(void **state)
+{
+    (void)state;
+    hold();
+    its.load = 0;
+    play(20);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 0);
+    its.pdc = PDC_REST;
+    play(3);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
+}
+
+// A swing of 120 to 220 Hz: both ways of it take up to 4 ms to be seen.
+static void a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds(void **state)
+{
+    (void)state;
+    int told_late = 0, onset_off = 0;
+    for (int k = 0; k < 200; k++) {
+        (void)new_course(state);
+        its.seed = (uint64_t)(100 + k);
+        its.pac_sigma = 5;
+        hold();
+        const uint32_t begins_us = its.t_us;
+        shaken(30, 60, 120 + k / 2);
+        const bt_msg_event *slip = first(BT_EVENT_KIND_SLIP);
+        told_late += slip->t_us - begins_us > 7000;
+        onset_off += abs((int32_t)(slip->onset_us - begins_us)) > 5000;
+        assert_in_range(slip->peak_count, 40, 160);
+        assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
+        assert_int_equal(told(BT_EVENT_KIND_JOLT), 1);
+        assert_int_equal(slip->energy_count2, UINT32_MAX);
+        play(60);
+        assert_int_equal(told(BT_EVENT_KIND_STUCK), 1);
+        assert_int_equal(first(BT_EVENT_KIND_STUCK)->onset_us, slip->onset_us);
+    }
+    assert_in_range(told_late, 0, 10);
+    assert_in_range(onset_off, 0, 10);
+}
+
+static void held_for_ten_minutes_in_noise_nothing_is_told(void **state)
+{
+    (void)state;
+    its.pac_sigma = 5;
+    its.sigma = 1.5;
+    hold();
+    play(60000);
+    assert_int_equal(its.count, 0);
+}
+
+static void a_resting_worn_finger_tells_nothing(void **state)
+{
+    (void)state;
+    its.pac_sigma = 5;
+    its.sigma = 5;
+    play(6000);
+    assert_int_equal(its.count, 0);
+}
+
+// An arm that hums: what was there at rest is no slip later.
+static void noise_at_rest_raises_what_it_takes(void **state)
+{
+    (void)state;
+    play(300);
+    shaken(600, 20, 150);
+    its.count = 0;
+    its.load = 120;
+    its.pdc = PDC_REST + 60;
+    shaken(300, 20, 150);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+    shaken(20, 400, 150);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
+}
+
+static void a_glitch_is_no_event(void **state)
+{
+    (void)state;
+    hold();
+    for (int k = 0; k < 50; k++) {
+        its.pac[k % BT_PAC_PER_FRAME] = k % 2 ? 1500 : -1500;
+        play(1);
+        memset(its.pac, 0, sizeof its.pac);
+        play(20);
+    }
+    assert_int_equal(its.count, 0);
+}
+
+static void a_light_tap_on_what_is_held_is_a_jolt_and_no_slip(void **state)
+{
+    (void)state;
+    hold();
+    for (int i = 6; i < BT_PAC_PER_FRAME; i++) {
+        its.pac[i] = 28 * exp(-(i - 6) / 4.0); // one blow that fades within 2 ms
+    }
+    play(1);
+    memset(its.pac, 0, sizeof its.pac);
+    play(50);
+    assert_int_equal(told(BT_EVENT_KIND_JOLT), 1);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+    assert_in_range(first(BT_EVENT_KIND_JOLT)->peak_count, 20, 60);
+}
+
+// PAC of a ramp of pressure, as the sensor's high-pass of 10 Hz leaves it.
+static void squeezed(int rounds, double counts_per_s)
+{
+    static double level;
+    for (int k = 0; k < rounds; k++) {
+        for (int i = 0; i < BT_PAC_PER_FRAME; i++) {
+            level += (counts_per_s / (2 * 3.14159265 * 10) - level) / (2200 / (2 * 3.14159265 * 10));
+            its.pac[i] = level;
+        }
+        play(1);
+    }
+    memset(its.pac, 0, sizeof its.pac);
+}
+
+static void squeezing_harder_is_no_slip(void **state)
+{
+    (void)state;
+    hold();
+    squeezed(50, 98.6 * 100 * 2); // 2 N/s
+    squeezed(50, 0);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+}
+
+static void a_landing_is_no_slip(void **state)
+{
+    (void)state;
+    play(300);
+    its.load = 120;
+    its.pdc = PDC_REST + 60;
+    shaken(20, 200, 130);
+    play(100);
+    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+    shaken(20, 200, 130);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
+}
+
+static void nobody_slips_untouched(void **state)
+{
+    (void)state;
+    play(300);
+    shaken(20, 200, 130);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 0);
+    assert_true(told(BT_EVENT_KIND_JOLT) > 0);
+}
+
+// The slip is over in the PAC slot behind the word that showed the release.
+static void a_slip_ends_with_the_hold(void **state)
+{
+    (void)state;
+    hold();
+    shaken(10, 100, 150);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), 1);
+    its.load = 0;
+    its.pdc = PDC_REST;
+    shaken(3, 100, 150);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
+    assert_int_equal(told(BT_EVENT_KIND_STUCK), 1);
+}
+
+static void missing_words_are_no_event(void **state)
+{
+    (void)state;
+    hold();
+    for (int k = 0; k < 40; k++) {
+        its.good_until = k % 3 ? BT_SLOTS : k;
+        play(1);
+    }
+    assert_int_equal(its.count, 0);
+}
+
+// The widest words there are: nothing wraps (the sanitizers look on), and each begun slip ends.
+static void the_rails_do_not_wrap(void **state)
+{
+    (void)state;
+    play(300);
+    for (int k = 0; k < 400; k++) {
+        its.load = k % 40 < 30 ? 4000 : 0;
+        for (int i = 0; i < BT_PAC_PER_FRAME; i++) {
+            its.pac[i] = (double)random_range(&its.seed, -4000, 4000);
+        }
+        play(1);
+    }
+    memset(its.pac, 0, sizeof its.pac);
+    its.load = 0;
+    play(400);
+    assert_int_equal(told(BT_EVENT_KIND_SLIP), told(BT_EVENT_KIND_STUCK));
+    assert_int_equal(told(BT_EVENT_KIND_TOUCH), told(BT_EVENT_KIND_LIFT));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(touch_and_lift_are_told_in_the_slot_that_shows_them, new_course),
+        cmocka_unit_test_setup(touches_in_quick_succession_are_all_told, new_course),
+        cmocka_unit_test_setup(pressure_that_stays_is_no_lift, new_course),
+        cmocka_unit_test_setup(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds, new_course),
+        cmocka_unit_test_setup(held_for_ten_minutes_in_noise_nothing_is_told, new_course),
+        cmocka_unit_test_setup(a_resting_worn_finger_tells_nothing, new_course),
+        cmocka_unit_test_setup(noise_at_rest_raises_what_it_takes, new_course),
+        cmocka_unit_test_setup(a_glitch_is_no_event, new_course),
+        cmocka_unit_test_setup(a_light_tap_on_what_is_held_is_a_jolt_and_no_slip, new_course),
+        cmocka_unit_test_setup(squeezing_harder_is_no_slip, new_course),
+        cmocka_unit_test_setup(a_landing_is_no_slip, new_course),
+        cmocka_unit_test_setup(nobody_slips_untouched, new_course),
+        cmocka_unit_test_setup(a_slip_ends_with_the_hold, new_course),
+        cmocka_unit_test_setup(missing_words_are_no_event, new_course),
+        cmocka_unit_test_setup(the_rails_do_not_wrap, new_course),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,131 @@
+// EVENTs of a session: who gets them, when, and that nobody pays who does not ask.
+#include "../fake_host.h"
+
+static void subscribe(uint8_t fingers, uint8_t quantities)
+{
+    uint8_t payload[BT_SUBSCRIBE_BYTES];
+    bt_msg_subscribe msg = {.req_id = 3, .fingers = fingers, .quantities = quantities};
+    bt_msg_subscribe_pack(&msg, payload);
+    assert_int_equal(host_error(&session, BT_SUBSCRIBE_ID, payload, sizeof payload), BT_ERROR_OK);
+}
+
+static uint32_t t_us;
+
+// A round of finger 0 and 3, electrodes at `count`; returns the slot in which the first EVENT came, or
+// BT_SLOTS.
+static uint8_t played(uint16_t count)
+{
+    uint8_t told = BT_SLOTS;
+    bt_session_begin(&session, t_us);
+    for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
+        uint16_t words[BT_MAX_FINGERS];
+        bool electrode = bt_slot_channel[slot] >= BT_CHANNEL_E1;
+        for (int f = 0; f < BT_MAX_FINGERS; f++) {
+            words[f] = f == 0 || f == 3 ? (electrode ? count : 2000) : BT_INVALID_COUNT;
+        }
+        int before = host_count(BT_EVENT_ID);
+        bt_session_slot(&session, slot, words, t_us + slot * 1000000u / BT_SLOT_HZ);
+        told = told == BT_SLOTS && host_count(BT_EVENT_ID) > before ? slot : told;
+    }
+    bt_session_round(&session);
+    t_us += BT_FRAME_MS * 1000;
+    return told;
+}
+
+static void play(int rounds, uint16_t count)
+{
+    for (int k = 0; k < rounds; k++) {
+        (void)played(count);
+    }
+}
+
+static void rest(void)
+{
+    t_us = 0;
+    play(100, 3000);
+    host_forget();
+}
+
+static void who_subscribes_is_told_in_the_slot_that_shows_it(void **state)
+{
+    (void)state;
+    rest();
+    subscribe(1 << 3, BT_QUANTITY_FLAG_EVENTS | BT_QUANTITY_FLAG_TOUCH);
+    assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1 << 0 | 1 << 3, 0), BT_ERROR_OK);
+    host_forget();
+    uint8_t slot = played(2900);
+    slot = slot == BT_SLOTS ? played(2900) : slot; // a far word waits for its second
+    assert_in_range(slot, 0, BT_SLOTS - 1);
+    assert_int_equal(host_count(BT_EVENT_ID), 1);
+    assert_int_equal(host_count(BT_TOUCH_ID), 1);
+    bt_msg_event event = {0};
+    bt_msg_touch touch = {0};
+    for (int k = 0; k < host.count; k++) {
+        if (host.message[k].id == BT_EVENT_ID) {
+            bt_msg_event_unpack(&event, host.message[k].payload);
+        } else if (host.message[k].id == BT_TOUCH_ID) {
+            bt_msg_touch_unpack(&touch, host.message[k].payload);
+        }
+    }
+    assert_int_equal(event.kind, BT_EVENT_KIND_TOUCH);
+    assert_int_equal(event.finger, 3);
+    assert_int_equal(event.slot, slot);
+    assert_int_equal(event.slot, touch.slot);
+    assert_int_equal(event.seq, touch.seq);
+    assert_int_equal(event.t_us, touch.t_us);
+    play(10, 2900);
+    host_forget();
+    play(2, 3000);
+    assert_int_equal(host_count(BT_EVENT_ID), 1);
+    bt_msg_event_unpack(&event, host.message[0].payload);
+    for (int k = 0; k < host.count; k++) {
+        if (host.message[k].id == BT_EVENT_ID) {
+            bt_msg_event_unpack(&event, host.message[k].payload);
+        }
+    }
+    assert_int_equal(event.kind, BT_EVENT_KIND_LIFT);
+}
+
+static void nobody_is_told_who_did_not_ask_or_does_not_stream(void **state)
+{
+    (void)state;
+    static const uint8_t none[BT_SLOTS];
+    rest();
+    assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 0x1F, 0), BT_ERROR_OK); // not subscribed
+    play(20, 2900);
+    assert_int_equal(host_count(BT_EVENT_ID), 0);
+    assert_memory_equal(session.events_due, none, sizeof none); // so no slot looks for any
+    play(100, 3000);
+    subscribe(0x1F, BT_QUANTITY_FLAG_EVENTS);
+    assert_int_equal(start(BT_STREAM_FLAG_STATUS, 0x1F, 0), BT_ERROR_OK); // streams nothing they come with
+    play(20, 2900);
+    assert_int_equal(host_count(BT_EVENT_ID), 0);
+    assert_memory_equal(session.events_due, none, sizeof none);
+}
+
+static void they_come_with_pac_alone_and_end_with_the_subscription(void **state)
+{
+    (void)state;
+    static const uint8_t none[BT_SLOTS];
+    rest();
+    subscribe(1 << 0, BT_QUANTITY_FLAG_EVENTS);
+    assert_int_equal(start(BT_STREAM_FLAG_PAC, 1 << 0, 0), BT_ERROR_OK);
+    host_forget();
+    play(5, 2900);
+    assert_int_equal(host_count(BT_EVENT_ID), 1);
+    subscribe(1 << 0, 0);
+    host_forget();
+    play(100, 3000);
+    assert_int_equal(host_count(BT_EVENT_ID), 0);
+    assert_memory_equal(session.events_due, none, sizeof none);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup(who_subscribes_is_told_in_the_slot_that_shows_it, new_session),
+        cmocka_unit_test_setup(nobody_is_told_who_did_not_ask_or_does_not_stream, new_session),
+        cmocka_unit_test_setup(they_come_with_pac_alone_and_end_with_the_subscription, new_session),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

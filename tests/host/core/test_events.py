@@ -1,0 +1,95 @@
+"""Events by the board's own code: on recordings of real fingers, and on noise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac import EventKind
+from biotac.core.events import pac_events
+
+SHARED = Path(__file__).parents[4] / "shared/data"
+SLIDING_M_S = 0.002
+PER_S = 2200
+
+
+def shared(name: str) -> Any:
+    path = SHARED / name
+    if not path.is_file():
+        pytest.skip("no ../shared/data: real recordings are not part of the project")
+    return np.load(path)
+
+
+def told(events: Any, kind: EventKind) -> Any:
+    return events[events["kind"] == kind]
+
+
+def test_real_slides_slip_and_begin_to_when_the_robot_moves() -> None:
+    # Ten materials, ten slides; the arm's speed is known every 7 ms, with holes of 40 ms.
+    data = shared("slides/slides.npz")
+    called, late_s = [], []
+    for trial in (f"m{m}_{k}_" for m in range(1, 11) for k in range(1, 11)):
+        t_s, at_s = data[trial + "t"], data[trial + "cv_t"]
+        speed_m_s = np.linalg.norm(data[trial + "cv"][:, :3], axis=1)
+        events, slips = pac_events(data[trial + "frame"][:, 3:25])
+        called.append(slips[np.interp(t_s, at_s, speed_m_s) > SLIDING_M_S].mean())
+        begins_s = at_s[speed_m_s > SLIDING_M_S][0]
+        if begins_s > 0.03:  # else it slides as the recording begins
+            first = told(events, EventKind.SLIP)[0]
+            late_s.append(t_s[0] + first["t_us"] / 1e6 - begins_s)
+    assert min(called) >= 0.95
+    assert len(late_s) == 30
+    assert np.mean(np.abs(late_s) <= 0.03) >= 0.95
+
+
+def test_real_taps_are_jolts() -> None:
+    # A tap is visible where the signal leaves, in 70 ms, twice the range it had in the 43 ms before.
+    data = shared("taps/handover.npz")
+    signals = np.concatenate([data[f"handover_{what}_signals"] for what in ("rod", "box", "plate")]).astype(int)
+    height = np.abs(signals - np.median(signals[:, :95], axis=1, keepdims=True))
+    visible = height[:, 95:250].max(axis=1) > 2 * height[:, :95].max(axis=1)
+    found, early = [], []
+    for signal in signals:
+        events, _ = pac_events(np.clip(2038 + signal[:594].reshape(-1, 22), 0, 4095))
+        sample = told(events, EventKind.JOLT)["t_us"].astype(int) * PER_S // 1_000_000
+        early.append((sample < 95).any())
+        found.append(((sample >= 95) & (sample < 250)).any())
+    assert visible.sum() > 200
+    assert np.mean(np.array(found)[visible]) >= 0.6
+    assert np.mean(early) <= 0.05
+
+
+def test_ten_minutes_of_noise_held_hold_no_event() -> None:
+    noise = np.rint(2038 + np.random.default_rng(3).normal(0.0, 5.0, (60_000, 22))).astype(int)
+    events, slips = pac_events(noise)
+    assert len(events) == 0 and not slips.any()
+
+
+def test_a_finger_tells_its_events_in_order() -> None:
+    finger = biotac.Finger(index=2)
+    counts = np.full((400, 19), 3000)
+    counts[300:370, :6] -= 100
+    pdc = np.full(400, 1326)
+    pdc[300:370] += 60
+    pac = np.full((400, 22), 2038)
+    sway = np.rint(80 * np.sin(np.arange(20 * 22) * 2 * np.pi * 150 / PER_S)).astype(int)
+    pac[320:340] += sway.reshape(20, 22)
+    events = finger.events(counts, pdc, pac=pac)
+    kinds = [EventKind(kind) for kind in events["kind"]]
+    assert kinds == [EventKind.TOUCH, EventKind.JOLT, EventKind.SLIP, EventKind.STUCK, EventKind.LIFT]
+    assert (events["finger"] == 2).all() and (np.diff(events["t_us"].astype(int)) >= 0).all()
+    slip = told(events, EventKind.SLIP)[0]
+    assert 0 <= int(slip["onset_us"]) - 3_200_000 <= 5000 and slip["peak_count"] > 60
+    assert told(events, EventKind.TOUCH)["seq"][0] in (300, 301)
+
+
+@pytest.mark.parametrize(
+    "pac", [np.zeros((3, 21), int), np.zeros((3, 22)), np.full((3, 22), 5000), np.full((3, 22), -1)]
+)
+def test_what_is_no_pac_is_refused(pac: Any) -> None:
+    with pytest.raises(ValueError, match="expected"):
+        pac_events(pac)
