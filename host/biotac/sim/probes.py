@@ -14,6 +14,7 @@ the rest of physics.py: a finger like a BioTac and not a given one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,7 +49,7 @@ PROBES = (
     Probe("10 mm", 10.0, 10.0),
     Probe("flat", np.inf, 10.0),
 )
-BAR = Probe("bar", 0.5, 6.0, bar=True)
+BAR = Probe("bar", 1.0, 10.0, bar=True)
 
 
 def footprints(probe: Probe, contact_mm: Floats, force_n: Floats, turned_rad: Floats | None = None) -> Footprints:
@@ -79,7 +80,7 @@ def footprints(probe: Probe, contact_mm: Floats, force_n: Floats, turned_rad: Fl
     return Footprints(np.hypot(SKIN_MM, size / slender / 2.0), np.hypot(SKIN_MM, ended / 2.0), along)
 
 
-def counts_of(finger: Finger, contacts: list[tuple[States, Footprints | None]]) -> Floats:
+def counts_of(finger: Finger, contacts: Sequence[tuple[States, Footprints | None]]) -> Floats:
     """Counts (n, 19), not rounded, of contacts that are there at once: their squeezes and volumes add.
 
     All have n states; the temperature is the first one's.

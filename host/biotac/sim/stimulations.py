@@ -17,7 +17,7 @@ from ..core import geometry as surface
 from ..core.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from .physics import Finger, States, deform
-from .probes import PROBES, Probe, footprints
+from .probes import BAR, PROBES, Probe, counts_of, footprints
 from .sampling import PDC_NOISE, PDC_PER_N
 
 Integers = npt.NDArray[np.int64]
@@ -113,6 +113,37 @@ def stimulate(
         contact=np.repeat(np.arange(n), tilts * frames),
         stimulation=np.repeat(np.arange(presses), frames),
     )
+
+
+BAR_X_MM, BAR_ROLL_DEG = (-9.5, -6.5), 12.0  # the middle of the pad: an edge as long as the finger is wide
+BAR_PEAK_N = (10.0, 30.0)
+BAR_LEVELS = (0.25, 0.5, 1.0)  # of the peak
+BAR_FRICTION = 0.2
+
+
+def press_bars(finger: Finger, presses: int, *, seed: int, bar: Probe = BAR) -> tuple[Floats, Floats, Floats]:
+    """A bar across the pad in any direction, each press read at BAR_LEVELS of its peak.
+
+    Counts (presses, 3, 19), the tare (19,) and the bar's direction (presses,) in rad, 0 to pi from the tip's to E11's
+    side.
+    """
+    rng = np.random.default_rng([seed, 34])
+    roll = np.radians(rng.uniform(-BAR_ROLL_DEG, BAR_ROLL_DEG, presses))
+    x = rng.uniform(*BAR_X_MM, presses)
+    contact_mm = np.column_stack([x, surface.RADIUS_MM * np.sin(roll), -surface.RADIUS_MM * np.cos(roll)])
+    peak = rng.uniform(*BAR_PEAK_N, presses)
+    turned = rng.uniform(0.0, np.pi, presses)
+    to_tip, to_side = surface.tangents_at(surface.normals_at(contact_mm))
+    size, way = BAR_FRICTION * rng.random(presses), rng.uniform(0.0, 2.0 * np.pi, presses)
+    shear = to_tip * (size * np.cos(way))[:, None] + to_side * (size * np.sin(way))[:, None]
+    none = np.zeros(presses)
+    counts = np.empty((presses, len(BAR_LEVELS), 19))
+    for k, level in enumerate(BAR_LEVELS):
+        force = level * peak
+        states = States(contact_mm, force, shear * force[:, None], none, none, none)
+        counts[:, k] = counts_of(finger, [(states, footprints(bar, contact_mm, force, turned))])
+    noisy = np.rint(counts + rng.normal(0.0, finger.noise_counts, counts.shape))
+    return np.clip(noisy, 0.0, _sensor.FULL_SCALE_COUNT), finger.rest_counts(np.zeros(1))[0], turned
 
 
 def _places(places: Sequence[int], rng: np.random.Generator) -> tuple[Floats, Floats]:
