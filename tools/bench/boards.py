@@ -32,7 +32,14 @@ FRAMES = 12  # per weighting
 WEIGHTS = ("abs n=2", "compress n=1", "compress n=2")  # in the order of enum bt_poc_weights, as image.c counts
 # What some files want compiled otherwise than with -O3; the boards' images are built by the same facts.
 OPTIONS = json.loads((FIRMWARE / "boards" / "compile_options.json").read_text(encoding="utf-8"))["files"]
-APART = [path for path in (FIRMWARE / "core").rglob("*.c") if path.name in OPTIONS]
+
+
+def of_room(source: Path) -> str:
+    """As compile_options.json names it."""
+    return f"{source.parent.name}/{source.name}"
+
+
+APART = [path for path in (FIRMWARE / "core").rglob("*.c") if of_room(path) in OPTIONS]
 CORE = sorted(set((FIRMWARE / "core").rglob("*.c")) - set(APART))
 JUDGED = sorted([*(FIRMWARE / "reference").glob("*.c"), *(ROOT / "tools/bench/variants").glob("*.c")])
 SHIPPED = sorted(path for room in ("core", "sensor", "app") for path in (FIRMWARE / room).rglob("*.c"))
@@ -108,7 +115,7 @@ def build(board: Board, name: str, *sources: object) -> Path:
     apart = []
     for source in APART:
         apart.append(elf.with_suffix(f".{source.parent.name}_{source.stem}.o"))
-        command(*compiler, *OPTIONS[source.name], "-c", source, "-o", apart[-1])
+        command(*compiler, *OPTIONS[of_room(source)], "-c", source, "-o", apart[-1])
     command(*compiler, "-O3", *link, "-T", board.script, *board.start, *sources, *CORE, *JUDGED, *apart,
             "-lm", "-o", elf)  # fmt: skip
     return elf
