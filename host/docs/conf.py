@@ -34,6 +34,7 @@ html_copy_source = False
 html_static_path = ["style"]
 html_css_files = ["page.css"]
 
+autodoc_mock_imports = ["scipy", "sklearn", "statsmodels"]  # the extra `features`: pages are built without it
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True  # names of constants, not their values

@@ -26,7 +26,7 @@ def score(said: npt.ArrayLike, truth: npt.ArrayLike, *, least: float = 0.0) -> S
 
     ``r2`` is the squared correlation: the paper's Table 3 has R2 above 1 - SMSE, which only that can. Eq 6 divides by
     the truth and diverges where it is 0: ``percent`` is 100 times the integrals, by the trapezoidal rule, of
-    |said - truth| over |truth|, rows with |truth| > ``least`` only. All NaN with fewer than two rows.
+    ``abs(said - truth)`` over ``abs(truth)``, rows beyond ``least`` only. All NaN with fewer than two rows.
     """
     y, t = np.asarray(said, dtype=np.float64), np.asarray(truth, dtype=np.float64)
     good = np.isfinite(y) & np.isfinite(t)

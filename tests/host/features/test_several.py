@@ -48,6 +48,6 @@ def test_two_far_ones_are_two_and_a_bridge_makes_them_one() -> None:
 
 def test_two_simulated_contacts() -> None:
     """From 8 mm on mostly two, and each within 2 mm; at 6 mm most share an electrode. One is mostly one."""
-    rows = {row["apart_mm"]: row for row in seed000_more.pairs(Finger(1), 60, 1)}
+    rows = {row["apart_mm"]: row for row in seed000_more.pairs(Finger(1), 40, 1)}
     assert rows[0.0]["right"] > 0.85
     assert all(rows[apart]["right"] > 0.6 and rows[apart]["poc_rmse_mm"] < 2.0 for apart in (8.0, 10.0, 12.0, 14.0))
