@@ -22,6 +22,7 @@ EQ4_MAX_N = 40.0  # what the paper pressed with at most
 STRONGEST = 3
 THRESHOLD_N = 1.0  # seed 000: "> 1 N"
 
+#: ``dr_mm`` (d, r) on the skin laid flat, NaN unless ``valid``; ``force_n`` by Eq 4, of the three strongest electrodes.
 PAF_DTYPE = np.dtype([("dr_mm", "<f8", (2,)), ("force_n", "<f8"), ("valid", "?")])
 
 

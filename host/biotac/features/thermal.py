@@ -14,7 +14,8 @@ from ..wire.messages_gen import INVALID_COUNT
 KELVIN_AT_0_C = 273.15
 RANGE_C = (0.0, 75.0)  # the SynTouch manual's; a BioTac SP reads 47 to 63 by it, which nobody can tell from here
 
-#: ``celsius`` NaN where missing, railed or beyond RANGE_C; ``flux`` counts above the row's own first; ``flux_is_si`` never yet.
+#: ``celsius`` is NaN where missing, railed or beyond RANGE_C, ``flux_counts`` TAC above that of the first row that has
+#: one; ``flux_is_si`` is False until somebody knows its gain.
 THERMAL_DTYPE = np.dtype([("celsius", "<f8"), ("valid", "?"), ("flux_counts", "<f8"), ("flux_is_si", "?")])
 
 
