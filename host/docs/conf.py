@@ -34,6 +34,7 @@ html_copy_source = False
 html_static_path = ["style"]
 html_css_files = ["page.css"]
 
+autodoc_mock_imports = ["scipy", "sklearn", "statsmodels"]  # the extra `features`: pages are built without it
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True  # names of constants, not their values
@@ -53,6 +54,8 @@ MEANINGS: dict[Any, dict[int, str]] = {
 }
 #: Ends of field names; the first that fits holds.
 UNITS = {
+    "_counts": "count",
+    "celsius": "C",
     "_count2": "count^2",
     "_100un": "100 uN",
     "_mnmm": "mN*mm",
@@ -87,7 +90,7 @@ def explain(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[
 
 def comment(name: str) -> list[str]:
     """The comment above a constant, in whichever module defines it."""
-    for module in ("wire.frames", "core.compute", "core.finger"):
+    for module in ("wire.frames", "core.compute", "core.finger", "features.paf", "features.thermal"):
         found = ModuleAnalyzer.for_module(f"biotac.{module}").find_attr_docs().get(("", name))
         if found:
             return list(found)

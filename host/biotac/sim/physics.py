@@ -79,6 +79,18 @@ class States:
         return force, torque
 
 
+@dataclass(frozen=True)
+class Footprints:
+    """What n contacts cover, where they are not round: half lengths (n,) in mm of a Gaussian's ellipse.
+
+    ``along`` (n, 3) is the long one's unit vector in the tangent plane. probes.py makes them.
+    """
+
+    short_mm: Floats
+    long_mm: Floats
+    along: Floats
+
+
 def compliance(points_mm: Floats) -> Floats:
     """How freely the skin over core points (n, 3) moves: (n,), 0 to 1."""
     anchored = 1.0 - ANCHOR_SHARE * (1.0 + points_mm[:, 2] / surface.RADIUS_MM)
@@ -102,33 +114,43 @@ def _distance2(points_mm: Floats, contact_mm: Floats) -> Floats:
 
 def _squeeze_and_bulge(state: Floats) -> tuple[Floats, Floats]:
     """Log compression and relative bulge (n, 19) for touched states in _pack()'s columns."""
-    contact, force, shear, torsion, tip = (
-        state[:, 0:3], state[:, 3], state[:, 4:7], state[:, 7], state[:, 8],
-    )  # fmt: skip
+    contact, force, shear, torsion = state[:, 0:3], state[:, 3], state[:, 4:7], state[:, 7]
     normal = surface.normals_at(contact)
-    footprint = (tip + FOOTPRINT_GROWTH_MM * np.cbrt(force))[:, None]
+    footprint, ellipse = state[:, 8:9], state[:, 9:13]
+    if not ellipse.shape[1]:
+        footprint = footprint + FOOTPRINT_GROWTH_MM * np.cbrt(force)[:, None]
+    # of one area with the round one, so that a footprint's shape alone takes no force away
+    size = footprint if not ellipse.shape[1] else np.sqrt(footprint * ellipse[:, :1])
     depth = (
-        SQUEEZE_AT_REFERENCE
-        * ((force / SQUEEZE_FORCE_N) ** SQUEEZE_EXPONENT)[:, None]
-        * (SQUEEZE_FOOTPRINT_MM / footprint)
+        SQUEEZE_AT_REFERENCE * ((force / SQUEEZE_FORCE_N) ** SQUEEZE_EXPONENT)[:, None] * (SQUEEZE_FOOTPRINT_MM / size)
     )
 
-    def squeeze(distance2: Floats, facing: Floats) -> Floats:
-        result: Floats = depth * np.exp(-distance2 / (2.0 * footprint**2)) * np.maximum(facing, 0.0)
+    def footprints2(points_mm: Floats, distance2: Floats) -> Floats:
+        """Squared distance (contacts, points) in footprints."""
+        if not ellipse.shape[1]:
+            return distance2 / footprint**2
+        along = ellipse[:, 1:] @ points_mm.T - (ellipse[:, 1:] * contact).sum(axis=1)[:, None]
+        along2 = np.minimum(along**2, distance2)
+        result: Floats = (distance2 - along2) / footprint**2 + along2 / ellipse[:, :1] ** 2
         return result
 
-    def outside(distance2: Floats) -> Floats:
-        result: Floats = 1.0 - np.exp(-distance2 / (2.0 * (BULGE_HOLE * footprint) ** 2))
+    def squeeze(away2: Floats, facing: Floats) -> Floats:
+        result: Floats = depth * np.exp(-away2 / 2.0) * np.maximum(facing, 0.0)
         return result
 
-    far = _distance2(_MESH_MM, contact)
+    def outside(away2: Floats) -> Floats:
+        result: Floats = 1.0 - np.exp(-away2 / (2.0 * BULGE_HOLE**2))
+        return result
+
+    far = footprints2(_MESH_MM, _distance2(_MESH_MM, contact))
     pressed = squeeze(far, normal @ _MESH_NORMAL.T)
     volume_mm3 = (GAP_MM * (1.0 - np.exp(-pressed))) @ _MESH_AREA_MM2
     room_mm3 = (GAP_MM * outside(far)) @ (_MESH_COMPLIANCE * _MESH_AREA_MM2)
 
     near = _distance2(surface.ELECTRODE_MM, contact)
-    compression = squeeze(near, normal @ surface.ELECTRODE_NORMAL.T)
-    bulge = (BULGE_SHARE * volume_mm3 / room_mm3)[:, None] * _ELECTRODE_COMPLIANCE * outside(near)
+    away2 = footprints2(surface.ELECTRODE_MM, near)
+    compression = squeeze(away2, normal @ surface.ELECTRODE_NORMAL.T)
+    bulge = (BULGE_SHARE * volume_mm3 / room_mm3)[:, None] * _ELECTRODE_COMPLIANCE * outside(away2)
 
     shift = shear / SHEAR_N_PER_MM
     length = np.linalg.norm(shift, axis=1, keepdims=True)
@@ -142,23 +164,26 @@ def _squeeze_and_bulge(state: Floats) -> tuple[Floats, Floats]:
     return compression, bulge + sideways
 
 
-def _pack(states: States) -> Floats:
-    """The mechanical part of touched states as rows (n, 9)."""
-    return np.column_stack(
-        [states.contact_mm, states.force_n, states.shear_n, states.torsion_nmm, states.tip_radius_mm]
-    )
+def _pack(states: States, footprints: Footprints | None) -> Floats:
+    """The mechanical part of touched states as rows (n, 9), or (n, 13) with footprints in place of the tip."""
+    load = [states.contact_mm, states.force_n, states.shear_n, states.torsion_nmm]
+    if footprints is None:
+        return np.column_stack([*load, states.tip_radius_mm])
+    return np.column_stack([*load, footprints.short_mm, footprints.long_mm, footprints.along])
 
 
-def deform(states: States) -> tuple[Floats, Floats]:
+def deform(states: States, footprints: Footprints | None = None) -> tuple[Floats, Floats]:
     """Log compression and relative bulge of the gap over the electrodes, each (n, 19).
 
-    Both are 0 without contact. Equal states are computed once: a scenario mostly holds still.
+    Both are 0 without contact, and those of several contacts add: the logs of what each leaves of the gap, and the
+    volumes each displaces. ``footprints`` take the place of ``tip_radius_mm``. Equal states are computed once: a
+    scenario mostly holds still.
     """
     compression = np.zeros((len(states), ELECTRODES))
     bulge = np.zeros((len(states), ELECTRODES))
     touched = np.flatnonzero(states.force_n > 0.0)
     if len(touched):
-        unique, inverse = np.unique(_pack(states)[touched], axis=0, return_inverse=True)
+        unique, inverse = np.unique(_pack(states, footprints)[touched], axis=0, return_inverse=True)
         parts = [_squeeze_and_bulge(unique[k : k + _BLOCK]) for k in range(0, len(unique), _BLOCK)]
         rows = inverse.reshape(-1)  # NumPy 2.0 alone returns it as a column
         compression[touched] = np.concatenate([part[0] for part in parts])[rows]
@@ -194,13 +219,16 @@ class Finger:
 
     def counts(self, states: States) -> Floats:
         """Counts (n, 19), not rounded, without noise, drift or creep."""
-        compression, bulge = deform(states)
+        return self.counts_of(*deform(states), states.warm_c)
+
+    def counts_of(self, compression: Floats, bulge: Floats, warm_c: Floats) -> Floats:
+        """counts() of what deform() says, each (n, 19), at ``warm_c`` (n,) above 30 C."""
         change = bulge * self.gap_gain
         # a bulge opens the gap in proportion; a negative one must not close it past zero
         opened = np.where(change >= 0.0, 1.0 + change, np.exp(np.minimum(change, 0.0)))
         gap = np.exp(-compression * self.gap_gain) * opened
         share = FIXED_RESISTANCE_SHARE + (1.0 - FIXED_RESISTANCE_SHARE) / gap**2
-        return _divider(self.r0_ohm * share * np.exp(TEMPERATURE_PER_C * states.warm_c)[:, None])
+        return _divider(self.r0_ohm * share * np.exp(TEMPERATURE_PER_C * warm_c)[:, None])
 
 
 def _divider(resistance_ohm: Floats) -> Floats:

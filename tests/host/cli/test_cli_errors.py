@@ -121,6 +121,7 @@ CASES: list[tuple[int, str, str]] = [
     (2, "add E_base", "experiment shear @brief.npz"),
     (2, "leave one out", "experiment shear @rest.npz --seed 2"),
     (2, "leave --map out", "experiment poke --map +no.wrench.json"),
+    (2, "leave them out", "experiment poke --quick"),
     (2, "as `biotac calibrate wrench --out` writes it", "experiment shear --map +no.wrench.json"),
     (2, "rename the file", "experiment shear --map +paper.wrench.json"),
     (2, "give --map FILE", "experiment torsion-shear --check --out +out"),

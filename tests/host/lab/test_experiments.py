@@ -360,3 +360,21 @@ def test_check_fails_with_its_own_code_when_a_figure_is_missed(monkeypatch, caps
     assert main(["experiment", "plate-normal", "--check"]) == 1
     said = capsys.readouterr().out
     assert "NOT met: median" in said and "\nmet: 90th percentile" in said
+
+
+# ---- seed000 -------------------------------------------------------------------------------------
+
+
+@pytest.mark.nightly
+def test_seed000_has_a_row_for_every_table_and_figure(tmp_path: Path, capsys) -> None:
+    assert main(["experiment", "seed000", "--quick", "--out", str(tmp_path), "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    page = (tmp_path / "seed000.md").read_text(encoding="utf-8")
+    first = [row.split("|")[1] for row in page.split("## Table 3")[0].splitlines() if row.startswith("| ")]
+    said = " ".join(first)
+    for kind, last in (("Table", 4), ("Fig", 13)):
+        for k in range(1, last + 1):
+            assert re.search(rf"{kind} (\d+, )*{k}\b", said), (kind, k)
+    assert all(row.count("|") == 6 for row in page.split("## Table 3")[0].splitlines() if row.startswith("| "))
+    assert [one["correct"] for one in facts["roc"]] and facts["bars"]["test"] == 30
+    assert (tmp_path / "seed000.png").stat().st_size > 10_000

@@ -48,6 +48,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="a .wrench.json to try beside the paper's model; more than once if you like",
     )
+    parser.add_argument(
+        "--real",
+        metavar="FILE",
+        type=Path,
+        action="append",
+        default=[],
+        help="seed000: an .npz with its force to try nets on, too; more than once if you like",
+    )
+    parser.add_argument("--quick", action="store_true", help="seed000: a small run of the same, with worse figures")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="NAME.md, NAME.png and NAME.json go here")
     parser.add_argument("--force", action="store_true", help="overwrite what is there")
     parser.add_argument("--check", action="store_true", help="exit 1 when a figure misses what is asked of it")
@@ -60,7 +69,9 @@ def run(args: argparse.Namespace) -> int:
     progress = Progress()
     try:
         seed = 1 if args.seed is None else args.seed
-        options = Options(seed, args.recording, args.finger, tuple(args.map), progress.show)
+        options = Options(
+            seed, args.recording, args.finger, tuple(args.map), tuple(args.real), args.quick, progress.show
+        )
         result = experiment.run(options)
         facts = experiment.facts(result)
     finally:
@@ -85,6 +96,8 @@ def _check_arguments(args: argparse.Namespace, experiment: Experiment) -> None:
         raise InputError(f"--seed is {args.seed}: expected 0 to {SEED_MAX}")
     if args.map and not experiment.MAPS:
         raise InputError(f"{args.name} has no use for a wrench map: leave --map out")
+    if (args.real or args.quick) and not getattr(experiment, "REAL", False):
+        raise InputError(f"{args.name} has no use for --real or --quick: leave them out")
     if args.out is not None:
         check_drawable()
         outputs.check(args.out, _places(args.out, args.name), overwrite=args.force)

@@ -18,6 +18,7 @@ NAMES = {
     "shear-torsion": "shear and torsion at once on held-out places, calibrated against the paper's model",
     "hold": "light holds spliced into presses, against what presses leave in the skin",
     "navarro": "pressure calibration and its verification press (Navarro et al.)",
+    "seed000": "every table and figure of point, curvature and force by learning (Wettels and Loeb)",
 }
 
 

@@ -18,13 +18,16 @@ class Options:
 
     ``seed`` chooses the emulated finger; with ``recording`` there is none, and ``finger`` is which of the
     recording's is meant. ``maps`` are files of fitted wrench maps to try beside the paper's model; ``show`` is
-    told what is going on.
+    told what is going on. ``real`` are recordings with their force to try beside the emulated finger; ``quick`` asks
+    for a smaller run of the same, whose figures are worse.
     """
 
     seed: int = 1
     recording: Path | None = None
     finger: int = 0
     maps: tuple[Path, ...] = ()
+    real: tuple[Path, ...] = ()
+    quick: bool = False
     show: Show = field(default=lambda text: None)
 
 
@@ -32,8 +35,9 @@ class Experiment(Protocol):
     """The module of an experiment, host/biotac/lab/experiments/NAME.py.
 
     ``RECORDING`` says in words what a recording must hold, empty where none makes sense; ``MAPS`` whether
-    wrench maps can be tried. ``facts`` are JSON types only; ``page`` is built from nothing else, so that table
-    and JSON cannot differ. Facts hold ``experiment``, ``source``, ``checks`` (of check()) and ``notes``.
+    wrench maps can be tried; ``REAL``, where there is one, whether Options.real and quick are for it. ``facts`` are
+    JSON types only; ``page`` is built from nothing else, so that table and JSON cannot differ. Facts hold
+    ``experiment``, ``source``, ``checks`` (of check()) and ``notes``.
     """
 
     @property

@@ -1,0 +1,105 @@
+"""Force by nets: seed 000, II.D, one net for everything or one for each class of probe and place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from . import inputs, levenberg
+from .signals import Floats
+
+Integers = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+FORWARD_D_MM = 14.0  # seed 000, II.D3: "near d = 14 mm the BioTac begins to curve and taper"
+CLASSES = ("rear, small", "rear, large", "forward, small", "forward, large")
+STOPPING_SHARE = 0.15
+
+
+def classes(d_mm: Floats, large: Bools) -> Integers:
+    """Which of CLASSES (n,): ``d_mm`` of the PAF, and whether the probe is the 10 mm or the flat one."""
+    result: Integers = 2 * (np.asarray(d_mm) >= FORWARD_D_MM).astype(np.int64) + np.asarray(large).astype(np.int64)
+    return result
+
+
+@dataclass(frozen=True)
+class ForceNets:
+    """A net a class, each with its reductions; ``nets[c]`` is one for all axes, or one an axis."""
+
+    nets: dict[int, list[tuple[inputs.Reduction, levenberg.Net]]]
+
+    def __call__(self, above: Floats, kind: Integers | None = None) -> Floats:
+        """Force (n, 3) in N of signals (n, 19); ``kind`` (n,) is each row's class where there are several nets.
+
+        Raises InputError for a class no net was trained for.
+        """
+        of = np.zeros(len(above), np.int64) if kind is None else np.asarray(kind)
+        unknown = sorted(set(of.tolist()) - set(self.nets))
+        if unknown:
+            raise InputError(f"class {unknown[0]} has no net: expected one of {sorted(self.nets)}; train with it")
+        result = np.empty((len(above), 3))
+        for c, nets in self.nets.items():
+            rows = of == c
+            if rows.any():
+                result[rows] = np.hstack([net(reduction(above[rows])) for reduction, net in nets])
+        return result
+
+
+def train(
+    above: Floats,
+    force_n: Floats,
+    groups: Integers,
+    kind: Integers | None = None,
+    *,
+    reduce: inputs.Reduce = inputs.principal,
+    by_spearman: bool = False,
+    seed: int = 0,
+    steps: int = levenberg.STEPS,
+) -> ForceNets:
+    """Nets from signals (n, 19) to force (n, 3) in N.
+
+    ``groups`` (n,) is what may not be on both sides of the early stop: contacts, blocks. ``kind`` (n,) makes a net
+    for each class of it. ``by_spearman`` gives each axis a net of its own with the electrodes that follow that axis.
+    """
+    of = np.zeros(len(above), np.int64) if kind is None else np.asarray(kind)
+    made: dict[int, list[tuple[inputs.Reduction, levenberg.Net]]] = {}
+    for c in np.unique(of).tolist():
+        x, f, names = above[of == c], force_n[of == c], groups[of == c]
+        if by_spearman:
+            kept = inputs.correlated(x, f)
+            kept[:, ~kept.any(axis=0)] = True  # an axis that nothing follows gets what there is
+            parts = [(inputs.only(x, kept[:, axis]), f[:, [axis]]) for axis in range(3)]
+        else:
+            parts = [(reduce(x), f)]
+        stopping = _aside(names, seed)
+        made[c] = [(its, _net(its(x), target, stopping, seed, steps)) for its, target in parts]
+    return ForceNets(made)
+
+
+def _net(x: Floats, target: Floats, stopping: Bools, seed: int, steps: int) -> levenberg.Net:
+    aside = (x[stopping], target[stopping]) if stopping.any() else None
+    return levenberg.train(x[~stopping], target[~stopping], aside, seed=seed, steps=steps)
+
+
+def _aside(groups: Integers, seed: int) -> Bools:
+    """STOPPING_SHARE of the groups, and none of a single one."""
+    names = np.random.default_rng([seed, 9]).permutation(np.unique(groups))
+    result: Bools = np.isin(groups, names[: int(len(names) * STOPPING_SHARE)])
+    return result
+
+
+def cross_validated(
+    above: Floats, groups: Integers, folds: int, predict: Callable[[Bools, Bools], Floats], axes: int = 3
+) -> Floats:
+    """Held-out predictions (n, axes): ``predict(training, test)`` for each of ``folds``, no group on both sides."""
+    from sklearn.model_selection import GroupKFold
+
+    said = np.full((len(above), axes), np.nan)
+    for training, test in GroupKFold(folds).split(above, groups=groups):
+        masks = [np.isin(np.arange(len(above)), part) for part in (training, test)]
+        said[masks[1]] = predict(*masks)
+    return said

@@ -1,0 +1,97 @@
+"""Several contacts at once: what seed 000, II.C, leaves to others, by clusters on the skin's graph.
+
+Electrodes are neighbours when they are at most REACH_MM apart on the skin laid flat. Each pressed electrode belongs to
+the strongest one that it can climb to, step by step to its strongest neighbour; two such summits are one contact when
+the pass between them is not much lower than the lower one. The electrodes stand 4 to 7 mm apart: two contacts that
+share a summit are one here, and are told as one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..core import geometry as surface
+from .paf import electrode_force
+from .signals import ELECTRODE_DR_MM, ELECTRODES, Floats
+
+REACH_MM = 5.5
+PASS_SHARE = 0.5  # of the lower summit
+SHARE_POWER = 1.0 / 3.0  # how near an electrode a contact lies says more than its force: drawn towards equal shares
+LEAST_SHARE = 0.1  # of the strongest electrode: below it, what two contacts bulge and noise are
+
+
+def _graph() -> npt.NDArray[np.bool_]:
+    between = np.linalg.norm(ELECTRODE_DR_MM[:, None] - ELECTRODE_DR_MM[None], axis=2)
+    result: npt.NDArray[np.bool_] = (between <= REACH_MM) & ~np.eye(ELECTRODES, dtype=bool)
+    return result
+
+
+NEIGHBOURS = _graph()
+
+
+@dataclass(frozen=True)
+class Contact:
+    """``poc_mm`` (3,) on the core's surface; ``share`` of the force, 0 to 1; ``electrodes``, strongest first."""
+
+    poc_mm: Floats
+    share: float
+    electrodes: tuple[int, ...]
+
+
+def contacts(row: npt.NDArray[Any], *, least_n: float = 0.05) -> list[Contact]:
+    """The contacts of one frame, strongest first; none where no electrode has ``least_n`` by Eq 4 or one is missing.
+
+    ``row`` is a frame of ``biotac.load`` or a live hand, or signals (19,). Shares are a guess from Eq 4, good to
+    about 0.1 (host/docs/features.md).
+    """
+    force = electrode_force(row if row.dtype.names else row[None, :])[0]
+    if np.isnan(force).any() or force.max() < least_n:
+        return []
+    pressed = force > LEAST_SHARE * force.max()
+    summit = _climb(force, pressed)
+    groups = [np.flatnonzero(pressed & (summit == top)) for top in _merged(force, pressed, summit)]
+    part = [float((force[group] ** SHARE_POWER).sum()) for group in groups]
+    found = []
+    for group, its in zip(groups, part, strict=True):
+        weight = force[group]
+        middle = (surface.ELECTRODE_MM[group] * weight[:, None]).sum(axis=0) / weight.sum()
+        order = group[np.argsort(-weight)]
+        found.append(Contact(surface.project(middle[None])[0], its / sum(part), tuple(order.tolist())))
+    return sorted(found, key=lambda one: -one.share)
+
+
+def _climb(force: Floats, pressed: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """The summit (19,) above each electrode; its own number where nothing near is stronger."""
+    up = np.arange(ELECTRODES)
+    for k in np.flatnonzero(pressed):
+        near = np.flatnonzero(NEIGHBOURS[k] & pressed)
+        if len(near) and force[near].max() > force[k]:
+            up[k] = near[np.argmax(force[near])]
+    for _ in range(ELECTRODES):
+        up = up[up]
+    return up
+
+
+def _merged(force: Floats, pressed: npt.NDArray[np.bool_], summit: npt.NDArray[np.int64]) -> list[int]:
+    """Summits that stand for themselves; ``summit`` is changed where a lower one joins a higher."""
+    tops = sorted(set(summit[pressed].tolist()), key=lambda k: -force[k])
+    kept: list[int] = []
+    for top in tops:
+        mine = np.flatnonzero(pressed & (summit == top))
+        best, into = 0.0, top
+        for other in kept:
+            theirs = np.flatnonzero(pressed & (summit == other))
+            touching = NEIGHBOURS[np.ix_(mine, theirs)]
+            if touching.any():
+                passes = np.minimum(force[mine][:, None], force[theirs][None, :])[touching]
+                if passes.max() > best:
+                    best, into = float(passes.max()), other
+        if best > PASS_SHARE * force[top]:
+            summit[mine] = into
+        else:
+            kept.append(top)
+    return kept

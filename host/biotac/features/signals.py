@@ -1,0 +1,53 @@
+"""What every feature is made of: electrodes above their tare, and places on the skin laid flat."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..core import geometry as surface
+from ..core.unroll import unroll
+from ..errors import InputError
+from ..wire import sensor_gen as _sensor
+from ..wire.messages_gen import INVALID_COUNT
+
+Floats = npt.NDArray[np.float64]
+
+ELECTRODES = len(_sensor.ELECTRODE_NAMES)
+
+
+def signals(rows: npt.NDArray[Any]) -> Floats:
+    """Counts above the tare (n, 19) float64, compression < 0; NaN where an electrode or its tare is missing.
+
+    ``rows`` are those of ``biotac.load`` or of a live hand (their ``counts`` and ``tare``), or an array (n, 19) that
+    is tared already and is taken as it is. Raises InputError for anything else.
+    """
+    rows = np.atleast_1d(rows)
+    if rows.dtype.names is None:
+        if rows.ndim != 2 or rows.shape[1] != ELECTRODES or rows.dtype.kind not in "fi":
+            raise InputError(
+                f"rows are {rows.dtype} {rows.shape}: expected frames of biotac.load, or counts above the tare "
+                f"(n, {ELECTRODES})"
+            )
+        return rows.astype(np.float64)
+    missing = [name for name in ("counts", "tare") if name not in rows.dtype.names]
+    if missing:
+        raise InputError(f"rows have no {' and no '.join(missing)}: expected frames; load those fields too")
+    counts = rows["counts"]
+    above: Floats = np.where(counts == INVALID_COUNT, np.nan, counts - rows["tare"].astype(np.float64))
+    return above
+
+
+def skin(points_mm: Floats) -> Floats:
+    """Core points (n, 3) as seed 000's (d, r) in mm, (n, 2): its figure 3.
+
+    d runs along the finger from the proximal end of the pattern, x = -16 mm, to the tip; r is the arc from the ventral
+    line, + on E11's side (the paper's left is -). Over the cap they are those of a globe with its pole at the tip.
+    """
+    across, along = unroll(surface.project(points_mm))
+    return np.column_stack([along - surface.PROXIMAL_END_MM, across])
+
+
+ELECTRODE_DR_MM = skin(surface.ELECTRODE_MM)

@@ -1,0 +1,44 @@
+"""Temperature in degrees C, and what can be said of heat flux."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from ..wire import sensor_gen as _sensor
+from ..wire.messages_gen import INVALID_COUNT
+
+KELVIN_AT_0_C = 273.15
+RANGE_C = (0.0, 75.0)  # the SynTouch manual's; a BioTac SP reads 47 to 63 by it, which nobody can tell from here
+
+#: ``celsius`` is NaN where missing, railed or beyond RANGE_C, ``flux_counts`` TAC above that of the first row that has
+#: one; ``flux_is_si`` is False until somebody knows its gain.
+THERMAL_DTYPE = np.dtype([("celsius", "<f8"), ("valid", "?"), ("flux_counts", "<f8"), ("flux_is_si", "?")])
+
+
+def thermal(rows: npt.NDArray[Any]) -> npt.NDArray[np.void]:
+    """THERMAL_DTYPE (n,) of rows with ``tdc`` and ``tac``.
+
+    TDC is a thermistor in a divider: T = beta / ln(A / x - B) - 273.15 with x = TDC / 4095 (sensor.toml, the product
+    manual). TAC is high-pass filtered and amplified by stages whose gain in W no public document gives, so heat flux
+    stays in counts against the first valid row, and ``flux_is_si`` is False. Raises InputError for rows without them.
+    """
+    rows = np.atleast_1d(rows)
+    missing = [name for name in ("tdc", "tac") if name not in (rows.dtype.names or ())]
+    if missing:
+        raise InputError(f"rows have no {' and no '.join(missing)}: expected frames; load those fields too")
+    result = np.zeros(len(rows), THERMAL_DTYPE)
+    share = np.clip(rows["tdc"].astype(np.float64), 1.0, _sensor.FULL_SCALE_COUNT) / _sensor.FULL_SCALE_COUNT
+    inside = _sensor.TDC_A / share - _sensor.TDC_B
+    # a railed converter says only that it is
+    known = (rows["tdc"] != INVALID_COUNT) & (rows["tdc"] < _sensor.FULL_SCALE_COUNT) & (inside > 1.0)
+    celsius = _sensor.TDC_BETA_K / np.log(np.where(known, inside, np.e)) - KELVIN_AT_0_C
+    result["valid"] = known & (celsius >= RANGE_C[0]) & (celsius <= RANGE_C[1])
+    result["celsius"] = np.where(result["valid"], celsius, np.nan)
+    there = rows["tac"] != INVALID_COUNT
+    first = float(rows["tac"][there][0]) if there.any() else np.nan
+    result["flux_counts"] = np.where(there, rows["tac"] - first, np.nan)
+    return result

@@ -1,0 +1,189 @@
+"""Every table and figure of seed 000 (Wettels and Loeb 2011), on an emulated finger and on recordings with their force.
+
+The paper's probes, places and presses are drawn by sim/stimulations.py. What is learnt is judged on contacts that
+training has not seen; beside it stands the paper's own split, rows at random, of which neighbours in time land on
+either side: what it gains over contacts held out is a leak and not a finding.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...core.geometry import Floats
+from ...errors import InputError
+from ...sim.physics import Finger
+from ...sim.probes import PROBES
+from .outcome import Facts, Options, check, claim, text
+from .seed000_page import PAPER_PLACES, details, overview
+
+RECORDING = ""
+MAPS = False
+REAL = True
+
+ROC_ASKED, D_ASKED_MM, R_ASKED_MM, BAR_ASKED_DEG = 0.947, 2.3, 2.2, 5.0
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is drawn and learnt: contacts a probe, rows and steps of a net."""
+
+    places: tuple[int, ...] = (400, 400, 400, 400)
+    paf_places: tuple[int, ...] = PAPER_PLACES
+    frames: int = 6000
+    steps: int = 60
+    force_places: tuple[int, ...] = (150, 150, 150, 150)
+    force_steps: int = 25
+    reduced_places: tuple[int, ...] = (60, 60, 60, 60)
+    reduced_steps: int = 15
+    bars: int = 6000
+    pairs: int = 200
+
+
+QUICK = Size((8, 8, 8, 8), (3, 3, 3, 3), 300, 2, (6, 6, 6, 6), 2, (6, 6, 6, 6), 1, 200, 20)
+
+
+@dataclass(frozen=True)
+class Result:
+    """``paf`` is what figure 8 draws: truth, raw and smoothed (n, 2); ``force`` truth and estimate (n, 3)."""
+
+    source: str
+    parts: Facts
+    notes: list[str]
+    paf: Any = field(repr=False)
+    force: tuple[Floats, Floats] = field(repr=False)
+
+
+def run(options: Options) -> Result:
+    """Minutes; see host/docs/features.md. Raises InputError without scikit-learn, scipy and statsmodels."""
+    try:
+        import sklearn  # noqa: F401
+        import statsmodels  # noqa: F401
+    except ImportError as error:
+        raise InputError(f"{error.name} is not installed; pip install 'biotac-gateway[features]'") from None
+    from threadpoolctl import threadpool_limits
+
+    size = QUICK if options.quick else Size()
+    # nets are many small systems: BLAS's own threads would wait for each other
+    with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(min(2, os.cpu_count() or 1)) as pool:
+        return _run(options, size, pool)
+
+
+def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
+    from . import seed000_force as force
+    from . import seed000_more as more
+    from . import seed000_paf as paf
+    from . import seed000_roc as roc
+
+    finger, seed = Finger(options.seed), options.seed
+    its = force.load(finger, size.force_places, seed)
+    less = force.load(finger, size.reduced_places, seed)
+    steps = size.force_steps
+    options.show("drawing presses and training nets")
+    nets = pool.submit(force.networks, its, steps, seed)
+    by_contact = pool.submit(roc.frames, finger, size.places, True, seed, size.steps, size.frames)
+    by_row = pool.submit(roc.frames, finger, PAPER_PLACES, False, seed, size.steps, size.frames)
+    grown = pool.submit(roc.trajectories, finger, size.places, seed, size.steps)
+    bars = pool.submit(more.bars, finger, size.bars, seed, size.steps)
+    reduced = pool.submit(force.reductions, less, size.reduced_steps, seed)
+    pairs = pool.submit(more.pairs, finger, size.pairs, seed)
+    real = [pool.submit(force.recorded, path, steps, seed, options.show) for path in options.real]
+    rows, drawn = paf.run(finger, size.paf_places, seed)
+    said = nets.result()
+    parts = {
+        "paf": rows,
+        "impedance": paf.impedance(finger),
+        "correlations": paf.correlations(finger, PAPER_PLACES, seed),
+        "roc": [by_row.result(), by_contact.result(), *grown.result()],
+        "force": [{"how": how} | force.scores(one, its.force_n) for how, one in said.items()],
+        "force_places": list(size.force_places),
+        "classes": force.by_class(said[force.A_PRIORI], its),
+        "reductions": reduced.result(),
+        "pairs": pairs.result(),
+        "bars": bars.result(),
+        "real": [one.result() for one in real],
+    }
+    notes = [
+        f"emulated finger, seed {seed}: Hertz's footprints on numerics.md 3.1, like a BioTac and not a given one",
+        f"contacts of five presses, 30 to 40 N: the paper's {PAPER_PLACES} for PAF, {size.places} for curvature, "
+        f"{size.force_places} for force, {size.reduced_places} for figure 10",
+        "no filter: the paper's 3-pole 5 Hz low-pass lags by about 0.1 s; R2 is the squared correlation, as its "
+        "table 3 needs; Eq 6 only where the force is above 1 N",
+        "rear and forward by the true place, the probe known, as the paper has it; a row says what PAF's own d does",
+    ]
+    if options.quick:
+        notes.append("--quick: far too few rows for the figures to mean anything")
+    return Result(f"emulated finger, seed {seed}", parts, notes, drawn, (its.force_n, said[force.A_PRIORI]))
+
+
+def facts(result: Result) -> Facts:
+    """All figures, and what the issue asks of them."""
+    its = result.parts
+    paf = _paf(its, "30 to 40 N, as the paper", "rest offset removed", "force threshold")
+    best = max(its["roc"][1:], key=lambda one: one["correct"])
+    one, four = its["force"][0]["pooled_n"], its["force"][1]["pooled_n"]
+    return {
+        "experiment": "seed000",
+        "source": result.source,
+        **its,
+        "checks": [
+            check("PAF d above 1 N, the paper's loads", paf["d"]["rmse"], D_ASKED_MM, "mm"),
+            check("PAF r above 1 N, the paper's loads", paf["r"]["rmse"], R_ASKED_MM, "mm"),
+            check(
+                f"probes taken for others, held out, by {best['what']}", 1 - best["correct"], 1 - ROC_ASKED, "of all"
+            ),
+            claim(f"nets by class beat one net, pooled RMSE {text(four)} against {text(one)} N", four < one),
+            check("direction of a bar, RMSE", its["bars"]["rmse_deg"], BAR_ASKED_DEG, "deg"),
+        ],
+        "notes": result.notes,
+    }
+
+
+def _paf(its: Facts, load: str, equation: str, technique: str) -> Facts:
+    wanted = (load, equation, technique)
+    found: Facts = next(row for row in its["paf"] if (row["load"], row["equation"], row["technique"]) == wanted)
+    return found
+
+
+def page(facts: Facts) -> list[str]:
+    """A row for each table and figure, then the tables themselves."""
+    return [*overview(facts), *details(facts)]
+
+
+def draw(result: Result, figure: Any) -> None:
+    """Figures 6, 7, 8 and 12."""
+    figure.set_size_inches(15, 11)
+    grid = figure.add_gridspec(3, 2)
+    truth, raw, smooth = result.paf
+    for k, name in enumerate(("d", "r")):
+        axes = figure.add_subplot(grid[0, k])
+        axes.plot(raw[:, k], ".", markersize=1.5, color="#93c5fd", label="Eq 5")
+        axes.plot(smooth[:, k], ".", markersize=1.5, color="#1d4ed8", label="above 1 N, LOWESS")
+        axes.plot(truth[:, k], color="#dc2626", linewidth=0.8, label="true")
+        axes.set(title=f"figures 8 and 9: {name} [mm]", xlabel="row")
+        axes.legend(fontsize=7, loc="lower right")
+    axes = figure.add_subplot(grid[1, 0])
+    found = np.array(result.parts["correlations"], dtype=float)
+    for k, (name, color) in enumerate(zip(("x", "y", "z"), ("#dc2626", "#15803d", "#1d4ed8"), strict=True)):
+        axes.bar(np.arange(1, 20) + 0.27 * (k - 1), found[:, k], 0.27, color=color, label=f"F{name}")
+    axes.set(title="figure 6: Spearman coefficient of each electrode", xticks=range(1, 20))
+    axes.legend(fontsize=7)
+    axes = figure.add_subplot(grid[1, 1])
+    confusion = np.array(result.parts["roc"][-1]["confusion"])
+    axes.imshow(confusion, cmap="Blues")
+    for (row, column), value in np.ndenumerate(confusion):
+        axes.text(column, row, str(value), ha="center", va="center", fontsize=8)
+    names = [probe.name for probe in PROBES]
+    axes.set(xticks=range(4), yticks=range(4), xticklabels=names, yticklabels=names, xlabel="is", ylabel="taken for")
+    axes.set_title(f"figure 7: by {result.parts['roc'][-1]['what']}, held out")
+    inner = grid[2, :].subgridspec(1, 3)
+    true, said = result.force
+    for k, name in enumerate(("x", "y", "z")):
+        axes = figure.add_subplot(inner[0, k])
+        axes.plot(true[:, k], said[:, k], ".", markersize=1, color="#1d4ed8")
+        axes.axline((0, 0), slope=1, color="#dc2626", linewidth=0.8)
+        axes.set(title=f"figure 12: F{name} [N], held out", xlabel="true", ylabel="nets by class")

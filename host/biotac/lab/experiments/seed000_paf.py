@@ -1,0 +1,85 @@
+"""Seed 000's table 3 and figures 4, 6, 8 and 9 on an emulated finger: PAF by each technique, and who follows what."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from ...core import geometry as surface
+from ...core.geometry import Floats
+from ...features import inputs
+from ...features.paf import THRESHOLD_N, paf
+from ...features.scores import score
+from ...features.signals import skin
+from ...features.smooth import causal, lowess
+from ...sim.physics import Finger
+from ...sim.probes import PROBES, footprints
+from ...sim.stimulations import Stimulations, stimulate
+from .outcome import Facts, number
+
+LOADS_N = {"30 to 40 N, as the paper": (30.0, 40.0), "6 to 12 N": (6.0, 12.0)}
+EQUATIONS = {"as printed": True, "rest offset removed": False}
+TECHNIQUES = ("none", "11-point LOWESS", "force threshold", "both", "causal 11 taps and threshold")
+FRAMES = 20
+
+
+def run(finger: Finger, places: tuple[int, ...], seed: int) -> tuple[list[Facts], Any]:
+    """A row a load, equation and technique; and what is drawn: true and estimated places of the first."""
+    rows: list[Facts] = []
+    drawn: Any = None
+    for load, peak_n in LOADS_N.items():
+        its = stimulate(finger, places, seed=seed, frames=FRAMES, peak_n=peak_n)
+        truth = skin(its.contact_mm)
+        firm = np.linalg.norm(its.force_n, axis=1) > THRESHOLD_N
+        for equation, as_printed in EQUATIONS.items():
+            said = paf(its.counts - its.tare, as_printed=as_printed, threshold_n=0.0)["dr_mm"]
+            for technique in TECHNIQUES:
+                found = _by(technique, said, firm, its)
+                scores = [score(found[:, k], truth[:, k]) for k in (0, 1)]
+                held = np.isfinite(found).all(axis=1)
+                rows.append({
+                    "load": load, "equation": equation, "technique": technique, "share": number(float(held.mean())),
+                    "d": {name: number(value) for name, value in asdict(scores[0]).items()},
+                    "r": {name: number(value) for name, value in asdict(scores[1]).items()},
+                })  # fmt: skip
+                if drawn is None and technique == "both" and not as_printed:
+                    drawn = truth, said, found
+    return rows, drawn
+
+
+def _by(technique: str, said: Floats, firm: Any, its: Stimulations) -> Floats:
+    """The paper merged its files; a contact is smoothed by itself here, as nothing lies between two of them."""
+    found = said if technique in TECHNIQUES[:2] else np.where(firm[:, None], said, np.nan)
+    if technique in ("none", "force threshold"):
+        return found
+    smooth = np.full_like(found, np.nan)
+    for contact in np.unique(its.contact):
+        rows = np.flatnonzero((its.contact == contact) & np.isfinite(found).all(axis=1))
+        if len(rows) >= 11:
+            smooth[rows] = causal(found[rows]) if technique.startswith("causal") else lowess(found[rows])
+    return smooth
+
+
+def correlations(finger: Finger, places: tuple[int, ...], seed: int) -> list[list[float | None]]:
+    """Figure 6: absolute Spearman coefficients (19, 3) of the electrodes with Fx, Fy and Fz."""
+    its = stimulate(finger, places, seed=seed, frames=5)
+    found = inputs.correlations(its.counts - its.tare, its.force_n)
+    return [[number(value) for value in row] for row in found.tolist()]
+
+
+def impedance(finger: Finger) -> list[Facts]:
+    """Figure 4: resistance of E18 over its rest when a 1 mm tip presses with 10 N at these distances along d."""
+    from ...sim.physics import States
+    from ...sim.probes import counts_of
+
+    at = np.array([0.0, 1.0, 2.0, 4.0, 6.0])
+    over = surface.ELECTRODE_MM[17]
+    contact = surface.project(np.column_stack([over[0] + at, np.repeat(over[1], 5), np.repeat(over[2], 5)]))
+    none = np.zeros(len(at))
+    states = States(contact, np.full(len(at), 10.0), np.zeros((len(at), 3)), none, none, none)
+    counts = counts_of(finger, [(states, footprints(PROBES[0], contact, states.force_n))])[:, 17]
+    rest = finger.rest_counts(np.zeros(1))[0, 17]
+    ratio = (4095.0 / counts - 1.0) / (4095.0 / rest - 1.0)
+    return [{"mm": float(mm), "ratio": number(float(one))} for mm, one in zip(at, ratio, strict=True)]
