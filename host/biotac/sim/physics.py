@@ -10,9 +10,10 @@ so this is a sensor like a BioTac, not a given BioTac. sampling.py adds what tim
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from ..core import geometry as surface
 from ..core.geometry import Floats
@@ -65,6 +66,12 @@ class States:
 
     def __len__(self) -> int:
         return len(self.force_n)
+
+    def of(self, rows: npt.NDArray[Any]) -> States:
+        """At some of the instants, as NumPy indexes them."""
+        sliding = None if self.slip_mm_s is None else self.slip_mm_s[rows]
+        every = (self.contact_mm, self.force_n, self.shear_n, self.torsion_nmm, self.tip_radius_mm, self.warm_c)
+        return States(*(values[rows] for values in every), slip_mm_s=sliding)
 
     def wrench(self) -> tuple[Floats, Floats]:
         """Force (n, 3) in N on the finger and torque (n, 3) in N mm about the origin."""

@@ -96,7 +96,7 @@ def stimulate(
     compression, bulge = np.empty((len(states), 19)), np.empty((len(states), 19))
     for k, one in enumerate(probes):
         rows = of_row == k
-        mine = States(*(getattr(states, its.name)[rows] for its in fields(States)))
+        mine = states.of(rows)
         its_print = footprints(one, mine.contact_mm, mine.force_n)
         compression[rows], bulge[rows] = deform(mine, its_print)
     exact = finger.counts_of(compression, bulge, zeros)
