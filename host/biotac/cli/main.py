@@ -37,7 +37,11 @@ VERBS = {
     ),
     "replay": ("biotac.cli.recordings.replay", "Play a recording as the board that made it, here or on a pty."),
     "recompute": ("biotac.cli.recordings.recompute", "Run a recording's counts through the maths with other settings."),
-    "export": ("biotac.cli.recordings.export", "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag."),
+    "export": (
+        "biotac.cli.recordings.export",
+        "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag, or many to a lake of Parquet.",
+    ),
+    "lake": ("biotac.cli.recordings.lake", "Check a lake of recordings, or ask it in SQL."),
     "import": ("biotac.cli.recordings.import_btd", "Turn a SynTouch .btd file into a recording."),
     "calibrate": (
         "biotac.cli.calibrate",
