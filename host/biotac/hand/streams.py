@@ -393,6 +393,10 @@ class Streams:
         if now_s < self._due_s:
             return self._due_s - now_s
         if now_s - self._heard_s >= self._silence_s():
+            # It may be this side that was away, stopped or asleep: what waits to be read comes first.
+            self._board.read(0.0)
+            now_s = self._monotonic_s()
+        if now_s - self._heard_s >= self._silence_s():
             self._board.lost(self._silent(), "silence")
             self._heard_s = now_s = self._monotonic_s()
         self._due_s = self._heard_s + self._silence_s()
