@@ -16,6 +16,8 @@ ROOT = "biotac"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 FIND_S = 1.0  # who does not tell of itself by then is not there
 
+LEASE_MS = 30_000  # a computer that says nothing for so long is gone; a program that ends is gone at once
+
 #: Before each batch: its number, by which a reader knows what it missed.
 NUMBER = struct.Struct("<Q")
 
@@ -46,6 +48,8 @@ def open_session(
             facts = zenoh.Config.from_file(str(config))
         else:
             facts = zenoh.Config.from_env() if os.environ.get("ZENOH_CONFIG") else zenoh.Config()
+            # Who is stopped for a while (a debugger, a laptop's lid) goes on from there; Zenoh's own 10 s cut it off.
+            facts.insert_json5("transport/link/tx/lease", str(LEASE_MS))
         for what, endpoint in (("connect", connect), ("listen", listen)):
             if endpoint is not None:
                 facts.insert_json5(f"{what}/endpoints", json.dumps([endpoint]))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
 import secrets
 import socket
 import threading
+import time
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
@@ -21,6 +23,8 @@ from . import network, rights
 FORM = "zenoh:NAME?connect=tcp/HOST:7447&write=yes&config=FILE"
 MAX_WAITING_BYTES = 4 << 20  # of batches that nobody reads; about half a minute of five fingers
 ANSWER_S = 1.0
+# Whose connection was cut, or who was stopped for as long as Zenoh waits, finds the same board again by itself.
+GONE_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,7 @@ class ZenohLink:
         self._waiting = 0  # bytes
         self._next: int | None = None
         self._started = False
-        self._gone = False
+        self._gone_s = math.inf  # since when, by time.monotonic
         self._declared: list[Any] = []
         self.reopen(port)
 
@@ -104,12 +108,12 @@ class ZenohLink:
     def _listen(self, session: Any, epoch: str) -> None:
         with self._came:
             self._batches.clear()
-            self._waiting, self._next, self._started, self._gone = 0, None, False, False
+            self._waiting, self._next, self._started, self._gone_s = 0, None, False, math.inf
 
         def came_or_went(sample: Any) -> None:
-            if "DELETE" in str(sample.kind) and str(sample.key_expr).endswith(f"/{epoch}"):
+            if str(sample.key_expr).endswith(f"/{epoch}"):
                 with self._came:
-                    self._gone = True
+                    self._gone_s = time.monotonic() if "DELETE" in str(sample.kind) else math.inf
                     self._came.notify_all()
 
         tokens = session.liveliness()
@@ -159,12 +163,12 @@ class ZenohLink:
     def read(self, timeout_s: float) -> bytes:
         """See Link.read."""
         with self._came:
-            if not self._batches and not self._gone:
-                self._came.wait_for(lambda: self._batches or self._gone, timeout_s)
+            if not self._batches:
+                self._came.wait_for(lambda: self._batches, timeout_s)
             data = b"".join(self._batches)
             self._batches.clear()
             self._waiting = 0
-            if not data and self._gone:
+            if not data and time.monotonic() - self._gone_s >= GONE_S:
                 raise DeviceLostError(
                     f"{self.port} is not shared any more; see to `biotac serve` there, and open it again"
                 )
