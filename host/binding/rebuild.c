@@ -30,7 +30,9 @@ size_t bt_rebuild(const uint8_t *codes, size_t n, const uint8_t *const *tables, 
     return at + (rest_bytes - taken);
 }
 
-void bt_column(const uint8_t *planes, size_t n, size_t parts, size_t size, uint8_t *out, size_t stride)
+// With a constant size the loops over bytes are none.
+static inline void read_values(const uint8_t *planes, size_t n, size_t parts, size_t size, const uint32_t *at,
+                               uint8_t *out, size_t stride)
 {
     size_t plane = n * parts;
     for (size_t j = 0; j < parts; j++) {
@@ -41,9 +43,35 @@ void bt_column(const uint8_t *planes, size_t n, size_t parts, size_t size, uint8
                 zigzag |= (uint64_t)planes[b * plane + j * n + k] << 8 * b;
             }
             value += (zigzag >> 1) ^ (0 - (zigzag & 1));
+            uint8_t *to = out + at[k] * stride + j * size;
             for (size_t b = 0; b < size; b++) {
-                out[k * stride + j * size + b] = (uint8_t)(value >> 8 * b);
+                to[b] = (uint8_t)(value >> 8 * b);
             }
         }
+    }
+}
+
+void bt_columns(const uint8_t *planes, size_t n, const bt_stored_column *columns, size_t count,
+                const uint32_t *at, uint8_t *out, size_t stride)
+{
+    for (const bt_stored_column *its = columns; its < columns + count; its++) {
+        uint8_t *to = out + its->offset;
+        switch (its->offset < 0 ? 0 : its->size) {
+        case 1:
+            read_values(planes, n, its->parts, 1, at, to, stride);
+            break;
+        case 2:
+            read_values(planes, n, its->parts, 2, at, to, stride);
+            break;
+        case 4:
+            read_values(planes, n, its->parts, 4, at, to, stride);
+            break;
+        case 8:
+            read_values(planes, n, its->parts, 8, at, to, stride);
+            break;
+        default:
+            break;
+        }
+        planes += n * its->parts * its->size;
     }
 }

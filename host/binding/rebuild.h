@@ -16,8 +16,16 @@ enum bt_rebuild_code {
 size_t bt_rebuild(const uint8_t *codes, size_t n, const uint8_t *const *tables, const uint32_t *row_bytes,
                   const uint8_t *id, const uint8_t *rest, size_t rest_bytes, uint8_t *out);
 
-// A column of n rows of parts values of size bytes (1, 2, 4 or 8), from byte planes of zigzag changes:
-// component j of row k goes to out + k stride + j size.
-void bt_column(const uint8_t *planes, size_t n, size_t parts, size_t size, uint8_t *out, size_t stride);
+// A column as it is stored: n x parts values of size bytes (1, 2, 4 or 8).
+typedef struct {
+    uint32_t size;
+    uint32_t parts;
+    int32_t offset; // of the first in a row that is read; below 0: not wanted
+} bt_stored_column;
+
+// Columns of n rows from byte planes of zigzag changes, one after the other: row k becomes row at[k] of out,
+// whose rows are stride bytes long.
+void bt_columns(const uint8_t *planes, size_t n, const bt_stored_column *columns, size_t count,
+                const uint32_t *at, uint8_t *out, size_t stride);
 
 #endif

@@ -39,7 +39,7 @@ def test_the_firmwares_wire_conforms(tmp_path: Path) -> None:
 
 def test_the_c_clients_wire_conforms(tmp_path: Path) -> None:
     client = ROOT / "firmware/client"
-    build = ["cc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-DCLIENT", "-fsanitize=address,undefined", f"-I{client}"]
+    build = ["cc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-DCLIENT", f"-I{client}"]
     program = tmp_path / "client"
     sources = [str(CONFORMING / "core.c"), str(client / "biotac_client.c")]
     subprocess.run([*build, *sources, "-o", str(program)], check=True)

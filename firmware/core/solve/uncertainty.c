@@ -67,84 +67,143 @@ uint32_t bt_sigma_count_q8(uint32_t noise_count2)
     return root(times(noise_count2, VARIANCE_PER_NOISE_Q16));
 }
 
-static uint32_t square_of(int32_t value)
+// ---- the point of contact ------------------------------------------------------------------------------
+
+// m * 2^e, m of 16 bits with the highest one set, or zero. Each step is off by 2^-15 of itself at most, which
+// is a thirtieth of what a um is of the largest sigma that fits.
+typedef struct {
+    uint32_t m;
+    int e;
+} scaled;
+
+static scaled scaled_of(uint32_t value, int e)
 {
-    return bt_abs32(value) * bt_abs32(value);
+    if (value == 0) {
+        return (scaled){0, 0};
+    }
+    int up = __builtin_clz(value) - 16;
+    return (scaled){up >= 0 ? value << up : value >> -up, e - up};
 }
 
-#define QUOTIENT_BITS 25 // of 65535 in 1/256 um, and what is more saturates
-
-// num / den in 1/256 um, den > 0, cut where it saturates anyway. By 32-bit divisions, each with a divisor
-// that is a little too large, and what remains divided again; of den the first 32 bits count.
-static uint32_t quotient_q8(uint64_t num, uint64_t den)
+static scaled product(scaled a, scaled b)
 {
-    uint32_t high = (uint32_t)(den >> 32);
-    uint32_t quotient = 0;
-    int shift = high != 0 ? 32 - __builtin_clz(high) : -__builtin_clz((uint32_t)den);
-    if (high != 0) {
-        den >>= shift;
-        num >>= shift;
-    } else if (shift == 0 || num >> (64 + shift) == 0) {
-        den <<= -shift;
-        num <<= -shift;
-    } else {
-        return 1u << QUOTIENT_BITS;
+    return scaled_of(a.m * b.m, a.e + b.e);
+}
+
+static scaled ratio(scaled a, scaled b)
+{
+    return scaled_of(BT_DIVIDE_U32(a.m << 16, b.m), a.e - b.e - 16);
+}
+
+static scaled root_of(uint32_t value)
+{
+    if (value == 0) {
+        return (scaled){0, 0};
     }
-    if (num >> QUOTIENT_BITS >= den) {
-        return 1u << QUOTIENT_BITS;
+    int up = __builtin_clz(value) & ~1;
+    return (scaled){root32(value << up), -up / 2};
+}
+
+// sqrt(a^2 + b^2)
+static scaled together(scaled a, scaled b)
+{
+    if (a.m == 0 || (b.m != 0 && b.e > a.e)) {
+        scaled other = a;
+        a = b;
+        b = other;
     }
-    const uint32_t divisor = ((uint32_t)den >> 16) + 1;
-    uint32_t part = BT_DIVIDE_U32((uint32_t)(num >> QUOTIENT_BITS), divisor) << (QUOTIENT_BITS - 16);
-    num -= times(part, (uint32_t)den); // below 2^43 now
-    quotient += part;
-    part = BT_DIVIDE_U32((uint32_t)(num >> 16), divisor);
-    num -= times(part, (uint32_t)den);
-    quotient += part;
-    for (; num >= den; num -= den) {
-        quotient++;
+    uint32_t less = b.m == 0 || a.e - b.e > 15 ? 0 : b.m >> (a.e - b.e + 1);
+    uint32_t more = a.m >> 1;
+    scaled sum = root_of(more * more + less * less);
+    return scaled_of(sum.m, sum.e + a.e + 1);
+}
+
+static uint16_t rounded(scaled value)
+{
+    if (value.e > 0) {
+        return TOP;
     }
-    return quotient;
+    return value.e < -16 ? 0 : saturate((((uint64_t)value.m << 1 >> -value.e) + 1) >> 1);
+}
+
+#define WEIGHT_BITS 13 // of all weights together
+#define SQUARE_BITS 10 // that distances^2 in um^2 do without
+#define EQUAL_BITS  8  // of slopes that are all 1
+#define FARTHEST_UM 18400u
+// Between electrodes along the finger, and from one to the line through the middle of the tip.
+_Static_assert(((FARTHEST_UM * FARTHEST_UM >> SQUARE_BITS) + 1) * ((1ull << WEIGHT_BITS) + BT_ELECTRODES)
+                   <= UINT32_MAX,
+               "sums of weighted squares fit");
+#define N_PER_UM_Q30 ((1u << 31) / BT_CORE_RADIUS_UM) // to n of 15 bits
+_Static_assert((1ull << 31) / BT_CORE_RADIUS_UM * (BT_CORE_RADIUS_UM + 2) <= UINT32_MAX, "a point fits");
+
+static uint32_t square_of(int32_t um)
+{
+    return bt_abs32(um) * bt_abs32(um);
+}
+
+static inline uint32_t less_bits(uint32_t square_um2)
+{
+    return (square_um2 + (1u << (SQUARE_BITS - 1))) >> SQUARE_BITS;
 }
 
 static uint16_t poc_sigma_um(const int32_t e_q4[BT_ELECTRODES], int weights, const int16_t poc_um[3],
                              uint32_t sigma_q8)
 {
-    bool tip = poc_um[0] > 0;
-    uint64_t along = 0;  // of w'^2 (x - c_x)^2, on the cylinder
-    uint64_t across = 0; // of w'^2 |r x n|^2; on the cylinder without x
-    uint32_t total = 0;  // W: 19 of 24 bits
-    int64_t lever = 0;   // of w r n
+    const bool once = weights == BT_POC_WEIGHTS_COMPRESS_N1;
+    const bool tip = poc_um[0] > 0;
+    uint32_t weight[BT_ELECTRODES];
+    bool counts[BT_ELECTRODES];
+    uint32_t total = 0; // W: 19 of 26 bits
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        if (e_q4[i] == 0 || (e_q4[i] > 0 && weights != BT_POC_WEIGHTS_ABS_N2)) {
+        counts[i] = e_q4[i] < 0 || (e_q4[i] > 0 && weights == BT_POC_WEIGHTS_ABS_N2);
+        uint32_t e = counts[i] ? (bt_abs32(e_q4[i]) + 8) >> 4 : 0;
+        weight[i] = once ? e : e * e;
+        total += weight[i];
+    }
+    int down = 0; // what weights are shifted by; even, for it is halved
+    while (total >> down >= 1u << WEIGHT_BITS) {
+        down += 2;
+    }
+    const uint32_t half = (1u << down) >> 1;
+    int32_t n_q15[3];
+    for (int d = 0; d < 3; d++) {
+        n_q15[d] = bt_with_sign((bt_abs32(poc_um[d]) * N_PER_UM_Q30 + (1u << 15)) >> 16, poc_um[d]);
+    }
+    if (!tip) {
+        n_q15[0] = 0;
+    }
+    uint32_t along = 0;   // of w'^2 (x - c_x)^2, on the cylinder
+    uint32_t across = 0;  // of w'^2 |r x n|^2; on the cylinder without x
+    int32_t lever_q3 = 0; // of w r n
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        if (!counts[i]) {
             continue;
         }
-        uint32_t e = (bt_abs32(e_q4[i]) + 8) >> 4;
-        uint32_t weight = weights == BT_POC_WEIGHTS_COMPRESS_N1 ? e : e * e;
-        uint32_t slope = weights == BT_POC_WEIGHTS_COMPRESS_N1 ? 1 : 2 * e;
-        uint32_t slope2 = slope * slope;
         const int16_t *r = bt_electrode_um[i];
-        int32_t out = r[1] * poc_um[1] + r[2] * poc_um[2]; // each product is below 2^28
-        uint32_t length2 = square_of(r[1]) + square_of(r[2]);
+        const uint32_t w = (weight[i] + half) >> down;
+        const uint32_t slope2 = once ? 1u << EQUAL_BITS : w; // of a square, a quarter
+        int32_t out_q15 = r[1] * n_q15[1] + r[2] * n_q15[2];
+        uint32_t off = square_of((r[1] * n_q15[2] - r[2] * n_q15[1]) >> 15);
         if (tip) {
-            out += r[0] * poc_um[0];
-            length2 += square_of(r[0]);
+            out_q15 += r[0] * n_q15[0];
+            off += square_of((r[0] * n_q15[1] - r[1] * n_q15[0]) >> 15)
+                   + square_of((r[0] * n_q15[2] - r[2] * n_q15[0]) >> 15);
         } else {
-            along += times(slope2, square_of(r[0] - poc_um[0]));
+            along += slope2 * less_bits(square_of(r[0] - poc_um[0]));
         }
-        out = bt_with_sign(BT_DIVIDE_U32(bt_abs32(out), BT_CORE_RADIUS_UM), out);
-        uint32_t out2 = square_of(out); // with c rounded it may be more than the length
-        across += times(slope2, length2 > out2 ? length2 - out2 : 0);
-        total += weight;
-        // out is below 2^15, so that its products with halves of the weight fit.
-        lever += (int64_t)((int32_t)(weight >> 16) * out) * 65536 + (int32_t)(weight & 0xFFFF) * out;
+        across += slope2 * less_bits(off);
+        lever_q3 += (int32_t)w * ((out_q15 + (1 << 11)) >> 12);
     }
-    if (lever <= 0) { // nothing weighs, or too little to say where
+    if (lever_q3 <= 0) { // nothing weighs, or too little to say where
         return UNKNOWN;
     }
-    uint32_t along_q8 = quotient_q8(times(root(along), sigma_q8), total);
-    uint32_t across_q8 = quotient_q8(times(root(across), sigma_q8) * BT_CORE_RADIUS_UM, (uint64_t)lever);
-    uint64_t square_q16 = times(along_q8, along_q8) + times(across_q8, across_q8);
-    return saturate((root(square_q16) + 128ull) >> 8);
+    const int slope_e = once ? (SQUARE_BITS - EQUAL_BITS) / 2 : SQUARE_BITS / 2 + 1 + down / 2;
+    scaled sigma = scaled_of(sigma_q8, slope_e - 8);
+    scaled along_um = ratio(product(root_of(along), sigma), scaled_of(total, 0));
+    scaled across_um = ratio(product(product(root_of(across), sigma), scaled_of(BT_CORE_RADIUS_UM, 0)),
+                             scaled_of((uint32_t)lever_q3, down - 3));
+    return rounded(together(along_um, across_um));
 }
 
 static void force_sigma(const bt_solve_settings *settings, uint32_t sigma_q8, bt_msg_frame *msg)

@@ -1,5 +1,7 @@
 #include "wire/cobs.h"
 
+#include "wire/little_endian.h"
+
 #include <stdint.h>
 
 // A byte of the word is zero; exact for whether, not for which.
@@ -8,38 +10,48 @@ static inline int has_zero(uint32_t word)
     return ((word - 0x01010101u) & ~word & 0x80808080u) != 0;
 }
 
-typedef uint32_t __attribute__((may_alias)) any_word;
+// code waits for the distance to the next zero, and here it is: from now on its own place waits.
+static inline uint8_t *patched(uint8_t *code, uint8_t *zero)
+{
+    *code = (uint8_t)(zero - code);
+    return zero;
+}
 
-// From the end, so that each distance is known when it is needed. Most words have no zero: these are passed
-// by four bytes at a time.
+static inline uint8_t *bytewise(uint8_t *code, uint8_t *at, const uint8_t *end)
+{
+    for (; at < end; at++) {
+        if (*at == 0) {
+            code = patched(code, at);
+        }
+    }
+    return code;
+}
+
+static inline uint8_t *wordwise(uint8_t *code, uint8_t *at)
+{
+    uint32_t word = bt_get_aligned_u32(at);
+    if (has_zero(word)) {
+        code = word << 24 == 0 ? patched(code, at) : code;
+        code = word << 16 >> 24 == 0 ? patched(code, at + 1) : code;
+        code = word << 8 >> 24 == 0 ? patched(code, at + 2) : code;
+        code = word >> 24 == 0 ? patched(code, at + 3) : code;
+    }
+    return code;
+}
+
+// Most words have no zero: these are passed by four bytes at a time.
 void bt_cobs_in_place(uint8_t *block, size_t bytes)
 {
-    uint8_t *next = block + bytes;
-    uint8_t *at = next;
-#define PATCH(zero, byte)                                                                                    \
-    if (zero) {                                                                                              \
-        *(byte) = (uint8_t)(next - (byte));                                                                  \
-        next = (byte);                                                                                       \
+    const size_t before = -(uintptr_t)(block + 1) & 3;
+    uint8_t *const end = block + bytes;
+    uint8_t *at = before < bytes ? block + 1 + before : end;
+    uint8_t *code = bytewise(block, block + 1, at);
+    for (const uint8_t *whole = at + ((size_t)(end - at) & ~(size_t)7); at != whole; at += 8) {
+        code = wordwise(code, at);
+        code = wordwise(code, at + 4);
     }
-    uint8_t *const whole = block + 5; // from here on down words end before the block does
-    while (at > block + 1) {
-        if (((uintptr_t)at & 3) != 0 || at < whole) {
-            at--;
-            PATCH(*at == 0, at)
-            continue;
-        }
-        uint32_t word;
-        do {
-            at -= 4;
-            word = *(const any_word *)(const void *)at;
-        } while (!has_zero(word) && at >= whole);
-        PATCH(word >> 24 == 0, at + 3) // its bytes in memory's order: see wire/messages_gen.c
-        PATCH((uint8_t)(word >> 16) == 0, at + 2)
-        PATCH((uint8_t)(word >> 8) == 0, at + 1)
-        PATCH((uint8_t)word == 0, at)
-    }
-#undef PATCH
-    *block = (uint8_t)(next - block);
+    code = bytewise(code, at, end);
+    *code = (uint8_t)(end - code);
 }
 
 int bt_cobs_decode(const uint8_t *in, size_t bytes, uint8_t *out)

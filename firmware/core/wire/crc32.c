@@ -1,10 +1,28 @@
 #include "wire/crc32.h"
 
+#include "wire/little_endian.h"
+
+static uint32_t bytewise(uint32_t crc, const uint8_t *at, const uint8_t *end)
+{
+    for (; at != end; at++) {
+        crc = bt_crc32_step(crc, *at);
+    }
+    return crc;
+}
+
+// A word at a time: that saves a core without caches a third of a byte's cycles.
 uint32_t bt_crc32(const uint8_t *data, size_t bytes)
 {
-    uint32_t crc = BT_CRC32_START;
-    for (size_t k = 0; k < bytes; k++) {
-        crc = bt_crc32_step(crc, data[k]);
+    const size_t before = -(uintptr_t)data & 3;
+    const uint8_t *const end = data + bytes;
+    const uint8_t *at = before < bytes ? data + before : end;
+    uint32_t crc = bytewise(BT_CRC32_START, data, at);
+    for (const uint8_t *whole = at + ((size_t)(end - at) & ~(size_t)3); at != whole; at += 4) {
+        crc ^= bt_get_aligned_u32(at);
+        crc = bt_crc32_step(crc, 0);
+        crc = bt_crc32_step(crc, 0);
+        crc = bt_crc32_step(crc, 0);
+        crc = bt_crc32_step(crc, 0);
     }
-    return bt_crc32_end(crc);
+    return bt_crc32_end(bytewise(crc, at, end));
 }

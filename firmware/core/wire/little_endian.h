@@ -16,6 +16,14 @@ static inline uint32_t bt_get_u32(const uint8_t *at)
     return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
 }
 
+// Of what lies at a multiple of four: one load. Its bytes are in this order, lowest first, on every board.
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "words are read as they lie");
+typedef uint32_t __attribute__((may_alias)) bt_word_in_place;
+static inline uint32_t bt_get_aligned_u32(const uint8_t *at)
+{
+    return *(const bt_word_in_place *)(const void *)at;
+}
+
 static inline uint16_t bt_get_u16(const uint8_t *at)
 {
     return (uint16_t)(at[0] | at[1] << 8);

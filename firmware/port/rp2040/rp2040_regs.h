@@ -57,7 +57,7 @@
 #define DMA_SNIFF_OUT_INV                 (1u << 11)
 #define DMA_SNIFF_OUT_REV                 (1u << 10)
 #define DMA_SNIFF_CALC_CRC32_REVERSED     (1u << 5) // polynomial 0x04C11DB7, each byte's lowest bit first
-#define DMA_SNIFF_CHANNEL_0               (0u << 1)
+#define DMA_SNIFF_CHANNEL(channel)        ((uint32_t)(channel) << 1)
 #define DMA_SNIFF_EN                      (1u << 0)
 #define DMA_CHAN_ABORT                    REG32(0x50000444u)
 

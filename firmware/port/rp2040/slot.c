@@ -7,15 +7,13 @@
 // many; no word of that slot counts then, for none can be told from its neighbour's.
 #include "port.h"
 
+#include "dma.h"
 #include "pins.h"
 #include "system.h"
 #include "wait.h"
 #include "wire/sensor_gen.h"
 
 #include <string.h>
-
-#define DEALER 1 // channel 0 is sniffer.c's
-#define WORKER 2
 
 #define STEP_US      2 // two words of a step, one a us
 #define STEPS_OF(us) (((us) + STEP_US - 1) / STEP_US)
@@ -84,9 +82,9 @@ void slot_start(void)
     }
     set_reads(0);
     DMA_TIMER0 = 1u << 16 | CLK_SYS_HZ / 1000000u; // a word of a step every us
-    DMA_TRANS_COUNT(WORKER) = 1;
-    DMA_CTRL(WORKER) = DMA_QUIET | DMA_UNPACED | DMA_CHAIN_TO_ITSELF(WORKER) | DMA_WORDS | DMA_HIGH_PRIORITY
-                       | DMA_CHANNEL_EN;
+    DMA_TRANS_COUNT(DMA_WORKER) = 1;
+    DMA_CTRL(DMA_WORKER) = DMA_QUIET | DMA_UNPACED | DMA_CHAIN_TO_ITSELF(DMA_WORKER) | DMA_WORDS
+                           | DMA_HIGH_PRIORITY | DMA_CHANNEL_EN;
 }
 
 uint32_t port_spi_slot_begin(uint16_t mosi, uint8_t mask)
@@ -96,23 +94,23 @@ uint32_t port_spi_slot_begin(uint16_t mosi, uint8_t mask)
         set_reads(mask);
     }
     spi_select_at_once(mask);
-    DMA_READ_ADDR(DEALER) = address(steps);
-    DMA_WRITE_ADDR(DEALER) = address(&DMA_READ_THEN_WRITE_TRIG(WORKER));
-    DMA_TRANS_COUNT(DEALER) = STEPS * (sizeof(step) / sizeof(uint32_t));
-    DMA_TREQS_DUE(DEALER) = 0;       // ticks that came while there was nothing to do
+    DMA_READ_ADDR(DMA_DEALER) = address(steps);
+    DMA_WRITE_ADDR(DMA_DEALER) = address(&DMA_READ_THEN_WRITE_TRIG(DMA_WORKER));
+    DMA_TRANS_COUNT(DMA_DEALER) = STEPS * (sizeof(step) / sizeof(uint32_t));
+    DMA_TREQS_DUE(DMA_DEALER) = 0;   // ticks that came while there was nothing to do
     __asm volatile("" ::: "memory"); // what the DMA reads is written
-    DMA_CTRL_TRIG(DEALER) = DMA_QUIET | DMA_BY_TIMER0 | DMA_CHAIN_TO_ITSELF(DEALER) | DMA_WRITES_WRAP
-                            | DMA_WRAP_BYTES(3) | DMA_INCR_WRITE | DMA_INCR_READ | DMA_WORDS
-                            | DMA_HIGH_PRIORITY | DMA_CHANNEL_EN;
+    DMA_CTRL_TRIG(DMA_DEALER) = DMA_QUIET | DMA_BY_TIMER0 | DMA_CHAIN_TO_ITSELF(DMA_DEALER) | DMA_WRITES_WRAP
+                                | DMA_WRAP_BYTES(3) | DMA_INCR_WRITE | DMA_INCR_READ | DMA_WORDS
+                                | DMA_HIGH_PRIORITY | DMA_CHANNEL_EN;
     return SLOT_US;
 }
 
 void port_spi_slot_end(uint16_t *word)
 {
-    bool in_time = !(DMA_CTRL_TRIG(DEALER) & DMA_BUSY) && !(SPI0_SSPSR & (SSPSR_RNE | SSPSR_BSY));
+    bool in_time = !(DMA_CTRL_TRIG(DMA_DEALER) & DMA_BUSY) && !(SPI0_SSPSR & (SSPSR_RNE | SSPSR_BSY));
     if (!in_time) {
-        DMA_CHAN_ABORT = 1u << DEALER | 1u << WORKER;
-        (void)wait_for(&DMA_CHAN_ABORT, 1u << DEALER | 1u << WORKER, 0, WAIT_SPI_TURNS);
+        DMA_CHAN_ABORT = 1u << DMA_DEALER | 1u << DMA_WORKER;
+        (void)wait_for(&DMA_CHAN_ABORT, 1u << DMA_DEALER | 1u << DMA_WORKER, 0, WAIT_SPI_TURNS);
         spi_reset();
     }
     spi_select_at_once(0);

@@ -2,6 +2,7 @@
 // between them and the main loop stand two rings, each with one writer and one reader.
 #include "port.h"
 
+#include "dma.h"
 #include "rp2040_regs.h"
 #include "system.h"
 #include "usb.h"
@@ -9,7 +10,6 @@
 #include "wait.h"
 
 #include <stdatomic.h>
-#include <string.h>
 
 #define TX_RING 4096 // 40 ms of five fingers' frames
 #define RX_RING 256  // some commands; when it is full the host is told to wait
@@ -90,14 +90,6 @@ static uint32_t min(uint32_t a, uint32_t b)
     return a < b ? a : b;
 }
 
-// The controller's memory is volatile, so no memcpy.
-static void copy_out(volatile uint8_t *to, const uint8_t *from, uint32_t bytes)
-{
-    for (uint32_t k = 0; k < bytes; k++) {
-        to[k] = from[k];
-    }
-}
-
 static void send_next(void)
 {
     if (in_busy || !link_open()) {
@@ -113,8 +105,8 @@ static void send_next(void)
     }
     uint32_t taken = min(waiting, USB_PACKET_BYTES - bytes);
     uint32_t first = min(taken, TX_RING - tail % TX_RING); // the rest lies at the ring's start
-    copy_out(out + bytes, tx + tail % TX_RING, first);
-    copy_out(out + bytes + first, tx, taken - first);
+    dma_copy(DMA_OF_USB, out + bytes, tx + tail % TX_RING, first);
+    dma_copy(DMA_OF_USB, out + bytes + first, tx, taken - first);
     bytes += taken;
     tail += taken;
     // A host waits for more after a full packet; when there is none, an empty one tells it so.
@@ -330,8 +322,8 @@ bool port_link_write(const uint8_t *data, size_t bytes)
         return false;
     }
     uint32_t first = min((uint32_t)bytes, TX_RING - head % TX_RING);
-    memcpy(tx + head % TX_RING, data, first);
-    memcpy(tx, data + first, bytes - first);
+    dma_copy(DMA_OF_FRAMES, tx + head % TX_RING, data, first);
+    dma_copy(DMA_OF_FRAMES, tx, data + first, (uint32_t)bytes - first);
     set(&tx_head, head + (uint32_t)bytes);
     // The interrupt either sees the new bytes, or has left in_busy false by now; likewise when reading.
     atomic_signal_fence(memory_order_seq_cst);

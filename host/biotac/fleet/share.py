@@ -38,6 +38,7 @@ class Share:
         self._secret = b""
         self._deciding = threading.Lock()
         self._commanding = threading.Lock()
+        self._publishing = threading.Lock()  # Zenoh's things are not to be given up while they are in use
         self._paused: threading.Timer | None = None
         self._pauses = 0
         self._tail = b""
@@ -77,9 +78,10 @@ class Share:
         kept = [
             part for part in data.split(b"\0") if len(part) > 1 and not (part[1] in rights.ANSWERS and _asked(part))
         ]
-        if kept:
-            self._wire.put(network.NUMBER.pack(self.batches) + b"\0".join(kept) + b"\0")
-            self.batches += 1
+        with self._publishing:
+            if kept and self._declared:
+                self._wire.put(network.NUMBER.pack(self.batches) + b"\0".join(kept) + b"\0")
+                self.batches += 1
 
     # ---- what it is asked ----------------------------------------------------------------------
 
@@ -185,9 +187,10 @@ class Share:
         self._board.record = None
         if self._paused is not None:
             self._paused.cancel()
-        declared, self._declared = [*self._declared, self._epoch, self._wire], []
-        for its in declared if len(declared) > 2 else ():
-            its.undeclare()
+        with self._publishing:
+            declared, self._declared = self._declared, []
+            for its in [*declared, self._epoch, self._wire] if declared else ():
+                its.undeclare()
 
     def __enter__(self) -> Share:
         return self

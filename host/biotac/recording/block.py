@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch
 from ..wire.dtypes_gen import DTYPES
+from ..wire.fields import WIRE_INVALID
 from ..wire.frames import StructArray
 from ..wire.native import ffi, lib
 
@@ -136,16 +137,30 @@ def _tables(batch: Batch) -> list[StructArray]:
     return [frames, batch.pac, batch.idle]
 
 
+#: Of a row of a table: finger, seq and t_us; messages begin with the same three.
+_LEAD = 1 + 4 + 8
+
+
 def table_dtype(kind: int) -> np.dtype[Any]:
     return np.dtype([("finger", "u1"), *((name, dtype) for name, dtype in COLUMNS[kind].items())])
 
 
 def as_sent(rows: StructArray, kind: int) -> StructArray:
-    """Messages of a kind, seq and t_us wrapped again."""
-    out = np.empty(len(rows), DTYPES[KINDS[kind]])
-    for name in out.dtype.names or ():
-        out[name] = rows[name] & np.iinfo(out.dtype[name]).max if name in ("seq", "t_us") else rows[name]
+    """Messages of a kind, seq and t_us wrapped again; those that are as sent already, as they are."""
+    sent = DTYPES[KINDS[kind]]
+    if rows.dtype == sent:
+        return rows
+    out = np.empty(len(rows), sent)
+    out["finger"] = rows["finger"]
+    for name in ("seq", "t_us"):
+        out[name] = rows[name] & np.iinfo(sent[name]).max
+    rest = rows.dtype.itemsize - _LEAD  # the same in both, so it is one move a row
+    _bytes(out)[:, -rest:] = _bytes(rows)[:, -rest:]
     return out
+
+
+def _bytes(rows: StructArray) -> NDArray[np.uint8]:
+    return rows.view(np.uint8).reshape(len(rows), rows.dtype.itemsize)
 
 
 def together(rest: Rest, sent: list[StructArray]) -> bytes:
@@ -188,27 +203,60 @@ def _planes(values: NDArray[Any]) -> bytes:
     return planes.tobytes()
 
 
-def read_part(data: bytes, layout: list[list[Column]], wanted: Mapping[int, Collection[str]]) -> list[StructArray]:
-    """Rows by kind, of the fields ``wanted`` of each. ValueError or struct.error for other sizes."""
+class Reading:
+    """How the stored columns of one kind become rows: of the fields ``wanted``, or none at all (None)."""
+
+    def __init__(self, kind: int, columns: list[Column], wanted: Collection[str] | None) -> None:
+        full = table_dtype(kind)
+        chosen = {"finger", *(wanted or ())}
+        self.dtype = np.dtype([(name, full[name]) for name in full.names or () if name in chosen])
+        self.wanted = wanted is not None
+        self.row_bytes = sum(stored.itemsize * parts for _, stored, parts in columns)
+        fields = dict(self.dtype.fields or {})
+        del fields["finger"]
+        specs = []
+        for name, stored, parts in columns:
+            its = fields.pop(name, None)
+            if its is not None and (its[0].base, int(np.prod(its[0].shape))) != (stored, parts):
+                raise ValueError(f"{name} is {parts} x {stored}, expected {its[0]}")
+            specs.append((stored.itemsize, parts, -1 if its is None else its[1]))
+        self._columns = ffi.new("bt_stored_column[]", specs)
+        self._missing = list(fields)
+
+    def table(self, finger: NDArray[np.uint8]) -> StructArray:
+        """Rows of these fingers, to be read; a field that the recording's version did not have is invalid."""
+        rows = np.empty(len(finger) if self.wanted else 0, self.dtype)
+        if self.wanted:
+            rows["finger"] = finger
+        for name in self._missing:
+            rows[name] = WIRE_INVALID.get(self.dtype[name].base.str[1:], 0)
+        return rows
+
+    def read(self, planes: memoryview, rows: StructArray, at: NDArray[np.uint32]) -> None:
+        """A part's columns of this kind, ``len(at) * row_bytes`` bytes, into the rows ``at`` of a table."""
+        source, index, out = (
+            ffi.from_buffer("uint8_t[]", planes),
+            ffi.from_buffer("uint32_t[]", at),
+            ffi.from_buffer("uint8_t[]", rows),
+        )
+        lib.bt_columns(source, len(at), self._columns, len(self._columns), index, out, rows.dtype.itemsize)
+
+
+def read_part(data: bytes, readings: Sequence[Reading], tables: list[StructArray], finger: int) -> None:
+    """A finger's part into its rows of ``tables``, by kind. ValueError or struct.error for other sizes."""
     counts = _ROWS.unpack_from(data)
-    expected = _ROWS.size + sum(
-        n * dtype.itemsize * parts for n, columns in zip(counts, layout, strict=True) for _, dtype, parts in columns
-    )
+    expected = _ROWS.size + sum(n * reading.row_bytes for n, reading in zip(counts, readings, strict=True))
     if expected != len(data):
         raise ValueError(f"a finger's part of {len(data)} bytes, expected {expected}")
-    at, out = _ROWS.size, []
-    planes = ffi.from_buffer("uint8_t[]", data)
-    for kind, (n, columns) in enumerate(zip(counts, layout, strict=True)):
-        of_kind = [column for column in columns if column[0] in wanted.get(kind, ())]
-        rows = np.empty(n, np.dtype([(name, dtype, (parts,) if parts > 1 else ()) for name, dtype, parts in of_kind]))
-        for name, dtype, parts in columns if n else ():
-            if name in wanted.get(kind, ()):
-                assert rows.dtype.fields is not None
-                begin = ffi.from_buffer("uint8_t[]", rows) + rows.dtype.fields[name][1]
-                lib.bt_column(planes + at, n, parts, dtype.itemsize, begin, rows.dtype.itemsize)
-            at += n * dtype.itemsize * parts
-        out.append(rows)
-    return out
+    begin = _ROWS.size
+    for n, reading, rows in zip(counts, readings, tables, strict=True):
+        end = begin + n * reading.row_bytes
+        if reading.wanted:
+            at = np.flatnonzero(rows["finger"] == finger).astype(np.uint32)
+            if len(at) != n:
+                raise ValueError(f"a finger's part of {n} rows, expected {len(at)}")
+            reading.read(memoryview(data)[begin:end], rows, at)
+        begin = end
 
 
 def layout_of(text: bytes) -> list[list[Column]]:

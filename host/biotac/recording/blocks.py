@@ -11,10 +11,9 @@ import numpy as np
 from mcap.records import Message, Metadata
 
 from ..hand.gap import GAP
-from ..wire.fields import WIRE_INVALID
 from ..wire.frames import StructArray
 from . import layout
-from .block import KINDS, Column, Rest, as_sent, layout_of, read_part, table_dtype, together
+from .block import KINDS, Reading, Rest, as_sent, layout_of, read_part, table_dtype, together
 from .scan import Scan
 
 ALL = {kind: table_dtype(kind).names or () for kind in range(len(KINDS))}
@@ -59,7 +58,7 @@ class Blocks:
         self._wanted = wanted
         self._fingers = fingers
         self.scan = Scan(path, self._is_wanted, check=check)
-        self._layout: list[list[Column]] | None = None
+        self._readings: list[Reading] = []
 
     def __iter__(self) -> Iterator[Piece]:
         parts: dict[int, bytes] = {}
@@ -103,41 +102,30 @@ class Blocks:
     def _piece(self, message: Message, parts: dict[int, bytes]) -> Piece | None:
         try:
             rest = Rest.unpack(message.data)
-            if self._layout is None:
-                self._layout = layout_of(self.scan.schemas[layout.REST])
-            read = {finger: read_part(data, self._layout, self._wanted) for finger, data in parts.items()}
+            if not self._readings:
+                columns = layout_of(self.scan.schemas[layout.REST])
+                self._readings = [Reading(kind, its, self._wanted.get(kind)) for kind, its in enumerate(columns)]
             wanted = rest.all_fingers if self._fingers is None else rest.all_fingers & set(self._fingers)
-            whole = set(read) >= wanted
+            whole = set(parts) >= wanted
             if not whole:
-                rest = rest.without(wanted - set(read))
-            rows = [self._joined(kind, rest, read) for kind in range(len(KINDS))]
+                rest = rest.without(wanted - set(parts))
+            rows = self._tables(rest, self._readings)
+            for finger, data in parts.items():
+                read_part(data, self._readings, rows, finger)
         except (KeyError, TypeError, ValueError, struct.error, IndexError) as error:
             self.scan.damaged_chunks += 1
             self.scan.problems.append(f"one second of {self.scan.path.name} is damaged and left out ({error})")
             return None
         return Piece(message.publish_time, message.log_time, message.sequence, rows, rest, whole=whole)
 
-    def _joined(self, kind: int, rest: Rest, read: dict[int, list[StructArray]]) -> StructArray:
-        if kind not in self._wanted:
-            return np.empty(0, np.dtype([("finger", "u1")]))
-        wanted = self._wanted[kind]
-        full = table_dtype(kind)
-        dtype = np.dtype([(name, full[name]) for name in full.names or () if name in wanted or name == "finger"])
-        finger = rest.fingers(kind)
+    def _tables(self, rest: Rest, readings: list[Reading]) -> list[StructArray]:
+        """Rows to be read, by kind, each with its finger."""
+        chosen = np.ones(256, np.bool_)
         if self._fingers is not None:
-            chosen = np.zeros(256, np.bool_)
+            chosen[:] = False
             chosen[list(self._fingers)] = True
-            finger = finger[chosen[finger]]
-        out = np.empty(len(finger), dtype)
-        out["finger"] = finger
-        for one, tables in read.items():
-            mine = np.flatnonzero(finger == one)
-            for name in dtype.names or ():
-                if name in (tables[kind].dtype.names or ()):
-                    out[name][mine] = tables[kind][name]
-                elif name != "finger":  # of a version that did not have it
-                    out[name][mine] = WIRE_INVALID.get(dtype[name].base.str[1:], 0)
-        return out
+        fingers = [rest.fingers(kind) for kind in range(len(KINDS))]
+        return [reading.table(finger[chosen[finger]]) for reading, finger in zip(readings, fingers, strict=True)]
 
 
 def is_lossless(frames: StructArray, pac: StructArray, idle: StructArray) -> bool:

@@ -18,7 +18,8 @@ from ..hand.gap import Gap
 from ..keep.values import own_settings
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, StreamDecoder, join
-from ..wire.frames import StructArray
+from ..wire.frames import StructArray, frames_from_wire
+from ..wire.messages_gen import Setting
 from . import layout
 from .block import FRAME, IDLE, PAC, as_sent
 from .blocks import Blocks, is_lossless
@@ -32,9 +33,10 @@ class Recording:
     """A recording in memory.
 
     ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``idle`` (IDLE_DTYPE)
-    heartbeats, ``wire`` the FRAME messages as sent, ``messages`` the rest (tare changes, status). ``settings`` are the
-    board's, ``calibrations`` and ``maps`` (bytes, as the board holds them) those in force, by finger, when it began,
-    ``names`` what fingers were called: ``recording["index"]`` is that finger's frames.
+    heartbeats, ``wire`` the FRAME messages as sent, ``seq`` and ``t_us`` (int64, (n,)) their unwrapped numbers and
+    times, ``messages`` the rest (tare changes, status). ``settings`` are the board's, ``calibrations`` and ``maps``
+    (bytes, as the board holds them) those in force, by finger, when it began, ``names`` what fingers were called:
+    ``recording["index"]`` is that finger's frames.
     ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its
     index; ``damaged_chunks``: seconds that were left out; ``wrong_checksums``: over the file's records and its index;
     ``gaps``: times in which the board was away. ``blocks`` are the wire's bytes as they came, about one a second,
@@ -58,15 +60,14 @@ class Recording:
         decoder.accept_newer_minor()
         batch = self._rows(decoder) or self._decoded(decoder, show)
         show(1.0)
-        self._batch = batch
-        self.wire: StructArray = batch.wire
+        self._sent, self.seq, self.t_us = batch.wire, batch.seq, batch.t_us
         self.pac: StructArray = batch.pac
         self.idle: StructArray = batch.idle
         self.messages: list[Any] = batch.messages
         self.frames_lost = decoder.lost
         self.pac_lost = decoder.lost_pac
         self.disordered = decoder.disordered
-        if self.cut_off and not len(self.wire):
+        if self.cut_off and not len(self.seq):
             raise RecordingError(f"{self.path} was cut off before its first second was whole; record it again")
         self._describe_losses(decoder)
 
@@ -103,7 +104,7 @@ class Recording:
             return None
         self._take_arrivals([piece.rest.last_us if piece.rest else None for piece in pieces])
         self.counts = replace(decoder.counts, good=decoder.counts.good + len(sent) + len(pac) + len(idle))
-        rows = Batch(as_sent(sent, FRAME), sent["seq"].astype(np.int64), sent["t_us"], pac, idle, others.messages)
+        rows = Batch(sent, sent["seq"].astype(np.int64), sent["t_us"], pac, idle, others.messages)
         return rows
 
     def _decoded(self, decoder: StreamDecoder, show: Callable[[float], None]) -> Batch:
@@ -120,10 +121,15 @@ class Recording:
         ends = zip(last_us, self.all_here_ns, strict=True)
         self._arrivals = [(t_us, at_ns) for t_us, at_ns in ends if t_us and at_ns is not None]
 
-    @property
+    @cached_property
     def frames(self) -> StructArray:
         """The FRAMEs in user units, FRAME_DTYPE (n,), in the order of arrival."""
-        return self._batch.frames
+        return frames_from_wire(self._sent, self.seq, self.t_us)
+
+    @cached_property
+    def wire(self) -> StructArray:
+        """The FRAME messages as sent, with seq and t_us as they wrap."""
+        return as_sent(self._sent, FRAME)
 
     @cached_property
     def blocks(self) -> list[bytes]:
@@ -204,25 +210,25 @@ class Recording:
         self.calibrations, self.maps, self.settings = facts.calibrations, facts.maps, facts.settings
 
     @property
-    def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
+    def finger_settings(self) -> dict[int, dict[Setting, int]]:
         """All settings that a finger's results come from, for the fingers that had a calibration in force."""
         return own_settings(self.settings, self.calibrations)
 
     @property
     def fingers(self) -> list[int]:
         """Fingers of which there is a frame, a heartbeat or PAC."""
-        rows = (self.frames, self.idle, self.pac)
+        rows = (self._sent, self.idle, self.pac)
         return sorted({int(finger) for table in rows for finger in np.unique(table["finger"])})
 
     @property
     def begin_us(self) -> int:
         """Device time of the first frame or heartbeat; 0 without any."""
-        return min((int(rows["t_us"].min()) for rows in (self.frames, self.idle) if len(rows)), default=0)
+        return min((int(t_us.min()) for t_us in (self.t_us, self.idle["t_us"]) if len(t_us)), default=0)
 
     @property
     def end_us(self) -> int:
         """Device time of the last frame or heartbeat; 0 without any."""
-        return max((int(rows["t_us"].max()) for rows in (self.frames, self.idle) if len(rows)), default=0)
+        return max((int(t_us.max()) for t_us in (self.t_us, self.idle["t_us"]) if len(t_us)), default=0)
 
     @property
     def begin_ns(self) -> int:

@@ -87,7 +87,7 @@ class Scan:
     def __iter__(self) -> Iterator[Metadata | tuple[str, Message]]:
         try:
             self._size = self.path.stat().st_size
-            stream = self.path.open("rb")
+            stream = self.path.open("rb", buffering=1 << 18)
         except OSError as error:
             raise RecordingError(f"{self.path} cannot be read ({error.strerror}); check the path") from error
         with stream:

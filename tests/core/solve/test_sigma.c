@@ -139,6 +139,57 @@ static void sigmas_of_squared_compression(void **state)
     sigmas_are_those_of_a_monte_carlo(BT_POC_WEIGHTS_COMPRESS_N2);
 }
 
+// The header's formula in double, of the published point and of what e is rounded to.
+static double first_order_um(const double e[BT_ELECTRODES], int weights, const int16_t poc_um[3],
+                             double sigma)
+{
+    const bool tip = poc_um[0] > 0;
+    double along = 0, across = 0, total = 0, lever = 0, n[3];
+    for (int d = 0; d < 3; d++) {
+        n[d] = d == 0 && !tip ? 0 : (double)poc_um[d] / BT_CORE_RADIUS_UM;
+    }
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        if (e[i] == 0 || (e[i] > 0 && weights != BT_POC_WEIGHTS_ABS_N2)) {
+            continue;
+        }
+        const bool once = weights == BT_POC_WEIGHTS_COMPRESS_N1;
+        const double size = fabs(e[i]), weight = once ? size : size * size, slope = once ? 1 : 2 * size;
+        const int16_t *r = bt_electrode_um[i];
+        const double x = tip ? r[0] : 0;
+        const double cross[3] = {r[1] * n[2] - r[2] * n[1], r[2] * n[0] - x * n[2], x * n[1] - r[1] * n[0]};
+        for (int d = 0; d < 3; d++) {
+            across += slope * slope * cross[d] * cross[d];
+        }
+        along += tip ? 0 : slope * slope * pow(r[0] - poc_um[0], 2);
+        total += weight;
+        lever += weight * (x * n[0] + r[1] * n[1] + r[2] * n[2]);
+    }
+    return sigma * sqrt(along / (total * total) + across * pow(BT_CORE_RADIUS_UM / lever, 2));
+}
+
+static void sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range(void **state)
+{
+    (void)state;
+    static const int counts[] = {30, 300, 3000, 8000};
+    uint64_t seed = 5;
+    for (int run = 0; run < 40000; run++) {
+        const int most = counts[run % 4], weights = run / 4 % 3, middle = run / 12 % BT_ELECTRODES;
+        const uint32_t noise = 19 * (uint32_t)random_range(&seed, 1, 36);
+        double e[BT_ELECTRODES];
+        press(middle, e);
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            e[i] = round(e[i] * most / 3000 + (double)random_range(&seed, -most / 20, most / 20));
+        }
+        bt_msg_frame msg = sigmas(e, weights, noise);
+        const double want = first_order_um(e, weights, msg.poc_um, sqrt(noise / 19.0));
+        // What a sum of rounded parts may be off: a hundredth, as it was with sums of 64 bits.
+        if (fabs(msg.poc_sigma_um - want) > 0.5 + want / 100) {
+            fail_msg("%d counts at E%d, weights %d: %d um, by the formula %.2f", most, middle + 1, weights,
+                     msg.poc_sigma_um, want);
+        }
+    }
+}
+
 static void one_electrodes_sigma_is_the_root_of_its_share(void **state)
 {
     (void)state;
@@ -271,6 +322,7 @@ int main(void)
         cmocka_unit_test(sigmas_of_squared_weights),
         cmocka_unit_test(sigmas_of_compression),
         cmocka_unit_test(sigmas_of_squared_compression),
+        cmocka_unit_test(sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range),
         cmocka_unit_test(one_electrodes_sigma_is_the_root_of_its_share),
         cmocka_unit_test(what_is_not_known_is_marked),
         cmocka_unit_test(sigmas_saturate_below_the_mark),

@@ -258,6 +258,34 @@ static void crc32_known_answers_hold(void **state)
     assert_int_equal(bt_crc32((const uint8_t *)"123456789", 9), 0xCBF43926);
 }
 
+// Both work in words: wherever they begin and end, and nothing outside is written.
+static void any_block_comes_back_from_any_address(void **state)
+{
+    (void)state;
+    uint64_t seed = 21;
+    for (int run = 0; run < 20000; run++) {
+        uint8_t room[BT_COBS_BLOCK_BYTES + 16], plain[BT_COBS_BLOCK_BYTES], back[BT_COBS_BLOCK_BYTES + 1];
+        size_t bytes = (size_t)random_range(&seed, 0, run % 4 ? 24 : BT_COBS_BLOCK_BYTES);
+        uint8_t *block = room + 4 + random_range(&seed, 0, 3);
+        int64_t top = run % 3 ? 255 : 1; // a 1 above a 0 is what looks like a zero to has_zero
+        memset(room, 0xA5, sizeof room);
+        for (size_t k = 0; k < bytes; k++) {
+            block[1 + k] = plain[k] = (uint8_t)random_range(&seed, 0, top);
+        }
+        uint32_t crc = 0xFFFFFFFFu;
+        for (size_t k = 0; k < 8 * bytes; k++) {
+            crc = crc >> 1 ^ (0xEDB88320u & (0u - ((crc ^ plain[k / 8] >> k % 8) & 1)));
+        }
+        assert_int_equal(bt_crc32(block + 1, bytes), ~crc);
+        bt_cobs_in_place(block, bytes + 1);
+        assert_null(memchr(block, 0, bytes + 1));
+        assert_int_equal(bt_cobs_decode(block, bytes + 1, back), bytes);
+        assert_memory_equal(back, plain, bytes);
+        assert_int_equal(block[-1], 0xA5);
+        assert_int_equal(block[bytes + 1], 0xA5);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -269,6 +297,7 @@ int main(void)
         cmocka_unit_test(after_any_noise_one_delimiter_is_enough_to_go_on),
         cmocka_unit_test(cobs_examples_hold_in_both_directions),
         cmocka_unit_test(crc32_known_answers_hold),
+        cmocka_unit_test(any_block_comes_back_from_any_address),
     };
     return cmocka_run_group_tests(tests, load_cases, NULL);
 }

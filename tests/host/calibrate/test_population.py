@@ -170,10 +170,10 @@ def test_the_packages_own_names_what_it_is_made_of() -> None:
 
 @pytest.mark.nightly
 def test_real_fingers_each_by_the_other() -> None:
-    """The asked figures (issue 15), but for x after five presses: .45 asked of F2, .50 reached."""
+    """The asked figures (issue 15), but for x after five presses: .45 asked of F2, .46 reached."""
     if not SHARED.exists():
         pytest.skip("no ../shared/data: real recordings are not part of the project")
-    runs = [load_run(SHARED / name) for name in ("F1.npz", "F2.npz")]
+    runs = [training.aligned(load_run(SHARED / name)) for name in ("F1.npz", "F2.npz")]
     fingers = [training.sums_of(run) for run in runs]
     within = []
     for k, new in ((0, runs[1]), (1, runs[0])):
@@ -181,7 +181,7 @@ def test_real_fingers_each_by_the_other() -> None:
         facts = worth.facts(worth.worth(training.train([fingers[k]]), new), sigma)
         within.append(facts["coverage"])
         assert (np.array(facts["rmse_n"]) <= [0.62, 0.39, 0.46]).all()
-        assert (np.array(facts["rmse_scale5_n"]) <= [0.51, 0.39, 0.44]).all()
-        assert (np.array(facts["rmse_60s_n"]) <= [0.48, 0.40, 0.49]).all()
+        assert (np.array(facts["rmse_scale5_n"]) <= [0.47, 0.39, 0.44]).all()
+        assert (np.array(facts["rmse_60s_n"]) <= [0.44, 0.38, 0.47]).all()
     one, two = np.mean(within, axis=0)
     assert 0.55 <= one <= 0.80 and 0.90 <= two <= 0.99

@@ -95,20 +95,27 @@ def by_columns(counts: Floats, tare: Floats, of: Callable[[Floats], Floats]) -> 
 
 def mirrored(run: Run) -> Run:
     """The finger's mirror image under the mirrored load."""
-    truth = run.truth[:, :3] * [1.0, -1.0, 1.0]
-    return replace(
-        run, counts=run.counts[:, MIRROR], tare=run.tare[MIRROR], drift=run.drift[MIRROR], truth=truth, pdc=None
-    )
+    truth = run.truth * [1.0, -1.0, 1.0]
+    return replace(run, counts=run.counts[:, MIRROR], tare=run.tare[MIRROR], drift=run.drift[MIRROR], truth=truth)
+
+
+def aligned(run: Run) -> Run:
+    """The run with its truth at the counts' time: the lag is two loggers', and no finger's. Without PDC.
+
+    Raises RecordingError when force and counts do not follow each other.
+    """
+    lag, _ = (0, 0.0) if run.by_clocks else Lags(run, Blocks(run.rest, run.contact)).check()
+    rows = np.arange(max(-lag, 0), len(run.truth) - max(lag, 0))
+    contact = None if run.contact is None else run.contact[rows]
+    counts, truth = run.counts[rows + lag], run.truth[rows, :3]
+    return replace(run, counts=counts, truth=truth, rest=run.rest[rows], contact=contact, pdc=None)
 
 
 def sums_of(run: Run) -> FingerSums:
-    """What training needs of a run. Raises RecordingError when force and counts do not follow each other."""
-    blocks = Blocks(run.rest, run.contact)
-    lag, _ = (0, 0.0) if run.by_clocks else Lags(run, blocks).check()
-    truth = run.truth[:, :3].copy()
+    """What training needs of a run that is aligned."""
+    truth = run.truth.copy()
     truth[:, 0] -= truth[:, 0].sum() / truth[:, 2].sum() * truth[:, 2]
-    rows = np.arange(max(-lag, 0), len(truth) - max(lag, 0))
-    level = replace(run, counts=run.counts[rows + lag], truth=truth[rows], pdc=None)
+    level = replace(run, truth=truth)
     return FingerSums(sums(level), sums(mirrored(level)))
 
 
@@ -123,7 +130,7 @@ def sums(run: Run) -> Sums:
             rows = slice(start, start + ROWS_AT_ONCE)
             z = columns(run.counts[rows] - run.tare + drift, run.tare)
             gram += weight * (z.T @ z)
-            cross += weight * (z.T @ run.truth[rows, :3])
+            cross += weight * (z.T @ run.truth[rows])
             mean += weight * z.sum(axis=0)
     n = len(run.counts)
     return Sums(gram / n, cross / n, mean / n)

@@ -40,8 +40,8 @@ class Worth:
 
 
 def worth(its: Population, run: Run) -> Worth:
-    """Of a map on a run whose finger is new to it."""
-    truth = run.truth[:, :3]
+    """Of a map on an aligned run whose finger is new to it."""
+    truth = run.truth
     said = its.force(run.counts, run.tare)
     draws = _scaled(said, truth)
     error = said - truth
@@ -55,7 +55,7 @@ def worth(its: Population, run: Run) -> Worth:
 
 
 def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: bool = False) -> tuple[Floats, Floats]:
-    """One sigma (3,) in N of a new finger's force, as the map is and after five presses.
+    """One sigma (3,) in N of a new finger's force, as the map is and after five presses; ``runs`` are aligned.
 
     Of several fingers, what the others' map leaves on each; of one, what its map leaves on its mirror image, the one
     other finger there is.
@@ -74,7 +74,7 @@ def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: b
 
 def worth_of_force(its: Population, run: Run) -> tuple[Floats, Floats]:
     """RMSE (3,) in N as it is and after five presses; the former again where the run has none."""
-    truth = run.truth[:, :3]
+    truth = run.truth
     said = its.force(run.counts, run.tare)
     raw = _rms(said - truth)
     each = [((scale.applied(said) - truth) ** 2).mean(axis=0) for scale in _scaled(said, truth)]
@@ -129,10 +129,10 @@ def _minute(its: Population, run: Run) -> Floats | None:
     found = []
     for start in np.linspace(0, n - rows, MINUTES).astype(int):
         minute = slice(start, start + rows)
-        part = replace(run, counts=run.counts[minute], truth=run.truth[minute, :3], pdc=None)
+        part = replace(run, counts=run.counts[minute], truth=run.truth[minute])
         moved = pulled(its, sums(part), MINUTE_S)
         rest = np.r_[: max(start - ROWS_PER_S, 0), min(start + rows + ROWS_PER_S, n) : n]
-        found.append(((moved.force(run.counts[rest], run.tare) - run.truth[rest, :3]) ** 2).mean(axis=0))
+        found.append(((moved.force(run.counts[rest], run.tare) - run.truth[rest]) ** 2).mean(axis=0))
     result: Floats = np.sqrt(np.mean(found, axis=0))
     return result
 

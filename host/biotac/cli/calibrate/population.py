@@ -42,9 +42,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{args.test} is trained on and judged by: expected another finger's; leave it out of one")
     if args.out is not None and args.out.exists() and not args.force:
         raise InputError(f"{args.out} exists and would be overwritten; choose another name or say --force")
-    runs = [load(path).run for path in args.files]
-    tested = None if args.test is None else load(args.test).run
     with threadpool_limits(limits=THREADS, user_api="blas"):
+        runs = [training.aligned(load(path).run) for path in args.files]
+        tested = None if args.test is None else training.aligned(load(args.test).run)
         facts, kept = _calibrated(args, runs, tested)
     if args.out is not None:
         with whole(args.out, overwrite=args.force) as place:

@@ -30,7 +30,7 @@ def columns_of(recording: Recording) -> Columns:
     out = Columns()
     for finger in recording.fingers:
         mine = recording.wire["finger"] == finger
-        fields = _fields(recording.wire[mine]) | _counters(recording.frames[mine])
+        fields = _fields(recording.wire[mine]) | {"seq": recording.seq[mine], "t_us": recording.t_us[mine]}
         for kind, rows in (("pac", recording.pac), ("idle", recording.idle)):
             own = rows[rows["finger"] == finger]
             if len(own):

@@ -123,7 +123,7 @@ UNTRAINED = (
 def _of_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Population], list[str]]:
     """By recording the map of the others; of a single one the package's, if it was not made of it."""
     if len(runs) > 1:
-        fingers = [training.sums_of(run) for run in runs]
+        fingers = [training.sums_of(training.aligned(run)) for run in runs]
         return {
             path.name: training.train([its for j, its in enumerate(fingers) if j != k], symmetric=True)
             for k, path in enumerate(files)
@@ -137,7 +137,7 @@ def _of_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Popula
 
 
 def _untrained(its: Population, run: Run) -> dict[str, list[float]]:
-    found = worth.worth(its, run)
+    found = worth.worth(its, training.aligned(run))
     all_three = {POPULATION: found.rmse_n, PRESSES: found.rmse_scale5_n, MINUTE: found.rmse_60s_n}
     return {key: rmse.tolist() for key, rmse in all_three.items() if rmse is not None}
 
