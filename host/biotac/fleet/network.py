@@ -23,7 +23,7 @@ NUMBER = struct.Struct("<Q")
 
 
 def key(name: str, what: str) -> str:
-    """``wire``, ``command``, ``claim``, ``info`` or a liveliness token's: ``live/EPOCH``, ``writer/ID``."""
+    """``wire/EPOCH``, ``command``, ``claim``, ``info`` or a liveliness token's: ``live/EPOCH``, ``writer/ID``."""
     return f"{ROOT}/{name}/{what}"
 
 

@@ -44,7 +44,6 @@ class Share:
         self._tail = b""
         if network.alive(session, name):
             raise PortError(f"somebody shares a board as {name} already; choose another --name, or end that one")
-        self._wire = session.declare_publisher(network.key(name, "wire"))  # drops for whoever is too slow, and goes on
         self._declared = [
             session.declare_queryable(network.key(name, what), answer)
             for what, answer in (("info", self._tell), ("claim", self._claim), ("command", self._command))
@@ -52,18 +51,27 @@ class Share:
         self._declared.append(
             session.liveliness().declare_subscriber(network.key(name, "writer/*"), self._writer_changed)
         )
+        self._epoch, self._wire = self._new_epoch()
         self._board.record, self._board.record_gap = self._publish, self._came_back
-        self._epoch = self._new_epoch()
         hand.start()
         hand.run()
 
-    def _new_epoch(self) -> Any:
-        return self._session.liveliness().declare_token(network.key(self.name, f"live/{secrets.token_hex(8)}"))
+    def _new_epoch(self) -> tuple[Any, Any]:
+        """Its token, and the publisher for those who have seen it: no reader goes on as if the board were the same.
+
+        A publisher drops for whoever is too slow, and goes on.
+        """
+        epoch = secrets.token_hex(8)
+        wire = self._session.declare_publisher(network.key(self.name, f"wire/{epoch}"))
+        return self._session.liveliness().declare_token(network.key(self.name, f"live/{epoch}")), wire
 
     def _came_back(self, gap: Gap) -> None:
         """Its readers are to meet the board anew, which may have restarted."""
-        before, self._epoch = self._epoch, self._new_epoch()
-        before.undeclare()
+        with self._publishing:
+            before = self._epoch, self._wire
+            self._epoch, self._wire = self._new_epoch()
+            for its in before:
+                its.undeclare()
 
     # ---- what it sends -------------------------------------------------------------------------
 

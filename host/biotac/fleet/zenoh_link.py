@@ -119,7 +119,7 @@ class ZenohLink:
         tokens = session.liveliness()
         # Zenoh ends what nobody holds.
         self._declared = [
-            session.declare_subscriber(network.key(self._its.name, "wire"), self._take),
+            session.declare_subscriber(network.key(self._its.name, f"wire/{epoch}"), self._take),
             tokens.declare_subscriber(network.key(self._its.name, "live/*"), came_or_went, history=True),
         ]
 
