@@ -12,6 +12,7 @@ from pathlib import Path
 
 from committed import ROOT, write_or_check
 from protogen import (
+    c_client,
     c_crc,
     c_map,
     c_population,
@@ -42,6 +43,7 @@ def outputs(root: Path) -> dict[Path, str]:
         root / "tools/bench/variants/mirrored_f32_gen.h": c_variants.mirrored(contract, c_variants.F32),
         root / "tools/bench/variants/mirrored_i64_gen.h": c_variants.mirrored(contract, c_variants.I64),
         root / "tools/bench/variants/tables_gen.h": c_variants.tables(contract),
+        root / "firmware/client/biotac_client_gen.h": c_client.header(contract),
         root / "firmware/core/wire/messages_gen.h": c_wire.header(contract),
         root / "firmware/core/wire/messages_gen.c": c_wire.source(contract),
         root / "host/biotac/wire/sensor_gen.py": python_code.sensor(contract),

@@ -37,6 +37,16 @@ def test_the_firmwares_wire_conforms(tmp_path: Path) -> None:
     assert told.count("not offered") == 1 and "cobs     not offered" in told
 
 
+def test_the_c_clients_wire_conforms(tmp_path: Path) -> None:
+    client = ROOT / "firmware/client"
+    build = ["cc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-DCLIENT", f"-I{client}"]
+    program = tmp_path / "client"
+    sources = [str(CONFORMING / "core.c"), str(client / "biotac_client.c")]
+    subprocess.run([*build, *sources, "-o", str(program)], check=True)
+    told = passes(str(program))
+    assert told.count("not offered") == 1 and "cobs     not offered" in told
+
+
 def test_the_librarys_wire_conforms() -> None:
     assert passes(*LIBRARY).count("not offered") == 2  # COBS is inside of its framing, in C
 

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCES = ("protocol", "tools", "firmware/core", "host/biotac")
+SOURCES = ("protocol", "tools", "firmware/core", "firmware/client", "host/biotac")
 GENERATED = (
+    "firmware/client/biotac_client_gen.h",
     "firmware/core/wire/sensor_gen.h",
     "firmware/core/wire/sensor_gen.c",
     "firmware/core/wire/messages_gen.h",

@@ -18,6 +18,51 @@ def declare(field: Field) -> str:
     return f"    {C_TYPE[field.type]} {field.name}{array}; // [{note}] {field.doc}"
 
 
+def define(message: Message) -> list[str]:
+    """Its number, its length on the wire, its struct."""
+    out = [f"// {message.doc}", f"#define BT_{message.name}_ID 0x{message.id:02X}"]
+    out += [f"#define BT_{message.name}_BYTES {message.payload_bytes}", "typedef struct {"]
+    out += [declare(field) for field in message.fields]
+    return [*out, f"}} {struct_name(message)};"]
+
+
+def field_lists(contract: Contract) -> list[str]:
+    """X(name, type, count) for every field, so that tests can compare by name."""
+    out = []
+    for message in contract.messages:
+        fields = " ".join(f"X({f.name}, {f.type}, {f.count})" for f in message.fields)
+        out += [f"#define BT_{message.name}_FIELDS(X) {fields}"]
+    names = " ".join(f"X({m.name}, {struct_name(m)})" for m in contract.messages)
+    return [*out, f"#define BT_WIRE_MESSAGES(X) {names}"]
+
+
+def vocabulary(contract: Contract) -> list[str]:
+    """Enums, flags and settings."""
+    link = contract.link
+    out = []
+    for name, enum in link["enum"].items():
+        out += [f"// {enum['doc']}", f"enum bt_{name} {{"]
+        out += [
+            f"    BT_{name.upper()}_{key} = {entry['value']}, // {entry['doc']}"
+            for key, entry in enum.items()
+            if key != "doc"
+        ]
+        out += ["};", ""]
+    for name, flags in link["flags"].items():
+        out += [f"// {flags['doc']}"]
+        out += [
+            f"#define BT_{name.upper()}_FLAG_{key} (1u << {entry['bit']}) // {entry['doc']}"
+            for key, entry in flags.items()
+            if key != "doc"
+        ]
+        known = sum(1 << entry["bit"] for key, entry in flags.items() if key != "doc")
+        out += [f"#define BT_{name.upper()}_FLAGS 0x{known:X}u // all there are", ""]
+    out += ["enum bt_setting {"]
+    out += [f"    BT_SETTING_{n.upper()} = {s['id']}, // [{s['unit']}]" for n, s in link["setting"].items()]
+    out += ["};", f"#define BT_SETTINGS {len(link['setting'])}", ""]
+    return out
+
+
 def header(contract: Contract) -> str:
     wire, link = contract.link["wire"], contract.link
     out = [
@@ -41,26 +86,7 @@ def header(contract: Contract) -> str:
         "#define BT_INVALID_I32 INT32_MIN",
         "",
     ]
-    for name, enum in link["enum"].items():
-        out += [f"// {enum['doc']}", f"enum bt_{name} {{"]
-        out += [
-            f"    BT_{name.upper()}_{key} = {entry['value']}, // {entry['doc']}"
-            for key, entry in enum.items()
-            if key != "doc"
-        ]
-        out += ["};", ""]
-    for name, flags in link["flags"].items():
-        out += [f"// {flags['doc']}"]
-        out += [
-            f"#define BT_{name.upper()}_FLAG_{key} (1u << {entry['bit']}) // {entry['doc']}"
-            for key, entry in flags.items()
-            if key != "doc"
-        ]
-        known = sum(1 << entry["bit"] for key, entry in flags.items() if key != "doc")
-        out += [f"#define BT_{name.upper()}_FLAGS 0x{known:X}u // all there are", ""]
-    out += ["enum bt_setting {"]
-    out += [f"    BT_SETTING_{n.upper()} = {s['id']}, // [{s['unit']}]" for n, s in link["setting"].items()]
-    out += ["};", f"#define BT_SETTINGS {len(link['setting'])}", ""]
+    out += vocabulary(contract)
     out += ["// Ranges, for the bounds that the core asserts."]
     for name, setting in link["setting"].items():
         low, high = setting["range"]
@@ -82,10 +108,7 @@ def header(contract: Contract) -> str:
     ]
     for message in contract.messages:
         upper, struct = message.name, struct_name(message)
-        out += [f"// {message.doc}", f"#define BT_{upper}_ID 0x{message.id:02X}"]
-        out += [f"#define BT_{upper}_BYTES {message.payload_bytes}", "typedef struct {"]
-        out += [declare(field) for field in message.fields]
-        out += [f"}} {struct};"]
+        out += define(message)
         out += [f"void {struct}_pack(const {struct} *msg, uint8_t out[BT_{upper}_BYTES]);"]
         if message.name in PACKED_AS_HALFWORDS:
             out += ["// The same into aligned halfwords, in a third of the time; little-endian cores only."]
@@ -98,11 +121,7 @@ def header(contract: Contract) -> str:
         "#ifndef BT_CDEF // the rest is macros for the C tests",
         "// X(name, type, count) for every field, so that tests can compare by name.",
     ]
-    for message in contract.messages:
-        fields = " ".join(f"X({f.name}, {f.type}, {f.count})" for f in message.fields)
-        out += [f"#define BT_{message.name}_FIELDS(X) {fields}"]
-    names = " ".join(f"X({m.name}, {struct_name(m)})" for m in contract.messages)
-    out += [f"#define BT_WIRE_MESSAGES(X) {names}", "#endif", "", "#endif", ""]
+    out += [*field_lists(contract), "#endif", "", "#endif", ""]
     return "\n".join(out)
 
 

@@ -30,6 +30,7 @@ VERBS = {
     "view": ("biotac.cli.live.view", "Show a board or a recording live in the browser."),
     "stream": ("biotac.cli.live.stream", "Print frames as they arrive: one line each, or one JSON object each."),
     "lsl": ("biotac.cli.live.lsl", "Publish fingers on the Lab Streaming Layer."),
+    "serve": ("biotac.cli.live.serve", "Share a board with other computers, which open it as zenoh:NAME."),
     "record": ("biotac.cli.live.record", "Record everything a board sends to an MCAP file."),
     "check": (
         "biotac.cli.recordings.check",
@@ -37,11 +38,15 @@ VERBS = {
     ),
     "replay": ("biotac.cli.recordings.replay", "Play a recording as the board that made it, here or on a pty."),
     "recompute": ("biotac.cli.recordings.recompute", "Run a recording's counts through the maths with other settings."),
-    "export": ("biotac.cli.recordings.export", "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag."),
+    "export": (
+        "biotac.cli.recordings.export",
+        "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag, many to a lake.",
+    ),
+    "lake": ("biotac.cli.recordings.lake", "Check a lake of recordings, or ask it in SQL."),
     "import": ("biotac.cli.recordings.import_btd", "Turn a SynTouch .btd file into a recording."),
     "calibrate": (
         "biotac.cli.calibrate",
-        "Fit a finger's wrench, or its pressure, to a reference, measure it held out, give it to the board.",
+        "Fit a finger's wrench or pressure to a reference, measure it held out, give it to the board.",
     ),
     "calibration": ("biotac.cli.boards.calibration", "Show, get, put or store a finger's calibration."),
     "map": (
@@ -63,13 +68,12 @@ VERBS = {
 }
 
 EPILOG = """\
-A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, sim:SOURCE, a simulated board that plays
-a scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd), emu:pico?source=SOURCE, a Pico's
-flash image in an emulator that plays the same, or replay:REC, a recording that answers as its board did.
+A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, zenoh:NAME, one that is shared; sim:SOURCE,
+a simulated board that plays a scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd),
+emu:pico?source=SOURCE, a Pico's image in an emulator, or replay:REC, a recording that answers as its board did.
 
-exit codes: 0 done   1 check, doctor or experiment found something   2 unusable file or argument
-3 port cannot be opened   4 no gateway on the port   5 firmware of another wire version   6 board lost
-7 command refused   8 flashing failed   130 interrupted
+exit codes: 0 done  1 check, doctor or experiment found something  2 unusable file or argument  3 port not opened
+4 no gateway on the port  5 another wire version  6 board lost  7 command refused  8 flashing failed  130 interrupted
 """
 
 

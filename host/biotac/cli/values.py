@@ -38,6 +38,13 @@ def pace(text: str) -> float:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
+def workers(text: str) -> int:
+    """How many processes."""
+    if not (text.isascii() and text.isdigit() and 1 <= int(text[:9]) <= 1024):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; expected 1 to 1024")
+    return int(text)
+
+
 def finger(text: str) -> int:
     """A chip select, by number or by name."""
     from ..hand.views import DEFAULT_NAMES, finger_index

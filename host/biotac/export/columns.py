@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..recording.layout import frame_id
 from ..recording.reader import Recording
-from ..wire.fields import FRAME_FIELDS, PAC_FIELDS, Field
+from ..wire.fields import FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field
 from ..wire.frames import StructArray
 
 #: Told a share 0..1 of the work that is done.
@@ -29,24 +29,33 @@ def _stamped(fields: Sequence[Field]) -> tuple[Field, ...]:
 COLUMNS = _stamped(FRAME_FIELDS)
 #: One row a finger and round: 22 samples, the k-th k/2200 s after t_us.
 PAC_COLUMNS = _stamped(PAC_FIELDS)
+#: One row a heartbeat of a finger that nobody touches.
+IDLE_COLUMNS = _stamped(IDLE_FIELDS)
+
+#: What the exports to one file have. A lake has heartbeats, too.
+EXPORTED: Mapping[str, tuple[Field, ...]] = {"frames": COLUMNS, "pac": PAC_COLUMNS}
+HEARTBEATS: Mapping[str, tuple[Field, ...]] = {"idle": IDLE_COLUMNS}
 
 
 @dataclass(frozen=True)
 class Table:
-    """One finger's rows of one kind (``frames`` or ``pac``); arrays (n,) or (n, parts) by column name."""
+    """One finger's rows of one kind (``frames``, ``pac``); arrays (n,) or (n, parts) by column name.
+
+    ``finger`` is None for rows that are the board's.
+    """
 
     kind: str
-    finger: int
+    finger: int | None
     columns: tuple[Field, ...]
     arrays: dict[str, NDArray[Any]]
 
     @property
-    def frame_id(self) -> str:
+    def frame_id(self) -> str | None:
         """The coordinate frame of its vectors."""
-        return frame_id(self.finger)
+        return None if self.finger is None else frame_id(self.finger)
 
     def __len__(self) -> int:
-        return len(self.arrays["seq"])
+        return len(self.arrays["t_us"])
 
     def flat(self) -> Iterator[tuple[str, Field, NDArray[Any]]]:
         """Scalar columns (n,), vectors taken apart: ``force_x_n`` of force_n, ``counts_E1`` of counts."""
@@ -58,14 +67,12 @@ class Table:
                 yield name, column, values[:, k]
 
 
-def tables(recording: Recording) -> list[Table]:
-    """Frames and PAC of every finger that has any, in the fingers' order."""
+def tables(recording: Recording, kinds: Mapping[str, tuple[Field, ...]] = EXPORTED) -> list[Table]:
+    """The ``kinds`` of rows of every finger that has any, in the fingers' order."""
     made = []
     for finger in recording.fingers:
-        for kind, columns, rows in (
-            ("frames", COLUMNS, recording.frames),
-            ("pac", PAC_COLUMNS, recording.pac),
-        ):
+        for kind, columns in kinds.items():
+            rows: StructArray = getattr(recording, kind)
             mine = rows[rows["finger"] == finger]
             if len(mine):
                 made.append(Table(kind, finger, columns, _arrays(recording, columns, mine)))

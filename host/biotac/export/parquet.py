@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from ..recording.layout import frame_id
 from ..recording.reader import Recording
 from .columns import Show, Table
 
@@ -21,43 +21,77 @@ PAC_APART = True
 _ROWS = 1 << 17  # in memory at once
 
 
-def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """All fingers in the order of time, sorted by t_us and finger; null where there is no value.
+@dataclass(frozen=True)
+class Label:
+    """A column of text that a whole table has in common, None where there is none; dictionary-encoded, so it is small.
 
-    Integers are delta-encoded, which is what makes zstd small; ``frame_id`` is dictionary-encoded text.
+    ``texts`` has one for each of the tables.
     """
-    order = np.lexsort((_finger_of(made), np.concatenate([table.arrays["t_us"] for table in made])))
-    fields = [
-        pa.field("finger", pa.uint8(), metadata={"unit": "1", "what": "chip select index"}),
-        pa.field("frame_id", pa.dictionary(pa.int8(), pa.string()), metadata={"what": "coordinate frame of vectors"}),
+
+    name: str
+    what: str
+    texts: tuple[str | None, ...]
+
+
+def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
+    """All fingers in the order of time, sorted by t_us and finger; null where there is no value."""
+    metadata = {f"biotac.{key}": value for key, value in recording.metadata.items()}
+    write_labelled(place, made, [frame_ids(made)], metadata, show)
+
+
+def frame_ids(made: list[Table]) -> Label:
+    """The tables' coordinate frames."""
+    return Label("frame_id", "coordinate frame of vectors", tuple(table.frame_id for table in made))
+
+
+def write_labelled(
+    place: Path, made: list[Table], labels: list[Label], metadata: Mapping[str, str], show: Show = lambda share: None
+) -> None:
+    """The rows of tables of one kind, in the order of time, each with its table's labels.
+
+    Integers are delta-encoded, which is what makes zstd small.
+    """
+    times = np.concatenate([table.arrays["t_us"] for table in made])
+    of_table = np.repeat(np.arange(len(made)), [len(table) for table in made])
+    fingers = None
+    fields = []
+    if made[0].finger is not None:
+        fingers = np.array([table.finger for table in made], np.uint8)
+        fields = [pa.field("finger", pa.uint8(), metadata={"unit": "1", "what": "chip select index"})]
+    order = np.lexsort((of_table if fingers is None else fingers[of_table], times))
+    fields += [
+        pa.field(label.name, pa.dictionary(pa.int8(), pa.string()), metadata={"what": label.what}) for label in labels
     ]
     for name, column, values in made[0].flat():
         fields.append(
             pa.field(name, pa.from_numpy_dtype(values.dtype), metadata={"unit": column.unit, "what": column.what})
         )
-    schema = pa.schema(fields, metadata={f"biotac.{key}": value for key, value in recording.metadata.items()})
+    schema = pa.schema(fields, metadata=dict(metadata))
+    sorting = [(name, "ascending") for name in ("t_us", *(["finger"] if fingers is not None else []))]
     with pq.ParquetWriter(
         place,
         schema,
         compression="zstd",
-        use_dictionary=["frame_id", *(f.name for f in fields if pa.types.is_floating(f.type))],
+        use_dictionary=[*(its.name for its in labels), *(f.name for f in fields if pa.types.is_floating(f.type))],
         column_encoding={f.name: "DELTA_BINARY_PACKED" for f in fields if pa.types.is_integer(f.type)},
-        sorting_columns=pq.SortingColumn.from_ordering(schema, [("t_us", "ascending"), ("finger", "ascending")]),
+        sorting_columns=pq.SortingColumn.from_ordering(schema, sorting),
     ) as out:
         for begin in range(0, len(order), _ROWS):
             chosen = order[begin : begin + _ROWS]
-            out.write_table(pa.Table.from_arrays(list(_columns(made, chosen, schema)), schema=schema))
+            columns = list(_columns(made, labels, fingers, of_table, chosen))
+            out.write_table(pa.Table.from_arrays(columns, schema=schema))
             show(begin / len(order))
 
 
-def _finger_of(made: list[Table]) -> NDArray[np.uint8]:
-    return np.repeat(np.array([table.finger for table in made], np.uint8), [len(table) for table in made])
-
-
-def _columns(made: list[Table], chosen: NDArray[Any], schema: pa.Schema) -> Iterator[pa.Array]:
-    fingers = _finger_of(made)[chosen]
-    yield pa.array(fingers)
-    yield pa.array([frame_id(finger) for finger in fingers.tolist()]).dictionary_encode().cast(schema.types[1])
+def _columns(
+    made: list[Table], labels: list[Label], fingers: NDArray[np.uint8] | None, of_table: NDArray[Any], chosen: Any
+) -> Iterator[pa.Array]:
+    if fingers is not None:
+        yield pa.array(fingers[of_table[chosen]])
+    for label in labels:
+        words = sorted({text for text in label.texts if text is not None})
+        code = np.array([-1 if text is None else words.index(text) for text in label.texts], np.int8)[of_table[chosen]]
+        yield pa.DictionaryArray.from_arrays(pa.array(code, mask=code < 0), pa.array(words, pa.string()))
     for parts in zip(*(table.flat() for table in made), strict=True):
         column = parts[0][1]
         values = np.concatenate([values for _, _, values in parts])[chosen]

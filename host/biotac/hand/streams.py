@@ -36,6 +36,7 @@ EVENTS_SINCE_MINOR = 5
 _TOLD_OF = {wire.Touch: wire.QuantityFlags.TOUCH, wire.Event: wire.QuantityFlags.EVENTS}
 # A streaming board sends a status every second by default; three missing ones are a dead link.
 SILENCE_S = 3.0
+LAST_LOOK_S = 1.0  # before it is called silent
 # A board whose live host has died stops streaming after this long.
 KEEPALIVE_S = 1.0
 PINGS_PER_KEEPALIVE = 3
@@ -419,6 +420,10 @@ class Streams:
         now_s = self._monotonic_s()
         if now_s < self._due_s:
             return self._due_s - now_s
+        if now_s - self._heard_s >= self._silence_s():
+            # It may be this side that was away, stopped or asleep: what waits to be read comes first.
+            self._board.read(LAST_LOOK_S)
+            now_s = self._monotonic_s()
         if now_s - self._heard_s >= self._silence_s():
             self._board.lost(self._silent(), "silence")
             self._heard_s = now_s = self._monotonic_s()

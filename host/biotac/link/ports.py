@@ -18,6 +18,7 @@ OPENERS = {
     "sim": "biotac.sim.ports:open_sim",
     "emu": "biotac.sim.ports:open_sim",
     "replay": "biotac.recording.replay_link:open_replay",
+    "zenoh": "biotac.fleet.zenoh_link:open_zenoh",
 }
 PATH = "biotac.link.serial_port:open_path"
 
@@ -33,7 +34,7 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
     if not known and colon and os.sep not in port and not port.upper().startswith("COM") and len(scheme) > 1:
         raise PortError(
             f"no kind of port is called {scheme!r}; expected a device path, serial:NUMBER, "
-            "spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, sim:SOURCE, emu:pico or replay:REC"
+            "spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, sim:SOURCE, emu:pico, replay:REC or zenoh:NAME"
         )
     module, _, function = (OPENERS[scheme] if known else PATH).partition(":")
     link: Link = getattr(importlib.import_module(module), function)(port, pace)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,19 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..clock import LAST_SAMPLE_US, DeviceClock
-from ..errors import InputError, RecordingError
+from ..errors import RecordingError
 from ..hand.gap import Gap
-from ..keep.calibration_file import from_dict
-from ..keep.map_blob import as_blob
 from ..keep.values import own_settings
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, StreamDecoder, join
 from ..wire.frames import StructArray, frames_from_wire
-from ..wire.identity import NO_IMAGE
 from ..wire.messages_gen import Setting
 from . import layout
 from .block import FRAME, IDLE, PAC, as_sent
 from .blocks import Blocks, is_lossless
+from .facts import Facts
 from .layout import finger_of
 from .stamps import Stamps
 from .tabular import to_pandas, to_xarray
@@ -208,16 +205,9 @@ class Recording:
                 "install the biotac-gateway it was recorded with"
             )
         self.metadata = metadata
-        hello: dict[str, Any] = {"image_crc32": NO_IMAGE} | json.loads(metadata["hello"])
-        self.info = wire.Hello(**_tuples(hello))
-        self.sensors = [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))]
-        named = json.loads(metadata["settings"])
-        own = json.loads(metadata.get("calibrations", "{}"))
-        # A setting or a calibration that this recording's firmware did not have yet: what it did, and none.
-        self.calibrations = {int(finger): from_dict(its) for finger, its in own.items()}
-        self.maps = _maps(metadata.get("maps", "{}"))
-        self.names = layout.names_of(metadata)
-        self.settings = {s: int(named.get(s.name.lower(), wire.SETTINGS[s].before)) for s in wire.Setting}
+        facts = Facts.read(metadata)
+        self.info, self.sensors, self.names = facts.info, facts.sensors, facts.names
+        self.calibrations, self.maps, self.settings = facts.calibrations, facts.maps, facts.settings
 
     @property
     def finger_settings(self) -> dict[int, dict[Setting, int]]:
@@ -256,16 +246,3 @@ class Recording:
                 f"{counts.bad} wire frame(s) refused: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
                 f"{counts.bad_length} wrong length, {counts.too_long} too long"
             )
-
-
-def _maps(text: str) -> dict[int, bytes]:
-    """Maps as JSON had them; ValueError for what is none."""
-    try:
-        return {finger: as_blob(its) for finger, its in layout.maps_of(text).items()}
-    except InputError as error:
-        raise ValueError(error) from error
-
-
-def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
-    """A message's fields as JSON had them."""
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}

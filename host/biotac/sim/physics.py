@@ -69,9 +69,10 @@ class States:
 
     def of(self, rows: npt.NDArray[Any]) -> States:
         """At some of the instants, as NumPy indexes them."""
-        sliding = None if self.slip_mm_s is None else self.slip_mm_s[rows]
-        every = (self.contact_mm, self.force_n, self.shear_n, self.torsion_nmm, self.tip_radius_mm, self.warm_c)
-        return States(*(values[rows] for values in every), slip_mm_s=sliding)
+        return States(
+            self.contact_mm[rows], self.force_n[rows], self.shear_n[rows], self.torsion_nmm[rows],
+            self.tip_radius_mm[rows], self.warm_c[rows], None if self.slip_mm_s is None else self.slip_mm_s[rows],
+        )  # fmt: skip
 
     def wrench(self) -> tuple[Floats, Floats]:
         """Force (n, 3) in N on the finger and torque (n, 3) in N mm about the origin."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
@@ -30,8 +31,10 @@ class LivePlayer:
         # A person watches: simulated boards run in real time.
         self._hand = open_hand(port, pace=1.0)
         try:
-            # An earlier program may have left the board with another choice: the page shows all of it.
-            self._hand.subscribe(RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags.EVENTS)
+            # An earlier program may have left the board with another choice: the page shows all of it. Of a board that
+            # others share it shows what its writer chose.
+            with suppress(CommandRefusedError):
+                self._hand.subscribe(RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags.EVENTS)
         except BaseException:
             self._hand.close()
             raise

@@ -151,6 +151,14 @@ def values_of(field: Field, sent: Any) -> Any:
     return out.astype(field.dtype, copy=False)
 
 
+def sent_of(field: Field, values: Any, dtype: np.dtype[Any]) -> Any:
+    """Inverse of values_of: integers of the message's ``dtype``, NaN as its mark of no value."""
+    if field.per_unit is None:
+        return values.astype(dtype, copy=False)
+    scaled = np.rint(values.astype(np.float64) * field.per_unit)
+    return np.where(np.isnan(scaled), WIRE_INVALID[dtype.str[1:]], scaled).astype(dtype)
+
+
 def as_json(row: Any, fields: Sequence[Field] = FRAME_FIELDS) -> dict[str, Any]:
     """One row, of a structured array or with the fields as attributes, of JSON types only: invalid is None."""
     of = row.__getitem__ if isinstance(row, np.void) else lambda name: getattr(row, name)

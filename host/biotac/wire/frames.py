@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .fields import FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, WIRE_INVALID, dtype_of, values_of
+from .dtypes_gen import DTYPES
+from .fields import FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, WIRE_INVALID, dtype_of, sent_of, values_of
 from .messages_gen import INVALID_COUNT, FrameFlags, TareState
+from .messages_gen import Frame as _FrameMessage
 
 UM_PER_MM = 1_000
 FORCE_LSB_PER_N = 10_000  # force_100un
@@ -101,6 +103,17 @@ def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any
     for its in FRAME_FIELDS:
         if its.sent:
             out[its.name] = values_of(its, messages[its.sent])
+    return out
+
+
+def frames_to_wire(frames: StructArray) -> StructArray:
+    """Inverse of frames_from_wire: FRAME_DTYPE (n,) as the messages (n,) that it was made of, to the bit."""
+    out = np.zeros(len(frames), DTYPES[_FrameMessage.ID])
+    out["finger"] = frames["finger"]
+    out["seq"], out["t_us"] = frames["seq"] & 0xFFFF, frames["t_us"] & 0xFFFFFFFF
+    for its in FRAME_FIELDS:
+        if its.sent:
+            out[its.sent] = sent_of(its, frames[its.name], out.dtype[its.sent].base)
     return out
 
 

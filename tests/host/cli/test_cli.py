@@ -106,7 +106,7 @@ def test_an_unknown_port_exits_3(capsys, verb: str) -> None:
     assert "`biotac list`" in fails(capsys, 3, verb, "/dev/ttyNOWHERE7")
     expected = (
         "expected a device path, serial:NUMBER, spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, "
-        "sim:SOURCE, emu:pico or replay:REC"
+        "sim:SOURCE, emu:pico, replay:REC or zenoh:NAME"
     )
     assert expected in fails(capsys, 3, verb, "telnet:1")
 

@@ -402,3 +402,17 @@ def test_the_latest_of_each_finger_is_found_in_whichever_batch_has_it() -> None:
 
 #: Fingers of one batch after another; 200 has no bit in a mask.
 SHOWN = [(2,), (0, 1), (3, 3), (200, 0), (), (1,), (0, 1), (0,), *[(1, 0)] * 40]
+
+
+def test_a_program_that_was_stopped_reads_before_it_says_silent(live: Live) -> None:
+    """SIGSTOP, or a laptop's lid: the clock has gone on, and what the board said meanwhile waits to be read."""
+    live.hand.start()
+    live.hand._board.read(0.0)
+    live.hand.link.patience = 1.0
+    live.clock.now_s += 10.0
+    live.send(frame(1))
+    live.hand._streams.read(0.0)
+    assert live.hand.stats.frames == 1
+    live.clock.now_s += 10.0
+    with pytest.raises(biotac.DeviceLostError, match="silent for 3 s"):
+        live.hand._streams.read(0.0)

@@ -1,8 +1,14 @@
-// The firmware's wire for protocol/conformance: a request a line in, an answer a line out.
+// The firmware's wire for protocol/conformance, or with -DCLIENT the C client's: a request a line in, an
+// answer a line out.
+#ifdef CLIENT
+#define BT_CLIENT_FIELDS
+#include "biotac_client.h"
+#else
 #include "wire/cobs.h"
 #include "wire/crc32.h"
 #include "wire/framing.h"
 #include "wire/messages_gen.h"
+#endif
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,6 +43,58 @@ static void put_hex(const uint8_t *data, size_t bytes)
     }
 }
 
+#ifdef CLIENT
+#define bt_crc32 bt_client_crc
+
+static int bt_cobs_decode(uint8_t *in, size_t bytes, uint8_t *out)
+{
+    int plain = bt_client_uncobs(in, bytes);
+    memcpy(out, in, plain < 0 ? 0 : (size_t)plain);
+    return plain;
+}
+
+static size_t bt_frame_encode(uint8_t id, const uint8_t *payload, size_t bytes, uint8_t *out)
+{
+    memcpy(out + 2, payload, bytes);
+    return bt_client_seal(id, bytes, out);
+}
+
+static void unframe(const uint8_t *wire, size_t bytes)
+{
+    bt_client client = {0};
+    for (size_t k = 0; k < bytes; k++) {
+        int id = bt_client_push(&client, wire[k]);
+        if (id > 0) {
+            printf("frame %02x ", (unsigned)id);
+            put_hex(client.buffer + 1, client.payload_bytes);
+            printf("; ");
+        }
+    }
+    printf("counts");
+    for (int k = 0; k < 4; k++) {
+        printf(" %lu", (unsigned long)client.refused[k]);
+    }
+}
+
+// By way of a frame, as whoever uses it has to.
+#define UNPACK(MESSAGE, struct_name)                                                                         \
+    bt_client client = {0};                                                                                  \
+    uint8_t frame[BT_ENCODED_MAX_BYTES];                                                                     \
+    size_t sealed = bt_frame_encode(BT_##MESSAGE##_ID, payload, sizeof payload, frame);                      \
+    for (size_t k = 0; k < sealed; k++) {                                                                    \
+        bt_client_push(&client, frame[k]);                                                                   \
+    }                                                                                                        \
+    if (!bt_client_read(&client, BT_##MESSAGE##_ID, &msg)) {                                                 \
+        abort();                                                                                             \
+    }
+#define PACK(MESSAGE, struct_name)                                                                           \
+    uint8_t frame[BT_ENCODED_MAX_BYTES];                                                                     \
+    size_t sealed = bt_client_write(BT_##MESSAGE##_ID, &msg, frame);                                         \
+    if (bt_client_uncobs(frame, sealed - 1) != 1 + (int)sizeof payload + 4) {                                \
+        abort();                                                                                             \
+    }                                                                                                        \
+    memcpy(payload, frame + 1, sizeof payload);
+#else
 static void unframe(const uint8_t *wire, size_t bytes)
 {
     unsigned outcomes[6] = {0};
@@ -55,6 +113,10 @@ static void unframe(const uint8_t *wire, size_t bytes)
            outcomes[BT_DEFRAMED_BAD_CRC], outcomes[BT_DEFRAMED_BAD_LENGTH]);
 }
 
+#define UNPACK(MESSAGE, struct_name) struct_name##_unpack(&msg, payload);
+#define PACK(MESSAGE, struct_name)   struct_name##_pack(&msg, payload);
+#endif
+
 #define PUT_FIELD(name, type, count)                                                                         \
     printf("%s%s", separator, #name);                                                                        \
     separator = "; ";                                                                                        \
@@ -72,11 +134,10 @@ static void unframe(const uint8_t *wire, size_t bytes)
         uint8_t payload[BT_##MESSAGE##_BYTES];                                                               \
         if (unpack) {                                                                                        \
             from_hex(strtok(NULL, " "), payload);                                                            \
-            struct_name##_unpack(&msg, payload);                                                             \
+            UNPACK(MESSAGE, struct_name)                                                                     \
             BT_##MESSAGE##_FIELDS(PUT_FIELD)                                                                 \
         } else {                                                                                             \
-            BT_##MESSAGE##_FIELDS(TAKE_FIELD) struct_name##_pack(&msg, payload);                             \
-            put_hex(payload, sizeof payload);                                                                \
+            BT_##MESSAGE##_FIELDS(TAKE_FIELD) PACK(MESSAGE, struct_name) put_hex(payload, sizeof payload);   \
         }                                                                                                    \
     }
 

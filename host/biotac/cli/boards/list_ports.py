@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from contextlib import closing
 from typing import Any
 
 from ...errors import BiotacError
@@ -19,6 +20,13 @@ EXAMPLE = "biotac list"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """--all is not the default: bytes sent to an unknown device may mean something to it."""
+    parser.add_argument(
+        "--zenoh",
+        metavar="ENDPOINT",
+        nargs="?",
+        const="",
+        help="boards that other computers share, too; by way of ENDPOINT (tcp/HOST:7447), or looked for",
+    )
     parser.add_argument("--all", action="store_true", help="ask every port; without it only those with our USB ids")
 
 
@@ -26,16 +34,30 @@ def run(args: argparse.Namespace) -> int:
     """Print ports and scenarios."""
     ports = [describe(port, ask=port.is_board or args.all) for port in serial_ports()]
     scenarios = [f"sim:{name}" for name in bundled_scenarios()]
+    remote = _shared(args.zenoh or None) if args.zenoh is not None else []
     if args.json:
-        print(json.dumps({"ports": ports, "scenarios": scenarios}))
+        print(json.dumps({"ports": ports, "scenarios": scenarios, "zenoh": remote}))
         return 0
     if not any(port["is_board"] for port in ports):
         print("no board on USB; plug one in, ask `biotac doctor`, or try a simulated one:")
     for port in ports:
         print(as_line(port))
+    for facts in remote:
+        commander = f"commanded by {facts['writer']}" if facts.get("writer") else "commanded by nobody"
+        print(f"{as_line(facts)}  {commander}")
+    if args.zenoh is not None and not remote:
+        print("no board is shared on the network; `biotac serve PORT --name NAME` shares one")
     for name in scenarios:
         print(name)
     return 0
+
+
+def _shared(endpoint: str | None) -> list[dict[str, Any]]:
+    """What computers on the network say of the boards that they share."""
+    from ...fleet import network  # here, for most lists are of this computer
+
+    with closing(network.open_session("biotac list", connect=endpoint)) as session:
+        return [{"port": network.found(facts), **facts} for facts in network.shared(session)]
 
 
 def describe(port: SerialPort, *, ask: bool) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""biotac export REC OUT"""
+"""biotac export REC OUT, and biotac export REC... --lake DIR"""
 
 from __future__ import annotations
 
@@ -6,31 +6,41 @@ import argparse
 import json
 from pathlib import Path
 
+from ...errors import InputError
 from ...export import FORMATS, export
 from ..progress import Progress
+from . import lake
 from .loading import load
 
-EXAMPLE = "biotac export grasp.mcap grasp.parquet"
+EXAMPLE = "biotac export grasp.mcap grasp.parquet, or biotac export trials/*.mcap --lake trials.lake -j 4"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Recording, file and whether to overwrite."""
-    parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record")
+    """Recordings, where to, and whether to overwrite."""
+    parser.add_argument("recordings", metavar="REC", nargs="+", type=Path, help="file written by biotac record")
     formats = "; ".join(f"{suffix} {its.what}" for suffix, its in FORMATS.items())
-    parser.add_argument("out", metavar="OUT", type=Path, help=f"file to write: {formats}")
-    parser.add_argument("--force", action="store_true", help="overwrite OUT")
+    # The last of the words is OUT where there is no lake; argparse shows it, and run() takes it from the others.
+    parser.add_argument("out", metavar="OUT", nargs="?", type=Path, help=f"file to write: {formats}")
+    parser.add_argument("--force", action="store_true", help="overwrite OUT, or what the lake has of the recordings")
+    lake.add_export_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write OUT, or leave nothing behind; what the recording lacks is said on stderr."""
-    recording = load(args.recording)
+    places = [*args.recordings, *([args.out] if args.out else [])]
+    if args.lake is not None:
+        return lake.run_export(args, places)
+    if len(places) != 2:
+        raise InputError(f"{len(places)} files are named, expected REC OUT; many recordings go to --lake DIR")
+    source, out = places
+    recording = load(source)
     progress = Progress()
     try:
         written = export(
             recording,
-            args.out,
+            out,
             overwrite=args.force,
-            show=lambda share: progress.show(f"{args.out}: {share:.0%}, Ctrl-C stops and leaves nothing behind"),
+            show=lambda share: progress.show(f"{out}: {share:.0%}, Ctrl-C stops and leaves nothing behind"),
         )
     finally:
         progress.done()

@@ -1,0 +1,47 @@
+// A gateway's other end for microcontrollers: bytes in, checked messages out, commands as bytes.
+// No heap, no libc, no other file of this project but biotac_client_gen.h, which link.toml makes.
+#ifndef BIOTAC_CLIENT_H
+#define BIOTAC_CLIENT_H
+
+#include "biotac_client_gen.h"
+
+#include <stddef.h>
+
+#define BT_ENCODED_MAX_BYTES (BT_FRAME_MAX_BYTES + 2)
+
+// What stood between two delimiters and is no message.
+enum bt_refused {
+    BT_REFUSED_TOO_LONG = -1, // more bytes than any frame has
+    BT_REFUSED_COBS = -2,
+    BT_REFUSED_CRC = -3,    // also: too short to hold an id and a CRC
+    BT_REFUSED_LENGTH = -4, // CRC is right, but a known id has another length
+};
+
+typedef struct {
+    uint32_t refused[4]; // counts, in the order of enum bt_refused
+    uint16_t filled;     // of buffer; more than fits is counted up to one too many
+    uint8_t id;
+    uint8_t payload_bytes;
+    uint8_t accept_longer; // set it when HELLO's wire_minor is above BT_WIRE_MINOR: fields were appended
+    uint8_t buffer[BT_FRAME_MAX_BYTES + 1];
+} bt_client; // all zero is a valid start
+
+// One byte from the board. Returns a message's id once it is whole and checked, which bt_client_read gives
+// until the next push; 0 when there is none yet; enum bt_refused (negative) for what is none. Unknown ids are
+// returned, too: let them be.
+int bt_client_push(bt_client *client, uint8_t byte);
+
+// The message that came, as its struct (bt_msg_frame for BT_FRAME_ID, and so on). Returns 0 when id is not
+// what came, or is not known; then msg is left alone.
+int bt_client_read(const bt_client *client, uint8_t id, void *msg);
+
+// A command as bytes for the board: msg is id's struct. Returns how many, with the delimiter; 0 for an id
+// that is not known.
+size_t bt_client_write(uint8_t id, const void *msg, uint8_t out[BT_ENCODED_MAX_BYTES]);
+
+// The pieces, for who wants them alone. seal: a payload lies at out + 2. Both as in the sentences above.
+size_t bt_client_seal(uint8_t id, size_t payload_bytes, uint8_t *out);
+int bt_client_uncobs(uint8_t *data, size_t bytes); // in place; the length, or -1
+uint32_t bt_client_crc(const uint8_t *data, size_t bytes);
+
+#endif

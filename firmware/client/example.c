@@ -1,0 +1,59 @@
+// Prints what a board's fingers feel: cc -o example example.c biotac_client.c && ./example /dev/ttyACM0 500
+#include "biotac_client.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <termios.h>
+#include <unistd.h>
+
+static int fd;
+
+static void command(uint8_t id, const void *msg)
+{
+    uint8_t out[BT_ENCODED_MAX_BYTES];
+    if (write(fd, out, bt_client_write(id, msg, out)) <= 0) {
+        exit(2);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    fd = argc == 3 ? open(argv[1], O_RDWR | O_NOCTTY) : -1;
+    struct termios raw;
+    if (fd < 0 || tcgetattr(fd, &raw) != 0) {
+        fprintf(stderr, "expected a board's port and how many frames\n");
+        return 2;
+    }
+    cfmakeraw(&raw);
+    tcsetattr(fd, TCSANOW, &raw);
+
+    static bt_client board;
+    command(BT_HELLO_REQUEST_ID, &(bt_msg_hello_request){.req_id = 1, .nonce = 7});
+    int left = atoi(argv[2]);
+    for (uint8_t byte; left > 0 && read(fd, &byte, 1) == 1;) {
+        int id = bt_client_push(&board, byte);
+        bt_msg_hello hello;
+        bt_msg_frame frame;
+        if (id == BT_HELLO_ID && bt_client_read(&board, BT_HELLO_ID, &hello) && hello.nonce == 7) {
+            if (hello.wire_major != BT_WIRE_MAJOR) {
+                fprintf(stderr, "the board speaks wire %u, this program %u\n", hello.wire_major,
+                        BT_WIRE_MAJOR);
+                return 2;
+            }
+            board.accept_longer = hello.wire_minor > BT_WIRE_MINOR;
+            // Controllers give a keep-alive and PING now and then: so the board stops when they are gone.
+            command(BT_START_ID,
+                    &(bt_msg_start){.req_id = 2, .streams = BT_STREAM_FLAG_FRAMES, .fingers = 0x1F});
+        } else if (id == BT_FRAME_ID && bt_client_read(&board, BT_FRAME_ID, &frame)) {
+            printf("%u %u", frame.finger, (unsigned)frame.t_us);
+            for (int axis = 0; axis < 3; axis++) { // BT_INVALID_I32 where there is no force
+                printf(" %ld", (long)frame.force_100un[axis]);
+            }
+            printf(" %lx\n", (unsigned long)frame.flags);
+            left--;
+        }
+    }
+    command(BT_STOP_ID, &(bt_msg_stop){.req_id = 3});
+    return left > 0;
+}

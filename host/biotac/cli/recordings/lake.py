@@ -1,0 +1,174 @@
+"""biotac lake check DIR, biotac lake sql QUERY DIR, and what biotac export --lake does"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import functools
+import json
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ...errors import BiotacError, InputError
+from .. import values
+from ..progress import Progress
+
+EXAMPLE = 'biotac lake sql "SELECT board, count(*) FROM frames GROUP BY board" trials.lake'
+
+
+def add_export_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which lake, and who does it."""
+    parser.add_argument("--lake", metavar="DIR", type=Path, help="a folder of Parquet files that all REC are put into")
+    _add_workers(parser)
+
+
+def _add_workers(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("-j", dest="jobs", metavar="N", type=values.workers, default=1, help="processes")
+    parser.add_argument("--dask", metavar="ADDRESS", help="a Dask scheduler, whose workers see the same files")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The verbs of a lake."""
+    what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
+    words = {
+        "check": "Check all files against their seals, and every on-board result against the float64 reference.",
+        "sql": "Ask DuckDB; each topic is a table. Prints CSV, or with --json an object a line.",
+    }
+    its = {name: what.add_parser(name, help=text, description=text) for name, text in words.items()}
+    for name, one in its.items():
+        one.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print JSON for machines")
+        if name == "sql":
+            one.add_argument("query", metavar="QUERY", help='such as "SELECT max(force_z_n) FROM frames"')
+        one.add_argument(
+            "folder", metavar="DIR", nargs="?" if name == "sql" else None, type=Path, default=Path(), help="the lake"
+        )
+    _add_workers(its["check"])
+    its["check"].set_defaults(action=run_check)
+    its["sql"].set_defaults(action=run_sql)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do what was asked for."""
+    return int(args.action(args))
+
+
+def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
+    """0: all are in the lake. 2: some are not; each is named, the others are there."""
+    layout, writing = _room("layout"), _room("writing")
+    lake = layout.opened(args.lake, create=True)
+    with layout.sole_writer(args.lake):
+        work = functools.partial(writing.put, str(args.lake.absolute()), lake.partition, args.force)
+        done, failed = _all(work, [str(path.absolute()) for path in dict.fromkeys(sources)], args, "exported")
+    new = {its.recording for its in done if its.new}
+    facts = {
+        "lake": str(args.lake),
+        "exported": len(new),
+        "already_there": len({its.recording for its in done} - new),
+        "same_as_another": len(done) - len({its.recording for its in done}),
+        "failed": failed,
+        "rows": sum(sum(its.rows.values()) for its in done),
+    }
+    if args.json:
+        print(json.dumps(facts))
+    else:
+        print(
+            f"{args.lake}: {facts['exported']} exported, {facts['rows']} rows; {facts['already_there']} there before, "
+            f"{facts['same_as_another']} the same as another, {len(failed)} failed"
+        )
+    return InputError.exit_code if failed else 0
+
+
+def run_check(args: argparse.Namespace) -> int:
+    """0: all of it is right. 1: something is not, and is named. 2 (raised): no lake, or files that are none of it."""
+    lake = _room("layout").opened(args.folder)
+    work = functools.partial(_room("checking").check, str(args.folder.absolute()), lake.topics, lake.partition)
+    done, failed = _all(work, sorted(lake.partition), args, "checked")
+    wrong = [text for its in done for text in its.wrong]
+    for text in wrong if not args.json else ():
+        print(text)
+    good = not wrong and not failed and bool(done)
+    facts: dict[str, Any] = {
+        "lake": str(args.folder),
+        "good": good,
+        "recordings": len(lake.partition),
+        "unfinished": lake.unfinished,
+        "frames": sum(its.frames for its in done),
+        "violations": sum(its.violations for its in done),
+        "wrong": wrong,
+        "failed": failed,
+    }
+    largest = {
+        name: max((getattr(its, name) for its in done), default=0.0)
+        for name in ("poc_um_max", "force_mn_max", "torque_nmm_max")
+    }
+    facts |= largest
+    if args.json:
+        print(json.dumps(facts))
+    else:
+        _warn_of_unfinished(lake)
+        verdict = "good" if good else f"{len(wrong) + len(failed)} wrong" if lake.partition else "nothing in it"
+        poc_um, force_mn, torque_nmm = largest.values()
+        print(
+            f"{args.folder}: {facts['recordings']} recordings, {facts['frames']} frames, {verdict}; largest error "
+            f"PoC {poc_um:.3f} um, force {force_mn:.4f} mN, torque {torque_nmm:.5f} N*mm"
+        )
+    return 0 if good else 1
+
+
+def run_sql(args: argparse.Namespace) -> int:
+    """Print what the query gives."""
+    lake = _room("layout").opened(args.folder)
+    _warn_of_unfinished(lake)
+    names, rows = _room("sql").query(lake, args.query)
+    if args.json:
+        for row in rows:
+            print(json.dumps(dict(zip(names, row, strict=True)), default=str))
+        return 0
+    out = csv.writer(sys.stdout, lineterminator="\n")
+    out.writerow(names)
+    out.writerows(rows)
+    return 0
+
+
+def _warn_of_unfinished(lake: Any) -> None:
+    if lake.unfinished:
+        print(
+            f"biotac: {lake.unfinished} file(s) of exports that did not come to their end are left out; export again",
+            file=sys.stderr,
+        )
+
+
+def _all(
+    work: Callable[[str], Any], items: list[str], args: argparse.Namespace, did: str
+) -> tuple[list[Any], list[str]]:
+    """What ``work`` gave, and what is said of those that failed, in the order of ``items``."""
+    progress = Progress()
+    results: dict[str, Any] = {}
+    try:
+        for item, result in _room("workers").each(work, items, args.jobs, args.dask):
+            results[item] = result
+            progress.show(f"{len(results)} of {len(items)} {did}; Ctrl-C stops, the same command goes on from there")
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            f"{len(results)} of {len(items)} are {did}; the same command goes on from there"
+        ) from None
+    finally:
+        progress.done()
+    failed = [str(results[item]) for item in items if isinstance(results[item], BiotacError)]
+    for text in failed:
+        print(f"biotac: {text}", file=sys.stderr)
+    return [its for item in items if not isinstance(its := results[item], BiotacError)], failed
+
+
+def _room(name: str) -> ModuleType:
+    """A module of the lake. InputError for the extra that it needs."""
+    try:
+        return import_module(f"biotac.lake.{name}")
+    except ImportError as error:
+        raise InputError(
+            f"a lake needs {error.name}, which is not installed; pip install 'biotac-gateway[lake]'"
+        ) from error

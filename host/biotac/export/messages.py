@@ -1,0 +1,83 @@
+"""Messages besides rows (TARE, STATUS and whatever a board tells with its time), as tables of the wire's integers."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..recording.reader import Recording
+from ..wire.dtypes_gen import DTYPES
+from ..wire.fields import Field
+from ..wire.frames import StructArray
+from ..wire.sensor_gen import ELECTRODE_NAMES
+from .columns import STAMP, Table
+
+_T_US = Field("t_us", "<i8", "us", "device time, unwrapped from the first value seen")
+_ITS_OWN = ("seq", "t_us", "req_id", "finger")  # of the message, which the tables have otherwise or not
+_WRAP_US = 2**32
+
+
+def message_tables(recording: Recording) -> list[Table]:
+    """A table a kind of message and finger, whose kind is the message's name in small letters."""
+    timed = [m for m in recording.messages if "t_us" in (DTYPES[m.ID].names or ())]
+    # STATUS comes each second, so two neighbours are never half a wrap apart.
+    told_us = np.array([recording.begin_us, *(m.t_us for m in timed)], np.float64)
+    t_us = np.unwrap(told_us, period=_WRAP_US)[1:].astype(np.int64)
+    groups: dict[tuple[int, int | None], list[int]] = defaultdict(list)
+    for k, message in enumerate(timed):
+        groups[message.ID, getattr(message, "finger", None)].append(k)
+    return [
+        _table(recording, message_id, finger, [timed[k] for k in at], t_us[at])
+        for (message_id, finger), at in sorted(groups.items(), key=lambda its: (its[0][0], its[0][1] or 0))
+    ]
+
+
+def _table(
+    recording: Recording, message_id: int, finger: int | None, told: list[Any], t_us: NDArray[np.int64]
+) -> Table:
+    rows: StructArray = np.concatenate([np.frombuffer(m.pack(), DTYPES[message_id]) for m in told])
+    own = _fields(message_id)
+    arrays: dict[str, NDArray[Any]] = {"t_us": t_us, STAMP.name: recording.stamp_ns(t_us)}
+    return Table(
+        _name(message_id).lower(),
+        finger,
+        (_T_US, STAMP, *own),
+        arrays | {field.name: rows[field.name] for field in own},
+    )
+
+
+def _name(message_id: int) -> str:
+    return next(name for name, its in _schema().items() if its["id"] == message_id)
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    text = resources.files("biotac").joinpath("schema.json").read_text(encoding="utf-8")
+    messages: dict[str, Any] = json.loads(text)["link"]["message"]
+    return messages
+
+
+@cache
+def _fields(message_id: int) -> tuple[Field, ...]:
+    """With the units and meanings that protocol/link.toml gives them."""
+    dtype = DTYPES[message_id]
+    told = {field["name"]: field for field in _schema()[_name(message_id)]["fields"]}
+    made = []
+    for name in dtype.names or ():
+        if name in _ITS_OWN:
+            continue
+        base, shape = dtype[name].base, dtype[name].shape
+        count = shape[0] if shape else 0
+        parts = tuple(ELECTRODE_NAMES) if count == len(ELECTRODE_NAMES) else tuple(str(k) for k in range(count))
+        about = told[name]
+        # link.toml marks no value of these messages by all ones, and says so of the field.
+        ones = int(np.iinfo(base).max)
+        invalid = ones if f"0x{ones:X} " in about["doc"] else None
+        made.append(Field(name, base.str, about["unit"], about["doc"], parts, invalid=invalid))
+    return tuple(made)

@@ -1,0 +1,108 @@
+"""Zenoh sessions, the keys that boards are shared under, and who is there."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, PortError
+
+ROOT = "biotac"
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+FIND_S = 1.0  # who does not tell of itself by then is not there
+
+LEASE_MS = 30_000  # a computer that says nothing for so long is gone; a program that ends is gone at once
+
+#: Before each batch: its number, by which a reader knows what it missed.
+NUMBER = struct.Struct("<Q")
+
+
+def key(name: str, what: str) -> str:
+    """``wire/EPOCH``, ``command``, ``claim``, ``info`` or a liveliness token's: ``live/EPOCH``, ``writer/ID``."""
+    return f"{ROOT}/{name}/{what}"
+
+
+def checked_name(name: str) -> str:
+    """``name``, or InputError."""
+    if not NAME.fullmatch(name):
+        raise InputError(f"{name!r} is no name for a board; expected up to 64 letters, digits, '_', '-' and '.'")
+    return name
+
+
+def open_session(
+    where: str, *, connect: str | None = None, listen: str | None = None, config: str | os.PathLike[str] | None = None
+) -> Any:
+    """A zenoh.Session. ``connect`` and ``listen`` are Zenoh's endpoints (tcp/HOST:7447), which end the looking around.
+
+    ``config`` is Zenoh's own file (users and passwords, TLS, access rules); without it the one that ZENOH_CONFIG names.
+    Raises InputError without Zenoh or for a bad file, PortError, beginning with ``where``, when nobody is reached.
+    """
+    zenoh = _zenoh()
+    try:
+        if config is not None:
+            facts = zenoh.Config.from_file(str(config))
+        else:
+            facts = zenoh.Config.from_env() if os.environ.get("ZENOH_CONFIG") else zenoh.Config()
+            # Who is stopped for a while (a debugger, a laptop's lid) goes on from there; Zenoh's own 10 s cut it off.
+            facts.insert_json5("transport/link/tx/lease", str(LEASE_MS))
+        for what, endpoint in (("connect", connect), ("listen", listen)):
+            if endpoint is not None:
+                facts.insert_json5(f"{what}/endpoints", json.dumps([endpoint]))
+        if connect is not None or listen is not None:
+            facts.insert_json5("scouting/multicast/enabled", "false")
+        if connect is not None and listen is None:
+            facts.insert_json5("mode", '"client"')
+    except zenoh.ZError as error:
+        file = Path(config or os.environ.get("ZENOH_CONFIG", "")).name
+        raise InputError(f"{file} is no configuration of Zenoh ({_short(error)}); see zenoh.io/docs") from error
+    try:
+        return zenoh.open(facts)
+    except zenoh.ZError as error:
+        raise PortError(
+            f"{where}: Zenoh cannot be reached ({_short(error)}); check the endpoint, and that `biotac serve` runs"
+        ) from error
+
+
+def shared(session: Any, name: str = "*") -> list[dict[str, Any]]:
+    """What the boards of that name (by default all) tell of themselves, in the order of their names."""
+    told = []
+    for reply in session.get(key(name, "info"), target=_zenoh().QueryTarget.ALL, timeout=FIND_S):
+        if reply.ok is not None:
+            try:
+                facts = json.loads(reply.ok.payload.to_bytes())
+            except ValueError:
+                continue  # of something else that has our key
+            if isinstance(facts, dict) and isinstance(facts.get("name"), str):
+                told.append(facts)
+    return sorted(told, key=lambda facts: facts["name"])
+
+
+def alive(session: Any, name: str) -> set[str]:
+    """Epochs under which a board of that name is shared: one, or none, or two that are called the same."""
+    replies = session.liveliness().get(key(name, "live/*"), timeout=FIND_S)
+    return {str(reply.ok.key_expr).rpartition("/")[2] for reply in replies if reply.ok is not None}
+
+
+def found(facts: Mapping[str, Any]) -> str:
+    """The PORT of what ``shared`` lists."""
+    return f"zenoh:{facts['name']}"
+
+
+def _zenoh() -> Any:
+    try:
+        import zenoh
+    except ImportError as error:
+        raise InputError(
+            "boards on a network need Zenoh, which is not installed; pip install 'biotac-gateway[zenoh]'"
+        ) from error
+    return zenoh
+
+
+def _short(error: Exception) -> str:
+    """Zenoh's words without the place in its source."""
+    return str(error).partition("  at ")[0].strip().rstrip("!")

@@ -1,0 +1,224 @@
+"""A board of this computer for all on the network: the other end of ``zenoh:NAME``."""
+
+from __future__ import annotations
+
+import hmac
+import json
+import secrets
+import struct
+import threading
+from contextlib import suppress
+from dataclasses import replace
+from types import TracebackType
+from typing import Any
+
+from ..errors import BiotacError, CommandRefusedError, PortError
+from ..hand.gap import Gap
+from ..hand.hand import Hand
+from ..wire import messages_gen as wire
+from ..wire.framing import encode, open_frame
+from ..wire.identity import board_text, serial_text, version_text
+from . import network, rights
+
+PAUSE_S = 0.5  # of the stream, after a command that it was stopped for
+
+
+class Share:
+    """Shares ``hand`` as ``name`` on ``session`` until it is closed; use as a context manager. Both are the caller's.
+
+    The hand streams from then on, whoever listens. Raises PortError when the name is taken.
+    """
+
+    def __init__(self, hand: Hand, session: Any, name: str) -> None:
+        self.name = network.checked_name(name)
+        self.batches = 0  #: published so far
+        self.writer: str | None = None  #: who may command now
+        self._hand, self._session = hand, session
+        self._board = hand._board  # its bytes, and commands of any kind
+        self._secret = b""
+        self._deciding = threading.Lock()
+        self._commanding = threading.Lock()
+        self._publishing = threading.Lock()  # Zenoh's things are not to be given up while they are in use
+        self._paused: threading.Timer | None = None
+        self._pauses = 0
+        self._tail = b""
+        if network.alive(session, name):
+            raise PortError(f"somebody shares a board as {name} already; choose another --name, or end that one")
+        self._declared = [
+            session.declare_queryable(network.key(name, what), answer)
+            for what, answer in (("info", self._tell), ("claim", self._claim), ("command", self._command))
+        ]
+        self._declared.append(
+            session.liveliness().declare_subscriber(network.key(name, "writer/*"), self._writer_changed)
+        )
+        self._epoch, self._wire = self._new_epoch()
+        self._board.record, self._board.record_gap = self._publish, self._came_back
+        hand.start()
+        hand.run()
+
+    def _new_epoch(self) -> tuple[Any, Any]:
+        """Its token, and the publisher for those who have seen it: no reader goes on as if the board were the same.
+
+        A publisher drops for whoever is too slow, and goes on.
+        """
+        epoch = secrets.token_hex(8)
+        wire = self._session.declare_publisher(network.key(self.name, f"wire/{epoch}"))
+        return self._session.liveliness().declare_token(network.key(self.name, f"live/{epoch}")), wire
+
+    def _came_back(self, gap: Gap) -> None:
+        """Its readers are to meet the board anew, which may have restarted."""
+        with self._publishing:
+            before = self._epoch, self._wire
+            self._epoch, self._wire = self._new_epoch()
+            for its in before:
+                its.undeclare()
+
+    # ---- what it sends -------------------------------------------------------------------------
+
+    def _publish(self, chunk: bytes) -> None:
+        """Whole messages only: what is lost is lost whole. Answers to somebody's questions go to nobody else."""
+        if not chunk:
+            return
+        data = self._tail + chunk
+        end = data.rfind(b"\0") + 1
+        data, self._tail = data[:end], data[end:]
+        # COBS: the second byte of what stands between two delimiters is the message's id, as no id is 0.
+        kept = [
+            part for part in data.split(b"\0") if len(part) > 1 and not (part[1] in rights.ANSWERS and _asked(part))
+        ]
+        with self._publishing:
+            if kept and self._declared:
+                self._wire.put(network.NUMBER.pack(self.batches) + b"\0".join(kept) + b"\0")
+                self.batches += 1
+
+    # ---- what it is asked ----------------------------------------------------------------------
+
+    def _tell(self, query: Any) -> None:
+        hello = self._hand.info
+        facts = {
+            "name": self.name,
+            "board": board_text(hello.board),
+            "serial_number": serial_text(hello),
+            "firmware": version_text(hello),
+            "wire": f"{hello.wire_major}.{hello.wire_minor}",
+            "fingers": self._hand.fingers,
+            "connected": self._hand.connected,
+            "writer": self.writer,
+        }
+        query.reply(network.key(self.name, "info"), json.dumps(facts).encode())
+
+    def _claim(self, query: Any) -> None:
+        """A claim is who (its token's name) and a secret that goes with its commands; the answer, who may command."""
+        who, _, secret = (query.payload.to_bytes() if query.payload else b"").partition(b"\0")
+        with self._deciding:
+            if self.writer is None and len(secret) >= 16:
+                self.writer, self._secret = who.decode(errors="replace"), secret
+            mine = hmac.compare_digest(secret, self._secret)
+            answer = b"" if mine else (self.writer or "nobody").encode()
+        query.reply(network.key(self.name, "claim"), answer)
+
+    def _writer_changed(self, sample: Any) -> None:
+        gone = str(sample.key_expr).rpartition("/")[2]
+        with self._deciding:
+            if "DELETE" in str(sample.kind) and gone == self.writer:
+                self.writer, self._secret = None, b""
+
+    def _command(self, query: Any) -> None:
+        """Nothing is answered while the board is away, so that whoever asks looks for it again."""
+        frame = open_frame(query.payload.to_bytes()) if query.payload else None
+        if frame is None:
+            return
+        message_id, payload = frame
+        secret = query.attachment.to_bytes() if query.attachment else b""
+        may = not rights.needs_writer(message_id)
+        if not may:
+            with self._deciding:
+                may = self.writer is not None and hmac.compare_digest(secret, self._secret)
+        try:
+            answer = self._asked_for(message_id, payload) if may else _refusal(message_id, payload, wire.Error.NOT_HERE)
+        except BiotacError:
+            return
+        query.reply(network.key(self.name, "command"), answer)
+
+    def _asked_for(self, message_id: int, payload: bytes) -> bytes:
+        kind = wire.MESSAGES.get(message_id)
+        answers = wire.ANSWERS.get(kind) if kind is not None else None
+        if kind is None or answers is None:
+            return _refusal(message_id, payload, wire.Error.UNKNOWN_COMMAND)
+        try:
+            request = kind.unpack(payload)
+        except struct.error:
+            return _refusal(message_id, payload, wire.Error.BAD_LENGTH)
+        if isinstance(request, wire.HelloRequest):
+            self._board.check()
+            if not self._hand.connected:
+                return b""
+            hello = replace(self._hand.info, req_id=request.req_id, nonce=request.nonce)
+            return encode(hello.ID, hello.pack())
+        with self._commanding:
+            try:
+                answer = self._ask(request, answers)
+            except CommandRefusedError as error:
+                return _refusal(message_id, payload, error.error)
+        answer = replace(answer, req_id=request.req_id)
+        return encode(answer.ID, answer.pack())
+
+    def _ask(self, request: Any, answers: type[Any]) -> Any:
+        """What a streaming board is too busy for (maps, saving) pauses the stream, for all, until a while after."""
+        if self._paused is None:
+            try:
+                return self._board.ask(request, answers)
+            except CommandRefusedError as error:
+                if error.error != wire.Error.BUSY:
+                    raise
+            self._hand.stop()
+        else:
+            self._paused.cancel()
+        try:
+            return self._board.ask(request, answers)
+        finally:
+            self._pauses += 1
+            self._paused = threading.Timer(PAUSE_S, self._go_on, [self._pauses])
+            self._paused.daemon = True
+            self._paused.start()
+
+    def _go_on(self, pause: int) -> None:
+        with self._commanding:
+            if pause != self._pauses:
+                return  # another command has come in between
+            self._paused = None
+            with suppress(BiotacError):  # a board that is away is told when it is back
+                self._hand.start()
+
+    def close(self) -> None:
+        """Take it off the network. The hand goes on streaming. Safe to call twice."""
+        self._board.record = None
+        if self._paused is not None:
+            self._paused.cancel()
+        with self._publishing:
+            declared, self._declared = self._declared, []
+            for its in [*declared, self._epoch, self._wire] if declared else ():
+                its.undeclare()
+
+    def __enter__(self) -> Share:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _asked(part: bytes) -> bool:
+    """Its request's number is not 0: somebody waits for it. Boards send STATUS by themselves, too."""
+    frame = open_frame(part)
+    if frame is None:
+        return False
+    try:
+        return bool(wire.MESSAGES[frame[0]].unpack(frame[1]).req_id)
+    except struct.error:
+        return True
+
+
+def _refusal(message_id: int, payload: bytes, error: int) -> bytes:
+    return encode(wire.Reply.ID, wire.Reply(payload[0] if payload else 0, message_id, error).pack())

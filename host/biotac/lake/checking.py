@@ -1,0 +1,89 @@
+"""A recording of a lake against what seals it, and its results against the float64 reference."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from ..errors import InputError
+from ..lab.crosscheck import CrossCheck
+from ..recording.facts import Facts
+from ..wire.fields import FRAME_FIELDS
+from ..wire.frames import FRAME_DTYPE, StructArray, frames_to_wire
+from .layout import RECORDINGS, place
+
+
+@dataclass(frozen=True)
+class Checked:
+    """``wrong`` in words: files that are not what was sealed, and results out of their bounds (``violations``)."""
+
+    recording: str
+    frames: int
+    violations: int
+    poc_um_max: float
+    force_mn_max: float
+    torque_nmm_max: float
+    wrong: list[str]
+
+
+def check(lake: str, topics: dict[str, set[str]], partition: dict[str, str], recording: str) -> Checked:
+    """Read all files of ``recording``; ``topics`` and ``partition`` are the lake's. InputError for a damaged seal."""
+    folder = Path(lake)
+    seal = place(folder, RECORDINGS, partition[recording], recording)
+    try:
+        row: dict[str, Any] = pq.read_table(seal, partitioning=None).to_pylist()[0]
+        facts = Facts.read(dict(row["metadata"]))
+        files = {its["topic"]: its for its in row["files"]}
+    except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise InputError(f"{seal} is damaged ({error}); export its recording again with --force") from error
+    wrong = []
+    outcome = CrossCheck(wire_minor=facts.info.wire_minor)
+    for topic in sorted({*files, *(topic for topic, its in topics.items() if recording in its)} - {RECORDINGS}):
+        path = place(folder, topic, partition[recording], recording)
+        told = files.get(topic)
+        if told is None:
+            wrong.append(f"{path} is not named by its seal; move it elsewhere")
+            continue
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            wrong.append(f"{path} cannot be read ({error.strerror}); export {row['source']} again with --force")
+            continue
+        if hashlib.sha256(data).hexdigest() != told["sha256"]:
+            wrong.append(f"{path} is not what was exported; export {row['source']} again with --force")
+        elif topic == "frames":
+            rows = frames_of(pq.read_table(io.BytesIO(data)))
+            outcome.add(frames_to_wire(rows), facts.settings, facts.finger_settings, facts.maps)
+    wrong += [f"{recording} ({row['source']}): {finding}" for finding in outcome.findings]
+    return Checked(
+        recording,
+        outcome.frames,
+        outcome.violations,
+        outcome.poc_um_max,
+        outcome.force_mn_max,
+        outcome.torque_nmm_max,
+        wrong,
+    )
+
+
+def frames_of(table: pa.Table) -> StructArray:
+    """The topic ``frames`` as FRAME_DTYPE (n,): null as the marks that rows have."""
+    out = np.empty(table.num_rows, FRAME_DTYPE)
+    for field in FRAME_FIELDS:
+        values = [_numbers(table[name], field.invalid) for name in field.flat_names()]
+        out[field.name] = np.column_stack(values) if field.parts else values[0]
+    return out
+
+
+def _numbers(column: pa.ChunkedArray, invalid: int | None) -> Any:
+    if column.null_count and pa.types.is_integer(column.type):
+        column = pc.fill_null(column, invalid)
+    return column.to_numpy()

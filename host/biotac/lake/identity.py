@@ -1,0 +1,61 @@
+"""Names that stay the same however often, from wherever and on whichever machine a recording is exported."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from datetime import datetime, timezone
+from pathlib import Path
+from urllib.parse import quote
+
+from ..errors import RecordingError
+from ..keep.calibration_file import to_dict
+from ..recording import Recording
+from ..recording.blocks import Blocks
+from ..recording.facts import Facts
+from ..recording.layout import maps_text
+from ..wire.identity import ascii_text, serial_text
+
+NO_BOARD = "none"  # of imported files
+_LETTERS = 16
+
+
+def recording_id(path: Path) -> str:
+    """By how it begins: its metadata and its first second. One that has grown since is the same recording.
+
+    Only so much of it is read. RecordingError for no recording.
+    """
+    blocks = Blocks(path, check=False)
+    first = next(iter(blocks), None)
+    if first is None or blocks.metadata is None:
+        Recording(path)  # which says what is wrong with it
+        raise RecordingError(f"{path} holds no second of data; there is nothing to export")
+    begin = json.dumps([blocks.metadata, first.arrived_ns], sort_keys=True).encode()
+    return hashlib.sha256(begin + first.bytes()).hexdigest()[:_LETTERS]
+
+
+def partition(recording: Recording) -> str:
+    """Board and day (UTC) on which it began."""
+    day = datetime.fromtimestamp(recording.begin_ns // 10**9, timezone.utc)
+    return f"board={quote(board(recording), safe='')}/date={day:%Y-%m-%d}"
+
+
+def board(recording: Recording) -> str:
+    """Its number, as USB tells it."""
+    return serial_text(recording.info) if any(recording.info.board_serial) else NO_BOARD
+
+
+def sensors(recording: Recording) -> dict[int, str]:
+    """Serial numbers by finger, of sensors that tell one."""
+    told = {s.finger: ascii_text(s.serial) for s in recording.sensors if s.present}
+    return {finger: serial for finger, serial in told.items() if serial}
+
+
+def calibrations(facts: Facts | Recording) -> dict[int, str]:
+    """By finger, of those that had a calibration or a map in force: a hash of both, without who made them where."""
+    made = {}
+    for finger in sorted({*facts.calibrations, *facts.maps}):
+        own = facts.calibrations.get(finger)
+        told = [own and to_dict(own), maps_text({0: facts.maps[finger]} if finger in facts.maps else {})]
+        made[finger] = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:_LETTERS]
+    return made

@@ -1,0 +1,114 @@
+"""Where everything is in a lake, and what is in its way."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..errors import InputError
+
+#: The topic with a row a recording, whose file seals the recording's others.
+RECORDINGS = "recordings"
+#: Files that are not whole yet. Readers leave out what begins with a dot.
+PARTIAL = ".partial"
+LOCK = ".lock"
+_PLACE = re.compile(r"([a-z][a-z0-9_]*)/(board=[^/]+/date=\d{4}-\d\d-\d\d)/([0-9a-f]{16})\.parquet")
+
+
+@dataclass
+class Lake:
+    """What is in ``folder`` now, by recording: its partition, and its topics' files."""
+
+    folder: Path
+    partition: dict[str, str] = field(default_factory=dict)
+    topics: dict[str, set[str]] = field(default_factory=dict)  # recordings by topic
+    unfinished: int = 0  # files of recordings whose export did not come to its end
+
+    def path(self, topic: str, recording: str) -> Path:
+        """Of a recording that is in the lake."""
+        return place(self.folder, topic, self.partition[recording], recording)
+
+    def paths(self, topic: str) -> list[Path]:
+        """All files of a topic, in the order of their recordings' ids."""
+        return [self.path(topic, recording) for recording in sorted(self.topics.get(topic, ()))]
+
+
+def place(folder: Path, topic: str, partition: str, recording: str) -> Path:
+    """Of one file."""
+    return folder / topic / partition / f"{recording}.parquet"
+
+
+def opened(folder: Path, *, create: bool = False) -> Lake:
+    """What is there. InputError for no lake, and for files that no export put there."""
+    if create:
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir(parents=True)
+    if not folder.is_dir() or not (create or (folder / RECORDINGS).is_dir()):
+        raise InputError(f"{folder} is no lake; `biotac export RECS... --lake {folder}` makes one")
+    lake = Lake(folder)
+    found: list[tuple[str, str, str]] = []
+    foreign: list[str] = []
+    for file in _files(folder):
+        match = _PLACE.fullmatch(file)
+        if match:
+            found.append((match[1], match[2], match[3]))
+        else:
+            foreign.append(file)
+    if foreign:
+        more = f" and {len(foreign) - 1} more" if foreign[1:] else ""
+        raise InputError(
+            f"{folder / min(foreign)}{more} is no part of a lake; expected TOPIC/board=.../date=.../ID.parquet: "
+            "move it elsewhere"
+        )
+    for topic, partition, recording in found:
+        if topic == RECORDINGS:
+            if recording in lake.partition:
+                raise InputError(
+                    f"{folder} holds recording {recording} in {lake.partition[recording]} and in {partition}; "
+                    "one is a copy: remove it"
+                )
+            lake.partition[recording] = partition
+    for topic, partition, recording in found:
+        if lake.partition.get(recording) == partition:
+            lake.topics.setdefault(topic, set()).add(recording)
+        else:
+            lake.unfinished += 1
+    return lake
+
+
+def _files(folder: Path) -> Iterator[str]:
+    """All files below, as POSIX paths; nothing that begins with a dot."""
+    for at, folders, files in os.walk(folder):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        where = Path(at).relative_to(folder).as_posix()
+        for name in files:
+            if not name.startswith("."):
+                yield name if where == "." else f"{where}/{name}"
+
+
+@contextlib.contextmanager
+def sole_writer(folder: Path) -> Iterator[None]:
+    """While an export writes; what one that was killed left half-written is removed. InputError when there is another.
+
+    Nothing is locked where the system has no flock.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        fcntl = None  # type: ignore[assignment]
+    with (folder / LOCK).open("w") as lock:
+        try:
+            if fcntl is not None:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise InputError(f"another export writes to {folder}; wait for its end") from error
+        shutil.rmtree(folder / PARTIAL, ignore_errors=True)
+        try:
+            yield
+        finally:
+            shutil.rmtree(folder / PARTIAL, ignore_errors=True)

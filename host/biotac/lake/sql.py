@@ -1,0 +1,47 @@
+"""A lake asked in SQL, by DuckDB: a view a topic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import duckdb
+
+from ..errors import InputError
+from .layout import Lake
+
+# Told, or a board's number that has no letter in it would be read as a number, without its zeros.
+_TYPES = "hive_types = {'board': VARCHAR, 'date': DATE}"
+
+
+def query(lake: Lake, text: str) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
+    """Names of the result's columns, and its rows as they are read.
+
+    Each topic is a view, over recordings that are whole. InputError for what DuckDB refuses.
+    """
+    connection = duckdb.connect(":memory:")
+    connection.execute("SET TimeZone = 'UTC'")
+    try:
+        for topic in sorted(lake.topics):
+            paths = ", ".join("'" + str(path).replace("'", "''") + "'" for path in lake.paths(topic))
+            connection.execute(
+                f"CREATE VIEW {topic} AS SELECT * FROM read_parquet([{paths}], hive_partitioning = true, {_TYPES})"
+            )
+        result = connection.execute(text)
+    except duckdb.Error as error:
+        known = ", ".join(sorted(lake.topics))
+        raise InputError(f"DuckDB refuses it: {_first_line(error)}; topics are {known}") from error
+    names = [column[0] for column in result.description or ()]
+    return names, _rows(result)
+
+
+def _rows(result: Any) -> Iterator[tuple[Any, ...]]:
+    try:
+        while rows := result.fetchmany(10_000):
+            yield from rows
+    except duckdb.Error as error:
+        raise InputError(f"DuckDB stops: {_first_line(error)}; `biotac lake check` finds damaged files") from error
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().splitlines()[0]

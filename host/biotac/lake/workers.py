@@ -1,0 +1,94 @@
+"""The same work on many items: here, in processes of this computer, or on a Dask cluster."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
+
+from ..errors import BiotacError, InputError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+_ENDED = "its worker ended before it was done (memory?); run it again with fewer workers"
+
+
+def each(
+    work: Callable[[Item], Result], items: Sequence[Item], jobs: int = 1, dask: str | None = None
+) -> Iterator[tuple[Item, Result | BiotacError]]:
+    """Items and what ``work`` made of them, or its error, as they come; ``work`` and items can be pickled.
+
+    ``dask`` is a scheduler's address, whose workers have this package and see the same files. InputError when it is not
+    there, or Dask is not installed.
+    """
+    if dask is not None:
+        yield from _on_dask(work, items, dask)
+    elif jobs == 1:
+        for item in items:
+            yield item, _tried(work, item)
+    else:
+        yield from _in_processes(work, items, jobs)
+
+
+def _tried(work: Callable[[Item], Result], item: Item) -> Result | BiotacError:
+    try:
+        return work(item)
+    except BiotacError as error:
+        return error
+    except OSError as error:
+        return InputError(f"{item}: {error.strerror or error}")
+
+
+def _in_processes(
+    work: Callable[[Item], Result], items: Sequence[Item], jobs: int
+) -> Iterator[tuple[Item, Result | BiotacError]]:
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from concurrent.futures.process import BrokenProcessPool
+    from multiprocessing import get_context
+
+    # spawn: a fork of a process with threads (pyarrow's) may hang.
+    with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_leave_interrupts) as pool:
+        of = {pool.submit(_tried, work, item): item for item in items}
+        try:
+            for done in as_completed(of):
+                try:
+                    yield of[done], done.result()
+                except BrokenProcessPool:
+                    yield of[done], InputError(f"{of[done]}: {_ENDED}")
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _leave_interrupts() -> None:
+    """Ctrl-C reaches all of a terminal's processes; the one that gives out work ends the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _on_dask(
+    work: Callable[[Item], Result], items: Sequence[Item], address: str
+) -> Iterator[tuple[Item, Result | BiotacError]]:
+    try:
+        import distributed
+    except ImportError as error:
+        raise InputError(
+            f"--dask needs {error.name}, which is not installed; pip install 'biotac-gateway[dask]'"
+        ) from error
+    connect: Any = distributed.Client  # which has no types
+    as_completed: Any = distributed.as_completed
+    try:
+        client = connect(address, timeout="10s", set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"no Dask scheduler answers at {address} ({error}); start one with `dask scheduler`, expected tcp://HOST:PORT"
+        ) from error
+    with client:
+        futures = client.map(_tried, [work] * len(items), items, pure=False)
+        of = dict(zip(futures, items, strict=True))
+        for done in as_completed(futures, loop=client.loop, raise_errors=False):
+            problem = done.exception()
+            if isinstance(problem, ImportError):
+                raise InputError(f"a Dask worker lacks {problem.name}; pip install 'biotac-gateway[lake,dask]' there")
+            if problem is not None:
+                yield of[done], InputError(f"{of[done]}: {_ENDED} ({type(problem).__name__})")
+            else:
+                yield of[done], done.result()

@@ -1,0 +1,149 @@
+"""One recording into a lake: its topics' files first, then the file that seals them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from ..errors import InputError
+from ..export.columns import EXPORTED, HEARTBEATS, Table, tables
+from ..export.messages import message_tables
+from ..export.parquet import Label, frame_ids, write_labelled
+from ..recording import Recording
+from ..recording.layout import CHECKSUM
+from . import identity
+from .layout import PARTIAL, RECORDINGS, place
+
+SIZE = b"biotac.size_bytes"  # of the source: one that has grown is exported again
+
+_SEAL = pa.schema(
+    [
+        pa.field("recording", pa.string(), metadata={"what": "id, the name of its files"}),
+        pa.field("source", pa.string(), metadata={"what": "name of the file that it was exported from"}),
+        pa.field("begin_ns", pa.int64(), metadata={"unit": "ns", "what": "stamp of its begin, Unix"}),
+        pa.field("duration_s", pa.float64(), metadata={"unit": "s", "what": "by the board's clock"}),
+        pa.field("size_bytes", pa.int64(), metadata={"unit": "B", "what": "of the source"}),
+        pa.field("frames_lost", pa.int64(), metadata={"unit": "1", "what": "by the sequence numbers"}),
+        pa.field("pac_lost", pa.int64(), metadata={"unit": "1", "what": "by the sequence numbers"}),
+        pa.field("problems", pa.list_(pa.string()), metadata={"what": "what of the source is missing or damaged"}),
+        pa.field("sensors", pa.map_(pa.uint8(), pa.string()), metadata={"what": "serial numbers by finger"}),
+        pa.field("calibrations", pa.map_(pa.uint8(), pa.string()), metadata={"what": "ids by finger"}),
+        pa.field(
+            "metadata", pa.map_(pa.string(), pa.string()), metadata={"what": "as host/docs/recording.md has them"}
+        ),
+        pa.field(
+            "files",
+            pa.list_(
+                pa.struct(
+                    [("topic", pa.string()), ("rows", pa.int64()), ("bytes", pa.int64()), ("sha256", pa.string())]
+                )
+            ),
+            metadata={"what": "the recording's other files"},
+        ),
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Written:
+    """``rows`` by topic; ``new`` is False for what was in the lake before."""
+
+    recording: str
+    new: bool
+    rows: dict[str, int]
+
+
+def put(lake: str, known: dict[str, str], force: bool, source: str) -> Written:
+    """Write the recording ``source`` into ``lake``, unless it is there already, at least as long.
+
+    ``known`` are partitions by recording. Same bytes from the same recording and version, wherever it runs. Raises
+    RecordingError or InputError for what cannot be read or written; then nothing of it has got into the lake.
+    """
+    folder, path = Path(lake), Path(source)
+    name = identity.recording_id(path)
+    size = path.stat().st_size
+    if name in known and not force and _sealed(folder, known[name], name) >= size:
+        return Written(name, False, {})
+    recording = Recording(path)
+    partition = identity.partition(recording)
+    if name not in known and _sealed(folder, partition, name) >= size:  # by a copy of it that is put in, too
+        return Written(name, True, {})
+    topics: dict[str, list[Table]] = {}
+    for table in [*tables(recording, {**EXPORTED, **HEARTBEATS}), *message_tables(recording)]:
+        topics.setdefault(table.kind, []).append(table)
+    if not topics:
+        raise InputError(f"{path} holds no frame, no PAC and no message; there is nothing to export")
+    try:
+        partial = folder / PARTIAL
+        partial.mkdir(exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=f"{name}.", dir=partial) as stage:
+            files = [_write(Path(stage), topic, made, recording, name) for topic, made in sorted(topics.items())]
+            _seal(Path(stage) / RECORDINGS, recording, name, size, files)
+            for topic in [*sorted(topics), RECORDINGS]:  # in this order: what is sealed is whole
+                target = place(folder, topic, partition, name)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                os.replace(Path(stage) / topic, target)
+    except OSError as error:
+        raise InputError(
+            f"{folder} cannot be written ({error.strerror or error}); see to it and run it again"
+        ) from error
+    return Written(name, True, {its["topic"]: its["rows"] for its in files})
+
+
+def _sealed(folder: Path, partition: str, name: str) -> int:
+    """How long the source was of what is there; -1 where nothing is."""
+    try:
+        facts = pq.read_metadata(place(folder, RECORDINGS, partition, name)).metadata or {}
+    except (OSError, pa.ArrowException):
+        return -1
+    return int(facts.get(SIZE, 0))
+
+
+def _write(stage: Path, topic: str, made: list[Table], recording: Recording, name: str) -> dict[str, Any]:
+    sensors, calibrations = identity.sensors(recording), identity.calibrations(recording)
+    fingers = [table.finger for table in made]
+    labels = [Label("recording", "id of the recording", (name,) * len(made))]
+    if None not in fingers:
+        labels += [
+            frame_ids(made),
+            Label(
+                "sensor",
+                "serial number, null where none is told",
+                tuple(sensors.get(f) for f in fingers if f is not None),
+            ),
+            Label(
+                "calibration",
+                "id of calibration and map in force, null without",
+                tuple(calibrations.get(f) for f in fingers if f is not None),
+            ),
+        ]
+    write_labelled(stage / topic, made, labels, {"biotac.recording": name})
+    data = (stage / topic).read_bytes()
+    rows = sum(len(table) for table in made)
+    return {"topic": topic, "rows": rows, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+
+
+def _seal(place: Path, recording: Recording, name: str, size: int, files: list[dict[str, Any]]) -> None:
+    row = {
+        "recording": name,
+        "source": recording.path.name,
+        "begin_ns": recording.begin_ns,
+        "duration_s": (recording.end_us - recording.begin_us) / 1e6,
+        "size_bytes": size,
+        "frames_lost": recording.frames_lost,
+        "pac_lost": recording.pac_lost,
+        "problems": [text.replace(str(recording.path), recording.path.name) for text in recording.problems],
+        "sensors": list(identity.sensors(recording).items()),
+        "calibrations": list(identity.calibrations(recording).items()),
+        "metadata": sorted((key, its) for key, its in recording.metadata.items() if key != CHECKSUM),
+        "files": files,
+    }
+    schema = _SEAL.with_metadata({SIZE: str(size).encode()})
+    pq.write_table(pa.Table.from_pylist([row], schema=schema), place, compression="zstd")

@@ -1,0 +1,235 @@
+"""A board that another program shares by Zenoh: a PORT like any other, one writer, and nobody hurt by the slow."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from maps import make_map
+
+import biotac
+from biotac.cli.main import main
+from biotac.errors import CommandRefusedError, DeviceLostError, PortError, WireVersionError
+from biotac.fleet import network, rights, zenoh_link
+from biotac.fleet.share import Share
+from biotac.view.serving import Viewing
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode, open_frame
+
+pytest.importorskip("zenoh")
+
+
+class Shared:
+    """A simulated board, shared under a name at an endpoint of its own."""
+
+    def __init__(self, name: str = "left", source: str = "sim:press.toml?fingers=2&pace=real&seconds=60") -> None:
+        with closing(socket.socket()) as free:
+            free.bind(("127.0.0.1", 0))
+            self.endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+        self.name, self.source = name, source
+        self.stack = ExitStack()
+        self.start()
+
+    def start(self) -> None:
+        self.session = self.stack.enter_context(closing(network.open_session(self.name, listen=self.endpoint)))
+        self.hand = self.stack.enter_context(biotac.open(self.source, reconnect=True))
+        self.share = self.stack.enter_context(Share(self.hand, self.session, self.name))
+
+    def port(self, more: str = "") -> str:
+        return f"zenoh:{self.name}?connect={self.endpoint}{more}"
+
+    @contextmanager
+    def client(self) -> Iterator[Any]:
+        with closing(network.open_session("test", connect=self.endpoint)) as session:
+            yield session
+
+
+@pytest.fixture(scope="module")
+def shared() -> Iterator[Shared]:
+    its = Shared()
+    with its.stack:
+        yield its
+
+
+def until(hand: biotac.Hand, frames: int) -> int:
+    """Read that many; the stream's own time, not the wall's."""
+    seen = 0
+    for batch in hand.batches():
+        seen += len(batch.wire)
+        if seen >= frames:
+            break
+    return seen
+
+
+def test_every_command_that_changes_something_needs_the_writer() -> None:
+    free = {m.__name__ for m in wire.ANSWERS if not rights.needs_writer(m.ID)}
+    assert free == {"HelloRequest", "Start", "Stop", "Ping"} | {
+        m.__name__ for m in wire.ANSWERS if m.__name__.startswith(("Get", "Read"))
+    }
+    assert rights.needs_writer(0xEE)  # of a newer wire
+
+
+def test_it_is_a_port_like_any_other(shared, tmp_path, capsys) -> None:
+    path = tmp_path / "a.mcap"
+    with biotac.open(shared.port()) as hand:
+        assert (hand.info.boot_id, hand.fingers) == (shared.hand.info.boot_id, shared.hand.fingers)
+        assert hand.settings() == shared.hand.settings()
+        hand.record(path)
+        until(hand, 100)
+        assert hand.stats.frames_lost == hand.link.batches_lost == hand.stats.crc_errors == 0
+    recording = biotac.Recording(path)
+    assert len(recording.frames) >= 100 and not recording.problems
+    assert main(["check", str(path)]) == 0
+    assert main(["info", shared.port(), "--json"]) == 0
+    with Viewing(shared.port(), port=0) as viewing:
+        assert viewing.server.token
+
+
+def test_readers_have_the_same_frames_and_no_answers_of_others(shared) -> None:
+    """One asks all the time; the other's stream has no reply in it but its own."""
+    with biotac.open(shared.port()) as asking, biotac.open(shared.port()) as reading:
+        reading.start()
+        told: list[Any] = []
+        seen = 0
+        for batch in reading.batches():
+            asking.status()
+            told += batch.messages
+            seen += len(batch.wire)
+            if seen > 100:
+                break
+        answers = [m for m in told if getattr(m, "req_id", 0)]
+        assert all(isinstance(m, wire.Reply) and m.command == wire.Start.ID for m in answers)
+        assert reading.stats.frames_lost == 0
+
+
+def test_who_may_command_is_said_and_kept_to(shared, capsys) -> None:
+    with biotac.open(shared.port()) as reader:
+        with pytest.raises(CommandRefusedError, match="open it with &write=yes, which one program may") as refused:
+            reader.tare(0)
+        assert refused.value.exit_code == 7
+        with biotac.open(shared.port("&write=yes")) as writer:
+            assert shared.share.writer is not None
+            writer.set_setting(wire.Setting.CONTACT_ENERGY_COUNT2, 1001)
+            assert reader.setting(wire.Setting.CONTACT_ENERGY_COUNT2) == 1001
+            writer.set_map(1, make_map(1))  # for which the board's stream has to stand still
+            assert reader.get_map(1) is not None
+            writer.clear_map(1)
+            with pytest.raises(PortError, match=r"commands this board, and one may; read it without write=yes"):
+                biotac.open(shared.port("&write=yes"))
+            assert main(["list", "--zenoh", shared.endpoint, "--json"]) == 0
+            (told,) = json.loads(capsys.readouterr().out)["zenoh"]
+            assert told["port"] == "zenoh:left" and told["writer"] == shared.share.writer
+            until(writer, 20)  # it streams again
+    gone = threading.Event()
+    for _ in range(1000):
+        if shared.share.writer is None:
+            gone.set()
+            break
+        shared.hand.status()
+    assert gone.is_set()
+    with biotac.open(shared.port("&write=yes")) as writer:
+        writer.set_setting(wire.Setting.CONTACT_ENERGY_COUNT2, 1000)
+
+
+def test_the_sharing_side_enforces_it(shared) -> None:
+    """Of a client that does not keep to the rules: no claim, a wrong secret, damaged bytes, an unknown command."""
+    before = shared.hand.setting(wire.Setting.CONTACT_ENERGY_COUNT2)
+    change = wire.SetSetting(9, wire.Setting.CONTACT_ENERGY_COUNT2, before + 5)
+    with shared.client() as session, biotac.open(shared.port("&write=yes")):
+        for secret in (b"", b"\0" * 32):
+            replies = list(
+                session.get(
+                    network.key("left", "command"), payload=encode(change.ID, change.pack())[:-1], attachment=secret
+                )
+            )
+            (answer,) = [open_frame(reply.ok.payload.to_bytes()[:-1]) for reply in replies]
+            assert answer is not None
+            assert wire.Reply.unpack(answer[1]) == wire.Reply(9, change.ID, wire.Error.NOT_HERE)
+        for payload in (b"", b"\0", b"no frame", encode(0x89, b"")[:-1]):
+            list(session.get(network.key("left", "command"), payload=payload, timeout=0.2))
+    assert shared.hand.setting(wire.Setting.CONTACT_ENERGY_COUNT2) == before
+
+
+def test_a_slow_reader_loses_whole_batches_counted_and_hurts_nobody(shared, monkeypatch) -> None:
+    monkeypatch.setattr(zenoh_link, "MAX_WAITING_BYTES", 20_000)
+    with biotac.open(shared.port()) as slow, biotac.open(shared.port()) as quick:
+        until(slow, 20)
+        until(quick, 300)
+        assert quick.stats.frames_lost == quick.link.batches_lost == 0
+        until(slow, 100)
+        assert slow.link.batches_lost > 0 and slow.stats.frames_lost > 0
+        assert slow.stats.crc_errors == slow.stats.other_errors == 0  # whole ones
+        lost = slow.link.batches_lost
+        until(slow, 100)
+        assert slow.link.batches_lost == lost  # and it goes on
+
+
+def test_round_trips_include_the_network(shared, monkeypatch) -> None:
+    """A network of 60 ms there and back: the clock's round trip, and so its bounds, are no shorter."""
+    import time
+
+    real = zenoh_link.ZenohLink._ask
+
+    def far(self: Any, *args: Any) -> None:
+        time.sleep(0.03)
+        real(self, *args)
+        time.sleep(0.03)
+
+    monkeypatch.setattr(zenoh_link.ZenohLink, "_ask", far)
+    with biotac.open(shared.port()) as hand:
+        hand.sync()
+        assert hand.clock.quickest_round_trip_s >= 0.06
+
+
+def test_two_of_a_name_and_other_bad_ports_are_one_line(shared, capsys) -> None:
+    with shared.client() as session, pytest.raises(PortError, match="choose another --name"):
+        Share(shared.hand, session, "left")
+    for port, code, cure in (
+        (shared.port().replace("left", "right"), 3, "biotac serve PORT --name right"),
+        ("zenoh:left?connect=tcp/127.0.0.1:1", 3, "that `biotac serve` runs"),
+        ("zenoh:?write=yes", 3, "`biotac list --zenoh` lists names"),
+        ("zenoh:left?write=maybe", 3, "expected zenoh:NAME"),
+        (shared.port("&config=/no/such.json5"), 2, "is no configuration of Zenoh"),
+    ):
+        assert main(["info", port]) == code
+        said = capsys.readouterr().err.splitlines()
+        assert len(said) == 1 and cure in said[0]
+
+
+def test_another_wire_version_is_5() -> None:
+    its = Shared("old")
+    with its.stack:
+        its.hand._board.info = replace(its.hand.info, wire_major=wire.WIRE_MAJOR + 1)
+        with pytest.raises(WireVersionError) as error:
+            biotac.open(its.port())
+        assert error.value.exit_code == 5
+
+
+def test_a_board_that_is_taken_off_is_lost_and_found_again(tmp_path: Path) -> None:
+    its = Shared("coming")
+    with its.stack, biotac.open(its.port(), reconnect=True) as hand, biotac.open(its.port()) as without:
+        hand.record(tmp_path / "a.mcap")
+        until(hand, 20)
+        without.start()
+        its.stack.close()
+        with pytest.raises(DeviceLostError, match="is not shared any more"):
+            until(without, 10_000)
+        its.start()
+        gaps: list[Any] = []
+        for batch in hand.batches():
+            gaps += [m for m in batch.messages if isinstance(m, biotac.Gap)]
+            if gaps:
+                break
+        assert gaps[0].reason == "rebooted"  # another process, so another boot
+        until(hand, 20)
+    first, second = biotac.Recording(tmp_path / "a.mcap"), biotac.Recording(tmp_path / "a.2.mcap")
+    assert len(first.frames) >= 20 <= len(second.frames)
+    gap = (first.gaps + second.gaps)[0]
+    assert gap.back_at_ns > gap.lost_at_ns > 0  # of stated length

@@ -1,0 +1,317 @@
+"""A lake: the recordings' own numbers, once each, whoever wrote it and however often it was interrupted."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pyarrow.dataset as ds
+import pyarrow.parquet as pq
+import pytest
+from copies import copies
+from maps import make_map
+from record_all import record_all
+
+import biotac
+from biotac.cli.main import main
+from biotac.errors import InputError
+from biotac.export.messages import message_tables
+from biotac.lake import identity, layout
+from biotac.recording.file import RecordingFile
+from biotac.wire import messages_gen as wire
+from biotac.wire.frames import frames_from_wire, frames_to_wire
+from biotac.wire.framing import encode
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """With faults, so that there are missing words; with heartbeats, a calibration and a map."""
+    folder = tmp_path_factory.mktemp("sources")
+    faults = record_all("sim:faults.toml?fingers=2&seconds=1", folder / "faults.mcap")
+    with biotac.open("sim:press.toml?fingers=2&seconds=2") as hand:
+        hand.set_calibration(0, biotac.Calibration(force_gain_nn=(1_000_000, 900_000, 800_000)))
+        hand.set_map(1, make_map(1))
+        hand.want("force", "pac", rest=False)
+        hand.record(folder / "own.mcap")
+        hand.read_batch(100)
+    return [faults, folder / "own.mcap", *copies(biotac.Recording(faults), folder, 2, 86_400.0)[1:]]
+
+
+@pytest.fixture(scope="module")
+def lake(sources, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("lake") / "lake"
+    assert export(sources, folder) == 0
+    return folder
+
+
+def export(sources: list[Path], folder: Path, *options: str) -> int:
+    return main(["export", *map(str, sources), "--lake", str(folder), *options])
+
+
+def sql(capsys: pytest.CaptureFixture[str], lake: Path, query: str) -> list[dict[str, Any]]:
+    capsys.readouterr()
+    assert main(["lake", "sql", query, str(lake), "--json"]) == 0
+    return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+
+def hashes(folder: Path) -> dict[str, str]:
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.rglob("*.parquet")
+    }
+
+
+def test_frames_become_the_wire_again_to_the_bit(sources) -> None:
+    for source in sources:
+        recording = biotac.Recording(source)
+        again = frames_to_wire(recording.frames)
+        assert again.tobytes() == recording.wire.tobytes()
+        assert frames_from_wire(again, recording.frames["seq"], recording.frames["t_us"]).tobytes() == (
+            recording.frames.tobytes()
+        )
+
+
+def test_every_row_of_every_topic_is_there_with_its_ids(sources, lake, capsys) -> None:
+    by_id = {identity.recording_id(path): biotac.Recording(path) for path in sources}
+    assert len(by_id) == len(sources)
+    assert {row["recording"] for row in sql(capsys, lake, "SELECT recording FROM recordings")} == set(by_id)
+    for topic, rows_of in {
+        "frames": lambda rec: rec.frames,
+        "pac": lambda rec: rec.pac,
+        "idle": lambda rec: rec.idle,
+        "tare": lambda rec: [m for m in rec.messages if isinstance(m, wire.Tare)],
+        "status": lambda rec: [m for m in rec.messages if isinstance(m, wire.Status)],
+    }.items():
+        told = sql(capsys, lake, f"SELECT recording, count(*) AS n FROM {topic} GROUP BY recording")
+        assert {row["recording"]: row["n"] for row in told} == {
+            name: len(rows_of(rec)) for name, rec in by_id.items() if len(rows_of(rec))
+        }
+    name, own = next((name, rec) for name, rec in by_id.items() if rec.calibrations)
+    told = sql(capsys, lake, f"SELECT DISTINCT finger, sensor, calibration FROM frames WHERE recording = '{name}'")
+    assert {row["finger"]: row["sensor"] for row in told} == identity.sensors(own)
+    assert {row["finger"]: row["calibration"] for row in told} == identity.calibrations(own)
+    assert len({row["calibration"] for row in told}) == 2  # and without one it is null
+    assert sql(capsys, lake, "SELECT count(*) AS n FROM frames WHERE calibration IS NULL")[0]["n"] == sum(
+        len(rec.frames) for rec in by_id.values() if rec is not own
+    )
+
+
+def test_columns_are_those_of_the_parquet_export(sources, lake, tmp_path) -> None:
+    assert main(["export", str(sources[0]), str(tmp_path / "a.parquet")]) == 0
+    place = layout.opened(lake).path("frames", identity.recording_id(sources[0]))
+    alone, mine = (pq.read_table(path, partitioning=None) for path in (tmp_path / "a.parquet", place))
+    assert set(mine.column_names) - set(alone.column_names) == {"recording", "sensor", "calibration"}
+    assert mine.select(alone.column_names).equals(alone)  # nulls, stamps and all
+    assert mine["counts_E1"].null_count + mine["force_z_n"].null_count > 0
+
+
+def test_other_programs_read_it_as_it_is(sources, lake) -> None:
+    data = ds.dataset(lake / "frames", partitioning="hive")
+    assert {"board", "date", "recording", "force_z_n"} <= set(data.schema.names)
+    assert data.count_rows() == sum(len(biotac.Recording(path).frames) for path in sources)
+    days = data.to_table(columns=["date"])["date"].to_pylist()
+    assert len(set(days)) == 2  # one of them is a day later
+
+
+def test_times_of_messages_are_unwrapped(sources) -> None:
+    """Of a board that has run for three and a half hours: 32 bits of us are 71.6 min."""
+    status = next(m for m in biotac.Recording(sources[0]).messages if isinstance(m, wire.Status))
+    t_us = [3 * 2**32 - 900_000, 3 * 2**32 + 100_000]
+    told = SimpleNamespace(
+        messages=[replace(status, t_us=at % 2**32) for at in t_us],
+        begin_us=3 * 2**32 - 1_000_000,
+        stamp_ns=lambda t_us: t_us * 1000,
+    )
+    (table,) = message_tables(told)
+    assert table.kind == "status" and table.finger is None
+    assert table.arrays["t_us"].tolist() == t_us
+
+
+def test_again_does_nothing_and_grown_files_replace(sources, tmp_path, capsys) -> None:
+    folder, cut, grown = tmp_path / "lake", tmp_path / "cut.mcap", tmp_path / "grown.mcap"
+    told = biotac.Recording(sources[1])
+    data = b"".join(told.blocks)
+    middle = data.index(b"\0", len(data) // 2) + 1
+    for path, blocks in ((cut, [data[:middle]]), (grown, [data[:middle], data[middle:]])):
+        file = RecordingFile(path.open("xb"), told.metadata)
+        for k, block in enumerate(blocks):
+            file.add(block, told.begin_ns + k)
+        file.close()
+    whole = biotac.Recording(grown)
+    assert identity.recording_id(cut) == identity.recording_id(grown) != identity.recording_id(sources[1])
+    assert export([cut], folder) == 0
+    some = sql(capsys, folder, "SELECT count(*) AS n FROM pac")[0]["n"]
+    assert 0 < some < len(whole.pac)
+    assert export([grown, cut, grown], folder) == 0
+    assert export([grown, cut], tmp_path / "at_once") == 0
+    assert hashes(tmp_path / "at_once") == hashes(folder)
+    before = hashes(folder)
+    stamps = {path: path.stat().st_mtime_ns for path in folder.rglob("*.parquet")}
+    assert sql(capsys, folder, "SELECT count(*) AS n FROM pac")[0]["n"] == len(whole.pac)
+    assert export([cut, grown], folder, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["exported"] == 0
+    assert hashes(folder) == before and stamps == {path: path.stat().st_mtime_ns for path in stamps}
+
+
+def test_two_processes_write_the_same_bytes_as_one(sources, lake, tmp_path) -> None:
+    assert export(sources, tmp_path / "two", "-j", "2") == 0
+    assert hashes(tmp_path / "two") == hashes(lake)
+
+
+@pytest.mark.nightly  # whose set of packages has Dask
+def test_dask_writes_the_same_bytes(sources, lake, tmp_path, capsys) -> None:
+    import distributed
+
+    with distributed.LocalCluster(
+        n_workers=2, processes=False, protocol="tcp", dashboard_address=None, threads_per_worker=1
+    ) as cluster:
+        address = cluster.scheduler_address
+        assert export([*sources, tmp_path / "no.mcap"], tmp_path / "dask", "--dask", address) == 2
+        assert "no.mcap cannot be read" in capsys.readouterr().err
+        assert main(["lake", "check", str(tmp_path / "dask"), "--dask", address]) == 0
+    assert hashes(tmp_path / "dask") == hashes(lake)
+
+
+@pytest.mark.parametrize("at", [0, 3, 6, *(pytest.param(k, marks=pytest.mark.nightly) for k in (1, 2, 4, 5))])
+def test_killed_at_any_rename_nothing_is_twice_or_missing(
+    sources, lake, tmp_path, capsys, monkeypatch, at: int
+) -> None:
+    """As kill -9 leaves it: no handler runs between two renames."""
+    real, done = os.replace, []
+
+    def killed(source: Any, target: Any) -> None:
+        if len(done) == at:
+            raise SystemExit
+        done.append(target)
+        real(source, target)
+
+    folder = tmp_path / "lake"
+    assert export(sources[1:2], folder) == 0
+    monkeypatch.setattr("biotac.lake.writing.os.replace", killed)
+    with pytest.raises(SystemExit):
+        export(sources, folder)
+    monkeypatch.undo()
+    (folder / layout.PARTIAL / "left").mkdir(parents=True)
+    whole = layout.opened(folder)
+    assert identity.recording_id(sources[1]) in whole.partition and whole.unfinished == at % 6
+    assert sql(capsys, folder, "SELECT count(*) AS n FROM frames")[0]["n"] in {
+        sum(len(biotac.Recording(path).frames) for path in some) for some in (sources[1:2], sources[:2])
+    }
+    assert export(sources, folder) == 0
+    assert hashes(folder) == hashes(lake)
+    assert not (folder / layout.PARTIAL).exists() and not layout.opened(folder).unfinished
+
+
+def test_a_file_that_fails_is_named_and_the_rest_is_done(sources, lake, tmp_path, capsys) -> None:
+    bad = tmp_path / "bad.mcap"
+    bad.write_bytes(b"no recording")
+    assert export([bad, *sources, tmp_path / "no.mcap"], tmp_path / "lake") == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 2 and "bad.mcap" in said[0] and "no.mcap" in said[1]
+    assert hashes(tmp_path / "lake") == hashes(lake)
+
+
+def test_check_runs_the_crosscheck_over_all_of_it(sources, lake, capsys) -> None:
+    assert main(["lake", "check", str(lake), "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["good"] and facts["recordings"] == len(sources) and facts["violations"] == 0
+    one_by_one = []
+    for source in sources:
+        assert main(["check", str(source), "--json"]) == 0
+        one_by_one.append(json.loads(capsys.readouterr().out)["crosscheck"])
+    for name in ("poc_um_max", "force_mn_max", "torque_nmm_max"):
+        assert facts[name] == max(its[name] for its in one_by_one)
+    assert facts["frames"] == sum(its["frames"] for its in one_by_one)
+
+
+def test_check_finds_what_is_wrong(sources, lake, tmp_path, capsys) -> None:
+    folder = tmp_path / "lake"
+    shutil.copytree(lake, folder)
+    its = layout.opened(folder)
+    first, second, *_ = sorted(its.topics["frames"])
+    flipped = bytearray(its.path("frames", first).read_bytes())
+    flipped[len(flipped) // 2] ^= 1
+    its.path("frames", first).write_bytes(flipped)
+    its.path("pac", second).unlink()
+    assert main(["lake", "check", str(folder)]) == 1
+    said = capsys.readouterr().out.splitlines()
+    assert len(said) == 3
+    assert any("is not what was exported" in line and first in line for line in said)
+    assert any("cannot be read" in line and second in line for line in said)
+    assert export(sources, folder, "--force") == 0
+    assert hashes(folder) == hashes(lake)
+
+
+def test_a_wrong_result_is_found(sources, tmp_path, capsys) -> None:
+    """A board that is wrong by 1 mN, once."""
+    real = biotac.Recording(sources[0])
+    sent = real.wire.copy()
+    at = int(np.flatnonzero(sent["force_100un"][:, 2] != wire.INVALID_I32)[-1])
+    sent["force_100un"][at, 2] += 10
+    file = RecordingFile((tmp_path / "wrong.mcap").open("xb"), real.metadata)
+    file.add(b"".join(encode(wire.Frame.ID, row.tobytes()) for row in sent), real.begin_ns)
+    file.close()
+    assert export([tmp_path / "wrong.mcap"], tmp_path / "lake") == 0
+    assert main(["lake", "check", str(tmp_path / "lake")]) == 1
+    assert f"frame {sent['seq'][at]} " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("verb", ["check", "sql", "export"])
+def test_a_foreign_file_is_one_line_and_2(sources, lake, tmp_path, capsys, verb: str) -> None:
+    folder = tmp_path / "lake"
+    shutil.copytree(lake, folder)
+    (folder / "frames" / "mine.parquet").write_bytes(b"PAR1")
+    words = {
+        "check": ["lake", "check", str(folder)],
+        "sql": ["lake", "sql", "SELECT 1", str(folder)],
+        "export": ["export", str(sources[0]), "--lake", str(folder)],
+    }[verb]
+    assert main(words) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1 and "mine.parquet is no part of a lake" in said[0] and "move it elsewhere" in said[0]
+
+
+def test_two_exports_at_once_are_refused_in_words(sources, lake) -> None:
+    with layout.sole_writer(lake), pytest.raises(InputError, match="another export writes"), layout.sole_writer(lake):
+        pass
+
+
+def test_sql_prints_csv_and_says_what_is_wrong(lake, capsys) -> None:
+    assert main(["lake", "sql", "SELECT count(*) AS n, NULL AS nothing FROM recordings", str(lake)]) == 0
+    assert list(csv.reader(io.StringIO(capsys.readouterr().out))) == [["n", "nothing"], ["3", ""]]
+    assert main(["lake", "sql", "SELECT no FROM frames", str(lake)]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.nightly
+def test_five_hundred_killed_half_way(sources, tmp_path) -> None:
+    """kill -9 of the command with its workers, at ten moments, then once to the end."""
+    many = tmp_path / "many"
+    many.mkdir()
+    made = copies(biotac.Recording(sources[0]), many, 500, 600.0)
+    words = [sys.executable, "-m", "biotac", "export", *map(str, made), "--lake", str(tmp_path / "lake"), "-j", "2"]
+    for _ in range(10):
+        running = subprocess.Popen(words, start_new_session=True, stdout=subprocess.DEVNULL)
+        target = len(list((tmp_path / "lake").rglob("*.parquet"))) + 200
+        while running.poll() is None and len(list((tmp_path / "lake").rglob("*.parquet"))) < target:
+            os.sched_yield()
+        if running.poll() is None:
+            os.killpg(running.pid, signal.SIGKILL)
+        running.wait()
+    assert subprocess.run(words, stdout=subprocess.DEVNULL, check=False).returncode == 0
+    assert export(made, tmp_path / "once") == 0
+    assert hashes(tmp_path / "lake") == hashes(tmp_path / "once")
+    its = layout.opened(tmp_path / "lake")
+    assert len(its.partition) == 500 and not its.unfinished

@@ -1,0 +1,71 @@
+"""The client's header: the wire's words and structs, and where each struct's fields are on the wire."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+from .c_wire import define, field_lists, struct_name, vocabulary
+from .schema import GENERATED, TYPE_BYTES, Contract, Message
+
+_MOST = 0x3F  # numbers in a run; a run is a byte, the size's logarithm above the count
+
+
+def runs(message: Message) -> list[tuple[int, int]]:
+    """Neighbours of one size, as (size in bytes, how many): in a struct there is no padding between them."""
+    sizes = [TYPE_BYTES[field.type] for field in message.fields for _ in range(field.count)]
+    out = []
+    for size, group in groupby(sizes):
+        count = len(list(group))
+        while count:
+            out.append((size, min(count, _MOST)))
+            count -= out[-1][1]
+    return out
+
+
+def struct_bytes(message: Message) -> int:
+    """As every ABI of today lays it out: numbers lie at multiples of their size."""
+    at, most = 0, 1
+    for size, count in runs(message):
+        at = -(-at // size) * size + size * count
+        most = max(most, size)
+    return -(-at // most) * most
+
+
+def header(contract: Contract) -> str:
+    wire = contract.link["wire"]
+    out = [
+        f"// {GENERATED}",
+        "// The words and structs of the wire for biotac_client.c; units and Q formats stand beside each field.",
+        "#ifndef BIOTAC_CLIENT_GEN_H",
+        "#define BIOTAC_CLIENT_GEN_H",
+        "",
+        "#include <stdint.h>",
+        "",
+        f"#define BT_WIRE_MAJOR {wire['major']}",
+        f"#define BT_WIRE_MINOR {wire['minor']}",
+        f"#define BT_SCHEMA_HASH 0x{contract.hash:08X}u",
+        f"#define BT_FRAME_MAX_BYTES {wire['max_frame_bytes']} // id + payload + CRC",
+        f"#define BT_INVALID_COUNT 0x{wire['invalid_count']:04X}",
+        "#define BT_INVALID_I16 INT16_MIN",
+        "#define BT_INVALID_I32 INT32_MIN",
+        "",
+        *vocabulary(contract),
+    ]
+    for message in contract.messages:
+        out += [*define(message), ""]
+    out += [
+        "#ifdef BT_CLIENT_LAYOUT",
+        "// Of each message: id, how many runs, and the runs; a run is the size's logarithm (2 bits) and a count (6).",
+        "static const uint8_t bt_client_layout[] = {",
+    ]
+    for message in contract.messages:
+        its = runs(message)
+        numbers = [f"0x{size.bit_length() - 1 << 6 | count:02X}" for size, count in its]
+        out += [f"    BT_{message.name}_ID, {len(its)}, {', '.join(numbers)},"]
+    out += ["    0, 0,", "};"]
+    out += [
+        f'_Static_assert(sizeof({struct_name(m)}) == {struct_bytes(m)}, "numbers lie at multiples of their size");'
+        for m in contract.messages
+    ]
+    out += ["#endif", "", "#ifdef BT_CLIENT_FIELDS // for tests: X(name, type, count) for every field"]
+    return "\n".join([*out, *field_lists(contract), "#endif", "", "#endif", ""])
