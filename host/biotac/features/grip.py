@@ -1,0 +1,167 @@
+"""Grip state by a particle filter: seed 000, Eq 7, with histograms as the table from sensor values to states.
+
+A particle is a guess of the state: the grip holds, it is about to give, or it slips. Each round particles move as
+states did in training, weigh what the histograms give what was sensed, and are drawn anew by weight; what is published
+is their mean. Only NumPy is needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..core.geometry import normals_at
+from ..errors import InputError
+from ..wire.messages_gen import INVALID_COUNT
+
+Floats = npt.NDArray[np.float64]
+
+LAG = 8  # PAC samples that a change is over, as the board's events
+EDGES = 4  # of bins, by state
+PARTICLES = 500
+NAMES = ("shake", "ratio")
+
+
+class GripState(IntEnum):
+    """Seed 000's X."""
+
+    STABLE = 0
+    INCIPIENT = 1
+    SLIPPING = 2
+
+
+STATES = len(GripState)
+
+
+def load_ratio(force_n: npt.ArrayLike, poc_mm: npt.ArrayLike) -> Floats:
+    """Tangential over normal force (n,), of force (n, 3) on the finger at a point of contact (n, 3).
+
+    NaN where either is unknown or nothing presses.
+    """
+    force, poc = np.asarray(force_n, dtype=np.float64), np.asarray(poc_mm, dtype=np.float64)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        normal = -(force * normals_at(poc)).sum(axis=1)
+        tangential = np.sqrt(np.maximum((force**2).sum(axis=1) - normal**2, 0.0))
+        ratio: Floats = np.where(normal > 0.0, tangential / normal, np.nan)
+    return ratio
+
+
+def observations(rows: npt.NDArray[Any], pac: npt.ArrayLike) -> Floats:
+    """What is sensed in each round of one finger (n, 2): NAMES; NaN where unknown.
+
+    ``rows`` (n,) are frames with ``force_n`` and ``poc_mm``, ``pac`` (n, 22) the counts of the same rounds, one after
+    the other. ``shake`` is the logarithm (base 10) of the mean squared change of PAC over 8 samples, count^2, ``ratio``
+    that of load_ratio(). Raises InputError for other shapes.
+    """
+    counts = np.asarray(pac)
+    if counts.ndim != 2 or len(counts) != len(rows) or counts.shape[1] <= LAG:
+        raise InputError(f"pac is {counts.shape} for {len(rows)} frames: expected its 22 samples for each of them")
+    level = np.where(counts == INVALID_COUNT, np.nan, counts.astype(np.float64))
+    flat = np.concatenate([np.full(LAG, np.nan), level.ravel()])
+    change2 = ((flat[LAG:] - flat[:-LAG]) ** 2).reshape(counts.shape)
+    known = np.isfinite(change2)
+    mean = np.where(known, change2, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    shake = np.where(known.any(axis=1), np.log10(np.maximum(mean, 1.0)), np.nan)
+    return np.column_stack([shake, load_ratio(rows["force_n"], rows["poc_mm"])])
+
+
+@dataclass(frozen=True)
+class Trained:
+    """``edges`` (k, b - 1) of each channel's b bins; ``likelihood`` (k, b, 3) of a bin in a state.
+
+    ``transition`` (3, 3) is from row to column, ``start`` (3,) how often each state was. ``friction`` is the least load
+    ratio at which training began to slip, NaN if it never did.
+    """
+
+    edges: Floats
+    likelihood: Floats
+    transition: Floats
+    start: Floats
+    friction: float
+
+    def weigh(self, observed: Floats) -> Floats:
+        """P(observed | state) (n, 3), but for a factor; channels count as independent, and a NaN says nothing."""
+        weight = np.ones((len(observed), STATES))
+        for edges, table, values in zip(self.edges, self.likelihood, observed.T, strict=True):
+            known = np.isfinite(values)
+            weight[known] *= table[np.searchsorted(edges, values[known])]
+        return weight
+
+    def margin_n(self, force_n: npt.ArrayLike, poc_mm: npt.ArrayLike) -> Floats:
+        """Newtons (n,) of tangential force until it slips, below 0 when it should; NaN where unknown."""
+        force = np.asarray(force_n, dtype=np.float64)
+        ratio = load_ratio(force, poc_mm)
+        normal = np.linalg.norm(force, axis=1) / np.sqrt(1.0 + ratio**2)
+        left: Floats = normal * (self.friction - ratio)
+        return left
+
+
+def train(observed: npt.ArrayLike, states: npt.ArrayLike) -> Trained:
+    """Histograms and transitions from rounds (n, k) whose ``states`` (n,) are known, one after the other.
+
+    Every bin and every transition counts once more than it was seen, so that nothing is impossible. Raises InputError
+    when a state is missing.
+    """
+    values, labels = _rounds(observed), np.asarray(states)
+    if labels.shape != (len(values),) or labels.dtype.kind not in "iu" or not np.isin(labels, list(GripState)).all():
+        raise InputError(f"states are {labels.dtype} {labels.shape}: expected {len(values)} of GripState, one a round")
+    seen = np.bincount(labels, minlength=STATES)
+    if not seen.all():
+        counted = ", ".join(f"{n} {GripState(k).name.lower()}" for k, n in enumerate(seen))
+        raise InputError(f"training has {counted} rounds: expected some of each; record a grip that gives")
+    at = np.arange(1, EDGES + 1) / (EDGES + 1)
+    # of each state's own values: slips are rare, and what tells them lies where they are
+    of_states = np.array([np.nanquantile(values[labels == state], at, axis=0) for state in GripState])
+    edges = np.sort(of_states.reshape(-1, values.shape[1]).T, axis=1)
+    tables = np.ones((len(edges), edges.shape[1] + 1, STATES))
+    for table, its, column in zip(tables, edges, values.T, strict=True):
+        known = np.isfinite(column)
+        np.add.at(table, (np.searchsorted(its, column[known]), labels[known]), 1.0)
+        table /= table.sum(axis=0)
+    moves = np.ones((STATES, STATES))
+    np.add.at(moves, (labels[:-1], labels[1:]), 1.0)
+    begins = np.flatnonzero((labels[1:] == GripState.SLIPPING) & (labels[:-1] != GripState.SLIPPING))
+    at_begin = values[begins, NAMES.index("ratio")] if values.shape[1] == len(NAMES) else np.empty(0)
+    friction = float(np.nanmin(at_begin)) if np.isfinite(at_begin).any() else float("nan")
+    return Trained(edges, tables, moves / moves.sum(axis=1, keepdims=True), seen / seen.sum(), friction)
+
+
+class GripFilter:
+    """Follows one finger's grip, round by round; the same ``seed`` gives the same particles."""
+
+    def __init__(self, trained: Trained, *, particles: int = PARTICLES, seed: int = 0) -> None:
+        self._trained = trained
+        self._rng = np.random.default_rng(seed)
+        # as many of each as there were in training
+        self._particles = np.searchsorted(np.cumsum(trained.start), (np.arange(particles) + 0.5) / particles)
+        self._reach = np.cumsum(trained.transition, axis=1)
+
+    def feed(self, observed: npt.ArrayLike) -> Floats:
+        """Share of each GripState (n, 3) after each round of ``observed`` (n, k). Raises InputError for another k."""
+        values = _rounds(observed)
+        if values.shape[1] != len(self._trained.edges):
+            raise InputError(f"{values.shape[1]} values a round: expected the {len(self._trained.edges)} of training")
+        return np.array([self._step(weight) for weight in self._trained.weigh(values)]).reshape(-1, STATES)
+
+    def _step(self, of_state: Floats) -> Floats:
+        """Eq 7: by the transitions, then by the weights; drawn anew at even steps, which adds the least chance."""
+        n = len(self._particles)
+        draw = self._rng.random(n)
+        moved = np.minimum((draw[:, None] > self._reach[self._particles]).sum(axis=1), STATES - 1)
+        weight = of_state[moved]
+        weight /= weight.sum()
+        share: Floats = np.bincount(moved, weight, STATES).astype(np.float64)
+        even = (np.arange(n) + self._rng.random()) / n
+        self._particles = moved[np.minimum(np.searchsorted(np.cumsum(weight), even), n - 1)]
+        return share
+
+
+def _rounds(observed: npt.ArrayLike) -> Floats:
+    values = np.asarray(observed, dtype=np.float64)
+    if values.ndim != 2:
+        raise InputError(f"observed is of shape {values.shape}: expected (n, k), a row a round")
+    return values
