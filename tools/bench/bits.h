@@ -1,8 +1,9 @@
-// One number over many results of the shipped kernels: equal on every build that computes the same
-// bits. Frames run through every size and both signs by a fixed generator.
+// One number over many results of the shipped kernels, and over what a whole finger says: equal on every
+// build that computes the same bits. Frames run through every size and both signs by a fixed generator.
 #ifndef BIOTAC_BENCH_BITS_H
 #define BIOTAC_BENCH_BITS_H
 
+#include "finger.h"
 #include "map/population.h"
 #include "maps.h"
 #include "signal/signals.h"
@@ -53,10 +54,78 @@ static inline uint32_t bits_map_hash(void)
     return chain[0];
 }
 
+#define BITS_ROUNDS 300
+
+// A word of a finger that rests, is pressed and let go, slips, and now and then does not answer.
+static inline uint16_t bits_word(uint32_t *seed, int round, uint8_t slot)
+{
+    const uint32_t noise = bits_step(seed);
+    const int phase = round % 60;
+    const int pressed = phase < 25 ? 0 : phase < 35 ? (phase - 25) * 12 : phase < 50 ? 120 : 0;
+    const uint8_t channel = bt_slot_channel[slot];
+    if (noise % 1021 == 0) {
+        return BT_INVALID_COUNT;
+    }
+    if (channel == BT_CHANNEL_PAC) {
+        uint32_t swing = phase >= 40 && phase < 48 ? 160 : 6;
+        return (uint16_t)(2038 + (int)(noise % (2 * swing)) - (int)swing);
+    }
+    int at = channel - BT_CHANNEL_E1;
+    int more = at >= 0 ? (at % 5 - 2) * pressed : pressed;
+    return (uint16_t)(2000 + more + (int)(noise % 5));
+}
+
+static inline void bits_add(uint32_t *chain, const uint8_t *payload, size_t bytes)
+{
+    *chain = *chain * 31 ^ bt_crc32(payload, bytes);
+}
+
+// All that a finger says of every round, standard deviations too, and its EVENTs.
+static inline uint32_t bits_finger_hash(void)
+{
+    static bt_finger finger;
+    static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
+    uint32_t seed = 23, chain = 0;
+    bt_settings all;
+    bt_settings_reset(&all);
+    const bt_solve_settings solve = bt_solve_settings_from(&all);
+    const bt_tare_settings tare = bt_tare_settings_from(&all);
+    bt_finger_reset(&finger, 0);
+    finger.quantities = 0xFF;
+    for (int round = 0; round < BITS_ROUNDS; round++) {
+        const uint32_t t_us = (uint32_t)round * 10000;
+        uint8_t payload[BT_FRAME_BYTES];
+        bt_finger_begin(&finger, t_us, &tare);
+        for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
+            bool touched = bt_finger_put(&finger, slot, bits_word(&seed, round, slot));
+            bool due = touched || slot == finger.events.watched;
+            for (size_t k = 0; k < sizeof pac_slot; k++) {
+                due |= slot == pac_slot[k];
+            }
+            uint32_t told = due ? bt_finger_events(&finger, slot, touched) : 0;
+            for (uint8_t event = 0; told != 0; event++, told >>= 1) {
+                if (told & 1) {
+                    bt_msg_event msg;
+                    bt_finger_event(&finger, event, slot, t_us, &msg);
+                    bt_msg_event_pack(&msg, payload);
+                    bits_add(&chain, payload, BT_EVENT_BYTES);
+                }
+            }
+        }
+        if (bt_finger_end(&finger, &tare)) {
+            bt_msg_frame msg;
+            bt_finger_frame(&finger, &solve, 0, &msg);
+            bt_msg_frame_pack(&msg, payload);
+            bits_add(&chain, payload, BT_FRAME_BYTES);
+        }
+    }
+    return chain;
+}
+
 static inline uint32_t bits_hash(void)
 {
     uint32_t seed = 7;
-    uint32_t chain[8] = {bits_map_hash()};
+    uint32_t chain[8] = {bits_map_hash() ^ bits_finger_hash()};
     bt_settings all;
     bt_settings_reset(&all);
     bt_solve_settings settings = bt_solve_settings_from(&all);

@@ -172,7 +172,7 @@ static void sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range(void
     (void)state;
     static const int counts[] = {30, 300, 3000, 8000};
     uint64_t seed = 5;
-    for (int run = 0; run < 40000; run++) {
+    for (int run = 0; run < 8000; run++) {
         const int most = counts[run % 4], weights = run / 4 % 3, middle = run / 12 % BT_ELECTRODES;
         const uint32_t noise = 19 * (uint32_t)random_range(&seed, 1, 36);
         double e[BT_ELECTRODES];
