@@ -71,7 +71,7 @@ static inline uint16_t bits_word(uint32_t *seed, int round, uint8_t slot)
         return (uint16_t)(2038 + (int)(noise % (2 * swing)) - (int)swing);
     }
     int at = channel - BT_CHANNEL_E1;
-    int more = at >= 0 ? (at % 5 - 2) * pressed : pressed;
+    int more = at >= 0 ? (at % 5 - 2) * pressed : channel == BT_CHANNEL_PDC ? pressed : 0;
     return (uint16_t)(2000 + more + (int)(noise % 5));
 }
 
