@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 from rig import Rig
 
+import biotac
+
 SECONDS = 3
 SLOT_US = 1e6 / 4400
 
@@ -23,6 +25,19 @@ def test_slots_are_on_time_and_the_bus_rules_kept_while_five_fingers_stream(rig:
     assert seen["gap_us"] >= 5
     assert seen["interrupt_us"] < SLOT_US / 2
     assert counters["slept"] > 0.5
+
+
+@pytest.mark.nightly
+def test_an_event_is_with_the_host_within_a_millisecond_of_its_slot(rig: Rig) -> None:
+    rig.need("counters")
+    hand = rig.open("press.toml?fingers=5&seconds=3")
+    told: list[biotac.Event] = []
+    hand.on_event(told.append)
+    frames = hand.read(100)
+    seen = hand.link.board.counters()["latency"]  # type: ignore[attr-defined]
+    assert {event.kind for event in told} >= {biotac.EventKind.TOUCH} and len(frames) == 1500
+    assert seen["events"] >= 5
+    assert seen["event_us"] <= 1000
 
 
 def test_every_frames_arrival_is_told_and_none_comes_before_its_round_is_over(rig: Rig) -> None:

@@ -1,10 +1,11 @@
-// How long after a round's last electrode was sampled the last byte of its FRAMEs is with the host, and how long after
-// the host's latest bytes a REPLY is, in device time. Watches the bus for sample commands and the USB for messages; the
-// image knows nothing of it.
+// How long after a round's last electrode was sampled the last byte of its FRAMEs is with the host, how long after its
+// slot an EVENT is, and after the host's latest bytes a REPLY, in device time. Watches the bus for sample commands and the
+// USB for messages; the image knows nothing of it.
 import fs from 'node:fs'
 
 const SCHEMA = JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url)))
 const FRAME_ID = SCHEMA.link.message.FRAME.id
+const EVENT_ID = SCHEMA.link.message.EVENT.id
 const REPLY_ID = SCHEMA.link.message.REPLY.id
 const command = (name) => SCHEMA.sensor.channel.find((channel) => channel.name === name).command << 8
 const SLOTS = SCHEMA.sensor.frame.slots
@@ -12,7 +13,7 @@ const SLOT_US = 1e6 / SCHEMA.sensor.bus.slot_hz
 const MARK_AT = SLOTS.findIndex((name) => name !== 'PAC') // the first slot that comes once a round
 const MARK = command(SLOTS[MARK_AT])
 const LAST = command(SLOTS.findLast((name) => /^E\d+$/.test(name)))
-const T_US_AT = 3 // in a FRAME: id, seq, then the time of its first slot
+const T_US_AT = 3 // in a FRAME: id, seq, then the time of its first slot; in an EVENT, of the slot that shows it
 const FINGER_AT = T_US_AT + 4
 const HEAD_BYTES = FINGER_AT + 1
 const SAME_ROUND_US = 200 // t_us is read shortly before the command goes out
@@ -39,6 +40,8 @@ export class Latency {
     this.arrivals = [] // likewise [t_us, finger, device us with the host]
     this.askedUs = null // when bytes last went to the board
     this.replyUs = 0 // the longest
+    this.events = 0
+    this.eventUs = 0 // from an EVENT's slot until it is with the host, the longest
     this.unmatched = 0 // FRAMEs whose round was not seen on the bus
   }
 
@@ -65,6 +68,7 @@ export class Latency {
       }
       const start = head(this.unfinished, HEAD_BYTES)
       if (start.length === HEAD_BYTES && start[0] === FRAME_ID) this.#frame(start, nanos / 1000)
+      if (start.length === HEAD_BYTES && start[0] === EVENT_ID) this.#event(start, nanos / 1000)
       if (start[0] === REPLY_ID && this.askedUs !== null) {
         this.replyUs = Math.max(this.replyUs, nanos / 1000 - this.askedUs)
         this.askedUs = null
@@ -76,7 +80,13 @@ export class Latency {
   counters() {
     const sorted = [...this.us].sort((a, b) => a - b)
     const at = (share) => sorted[Math.floor(share * (sorted.length - 1))] ?? null
-    return { frames: sorted.length, unmatched: this.unmatched, reply_us: this.replyUs, median_us: at(0.5), p99_us: at(0.99), worst_us: at(1) }
+    const events = { events: this.events, event_us: this.eventUs }
+    return { frames: sorted.length, unmatched: this.unmatched, ...events, reply_us: this.replyUs, median_us: at(0.5), p99_us: at(0.99), worst_us: at(1) }
+  }
+
+  #event(start, us) {
+    this.events++
+    this.eventUs = Math.max(this.eventUs, us - new DataView(start.buffer).getUint32(T_US_AT, true))
   }
 
   #frame(start, us) {
