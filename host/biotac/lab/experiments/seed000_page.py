@@ -66,7 +66,7 @@ def overview(facts: Facts) -> list[str]:
          _class(rear), real, "places are new to the net, the paper's were not; F1 and F2 are one flat plate"],
         ["Fig 13", "classifier and look-up feed the nets", f"PAF feeds them: {text(cascade['pooled_n'], 2)} N pooled",
          "-", "the probe is taken as known, as the paper does"],
-        ["Eq 7", "particle filter, proposed", "-", "-", "grip state is not part of this experiment"],
+        ["Eq 7", "particle filter, proposed", "-", "-", "the paper has no figure; built as biotac.features.grip"],
     ]  # fmt: skip
     head = ["paper", "there", "emulated finger", "recordings", "why they differ"]
     return ["## Every table and figure", "", *table(head, rows)]
