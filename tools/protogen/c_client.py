@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import groupby
 
-from .c_wire import define, field_lists, struct_name, vocabulary
+from .c_wire import constants, define, field_lists, struct_name, vocabulary
 from .schema import GENERATED, TYPE_BYTES, Contract, Message
 
 _MOST = 0x3F  # numbers in a run; a run is a byte, the size's logarithm above the count
@@ -32,7 +32,6 @@ def struct_bytes(message: Message) -> int:
 
 
 def header(contract: Contract) -> str:
-    wire = contract.link["wire"]
     out = [
         f"// {GENERATED}",
         "// The words and structs of the wire for biotac_client.c; units and Q formats stand beside each field.",
@@ -41,13 +40,7 @@ def header(contract: Contract) -> str:
         "",
         "#include <stdint.h>",
         "",
-        f"#define BT_WIRE_MAJOR {wire['major']}",
-        f"#define BT_WIRE_MINOR {wire['minor']}",
-        f"#define BT_SCHEMA_HASH 0x{contract.hash:08X}u",
-        f"#define BT_FRAME_MAX_BYTES {wire['max_frame_bytes']} // id + payload + CRC",
-        f"#define BT_INVALID_COUNT 0x{wire['invalid_count']:04X}",
-        "#define BT_INVALID_I16 INT16_MIN",
-        "#define BT_INVALID_I32 INT32_MIN",
+        *constants(contract),
         "",
         *vocabulary(contract),
     ]

@@ -63,6 +63,20 @@ def vocabulary(contract: Contract) -> list[str]:
     return out
 
 
+def constants(contract: Contract) -> list[str]:
+    """Which wire it is, and what stands for no value."""
+    wire = contract.link["wire"]
+    return [
+        f"#define BT_WIRE_MAJOR {wire['major']}",
+        f"#define BT_WIRE_MINOR {wire['minor']}",
+        f"#define BT_SCHEMA_HASH 0x{contract.hash:08X}u",
+        f"#define BT_FRAME_MAX_BYTES {wire['max_frame_bytes']} // id + payload + CRC",
+        f"#define BT_INVALID_COUNT 0x{wire['invalid_count']:04X}",
+        "#define BT_INVALID_I16 INT16_MIN",
+        "#define BT_INVALID_I32 INT32_MIN",
+    ]
+
+
 def header(contract: Contract) -> str:
     wire, link = contract.link["wire"], contract.link
     out = [
@@ -74,16 +88,10 @@ def header(contract: Contract) -> str:
         "",
         "#include <stdint.h>",
         "",
-        f"#define BT_WIRE_MAJOR {wire['major']}",
-        f"#define BT_WIRE_MINOR {wire['minor']}",
-        f"#define BT_SCHEMA_HASH 0x{contract.hash:08X}u",
-        f"#define BT_FRAME_MAX_BYTES {wire['max_frame_bytes']} // id + payload + CRC",
-        f"#define BT_INVALID_COUNT 0x{wire['invalid_count']:04X}",
+        *constants(contract),
         f"#define BT_BOOTLOADER_MAGIC 0x{wire['bootloader_magic']:08X}u // of REBOOT_BOOTLOADER",
         f"#define BT_USB_VENDOR 0x{contract.link['usb']['vendor']:04X}",
         f"#define BT_USB_PRODUCT 0x{contract.link['usb']['product']:04X}",
-        "#define BT_INVALID_I16 INT16_MIN",
-        "#define BT_INVALID_I32 INT32_MIN",
         "",
     ]
     out += vocabulary(contract)

@@ -11,11 +11,11 @@
 #define BT_SCHEMA_HASH 0x74DE99CEu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
+#define BT_INVALID_I16 INT16_MIN
+#define BT_INVALID_I32 INT32_MIN
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
 #define BT_USB_VENDOR 0x1209
 #define BT_USB_PRODUCT 0x0001
-#define BT_INVALID_I16 INT16_MIN
-#define BT_INVALID_I32 INT32_MIN
 
 // Why a command was refused.
 enum bt_error {
