@@ -55,7 +55,6 @@ REFUSED = [
     (wire.GetSetting, (0,), wire.Error.UNKNOWN_SETTING),
     (wire.SetSetting, (int(Setting.IDLE_PERIOD_MS), 1), wire.Error.OUT_OF_RANGE),
     (wire.Start, (0x80, 1, 0), wire.Error.OUT_OF_RANGE),
-    (wire.Subscribe, (1, 0x80), wire.Error.OUT_OF_RANGE),
     (wire.RebootBootloader, (1,), wire.Error.OUT_OF_RANGE),
     (wire.GetMap, (NO_FINGER,), wire.Error.NO_SUCH_FINGER),
     (wire.ReadMap, (NO_FINGER, 0), wire.Error.NO_SUCH_FINGER),
