@@ -10,6 +10,8 @@
 #include "solve/solve.h"
 #include "wire/crc32.h"
 
+#include <string.h>
+
 #define BITS_FRAMES 100000
 
 static inline uint32_t bits_step(uint32_t *seed)
@@ -98,10 +100,8 @@ static inline uint32_t bits_finger_hash(void)
         bt_finger_begin(&finger, t_us, &tare);
         for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
             bool touched = bt_finger_put(&finger, slot, bits_word(&seed, round, slot));
-            bool due = touched || slot == finger.events.watched;
-            for (size_t k = 0; k < sizeof pac_slot; k++) {
-                due |= slot == pac_slot[k];
-            }
+            bool due =
+                touched || slot == finger.events.watched || memchr(pac_slot, slot, sizeof pac_slot) != NULL;
             uint32_t told = due ? bt_finger_events(&finger, slot, touched) : 0;
             for (uint8_t event = 0; told != 0; event++, told >>= 1) {
                 if (told & 1) {

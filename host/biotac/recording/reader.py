@@ -18,7 +18,7 @@ from ..hand.gap import Gap
 from ..keep.values import own_settings
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, StreamDecoder, join
-from ..wire.frames import StructArray, frames_from_wire
+from ..wire.frames import StructArray
 from ..wire.messages_gen import Setting
 from . import layout
 from .block import FRAME, IDLE, PAC, as_sent
@@ -60,7 +60,8 @@ class Recording:
         decoder.accept_newer_minor()
         batch = self._rows(decoder) or self._decoded(decoder, show)
         show(1.0)
-        self._sent, self.seq, self.t_us = batch.wire, batch.seq, batch.t_us
+        self._batch = batch  # whose wire may have seq and t_us unwrapped
+        self.seq, self.t_us = batch.seq, batch.t_us
         self.pac: StructArray = batch.pac
         self.idle: StructArray = batch.idle
         self.messages: list[Any] = batch.messages
@@ -121,15 +122,15 @@ class Recording:
         ends = zip(last_us, self.all_here_ns, strict=True)
         self._arrivals = [(t_us, at_ns) for t_us, at_ns in ends if t_us and at_ns is not None]
 
-    @cached_property
+    @property
     def frames(self) -> StructArray:
         """The FRAMEs in user units, FRAME_DTYPE (n,), in the order of arrival."""
-        return frames_from_wire(self._sent, self.seq, self.t_us)
+        return self._batch.frames
 
     @cached_property
     def wire(self) -> StructArray:
         """The FRAME messages as sent, with seq and t_us as they wrap."""
-        return as_sent(self._sent, FRAME)
+        return as_sent(self._batch.wire, FRAME)
 
     @cached_property
     def blocks(self) -> list[bytes]:
@@ -217,18 +218,18 @@ class Recording:
     @property
     def fingers(self) -> list[int]:
         """Fingers of which there is a frame, a heartbeat or PAC."""
-        rows = (self._sent, self.idle, self.pac)
+        rows = (self._batch.wire, self.idle, self.pac)
         return sorted({int(finger) for table in rows for finger in np.unique(table["finger"])})
 
     @property
     def begin_us(self) -> int:
         """Device time of the first frame or heartbeat; 0 without any."""
-        return min((int(t_us.min()) for t_us in (self.t_us, self.idle["t_us"]) if len(t_us)), default=0)
+        return self._batch.first_t_us() or 0
 
     @property
     def end_us(self) -> int:
         """Device time of the last frame or heartbeat; 0 without any."""
-        return max((int(t_us.max()) for t_us in (self.t_us, self.idle["t_us"]) if len(t_us)), default=0)
+        return self._batch.last_t_us() or 0
 
     @property
     def begin_ns(self) -> int:
