@@ -106,6 +106,7 @@ def test_another_sensor_is_refused_and_that_is_said(rig: Rig, tmp_path: Path, se
     assert hand.calibration_state(1) == CalibrationState.OTHER_SENSOR
 
 
+@pytest.mark.long
 def test_lost_rounds_and_words_at_rest_change_nothing(rig: Rig, tmp_path: Path) -> None:
     rig.need("scenarios")
     text = 'name = "rest"\nseed = 5\n[[step]]\ndo = "rest"\nseconds = 4.0\n'

@@ -204,7 +204,11 @@ def test_a_wrong_image_leaves_the_board_alone(bench: Bench, tmp_path: Path) -> N
     assert after["flash"] == before["flash"]
 
 
-@pytest.mark.parametrize("cut", [1, 2000, SECTOR + 100, SECTOR + 15 * PAGE + 7, 40_000, -PAGE + 8, -1])
+CUTS = [1, 2000, SECTOR + 100, SECTOR + 15 * PAGE + 7, 40_000, -PAGE + 8, -1]
+BY_DAY = (1, SECTOR + 100, -1)
+
+
+@pytest.mark.parametrize("cut", [pytest.param(cut, marks=() if cut in BY_DAY else pytest.mark.long) for cut in CUTS])
 def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path: Path, cut: int) -> None:
     """The boot block goes last: from the first byte to the last, what is left is a board in its loader."""
     image = read_image(BUILT)
