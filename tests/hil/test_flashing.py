@@ -77,10 +77,18 @@ def bench(rig: Rig, tmp_path: Path) -> Iterator[Bench]:
     assert wrong == []
 
 
-@pytest.fixture(scope="session")
-def next_release(tmp_path_factory: pytest.TempPathFactory) -> Image:
-    """The same sources with another patch number, built as the image is."""
-    folder = tmp_path_factory.mktemp("next")
+_built: list[Image] = []
+
+
+@pytest.fixture
+def next_release(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> Image:
+    """The same sources with another patch number, built as the image is: once, and only where there is a bench."""
+    if not _built:
+        _built.append(build_next_release(tmp_path_factory.mktemp("next")))
+    return _built[0]
+
+
+def build_next_release(folder: Path) -> Image:
     shutil.copytree(ROOT / "firmware", folder / "firmware")
     (folder / "tools").symlink_to(ROOT / "tools")
     version = folder / "firmware/app/version.h"
