@@ -91,6 +91,7 @@ static void every_command_gets_exactly_one_reply_with_its_req_id(void **state)
         {BT_CLEAR_MAP_ID, BT_REPLY_ID, 0, 34},
         {BT_HOLD_ID, BT_REPLY_ID, 0, 35},
         {BT_RELEASE_ID, BT_REPLY_ID, 0, 36},
+        {BT_CLEAR_FAULTS_ID, BT_REPLY_ID, 0, 37},
     };
     for (int id = 0x80; id < 0x100; id++) { // the table holds every command there is
         int listed = 0;
