@@ -92,6 +92,17 @@ def test_record_then_check(capsys, tmp_path: Path) -> None:
     assert facts["frames"] >= 200
 
 
+def test_record_tells_faults_of_its_time_only(capsys, tmp_path: Path) -> None:
+    world = tmp_path / "loose.toml"
+    world.write_text(
+        'name = "loose"\nseed = 1\nfingers = 1\n[[step]]\ndo = "rest"\nseconds = 1.0\n'
+        '[[fault]]\nat_s = 0.5\nseconds = 0.01\nfinger = 0\nkind = "no_channel"\nchannel = "TDC"\n'
+    )
+    assert main(["record", f"sim:{world}", str(tmp_path / "a.mcap"), "--json"]) == 0
+    faults = json.loads(capsys.readouterr().out)["faults"]  # and not that it was switched on before
+    assert [line.partition(",")[0] for line in faults] == ["index: TDC_MISSING"]
+
+
 def test_record_does_not_overwrite(capsys, tmp_path: Path) -> None:
     out = tmp_path / "a.mcap"
     out.write_bytes(b"precious")
