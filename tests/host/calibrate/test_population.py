@@ -12,10 +12,11 @@ import wrench_run
 
 from biotac.calibrate.population import keeping, training, worth
 from biotac.calibrate.population.fewshot import Scale, pulled, scale_of
-from biotac.calibrate.wrench import board
+from biotac.calibrate.wrench import board, features, moments
 from biotac.calibrate.wrench.run import Run, load_run
 from biotac.cli.main import main
 from biotac.core import geometry as surface
+from biotac.core.map_columns import Signals
 from biotac.errors import InputError
 
 SHARED = Path(__file__).parents[4] / "shared/data/syntouchcontact"
@@ -164,6 +165,19 @@ def test_the_packages_own_names_what_it_is_made_of() -> None:
     for word in ("MiaoLi/syntouchcontact", "d58862d13f1325d8e0e70921b449a1df9649d483", "no licence stated"):
         assert word in kept.provenance["source"]
     assert all(len(sha256) == 64 for sha256 in kept.provenance["files"].values())
+
+
+def test_a_finger_is_pulled_to_others_and_not_to_itself(
+    its: training.Population, runs: list[Run], files: list[Path]
+) -> None:
+    kept = keeping.Kept(its, np.ones(3), np.ones(3), keeping.provenance_of(files[:2], "", symmetric=False))
+    others, note = keeping.others_than(kept, [files[2]])
+    assert others is not None and note == "pulled to the population map of 1.npz, 2.npz"
+    e = runs[2].counts[:50] - runs[2].tare
+    z = moments.with_one(features.columns(Signals(e, runs[2].tare)))
+    assert z @ others == pytest.approx(its.force(runs[2].counts[:50], runs[2].tare), abs=1e-9)
+    others, note = keeping.others_than(kept, [files[0]])
+    assert others is None and note.startswith("not pulled to the population map of 1.npz, 2.npz, which was made of")
 
 
 @pytest.mark.nightly
