@@ -128,11 +128,11 @@ function ahead() {
   return (world - base[1]) / pace > wall - base[0]
 }
 
-/** What becomes of the sensors' board while the gateway does nothing; true when it has nothing to do. */
+/** The sensors' board, while the gateway has no power or stands still; true when it has nothing to do. */
 function sensorsAlone() {
-  if (sensorPty === null || !sensorPty.up) return true
+  if (sensorPty === null) return true
   sensors.runAlone(STRETCH_NS)
-  return false
+  return sensorPty.received.length === 0
 }
 
 /** One turn; returns true when there is nothing to do for a while. */
@@ -145,10 +145,7 @@ function turn() {
     sensorPty?.poll()
     sensorPty?.flush()
   }
-  if (!rig) {
-    sensors.runAlone(STRETCH_NS) // it is not on the host's bus yet
-    return false
-  }
+  if (!rig) return sensorsAlone()
   if (pace === 0 && pty.pendingBytes > 0) {
     pty.flush()
     return sensorsAlone() // unpaced nothing is dropped: emulated time waits for the program that reads

@@ -15,7 +15,7 @@ import { CHIP_SELECTS, WIDTHS } from './sensors.mjs'
 import { UsbHost } from './usb.mjs'
 
 const [MISO, SCK, MOSI] = [16, 18, 19] // firmware/boards/pico_sensor/pins.h
-const SELECTS = [2, 3, 4, 5, 6]
+export const SELECTS = [2, 3, 4, 5, 6]
 const SYNCHRONISER_NS = 16 // two flip-flops behind each input
 const SAMPLE_COMMAND = 0x80 // and above
 const SLOTS = JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url))).sensor.frame.slots.length
@@ -60,7 +60,7 @@ export class SensorBoard {
 
   /** Run by itself, while there is no gateway, or it stands still. */
   runAlone(nanos) {
-    this.#run(this.machine.nanos + nanos)
+    this.runUntil(this.machine.nanos + nanos)
     if (this.gateway) this.behind = this.machine.nanos - this.gateway.clock.nanos
   }
 
@@ -69,7 +69,7 @@ export class SensorBoard {
     this.behind = this.machine.nanos - mcu.clock.nanos
     this.gateway = mcu
     CHIP_SELECTS.forEach((pin, finger) => {
-      mcu.gpio[pin].addListener((state) => this.#edge(mcu.clock.nanos, SELECTS[finger], state !== GPIOPinState.Low))
+      mcu.gpio[pin].addListener((state) => this.lead(mcu.clock.nanos, SELECTS[finger], state !== GPIOPinState.Low))
     })
     const spi = mcu.spi[0]
     const done = mcu.clock.createAlarm(() => {
@@ -80,36 +80,37 @@ export class SensorBoard {
       if (!WIDTHS.includes(spi.dataBits) || spi.spiMode !== 0) throw new Error('the gateway speaks another SPI')
       this.transfers++
       this.commands += spi.dataBits === SPI_BLOCK_BITS && mosi >> 8 >= SAMPLE_COMMAND ? 1 : 0
-      done.schedule(this.#clockOut(mcu.clock.nanos, mosi, spi.dataBits, 1e9 / spi.clockFrequency))
+      done.schedule(this.clockOut(mcu.clock.nanos, mosi, spi.dataBits, 1e9 / spi.clockFrequency))
     }
   }
 
   /** Come to where the gateway is. */
   follow() {
-    const there = this.gateway.clock.nanos + this.behind
-    if (there > this.machine.nanos) this.#run(there)
+    this.runUntil(this.gateway.clock.nanos + this.behind)
   }
 
-  #run(nanos) {
+  runUntil(nanos) {
+    if (nanos <= this.machine.nanos) return
     this.usb.setOpen(this.port.up)
     this.usb.poke()
     this.machine.runUntil(nanos)
   }
 
   /** A word's edges, the first bit out half a period before the clock first rises. Returns how long it takes in ns. */
-  #clockOut(start, mosi, bits, period) {
+  clockOut(start, mosi, bits, period) {
     this.bits = []
     for (let k = 0; k < bits; k++) {
-      this.#edge(start + k * period, MOSI, ((mosi >> (bits - 1 - k)) & 1) === 1)
-      this.#edge(start + (k + 0.5) * period, SAMPLE)
-      this.#edge(start + (k + 0.5) * period, SCK, true)
-      this.#edge(start + (k + 1) * period, SCK, false)
+      this.lead(start + k * period, MOSI, ((mosi >> (bits - 1 - k)) & 1) === 1)
+      this.lead(start + (k + 0.5) * period, SAMPLE)
+      this.lead(start + (k + 0.5) * period, SCK, true)
+      this.lead(start + (k + 1) * period, SCK, false)
     }
     if (this.fell !== null) this.leastLeft = Math.min(this.leastLeft, start + period / 2 - this.fell)
     return bits * period
   }
 
-  #edge(nanos, pin, high) {
+  /** A lead's level at a time of the gateway's: SELECTS, SCK, MOSI; or when MISO is taken in. */
+  lead(nanos, pin, high) {
     if (SELECTS.includes(pin)) this.fell = high ? null : nanos
     const at = nanos + this.behind + (pin === SAMPLE ? 0 : SYNCHRONISER_NS)
     let k = this.edges.length
