@@ -52,6 +52,7 @@ def test_what_cannot_be_described_is_refused() -> None:
         texture.describe(np.full((2, 6), np.nan))
 
 
+@pytest.mark.nightly
 def test_what_is_held_is_told_by_real_taps() -> None:
     path = SHARED / "taps/handover.npz"
     if not path.is_file():
