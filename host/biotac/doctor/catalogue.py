@@ -185,6 +185,12 @@ CATALOGUE: dict[str, Entry] = {
         "it.",
         "Another cable and socket; feed the sensors from a supply of their own if they draw more than the board gives.",
     ),
+    "faults_latched": Entry(
+        W,
+        "The board remembers faults of before this examination, be they of a single round: they stay until somebody "
+        "clears them.",
+        "See each flag in MESSAGES.md and safety.md; once its cause is known, `Hand.clear_faults()`.",
+    ),
     "slots_late": Entry(
         E,
         "The board missed times at which it should have sampled: those channels are missing from their frames.",

@@ -36,7 +36,7 @@ RELEASE = release(__version__)
 
 
 def message(kind: Any, **values: Any) -> Any:
-    fields = {f.name: 0 for f in dataclasses.fields(kind)}
+    fields = {f.name: (0,) * 5 if f.name == "finger_faults" else 0 for f in dataclasses.fields(kind)}
     return kind(**fields | values)
 
 
@@ -125,6 +125,7 @@ def port(device: str, number: str) -> SerialPort:
     return SerialPort(device, "", number, wire.USB_VENDOR, wire.USB_PRODUCT)
 
 
+BEFORE = {"uptime_s": 10, "fingers_present": 0b11, "slots_late": 2**32 - 1}
 AFTER = {"uptime_s": 11, "fingers_present": 0b11, "slots_late": 2**32 - 1}
 STATS = LinkStats(1000, 200, 0, 0, 0, 0, 0)
 
@@ -186,6 +187,12 @@ CASES: list[tuple[str, Facts, str]] = [
     ("words_error", grown(0, words_error=5), "5 of 4405 words"),
     ("board_restarted", board(after=message(wire.Status, **AFTER | {"uptime_s": 0})), "up for 0 s"),
     ("board_restarted", board(stats=dataclasses.replace(STATS, disordered=2)), "up for"),
+    ("faults_latched", board(before=message(wire.Status, **BEFORE | {"faults": 9})), "board: STORAGE"),
+    (
+        "faults_latched",
+        board(before=message(wire.Status, **BEFORE | {"finger_faults": (0, 32, 0, 0, 0)})),
+        "middle: RAIL",
+    ),
     ("slots_late", board(after=message(wire.Status, **AFTER | {"slots_late": 2})), "3 slots"),
     ("messages_dropped", board(after=message(wire.Status, **AFTER | {"messages_dropped": 4})), "4 messages"),
     ("frames_lost", board(stats=dataclasses.replace(STATS, frames_lost=5)), "5 frames and 0 PAC"),
