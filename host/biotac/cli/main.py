@@ -43,6 +43,10 @@ VERBS = {
         "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag, many to a lake.",
     ),
     "lake": ("biotac.cli.recordings.lake", "Check a lake of recordings, or ask it in SQL."),
+    "inventory": (
+        "biotac.cli.recordings.inventory",
+        "List a lake's boards and sensors, their calibrations, ages and health against their own history.",
+    ),
     "import": ("biotac.cli.recordings.import_btd", "Turn a SynTouch .btd file into a recording."),
     "calibrate": (
         "biotac.cli.calibrate",
@@ -58,6 +62,10 @@ VERBS = {
         "Do a paper's experiment again: figure, table against the paper, JSON.",
     ),
     "sim": ("biotac.cli.live.sim", "Run a simulated or emulated board on a pty that any serial program can open."),
+    "sensor": (
+        "biotac.cli.live.sensor",
+        "Have a Pico that is wired to a gateway play scenarios and recordings as its sensors.",
+    ),
     "flash": ("biotac.cli.boards.flash", "Write a firmware image to a board, and give it its settings back."),
     "bench": (
         "biotac.cli.lab.bench",

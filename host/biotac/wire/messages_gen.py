@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0x74DE99CE
+SCHEMA_HASH = 0x2823160D
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -93,6 +93,20 @@ class Board(IntEnum):
     POSIX_SIM = 1  # a process on a pty with emulated sensors
     PICO = 2  # Raspberry Pi Pico (RP2040)
     LINUX_SBC = 3  # a Linux computer with the sensors on its own SPI bus (spidev)
+    PICO_SENSOR = 4  # Raspberry Pi Pico that is itself one to five emulated sensors (firmware/boards/pico_sensor): it knows HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages, and nothing else
+
+
+class EmuFault(IntEnum):
+    """What an emulated sensor does instead of answering rightly. A tape holds the same codes in place of counts."""
+
+    NONE = 0  # nothing: it answers
+    SWAPPED = 65529  # unplugged, and it will be another sensor that is plugged in
+    UNPLUGGED = 65530  # no sensor or no power: MISO let go; afterwards it is mute until asked for a property
+    TOO_EARLY = 65531  # late: it answers as if the 50 us had not passed
+    STUCK_HIGH = 65532  # MISO high throughout
+    STUCK_LOW = 65533  # silence: MISO low throughout
+    BAD_PARITY = 65534  # one bit of the word flipped
+    NO_CHANNEL = 65535  # the sensor has no such channel
 
 
 class CalibrationState(IntEnum):
@@ -143,6 +157,20 @@ class FrameFlags(IntFlag):
     SENSOR_OTHER = 1 << 24  # another sensor than at START, with a tare of its own; no results where it has not the same calibration and map
     POPULATION = 1 << 25  # force comes from the population map, or in part
     OUTSIDE = 1 << 26  # fewer electrodes carry the signal than on any plate that the population map was made of: force is pulled towards Lin's, or is Lin's
+
+
+class FaultFlags(IntFlag):
+    """What went wrong on a board (STATUS); a bit stays until CLEAR_FAULTS."""
+
+    STARTED = 1 << 0  # it was switched on, lost power for a moment, or was reset from outside
+    HUNG = 1 << 1  # the firmware stood still for a second, and the watchdog started it again
+    CRASHED = 1 << 2  # the firmware started itself again after an exception
+    STORAGE = 1 << 3  # what was saved is damaged or half written: settings, calibrations and maps may be older ones, or the defaults
+    SLOTS_LATE = 1 << 4  # the main loop fell behind and slots were lost
+    DROPPED = 1 << 5  # messages found no room: the host read too slowly
+    LINK_DAMAGED = 1 << 6  # bytes from the host came damaged
+    HOST_SILENT = 1 << 7  # a stream was ended because the host said nothing for keepalive_ms
+    HOLD_LAPSED = 1 << 8  # a HOLD ended because the host said nothing for hold_timeout_ms
 
 
 class StreamFlags(IntFlag):
@@ -227,6 +255,19 @@ BOARD_DOC: dict[int, str] = {
     1: "a process on a pty with emulated sensors",
     2: "Raspberry Pi Pico (RP2040)",
     3: "a Linux computer with the sensors on its own SPI bus (spidev)",
+    4: "Raspberry Pi Pico that is itself one to five emulated sensors (firmware/boards/pico_sensor): it knows HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages, and nothing else",
+}
+
+
+EMU_FAULT_DOC: dict[int, str] = {
+    0: "nothing: it answers",
+    65529: "unplugged, and it will be another sensor that is plugged in",
+    65530: "no sensor or no power: MISO let go; afterwards it is mute until asked for a property",
+    65531: "late: it answers as if the 50 us had not passed",
+    65532: "MISO high throughout",
+    65533: "silence: MISO low throughout",
+    65534: "one bit of the word flipped",
+    65535: "the sensor has no such channel",
 }
 
 
@@ -274,6 +315,19 @@ FRAME_FLAG_DOC: dict[int, str] = {
     16777216: "another sensor than at START, with a tare of its own; no results where it has not the same calibration and map",
     33554432: "force comes from the population map, or in part",
     67108864: "fewer electrodes carry the signal than on any plate that the population map was made of: force is pulled towards Lin's, or is Lin's",
+}
+
+
+FAULT_FLAG_DOC: dict[int, str] = {
+    1: "it was switched on, lost power for a moment, or was reset from outside",
+    2: "the firmware stood still for a second, and the watchdog started it again",
+    4: "the firmware started itself again after an exception",
+    8: "what was saved is damaged or half written: settings, calibrations and maps may be older ones, or the defaults",
+    16: "the main loop fell behind and slots were lost",
+    32: "messages found no room: the host read too slowly",
+    64: "bytes from the host came damaged",
+    128: "a stream was ended because the host said nothing for keepalive_ms",
+    256: "a HOLD ended because the host said nothing for hold_timeout_ms",
 }
 
 
@@ -901,12 +955,14 @@ class Status:
     sigma_shed: int
     wrench_repeated: int
     frames_shed: int
+    faults: int
+    finger_faults: tuple[int, ...]
 
     ID: ClassVar[int] = 0x13
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIIIIIIIIIII")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIIIIIIIIIIIH5I")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 65 bytes."""
+        """Payload without id and CRC, 87 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -927,6 +983,8 @@ class Status:
             self.sigma_shed,
             self.wrench_repeated,
             self.frames_shed,
+            self.faults,
+            *self.finger_faults,
         )
 
     @classmethod
@@ -953,6 +1011,8 @@ class Status:
             v[16],
             v[17],
             v[18],
+            v[19],
+            v[20 : 25],
         )
 
 
@@ -1886,7 +1946,211 @@ class Release:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release
+@dataclass(frozen=True, slots=True)
+class ClearFaults:
+    """Clear what STATUS told of: these bits and no others, so that what came meanwhile stays. What still goes on is set again in the next round."""
+
+    req_id: int
+    faults: int
+    finger_faults: tuple[int, ...]
+
+    ID: ClassVar[int] = 0x9A
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BH5I")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 23 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.faults,
+            *self.finger_faults,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> ClearFaults:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2 : 7],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EmuStatus:
+    """How an emulated sensor board gets on. Reply to every EMU command. Counts are since EMU_PLUG of finger 0."""
+
+    req_id: int
+    fingers: int
+    slots_taken: int
+    room_slots: int
+    slots_served: int
+    elapsed_us: int
+    words: int
+    words_late: int
+    samples_starved: int
+    slowest_us: int
+
+    ID: ClassVar[int] = 0x40
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBIHIIIIIH")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 30 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.fingers,
+            self.slots_taken,
+            self.room_slots,
+            self.slots_served,
+            self.elapsed_us,
+            self.words,
+            self.words_late,
+            self.samples_starved,
+            self.slowest_us,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuStatus:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4],
+            v[5],
+            v[6],
+            v[7],
+            v[8],
+            v[9],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EmuPlug:
+    """Plug a sensor in or out. Finger 0's forgets the tape, the faults and the counts, and so comes first."""
+
+    req_id: int
+    finger: int
+    present: int
+    serial: tuple[int, ...]
+
+    ID: ClassVar[int] = 0xC0
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBB16B")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 19 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.present,
+            *self.serial,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuPlug:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3 : 19],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EmuTape:
+    """The next slots of the tape. What does not fit, or begins elsewhere than at slots_taken, is left: EMU_STATUS tells where to go on. The bus is served in the tape's order, sample by sample as it asks."""
+
+    req_id: int
+    fingers: int
+    slots: int
+    first_slot: int
+    samples: tuple[int, ...]
+
+    ID: ClassVar[int] = 0xC1
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBBI220B")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 227 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.fingers,
+            self.slots,
+            self.first_slot,
+            *self.samples,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuTape:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4 : 224],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EmuSetFault:
+    """What a sensor does from now on, whatever its tape says."""
+
+    req_id: int
+    finger: int
+    fault: int
+
+    ID: ClassVar[int] = 0xC2
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBH")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 4 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.fault,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuSetFault:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EmuGetStatus:
+    """Ask how the board gets on."""
+
+    req_id: int
+
+    ID: ClassVar[int] = 0xC3
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 1 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuGetStatus:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+        )
+
+
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -1931,6 +2195,12 @@ MESSAGES: dict[int, type[Any]] = {
     ClearMap.ID: ClearMap,
     Hold.ID: Hold,
     Release.ID: Release,
+    ClearFaults.ID: ClearFaults,
+    EmuStatus.ID: EmuStatus,
+    EmuPlug.ID: EmuPlug,
+    EmuTape.ID: EmuTape,
+    EmuSetFault.ID: EmuSetFault,
+    EmuGetStatus.ID: EmuGetStatus,
 }
 
 # What each command is answered by.
@@ -1961,4 +2231,9 @@ ANSWERS: dict[type[Any], type[Any]] = {
     ClearMap: Reply,
     Hold: Reply,
     Release: Reply,
+    ClearFaults: Reply,
+    EmuPlug: EmuStatus,
+    EmuTape: EmuStatus,
+    EmuSetFault: EmuStatus,
+    EmuGetStatus: EmuStatus,
 }
