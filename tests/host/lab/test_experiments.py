@@ -152,6 +152,9 @@ def test_the_real_plate(shared_data: Path, capsys: pytest.CaptureFixture[str]) -
     assert [one["limit"] for one in facts["checks"]] == [8.9, 14.7]
     median, p90 = (one["seen"] for one in facts["checks"])
     assert median <= 8.9 and p90 <= 14.7
+    # what a correction by the other contacts leaves is less than half: the error is the formula's
+    assert facts["corrected"]["recorded"]["median_deg"] < 4.0
+    assert facts["corrected"]["recorded"]["p90_deg"] < 11.0
 
 
 # ---- the weight: figures 3, 9 and 10 -------------------------------------------------------------

@@ -206,7 +206,7 @@ def test_no_gains_unless_asked(tmp_path: Path) -> None:
 
 
 def test_the_bundled_scenarios_are_these() -> None:
-    names = ["calibrate", "calibrate_gaps", "drift", "faults", "fingers", "grasp", "poke", "press", "shear"]
+    names = ["calibrate", "calibrate_gaps", "drift", "faults", "fingers", "grasp", "poke", "press", "shear", "weights"]
     assert bundled_scenarios() == [f"{name}.toml" for name in names]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from . import contact as calibrate_contact
+from . import normal as calibrate_normal
 from . import population as calibrate_population
 from . import pressure as calibrate_pressure
 from . import scale as calibrate_scale
@@ -19,6 +20,7 @@ WHATS = (
     calibrate_scale,
     calibrate_weights,
     calibrate_pressure,
+    calibrate_normal,
     calibrate_contact,
 )
 

@@ -1,10 +1,11 @@
-"""The normal at the point of contact against that of a flat plate: no fitting, the board's default weights.
+"""The normal at the point of contact against that of a flat plate: the board's default weights, nothing fitted.
 
 A flat plate that touches a convex finger does so where the finger's outward normal is the plate's. On a
 recording the plate's normal was measured (motion capture, trial_15330 of Robotic-Finger); protocol of
 reference/biotac.md, section 5: every frame in contact counts. In contact is where the board says so and PDC
 is more than CONTACT_COUNTS above the rest the board has for it, which on that sensor is more than 2000
-count^2 of signal; figures for other thresholds stand beside it.
+count^2 of signal; figures for other thresholds stand beside it. What a correction of the normal by other contacts of
+the same recording leaves stands there, too: whether the error is the formula's or the sensor's.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from ...calibrate import normal
 from ...core import geometry as surface
 from ...core.geometry import Floats
-from ...errors import RecordingError
+from ...errors import InputError, RecordingError
 from ...markdown import table
 from ...sim.physics import PROFILES, Profile
 from ...sim.timeline import Pose
@@ -40,6 +42,7 @@ KNOWN_DEG = {
     wire.PocWeights.COMPRESS_N2: (11.0, 19.4),
 }
 EMULATED_CONTACTS = 40
+APART_ROWS = 15  # frames without contact between two contacts
 
 
 @dataclass(frozen=True)
@@ -61,10 +64,11 @@ class Angles:
 
 @dataclass(frozen=True)
 class Result:
-    """A case a sensor and kind of weights."""
+    """A case a sensor and kind of weights; ``corrected_deg`` by sensor, each contact by a correction of the others."""
 
     source: str
     cases: list[Angles]
+    corrected_deg: dict[str, Floats]
     notes: list[str]
     is_recorded: bool
 
@@ -104,19 +108,40 @@ def run(options: Options) -> Result:
                     f"{options.recording}: PDC is never {CONTACT_COUNTS:g} counts above rest in contact: expected "
                     f"presses; is it counts?"
                 )
-        return Result(str(options.recording), cases, list(theirs.notes), True)
-    cases = []
+        notes, corrected = list(theirs.notes), {}
+        try:
+            corrected["recorded"] = _corrected(theirs.trial, theirs.plate_normal)
+        except InputError as error:
+            notes.append(f"no correction: {error}")
+        return Result(str(options.recording), cases, corrected, notes, True)
+    cases, corrected = [], {}
     for profile in PROFILES:
         options.show(f"a plate on the {profile} sensor")
         trial = emulated(options.seed, profile)
         assert trial.at_mm is not None
         contact = np.where(np.isfinite(trial.at_mm), trial.at_mm, [0.0, 0.0, -surface.RADIUS_MM])
-        cases += [_case(profile, weights, trial, surface.normals_at(contact)) for weights in WEIGHTS]
+        normals = surface.normals_at(contact)
+        cases += [_case(profile, weights, trial, normals) for weights in WEIGHTS]
+        corrected[profile] = _corrected(trial, normals)
     notes = [
         f"emulated sensor, seed {options.seed}: {EMULATED_CONTACTS} presses of a {FLAT_MM:g} mm flat, 1 to 6 N, x -12 "
         "to 3.5 mm, up to 57 deg of roll, no shear; a real plate also rubs: these angles are kinder than a laboratory's"
     ]
-    return Result(f"emulated finger, seed {options.seed}", cases, notes, False)
+    return Result(f"emulated finger, seed {options.seed}", cases, corrected, notes, False)
+
+
+def looks(trial: Trial, normals: Floats) -> normal.Looks:
+    """Its frames in contact with a point, by CONTACT_COUNTS and the default weights; ``normals`` (n, 3) the plate's."""
+    points = trial.again({wire.Setting.POC_WEIGHTS: int(SHIPPED)}).frames["poc_mm"]
+    known = np.isfinite(points).all(axis=1) & np.isfinite(trial.signal).all(axis=1)
+    rows = np.flatnonzero(trial.touched & (trial.pressure > CONTACT_COUNTS) & known)
+    contact = np.concatenate([[0], np.cumsum(np.diff(rows) > APART_ROWS)])[: len(rows)]
+    return normal.Looks(points[rows], trial.signal[rows], normals[rows], contact)
+
+
+def _corrected(trial: Trial, normals: Floats) -> Floats:
+    its = looks(trial, normals)
+    return normal.angles_deg(normal.held_out(its), its.normals)
 
 
 def _case(profile: str, weights: wire.PocWeights, trial: Trial, normals: Floats) -> Angles:
@@ -135,6 +160,7 @@ def facts(result: Result) -> Facts:
         "contact_counts": CONTACT_COUNTS,
         "shipped": SHIPPED.name,
         "cases": [_case_facts(case) for case in result.cases],
+        "corrected": {profile: _summary(angles, CONTACT_COUNTS) for profile, angles in result.corrected_deg.items()},
         "known_deg": {weights.name: list(both) for weights, both in KNOWN_DEG.items()} if result.is_recorded else {},
         "checks": [
             check(f"{what}, default weights, {shipped.profile}", float(np.percentile(angles, q)), limit, "deg")
@@ -171,6 +197,9 @@ def page(facts: Facts) -> list[str]:
                 rows.append([*which, str(its["frames"]), *angles])
         both = [f"{text(its['median_deg'], 1)} / {text(its['p90_deg'], 1)}" for its in case["by_threshold"]]
         others.append([*which, *both])
+    for profile, its in facts["corrected"].items():
+        angles = [text(its[name], 2) for name in ("median_deg", "mean_deg", "p90_deg")]
+        rows.append([profile, "default, each contact corrected by the others", str(its["frames"]), *angles])
     for name, (median, p90) in facts["known_deg"].items():
         weights = WORDS[wire.PocWeights[name]]
         rows.append(["trial_15330 in float64, own tare", weights, "-", text(median, 1), "-", text(p90, 1)])

@@ -1,0 +1,158 @@
+"""The normal at the point of contact, corrected by contacts of a flat plate whose normal was recorded.
+
+The formula's normal, and what the electrodes' pattern says beyond it, linear and with ridge: 66 numbers. Frames of one
+contact are one look at the finger, so whatever is chosen or judged is held out by whole contacts.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ..core import geometry as surface
+from ..core.geometry import Floats
+from ..core.map_columns import ELECTRODES
+from ..documents import read_json
+from ..errors import InputError
+
+FORMAT = "biotac-normal/1"
+RIDGES = (0.01, 0.1, 1.0)  # of each input's variance
+VARIANCE_FLOOR = 1e-9
+LEAST_CONTACTS = 8
+INPUTS = 3 + ELECTRODES
+
+Contacts = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Normal:
+    """``coefficients`` (23, 3): what is added to the formula's normal, of it, of the pattern, and always."""
+
+    coefficients: Floats
+
+    def corrected(self, points_mm: Floats, e: Floats) -> Floats:
+        """Unit normals (n, 3) of published points (n, 3) and counts above the tare (n, 19); NaN without a point."""
+        formula, inputs = _inputs(points_mm, e)
+        return _unit(formula + inputs @ self.coefficients[:-1] + self.coefficients[-1])
+
+    def point_mm(self, points_mm: Floats, e: Floats) -> Floats:
+        """Where the finger's outward normal is that (n, 3). Along the cylinder it turns alone, and x stays."""
+        normal = self.corrected(points_mm, e)
+        x = points_mm[:, 0]
+        normal[:, 0] = np.where(x > 0.0, np.maximum(normal[:, 0], 0.0), 0.0)
+        result: Floats = surface.RADIUS_MM * _unit(normal)
+        result[:, 0] = np.where(x > 0.0, result[:, 0], x)
+        return result
+
+
+@dataclass(frozen=True)
+class Looks:
+    """Frames (n,) of a plate on the finger: published ``points_mm`` (n, 3), counts above the tare ``e`` (n, 19), the
+    plate's unit ``normals`` (n, 3) outward, and which ``contact`` (n,) each is of.
+    """
+
+    points_mm: Floats
+    e: Floats
+    normals: Floats
+    contact: Contacts
+
+
+def fit(looks: Looks) -> Normal:
+    """With the ridge that is best on contacts held out. Raises InputError for too few contacts."""
+    return Normal(_Fitting(looks).all_but(None))
+
+
+def held_out(looks: Looks) -> Floats:
+    """Normals (n, 3) of each contact by fit() of the others, its choice of ridge included. Raises InputError."""
+    fitting = _Fitting(looks)
+    result = np.empty_like(looks.normals)
+    for k, rows in enumerate(fitting.rows):
+        result[rows] = fitting.said(rows, fitting.all_but(k))
+    return result
+
+
+def angles_deg(one: Floats, other: Floats) -> Floats:
+    """Between unit vectors (n, 3)."""
+    # atan2 keeps small angles that acos rounds to nothing
+    cross = np.linalg.norm(np.cross(one, other), axis=1)
+    result: Floats = np.degrees(np.arctan2(cross, (one * other).sum(axis=1)))
+    return result
+
+
+def dumps(its: Normal) -> str:
+    """As JSON."""
+    return json.dumps({"format": FORMAT, "coefficients": its.coefficients.tolist()}) + "\n"
+
+
+def load(path: Path) -> Normal:
+    """Inverse of dumps. Raises InputError naming what is wrong with it."""
+    try:
+        facts = read_json(path)
+        if facts["format"] != FORMAT:
+            raise ValueError(f"format {facts['format']!r}")
+        its = np.array(facts["coefficients"], dtype=np.float64)
+        if its.shape != (INPUTS + 1, 3) or not np.isfinite(its).all():
+            raise ValueError(f"coefficients {its.shape}")
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
+        seen = str(error) or type(error).__name__
+        raise InputError(f"{path}: {seen}: expected a {FORMAT} as `biotac calibrate normal --out` writes it") from None
+    return Normal(its)
+
+
+class _Fitting:
+    """Sums of every contact, so that any choice of contacts costs a solve of 22 numbers."""
+
+    def __init__(self, looks: Looks) -> None:
+        names, of = np.unique(looks.contact, return_inverse=True)
+        if len(names) < LEAST_CONTACTS:
+            raise InputError(
+                f"{len(names)} contacts of the plate: expected {LEAST_CONTACTS} or more; press it from many sides"
+            )
+        self.rows = [np.flatnonzero(of == k) for k in range(len(names))]
+        self._normals = looks.normals
+        self._formula, inputs = _inputs(looks.points_mm, looks.e)
+        self._z = np.column_stack([inputs, np.ones(len(inputs))])
+        left = looks.normals - self._formula
+        self._gram = np.array([self._z[rows].T @ self._z[rows] for rows in self.rows])
+        self._cross = np.array([self._z[rows].T @ left[rows] for rows in self.rows])
+
+    def said(self, rows: npt.NDArray[np.intp], coefficients: Floats) -> Floats:
+        """Unit normals of ``rows``."""
+        return _unit(self._formula[rows] + self._z[rows] @ coefficients)
+
+    def all_but(self, out: int | None) -> Floats:
+        """Coefficients (23, 3) without contact ``out``, whose ridge is chosen without it, too."""
+        kept = [k for k in range(len(self.rows)) if k != out]
+        errors = []
+        for ridge in RIDGES:
+            said = [self.said(self.rows[k], self._solved([j for j in kept if j != k], ridge)) for k in kept]
+            truth = [self._normals[self.rows[k]] for k in kept]
+            errors.append(np.median(angles_deg(np.concatenate(said), np.concatenate(truth))))
+        return self._solved(kept, RIDGES[int(np.argmin(errors))])
+
+    def _solved(self, contacts: list[int], ridge: float) -> Floats:
+        gram, cross = self._gram[contacts].sum(axis=0), self._cross[contacts].sum(axis=0)
+        n = gram[-1, -1]
+        mean = gram[-1, :-1] / n
+        about_mean = gram[:-1, :-1] / n - mean[:, None] * mean
+        # the core's normals lie in a plane where nothing touched the tip: a column that stands still is worth nothing
+        pull = ridge * np.maximum(np.diag(about_mean), VARIANCE_FLOOR)
+        its = np.linalg.solve(about_mean + np.diag(pull), cross[:-1] / n - mean[:, None] * (cross[-1] / n))
+        return np.vstack([its, cross[-1] / n - mean @ its])
+
+
+def _inputs(points_mm: Floats, e: Floats) -> tuple[Floats, Floats]:
+    """The formula's normals (n, 3), and with them the pattern of the counts, whatever their size (n, 22)."""
+    known = np.isfinite(points_mm).all(axis=1, keepdims=True)
+    formula = np.where(known, surface.normals_at(np.where(known, points_mm, [0.0, 0.0, -1.0])), np.nan)
+    return formula, np.column_stack([formula, _unit(e)])
+
+
+def _unit(of: Floats) -> Floats:
+    length = np.linalg.norm(of, axis=1, keepdims=True)
+    result: Floats = of / np.where(length > 0.0, length, 1.0)
+    return result
