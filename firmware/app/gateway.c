@@ -83,6 +83,7 @@ static uint8_t reboot_bootloader(void)
 
 static void load_settings(bt_session *session)
 {
+    session->faults |= bt_storage_damaged(&flash) ? BT_FAULT_FLAG_STORAGE : 0;
     uint8_t record[BT_STORAGE_MAX_BYTES];
     uint16_t version;
     int bytes = bt_storage_read(&flash, BT_RECORD_SETTINGS, &version, record, sizeof record);
@@ -95,8 +96,10 @@ static void load_settings(bt_session *session)
             bt_calibration_unpack(&session->calibration[f], version, record, (size_t)bytes);
         }
         bytes = bt_storage_read(&flash, map_id(f), &version, record, sizeof record);
-        if (bytes > 0) {
-            bt_finger_map_load(&session->map[f], session->board.maps, f, version, record, (size_t)bytes);
+        if (bytes > 0
+            && !bt_finger_map_load(&session->map[f], session->board.maps, f, version, record,
+                                   (size_t)bytes)) {
+            session->faults |= BT_FAULT_FLAG_STORAGE;
         }
     }
     bt_session_use_settings(session);
@@ -124,6 +127,7 @@ void bt_gateway_init(bt_gateway *gateway)
     port_delay_us(BT_POWER_ON_MS * 1000);
     bt_session_init(&gateway->session, &identity, port_link_write, port_now_us());
     bt_session_use_board(&gateway->session, &actions);
+    gateway->session.faults |= port_started_by();
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         bt_properties_read(f, &gateway->session.info[f]);
         gateway->session.finger[f].present = gateway->session.info[f].present;
@@ -233,6 +237,9 @@ void bt_gateway_poll(bt_gateway *gateway)
     for (int n = 0; n < BT_SLOTS && bt_sampler_pop(&gateway->sampler, &slot); n++) {
         take_slot(gateway, &slot);
     }
-    session->slots_late = gateway->sampler.late;
+    if (session->slots_late != gateway->sampler.late) {
+        session->slots_late = gateway->sampler.late;
+        session->faults |= BT_FAULT_FLAG_SLOTS_LATE;
+    }
     bt_session_tick(session, port_now_us());
 }

@@ -72,7 +72,8 @@ bool port_reboot_bootloader(void);
 // ---- identity -------------------------------------------------------------------------------
 uint16_t port_board(void); // enum bt_board
 void port_board_serial(uint8_t serial[12]);
-uint32_t port_boot_id(void); // random at each boot
+uint32_t port_boot_id(void);    // random at each boot
+uint16_t port_started_by(void); // BT_FAULT_FLAG_STARTED, HUNG or CRASHED
 // CRC-32 of the image that runs, read where it is stored; 0xFFFFFFFF where there is no image.
 uint32_t port_image_crc32(void);
 

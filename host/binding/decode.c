@@ -16,7 +16,7 @@ _Static_assert(BT_DECODE_ROOM >= BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1, "the 
 #define FRAME_1_0_BYTES  126
 #define AROUND           (1 + BT_CRC_BYTES + 2) // id, CRC, COBS byte, delimiter
 #define STATUS_1_0_BYTES 33
-#define LACKS_MAX_BYTES  32
+#define LACKS_MAX_BYTES  54
 static const struct {
     uint8_t id;
     uint8_t bytes;
@@ -30,11 +30,12 @@ static const struct {
     {BT_FRAME_ID, 12, {0xFF, 0xFF, 0, 0, 0, 0x80, 0, 0, 0, 0x80, 0, 0}},
     {BT_FRAME_ID, 2, {0}},
     {BT_HELLO_ID, 4, {0xFF, 0xFF, 0xFF, 0xFF}}, // image_crc32: unknown
-    {BT_STATUS_ID, 32, {0}},                    // frames_idle, what was skipped, what was shed: nothing was
-    {BT_STATUS_ID, 12, {0}},                    // sigma_shed, wrench_repeated, frames_shed
+    {BT_STATUS_ID, 54, {0}},                    // frames_idle, what was skipped, what was shed, faults: none
+    {BT_STATUS_ID, 34, {0}},                    // sigma_shed, wrench_repeated, frames_shed, faults
+    {BT_STATUS_ID, 22, {0}},                    // faults, finger_faults
     {BT_CALIBRATION_ID, 4, {0}},                // pressure_gain_nn: not calibrated
 };
-_Static_assert(BT_FRAME_BYTES == FRAME_1_0_BYTES + 20 && BT_STATUS_BYTES == STATUS_1_0_BYTES + 32
+_Static_assert(BT_FRAME_BYTES == FRAME_1_0_BYTES + 20 && BT_STATUS_BYTES == STATUS_1_0_BYTES + 54
                    && BT_CALIBRATION_BYTES == 51 + 4 && BT_HELLO_BYTES == 35 + 4,
                "who appends more says so above");
 // A FRAME or a STATUS filled up is longer than what came.

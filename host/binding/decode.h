@@ -14,8 +14,8 @@
 #include "wire/framing.h"
 
 #define BT_DECODE_BYTES    65536 // what one call takes
-// The call's bytes and the rest of the call before; three quarters more where messages are filled up.
-#define BT_DECODE_ROOM     (BT_DECODE_BYTES + BT_DECODE_BYTES / 4 * 3 + 512)
+// The call's bytes and the rest of the call before; more than twice of it where messages are filled up.
+#define BT_DECODE_ROOM     (BT_DECODE_BYTES / 4 * 9 + 512)
 #define BT_DECODE_OUTCOMES 6 // enum bt_deframed
 #define BT_UNKNOWN_ID      (-1)
 

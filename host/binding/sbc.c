@@ -193,6 +193,11 @@ uint32_t port_boot_id(void)
     return board->boot_id;
 }
 
+uint16_t port_started_by(void)
+{
+    return BT_FAULT_FLAG_STARTED;
+}
+
 uint32_t port_image_crc32(void)
 {
     return UINT32_MAX;

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from .errors import WireVersionError as WireVersionError
     from .hand import aio as aio
     from .hand.compatibility import HandWarning as HandWarning
+    from .hand.faults import Faults as Faults
     from .hand.gap import Gap as Gap
     from .hand.hand import Hand as Hand
     from .hand.opening import open as open
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from .wire.frames import PAC_DTYPE as PAC_DTYPE
     from .wire.frames import Frame as Frame
     from .wire.messages_gen import CalibrationState as CalibrationState
+    from .wire.messages_gen import FaultFlags as FaultFlags
     from .wire.messages_gen import ForceModel as ForceModel
     from .wire.messages_gen import FrameFlags as FrameFlags
     from .wire.messages_gen import PocWeights as PocWeights
@@ -68,6 +70,7 @@ _HOMES = {
     "NotAGatewayError PortError RecordingError RecordingWarning ScenarioError WireVersionError",
     ".hand.aio": "aio",
     ".hand.compatibility": "HandWarning",
+    ".hand.faults": "Faults",
     ".hand.gap": "Gap",
     ".hand.hand": "Hand",
     ".hand.opening": "open",
@@ -77,8 +80,8 @@ _HOMES = {
     ".version": "__version__",
     ".wire.batches": "Batch LinkStats",
     ".wire.frames": "FRAME_DTYPE IDLE_DTYPE PAC_DTYPE Frame",
-    ".wire.messages_gen": "CalibrationState Event EventKind ForceModel FrameFlags PocWeights QuantityFlags Setting "
-    "Status Tare TareReason TareState Touch",
+    ".wire.messages_gen": "CalibrationState Event EventKind FaultFlags ForceModel FrameFlags PocWeights QuantityFlags "
+    "Setting Status Tare TareReason TareState Touch",
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
 

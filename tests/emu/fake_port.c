@@ -221,6 +221,11 @@ uint32_t port_boot_id(void)
     return 42;
 }
 
+uint16_t port_started_by(void)
+{
+    return 0;
+}
+
 uint32_t port_image_crc32(void)
 {
     return UINT32_MAX;

@@ -204,6 +204,8 @@ def test_toml_made_to_hurt_is_refused_in_little_memory(tmp_path: Path, line: str
 
 
 REST = 'name = "x"\n[[step]]\ndo = "rest"\nseconds = {}\n'
+LONGEST = REST.format(1) + '[[step]]\ndo = "press"\nforce_n = 3.0\nat = "E17"\nseconds = 199\n'
+LONGEST += '[[step]]\ndo = "slip"\nmm_s = 5.0\nseconds = 700\n'
 FAULT = '[[fault]]\nat_s = 0\nseconds = {}\nfinger = 0\nkind = "stuck_low"\n'
 
 
@@ -211,6 +213,7 @@ FAULT = '[[fault]]\nat_s = 0\nseconds = {}\nfinger = 0\nkind = "stuck_low"\n'
     ("text", "most_s"),
     [
         (REST.format(3600) + FAULT.format(3600) * 2000, 10.0),
+        pytest.param('gains = "fit"\n' + LONGEST + FAULT.format(900) * 11, 10.0, marks=pytest.mark.nightly),
         (REST.format(20) + FAULT.format(0.01) * 3_000, 10.0),
         pytest.param("\n".join(f"k{k}" + ".b" * 30 + " = 1" for k in range(14_000)), 10.0, marks=pytest.mark.nightly),
     ],

@@ -71,14 +71,13 @@ static void put(int kind, const void *bytes, size_t count)
 // instead. NULL: no board ever sent this length.
 static const char *fill_of_older(uint8_t id, size_t bytes)
 {
-    static const char nothing[32];
+    static const char nothing[54];
     return id == BT_FRAME_ID && bytes == 126
                ? "\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\0\0\0\x80\0\0\0\x80\0\0"
-           : id == BT_STATUS_ID && bytes == 33      ? nothing
+           : id == BT_STATUS_ID && (bytes == 33 || bytes == 53 || bytes == 65) ? nothing
            : id == BT_FRAME_ID && bytes == 134      ? "\xFF\xFF\0\0\0\x80\0\0\0\x80\0\0"
            : id == BT_FRAME_ID && bytes == 144      ? "\0\0"
            : id == BT_HELLO_ID && bytes == 35       ? "\xFF\xFF\xFF\xFF"
-           : id == BT_STATUS_ID && bytes == 53      ? "\0\0\0\0\0\0\0\0\0\0\0\0"
            : id == BT_CALIBRATION_ID && bytes == 51 ? "\0\0\0\0"
                                                     : NULL;
 }

@@ -106,6 +106,23 @@ def test_another_sensor_is_refused_and_that_is_said(rig: Rig, tmp_path: Path, se
     assert hand.calibration_state(1) == CalibrationState.OTHER_SENSOR
 
 
+@pytest.mark.long
+def test_two_sensors_swapped_are_both_refused(rig: Rig, tmp_path: Path) -> None:
+    rig.need("scenarios")
+    path = tmp_path / "swapped.toml"
+    path.write_text(held_press(2, hold_s=0.7) + fault("swapped", 1.6, 0.1, 0) + fault("swapped", 1.6, 0.1, 1))
+    hand = rig.open(str(path))
+    for finger in (0, 1):
+        hand.set_calibration(finger, for_finger(hand, finger))
+    frames = hand.read(100)
+    for finger in (0, 1):
+        _, after = split(of(frames, finger))
+        assert np.all(after["flags"] & (FrameFlags.SENSOR_OTHER | FrameFlags.SENSOR_UNSURE))
+        assert np.all(np.isnan(after["force_n"][BACK_ROUNDS:]))
+        assert hand.faults().by_index[finger] & FrameFlags.SENSOR_OTHER
+
+
+@pytest.mark.long
 def test_lost_rounds_and_words_at_rest_change_nothing(rig: Rig, tmp_path: Path) -> None:
     rig.need("scenarios")
     text = 'name = "rest"\nseed = 5\n[[step]]\ndo = "rest"\nseconds = 4.0\n'

@@ -26,6 +26,9 @@ DOUBT = (
     FrameFlags.UNTARED | FrameFlags.POC_INVALID | FrameFlags.ELECTRODE_MISSING | FrameFlags.RAIL | FrameFlags.FAULT
     | FrameFlags.DOUBT | FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER
 )  # fmt: skip
+LATCHED = DOUBT & ~(FrameFlags.UNTARED | FrameFlags.POC_INVALID) | (
+    FrameFlags.PDC_MISSING | FrameFlags.TAC_MISSING | FrameFlags.TDC_MISSING
+)  # fmt: skip
 healthy_runs: dict[tuple[str, str], biotac.Batch] = {}
 
 
@@ -51,15 +54,15 @@ def scenario(play: dict[str, Any]) -> str:
     return HEALTHY + "".join(fault(its[0], round(at_s, 3), seconds, HURT, its[1]) for at_s, seconds in faults_of(play))
 
 
-def run(rig: Rig, source: Path) -> tuple[biotac.Batch, wire.SensorStatus]:
+def run(rig: Rig, source: Path) -> tuple[biotac.Batch, wire.SensorStatus, biotac.Faults]:
     rig.need("scenarios")
     hand = rig.open(str(source))
     hand.set_setting(wire.Setting.THERMAL_GAIN_MILLI, 0)  # results rest on the electrodes alone
     batch = hand.read_batch(100)
     assert hand.stats.frames_lost == hand.stats.crc_errors == 0
-    status = hand.sensor_status(HURT)
+    status, latched = hand.sensor_status(HURT), hand.faults()
     rig.close()
-    return batch, status
+    return batch, status, latched
 
 
 def healthy(rig: Rig, tmp_path: Path, recorded: bool) -> biotac.Batch:
@@ -95,7 +98,7 @@ def test_what_is_wrong_is_told(rig: Rig, tmp_path: Path, row: dict[str, Any]) ->
     else:
         source = tmp_path / "hurt.toml"
         source.write_text(scenario(play))
-    batch, status = run(rig, source)
+    batch, status, latched = run(rig, source)
     frames = batch.frames
     assert of(frames, WITNESS).tobytes() == of(good, WITNESS).tobytes()
     good, mine = of(good, HURT), of(frames, HURT)
@@ -111,5 +114,8 @@ def test_what_is_wrong_is_told(rig: Rig, tmp_path: Path, row: dict[str, Any]) ->
     assert not len(unsaid), [(int(k), off_n[k], FrameFlags(int(mine["flags"][k]))) for k in unsaid[:5]]
     for name in row.get("flags", []):
         assert (mine["flags"] & FrameFlags[name]).any(), name
+    for finger in (HURT, WITNESS):  # what a FRAME said once, the board still knows
+        said = int(np.bitwise_or.reduce(of(frames, finger)["flags"])) & LATCHED
+        assert latched.by_index[finger] & said == said
     if "counter" in row:
         assert getattr(status, row["counter"]) > 0

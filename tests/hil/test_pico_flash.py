@@ -13,7 +13,7 @@ import pytest
 from rig import Rig
 
 import biotac
-from biotac import Setting
+from biotac import FaultFlags, Setting
 from biotac.wire import messages_gen as wire
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -123,11 +123,16 @@ def test_the_loader_is_entered_by_a_touch_at_1200_baud(pico: Pico) -> None:
 
 def test_a_board_that_hangs_starts_again_as_another_boot(pico: Pico) -> None:
     first = pico.boot_id()
+    assert pico.hand.clear_faults().board == FaultFlags.STARTED
     pico.board.say("lose interrupts")
     facts = pico.until(watchdog_resets=1)
     assert facts["boots"] == 2
     pico.up(2)
     assert pico.boot_id() != first
+    assert pico.hand.clear_faults().board == FaultFlags.HUNG
+    pico.board.say("cut power")
+    pico.up(3)
+    assert pico.hand.faults().board == FaultFlags.STARTED
 
 
 def test_the_flashs_number_is_the_boards_and_the_usb_serial(pico: Pico) -> None:

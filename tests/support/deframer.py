@@ -16,7 +16,7 @@ CRC_BYTES = 4
 LACKS = {
     wire.Frame.ID: (b"\xff" * 10 + b"\0\0\0\x80\0\0\0\x80\0\0", b"\xff\xff\0\0\0\x80\0\0\0\x80\0\0", bytes(2)),
     wire.Hello.ID: (b"\xff" * 4,),
-    wire.Status.ID: (bytes(32), bytes(12)),
+    wire.Status.ID: (bytes(54), bytes(34), bytes(22)),
     wire.Calibration.ID: (bytes(4),),
 }
 ENCODED_MAX_BYTES = wire.MAX_FRAME_BYTES + 1  # COBS adds exactly one byte to frames this short

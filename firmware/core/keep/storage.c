@@ -160,6 +160,28 @@ int bt_storage_read(const bt_flash *flash, uint16_t id, uint16_t *version, uint8
     return (int)bytes;
 }
 
+static bool page_whole(const uint8_t page[BT_FLASH_PAGE_BYTES])
+{
+    return bt_storage_page_is(page, bt_get_u16(page + 4));
+}
+
+bool bt_storage_damaged(const bt_flash *flash)
+{
+    uint8_t page[BT_FLASH_PAGE_BYTES];
+    uint32_t generation;
+    int used = sector_in_use(flash, &generation);
+    for (int sector = 0; sector < 2; sector++) {
+        // Of the sector that is not in use the first page alone counts: the rest is of before, or half moved.
+        for (int at = 0; at < (sector == used ? PAGES : 1); at++) {
+            read_page(flash, sector, at, page);
+            if (!page_blank(page) && !page_whole(page)) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
 bool bt_storage_write(const bt_flash *flash, uint16_t id, uint16_t version, const uint8_t *data, size_t bytes)
 {
     uint8_t record[BT_FLASH_PAGE_BYTES];

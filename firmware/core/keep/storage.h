@@ -43,6 +43,10 @@ int bt_storage_read(const bt_flash *flash, uint16_t id, uint16_t *version, uint8
 bool bt_storage_write(const bt_flash *flash, uint16_t id, uint16_t version, const uint8_t *data,
                       size_t bytes);
 
+// Something is written that is no whole record: power failed in the middle of a write, or the flash has lost
+// bits. What is read may then be an older record, or none.
+bool bt_storage_damaged(const bt_flash *flash);
+
 // One record as its page holds it, for who keeps records elsewhere: behind header and data all is 0xFF.
 void bt_storage_make_page(uint8_t page[BT_FLASH_PAGE_BYTES], uint16_t id, uint16_t version,
                           const uint8_t *data, size_t bytes);

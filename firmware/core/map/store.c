@@ -59,25 +59,27 @@ uint8_t bt_finger_map_use(bt_finger_map *its, const bt_map_flash *flash, uint8_t
     return error;
 }
 
-void bt_finger_map_load(bt_finger_map *its, const bt_map_flash *flash, uint8_t finger, uint16_t version,
+bool bt_finger_map_load(bt_finger_map *its, const bt_map_flash *flash, uint8_t finger, uint16_t version,
                         const uint8_t *record, size_t bytes)
 {
     bt_finger_map_reset(its);
     if (bytes < 4 || bt_get_u32(record) >= BT_MAP_SLOTS) {
-        return;
+        return false;
     }
     its->stored_slot = (uint8_t)bt_get_u32(record); // whatever else is new in a later version
     if (version != BT_MAP_RECORD_VERSION || bytes != BT_MAP_RECORD_BYTES) {
-        return;
+        return false;
     }
     uint32_t size = bt_get_u32(record + 4), crc32 = bt_get_u32(record + 8);
     if (size == 0 || size > BT_MAP_MAX_BYTES) {
-        return;
+        return size == 0;
     }
     bt_map_place place = {.slot = its->stored_slot, .bytes = (uint16_t)size, .crc32 = crc32};
-    if (copy_to_ram(&its->map, flash, finger, &place) == BT_ERROR_OK) {
-        its->place = place;
+    if (copy_to_ram(&its->map, flash, finger, &place) != BT_ERROR_OK) {
+        return false;
     }
+    its->place = place;
+    return true;
 }
 
 static bool is_free(const bt_finger_map maps[BT_MAX_FINGERS], uint8_t slot)

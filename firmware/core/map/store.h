@@ -51,8 +51,8 @@ size_t bt_map_place_pack(const bt_map_place *place, uint8_t record[BT_MAP_RECORD
 // No map, nothing stored.
 void bt_finger_map_reset(bt_finger_map *its);
 
-// From a record. A map that is damaged or that this firmware cannot compute is none, but stays stored.
-void bt_finger_map_load(bt_finger_map *its, const bt_map_flash *flash, uint8_t finger, uint16_t version,
+// From a record. A map that is damaged or that this firmware cannot compute is none, but stays stored: false.
+bool bt_finger_map_load(bt_finger_map *its, const bt_map_flash *flash, uint8_t finger, uint16_t version,
                         const uint8_t *record, size_t bytes);
 
 // Copy a map to the finger's RAM and judge it there; OK: it is the finger's. Otherwise the one that the

@@ -1,5 +1,6 @@
 #include "talk/commands.h"
 
+#include "talk/faults.h"
 #include "talk/map_commands.h"
 #include "talk/sensors.h"
 #include "talk/status.h"
@@ -316,6 +317,9 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         break;
     case BT_RELEASE_ID:
         error = hold_fingers(session, payload, false);
+        break;
+    case BT_CLEAR_FAULTS_ID:
+        bt_faults_clear(session, payload);
         break;
     case BT_GET_STATUS_ID:
         bt_session_send_status(session, req_id, now_us);

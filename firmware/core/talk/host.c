@@ -19,6 +19,12 @@ static bool filled_up(bt_deframer *deframer)
     return true;
 }
 
+static void damaged(bt_session *session)
+{
+    session->rx_errors++;
+    session->faults |= BT_FAULT_FLAG_LINK_DAMAGED;
+}
+
 void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, uint32_t now_us)
 {
     for (size_t k = 0; k < bytes; k++) {
@@ -32,10 +38,10 @@ void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, 
             bt_command(session, session->deframer.id, empty ? NULL : session->deframer.buffer + 1, now_us);
         } else if (outcome == BT_DEFRAMED_BAD_LENGTH) {
             // The CRC is right, so somebody meant this: bt_command answers it in words.
-            session->rx_errors++;
+            damaged(session);
             bt_command(session, session->deframer.id, NULL, now_us);
         } else if (outcome != BT_DEFRAMED_NOTHING) {
-            session->rx_errors++;
+            damaged(session);
         }
     }
 }
@@ -49,6 +55,7 @@ static void lapse_holds(bt_session *session, uint32_t now_us)
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         if (session->finger[f].tare.held) {
             bt_tare_lapse(&session->finger[f].tare);
+            session->faults |= BT_FAULT_FLAG_HOLD_LAPSED;
         }
     }
 }
@@ -61,6 +68,7 @@ void bt_session_tick(bt_session *session, uint32_t now_us)
     }
     if (session->keepalive_ms != 0 && now_us - session->heard_us > session->keepalive_ms * 1000u) {
         bt_session_stop(session);
+        session->faults |= BT_FAULT_FLAG_HOST_SILENT;
     }
     lapse_holds(session, now_us);
     if (now_us - session->status_us < session->status_period_us) {

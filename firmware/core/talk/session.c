@@ -79,6 +79,7 @@ void bt_session_send_sealed(bt_session *session, uint8_t id, uint8_t *frame)
         session->messages_sent++;
     } else {
         session->messages_dropped++;
+        session->faults |= BT_FAULT_FLAG_DROPPED;
     }
 }
 

@@ -105,6 +105,8 @@ typedef struct {
     uint32_t slots_late;
     uint32_t rx_frames;
     uint32_t rx_errors;
+    uint16_t faults;                        // BT_FAULT_FLAG_*, until the host clears them
+    uint32_t finger_faults[BT_MAX_FINGERS]; // BT_FRAME_FLAG_*, likewise (faults.h)
 } bt_session;
 
 void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, uint32_t now_us);

@@ -1,5 +1,7 @@
 #include "talk/status.h"
 
+#include <string.h>
+
 void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us)
 {
     uint8_t payload[BT_STATUS_BYTES];
@@ -23,7 +25,9 @@ void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us
         .sigma_shed = session->sheds.sigma,
         .wrench_repeated = session->sheds.wrench,
         .frames_shed = session->sheds.frames,
+        .faults = session->faults,
     };
+    memcpy(msg.finger_faults, session->finger_faults, sizeof msg.finger_faults);
     bt_msg_status_pack(&msg, payload);
     bt_session_send(session, BT_STATUS_ID, payload);
 }

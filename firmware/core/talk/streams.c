@@ -1,5 +1,6 @@
 #include "talk/streams.h"
 
+#include "talk/faults.h"
 #include "talk/sensors.h"
 
 #include <string.h>
@@ -210,6 +211,7 @@ static void send_frame(bt_session *session, bt_finger *finger)
     bt_finger_frame(finger, &session->kernel[finger->index], shed, &msg);
     finger->quantities = quantities;
     msg.flags |= bt_sensors_flags(session, finger->index);
+    bt_faults_of_round(session, finger->index, msg.flags);
     bt_msg_frame_pack_even(&msg, frame + BT_PAYLOAD_AT / 2);
     bt_session_send_sealed(session, BT_FRAME_ID, (uint8_t *)frame);
     count_skips(&session->skips, finger->quantities);
@@ -261,6 +263,9 @@ void bt_session_round(bt_session *session)
             bt_finger_pass(finger);
             continue;
         }
+        if (finger->answered) {
+            bt_faults_of_round(session, (unsigned)f, bt_sensors_flags(session, (unsigned)f));
+        }
         if (!bt_finger_end(finger, &session->tare[f])) {
             // One that never said who it is cannot be told from the next one by anything else.
             if (finger->silent_rounds == BT_UNPLUGGED_ROUNDS && finger->answered
@@ -269,6 +274,7 @@ void bt_session_round(bt_session *session)
             }
             continue;
         }
+        bt_faults_of_round(session, (unsigned)f, bt_channel_flags(&finger->round, &finger->tare));
         answering |= 1u << f;
         if (streams(session, finger, BT_STREAM_FLAG_FRAMES)) {
             send_round(session, finger);

@@ -579,6 +579,10 @@ void bt_msg_status_pack(const bt_msg_status *msg, uint8_t out[BT_STATUS_BYTES])
     at = put(at, (uint32_t)msg->sigma_shed, 4);
     at = put(at, (uint32_t)msg->wrench_repeated, 4);
     at = put(at, (uint32_t)msg->frames_shed, 4);
+    at = put(at, (uint32_t)msg->faults, 2);
+    for (int k = 0; k < 5; k++) {
+        at = put(at, (uint32_t)msg->finger_faults[k], 4);
+    }
     (void)at;
 }
 
@@ -624,6 +628,12 @@ void bt_msg_status_unpack(bt_msg_status *msg, const uint8_t in[BT_STATUS_BYTES])
     msg->wrench_repeated = (uint32_t)value;
     at = get(at, &value, 4);
     msg->frames_shed = (uint32_t)value;
+    at = get(at, &value, 2);
+    msg->faults = (uint16_t)value;
+    for (int k = 0; k < 5; k++) {
+        at = get(at, &value, 4);
+        msg->finger_faults[k] = (uint32_t)value;
+    }
     (void)at;
 }
 
@@ -1333,6 +1343,32 @@ void bt_msg_release_unpack(bt_msg_release *msg, const uint8_t in[BT_RELEASE_BYTE
     (void)at;
 }
 
+void bt_msg_clear_faults_pack(const bt_msg_clear_faults *msg, uint8_t out[BT_CLEAR_FAULTS_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->faults, 2);
+    for (int k = 0; k < 5; k++) {
+        at = put(at, (uint32_t)msg->finger_faults[k], 4);
+    }
+    (void)at;
+}
+
+void bt_msg_clear_faults_unpack(bt_msg_clear_faults *msg, const uint8_t in[BT_CLEAR_FAULTS_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 2);
+    msg->faults = (uint16_t)value;
+    for (int k = 0; k < 5; k++) {
+        at = get(at, &value, 4);
+        msg->finger_faults[k] = (uint32_t)value;
+    }
+    (void)at;
+}
+
 void bt_msg_emu_status_pack(const bt_msg_emu_status *msg, uint8_t out[BT_EMU_STATUS_BYTES])
 {
     uint8_t *at = out;
@@ -1562,6 +1598,8 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_HOLD_BYTES;
     case BT_RELEASE_ID:
         return BT_RELEASE_BYTES;
+    case BT_CLEAR_FAULTS_ID:
+        return BT_CLEAR_FAULTS_BYTES;
     case BT_EMU_STATUS_ID:
         return BT_EMU_STATUS_BYTES;
     case BT_EMU_PLUG_ID:

@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0x202B201Bu
+#define BT_SCHEMA_HASH 0x2823160Du
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -139,6 +139,18 @@ enum bt_event_kind {
 #define BT_FRAME_FLAG_POPULATION (1u << 25) // force comes from the population map, or in part
 #define BT_FRAME_FLAG_OUTSIDE (1u << 26) // fewer electrodes carry the signal than on any plate that the population map was made of: force is pulled towards Lin's, or is Lin's
 #define BT_FRAME_FLAGS 0x7FFFFFFu // all there are
+
+// What went wrong on a board (STATUS); a bit stays until CLEAR_FAULTS.
+#define BT_FAULT_FLAG_STARTED (1u << 0) // it was switched on, lost power for a moment, or was reset from outside
+#define BT_FAULT_FLAG_HUNG (1u << 1) // the firmware stood still for a second, and the watchdog started it again
+#define BT_FAULT_FLAG_CRASHED (1u << 2) // the firmware started itself again after an exception
+#define BT_FAULT_FLAG_STORAGE (1u << 3) // what was saved is damaged or half written: settings, calibrations and maps may be older ones, or the defaults
+#define BT_FAULT_FLAG_SLOTS_LATE (1u << 4) // the main loop fell behind and slots were lost
+#define BT_FAULT_FLAG_DROPPED (1u << 5) // messages found no room: the host read too slowly
+#define BT_FAULT_FLAG_LINK_DAMAGED (1u << 6) // bytes from the host came damaged
+#define BT_FAULT_FLAG_HOST_SILENT (1u << 7) // a stream was ended because the host said nothing for keepalive_ms
+#define BT_FAULT_FLAG_HOLD_LAPSED (1u << 8) // a HOLD ended because the host said nothing for hold_timeout_ms
+#define BT_FAULT_FLAGS 0x1FFu // all there are
 
 // What START turns on.
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME messages
@@ -392,7 +404,7 @@ void bt_msg_tare_unpack(bt_msg_tare *msg, const uint8_t in[BT_TARE_BYTES]);
 
 // Health of the board and the link. Periodic, and reply to GET_STATUS.
 #define BT_STATUS_ID 0x13
-#define BT_STATUS_BYTES 65
+#define BT_STATUS_BYTES 87
 typedef struct {
     uint16_t seq; // [1] counts STATUS messages
     uint32_t t_us; // [us] device time of packing
@@ -413,6 +425,8 @@ typedef struct {
     uint32_t sigma_shed; // [1] FRAMEs without standard deviations that were asked for, for want of time: the first to go
     uint32_t wrench_repeated; // [1] FRAMEs that repeat the wrench of the finger's map, likewise: the second to go
     uint32_t frames_shed; // [1] FRAMEs that were not sent, likewise: the last to go
+    uint16_t faults; // [flags fault] what went wrong since CLEAR_FAULTS cleared it, or since boot
+    uint32_t finger_faults[5]; // [flags frame] of each finger, likewise: the flags of its rounds, sent or not, that speak against its numbers; UNTARED only where a tare was lost, OUTSIDE only in contact
 } bt_msg_status;
 void bt_msg_status_pack(const bt_msg_status *msg, uint8_t out[BT_STATUS_BYTES]);
 void bt_msg_status_unpack(bt_msg_status *msg, const uint8_t in[BT_STATUS_BYTES]);
@@ -757,6 +771,17 @@ typedef struct {
 void bt_msg_release_pack(const bt_msg_release *msg, uint8_t out[BT_RELEASE_BYTES]);
 void bt_msg_release_unpack(bt_msg_release *msg, const uint8_t in[BT_RELEASE_BYTES]);
 
+// Clear what STATUS told of: these bits and no others, so that what came meanwhile stays. What still goes on is set again in the next round.
+#define BT_CLEAR_FAULTS_ID 0x9A
+#define BT_CLEAR_FAULTS_BYTES 23
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint16_t faults; // [flags fault] STATUS.faults as it was read
+    uint32_t finger_faults[5]; // [flags frame] STATUS.finger_faults, likewise
+} bt_msg_clear_faults;
+void bt_msg_clear_faults_pack(const bt_msg_clear_faults *msg, uint8_t out[BT_CLEAR_FAULTS_BYTES]);
+void bt_msg_clear_faults_unpack(bt_msg_clear_faults *msg, const uint8_t in[BT_CLEAR_FAULTS_BYTES]);
+
 // How an emulated sensor board gets on. Reply to every EMU command. Counts are since EMU_PLUG of finger 0.
 #define BT_EMU_STATUS_ID 0x40
 #define BT_EMU_STATUS_BYTES 30
@@ -836,7 +861,7 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_FRAME_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(counts, u16, 19) X(pdc, u16, 1) X(tac, u16, 1) X(tdc, u16, 1) X(poc_um, i16, 3) X(force_100un, i32, 3) X(torque_mnmm, i32, 3) X(tare_q4, u16, 19) X(pdc_tare_q4, u16, 1) X(poc_sigma_um, u16, 1) X(force_sigma_100un, u16, 3) X(pdc_filtered_q4, u16, 1) X(pressure_force_100un, i32, 1) X(torsion_mnmm, i32, 1) X(wrench_age_ms, u16, 1)
 #define BT_PAC_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(pac, u16, 22)
 #define BT_TARE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(reason, u8, 1) X(noise_count2, u32, 1) X(tare_q16, u32, 19) X(pdc_tare_q16, u32, 1)
-#define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1) X(sigma_shed, u32, 1) X(wrench_repeated, u32, 1) X(frames_shed, u32, 1)
+#define BT_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(uptime_s, u32, 1) X(fingers_present, u8, 1) X(streams, u8, 1) X(messages_sent, u32, 1) X(messages_dropped, u32, 1) X(slots_late, u32, 1) X(rx_frames, u32, 1) X(rx_errors, u32, 1) X(frames_idle, u32, 1) X(poc_skipped, u32, 1) X(force_skipped, u32, 1) X(torque_skipped, u32, 1) X(sigma_skipped, u32, 1) X(sigma_shed, u32, 1) X(wrench_repeated, u32, 1) X(frames_shed, u32, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
 #define BT_SENSOR_STATUS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(tare_state, u8, 1) X(tare_reason, u8, 1) X(tare_age_ms, u32, 1) X(noise_count2, u32, 1) X(words_good, u32, 1) X(words_stuck, u32, 1) X(words_error, u32, 1) X(words_parity, u32, 1) X(last_error_word, u16, 1)
 #define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1)
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
@@ -867,12 +892,13 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_CLEAR_MAP_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1)
 #define BT_HOLD_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
 #define BT_RELEASE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
+#define BT_CLEAR_FAULTS_FIELDS(X) X(req_id, u8, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
 #define BT_EMU_STATUS_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots_taken, u32, 1) X(room_slots, u16, 1) X(slots_served, u32, 1) X(elapsed_us, u32, 1) X(words, u32, 1) X(words_late, u32, 1) X(samples_starved, u32, 1) X(slowest_us, u16, 1)
 #define BT_EMU_PLUG_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(serial, u8, 16)
 #define BT_EMU_TAPE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots, u8, 1) X(first_slot, u32, 1) X(samples, u8, 220)
 #define BT_EMU_SET_FAULT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(fault, u16, 1)
 #define BT_EMU_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status)
 #endif
 
 #endif

@@ -22,6 +22,7 @@ static uint8_t unique_id[FLASH_ID_BYTES];
 static bool has_id;
 static char serial_text[2 * FLASH_ID_BYTES + 1];
 static uint32_t boot_id;
+static uint16_t started_by;
 static bool leaving;
 static uint32_t leave_us;
 
@@ -60,10 +61,25 @@ static void make_boot_id(void)
     boot_id = bt_crc32(noise, sizeof noise);
 }
 
+// In scratch 1 while this firmware runs: another image, or the loader, resets the chip by its watchdog, too.
+#define RUNNING 0x42544757u // "WGTB"
+
+static void note_start(void)
+{
+    const uint32_t reason = WATCHDOG_REASON;
+    if (WATCHDOG_SCRATCH1 != RUNNING || reason == 0) {
+        started_by = BT_FAULT_FLAG_STARTED;
+    } else {
+        started_by = reason & WATCHDOG_TIMED_OUT ? BT_FAULT_FLAG_HUNG : BT_FAULT_FLAG_CRASHED;
+    }
+    WATCHDOG_SCRATCH1 = RUNNING;
+}
+
 void port_init(int argc, char **argv)
 {
     (void)argc;
     (void)argv;
+    note_start();
     flash_start();
     has_id = flash_unique_id(unique_id);
     watchdog_start();
@@ -81,6 +97,7 @@ void port_idle(void)
     }
     uint32_t since_us = port_now_us() - leave_us;
     if (leaving && since_us >= LEAVE_AFTER_US && (usb_all_sent() || since_us >= LEAVE_LATEST_US)) {
+        WATCHDOG_SCRATCH1 = 0;
         rom_enter_loader();
     }
     usb_watch();
@@ -118,4 +135,9 @@ void port_board_serial(uint8_t serial[12])
 uint32_t port_boot_id(void)
 {
     return boot_id;
+}
+
+uint16_t port_started_by(void)
+{
+    return started_by;
 }

@@ -234,8 +234,11 @@
 // ---- 4.7 watchdog
 #define WATCHDOG_CTRL        REG32(0x40058000u)
 #define WATCHDOG_LOAD        REG32(0x40058004u)
-#define WATCHDOG_SCRATCH0    REG32(0x4005800Cu) // keeps its value over every reset but power-on
+#define WATCHDOG_REASON      REG32(0x40058008u)
+#define WATCHDOG_SCRATCH0    REG32(0x4005800Cu) // these keep their values over every reset but power-on
+#define WATCHDOG_SCRATCH1    REG32(0x40058010u)
 #define WATCHDOG_TICK        REG32(0x4005802Cu)
+#define WATCHDOG_TIMED_OUT   (1u << 0)
 #define WATCHDOG_TRIGGER     (1u << 31)
 #define WATCHDOG_ENABLE      (1u << 30)
 #define WATCHDOG_PAUSE       (7u << 24) // while a debugger holds a core

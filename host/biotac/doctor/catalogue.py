@@ -113,6 +113,11 @@ CATALOGUE: dict[str, Entry] = {
         "is left out.",
         "`biotac flash` where the firmware is older, `pip install -U biotac-gateway` where the library is.",
     ),
+    "firmware_older": Entry(
+        W,
+        "The board runs an older release than this package, without what has been mended or added since.",
+        "`biotac flash`, which keeps the board's settings, calibrations and maps.",
+    ),
     # ---- sensors
     "no_sensor": Entry(
         E,
@@ -179,6 +184,12 @@ CATALOGUE: dict[str, Entry] = {
         "The board started again while it was being examined: its supply gave way, its watchdog bit, or somebody reset "
         "it.",
         "Another cable and socket; feed the sensors from a supply of their own if they draw more than the board gives.",
+    ),
+    "faults_latched": Entry(
+        W,
+        "The board remembers faults of before this examination, be they of a single round: they stay until somebody "
+        "clears them.",
+        "See each flag in MESSAGES.md and safety.md; once its cause is known, `Hand.clear_faults()`.",
     ),
     "slots_late": Entry(
         E,

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
+from ..hand.faults import faults_of
+from ..hand.views import DEFAULT_NAMES
+from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from .catalogue import Finding
 from .facts import BoardFacts, Facts
@@ -17,13 +21,16 @@ RATE_SHARE = 0.01
 
 
 def check(facts: Facts) -> Iterator[Finding]:
-    """Restarts, late slots, losses on either side, rate, drift."""
+    """Restarts, faults of before, late slots, losses on either side, rate, drift."""
     board = facts.board
     if board is None:
         return
     if board.after.uptime_s < board.before.uptime_s or board.stats.disordered:
         yield Finding("board_restarted", f"it has been up for {board.after.uptime_s} s")
         return  # its counters began again: they say nothing
+    earlier = replace(board.before, faults=board.before.faults & ~wire.FaultFlags.STARTED)  # so does every board
+    if faults := faults_of(earlier, DEFAULT_NAMES):
+        yield Finding("faults_latched", str(faults).replace("\n", "; "))
     for counter, what in (("slots_late", "slots came too late"), ("messages_dropped", "messages found no room")):
         more = board.more_of_board(counter)
         if more:

@@ -18,6 +18,7 @@ from ..wire.frames import tare_to_q4
 from ..wire.sensor_gen import MAX_SENSORS
 from . import map_transfer as transfer
 from .board import Board
+from .faults import Faults, faults_of
 from .views import DEFAULT_NAMES, finger_index
 
 Finger: TypeAlias = str | SupportsIndex
@@ -27,6 +28,7 @@ CALIBRATION_SINCE_MINOR = 3  # of wire 1.x
 MAP_SINCE_MINOR = 4
 PRESSURE_SINCE_MINOR = 4
 HOLD_SINCE_MINOR = 5
+FAULTS_SINCE_MINOR = 5
 
 
 class Commands:
@@ -50,6 +52,23 @@ class Commands:
     def status(self) -> wire.Status:
         """Counters of the board and its link. Its time of answering also feeds ``clock``."""
         return self._board.ask(wire.GetStatus(0), wire.Status)
+
+    def faults(self) -> Faults:
+        """What went wrong on the board since ``clear_faults`` or its start, whoever read it meanwhile.
+
+        Be it for one round: the board keeps it. Raises WireVersionError for firmware that keeps no faults.
+        """
+        if self._board.info.wire_minor < FAULTS_SINCE_MINOR:
+            raise WireVersionError(
+                f"the board's firmware keeps no faults, expected wire 1.{FAULTS_SINCE_MINOR}; update it: biotac flash"
+            )
+        return faults_of(self.status(), self._names)
+
+    def clear_faults(self) -> Faults:
+        """The same, and have the board forget these; what comes meanwhile stays for the next call."""
+        told = self.faults()
+        self._board.tell(wire.ClearFaults(0, int(told.board), told.by_index))
+        return told
 
     def sync(self, round_trips: int = 5) -> None:
         """Ask for the board's time: ``clock`` gets its bound from round trips, and the drift from later ones."""

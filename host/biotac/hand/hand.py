@@ -181,6 +181,8 @@ class Hand:
 
     ping = _of("_commands", Commands.ping)
     status = _of("_commands", Commands.status)
+    faults = _of("_commands", Commands.faults)
+    clear_faults = _of("_commands", Commands.clear_faults)
     sync = _of("_commands", Commands.sync)
     sensor_status = _of("_commands", Commands.sensor_status)
     sensor_info = _of("_commands", Commands.sensor_info)

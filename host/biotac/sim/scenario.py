@@ -43,7 +43,9 @@ SHEAR_MAX_N = 20.0
 TORSION_MAX_NMM = 100.0
 SLIP_MAX_MM_S = 200.0
 SEED_MAX = 2**31 - 1
-FAULTS_MAX_S = 36_000.0  # all together; what they take to play goes by it
+FINGER_SECONDS_MAX = 900.0  # all fingers together, whoever wrote it: 4 s to play, 250 MB; ``seconds`` repeats it
+MOVING_MAX_S = 200.0  # likewise: each frame of it costs 0.15 ms, twice with gains = "fit"
+FAULTS_MAX_S = 10_000.0  # all together; what they take to play goes by it
 
 FAULT_CODES = {
     "bad_parity": tape.BAD_PARITY,
@@ -166,8 +168,10 @@ def _add_step(step: Table, tracks: tuple[Track, ...]) -> None:
     do = step.choice("do", tuple(STEP_KEYS))
     step.only(("do", "seconds", "fingers", *STEP_KEYS[do]), f" to {do}")
     seconds = step.number("seconds", 0.01, MAX_SECONDS, "s")
-    if tracks[0].seconds + seconds > MAX_SECONDS:
-        raise step.error("seconds", "makes the scenario too long", f"at most {MAX_SECONDS:g} s in all", "shorten it")
+    most_s = FINGER_SECONDS_MAX / len(tracks)
+    if tracks[0].seconds + seconds > most_s:
+        expected = f"at most {most_s:g} s in all with {len(tracks)} finger(s)"
+        raise step.error("seconds", "makes the scenario too long", expected, "shorten it; ?seconds= repeats it")
     acting = step.indices("fingers", len(tracks)) if "fingers" in step else tuple(range(len(tracks)))
     for index, track in enumerate(tracks):
         if index not in acting or do == "hold":
@@ -183,6 +187,9 @@ def _add_step(step: Table, tracks: tuple[Track, ...]) -> None:
             _press(step, track, seconds)
         else:
             _move(step, do, track, seconds, index)
+    if sum(track.moving_s for track in tracks) > MOVING_MAX_S:
+        expected = f"at most {MOVING_MAX_S:g} s of changing load in all, fingers added up"
+        raise step.error("seconds", "makes the load change too long", expected, "hold, or shorten it")
 
 
 def _press(step: Table, track: Track, seconds: float) -> None:

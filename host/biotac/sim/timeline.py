@@ -50,6 +50,7 @@ class Track:
 
     pose: Pose = field(default_factory=Pose)
     seconds: float = 0.0
+    moving_s: float = 0.0  #: of them with a load that changes, each frame of which has to be computed
     _starts_s: list[float] = field(default_factory=list)
     _lengths_s: list[float] = field(default_factory=list)
     _from: list[list[float]] = field(default_factory=list)
@@ -57,9 +58,12 @@ class Track:
 
     def ramp(self, seconds: float, end: Pose, start: Pose | None = None) -> None:
         """Go straight to ``end``; ``start`` jumps first (without load a jump has no effect)."""
+        begin = start or self.pose
+        if replace(begin, celsius=end.celsius, slip_mm_s=end.slip_mm_s) != end:
+            self.moving_s += seconds
         self._starts_s.append(self.seconds)
         self._lengths_s.append(seconds)
-        self._from.append((start or self.pose).row())
+        self._from.append(begin.row())
         self._to.append(end.row())
         self.pose = end
         self.seconds += seconds

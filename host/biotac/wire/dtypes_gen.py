@@ -160,6 +160,8 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("sigma_shed", "<u4"),
             ("wrench_repeated", "<u4"),
             ("frames_shed", "<u4"),
+            ("faults", "<u2"),
+            ("finger_faults", "<u4", (5,)),
         ]
     ),
     wire.SensorStatus.ID: np.dtype(
@@ -380,6 +382,13 @@ DTYPES: dict[int, np.dtype[Any]] = {
         [
             ("req_id", "u1"),
             ("fingers", "u1"),
+        ]
+    ),
+    wire.ClearFaults.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("faults", "<u2"),
+            ("finger_faults", "<u4", (5,)),
         ]
     ),
     wire.EmuStatus.ID: np.dtype(

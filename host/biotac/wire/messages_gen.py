@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0x202B201B
+SCHEMA_HASH = 0x2823160D
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -159,6 +159,20 @@ class FrameFlags(IntFlag):
     OUTSIDE = 1 << 26  # fewer electrodes carry the signal than on any plate that the population map was made of: force is pulled towards Lin's, or is Lin's
 
 
+class FaultFlags(IntFlag):
+    """What went wrong on a board (STATUS); a bit stays until CLEAR_FAULTS."""
+
+    STARTED = 1 << 0  # it was switched on, lost power for a moment, or was reset from outside
+    HUNG = 1 << 1  # the firmware stood still for a second, and the watchdog started it again
+    CRASHED = 1 << 2  # the firmware started itself again after an exception
+    STORAGE = 1 << 3  # what was saved is damaged or half written: settings, calibrations and maps may be older ones, or the defaults
+    SLOTS_LATE = 1 << 4  # the main loop fell behind and slots were lost
+    DROPPED = 1 << 5  # messages found no room: the host read too slowly
+    LINK_DAMAGED = 1 << 6  # bytes from the host came damaged
+    HOST_SILENT = 1 << 7  # a stream was ended because the host said nothing for keepalive_ms
+    HOLD_LAPSED = 1 << 8  # a HOLD ended because the host said nothing for hold_timeout_ms
+
+
 class StreamFlags(IntFlag):
     """What START turns on."""
 
@@ -301,6 +315,19 @@ FRAME_FLAG_DOC: dict[int, str] = {
     16777216: "another sensor than at START, with a tare of its own; no results where it has not the same calibration and map",
     33554432: "force comes from the population map, or in part",
     67108864: "fewer electrodes carry the signal than on any plate that the population map was made of: force is pulled towards Lin's, or is Lin's",
+}
+
+
+FAULT_FLAG_DOC: dict[int, str] = {
+    1: "it was switched on, lost power for a moment, or was reset from outside",
+    2: "the firmware stood still for a second, and the watchdog started it again",
+    4: "the firmware started itself again after an exception",
+    8: "what was saved is damaged or half written: settings, calibrations and maps may be older ones, or the defaults",
+    16: "the main loop fell behind and slots were lost",
+    32: "messages found no room: the host read too slowly",
+    64: "bytes from the host came damaged",
+    128: "a stream was ended because the host said nothing for keepalive_ms",
+    256: "a HOLD ended because the host said nothing for hold_timeout_ms",
 }
 
 
@@ -928,12 +955,14 @@ class Status:
     sigma_shed: int
     wrench_repeated: int
     frames_shed: int
+    faults: int
+    finger_faults: tuple[int, ...]
 
     ID: ClassVar[int] = 0x13
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIIIIIIIIIII")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBIBBIIIIIIIIIIIIIH5I")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 65 bytes."""
+        """Payload without id and CRC, 87 bytes."""
         return self.STRUCT.pack(
             self.seq,
             self.t_us,
@@ -954,6 +983,8 @@ class Status:
             self.sigma_shed,
             self.wrench_repeated,
             self.frames_shed,
+            self.faults,
+            *self.finger_faults,
         )
 
     @classmethod
@@ -980,6 +1011,8 @@ class Status:
             v[16],
             v[17],
             v[18],
+            v[19],
+            v[20 : 25],
         )
 
 
@@ -1914,6 +1947,36 @@ class Release:
 
 
 @dataclass(frozen=True, slots=True)
+class ClearFaults:
+    """Clear what STATUS told of: these bits and no others, so that what came meanwhile stays. What still goes on is set again in the next round."""
+
+    req_id: int
+    faults: int
+    finger_faults: tuple[int, ...]
+
+    ID: ClassVar[int] = 0x9A
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BH5I")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 23 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.faults,
+            *self.finger_faults,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> ClearFaults:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2 : 7],
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class EmuStatus:
     """How an emulated sensor board gets on. Reply to every EMU command. Counts are since EMU_PLUG of finger 0."""
 
@@ -2087,7 +2150,7 @@ class EmuGetStatus:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -2132,6 +2195,7 @@ MESSAGES: dict[int, type[Any]] = {
     ClearMap.ID: ClearMap,
     Hold.ID: Hold,
     Release.ID: Release,
+    ClearFaults.ID: ClearFaults,
     EmuStatus.ID: EmuStatus,
     EmuPlug.ID: EmuPlug,
     EmuTape.ID: EmuTape,
@@ -2167,6 +2231,7 @@ ANSWERS: dict[type[Any], type[Any]] = {
     ClearMap: Reply,
     Hold: Reply,
     Release: Reply,
+    ClearFaults: Reply,
     EmuPlug: EmuStatus,
     EmuTape: EmuStatus,
     EmuSetFault: EmuStatus,

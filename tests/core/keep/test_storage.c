@@ -4,6 +4,7 @@
 
 #include "keep/calibration.h"
 #include "keep/storage.h"
+#include "wire/little_endian.h"
 
 #define NEIGHBOUR 7  // another record that must outlive everything
 #define SAVES     40 // over two changes of sector
@@ -130,6 +131,30 @@ static void the_latest_record_of_each_id_is_found_over_many_writes(void **state)
     }
     // Twelve of fifteen pages are taken after a change of sector: three writes lie between two, at least.
     assert_in_range(erases, 1000 / 15, 1000 / 4);
+}
+
+static void a_damaged_page_is_told(void **state)
+{
+    (void)state;
+    assert_false(bt_storage_damaged(&flash)); // nothing was ever saved
+    for (int number = 1; number <= SAVES; number++) {
+        assert_true(write_one(1, number));
+        assert_false(bt_storage_damaged(&flash));
+    }
+    size_t last = 0;
+    for (size_t at = 0; at < sizeof flash_bytes; at += BT_FLASH_PAGE_BYTES) {
+        last =
+            bt_storage_page_is(flash_bytes + at, 1) && bt_get_u16(flash_bytes + at + 6) == SAVES ? at : last;
+    }
+    for (size_t at = last; at < last + BT_FLASH_PAGE_BYTES; at++) { // what is read is then an older one
+        flash_bytes[at] ^= 1u << at % 8;
+        assert_true(bt_storage_damaged(&flash));
+        assert_int_equal(stored(1), SAVES - 1);
+        flash_bytes[at] ^= 1u << at % 8;
+    }
+    const size_t used = last / BT_FLASH_SECTOR_BYTES * BT_FLASH_SECTOR_BYTES;
+    flash_bytes[used] ^= 1; // the sector in use: what is read is then of the one before
+    assert_true(bt_storage_damaged(&flash));
 }
 
 static void the_same_again_wears_nothing(void **state)
@@ -387,6 +412,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         T(a_new_flash_holds_nothing),
         T(the_latest_record_of_each_id_is_found_over_many_writes),
+        T(a_damaged_page_is_told),
         T(the_same_again_wears_nothing),
         T(what_does_not_fit_is_refused),
         T(generations_may_wrap),

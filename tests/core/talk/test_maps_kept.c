@@ -45,7 +45,8 @@ static void a_record_that_cannot_be_is_no_map(void **state)
     (void)bt_map_place_pack(&good, packed);
     record[0] = (bt_map_place){0};
     power_on();
-    bt_finger_map_load(&session.map[0], &map_flash, 0, BT_MAP_RECORD_VERSION + 1, packed, sizeof packed);
+    (void)bt_finger_map_load(&session.map[0], &map_flash, 0, BT_MAP_RECORD_VERSION + 1, packed,
+                             sizeof packed);
     for (int k = 0; k < 3 * BT_MAP_SLOTS; k++) {
         size_t more = make_map(other, (uint32_t)k, 2, "");
         assert_int_equal(upload(1, other, more), BT_ERROR_OK);

@@ -91,6 +91,7 @@ static void every_command_gets_exactly_one_reply_with_its_req_id(void **state)
         {BT_CLEAR_MAP_ID, BT_REPLY_ID, 0, 34},
         {BT_HOLD_ID, BT_REPLY_ID, 0, 35},
         {BT_RELEASE_ID, BT_REPLY_ID, 0, 36},
+        {BT_CLEAR_FAULTS_ID, BT_REPLY_ID, 0, 37},
     };
     for (int id = 0x80; id < 0x100; id++) { // the table holds every command there is
         int listed = 0;
@@ -242,6 +243,20 @@ static void settings_are_refused_while_streaming(void **state)
     assert_int_equal(set_error(BT_SETTING_POC_WEIGHTS, 0), BT_ERROR_OK);
 }
 
+static void a_command_that_comes_twice_is_answered_twice_and_does_no_more(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 2; k++) { // as a host says it again that had no answer
+        assert_int_equal(set_error(BT_SETTING_IDLE_PERIOD_MS, 250), BT_ERROR_OK);
+        assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1, 0), BT_ERROR_OK);
+        assert_int_equal(session.streams, BT_STREAM_FLAG_FRAMES);
+        assert_int_equal(stop(), BT_ERROR_OK);
+        assert_int_equal(stop(), BT_ERROR_OK);
+        assert_int_equal(session.streams, 0);
+        assert_int_equal(get(BT_SETTING_IDLE_PERIOD_MS), 250);
+    }
+}
+
 static void unknown_commands_are_answered_as_such(void **state)
 {
     (void)state;
@@ -302,6 +317,7 @@ int main(void)
         T(settings_hold_their_ranges_and_refused_values_change_nothing),
         T(a_new_setting_is_what_the_kernels_use),
         T(settings_are_refused_while_streaming),
+        T(a_command_that_comes_twice_is_answered_twice_and_does_no_more),
         T(unknown_commands_are_answered_as_such),
         T(saving_and_leaving_are_the_boards_to_do),
         T(an_unknown_command_without_payload_is_unknown_too),

@@ -28,11 +28,13 @@ def fails(capsys, code: int, *words: str) -> str:
     return error
 
 
-def test_help_fits_a_screen_and_every_verb_has_an_example() -> None:
+def test_help_fits_a_screen_and_every_verb_has_an_example(capsys) -> None:
     assert parser().format_help().count("\n") <= 40
     for name, (place, text) in VERBS.items():
         example = importlib.import_module(place).EXAMPLE
-        said = run(name, "--help").stdout
+        with pytest.raises(SystemExit):
+            main([name, "--help"])
+        said = capsys.readouterr().out
         assert text[:40] in said and said.rstrip().endswith(f"example: {example}")
 
 
@@ -88,6 +90,17 @@ def test_record_then_check(capsys, tmp_path: Path) -> None:
     assert facts["good"] is True
     assert facts["crosscheck"]["violations"] == 0
     assert facts["frames"] >= 200
+
+
+def test_record_tells_faults_of_its_time_only(capsys, tmp_path: Path) -> None:
+    world = tmp_path / "loose.toml"
+    world.write_text(
+        'name = "loose"\nseed = 1\nfingers = 1\n[[step]]\ndo = "rest"\nseconds = 1.0\n'
+        '[[fault]]\nat_s = 0.5\nseconds = 0.01\nfinger = 0\nkind = "no_channel"\nchannel = "TDC"\n'
+    )
+    assert main(["record", f"sim:{world}", str(tmp_path / "a.mcap"), "--json"]) == 0
+    faults = json.loads(capsys.readouterr().out)["faults"]  # and not that it was switched on before
+    assert [line.partition(",")[0] for line in faults] == ["index: TDC_MISSING"]
 
 
 def test_record_does_not_overwrite(capsys, tmp_path: Path) -> None:

@@ -28,8 +28,9 @@ ROUNDS_PER_S = 100
 STREAM_BYTES = (150_000, 1_500_000)
 FILE_BYTES = (120_000, 800_000)
 RANDOM = random.Random(20261121)
-MOMENTS = [("stream", RANDOM.randrange(*STREAM_BYTES)) for _ in range(8)]
-MOMENTS += [("file", RANDOM.randrange(*FILE_BYTES)) for _ in range(7)]
+MOMENTS = [("stream", RANDOM.randrange(*STREAM_BYTES)) for _ in range(50)]
+MOMENTS += [("file", RANDOM.randrange(*FILE_BYTES)) for _ in range(50)]
+BY_DAY = (0, 50, 99)
 
 RECORDER = """
 import os, signal, sys
@@ -87,8 +88,7 @@ def arrived_frames(stream: bytes) -> list[tuple[int, int]]:
 
 @pytest.mark.parametrize(
     ("where", "at"),
-    # by day every third
-    [pytest.param(*moment, marks=pytest.mark.nightly if k % 3 else ()) for k, moment in enumerate(MOMENTS)],
+    [pytest.param(*moment, marks=() if k in BY_DAY else pytest.mark.nightly) for k, moment in enumerate(MOMENTS)],
 )
 def test_a_killed_recorder_loses_at_most_the_last_second(tmp_path: Path, capsys, where: str, at: int) -> None:
     path, truth = tmp_path / "killed.mcap", tmp_path / "arrived.bin"

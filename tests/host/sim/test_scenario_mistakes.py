@@ -74,6 +74,20 @@ BAD: list[tuple[str, str, int, str, str]] = [
         "'force_n' is 51",
     ),
     (
+        "too long for its fingers",
+        'name = "t"\nfingers = 5\n[[step]]\ndo = "rest"\nseconds = 181\n',
+        5,
+        "step 1",
+        "expected at most 180 s in all with 5 finger(s)",
+    ),
+    (
+        "too long a change",
+        'name = "t"\nfingers = 2\n[[step]]\ndo = "press"\nforce_n = 1\nat = "E17"\nseconds = 151\n',
+        7,
+        "step 1",
+        "expected at most 200 s of changing load",
+    ),
+    (
         "too long",
         step('[[step]]\ndo = "hold"\nseconds = 3600\n'),
         10,

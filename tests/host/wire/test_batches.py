@@ -233,7 +233,7 @@ def test_a_status_keeps_device_time_when_nothing_streams() -> None:
     decoder.feed(frame(0, 0, 0))
     half_hour_us = 30 * 60 * 10**6
     for k in range(1, 10):
-        status = wire.Status(k, k * half_hour_us % 2**32, *[0] * 17)
+        status = wire.Status(k, k * half_hour_us % 2**32, *[0] * 18, finger_faults=(0,) * 5)
         decoder.feed(encode(wire.Status.ID, status.pack()))
     assert decoder.unwrap_t_us(9 * half_hour_us % 2**32) == 9 * half_hour_us
     assert decoder.unwrap_t_us((9 * half_hour_us + 5) % 2**32) == 9 * half_hour_us + 5

@@ -32,6 +32,7 @@ def run(args: argparse.Namespace) -> int:
     first_us: int | None = None
     last_us = 0
     with biotac.open(args.port) as hand:
+        earlier = faults_told(hand)
         recorder = hand.record(args.out, overwrite=args.force)
         table = None
         with ExitStack() as shown, suppress(KeyboardInterrupt):  # the usual way to stop a recording
@@ -50,15 +51,26 @@ def run(args: argparse.Namespace) -> int:
                     break
         progress.done()
         stats = hand.stats
+        faults = [line for line in faults_told(hand) if line not in earlier]
     facts = {
         "recording": str(args.out),
         "frames": stats.frames,
         "frames_lost": stats.frames_lost,
         "crc_errors": stats.crc_errors,
+        "faults": faults,
         "device_seconds": (last_us - (first_us or 0)) / 1e6,
     }
     if args.json:
         print(json.dumps(facts))
     else:
         print(f"{args.out}: {stats.frames} frames, {stats.frames_lost} lost; `biotac check {args.out}` verifies them")
+        for fault in faults:
+            print(f"while it was recorded, {fault}")
     return 0
+
+
+def faults_told(hand: biotac.Hand) -> list[str]:
+    """What the board's latched faults are, a line each; none for firmware that keeps none."""
+    with suppress(biotac.WireVersionError):
+        return str(hand.faults()).splitlines()
+    return []

@@ -1,0 +1,39 @@
+"""What went wrong on a board, latched there: a fault of a single frame is not missed by who looks once a minute."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ..wire import messages_gen as wire
+
+
+@dataclass(frozen=True)
+class Faults:
+    """Since ``Hand.clear_faults``, or the board's start. False when there is nothing; as text, a line each."""
+
+    board: wire.FaultFlags
+    fingers: Mapping[str, wire.FrameFlags]  #: by name, of those fingers that have any
+
+    by_index: tuple[int, ...]  #: of all five fingers, as STATUS has them
+
+    def __bool__(self) -> bool:
+        return bool(self.board or self.fingers)
+
+    def __str__(self) -> str:
+        lines = [f"board: {name}, {words}" for name, words in _named(self.board, wire.FAULT_FLAG_DOC)]
+        for finger, flags in self.fingers.items():
+            lines += [f"{finger}: {name}, {words}" for name, words in _named(flags, wire.FRAME_FLAG_DOC)]
+        return "\n".join(lines)
+
+
+def faults_of(status: wire.Status, names: Mapping[str, int]) -> Faults:
+    """What a STATUS tells, of fingers with these names; one without a name has its chip select's."""
+    name_of = {finger: name for name, finger in names.items()}
+    fingers = {name_of.get(f, str(f)): wire.FrameFlags(flags) for f, flags in enumerate(status.finger_faults) if flags}
+    return Faults(wire.FaultFlags(status.faults), fingers, status.finger_faults)
+
+
+def _named(flags: wire.FaultFlags | wire.FrameFlags, doc: Mapping[int, str]) -> list[tuple[str, str]]:
+    kind = type(flags)
+    return [(str(kind(bit).name), words) for bit, words in doc.items() if flags & bit]

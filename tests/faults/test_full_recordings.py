@@ -1,0 +1,40 @@
+"""A disk that gets full in the middle of a recording: it is told, and what fitted is kept."""
+
+from __future__ import annotations
+
+import json
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from record_all import record_all
+
+import biotac
+
+FINGERS = 2
+ROUNDS_PER_S = 100
+SECONDS = 8
+PORT = f"sim:press.toml?fingers={FINGERS}&seconds={SECONDS}"
+
+
+@pytest.mark.parametrize("sizes", [2, pytest.param(20, marks=pytest.mark.nightly)])
+def test_what_fitted_is_kept_but_for_a_second(tmp_path: Path, sizes: int) -> None:
+    whole = record_all(PORT, tmp_path / "whole.mcap")
+    frames, whole_bytes = biotac.load(whole), whole.stat().st_size
+    draw = random.Random(sizes)
+    limits = [draw.randrange(whole_bytes // 4, whole_bytes * 9 // 10) for _ in range(sizes)]
+    script = Path(__file__).with_name("full_disk_recording.py")
+    words = [sys.executable, str(script), PORT, str(tmp_path), *map(str, limits)]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    for limit, line in zip(limits, done.stdout.splitlines(), strict=True):
+        told = json.loads(line)
+        assert told["told"] == 1
+        recording = biotac.Recording(tmp_path / f"{limit}.mcap")
+        kept = recording.frames
+        assert recording.cut_off and recording.counts.bad == 0 and recording.frames_lost == 0
+        assert kept.tobytes() == frames[: len(kept)].tobytes()
+        assert len(kept) <= told["read"] + FINGERS * ROUNDS_PER_S
+        assert len(kept) >= len(frames) * limit / whole_bytes - FINGERS * ROUNDS_PER_S
