@@ -100,7 +100,9 @@ def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
         description="BioTac fingertips over USB: forces, points of contact, torques.",
         epilog=EPILOG,
         formatter_class=OneLineEach,
+        add_help=False,
     )
+    top.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)  # who reads this knows it
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
     for name, (place, text) in VERBS.items():
         verb = verbs.add_parser(name, help=text, description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
