@@ -30,7 +30,7 @@ static uint32_t put(uint32_t from, uint32_t slots)
 static uint16_t ask(uint8_t finger, uint32_t slot)
 {
     uint8_t command = bt_channel_command[bt_slot_channel[slot % BT_SLOTS]];
-    return bt_emu_stream_count(&stream, finger, (command & 0x7E) >> 1, 0);
+    return bt_emu_stream_count(&stream, finger, (uint8_t)((command & 0x7E) >> 1), 0);
 }
 
 static int empty(void **state)

@@ -221,6 +221,7 @@ CASES: list[tuple[int, str, str]] = [
     (2, "leave one out", f"flash --emulated {NO_PORT} @text.uf2"),
     (2, "expected an image, .uf2", f"flash {NO_PORT} +no.uf2"),
     (2, "take the build's .uf2", f"flash {NO_PORT} @text.uf2"),
+    (2, "kinds are none", "sensor /dev/null press.toml --fault 2=loose"),
     (2, "name the IMAGE", "flash"),
     (2, "expected 500 to", "bench decode --frames 1"),
     (2, "expected a scenario's path or one of", "bench idle --source nowhere.toml"),
