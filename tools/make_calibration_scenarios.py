@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write the bundled scenarios that calibrate a finger everywhere, and everywhere but in some places.
+"""Write the bundled scenarios that calibrate a finger: everywhere, everywhere but in some places, and by weights.
 
 tools/make_calibration_scenarios.py           write them
 tools/make_calibration_scenarios.py --check   exit 1 when one has drifted
@@ -11,6 +11,7 @@ import math
 import random
 import sys
 
+from biotac.calibrate.population import weights
 from biotac.core.geometry import RADIUS_MM
 from committed import ROOT, write_or_check
 
@@ -87,8 +88,33 @@ def contact(rng: random.Random, x: float, y: float, turn: int, *, shear_to_tip: 
     return steps
 
 
+def weighed() -> str:
+    """A finger under the loads that `biotac calibrate weights` asks for, here and there along the pad."""
+    lines = [
+        "# Weights on a finger's pad, its block tilted to every side: what `biotac calibrate weights` asks for.",
+        "# Made by tools/make_calibration_scenarios.py.",
+        'name = "weights"',
+        "seed = 3",
+        "step = [",
+        "  {do = 'rest', seconds = 1.5},",
+    ]
+    for k, load in enumerate(weights.plan(weights.MASSES_G, weights.TILTS_DEG)):
+        x, y, z = (load.size_n * part for part in load.toward)
+        at_mm = ALONG_MM[k % len(ALONG_MM)]
+        lines += [
+            # sheared while it hardly touches: what follows is one load that comes, lies still, and goes
+            f"  {{do = 'press', at_mm = [{at_mm}, 0.0], tip_mm = 4.0, force_n = 0.05, seconds = 0.05}},",
+            f"  {{do = 'shear', shear_n = [{x:.4f}, {y:.4f}], seconds = 0.05}},",
+            f"  {{do = 'press', force_n = {z:.4f}, seconds = 0.4}},",
+            "  {do = 'hold', seconds = 1.4},",
+            "  {do = 'press', force_n = 0.0, seconds = 0.3},",
+            "  {do = 'rest', seconds = 1.5},",
+        ]
+    return "\n".join([*lines, "]", ""])
+
+
 def main() -> int:
-    """Write or check both."""
+    """Write or check all."""
     everywhere = scenario(
         "calibrate",
         "A finger warms up, is left alone, and is then pressed, sheared and twisted in 32 places, each twice: what a\n"
@@ -101,6 +127,7 @@ def main() -> int:
         shear_to_tip=False,
     )
     files = {FOLDER / "calibrate.toml": everywhere, FOLDER / "calibrate_gaps.toml": with_gaps}
+    files[FOLDER / "weights.toml"] = weighed()
     return write_or_check(files, "tools/make_calibration_scenarios.py")
 
 

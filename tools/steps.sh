@@ -13,6 +13,17 @@ step() { # step "WHAT IS DONE" FUNCTION [ARGUMENT...]: runs it and tells how lon
     echo "-- $((SECONDS - begin)) s"
 }
 
+both() { # both "WHAT" FUNCTION "WHAT ELSE" FUNCTION: two steps at once, each of which keeps one core busy
+    local said result=0
+    said=$(mktemp)
+    step "$3" "$4" >"$said" 2>&1 &
+    step "$1" "$2"
+    wait $! || result=$?
+    cat "$said"
+    rm "$said"
+    return $result
+}
+
 install_for_quick() {
     make_venv test
     need "test -e /usr/include/cmocka.h" libcmocka-dev
@@ -68,6 +79,14 @@ m4f_tests() { # arguments go to ctest
 
 python_tests() { # arguments go to pytest; two processes, each with whole files, for what tests of a file share
     pytest -n 2 --dist loadfile "$@"
+}
+
+fuzzing() {
+    python tools/fuzz --seconds 10
+}
+
+same_bits() {
+    tools/bench/run --bits
 }
 
 sanitized_board() {

@@ -25,5 +25,6 @@ make_venv() {
     need "python3 -c 'import os, sysconfig as s; assert os.path.exists(s.get_path(\"include\") + \"/Python.h\")'" python3-dev
     [ -x .venv/bin/python ] || python3 -m venv .venv
     echo "installing the package into .venv"
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check ".${1:+[$1]}"
+    # Python compiles what it imports; of all that is installed here that is the smaller part.
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile ".${1:+[$1]}"
 }

@@ -106,6 +106,7 @@ def test_another_sensor_is_refused_and_that_is_said(rig: Rig, tmp_path: Path, se
     assert hand.calibration_state(1) == CalibrationState.OTHER_SENSOR
 
 
+@pytest.mark.long
 def test_two_sensors_swapped_are_both_refused(rig: Rig, tmp_path: Path) -> None:
     rig.need("scenarios")
     path = tmp_path / "swapped.toml"
@@ -121,6 +122,7 @@ def test_two_sensors_swapped_are_both_refused(rig: Rig, tmp_path: Path) -> None:
         assert hand.faults().by_index[finger] & FrameFlags.SENSOR_OTHER
 
 
+@pytest.mark.long
 def test_lost_rounds_and_words_at_rest_change_nothing(rig: Rig, tmp_path: Path) -> None:
     rig.need("scenarios")
     text = 'name = "rest"\nseed = 5\n[[step]]\ndo = "rest"\nseconds = 4.0\n'

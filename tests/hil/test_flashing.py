@@ -77,10 +77,18 @@ def bench(rig: Rig, tmp_path: Path) -> Iterator[Bench]:
     assert wrong == []
 
 
-@pytest.fixture(scope="session")
-def next_release(tmp_path_factory: pytest.TempPathFactory) -> Image:
-    """The same sources with another patch number, built as the image is."""
-    folder = tmp_path_factory.mktemp("next")
+_built: list[Image] = []
+
+
+@pytest.fixture
+def next_release(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> Image:
+    """The same sources with another patch number, built as the image is: once, and only where there is a bench."""
+    if not _built:
+        _built.append(build_next_release(tmp_path_factory.mktemp("next")))
+    return _built[0]
+
+
+def build_next_release(folder: Path) -> Image:
     shutil.copytree(ROOT / "firmware", folder / "firmware")
     (folder / "tools").symlink_to(ROOT / "tools")
     version = folder / "firmware/app/version.h"
@@ -204,7 +212,11 @@ def test_a_wrong_image_leaves_the_board_alone(bench: Bench, tmp_path: Path) -> N
     assert after["flash"] == before["flash"]
 
 
-@pytest.mark.parametrize("cut", [1, 2000, SECTOR + 100, SECTOR + 15 * PAGE + 7, 40_000, -PAGE + 8, -1])
+CUTS = [1, 2000, SECTOR + 100, SECTOR + 15 * PAGE + 7, 40_000, -PAGE + 8, -1]
+BY_DAY = (1, SECTOR + 100, -1)
+
+
+@pytest.mark.parametrize("cut", [pytest.param(cut, marks=() if cut in BY_DAY else pytest.mark.long) for cut in CUTS])
 def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path: Path, cut: int) -> None:
     """The boot block goes last: from the first byte to the last, what is left is a board in its loader."""
     image = read_image(BUILT)

@@ -8,12 +8,10 @@ import biotac
 from biotac.wire import messages_gen as wire
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("ability", "verbs", "reason"),
-    [
-        pytest.param("cable", ["unplug", "plug"], "silence", marks=pytest.mark.long),
-        ("power", ["cut power"], "rebooted"),
-    ],
+    [("cable", ["unplug", "plug"], "silence"), ("power", ["cut power"], "rebooted")],
 )
 def test_a_hand_comes_back_by_itself(rig, ability: str, verbs: list[str], reason: str) -> None:
     rig.need(ability)

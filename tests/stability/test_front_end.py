@@ -55,7 +55,7 @@ def test_a_slow_load_keeps_its_signal_without_pressure(profile: str, n_per_s: fl
     assert kept_in_hold(ramp(profile, n_per_s), pdc=False) >= 0.98
 
 
-@pytest.mark.parametrize(("profile", "n_per_s"), [("new", 0.02), *RAMPS])
+@pytest.mark.parametrize(("profile", "n_per_s"), [pytest.param("new", 0.02, marks=pytest.mark.nightly), *RAMPS])
 def test_pressure_keeps_the_slowest_load(profile: str, n_per_s: float) -> None:
     assert kept_in_hold(ramp(profile, n_per_s), pdc=True) >= 0.99
 
@@ -185,8 +185,15 @@ def test_fifty_presses_are_each_seen_and_leave_no_bias() -> None:
 # ---- temperature -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("profile", ["new", "worn"])
-@pytest.mark.parametrize("pdc", [True, False])
+# Twenty minutes of a sensor's time each: by day each profile, and each kind, once.
+@pytest.mark.parametrize(
+    ("profile", "pdc"),
+    [
+        ("new", True),
+        ("worn", False),
+        *(pytest.param(profile, pdc, marks=pytest.mark.nightly) for profile, pdc in [("new", False), ("worn", True)]),
+    ],
+)
 def test_eight_degrees_at_rest_are_followed_within_the_slew(profile: str, pdc: bool) -> None:
     begun = without_drift(script(2, profile)).warm(8, 400).rest(5).warm(-16, 800).rest(5)
     course = begun.make()

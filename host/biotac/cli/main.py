@@ -43,6 +43,10 @@ VERBS = {
         "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag, many to a lake.",
     ),
     "lake": ("biotac.cli.recordings.lake", "Check a lake of recordings, or ask it in SQL."),
+    "inventory": (
+        "biotac.cli.recordings.inventory",
+        "List a lake's boards and sensors, their calibrations, ages and health against their own history.",
+    ),
     "import": ("biotac.cli.recordings.import_btd", "Turn a SynTouch .btd file into a recording."),
     "calibrate": (
         "biotac.cli.calibrate",

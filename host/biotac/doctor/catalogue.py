@@ -113,6 +113,11 @@ CATALOGUE: dict[str, Entry] = {
         "is left out.",
         "`biotac flash` where the firmware is older, `pip install -U biotac-gateway` where the library is.",
     ),
+    "firmware_older": Entry(
+        W,
+        "The board runs an older release than this package, without what has been mended or added since.",
+        "`biotac flash`, which keeps the board's settings, calibrations and maps.",
+    ),
     # ---- sensors
     "no_sensor": Entry(
         E,

@@ -17,6 +17,8 @@ RECORDINGS = "recordings"
 #: Files that are not whole yet. Readers leave out what begins with a dot.
 PARTIAL = ".partial"
 LOCK = ".lock"
+#: Of boards and sensors, at the top; made anew by each `biotac inventory`.
+INVENTORY = "inventory.json"
 _PLACE = re.compile(r"([a-z][a-z0-9_]*)/(board=[^/]+/date=\d{4}-\d\d-\d\d)/([0-9a-f]{16})\.parquet")
 
 
@@ -57,7 +59,7 @@ def opened(folder: Path, *, create: bool = False) -> Lake:
         match = _PLACE.fullmatch(file)
         if match:
             found.append((match[1], match[2], match[3]))
-        else:
+        elif file != INVENTORY:
             foreign.append(file)
     if foreign:
         more = f" and {len(foreign) - 1} more" if foreign[1:] else ""

@@ -222,6 +222,7 @@ class Reading:
             specs.append((stored.itemsize, parts, -1 if its is None else its[1]))
         self._columns = ffi.new("bt_stored_column[]", specs)
         self._missing = list(fields)
+        self.nothing = self.table(np.empty(0, np.uint8))
 
     def table(self, finger: NDArray[np.uint8]) -> StructArray:
         """Rows of these fingers, to be read; a field that the recording's version did not have is invalid."""

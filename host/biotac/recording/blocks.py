@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from mcap.records import Message, Metadata
+from numpy.typing import NDArray
 
 from ..hand.gap import GAP
 from ..wire.frames import StructArray
@@ -56,7 +57,8 @@ class Blocks:
         self.damaged_metadata = 0
         self.gaps: list[dict[str, str]] = []
         self._wanted = wanted
-        self._fingers = fingers
+        self._fingers = None if fingers is None else set(fingers)
+        self._chosen = None if fingers is None else np.isin(np.arange(256), list(fingers))
         self.scan = Scan(path, self._is_wanted, check=check)
         self._readings: list[Reading] = []
 
@@ -105,7 +107,7 @@ class Blocks:
             if not self._readings:
                 columns = layout_of(self.scan.schemas[layout.REST])
                 self._readings = [Reading(kind, its, self._wanted.get(kind)) for kind, its in enumerate(columns)]
-            wanted = rest.all_fingers if self._fingers is None else rest.all_fingers & set(self._fingers)
+            wanted = rest.all_fingers if self._fingers is None else rest.all_fingers & self._fingers
             whole = set(parts) >= wanted
             if not whole:
                 rest = rest.without(wanted - set(parts))
@@ -120,15 +122,14 @@ class Blocks:
 
     def _tables(self, rest: Rest, readings: list[Reading]) -> list[StructArray]:
         """Rows to be read, by kind, each with its finger."""
-        chosen = np.ones(256, np.bool_)
-        if self._fingers is not None:
-            chosen[:] = False
-            chosen[list(self._fingers)] = True
-        tables = []
-        for kind, reading in enumerate(readings):
-            fingers = rest.fingers(kind) if reading.wanted else np.empty(0, np.uint8)
-            tables.append(reading.table(fingers[chosen[fingers]]))
-        return tables
+        return [
+            reading.table(self._mine(rest.fingers(kind))) if reading.wanted else reading.nothing
+            for kind, reading in enumerate(readings)
+        ]
+
+    def _mine(self, fingers: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Those that are wanted."""
+        return fingers if self._chosen is None else fingers[self._chosen[fingers]]
 
 
 def is_lossless(frames: StructArray, pac: StructArray, idle: StructArray) -> bool:

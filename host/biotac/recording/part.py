@@ -53,7 +53,8 @@ def load(
         if begin_us is None or not _overlaps(piece, begin_us, start_s, stop_s):
             continue
         rows = piece.rows[FRAME]
-        rows = rows[_within(rows["t_us"], begin_us, start_s, stop_s)]
+        if not _lies_within(piece, begin_us, start_s, stop_s):
+            rows = rows[_within(rows["t_us"], begin_us, start_s, stop_s)]
         out = np.empty(len(rows), dtype)
         for field in chosen:
             out[field.name] = values_of(field, rows[field.sent or field.name])
@@ -120,6 +121,12 @@ def _overlaps(piece: Piece, begin_us: int, start_s: float, stop_s: float | None)
     return piece.rest.last_us >= begin_us + start_s * 1e6 and (
         stop_s is None or piece.rest.first_us < begin_us + stop_s * 1e6
     )
+
+
+def _lies_within(piece: Piece, begin_us: int, start_s: float, stop_s: float | None) -> bool:
+    assert piece.rest is not None
+    ends_us = np.array([piece.rest.first_us, piece.rest.last_us])
+    return bool(_within(ends_us, begin_us, start_s, stop_s).all())
 
 
 def _within(t_us: NDArray[Any], begin_us: int, start_s: float, stop_s: float | None) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ import io
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -20,10 +20,10 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, DataEnd, Footer, McapRecord, Message, Metadata, Schema, Statistics
-from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from ..errors import RecordingError
+from .chunk import chunk_of, records_of, unpack
 
 # A second of five fingers is 0.1 MB. Files have a quarter of what they unpack to; those of format 1, with fingers at
 # rest, a fiftieth. In memory it becomes ten times that.
@@ -32,8 +32,10 @@ _RATIO_MAX = 100
 _FREE_BYTES = 1 << 24
 
 _HEAD = struct.Struct("<BQ")
-_CHANNEL = struct.Struct("<H")
-_MESSAGE_INDEX = int(Opcode.MESSAGE_INDEX)
+_START = struct.Struct("<BQH")  # and what a message index begins with: its channel
+# As plain numbers: a member of an enum is looked up anew for each of sixteen thousand records.
+_CHUNK, _MESSAGE_INDEX = int(Opcode.CHUNK), int(Opcode.MESSAGE_INDEX)
+_DATA_END, _FOOTER = int(Opcode.DATA_END), int(Opcode.FOOTER)
 _FOOTER_BYTES = _HEAD.size + 16  # that its checksum is over, too
 _READ: dict[int, Any] = {
     Opcode.METADATA: Metadata,
@@ -79,6 +81,7 @@ class Scan:
         self._wanted = cache(wanted)
         self._check = check
         self._topics: dict[int, str] = {}
+        self._unwanted: set[int] = set()  # channels
         self._schema: dict[int, bytes] = {}
         self._unpacked = 0
         self._chunks = self._metadata = 0
@@ -102,27 +105,29 @@ class Scan:
             held: tuple[int, int] | None = None  # where a chunk is, until its indexes say which channels it has
             channels: set[int] = set()
             while True:
-                # with what a message index begins with: which channel
-                start = stream.read(_HEAD.size + _CHANNEL.size).ljust(_HEAD.size + _CHANNEL.size, b"\0")
-                opcode, length = _HEAD.unpack_from(start)
+                opcode, length, channel = _START.unpack(stream.read(_START.size).ljust(_START.size, b"\0"))
                 at = good_until + _HEAD.size
                 whole = opcode != 0 and length <= self._size - at
                 if opcode == _MESSAGE_INDEX and whole:  # two of three records
-                    channels.add(_CHANNEL.unpack_from(start, _HEAD.size)[0])
+                    channels.add(channel)
                     good_until = at + length
                     stream.seek(good_until)
                     continue
                 if held is not None:
-                    yield from self._open(stream, *held, channels)
+                    self._chunks += 1
+                    unwanted = bool(channels) and channels <= self._unwanted
+                    if not unwanted or self._check:
+                        yield from self._open(stream, *held, unwanted=unwanted)
                     held = None
-                if whole and opcode in (Opcode.DATA_END, Opcode.FOOTER):
-                    self._prove(stream, opcode, at, length)
-                if not whole or opcode == Opcode.FOOTER:
-                    break
-                if opcode == Opcode.CHUNK:
+                if opcode == _CHUNK and whole:
                     held, channels = (at, length), set()
-                elif opcode in _READ and opcode != Opcode.DATA_END:
-                    yield from self._one(opcode, _content(stream, at, length))
+                else:
+                    if whole and opcode in (_DATA_END, _FOOTER):
+                        self._prove(stream, opcode, at, length)
+                    if not whole or opcode == _FOOTER:
+                        break
+                    if opcode in _READ and opcode != _DATA_END:
+                        yield from self._one(opcode, _content(stream, at, length))
                 good_until = at + length
                 stream.seek(good_until)
             self.cut_off = not whole or self._size - at - length < len(MCAP0_MAGIC)
@@ -170,12 +175,16 @@ class Scan:
         else:
             yield from self._take([record])
 
-    def _take(self, records: list[McapRecord]) -> Iterator[tuple[str, Message]]:
+    def _take(self, records: Iterable[McapRecord]) -> Iterator[tuple[str, Message]]:
         for record in records:
             if isinstance(record, Schema):
                 self._schema.setdefault(record.id, record.data)
             elif isinstance(record, Channel):
                 self._topics[record.id] = record.topic
+                if self._wanted(record.topic):
+                    self._unwanted.discard(record.id)
+                else:
+                    self._unwanted.add(record.id)
                 self.schemas.setdefault(record.topic, self._schema.get(record.schema_id, b""))
             elif isinstance(record, Statistics):
                 self._counted = True
@@ -199,19 +208,13 @@ class Scan:
                 f"{sum(told.get(channel, 0) for channel in wanted)}: some of it is damaged beyond recognition"
             )
 
-    def _open(self, stream: BinaryIO, at: int, length: int, channels: set[int]) -> Iterator[tuple[str, Message]]:
-        self._chunks += 1
-        topics = [self._topics.get(channel) for channel in channels]
-        unwanted = bool(topics) and all(topic is not None and not self._wanted(topic) for topic in topics)
-        if unwanted and not self._check:
-            return
+    def _open(self, stream: BinaryIO, at: int, length: int, *, unwanted: bool) -> Iterator[tuple[str, Message]]:
         try:
-            chunk = Chunk.read(_content(stream, at, length))
+            stream.seek(at)
+            chunk = chunk_of(stream.read(length))
             self._weigh(chunk)
-            if unwanted:
-                get_chunk_data_stream(chunk, validate_crc=True)
-                return
-            records = breakup_chunk(chunk, validate_crc=True)
+            data = unpack(chunk)
+            records = [] if unwanted else list(records_of(data))
         except RecordingError:
             raise
         except Exception as error:  # mcap, zstandard and struct each raise their own kinds

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from biotac.calibrate.population import keeping
+from biotac.calibrate.population.fewshot import scaled
 from biotac.calibrate.population.presses import Held, found
 from biotac.calibrate.population.training import Population
 from biotac.calibrate.wrench import fitted
@@ -18,7 +19,7 @@ from biotac.errors import InputError
 TARE = np.full(19, 2800.0)
 
 
-def held(its: Population, gain: float, balance: float) -> Held:
+def held(its: Population, gain: float, balance: float) -> tuple[Held, Population]:
     """Presses on a finger that is softer than the map by ``gain``, its plate tilted by ``balance``."""
     rng = np.random.default_rng(5)
     patterns = -np.abs(rng.normal(300.0, 80.0, (6, 19)))
@@ -26,7 +27,7 @@ def held(its: Population, gain: float, balance: float) -> Held:
     # the tilt is in what the map says, so that it is taken out of presses that were straight
     tilted = Population(its.coefficients.copy(), its.variance)
     tilted.coefficients[:, 0] = balance * its.coefficients[:, 2]
-    return Held(TARE + patterns, TARE, np.arange(6), gain * said[:, 2]), tilted
+    return Held(TARE + patterns, TARE, np.arange(6), gain * said[:, 2:] * [0.0, 0.0, 1.0]), tilted
 
 
 @pytest.fixture
@@ -40,23 +41,33 @@ def firm() -> Population:
 
 def test_presses_are_judged_each_by_the_others(firm: Population) -> None:
     presses, tilted = held(firm, 1.3, 0.08)
-    its = found(tilted, presses)
-    assert its.scale.gain == pytest.approx(1.3, abs=0.02)
-    assert its.scale.balance == pytest.approx(0.08, abs=0.005)
-    assert (its.held_out_n < 0.1 * its.before_n).all()
+    its = found(tilted, presses, scaled)
+    x, _, z = its.own.coefficients[:38].T
+    assert z == pytest.approx(np.full(38, 1.3 * -5.0), rel=0.02)
+    assert x == pytest.approx(np.zeros(38), abs=0.005 * 5.0)
+    assert (its.held_out_n[[0, 2]] < 0.1 * its.before_n[[0, 2]]).all()
     assert its.worth_it(np.full(3, 100.0))
     assert not its.worth_it(np.full(3, 1e-3))  # a finger unlike those that the map is of
 
 
 def test_a_reading_that_is_wrong_shows_held_out(firm: Population) -> None:
     presses, tilted = held(firm, 1.0, 0.0)
-    presses.shown_n[2] *= 5.0
-    assert not found(tilted, presses).worth_it(np.full(3, 100.0))
+    presses.force_n[2] *= 5.0
+    assert not found(tilted, presses, scaled).worth_it(np.full(3, 100.0))
 
 
 def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "own.wrench.json"
-    words = ["calibrate", "scale", "sim:fingers.toml?seconds=240", "--finger", "thumb", "--presses", "3", "--json"]
+    words = [
+        "calibrate",
+        "scale",
+        "sim:fingers.toml?fingers=1&seconds=240",
+        "--finger",
+        "index",
+        "--presses",
+        "3",
+        "--json",
+    ]
     assert main([*words, "--out", str(out)]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["shown_n"] == [2.0, 3.5, 5.0]
@@ -70,7 +81,7 @@ def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFi
 
 def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recording = tmp_path / "presses.mcap"
-    assert main(["record", "sim:fingers.toml", str(recording)]) == 0
+    assert main(["record", "sim:fingers.toml?fingers=1", str(recording)]) == 0
     capsys.readouterr()
     # four presses of the first finger are in it: 2, 3.5, 5 and 4 N; in grams
     grams = ",".join(f"{1000 * force / 9.80665:.2f}" for force in (2.0, 3.5, 5.0, 4.0))
@@ -79,6 +90,8 @@ def test_a_recording_with_readings_says_the_same(tmp_path: Path, capsys: pytest.
     facts = json.loads(capsys.readouterr().out)
     assert facts["shown_n"] == pytest.approx([2.0, 3.5, 5.0, 4.0], abs=1e-4)
     assert facts["serial"] == "BTSIM00000000001"
+    assert main([*words[:-1], "510,300"]) != 0
+    assert "expected 3 or more" in capsys.readouterr().err
     assert main(words[:-2]) != 0
     assert "--readings" in capsys.readouterr().err
 

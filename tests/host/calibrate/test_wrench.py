@@ -154,6 +154,22 @@ def test_ridge_shrinks_toward_lins_geometry(model: models.Model, finger: Path, m
         assert likeness > 0.9999, f"axis {axis}"
 
 
+def test_ridge_shrinks_toward_the_map_of_other_fingers(finger: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is known of others is the force of a whole map, offset and all; torque stays Lin's."""
+    run = load_run(finger)
+    monkeypatch.setattr(models, "OTHERS_LAMBDAS", (1e12,))
+    others = np.random.default_rng(3).normal(size=(features.width(with_pdc=False) + 1, 3))
+    rows = np.arange(500)
+    for pdc in (None, np.zeros(500)):
+        signals = Signals((run.counts - run.tare)[rows], run.tare, pdc)
+        truth = np.column_stack([run.truth[rows], np.ones((500, 3))])
+        sums = moments.strip_sums(signals, truth, run.drift)
+        (found,) = models.pulled_to_others(sums, [models.JOINED.family], others)
+        assert found[0, : len(others) - 1, :3] == pytest.approx(others[:-1], abs=1e-6)
+        assert found[0, len(others) - 1 : -1, :3] == pytest.approx(0.0, abs=1e-6)  # of PDC others know nothing
+        assert found[0, :-1, 3:] == pytest.approx(models.lin(sums)[:-1, 3:], abs=1e-6)
+
+
 def test_a_column_that_never_moved_in_training_goes_nowhere_when_it_does() -> None:
     rng = np.random.default_rng(0)
     x = rng.normal(0.0, 0.5, (3000, 19))

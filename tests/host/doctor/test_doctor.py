@@ -20,9 +20,11 @@ from biotac.cli.main import main
 from biotac.clock import Fit
 from biotac.doctor import CATALOGUE, BoardFacts, Facts, SystemFacts, judge, udev
 from biotac.doctor.system import look
+from biotac.doctor.version import release
 from biotac.errors import DeviceLostError, InputError, NotAGatewayError, PortError, WireVersionError
 from biotac.link.discovery import SerialPort
 from biotac.link.holders import Holder
+from biotac.version import __version__
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import LinkStats
 from biotac.wire.frames import FRAME_DTYPE, IDLE_DTYPE
@@ -30,6 +32,7 @@ from biotac.wire.frames import FRAME_DTYPE, IDLE_DTYPE
 ROOT = Path(__file__).resolve().parents[3]
 PORT = "/dev/ttyACM0"
 NOBODY = Holder(7, "minicom")
+RELEASE = release(__version__)
 
 
 def message(kind: Any, **values: Any) -> Any:
@@ -55,13 +58,18 @@ def rounds(fingers: tuple[int, ...] = (0, 1), n: int = 100, step_us: int = 10_00
     return frames
 
 
+def hello(*firmware: int, **values: Any) -> wire.Hello:
+    names = ("firmware_major", "firmware_minor", "firmware_patch")
+    return message(wire.Hello, slot_hz=4400, **dict(zip(names, firmware, strict=True)), **values)
+
+
 def healthy(**changes: Any) -> BoardFacts:
     """Two fingers, a second, nothing to complain of."""
     states = [message(wire.SensorStatus, finger=f, tare_state=wire.TareState.REST, words_stuck=9) for f in range(5)]
     after = [dataclasses.replace(s, words_good=4400) if s.finger < 2 else s for s in states]
     after[3] = dataclasses.replace(after[3], words_stuck=4409)  # an open chip select: it reads so, and is no fault
     facts = {
-        "hello": message(wire.Hello, slot_hz=4400, fingers_present=0b11),
+        "hello": hello(*RELEASE, fingers_present=0b11),
         "sensors": [info(0, "BT00001"), info(1, "BT00002")],
         "before": message(wire.Status, uptime_s=10, fingers_present=0b11, slots_late=2**32 - 1),
         "after": message(wire.Status, uptime_s=11, fingers_present=0b11, slots_late=2**32 - 1),
@@ -148,7 +156,12 @@ CASES: list[tuple[str, Facts, str]] = [
     ("board_lost", Facts(PORT, error=DeviceLostError("went away")), "went away"),
     ("wire_version", Facts(PORT, error=WireVersionError("speaks wire 9.0")), "wire 9.0"),
     ("schema_differs", board(warnings=[HandWarning("schema_differs", "other schema")]), "other schema"),
-    ("no_sensor", board(hello=message(wire.Hello, slot_hz=4400), sensors=[]), "no sensor answers"),
+    (
+        "firmware_older",
+        board(hello=hello(0, 0, 9, fingers_present=0b11)),
+        f"firmware 0.0.9, this package {__version__}",
+    ),
+    ("no_sensor", board(hello=hello(*RELEASE), sensors=[]), "no sensor answers"),
     ("sensor_missing", dataclasses.replace(board(), expected_fingers=3), "2 of 3 sensors answer: finger 0, 1"),
     ("sensor_lost", board(frames=rounds((0,))), "finger 1 sent no frame"),
     ("sensor_lost", board(after=message(wire.Status, **AFTER | {"fingers_present": 1})), "finger 1 stopped"),
@@ -204,6 +217,11 @@ def test_one_fault_makes_one_finding(code: str, facts: Facts, words: str) -> Non
     found = judge(facts)
     assert {f.code for f in found} == {code}
     assert words in found[0].seen
+
+
+@pytest.mark.parametrize("version", ["1.12.3", "1.12.3.dev4", "1.12.3rc1", "1.12.3+g0a1"])
+def test_a_development_version_is_not_newer_than_its_release(version: str) -> None:
+    assert release(version) == (1, 12, 3)
 
 
 def test_every_code_has_a_case_and_a_page() -> None:

@@ -11,7 +11,8 @@ from fake_flash_board import NEW_SETTING, FakeBoard, make_drive, make_image, no_
 
 from biotac.cli.main import main
 from biotac.errors import BiotacError, FlashError, InputError, NotAGatewayError
-from biotac.flash import flash, loader_drive, read_backup, read_image
+from biotac.flash import carried, flash, loader_drive, read_backup, read_image
+from biotac.flash.every import flash_every
 from biotac.flash.image import Image
 from biotac.flash.loader_drive import linux_folders
 from biotac.wire import messages_gen as wire
@@ -264,12 +265,16 @@ def test_without_an_image_one_is_asked_for(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert "name the IMAGE" in refused(capsys, 2)
+    monkeypatch.setattr(carried, "CARRIED", tmp_path / "carried.uf2")
+    without = refused(capsys, 2)
+    assert "built without the board's image" in without and "name the IMAGE" in without
     assert "cannot be read" in refused(capsys, 2, "nowhere.uf2")
     built = tmp_path / "build/pico/biotac-pico.uf2"
     built.parent.mkdir(parents=True)
     built.write_bytes(b"none")
     assert f"{built} is not flashed: 4 bytes are no UF2" in refused(capsys, 2)
+    carried.CARRIED.write_bytes(b"mine")
+    assert f"{carried.CARRIED} is not flashed: 4 bytes" in refused(capsys, 2)  # whatever is around
 
 
 def test_ports_that_cannot_be_flashed(
@@ -284,6 +289,9 @@ def test_ports_that_cannot_be_flashed(
     assert "are no UF2" in refused(capsys, 2, "--emulated", str(Path(__file__)))
     assert "leave one out" in refused(capsys, 2, "--emulated", "/dev/ttyACM0", image)
     assert "leave one out" in refused(capsys, 2, "--no-backup", "--backup", "x", image)
+    assert "leave one out" in refused(capsys, 2, "--all", "/dev/ttyACM0", image)
+    assert "leave one out" in refused(capsys, 2, "--all", "--restore", "x", image)
+    assert "no board is plugged in" in refused(capsys, 3, "--all", image)
     ports |= {"/dev/ttyACM0": "A", "/dev/ttyACM1": "B"}
     assert "2 boards are plugged in (/dev/ttyACM0, /dev/ttyACM1)" in refused(capsys, 3, image)
 
@@ -322,3 +330,40 @@ def test_the_whole_command_over_a_drive(
     assert facts["settings_restored"] == ["idle_period_ms"]
     assert Path(facts["backup"]).is_file()
     assert "writing 20 blocks to the drive RPI-RP2" in said.err
+
+
+def test_every_board_is_flashed_that_runs_something_else(scripted_board, hello, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    no_waiting(monkeypatch)
+    image = read_image(make_image(tmp_path))
+    first, mute, last = (FakeBoard(scripted_board, hello) for _ in range(3))
+    for number, fake in enumerate((first, mute, last)):
+        fake.serial = (number + 1, 2, 3) + (0,) * 9
+    mute.answers = False
+    loader = first  # the way to a board is that of whichever is in its loader
+    monkeypatch.setattr(loader, "ready", lambda: any(fake.in_loader for fake in (first, last)))
+    into = {fake: fake.write for fake in (first, last)}
+    monkeypatch.setattr(
+        loader, "write", lambda its, show: next(into[f] for f in (first, last) if f.in_loader)(its, show)
+    )
+    results = list(flash_every(image, [first, mute, last], [loader]))
+    assert [result.outcome is not None for result in results] == [True, False, True]
+    assert isinstance(results[1].error, NotAGatewayError)
+    assert (first.version, last.version) == ((0, 2, 0), (0, 2, 0))
+    again = list(flash_every(image, [first, last], [loader]))
+    assert [(result.outcome, result.error) for result in again] == [(None, None)] * 2
+    assert first.events == ["loader", "write"]
+
+
+def test_a_board_that_stays_in_its_loader_keeps_the_next_one_from_its_place(
+    scripted_board, hello, tmp_path, monkeypatch
+) -> None:
+    """A loader has no serial number: what is written then would go to the first board."""
+    monkeypatch.chdir(tmp_path)
+    no_waiting(monkeypatch)
+    first, second = (FakeBoard(scripted_board, hello) for _ in range(2))
+    monkeypatch.setattr(first, "write", lambda image, show: (_ for _ in ()).throw(FlashError("took 3 of 20 blocks")))
+    results = list(flash_every(read_image(make_image(tmp_path)), [first, second], [first]))
+    assert "took 3 of 20" in str(results[0].error)
+    assert "another board is in its loader" in str(results[1].error)
+    assert second.events == []

@@ -13,6 +13,7 @@ import struct
 import threading
 import time
 import zlib
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -255,6 +256,7 @@ class OldHost(Old):
         super().__init__(minor)
         self._fd = os.open(path, os.O_RDWR | os.O_NOCTTY)
         self._frames = Frames()
+        self._heard: deque[tuple[int, bytes]] = deque()  # one read may bring several
 
     def close(self) -> None:
         os.close(self._fd)
@@ -275,12 +277,14 @@ class OldHost(Old):
     def hear(self, wanted: Callable[[str, dict[str, Any]], bool]) -> tuple[str, dict[str, Any]]:
         give_up_s = time.monotonic() + 60
         while time.monotonic() < give_up_s:
-            if not select.select([self._fd], [], [], 1.0)[0]:
+            if not self._heard:
+                if select.select([self._fd], [], [], 1.0)[0]:
+                    self._heard.extend(self._frames.feed(os.read(self._fd, 4096)))
                 continue
-            for message_id, payload in self._frames.feed(os.read(self._fd, 4096)):
-                name = self.names.get(message_id)  # ids that it does not know mean nothing to it
-                if name is not None and wanted(name, its := self.read(name, payload)):
-                    return name, its
+            message_id, payload = self._heard.popleft()
+            name = self.names.get(message_id)  # ids that it does not know mean nothing to it
+            if name is not None and wanted(name, its := self.read(name, payload)):
+                return name, its
         raise AssertionError("no answer")
 
 

@@ -29,4 +29,4 @@ def test_both_contestants_give_back_every_integer() -> None:
     assert 0 < outcome.floor_bytes < outcome.wire_bytes
     assert sum(outcome.mcap_parts.values()) == outcome.mcap_bytes > outcome.mcap_parts["wire"] > 0
     assert outcome.protobuf_bytes > outcome.floor_bytes
-    assert set(outcome.load_s) == {"MCAP wire", "protobuf"}
+    assert set(outcome.load_s) == {"MCAP wire", "protobuf", recording.ALL, recording.FORCE}

@@ -302,14 +302,21 @@ def test_five_hundred_killed_half_way(sources, tmp_path) -> None:
     many.mkdir()
     made = copies(biotac.Recording(sources[0]), many, 500, 600.0)
     words = [sys.executable, "-m", "biotac", "export", *map(str, made), "--lake", str(tmp_path / "lake"), "-j", "2"]
+
+    def sealed() -> int:
+        return len(list((tmp_path / "lake" / layout.RECORDINGS).rglob("*.parquet")))
+
+    killed = 0
     for _ in range(10):
         running = subprocess.Popen(words, start_new_session=True, stdout=subprocess.DEVNULL)
-        target = len(list((tmp_path / "lake").rglob("*.parquet"))) + 200
-        while running.poll() is None and len(list((tmp_path / "lake").rglob("*.parquet"))) < target:
+        target = sealed() + 30
+        while running.poll() is None and sealed() < target:
             os.sched_yield()
         if running.poll() is None:
             os.killpg(running.pid, signal.SIGKILL)
+            killed += 1
         running.wait()
+    assert killed == 10
     assert subprocess.run(words, stdout=subprocess.DEVNULL, check=False).returncode == 0
     assert export(made, tmp_path / "once") == 0
     assert hashes(tmp_path / "lake") == hashes(tmp_path / "once")

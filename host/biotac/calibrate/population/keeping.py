@@ -18,6 +18,7 @@ import numpy as np
 from ...core import population
 from ...core.board_map import BoardMap
 from ...core.geometry import Floats
+from ...core.map_columns import ELECTRODES
 from ...core.population import SHIPPED, shipped
 from ...errors import InputError
 from ...version import __version__
@@ -44,6 +45,21 @@ def provenance_of(files: Sequence[Path], source: str, *, symmetric: bool) -> dic
     """Names and SHA-256 of the recordings, and ``source``: where they are from and under which licence."""
     hashes = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
     return {"source": source, "files": hashes, "symmetric": symmetric, "software": f"biotac-gateway {__version__}"}
+
+
+def made_of(kept: Kept, files: Sequence[Path]) -> bool:
+    """Whether it was trained on one of ``files``: what it says of these is no forecast."""
+    seen = provenance_of(files, "", symmetric=False)["files"]
+    return bool(set(seen.values()) & set(kept.provenance.get("files", {}).values()))
+
+
+def others_than(kept: Kept, files: Sequence[Path]) -> tuple[Floats | None, str]:
+    """Coefficients (533, 3) of a wrench map to pull the finger of ``files`` to, and a note; None if it knows them."""
+    fingers = ", ".join(kept.provenance.get("files", {})) or "fingers that it does not name"
+    if made_of(kept, files):
+        return None, f"not pulled to the population map of {fingers}, which was made of this recording"
+    # columns of counts above the tare mean the same whatever that is
+    return kept.its.wrench_map(np.zeros(ELECTRODES)).coefficients, f"pulled to the population map of {fingers}"
 
 
 def dumps(kept: Kept) -> str:

@@ -1,9 +1,10 @@
-"""Presses on a kitchen scale, guided on a board or from a recording: what the map says to each, and held out."""
+"""Presses of known force, guided on a board or from a recording: what the map says to each, and held out."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,29 +21,35 @@ from ..pressure.guided import Face, ask_forces
 from ..pressure.presses import Press, Procedure, Step
 from ..pressure.rows import rows_of
 from ..wrench.run import Run
-from .fewshot import LEAST_PRESSES, Scale, scale_of
-from .training import Population
+from .training import Population, by_columns
 
+LEAST_PRESSES = 3
 FAR_SIGMAS = 3.0
+STRAIGHT = (0.0, 0.0, 1.0)
 ASKED_N = (2.0, 5.0, 3.0, 6.0, 4.0)  # light and firm in turn; of more presses, again from the first
+
+
+#: A map, columns (k, 323) and force (k, 3) in N of presses -> the map with what they say; as in fewshot.
+Fit = Callable[[Population, Floats, Floats], Population]
 
 
 @dataclass(frozen=True)
 class Held:
     """Of k presses: frames' ``counts`` (n, 19) and ``tare`` (19,), which ``press`` (n,) they are of, 0 to k - 1.
 
-    ``shown_n`` (k,) is what the scale showed.
+    ``force_n`` (k, 3) is what the finger was pressed with.
     """
 
     counts: Floats
     tare: Floats
     press: Any
-    shown_n: Floats
+    force_n: Floats
 
-    def said(self, its: Population) -> Floats:
-        """The map's force (k, 3) in N, a mean over each press."""
-        force = its.force(self.counts, self.tare)
-        return np.array([force[self.press == k].mean(axis=0) for k in range(len(self.shown_n))])
+    @cached_property
+    def columns(self) -> Floats:
+        """Of the map (k, 323), a mean over each press."""
+        every = by_columns(self.counts, self.tare, lambda z: z)
+        return np.array([every[self.press == k].mean(axis=0) for k in range(len(self.force_n))])
 
     def run(self, name: str) -> Run:
         """The frames as a run without a force, to compare fixed point with float on."""
@@ -53,47 +60,54 @@ class Held:
 
 @dataclass(frozen=True)
 class Found:
-    """``scale`` of all presses. RMS over presses of the error along x and z (2,) in N, where x should be 0.
+    """The finger's ``own`` map by all presses, and RMS errors (3,) over them in N.
 
-    ``held_out_n`` is of each press by the scale of the others; ``before_n`` of the map as it was.
+    ``held_out_n`` is of each press by the map of the others, ``before_n`` of the map as it was.
     """
 
-    scale: Scale
+    own: Population
     before_n: Floats
     held_out_n: Floats
 
     def worth_it(self, sigma_n: Floats) -> bool:
         """Better than the map as it was, and a finger as the map knows them, whose one sigma (3,) is ``sigma_n``."""
         better = (self.held_out_n**2).sum() < (self.before_n**2).sum()
-        return bool(better and (self.held_out_n < FAR_SIGMAS * sigma_n[[0, 2]]).all())
+        return bool(better and (self.held_out_n < FAR_SIGMAS * sigma_n).all())
 
 
-def found(its: Population, held: Held) -> Found:
-    """Gain and balance, and what they are worth. Raises InputError for presses that say nothing."""
-    said, shown = held.said(its), held.shown_n
-    scale = scale_of(said, shown)
-    truth = np.column_stack([np.zeros_like(shown), shown])
-    every = np.arange(len(shown))
-    out = np.array([scale_of(said[every != k], shown[every != k], least=2).applied(said[k : k + 1])[0] for k in every])
-    before, after = (np.sqrt(((force[:, [0, 2]] - truth) ** 2).mean(axis=0)) for force in (said, out))
-    return Found(scale, before, after)
+def found(its: Population, held: Held, fit: Fit) -> Found:
+    """The finger's own map by ``fit``, and what it is worth. Raises InputError for presses that say nothing."""
+    columns, force_n = held.columns, held.force_n
+    own = fit(its, columns, force_n)
+    every = np.arange(len(force_n))
+    out = [columns[k] @ fit(its, columns[every != k], force_n[every != k]).coefficients for k in every]
+    before, after = (np.sqrt(((said - force_n) ** 2).mean(axis=0)) for said in (columns @ its.coefficients, out))
+    return Found(own, before, after)
 
 
 def asked_n(presses: int) -> tuple[float, ...]:
-    """Newtons to ask for. Raises InputError for too few."""
-    if presses < LEAST_PRESSES:
-        raise InputError(f"{presses} presses are planned, expected {LEAST_PRESSES} or more; five are worth having")
+    """Newtons to ask for on a scale. Raises InputError for too few."""
+    _check_enough(presses)
     return tuple(ASKED_N[k % len(ASKED_N)] for k in range(presses))
 
 
-def guided(hand: Hand, finger: int, presses: int, face: Face) -> Held:
-    """On a board: ``face`` says what to do and is asked what the scale shows; a scenario knows its force itself.
+def guided(
+    hand: Hand,
+    finger: int,
+    forces_n: Sequence[float],
+    face: Face,
+    *,
+    truth: Truth | None = None,
+    toward: Sequence[Sequence[float]] | None = None,
+) -> Held:
+    """On a board: ``face`` says what to do, a press for each of ``forces_n`` (k,), and tells its size when it is held.
 
-    Raises InputError when a press is waited for in vain.
+    ``truth`` tells it instead, of a scenario. ``toward`` (k, 3) are directions, straight down if not given. Raises
+    InputError when a press is waited for in vain.
     """
-    truth = None if hand.link.source is None else Truth(hand.link.source)
-    procedure = Procedure([finger], asked_n(presses), needs_force=truth is not None)
-    typed: dict[tuple[int, int], float] = {}
+    _check_enough(len(forces_n))
+    procedure = Procedure([finger], forces_n, needs_force=truth is not None)
+    told: dict[tuple[int, int], float] = {}
     kept: list[tuple[StructArray, Any]] = []
     shown: Step | None = procedure.step
     face.show(shown)
@@ -105,7 +119,7 @@ def guided(hand: Hand, finger: int, presses: int, face: Face) -> Held:
         if procedure.step != shown:
             shown = procedure.step
             if truth is None:
-                ask_forces(procedure, typed, face)
+                ask_forces(procedure, told, face)
             face.show(shown)
         if procedure.done:
             break
@@ -113,26 +127,38 @@ def guided(hand: Hand, finger: int, presses: int, face: Face) -> Held:
         procedure.finish()
     hand.stop()
     frames, t_us = np.concatenate([one for one, _ in kept]), np.concatenate([at for _, at in kept])
-    held = procedure.presses[finger]
-    return _held(frames, t_us, held, [typed.get((finger, press.number), np.nan) for press in held])
+    presses = procedure.presses[finger]
+    sizes_n = [told.get((finger, press.number), float(np.mean(press.rows["force_n"]))) for press in presses]
+    return _held(frames, t_us, presses, sizes_n, toward)
 
 
-def recorded(recording: Recording, finger: int, shown_n: Sequence[float]) -> Held:
-    """From a recording, a press for each reading. Raises InputError when there are not so many."""
-    if len(shown_n) < LEAST_PRESSES:
-        raise InputError(f"{len(shown_n)} readings: expected {LEAST_PRESSES} or more, one a press; name them in order")
+def recorded(
+    recording: Recording, finger: int, forces_n: Sequence[float], toward: Sequence[Sequence[float]] | None = None
+) -> Held:
+    """From a recording, a press for each of ``forces_n`` (k,). Raises InputError when there are not so many."""
+    _check_enough(len(forces_n))
     rows = recorded_rows(recording, None)
-    procedure = Procedure([finger], shown_n, needs_force=False)
+    procedure = Procedure([finger], forces_n, needs_force=False)
     procedure.feed(rows[rows["finger"] == finger])
     procedure.finish()
     mine = recording.wire["finger"] == finger
-    return _held(recording.wire[mine], recording.frames["t_us"][mine], procedure.presses[finger], shown_n)
+    return _held(recording.wire[mine], recording.frames["t_us"][mine], procedure.presses[finger], forces_n, toward)
 
 
-def _held(frames: StructArray, t_us: Any, presses: Sequence[Press], typed: Sequence[float]) -> Held:
-    counts, numbers, shown = [], [], []
-    tares = []
-    for k, (press, force_n) in enumerate(zip(presses, typed, strict=True)):
+def _check_enough(presses: int) -> None:
+    if presses < LEAST_PRESSES:
+        raise InputError(f"{presses} presses of known force: expected {LEAST_PRESSES} or more; five are worth having")
+
+
+def _held(
+    frames: StructArray,
+    t_us: Any,
+    presses: Sequence[Press],
+    sizes_n: Sequence[float],
+    toward: Sequence[Sequence[float]] | None,
+) -> Held:
+    counts, numbers, tares = [], [], []
+    for k, press in enumerate(presses):
         its = frames[np.isin(t_us, press.rows["t_us"])]
         whole = (its["counts"] != wire.INVALID_COUNT).all(axis=1) & (its["tare_q4"] != wire.INVALID_COUNT).all(axis=1)
         if not whole.any():
@@ -142,8 +168,8 @@ def _held(frames: StructArray, t_us: Any, presses: Sequence[Press], typed: Seque
         counts.append(its["counts"][whole].astype(np.float64))
         tares.append(its["tare_q4"][whole] / Q4_PER_COUNT)
         numbers.append(np.full(int(whole.sum()), k))
-        shown.append(float(np.nanmean(press.rows["force_n"])) if np.isnan(force_n) else force_n)
     tare = tares[0].mean(axis=0)
     # each press above its own tare: a board takes a new one in between
     level = [one - at + tare for one, at in zip(counts, tares, strict=True)]
-    return Held(np.concatenate(level), tare, np.concatenate(numbers), np.array(shown))
+    directions = np.array([STRAIGHT] * len(presses) if toward is None else toward)
+    return Held(np.concatenate(level), tare, np.concatenate(numbers), np.array(sizes_n)[:, None] * directions)

@@ -29,14 +29,15 @@ SIGMAS = (1.0, 2.0)
 class Worth:
     """RMSE (3,) in N: of the map as it is, after five straight presses, after a minute on a plate; None: not found.
 
-    ``error_n`` (n, 3) is the map's as it is, ``scale5_error_n`` that of the draw in the middle.
+    ``said_n`` and ``truth_n`` (n, 3) are what the map says as it is, and the plate; ``scales`` come of the draws.
     """
 
     rmse_n: Floats
     rmse_scale5_n: Floats | None
     rmse_60s_n: Floats | None
-    error_n: Floats
-    scale5_error_n: Floats | None
+    said_n: Floats
+    truth_n: Floats
+    scales: tuple[Scale, ...]
 
 
 def worth(its: Population, run: Run) -> Worth:
@@ -44,21 +45,16 @@ def worth(its: Population, run: Run) -> Worth:
     truth = run.truth
     said = its.force(run.counts, run.tare)
     draws = _scaled(said, truth)
-    error = said - truth
-    middle = None
-    scale5 = None
-    if draws:
-        each = np.array([((scale.applied(said) - truth) ** 2).mean(axis=0) for scale in draws])
-        scale5 = np.sqrt(each.mean(axis=0))
-        middle = draws[int(np.argsort(each.sum(axis=1))[len(each) // 2])].applied(said) - truth
-    return Worth(_rms(error), scale5, _minute(its, run), error, middle)
+    each = [((scale.applied(said) - truth) ** 2).mean(axis=0) for scale in draws]
+    scale5 = np.sqrt(np.mean(each, axis=0)) if draws else None
+    return Worth(_rms(said - truth), scale5, _minute(its, run), said, truth, tuple(draws))
 
 
 def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: bool = False) -> tuple[Floats, Floats]:
     """One sigma (3,) in N of a new finger's force, as the map is and after five presses; ``runs`` are aligned.
 
     Of several fingers, what the others' map leaves on each; of one, what its map leaves on its mirror image, the one
-    other finger there is.
+    other finger there is; an image's F_x is off by what no press mends, but presses leave no finger less known.
     """
     if len(fingers) == 1:
         alone = train(fingers, mirror=False)
@@ -69,7 +65,7 @@ def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: b
             others = [finger for j, finger in enumerate(fingers) if j != k]
             found.append(worth_of_force(train(others, symmetric=symmetric), run))
     raw, scaled = (np.sqrt(np.mean([one[k] ** 2 for one in found], axis=0)) for k in (0, 1))
-    return raw, scaled
+    return raw, np.minimum(raw, scaled)
 
 
 def worth_of_force(its: Population, run: Run) -> tuple[Floats, Floats]:
@@ -92,10 +88,11 @@ def facts(its: Worth, sigma: tuple[Floats, Floats]) -> dict[str, Any]:
         "rmse_n": its.rmse_n.tolist(),
         "rmse_scale5_n": None if its.rmse_scale5_n is None else its.rmse_scale5_n.tolist(),
         "rmse_60s_n": None if its.rmse_60s_n is None else its.rmse_60s_n.tolist(),
-        "coverage": coverage(its.error_n, sigma[0]),
+        "coverage": coverage(its.said_n - its.truth_n, sigma[0]),
     }
-    if its.scale5_error_n is not None:
-        result["coverage_scale5"] = coverage(its.scale5_error_n, sigma[1])
+    if its.scales:
+        each = [coverage(scale.applied(its.said_n) - its.truth_n, sigma[1]) for scale in its.scales]
+        result["coverage_scale5"] = np.mean(each, axis=0).tolist()
     return result
 
 

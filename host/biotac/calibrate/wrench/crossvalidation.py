@@ -21,12 +21,13 @@ from ...core.map_columns import Signals
 from . import features, models
 from .blocks import BLOCKS, Blocks
 from .lag import Lags
-from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, TEMPLATE
+from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, TEMPLATE, Model
 from .moments import Rows, Sums, air_sums, at, linear_columns, moved, smoothed, stacked, strip_sums, with_one
 from .run import Run
 from .template import Template
 
 INNER_FOLDS = 5
+FIRST_OF_POOL = len(MODELS) - len(POOL)
 WINDOWS_ROWS = (1, 5, 9)  # as recorded, or a mean: a third of the noise for 40 ms of delay at 100 Hz
 # What the frames in free air weigh against the run's. A finger that never rests leaves the map free to say half a
 # newton in air, or more; but where light presses are scarce, holding it at zero bends the map in contact. So: the most
@@ -60,9 +61,9 @@ class Choice:
 class Fit:
     """One training: the choice per axis for every model by name, of which ``best`` is the pool.
 
-    ``lag_rows`` of each axis; ``weights`` (axes, m) of POOL's models, each with both LAMBDAS; ``air_share`` is the
-    weight of the frames in free air, of the run's, 0 without any; ``less`` are coefficients (p + 1, axes)
-    from LESS of its blocks.
+    ``lag_rows`` of each axis; ``weights`` (axes, m) of POOL's models, each with both LAMBDAS, and where others are
+    known again with both OTHERS_LAMBDAS; ``air_share`` is the weight of the frames in free air, of the run's, 0 without
+    any; ``less`` are coefficients (p + 1, axes) from LESS of its blocks.
     """
 
     lag_rows: tuple[int, ...]
@@ -114,9 +115,12 @@ def validate(
     *,
     align: bool = True,
     windows: tuple[int, ...] = WINDOWS_ROWS,
+    others: Floats | None = None,
     show: Show | None = None,
 ) -> Validation:
     """Hold every block out once, then train on all. ``align`` False takes rows as they stand, lag 0.
+
+    ``others`` (q + 1, 3) are coefficients of a map of other fingers, to pull the force to.
 
     BLAS runs on one thread meanwhile, in the whole process. Raises RecordingError when force and counts do not follow
     each other.
@@ -124,13 +128,14 @@ def validate(
     # Thousands of small systems: OpenBLAS's threads wait for each other, and on a busy computer for much longer.
     threads = min(THREADS, os.cpu_count() or 1)
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
-        return _validate(run, align, windows, show, pool)
+        return _validate(run, align, windows, others, show, pool)
 
 
 def _validate(
     run: Run,
     align: bool,
     windows: tuple[int, ...],
+    others: Floats | None,
     show: Show | None,
     pool: ThreadPoolExecutor,
 ) -> Validation:
@@ -146,7 +151,7 @@ def _validate(
         of = [other for other in every if other != block]
         its = lags.of_axes(strips) if align else (0,) * axes
         trainings.append(_Training(of, strips, its, timing.window(its, of, strips)))
-    trainer = _Trainer(run, blocks, trainings, pool)
+    trainer = _Trainer(run, blocks, trainings, others, pool)
     template = Template(run)
     predicted = np.full((len(SHIFTS_COUNTS), len(run.truth), axes), np.nan)
     errors: dict[str, Floats] = {}
@@ -248,9 +253,10 @@ class _Trainer:
         run: Run,
         blocks: Blocks,
         trainings: Sequence[_Training],
+        others: Floats | None,
         pool: ThreadPoolExecutor,
     ) -> None:
-        self._blocks = blocks
+        self._blocks, self._others = blocks, others
         self._late = sorted({late for its in trainings for late in enumerate(its.lag_rows)})
         truth = _late(run, self._late)
         self._sums: dict[int, Sums] = {}
@@ -278,26 +284,32 @@ class _Trainer:
             share = self._air_share(kept, tested, air)
             total, kept = total.plus(air, share), [one.plus(air, share) for one in kept]
         rows = sum(one.rows for one in tested)
-        families = [model.family for model in MODELS]
-        inner = [np.array(one) for one in zip(*(models.pulled(one, families) for one in kept), strict=True)]
-        alone = models.pulled(total, families)
+        inner = [np.array(one) for one in zip(*(self._pulled(one, MODELS) for one in kept), strict=True)]
+        alone = self._pulled(total, MODELS)
         choices = {
             LIN: _choices(LIN, models.lin(total, offset=False)),
             LIN_OFFSET: _choices(LIN_OFFSET, models.lin(total)),
         }
-        for model, fits, whole in zip(MODELS, inner, alone, strict=True):
+        for model, fits, whole in zip(MODELS, inner, alone, strict=False):
             mse = np.sum([out.errors(fit) for fit, out in zip(fits, tested, strict=True)], axis=0) / rows
             # for comparison: one lambda for all axes
             best = int((mse / np.maximum(mse.min(axis=0), 1e-12)).mean(axis=1).argmin())
             choices[model.name] = _choices(model.name, whole[best], LAMBDAS[best], mse[best])
-        weights, mse = _weights(np.concatenate(inner[-len(POOL) :], axis=1), tested, rows)
-        choices[POOLED] = _choices(POOLED, _mean(weights, alone[-len(POOL) :]), mse=mse)
+        weights, mse = _weights(np.concatenate(inner[FIRST_OF_POOL:], axis=1), tested, rows)
+        choices[POOLED] = _choices(POOLED, _mean(weights, alone[FIRST_OF_POOL:]), mse=mse)
         less = []
         for part in LESS:
             sums = every.of(its.strips & self._blocks.own(its.of[:: round(1 / part)]))
             sums = sums if air is None else sums.plus(air, share)
-            less.append(_mean(weights, models.pulled(sums, [model.family for model in POOL])))
+            less.append(_mean(weights, self._pulled(sums, POOL)))
         return Fit(its.lag_rows, its.window_rows, share, choices, weights, tuple(less))
+
+    def _pulled(self, sums: Sums, of: Sequence[Model]) -> list[Floats]:
+        """Those pulled to Lin's scales, then those of POOL pulled to others."""
+        found = models.pulled(sums, [model.family for model in of])
+        if self._others is not None:
+            found += models.pulled_to_others(sums, [model.family for model in POOL], self._others)
+        return found
 
     def _air_share(self, kept: list[Sums], tested: list[Sums], air: Sums) -> float:
         """By a model that bends as the pool will, and costs little."""

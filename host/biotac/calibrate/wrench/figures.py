@@ -103,9 +103,16 @@ def next_minute(validation: Validation) -> dict[str, Any]:
 
 
 def weights(validation: Validation) -> list[dict[str, float]]:
-    """Per axis: model -> its weight in the pool, a mean over the folds."""
-    mean = np.mean([fit.weights for fit in validation.folds], axis=0).reshape(-1, len(POOL), len(LAMBDAS)).sum(axis=2)
-    return [{model.name: float(one) for model, one in zip(POOL, its, strict=True)} for its in mean]
+    """Per axis: model -> its weight in the pool, a mean over the folds; pulled to others or not."""
+    mean = np.mean([fit.weights for fit in validation.folds], axis=0)
+    of_models = mean.reshape(len(mean), -1, len(POOL), len(LAMBDAS)).sum(axis=(1, 3))
+    return [{model.name: float(one) for model, one in zip(POOL, its, strict=True)} for its in of_models]
+
+
+def pulled_share(validation: Validation) -> list[float]:
+    """Per axis: the weight of what is pulled to other fingers, a mean over the folds; 0 where none were known."""
+    mean = np.mean([fit.weights for fit in validation.folds], axis=0)
+    return [float(one) for one in mean[:, len(POOL) * len(LAMBDAS) :].sum(axis=1)]
 
 
 def summary(validation: Validation) -> dict[str, Any]:
@@ -131,6 +138,7 @@ def summary(validation: Validation) -> dict[str, Any]:
         "window_rows": validation.final.window_rows,
         "affine_r2": validation.affine_r2,
         "weights": dict(zip(run.axes, weights(validation), strict=True)),
+        "pulled_to_others": dict(zip(run.axes, pulled_share(validation), strict=True)),
         "models": {name: _list(errors[0]) for name, errors in validation.by_model.items()},
         "models_drifted": {name: _list(errors[1:].max(axis=0)) for name, errors in validation.by_model.items()},
         "confusion": [_list(row) for row in confusion(predicted[0], truth)],

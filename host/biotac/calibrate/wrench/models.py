@@ -1,7 +1,7 @@
 """The models, all linear in their coefficients, solved from sums alone.
 
-Ridge shrinks toward what is known without the run and not toward zero: Lin's geometry. A coefficient the run says
-nothing about stays what that makes it.
+Ridge shrinks toward what is known without the run and not toward zero: Lin's geometry, and in other members of the pool
+the map of other fingers. A coefficient the run says nothing about stays what that makes it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from .moments import Sums
 
 # Per row, in units of each column's own variance; every model is fitted with both.
 LAMBDAS = (1e-5, 1e-3)
+# The same, toward the map of other fingers, which is worth more trust. Of F1 and F2, each with the other's, a third of
+# the recording is worth half of it without; on the whole it costs F1 a fiftieth and saves F2 a fifteenth.
+OTHERS_LAMBDAS = (1e-3, 1e-1)
 # A column that is constant in training has no variance to be measured in: without a floor it is free,
 # and a test row that moves it goes anywhere (the hinge model of biotac.md 5: R2 -34).
 COLUMN_FLOOR = 0.01
@@ -97,14 +100,26 @@ def solve(sums: Sums, lam: float) -> Floats:
 
 def pulled(sums: Sums, families: Sequence[Family]) -> list[Floats]:
     """Of each family, coefficients (2, p + 1, axes) of all columns, with each of LAMBDAS, pulled to Lin's scales."""
+    return _pulled_to(lin(sums), sums, families, LAMBDAS)
+
+
+def pulled_to_others(sums: Sums, families: Sequence[Family], others: Floats) -> list[Floats]:
+    """The same with OTHERS_LAMBDAS, force pulled to ``others`` (q + 1, 3), which have no columns of PDC."""
     known = lin(sums)
+    known[:, : others.shape[1]] = 0.0
+    known[: len(others) - 1, : others.shape[1]] = others[:-1]
+    known[-1, : others.shape[1]] = others[-1]
+    return _pulled_to(known, sums, families, OTHERS_LAMBDAS)
+
+
+def _pulled_to(known: Floats, sums: Sums, families: Sequence[Family], lambdas: Sequence[float]) -> list[Floats]:
     left = sums.left_by(known)
     result = []
     for family in families:
         index = family.index(len(known) - 1)
         own = left.part(index)
-        found = np.repeat(known[None], len(LAMBDAS), axis=0)
-        for k, lam in enumerate(LAMBDAS):
+        found = np.repeat(known[None], len(lambdas), axis=0)
+        for k, lam in enumerate(lambdas):
             found[k, np.append(index, -1)] += solve(own, lam)
         result.append(found)
     return result

@@ -1,4 +1,4 @@
-"""biotac flash [PORT] [IMAGE]"""
+"""biotac flash [PORT] [IMAGE], biotac flash --all [IMAGE]"""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ...errors import InputError, PortError
+from ...errors import FlashError, InputError, PortError
 from ...flash import Backup, Image, Loader, Outcome, Restored, Target, flash, read_backup, read_image
+from ...flash.carried import find_image
+from ...flash.every import Result, flash_every
 from ...flash.image import note_text
 from ...wire.identity import serial_text, version_text
 from ..progress import Progress
 
-EXAMPLE = "biotac flash /dev/ttyACM0 build/pico/biotac-pico.uf2"
-IMAGE = Path("build/pico/biotac-pico.uf2")
+EXAMPLE = "biotac flash /dev/ttyACM0"
 EMULATED = "emu:pico?source=press.toml"
 
 
@@ -28,8 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="device path or emu:pico?source=SOURCE (default: the only board there is)",
     )
     parser.add_argument(
-        "image", metavar="IMAGE", nargs="?", help=f".uf2 file (default: {IMAGE} of the clone you are in)"
+        "image", metavar="IMAGE", nargs="?", help=".uf2 file (default: the one that this package carries)"
     )
+    parser.add_argument("--all", action="store_true", help="every board that is plugged in and runs something else")
     parser.add_argument("--emulated", action="store_true", help=f"rehearse it on an emulated board: {EMULATED}")
     parser.add_argument(
         "--backup", type=Path, metavar="FILE", help="new file for the settings (default: one in this folder)"
@@ -45,12 +47,18 @@ def run(args: argparse.Namespace) -> int:
     """Flash, and say what the board says afterwards."""
     if args.backup is not None and args.no_backup:
         raise InputError("--backup and --no-backup contradict each other; leave one out")
-    port, path = sort_out(args.port, args.image, emulated=args.emulated)
+    port, path = sort_out(args.port, args.image, alone=args.emulated or args.all)
+    if args.all:
+        for flag in ("emulated", "backup", "restore"):
+            if getattr(args, flag):
+                raise InputError(f"--all is for every board that is plugged in, --{flag} for one; leave one out")
     image = read_image(path or find_image())
     kept = None if args.restore is None else read_backup(args.restore)
     say(f"{image.path}: {note_text(image.note)}")
+    if args.all:
+        return run_all(image, args)
     progress = Progress()
-    target, loaders = find_board(port)
+    target, loaders = find_board(EMULATED if args.emulated else port)
     try:
         outcome = flash(
             image,
@@ -75,21 +83,51 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def sort_out(port: str | None, image: str | None, *, emulated: bool) -> tuple[str | None, Path | None]:
+def run_all(image: Image, args: argparse.Namespace) -> int:
+    """Flash every board, say what became of each, and return 8 when one of them failed."""
+    from ...flash.target_serial import SerialTarget, gateway_ports
+
+    targets = [SerialTarget(port) for port in sorted(gateway_ports())]
+    if not targets:
+        raise PortError("no board is plugged in; `biotac list` shows what is there")
+    progress = Progress()
+    results = []
+    for result in flash_every(
+        image,
+        targets,
+        usb_loaders(),
+        keep=not args.no_backup,
+        downgrade=args.downgrade,
+        say=say,
+        show=lambda done, of: progress.show(f"{done} of {of} blocks"),
+    ):
+        progress.done()
+        results.append(result)
+        if result.error is not None:
+            say(f"{result.port}: {result.error}")
+        elif not args.json:
+            print(summary(result.outcome) if result.outcome else f"{result.port} runs this image already")
+    if args.json:
+        print(json.dumps([its_facts(image, result) for result in results]))
+    failed = [result.port for result in results if result.error is not None]
+    if failed:
+        raise FlashError(f"{len(failed)} of {len(results)} boards were not flashed: {', '.join(failed)}; see above")
+    return 0
+
+
+def its_facts(image: Image, result: Result) -> dict[str, Any]:
+    """One of several boards, for machines."""
+    error = None if result.error is None else str(result.error)
+    return {"port": result.port, "error": error} | (facts(image, result.outcome) if result.outcome else {})
+
+
+def sort_out(port: str | None, image: str | None, *, alone: bool) -> tuple[str | None, Path | None]:
     """Both words are optional: a single one is the image when it ends in .uf2, or can be nothing else."""
-    if image is None and port is not None and (emulated or port.lower().endswith(".uf2")):
+    if image is None and port is not None and (alone or port.lower().endswith(".uf2")):
         port, image = None, port
-    if emulated and port is not None:
-        raise InputError(f"--emulated stands for {EMULATED}, and {port} is another PORT; leave one out")
-    return EMULATED if emulated else port, None if image is None else Path(image)
-
-
-def find_image() -> Path:
-    """The image that was built in the clone around the working directory."""
-    for folder in (Path.cwd(), *Path.cwd().parents):
-        if (folder / IMAGE).is_file():
-            return folder / IMAGE
-    raise InputError(f"no {IMAGE} here or above; name the IMAGE, a .uf2 file (building one: firmware/boards/pico)")
+    if alone and port is not None:
+        raise InputError(f"--emulated and --all say which board, and {port} is another PORT; leave one out")
+    return port, None if image is None else Path(image)
 
 
 def find_board(port: str | None) -> tuple[Target, list[Loader]]:
@@ -100,16 +138,22 @@ def find_board(port: str | None) -> tuple[Target, list[Loader]]:
 
         emulated = EmulatedTarget(port)
         return emulated, [EmulatedLoader(emulated.board)]
-    from ...flash.loader_drive import DriveLoader
-    from ...flash.loader_picotool import PicotoolLoader
     from ...flash.target_serial import SerialTarget, only_port
 
-    loaders: list[Loader] = [DriveLoader(), PicotoolLoader()]
+    loaders = usb_loaders()
     port = port or only_port()
     if port is None and not any(loader.ready() for loader in loaders):
         cures = "; ".join(loader.cure() for loader in loaders)
         raise PortError(f"no board is there, neither running nor in its loader: {cures}; or name its PORT")
     return SerialTarget(port), loaders
+
+
+def usb_loaders() -> list[Loader]:
+    """The ways to a board that is in its loader on USB."""
+    from ...flash.loader_drive import DriveLoader
+    from ...flash.loader_picotool import PicotoolLoader
+
+    return [DriveLoader(), PicotoolLoader()]
 
 
 def facts(image: Image, outcome: Outcome) -> dict[str, Any]:

@@ -8,11 +8,19 @@ from . import contact as calibrate_contact
 from . import population as calibrate_population
 from . import pressure as calibrate_pressure
 from . import scale as calibrate_scale
+from . import weights as calibrate_weights
 from . import wrench as calibrate_wrench
 
 EXAMPLE = calibrate_wrench.EXAMPLE
 
-WHATS = (calibrate_wrench, calibrate_population, calibrate_scale, calibrate_pressure, calibrate_contact)
+WHATS = (
+    calibrate_wrench,
+    calibrate_population,
+    calibrate_scale,
+    calibrate_weights,
+    calibrate_pressure,
+    calibrate_contact,
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

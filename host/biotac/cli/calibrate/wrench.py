@@ -8,12 +8,14 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import biotac
 
+from ...calibrate.population import keeping
 from ...calibrate.reference.files import read_reference
 from ...calibrate.reference.mounting import read_mounting
 from ...calibrate.wrench import board, figures, fitted, provenance, report
@@ -52,6 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mounting", metavar="M", help="how its sensor is fixed: a .toml, or lin (axes are Lin's)")
     parser.add_argument(
         "--finger", metavar="NAME", type=values.finger, help="of a recording with several: name or chip select"
+    )
+    parser.add_argument(
+        "--population",
+        metavar="FILE",
+        default=None,
+        help="pull to this map of other fingers, or to none (the package's)",
     )
     parser.add_argument("--serial", metavar="BT...", default="", help="refuse data of another sensor than this")
     parser.add_argument("--force", action="store_true", help="overwrite what is there; take another sensor's data")
@@ -159,7 +167,12 @@ def fit(args: argparse.Namespace, loaded: Loaded, put: Put, more: dict[str, Any]
         windows = (1,) if args.as_recorded else WINDOWS_ROWS
         # clocks that were aligned by themselves leave no lag to look for
         its_own_lag = not args.as_recorded and not loaded.run.by_clocks
-        validation = validate(loaded.run, align=its_own_lag, windows=windows, show=progress.show)
+        run, others = loaded.run, None
+        if args.population != "none":
+            kept = keeping.load(None if args.population is None else Path(args.population))
+            others, note = keeping.others_than(kept, loaded.files)
+            run = replace(run, notes=(*run.notes, note))
+        validation = validate(run, align=its_own_lag, windows=windows, others=others, show=progress.show)
     finally:
         progress.done()
     its = loaded.provenance(int(time.time()))

@@ -148,6 +148,7 @@ def _recording(outcome: recording.Outcome) -> None:
     )
     print("CPU s to load to NumPy: " + ", ".join(f"{name} {taken:.3f}" for name, taken in outcome.load_s.items()))
     print(f"{outcome.faster:.1f}x  MCAP wire against protobuf")
+    print(f"{outcome.part:.2f}x  one finger's force against all frames")
 
 
 def _asked_mb(outcome: recording.Outcome) -> str:

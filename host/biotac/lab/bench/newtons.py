@@ -130,8 +130,7 @@ def _of_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Popula
         }, ["population maps are of the other recordings, symmetric as the package's"]
     kept = keeping.load(None)
     path = files[0]
-    seen = keeping.provenance_of([path], "", symmetric=True)["files"]
-    if set(seen.values()) & set(kept.provenance.get("files", {}).values()):
+    if keeping.made_of(kept, [path]):
         return {}, [f"the package's population map was made of {path.name}: name another finger's recording too"]
     return {path.name: kept.its}, ["the population map is the package's"]
 

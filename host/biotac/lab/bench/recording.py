@@ -26,6 +26,7 @@ ROUNDS = 3
 MB = 1e6
 ASKED_MCAP_MB = 40.0
 PARTS = ("wire", "plots", "index and headers")
+ALL, FORCE = "all frames", "one finger's force"
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,11 @@ class Outcome:
     protobuf_bytes: int
     floor_bytes: float
     load_s: dict[str, float]
+
+    @property
+    def part(self) -> float:
+        """CPU time to load one finger's force over that of all frames."""
+        return self.load_s[FORCE] / self.load_s[ALL]
 
     @property
     def faster(self) -> float:
@@ -76,6 +82,8 @@ def measure(source: str, *, fingers: int, seconds: float, show: Callable[[str], 
         for name, load in loaders.items():
             show(f"checking {name}")
             check_same(load(), content, name)
+        loaders[ALL] = lambda: biotac.load(mcap)
+        loaders[FORCE] = lambda: biotac.load(mcap, fields=["t_us", "force_n"], fingers=[0])
         show("loading")
         return Outcome(
             source=source,

@@ -1,0 +1,118 @@
+"""A scale or balance on a serial port, by what it prints.
+
+Two families of lines, which many makers' scales speak: MT-SICS (``S S     123.4 g``, and ``S D`` while it moves) and
+A&D's (``ST,+00123.4  g``, ``US,`` while it moves, with ``GS,`` or ``NT,`` between in the indicators'). Both answer the
+command SI with a line; a scale that prints by itself may pass over it. Written from published formats and tested
+against a scale that was made up: it has met no hardware.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from types import TracebackType
+from urllib.parse import parse_qsl
+
+import serial
+
+from ...errors import InputError, PortError
+from ...link.serial_port import describe_open_error
+
+UNITS_N = {"N": 1.0, "g": 9.80665e-3, "kg": 9.80665}
+ASK = b"SI\r\n"
+ASK_S = 0.25  # how often
+PATIENCE_S = 5.0  # a kitchen scale settles in one or two
+LEAST_N = 0.1  # less is an empty pan
+MAX_LINE_BYTES = 64
+_OPTIONS = {"baud": "9600", "bits": "8", "parity": "N", "stop": "1"}
+_FORM = "PORT[?baud=9600&bits=8&parity=N&stop=1]"
+_WEIGHT = re.compile(
+    r"(?:S[IR]*\s+(?P<moving>[SD])|(?P<settled>ST|US),(?:(?:GS|NT),)?)\s*"
+    r"(?P<number>[-+]?\s*\d+(?:\.\d*)?)\s*(?P<unit>[A-Za-z]+)"
+)
+_BEYOND = re.compile(r"S[IR]*\s+[-+]|OL,.*")
+
+
+class Scale:
+    """The scale at ``port``, opened with ``?baud=`` and its like. Raises InputError and PortError."""
+
+    def __init__(self, port: str, patience_s: float = PATIENCE_S) -> None:
+        place, _, query = port.partition("?")
+        options = _OPTIONS | dict(parse_qsl(query))
+        self._port, self._patience_s = place, patience_s
+        try:
+            if set(options) != set(_OPTIONS):
+                raise ValueError(f"option {', '.join(set(options) - set(_OPTIONS))}")
+            baud, bits, stop = (int(options[key]) for key in ("baud", "bits", "stop"))
+            self._serial = serial.serial_for_url(place, do_not_open=True, timeout=0.05, write_timeout=1.0)
+            self._serial.baudrate, self._serial.bytesize, self._serial.stopbits = baud, bits, stop
+            self._serial.parity = options["parity"].upper()
+        except ValueError as error:
+            raise InputError(f"{port}: {error}: expected {_FORM}, as the scale's menu says") from None
+        try:
+            self._serial.open()
+        except (serial.SerialException, OSError) as error:
+            raise PortError(describe_open_error(place, error)) from error
+
+    def __enter__(self) -> Scale:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._serial.close()
+
+    def force_n(self) -> float:
+        """What it shows now, in N, once it says that it has settled. Raises InputError and PortError."""
+        seen: list[str] = []
+        try:
+            self._serial.read(self._serial.in_waiting)  # what it said before the press
+            for line in self._lines():
+                seen.append(line)
+                value_n = self._settled_n(line)
+                if value_n is not None:
+                    return value_n
+        except (serial.SerialException, OSError) as error:
+            raise PortError(f"{self._port}: the scale went away ({error}); see to its cable") from error
+        if not seen:
+            raise InputError(
+                f"{self._port}: the scale is silent for {self._patience_s:g} s; switch its output on, and give its "
+                f"baud rate: {_FORM}"
+            )
+        if any(_WEIGHT.fullmatch(line) for line in seen):
+            raise InputError(
+                f"{self._port}: the scale did not settle in {self._patience_s:g} s, its last word was {seen[-1]!r}; "
+                "hold still, and begin again"
+            )
+        raise InputError(
+            f"{self._port}: {seen[-1]!r} is no weight: expected lines as 'S S  123.4 g' or 'ST,+0123.4  g'; choose "
+            f"that format on the scale, or its baud rate: {_FORM}"
+        )
+
+    def _lines(self) -> Iterator[str]:
+        """Whole lines until the patience is over, asking for one now and then."""
+        end = time.monotonic() + self._patience_s
+        ask, data = 0.0, b""
+        while (now := time.monotonic()) < end:
+            if now >= ask:
+                self._serial.write(ASK)
+                ask = now + ASK_S
+            data += self._serial.read(MAX_LINE_BYTES)
+            *lines, data = re.split(rb"[\r\n]+", data)
+            data = data[-MAX_LINE_BYTES:]
+            yield from (line.decode("ascii", "replace").strip() for line in lines if line.strip())
+
+    def _settled_n(self, line: str) -> float | None:
+        if _BEYOND.fullmatch(line):
+            raise InputError(f"{self._port}: {line!r}: the scale is beyond its range; press less, or take another")
+        found = _WEIGHT.fullmatch(line)
+        if found is None or found["moving"] == "D" or found["settled"] == "US":
+            return None
+        unit = found["unit"]
+        if unit not in UNITS_N:
+            raise InputError(f"{self._port}: {line!r}: expected {', '.join(UNITS_N)}; choose one on the scale")
+        value_n = float(found["number"].replace(" ", "")) * UNITS_N[unit]
+        if value_n < LEAST_N:
+            raise InputError(f"{self._port}: {line!r} while a finger presses: expected more; hold on until told")
+        return value_n

@@ -1,0 +1,144 @@
+"""What `calibrate scale` and `calibrate weights` share: a few presses make the population map the finger's own."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import biotac
+
+from ...calibrate.population import keeping
+from ...calibrate.population.presses import Fit, Held, found
+from ...calibrate.pressure.presses import Phase, Step
+from ...calibrate.wrench import board, fitted, provenance
+from ...calibrate.wrench.upload import upload
+from ...errors import InputError
+from ...hand.hand import Hand
+from ...partial_file import whole
+from ...recording import Recording
+from ...wire.identity import ascii_text
+from .. import values
+from ..recordings.loading import load
+
+WHY = "no better than the population map, or a finger unlike those; tare, and load its pad flat, firm and still"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which finger, and where the map goes."""
+    parser.add_argument("where", metavar="PORT|REC", help="a board, or a recording (.mcap) of such presses")
+    parser.add_argument("--finger", metavar="NAME", type=values.finger, required=True, help="name or chip select")
+    parser.add_argument("--population", metavar="FILE", type=Path, help="another map than the package's own")
+    parser.add_argument("--out", metavar="FILE", type=Path, help="the finger's map goes here (.wrench.json)")
+    parser.add_argument("--no-upload", action="store_true", help="leave the board as it is")
+    parser.add_argument("--save", action="store_true", help="have the board keep the map over a restart")
+    parser.add_argument("--force", action="store_true", help="overwrite what is there; upload what is not worth it")
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """``held`` of sensor ``serial``; ``hand`` is the board, or None for a recording."""
+
+    held: Held
+    serial: str
+    hand: Hand | None
+
+
+@contextmanager
+def pressed(
+    args: argparse.Namespace, guide: Callable[[Hand], Held], recorded: Callable[[Recording], Held]
+) -> Iterator[Pressed]:
+    """On a board by ``guide``, or ``recorded``. Raises InputError."""
+    if args.out is not None and args.out.exists() and not args.force:
+        raise InputError(f"{args.out} exists and would be overwritten; choose another name or say --force")
+    if Path(args.where).is_file() or args.where.endswith(".mcap"):
+        if args.save:
+            raise InputError("a recording goes to no board: expected no --save; that is for boards")
+        recording = load(Path(args.where))
+        serial = next((ascii_text(its.serial) for its in recording.sensors if its.finger == args.finger), "")
+        yield Pressed(recorded(recording), serial, None)
+        return
+    with biotac.open(args.where) as hand:
+        if args.finger not in hand.fingers:
+            raise InputError(f"finger {args.finger} does not answer: expected one of {hand.fingers}; see to its cable")
+        held = guide(hand)
+        yield Pressed(held, ascii_text(hand.sensor_info(args.finger).serial), hand)
+
+
+class Guide:
+    """What to do, on stderr, so that stdout is the result's alone; ``press`` says it in words."""
+
+    def __init__(self, press: Callable[[Step], str], force_n: Callable[[Step], float], held: str) -> None:
+        self._press, self._force_n, self._held = press, force_n, held
+
+    def show(self, step: Step | None) -> None:
+        """See guided.Face."""
+        if step is not None:
+            words = {Phase.REST: "let go, and leave it alone", Phase.RELEASE: self._held}
+            said = self._press(step) if step.phase is Phase.PRESS else words[step.phase]
+            print(f"biotac: {said}", file=sys.stderr)
+
+    def force_n(self, step: Step) -> float:
+        """See guided.Face."""
+        return self._force_n(step)
+
+
+def tell(
+    args: argparse.Namespace, its: Pressed, fit: Fit, how: str, more: Callable[[keeping.Kept], dict[str, Any]]
+) -> dict[str, Any]:
+    """Fit, say what it is worth; then, and only if it is worth it, onto the board. What was found as JSON types.
+
+    ``how`` says where the force is from, ``more`` what else was found.
+    """
+    kept = keeping.load(args.population)
+    result = found(kept.its, its.held, fit)
+    own = result.own.wrench_map(its.held.tare)
+    run, made_s = its.held.run(args.where), int(time.time())
+    facts: dict[str, Any] = {
+        "finger": args.finger,
+        "serial": its.serial,
+        "presses": len(its.held.force_n),
+        **more(kept),
+        "before_n": result.before_n.tolist(),
+        "held_out_n": result.held_out_n.tolist(),
+        "worth_it": result.worth_it(kept.sigma_scale5_n),
+        "sigma_n": kept.sigma_scale5_n.tolist(),
+        "fixed_point": board.summary(own, run),
+    }
+    if args.out is not None:
+        origin = provenance.Provenance(
+            its.serial, made_s, kept.provenance.get("software", ""), (args.where,), "",
+            f"{len(its.held.force_n)} {how}; population map of {', '.join(kept.provenance.get('files', {}))}",
+        )  # fmt: skip
+        with whole(args.out, overwrite=args.force) as place:
+            place.write_text(provenance.embed(fitted.dumps(own), origin), encoding="utf-8")
+        facts["written"] = str(args.out)
+    if its.hand is not None and not args.no_upload and (facts["worth_it"] or args.force):
+        facts["board"] = upload(its.hand, args.finger, own, run, serial=its.serial, made_s=made_s).facts()
+        if args.save:
+            its.hand.save_settings()
+    return facts
+
+
+def show(args: argparse.Namespace, facts: dict[str, Any], title: str) -> None:
+    """On stdout, as JSON or in lines."""
+
+    def numbers(of: Sequence[float]) -> str:
+        return "  ".join(f"{value:5.2f}" for value in of)
+
+    lines = [
+        f"finger {facts['finger']}, {title}",
+        f"  error along x, y, z before:   {numbers(facts['before_n'])} N",
+        f"  of each press by the others:  {numbers(facts['held_out_n'])} N",
+        f"  one sigma after five presses: {numbers(facts['sigma_n'])} N, with shear",
+        *([] if facts["worth_it"] else [f"  not worth having: {WHY}"]),
+        *([f"  written: {facts['written']}"] if "written" in facts else []),
+        "  on the board until it restarts (--save keeps it)" if "board" in facts else "  the board is as it was",
+    ]
+    print(json.dumps(facts) if args.json else "\n".join(lines))

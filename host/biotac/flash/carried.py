@@ -1,0 +1,26 @@
+"""The image that is flashed when none is named: the package's own, which a released wheel carries."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import InputError
+
+CARRIED = Path(__file__).with_name("biotac-pico.uf2")  # host/CMakeLists.txt puts it there
+BUILT = Path("build/pico/biotac-pico.uf2")  # of a clone
+
+
+def find_image() -> Path:
+    """The image that this package carries; without one that of the clone around the working directory.
+
+    Raises InputError when there is neither.
+    """
+    if CARRIED.is_file():
+        return CARRIED
+    for folder in (Path.cwd(), *Path.cwd().parents):
+        if (folder / BUILT).is_file():
+            return folder / BUILT
+    raise InputError(
+        f"this biotac-gateway was built without the board's image, and no {BUILT} is here or above; install a released "
+        "wheel, or name the IMAGE, a .uf2 file (building one: firmware/boards/pico)"
+    )

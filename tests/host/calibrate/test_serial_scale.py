@@ -1,0 +1,121 @@
+"""A scale on a serial port: a pseudo-terminal that prints what scales print, asked or not."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import threading
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from biotac.calibrate.reference.scale import Scale
+from biotac.cli.main import main
+from biotac.errors import InputError, PortError
+
+G = 9.80665
+PATIENCE_S = 0.6
+
+
+@contextmanager
+def printing(lines: list[bytes]) -> Iterator[str]:
+    """The path of a scale that answers every request with the next of ``lines``, the last one again and again."""
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    waiting, over = list(lines), threading.Event()
+
+    def answer() -> None:
+        asked = b""
+        while not over.is_set():
+            if not select.select([ours], [], [], 0.02)[0]:
+                continue
+            asked += os.read(ours, 64)
+            if asked.endswith(b"\r\n"):
+                asked = b""
+                os.write(ours, waiting[0])
+                del waiting[: len(waiting) > 1]
+
+    thread = threading.Thread(target=answer, daemon=True)
+    thread.start()
+    try:
+        yield os.ttyname(theirs)
+    finally:
+        over.set()
+        thread.join()
+        os.close(theirs)
+        os.close(ours)
+
+
+@pytest.mark.parametrize(
+    ("printed", "force_n"),
+    [
+        (b"S S     100.00 g\r\n", 0.1 * G),
+        (b"S S      0.123 kg\r\n", 0.123 * G),
+        (b"ST,+00123.4  g\r\n", 0.1234 * G),
+        (b"ST,GS,+  0.500kg\r\n", 0.5 * G),
+        (b"ST,+0002.50  N\r\n", 2.5),
+        (b"123.4  g\r\nST,+00200.0  g\r\n", 0.2 * G),  # begun in the middle of a line
+        (b"US,+00400.0  g\r\nS D     300.0 g\r\nS S     250.0 g\r\n", 0.25 * G),
+    ],
+)
+def test_what_scales_print_is_newtons(printed: bytes, force_n: float) -> None:
+    with printing([printed]) as port, Scale(port, PATIENCE_S) as scale:
+        assert scale.force_n() == pytest.approx(force_n)
+        assert scale.force_n() == pytest.approx(force_n)
+
+
+def test_it_waits_until_the_scale_has_settled() -> None:
+    lines = [b"US,+00100.0  g\r\n", b"US,+00180.0  g\r\n", b"ST,+00200.0  g\r\n"]
+    with printing(lines) as port, Scale(port) as scale:
+        assert scale.force_n() == pytest.approx(0.2 * G)
+
+
+@pytest.mark.parametrize(
+    ("printed", "words"),
+    [
+        (b"", "is silent for 0.6 s"),
+        (b"\x83\xfe\x11\r\n", "is no weight"),
+        (b"hello\r\n", "'hello' is no weight"),
+        (b"S D     100.00 g\r\n", "did not settle"),
+        (b"US,+00123.4  g\r\n", "did not settle"),
+        (b"S +\r\n", "beyond its range"),
+        (b"OL,+9999999  g\r\n", "beyond its range"),
+        (b"S S     10.00 oz\r\n", "expected N, g, kg"),
+        (b"ST,+00000.0  g\r\n", "while a finger presses"),
+        (b"ST,-00120.0  g\r\n", "while a finger presses"),
+    ],
+)
+def test_what_is_no_reading_is_one_line(printed: bytes, words: str) -> None:
+    with printing([printed]) as port, Scale(port, PATIENCE_S) as scale, pytest.raises(InputError) as refused:
+        scale.force_n()
+    assert words in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("query", ["?baud=fast", "?speed=9600", "?parity=X"])
+def test_a_form_that_is_not_known_is_refused(query: str) -> None:
+    with pytest.raises(InputError, match="baud=9600"):
+        Scale(f"/dev/null{query}")
+
+
+def test_a_port_that_is_not_there_is_named() -> None:
+    with pytest.raises(PortError, match="no port /dev/nowhere"):
+        Scale("/dev/nowhere")
+
+
+def test_a_scale_that_is_unplugged_is_told() -> None:
+    with printing([b"S S 1 g\r\n"]) as port:
+        scale = Scale(port)
+    with scale, pytest.raises(PortError, match="went away"):
+        scale.force_n()
+
+
+def test_a_calibration_reads_the_scale_at_every_press(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["calibrate", "scale", "sim:fingers.toml?fingers=1", "--finger", "index", "--presses", "3", "--json"]
+    shown = [b"S S     204.0 g\r\n", b"S S     357.0 g\r\n", b"S S     510.0 g\r\n"]
+    with printing(shown) as port:
+        assert main([*words, "--scale", f"{port}?baud=9600"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["shown_n"] == pytest.approx([0.204 * G, 0.357 * G, 0.510 * G])

@@ -1,0 +1,142 @@
+"""`biotac calibrate weights`: the emulated finger by what its scenario applied, judged on loads that it lacks."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import wrench_run
+
+from biotac.calibrate.population import fewshot, keeping, training, weights
+from biotac.calibrate.population.presses import Held, found
+from biotac.calibrate.wrench import fitted
+from biotac.calibrate.wrench.run import load_run
+from biotac.cli.main import main
+from biotac.core.geometry import RADIUS_MM
+from biotac.errors import InputError
+from biotac.sim.loading import load_source
+from biotac.sim.physics import Finger, States
+
+G = 9.80665
+
+
+@pytest.fixture(scope="module")
+def others(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A population map of two emulated fingers that are not the scenario's."""
+    folder = tmp_path_factory.mktemp("others")
+    runs = [load_run(wrench_run.save(folder / f"{k}.npz", wrench_run.fields(4000, seed=k))) for k in (1, 2)]
+    some = [replace(run, counts=run.counts[::4], truth=run.truth[::4]) for run in runs]
+    its = training.train([training.sums_of(run) for run in some])
+    place = folder / "population.json"
+    place.write_text(keeping.dumps(keeping.Kept(its, np.full(3, 0.5), np.full(3, 0.5), {})), encoding="utf-8")
+    return place
+
+
+@pytest.mark.parametrize(
+    ("down", "force"),
+    [
+        ("the tip", (0.5, 0.0, 0.8660254)),
+        ("the base", (-0.5, 0.0, 0.8660254)),
+        ("E11's side", (0.0, 0.5, 0.8660254)),
+        ("E1's side", (0.0, -0.5, 0.8660254)),
+    ],
+)
+def test_a_block_turns_a_part_of_the_weight_to_the_side_that_is_down(down: str, force: tuple[float, ...]) -> None:
+    load = weights.Load(300.0, 30.0, down)
+    assert load.toward == pytest.approx(force)
+    assert load.size_n == pytest.approx(0.3 * G)
+
+
+def test_the_plan_is_every_mass_on_every_block() -> None:
+    its = weights.plan((200.0, 500.0), (10.0, 20.0))
+    assert len(its) == len(set(its)) == 2 * (1 + 2 * 4)
+    assert str(its[0]) == "200 g on the pad, the block level"
+    assert str(its[-1]) == "500 g on the pad, the block tilted by 20 deg, E1's side down"
+
+
+@pytest.mark.parametrize(
+    ("masses", "tilts", "words"),
+    [((), (15.0,), "50 to 2000 g"), ((5.0,), (), "masses of 5 g"), ((200.0,), (45.0,), "tilts of 45 deg")],
+)
+def test_weights_that_no_finger_holds_are_refused(
+    masses: tuple[float, ...], tilts: tuple[float, ...], words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        weights.plan(masses, tilts)
+
+
+def test_the_scenario_applies_what_the_plan_says() -> None:
+    """The bundled one, for those who try it without hardware."""
+    known = load_source("weights.toml").known_force_n
+    assert known is not None
+    held = known[:, 0][known[:, 0, 2] > 1.5]
+    for load in weights.plan(weights.MASSES_G, weights.TILTS_DEG):
+        wanted = load.size_n * np.array(load.toward)
+        assert (np.linalg.norm(held - wanted, axis=1) < 1e-3).sum() > 100
+
+
+def test_weights_mend_the_map_of_other_fingers(
+    others: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "own.wrench.json"
+    words = ["calibrate", "weights", "sim:weights.toml?seconds=240", "--finger", "index", "--population", str(others)]
+    assert main([*words, "--out", str(out), "--json"]) == 0
+    captured = capsys.readouterr()
+    facts = json.loads(captured.out)
+    assert "weight 3 of 10: 200 g on the pad, the block tilted by 15 deg, the tip down" in captured.err
+    assert facts["presses"] == 10 and facts["worth_it"]
+    assert facts["board"]["frames_bit_for_bit"] > 0 and facts["board"]["outside"] == 0
+    counts, rest, truth = between()
+    before = rms(keeping.load(others).its.force(counts, rest) - truth)
+    own = fitted.load(out)
+    after = rms(own.predict(counts - rest + own.tare) - truth)
+    assert np.linalg.norm(after) < 0.9 * np.linalg.norm(before)
+    assert after[2] < 0.7 * before[2]
+
+
+def between() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Counts, those at rest, and force in N: the scenario's finger under weights and tilts that it does not have."""
+    loads = [load for x in (-10.0, -7.0, -3.0) for load in weights.plan((300.0, 600.0), (10.0, 20.0))]
+    force = np.array([load.size_n * np.array(load.toward) for load in loads])
+    contact = np.array([[x, 0.0, -RADIUS_MM] for x in (-10.0, -7.0, -3.0) for _ in range(len(loads) // 3)])
+    shear, nothing = force * [1.0, 1.0, 0.0], np.zeros(len(loads))
+    finger = Finger(3)
+    states = States(contact, force[:, 2], shear, nothing, np.full(len(loads), 4.0), nothing)
+    return finger.counts(states), finger.rest_counts(np.zeros(1))[0], force
+
+
+def rms(error: np.ndarray) -> np.ndarray:
+    return np.sqrt((error**2).mean(axis=0))
+
+
+def test_a_recording_says_the_same_and_goes_to_no_board(
+    others: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = tmp_path / "weights.mcap"
+    assert main(["record", "sim:weights.toml", str(recording)]) == 0
+    capsys.readouterr()
+    words = ["calibrate", "weights", str(recording), "--finger", "0", "--population", str(others), "--json"]
+    assert main(words) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["serial"] == "BTSIM00000000003" and "board" not in facts
+    assert np.linalg.norm(facts["force_n"], axis=1) == pytest.approx([0.2 * G, 0.5 * G] * 5)
+    assert main([*words, "--masses", "200,500,700"]) != 0  # more than were laid on it
+    assert "press 11" in capsys.readouterr().err
+    assert main([*words, "--save"]) != 0
+    assert "--save" in capsys.readouterr().err
+
+
+def test_axes_that_are_mixed_are_told_apart() -> None:
+    """What nine numbers can say: a finger that answers with its axes turned and stretched."""
+    its = keeping.load(None).its
+    firm = training.Population(100.0 * its.coefficients, its.variance)  # so that the prior says little
+    rng = np.random.default_rng(7)
+    counts = 2800.0 - np.abs(rng.normal(200.0, 80.0, (12, 19)))
+    tare = np.full(19, 2800.0)
+    mixing = np.array([[0.9, 0.1, -0.1], [0.05, 1.2, 0.1], [0.1, -0.1, 1.1]])
+    held = Held(counts, tare, np.arange(12), firm.force(counts, tare) @ mixing)
+    result = found(firm, held, fewshot.weighed)
+    assert (result.held_out_n < 0.2 * result.before_n).all()
