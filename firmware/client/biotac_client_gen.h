@@ -7,7 +7,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0xFEAC80E4u
+#define BT_SCHEMA_HASH 0x2823160Du
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -75,6 +75,19 @@ enum bt_board {
     BT_BOARD_POSIX_SIM = 1, // a process on a pty with emulated sensors
     BT_BOARD_PICO = 2, // Raspberry Pi Pico (RP2040)
     BT_BOARD_LINUX_SBC = 3, // a Linux computer with the sensors on its own SPI bus (spidev)
+    BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico that is itself one to five emulated sensors (firmware/boards/pico_sensor): it knows HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages, and nothing else
+};
+
+// What an emulated sensor does instead of answering rightly. A tape holds the same codes in place of counts.
+enum bt_emu_fault {
+    BT_EMU_FAULT_NONE = 0, // nothing: it answers
+    BT_EMU_FAULT_SWAPPED = 65529, // unplugged, and it will be another sensor that is plugged in
+    BT_EMU_FAULT_UNPLUGGED = 65530, // no sensor or no power: MISO let go; afterwards it is mute until asked for a property
+    BT_EMU_FAULT_TOO_EARLY = 65531, // late: it answers as if the 50 us had not passed
+    BT_EMU_FAULT_STUCK_HIGH = 65532, // MISO high throughout
+    BT_EMU_FAULT_STUCK_LOW = 65533, // silence: MISO low throughout
+    BT_EMU_FAULT_BAD_PARITY = 65534, // one bit of the word flipped
+    BT_EMU_FAULT_NO_CHANNEL = 65535, // the sensor has no such channel
 };
 
 // Whether a finger's calibration, or map, is what its results come from.
@@ -635,6 +648,59 @@ typedef struct {
     uint32_t finger_faults[5]; // [flags frame] STATUS.finger_faults, likewise
 } bt_msg_clear_faults;
 
+// How an emulated sensor board gets on. Reply to every EMU command. Counts are since EMU_PLUG of finger 0.
+#define BT_EMU_STATUS_ID 0x40
+#define BT_EMU_STATUS_BYTES 30
+typedef struct {
+    uint8_t req_id; // [1] of the command
+    uint8_t fingers; // [bit mask] plugged in
+    uint32_t slots_taken; // [1] of the tape, from the host: the next EMU_TAPE begins here
+    uint16_t room_slots; // [1] that fit behind them now
+    uint32_t slots_served; // [1] of the tape, that the bus has come past
+    uint32_t elapsed_us; // [us] by this board's clock, from its first sample command to the latest; wraps
+    uint32_t words; // [1] answers that the bus has read
+    uint32_t words_late; // [1] of them, not ready in the bus's own time: MISO was let go, or the answer was one of two for other times
+    uint32_t samples_starved; // [1] asked for behind what had come of the tape: MISO was let go
+    uint16_t slowest_us; // [us] the longest that an answer took from the select's rise; the bus leaves 50 us
+} bt_msg_emu_status;
+
+// Plug a sensor in or out. Finger 0's forgets the tape, the faults and the counts, and so comes first.
+#define BT_EMU_PLUG_ID 0xC0
+#define BT_EMU_PLUG_BYTES 19
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] chip select index
+    uint8_t present; // [bool] 0: nothing is there
+    uint8_t serial[16]; // [ASCII] serial number; all zero: one is made up
+} bt_msg_emu_plug;
+
+// The next slots of the tape. What does not fit, or begins elsewhere than at slots_taken, is left: EMU_STATUS tells where to go on. The bus is served in the tape's order, sample by sample as it asks.
+#define BT_EMU_TAPE_ID 0xC1
+#define BT_EMU_TAPE_BYTES 227
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t fingers; // [1] on the tape; the same in all of it
+    uint8_t slots; // [1] in this message: slots * fingers is at most 110
+    uint32_t first_slot; // [1] since the tape's begin
+    uint8_t samples[220]; // [1] u16, little-endian, of slots * fingers samples, slot by slot: a count or an emu_fault; the rest is ignored
+} bt_msg_emu_tape;
+
+// What a sensor does from now on, whatever its tape says.
+#define BT_EMU_SET_FAULT_ID 0xC2
+#define BT_EMU_SET_FAULT_BYTES 4
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint8_t finger; // [1] chip select index
+    uint16_t fault; // [enum emu_fault] NONE ends it
+} bt_msg_emu_set_fault;
+
+// Ask how the board gets on.
+#define BT_EMU_GET_STATUS_ID 0xC3
+#define BT_EMU_GET_STATUS_BYTES 1
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+} bt_msg_emu_get_status;
+
 #ifdef BT_CLIENT_LAYOUT
 // Of each message: id, how many runs, and the runs; a run is the size's logarithm (2 bits) and a count (6).
 static const uint8_t bt_client_layout[] = {
@@ -681,6 +747,11 @@ static const uint8_t bt_client_layout[] = {
     BT_HOLD_ID, 1, 0x02,
     BT_RELEASE_ID, 1, 0x02,
     BT_CLEAR_FAULTS_ID, 3, 0x01, 0x41, 0x85,
+    BT_EMU_STATUS_ID, 5, 0x02, 0x81, 0x41, 0x85, 0x41,
+    BT_EMU_PLUG_ID, 1, 0x13,
+    BT_EMU_TAPE_ID, 6, 0x03, 0x81, 0x3F, 0x3F, 0x3F, 0x1F,
+    BT_EMU_SET_FAULT_ID, 2, 0x02, 0x41,
+    BT_EMU_GET_STATUS_ID, 1, 0x01,
     0, 0,
 };
 _Static_assert(sizeof(bt_msg_hello) == 48, "numbers lie at multiples of their size");
@@ -726,6 +797,11 @@ _Static_assert(sizeof(bt_msg_clear_map) == 2, "numbers lie at multiples of their
 _Static_assert(sizeof(bt_msg_hold) == 2, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_release) == 2, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_clear_faults) == 24, "numbers lie at multiples of their size");
+_Static_assert(sizeof(bt_msg_emu_status) == 36, "numbers lie at multiples of their size");
+_Static_assert(sizeof(bt_msg_emu_plug) == 19, "numbers lie at multiples of their size");
+_Static_assert(sizeof(bt_msg_emu_tape) == 228, "numbers lie at multiples of their size");
+_Static_assert(sizeof(bt_msg_emu_set_fault) == 4, "numbers lie at multiples of their size");
+_Static_assert(sizeof(bt_msg_emu_get_status) == 1, "numbers lie at multiples of their size");
 #endif
 
 #ifdef BT_CLIENT_FIELDS // for tests: X(name, type, count) for every field
@@ -772,7 +848,12 @@ _Static_assert(sizeof(bt_msg_clear_faults) == 24, "numbers lie at multiples of t
 #define BT_HOLD_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
 #define BT_RELEASE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
 #define BT_CLEAR_FAULTS_FIELDS(X) X(req_id, u8, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults)
+#define BT_EMU_STATUS_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots_taken, u32, 1) X(room_slots, u16, 1) X(slots_served, u32, 1) X(elapsed_us, u32, 1) X(words, u32, 1) X(words_late, u32, 1) X(samples_starved, u32, 1) X(slowest_us, u16, 1)
+#define BT_EMU_PLUG_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(serial, u8, 16)
+#define BT_EMU_TAPE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots, u8, 1) X(first_slot, u32, 1) X(samples, u8, 220)
+#define BT_EMU_SET_FAULT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(fault, u16, 1)
+#define BT_EMU_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status)
 #endif
 
 #endif

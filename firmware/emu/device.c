@@ -11,18 +11,16 @@ enum pending {
     REFUSAL,  // word holds an error word
 };
 
-static unsigned ones(uint8_t byte)
+static bool has_odd_parity(unsigned byte)
 {
-    unsigned n = 0;
-    for (; byte != 0; byte = (uint8_t)(byte & (byte - 1))) {
-        n++;
-    }
-    return n;
+    byte ^= byte >> 4;
+    byte ^= byte >> 2;
+    return (byte ^ byte >> 1) & 1;
 }
 
 static uint8_t with_odd_parity(uint8_t byte)
 {
-    return (uint8_t)(byte | (ones(byte) % 2 == 0));
+    return (uint8_t)(byte | !has_odd_parity(byte));
 }
 
 static uint16_t data_word(uint16_t count)
@@ -59,9 +57,9 @@ static void lose_power(bt_emu_device *device, bool swapped)
 // A fault of the line as it is now, or 0.
 static uint16_t line_fault(bt_emu_device *device, uint16_t said)
 {
-    if (said == BT_EMU_SWAPPED || said == BT_EMU_UNPLUGGED) {
-        lose_power(device, said == BT_EMU_SWAPPED);
-        return BT_EMU_UNPLUGGED;
+    if (said == BT_EMU_FAULT_SWAPPED || said == BT_EMU_FAULT_UNPLUGGED) {
+        lose_power(device, said == BT_EMU_FAULT_SWAPPED);
+        return BT_EMU_FAULT_UNPLUGGED;
     }
     device->unplugged = false;
     return said > BT_FULL_SCALE_COUNT ? said : 0;
@@ -77,20 +75,20 @@ static void latch_sample(bt_emu_device *device, uint8_t channel, uint64_t t_ns)
     uint16_t count = device->source(device->context, device->finger, channel, t_ns);
     device->pending = SAMPLE;
     switch (line_fault(device, count)) {
-    case BT_EMU_NO_CHANNEL:
+    case BT_EMU_FAULT_NO_CHANNEL:
         device->word = BT_ERROR_WORD_NO_CHANNEL;
         break;
-    case BT_EMU_BAD_PARITY:
+    case BT_EMU_FAULT_BAD_PARITY:
         device->word = data_word(2048) ^ 0x0010;
         break;
-    case BT_EMU_UNPLUGGED:
-    case BT_EMU_STUCK_LOW:
+    case BT_EMU_FAULT_UNPLUGGED:
+    case BT_EMU_FAULT_STUCK_LOW:
         device->word = 0x0000;
         break;
-    case BT_EMU_STUCK_HIGH:
+    case BT_EMU_FAULT_STUCK_HIGH:
         device->word = 0xFFFF;
         break;
-    case BT_EMU_TOO_EARLY:
+    case BT_EMU_FAULT_TOO_EARLY:
         device->word = BT_ERROR_WORD_SAMPLING_DELAY;
         break;
     default:
@@ -140,7 +138,7 @@ static void put_pattern(bt_emu_device *device)
 
 static void look_up_property(bt_emu_device *device, uint8_t selector, uint64_t t_ns)
 {
-    if (line_now(device, t_ns) == BT_EMU_UNPLUGGED) {
+    if (line_now(device, t_ns) == BT_EMU_FAULT_UNPLUGGED) {
         return;
     }
     device->pending = PROPERTY;
@@ -173,51 +171,81 @@ static void look_up_property(bt_emu_device *device, uint8_t selector, uint64_t t
 
 // ---- the shift register -----------------------------------------------------------------------------
 
-// What the line makes of a byte that is no sample's.
-static uint8_t through_the_line(bt_emu_device *device, uint8_t byte, uint64_t t_ns)
+// What the line makes of a byte that is no sample's, the low one of two or the other.
+static uint8_t on_the_line(uint8_t byte, uint16_t fault, bool low)
 {
-    unsigned low = device->position & 1;
-    switch (line_now(device, t_ns)) {
-    case 0:
+    switch (fault) {
+    case BT_EMU_FAULT_NONE:
         return byte;
-    case BT_EMU_STUCK_HIGH:
+    case BT_EMU_FAULT_STUCK_HIGH:
         return 0xFF;
-    case BT_EMU_BAD_PARITY:
+    case BT_EMU_FAULT_BAD_PARITY:
         return byte ^ 0x10;
-    case BT_EMU_TOO_EARLY:
+    case BT_EMU_FAULT_TOO_EARLY:
         return (uint8_t)(BT_ERROR_WORD_DELAY >> (low ? 0 : 8));
-    case BT_EMU_NO_CHANNEL:
+    case BT_EMU_FAULT_NO_CHANNEL:
         return (uint8_t)(BT_ERROR_WORD_NO_CHANNEL >> (low ? 0 : 8));
     default:
         return 0x00;
     }
 }
 
-// Two bytes, as of the moment at which the first of them begins; they count as given.
-static uint16_t answer(bt_emu_device *device)
+// Two bytes of what is no property.
+static uint16_t word_now(const bt_emu_device *device, bool settled)
 {
     if (device->pending == NOTHING) {
         return device->unplugged ? 0x0000 : BT_ERROR_WORD_NO_DATA;
     }
-    if (!device->settled) {
+    if (!settled) {
         return device->pending == SAMPLE ? BT_ERROR_WORD_SAMPLING_DELAY : BT_ERROR_WORD_DELAY;
     }
-    device->pending = NOTHING;
     return device->word;
+}
+
+// As of the moment at which the first of its bytes begins; they count as given.
+static uint16_t answer(bt_emu_device *device)
+{
+    uint16_t word = word_now(device, device->settled);
+    if (device->settled) {
+        device->pending = NOTHING;
+    }
+    return word;
+}
+
+static uint8_t property_byte(const bt_emu_device *device, unsigned at)
+{
+    return at < device->property_bytes ? device->property[at] : 0;
 }
 
 static uint8_t shift_out(bt_emu_device *device, uint64_t t_ns)
 {
+    bool low = device->position & 1;
     if (device->pending == PROPERTY && device->settled) {
-        bool more = device->property_at < device->property_bytes;
-        return through_the_line(device, more ? device->property[device->property_at++] : 0, t_ns);
+        uint8_t byte = property_byte(device, device->property_at);
+        device->property_at = (uint8_t)(device->property_at + (device->property_at < device->property_bytes));
+        return on_the_line(byte, line_now(device, t_ns), low);
     }
-    if (device->position % 2 == 0) {
+    if (!low) {
         uint16_t word = answer(device);
         device->out[0] = (uint8_t)(word >> 8);
         device->out[1] = (uint8_t)word;
     }
-    return device->out[device->position % 2];
+    return device->out[low];
+}
+
+uint16_t bt_emu_word_ahead(const bt_emu_device *device, unsigned bytes, bool settled, uint64_t t_ns)
+{
+    if (!device->present) {
+        return 0x0000;
+    }
+    if (device->pending != PROPERTY || !settled) {
+        return word_now(device, settled);
+    }
+    uint16_t said = device->source(device->context, device->finger, BT_EMU_LINE, t_ns);
+    uint16_t fault = said > BT_FULL_SCALE_COUNT ? said : BT_EMU_FAULT_NONE;
+    unsigned at = device->property_at + bytes;
+    uint8_t high = on_the_line(property_byte(device, at), fault, false);
+    return (uint16_t)(high << 8 | on_the_line(property_byte(device, at + 1), fault, true));
 }
 
 static void take_first_byte(bt_emu_device *device, uint8_t mosi, uint64_t t_ns)
@@ -229,7 +257,7 @@ static void take_first_byte(bt_emu_device *device, uint8_t mosi, uint64_t t_ns)
     }
     device->settled = false;
     if (mosi & 0x80) {
-        if (ones(mosi) % 2 == 1) {
+        if (has_odd_parity(mosi)) {
             latch_sample(device, (uint8_t)((mosi & 0x7E) >> 1), t_ns);
         } else {
             refuse(device, BT_ERROR_WORD_COMMAND_PARITY);

@@ -18,32 +18,22 @@
 //   them one by one); behind the last come zeros.
 // - `mute`: some sensors "sent all zeroes" until a property had been read (users of CLIB), so with power
 // coming back. What a real sensor says to a read that nothing asked for is not known: here 0xA55F, so that no
-// old data is taken for new. Where the counts come from is a function; faults are counts too, see enum
-// bt_emu_fault. Times are ns since the emulation began.
+// old data is taken for new. Where the counts come from is a function; faults are counts too: enum
+// bt_emu_fault of the wire. Times are ns since the emulation began.
 #ifndef BIOTAC_EMU_DEVICE_H
 #define BIOTAC_EMU_DEVICE_H
 
+#include "wire/messages_gen.h"
 #include "wire/sensor_gen.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
-// What a source may return instead of 0..4095: the fault of this one sample.
-enum bt_emu_fault {
-    BT_EMU_SWAPPED = 0xFFF9,    // unplugged, and it will be another sensor that is plugged in
-    BT_EMU_UNPLUGGED = 0xFFFA,  // no sensor, or no power: MISO low, and afterwards it is mute
-    BT_EMU_TOO_EARLY = 0xFFFB,  // answers as if the 50 us had not passed
-    BT_EMU_STUCK_HIGH = 0xFFFC, // MISO high throughout
-    BT_EMU_STUCK_LOW = 0xFFFD,  // MISO low throughout
-    BT_EMU_BAD_PARITY = 0xFFFE, // one bit of the word flipped
-    BT_EMU_NO_CHANNEL = 0xFFFF, // the sensor has no such channel
-};
-
 // The channel that stands for the line itself, of which a source is asked where no sample is taken: 0, or the
 // fault that it has now.
 #define BT_EMU_LINE 64
 
-// Count of a channel (its number on the bus, 0..63) of one finger at a time; 0..4095 or a fault.
+// Count of a channel (its number on the bus, 0..63) of one finger at a time; 0..4095 or an enum bt_emu_fault.
 typedef uint16_t (*bt_emu_source)(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns);
 
 #define BT_EMU_PROPERTY_BYTES (2 * BT_SLOTS) // the list of channels
@@ -81,5 +71,9 @@ void bt_emu_select(bt_emu_device *device, bool low, uint64_t t_ns);
 // Returns what this device drives on MISO. Call for selected devices only. A word is two bytes, MSB first.
 uint8_t bt_emu_transfer8(bt_emu_device *device, uint8_t mosi, uint64_t t_ns);
 uint16_t bt_emu_transfer16(bt_emu_device *device, uint16_t mosi, uint64_t t_ns);
+
+// The two bytes that it would say if it were selected now, its 50 us over or not, whatever the master sends;
+// of a property those so many bytes further on.
+uint16_t bt_emu_word_ahead(const bt_emu_device *device, unsigned bytes, bool settled, uint64_t t_ns);
 
 #endif

@@ -52,7 +52,7 @@ uint16_t bt_tape_count(void *context, uint8_t finger, uint8_t channel, uint64_t 
         tape->start_ns = t_ns;
     }
     if (finger >= tape->fingers) {
-        return BT_EMU_STUCK_LOW;
+        return BT_EMU_FAULT_STUCK_LOW;
     }
     uint64_t number = slot_number(tape, t_ns);
     uint64_t frame = number / BT_SLOTS;
@@ -73,7 +73,7 @@ uint16_t bt_tape_count(void *context, uint8_t finger, uint8_t channel, uint64_t 
             return (uint16_t)(tape->samples[at] | tape->samples[at + 1] << 8);
         }
     }
-    return BT_EMU_NO_CHANNEL;
+    return BT_EMU_FAULT_NO_CHANNEL;
 }
 
 bool bt_tape_over(const bt_tape *tape, uint64_t t_ns)

@@ -1,6 +1,6 @@
 // Counts for the emulated sensors, prepared by the host (host/biotac/sim/tape.py): one uint16 per
-// frame, finger and slot, little-endian, after a 24-byte header. Values above 4095 are faults, see
-// device.h.
+// frame, finger and slot, little-endian, after a 24-byte header. Values above 4095 are
+// faults: enum bt_emu_fault of the wire.
 #ifndef BIOTAC_EMU_TAPE_H
 #define BIOTAC_EMU_TAPE_H
 

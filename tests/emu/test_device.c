@@ -265,7 +265,7 @@ static void a_sensor_without_power_forgets_and_may_come_back_as_another(void **s
     static const struct {
         uint16_t fault;
         const char *serial;
-    } table[] = {{BT_EMU_UNPLUGGED, "BT0123456789ABCD"}, {BT_EMU_SWAPPED, "BT0123456789ABCX"}};
+    } table[] = {{BT_EMU_FAULT_UNPLUGGED, "BT0123456789ABCD"}, {BT_EMU_FAULT_SWAPPED, "BT0123456789ABCX"}};
     for (size_t k = 0; k < 2; k++) {
         (void)new_device(NULL);
         next_count = table[k].fault;
@@ -289,10 +289,10 @@ static void every_fault_shows_on_the_bus_as_itself(void **state)
         uint16_t fault, word;
         enum bt_word kind;
     } table[] = {
-        {BT_EMU_TOO_EARLY, 0xA52D, BT_WORD_ERROR},
-        {BT_EMU_STUCK_HIGH, 0xFFFF, BT_WORD_STUCK},
-        {BT_EMU_STUCK_LOW, 0x0000, BT_WORD_STUCK},
-        {BT_EMU_NO_CHANNEL, 0xA558, BT_WORD_ERROR},
+        {BT_EMU_FAULT_TOO_EARLY, 0xA52D, BT_WORD_ERROR},
+        {BT_EMU_FAULT_STUCK_HIGH, 0xFFFF, BT_WORD_STUCK},
+        {BT_EMU_FAULT_STUCK_LOW, 0x0000, BT_WORD_STUCK},
+        {BT_EMU_FAULT_NO_CHANNEL, 0xA558, BT_WORD_ERROR},
     };
     uint16_t count;
     for (size_t k = 0; k < sizeof table / sizeof *table; k++) {
@@ -302,7 +302,7 @@ static void every_fault_shows_on_the_bus_as_itself(void **state)
         assert_int_equal(bt_word_decode(word, &count), table[k].kind);
         assert_int_equal(count, BT_INVALID_COUNT);
     }
-    next_count = BT_EMU_BAD_PARITY;
+    next_count = BT_EMU_FAULT_BAD_PARITY;
     assert_int_equal(bt_word_decode(sample(0xA2, 9000000), &count), BT_WORD_PARITY);
     device.present = false;
     assert_int_equal(sample(0xA2, 10000000), 0x0000);
@@ -364,6 +364,46 @@ static void the_list_of_channels_is_pairs_and_an_end(void **state)
     assert_int_equal(one_byte(9000000), 0);
 }
 
+static void assert_said_ahead(uint64_t t_ns, bool settled)
+{
+    uint16_t ahead = bt_emu_word_ahead(&device, 0, settled, t_ns);
+    bt_emu_device copy = device;
+    bt_emu_select(&copy, true, t_ns);
+    assert_int_equal(bt_emu_transfer16(&copy, BT_LISTEN_WORD, t_ns), ahead);
+}
+
+static void what_it_will_say_is_told_ahead(void **state)
+{
+    (void)state;
+    const uint16_t words[] = {0xA200, 0x6115, 0x0001, 0x0001, 0x6113, 0x0100, 0xA300, 0x0001,
+                              0xFF00, 0x2000, 0x4000, 0x0001, 0x8000, 0x0000, 0x0000};
+    const uint16_t counts[] = {2048,
+                               BT_EMU_FAULT_BAD_PARITY,
+                               BT_EMU_FAULT_STUCK_HIGH,
+                               BT_EMU_FAULT_STUCK_LOW,
+                               BT_EMU_FAULT_TOO_EARLY,
+                               BT_EMU_FAULT_NO_CHANNEL};
+    uint64_t t_ns = 1000000;
+    for (size_t c = 0; c < sizeof counts / sizeof *counts; c++) {
+        next_count = counts[c];
+        for (size_t w = 0; w < sizeof words / sizeof *words; w++) {
+            (void)transfer(words[w], t_ns);
+            assert_said_ahead(t_ns + 49999, device.settled);
+            assert_said_ahead(t_ns + 50000, true);
+            t_ns += 60000;
+        }
+    }
+}
+
+static void a_property_is_told_a_byte_further_on(void **state)
+{
+    (void)state;
+    (void)transfer(0x6115, 0);
+    assert_int_equal(bt_emu_word_ahead(&device, 0, true, 0), 'B' << 8 | 'T');
+    assert_int_equal(bt_emu_word_ahead(&device, 1, true, 0), 'T' << 8 | '0');
+    assert_int_equal(bt_emu_word_ahead(&device, 16, true, 0), 0);
+}
+
 #define T(name) cmocka_unit_test_setup(name, new_device)
 int main(void)
 {
@@ -389,6 +429,8 @@ int main(void)
         T(properties_are_plain_bytes_padded_with_zeros),
         T(property_bytes_may_come_one_by_one),
         T(the_list_of_channels_is_pairs_and_an_end),
+        T(what_it_will_say_is_told_ahead),
+        T(a_property_is_told_a_byte_further_on),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

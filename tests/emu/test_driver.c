@@ -151,14 +151,14 @@ static void one_finger_in_trouble_never_changes_another(void **state)
         uint16_t fault;
         uint32_t one_in;
     } faults[] = {
-        {"bad parity at times", BT_EMU_BAD_PARITY, 5},
-        {"bad parity", BT_EMU_BAD_PARITY, 1},
-        {"stuck low", BT_EMU_STUCK_LOW, 1},
-        {"stuck high", BT_EMU_STUCK_HIGH, 1},
-        {"error words", BT_EMU_TOO_EARLY, 3},
+        {"bad parity at times", BT_EMU_FAULT_BAD_PARITY, 5},
+        {"bad parity", BT_EMU_FAULT_BAD_PARITY, 1},
+        {"stuck low", BT_EMU_FAULT_STUCK_LOW, 1},
+        {"stuck high", BT_EMU_FAULT_STUCK_HIGH, 1},
+        {"error words", BT_EMU_FAULT_TOO_EARLY, 3},
         {"rails", 4095, 1},
-        {"unknown channel", BT_EMU_NO_CHANNEL, 7},
-        {"gone at times", BT_EMU_STUCK_LOW, 2},
+        {"unknown channel", BT_EMU_FAULT_NO_CHANNEL, 7},
+        {"gone at times", BT_EMU_FAULT_STUCK_LOW, 2},
     };
     boot(START_NS);
     run_rounds(150);
@@ -207,7 +207,7 @@ static void bad_words_are_counted_by_kind_for_their_finger(void **state)
     (void)state;
     trouble.finger = 3;
     trouble.one_in = 1;
-    trouble.fault = BT_EMU_NO_CHANNEL;
+    trouble.fault = BT_EMU_FAULT_NO_CHANNEL;
     boot(START_NS);
     run_rounds(20);
     const bt_finger *finger = gateway.session.finger;

@@ -47,7 +47,7 @@ static uint64_t flipped;
 
 static uint16_t one_bit(uint64_t n)
 {
-    return n == flipped ? BT_EMU_BAD_PARITY : 0;
+    return n == flipped ? BT_EMU_FAULT_BAD_PARITY : 0;
 }
 
 static void one_flipped_bit_anywhere_changes_nothing(void **state)
@@ -68,7 +68,7 @@ static void one_flipped_bit_anywhere_changes_nothing(void **state)
 
 static uint16_t error_words(uint64_t n)
 {
-    return n > 50 ? BT_EMU_NO_CHANNEL : 0;
+    return n > 50 ? BT_EMU_FAULT_NO_CHANNEL : 0;
 }
 
 static void an_error_word_is_no_value(void **state)
@@ -111,7 +111,7 @@ static void a_serial_number_that_could_not_be_read_is_read_later(void **state)
     (void)state;
     trouble.finger = 2;
     trouble.one_in = 1;
-    trouble.fault = BT_EMU_BAD_PARITY;
+    trouble.fault = BT_EMU_FAULT_BAD_PARITY;
     boot(START_NS);
     assert_int_equal(gateway.session.info[2].present, 0);
     trouble.one_in = 0;

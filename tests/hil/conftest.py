@@ -29,11 +29,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.hookimpl(tryfirst=True)  # before -m is applied
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What is marked ``long`` is for the night on a rig that is slower than a board."""
+    """What is marked ``long`` is for the night on a rig that is slower than a board, and all on one much slower."""
     for item in items:
         params = item.callspec.params if hasattr(item, "callspec") else {}
-        slow = RIGS.get(params.get("rig_name"), {}).get("slow", False)
-        if slow and item.get_closest_marker("long") is not None:
+        facts = RIGS.get(params.get("rig_name"), {})
+        slow = facts.get("slow", False) and item.get_closest_marker("long") is not None
+        if slow or facts.get("nightly", False):
             item.add_marker("nightly")
 
 

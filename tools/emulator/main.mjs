@@ -2,6 +2,10 @@
 //
 //   node main.mjs --image BIN --wasm sensors.wasm --tape FILE --pty PATH --master FD
 //                 [--pace X] [--hold] [--serials A,B,...]
+//   node main.mjs --image BIN --sensor BIN --sensor-pty PATH --sensor-master FD --tape FILE --pty PATH --master FD ...
+//
+// The second form has a second Pico in place of the sensors (sensor_board.mjs). It writes "sensor PATH" once that board's
+// port can be opened, and gives the first one power when stdin says "power".
 //
 // FD is the open master side of a pty, non-blocking; PATH is the name of its other side, to be told.
 // Like the posix board this writes "pty PATH" once the port can be opened, and "end" once the tape is played and
@@ -17,6 +21,8 @@ import { parseArgs } from 'node:util'
 
 import { Pty } from './pty.mjs'
 import { Rig } from './rig.mjs'
+import { SensorBoard } from './sensor_board.mjs'
+import { Sensors } from './sensors.mjs'
 
 const STRETCH_NS = 1e6
 const BOOT_NS = 10e9 // a board that has not begun to sample by then will not
@@ -26,6 +32,9 @@ const { values: options } = parseArgs({
   options: {
     image: text,
     wasm: text,
+    sensor: text,
+    'sensor-pty': text,
+    'sensor-master': text,
     tape: text,
     pty: text,
     master: text,
@@ -40,19 +49,39 @@ function die(what, why) {
   process.exit(2)
 }
 
-function start() {
+const pace = Number(options.pace)
+const pty = new Pty(Number(options.master))
+const sensorPty = options.sensor === undefined ? null : new Pty(Number(options['sensor-master']))
+const tape = read(options.tape)
+let sensors = null
+let rig = null // once the gateway has power
+
+function read(path) {
   try {
-    const [image, wasm, tape] = [options.image, options.wasm, options.tape].map((path) => fs.readFileSync(path))
-    const { serials, hold } = options
-    return new Rig({ image, wasm, tape, serials, hold, port: pty, lossless: pace === 0 })
+    return fs.readFileSync(path)
   } catch (error) {
-    return die(options.image, error.message)
+    return die(path, error.message)
   }
 }
 
-const pace = Number(options.pace)
-const pty = new Pty(Number(options.master))
-const rig = start()
+function plugIn() {
+  try {
+    if (sensorPty === null) sensors = new Sensors(read(options.wasm), tape, options.serials)
+    else sensors = new SensorBoard({ image: read(options.sensor), tape, port: sensorPty })
+  } catch (error) {
+    die(options.sensor ?? options.tape, error.message)
+  }
+}
+
+function power() {
+  try {
+    rig = new Rig({ image: read(options.image), sensors, hold: options.hold, port: pty, lossless: pace === 0 })
+  } catch (error) {
+    die(options.image, error.message)
+  }
+  boot()
+}
+
 let asked = false // to end the hold
 let told = false // that the tape is over
 let polled = 0
@@ -99,17 +128,27 @@ function ahead() {
   return (world - base[1]) / pace > wall - base[0]
 }
 
+/** The sensors' board, while the gateway has no power or stands still; true when it has nothing to do. */
+function sensorsAlone() {
+  if (sensorPty === null) return true
+  sensors.runAlone(STRETCH_NS)
+  return sensorPty.received.length === 0
+}
+
 /** One turn; returns true when there is nothing to do for a while. */
 function turn() {
   let news = false
-  if (performance.now() - polled >= POLL_MS || rig.still) {
+  if (performance.now() - polled >= POLL_MS || !rig || rig.still) {
     polled = performance.now()
     news = pty.poll()
     pty.flush()
+    sensorPty?.poll()
+    sensorPty?.flush()
   }
+  if (!rig) return sensorsAlone()
   if (pace === 0 && pty.pendingBytes > 0) {
     pty.flush()
-    return true // unpaced nothing is dropped: emulated time waits for the program that reads
+    return sensorsAlone() // unpaced nothing is dropped: emulated time waits for the program that reads
   }
   if (rig.still && !news && pty.up === rig.usb.open) {
     if (asked && rig.waiting) {
@@ -120,17 +159,20 @@ function turn() {
         console.log('end')
       }
       tellAwaited(true)
-      return true
+      return sensorsAlone()
     }
   }
   if (ahead()) return true
   rig.run(STRETCH_NS)
+  sensors.follow()
   tellAwaited(false)
   return false
 }
 
 function line(words) {
-  if (words === 'run') {
+  if (words === 'power') {
+    power()
+  } else if (words === 'run') {
     asked = true
   } else if (words === 'counters') {
     answer('counters')
@@ -159,5 +201,7 @@ function loop() {
   else setImmediate(loop)
 }
 
-boot()
+plugIn()
+if (sensorPty === null) power()
+else console.log(`sensor ${options['sensor-pty']}`)
 loop()

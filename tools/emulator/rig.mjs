@@ -5,13 +5,12 @@ import { Latency } from './latency.mjs'
 import { Loader } from './loader.mjs'
 import { FLASH_BYTES, Machine } from './machine.mjs'
 import { Board, BootRom } from './rom.mjs'
-import { Sensors } from './sensors.mjs'
 import { SlotTiming } from './timing.mjs'
 import { UsbHost } from './usb.mjs'
 
 export class Rig {
   /** port: a Pty or something like it. hold: device time stands still from the first sample on until release(). */
-  constructor({ image, wasm, tape, serials, port, hold, lossless }) {
+  constructor({ image, sensors, port, hold, lossless }) {
     this.port = port
     this.reading = true
     this.plugged = true
@@ -20,7 +19,7 @@ export class Rig {
     this.latency = new Latency()
     this.timing = new SlotTiming()
     this.events = [] // [world ns, verb], sorted
-    this.sensors = new Sensors(wasm, tape, serials)
+    this.sensors = sensors
     this.lossless = lossless
     this.board = new Board()
     this.loaders = 0 // how often the chip went to its UF2 loader

@@ -7,7 +7,7 @@ const SCK = 18
 const MOSI = 19
 export const CHIP_SELECTS = [17, 20, 21, 22, 26] // of fingers 0 to 4: firmware/boards/pico
 const SPI_FUNCTION = 1
-const WIDTHS = [8, 16] // of a property's byte; of all else
+export const WIDTHS = [8, 16] // of a property's byte; of all else
 const STRETCH_NS = 150e3
 const FASTEST_HZ = 10e6 // data sheet
 const RESETS = 0x4000c
@@ -52,6 +52,9 @@ export class Sensors {
   powerCycle() {
     this.calls.power_cycle()
   }
+
+  /** Come to where the gateway is: they are there. */
+  follow() {}
 
   /** Solder them to a chip. nanos() is the time the sensors live in. */
   wire(mcu, nanos) {

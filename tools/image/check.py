@@ -45,11 +45,12 @@ POINTERS = {
     "flash->read(": ("port_flash_read",),
     "rom.": (ROM,),
     "boot2_copy": (ROM,),
+    "device->source(": ("bt_emu_stream_count",),
     "lookup(": (ROM,),
     "loader(": (ROM,),
 }
-# The interrupt that may interrupt everything, and the one that it may interrupt.
-INTERRUPTS = ("usb_interrupt", "timer_interrupt")
+# One may interrupt the next one; the last two are the sensor board's.
+INTERRUPTS = ("usb_interrupt", "timer_interrupt", "exchanged", "heard")
 
 
 def section_sizes(elf: Path, objdump: str) -> dict[str, int]:
@@ -62,17 +63,21 @@ def symbols(elf: Path, objdump: str) -> set[str]:
     return {line.split()[-1] for line in text.splitlines() if re.match(r"^[0-9a-f]{8} ", line)}
 
 
+def interrupts(program: stack.Program) -> list[str]:
+    return [name for name in INTERRUPTS if name in program.functions]
+
+
 def stack_depth(program: stack.Program) -> tuple[int, str]:
-    """With both interrupts on top of the main loop's deepest chain."""
-    chains = [program.deepest(name) for name in ("main", *INTERRUPTS)]
-    depth = sum(bytes_ for bytes_, _ in chains) + EXCEPTION_BYTES * len(INTERRUPTS)
+    """With all interrupts on top of the main loop's deepest chain."""
+    chains = [program.deepest(name) for name in ("main", *interrupts(program))]
+    depth = sum(bytes_ for bytes_, _ in chains) + EXCEPTION_BYTES * (len(chains) - 1)
     return depth, "; ".join(f"{' > '.join(chain)} {bytes_}" for bytes_, chain in chains)
 
 
 def misplaced(program: stack.Program) -> list[str]:
     """What would be run from the slow flash, or from SRAM before it is there."""
     early = program.reached("clocks_start") | {"image_reset"}
-    late = program.reached("main").union(*(program.reached(name) for name in INTERRUPTS)) - {ROM}
+    late = program.reached("main").union(*(program.reached(name) for name in interrupts(program))) - {ROM}
     wrong = [f"{name} in flash" for name in late if program.functions[name].address < SRAM]
     return sorted(
         wrong + [f"{name} in SRAM before it is copied" for name in early if program.functions[name].address >= SRAM]

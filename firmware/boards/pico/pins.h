@@ -2,6 +2,12 @@
 #ifndef BIOTAC_PICO_PINS_H
 #define BIOTAC_PICO_PINS_H
 
+// Who this image is.
+#define IMAGE_BOARD   BT_BOARD_PICO
+#define IMAGE_NAME    "biotac-gateway"
+#define IMAGE_PURPOSE "BioTac sensors to USB serial"
+#define IMAGE_PRODUCT "BioTac gateway (Pico)"
+
 // SPI0's, by the RP2040's function table.
 #define PIN_MISO 16
 #define PIN_SCK  18

@@ -1369,6 +1369,148 @@ void bt_msg_clear_faults_unpack(bt_msg_clear_faults *msg, const uint8_t in[BT_CL
     (void)at;
 }
 
+void bt_msg_emu_status_pack(const bt_msg_emu_status *msg, uint8_t out[BT_EMU_STATUS_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->fingers, 1);
+    at = put(at, (uint32_t)msg->slots_taken, 4);
+    at = put(at, (uint32_t)msg->room_slots, 2);
+    at = put(at, (uint32_t)msg->slots_served, 4);
+    at = put(at, (uint32_t)msg->elapsed_us, 4);
+    at = put(at, (uint32_t)msg->words, 4);
+    at = put(at, (uint32_t)msg->words_late, 4);
+    at = put(at, (uint32_t)msg->samples_starved, 4);
+    at = put(at, (uint32_t)msg->slowest_us, 2);
+    (void)at;
+}
+
+void bt_msg_emu_status_unpack(bt_msg_emu_status *msg, const uint8_t in[BT_EMU_STATUS_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->fingers = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->slots_taken = (uint32_t)value;
+    at = get(at, &value, 2);
+    msg->room_slots = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->slots_served = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->elapsed_us = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->words = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->words_late = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->samples_starved = (uint32_t)value;
+    at = get(at, &value, 2);
+    msg->slowest_us = (uint16_t)value;
+    (void)at;
+}
+
+void bt_msg_emu_plug_pack(const bt_msg_emu_plug *msg, uint8_t out[BT_EMU_PLUG_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->present, 1);
+    for (int k = 0; k < 16; k++) {
+        at = put(at, (uint32_t)msg->serial[k], 1);
+    }
+    (void)at;
+}
+
+void bt_msg_emu_plug_unpack(bt_msg_emu_plug *msg, const uint8_t in[BT_EMU_PLUG_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->present = (uint8_t)value;
+    for (int k = 0; k < 16; k++) {
+        at = get(at, &value, 1);
+        msg->serial[k] = (uint8_t)value;
+    }
+    (void)at;
+}
+
+void bt_msg_emu_tape_pack(const bt_msg_emu_tape *msg, uint8_t out[BT_EMU_TAPE_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->fingers, 1);
+    at = put(at, (uint32_t)msg->slots, 1);
+    at = put(at, (uint32_t)msg->first_slot, 4);
+    for (int k = 0; k < 220; k++) {
+        at = put(at, (uint32_t)msg->samples[k], 1);
+    }
+    (void)at;
+}
+
+void bt_msg_emu_tape_unpack(bt_msg_emu_tape *msg, const uint8_t in[BT_EMU_TAPE_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->fingers = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->slots = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->first_slot = (uint32_t)value;
+    for (int k = 0; k < 220; k++) {
+        at = get(at, &value, 1);
+        msg->samples[k] = (uint8_t)value;
+    }
+    (void)at;
+}
+
+void bt_msg_emu_set_fault_pack(const bt_msg_emu_set_fault *msg, uint8_t out[BT_EMU_SET_FAULT_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->finger, 1);
+    at = put(at, (uint32_t)msg->fault, 2);
+    (void)at;
+}
+
+void bt_msg_emu_set_fault_unpack(bt_msg_emu_set_fault *msg, const uint8_t in[BT_EMU_SET_FAULT_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 1);
+    msg->finger = (uint8_t)value;
+    at = get(at, &value, 2);
+    msg->fault = (uint16_t)value;
+    (void)at;
+}
+
+void bt_msg_emu_get_status_pack(const bt_msg_emu_get_status *msg, uint8_t out[BT_EMU_GET_STATUS_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    (void)at;
+}
+
+void bt_msg_emu_get_status_unpack(bt_msg_emu_get_status *msg, const uint8_t in[BT_EMU_GET_STATUS_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    (void)at;
+}
+
 int bt_wire_payload_bytes(uint8_t id)
 {
     switch (id) {
@@ -1458,6 +1600,16 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_RELEASE_BYTES;
     case BT_CLEAR_FAULTS_ID:
         return BT_CLEAR_FAULTS_BYTES;
+    case BT_EMU_STATUS_ID:
+        return BT_EMU_STATUS_BYTES;
+    case BT_EMU_PLUG_ID:
+        return BT_EMU_PLUG_BYTES;
+    case BT_EMU_TAPE_ID:
+        return BT_EMU_TAPE_BYTES;
+    case BT_EMU_SET_FAULT_ID:
+        return BT_EMU_SET_FAULT_BYTES;
+    case BT_EMU_GET_STATUS_ID:
+        return BT_EMU_GET_STATUS_BYTES;
     default:
         return -1;
     }

@@ -33,14 +33,14 @@ _Static_assert(sizeof(record) == 12 || sizeof(void *) != 4, "picotool reads it b
 #define STRING(name, words) KEPT static const char name[] = words
 #define PIN(n)              (1u << (n))
 
-STRING(name, "biotac-gateway");
+STRING(name, IMAGE_NAME);
 STRING(version, NUMBER(BT_VERSION_MAJOR) "." NUMBER(BT_VERSION_MINOR) "." NUMBER(
                     BT_VERSION_PATCH) ", wire " NUMBER(BT_WIRE_MAJOR) "." NUMBER(BT_WIRE_MINOR));
-STRING(description, "BioTac sensors to USB serial");
+STRING(description, IMAGE_PURPOSE);
 STRING(board, PINS_BOARD);
-STRING(miso, "SPI0 MISO");
-STRING(sck, "SPI0 SCK");
-STRING(mosi, "SPI0 MOSI");
+STRING(miso, "SPI MISO");
+STRING(sck, "SPI SCK");
+STRING(mosi, "SPI MOSI");
 STRING(select_0, "chip select of finger 0");
 STRING(select_1, "chip select of finger 1");
 STRING(select_2, "chip select of finger 2");

@@ -2,6 +2,7 @@
 // for.
 #include "image_note.h"
 
+#include "pins.h"
 #include "port.h"
 
 #include "wire/crc32.h"
@@ -10,7 +11,7 @@
 
 // volatile: the build fills in size and CRC after the compiler has seen them as zeros.
 __attribute__((section(".image_note"), used)) static const volatile bt_image_note note =
-    BT_IMAGE_NOTE(BT_BOARD_PICO);
+    BT_IMAGE_NOTE(IMAGE_BOARD);
 
 #define FLASH_MAX_BYTES (2u * 1024 * 1024)
 

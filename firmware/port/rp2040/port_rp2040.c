@@ -1,6 +1,7 @@
 // The RP2040 without a vendor's SDK: start-up in order, identity, and the main loop's rest.
 #include "port.h"
 
+#include "pins.h"
 #include "system.h"
 #include "wire/crc32.h"
 #include "wire/messages_gen.h"
@@ -84,8 +85,7 @@ void port_init(int argc, char **argv)
     watchdog_start();
     make_serial_text();
     make_boot_id();
-    spi_start();
-    slot_start();
+    bus_start();
     timer_start();
     usb_start(serial_text);
 }
@@ -119,7 +119,7 @@ bool port_reboot_bootloader(void)
 
 uint16_t port_board(void)
 {
-    return BT_BOARD_PICO;
+    return IMAGE_BOARD;
 }
 
 void port_board_serial(uint8_t serial[12])

@@ -24,11 +24,14 @@
 #define NVIC_ICER REG32(0xE000E180u)
 #define NVIC_IPR1                                                                                            \
     REG32(0xE000E404u) // priorities of interrupts 4..7, the two upper bits of each byte; 0 first
-#define VTOR REG32(0xE000ED08u)
+#define NVIC_IPR2 REG32(0xE000E408u) // of interrupts 8..11
+#define VTOR      REG32(0xE000ED08u)
 
 // ---- 2.3.2 interrupts
 #define TIMER_IRQ_0 0
 #define USBCTRL_IRQ 5
+#define PIO0_IRQ_0  7
+#define PIO0_IRQ_1  8
 
 // ---- 2.5 DMA
 #define DMA_READ_ADDR(channel)   REG32(0x50000000u + 0x40u * (channel))
@@ -37,13 +40,16 @@
 #define DMA_CTRL_TRIG(channel)   REG32(0x5000000Cu + 0x40u * (channel))
 #define DMA_CTRL(channel)        REG32(0x50000010u + 0x40u * (channel)) // alias 1: without starting it
 #define DMA_READ_THEN_WRITE_TRIG(channel) REG32(0x50000028u + 0x40u * (channel)) // alias 2: of two words
+#define DMA_READ_TRIG(channel)            REG32(0x5000003Cu + 0x40u * (channel)) // alias 3
 #define DMA_TREQS_DUE(channel)            REG32(0x50000800u + 0x40u * (channel)) // CTDREQ; any write: none
 #define DMA_BUSY                          (1u << 24)
 #define DMA_SNIFF_THIS                    (1u << 23)
 #define DMA_QUIET                         (1u << 21) // no interrupt
 #define DMA_UNPACED                       (0x3Fu << 15)
 #define DMA_BY_TIMER0                     (0x3Bu << 15)
-#define DMA_CHAIN_TO_ITSELF(channel)      ((uint32_t)(channel) << 11) // that is, to none
+#define DMA_BY_PIO0_RX(sm)                ((4u + (sm)) << 15)
+#define DMA_CHAIN_TO(channel)             ((uint32_t)(channel) << 11)
+#define DMA_CHAIN_TO_ITSELF(channel)      DMA_CHAIN_TO(channel) // that is, to none
 #define DMA_WRITES_WRAP                   (1u << 10)
 #define DMA_WRAP_BYTES(bits)              ((uint32_t)(bits) << 6)
 #define DMA_INCR_WRITE                    (1u << 5)
@@ -59,6 +65,7 @@
 #define DMA_SNIFF_CALC_CRC32_REVERSED     (1u << 5) // polynomial 0x04C11DB7, each byte's lowest bit first
 #define DMA_SNIFF_CHANNEL(channel)        ((uint32_t)(channel) << 1)
 #define DMA_SNIFF_EN                      (1u << 0)
+#define DMA_START                         REG32(0x50000430u) // bit channel
 #define DMA_CHAN_ABORT                    REG32(0x50000444u)
 
 // ---- 2.13 power-on state machine
@@ -73,6 +80,7 @@
 #define RESETS_DMA        (1u << 2)
 #define RESETS_IO_BANK0   (1u << 5)
 #define RESETS_PADS_BANK0 (1u << 8)
+#define RESETS_PIO0       (1u << 10)
 #define RESETS_PLL_SYS    (1u << 12)
 #define RESETS_PLL_USB    (1u << 13)
 #define RESETS_SPI0       (1u << 16)
@@ -114,17 +122,44 @@
 #define IO_BANK0_GPIO_CTRL(n) REG32(0x40014004u + 8u * (n))
 #define GPIO_FUNC_SPI         1u
 #define GPIO_FUNC_SIO         5u
+#define GPIO_FUNC_PIO0        6u
 #define GPIO_OUTOVER_LOW      (2u << 8) // whatever the function says
 #define GPIO_OUTOVER_HIGH     (3u << 8)
 #define PADS_BANK0_GPIO(n)    REG32(0x4001C004u + 4u * (n))
 #define PADS_IE               (1u << 6)
 #define PADS_DRIVE_4MA        (1u << 4)
+#define PADS_PUE              (1u << 3)
 #define PADS_PDE              (1u << 2)
 #define PADS_SCHMITT          (1u << 1)
 #define IO_QSPI_SS_CTRL       REG32(0x4001800Cu)
 #define IO_QSPI_OUTOVER_LOW   (2u << 8)
 #define IO_QSPI_OUTOVER_HIGH  (3u << 8)
 #define IO_QSPI_OUTOVER_BITS  (3u << 8)
+
+// ---- 3.7 PIO
+#define PIO0_CTRL          REG32(0x50200000u) // bit sm: runs
+#define PIO0_FSTAT         REG32(0x50200004u)
+#define PIO_RX_EMPTY(sm)   (1u << (8 + (sm)))
+#define PIO0_TXF(sm)       REG32(0x50200010u + 4u * (sm))
+#define PIO0_RXF(sm)       REG32(0x50200020u + 4u * (sm))
+#define PIO0_PROGRAM(at)   REG32(0x50200048u + 4u * (at))
+#define PIO0_CLKDIV(sm)    REG32(0x502000C8u + 0x18u * (sm))
+#define PIO_CLKDIV_NONE    (1u << 16)
+#define PIO0_EXECCTRL(sm)  REG32(0x502000CCu + 0x18u * (sm))
+#define PIO_JMP_PIN(pin)   ((uint32_t)(pin) << 24)
+#define PIO_WRAP(from, to) ((uint32_t)(from) << 12 | (uint32_t)(to) << 7)
+#define PIO_STATUS_TX(n)   (n) // STATUS is all ones while fewer than n words wait in TX
+#define PIO0_SHIFTCTRL(sm)                                                                                   \
+    REG32(0x502000D0u + 0x18u * (sm)) // 0: both to the left, 32 bits, nothing by itself
+#define PIO_AUTOPUSH(bits) ((uint32_t)(bits) << 20 | 1u << 16)
+#define PIO0_EXEC(sm)      REG32(0x502000D8u + 0x18u * (sm)) // executed at once
+#define PIO0_PINCTRL(sm)   REG32(0x502000DCu + 0x18u * (sm))
+#define PIO_IN_BASE(pin)   ((uint32_t)(pin) << 15)
+#define PIO_OUT_ONE(pin)   (1u << 20 | (uint32_t)(pin))
+#define PIO0_IRQ0_INTE     REG32(0x5020012Cu)
+#define PIO_INT_RX(sm)     (1u << (sm)) // not empty
+#define PIO0_IRQ1_INTF     REG32(0x5020013Cu)
+#define PIO_INT_FLAG0      (1u << 8)
 
 // ---- 4.1 USB device controller
 #define USB_DPRAM_BASE         0x50100000u

@@ -39,6 +39,11 @@ static void use_vectors(void)
     VTOR = (uint32_t)(uintptr_t)vectors;
 }
 
+void use_interrupt(uint32_t number, void (*handler)(void))
+{
+    vectors[EXCEPTIONS + number] = handler;
+}
+
 // The only code, with what it calls, that runs from flash: it copies all other. At the full clock, because on
 // the ring oscillator a word that takes the flash 256 cycles takes 40 us. Loops of its own and not memcpy,
 // which is not there yet; the volatile keeps the compiler from putting the call back.

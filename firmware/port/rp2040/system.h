@@ -10,6 +10,9 @@
 // or what it calls in it.
 #define AT_BOOT __attribute__((section(".boot_code"), noinline))
 
+// ---- startup.c: who takes an interrupt, beside the timer's and the USB's
+void use_interrupt(uint32_t number, void (*handler)(void));
+
 // ---- system.c: clocks, watchdog, reset
 // CLK_SYS_HZ from the crystal, 48 MHz for USB, the 1 us tick; false when the crystal or a PLL never came up.
 bool clocks_start(void);
@@ -27,8 +30,10 @@ void timer_sleep(void);
 // Something came that the main loop should look at; port_idle will not sleep over it. For interrupts.
 void timer_wake(void);
 
+// ---- what the image is for: a gateway's side of the sensors' bus (spi.c), or the sensors'
+void bus_start(void);
+
 // ---- spi.c
-void spi_start(void);
 void spi_reset(void);                  // whatever it was about
 void spi_select_at_once(uint8_t mask); // port_spi_select without its waits
 

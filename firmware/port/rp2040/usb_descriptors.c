@@ -1,5 +1,6 @@
 #include "usb_descriptors.h"
 
+#include "pins.h"
 #include "version.h"
 #include "wire/messages_gen.h"
 
@@ -44,4 +45,4 @@ const uint8_t usb_config_descriptor[USB_CONFIG_BYTES] = {
 };
 // clang-format on
 
-const char *const usb_string[USB_STRINGS] = {NULL, "BioTac gateway", "BioTac gateway (Pico)", NULL};
+const char *const usb_string[USB_STRINGS] = {NULL, "BioTac gateway", IMAGE_PRODUCT, NULL};

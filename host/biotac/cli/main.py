@@ -62,6 +62,10 @@ VERBS = {
         "Do a paper's experiment again: figure, table against the paper, JSON.",
     ),
     "sim": ("biotac.cli.live.sim", "Run a simulated or emulated board on a pty that any serial program can open."),
+    "sensor": (
+        "biotac.cli.live.sensor",
+        "Have a Pico that is wired to a gateway play scenarios and recordings as its sensors.",
+    ),
     "flash": ("biotac.cli.boards.flash", "Write a firmware image to a board, and give it its settings back."),
     "bench": (
         "biotac.cli.lab.bench",

@@ -61,6 +61,8 @@ def flash(
             f"{image.path} speaks wire {image.note.wire[0]}, this library {wire.WIRE_MAJOR}: it could not tell whether "
             "flashing worked; install the biotac-gateway of the image's release"
         )
+    if restore_from is not None and image.note.board == wire.Board.PICO_SENSOR:
+        raise InputError(f"{image.path} is for a sensor board, which keeps no settings; leave --restore out")
     loader = first_ready(loaders)
     before: wire.Hello | None = None
     written: Backup | None = None
@@ -115,7 +117,8 @@ def leave(
                 "older one may not know what newer settings mean; --downgrade if you mean it"
             )
         say(f"{target.port} runs firmware {version_text(hand.info)}, serial {serial_text(hand.info)}")
-        backup = save(hand, backup_path) if keep else None
+        # A sensor board keeps nothing over a reboot.
+        backup = save(hand, backup_path) if keep and hand.info.board != wire.Board.PICO_SENSOR else None
         if backup is not None:
             say(f"{len(backup.values)} settings are in {backup.path}")
         with step(backup):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 
+from ..errors import NotAGatewayError
 from ..keep import Calibration, harness
 from ..link import Link, open_link
 from ..link.discovery import SERIAL_PREFIX, choose
@@ -64,6 +65,11 @@ def shake_hands(
     hand = Hand(link, reconnect=reconnect, fingers=fingers)
     source = link.source
     try:
+        if hand.info.board == wire.Board.PICO_SENSOR:
+            raise NotAGatewayError(
+                f"{link.port} is a sensor board, no gateway: feed it with `biotac sensor {link.port} SOURCE`, and open "
+                "the port of the gateway that it is wired to"
+            )
         for finger, calibration in (calibrations or {}).items():
             hand.set_calibration(finger, calibration)
         for name, value in source.settings.items() if source else ():

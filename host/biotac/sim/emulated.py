@@ -35,6 +35,8 @@ class Tools:
 class EmulatedBoard(SimBoard):
     """A running emulator; ``path`` is the pty that any serial program can open."""
 
+    _pass_fds: tuple[int, ...] = ()  # beside its own pty's
+
     def __init__(self, board: str, source: Source, *, pace: float, hold: bool, image: str | None = None) -> None:
         self._tools = find_tools(board, image)
         super().__init__(source, pace=pace, hold=hold)
@@ -52,7 +54,7 @@ class EmulatedBoard(SimBoard):
             command += ["--pty", path, *options]
             command += ["--master", str(master)]
             pipe = subprocess.PIPE
-            return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=[master])
+            return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=[master, *self._pass_fds])
         finally:
             os.close(master)
 

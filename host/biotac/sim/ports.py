@@ -10,6 +10,7 @@ from .emulated import EmulatedBoard
 from .loading import load_source
 from .process import SimBoard, SimLink
 from .source import Source
+from .two_picos import TwoPicos
 
 
 @dataclass(frozen=True)
@@ -69,4 +70,6 @@ def start_board(board: str, source: Source, *, pace: float, image: str | None = 
     """
     if board == "posix":
         return SimBoard(source, pace=pace, hold=True)
+    if board == "two_picos":
+        return TwoPicos(source, pace=pace, hold=True, image=image)
     return EmulatedBoard(board, source, pace=pace, hold=True, image=image)

@@ -14,16 +14,17 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
+from ..wire import messages_gen as _wire
 from ..wire import sensor_gen as _sensor
 from .source import Source
 
-NO_CHANNEL = 0xFFFF  # the sensor has no such channel: error word 0xA558
-BAD_PARITY = 0xFFFE  # a word with a flipped parity bit
-STUCK_LOW = 0xFFFD  # line stuck low
-STUCK_HIGH = 0xFFFC  # line stuck high
-ERROR_WORD = 0xFFFB  # error word 0xA52D: insufficient sampling delay
-UNPLUGGED = 0xFFFA  # no sensor or no power; afterwards it is mute until asked for a property
-SWAPPED = 0xFFF9  # likewise, and it is another sensor that comes back
+NO_CHANNEL = _wire.EmuFault.NO_CHANNEL  # the sensor has no such channel: error word 0xA558
+BAD_PARITY = _wire.EmuFault.BAD_PARITY  # a word with a flipped parity bit
+STUCK_LOW = _wire.EmuFault.STUCK_LOW  # line stuck low
+STUCK_HIGH = _wire.EmuFault.STUCK_HIGH  # line stuck high
+ERROR_WORD = _wire.EmuFault.TOO_EARLY  # error word 0xA52D: insufficient sampling delay
+UNPLUGGED = _wire.EmuFault.UNPLUGGED  # no sensor or no power; afterwards it is mute until asked for a property
+SWAPPED = _wire.EmuFault.SWAPPED  # likewise, and it is another sensor that comes back
 CODES = (NO_CHANNEL, BAD_PARITY, STUCK_LOW, STUCK_HIGH, ERROR_WORD, UNPLUGGED, SWAPPED)
 
 MAGIC = b"BTTAPE01"

@@ -391,4 +391,47 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("finger_faults", "<u4", (5,)),
         ]
     ),
+    wire.EmuStatus.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("fingers", "u1"),
+            ("slots_taken", "<u4"),
+            ("room_slots", "<u2"),
+            ("slots_served", "<u4"),
+            ("elapsed_us", "<u4"),
+            ("words", "<u4"),
+            ("words_late", "<u4"),
+            ("samples_starved", "<u4"),
+            ("slowest_us", "<u2"),
+        ]
+    ),
+    wire.EmuPlug.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+            ("present", "u1"),
+            ("serial", "u1", (16,)),
+        ]
+    ),
+    wire.EmuTape.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("fingers", "u1"),
+            ("slots", "u1"),
+            ("first_slot", "<u4"),
+            ("samples", "u1", (220,)),
+        ]
+    ),
+    wire.EmuSetFault.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("finger", "u1"),
+            ("fault", "<u2"),
+        ]
+    ),
+    wire.EmuGetStatus.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+        ]
+    ),
 }

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0xFEAC80E4
+SCHEMA_HASH = 0x2823160D
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -93,6 +93,20 @@ class Board(IntEnum):
     POSIX_SIM = 1  # a process on a pty with emulated sensors
     PICO = 2  # Raspberry Pi Pico (RP2040)
     LINUX_SBC = 3  # a Linux computer with the sensors on its own SPI bus (spidev)
+    PICO_SENSOR = 4  # Raspberry Pi Pico that is itself one to five emulated sensors (firmware/boards/pico_sensor): it knows HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages, and nothing else
+
+
+class EmuFault(IntEnum):
+    """What an emulated sensor does instead of answering rightly. A tape holds the same codes in place of counts."""
+
+    NONE = 0  # nothing: it answers
+    SWAPPED = 65529  # unplugged, and it will be another sensor that is plugged in
+    UNPLUGGED = 65530  # no sensor or no power: MISO let go; afterwards it is mute until asked for a property
+    TOO_EARLY = 65531  # late: it answers as if the 50 us had not passed
+    STUCK_HIGH = 65532  # MISO high throughout
+    STUCK_LOW = 65533  # silence: MISO low throughout
+    BAD_PARITY = 65534  # one bit of the word flipped
+    NO_CHANNEL = 65535  # the sensor has no such channel
 
 
 class CalibrationState(IntEnum):
@@ -241,6 +255,19 @@ BOARD_DOC: dict[int, str] = {
     1: "a process on a pty with emulated sensors",
     2: "Raspberry Pi Pico (RP2040)",
     3: "a Linux computer with the sensors on its own SPI bus (spidev)",
+    4: "Raspberry Pi Pico that is itself one to five emulated sensors (firmware/boards/pico_sensor): it knows HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages, and nothing else",
+}
+
+
+EMU_FAULT_DOC: dict[int, str] = {
+    0: "nothing: it answers",
+    65529: "unplugged, and it will be another sensor that is plugged in",
+    65530: "no sensor or no power: MISO let go; afterwards it is mute until asked for a property",
+    65531: "late: it answers as if the 50 us had not passed",
+    65532: "MISO high throughout",
+    65533: "silence: MISO low throughout",
+    65534: "one bit of the word flipped",
+    65535: "the sensor has no such channel",
 }
 
 
@@ -1949,7 +1976,181 @@ class ClearFaults:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults
+@dataclass(frozen=True, slots=True)
+class EmuStatus:
+    """How an emulated sensor board gets on. Reply to every EMU command. Counts are since EMU_PLUG of finger 0."""
+
+    req_id: int
+    fingers: int
+    slots_taken: int
+    room_slots: int
+    slots_served: int
+    elapsed_us: int
+    words: int
+    words_late: int
+    samples_starved: int
+    slowest_us: int
+
+    ID: ClassVar[int] = 0x40
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBIHIIIIIH")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 30 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.fingers,
+            self.slots_taken,
+            self.room_slots,
+            self.slots_served,
+            self.elapsed_us,
+            self.words,
+            self.words_late,
+            self.samples_starved,
+            self.slowest_us,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuStatus:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4],
+            v[5],
+            v[6],
+            v[7],
+            v[8],
+            v[9],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EmuPlug:
+    """Plug a sensor in or out. Finger 0's forgets the tape, the faults and the counts, and so comes first."""
+
+    req_id: int
+    finger: int
+    present: int
+    serial: tuple[int, ...]
+
+    ID: ClassVar[int] = 0xC0
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBB16B")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 19 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.present,
+            *self.serial,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuPlug:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3 : 19],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EmuTape:
+    """The next slots of the tape. What does not fit, or begins elsewhere than at slots_taken, is left: EMU_STATUS tells where to go on. The bus is served in the tape's order, sample by sample as it asks."""
+
+    req_id: int
+    fingers: int
+    slots: int
+    first_slot: int
+    samples: tuple[int, ...]
+
+    ID: ClassVar[int] = 0xC1
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBBI220B")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 227 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.fingers,
+            self.slots,
+            self.first_slot,
+            *self.samples,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuTape:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4 : 224],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EmuSetFault:
+    """What a sensor does from now on, whatever its tape says."""
+
+    req_id: int
+    finger: int
+    fault: int
+
+    ID: ClassVar[int] = 0xC2
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBH")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 4 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.finger,
+            self.fault,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuSetFault:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EmuGetStatus:
+    """Ask how the board gets on."""
+
+    req_id: int
+
+    ID: ClassVar[int] = 0xC3
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<B")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 1 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuGetStatus:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+        )
+
+
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -1995,6 +2196,11 @@ MESSAGES: dict[int, type[Any]] = {
     Hold.ID: Hold,
     Release.ID: Release,
     ClearFaults.ID: ClearFaults,
+    EmuStatus.ID: EmuStatus,
+    EmuPlug.ID: EmuPlug,
+    EmuTape.ID: EmuTape,
+    EmuSetFault.ID: EmuSetFault,
+    EmuGetStatus.ID: EmuGetStatus,
 }
 
 # What each command is answered by.
@@ -2026,4 +2232,8 @@ ANSWERS: dict[type[Any], type[Any]] = {
     Hold: Reply,
     Release: Reply,
     ClearFaults: Reply,
+    EmuPlug: EmuStatus,
+    EmuTape: EmuStatus,
+    EmuSetFault: EmuStatus,
+    EmuGetStatus: EmuStatus,
 }

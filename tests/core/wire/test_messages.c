@@ -10,7 +10,7 @@ typedef uint32_t u32;
 typedef int16_t i16;
 typedef int32_t i32;
 
-#define MAX_VALUES 128
+#define MAX_VALUES 256
 
 // read_HELLO and so on: values of one field by name; returns how many, -1 for no such field.
 #define READ_FIELD(name, type, count)                                                                        \

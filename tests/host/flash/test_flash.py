@@ -11,7 +11,7 @@ from fake_flash_board import NEW_SETTING, FakeBoard, make_drive, make_image, no_
 
 from biotac.cli.main import main
 from biotac.errors import BiotacError, FlashError, InputError, NotAGatewayError
-from biotac.flash import carried, flash, loader_drive, read_backup, read_image
+from biotac.flash import Backup, carried, flash, loader_drive, read_backup, read_image
 from biotac.flash.every import flash_every
 from biotac.flash.image import Image
 from biotac.flash.loader_drive import linux_folders
@@ -98,6 +98,22 @@ def test_an_image_of_another_board_leaves_the_board_alone(fake: FakeBoard, tmp_p
     assert "is for PICO, but POSIX_SIM answers" in fails(fake, tmp_path, InputError)
     assert fake.events == []
     assert backups(tmp_path) == []
+
+
+def test_the_two_picos_images_are_told_apart(fake: FakeBoard, tmp_path: Path) -> None:
+    sensors = make_image(tmp_path, note(wire.Board.PICO_SENSOR), "sensors.uf2")
+    with pytest.raises(InputError, match="is for PICO_SENSOR, but PICO answers"):
+        flash(read_image(sensors), fake, [fake])
+    fake.board = int(wire.Board.PICO_SENSOR)
+    with pytest.raises(InputError, match="is for PICO, but PICO_SENSOR answers"):
+        flash(read_image(make_image(tmp_path)), fake, [fake])
+    assert fake.events == []
+    outcome = flash(read_image(sensors), fake, [fake])
+    assert fake.events == ["loader", "write"]
+    assert outcome.backup is None  # it keeps no settings
+    backup = Backup(tmp_path / "other.json", {})
+    with pytest.raises(InputError, match="keeps no settings"):
+        flash(read_image(sensors), fake, [fake], restore_from=backup)
 
 
 def test_an_image_of_another_wire_leaves_the_board_alone(fake: FakeBoard, tmp_path: Path) -> None:

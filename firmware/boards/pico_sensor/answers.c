@@ -1,0 +1,195 @@
+// A sensor's answer does not depend on what the master sends meanwhile (firmware/emu/device.h). So once an
+// exchange is over, its sensor is asked what it will say next: before its 50 us are over, and after. The
+// first is offered at once, the other when it is time. The sensor itself hears of the next exchange when that
+// is over; where it would have said something else than was offered, the word was late.
+#include "answers.h"
+
+#include "hold_off.h"
+#include "port.h"
+#include "rp2040_regs.h"
+#include "shifter.h"
+
+#include <string.h>
+
+#define SAMPLE_RAM 76800 // 3.5 s of five sensors, 17 s of one
+
+// The alarm offers what is settled so long before the 50 us are over: an interrupt that is under way delays
+// it by less.
+#define AHEAD_US 2
+
+// The main loop is to come round to its watchdog, however quiet bus and host are.
+#define HEARTBEAT_US 100000
+
+static bt_emu_device sensor[BT_MAX_FINGERS];
+static uint16_t samples[SAMPLE_RAM];
+static bt_emu_stream *source;
+static bt_answer_counts counts;
+
+// ---- offers that wait for their time: the alarm's, and whoever holds it off ----------------------------
+
+static struct {
+    bool waits;
+    uint32_t at_us;
+    uint32_t offer, after_byte;
+} settling[BT_MAX_FINGERS];
+
+static void set_alarm(void)
+{
+    int next = -1;
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (settling[f].waits && (next < 0 || (int32_t)(settling[f].at_us - settling[next].at_us) < 0)) {
+            next = f;
+        }
+    }
+    port_alarm_at(next >= 0 ? settling[next].at_us : port_now_us() + HEARTBEAT_US);
+}
+
+bool bt_port_alarm(void)
+{
+    uint32_t now_us = port_now_us();
+    bool heartbeat = true;
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        if (settling[f].waits && (int32_t)(settling[f].at_us - now_us) <= 0) {
+            settling[f].waits = heartbeat = false;
+            (void)shifter_offer(f, settling[f].offer, settling[f].after_byte);
+        }
+    }
+    set_alarm();
+    return heartbeat;
+}
+
+// ---- what a sensor will say
+// --------------------------------------------------------------------------------
+
+static uint32_t offer_at(const bt_emu_device *device, unsigned bytes, bool settled)
+{
+    uint64_t t_ns = device->released_ns + (settled ? BT_SETTLE_US * 1000 : 0);
+    bool there = device->present && !device->unplugged;
+    return OFFER_WORD(bt_emu_word_ahead(device, bytes, settled, t_ns)) | (there ? OFFER_DRIVE : 0)
+           | (settled ? OFFER_SETTLED : 0);
+}
+
+static void offer(uint8_t finger)
+{
+    const bt_emu_device *device = &sensor[finger];
+    uint32_t settled = offer_at(device, 0, true);
+    uint32_t after_byte = offer_at(device, 1, true);
+    uint32_t early = device->settled ? settled : offer_at(device, 0, false);
+    uint32_t primask = hold_off();
+    bool newest = shifter_offer(finger, early, device->settled ? after_byte : 0);
+    settling[finger].waits = newest && !device->settled;
+    if (settling[finger].waits) {
+        settling[finger].offer = settled;
+        settling[finger].after_byte = after_byte;
+        settling[finger].at_us = shifter_released_us(finger) + BT_SETTLE_US - AHEAD_US;
+        set_alarm();
+    }
+    go_on(primask);
+}
+
+// ---- what a sensor hears
+// -----------------------------------------------------------------------------------
+
+static void hear(uint8_t finger, const exchange *heard, bool alone)
+{
+    bt_emu_device *device = &sensor[finger];
+    uint64_t end_ns = heard->t_us * 1000ull;
+    bool settled = alone && heard->offer & OFFER_SETTLED;
+    // What was offered tells on which side of the 50 us it was.
+    bt_emu_select(device, true, settled ? device->released_ns + BT_SETTLE_US * 1000 : device->released_ns);
+    uint16_t said = 0;
+    for (int k = 0; k < heard->bytes; k++) {
+        uint8_t mosi = k == 0 ? (uint8_t)(heard->mosi >> 8) : k == 1 ? (uint8_t)heard->mosi : 0;
+        uint8_t miso = bt_emu_transfer8(device, mosi, end_ns);
+        said = (uint16_t)(k > 1 ? said : said | miso << (k == 0 ? 8 : 0));
+    }
+    bt_emu_select(device, false, end_ns);
+    if (alone && heard->mosi <= BT_READ_MOSI_MAX) {
+        uint16_t mask = heard->bytes == 1 ? 0xFF00 : 0xFFFF;
+        uint16_t offered = heard->offer & OFFER_DRIVE ? WORD_OF(heard->offer) : 0;
+        counts.words++;
+        counts.late += ((said ^ offered) & mask) != 0 || heard->bytes > 2; // there are no more in an offer
+    }
+}
+
+static void exchanged(void)
+{
+    exchange done;
+    while (shifter_take(&done)) {
+        bool alone = (done.selected & (done.selected - 1)) == 0;
+        bool started = source->started;
+        for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+            if (done.selected >> f & 1) {
+                hear(f, &done, alone);
+                offer(f);
+            }
+        }
+        if (source->started && done.mosi > BT_READ_MOSI_MAX) {
+            counts.first_us = started ? counts.first_us : done.t_us;
+            counts.latest_us = done.t_us;
+        }
+        uint32_t took_us = port_now_us() - done.t_us;
+        counts.slowest_us = took_us > counts.slowest_us ? took_us : counts.slowest_us;
+    }
+}
+
+// ---- for the main loop: with the model's own interrupt held off, and no other ----------------------------
+
+static void hold_off_model(void)
+{
+    NVIC_ICER = 1u << PIO0_IRQ_1;
+    __asm volatile("dsb\n isb" ::: "memory");
+}
+
+static void let_go_model(void)
+{
+    __asm volatile("" ::: "memory");
+    NVIC_ISER = 1u << PIO0_IRQ_1;
+}
+
+void answers_renew(void)
+{
+    hold_off_model();
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        offer(f);
+    }
+    let_go_model();
+}
+
+void answers_plug(uint8_t finger, bool present, const char *serial)
+{
+    hold_off_model();
+    bt_emu_init(&sensor[finger], finger, present, serial, bt_emu_stream_count, source);
+    offer(finger);
+    let_go_model();
+}
+
+void answers_forget(void)
+{
+    hold_off_model();
+    bt_emu_stream_init(source, samples, SAMPLE_RAM);
+    memset(&counts, 0, sizeof counts);
+    let_go_model();
+}
+
+void answers_start(bt_emu_stream *stream)
+{
+    source = stream;
+    answers_forget();
+    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
+        char serial[] = "BTEMU00000000001";
+        serial[sizeof serial - 2] = (char)('1' + f);
+        bt_emu_init(&sensor[f], f, true, serial, bt_emu_stream_count, source);
+    }
+    shifter_start(exchanged);
+    answers_renew();
+}
+
+bt_answer_counts answers_counts(void)
+{
+    hold_off_model();
+    bt_answer_counts now = counts;
+    let_go_model();
+    now.late += shifter_lost();
+    return now;
+}

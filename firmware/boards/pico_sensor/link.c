@@ -1,0 +1,185 @@
+#include "link.h"
+
+#include "answers.h"
+#include "port.h"
+#include "version.h"
+#include "wire/framing.h"
+
+#include <string.h>
+
+static bt_emu_stream *stream;
+static bt_deframer deframer;
+static uint8_t plugged;
+
+void link_start(bt_emu_stream *its)
+{
+    stream = its;
+    plugged = (1u << BT_MAX_FINGERS) - 1;
+    bt_deframer_reset(&deframer);
+}
+
+// A frame that there is no room for is lost, as with the gateway: the host asks again.
+static void send(uint8_t id, const uint8_t *payload)
+{
+    uint8_t frame[BT_ENCODED_MAX_BYTES];
+    (void)port_link_write(frame, bt_frame_encode(id, payload, (size_t)bt_wire_payload_bytes(id), frame));
+}
+
+static void reply(uint8_t req_id, uint8_t command, uint8_t error)
+{
+    uint8_t payload[BT_REPLY_BYTES];
+    bt_msg_reply_pack(&(bt_msg_reply){req_id, command, error}, payload);
+    send(BT_REPLY_ID, payload);
+}
+
+static void send_status(uint8_t req_id)
+{
+    bt_answer_counts counts = answers_counts();
+    uint32_t room = bt_emu_stream_room(stream);
+    bt_msg_emu_status status = {
+        .req_id = req_id,
+        .fingers = plugged,
+        .slots_taken = stream->taken,
+        .room_slots = (uint16_t)(room < UINT16_MAX ? room : UINT16_MAX),
+        .slots_served = stream->at + (stream->served != 0),
+        .elapsed_us = counts.latest_us - counts.first_us,
+        .words = counts.words,
+        .words_late = counts.late,
+        .samples_starved = stream->starved,
+        .slowest_us = (uint16_t)counts.slowest_us,
+    };
+    uint8_t payload[BT_EMU_STATUS_BYTES];
+    bt_msg_emu_status_pack(&status, payload);
+    send(BT_EMU_STATUS_ID, payload);
+}
+
+static void send_hello(const bt_msg_hello_request *request)
+{
+    bt_msg_hello hello = {
+        .req_id = request->req_id,
+        .nonce = request->nonce,
+        .wire_major = BT_WIRE_MAJOR,
+        .wire_minor = BT_WIRE_MINOR,
+        .schema_hash = BT_SCHEMA_HASH,
+        .firmware_major = BT_VERSION_MAJOR,
+        .firmware_minor = BT_VERSION_MINOR,
+        .firmware_patch = BT_VERSION_PATCH,
+        .board = port_board(),
+        .boot_id = port_boot_id(),
+        .slot_hz = BT_SLOT_HZ,
+        .fingers_present = plugged,
+        .image_crc32 = port_image_crc32(),
+    };
+    port_board_serial(hello.board_serial);
+    uint8_t payload[BT_HELLO_BYTES];
+    bt_msg_hello_pack(&hello, payload);
+    send(BT_HELLO_ID, payload);
+}
+
+static uint8_t plug(const bt_msg_emu_plug *command)
+{
+    if (command->finger >= BT_MAX_FINGERS) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    char serial[sizeof command->serial + 1] = "BTEMU00000000001";
+    if (command->serial[0] != 0) {
+        memcpy(serial, command->serial, sizeof command->serial);
+    } else {
+        serial[sizeof command->serial - 1] = (char)('1' + command->finger);
+    }
+    if (command->finger == 0) {
+        answers_forget();
+    }
+    uint8_t bit = (uint8_t)(1u << command->finger);
+    plugged = (uint8_t)(command->present ? plugged | bit : plugged & ~bit);
+    answers_plug(command->finger, command->present, serial);
+    return BT_ERROR_OK;
+}
+
+// What is not taken the status tells.
+static uint8_t take_tape(const bt_msg_emu_tape *command)
+{
+    if (command->fingers == 0 || command->fingers > BT_MAX_FINGERS || command->slots == 0
+        || 2 * command->slots * command->fingers > (int)sizeof command->samples) {
+        return BT_ERROR_OUT_OF_RANGE;
+    }
+    if (command->first_slot == stream->taken) {
+        (void)bt_emu_stream_put(stream, command->fingers, command->samples, command->slots);
+    }
+    return BT_ERROR_OK;
+}
+
+static uint8_t set_fault(const bt_msg_emu_set_fault *command)
+{
+    if (command->finger >= BT_MAX_FINGERS) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    if (command->fault != BT_EMU_FAULT_NONE && command->fault < BT_EMU_FAULT_SWAPPED) {
+        return BT_ERROR_OUT_OF_RANGE;
+    }
+    stream->fault[command->finger] = command->fault;
+    answers_renew();
+    return BT_ERROR_OK;
+}
+
+static union {
+    bt_msg_emu_plug plug;
+    bt_msg_emu_tape tape;
+    bt_msg_emu_set_fault fault;
+    bt_msg_hello_request hello;
+    bt_msg_reboot_bootloader reboot;
+} got;
+
+static void obey(uint8_t id, const uint8_t *payload)
+{
+    uint8_t req_id = payload[0]; // every command begins with it
+    uint8_t error = BT_ERROR_OK;
+    switch (id) {
+    case BT_HELLO_REQUEST_ID:
+        bt_msg_hello_request_unpack(&got.hello, payload);
+        send_hello(&got.hello);
+        return;
+    case BT_REBOOT_BOOTLOADER_ID:
+        bt_msg_reboot_bootloader_unpack(&got.reboot, payload);
+        error = got.reboot.magic != BT_BOOTLOADER_MAGIC ? BT_ERROR_OUT_OF_RANGE
+                : port_reboot_bootloader()              ? BT_ERROR_OK
+                                                        : BT_ERROR_NOT_HERE;
+        reply(req_id, id, error);
+        return;
+    case BT_EMU_PLUG_ID:
+        bt_msg_emu_plug_unpack(&got.plug, payload);
+        error = plug(&got.plug);
+        break;
+    case BT_EMU_TAPE_ID:
+        bt_msg_emu_tape_unpack(&got.tape, payload);
+        error = take_tape(&got.tape);
+        break;
+    case BT_EMU_SET_FAULT_ID:
+        bt_msg_emu_set_fault_unpack(&got.fault, payload);
+        error = set_fault(&got.fault);
+        break;
+    case BT_EMU_GET_STATUS_ID:
+        break;
+    default:
+        error = BT_ERROR_UNKNOWN_COMMAND;
+        break;
+    }
+    if (error == BT_ERROR_OK) {
+        send_status(req_id);
+    } else {
+        reply(req_id, id, error);
+    }
+}
+
+void link_poll(void)
+{
+    uint8_t bytes[64];
+    size_t n;
+    while ((n = port_link_read(bytes, sizeof bytes)) > 0) {
+        for (size_t k = 0; k < n; k++) {
+            if (bt_deframer_push(&deframer, bytes[k]) == BT_DEFRAMED_GOOD && deframer.payload_bytes > 0) {
+                obey(deframer.id, deframer.buffer + 1);
+            }
+        }
+    }
+}

@@ -1,0 +1,21 @@
+#include "answers.h"
+#include "link.h"
+#include "port.h"
+#include "system.h"
+
+static bt_emu_stream stream;
+
+void bus_start(void)
+{
+    answers_start(&stream);
+}
+
+int main(int argc, char **argv)
+{
+    port_init(argc, argv);
+    link_start(&stream);
+    for (;;) {
+        link_poll();
+        port_idle();
+    }
+}

@@ -1,0 +1,103 @@
+"""biotac sensor PORT SOURCE"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import threading
+from dataclasses import asdict
+
+from ...errors import InputError
+from ...link.discovery import SERIAL_PREFIX, choose
+from ...link.serial_port import SerialLink
+from ...sim.loading import load_source
+from ...sim.sensor_board import SensorBoard
+from ...wire import messages_gen as wire
+from ...wire.sensor_gen import SLOT_HZ
+from .. import values
+
+EXAMPLE = "biotac sensor /dev/ttyACM1 press.toml --fingers 5"
+SCENARIO_S = 600.0
+LOOK_S = 0.5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Port, source, faults."""
+    parser.add_argument(
+        "port", metavar="PORT", help="device path or serial:NUMBER of the sensor board, not the gateway"
+    )
+    parser.add_argument(
+        "source",
+        metavar="SOURCE",
+        nargs="?",
+        help="scenario (.toml) or recorded counts (.npz, .btd); without one the board goes on with what it has",
+    )
+    parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
+    parser.add_argument(
+        "--seconds",
+        type=values.seconds,
+        help="device time (default: scenarios repeat for ten minutes, recordings play once)",
+    )
+    kinds = ", ".join(fault.name.lower() for fault in wire.EmuFault)
+    parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="FINGER=KIND",
+        help=f"from now on, whatever the tape says: {kinds}; may be repeated",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Plug the sensors in, feed them until their tape is over, or Ctrl-C, and say how the board got on."""
+    faults = [fault_of(text) for text in args.fault]
+    port = choose(args.port.removeprefix(SERIAL_PREFIX)) if args.port.startswith(SERIAL_PREFIX) else args.port
+    board = SensorBoard(SerialLink(port))
+    try:
+        if args.source is not None:
+            seconds = args.seconds or (SCENARIO_S if args.source.endswith(".toml") else None)
+            board.plug(load_source(args.source, fingers=args.fingers, seconds=seconds))
+        for finger, fault in faults:
+            board.fault(finger, fault)
+        status = board.status() if args.source is None else play(board)
+    finally:
+        board.close()
+    print(json.dumps(asdict(status)) if args.json else summary(status))
+    return 0
+
+
+def play(board: SensorBoard) -> wire.EmuStatus:
+    """Until the bus has come past the last slot, or Ctrl-C."""
+    ended = threading.Event()
+    try:
+        status = board.feed(ended=ended)
+        while status.slots_served < status.slots_taken:
+            ended.wait(LOOK_S)
+            status = board.status()
+    except KeyboardInterrupt:
+        print("stopped; the board goes on with what it has", file=sys.stderr)
+        status = board.status()
+    return status
+
+
+def fault_of(text: str) -> tuple[int, wire.EmuFault]:
+    """``2=stuck_low``: a finger and what it does."""
+    finger, _, kind = text.partition("=")
+    if not finger.isdigit() or kind.upper() not in wire.EmuFault.__members__:
+        kinds = ", ".join(fault.name.lower() for fault in wire.EmuFault)
+        raise InputError(f"--fault {text}: expected FINGER=KIND, as in 2=stuck_low; kinds are {kinds}")
+    return int(finger), wire.EmuFault[kind.upper()]
+
+
+def summary(status: wire.EmuStatus) -> str:
+    """For people. Where the gateway lost no slot, the tape's time less this board's is the two clocks' drift."""
+    lines = [
+        f"{status.slots_served} of {status.slots_taken} slots served in {status.elapsed_us / 1e6:.3f} s by its clock; "
+        f"{status.words} words read, {status.words_late} late, {status.samples_starved} asked for in vain",
+        f"the slowest answer was ready {status.slowest_us} us after its select rose",
+    ]
+    if status.slots_served > 1 and status.elapsed_us:
+        tape_us = (status.slots_served - 1) * 1e6 / SLOT_HZ
+        lines.append(f"the gateway's clock is {(status.elapsed_us / tape_us - 1) * 1e6:+.0f} ppm slow by this board's")
+    return "\n".join(lines)

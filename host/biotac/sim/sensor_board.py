@@ -1,0 +1,86 @@
+"""The emulated sensors as a board of their own (firmware/boards/pico_sensor): plugged, fed with a Source, and asked.
+
+The board serves its tape in order, a sample for each sample command. It keeps 3.5 s of five fingers, 17 s of one.
+"""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import PortError
+from ..hand.board import Board
+from ..link import Link
+from ..wire import messages_gen as wire
+from ..wire import sensor_gen as sensor
+from ..wire.identity import board_text
+from .source import Source
+
+SAMPLES_A_MESSAGE = 110
+SAMPLE_BYTES = 2 * SAMPLES_A_MESSAGE
+BURST = 16  # messages until the board is asked how far it got
+REST_S = 0.05  # while its room is full
+
+
+class SensorBoard:
+    """The sensor board on ``link``, which is closed when it does not answer as one (PortError)."""
+
+    def __init__(self, link: Link) -> None:
+        self._board = Board(link)
+        self.info = self._board.info
+        if self.info.board != wire.Board.PICO_SENSOR:
+            seen = board_text(self.info.board)
+            self._board.close()
+            raise PortError(f"{link.port} is {seen}, no sensor board; name the other port, or `biotac flash` it")
+        self._samples: npt.NDArray[np.uint16] = np.zeros((0, 1), np.uint16)
+
+    def plug(self, source: Source) -> None:
+        """Plug in as many sensors as ``source`` has fingers, which begin at its first row; then feed()."""
+        frames, fingers, slots = source.samples.shape
+        self._samples = source.samples.transpose(0, 2, 1).reshape(frames * slots, fingers)
+        for finger in range(sensor.MAX_SENSORS):
+            serial = source.serials[finger] if finger < len(source.serials) else ""
+            padded = tuple(serial.encode().ljust(16, b"\0"))
+            self._board.ask(wire.EmuPlug(0, finger, finger < fingers, padded), wire.EmuStatus)
+
+    def status(self) -> wire.EmuStatus:
+        """How it gets on."""
+        return self._board.ask(wire.EmuGetStatus(0), wire.EmuStatus)
+
+    def fault(self, finger: int, fault: wire.EmuFault) -> wire.EmuStatus:
+        """Have a finger do this from now on, whatever its tape says; EmuFault.NONE ends it."""
+        return self._board.ask(wire.EmuSetFault(0, finger, fault), wire.EmuStatus)
+
+    def feed(self, until_full: bool = False, ended: threading.Event | None = None) -> wire.EmuStatus:
+        """Send what is left of the source as there is room for it; returns once all is there, or ``ended`` is set.
+
+        ``until_full``: returns when the board's room is full as well.
+        """
+        slots, fingers = self._samples.shape
+        size = SAMPLES_A_MESSAGE // fingers
+        status = self.status()
+        while status.slots_taken < slots and not (ended and ended.is_set()):
+            at = status.slots_taken
+            last = min(slots, at + BURST * size, at + status.room_slots)
+            if last - at < min(size, slots - at):
+                if until_full:
+                    break
+                threading.Event().wait(REST_S) if ended is None else ended.wait(REST_S)
+                status = self.status()
+                continue
+            parts = [(k, min(size, last - k)) for k in range(at, last, size)]
+            for first, count in parts[:-1]:
+                self._board.send(self._part(first, count))
+            status = self._board.ask(self._part(*parts[-1]), wire.EmuStatus)
+        return status
+
+    def _part(self, first: int, count: int) -> wire.EmuTape:
+        data = self._samples[first : first + count].astype("<u2").tobytes()
+        fingers = self._samples.shape[1]
+        return wire.EmuTape(0, fingers, count, first, tuple(data.ljust(SAMPLE_BYTES, b"\0")))
+
+    def close(self) -> None:
+        """Give the port back; the board goes on with what it has."""
+        self._board.close()

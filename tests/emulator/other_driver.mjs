@@ -1,0 +1,39 @@
+// Somebody else's driver on the leads of the sensors' board: one select, held up between words.
+//
+//   node other_driver.mjs IMAGE.bin HOST-BYTES COURSE.json
+//
+// HOST-BYTES is what the host says to the board first. COURSE: [{mosi, hz, wait_us}, ...], a word each and how long the
+// select stays high behind it. Writes {words: [...], counters}.
+import fs from 'node:fs'
+
+import { SELECTS, SensorBoard } from '../../tools/emulator/sensor_board.mjs'
+
+const SETTLED_NS = 200e6 // enumerated, and told
+const SETUP_NS = 500
+
+const [image, said, course] = process.argv.slice(2).map((path) => fs.readFileSync(path))
+let at = 0
+const port = {
+  up: true,
+  hasRoom: true,
+  put() {},
+  take(n) {
+    const part = said.subarray(at, at + n)
+    at += part.length
+    return part.length > 0 ? part : null
+  },
+}
+const board = new SensorBoard({ image, tape: Buffer.alloc(24), port })
+for (let ms = 0; ms < SETTLED_NS / 1e6; ms++) board.runAlone(1e6)
+let now = board.machine.nanos + 1e6
+const words = []
+for (const { mosi, hz, wait_us } of JSON.parse(course)) {
+  board.lead(now, SELECTS[0], false)
+  now += SETUP_NS
+  now += board.clockOut(now, mosi, 16, 1e9 / hz) + 1e9 / hz
+  board.lead(now, SELECTS[0], true)
+  board.runUntil(now)
+  words.push(board.bits.reduce((word, bit) => (word << 1) | bit, 0))
+  now += wait_us * 1000
+}
+console.log(JSON.stringify({ words, counters: board.counters() }))

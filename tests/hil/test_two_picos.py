@@ -1,0 +1,107 @@
+"""The gateway's image reads its sensors from a second Pico's, over a bus of edges: what the tape says, in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from rig import all_rigs, in_ci, prepare
+
+import biotac
+from biotac.hand.opening import shake_hands
+from biotac.sim.loading import load_source
+from biotac.sim.process import SimLink
+from biotac.sim.two_picos import TwoPicos
+from biotac.wire import messages_gen as wire
+
+SETTLE_US = 50
+DAY_S, NIGHT_S = 0.1, 60.0
+
+Open = Callable[[float], tuple[biotac.Hand, TwoPicos]]
+
+
+@pytest.fixture
+def opened() -> Iterator[Open]:
+    why = prepare(all_rigs()["two_picos"])
+    if why is not None:
+        pytest.fail(why) if in_ci() else pytest.skip(why)
+    hands = []
+
+    def open_pair(seconds: float) -> tuple[biotac.Hand, TwoPicos]:
+        board = TwoPicos(load_source("press.toml", fingers=5, seconds=seconds), pace=0.0, hold=True)
+        hands.append(shake_hands(SimLink("two_picos", board)))
+        return hands[-1], board
+
+    yield open_pair
+    for hand in hands:
+        hand.close()
+
+
+def on_posix(seconds: float) -> biotac.Batch:
+    with biotac.open(f"sim:press.toml?fingers=5&seconds={seconds}") as hand:
+        return hand.read_batch(seconds + 1)
+
+
+def assert_same(rows: np.ndarray, others: np.ndarray) -> None:
+    """In all fields but time: boards do not start at the same microsecond."""
+    assert len(rows) == len(others) > 0
+    for field in set(rows.dtype.names or ()) - {"t_us"}:
+        assert rows[field].tobytes() == others[field].tobytes(), field
+
+
+@pytest.mark.parametrize("seconds", [DAY_S, pytest.param(NIGHT_S, marks=pytest.mark.nightly)])
+def test_every_word_of_five_sensors_is_right_and_in_time(opened: Open, seconds: float) -> None:
+    hand, board = opened(seconds)
+    batch = hand.read_batch(seconds + 1)
+    there = on_posix(seconds)
+    assert_same(batch.wire, there.wire)
+    assert_same(batch.pac, there.pac)
+    for finger in hand.fingers:
+        words = hand.sensor_status(finger)
+        assert words.words_parity == words.words_stuck == words.words_error == 0
+    assert board.sensor_board is not None
+    told = board.sensor_board.status()
+    assert told.words_late == told.samples_starved == 0
+    assert told.slots_served == told.slots_taken == round(seconds * 4400)
+    assert told.words >= 5 * told.slots_served  # and those that asked who is there
+    leads = board.counters()["sensors"]
+    assert leads["late_edges"] == 0  # the two boards were never out of step
+    assert leads["answer_ns"] < leads["answer_left_ns"]
+    print(f"answers {leads['answer_ns']:.0f} of {leads['answer_left_ns']:.0f} ns, staged in {told.slowest_us} us")
+
+
+FAULTS = {
+    wire.EmuFault.BAD_PARITY: "words_parity",
+    wire.EmuFault.STUCK_LOW: "words_stuck",
+    wire.EmuFault.STUCK_HIGH: "words_stuck",
+    wire.EmuFault.TOO_EARLY: "words_error",
+    wire.EmuFault.NO_CHANNEL: "words_error",
+    wire.EmuFault.UNPLUGGED: "words_stuck",
+    wire.EmuFault.SWAPPED: "words_stuck",
+}
+
+
+@pytest.mark.nightly
+def test_faults_by_command_are_seen_on_their_finger_and_on_no_other(opened: Open) -> None:
+    hand, board = opened(4.0)
+    assert board.sensor_board is not None
+    for fault, counter in FAULTS.items():
+        before = [hand.sensor_status(finger) for finger in hand.fingers]
+        board.sensor_board.fault(1, fault)
+        hand.read_batch(0.2)
+        board.sensor_board.fault(1, wire.EmuFault.NONE)
+        hand.read_batch(0.3)  # it is asked who it is
+        after = [hand.sensor_status(finger) for finger in hand.fingers]
+        assert getattr(after[1], counter) > getattr(before[1], counter), fault.name
+        for finger in (0, 2, 3, 4):
+            for name in ("words_parity", "words_stuck", "words_error"):
+                assert getattr(after[finger], name) == 0, (fault.name, finger, name)
+    assert board.sensor_board.status().words_late == 0
+
+
+def test_places_on_the_tape_are_told_apart() -> None:
+    """What the comparison rests on: this scenario's rows differ, so that a slot too early or too late is seen."""
+    samples = load_source("press.toml", fingers=5, seconds=DAY_S).samples
+    assert all((one != next_one).any() for one, next_one in pairwise(samples))

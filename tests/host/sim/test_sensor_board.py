@@ -1,0 +1,131 @@
+"""The host's side of the sensor board, against a board that is a few lines of Python: no slot twice, none left out."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+import pytest
+
+from biotac.cli.live import sensor
+from biotac.errors import CommandRefusedError, InputError, NotAGatewayError, PortError
+from biotac.hand.opening import open as open_hand
+from biotac.link.serial_port import SerialLink
+from biotac.sim.loading import load_source
+from biotac.sim.sensor_board import SensorBoard
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import encode
+
+
+class FakeSensorBoard:
+    """Takes a tape as firmware/boards/pico_sensor does; ``serve`` slots of it are played between two questions."""
+
+    def __init__(self, hello: Any, *, room: int = 100_000, serve: int = 0, deaf_to: int = -1) -> None:
+        self.hello = hello
+        self.board = int(wire.Board.PICO_SENSOR)
+        self.room, self.serve, self.deaf_to = room, serve, deaf_to
+        self.rows: list[tuple[int, ...]] = []
+        self.served = 0
+        self.plugged: dict[int, wire.EmuPlug] = {}
+        self.faults: dict[int, int] = {}
+        self.parts = 0
+
+    def answer(self, message_id: int, payload: bytes) -> bytes:
+        if message_id == wire.HelloRequest.ID:
+            return self.hello(payload, board=self.board)
+        if message_id == wire.EmuPlug.ID:
+            plug = wire.EmuPlug.unpack(payload)
+            self.plugged[plug.finger] = plug
+        elif message_id == wire.EmuTape.ID:
+            self.parts += 1
+            if self.parts == self.deaf_to:
+                return b""
+            self._take(wire.EmuTape.unpack(payload))
+        elif message_id == wire.EmuSetFault.ID:
+            fault = wire.EmuSetFault.unpack(payload)
+            if fault.finger > 4:
+                return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.NO_SUCH_FINGER).pack())
+            self.faults[fault.finger] = fault.fault
+        elif message_id == wire.EmuGetStatus.ID:
+            self.served = min(len(self.rows), self.served + self.serve)
+        else:
+            return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.UNKNOWN_COMMAND).pack())
+        room = self.room - (len(self.rows) - self.served)
+        facts = (0x1F, len(self.rows), min(room, 0xFFFF), self.served, 0, 0, 0, 0, 0)
+        return encode(wire.EmuStatus.ID, wire.EmuStatus(payload[0], *facts).pack())
+
+    def _take(self, part: wire.EmuTape) -> None:
+        samples = np.frombuffer(bytes(part.samples), "<u2")[: part.slots * part.fingers]
+        fits = part.slots <= self.room - (len(self.rows) - self.served)
+        if part.first_slot == len(self.rows) and fits:
+            self.rows += [tuple(row) for row in samples.reshape(part.slots, part.fingers).tolist()]
+
+
+def rows_of(source: Any) -> list[tuple[int, ...]]:
+    return [tuple(row) for frame in source.samples.transpose(0, 2, 1).tolist() for row in frame]
+
+
+@pytest.mark.parametrize(
+    "facts", [{}, {"room": 3 * 44, "serve": 50}, {"deaf_to": 5}], ids=["roomy", "full", "a part lost"]
+)
+@pytest.mark.parametrize("fingers", [1, 5])
+def test_the_whole_tape_is_there_in_order(scripted_board, hello, facts: dict[str, int], fingers: int) -> None:
+    fake = FakeSensorBoard(hello, **facts)
+    source = load_source("press.toml", fingers=fingers, seconds=0.2)
+    board = SensorBoard(SerialLink(scripted_board(fake.answer).path))
+    board.plug(source)
+    assert [plug.present for _, plug in sorted(fake.plugged.items())] == [f < fingers for f in range(5)]
+    status = board.feed()
+    board.close()
+    assert status.slots_taken == len(fake.rows)
+    assert fake.rows == rows_of(source)
+
+
+def test_a_full_board_is_left_alone_until_the_gateway_has_power(scripted_board, hello) -> None:
+    fake = FakeSensorBoard(hello, room=200)
+    board = SensorBoard(SerialLink(scripted_board(fake.answer).path))
+    board.plug(load_source("press.toml", fingers=5, seconds=0.2))
+    assert 200 - 22 < board.feed(until_full=True).slots_taken <= 200
+    board.close()
+
+
+def test_faults_are_set_and_refused(scripted_board, hello) -> None:
+    fake = FakeSensorBoard(hello)
+    board = SensorBoard(SerialLink(scripted_board(fake.answer).path))
+    board.fault(2, wire.EmuFault.STUCK_LOW)
+    assert fake.faults == {2: 0xFFFD}
+    with pytest.raises(CommandRefusedError, match="NO_SUCH_FINGER"):
+        board.fault(5, wire.EmuFault.NONE)
+    board.close()
+
+
+def test_a_gateway_is_no_sensor_board_nor_the_other_way_round(scripted_board, hello) -> None:
+    fake = FakeSensorBoard(hello)
+    path = scripted_board(fake.answer).path
+    with pytest.raises(NotAGatewayError, match="biotac sensor"):
+        open_hand(path)
+    fake.board = int(wire.Board.PICO)
+    with pytest.raises(PortError, match="is PICO, no sensor board"):
+        SensorBoard(SerialLink(path))
+
+
+def test_the_verb_plays_a_source_and_says_how_it_went(scripted_board, hello, capsys) -> None:
+    fake = FakeSensorBoard(hello, room=500, serve=500)
+    words = [
+        scripted_board(fake.answer).path,
+        "press.toml",
+        "--fingers",
+        "2",
+        "--seconds",
+        "0.2",
+        "--fault",
+        "1=unplugged",
+    ]
+    parser = argparse.ArgumentParser()
+    sensor.add_arguments(parser)
+    assert sensor.run(argparse.Namespace(**vars(parser.parse_args(words)), json=False)) == 0
+    assert capsys.readouterr().out.startswith("880 of 880 slots served")
+    assert fake.faults == {1: int(wire.EmuFault.UNPLUGGED)}
+    with pytest.raises(InputError, match="expected FINGER=KIND"):
+        sensor.fault_of("2=loose")

@@ -1,0 +1,167 @@
+// The sensors as a board of their own: a second emulated Pico that runs firmware/boards/pico_sensor, and the leads to the
+// gateway's. Takes the place of Sensors (sensors.mjs), edge by edge: SCK and MOSI as the gateway's SPI block would drive
+// them, MISO as the pad carries it when the clock rises.
+//
+// The gateway runs ahead. What its pins do is kept with the time of it, and the sensors' board runs after it as soon as
+// the gateway wants to know something of it: the word that it has read.
+import fs from 'node:fs'
+
+import { GPIOPinState } from 'rp2040js'
+
+import { Machine } from './machine.mjs'
+import { PioTime } from './pio.mjs'
+import { Board, BootRom } from './rom.mjs'
+import { CHIP_SELECTS, WIDTHS } from './sensors.mjs'
+import { UsbHost } from './usb.mjs'
+
+const [MISO, SCK, MOSI] = [16, 18, 19] // firmware/boards/pico_sensor/pins.h
+export const SELECTS = [2, 3, 4, 5, 6]
+const SYNCHRONISER_NS = 16 // two flip-flops behind each input
+const SAMPLE_COMMAND = 0x80 // and above
+const SLOTS = JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url))).sensor.frame.slots.length
+const TAPE_FRAMES_AT = 12
+const SAMPLE = -1 // in place of a pin: the gateway takes in MISO
+const SPI_BLOCK_BITS = 16
+
+export class SensorBoard {
+  /** tape: what the host will play, of which only the length matters here. */
+  constructor({ image, tape, port }) {
+    this.port = port
+    this.frames = tape.readUInt32LE(TAPE_FRAMES_AT)
+    this.stretched = false // no lead makes a word longer
+    this.edges = [] // [ns, pin, high], sorted by time
+    this.bits = []
+    this.lateEdges = 0 // that came when the board was already past their time
+    this.transfers = this.commands = 0
+    this.fell = null // ns, when a select last fell
+    this.slowestAnswer = 0 // ns from there until MISO was driven, and the least that the bus has left for it
+    this.leastLeft = Infinity
+    this.gateway = null // the chip, once it has power
+    this.behind = 0 // ns: this board's time less the gateway's
+    this.machine = new Machine(image, (machine) => this.#attach(machine))
+  }
+
+  get started() {
+    return this.commands > 0
+  }
+
+  get over() {
+    return this.commands > this.frames * SLOTS
+  }
+
+  counters() {
+    const { transfers, commands, lateEdges, slowestAnswer, leastLeft } = this
+    return { transfers, commands, late_edges: lateEdges, answer_ns: slowestAnswer, answer_left_ns: leastLeft, usb: this.usb.state, instructions: this.machine.instructions, slept: this.machine.sleptNanos / this.machine.nanos }
+  }
+
+  powerCycle() {
+    this.machine.powerCycle()
+  }
+
+  /** Run by itself, while there is no gateway, or it stands still. */
+  runAlone(nanos) {
+    this.runUntil(this.machine.nanos + nanos)
+    if (this.gateway) this.behind = this.machine.nanos - this.gateway.clock.nanos
+  }
+
+  /** The gateway's chip, at the other end of the leads; again after each of its resets. */
+  wire(mcu) {
+    this.behind = this.machine.nanos - mcu.clock.nanos
+    this.gateway = mcu
+    CHIP_SELECTS.forEach((pin, finger) => {
+      mcu.gpio[pin].addListener((state) => this.lead(mcu.clock.nanos, SELECTS[finger], state !== GPIOPinState.Low))
+    })
+    const spi = mcu.spi[0]
+    const done = mcu.clock.createAlarm(() => {
+      this.follow()
+      spi.completeTransmit(this.bits.reduce((word, bit) => (word << 1) | bit, 0))
+    })
+    spi.onTransmit = (mosi) => {
+      if (!WIDTHS.includes(spi.dataBits) || spi.spiMode !== 0) throw new Error('the gateway speaks another SPI')
+      this.transfers++
+      this.commands += spi.dataBits === SPI_BLOCK_BITS && mosi >> 8 >= SAMPLE_COMMAND ? 1 : 0
+      done.schedule(this.clockOut(mcu.clock.nanos, mosi, spi.dataBits, 1e9 / spi.clockFrequency))
+    }
+  }
+
+  /** Come to where the gateway is. */
+  follow() {
+    this.runUntil(this.gateway.clock.nanos + this.behind)
+  }
+
+  runUntil(nanos) {
+    if (nanos <= this.machine.nanos) return
+    this.usb.setOpen(this.port.up)
+    this.usb.poke()
+    this.machine.runUntil(nanos)
+  }
+
+  /** A word's edges, the first bit out half a period before the clock first rises. Returns how long it takes in ns. */
+  clockOut(start, mosi, bits, period) {
+    this.bits = []
+    for (let k = 0; k < bits; k++) {
+      this.lead(start + k * period, MOSI, ((mosi >> (bits - 1 - k)) & 1) === 1)
+      this.lead(start + (k + 0.5) * period, SAMPLE)
+      this.lead(start + (k + 0.5) * period, SCK, true)
+      this.lead(start + (k + 1) * period, SCK, false)
+    }
+    if (this.fell !== null) this.leastLeft = Math.min(this.leastLeft, start + period / 2 - this.fell)
+    return bits * period
+  }
+
+  /** A lead's level at a time of the gateway's: SELECTS, SCK, MOSI; or when MISO is taken in. */
+  lead(nanos, pin, high) {
+    if (SELECTS.includes(pin)) this.fell = high ? null : nanos
+    const at = nanos + this.behind + (pin === SAMPLE ? 0 : SYNCHRONISER_NS)
+    let k = this.edges.length
+    while (k > 0 && this.edges[k - 1][0] > at) k--
+    this.edges.splice(k, 0, [at, pin, high])
+    if (k === 0) this.#await()
+  }
+
+  #await() {
+    if (this.edges.length === 0) return
+    const { nanos } = this.machine
+    const [at] = this.edges[0]
+    if (at < nanos - 1e-3) this.lateEdges++
+    this.next.schedule(Math.max(0, at - nanos))
+  }
+
+  #arrive() {
+    const [at, pin, high] = this.edges.shift()
+    if (pin === SAMPLE) {
+      this.pio.advance()
+      this.bits.push(this.machine.mcu.gpio[MISO].value === GPIOPinState.High ? 1 : 0)
+    } else {
+      if (SELECTS.includes(pin)) this.selectFell = high ? null : at - SYNCHRONISER_NS
+      this.pio.input(pin, high)
+    }
+    this.#await()
+  }
+
+  #attach(machine) {
+    const { mcu } = machine
+    this.pio = new PioTime(mcu)
+    for (const pin of SELECTS) this.pio.input(pin, true) // the gateway's, or the pull-up's
+    this.edges = []
+    this.next = mcu.clock.createAlarm(() => this.#arrive())
+    mcu.gpio[MISO].addListener((state) => {
+      const driven = state === GPIOPinState.High || state === GPIOPinState.Low
+      if (driven && this.selectFell !== null) {
+        this.slowestAnswer = Math.max(this.slowestAnswer, mcu.clock.nanos - this.selectFell)
+        this.selectFell = null
+      }
+    })
+    this.selectFell = null
+    this.rom = new BootRom(machine, new Board({ uniqueId: [0xe6, 0x60, 0x58, 0x38, 0x83, 0x1f, 0x5b, 0x5e] }), {
+      onLoader: () => {},
+      onCut: () => {},
+    })
+    this.usb = new UsbHost(mcu, {
+      onData: (bytes) => this.port.put(bytes),
+      canTake: () => this.port.hasRoom,
+      take: (n) => this.port.take(n),
+    })
+    this.usb.setOpen(this.port.up)
+  }
+}
