@@ -7,7 +7,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0x2823160Du
+#define BT_SCHEMA_HASH 0xCEC8D4C1u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -152,7 +152,8 @@ enum bt_event_kind {
 #define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME messages
 #define BT_STREAM_FLAG_PAC (1u << 1) // PAC messages
 #define BT_STREAM_FLAG_STATUS (1u << 2) // STATUS and SENSOR_STATUS once per status_period_ms
-#define BT_STREAM_FLAGS 0x7u // all there are
+#define BT_STREAM_FLAG_BANDS (1u << 3) // BANDS messages
+#define BT_STREAM_FLAGS 0xFu // all there are
 
 // What SUBSCRIBE asks for. What is not asked for is not computed.
 #define BT_QUANTITY_FLAG_POC (1u << 0) // point of contact; without it TORSION_OK is never set
@@ -419,6 +420,17 @@ typedef struct {
     uint32_t energy_count2; // [count^2] of TOUCH and LIFT: sum of squares of the filtered signals, from the latest word of every electrode; invalid of others
     uint16_t peak_count; // [count] of JOLT and SLIP: the most that dynamic pressure changed by within 3.6 ms since it began; 0xFFFF of others
 } bt_msg_event;
+
+// How strongly dynamic pressure vibrated in one round, in six octaves (SPEC.md, Bands).
+#define BT_BANDS_ID 0x18
+#define BT_BANDS_BYTES 32
+typedef struct {
+    uint16_t seq; // [1] that of the FRAME of the same round
+    uint32_t t_us; // [us] that of the PAC of the same round
+    uint8_t finger; // [1] chip select index
+    uint8_t good; // [1] samples of which a good word came; for each other one stands the last good one
+    uint32_t energy_q4[6]; // [count^2 q4] sum of squares over the round's 22 samples of what is in the band, the lowest first; 0xFFFFFFFF where no good word came
+} bt_msg_bands;
 
 // First message of a host. Allowed at any time.
 #define BT_HELLO_REQUEST_ID 0x80
@@ -720,6 +732,7 @@ static const uint8_t bt_client_layout[] = {
     BT_IDLE_ID, 7, 0x41, 0x81, 0x02, 0x81, 0x41, 0x81, 0x42,
     BT_TOUCH_ID, 4, 0x41, 0x81, 0x02, 0x81,
     BT_EVENT_ID, 5, 0x41, 0x81, 0x04, 0x82, 0x41,
+    BT_BANDS_ID, 4, 0x41, 0x81, 0x02, 0x86,
     BT_HELLO_REQUEST_ID, 2, 0x01, 0x81,
     BT_START_ID, 2, 0x03, 0x41,
     BT_STOP_ID, 1, 0x01,
@@ -770,6 +783,7 @@ _Static_assert(sizeof(bt_msg_sensor_status) == 44, "numbers lie at multiples of 
 _Static_assert(sizeof(bt_msg_idle) == 28, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_touch) == 16, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_event) == 24, "numbers lie at multiples of their size");
+_Static_assert(sizeof(bt_msg_bands) == 36, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_hello_request) == 8, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_start) == 6, "numbers lie at multiples of their size");
 _Static_assert(sizeof(bt_msg_stop) == 1, "numbers lie at multiples of their size");
@@ -821,6 +835,7 @@ _Static_assert(sizeof(bt_msg_emu_get_status) == 1, "numbers lie at multiples of 
 #define BT_IDLE_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(tare_state, u8, 1) X(flags, u32, 1) X(frames, u16, 1) X(energy_count2, u32, 1) X(pdc, u16, 1) X(tdc, u16, 1)
 #define BT_TOUCH_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(energy_count2, u32, 1)
 #define BT_EVENT_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(slot, u8, 1) X(kind, u8, 1) X(tare_state, u8, 1) X(onset_us, u32, 1) X(energy_count2, u32, 1) X(peak_count, u16, 1)
+#define BT_BANDS_FIELDS(X) X(seq, u16, 1) X(t_us, u32, 1) X(finger, u8, 1) X(good, u8, 1) X(energy_q4, u32, 6)
 #define BT_HELLO_REQUEST_FIELDS(X) X(req_id, u8, 1) X(nonce, u32, 1)
 #define BT_START_FIELDS(X) X(req_id, u8, 1) X(streams, u8, 1) X(fingers, u8, 1) X(keepalive_ms, u16, 1)
 #define BT_STOP_FIELDS(X) X(req_id, u8, 1)
@@ -853,7 +868,7 @@ _Static_assert(sizeof(bt_msg_emu_get_status) == 1, "numbers lie at multiples of 
 #define BT_EMU_TAPE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots, u8, 1) X(first_slot, u32, 1) X(samples, u8, 220)
 #define BT_EMU_SET_FAULT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(fault, u16, 1)
 #define BT_EMU_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status)
 #endif
 
 #endif

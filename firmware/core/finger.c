@@ -103,6 +103,7 @@ void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_
 static void fall_silent(bt_finger *finger)
 {
     finger->present = false;
+    finger->bands.begun = false; // before and after do not belong together
     if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS) {
         finger->silent_rounds++;
     }
@@ -261,12 +262,25 @@ void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_
     msg->tdc = finger->round.tdc;
 }
 
+static uint32_t first_pac_us(const bt_finger *finger)
+{
+    return finger->round.t_us + BT_FIRST_PAC_SLOT * 1000000u / BT_SLOT_HZ;
+}
+
 void bt_finger_pac(const bt_finger *finger, bt_msg_pac *msg)
 {
     msg->seq = seq_of(finger);
-    msg->t_us = finger->round.t_us + BT_FIRST_PAC_SLOT * 1000000u / BT_SLOT_HZ;
+    msg->t_us = first_pac_us(finger);
     msg->finger = finger->index;
     memcpy(msg->pac, finger->round.pac, sizeof msg->pac);
+}
+
+void bt_finger_bands(bt_finger *finger, bt_msg_bands *msg)
+{
+    msg->seq = seq_of(finger);
+    msg->t_us = first_pac_us(finger);
+    msg->finger = finger->index;
+    msg->good = bt_bands_round(&finger->bands, finger->round.pac, msg->energy_q4);
 }
 
 void bt_finger_tare(const bt_finger *finger, bt_msg_tare *msg)

@@ -4,6 +4,7 @@
 #define BIOTAC_FINGER_H
 
 #include "events/events.h"
+#include "signal/bands.h"
 #include "signal/round.h"
 #include "solve/pressure.h"
 #include "solve/results.h"
@@ -50,6 +51,7 @@ typedef struct {
     bt_lanes sent; // filtered counts when the last FRAME was sent
     bt_kept_wrench kept;
     bt_events events; // kept up while somebody subscribes to them
+    bt_bands bands;   // kept up while they are streamed
     bool shed;        // FRAMEs were left out for want of time since the last one
     bt_word_counts words;
 } bt_finger;
@@ -101,6 +103,7 @@ uint32_t bt_finger_wrench_age(const bt_finger *finger, const bt_solve_settings *
 void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint32_t shed, bt_msg_frame *msg);
 void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg);
 void bt_finger_pac(const bt_finger *finger, bt_msg_pac *msg);
+void bt_finger_bands(bt_finger *finger, bt_msg_bands *msg); // once a round
 
 // Where the finger is touched now, from the latest word of every electrode, be it of this round or of the
 // one before.

@@ -27,4 +27,7 @@ int64_t bt_replay_events(bt_finger *finger, const bt_settings *settings, int64_t
 int64_t bt_replay_pac(int64_t n, const uint16_t *pac, int held, uint8_t *slips, uint8_t *events,
                       int64_t room);
 
+// BANDS of PAC alone, (n, BT_PAC_PER_FRAME): energy_q4 (n, BT_BANDS), and good (n).
+void bt_replay_bands(bt_bands *bands, int64_t n, const uint16_t *pac, uint8_t *good, uint32_t *energy_q4);
+
 #endif

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from .wire.frames import IDLE_DTYPE as IDLE_DTYPE
     from .wire.frames import PAC_DTYPE as PAC_DTYPE
     from .wire.frames import Frame as Frame
+    from .wire.messages_gen import Bands as Bands
     from .wire.messages_gen import CalibrationState as CalibrationState
     from .wire.messages_gen import FaultFlags as FaultFlags
     from .wire.messages_gen import ForceModel as ForceModel
@@ -80,8 +81,8 @@ _HOMES = {
     ".version": "__version__",
     ".wire.batches": "Batch LinkStats",
     ".wire.frames": "FRAME_DTYPE IDLE_DTYPE PAC_DTYPE Frame",
-    ".wire.messages_gen": "CalibrationState Event EventKind FaultFlags ForceModel FrameFlags PocWeights QuantityFlags "
-    "Setting Status Tare TareReason TareState Touch",
+    ".wire.messages_gen": "Bands CalibrationState Event EventKind FaultFlags ForceModel FrameFlags PocWeights "
+    "QuantityFlags Setting Status Tare TareReason TareState Touch",
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
 

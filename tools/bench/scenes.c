@@ -172,6 +172,14 @@ static void events_slipping(const bt_solve_settings *settings)
     events(&slip_events);
 }
 
+static void bands_of_a_round(const bt_solve_settings *settings)
+{
+    (void)settings;
+    static bt_msg_bands bands;
+    bt_finger_bands(&slip_events, &bands);
+    sink = bands.energy_q4[0];
+}
+
 // A FRAME to bytes for the link, with the table's CRC: on an RP2040 the DMA makes it, in 1100 cycles less.
 static void framed(const bt_solve_settings *settings)
 {
@@ -249,6 +257,7 @@ const bench_scene bench_scenes[BENCH_SCENES] = {
     {"events", "at rest", events_at_rest},
     {"events", "in contact", events_in_contact},
     {"events", "slipping", events_slipping},
+    {"bands", "a round", bands_of_a_round},
     {"link", "44 words taken in, at rest", all_words},
     {"link", "FRAME packed, with CRC and COBS", framed},
 };

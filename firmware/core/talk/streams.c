@@ -250,6 +250,15 @@ static void send_pac(bt_session *session, const bt_finger *finger)
     bt_session_send(session, BT_PAC_ID, payload);
 }
 
+static void send_bands(bt_session *session, bt_finger *finger)
+{
+    uint8_t payload[BT_BANDS_BYTES];
+    bt_msg_bands msg;
+    bt_finger_bands(finger, &msg);
+    bt_msg_bands_pack(&msg, payload);
+    bt_session_send(session, BT_BANDS_ID, payload);
+}
+
 void bt_session_round(bt_session *session)
 {
     uint32_t answering = 0; // bit mask
@@ -283,8 +292,15 @@ void bt_session_round(bt_session *session)
     session->first = (uint8_t)(session->first_next % BT_MAX_FINGERS);
     // Vibration after all fingers' forces: who closes a grip waits for those.
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        if (answering >> f & 1 && streams(session, &session->finger[f], BT_STREAM_FLAG_PAC)) {
-            send_pac(session, &session->finger[f]);
+        bt_finger *finger = &session->finger[f];
+        if (!(answering >> f & 1)) {
+            continue;
+        }
+        if (streams(session, finger, BT_STREAM_FLAG_PAC)) {
+            send_pac(session, finger);
+        }
+        if (streams(session, finger, BT_STREAM_FLAG_BANDS)) {
+            send_bands(session, finger);
         }
     }
 }

@@ -45,7 +45,7 @@ VERBS = {
     "lake": ("biotac.cli.recordings.lake", "Check a lake of recordings, or ask it in SQL."),
     "inventory": (
         "biotac.cli.recordings.inventory",
-        "List a lake's boards and sensors, their calibrations, ages and health against their own history.",
+        "List a lake's boards and sensors, their ages, and their health against their own history.",
     ),
     "import": ("biotac.cli.recordings.import_btd", "Turn a SynTouch .btd file into a recording."),
     "calibrate": (
@@ -80,7 +80,7 @@ A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, zenoh:NA
 a simulated board that plays a scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd),
 emu:pico?source=SOURCE, a Pico's image in an emulator, or replay:REC, a recording that answers as its board did.
 
-exit codes: 0 done  1 check, doctor or experiment found something  2 unusable file or argument  3 port not opened
+exit codes: 0 done  1 something was found wrong  2 unusable file or argument  3 port not opened
 4 no gateway on the port  5 another wire version  6 board lost  7 command refused  8 flashing failed  130 interrupted
 """
 
@@ -101,7 +101,9 @@ def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
         description="BioTac fingertips over USB: forces, points of contact, torques.",
         epilog=EPILOG,
         formatter_class=OneLineEach,
+        add_help=False,
     )
+    top.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)  # whoever reads it has found it
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
     for name, (place, text) in VERBS.items():
         verb = verbs.add_parser(name, help=text, description=text, formatter_class=argparse.RawDescriptionHelpFormatter)

@@ -8,15 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..wire import messages_gen as wire
-from ..wire import sensor_gen as sensor
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray
 from ..wire.native import ffi, lib
+from .bands import pac_words
 
 #: An EVENT message's fields (protocol/MESSAGES.md), as the board sends them.
 EVENT_DTYPE = DTYPES[wire.Event.ID]
 _MOST_A_ROUND = 8
-_PAC = sensor.SLOTS.count("PAC")
 
 
 def pac_events(pac: Any, *, held: bool = True) -> tuple[StructArray, NDArray[np.bool_]]:
@@ -27,14 +26,7 @@ def pac_events(pac: Any, *, held: bool = True) -> tuple[StructArray, NDArray[np.
     EVENT_DTYPE (k,), whose times count from the first round, and bool (n,): it slips at the end of the round.
     Raises ValueError for another shape, type or range.
     """
-    words = np.asarray(pac)
-    if words.ndim != 2 or words.shape[1] != _PAC or words.dtype.kind not in "iu":
-        raise ValueError(f"pac is {words.dtype} of shape {words.shape}, expected integers of (n, {_PAC})")
-    if not np.all(((words >= 0) & (words <= sensor.FULL_SCALE_COUNT)) | (words == wire.INVALID_COUNT)):
-        raise ValueError(
-            f"pac holds {words.min()} to {words.max()}, expected 0 to {sensor.FULL_SCALE_COUNT}, or 0xFFFF"
-        )
-    words = np.ascontiguousarray(words, np.uint16)
+    words = pac_words(pac)
     slips = np.zeros(len(words), np.uint8)
     events = np.zeros(_MOST_A_ROUND * len(words), EVENT_DTYPE)
     told = lib.bt_replay_pac(

@@ -6,7 +6,7 @@ columns stand in wire/fields.py and in host/docs/rows.md. A ROS 2 bag has its ow
 
 from __future__ import annotations
 
-from .columns import COLUMNS, PAC_COLUMNS, Table, tables
+from .columns import BANDS_COLUMNS, COLUMNS, PAC_COLUMNS, Table, tables
 from .formats import FORMATS, export
 
-__all__ = ["COLUMNS", "FORMATS", "PAC_COLUMNS", "Table", "export", "tables"]
+__all__ = ["BANDS_COLUMNS", "COLUMNS", "FORMATS", "PAC_COLUMNS", "Table", "export", "tables"]

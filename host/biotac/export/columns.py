@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..recording.layout import frame_id
 from ..recording.reader import Recording
-from ..wire.fields import FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field
+from ..wire.fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field
 from ..wire.frames import StructArray
 
 #: Told a share 0..1 of the work that is done.
@@ -29,17 +29,19 @@ def _stamped(fields: Sequence[Field]) -> tuple[Field, ...]:
 COLUMNS = _stamped(FRAME_FIELDS)
 #: One row a finger and round: 22 samples, the k-th k/2200 s after t_us.
 PAC_COLUMNS = _stamped(PAC_FIELDS)
+#: One row a finger and round: a spectrogram of PAC, in octaves.
+BANDS_COLUMNS = _stamped(BANDS_FIELDS)
 #: One row a heartbeat of a finger that nobody touches.
 IDLE_COLUMNS = _stamped(IDLE_FIELDS)
 
 #: What the exports to one file have. A lake has heartbeats, too.
-EXPORTED: Mapping[str, tuple[Field, ...]] = {"frames": COLUMNS, "pac": PAC_COLUMNS}
+EXPORTED: Mapping[str, tuple[Field, ...]] = {"frames": COLUMNS, "pac": PAC_COLUMNS, "bands": BANDS_COLUMNS}
 HEARTBEATS: Mapping[str, tuple[Field, ...]] = {"idle": IDLE_COLUMNS}
 
 
 @dataclass(frozen=True)
 class Table:
-    """One finger's rows of one kind (``frames``, ``pac``); arrays (n,) or (n, parts) by column name.
+    """One finger's rows of one kind (``frames``, ``pac``, ``bands``); arrays (n,) or (n, parts) by column name.
 
     ``finger`` is None for rows that are the board's.
     """

@@ -11,7 +11,7 @@ import numpy as np
 from ..recording.reader import Recording
 from .columns import Show, Table
 
-PAC_APART = True
+KINDS_APART = True
 _ROWS = 10_000
 
 

@@ -27,8 +27,8 @@ class Format:
 
 
 FORMATS = {
-    ".csv": Format("biotac.export.csv_text", "text, one line a finger and round; PAC in a file of its own"),
-    ".parquet": Format("biotac.export.parquet", "columns for pandas and Arrow; PAC in a file of its own", "parquet"),
+    ".csv": Format("biotac.export.csv_text", "text, one line a finger and round; PAC, bands in files of their own"),
+    ".parquet": Format("biotac.export.parquet", "columns for pandas and Arrow; files likewise", "parquet"),
     ".h5": Format("biotac.export.hdf5", "HDF5, a group a finger, a dataset a column", "hdf5"),
     ".npz": Format("biotac.export.npz", "NumPy arrays named finger0/force_n"),
     ".ros2": Format("biotac.export.ros2", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC", "ros2"),
@@ -56,7 +56,7 @@ def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Sh
     written: list[Path] = []
     write: Write = module.write
     with ExitStack() as together:  # none is in its place before all are whole
-        for path, part in parts(out, made, apart=module.PAC_APART):
+        for path, part in parts(out, made, apart=module.KINDS_APART):
             write(together.enter_context(whole(path, overwrite=overwrite)), part, recording, show)
             written.append(path)
     return written
@@ -66,8 +66,10 @@ def parts(out: Path, made: list[Table], *, apart: bool) -> list[tuple[Path, list
     """Which tables go into which file: ``a.csv`` has the frames, ``a.pac.csv`` PAC, where formats are flat."""
     if not apart:
         return [(out, made)]
-    by_kind = {
-        out: [t for t in made if t.kind == "frames"],
-        out.with_suffix(f".pac{out.suffix}"): [t for t in made if t.kind == "pac"],
-    }
-    return [(path, of_kind) for path, of_kind in by_kind.items() if of_kind]
+    by_kind: dict[str, list[Table]] = {}
+    for table in made:
+        by_kind.setdefault(table.kind, []).append(table)
+    return [
+        (out if kind == "frames" else out.with_suffix(f".{kind}{out.suffix}"), of_kind)
+        for kind, of_kind in by_kind.items()
+    ]

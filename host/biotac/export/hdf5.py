@@ -9,7 +9,7 @@ import h5py
 from ..recording.reader import Recording
 from .columns import Show, Table
 
-PAC_APART = False
+KINDS_APART = False
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recording.reader import Recording
+from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.fields import Field
 from ..wire.frames import StructArray
@@ -24,8 +25,8 @@ _WRAP_US = 2**32
 
 
 def message_tables(recording: Recording) -> list[Table]:
-    """A table a kind of message and finger, whose kind is the message's name in small letters."""
-    timed = [m for m in recording.messages if "t_us" in (DTYPES[m.ID].names or ())]
+    """A table a kind of message and finger, whose kind is the message's name in small letters; BANDS are rows."""
+    timed = [m for m in recording.messages if "t_us" in (DTYPES[m.ID].names or ()) and not isinstance(m, wire.Bands)]
     # STATUS comes each second, so two neighbours are never half a wrap apart.
     told_us = np.array([recording.begin_us, *(m.t_us for m in timed)], np.float64)
     t_us = np.unwrap(told_us, period=_WRAP_US)[1:].astype(np.int64)

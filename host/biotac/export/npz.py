@@ -13,17 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recording.reader import Recording
-from .columns import COLUMNS, PAC_COLUMNS, Show, Table
+from .columns import EXPORTED, Show, Table
 
-PAC_APART = False
+KINDS_APART = False
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
     """As numpy.savez_compressed, array by array so that it can say how far it is."""
     about = {
         "metadata": recording.metadata,
-        "frames": [asdict(column) for column in COLUMNS],
-        "pac": [asdict(column) for column in PAC_COLUMNS],
+        **{kind: [asdict(column) for column in columns] for kind, columns in EXPORTED.items()},
         "frame_id": {f"finger{table.finger}": table.frame_id for table in made},
     }
     arrays: dict[str, NDArray[Any]] = {"columns": np.array(json.dumps(about))}

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..recording.reader import Recording
 from .columns import Show, Table
 
-PAC_APART = True
+KINDS_APART = True
 
 
 _ROWS = 1 << 17  # in memory at once

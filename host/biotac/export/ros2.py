@@ -12,12 +12,12 @@ from rosbags.typesys import Stores, get_typestore
 from ..recording.reader import Recording
 from .columns import Show, Table
 
-PAC_APART = False
+KINDS_APART = False
 _SHOW_ROWS = 1000
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """Topics ``/biotac/finger0/wrench``, ``poc``, ``flags``, ``counts`` (E1..E19, PDC, TAC, TDC) and ``pac``."""
+    """Topics ``/biotac/finger0/wrench``, ``poc``, ``flags``, ``counts`` (with PDC, TAC, TDC), ``pac``, ``bands``."""
     total = sum(len(table) for table in made)
     done = 0
     with Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
@@ -46,6 +46,7 @@ class _Topics:
                 "counts": "std_msgs/msg/UInt16MultiArray",
             },
             "pac": {"pac": "std_msgs/msg/UInt16MultiArray"},
+            "bands": {"bands": "std_msgs/msg/Float64MultiArray"},
         }[table.kind]
         self._connections = {
             name: (bag.add_connection(f"/biotac/finger{table.finger}/{name}", kind, typestore=self._store), kind)
@@ -57,14 +58,14 @@ class _Topics:
             name: (table.arrays[name] / 1000 if name.endswith("mm") else table.arrays[name]).tolist()
             for name in columns
         }
-        slow = [table.arrays[name] for name in ("pdc", "tac", "tdc")] if table.kind == "frames" else []
-        self._counts = np.column_stack([table.arrays["counts" if slow else "pac"], *slow]).astype(np.uint16)
+        listed = {"frames": ("counts", "pdc", "tac", "tdc"), "pac": ("pac",), "bands": ("energy_count2",)}[table.kind]
+        self._numbers = np.column_stack([table.arrays[name] for name in listed])
 
     def add(self, row: int) -> None:
         """Write all messages of one row."""
         stamp_ns = self._lists["stamp_ns"][row]
-        if self._table.kind == "pac":
-            self._write("pac", stamp_ns, self._array(row))
+        if self._table.kind != "frames":
+            self._write(self._table.kind, stamp_ns, self._array(self._table.kind, row))
             return
         header = self._make(
             "std_msgs/msg/Header",
@@ -79,14 +80,14 @@ class _Topics:
         point = self._make("geometry_msgs/msg/Point", *self._lists["poc_mm"][row])
         self._write("poc", stamp_ns, self._make("geometry_msgs/msg/PointStamped", header, point))
         self._write("flags", stamp_ns, self._make("std_msgs/msg/UInt32", self._lists["flags"][row]))
-        self._write("counts", stamp_ns, self._array(row))
+        self._write("counts", stamp_ns, self._array("counts", row))
 
     def _make(self, name: str, *values: Any) -> Any:
         return self._types[name](*values)
 
-    def _array(self, row: int) -> Any:
+    def _array(self, name: str, row: int) -> Any:
         layout = self._make("std_msgs/msg/MultiArrayLayout", [], 0)
-        return self._make("std_msgs/msg/UInt16MultiArray", layout, self._counts[row])
+        return self._make(self._connections[name][1], layout, self._numbers[row])
 
     def _write(self, name: str, stamp_ns: int, message: Any) -> None:
         connection, kind = self._connections[name]

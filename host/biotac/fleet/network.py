@@ -64,7 +64,8 @@ def open_session(
         return zenoh.open(facts)
     except zenoh.ZError as error:
         raise PortError(
-            f"{where}: Zenoh cannot be reached ({_short(error)}); check the endpoint, and that `biotac serve` runs"
+            f"{where}: Zenoh cannot be reached ({_short(error)}); check the endpoint, that `biotac serve` runs, and, "
+            "where it asks for a password or a certificate, your configuration of Zenoh"
         ) from error
 
 

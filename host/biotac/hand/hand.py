@@ -219,6 +219,7 @@ class Hand:
     on_touch = _of("_streams", Streams.on_touch)
     on_event = _of("_streams", Streams.on_event)
     on_slip = _of("_streams", Streams.on_slip)
+    on_bands = _of("_streams", Streams.on_bands)
     on_tare = _of("_streams", Streams.on_tare)
     on_status = _of("_streams", Streams.on_status)
     on_gap = _of("_streams", Streams.on_gap)

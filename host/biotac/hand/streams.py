@@ -64,7 +64,7 @@ class Streams:
         self._pulling = 0
         self._queues: list[BatchQueue] = []  # for others, such as biotac.aio
         self._skipped = [0, 0]  # batches and frames, of queues that are closed
-        self._hints = False  # somebody waits for TOUCH, EVENT or TARE
+        self._hinted = wire.StreamFlags(0)  # what somebody waits for comes with these
         self._wants: Wants | None = None
         self._quantities = dict.fromkeys(range(MAX_SENSORS), AT_FIRST)
         self._started: wire.Start | None = None
@@ -120,17 +120,23 @@ class Streams:
 
     # ---- what the board sends ------------------------------------------------------------------
 
-    def start(self, *, pac: bool = True, fingers: Fingers = ALL_FINGERS) -> None:
-        """Start streaming frames, status and, unless told otherwise, PAC; ``fingers`` are names, or a bit mask."""
+    def start(self, *, pac: bool = True, bands: bool = False, fingers: Fingers = ALL_FINGERS) -> None:
+        """Start streaming frames, status and, unless told otherwise, PAC; ``fingers`` are names, or a bit mask.
+
+        ``bands``: BANDS, too (``on_bands``). Raises InputError for a board that knows none.
+        """
         streams = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
         if pac:
             streams |= wire.StreamFlags.PAC
+        if bands:
+            streams |= wire.StreamFlags.BANDS
         self._start(self._wants.streams if self._wants else streams, self._latest.mask(fingers))
 
     def _start(self, streams: int, fingers: int) -> None:
+        streams |= self._hinted
+        if streams & wire.StreamFlags.BANDS:
+            self._need_wire_1_5("bands of PAC")
         # Pull alone has no keep-alive: it reads, and so could ping, only when its caller asks.
-        if self._hints:
-            streams |= wire.StreamFlags.FRAMES  # which they come with
         self._started = wire.Start(0, int(streams), fingers, self._keepalive_ms())
         self._board.tell(self._started)
         self._heard_s = self._monotonic_s()
@@ -174,7 +180,7 @@ class Streams:
     def want(self, *names: str, rest: bool = True, rate_hz: float | None = None) -> None:
         """Choose what the board computes and sends.
 
-        Names are force, poc, torque, pressure, sigma, touch, events, raw, pdc, temperature and pac. Electrodes' raw
+        Names are force, poc, torque, pressure, sigma, touch, events, raw, pdc, temperature, pac and bands. Raw
         counts, pdc and temperature travel in every FRAME, so each of them asks for frames and no more. Status always
         comes, it is the link's sign of life, whether ``status`` is named or not. With ``rest=False`` an untouched
         finger sends heartbeats in place of frames. ``rate_hz``, above 0 to 100, takes every n-th frame with n = 100 /
@@ -313,35 +319,49 @@ class Streams:
         Subscribes every finger to EVENTS besides what it is subscribed to. Raises InputError for a board that knows
         none.
         """
-        info = self._board.info
-        if info.wire_minor < EVENTS_SINCE_MINOR:
-            raise InputError(
-                f"the board speaks wire {info.wire_major}.{info.wire_minor}: expected 1.{EVENTS_SINCE_MINOR}, which "
-                "has events; update it with `biotac flash`"
-            )
+        self._need_wire_1_5("events")
         return self._on_told(wire.Event, fn)
 
     def on_slip(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
         """Call ``fn`` when what a finger holds begins to slip: the events of ``on_event`` that are SLIP."""
         return self.on_event(lambda event: fn(event) if event.kind == wire.EventKind.SLIP else None)
 
+    def on_bands(self, fn: Callable[[wire.Bands], Any]) -> Unsubscribe:
+        """Call ``fn`` with how strongly dynamic pressure vibrated, in octaves, a hundred times a second and finger.
+
+        Streams BANDS besides what is streamed. Raises InputError for a board that knows none.
+        """
+        self._need_wire_1_5("bands of PAC")
+        unsubscribe = self._on(wire.Bands, fn)
+        self._hint(wire.StreamFlags.BANDS)
+        return unsubscribe
+
+    def _need_wire_1_5(self, what: str) -> None:
+        info = self._board.info
+        if info.wire_minor < EVENTS_SINCE_MINOR:
+            raise InputError(
+                f"the board speaks wire {info.wire_major}.{info.wire_minor}: expected 1.{EVENTS_SINCE_MINOR}, which "
+                f"has {what}; update it with `biotac flash`"
+            )
+
     def _on_told(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
         unsubscribe = self._on(kind, fn)
         for quantities in {q for q in self._quantities.values() if _TOLD_OF[kind] not in q}:
             mask = sum(1 << f for f, q in self._quantities.items() if q == quantities)
             self.subscribe(quantities, fingers=mask)
-        self._hint()
+        self._hint(wire.StreamFlags.FRAMES)
         return unsubscribe
 
     def on_tare(self, fn: Callable[[wire.Tare], Any]) -> Unsubscribe:
         """Call ``fn`` with every change of a tare."""
         unsubscribe = self._on(wire.Tare, fn)
-        self._hint()
+        self._hint(wire.StreamFlags.FRAMES)
         return unsubscribe
 
-    def _hint(self) -> None:
-        self._hints = True
-        if self.streaming and self._started is not None and not self._started.streams & wire.StreamFlags.FRAMES:
+    def _hint(self, streams: wire.StreamFlags) -> None:
+        """Have ``streams``, with which it comes, streamed besides."""
+        self._hinted |= streams
+        if self.streaming and self._started is not None and self._hinted & ~self._started.streams:
             self._start(self._started.streams, self._started.fingers)
 
     def on_status(self, fn: Callable[[wire.Status], Any]) -> Unsubscribe:

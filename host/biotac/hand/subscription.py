@@ -19,7 +19,8 @@ QUANTITIES = {
     "events": QuantityFlags.EVENTS,
 }
 IN_EVERY_FRAME = ("raw", "pdc", "temperature")
-NAMES = (*QUANTITIES, *IN_EVERY_FRAME, "pac", "status")
+STREAMS = {"pac": StreamFlags.PAC, "bands": StreamFlags.BANDS}
+NAMES = (*QUANTITIES, *IN_EVERY_FRAME, *STREAMS, "status")
 FRAME_HZ = SLOT_HZ / len(SLOTS)
 
 
@@ -50,8 +51,8 @@ class Wants:
         streams = StreamFlags.STATUS
         if any(name in QUANTITIES or name in IN_EVERY_FRAME for name in names):
             streams |= StreamFlags.FRAMES
-        if "pac" in names:
-            streams |= StreamFlags.PAC
+        for name in names:
+            streams |= STREAMS.get(name, StreamFlags(0))
         return cls(quantities, streams, 1 if rate_hz is None else round(FRAME_HZ / rate_hz))
 
     def thin(self, batch: Batch) -> Batch:

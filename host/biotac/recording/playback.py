@@ -27,6 +27,7 @@ _STREAM_OF = {
     wire.Touch.ID: wire.StreamFlags.FRAMES,
     wire.Event.ID: wire.StreamFlags.FRAMES | wire.StreamFlags.PAC,
     wire.Pac.ID: wire.StreamFlags.PAC,
+    wire.Bands.ID: wire.StreamFlags.BANDS,
     wire.Status.ID: wire.StreamFlags.STATUS,
     wire.SensorStatus.ID: wire.StreamFlags.STATUS,
 }

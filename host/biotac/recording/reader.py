@@ -21,6 +21,7 @@ from ..wire.batches import Batch, StreamDecoder, join
 from ..wire.frames import StructArray
 from ..wire.messages_gen import Setting
 from . import layout
+from .bands import recorded_bands
 from .block import FRAME, IDLE, PAC, as_sent
 from .blocks import Blocks, is_lossless
 from .facts import Facts
@@ -131,6 +132,11 @@ class Recording:
     def wire(self) -> StructArray:
         """The FRAME messages as sent, with seq and t_us as they wrap."""
         return as_sent(self._batch.wire, FRAME)
+
+    @cached_property
+    def bands(self) -> StructArray:
+        """Energies of PAC in octaves, BANDS_DTYPE (n,), finger by finger: as recorded, or else computed of ``pac``."""
+        return recorded_bands(self.pac, self.messages, self.begin_us)
 
     @cached_property
     def blocks(self) -> list[bytes]:

@@ -217,6 +217,15 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("peak_count", "<u2"),
         ]
     ),
+    wire.Bands.ID: np.dtype(
+        [
+            ("seq", "<u2"),
+            ("t_us", "<u4"),
+            ("finger", "u1"),
+            ("good", "u1"),
+            ("energy_q4", "<u4", (6,)),
+        ]
+    ),
     wire.HelloRequest.ID: np.dtype(
         [
             ("req_id", "u1"),

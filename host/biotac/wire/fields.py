@@ -20,7 +20,7 @@ PAC_SAMPLES = tuple(str(k) for k in range(22))
 _ELECTRODES = tuple(ELECTRODE_NAMES)
 
 #: Marks of no value in the wire's integers, by type.
-WIRE_INVALID = {"u2": INVALID_COUNT, "i2": INVALID_I16, "i4": INVALID_I32}
+WIRE_INVALID = {"u2": INVALID_COUNT, "u4": 0xFFFFFFFF, "i2": INVALID_I16, "i4": INVALID_I32}
 
 
 @dataclass(frozen=True)
@@ -123,6 +123,22 @@ FRAME_FIELDS = (
 
 #: A row a finger and round: 22 samples, the k-th k/2200 s after t_us.
 PAC_FIELDS = (_FINGER, *_TIME, _count("pac", "dynamic pressure", PAC_SAMPLES))
+
+#: A row a finger and round: how strongly PAC vibrated, by octaves (SPEC.md, Bands).
+BANDS_FIELDS = (
+    _FINGER,
+    *_TIME,
+    Field("good", "u1", "1", "samples of which a good word came", (), "good"),
+    Field(
+        "energy_count2",
+        "<f8",
+        "count^2",
+        "sum of squares over 22 samples of what is in the band; NaN without a good word",
+        ("18hz", "36hz", "72hz", "147hz", "309hz", "over527hz"),
+        "energy_q4",
+        16,
+    ),
+)
 
 #: Heartbeats of untouched fingers: a row stands for ``frames`` rounds of which no FRAME was sent; ``seq`` is the last.
 IDLE_FIELDS = (

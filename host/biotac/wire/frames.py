@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .dtypes_gen import DTYPES
-from .fields import FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, WIRE_INVALID, dtype_of, sent_of, values_of
+from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, WIRE_INVALID, dtype_of, sent_of, values_of
 from .messages_gen import INVALID_COUNT, FrameFlags, TareState
 from .messages_gen import Frame as _FrameMessage
 
@@ -29,6 +29,9 @@ FRAME_DTYPE = dtype_of(FRAME_FIELDS)
 
 #: Twenty-two dynamic pressure samples, 1/2200 s apart from ``t_us`` on; 0xFFFF where missing.
 PAC_DTYPE = dtype_of(PAC_FIELDS)
+
+#: How strongly dynamic pressure vibrated in a round, in six octaves, the lowest first; ``t_us`` is that of PAC.
+BANDS_DTYPE = dtype_of(BANDS_FIELDS)
 
 #: Heartbeats of untouched fingers (Hand.subscribe): a row stands for ``frames`` rounds of which no FRAME
 #: was sent; ``seq`` is the last of them. ``energy_count2`` is the sum of squared signals.
@@ -101,6 +104,16 @@ def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any
     out = np.empty(len(messages), FRAME_DTYPE)
     out["finger"], out["seq"], out["t_us"] = messages["finger"], seq, t_us
     for its in FRAME_FIELDS:
+        if its.sent:
+            out[its.name] = values_of(its, messages[its.sent])
+    return out
+
+
+def bands_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]) -> StructArray:
+    """Convert BANDS messages (n,) with unwrapped seq and t_us to BANDS_DTYPE (n,)."""
+    out = np.empty(len(messages), BANDS_DTYPE)
+    out["finger"], out["seq"], out["t_us"] = messages["finger"], seq, t_us
+    for its in BANDS_FIELDS:
         if its.sent:
             out[its.name] = values_of(its, messages[its.sent])
     return out

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0x2823160D
+SCHEMA_HASH = 0xCEC8D4C1
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -179,6 +179,7 @@ class StreamFlags(IntFlag):
     FRAMES = 1 << 0  # FRAME messages
     PAC = 1 << 1  # PAC messages
     STATUS = 1 << 2  # STATUS and SENSOR_STATUS once per status_period_ms
+    BANDS = 1 << 3  # BANDS messages
 
 
 class QuantityFlags(IntFlag):
@@ -335,6 +336,7 @@ STREAM_FLAG_DOC: dict[int, str] = {
     1: "FRAME messages",
     2: "PAC messages",
     4: "STATUS and SENSOR_STATUS once per status_period_ms",
+    8: "BANDS messages",
 }
 
 
@@ -1208,6 +1210,42 @@ class Event:
             v[6],
             v[7],
             v[8],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Bands:
+    """How strongly dynamic pressure vibrated in one round, in six octaves (SPEC.md, Bands)."""
+
+    seq: int
+    t_us: int
+    finger: int
+    good: int
+    energy_q4: tuple[int, ...]
+
+    ID: ClassVar[int] = 0x18
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<HIBB6I")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 32 bytes."""
+        return self.STRUCT.pack(
+            self.seq,
+            self.t_us,
+            self.finger,
+            self.good,
+            *self.energy_q4,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Bands:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+            v[3],
+            v[4 : 10],
         )
 
 
@@ -2150,7 +2188,7 @@ class EmuGetStatus:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | Bands | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -2169,6 +2207,7 @@ MESSAGES: dict[int, type[Any]] = {
     Idle.ID: Idle,
     Touch.ID: Touch,
     Event.ID: Event,
+    Bands.ID: Bands,
     HelloRequest.ID: HelloRequest,
     Start.ID: Start,
     Stop.ID: Stop,

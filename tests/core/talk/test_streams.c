@@ -4,7 +4,7 @@
 static void only_what_was_asked_for_is_streamed(void **state)
 {
     (void)state;
-    for (uint8_t streams = 0; streams < 8; streams++) {
+    for (uint8_t streams = 0; streams <= BT_STREAM_FLAGS; streams++) {
         assert_int_equal(start(streams, 1 << 0 | 1 << 3, 0), BT_ERROR_OK);
         host_forget();
         for (int k = 0; k < 20; k++) {
@@ -12,6 +12,7 @@ static void only_what_was_asked_for_is_streamed(void **state)
         }
         assert_int_equal(host_count(BT_FRAME_ID), (streams & BT_STREAM_FLAG_FRAMES) != 0 ? 40 : 0);
         assert_int_equal(host_count(BT_PAC_ID), (streams & BT_STREAM_FLAG_PAC) != 0 ? 40 : 0);
+        assert_int_equal(host_count(BT_BANDS_ID), (streams & BT_STREAM_FLAG_BANDS) != 0 ? 40 : 0);
         for (int k = 0; k < host.count; k++) {
             uint8_t finger = host.message[k].payload[6];
             assert_true(finger == 0 || finger == 3);

@@ -190,6 +190,8 @@ CASES: list[tuple[int, str, str]] = [
     (2, "many recordings go to --lake", "export @rec.mcap"),
     (2, "`biotac export RECS... --lake", "lake check +no"),
     (2, "`biotac export RECS... --lake", "lake sql SELECT +no"),
+    (2, "`biotac export RECS... --lake", "inventory +no"),
+    (3, "`biotac list` shows the ports", "sensor /dev/ttyNOWHERE7"),
     (2, "check the path", "import +no.btd +out.mcap"),
     (2, "expected a SynTouch .btd", "import @none.btd +out.mcap"),
     (2, "say --force", "import @none.btd @rec.mcap"),

@@ -20,9 +20,10 @@ from rosbags.typesys import Stores, get_typestore
 
 import biotac
 from biotac.cli.main import main
-from biotac.export import COLUMNS, FORMATS, PAC_COLUMNS
+from biotac.core.bands import pac_bands
+from biotac.export import BANDS_COLUMNS, COLUMNS, FORMATS, PAC_COLUMNS
 from biotac.export.columns import STAMP
-from biotac.wire.fields import FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS
+from biotac.wire.fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS
 
 FINGERS = 2
 
@@ -74,6 +75,15 @@ def expected_pac(recording: biotac.Recording, finger: int) -> dict[str, np.ndarr
     return {"seq": rows["seq"], "t_us": rows["t_us"], "stamp_ns": stamp_ns, "pac": rows["pac"]}
 
 
+def expected_bands(recording: biotac.Recording, finger: int) -> dict[str, np.ndarray]:
+    pac = expected_pac(recording, finger)
+    energy = pac_bands(pac.pop("pac"))  # no word is missing
+    return {**pac, "good": np.full(len(energy), 22, np.uint8), "energy_count2": energy}
+
+
+KINDS = (("", COLUMNS, expected), (".pac", PAC_COLUMNS, expected_pac), (".bands", BANDS_COLUMNS, expected_bands))
+
+
 def same(got: Any, wanted: np.ndarray) -> bool:
     """Equal to the bit, NaN at the same places."""
     return bool(np.array_equal(np.asarray(got), wanted, equal_nan=wanted.dtype.kind == "f"))
@@ -91,14 +101,17 @@ def test_every_column_is_documented_and_has_a_unit() -> None:
     assert re.findall(r"^\| `.*$", page, re.MULTILINE) == [
         f"| `{f.name}` | {f.unit} | {' to '.join(f.parts[:: len(f.parts) - 1]) if f.parts else ''} "
         f"| {np.dtype(f.dtype)} | {f.what} |"
-        for f in (*FRAME_FIELDS, *PAC_FIELDS, *IDLE_FIELDS, STAMP)
+        for f in (*FRAME_FIELDS, *PAC_FIELDS, *BANDS_FIELDS, *IDLE_FIELDS, STAMP)
     ]
 
 
 def test_csv_has_every_number_of_every_frame(recorded, tmp_path, capsys) -> None:
     assert export(recorded, tmp_path / "a.csv", "--json") == 0
-    assert json.loads(capsys.readouterr().out)["written"] == [str(tmp_path / n) for n in ("a.csv", "a.pac.csv")]
-    for name, columns, wanted_of in (("a.csv", COLUMNS, expected), ("a.pac.csv", PAC_COLUMNS, expected_pac)):
+    assert json.loads(capsys.readouterr().out)["written"] == [
+        str(tmp_path / n) for n in ("a.csv", "a.pac.csv", "a.bands.csv")
+    ]
+    for kind, columns, wanted_of in KINDS:
+        name = f"a{kind}.csv"
         with (tmp_path / name).open(newline="") as file:
             rows = list(csv.DictReader(file))
         times = [int(row["t_us"]) for row in rows]
@@ -123,8 +136,8 @@ def test_units_stand_at_the_end_of_flat_names(recorded, tmp_path) -> None:
 
 def test_parquet_says_units_and_frames(recorded, tmp_path) -> None:
     assert export(recorded, tmp_path / "a.parquet") == 0
-    for name, columns, wanted_of in (("a.parquet", COLUMNS, expected), ("a.pac.parquet", PAC_COLUMNS, expected_pac)):
-        table = pq.read_table(tmp_path / name)
+    for kind, columns, wanted_of in KINDS:
+        table = pq.read_table(tmp_path / f"a{kind}.parquet")
         for finger in range(FINGERS):
             mine = table.filter([i.as_py() == f"biotac_finger{finger}" for i in table["frame_id"]])
             assert set(mine["finger"].to_pylist()) == {finger}
@@ -142,8 +155,8 @@ def test_hdf5_has_a_dataset_a_column(recorded, tmp_path) -> None:
     with h5py.File(tmp_path / "a.h5") as file:
         assert file.attrs["firmware"] == biotac.__version__
         for finger in range(FINGERS):
-            for kind, columns, wanted_of in (("frames", COLUMNS, expected), ("pac", PAC_COLUMNS, expected_pac)):
-                group = file[f"finger{finger}/{kind}"]
+            for kind, columns, wanted_of in KINDS:
+                group = file[f"finger{finger}/{kind[1:] or 'frames'}"]
                 assert group.attrs["frame_id"] == f"biotac_finger{finger}"
                 wanted = wanted_of(recorded, finger)
                 assert set(group) == set(wanted)
@@ -159,9 +172,9 @@ def test_npz_says_what_its_columns_are(recorded, tmp_path) -> None:
         assert about["frame_id"]["finger1"] == "biotac_finger1"
         assert {c["name"]: c["unit"] for c in about["frames"]}["torque_nmm"] == "N*mm"
         for finger in range(FINGERS):
-            for kind, wanted in (("frames", expected(recorded, finger)), ("pac", expected_pac(recorded, finger))):
-                for name, values in wanted.items():
-                    assert same(arrays[f"finger{finger}/{kind}/{name}"], values), name
+            for kind, _, wanted_of in KINDS:
+                for name, values in wanted_of(recorded, finger).items():
+                    assert same(arrays[f"finger{finger}/{kind[1:] or 'frames'}/{name}"], values), name
 
 
 def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
@@ -172,7 +185,9 @@ def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
             got.setdefault(connection.topic, []).append((stamp_ns, bag.deserialize(data, connection.msgtype)))
     for finger in range(FINGERS):
         wanted, pac = expected(recorded, finger), expected_pac(recorded, finger)
-        topics = {name: got[f"/biotac/finger{finger}/{name}"] for name in ("wrench", "poc", "flags", "counts", "pac")}
+        topics = {
+            name: got[f"/biotac/finger{finger}/{name}"] for name in ("wrench", "poc", "flags", "counts", "pac", "bands")
+        }
         for name, vectors in (
             ("force_n", [m.wrench.force for _, m in topics["wrench"]]),
             ("torque_nmm", [m.wrench.torque for _, m in topics["wrench"]]),
@@ -190,6 +205,7 @@ def test_a_ros_bag_plays_with_standard_messages(recorded, tmp_path) -> None:
         slow = np.column_stack([wanted["counts"], wanted["pdc"], wanted["tac"], wanted["tdc"]])
         assert np.array_equal([m.data for _, m in topics["counts"]], slow)
         assert np.array_equal([m.data for _, m in topics["pac"]], pac["pac"])
+        assert np.array_equal([m.data for _, m in topics["bands"]], expected_bands(recorded, finger)["energy_count2"])
 
 
 @pytest.mark.parametrize("suffix", list(FORMATS))

@@ -137,6 +137,7 @@ def test_a_ros_2_bag_in_its_own_units_rounded_once(recorded, tmp_path: Path) -> 
                 "flags": lambda m: {"flags": [m.data]},
                 "counts": lambda m: {"counts": m.data[:19], "slow": m.data[19:]},
                 "pac": lambda m: {},
+                "bands": lambda m: {},
             }[kind](message).items():
                 got.setdefault(f"{finger}/{name}", []).append(values)
     for finger in FINGERS:

@@ -15,6 +15,7 @@ from biotac.flash import Backup, carried, flash, loader_drive, read_backup, read
 from biotac.flash.every import flash_every
 from biotac.flash.image import Image
 from biotac.flash.loader_drive import linux_folders
+from biotac.hand.hand import Hand
 from biotac.wire import messages_gen as wire
 
 
@@ -353,22 +354,19 @@ def test_every_board_is_flashed_that_runs_something_else(scripted_board, hello, 
     no_waiting(monkeypatch)
     image = read_image(make_image(tmp_path))
     first, mute, last = (FakeBoard(scripted_board, hello) for _ in range(3))
-    for number, fake in enumerate((first, mute, last)):
-        fake.serial = (number + 1, 2, 3) + (0,) * 9
-    mute.answers = False
-    loader = first  # the way to a board is that of whichever is in its loader
-    monkeypatch.setattr(loader, "ready", lambda: any(fake.in_loader for fake in (first, last)))
-    into = {fake: fake.write for fake in (first, last)}
-    monkeypatch.setattr(
-        loader, "write", lambda its, show: next(into[f] for f in (first, last) if f.in_loader)(its, show)
-    )
-    results = list(flash_every(image, [first, mute, last], [loader]))
+    last.serial = (4, 5, 6) + (0,) * 9  # after which its backup is called
+
+    def nothing() -> Hand:
+        raise NotAGatewayError("nothing answers")
+
+    monkeypatch.setattr(mute, "open", nothing)
+    results = list(flash_every(image, [first, mute, last], [first, last]))
     assert [result.outcome is not None for result in results] == [True, False, True]
     assert isinstance(results[1].error, NotAGatewayError)
     assert (first.version, last.version) == ((0, 2, 0), (0, 2, 0))
-    again = list(flash_every(image, [first, last], [loader]))
+    again = list(flash_every(image, [first, last], [first, last]))
     assert [(result.outcome, result.error) for result in again] == [(None, None)] * 2
-    assert first.events == ["loader", "write"]
+    assert first.events == last.events == ["loader", "write"]
 
 
 def test_a_board_that_stays_in_its_loader_keeps_the_next_one_from_its_place(

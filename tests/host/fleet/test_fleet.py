@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import socket
+import subprocess
+import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
@@ -30,9 +33,7 @@ class Shared:
     """A simulated board, shared under a name at an endpoint of its own."""
 
     def __init__(self, name: str = "left", source: str = "sim:press.toml?fingers=2&pace=real&seconds=60") -> None:
-        with closing(socket.socket()) as free:
-            free.bind(("127.0.0.1", 0))
-            self.endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self.name, self.source = name, source
         self.stack = ExitStack()
         self.start()
@@ -173,8 +174,6 @@ def test_a_slow_reader_loses_whole_batches_counted_and_hurts_nobody(shared, monk
 
 def test_round_trips_include_the_network(shared, monkeypatch) -> None:
     """A network of 60 ms there and back: the clock's round trip, and so its bounds, are no shorter."""
-    import time
-
     real = zenoh_link.ZenohLink._ask
 
     def far(self: Any, *args: Any) -> None:
@@ -193,7 +192,7 @@ def test_two_of_a_name_and_other_bad_ports_are_one_line(shared, capsys) -> None:
         Share(shared.hand, session, "left")
     for port, code, cure in (
         (shared.port().replace("left", "right"), 3, "biotac serve PORT --name right"),
-        ("zenoh:left?connect=tcp/127.0.0.1:1", 3, "that `biotac serve` runs"),
+        ("zenoh:left?connect=tcp/127.0.0.1:1", 3, "that `biotac serve` runs, and"),
         ("zenoh:?write=yes", 3, "`biotac list --zenoh` lists names"),
         ("zenoh:left?write=maybe", 3, "expected zenoh:NAME"),
         (shared.port("&config=/no/such.json5"), 2, "is no configuration of Zenoh"),
@@ -233,3 +232,104 @@ def test_a_board_that_is_taken_off_is_lost_and_found_again(tmp_path: Path) -> No
     assert len(first.frames) >= 20 <= len(second.frames)
     gap = (first.gaps + second.gaps)[0]
     assert gap.back_at_ns > gap.lost_at_ns > 0  # of stated length
+
+
+def reached(folder: Path, endpoint: str, of_server: Any, of_clients: list[Any]) -> list[bool]:
+    """Who gets through to a board's program, each with Zenoh's own configuration or, for None, without."""
+
+    def file(name: str, transport: Any) -> Path | None:
+        if transport is None:
+            return None
+        path = folder / f"{name}.json5"
+        path.write_text(json.dumps({"transport": transport}))
+        return path
+
+    seen = []
+    with closing(network.open_session("left", listen=endpoint, config=file("server", of_server))) as server:
+        here = server.declare_queryable(network.key("left", "info"), lambda query: query.reply(query.key_expr, b"{}"))
+        for k, transport in enumerate(of_clients):
+            try:
+                with closing(network.open_session("t", connect=endpoint, config=file(f"{k}", transport))) as session:
+                    seen.append(any(reply.ok for reply in session.get(network.key("left", "info"), timeout=1.0)))
+            except PortError as error:
+                assert "password or a certificate" in str(error)
+                seen.append(False)
+        here.undeclare()
+    return seen
+
+
+def free_port() -> int:
+    with closing(socket.socket()) as free:
+        free.bind(("127.0.0.1", 0))
+        number: int = free.getsockname()[1]
+        return number
+
+
+def test_a_password_keeps_others_out(tmp_path: Path) -> None:
+    (tmp_path / "users").write_text("lab:good\n")
+    good, bad = ({"auth": {"usrpwd": {"user": "lab", "password": word}}} for word in ("good", "bad"))
+    server = {"auth": {"usrpwd": {"user": "lab", "password": "good", "dictionary_file": str(tmp_path / "users")}}}
+    assert reached(tmp_path, f"tcp/127.0.0.1:{free_port()}", server, [good, bad, None]) == [True, False, False]
+
+
+@pytest.mark.nightly
+def test_tls_keeps_others_out(tmp_path: Path) -> None:
+    """Certificates by openssl, as host/docs/network.md says."""
+    for name in ("board", "other"):
+        words = ["-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost"]
+        words += ["-addext", "subjectAltName=DNS:localhost", "-addext", "basicConstraints=critical,CA:FALSE"]
+        files = ["-keyout", str(tmp_path / f"{name}.key"), "-out", str(tmp_path / f"{name}.pem")]
+        subprocess.run(["openssl", "req", *words, *files], check=True, capture_output=True)
+    board, other = ({"link": {"tls": {"root_ca_certificate": str(tmp_path / f"{n}.pem")}}} for n in ("board", "other"))
+    its = {"listen_private_key": str(tmp_path / "board.key"), "listen_certificate": str(tmp_path / "board.pem")}
+    server = {"link": {"tls": its}}
+    assert reached(tmp_path, f"tls/localhost:{free_port()}", server, [board, other, None]) == [True, False, False]
+
+
+@pytest.mark.nightly
+def test_a_gateway_that_is_killed_leaves_a_gap_in_every_recording(tmp_path: Path) -> None:
+    """kill -9 of `biotac serve`, three seconds of nothing, and another one of the same name."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    source = "sim:press.toml?fingers=5&pace=real&seconds=300"
+    words = [sys.executable, "-m", "biotac", "serve", source, "--name", "left", "--listen", endpoint]
+
+    def serve() -> subprocess.Popen[str]:
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        assert process.stdout is not None
+        with process.stdout as said:
+            assert "is shared" in said.readline()
+        return process
+
+    away_s = 3.0
+    with ExitStack() as stack:
+        serving = serve()
+        port = f"zenoh:left?connect={endpoint}"
+        hands = [stack.enter_context(biotac.open(port, reconnect=True)) for _ in range(3)]
+        for k, hand in enumerate(hands):
+            hand.record(tmp_path / f"{k}.mcap")
+            hand.start()
+            hand.run()
+        while any(hand.stats.frames < 200 for hand in hands):
+            time.sleep(0.05)
+        killed_ns = time.time_ns()
+        serving.kill()
+        serving.wait()
+        time.sleep(away_s)
+        serving = serve()
+        stack.callback(serving.wait)
+        stack.callback(serving.terminate)
+        back_ns = time.time_ns()
+        while any(hand.stats.gaps == 0 for hand in hands):
+            time.sleep(0.05)
+        seen = [hand.stats.frames for hand in hands]
+        while any(hand.stats.frames < before + 200 for hand, before in zip(hands, seen, strict=True)):
+            time.sleep(0.05)
+        assert all(hand.link.batches_lost == 0 for hand in hands)
+    for k in range(3):
+        first, second = biotac.Recording(tmp_path / f"{k}.mcap"), biotac.Recording(tmp_path / f"{k}.2.mcap")
+        assert len(first.frames) >= 200 <= len(second.frames)
+        (gap,) = {(its.lost_at_ns, its.back_at_ns) for its in first.gaps + second.gaps}
+        assert killed_ns < gap[0] < gap[1] and gap[1] > back_ns  # by this computer's clock
+        print(
+            f"reader {k}: {(gap[0] - killed_ns) / 1e9:.2f} s after the kill, a gap of {(gap[1] - gap[0]) / 1e9:.2f} s"
+        )

@@ -26,8 +26,8 @@ from biotac.wire.framing import encode
 
 HAND = """
 batches calibration calibration_state calibrations check clear_calibration clear_faults clear_map clock close
-connected ended faults finger_settings fingers frames get_map grasp hold info link map_state maps on_batch on_event
-on_gap on_slip on_status on_tare on_touch ping point port read read_batch reboot_bootloader record release run
+connected ended faults finger_settings fingers frames get_map grasp hold info link map_state maps on_bands on_batch
+on_event on_gap on_slip on_status on_tare on_touch ping point port read read_batch reboot_bootloader record release run
 save_settings sensor_info sensor_status set_calibration set_map set_setting set_tare setting settings start stats
 status stop streaming subscribe sync tare want warnings
 """

@@ -150,10 +150,24 @@ def test_events_are_called_with_slips_apart(live: Live) -> None:
     assert seen == ["TOUCH", "SLIP", "slip of 2, 120"]
 
 
+def test_bands_are_streamed_to_who_wants_them(live: Live) -> None:
+    seen: list[wire.Bands] = []
+    live.hand.run()
+    assert not live.firmware.of(wire.Start)[-1].streams & wire.StreamFlags.BANDS
+    live.hand.on_bands(seen.append)
+    assert live.firmware.of(wire.Start)[-1].streams & wire.StreamFlags.BANDS
+    bands = wire.Bands(3, 30_227, 2, 22, (1, 2, 3, 4, 5, 2**32 - 2))
+    live.send(biotac.wire.framing.encode(bands.ID, bands.pack()), frame(0))
+    live.until(lambda: len(seen) == 1)
+    assert seen == [bands]
+
+
 def test_a_board_without_events_is_told_so(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live.hand._board, "info", replace(live.hand.info, wire_minor=4))
     with pytest.raises(biotac.InputError, match="has events; update it"):
         live.hand.on_event(print)
+    with pytest.raises(biotac.InputError, match="has bands of PAC; update it"):
+        live.hand.on_bands(print)
     live.hand.subscribe(wire.QuantityFlags.EVENTS | wire.QuantityFlags.FORCE)
     assert live.firmware.of(wire.Subscribe)[-1].quantities == wire.QuantityFlags.FORCE
 

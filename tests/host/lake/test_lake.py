@@ -90,6 +90,7 @@ def test_every_row_of_every_topic_is_there_with_its_ids(sources, lake, capsys) -
     for topic, rows_of in {
         "frames": lambda rec: rec.frames,
         "pac": lambda rec: rec.pac,
+        "bands": lambda rec: rec.bands,
         "idle": lambda rec: rec.idle,
         "tare": lambda rec: [m for m in rec.messages if isinstance(m, wire.Tare)],
         "status": lambda rec: [m for m in rec.messages if isinstance(m, wire.Status)],
@@ -184,7 +185,7 @@ def test_dask_writes_the_same_bytes(sources, lake, tmp_path, capsys) -> None:
     assert hashes(tmp_path / "dask") == hashes(lake)
 
 
-@pytest.mark.parametrize("at", [0, 3, 6, *(pytest.param(k, marks=pytest.mark.nightly) for k in (1, 2, 4, 5))])
+@pytest.mark.parametrize("at", [0, 3, 7, *(pytest.param(k, marks=pytest.mark.nightly) for k in (1, 2, 4, 5, 6))])
 def test_killed_at_any_rename_nothing_is_twice_or_missing(
     sources, lake, tmp_path, capsys, monkeypatch, at: int
 ) -> None:
@@ -205,7 +206,7 @@ def test_killed_at_any_rename_nothing_is_twice_or_missing(
     monkeypatch.undo()
     (folder / layout.PARTIAL / "left").mkdir(parents=True)
     whole = layout.opened(folder)
-    assert identity.recording_id(sources[1]) in whole.partition and whole.unfinished == at % 6
+    assert identity.recording_id(sources[1]) in whole.partition and whole.unfinished == at % 7
     assert sql(capsys, folder, "SELECT count(*) AS n FROM frames")[0]["n"] in {
         sum(len(biotac.Recording(path).frames) for path in some) for some in (sources[1:2], sources[:2])
     }

@@ -376,6 +376,29 @@ def test_the_spectrum_is_numpys(view, open_page) -> None:
     truth = np.abs(np.fft.rfft((samples - samples.mean()) * window)) / window.sum()
     truth[1:-1] *= 2
     np.testing.assert_allclose(seen, truth, rtol=1e-9, atol=1e-9)
+    strongest = page.evaluate(
+        """async () => {
+          const { Finger } = await import('./model.js');
+          const { SpectrogramPlot } = await import('./plots.js');
+          const { readTheme } = await import('./colours.js');
+          const finger = new Finger(0);
+          for (let block = 0; block < 100; block++) {  // a second of silence, then one of 300 Hz
+            const tone = block < 50 ? 0 : 400;
+            const at = (k) => 2038 + tone * Math.sin(2 * Math.PI * 300 * (22 * block + k) / 2200);
+            finger.addPac(block / 100, Array.from({ length: 22 }, (_, k) => at(k)));
+          }
+          const plot = new SpectrogramPlot(document.getElementById('spectrogram-plot'));
+          plot.draw(finger, 2200, 0.37, readTheme());
+          const { width, height } = plot.picture;
+          const { data } = plot.picture.getContext('2d').getImageData(0, 0, width, height);
+          const alpha = (x, y) => data[4 * (y * width + x) + 3];
+          const rows = [...Array(height).keys()];
+          const loudest = rows.reduce((a, b) => (alpha(width - 2, b) > alpha(width - 2, a) ? b : a));
+          const before = Math.max(...rows.map((y) => alpha(width - 14, y)));
+          return { hz: (height - 1 - loudest) * 1100 / (height - 1), before };
+        }"""
+    )
+    assert abs(strongest["hz"] - 300) < 2200 / 128 and strongest["before"] == 0
 
 
 def test_the_fingertip_is_drawn_in_the_scales_colours(make_player, view_of, open_page, touch) -> None:

@@ -10,7 +10,7 @@ export function readTheme() {
   return theme;
 }
 
-function rgb(hex) {
+export function rgb(hex) {
   return [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 }
 

@@ -5,7 +5,7 @@ import { ThemeSwitch, wireControls } from "./controls.js";
 import { Fingertip } from "./fingertip.js";
 import { HandRow } from "./hand.js";
 import { Model, SPECTRUM_SAMPLES } from "./model.js";
-import { SpectrumPlot, TimePlot } from "./plots.js";
+import { SpectrogramPlot, SpectrumPlot, TimePlot } from "./plots.js";
 import { Flags, Link, Results, number, showLink, showTare, tell } from "./readout.js";
 import { amplitudes } from "./spectrum.js";
 import { Stream } from "./stream.js";
@@ -24,6 +24,7 @@ class Page {
       new TimePlot(byId("pdc-plot"), ["pdc"], ["text"], { least: 20, digits: 0, zero: false }),
     ];
     this.spectrum = new SpectrumPlot(byId("spectrum-plot"));
+    this.spectrogram = new SpectrogramPlot(byId("spectrogram-plot"));
     this.link = new Link();
     this.readMs = 0;
     this.lost = false;
@@ -181,6 +182,7 @@ class Page {
       this.hand.draw(fingers, this.theme, this.limit.counts);
       const pascals = finger?.pacIsFull ? amplitudes(finger.pac).map((v) => v * about.pac_pa_per_count) : null;
       this.spectrum.draw(pascals, about.pac_hz, this.theme);
+      this.spectrogram.draw(finger, about.pac_hz, about.pac_pa_per_count, this.theme);
     }
     this.draws++;
   }

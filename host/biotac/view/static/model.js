@@ -1,9 +1,14 @@
 // What came, finger by finger: the latest frame and ten seconds of history, in users' units.
 
+import { amplitudes } from "./spectrum.js";
+
 export const HISTORY_S = 10;
 export const SPECTRUM_SAMPLES = 1024;
 const HISTORY_ROWS = 1100; // a little more than HISTORY_S of frames
 const TRAIL_POINTS = 40;
+const COLUMN_SAMPLES = 128; // of the spectrogram: 58 ms
+const COLUMN_BLOCKS = 5; // of 10 ms, from one to the next
+export const COLUMNS = HISTORY_S * 20;
 
 export class Model {
   constructor(about) {
@@ -35,7 +40,7 @@ export class Model {
       this.finger(frame.finger).add(frame);
     }
     // A finger is there once it has sent a frame.
-    for (const [finger, , , pac] of news.pac) this.fingers.get(finger)?.addPac(pac);
+    for (const [finger, , tUs, pac] of news.pac) this.fingers.get(finger)?.addPac(tUs / 1e6, pac);
     this.dropped = news.dropped;
   }
 
@@ -72,6 +77,7 @@ export class Finger {
     this.rows = 0; // ever added
     this.pac = new Float64Array(SPECTRUM_SAMPLES);
     this.pacSamples = 0;
+    this.spectrogram = []; // { t, values }: amplitudes of counts, oldest first
     this.trail = [];
   }
 
@@ -85,7 +91,7 @@ export class Finger {
     if (this.trail.length > TRAIL_POINTS) this.trail.shift();
   }
 
-  addPac(samples) {
+  addPac(t, samples) {
     const n = samples.length;
     this.pac.copyWithin(0, n);
     for (let k = 0; k < n; k++) {
@@ -94,6 +100,9 @@ export class Finger {
       this.pac[at] = samples[k] ?? this.pac[at - 1];
     }
     this.pacSamples += n;
+    if (this.pacSamples < COLUMN_SAMPLES || (this.pacSamples / n) % COLUMN_BLOCKS) return;
+    this.spectrogram.push({ t, values: amplitudes(this.pac.slice(-COLUMN_SAMPLES)) });
+    if (this.spectrogram.length > COLUMNS) this.spectrogram.shift();
   }
 
   get pacIsFull() {

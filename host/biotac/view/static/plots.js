@@ -1,7 +1,8 @@
 // Plots over time and over frequency.
 
 import { fit } from "./fingertip.js";
-import { HISTORY_S } from "./model.js";
+import { rgb } from "./colours.js";
+import { COLUMNS, HISTORY_S } from "./model.js";
 
 const MARGIN = { left: 46, right: 10, top: 8, bottom: 22 };
 const GAP_S = 0.05; // a line breaks where frames are missing
@@ -162,6 +163,49 @@ export class SpectrumPlot {
     c.fillStyle = theme.accent;
     c.fill();
     c.globalAlpha = 1;
+  }
+}
+
+// Amplitude over time and frequency: the stronger, the more colour.
+export class SpectrogramPlot {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.picture = document.createElement("canvas");
+  }
+
+  draw(finger, rateHz, paPerCount, theme) {
+    const area = new Area(this.canvas);
+    const { c } = area;
+    const top = rateHz / 2;
+    const columns = finger?.spectrogram ?? [];
+    if (columns.length) {
+      this.paint(columns, paPerCount, rgb(theme.accent));
+      c.imageSmoothingEnabled = false;
+      c.drawImage(this.picture, area.left, area.top, area.right - area.left, area.bottom - area.top);
+    }
+    for (let hz = 0; hz <= top; hz += 250) area.tick(theme, { y: area.y(hz / top), text: hz ? String(hz) : "0 Hz" });
+    for (let s = -HISTORY_S; s <= 0; s += 2) {
+      area.tick(theme, { x: area.x(1 + s / HISTORY_S), text: s ? `−${-s}` : "0 s" });
+    }
+  }
+
+  paint(columns, paPerCount, colour) {
+    const [low, high] = DECADES;
+    const rows = columns[0].values.length;
+    const endS = columns.at(-1).t;
+    this.picture.width = COLUMNS;
+    this.picture.height = rows;
+    const c = this.picture.getContext("2d");
+    const image = c.createImageData(COLUMNS, rows);
+    for (const { t, values } of columns) {
+      const x = COLUMNS - 1 - Math.round(((endS - t) / HISTORY_S) * COLUMNS);
+      if (x < 0) continue;
+      values.forEach((v, k) => {
+        const share = (Math.log10(v * paPerCount) - low) / (high - low);
+        image.data.set([...colour, 255 * share], 4 * ((rows - 1 - k) * COLUMNS + x)); // which bounds it
+      });
+    }
+    c.putImageData(image, 0, 0);
   }
 }
 

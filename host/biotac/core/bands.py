@@ -1,0 +1,74 @@
+"""Bands of dynamic pressure (BANDS), by the board's own code (firmware/core/signal/bands.h)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..wire import messages_gen as wire
+from ..wire import sensor_gen as sensor
+from ..wire.dtypes_gen import DTYPES
+from ..wire.frames import StructArray, bands_from_wire
+from ..wire.native import ffi, lib
+
+#: Between which frequencies each band has at least half its power, Hz.
+BANDS_HZ = ((11, 26), (22, 53), (45, 106), (91, 214), (190, 454), (527, 1100))
+_SAMPLES = sensor.SLOTS.count("PAC")
+_WIRE = DTYPES[wire.Bands.ID]
+
+
+def bands_of(pac: StructArray) -> StructArray:
+    """BANDS_DTYPE (n,) of one finger's PAC_DTYPE rows (n,), as the board would tell them.
+
+    It begins anew where rounds are missing. Raises ValueError for rows of several fingers.
+    """
+    if len(np.unique(pac["finger"])) > 1:
+        raise ValueError(f"rows of fingers {np.unique(pac['finger']).tolist()}, expected those of one")
+    begins = np.flatnonzero(np.diff(pac["seq"].astype(np.int64)) != 1) + 1
+    sent = np.zeros(len(pac), _WIRE)
+    sent["finger"] = pac["finger"]
+    for part in np.split(np.arange(len(pac)), begins):
+        sent["good"][part], sent["energy_q4"][part] = _energies(pac["pac"][part])
+    return bands_from_wire(sent, pac["seq"], pac["t_us"])
+
+
+def pac_bands(pac: Any) -> NDArray[np.float64]:
+    """Energy of each round and band (n, 6), count^2, the lowest first (BANDS_HZ); NaN where a round has no good word.
+
+    ``pac`` (n, 22) are integers 0..4095, a round of 10 ms each and without a gap, 0xFFFF where no good word came. An
+    energy is the sum of squares over the round's 22 samples. Raises ValueError for another shape, type or range.
+    """
+    words = pac_words(pac)
+    sent = np.zeros(len(words), _WIRE)
+    sent["good"], sent["energy_q4"] = _energies(words)
+    rounds = np.arange(len(words))
+    energy: NDArray[np.float64] = bands_from_wire(sent, rounds, rounds)["energy_count2"]
+    return energy
+
+
+def pac_words(pac: Any) -> NDArray[np.uint16]:
+    """``pac`` as C takes it; ValueError unless it is (n, 22) integers 0..4095, or 0xFFFF."""
+    words = np.asarray(pac)
+    if words.ndim != 2 or words.shape[1] != _SAMPLES or words.dtype.kind not in "iu":
+        raise ValueError(f"pac is {words.dtype} of shape {words.shape}, expected integers of (n, {_SAMPLES})")
+    if not np.all(((words >= 0) & (words <= sensor.FULL_SCALE_COUNT)) | (words == wire.INVALID_COUNT)):
+        raise ValueError(
+            f"pac holds {words.min()} to {words.max()}, expected 0 to {sensor.FULL_SCALE_COUNT}, or 0xFFFF"
+        )
+    return np.ascontiguousarray(words, np.uint16)
+
+
+def _energies(words: NDArray[np.uint16]) -> tuple[NDArray[np.uint8], NDArray[np.uint32]]:
+    words = np.ascontiguousarray(words)
+    good = np.zeros(len(words), np.uint8)
+    energy_q4 = np.zeros((len(words), len(BANDS_HZ)), np.uint32)
+    lib.bt_replay_bands(
+        ffi.new("bt_bands *"),
+        len(words),
+        ffi.from_buffer("uint16_t[]", words),
+        ffi.from_buffer("uint8_t[]", good),
+        ffi.from_buffer("uint32_t[]", energy_q4),
+    )
+    return good, energy_q4

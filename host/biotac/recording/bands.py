@@ -1,0 +1,32 @@
+"""How strongly dynamic pressure vibrated in a recording, as a board told it or would have."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..core.bands import bands_of
+from ..wire import messages_gen as wire
+from ..wire.dtypes_gen import DTYPES
+from ..wire.frames import BANDS_DTYPE, StructArray, bands_from_wire
+
+
+def recorded_bands(pac: StructArray, messages: list[Any], begin_us: int) -> StructArray:
+    """BANDS_DTYPE (n,): of each finger the BANDS among ``messages``, or without any those of its ``pac`` rows.
+
+    Times of messages are unwrapped from ``begin_us`` on; a finger's rows lie together, in its order.
+    """
+    told = [message for message in messages if isinstance(message, wire.Bands)]
+    parts = []
+    for finger in sorted({m.finger for m in told} | set(np.unique(pac["finger"]).tolist())):
+        its = [message for message in told if message.finger == finger]
+        parts.append(_of_messages(its, begin_us) if its else bands_of(pac[pac["finger"] == finger]))
+    return np.concatenate(parts) if parts else np.empty(0, BANDS_DTYPE)
+
+
+def _of_messages(told: list[wire.Bands], begin_us: int) -> StructArray:
+    sent = np.frombuffer(b"".join(message.pack() for message in told), DTYPES[wire.Bands.ID])
+    seq = np.unwrap(sent["seq"].astype(np.int64), period=2**16)
+    t_us = np.unwrap(np.append(begin_us, sent["t_us"].astype(np.int64)), period=2**32)[1:]
+    return bands_from_wire(sent, seq, t_us)

@@ -1,0 +1,28 @@
+"""Which of ten materials is rubbed: python textures.py slides.npz, recordings of dexrob/BioTac_slide_20_50.
+
+Its counts are absolute values of tared ones, so that a vibration of f looks like one of 2 f: these bands are not those
+of a board, and what is learned here holds for these files alone. Each slide is learned from, or judged, as a whole.
+"""
+
+import sys
+
+import numpy as np
+from sklearn.model_selection import StratifiedKFold, cross_val_predict
+
+from biotac.features import texture
+
+SLIDING_M_S = 0.002
+
+slides = np.load(sys.argv[1])
+pac, materials = [], []
+for trial in sorted(name.removesuffix("frame") for name in slides if name.endswith("frame")):
+    speed_m_s = np.linalg.norm(slides[trial + "cv"][:, :3], axis=1)
+    slips = np.interp(slides[trial + "t"], slides[trial + "cv_t"], speed_m_s) > SLIDING_M_S
+    pac.append(slides[trial + "frame"][slips, 3:25].ravel())
+    materials.append(trial.split("_")[0])
+folds = StratifiedKFold(5, shuffle=True, random_state=0)
+for samples in (220, 1100, 2200, None):
+    rows = texture.describe_all(its[:samples] for its in pac)
+    found = cross_val_predict(texture.classifier(), rows, materials, cv=folds)
+    what = "all of each slide" if samples is None else f"its first {samples / 2200:g} s"
+    print(f"{what}: {np.mean(found == np.array(materials)):.0%} of {len(pac)} slides")

@@ -1,0 +1,68 @@
+"""Bands of dynamic pressure: what a board tells is what is computed of its PAC, and what is recorded and exported."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import biotac
+from biotac.core.bands import BANDS_HZ, bands_of, pac_bands
+from biotac.wire import messages_gen as wire
+
+PER_S = 2200
+
+
+def sine(hz: float, counts: float, rounds: int = 40) -> Any:
+    k = np.arange(22 * rounds)
+    return np.rint(2038 + counts * np.sin(2 * np.pi * hz * k / PER_S)).astype(int).reshape(-1, 22)
+
+
+def test_a_band_has_half_its_power_at_its_ends() -> None:
+    for band, (low_hz, high_hz) in enumerate(BANDS_HZ):
+        power = {hz: pac_bands(sine(hz, 1500, 200))[50:, band].mean() for hz in (*range(low_hz - 3, 1100, 5), high_hz)}
+        half = max(power.values()) / 2
+        inside = [hz for hz, its in power.items() if its > half * 1.03]
+        assert low_hz - 3 <= min(inside) <= low_hz + 5 and high_hz - 5 <= max(inside) <= max(high_hz + 3, 1100)
+
+
+def test_what_the_board_tells_is_what_is_computed_of_its_pac(tmp_path: Path) -> None:
+    path, without = tmp_path / "both.mcap", tmp_path / "pac.mcap"
+    for place, names in ((path, ("pac", "bands")), (without, ("pac",))):
+        with biotac.open("sim:grasp.toml?seconds=3") as hand:
+            hand.want("force", *names)
+            recorder = hand.record(place)
+            hand.read(250)
+            recorder.close()
+    told, computed = biotac.Recording(path), biotac.Recording(without)
+    assert any(isinstance(m, wire.Bands) for m in told.messages)
+    assert not any(isinstance(m, wire.Bands) for m in computed.messages)
+    for finger in told.fingers:
+        mine, pac = told.bands[told.bands["finger"] == finger], told.pac[told.pac["finger"] == finger]
+        again = bands_of(pac[np.isin(pac["seq"], mine["seq"])])
+        assert len(mine) > 200 and again.tobytes() == mine.tobytes()
+        assert computed.bands[computed.bands["finger"] == finger]["seq"].tolist() == (
+            computed.pac["seq"][computed.pac["finger"] == finger].tolist()
+        )
+
+
+def test_it_begins_anew_behind_lost_rounds() -> None:
+    rows = np.zeros(40, biotac.PAC_DTYPE)
+    rows["seq"] = np.arange(40)
+    rows["pac"] = sine(60, 900)
+    left = np.delete(rows, slice(10, 13))
+    assert bands_of(left)[10:].tobytes() == bands_of(rows[13:]).tobytes()
+
+
+def test_rounds_without_a_word_have_no_energy() -> None:
+    pac = sine(100, 300)
+    pac[7] = wire.INVALID_COUNT
+    assert np.flatnonzero(np.isnan(pac_bands(pac)).any(axis=1)).tolist() == [7]
+
+
+@pytest.mark.parametrize("pac", [np.zeros((3, 21), int), np.zeros((3, 22)), np.full((3, 22), 5000)])
+def test_what_is_no_pac_is_refused(pac: Any) -> None:
+    with pytest.raises(ValueError, match="expected"):
+        pac_bands(pac)

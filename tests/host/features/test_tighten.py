@@ -1,0 +1,19 @@
+"""The example of a controller that tightens before what it holds slips (host/docs/examples/tighten.py)."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+EXAMPLE = Path(__file__).resolve().parents[3] / "host" / "docs" / "examples" / "tighten.py"
+
+
+def test_what_is_held_is_lost_and_what_is_tightened_is_not() -> None:
+    its = runpy.run_path(str(EXAMPLE))
+    trained = its["learn"](range(3))
+    held, tightened = its["Thing"](0.25, 2.0), its["Thing"](0.25, 2.0)
+    its["grasp"](held, 100, None)
+    its["grasp"](tightened, 100, trained)
+    assert held.slid_mm >= its["LOST_MM"]
+    assert tightened.slid_mm < 1.0
+    assert tightened.rounds[-1][0] < its["MOST_N"]  # it does not squeeze for ever
