@@ -234,7 +234,7 @@ void bt_gateway_poll(bt_gateway *gateway)
     // A round's worth and no more: whoever is behind must still hear the host, and feed what watches over
     // him.
     bt_slot slot;
-    for (int n = 0; n < BT_SLOTS && bt_sampler_pop(&gateway->sampler, &slot); n++) {
+    for (int k = 0; k < BT_SLOTS && bt_sampler_pop(&gateway->sampler, &slot); k++) {
         take_slot(gateway, &slot);
     }
     if (session->slots_late != gateway->sampler.late) {

@@ -38,7 +38,7 @@ int main(int argc, char **argv)
         if (id == BT_HELLO_ID && bt_client_read(&board, BT_HELLO_ID, &hello) && hello.nonce == 7) {
             if (hello.wire_major != BT_WIRE_MAJOR) {
                 fprintf(stderr, "the board speaks wire %u, this program %u\n", hello.wire_major,
-                        BT_WIRE_MAJOR);
+                        (unsigned)BT_WIRE_MAJOR);
                 return 2;
             }
             board.accept_longer = hello.wire_minor > BT_WIRE_MINOR;

@@ -26,7 +26,7 @@ DOUBT = (
     FrameFlags.UNTARED | FrameFlags.POC_INVALID | FrameFlags.ELECTRODE_MISSING | FrameFlags.RAIL | FrameFlags.FAULT
     | FrameFlags.DOUBT | FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER
 )  # fmt: skip
-LATCHED = DOUBT & ~(FrameFlags.UNTARED | FrameFlags.POC_INVALID) | (
+LATCHED = DOUBT & ~(FrameFlags.UNTARED | FrameFlags.POC_INVALID | FrameFlags.DOUBT) | (
     FrameFlags.PDC_MISSING | FrameFlags.TAC_MISSING | FrameFlags.TDC_MISSING
 )  # fmt: skip
 healthy_runs: dict[tuple[str, str], biotac.Batch] = {}

@@ -318,10 +318,10 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
     while (k < end) {
         const uint16_t *before = k < BT_EVENTS_LAG ? events->before + k : pac + k - BT_EVENTS_LAG;
         const unsigned to = k < BT_EVENTS_LAG && end > BT_EVENTS_LAG ? BT_EVENTS_LAG : end;
-        const unsigned quiet = shakes(events) ? 0 : pass_quiet(events, pac + k, before, to - k);
-        events->now += quiet;
-        if (k + quiet < to) {
-            shake(events, pac + k + quiet, before + quiet, to - k - quiet);
+        const unsigned passed = shakes(events) ? 0 : pass_quiet(events, pac + k, before, to - k);
+        events->now += passed;
+        if (k + passed < to) {
+            shake(events, pac + k + passed, before + passed, to - k - passed);
             shook = true;
         }
         k = to;

@@ -1,17 +1,17 @@
 #include "talk/faults.h"
 
+// Not DOUBT and OUTSIDE, which the best finger has at the beginning and the end of a touch.
 #define AGAINST_ITS_NUMBERS                                                                                  \
     (BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_RAIL | BT_FRAME_FLAG_PDC_MISSING                        \
      | BT_FRAME_FLAG_TAC_MISSING | BT_FRAME_FLAG_TDC_MISSING | BT_FRAME_FLAG_BASE_OLD | BT_FRAME_FLAG_FAULT  \
-     | BT_FRAME_FLAG_TEMP | BT_FRAME_FLAG_DOUBT | BT_FRAME_FLAG_REPEATED | BT_FRAME_FLAG_SHED                \
-     | BT_FRAME_FLAG_SENSOR_UNSURE | BT_FRAME_FLAG_SENSOR_OTHER)
+     | BT_FRAME_FLAG_TEMP | BT_FRAME_FLAG_REPEATED | BT_FRAME_FLAG_SHED | BT_FRAME_FLAG_SENSOR_UNSURE        \
+     | BT_FRAME_FLAG_SENSOR_OTHER)
 
 void bt_faults_of_round(bt_session *session, unsigned f, uint32_t flags)
 {
     uint32_t against = AGAINST_ITS_NUMBERS;
-    // Before its first tare a finger is untared by nature, and noise alone is outside of any map.
+    // Before its first tare a finger is untared by nature.
     against |= session->finger[f].tare.reason != BT_TARE_REASON_NONE ? BT_FRAME_FLAG_UNTARED : 0;
-    against |= flags & BT_FRAME_FLAG_CONTACT ? BT_FRAME_FLAG_OUTSIDE : 0;
     session->finger_faults[f] |= flags & against;
 }
 

@@ -27,8 +27,8 @@ static void begin_events(bt_session *session)
         const bool asked = session->finger[f].quantities & BT_QUANTITY_FLAG_EVENTS;
         now = (uint8_t)(now | asked << f);
     }
-    const bool streams = session->streams & (BT_STREAM_FLAG_FRAMES | BT_STREAM_FLAG_PAC);
-    now = streams ? now & session->fingers : 0;
+    const bool streaming = session->streams & (BT_STREAM_FLAG_FRAMES | BT_STREAM_FLAG_PAC);
+    now = streaming ? now & session->fingers : 0;
     if (now == before) {
         return;
     }

@@ -427,7 +427,7 @@ typedef struct {
     uint32_t wrench_repeated; // [1] FRAMEs that repeat the wrench of the finger's map, likewise: the second to go
     uint32_t frames_shed; // [1] FRAMEs that were not sent, likewise: the last to go
     uint16_t faults; // [flags fault] what went wrong since CLEAR_FAULTS cleared it, or since boot
-    uint32_t finger_faults[5]; // [flags frame] of each finger, likewise: the flags of its rounds, sent or not, that speak against its numbers; UNTARED only where a tare was lost, OUTSIDE only in contact
+    uint32_t finger_faults[5]; // [flags frame] of each finger, likewise: the flags of its rounds, sent or not, that speak against its numbers, but DOUBT and OUTSIDE, which are of any touch; UNTARED only where a tare was lost
 } bt_msg_status;
 void bt_msg_status_pack(const bt_msg_status *msg, uint8_t out[BT_STATUS_BYTES]);
 void bt_msg_status_unpack(bt_msg_status *msg, const uint8_t in[BT_STATUS_BYTES]);

@@ -147,10 +147,10 @@ static void a_damaged_page_is_told(void **state)
             bt_storage_page_is(flash_bytes + at, 1) && bt_get_u16(flash_bytes + at + 6) == SAVES ? at : last;
     }
     for (size_t at = last; at < last + BT_FLASH_PAGE_BYTES; at++) { // what is read is then an older one
-        flash_bytes[at] ^= 1u << at % 8;
+        flash_bytes[at] ^= (uint8_t)(1u << at % 8);
         assert_true(bt_storage_damaged(&flash));
         assert_int_equal(stored(1), SAVES - 1);
-        flash_bytes[at] ^= 1u << at % 8;
+        flash_bytes[at] ^= (uint8_t)(1u << at % 8);
     }
     const size_t used = last / BT_FLASH_SECTOR_BYTES * BT_FLASH_SECTOR_BYTES;
     flash_bytes[used] ^= 1; // the sector in use: what is read is then of the one before
