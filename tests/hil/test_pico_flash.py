@@ -165,9 +165,9 @@ def test_picotool_finds_name_version_and_pins_in_the_image(rig: Rig) -> None:
     assert said[0x11A9BC3A].endswith(f"wire {wire.WIRE_MAJOR}.{wire.WIRE_MINOR}")
     assert said[0xB63CFFBB] == "pico"
     assert pins == {
-        1 << 16: "SPI0 MISO",
-        1 << 18: "SPI0 SCK",
-        1 << 19: "SPI0 MOSI",
+        1 << 16: "SPI MISO",
+        1 << 18: "SPI SCK",
+        1 << 19: "SPI MOSI",
         **{1 << pin: f"chip select of finger {f}" for f, pin in enumerate((17, 20, 21, 22, 26))},
     }
 

@@ -13,6 +13,8 @@ from biotac.features import texture
 
 SLIDING_M_S = 0.002
 
+if len(sys.argv) != 2:
+    sys.exit("expected one file: python textures.py slides.npz")
 slides = np.load(sys.argv[1])
 pac, materials = [], []
 for trial in sorted(name.removesuffix("frame") for name in slides if name.endswith("frame")):

@@ -293,7 +293,7 @@ def test_a_hand_asks_the_board_for_its_time(scripted_board, hello) -> None:
         if message_id == wire.HelloRequest.ID:
             return hello(payload)
         if message_id == wire.GetStatus.ID:
-            facts = dict.fromkeys((f.name for f in dataclasses.fields(wire.Status)), 0)
+            facts = dict.fromkeys((f.name for f in dataclasses.fields(wire.Status)), 0) | {"finger_faults": (0,) * 5}
             t_us = int((time.monotonic() - begin_s) * 1e6) % 2**32
             return encode(wire.Status.ID, wire.Status(**facts | {"t_us": t_us, "req_id": payload[0]}).pack())
         return b""

@@ -95,7 +95,12 @@ def test_a_lost_board_ends_the_iteration_in_words() -> None:
     run(main())
 
 
-@pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.py")))
+def test_every_example_is_run_somewhere() -> None:
+    """tighten.py in tests/host/features; textures.py by hand: it wants recordings that are not ours to ship."""
+    assert {path.name for path in EXAMPLES.glob("*.py")} == {*SAYS, "tighten.py", "textures.py"}
+
+
+@pytest.mark.parametrize("name", SAYS)
 def test_an_example_runs_and_says_what_it_should(name: str, tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, str(EXAMPLES / name)], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

@@ -39,10 +39,14 @@ class Timely(Firmware):
         answer = super().__call__(message_id, payload)
         if message_id != wire.GetStatus.ID:
             return self.before_pong + answer if message_id == wire.Ping.ID else answer
-        facts = dict.fromkeys((f.name for f in fields(wire.Status)), 0) | {
-            "req_id": payload[0],
-            "t_us": self.t_us() % 2**32,
-        }
+        facts = (
+            dict.fromkeys((f.name for f in fields(wire.Status)), 0)
+            | {"finger_faults": (0,) * 5}
+            | {
+                "req_id": payload[0],
+                "t_us": self.t_us() % 2**32,
+            }
+        )
         return encode(wire.Status.ID, wire.Status(**facts).pack())
 
 
