@@ -55,6 +55,7 @@ def test_every_slot_of_one_to_five_fingers_is_sampled_and_nothing_lost(board, fi
         assert len(mine) == (100 if finger < fingers else 0)
 
 
+@pytest.mark.long
 def test_the_host_has_all_frames_of_a_round_a_millisecond_after_its_last_electrode(rig) -> None:
     rig.need("counters")
     hand = rig.open("press.toml?fingers=5&seconds=4")
@@ -85,6 +86,7 @@ def test_the_same_scenario_gives_the_same_bytes(board) -> None:
     assert played() == played()
 
 
+@pytest.mark.long
 def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(rig) -> None:
     rig.need("cable")
     hand = rig.open("press.toml?fingers=5&seconds=2")

@@ -66,6 +66,7 @@ def test_a_contact_is_in_one_block_where_the_run_rests() -> None:
     assert [len(short.rows(k)) for k in range(BLOCKS)] == [2 * GUARD_ROWS] * BLOCKS
 
 
+@pytest.mark.nightly  # fits twice
 def test_nothing_of_a_held_out_block_reaches_its_own_prediction(finger: Path, validation: Validation) -> None:
     run = validation.run
     rows = validation.blocks.rows(7)

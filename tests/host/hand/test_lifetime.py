@@ -110,7 +110,7 @@ print(seen, flush=True)
 """
 
 
-@pytest.mark.parametrize("run", ["", "hand.run(queue=True)"])
+@pytest.mark.parametrize("run", [pytest.param("", marks=pytest.mark.nightly), "hand.run(queue=True)"])
 @pytest.mark.parametrize("end", ENDS)
 def test_a_program_that_ends_without_close_loses_nothing_that_came(end: str, run: str, tmp_path: Path) -> None:
     text, code = ENDS[end]
