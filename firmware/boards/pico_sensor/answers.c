@@ -8,6 +8,7 @@
 #include "port.h"
 #include "rp2040_regs.h"
 #include "shifter.h"
+#include "system.h"
 
 #include <string.h>
 
@@ -58,8 +59,7 @@ bool bt_port_alarm(void)
     return heartbeat;
 }
 
-// ---- what a sensor will say
-// --------------------------------------------------------------------------------
+// ---- what a sensor will say ----------------------------------------------------------------------------
 
 static uint32_t offer_at(const bt_emu_device *device, unsigned bytes, bool settled)
 {
@@ -87,8 +87,7 @@ static void offer(uint8_t finger)
     go_on(primask);
 }
 
-// ---- what a sensor hears
-// -----------------------------------------------------------------------------------
+// ---- what a sensor hears -------------------------------------------------------------------------------
 
 static void hear(uint8_t finger, const exchange *heard, bool alone)
 {
@@ -137,14 +136,12 @@ static void exchanged(void)
 
 static void hold_off_model(void)
 {
-    NVIC_ICER = 1u << PIO0_IRQ_1;
-    __asm volatile("dsb\n isb" ::: "memory");
+    interrupt_hold_off(PIO0_IRQ_1);
 }
 
 static void let_go_model(void)
 {
-    __asm volatile("" ::: "memory");
-    NVIC_ISER = 1u << PIO0_IRQ_1;
+    interrupt_let_go(PIO0_IRQ_1);
 }
 
 void answers_renew(void)

@@ -2,6 +2,8 @@
 #ifndef BIOTAC_RP2040_SYSTEM_H
 #define BIOTAC_RP2040_SYSTEM_H
 
+#include "rp2040_regs.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -9,6 +11,19 @@
 // Code that runs from flash, before all other is copied to SRAM. noinline, or it would end up in its caller,
 // or what it calls in it.
 #define AT_BOOT __attribute__((section(".boot_code"), noinline))
+
+// ---- one interrupt held off, and no other: for who shares something with it
+static inline void interrupt_hold_off(uint32_t number)
+{
+    NVIC_ICER = 1u << number;
+    __asm volatile("dsb\n isb" ::: "memory");
+}
+
+static inline void interrupt_let_go(uint32_t number)
+{
+    __asm volatile("" ::: "memory");
+    NVIC_ISER = 1u << number;
+}
 
 // ---- startup.c: who takes an interrupt, beside the timer's and the USB's
 void use_interrupt(uint32_t number, void (*handler)(void));

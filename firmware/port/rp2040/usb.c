@@ -300,14 +300,12 @@ bool usb_touched(void)
 // The main loop's turn at what the interrupt does: only this interrupt is held off, sampling is not.
 static void hold_off(void)
 {
-    NVIC_ICER = 1u << USBCTRL_IRQ;
-    __asm volatile("dsb\n isb" ::: "memory");
+    interrupt_hold_off(USBCTRL_IRQ);
 }
 
 static void let_go(void)
 {
-    __asm volatile("" ::: "memory");
-    NVIC_ISER = 1u << USBCTRL_IRQ;
+    interrupt_let_go(USBCTRL_IRQ);
 }
 
 bool port_link_up(void)

@@ -8,6 +8,12 @@ from pathlib import Path
 from ..errors import InputError
 
 
+def check_file(place: Path | None, *, overwrite: bool) -> None:
+    """Raises InputError when a file, if one is named, is there and may not be overwritten."""
+    if place is not None and place.exists() and not overwrite:
+        raise InputError(f"{place} exists and would be overwritten; choose another name or say --force")
+
+
 def check(folder: Path, places: Sequence[Path], *, overwrite: bool) -> None:
     """Raises InputError when a place in ``folder`` is named twice, or is there and may not be overwritten."""
     for place in places:

@@ -69,3 +69,8 @@ def add_port(parser: argparse.ArgumentParser) -> None:
         help="device path, serial:NUMBER, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE "
         "(default: the only board on USB)",
     )
+
+
+def numbers(text: str) -> tuple[float, ...]:
+    """Several, with commas between; none of an empty text."""
+    return tuple(float(part) for part in text.split(",")) if text else ()

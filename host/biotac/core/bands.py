@@ -15,7 +15,7 @@ from ..wire.native import ffi, lib
 
 #: Between which frequencies each band has at least half its power, Hz.
 BANDS_HZ = ((11, 26), (22, 53), (45, 106), (91, 214), (190, 454), (527, 1100))
-_SAMPLES = sensor.SLOTS.count("PAC")
+SAMPLES = sensor.SLOTS.count("PAC")  # of a round of 10 ms
 _WIRE = DTYPES[wire.Bands.ID]
 
 
@@ -51,8 +51,8 @@ def pac_bands(pac: Any) -> NDArray[np.float64]:
 def pac_words(pac: Any) -> NDArray[np.uint16]:
     """``pac`` as C takes it; ValueError unless it is (n, 22) integers 0..4095, or 0xFFFF."""
     words = np.asarray(pac)
-    if words.ndim != 2 or words.shape[1] != _SAMPLES or words.dtype.kind not in "iu":
-        raise ValueError(f"pac is {words.dtype} of shape {words.shape}, expected integers of (n, {_SAMPLES})")
+    if words.ndim != 2 or words.shape[1] != SAMPLES or words.dtype.kind not in "iu":
+        raise ValueError(f"pac is {words.dtype} of shape {words.shape}, expected integers of (n, {SAMPLES})")
     if not np.all(((words >= 0) & (words <= sensor.FULL_SCALE_COUNT)) | (words == wire.INVALID_COUNT)):
         raise ValueError(
             f"pac holds {words.min()} to {words.max()}, expected 0 to {sensor.FULL_SCALE_COUNT}, or 0xFFFF"

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recording.reader import Recording
+from ..recording.stamps import unwrapped_us
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.fields import Field
@@ -21,15 +22,12 @@ from .columns import STAMP, Table
 
 _T_US = Field("t_us", "<i8", "us", "device time, unwrapped from the first value seen")
 _ITS_OWN = ("seq", "t_us", "req_id", "finger")  # of the message, which the tables have otherwise or not
-_WRAP_US = 2**32
 
 
 def message_tables(recording: Recording) -> list[Table]:
     """A table a kind of message and finger, whose kind is the message's name in small letters; BANDS are rows."""
     timed = [m for m in recording.messages if "t_us" in (DTYPES[m.ID].names or ()) and not isinstance(m, wire.Bands)]
-    # STATUS comes each second, so two neighbours are never half a wrap apart.
-    told_us = np.array([recording.begin_us, *(m.t_us for m in timed)], np.float64)
-    t_us = np.unwrap(told_us, period=_WRAP_US)[1:].astype(np.int64)
+    t_us = unwrapped_us(recording.begin_us, [m.t_us for m in timed])
     groups: dict[tuple[int, int | None], list[int]] = defaultdict(list)
     for k, message in enumerate(timed):
         groups[message.ID, getattr(message, "finger", None)].append(k)

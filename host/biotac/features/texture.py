@@ -15,18 +15,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core.bands import BANDS_HZ, pac_bands
+from ..core.bands import BANDS_HZ, SAMPLES, pac_bands
 from ..errors import InputError
+from ..wire.sensor_gen import FULL_SCALE_COUNT
 
 if TYPE_CHECKING:
     from sklearn.pipeline import Pipeline
 
 Floats = npt.NDArray[np.float64]
 
-SAMPLES = 22  # of a round of 10 ms
 QUANTILES = (0.1, 0.5, 0.9, 1.0)  # over rounds
 FLOOR_COUNT2 = 1.0  # added to the mean square: no logarithm of nothing
-_MIDDLE, _HIGHEST = 2048, 4095
+_MIDDLE = (FULL_SCALE_COUNT + 1) // 2
 
 
 def energies(pac: npt.ArrayLike) -> Floats:
@@ -42,7 +42,7 @@ def energies(pac: npt.ArrayLike) -> Floats:
     if not np.isfinite(samples).all():
         raise InputError(f"{(~np.isfinite(samples)).sum()} samples are not finite: leave out, or fill, what is missing")
     rounds = samples[: len(samples) // SAMPLES * SAMPLES]
-    words = np.clip(np.rint(rounds - np.median(rounds)) + _MIDDLE, 0, _HIGHEST).astype(np.uint16)
+    words = np.clip(np.rint(rounds - np.median(rounds)) + _MIDDLE, 0, FULL_SCALE_COUNT).astype(np.uint16)
     return pac_bands(words.reshape(-1, SAMPLES))
 
 

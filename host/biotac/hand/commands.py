@@ -58,10 +58,7 @@ class Commands:
 
         Be it for one round: the board keeps it. Raises WireVersionError for firmware that keeps no faults.
         """
-        if self._board.info.wire_minor < FAULTS_SINCE_MINOR:
-            raise WireVersionError(
-                f"the board's firmware keeps no faults, expected wire 1.{FAULTS_SINCE_MINOR}; update it: biotac flash"
-            )
+        self._need(FAULTS_SINCE_MINOR, "keeps no faults")
         return faults_of(self.status(), self._names)
 
     def clear_faults(self) -> Faults:
@@ -129,11 +126,12 @@ class Commands:
             with suppress(DeviceLostError):  # it is not there to be told; its hold lapses
                 self.release(*fingers)
 
+    def _need(self, minor: int, lacks: str) -> None:
+        if self._board.info.wire_minor < minor:
+            raise WireVersionError(f"the board's firmware {lacks}, expected wire 1.{minor}; update it: biotac flash")
+
     def _mask(self, fingers: tuple[Finger, ...]) -> int:
-        if self._board.info.wire_minor < HOLD_SINCE_MINOR:
-            raise WireVersionError(
-                f"the board's firmware knows no HOLD, expected wire 1.{HOLD_SINCE_MINOR}; update it: biotac flash"
-            )
+        self._need(HOLD_SINCE_MINOR, "knows no HOLD")
         if not fingers:
             return ALL_FINGERS
         return sum({1 << finger_index(self._names, finger) for finger in fingers})
@@ -188,11 +186,8 @@ class Commands:
         firmware knows of none.
         """
         its = calibration
-        if its.pressure_gain_nn and self._board.info.wire_minor < PRESSURE_SINCE_MINOR:
-            raise WireVersionError(
-                "the board's firmware knows no pressure_gain_nn, expected wire "
-                f"1.{PRESSURE_SINCE_MINOR}; update it: biotac flash"
-            )
+        if its.pressure_gain_nn:
+            self._need(PRESSURE_SINCE_MINOR, "knows no pressure_gain_nn")
         number = self._index(finger)
         request = wire.SetCalibration(0, number, its.wire_serial(), its.made_s, its.wire_values())
         self._board.tell(request, lasting=("calibration", number))

@@ -10,6 +10,7 @@ from ..core.bands import bands_of
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import BANDS_DTYPE, StructArray, bands_from_wire
+from .stamps import unwrapped_us
 
 
 def recorded_bands(pac: StructArray, messages: list[Any], begin_us: int) -> StructArray:
@@ -28,5 +29,4 @@ def recorded_bands(pac: StructArray, messages: list[Any], begin_us: int) -> Stru
 def _of_messages(told: list[wire.Bands], begin_us: int) -> StructArray:
     sent = np.frombuffer(b"".join(message.pack() for message in told), DTYPES[wire.Bands.ID])
     seq = np.unwrap(sent["seq"].astype(np.int64), period=2**16)
-    t_us = np.unwrap(np.append(begin_us, sent["t_us"].astype(np.int64)), period=2**32)[1:]
-    return bands_from_wire(sent, seq, t_us)
+    return bands_from_wire(sent, seq, unwrapped_us(begin_us, sent["t_us"]))

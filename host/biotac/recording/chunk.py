@@ -17,7 +17,7 @@ from mcap.stream_reader import get_chunk_data_stream
 
 _CHUNK = struct.Struct("<QQQII")  # first and last time, unpacked size, checksum, length of the compression's name
 _LENGTH = struct.Struct("<Q")
-_HEAD = struct.Struct("<BQ")
+HEAD = struct.Struct("<BQ")  # of every record: which kind, and how long
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _MESSAGE_OPCODE = int(Opcode.MESSAGE)  # a member of an enum is looked up anew each time
 
@@ -48,8 +48,8 @@ def records_of(data: bytes) -> Iterator[Message | Channel | Schema]:
     """The records of an unpacked chunk. struct.error or mcap's errors for damaged ones."""
     at = 0
     while at < len(data):
-        opcode, length = _HEAD.unpack_from(data, at)
-        at += _HEAD.size
+        opcode, length = HEAD.unpack_from(data, at)
+        at += HEAD.size
         if opcode == _MESSAGE_OPCODE:
             channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, at)
             yield Message(

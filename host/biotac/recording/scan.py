@@ -23,7 +23,7 @@ from mcap.records import Channel, Chunk, DataEnd, Footer, McapRecord, Message, M
 from mcap.writer import MCAP0_MAGIC
 
 from ..errors import RecordingError
-from .chunk import chunk_of, records_of, unpack
+from .chunk import HEAD, chunk_of, records_of, unpack
 
 # A second of five fingers is 0.1 MB. Files have a quarter of what they unpack to; those of format 1, with fingers at
 # rest, a fiftieth. In memory it becomes ten times that.
@@ -31,12 +31,11 @@ _CHUNK_MAX_BYTES = 1 << 23
 _RATIO_MAX = 100
 _FREE_BYTES = 1 << 24
 
-_HEAD = struct.Struct("<BQ")
 _START = struct.Struct("<BQH")  # and what a message index begins with: its channel
 # As plain numbers: a member of an enum is looked up anew for each of sixteen thousand records.
 _CHUNK, _MESSAGE_INDEX = int(Opcode.CHUNK), int(Opcode.MESSAGE_INDEX)
 _DATA_END, _FOOTER = int(Opcode.DATA_END), int(Opcode.FOOTER)
-_FOOTER_BYTES = _HEAD.size + 16  # that its checksum is over, too
+_FOOTER_BYTES = HEAD.size + 16  # that its checksum is over, too
 _READ: dict[int, Any] = {
     Opcode.METADATA: Metadata,
     Opcode.SCHEMA: Schema,
@@ -106,7 +105,7 @@ class Scan:
             channels: set[int] = set()
             while True:
                 opcode, length, channel = _START.unpack(stream.read(_START.size).ljust(_START.size, b"\0"))
-                at = good_until + _HEAD.size
+                at = good_until + HEAD.size
                 whole = opcode != 0 and length <= self._size - at
                 if opcode == _MESSAGE_INDEX and whole:  # two of three records
                     channels.add(channel)
@@ -144,9 +143,9 @@ class Scan:
         record = self._read(opcode, _content(stream, at, length))
         if isinstance(record, DataEnd):
             self._data_end = at + length
-            begin, end, told = 0, at - _HEAD.size, record.data_section_crc
+            begin, end, told = 0, at - HEAD.size, record.data_section_crc
         elif isinstance(record, Footer):
-            begin, end, told = record.summary_start, at - _HEAD.size + _FOOTER_BYTES, record.summary_crc
+            begin, end, told = record.summary_start, at - HEAD.size + _FOOTER_BYTES, record.summary_crc
             if begin != self._data_end:
                 self.problems.append(f"{self.path.name} is damaged: its index is not where its end says")
                 return

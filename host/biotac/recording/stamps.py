@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 from numpy.typing import NDArray
 
 from ..clock import LAST_SAMPLE_US, DeviceClock
@@ -16,6 +17,14 @@ _PACE_S = 0.5
 _MAX_DRIFT = 500e-6
 _SETTLED_US = 600e6  # of the clock's course at a time, before it forgets what it was made of
 _REACH_US = 200e6
+
+
+def unwrapped_us(begin_us: int, told_us: npt.ArrayLike) -> NDArray[np.int64]:
+    """Device times of messages as sent, 32 bits, in order: unwrapped from ``begin_us`` on.
+
+    STATUS comes each second, so two neighbours are never half a wrap apart.
+    """
+    return np.unwrap(np.append(begin_us, told_us).astype(np.int64), period=2**32)[1:].astype(np.int64)
 
 
 class Stamps:

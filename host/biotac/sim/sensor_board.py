@@ -58,16 +58,17 @@ class SensorBoard:
 
         ``until_full``: returns when the board's room is full as well.
         """
+        ended = ended or threading.Event()
         slots, fingers = self._samples.shape
         size = SAMPLES_A_MESSAGE // fingers
         status = self.status()
-        while status.slots_taken < slots and not (ended and ended.is_set()):
+        while status.slots_taken < slots and not ended.is_set():
             at = status.slots_taken
             last = min(slots, at + BURST * size, at + status.room_slots)
             if last - at < min(size, slots - at):
                 if until_full:
                     break
-                threading.Event().wait(REST_S) if ended is None else ended.wait(REST_S)
+                ended.wait(REST_S)
                 status = self.status()
                 continue
             parts = [(k, min(size, last - k)) for k in range(at, last, size)]

@@ -18,13 +18,14 @@ from ..wire import messages_gen as _wire
 from ..wire import sensor_gen as _sensor
 from .source import Source
 
-NO_CHANNEL = _wire.EmuFault.NO_CHANNEL  # the sensor has no such channel: error word 0xA558
-BAD_PARITY = _wire.EmuFault.BAD_PARITY  # a word with a flipped parity bit
-STUCK_LOW = _wire.EmuFault.STUCK_LOW  # line stuck low
-STUCK_HIGH = _wire.EmuFault.STUCK_HIGH  # line stuck high
-ERROR_WORD = _wire.EmuFault.TOO_EARLY  # error word 0xA52D: insufficient sampling delay
-UNPLUGGED = _wire.EmuFault.UNPLUGGED  # no sensor or no power; afterwards it is mute until asked for a property
-SWAPPED = _wire.EmuFault.SWAPPED  # likewise, and it is another sensor that comes back
+# In place of a count; what each is says enum emu_fault (protocol/MESSAGES.md).
+NO_CHANNEL = _wire.EmuFault.NO_CHANNEL
+BAD_PARITY = _wire.EmuFault.BAD_PARITY
+STUCK_LOW = _wire.EmuFault.STUCK_LOW
+STUCK_HIGH = _wire.EmuFault.STUCK_HIGH
+ERROR_WORD = _wire.EmuFault.TOO_EARLY
+UNPLUGGED = _wire.EmuFault.UNPLUGGED
+SWAPPED = _wire.EmuFault.SWAPPED
 CODES = (NO_CHANNEL, BAD_PARITY, STUCK_LOW, STUCK_HIGH, ERROR_WORD, UNPLUGGED, SWAPPED)
 
 MAGIC = b"BTTAPE01"

@@ -6,6 +6,7 @@ Wire integers become mm, N and N*mm here and nowhere else.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -13,7 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .dtypes_gen import DTYPES
-from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, WIRE_INVALID, dtype_of, sent_of, values_of
+from .fields import (
+    BANDS_FIELDS,
+    FRAME_FIELDS,
+    IDLE_FIELDS,
+    PAC_FIELDS,
+    WIRE_INVALID,
+    Field,
+    dtype_of,
+    sent_of,
+    values_of,
+)
 from .messages_gen import INVALID_COUNT, FrameFlags, TareState
 from .messages_gen import Frame as _FrameMessage
 
@@ -101,19 +112,20 @@ def to_units(raw: NDArray[Any], per_unit: int) -> NDArray[np.float64]:
 
 def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]) -> StructArray:
     """Convert FRAME messages (n,) with unwrapped seq and t_us to FRAME_DTYPE (n,)."""
-    out = np.empty(len(messages), FRAME_DTYPE)
-    out["finger"], out["seq"], out["t_us"] = messages["finger"], seq, t_us
-    for its in FRAME_FIELDS:
-        if its.sent:
-            out[its.name] = values_of(its, messages[its.sent])
-    return out
+    return _from_wire(FRAME_FIELDS, FRAME_DTYPE, messages, seq, t_us)
 
 
 def bands_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]) -> StructArray:
     """Convert BANDS messages (n,) with unwrapped seq and t_us to BANDS_DTYPE (n,)."""
-    out = np.empty(len(messages), BANDS_DTYPE)
+    return _from_wire(BANDS_FIELDS, BANDS_DTYPE, messages, seq, t_us)
+
+
+def _from_wire(
+    of: Sequence[Field], dtype: np.dtype[Any], messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]
+) -> StructArray:
+    out = np.empty(len(messages), dtype)
     out["finger"], out["seq"], out["t_us"] = messages["finger"], seq, t_us
-    for its in BANDS_FIELDS:
+    for its in of:
         if its.sent:
             out[its.name] = values_of(its, messages[its.sent])
     return out

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...errors import InputError
+from ..reference.scale import STANDARD_GRAVITY
 
-STANDARD_GRAVITY = 9.80665  # m/s2; the earth's differs by 0.3 %
 MASSES_G = (200.0, 500.0)
 TILTS_DEG = (15.0,)
 MASS_G = (50.0, 2000.0)  # what a finger feels, and what it bears

@@ -19,7 +19,8 @@ import serial
 from ...errors import InputError, PortError
 from ...link.serial_port import describe_open_error
 
-UNITS_N = {"N": 1.0, "g": 9.80665e-3, "kg": 9.80665}
+STANDARD_GRAVITY = 9.80665  # m/s2; the earth's differs by 0.3 %
+UNITS_N = {"N": 1.0, "g": 1e-3 * STANDARD_GRAVITY, "kg": STANDARD_GRAVITY}
 ASK = b"SI\r\n"
 ASK_S = 0.25  # how often
 PATIENCE_S = 5.0  # a kitchen scale settles in one or two

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from ...calibrate import normal
-from ...errors import InputError
 from ...lab.experiments import laboratory, plate_normal
 from ...partial_file import whole
+from .. import outputs
 
 NAME = "normal"
 HELP = "The normal at the point of contact, corrected by a recording of a flat plate whose normal was measured."
@@ -27,8 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Say what it is worth on contacts held out, then fit all."""
-    if args.out is not None and args.out.exists() and not args.force:
-        raise InputError(f"{args.out} exists and would be overwritten; choose another name or say --force")
+    outputs.check_file(args.out, overwrite=args.force)
     theirs = laboratory.load(args.file, needs=("PDC", "z_dir"))
     assert theirs.plate_normal is not None
     looks = plate_normal.looks(theirs.trial, theirs.plate_normal)

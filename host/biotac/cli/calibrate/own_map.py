@@ -24,7 +24,7 @@ from ...hand.hand import Hand
 from ...partial_file import whole
 from ...recording import Recording
 from ...wire.identity import ascii_text
-from .. import values
+from .. import outputs, values
 from ..recordings.loading import load
 
 WHY = "no better than the population map, or a finger unlike those; tare, and load its pad flat, firm and still"
@@ -55,8 +55,7 @@ def pressed(
     args: argparse.Namespace, guide: Callable[[Hand], Held], recorded: Callable[[Recording], Held]
 ) -> Iterator[Pressed]:
     """On a board by ``guide``, or ``recorded``. Raises InputError."""
-    if args.out is not None and args.out.exists() and not args.force:
-        raise InputError(f"{args.out} exists and would be overwritten; choose another name or say --force")
+    outputs.check_file(args.out, overwrite=args.force)
     if Path(args.where).is_file() or args.where.endswith(".mcap"):
         if args.save:
             raise InputError("a recording goes to no board: expected no --save; that is for boards")

@@ -14,6 +14,7 @@ from ...calibrate.wrench.run import Run
 from ...calibrate.wrench.sources import load
 from ...errors import InputError
 from ...partial_file import whole
+from .. import outputs
 
 NAME = "population"
 HELP = "A force map for fingers that nobody has calibrated, learnt from other fingers on a force plate."
@@ -40,8 +41,7 @@ def run(args: argparse.Namespace) -> int:
     """Train, judge, write."""
     if args.test is not None and args.test.resolve() in [path.resolve() for path in args.files]:
         raise InputError(f"{args.test} is trained on and judged by: expected another finger's; leave it out of one")
-    if args.out is not None and args.out.exists() and not args.force:
-        raise InputError(f"{args.out} exists and would be overwritten; choose another name or say --force")
+    outputs.check_file(args.out, overwrite=args.force)
     with threadpool_limits(limits=THREADS, user_api="blas"):
         runs = [training.aligned(load(path).run) for path in args.files]
         tested = None if args.test is None else training.aligned(load(args.test).run)

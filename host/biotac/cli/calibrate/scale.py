@@ -14,6 +14,7 @@ from ...calibrate.reference.scale import UNITS_N, Scale
 from ...errors import InputError
 from ...hand.hand import Hand
 from ...recording import Recording
+from .. import values
 from . import own_map
 from .typed import reading_n
 
@@ -33,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scale", metavar="PORT", help="read the scale from a serial port: MT-SICS or A&D, ?baud=9600&parity=N&bits=8"
     )
     parser.add_argument(
-        "--readings", metavar="X,X,X", type=_numbers, help="what the scale showed at each, of a recording"
+        "--readings", metavar="X,X,X", type=values.numbers, help="what the scale showed at each, of a recording"
     )
     parser.add_argument("--unit", choices=list(UNITS_N), default="N", help="of the readings (default %(default)s)")
 
@@ -86,7 +87,3 @@ def run(args: argparse.Namespace) -> int:
             f"{facts['presses']} presses: gain of z {facts['gain']:.3f}, balance {facts['balance']:+.3f} N/N",
         )
     return 0
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    return tuple(float(part) for part in text.split(","))

@@ -8,6 +8,7 @@ from ...calibrate.population import fewshot, presses, weights
 from ...calibrate.pressure.presses import Step
 from ...hand.hand import Hand
 from ...recording import Recording
+from .. import values
 from . import own_map
 
 NAME = "weights"
@@ -22,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--masses", weights.MASSES_G, "G,G", "grams"),
         ("--tilts", weights.TILTS_DEG, "DEG,DEG", "degrees of the block"),
     ):
-        said = ",".join(f"{value:g}" for value in default)
-        parser.add_argument(name, metavar=metavar, type=_numbers, default=default, help=f"{what} (default {said})")
+        said = f"{what} (default {','.join(f'{value:g}' for value in default)})"
+        parser.add_argument(name, metavar=metavar, type=values.numbers, default=default, help=said)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -47,7 +48,3 @@ def run(args: argparse.Namespace) -> int:
         )
         own_map.show(args, facts, f"{facts['presses']} weights")
     return 0
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    return tuple(float(part) for part in text.split(",")) if text else ()

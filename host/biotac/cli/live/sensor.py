@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import threading
+import time
 from dataclasses import asdict
 
 from ...errors import InputError
-from ...link.discovery import SERIAL_PREFIX, choose
-from ...link.serial_port import SerialLink
+from ...link import open_link
 from ...sim.loading import load_source
 from ...sim.sensor_board import SensorBoard
 from ...wire import messages_gen as wire
@@ -52,8 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Plug the sensors in, feed them until their tape is over, or Ctrl-C, and say how the board got on."""
     faults = [fault_of(text) for text in args.fault]
-    port = choose(args.port.removeprefix(SERIAL_PREFIX)) if args.port.startswith(SERIAL_PREFIX) else args.port
-    board = SensorBoard(SerialLink(port))
+    board = SensorBoard(open_link(args.port))
     try:
         if args.source is not None:
             seconds = args.seconds or (SCENARIO_S if args.source.endswith(".toml") else None)
@@ -69,11 +67,10 @@ def run(args: argparse.Namespace) -> int:
 
 def play(board: SensorBoard) -> wire.EmuStatus:
     """Until the bus has come past the last slot, or Ctrl-C."""
-    ended = threading.Event()
     try:
-        status = board.feed(ended=ended)
+        status = board.feed()
         while status.slots_served < status.slots_taken:
-            ended.wait(LOOK_S)
+            time.sleep(LOOK_S)
             status = board.status()
     except KeyboardInterrupt:
         print("stopped; the board goes on with what it has", file=sys.stderr)

@@ -77,9 +77,7 @@ def angles_deg(points_mm: Floats, normals: Floats) -> Floats:
     """Between the core's outward normals at points (n, 3) and unit normals (n, 3); NaN without a point."""
     known = np.asarray(np.isfinite(points_mm).all(axis=1))
     mine = surface.normals_at(np.where(known[:, None], points_mm, [0.0, 0.0, -1.0]))
-    sine, cosine = np.linalg.norm(np.cross(mine, normals), axis=1), (mine * normals).sum(axis=1)
-    # atan2 keeps small angles that acos rounds to nothing
-    return np.where(known, np.degrees(np.arctan2(sine, cosine)), np.nan)
+    return np.where(known, normal.angles_deg(mine, normals), np.nan)
 
 
 def emulated(seed: int, profile: Profile) -> Trial:

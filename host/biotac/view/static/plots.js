@@ -171,6 +171,7 @@ export class SpectrogramPlot {
   constructor(canvas) {
     this.canvas = canvas;
     this.picture = document.createElement("canvas");
+    this.painted = []; // its newest column, and the colour: what it would have to be painted anew for
   }
 
   draw(finger, rateHz, paPerCount, theme) {
@@ -179,7 +180,9 @@ export class SpectrogramPlot {
     const top = rateHz / 2;
     const columns = finger?.spectrogram ?? [];
     if (columns.length) {
-      this.paint(columns, paPerCount, rgb(theme.accent));
+      const wanted = [columns.at(-1), theme.accent];
+      if (wanted.some((one, k) => one !== this.painted[k])) this.paint(columns, paPerCount, rgb(theme.accent));
+      this.painted = wanted;
       c.imageSmoothingEnabled = false;
       c.drawImage(this.picture, area.left, area.top, area.right - area.left, area.bottom - area.top);
     }
