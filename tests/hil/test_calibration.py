@@ -60,6 +60,7 @@ def test_nothing_is_changed_while_streaming(board: Callable[[str], biotac.Hand])
     hand.clear_calibration(0)
 
 
+@pytest.mark.long
 def test_frames_of_two_fingers_come_from_each_ones_own_gains(
     board: Callable[[str], biotac.Hand], tmp_path: Path
 ) -> None:

@@ -61,7 +61,8 @@ def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFi
     words = [
         "calibrate",
         "scale",
-        "sim:fingers.toml?fingers=1&seconds=240",
+        # An idle simulated board plays on: not to be over before a busy computer has fitted the map.
+        "sim:fingers.toml?fingers=1&seconds=2400",
         "--finger",
         "index",
         "--presses",

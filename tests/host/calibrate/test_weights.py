@@ -78,12 +78,13 @@ def test_the_scenario_applies_what_the_plan_says() -> None:
         assert (np.linalg.norm(held - wanted, axis=1) < 1e-3).sum() > 100
 
 
-@pytest.mark.nightly  # the board's check at its end found no frame to compare on a busy machine: it goes by the clock
+@pytest.mark.nightly  # the guide takes twelve seconds
 def test_weights_mend_the_map_of_other_fingers(
     others: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "own.wrench.json"
-    words = ["calibrate", "weights", "sim:weights.toml?seconds=240", "--finger", "index", "--population", str(others)]
+    # An idle simulated board plays on, 170 s in one: with 240 s it was over before a busy computer had fitted the map.
+    words = ["calibrate", "weights", "sim:weights.toml?seconds=2400", "--finger", "index", "--population", str(others)]
     assert main([*words, "--out", str(out), "--json"]) == 0
     captured = capsys.readouterr()
     facts = json.loads(captured.out)
