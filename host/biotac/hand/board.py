@@ -6,7 +6,8 @@ import struct
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import cycle
 from typing import Any, NoReturn, TypeVar
@@ -339,6 +340,16 @@ class Board:
         finally:
             self.awaiting -= 1
 
+    @contextmanager
+    def _turn(self) -> Iterator[None]:
+        """One command at a time. A thread that reads goes on reading until its turn, for the other waits for a reply."""
+        while not self._asking.acquire(blocking=not self.is_read_here()):
+            self.read(POLL_S)
+        try:
+            yield
+        finally:
+            self._asking.release()
+
     def ask(self, request: Any, reply: type[Reply]) -> Reply:
         """Send a command, whatever its ``req_id`` with the next, until it is answered, and return its reply.
 
@@ -351,7 +362,7 @@ class Board:
             return isinstance(m, (reply, wire.Reply)) and bool(getattr(m, "req_id", 0) == request.req_id)
 
         self.check()
-        with self._asking:
+        with self._turn():
             request = replace(request, req_id=next(self._req_ids))
             self._replies.clear()
             # Of several tries the first one's time holds: whichever was answered had left by then, or later.
@@ -386,7 +397,7 @@ class Board:
 
     def remember(self, what: tuple[str, int], again: Callable[[], object]) -> None:
         """A board that lost it is told ``what`` (kind, number) by ``again``, in the order in which it was told last."""
-        with self._asking:
+        with self._turn():
             self._lasting.pop(what, None)
             self._lasting[what] = again
 

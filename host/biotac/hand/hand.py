@@ -23,10 +23,11 @@ from . import compatibility
 from .board import Board
 from .commands import Commands
 from .compatibility import HandWarning
+from .keepalive import SILENCE_S
 from .pull import take
 from .reconnect import Reconnection
 from .recorded import Recorded, Recorder
-from .streams import SILENCE_S, Streams
+from .streams import Streams
 from .views import FingerView, Latest, checked_names, finger_index
 
 P = ParamSpec("P")

@@ -8,7 +8,6 @@ loses the oldest batches on this side.
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,30 +17,15 @@ from typing import Any
 from ..errors import DeviceLostError, InputError
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
-from ..wire.sensor_gen import MAX_SENSORS
 from .board import POLL_S, Board
 from .callbacks import Callbacks, Unsubscribe
-from .commands import ALL_FINGERS, PRESSURE_SINCE_MINOR
+from .commands import ALL_FINGERS
 from .gap import Gap
+from .keepalive import KeepAlive
 from .queue import LIMIT_ROWS, BatchQueue
 from .reader import Reader
-from .subscription import Wants
+from .subscription import Subscription, Wants
 from .views import Fingers, Latest
-
-#: What a FRAME can say of a contact, for Hand.subscribe.
-RESULTS = wire.QuantityFlags.POC | wire.QuantityFlags.FORCE | wire.QuantityFlags.TORQUE | wire.QuantityFlags.PRESSURE
-AT_FIRST = RESULTS | wire.QuantityFlags.REST_FRAMES
-EVENTS_SINCE_MINOR = 5
-# What a board tells of only when somebody is called with it.
-_TOLD_OF = {wire.Touch: wire.QuantityFlags.TOUCH, wire.Event: wire.QuantityFlags.EVENTS}
-# A streaming board sends a status every second by default; three missing ones are a dead link.
-SILENCE_S = 3.0
-LAST_LOOK_S = 1.0  # before it is called silent
-# A board whose live host has died stops streaming after this long.
-KEEPALIVE_S = 1.0
-PINGS_PER_KEEPALIVE = 3
-# Every so often a ping is a question for the board's time.
-ASK_TIME_S = 0.5
 
 
 class Streams:
@@ -54,9 +38,10 @@ class Streams:
         self.ended = False
         self._board = board
         self._link = board.link
-        self._monotonic_s = board.host_clock.monotonic_s
         self._latest = latest
         self._callbacks = Callbacks()
+        self._subscription = Subscription(board, latest, self._callbacks)
+        self._keepalive = KeepAlive(board)
         self._reader: Reader | None = None
         self._has_pulled = False
         self._pulled: BatchQueue | None = self._new_queue()  # for whoever pulls; without threads always
@@ -64,13 +49,6 @@ class Streams:
         self._pulling = 0
         self._queues: list[BatchQueue] = []  # for others, such as biotac.aio
         self._skipped = [0, 0]  # batches and frames, of queues that are closed
-        self._hinted = wire.StreamFlags(0)  # what somebody waits for comes with these
-        self._wants: Wants | None = None
-        self._quantities = dict.fromkeys(range(MAX_SENSORS), AT_FIRST)
-        self._started: wire.Start | None = None
-        self._heard_s = self._ping_due_s = self._monotonic_s()
-        self._due_s = -math.inf  # until when there is nothing to do but read while it streams
-        self._ask_due_s = -math.inf
         self._claiming = threading.Lock()
         board.deliver = self._deliver
 
@@ -130,31 +108,30 @@ class Streams:
             streams |= wire.StreamFlags.PAC
         if bands:
             streams |= wire.StreamFlags.BANDS
-        self._start(self._wants.streams if self._wants else streams, self._latest.mask(fingers))
+        wants = self._subscription.wants
+        self._start(wants.streams if wants else streams, self._latest.mask(fingers))
 
     def _start(self, streams: int, fingers: int) -> None:
-        streams |= self._hinted
-        if streams & wire.StreamFlags.BANDS:
-            self._need_wire_1_5("bands of PAC")
         # Pull alone has no keep-alive: it reads, and so could ping, only when its caller asks.
-        self._started = wire.Start(0, int(streams), fingers, self._keepalive_ms())
-        self._board.tell(self._started)
-        self._heard_s = self._monotonic_s()
-        self._due_s = self._ping_due_s = self._heard_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
+        self._subscription.start(streams, fingers, self._keepalive.timeout_ms(self._reader is not None))
         self.streaming = True
         self._link.release()
-        self._ask_time()
+        self._keepalive.start()
+
+    def _start_again(self) -> None:
+        """With what has come to be known since, where it streams."""
+        started = self._subscription.started
+        if self.streaming and started is not None:
+            self._start(started.streams, started.fingers)
 
     def resume(self) -> None:
         """Have a board that was away stream again, if it did."""
-        if self._started is not None:
-            self._board.tell(self._started)
+        self._subscription.resume()
 
     def stop(self) -> None:
         """Stop streaming. Frames already on their way are still delivered."""
-        self._board.tell(wire.Stop(0))
+        self._subscription.stop()
         self.streaming = False
-        self._started = None
         self._wake_all()
 
     def subscribe(self, quantities: wire.QuantityFlags, *, fingers: Fingers = ALL_FINGERS) -> None:
@@ -166,16 +143,7 @@ class Streams:
         the choice lasts until the board restarts. A board that knows no PRESSURE or EVENTS is not asked
         for them.
         """
-        asked = quantities
-        if self._board.info.wire_minor < PRESSURE_SINCE_MINOR:
-            asked &= ~wire.QuantityFlags.PRESSURE
-        if self._board.info.wire_minor < EVENTS_SINCE_MINOR:
-            asked &= ~wire.QuantityFlags.EVENTS
-        for kind, quantity in _TOLD_OF.items():
-            asked |= quantity if self._callbacks.wants(kind) else wire.QuantityFlags(0)
-        mask = self._latest.mask(fingers)
-        self._board.tell(wire.Subscribe(0, mask, int(asked)), lasting=("subscription", mask))
-        self._quantities.update({f: asked for f in range(MAX_SENSORS) if mask >> f & 1})
+        self._subscription.subscribe(quantities, fingers)
 
     def want(self, *names: str, rest: bool = True, rate_hz: float | None = None) -> None:
         """Choose what the board computes and sends.
@@ -190,9 +158,10 @@ class Streams:
         """
         wants = Wants.of(names, rest=rest, rate_hz=rate_hz)
         self.subscribe(wants.quantities)
-        self._wants = wants
-        if self.streaming and self._started is not None:
-            self._start(wants.streams, self._started.fingers)
+        self._subscription.wants = wants
+        started = self._subscription.started
+        if self.streaming and started is not None:
+            self._start(wants.streams, started.fingers)
 
     # ---- pull ----------------------------------------------------------------------------------
 
@@ -249,20 +218,13 @@ class Streams:
         elif self._link.ended:
             self._finish()
         else:
-            if self._monotonic_s() >= self._ask_due_s:
-                self._ask_time()
+            self._keepalive.ask_time_if_due()
             silent_s = 0.0
             while not board.read(POLL_S) and not self._link.ended:
                 silent_s += POLL_S
-                if silent_s >= self._silence_s():
-                    board.lost(self._silent(), "silence")
+                if silent_s >= self._keepalive.silence_s():
+                    self._keepalive.lose()
                     return
-
-    def _ask_time(self) -> None:
-        """A round trip for the clock, and a sign of life."""
-        self._ask_due_s = self._monotonic_s() + ASK_TIME_S
-        if self._link.keeps_time:
-            self._board.ask_time()
 
     def put_back(self, batch: Batch) -> None:
         """Return what ``batches`` has given and was not used."""
@@ -292,10 +254,9 @@ class Streams:
         self._reader = Reader(self, self._callbacks, board.closing, self._link.port)
         board.is_read_here, board.is_pulled = self._reader.is_here, False
         self._callbacks.queue.bound(self._limit_rows())
-        self._heard_s = self._monotonic_s()
+        self._keepalive.heard()
         self._reader.start()
-        if self.streaming and self._started is not None:
-            self._start(self._started.streams, self._started.fingers)  # now with keep-alive
+        self._start_again()  # now with keep-alive
 
     def on_batch(self, fn: Callable[[Batch], Any]) -> Unsubscribe:
         """Call ``fn`` with every batch, on the reading thread; returns what ends that.
@@ -319,7 +280,7 @@ class Streams:
         Subscribes every finger to EVENTS besides what it is subscribed to. Raises InputError for a board that knows
         none.
         """
-        self._need_wire_1_5("events")
+        self._subscription.need_wire_1_5("events")
         return self._on_told(wire.Event, fn)
 
     def on_slip(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
@@ -331,24 +292,14 @@ class Streams:
 
         Streams BANDS besides what is streamed. Raises InputError for a board that knows none.
         """
-        self._need_wire_1_5("bands of PAC")
+        self._subscription.need_wire_1_5("bands of PAC")
         unsubscribe = self._on(wire.Bands, fn)
         self._hint(wire.StreamFlags.BANDS)
         return unsubscribe
 
-    def _need_wire_1_5(self, what: str) -> None:
-        info = self._board.info
-        if info.wire_minor < EVENTS_SINCE_MINOR:
-            raise InputError(
-                f"the board speaks wire {info.wire_major}.{info.wire_minor}: expected 1.{EVENTS_SINCE_MINOR}, which "
-                f"has {what}; update it with `biotac flash`"
-            )
-
     def _on_told(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
         unsubscribe = self._on(kind, fn)
-        for quantities in {q for q in self._quantities.values() if _TOLD_OF[kind] not in q}:
-            mask = sum(1 << f for f, q in self._quantities.items() if q == quantities)
-            self.subscribe(quantities, fingers=mask)
+        self._subscription.tell_of(kind)
         self._hint(wire.StreamFlags.FRAMES)
         return unsubscribe
 
@@ -360,9 +311,8 @@ class Streams:
 
     def _hint(self, streams: wire.StreamFlags) -> None:
         """Have ``streams``, with which it comes, streamed besides."""
-        self._hinted |= streams
-        if self.streaming and self._started is not None and self._hinted & ~self._started.streams:
-            self._start(self._started.streams, self._started.fingers)
+        if self._subscription.hint(streams):
+            self._start_again()
 
     def on_status(self, fn: Callable[[wire.Status], Any]) -> Unsubscribe:
         """Call ``fn`` with the board's counters, every second."""
@@ -414,9 +364,9 @@ class Streams:
     # ---- on the thread that reads --------------------------------------------------------------
 
     def _deliver(self, batch: Batch) -> None:
-        if self._wants is not None:
-            batch = self._wants.thin(batch)
-        self._heard_s = now_s = self._monotonic_s()  # before anybody is woken by it
+        if self._subscription.wants is not None:
+            batch = self._subscription.wants.thin(batch)
+        now_s = self._keepalive.heard()  # before anybody is woken by it
         self._latest.update(batch, now_s)
         if self._pulled is not None:
             self._pulled.put(batch)
@@ -428,51 +378,18 @@ class Streams:
         """See reader.Source: waits for bytes, and does what is due: ping, notice silence or the end of a source."""
         if self._link.pace == 0:
             self._wait_for_room()
-        if self.streaming:
-            at_most_s = min(at_most_s, self._keep_alive())
-        self._board.read(at_most_s)
-
-    def _keep_alive(self) -> float:
-        """Do what is due while it streams; returns for how many s there is nothing more to do."""
-        if self._link.ended:
+        if self.streaming and self._link.ended:
             self._finish()
-            return self._silence_s()
-        now_s = self._monotonic_s()
-        if now_s < self._due_s:
-            return self._due_s - now_s
-        if now_s - self._heard_s >= self._silence_s():
-            # It may be this side that was away, stopped or asleep: what waits to be read comes first.
-            self._board.read(LAST_LOOK_S)
-            now_s = self._monotonic_s()
-        if now_s - self._heard_s >= self._silence_s():
-            self._board.lost(self._silent(), "silence")
-            self._heard_s = now_s = self._monotonic_s()
-        self._due_s = self._heard_s + self._silence_s()
-        if self._keepalive_ms():
-            if now_s >= self._ping_due_s:
-                self._ping_due_s = now_s + KEEPALIVE_S / PINGS_PER_KEEPALIVE
-                try:
-                    if now_s >= self._ask_due_s and self._link.keeps_time:
-                        self._ask_time()
-                    else:
-                        self._board.send(wire.Ping(0))
-                except DeviceLostError as error:
-                    self._board.lost(error, "unplugged")
-            self._due_s = min(self._ping_due_s, self._due_s)
-        return self._due_s - now_s
-
-    def _keepalive_ms(self) -> int:
-        # In device time, which a simulated board can let run fast; one that waits for its reader knows no dead host.
-        if self._reader is None or self._link.pace == 0:
-            return 0
-        return min(0xFFFF, round(1000 * KEEPALIVE_S * max(1.0, self._link.pace)))
+        elif self.streaming:
+            at_most_s = min(at_most_s, self._keepalive.serve(live=self._reader is not None))
+        self._board.read(at_most_s)
 
     def _wait_for_room(self) -> None:
         """Where nothing may be dropped: until consumers have room, or somebody awaits a reply."""
         if self._is_full():
             board = self._board
             board.wait_for(lambda: board.awaiting or board.closing.is_set() or not self._is_full())
-            self._heard_s = self._monotonic_s()  # it was not the board that was silent
+            self._keepalive.heard()  # it was not the board that was silent
 
     def _is_full(self) -> bool:
         return any(one.rows >= LIMIT_ROWS for one in self._all_queues())
@@ -494,11 +411,3 @@ class Streams:
         self.ended = True
         self.streaming = False
         self._wake_all()
-
-    def _silence_s(self) -> float:
-        """How long a board that streams may be silent."""
-        return SILENCE_S * self._link.patience
-
-    def _silent(self) -> DeviceLostError:
-        silent = f"{self._link.port} has been silent for {self._silence_s():.0f} s while streaming"
-        return DeviceLostError(f"{silent}; check the cable and open it again")

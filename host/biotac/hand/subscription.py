@@ -1,13 +1,25 @@
-"""What a program wants of the board, by name, as the flags that SUBSCRIBE and START carry."""
+"""What a program wants of the board, by name, as the flags that SUBSCRIBE and START carry; and what it was told."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ..errors import InputError
 from ..wire.batches import Batch
-from ..wire.messages_gen import QuantityFlags, StreamFlags
-from ..wire.sensor_gen import SLOT_HZ, SLOTS
+from ..wire.messages_gen import Event, QuantityFlags, Start, Stop, StreamFlags, Subscribe, Touch
+from ..wire.sensor_gen import MAX_SENSORS, SLOT_HZ, SLOTS
+from .board import Board
+from .callbacks import Callbacks
+from .commands import PRESSURE_SINCE_MINOR
+from .views import Fingers, Latest
+
+#: What a FRAME can say of a contact, for Hand.subscribe.
+RESULTS = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE | QuantityFlags.PRESSURE
+AT_FIRST = RESULTS | QuantityFlags.REST_FRAMES
+EVENTS_SINCE_MINOR = 5
+# What a board tells of only when somebody is called with it.
+TOLD_OF = {Touch: QuantityFlags.TOUCH, Event: QuantityFlags.EVENTS}
 
 QUANTITIES = {
     "force": QuantityFlags.FORCE,
@@ -61,3 +73,69 @@ class Wants:
             return batch
         kept = batch.seq % self.every == 0
         return replace(batch, wire=batch.wire[kept], seq=batch.seq[kept], t_us=batch.t_us[kept])
+
+
+class Subscription:
+    """What a board was told to compute and to send: what was asked for, and what ``callbacks`` need besides."""
+
+    def __init__(self, board: Board, latest: Latest, callbacks: Callbacks) -> None:
+        #: The last START, None before it and after a STOP.
+        self.started: Start | None = None
+        self.wants: Wants | None = None
+        self._board = board
+        self._latest = latest
+        self._callbacks = callbacks
+        self._hinted = StreamFlags(0)  # what somebody waits for comes with these
+        self._quantities = dict.fromkeys(range(MAX_SENSORS), AT_FIRST)
+
+    def start(self, streams: int, fingers: int, keepalive_ms: int) -> None:
+        """Have it stream."""
+        streams |= self._hinted
+        if streams & StreamFlags.BANDS:
+            self.need_wire_1_5("bands of PAC")
+        started = Start(0, int(streams), fingers, keepalive_ms)
+        self._board.tell(started)
+        self.started = started
+
+    def resume(self) -> None:
+        """Have a board that was away stream again, if it did."""
+        if self.started is not None:
+            self._board.tell(self.started)
+
+    def stop(self) -> None:
+        """Have it stream no more."""
+        self._board.tell(Stop(0))
+        self.started = None
+
+    def subscribe(self, quantities: QuantityFlags, fingers: Fingers) -> None:
+        """See Streams.subscribe."""
+        asked = quantities
+        if self._board.info.wire_minor < PRESSURE_SINCE_MINOR:
+            asked &= ~QuantityFlags.PRESSURE
+        if self._board.info.wire_minor < EVENTS_SINCE_MINOR:
+            asked &= ~QuantityFlags.EVENTS
+        for kind, quantity in TOLD_OF.items():
+            asked |= quantity if self._callbacks.wants(kind) else QuantityFlags(0)
+        mask = self._latest.mask(fingers)
+        self._board.tell(Subscribe(0, mask, int(asked)), lasting=("subscription", mask))
+        self._quantities.update({f: asked for f in range(MAX_SENSORS) if mask >> f & 1})
+
+    def tell_of(self, kind: type[Any]) -> None:
+        """Somebody is called with such messages: have every finger's told."""
+        for quantities in {q for q in self._quantities.values() if TOLD_OF[kind] not in q}:
+            mask = sum(1 << f for f, q in self._quantities.items() if q == quantities)
+            self.subscribe(quantities, mask)
+
+    def hint(self, streams: StreamFlags) -> bool:
+        """From now on START asks for ``streams``, too; whether the last one did not."""
+        self._hinted |= streams
+        return self.started is not None and bool(self._hinted & ~self.started.streams)
+
+    def need_wire_1_5(self, what: str) -> None:
+        """InputError for an older board."""
+        info = self._board.info
+        if info.wire_minor < EVENTS_SINCE_MINOR:
+            raise InputError(
+                f"the board speaks wire {info.wire_major}.{info.wire_minor}: expected 1.{EVENTS_SINCE_MINOR}, which "
+                f"has {what}; update it with `biotac flash`"
+            )

@@ -15,7 +15,7 @@ from ..core.board_map import BoardMap
 from ..core.compiled import on_board_q4, pressure_force_100un
 from ..core.map_versions import opened
 from ..errors import InputError
-from ..hand.streams import RESULTS
+from ..hand.subscription import RESULTS
 from ..keep.calibration_file import to_dict
 from ..keep.values import own_settings
 from ..version import __version__

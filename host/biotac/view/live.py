@@ -11,7 +11,7 @@ from pathlib import Path
 from ..errors import CommandRefusedError, InputError
 from ..hand.opening import open as open_hand
 from ..hand.recorded import Recorder
-from ..hand.streams import RESULTS
+from ..hand.subscription import RESULTS
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
 from .player import Recorded

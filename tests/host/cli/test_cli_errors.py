@@ -336,7 +336,7 @@ def test_a_board_that_falls_silent_is_6(
 
 
 def test_a_board_that_falls_silent_in_its_stream_is_6(capsys, scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.streams.SILENCE_S", 0.001)
+    monkeypatch.setattr("biotac.hand.keepalive.SILENCE_S", 0.001)
 
     def answer(message_id: int, payload: bytes) -> bytes:
         if message_id == wire.HelloRequest.ID:

@@ -113,7 +113,7 @@ def test_a_board_that_dies_in_mid_stream_is_named(monkeypatch) -> None:
 
 
 def test_a_silent_board_is_a_lost_board(scripted_board, hello, monkeypatch) -> None:
-    monkeypatch.setattr("biotac.hand.streams.SILENCE_S", 0.001)
+    monkeypatch.setattr("biotac.hand.keepalive.SILENCE_S", 0.001)
 
     def answer(message_id: int, payload: bytes) -> bytes:
         if message_id == wire.HelloRequest.ID:

@@ -136,7 +136,7 @@ def test_a_silent_board_that_answers_again_streams_again(world) -> None:
     send(there, frame(5))
     until(hand, lambda: hand[0].t_us == 50_000)
     hand.ping()  # all that it was asked is answered: no late answer breaks the silence
-    world.clock.now_s += hand._streams._silence_s() + 0.5
+    world.clock.now_s += hand._streams._keepalive.silence_s() + 0.5
     there.firmware.wait_for(wire.Start, 2)
     send(there, frame(300))
     until(hand, lambda: hand[0].t_us == 3_000_000)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -292,6 +293,21 @@ def test_commands_of_many_threads_do_not_mix() -> None:
     assert all(alone[setting] == value for setting, value in answers)
 
 
+def test_a_reading_thread_that_gives_a_command_reads_the_reply_that_another_waits_for() -> None:
+    """As at the end of a simulated source, which the thread that reads asks about while others command."""
+    with biotac.open("sim:drift.toml?seconds=60") as hand:
+        board, here = hand._board, threading.current_thread()
+        board.is_read_here = lambda: threading.current_thread() is here
+        answers: list[int] = []
+        other = threading.Thread(target=lambda: answers.append(hand.setting(wire.Setting.STATUS_PERIOD_MS)))
+        other.start()
+        while not board.awaiting:
+            time.sleep(0.001)
+        hand.ping()
+        other.join()
+    assert answers == [1000]
+
+
 def test_start_carries_the_keep_alive_and_pings_come_in_time(live: Live) -> None:
     live.hand.start()
     assert live.firmware.of(wire.Start)[-1].keepalive_ms == 0  # pulled: nobody would ping
@@ -311,10 +327,10 @@ def test_start_carries_the_keep_alive_and_pings_come_in_time(live: Live) -> None
 def test_a_board_whose_time_waits_has_no_keep_alive_and_a_fast_one_a_longer() -> None:
     with biotac.open("sim:drift.toml?seconds=1") as hand:
         hand.run()
-        assert hand._streams._keepalive_ms() == 0
+        assert hand._streams._keepalive.timeout_ms(live=True) == 0
     with biotac.open("sim:drift.toml?seconds=1&pace=4") as hand:
         hand.run()
-        assert hand._streams._keepalive_ms() == 4000
+        assert hand._streams._keepalive.timeout_ms(live=True) == 4000
 
 
 def test_silence_ends_the_reader_in_words(live: Live) -> None:

@@ -11,7 +11,7 @@ import pytest
 import biotac
 from biotac.cli.main import main
 from biotac.core.compiled import FORCE_GAINS, reference_q4
-from biotac.hand.streams import RESULTS
+from biotac.hand.subscription import RESULTS
 from biotac.recording.file import RecordingFile
 from biotac.wire import messages_gen as wire
 

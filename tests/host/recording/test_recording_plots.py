@@ -15,7 +15,7 @@ from mcap.writer import CompressionType, Writer
 from record_all import record_all
 
 import biotac
-from biotac.hand.streams import AT_FIRST
+from biotac.hand.subscription import AT_FIRST
 from biotac.recording import writer
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode

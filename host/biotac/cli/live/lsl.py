@@ -8,7 +8,7 @@ import sys
 
 import biotac
 
-from ...hand.streams import AT_FIRST
+from ...hand.subscription import AT_FIRST
 from .. import values
 
 EXAMPLE = "biotac lsl 'sim:press.toml?fingers=2'"

@@ -8,7 +8,7 @@ import sys
 
 import biotac
 
-from ...hand.streams import AT_FIRST, RESULTS
+from ...hand.subscription import AT_FIRST, RESULTS
 from ...wire.events import INVALID_U32, event_age_s, kind_name
 from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame

@@ -13,7 +13,7 @@ import numpy as np
 
 import biotac
 
-from ...hand.streams import RESULTS
+from ...hand.subscription import RESULTS
 from ...wire import messages_gen as wire
 from ...wire.batches import Batch
 from ...wire.dtypes_gen import DTYPES

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 import biotac
 from biotac.clock.stamps import Stamps
-from biotac.hand.streams import AT_FIRST
+from biotac.hand.subscription import AT_FIRST
 from biotac.recording.layout import frame_id
 
 #: Reliable, so that every subscriber's quality of service fits; half a second of rounds.
