@@ -24,6 +24,10 @@ def test_a_demo_leaves_recording_report_and_picture(tmp_path) -> None:
     assert len(biotac.load(tmp_path / "demo.mcap")) == demo.facts["frames"]
     assert json.loads((tmp_path / "report.json").read_text())["crosscheck"]["violations"] == 0
     assert "cross-check violations | 0" in (tmp_path / "report.md").read_text()
+    # of loads that it was not made of; x is hardly pressed here, so Lin's error of it is small
+    calibrated, lin = (np.array(demo.facts[name]) for name in ("calibrated_rmse_n", "lin_rmse_n"))
+    assert demo.facts["calibrated_by"] == "finger 0's own wrench map"
+    assert (calibrated < [0.3, 0.3, 0.6]).all() and (calibrated[1:] < lin[1:] / 3.0).all()
 
 
 def test_presses_are_seen_and_released(tmp_path) -> None:
