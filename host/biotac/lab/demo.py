@@ -67,8 +67,8 @@ def run_demo(
     wall = time.monotonic()
     # The board's counts are made; from here on it is a host with a board, and its cost is measured.
     with shake_hands(SimLink(f"sim:{source.name}", SimBoard(source, pace=0.0, hold=True))) as hand:
-        # What is checked is the board's arithmetic on Lin's formulas, to a twentieth of a millinewton. What an
-        # uncalibrated board says by default, the population map, is computed below, and drawn beside it.
+        # What is checked is the board's arithmetic on Lin's formulas, to a twentieth of a millinewton. What a
+        # calibrated board would say is computed below, and drawn beside it.
         hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
         settings = hand.settings()
         has_pac = bool(np.any(source.samples[:, :, PAC_SLOT] <= 4095))
@@ -86,7 +86,7 @@ def run_demo(
         stats = hand.stats
         status = hand.status()
     joined = join(batches)
-    answers = answers_to(joined, settings)
+    answers = answers_to(joined, settings, source)
     rows, played_fingers = source.samples.shape[:2]
     device_s = rows / FRAME_HZ
     recorded = Recording(recording_path)
@@ -200,7 +200,7 @@ def report_text(facts: dict[str, Any]) -> str:
         for words, name in (
             ("the board, by Lin's scales of its settings", "force_rmse_n"),
             ("the firmware's own scales", "lin_rmse_n"),
-            (f"what it says by default: {facts['calibrated_by']}", "calibrated_rmse_n"),
+            (facts["calibrated_by"], "calibrated_rmse_n"),
         ):
             x, y, z = facts[name]
             lines.append(f"* {words}: {x:.2f} / {y:.2f} / {z:.2f}")

@@ -2,37 +2,81 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.wrench import board, models
+from ..calibrate.wrench.fitted import WrenchMap
+from ..calibrate.wrench.moments import air_sums, smoothed, strip_sums
+from ..calibrate.wrench.run import load_run
+from ..core.board_map import BoardMap
+from ..core.board_map import on_board_q4 as mapped_q4
 from ..core.compiled import FORCE_GAINS, Settings, on_board_q4
 from ..core.population import in_force
+from ..sim.physics import Finger
+from ..sim.scenario import FLAT_MM
+from ..sim.source import Source
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch
 from ..wire.frames import FORCE_LSB_PER_N, to_units
+from .experiments import random_loads
+
+LOADS = 4000  # the least that `biotac calibrate wrench` takes
+LOADS_SEED = 1
 
 
 @dataclass(frozen=True)
 class Answers:
-    """Force (n, 3) in N of each frame: by Lin's scales as the firmware has them, and as the finger is calibrated."""
+    """Force (n, 3) in N of each frame: by Lin's scales as the firmware has them, and as the finger is calibrated.
+
+    ``calibrated_n`` is NaN but for finger 0 where the source's finger is emulated: its map is its own.
+    """
 
     lin_n: NDArray[np.float64]
     calibrated_by: str
     calibrated_n: NDArray[np.float64]
 
 
-def answers_to(batch: Batch, settings: Settings) -> Answers:
+def answers_to(batch: Batch, settings: Settings, source: Source) -> Answers:
     """By the board's own code, over the counts and tares that it sent."""
-    untared = (batch.wire["flags"] & wire.FrameFlags.UNTARED) != 0
+    frames = batch.wire
 
-    def force_n(its: Settings) -> NDArray[np.float64]:
-        force = to_units(on_board_q4(batch.wire["counts"], batch.wire["tare_q4"], its)[1], FORCE_LSB_PER_N)
-        force[untared] = np.nan
-        return force
+    def newtons(force_100un: NDArray[np.int32]) -> NDArray[np.float64]:
+        force_n = to_units(force_100un, FORCE_LSB_PER_N)
+        force_n[(frames["flags"] & wire.FrameFlags.UNTARED) != 0] = np.nan
+        return force_n
 
-    firmware = {gain: wire.SETTINGS[gain].default for gain in FORCE_GAINS}
+    def by(its: Settings) -> NDArray[np.float64]:
+        return newtons(on_board_q4(frames["counts"], frames["tare_q4"], its)[1])
+
+    lin_n = by(settings | {gain: wire.SETTINGS[gain].default for gain in FORCE_GAINS})
+    if source.emulated:
+        calibrated_n = newtons(mapped_q4(frames, settings, own_map(source.emulated[0]))[1])
+        calibrated_n[frames["finger"] != 0] = np.nan
+        return Answers(lin_n, "finger 0's own wrench map", calibrated_n)
     by_default = settings | {wire.Setting.FORCE_MODEL: wire.ForceModel.POPULATION}
-    by = "population map of real fingers" if in_force(by_default) else "scales fitted to this finger"
-    return Answers(force_n(settings | firmware), by, force_n(by_default))
+    words = "population map of real fingers" if in_force(by_default) else "scales fitted to this finger"
+    return Answers(lin_n, words, by(by_default))
+
+
+def own_map(finger: Finger) -> BoardMap:
+    """What a force plate's recording of other loads on ``finger`` gives: a flat, pressed and sheared at random.
+
+    One model and lambda in place of `biotac calibrate wrench`'s choice among them, which takes a minute.
+    """
+    loads, cell = random_loads.states(LOADS, LOADS_SEED)
+    loads = replace(loads, tip_radius_mm=np.full(LOADS, FLAT_MM / 2.0))
+    recorded = random_loads.recording(finger, loads, cell, LOADS_SEED)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "loads.npz"
+        np.savez(path, **{name: recorded[name] for name in ("E", "F", "E_base", "E_idle")})
+        run = load_run(path)
+    sums, air = strip_sums(smoothed(run, 1), run.truth, run.drift), air_sums(run, 1, len(run.axes))
+    assert air is not None
+    coefficients = models.pulled(sums.plus(air), [models.JOINED.family])[0][0]
+    lag_rows = (0,) * len(run.axes)
+    return board.quantise(WrenchMap(models.JOINED.name, run.axes, run.tare, 1, lag_rows, coefficients))

@@ -44,9 +44,10 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
         force_n=np.zeros((frames, count, 3)),
         torque_nmm=np.zeros((frames, count, 3)),
     )
-    for k, spec in enumerate(specs):
+    emulated = tuple(Finger(spec.seed, spec.profile) for spec in specs)
+    for k, finger in enumerate(emulated):
         track = scenario.tracks[k % own]
-        samples[:, k] = sampling.sample(Finger(spec.seed, spec.profile), track.states(boundary_s))
+        samples[:, k] = sampling.sample(finger, track.states(boundary_s))
         for fault in scenario.faults:
             if fault.finger == k % own:
                 _lay(fault, samples[:, k], period)
@@ -60,8 +61,9 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
         name=scenario.name,
         samples=samples,
         truth=truth,
-        settings=_fit(scenario, specs, period) if scenario.fit_gains else {},
+        settings=_fit(scenario, emulated, period) if scenario.fit_gains else {},
         serials=tuple(spec.serial for spec in specs),
+        emulated=emulated,
     )
 
 
@@ -88,13 +90,12 @@ def _lay(fault: Fault, words: sampling.Words, period: int) -> None:
         rows[(slot >= begin) & (slot < end) & mine] = fault.code
 
 
-def _fit(scenario: Scenario, specs: list[FingerSpec], period: int) -> dict[str, int]:
+def _fit(scenario: Scenario, emulated: tuple[Finger, ...], period: int) -> dict[str, int]:
     """Gains over one whole timeline, whatever part of it is played, and all fingers together."""
     middle_s = _seconds(np.arange(period) + 0.5)
     signals, forces, torques = [], [], []
-    for k, spec in enumerate(specs):
+    for k, finger in enumerate(emulated):
         states = scenario.tracks[k % len(scenario.tracks)].states(middle_s)
-        finger = Finger(spec.seed, spec.profile)
         signals.append(finger.counts(states) - finger.rest_counts(states.warm_c))
         force, torque = states.wrench()
         forces.append(force)

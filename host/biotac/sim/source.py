@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from .physics import Finger
+
 MAX_SECONDS = 3600.0  # 5 fingers for an hour are 160 MB of counts
 
 
@@ -34,6 +36,7 @@ class Source:
     stored tare the board should be given, or None. ``settings``: board settings to apply before
     streaming, by their name in link.toml. ``truth_force_n`` float64 (frames, fingers, 3): the force a
     recording itself carries, in Lin's frame, or None. ``serials``: one of 16 characters a finger.
+    ``emulated``: the sensor of each finger; () for a recording.
     ``skipped_frames``: incomplete frames of a recording that were left out.
     """
 
@@ -44,6 +47,7 @@ class Source:
     settings: dict[str, int] = field(default_factory=dict)
     truth_force_n: npt.NDArray[np.float64] | None = None
     serials: tuple[str, ...] = ()
+    emulated: tuple[Finger, ...] = ()
     skipped_frames: int = 0
 
     @property

@@ -182,17 +182,20 @@ def test_a_column_that_never_moved_in_training_goes_nowhere_when_it_does() -> No
         assert np.abs(models.solve(sums, lam)[4]).max() < 1e-6
 
 
-def test_weights_are_those_of_the_least_error_pulled_to_equal_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_weights_are_those_of_the_least_error_or_of_each_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     rng = np.random.default_rng(0)
     errors = rng.normal(size=(4000, 4)) * [1.0, 2.0, 4.0, 1.0]
     errors[:, 3] = errors[:, 0] + 3.0 * rng.normal(size=4000)  # no news, and more noise: any weight on it does harm
     product = errors.T @ errors / len(errors)
-    monkeypatch.setattr(models, "EQUAL", 0.0)
+    monkeypatch.setattr(models, "CHANCE", 0.0)
     found = models.weights(product)
     # of independent errors, one over their variance
     np.testing.assert_allclose(found, [16 / 21, 4 / 21, 1 / 21, 0.0], atol=0.02)
-    monkeypatch.setattr(models, "EQUAL", 1e9)
-    np.testing.assert_allclose(models.weights(product), 0.25, atol=1e-6)
+    monkeypatch.setattr(models, "CHANCE", 1e9)
+    alone = 1.0 / np.array([1.0, 4.0, 16.0, 10.0])
+    np.testing.assert_allclose(models.weights(product), alone / alone.sum(), atol=0.02)
 
 
 # ---- drift -------------------------------------------------------------------------------------

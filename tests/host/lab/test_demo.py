@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import biotac
 from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
-from biotac.lab.demo import expected_frames, run_demo
+from biotac.lab.demo import DemoRun, expected_frames, run_demo
 from biotac.sim.loading import load_source
 
 
@@ -17,17 +18,28 @@ def quiet(text: str) -> None:
     """No progress line in tests."""
 
 
-def test_a_demo_leaves_recording_report_and_picture(tmp_path) -> None:
-    demo = run_demo("press.toml", tmp_path, show=quiet)
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory: pytest.TempPathFactory) -> tuple[DemoRun, Path]:
+    """press.toml, and the folder of what it left."""
+    folder = tmp_path_factory.mktemp("demo")
+    return run_demo("press.toml", folder, show=quiet), folder
+
+
+def test_a_demo_leaves_recording_report_and_picture(pressed) -> None:
+    demo, folder = pressed
     assert demo.good
-    assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
-    assert len(biotac.load(tmp_path / "demo.mcap")) == demo.facts["frames"]
-    assert json.loads((tmp_path / "report.json").read_text())["crosscheck"]["violations"] == 0
-    assert "cross-check violations | 0" in (tmp_path / "report.md").read_text()
+    assert (folder / "demo.png").read_bytes().startswith(b"\x89PNG")
+    assert len(biotac.load(folder / "demo.mcap")) == demo.facts["frames"]
+    assert json.loads((folder / "report.json").read_text())["crosscheck"]["violations"] == 0
+    assert "cross-check violations | 0" in (folder / "report.md").read_text()
+    # of loads that it was not made of; x is hardly pressed here, so Lin's error of it is small
+    calibrated, lin = (np.array(demo.facts[name]) for name in ("calibrated_rmse_n", "lin_rmse_n"))
+    assert demo.facts["calibrated_by"] == "finger 0's own wrench map"
+    assert (calibrated < [0.3, 0.3, 0.6]).all() and (calibrated[1:] < lin[1:] / 3.0).all()
 
 
-def test_presses_are_seen_and_released(tmp_path) -> None:
-    demo = run_demo("press.toml", tmp_path, show=quiet)
+def test_presses_are_seen_and_released(pressed) -> None:
+    demo, _ = pressed
     truth = demo.source.truth
     assert truth is not None
     frames = demo.batch.frames

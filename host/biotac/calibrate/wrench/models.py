@@ -26,7 +26,9 @@ OTHERS_LAMBDAS = (1e-3, 1e-1)
 # A column that is constant in training has no variance to be measured in: without a floor it is free,
 # and a test row that moves it goes anywhere (the hinge model of biotac.md 5: R2 -34).
 COLUMN_FLOOR = 0.01
-EQUAL = 0.3  # how much of a member's own error is taken for chance: 0 trusts the inner folds, and follows their noise
+# How much of each member's own error is taken for chance: 0 trusts the inner folds, and follows their noise. In
+# proportion to the error: what is off by much in some folds (extrapolation) is what the next fold tells most apart.
+CHANCE = 0.5
 
 
 @dataclass(frozen=True)
@@ -137,12 +139,12 @@ def _levelled(sums: Sums) -> tuple[Floats, Floats, Floats, Floats]:
 
 
 def weights(error: Floats) -> Floats:
-    """Of members (m,), none below 0 and 1 together, for the least squared error of their mean, pulled to equal ones.
+    """Of members (m,), none below 0 and 1 together, for the least squared error of their mean, by CHANCE.
 
     ``error`` (m, m) is the mean product of the errors of any two.
     """
     size = len(error)
-    error = error + EQUAL * np.trace(error) / size * np.eye(size)
+    error = error + CHANCE * np.diag(np.diag(error))
     some = np.arange(size)
     while True:
         its = np.linalg.solve(error[np.ix_(some, some)], np.ones(len(some)))
