@@ -1,9 +1,10 @@
-"""A disk that gets full in the middle of a recording: it is told, and what fitted is kept."""
+"""A disk that gets full in the middle of a recording, or loses it: that is told, and what fitted is kept."""
 
 from __future__ import annotations
 
 import json
 import random
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -38,3 +39,16 @@ def test_what_fitted_is_kept_but_for_a_second(tmp_path: Path, sizes: int) -> Non
         assert kept.tobytes() == frames[: len(kept)].tobytes()
         assert len(kept) <= told["read"] + FINGERS * ROUNDS_PER_S
         assert len(kept) >= len(frames) * limit / whole_bytes - FINGERS * ROUNDS_PER_S
+
+
+def test_a_recording_whose_folder_is_removed_is_told_once_and_the_reading_goes_on(tmp_path: Path) -> None:
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    with biotac.open("sim:press.toml?seconds=4") as hand:
+        recorder = hand.record(folder / "a.mcap")
+        assert len(hand.read(0.5)) == 50
+        shutil.rmtree(folder)
+        with pytest.raises(FileNotFoundError, match="deleted while it was recorded"):
+            hand.read(2)
+        assert recorder.closed
+        assert len(hand.read(0.5)) == 50

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rig import Rig
 
@@ -18,6 +19,7 @@ from biotac.recording import Recording
 OWN = Calibration(
     PocWeights.COMPRESS_N2, (900_000, -800_000, 700_000), (600_000, -500_000), 300, "", 1_763_731_310, 9_500_000
 )
+GAIN_MAX_NN = 100_000_000  # a count; SPEC.md
 BOOT_S = 5  # of the board's time
 
 
@@ -79,6 +81,24 @@ def test_frames_of_two_fingers_come_from_each_ones_own_gains(
     assert blind.violations > 50
     recording = Recording(tmp_path / "two.mcap")
     assert (recording.settings, recording.finger_settings) == (settings, own)
+
+
+@pytest.mark.long
+def test_gains_at_their_limits_are_as_exact_as_any_and_beyond_them_refused(board: Callable[[str], biotac.Hand]) -> None:
+    hand = board("shear.toml?fingers=2&seconds=2.5")
+    for finger, top in enumerate((GAIN_MAX_NN, -GAIN_MAX_NN)):
+        its = replace(OWN, force_gain_nn=(top, -top, top), torque_gain_nn=(-top, top), pressure_gain_nn=GAIN_MAX_NN)
+        hand.set_calibration(finger, its)
+    with pytest.raises((CommandRefusedError, ValueError)):
+        hand.set_calibration(0, replace(OWN, force_gain_nn=(GAIN_MAX_NN + 1, 0, 0)))
+    settings, own = hand.settings(), hand.finger_settings()
+    messages = hand.read_batch(100).wire
+    touched = (messages["flags"] & biotac.FrameFlags.CONTACT) != 0
+    assert {int(f) for f in messages["finger"][touched]} == {0, 1}
+    assert np.abs(messages["force_100un"][touched]).max() > 200_000  # 20 N, of a press of less than one
+    judged = CrossCheck()
+    judged.add(messages, settings, own)
+    assert (judged.violations, judged.frames) == (0, len(messages))
 
 
 def test_a_saved_calibration_holds_after_power_was_off(rig: Rig) -> None:

@@ -116,6 +116,20 @@ def test_a_cable_pulled_in_mid_frame_stops_the_stream_and_a_new_host_is_served(r
     assert hand.sensor_status(4).words_good == 200 * 44
 
 
+def test_a_bus_that_is_suspended_ends_the_stream_and_is_served_after_it(rig) -> None:
+    rig.need("cable")
+    hand = rig.open("press.toml?fingers=5&seconds=2")
+    hand.link.board.plan(1.2345, "suspend")
+    hand.link.board.plan(1.5, "resume")
+    frames = hand.read(10)
+    assert 90 * 5 < len(frames) < 125 * 5
+    usb = hand.link.board.counters()["usb"]
+    assert (usb["state"], usb["hangs"], usb["failed"]) == ("configured", 0, [])
+    status = hand.status()
+    assert (status.streams, status.slots_late) == (0, 0)
+    assert hand.sensor_status(4).words_good == 200 * 44
+
+
 def test_windows_takes_it_for_a_device_of_several_interfaces(rig) -> None:
     # An interface association wants this triple (its ECN, table 1); Windows goes by it.
     rig.need("counters")

@@ -10,8 +10,8 @@
 // FD is the open master side of a pty, non-blocking; PATH is the name of its other side, to be told.
 // Like the posix board this writes "pty PATH" once the port can be opened, and "end" once the tape is played and
 // all of it handed over; "run" on stdin ends a hold, the end of stdin ends the process. More lines for stdin:
-//   [@SECONDS] VERB   stop reading, go on reading, unplug, plug, cut power, write uf2 FILE: now, or at a time of the
-//                     sensors' world
+//   [@SECONDS] VERB   stop reading, go on reading, unplug, plug, suspend, resume, cut power, write uf2 FILE: now, or at a
+//                     time of the sensors' world
 //   counters          answers "counters JSON"
 //   arrivals          answers "counters [[t_us, finger, device us when its last byte was with the host], ...]", one a FRAME
 //   until SECONDS JSON  answers likewise once the counters are those of JSON, or "never JSON" with what they are when

@@ -81,6 +81,8 @@ export class Rig {
       'silence the flash': () => (this.board.quad = null),
       unplug: () => this.#cable(false),
       plug: () => this.#cable(true),
+      suspend: () => this.usb.setAsleep(true),
+      resume: () => this.usb.setAsleep(false),
       'cut power': () => {
         this.sensors.powerCycle()
         this.machine.powerCycle()

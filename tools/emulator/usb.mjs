@@ -23,6 +23,7 @@ const CONTROLLER_ON = 1 // of MAIN_CTRL
 const BUS_RESET = 1 << 19 // of SIE_STATUS
 const CONNECTED = 1 << 16
 const SUSPENDED = 1 << 4
+const RESUMED = 1 << 11
 const MS = 1e6
 const DEBOUNCE_NS = 10 * MS // a real host waits ten times as long before it resets and after
 const SUSPEND_NS = 3 * MS
@@ -40,6 +41,7 @@ export class UsbHost {
     this.take = take // take(n): up to n bytes to send, or null
     this.open = false // the port, by some program
     this.plugged = true
+    this.asleep = false
     this.state = 'detached'
     this.device = {} // what enumeration found
     this.transfers = [] // control transfers to do
@@ -93,6 +95,16 @@ export class UsbHost {
     })
   }
 
+  /** Put the bus to sleep, the cable in and the device configured, as a laptop's lid does; false wakes it. */
+  setAsleep(asleep) {
+    if (asleep === this.asleep) return
+    this.asleep = asleep
+    if (asleep) this.bus.abort()
+    this.usb.sieStatus = asleep ? this.usb.sieStatus | SUSPENDED : (this.usb.sieStatus & ~SUSPENDED) | RESUMED
+    this.usb.sieStatusUpdated()
+    this.poke()
+  }
+
   /** The device is gone. */
   #lose() {
     this.deadline.cancel()
@@ -105,7 +117,7 @@ export class UsbHost {
 
   /** Start the next transaction, if there is one to do and the wire is free. */
   poke() {
-    if (this.bus.busy || this.state === 'detached' || this.state === 'reset') return
+    if (this.asleep || this.bus.busy || this.state === 'detached' || this.state === 'reset') return
     if (this.transfers.length > 0) return this.#control(this.transfers[0])
     if (this.state === 'configured' && this.device.in) this.#bulk()
   }

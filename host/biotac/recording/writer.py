@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
+import os
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -123,7 +125,13 @@ class Recorder:
         self._file.mark(what, facts)
 
     def flush(self) -> None:
-        """Close the current block and give it to the operating system."""
+        """Close the current block and give it to the operating system.
+
+        Raises OSError when that fails, or when the file is in no folder any more: what it holds would be gone with it.
+        """
+        if os.fstat(self.fileno()).st_nlink == 0:
+            self._file.close()  # told once
+            raise FileNotFoundError(errno.ENOENT, "was deleted while it was recorded", str(self.path))
         self._file.add(bytes(self._pending), self._arrived_ns, self._unix_ns())
         self._pending.clear()
 

@@ -156,6 +156,21 @@ static void touch_and_lift_are_told_in_the_slot_that_shows_them(void **state)
 }
 
 // The tare machine waits for a whole sweep until it calls a contact over; a tap on the pad is shorter.
+static void what_still_touches_by_more_than_half_of_what_it_takes_is_no_lift(void **state)
+{
+    (void)state;
+    play(300);
+    its.load = 200;
+    play(20);
+    assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
+    its.load = sqrt(0.75 * SETTING_COUNT2);
+    play(5);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 0);
+    its.load = sqrt(0.25 * SETTING_COUNT2);
+    play(5);
+    assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
+}
+
 static void touches_in_quick_succession_are_all_told(void **state)
 {
     (void)state;
@@ -365,6 +380,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(touch_and_lift_are_told_in_the_slot_that_shows_them, new_course),
+        cmocka_unit_test_setup(what_still_touches_by_more_than_half_of_what_it_takes_is_no_lift, new_course),
         cmocka_unit_test_setup(touches_in_quick_succession_are_all_told, new_course),
         cmocka_unit_test_setup(pressure_that_stays_is_no_lift, new_course),
         cmocka_unit_test_setup(a_slip_is_told_in_a_round_and_its_onset_within_five_milliseconds, new_course),

@@ -207,12 +207,18 @@ static void a_sensor_that_comes_back_keeps_its_calibration_and_another_has_none(
         bt_sensors_answer(&session, 0, session.info[0].serial);
         bt_sensors_answer(&session, 1, session.info[1].serial);
         assert_int_equal(session.unsure & 3, 0);
+        assert_int_equal(bt_sensors_to_ask(&session) & 3, 0); // each asking costs a round
         assert_int_equal(get(0).state, BT_CALIBRATION_STATE_IN_FORCE);
     }
     bt_sensors_answer(&session, 0, another);
     bt_sensors_answer(&session, 1, another);
     assert_int_equal(get(0).state, BT_CALIBRATION_STATE_OTHER_SENSOR);
     assert_int_equal(get(1).state, BT_CALIBRATION_STATE_IN_FORCE); // for any sensor
+    const uint8_t wanted = session.finger[0].quantities;
+    assert_int_not_equal(wanted, 0);
+    assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1, 0), BT_ERROR_OK);
+    host_round(&session, 1, 2000);
+    assert_int_equal(session.finger[0].quantities, wanted); // for the right sensor, when it is back
 }
 
 static void every_end_of_a_stream_counts(void **state)

@@ -100,6 +100,7 @@ static int stored(uint16_t id)
     uint16_t version;
     int bytes = bt_storage_read(&flash, id, &version, data, sizeof data);
     if (bytes < 0) {
+        assert_int_equal(bytes, -1);
         return -1;
     }
     assert_int_equal(bytes, make(want, id, version));

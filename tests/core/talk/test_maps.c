@@ -105,6 +105,7 @@ static void nothing_is_written_that_was_not_begun(void **state)
     uint32_t crc32 = bt_crc32(blob, bytes);
     assert_int_equal(write_part(0, blob, bytes, 0), BT_ERROR_NOT_BEGUN);
     assert_int_equal(end(0, crc32), BT_ERROR_NOT_BEGUN);
+    assert_int_equal(end(0, 0), BT_ERROR_NOT_BEGUN); // what no map has for its CRC
     assert_int_equal(begin(0, (uint16_t)bytes, crc32), BT_ERROR_OK);
     assert_int_equal(write_part(1, blob, bytes, 0), BT_ERROR_NOT_BEGUN); // another finger's
     assert_int_equal(end(1, crc32), BT_ERROR_NOT_BEGUN);

@@ -96,6 +96,11 @@ static void a_pattern_is_kept_where_the_pressure_is_shifted(void **state)
     assert_int_equal(finger.tare.reason, BT_TARE_REASON_SHIFT);
     assert_int_equal(finger.tare.base.pdc_q16 >> 16, PDC_REST + 20);
     assert_true(share_kept(&finger, 10) > 0.3); // its mean is gone with the shift
+    double mean = 0;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        mean += rest_count(&finger, i) + 10 * load_shape(i) - finger.tare.base.electrode_q16[i] / 65536.0;
+    }
+    assert_true(fabs(mean / BT_ELECTRODES) < 0.5); // of 2 counts
 }
 
 static void a_press_that_the_pressure_does_not_see_is_not_judged_by_it(void **state)
