@@ -342,7 +342,7 @@ class Board:
 
     @contextmanager
     def _turn(self) -> Iterator[None]:
-        """One command at a time. A thread that reads goes on reading until its turn, for the other waits for a reply."""
+        """One command at a time. A thread that reads goes on until its turn: another waits for a reply."""
         while not self._asking.acquire(blocking=not self.is_read_here()):
             self.read(POLL_S)
         try:
