@@ -77,6 +77,17 @@ bool bt_finger_put(bt_finger *finger, uint8_t slot, uint16_t count)
     return place(finger, slot, count) || late;
 }
 
+static bool ends_pac(uint8_t slot)
+{
+    static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
+    for (size_t k = 0; k < sizeof pac_slot; k++) {
+        if (slot == pac_slot[k]) {
+            return true;
+        }
+    }
+    return false;
+}
+
 uint32_t bt_finger_events(bt_finger *finger, uint8_t slot, bool touched)
 {
     bt_events *events = &finger->events;
@@ -86,7 +97,7 @@ uint32_t bt_finger_events(bt_finger *finger, uint8_t slot, bool touched)
     if (slot == events->watched) {
         return bt_events_watch(events, &finger->tare);
     }
-    if (bt_slot_channel[slot] == BT_CHANNEL_PAC) {
+    if (ends_pac(slot)) {
         return bt_events_pac(events, &finger->tare, finger->round.pac, bt_slot_pac[slot] + 1u);
     }
     return 0;

@@ -70,7 +70,8 @@ void bt_finger_begin(bt_finger *finger, uint32_t t_us, const bt_tare_settings *s
 bool bt_finger_put(bt_finger *finger, uint8_t slot, uint16_t count);
 
 // The events that this word shows, a mask of 1 << BT_EVENT_KIND_*; `touched` is what bt_finger_put said of
-// it. Due where that is true, in slots of BT_FINGER_EVENT_SLOTS and in the slot that is watched (events.h).
+// it. Only where that is true, in slots of BT_FINGER_EVENT_SLOTS and in the slot that is watched (events.h);
+// 0 in all others, which need not be asked.
 uint32_t bt_finger_events(bt_finger *finger, uint8_t slot, bool touched);
 void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_us, bt_msg_event *msg);
 

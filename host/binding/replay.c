@@ -89,17 +89,13 @@ static void keep(event_list *list, uint32_t told, bt_finger *finger, uint8_t slo
 int64_t bt_replay_events(bt_finger *finger, const bt_settings *settings, int64_t n, const uint16_t *words,
                          const uint32_t *t_us, uint8_t *events, int64_t room)
 {
-    static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
     bt_tare_settings tare_settings = bt_tare_settings_from(settings);
     event_list list = {.next = events, .room = room};
     for (int64_t k = 0; k < n; k++, words += BT_SLOTS) {
         bt_finger_begin(finger, t_us[k], &tare_settings);
         for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
             bool touched = bt_finger_put(finger, slot, words[slot]);
-            bool due = memchr(pac_slot, slot, sizeof pac_slot) != NULL || slot == finger->events.watched;
-            if (touched || due) {
-                keep(&list, bt_finger_events(finger, slot, touched), finger, slot, t_us[k]);
-            }
+            keep(&list, bt_finger_events(finger, slot, touched), finger, slot, t_us[k]);
         }
         (void)bt_finger_end(finger, &tare_settings);
     }
@@ -116,8 +112,10 @@ int64_t bt_replay_pac(int64_t n, const uint16_t *pac, int held, uint8_t *slips, 
     finger.tare.state = held ? BT_TARE_STATE_CONTACT : BT_TARE_STATE_REST;
     for (int64_t k = 0; k < n; k++, pac += BT_PAC_PER_FRAME) {
         finger.seq = (uint16_t)k;
-        memcpy(finger.round.pac, pac, sizeof finger.round.pac);
-        for (size_t p = 0; p < sizeof pac_slot; p++) {
+        for (size_t p = 0, done = 0; p < sizeof pac_slot; p++) {
+            const size_t end = bt_slot_pac[pac_slot[p]] + 1u; // as the words come
+            memcpy(finger.round.pac + done, pac + done, (end - done) * sizeof *pac);
+            done = end;
             uint32_t told = bt_finger_events(&finger, pac_slot[p], false);
             keep(&list, told, &finger, pac_slot[p], (uint32_t)(k * BT_FRAME_MS * 1000));
         }

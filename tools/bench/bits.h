@@ -86,7 +86,6 @@ static inline void bits_add(uint32_t *chain, const uint8_t *payload, size_t byte
 static inline uint32_t bits_finger_hash(void)
 {
     static bt_finger finger;
-    static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
     uint32_t seed = 23, chain = 0;
     bt_settings all;
     bt_settings_reset(&all);
@@ -100,9 +99,7 @@ static inline uint32_t bits_finger_hash(void)
         bt_finger_begin(&finger, t_us, &tare);
         for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
             bool touched = bt_finger_put(&finger, slot, bits_word(&seed, round, slot));
-            bool due =
-                touched || slot == finger.events.watched || memchr(pac_slot, slot, sizeof pac_slot) != NULL;
-            uint32_t told = due ? bt_finger_events(&finger, slot, touched) : 0;
+            uint32_t told = bt_finger_events(&finger, slot, touched);
             for (uint8_t event = 0; told != 0; event++, told >>= 1) {
                 if (told & 1) {
                     bt_msg_event msg;

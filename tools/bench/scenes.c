@@ -17,7 +17,7 @@ static bt_trigger trigger;
 static bt_finger rest_front, press_front, rest_whole, press_whole, press_force, press_poc, press_sigma,
     press_lin;
 static bt_finger rest_five[BT_MAX_FINGERS], press_five[BT_MAX_FINGERS], rest_words, rest_events, press_events,
-    slip_events;
+    jolt_events, slip_events;
 static bench_map pooled, pooled_6, pooled_7, affine, sign_split, gated, conductance, scaled_population;
 static bt_msg_frame message;
 static bt_msg_frame sent;
@@ -166,6 +166,13 @@ static void events_in_contact(const bt_solve_settings *settings)
     events(&press_events);
 }
 
+// What shakes and never is a slip: nothing touches.
+static void events_jolting(const bt_solve_settings *settings)
+{
+    (void)settings;
+    events(&jolt_events);
+}
+
 static void events_slipping(const bt_solve_settings *settings)
 {
     (void)settings;
@@ -256,6 +263,7 @@ const bench_scene bench_scenes[BENCH_SCENES] = {
     {"population map", "and Lin's, mixed", population},
     {"events", "at rest", events_at_rest},
     {"events", "in contact", events_in_contact},
+    {"events", "jolting", events_jolting},
     {"events", "slipping", events_slipping},
     {"bands", "a round", bands_of_a_round},
     {"link", "44 words taken in, at rest", all_words},
@@ -300,12 +308,13 @@ void bench_scenes_init(void)
     run(&press_front, press_count, 50);
     press_front.tare.noise.count2 = 400; // exact counts have none
     press_whole = press_lin = press_force = press_poc = press_sigma = press_front;
-    rest_events = rest_front;
+    rest_events = jolt_events = rest_front;
     press_events = slip_events = press_front;
     sink = bt_finger_events(&press_events, 0, true);
     sink = bt_finger_events(&slip_events, 0, true);
     swing(&rest_events, 5);
     swing(&press_events, 5);
+    swing(&jolt_events, 200);
     swing(&slip_events, 200);
     for (int k = 0; k < 110; k++) { // until it has landed
         events(&slip_events);

@@ -6,14 +6,16 @@
 
 // In squared changes of a noise of five counts, the worst of public recordings; a board's own noise raises
 // it.
-#define LEVEL_MIN   100
-#define LEVEL_MAX   3200 // sigma 28: a finger that shakes more feels nothing by it
+#define LEVEL_MIN 100
+#define LEVEL_MAX 3200 // sigma 28: a finger that shakes more feels nothing by it
 // In levels. Chosen on 100 real slides and 344 handovers, and on noise.
-#define CAP         12  // of one sample: a glitch, which is two of them, is neither jolt nor slip
-#define JOLT        25  // noise of sigma 5: no false one in ten minutes
-#define SLIP        20  // of each side; likewise
-#define MOST        100 // a slip is over when nothing has shaken for some 0.2 s
-#define DRAGGED     55  // samples of as much as counts, 25 ms: 20 to 30 ms do as well
+#define CAP       12  // of one sample: a glitch, which is two of them, is neither jolt nor slip
+#define JOLT      25  // noise of sigma 5: no false one in ten minutes
+#define SLIP      20  // of each side; likewise
+#define MOST      100 // a slip is over when nothing has shaken for some 0.2 s
+#define DRAG_COUNT2                                                                                          \
+    (75 * 75)           // changes of drags: those of squeezes by up to 6 N/s are less, or last less than
+#define DRAGGED     44  // so many samples, 20 ms
 #define TOGETHER    18  // samples from rise to fall, 8 ms: of one vibration
 #define NOISE_LOG   6   // rounds that its mean is over, as a power of two
 #define LANDING_MIN 220 // samples, 0.1 s
@@ -38,7 +40,6 @@ _Static_assert(BT_PAC_PER_FRAME == 22, "745/8192 is 2/22");
 void bt_events_reset(bt_events *events)
 {
     memset(events, 0, sizeof *events);
-    memset(events->before, 0xFF, sizeof events->before);
     events->watched = BT_EVENTS_NO_SLOT;
     events->level_count2 = LEVEL_MIN;
     events->noise_count2 = LEVEL_MIN / 2 * BT_PAC_PER_FRAME;
@@ -123,7 +124,7 @@ static BT_NOINLINE uint32_t touched_again(bt_events *events, const bt_tare *tare
 // ---- dynamic pressure
 // -----------------------------------------------------------------------------------------------
 
-static void end_round(bt_events *events, const bt_tare *tare, const uint16_t pac[BT_PAC_PER_FRAME])
+static void end_round(bt_events *events, const bt_tare *tare)
 {
     if (!events->touched && tare->state == BT_TARE_STATE_REST) {
         int32_t more = (int32_t)(events->sum_count2 - events->noise_count2);
@@ -133,9 +134,6 @@ static void end_round(bt_events *events, const bt_tare *tare, const uint16_t pac
     }
     events->sum_count2 = 0;
     events->done = 0;
-    for (unsigned k = 0; k < BT_EVENTS_LAG; k++) {
-        events->before[k] = pac[BT_PAC_PER_FRAME - BT_EVENTS_LAG + k];
-    }
 }
 
 // By how much a word differs from the one before it; not at all where either is missing.
@@ -168,67 +166,80 @@ static inline uint32_t less(uint32_t evidence, uint32_t by)
     return evidence > by ? evidence - by : 0;
 }
 
-// What a peak and the noise at rest want to know besides.
-static BT_NOINLINE void size_up(bt_events *events, const uint16_t *pac, const uint16_t *before,
-                                unsigned samples)
+// The first sample that rises, or falls.
+static BT_NOINLINE uint32_t since(const bt_events *events, const uint16_t *pac, const uint16_t *before,
+                                  bool falls)
 {
-    const uint32_t cap = CAP * events->level_count2;
-    for (unsigned k = 0; k < samples; k++) {
-        int32_t change = change_of(pac[k], before[k]);
-        uint32_t square = (uint32_t)(change * change);
-        events->most_count2 = square > events->most_count2 ? square : events->most_count2;
-        events->sum_count2 += square > cap ? cap : square;
+    unsigned k = 0;
+    while ((change_of(pac[k], before[k]) <= 0) != falls) {
+        k++;
     }
+    return events->now + k;
 }
 
+// What the noise takes away again is taken at the end: these are at most eight samples. A drag changes
+// slowly: the last of them stands for all.
 static BT_NOINLINE void add_shaken(bt_events *events, const uint16_t *pac, const uint16_t *before,
                                    unsigned samples)
 {
-    const uint32_t toll = events->level_count2 / 2;
     const uint32_t cap = CAP * events->level_count2;
-    const uint32_t most = MOST * events->level_count2;
-    uint32_t rises = events->rises;
-    uint32_t falls = events->falls;
-    uint32_t violent = events->violent;
+    uint32_t most = events->most_count2;
+    uint32_t all = 0, rose = 0, last = 0;
     for (unsigned k = 0; k < samples; k++) {
-        int32_t change = change_of(pac[k], before[k]);
-        uint32_t square = (uint32_t)(change * change);
-        if (square >= cap) {
-            square = cap;
-            violent++;
+        const uint32_t now = pac[k], then = before[k];
+        if ((now | then) > BT_FULL_SCALE_COUNT) {
+            continue;
         }
+        const int32_t change = (int32_t)(now - then);
+        const uint32_t square = (uint32_t)(change * change);
+        last = square;
+        most = square > most ? square : most;
+        const uint32_t capped = square > cap ? cap : square;
+        all += capped;
         if (change > 0) {
-            if (rises == 0) {
-                events->rises_since = events->now + k;
-            }
-            rises += square;
-        } else {
-            if (falls == 0) {
-                events->falls_since = events->now + k;
-            }
-            falls += square;
+            rose += capped;
         }
-        rises = less(rises, toll);
-        falls = less(falls, toll);
     }
-    events->rises = rises > most ? most : rises;
-    events->falls = falls > most ? most : falls;
-    events->violent = (uint8_t)(violent > DRAGGED ? DRAGGED : violent);
+    events->most_count2 = most;
+    events->sum_count2 += all;
+    if (last >= DRAG_COUNT2 && events->dragged < DRAGGED) {
+        events->dragged = (uint8_t)(events->dragged + samples);
+    }
+    const uint32_t fell = all - rose;
+    if (events->rises == 0 && rose != 0) {
+        events->rises_since = since(events, pac, before, false);
+    }
+    if (events->falls == 0 && fell != 0) {
+        events->falls_since = since(events, pac, before, true);
+    }
+    const uint32_t top = MOST * events->level_count2;
+    const uint32_t toll = events->level_count2 / 2 * samples;
+    const uint32_t rises = less(events->rises + rose, toll);
+    const uint32_t falls = less(events->falls + fell, toll);
+    events->rises = rises > top ? top : rises;
+    events->falls = falls > top ? top : falls;
 }
 
-// Of a slip only how long it goes on is asked: both sides are one.
-static BT_NOINLINE void go_on_slipping(bt_events *events, const uint16_t *pac, const uint16_t *before,
-                                       unsigned samples)
+// What can be no other event until it is over: a slip, or a jolt of what is not held yet.
+static inline bool is_told(const bt_events *events)
+{
+    return events->slips || (events->jolted && (events->landing || !events->touched));
+}
+
+// Only how long it goes on is asked: both sides are one.
+static BT_NOINLINE void go_on(bt_events *events, const uint16_t *pac, const uint16_t *before,
+                              unsigned samples)
 {
     const uint32_t cap = CAP * events->level_count2;
     const uint32_t most = 2 * MOST * events->level_count2;
-    uint32_t sum = events->rises + events->falls;
+    uint32_t all = 0;
     for (unsigned k = 0; k < samples; k++) {
         int32_t change = change_of(pac[k], before[k]);
         uint32_t square = (uint32_t)(change * change);
-        sum += square > cap ? cap : square;
+        all += square > cap ? cap : square;
     }
-    sum = less(sum, samples * events->level_count2);
+    events->sum_count2 += all;
+    const uint32_t sum = less(events->rises + events->falls + all, samples * events->level_count2);
     events->rises = sum > most ? most : sum;
     events->falls = 0;
 }
@@ -238,18 +249,16 @@ static inline bool shakes(const bt_events *events)
     return (events->rises | events->falls) != 0;
 }
 
-static BT_NOINLINE void shake(bt_events *events, const uint16_t *pac, const uint16_t *before,
-                              unsigned samples)
+static inline void shake(bt_events *events, const uint16_t *pac, const uint16_t *before, unsigned samples)
 {
     if (!shakes(events)) {
         events->began = events->now;
         events->most_count2 = 0;
-        events->violent = 0;
+        events->dragged = 0;
     }
-    if (events->slips) {
-        go_on_slipping(events, pac, before, samples);
+    if (is_told(events)) {
+        go_on(events, pac, before, samples);
     } else {
-        size_up(events, pac, before, samples);
         add_shaken(events, pac, before, samples);
     }
     events->now += samples;
@@ -281,10 +290,10 @@ static bool begins_to_slip(bt_events *events)
         return true;
     }
     events->slip_began = events->now - 1;
-    return events->violent >= DRAGGED;
+    return events->dragged >= DRAGGED;
 }
 
-static BT_NOINLINE uint32_t judge(bt_events *events)
+static inline uint32_t judge(bt_events *events)
 {
     uint32_t told = 0;
     if (!shakes(events)) {
@@ -309,22 +318,21 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
                        unsigned end)
 {
     uint32_t told = 0;
-    unsigned k = events->done;
-    if (end <= k) { // the last of the round before were left out
-        memset(events->before, 0xFF, sizeof events->before);
-        k = 0;
+    unsigned k = events->done < end ? events->done : 0;
+    const uint16_t *before = pac + k - BT_EVENTS_LAG;
+    if (k == 0 && end == BT_EVENTS_LAG) {
+        before = pac + BT_PAC_PER_FRAME - BT_EVENTS_LAG; // still those of the round before
+    } else if (k == 0) {
+        k = BT_EVENTS_LAG; // they may be gone
+        before = pac;
+        events->now += BT_EVENTS_LAG;
     }
-    bool shook = shakes(events);
-    while (k < end) {
-        const uint16_t *before = k < BT_EVENTS_LAG ? events->before + k : pac + k - BT_EVENTS_LAG;
-        const unsigned to = k < BT_EVENTS_LAG && end > BT_EVENTS_LAG ? BT_EVENTS_LAG : end;
-        const unsigned passed = shakes(events) ? 0 : pass_quiet(events, pac + k, before, to - k);
-        events->now += passed;
-        if (k + passed < to) {
-            shake(events, pac + k + passed, before + passed, to - k - passed);
-            shook = true;
-        }
-        k = to;
+    const unsigned samples = end - k;
+    const unsigned passed = shakes(events) ? 0 : pass_quiet(events, pac + k, before, samples);
+    const bool shook = passed < samples || shakes(events);
+    events->now += passed;
+    if (passed < samples) {
+        shake(events, pac + k + passed, before + passed, samples - passed);
     }
     events->done = (uint8_t)end;
     const bool goes_on = events->slips && events->touched && shakes(events);
@@ -335,7 +343,7 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
         told |= touched_again(events, tare);
     }
     if (end == BT_PAC_PER_FRAME) {
-        end_round(events, tare, pac);
+        end_round(events, tare);
     }
     return told;
 }

@@ -10,9 +10,9 @@
 // Hz, where real slides are 12 to 100 times over the noise, several times what neighbouring samples show.
 // What exceeds the noise adds up, and what stays below takes away again (a CUSUM): rises and falls each for
 // themselves. A jolt is enough of either. A slip is enough of both, for skin that slides goes to and fro and
-// pressing harder is all of one sign until it ends; or 25 ms of changes beyond 35 counts, which drag the skin
-// along. Of a finger that has just landed nothing is a slip. PAC is looked at three times a round, so jolts
-// and slips are told up to 3.6 ms late; their onsets are exact to a sample.
+// pressing harder is all of one sign until it ends; or 20 ms of changes beyond 75 counts, which drag the skin
+// along: so do squeezes by more than 6 N/s. Of a finger that has just landed nothing is a slip. PAC is looked
+// at three times a round, so jolts and slips are told up to 3.6 ms late; their onsets are exact to a sample.
 //
 // Units: counts, count^2; times in PAC samples of 1/2200 s, wrapping at 2^32.
 #ifndef BIOTAC_EVENTS_H
@@ -24,9 +24,8 @@
 #define BT_EVENTS_NO_SLOT 0xFF
 
 typedef struct {
-    uint16_t before[BT_EVENTS_LAG]; // PAC, the last of the round before
-    uint8_t watched;                // the slot of the electrode that is; BT_EVENTS_NO_SLOT untouched
-    uint8_t violent;                // samples of this vibration that changed by more than counts
+    uint8_t watched; // the slot of the electrode that is; BT_EVENTS_NO_SLOT untouched
+    uint8_t dragged; // samples of this vibration that changed by more than squeezes do
     bool touched;
     bool landing; // touched, and dynamic pressure has not been quiet since
     bool jolted;  // told of this vibration
@@ -55,8 +54,9 @@ void bt_events_reset(bt_events *events);
 uint32_t bt_events_touch(bt_events *events, const bt_tare *tare);
 // This slot is `watched`.
 uint32_t bt_events_watch(bt_events *events, const bt_tare *tare);
-// The first `end` PAC samples of the round are there, BT_INVALID_COUNT where no good word came. Due four
-// times a round, at the last with all.
+// The first `end` PAC samples of the round are there, BT_INVALID_COUNT where no good word came; behind them
+// are still those of the round before. Due three times a round: after the first BT_EVENTS_LAG, and last with
+// all.
 uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pac[BT_PAC_PER_FRAME],
                        unsigned end);
 

@@ -1,5 +1,7 @@
 """Radius of curvature as one of four classes: seed 000, II.B, by frames as there, and by loading trajectories.
 
+The paper's perceptron is train(); machine() is of today, and better.
+
 A frame's electrodes name their place first, and a net that has not seen the place is lost: held out by contact, frames
 do badly on the emulated finger (host/docs/features.md has the figures). What a contact looks like from its own middle
 depends on the place far less, and how that grows with the load says more than any frame: so shape() and trajectories().
@@ -8,6 +10,7 @@ depends on the place far less, and how that grows with the load says more than a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +19,9 @@ from ..errors import InputError
 from ..wire import sensor_gen as _sensor
 from . import inputs, levenberg
 from .signals import ELECTRODE_DR_MM, Floats
+
+if TYPE_CHECKING:
+    from sklearn.pipeline import Pipeline
 
 Integers = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -97,15 +103,21 @@ class Classifier:
         return self.net(self.reduction(columns))
 
     def __call__(self, columns: Floats, together: npt.NDArray[np.generic] | None = None) -> Integers:
-        """The class (n,) of each row; rows of one number in ``together`` (n,) are decided by their mean output."""
-        said = self.outputs(columns)
-        if together is not None:
-            _, of = np.unique(together, return_inverse=True)
-            sums = np.zeros((of.max() + 1, said.shape[1]))
-            np.add.at(sums, of, said)
-            said = sums[of]
-        result: Integers = said.argmax(axis=1)
-        return result
+        """The class (n,) of each row; see decide()."""
+        return decide(self.outputs(columns), together)
+
+
+def decide(outputs: Floats, together: npt.NDArray[np.generic] | None = None) -> Integers:
+    """The class (n,) of each row of ``outputs`` (n, classes), the largest; rows of one number in ``together`` (n,) are
+    decided by their mean output.
+    """
+    if together is not None:
+        _, of = np.unique(together, return_inverse=True)
+        sums = np.zeros((of.max() + 1, outputs.shape[1]))
+        np.add.at(sums, of, outputs)
+        outputs = sums[of]
+    result: Integers = outputs.argmax(axis=1)
+    return result
 
 
 def train(
@@ -122,6 +134,17 @@ def train(
     x = reduction(columns)
     aside = (x[stopping], targets[stopping])
     return Classifier(reduction, levenberg.train(x[training], targets[training], aside, seed=seed, steps=steps))
+
+
+def machine(**options: Any) -> Pipeline:
+    """A support vector machine with a radial kernel on scaled columns, to be fitted: ``fit(columns, kind)``; its
+    ``decision_function(columns)`` goes to decide(). ``options`` are those of sklearn's SVC.
+    """
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+    from sklearn.svm import SVC
+
+    return make_pipeline(StandardScaler(), SVC(**{"C": 10.0, **options}))
 
 
 def confusion(said: Integers, truth: Integers, classes: int) -> Integers:

@@ -223,9 +223,10 @@ class Recording:
 
     @property
     def fingers(self) -> list[int]:
-        """Fingers of which there is a frame, a heartbeat or PAC."""
+        """Fingers of which there is a frame, a heartbeat, PAC, BANDS or an EVENT."""
         rows = (self._batch.wire, self.idle, self.pac)
-        return sorted({int(finger) for table in rows for finger in np.unique(table["finger"])})
+        told = {m.finger for m in self.messages if isinstance(m, (wire.Bands, wire.Event))}
+        return sorted(told | {int(finger) for table in rows for finger in np.unique(table["finger"])})
 
     @property
     def begin_us(self) -> int:

@@ -134,6 +134,9 @@ def test_four_probes_are_told_apart_where_places_are_many() -> None:
     alone = (classifier(columns[test][:, 34:]) == kind[test]).mean()
     together = (classifier(columns[test][:, 34:], contact[test]) == kind[test]).mean()
     assert alone > 0.5 and together > alone
+    outputs = roc.machine().fit(columns[~test], kind[~test]).decision_function(columns[test])
+    assert (roc.decide(outputs) == kind[test]).mean() > alone
+    assert (roc.decide(outputs, contact[test]) == kind[test]).mean() >= together
 
 
 def test_force_by_nets_of_classes_and_of_one() -> None:

@@ -185,6 +185,14 @@ def test_a_missing_file_exits_2(tmp_path) -> None:
     assert "No such file" in done.stderr
 
 
+def test_a_finger_that_told_only_bands_is_there(recorded, tmp_path) -> None:
+    bands = wire.Bands(3, 30_227, 1, 22, (1, 2, 3, 4, 5, 6))
+    rewrite(recorded[0], tmp_path / "bands.mcap", lambda _: encode(bands.ID, bands.pack()))
+    told = biotac.Recording(tmp_path / "bands.mcap")
+    assert told.fingers == [1] and len(told.frames) == 0
+    assert set(told.bands["finger"]) == {1}
+
+
 def test_another_mcap_file_is_not_taken_for_a_recording(tmp_path) -> None:
     path = tmp_path / "other.mcap"
     with path.open("wb") as out:

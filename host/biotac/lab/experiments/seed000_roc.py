@@ -29,19 +29,26 @@ def frames(finger: Finger, places: tuple[int, ...], by_contact: bool, seed: int,
 
 
 def trajectories(finger: Finger, places: tuple[int, ...], seed: int, steps: int) -> list[Facts]:
-    """How a press grows, alone and all five of a contact together."""
+    """How a press grows, alone and all five of a contact together, by the paper's net and by support vectors."""
     its = stimulate(finger, places, seed=seed, frames=FRAMES)
     columns, press = roc.trajectories(its.counts - its.tare, its.tare, its.stimulation)
     first = np.searchsorted(its.stimulation, press)
     kind, contact = its.probe[first], its.contact[first]
     training, stopping, test = roc.split(contact, seed)
     net = roc.train(columns, kind, training, stopping, seed=seed, steps=steps)
-    alone, together = net(columns[test]), net(columns[test], contact[test])
+    machine = roc.machine().fit(columns[training | stopping], kind[training | stopping])
     _, one = np.unique(contact[test], return_index=True)
-    return [
-        _facts("press", BY_CONTACT, alone, kind[test], net, places),
-        _facts("contact of five presses", BY_CONTACT, together[one], kind[test][one], net, places),
-    ]
+    found = []
+    for outputs, its_net, by in (
+        (net.outputs(columns[test]), net, ""),
+        (machine.decision_function(columns[test]), None, ", support vectors"),
+    ):
+        alone, together = roc.decide(outputs), roc.decide(outputs, contact[test])
+        found += [
+            _facts("press" + by, BY_CONTACT, alone, kind[test], its_net, places),
+            _facts("contact of five presses" + by, BY_CONTACT, together[one], kind[test][one], its_net, places),
+        ]
+    return found
 
 
 def _case(
@@ -54,10 +61,13 @@ def _case(
 
 
 def _facts(
-    what: str, split: str, said: roc.Integers, truth: roc.Integers, net: roc.Classifier, places: tuple[int, ...]
+    what: str, split: str, said: roc.Integers, truth: roc.Integers, net: roc.Classifier | None, places: tuple[int, ...]
 ) -> Facts:
+    """Without a ``net`` nothing is said of its weights."""
+    its = net.net if net else None
     return {
         "what": what, "split": split, "places": list(places), "correct": number(float((said == truth).mean())),
         "confusion": roc.confusion(said, truth, len(PROBES)).tolist(),
-        "gamma": number(net.net.gamma), "weights": net.net.weights, "steps": net.net.steps,
+        "gamma": number(its.gamma) if its else None, "weights": its.weights if its else None,
+        "steps": its.steps if its else None,
     }  # fmt: skip
