@@ -19,6 +19,7 @@ from ..errors import DeviceLostError, InputError
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
 from ..wire.sensor_gen import MAX_SENSORS
+from . import bandwidth
 from .board import POLL_S, Board
 from .callbacks import Callbacks, Unsubscribe
 from .commands import ALL_FINGERS, PRESSURE_SINCE_MINOR
@@ -120,13 +121,14 @@ class Streams:
 
     # ---- what the board sends ------------------------------------------------------------------
 
-    def start(self, *, pac: bool = True, bands: bool = False, fingers: Fingers = ALL_FINGERS) -> None:
-        """Start streaming frames, status and, unless told otherwise, PAC; ``fingers`` are names, or a bit mask.
+    def start(self, *, pac: bool | None = None, bands: bool = False, fingers: Fingers = ALL_FINGERS) -> None:
+        """Start streaming frames, status and PAC; ``fingers`` are names, or a bit mask.
 
-        ``bands``: BANDS, too (``on_bands``). Raises InputError for a board that knows none.
+        ``pac``: None for PAC unless the port is a UART, which is slow. ``bands``: BANDS, too (``on_bands``). Raises
+        InputError for a board that knows none, and for more than a UART carries.
         """
         streams = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
-        if pac:
+        if self._link.bits_per_s is None if pac is None else pac:
             streams |= wire.StreamFlags.PAC
         if bands:
             streams |= wire.StreamFlags.BANDS
@@ -136,6 +138,9 @@ class Streams:
         streams |= self._hinted
         if streams & wire.StreamFlags.BANDS:
             self._need_wire_1_5("bands of PAC")
+        if self._link.bits_per_s is not None:
+            asked = (fingers & self._board.info.fingers_present).bit_count()
+            bandwidth.check(self._link.port, self._link.bits_per_s, streams, asked)
         # Pull alone has no keep-alive: it reads, and so could ping, only when its caller asks.
         self._started = wire.Start(0, int(streams), fingers, self._keepalive_ms())
         self._board.tell(self._started)
