@@ -105,6 +105,16 @@ static void load_settings(bt_session *session)
     bt_session_use_settings(session);
 }
 
+// Slower ones are none: a round's FRAME would take longer than all that a link may wait.
+#define UART_LEAST_BITS_PER_S 1200
+
+static void start_uart(const bt_settings *settings)
+{
+    int32_t bits_per_s = bt_settings_get(settings, BT_SETTING_UART_BITS_PER_S);
+    uint32_t pins = (uint32_t)bt_settings_get(settings, BT_SETTING_UART_PINS);
+    port_link_uart(bits_per_s < UART_LEAST_BITS_PER_S ? 0 : (uint32_t)bits_per_s, pins);
+}
+
 void bt_gateway_init(bt_gateway *gateway)
 {
     const bt_board_actions actions = {
@@ -136,6 +146,7 @@ void bt_gateway_init(bt_gateway *gateway)
         }
     }
     load_settings(&gateway->session); // now that it is known which sensors a calibration can be for
+    start_uart(&gateway->session.settings);
     gateway->round_open = false;
     gateway->link_was_up = false;
     // Absent sensors are read too: one that is plugged in later shows up by itself.

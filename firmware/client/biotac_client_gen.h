@@ -7,7 +7,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0xCEC8D4C1u
+#define BT_SCHEMA_HASH 0x8E1007F4u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -68,6 +68,14 @@ enum bt_poc_weights {
 enum bt_force_model {
     BT_FORCE_MODEL_LIN = 0, // Lin's three scales, force_gain_*_nn
     BT_FORCE_MODEL_POPULATION = 1, // the population map, made of other fingers (host/docs/population.md), while all three force gains are the defaults; with others it is LIN
+};
+
+// Which pins a board's UART is on. A Pico has four pairs that its sensors leave free.
+enum bt_uart_pins {
+    BT_UART_PINS_GPIO_0_1 = 0, // sends on GPIO 0, hears on GPIO 1
+    BT_UART_PINS_GPIO_4_5 = 1, // sends on GPIO 4, hears on GPIO 5
+    BT_UART_PINS_GPIO_8_9 = 2, // sends on GPIO 8, hears on GPIO 9
+    BT_UART_PINS_GPIO_12_13 = 3, // sends on GPIO 12, hears on GPIO 13
 };
 
 // What the firmware runs on.
@@ -181,8 +189,10 @@ enum bt_setting {
     BT_SETTING_PRESSURE_FILTER_MILLI = 12, // [1/1000]
     BT_SETTING_HOLD_TIMEOUT_MS = 13, // [ms]
     BT_SETTING_FORCE_MODEL = 14, // [enum force_model]
+    BT_SETTING_UART_BITS_PER_S = 15, // [bit/s]
+    BT_SETTING_UART_PINS = 16, // [enum uart_pins]
 };
-#define BT_SETTINGS 14
+#define BT_SETTINGS 16
 
 // Who is there. Reply to HELLO_REQUEST.
 #define BT_HELLO_ID 0x01

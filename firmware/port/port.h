@@ -51,8 +51,12 @@ bool port_link_write(const uint8_t *data, size_t bytes);
 // Returns how many bytes came, 0 when none did.
 size_t port_link_read(uint8_t *data, size_t bytes);
 
-// A host has the port open (DTR).
+// A host has the port open (DTR), or there is a UART. False for once when the one takes over from the other.
 bool port_link_up(void);
+
+// Besides, for while no host has the port open, a UART: bits a second, 0 for none, and an enum bt_uart_pins.
+// Once. Nothing where a board has none.
+void port_link_uart(uint32_t bits_per_s, uint32_t pins);
 
 // ---- flash for settings and maps ------------------------------------------------------------
 // What the core wants kept, as one run of bytes: settings (keep/storage.h), behind them the slots for maps

@@ -137,6 +137,12 @@ bool port_link_up(void)
     return true; // the host is this process
 }
 
+void port_link_uart(uint32_t bits_per_s, uint32_t pins)
+{
+    (void)bits_per_s;
+    (void)pins;
+}
+
 // ---- flash: none, so settings and maps last as long as the process; maps are kept in memory ------
 
 bool port_flash_erase(uint32_t sector_offset)

@@ -159,6 +159,12 @@ bool port_link_up(void)
     return fake.link_up;
 }
 
+void port_link_uart(uint32_t bits_per_s, uint32_t pins)
+{
+    (void)bits_per_s;
+    (void)pins;
+}
+
 static void change(uint32_t at, uint8_t value)
 {
     if (fake.flash_left == 0) {

@@ -1,11 +1,13 @@
 // An emulated Pico on a pty. `biotac sim --board pico` and biotac.open("emu:pico?source=...") start it.
 //
 //   node main.mjs --image BIN --wasm sensors.wasm --tape FILE --pty PATH --master FD
-//                 [--pace X] [--hold] [--serials A,B,...]
+//                 [--pace X] [--hold] [--serials A,B,...] [--uart-master FD]
 //   node main.mjs --image BIN --sensor BIN --sensor-pty PATH --sensor-master FD --tape FILE --pty PATH --master FD ...
 //
 // The second form has a second Pico in place of the sensors (sensor_board.mjs). It writes "sensor PATH" once that board's
 // port can be opened, and gives the first one power when stdin says "power".
+//
+// --uart-master has another pty on the pins of the UART that the image uses.
 //
 // FD is the open master side of a pty, non-blocking; PATH is the name of its other side, to be told.
 // Like the posix board this writes "pty PATH" once the port can be opened, and "end" once the tape is played and
@@ -38,6 +40,7 @@ const { values: options } = parseArgs({
     tape: text,
     pty: text,
     master: text,
+    'uart-master': text,
     pace: { type: 'string', default: '1' },
     serials: { type: 'string', default: '' },
     hold: { type: 'boolean', default: false },
@@ -52,6 +55,8 @@ function die(what, why) {
 const pace = Number(options.pace)
 const pty = new Pty(Number(options.master))
 const sensorPty = options.sensor === undefined ? null : new Pty(Number(options['sensor-master']))
+const uartPty = options['uart-master'] === undefined ? null : new Pty(Number(options['uart-master']))
+const ports = uartPty === null ? [pty] : [pty, uartPty]
 const tape = read(options.tape)
 let sensors = null
 let rig = null // once the gateway has power
@@ -75,7 +80,7 @@ function plugIn() {
 
 function power() {
   try {
-    rig = new Rig({ image: read(options.image), sensors, hold: options.hold, port: pty, lossless: pace === 0 })
+    rig = new Rig({ image: read(options.image), sensors, hold: options.hold, port: pty, uartPort: uartPty, lossless: pace === 0 })
   } catch (error) {
     die(options.image, error.message)
   }
@@ -140,14 +145,16 @@ function turn() {
   let news = false
   if (performance.now() - polled >= POLL_MS || !rig || rig.still) {
     polled = performance.now()
-    news = pty.poll()
-    pty.flush()
+    for (const port of ports) {
+      news = port.poll() || news
+      port.flush()
+    }
     sensorPty?.poll()
     sensorPty?.flush()
   }
   if (!rig) return sensorsAlone()
-  if (pace === 0 && pty.pendingBytes > 0) {
-    pty.flush()
+  if (pace === 0 && ports.some((port) => port.pendingBytes > 0)) {
+    for (const port of ports) port.flush()
     return sensorsAlone() // unpaced nothing is dropped: emulated time waits for the program that reads
   }
   if (rig.still && !news && pty.up === rig.usb.open) {

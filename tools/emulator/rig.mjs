@@ -6,12 +6,15 @@ import { Loader } from './loader.mjs'
 import { FLASH_BYTES, Machine } from './machine.mjs'
 import { Board, BootRom } from './rom.mjs'
 import { SlotTiming } from './timing.mjs'
+import { Uart } from './uart.mjs'
 import { UsbHost } from './usb.mjs'
 
 export class Rig {
-  /** port: a Pty or something like it. hold: device time stands still from the first sample on until release(). */
-  constructor({ image, sensors, port, hold, lossless }) {
+  /** port, uartPort: a Pty or something like it; no uartPort: nothing on either UART's pins. hold: device time stands
+   * still from the first sample on until release(). */
+  constructor({ image, sensors, port, uartPort, hold, lossless }) {
     this.port = port
+    this.uartPort = uartPort
     this.reading = true
     this.plugged = true
     this.waiting = hold // for release()
@@ -30,7 +33,7 @@ export class Rig {
 
   /** Device time stands still, and the board has done all that can be done meanwhile. */
   get still() {
-    return this.machine.time.held && this.machine.quiet && !this.usb.bus.busy
+    return this.machine.time.held && this.machine.quiet && !this.usb.bus.busy && !this.uarts.some((one) => one.busy)
   }
 
   get ended() {
@@ -41,6 +44,7 @@ export class Rig {
   run(nanos) {
     this.usb.setOpen(this.port.up)
     this.usb.poke()
+    for (const one of this.uarts) one.poke()
     const end = this.machine.nanos + nanos
     while (this.machine.nanos < end) {
       const world = this.machine.worldNanos
@@ -135,6 +139,7 @@ export class Rig {
         received: this.received,
         ...usb.bus.counters,
       },
+      uart: this.uarts.find((one) => one.wired)?.counters ?? null,
     }
   }
 
@@ -200,6 +205,7 @@ export class Rig {
     })
     this.usb.setPlugged(this.plugged)
     this.usb.setOpen(this.port.up)
+    this.uarts = this.uartPort === null ? [] : [0, 1].map((number) => new Uart(machine.mcu, number, this.uartPort))
     if (machine.inLoader) this.#enterLoader(machine)
   }
 }

@@ -50,7 +50,7 @@ POINTERS = {
     "loader(": (ROM,),
 }
 # One may interrupt the next one; the last two are the sensor board's.
-INTERRUPTS = ("usb_interrupt", "timer_interrupt", "exchanged", "heard")
+INTERRUPTS = ("usb_interrupt", "uart_interrupt", "timer_interrupt", "exchanged", "heard")
 
 
 def section_sizes(elf: Path, objdump: str) -> dict[str, int]:

@@ -1664,6 +1664,8 @@ const bt_setting_spec bt_setting_specs[BT_SETTINGS] = {
     {BT_SETTING_PRESSURE_FILTER_MILLI, 10, 1000, 500, 500},
     {BT_SETTING_HOLD_TIMEOUT_MS, 0, 3600000, 2000, 2000},
     {BT_SETTING_FORCE_MODEL, 0, 1, 1, 0},
+    {BT_SETTING_UART_BITS_PER_S, 0, 3000000, 0, 0},
+    {BT_SETTING_UART_PINS, 0, 3, 0, 0},
 };
 
 const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES] = {

@@ -253,6 +253,12 @@ bool port_link_up(void)
     return up;
 }
 
+void port_link_uart(uint32_t bits_per_s, uint32_t pins)
+{
+    (void)bits_per_s;
+    (void)pins;
+}
+
 bool port_reboot_bootloader(void)
 {
     return false; // a process has no loader

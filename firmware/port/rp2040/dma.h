@@ -10,6 +10,7 @@ enum dma_channel {
     DMA_DEALER,    // slot.c
     DMA_WORKER,
     DMA_OF_USB, // the USB's interrupt, or with it held off
+    DMA_OF_UART,
 };
 
 // Waits until they are moved, at most 254. More of the channel's control bits than every move has go into

@@ -96,11 +96,13 @@ void port_idle(void)
         (void)port_reboot_bootloader();
     }
     uint32_t since_us = port_now_us() - leave_us;
-    if (leaving && since_us >= LEAVE_AFTER_US && (usb_all_sent() || since_us >= LEAVE_LATEST_US)) {
+    bool all_sent = usb_all_sent() && uart_all_sent();
+    if (leaving && since_us >= LEAVE_AFTER_US && (all_sent || since_us >= LEAVE_LATEST_US)) {
         WATCHDOG_SCRATCH1 = 0;
         rom_enter_loader();
     }
     usb_watch();
+    uart_watch();
     watchdog_feed(); // nowhere else but before a flash erase: a main loop that hangs ends in a reset
     timer_sleep();
 }

@@ -25,6 +25,7 @@
 #define NVIC_IPR1                                                                                            \
     REG32(0xE000E404u) // priorities of interrupts 4..7, the two upper bits of each byte; 0 first
 #define NVIC_IPR2 REG32(0xE000E408u) // of interrupts 8..11
+#define NVIC_IPR5 REG32(0xE000E414u) // of interrupts 20..23
 #define VTOR      REG32(0xE000ED08u)
 
 // ---- 2.3.2 interrupts
@@ -32,6 +33,7 @@
 #define USBCTRL_IRQ 5
 #define PIO0_IRQ_0  7
 #define PIO0_IRQ_1  8
+#define UART_IRQ(n) (20 + (n))
 
 // ---- 2.5 DMA
 #define DMA_READ_ADDR(channel)   REG32(0x50000000u + 0x40u * (channel))
@@ -48,6 +50,7 @@
 #define DMA_UNPACED                       (0x3Fu << 15)
 #define DMA_BY_TIMER0                     (0x3Bu << 15)
 #define DMA_BY_PIO0_RX(sm)                ((4u + (sm)) << 15)
+#define DMA_BY_UART_TX(n)                 ((20u + 2u * (n)) << 15)
 #define DMA_CHAIN_TO(channel)             ((uint32_t)(channel) << 11)
 #define DMA_CHAIN_TO_ITSELF(channel)      DMA_CHAIN_TO(channel) // that is, to none
 #define DMA_WRITES_WRAP                   (1u << 10)
@@ -85,6 +88,7 @@
 #define RESETS_PLL_USB    (1u << 13)
 #define RESETS_SPI0       (1u << 16)
 #define RESETS_TIMER      (1u << 21)
+#define RESETS_UART(n)    (1u << (22 + (n)))
 #define RESETS_USBCTRL    (1u << 24)
 
 // ---- 2.15 clocks
@@ -121,6 +125,7 @@
 // ---- 2.19 pins
 #define IO_BANK0_GPIO_CTRL(n) REG32(0x40014004u + 8u * (n))
 #define GPIO_FUNC_SPI         1u
+#define GPIO_FUNC_UART        2u
 #define GPIO_FUNC_SIO         5u
 #define GPIO_FUNC_PIO0        6u
 #define GPIO_OUTOVER_LOW      (2u << 8) // whatever the function says
@@ -207,6 +212,28 @@
 #define USB_INT_SUSPEND        (1u << 14)
 #define USB_INT_BUS_RESET      (1u << 12)
 #define USB_INT_BUFF_STATUS    (1u << 4)
+
+// ---- 4.2 UART: an ARM PL011
+#define UART_DR(n)        REG32(0x40034000u + 0x4000u * (n))
+#define UART_FR(n)        REG32(0x40034018u + 0x4000u * (n))
+#define UART_IBRD(n)      REG32(0x40034024u + 0x4000u * (n))
+#define UART_FBRD(n)      REG32(0x40034028u + 0x4000u * (n))
+#define UART_LCR_H(n)     REG32(0x4003402Cu + 0x4000u * (n)) // a write puts IBRD and FBRD in force
+#define UART_CR(n)        REG32(0x40034030u + 0x4000u * (n))
+#define UART_IMSC(n)      REG32(0x40034038u + 0x4000u * (n))
+#define UART_ICR(n)       REG32(0x40034044u + 0x4000u * (n))
+#define UART_DMACR(n)     REG32(0x40034048u + 0x4000u * (n))
+#define UART_FIFO_BYTES   32
+#define UART_FR_RXFE      (1u << 4)
+#define UART_FR_BUSY      (1u << 3)
+#define UART_LCR_H_8_BITS (3u << 5)
+#define UART_LCR_H_FEN    (1u << 4)
+#define UART_CR_RXE       (1u << 9)
+#define UART_CR_TXE       (1u << 8)
+#define UART_CR_UARTEN    (1u << 0)
+#define UART_INT_RT       (1u << 6) // some came, and for 32 bits nothing more
+#define UART_INT_RX       (1u << 4) // half of the FIFO came
+#define UART_DMACR_TXDMAE (1u << 1)
 
 // ---- 4.4 SPI: an ARM PL022
 #define SPI0_SSPCR0    REG32(0x4003C000u)

@@ -295,7 +295,7 @@ bool usb_touched(void)
     return touched;
 }
 
-// ---- port.h, main loop ---------------------------------------------------------------------------
+// ---- link.c, main loop ----------------------------------------------------------------------------
 
 // The main loop's turn at what the interrupt does: only this interrupt is held off, sampling is not.
 static void hold_off(void)
@@ -308,15 +308,15 @@ static void let_go(void)
     interrupt_let_go(USBCTRL_IRQ);
 }
 
-bool port_link_up(void)
+bool usb_link_up(void)
 {
     return link_open() && !suspended;
 }
 
-bool port_link_write(const uint8_t *data, size_t bytes)
+bool usb_link_write(const uint8_t *data, size_t bytes)
 {
     uint32_t head = get(&tx_head);
-    if (!port_link_up() || bytes > TX_RING - (head - get(&tx_tail))) {
+    if (!usb_link_up() || bytes > TX_RING - (head - get(&tx_tail))) {
         return false;
     }
     uint32_t first = min((uint32_t)bytes, TX_RING - head % TX_RING);
@@ -333,7 +333,7 @@ bool port_link_write(const uint8_t *data, size_t bytes)
     return true;
 }
 
-size_t port_link_read(uint8_t *data, size_t bytes)
+size_t usb_link_read(uint8_t *data, size_t bytes)
 {
     uint32_t tail = get(&rx_tail);
     uint32_t come = get(&rx_head) - tail;

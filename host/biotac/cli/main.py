@@ -76,9 +76,10 @@ VERBS = {
 }
 
 EPILOG = """\
-A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, zenoh:NAME, one that is shared; sim:SOURCE,
-a simulated board that plays a scenario (sim:press.toml) or recorded counts (sim:trial.npz, sim:data.btd),
-emu:pico?source=SOURCE, a Pico's image in an emulator, or replay:REC, a recording that answers as its board did.
+A PORT is a device path (/dev/ttyACM0, COM3), serial:NUMBER of a board, uart:DEVICE?baud=N for a board's UART,
+zenoh:NAME, one that is shared; sim:SOURCE, a simulated board that plays a scenario (sim:press.toml) or recorded
+counts (sim:trial.npz, sim:data.btd), emu:pico?source=SOURCE, a Pico's image in an emulator, or replay:REC, a
+recording that answers as its board did.
 
 exit codes: 0 done  1 something was found wrong  2 unusable file or argument  3 port not opened
 4 no gateway on the port  5 another wire version  6 board lost  7 command refused  8 flashing failed  130 interrupted

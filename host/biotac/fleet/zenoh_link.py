@@ -59,6 +59,7 @@ class ZenohLink:
 
     patience = 2.0  # its answers come through a second program
     keeps_time = True
+    bits_per_s: int | None = None
 
     def __init__(self, port: str, its: ZenohPort) -> None:
         self.port = port

@@ -98,13 +98,14 @@ class Streams:
 
     # ---- what the board sends ------------------------------------------------------------------
 
-    def start(self, *, pac: bool = True, bands: bool = False, fingers: Fingers = ALL_FINGERS) -> None:
-        """Start streaming frames, status and, unless told otherwise, PAC; ``fingers`` are names, or a bit mask.
+    def start(self, *, pac: bool | None = None, bands: bool = False, fingers: Fingers = ALL_FINGERS) -> None:
+        """Start streaming frames, status and PAC; ``fingers`` are names, or a bit mask.
 
-        ``bands``: BANDS, too (``on_bands``). Raises InputError for a board that knows none.
+        ``pac``: None for PAC unless the port is a UART, which is slow. ``bands``: BANDS, too (``on_bands``). Raises
+        InputError for a board that knows none, and for more than a UART carries.
         """
         streams = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
-        if pac:
+        if self._link.bits_per_s is None if pac is None else pac:
             streams |= wire.StreamFlags.PAC
         if bands:
             streams |= wire.StreamFlags.BANDS

@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..wire.batches import Batch
 from ..wire.messages_gen import Event, QuantityFlags, Start, Stop, StreamFlags, Subscribe, Touch
 from ..wire.sensor_gen import MAX_SENSORS, SLOT_HZ, SLOTS
+from . import bandwidth
 from .board import Board
 from .callbacks import Callbacks
 from .commands import PRESSURE_SINCE_MINOR
@@ -93,6 +94,10 @@ class Subscription:
         streams |= self._hinted
         if streams & StreamFlags.BANDS:
             self.need_wire_1_5("bands of PAC")
+        link = self._board.link
+        if link.bits_per_s is not None:
+            asked = (fingers & self._board.info.fingers_present).bit_count()
+            bandwidth.check(link.port, link.bits_per_s, streams, asked)
         started = Start(0, int(streams), fingers, keepalive_ms)
         self._board.tell(started)
         self.started = started

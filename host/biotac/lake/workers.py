@@ -10,6 +10,7 @@ from ..errors import BiotacError, InputError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+_work: Callable[[Any], Any] | None = None  # in a worker
 _ENDED = "its worker ended before it was done (memory?); run it again with fewer workers"
 
 
@@ -47,8 +48,8 @@ def _in_processes(
     from multiprocessing import get_context
 
     # spawn: a fork of a process with threads (pyarrow's) may hang.
-    with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_leave_interrupts) as pool:
-        of = {pool.submit(_tried, work, item): item for item in items}
+    with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_begin, initargs=(work,)) as pool:
+        of = {pool.submit(_tried_here, item): item for item in items}
         try:
             for done in as_completed(of):
                 try:
@@ -59,9 +60,19 @@ def _in_processes(
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _leave_interrupts() -> None:
-    """Ctrl-C reaches all of a terminal's processes; the one that gives out work ends the others."""
+def _begin(work: Callable[[Any], Any]) -> None:
+    """A worker's start. ``work`` comes once: with each item it would cost more, the larger the lake that it knows of.
+
+    Ctrl-C reaches all of a terminal's processes; the one that gives out work ends the others.
+    """
+    global _work
+    _work = work
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _tried_here(item: Any) -> Any:
+    assert _work is not None
+    return _tried(_work, item)
 
 
 def _on_dask(

@@ -2,6 +2,7 @@
 
 ``/dev/ttyACM0``, ``COM3``   a serial port
 ``serial:NUMBER``            the board with that serial number
+``uart:DEVICE?baud=N``       a board's UART, at its setting uart_bits_per_s
 ``socket://HOST:PORT``   a port that another computer shares as a TCP connection, ``rfc2217://`` with its line settings
 ``spidev:0.0,0.1``           sensors on this computer's own SPI bus, one device a finger
 ``sim:SOURCE``               a simulated board playing a scenario or a recording

@@ -55,6 +55,9 @@ class Link(Protocol):
     #: Its device time is a clock's, which GET_STATUS tells: a recording's is not, nor a time that waits for its reader.
     keeps_time: bool
 
+    #: Of a UART: what it carries. None where messages fit whatever is asked for: USB, a network, this computer.
+    bits_per_s: int | None
+
     #: What can be read in place of ``read``: a file descriptor that gives the same bytes, and OSError when the board
     #: goes away. None where there is none, or ``read`` does more.
     fd: int | None

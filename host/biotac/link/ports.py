@@ -12,6 +12,7 @@ from .base import Link
 #: of that kind is opened: this room knows none of those above it, and a user of a real board waits for no physics.
 OPENERS = {
     "serial": "biotac.link.discovery:open_serial",
+    "uart": "biotac.link.serial_port:open_uart",
     "spidev": "biotac.link.spidev:open_spidev",
     "socket": "biotac.link.url_port:open_url",
     "rfc2217": "biotac.link.url_port:open_url",
@@ -34,7 +35,8 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
     if not known and colon and os.sep not in port and not port.upper().startswith("COM") and len(scheme) > 1:
         raise PortError(
             f"no kind of port is called {scheme!r}; expected a device path, serial:NUMBER, "
-            "spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, sim:SOURCE, emu:pico, replay:REC or zenoh:NAME"
+            "uart:DEVICE?baud=N, spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, sim:SOURCE, emu:pico, "
+            "replay:REC or zenoh:NAME"
         )
     module, _, function = (OPENERS[scheme] if known else PATH).partition(":")
     link: Link = getattr(importlib.import_module(module), function)(port, pace)

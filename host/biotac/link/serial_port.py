@@ -14,20 +14,24 @@ from serial.tools.list_ports import comports
 from ..errors import DeviceLostError, PortError
 from .base import Played
 from .holders import holders, in_words
+from .port_text import options_of
 
 READ_BYTES = 65536
+USB_BITS_PER_S = 115200  # whatever it is
 TTY_BYTES = 4000  # nearly what one tty read gives at most
+UART_FORM = "uart:DEVICE?baud=N"
 ONE_READ_BYTES = 8192  # more would be allocated for nothing, thousands of times a second
 
 
 class SerialLink:
-    """A byte pipe over USB-serial. The bit rate is meaningless on USB and left at a common one."""
+    """A byte pipe over a serial port: USB's, where a bit rate is meaningless and left at a common one, or a UART's."""
 
     patience = 1.0
     keeps_time = True
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, bits_per_s: int | None = None) -> None:
         self.port = path
+        self.bits_per_s = bits_per_s
         self.source: Played | None = None
         self.ended = False
         self.pace = 1.0
@@ -47,7 +51,8 @@ class SerialLink:
         """See Link.reopen."""
         self._close_port()
         try:
-            self._serial = serial.Serial(place, 115200, timeout=0, write_timeout=2, exclusive=exclusive())
+            rate = self.bits_per_s or USB_BITS_PER_S
+            self._serial = serial.Serial(place, rate, timeout=0, write_timeout=2, exclusive=exclusive())
         except (serial.SerialException, OSError, ValueError) as error:
             raise PortError(describe_open_error(place, error)) from error
         if os.name == "posix":
@@ -125,6 +130,15 @@ class SerialLink:
 def open_path(path: str, pace: float) -> SerialLink:
     """Open a serial port; its time is its own, whatever ``pace`` is."""
     return SerialLink(path)
+
+
+def open_uart(port: str, pace: float) -> SerialLink:
+    """Open a ``uart:`` port, an adapter at a board's UART; its time is its own, whatever ``pace`` is."""
+    path, options = options_of(port, {"baud"}, UART_FORM)
+    baud = options.get("baud", "")
+    if not path or not baud.isdecimal() or int(baud) == 0:
+        raise PortError(f"{port}: expected {UART_FORM}, with the board's setting uart_bits_per_s for N")
+    return SerialLink(path, int(baud))
 
 
 def went_away(port: str, error: Exception) -> DeviceLostError:

@@ -125,6 +125,7 @@ class SpidevLink:
         self.source: Played | None = None
         self.patience = 1.0
         self.keeps_time = True
+        self.bits_per_s: int | None = None
         self.ended = False
         self.fd: int | None = None
         self.pace = 1.0

@@ -21,6 +21,7 @@ class UrlLink:
 
     patience = 1.0
     keeps_time = True
+    bits_per_s: int | None = None
 
     def __init__(self, url: str) -> None:
         self.port = url

@@ -89,6 +89,7 @@ class ReplayLink:
         self.ended = False
         self.fd: int | None = None
         self.keeps_time = False
+        self.bits_per_s: int | None = None
         self.pace = pace
         self._clock = clock or SystemClock()
         self._pacer = Pacer(playback, pace, self._clock)

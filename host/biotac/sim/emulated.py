@@ -13,6 +13,8 @@ import shutil
 import subprocess
 import sys
 import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,30 +35,33 @@ class Tools:
 
 
 class EmulatedBoard(SimBoard):
-    """A running emulator; ``path`` is the pty that any serial program can open."""
+    """A running emulator; ``path`` is the pty that any serial program can open.
 
-    _pass_fds: tuple[int, ...] = ()  # beside its own pty's
+    With ``uart`` there is another one, ``uart_path``, on the pins of the board's UART.
+    """
 
-    def __init__(self, board: str, source: Source, *, pace: float, hold: bool, image: str | None = None) -> None:
+    _pass_fds: tuple[int, ...] = ()  # beside its own ptys'
+
+    def __init__(
+        self, board: str, source: Source, *, pace: float, hold: bool, image: str | None = None, uart: bool = False
+    ) -> None:
         self._tools = find_tools(board, image)
+        self._has_uart = uart
+        self.uart_path = ""
         super().__init__(source, pace=pace, hold=hold)
 
     def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
         tools = self._tools
-        master, slave = pty.openpty()
-        try:
-            # Raw from the start: an echoing terminal would send our own frames back to us.
-            tty.setraw(slave)
-            path = os.ttyname(slave)
-            os.close(slave)  # while nobody holds it, reading the master fails: that is the board's DTR
-            os.set_blocking(master, False)
-            command = [tools.node, str(tools.program), "--image", str(tools.image), "--wasm", str(tools.sensors)]
-            command += ["--pty", path, *options]
-            command += ["--master", str(master)]
+        command = [tools.node, str(tools.program), "--image", str(tools.image), "--wasm", str(tools.sensors), *options]
+        with new_pty() as (master, path), new_pty() as (uart_master, uart_path):
+            command += ["--pty", path, "--master", str(master)]
+            fds = [master, *self._pass_fds]
+            if self._has_uart:
+                self.uart_path = uart_path
+                command += ["--uart-master", str(uart_master)]
+                fds.append(uart_master)
             pipe = subprocess.PIPE
-            return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=[master, *self._pass_fds])
-        finally:
-            os.close(master)
+            return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=fds)
 
     def plan(self, seconds: float, verb: str) -> None:
         """Have something happen to the board once its sensors have lived for ``seconds``; see main.mjs."""
@@ -100,6 +105,21 @@ class EmulatedBoard(SimBoard):
             self.hear()
         word, _, text = self._answers.pop(0).partition(" ")
         return word, json.loads(text)
+
+
+@contextmanager
+def new_pty() -> Iterator[tuple[int, str]]:
+    """The master's descriptor, to be passed on, and the path of the other side; while nobody holds that, the master
+    cannot be read, which is the board's DTR."""
+    master, slave = pty.openpty()
+    try:
+        tty.setraw(slave)  # from the start: an echoing terminal would send our own frames back to us
+        path = os.ttyname(slave)
+        os.close(slave)
+        os.set_blocking(master, False)
+        yield master, path
+    finally:
+        os.close(master)
 
 
 def find_tools(board: str, image: str | None) -> Tools:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import pty
 import subprocess
 import threading
-import tty
 from contextlib import suppress
 
 from ..errors import BiotacError, PortError
 from ..link.serial_port import SerialLink
-from .emulated import EmulatedBoard
+from .emulated import EmulatedBoard, new_pty
 from .sensor_board import SensorBoard
 from .source import Source
 
@@ -33,17 +30,10 @@ class TwoPicos(EmulatedBoard):
         image = self._tools.image.parent.parent / "pico-sensor" / "biotac-sensor.bin"
         if not image.is_file():
             raise PortError(f"no image at {image}; build it as firmware/boards/pico_sensor/README.md says")
-        master, slave = pty.openpty()
-        try:
-            tty.setraw(slave)
-            path = os.ttyname(slave)
-            os.close(slave)
-            os.set_blocking(master, False)
+        with new_pty() as (master, path):
             self._pass_fds = (master,)
             more = ["--sensor", str(image), "--sensor-pty", path, "--sensor-master", str(master)]
             process = super()._start([*options, *more])
-        finally:
-            os.close(master)
         try:
             self._plug(process, path)
         except BaseException:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0xCEC8D4C1
+SCHEMA_HASH = 0x8E1007F4
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -85,6 +85,15 @@ class ForceModel(IntEnum):
 
     LIN = 0  # Lin's three scales, force_gain_*_nn
     POPULATION = 1  # the population map, made of other fingers (host/docs/population.md), while all three force gains are the defaults; with others it is LIN
+
+
+class UartPins(IntEnum):
+    """Which pins a board's UART is on. A Pico has four pairs that its sensors leave free."""
+
+    GPIO_0_1 = 0  # sends on GPIO 0, hears on GPIO 1
+    GPIO_4_5 = 1  # sends on GPIO 4, hears on GPIO 5
+    GPIO_8_9 = 2  # sends on GPIO 8, hears on GPIO 9
+    GPIO_12_13 = 3  # sends on GPIO 12, hears on GPIO 13
 
 
 class Board(IntEnum):
@@ -252,6 +261,14 @@ FORCE_MODEL_DOC: dict[int, str] = {
 }
 
 
+UART_PINS_DOC: dict[int, str] = {
+    0: "sends on GPIO 0, hears on GPIO 1",
+    1: "sends on GPIO 4, hears on GPIO 5",
+    2: "sends on GPIO 8, hears on GPIO 9",
+    3: "sends on GPIO 12, hears on GPIO 13",
+}
+
+
 BOARD_DOC: dict[int, str] = {
     1: "a process on a pty with emulated sensors",
     2: "Raspberry Pi Pico (RP2040)",
@@ -369,6 +386,8 @@ class Setting(IntEnum):
     PRESSURE_FILTER_MILLI = 12
     HOLD_TIMEOUT_MS = 13
     FORCE_MODEL = 14
+    UART_BITS_PER_S = 15
+    UART_PINS = 16
 
 
 class SettingSpec(NamedTuple):
@@ -438,6 +457,14 @@ SETTINGS: dict[Setting, SettingSpec] = {
     Setting.FORCE_MODEL: SettingSpec(
         "enum force_model", 0, 1, 1, 0,
         "force of a finger that has neither a wrench map nor force gains of its own; firmware, records and recordings that do not know it: LIN",
+    ),
+    Setting.UART_BITS_PER_S: SettingSpec(
+        "bit/s", 0, 3000000, 0, 0,
+        "of a UART that speaks this protocol while no host has the USB port open: 8 data bits, no parity, one stop bit; below 1200: there is none. Saved, it holds from the board's next start on; boards that are no Pico have none",
+    ),
+    Setting.UART_PINS: SettingSpec(
+        "enum uart_pins", 0, 3, 0, 0,
+        "where that UART is; from the next start on, too",
     ),
 }
 

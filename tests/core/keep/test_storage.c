@@ -398,7 +398,7 @@ static void a_record_without_the_force_model_means_lins(void **state)
     bt_settings_reset(&settings);
     assert_int_equal(bt_settings_get(&settings, BT_SETTING_FORCE_MODEL), BT_FORCE_MODEL_POPULATION);
     bt_settings_pack(&settings, record);
-    const size_t without = BT_SETTINGS_RECORD_BYTES - BT_SETTING_PAIR_BYTES;
+    const size_t without = (BT_SETTING_FORCE_MODEL - 1) * BT_SETTING_PAIR_BYTES; // it and what came later
     assert_int_equal(record[without], BT_SETTING_FORCE_MODEL);
     bt_settings_unpack(&settings, BT_SETTINGS_RECORD_VERSION, record, without);
     assert_int_equal(bt_settings_get(&settings, BT_SETTING_FORCE_MODEL), BT_FORCE_MODEL_LIN);

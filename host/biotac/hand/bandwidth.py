@@ -1,0 +1,47 @@
+"""What of a stream fits through a UART: the bytes of its messages against the bits that the line carries."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..errors import InputError
+from ..wire import messages_gen as wire
+from ..wire.framing import encode
+from ..wire.sensor_gen import MAX_SENSORS
+
+BITS_PER_BYTE = 10  # with start and stop bit
+ROUNDS_PER_S = 100
+_OF_A_ROUND: dict[wire.StreamFlags, Any] = {
+    wire.StreamFlags.FRAMES: wire.Frame,
+    wire.StreamFlags.PAC: wire.Pac,
+    wire.StreamFlags.BANDS: wire.Bands,
+}
+
+
+def bits_per_s(streams: int, fingers: int) -> int:
+    """What ``streams`` of so many fingers take while all of them are touched, without what comes now and then."""
+    a_round = sum(_bytes(message) for stream, message in _OF_A_ROUND.items() if streams & stream)
+    a_second = _bytes(wire.Status) + fingers * _bytes(wire.SensorStatus) if streams & wire.StreamFlags.STATUS else 0
+    return BITS_PER_BYTE * (ROUNDS_PER_S * fingers * a_round + a_second)
+
+
+def most_fingers(streams: int, line_bits_per_s: int) -> int:
+    """How many fingers' ``streams`` fit, 0 to 5."""
+    return max(n for n in range(MAX_SENSORS + 1) if n == 0 or bits_per_s(streams, n) <= line_bits_per_s)
+
+
+def check(port: str, line_bits_per_s: int, streams: int, fingers: int) -> None:
+    """Raise InputError when ``streams`` of so many fingers are more than the line carries."""
+    needed = bits_per_s(streams, fingers)
+    if needed <= line_bits_per_s:
+        return
+    lean = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
+    asked = " and ".join(message.__name__.upper() for stream, message in _OF_A_ROUND.items() if streams & stream)
+    raise InputError(
+        f"{port} carries {line_bits_per_s} bit/s, and {asked} of {fingers} fingers take {needed}; it fits "
+        f"{most_fingers(streams, line_bits_per_s)} fingers, or {most_fingers(lean, line_bits_per_s)} with FRAME alone"
+    )
+
+
+def _bytes(message: Any) -> int:
+    return len(encode(message.ID, bytes(message.STRUCT.size)))

@@ -1,0 +1,96 @@
+"""The Pico's UART: the same wire for a hand's own controller, the C client among them, while no host has USB open."""
+
+from __future__ import annotations
+
+import os
+import select
+import subprocess
+from pathlib import Path
+
+import pytest
+from rig import Rig
+
+import biotac
+from biotac import FaultFlags, InputError, Setting
+from biotac.hand.opening import shake_hands
+from biotac.link.serial_port import SerialLink
+from biotac.sim.emulated import EmulatedBoard, new_pty
+from biotac.sim.loading import load_source
+from biotac.wire import messages_gen as wire
+from biotac.wire.framing import open_frame
+
+CLIENT = Path(__file__).resolve().parents[2] / "firmware" / "client"
+BAUD = 400_000  # FRAMEs of two fingers fit; with PAC they do not
+FRAMES = 60
+PATIENCE_S = 5  # of the board's time
+
+
+class UartLink(SerialLink):
+    """At the emulated pins; a board that is slower than its time is waited for."""
+
+    patience = 60.0
+
+
+def test_the_same_wire_until_a_host_opens_usb(rig: Rig, tmp_path: Path) -> None:
+    rig.need("uart")
+    board = EmulatedBoard("pico", load_source("press.toml", fingers=2, seconds=60.0), pace=1.0, hold=True, uart=True)
+    rig.opened.append(board)
+    board.release()
+    with biotac.open(board.path) as hand:
+        hand.set_setting(Setting.UART_BITS_PER_S, BAUD)
+        hand.set_setting(Setting.UART_PINS, wire.UartPins.GPIO_4_5)
+        hand.save_settings()
+        assert board.counters()["uart"] is None  # not before the next start
+    board.do("cut power")
+    board.until(PATIENCE_S, uart={"sent": 0})
+    the_client_prints_what_python_reads(board, tmp_path)
+    with shake_hands(UartLink(board.uart_path, BAUD)) as hand:
+        told = hand.read_batch(0.3)
+        assert len(told.wire) == FRAMES and len(told.pac) == 0  # PAC is for who asks for it
+        too_much = "carries 400000 bit/s, and FRAME and PAC of 2 fingers take 423820; it fits 1 "
+        with pytest.raises(InputError, match=too_much):
+            hand.start(pac=True)
+        with biotac.open(board.path) as other:
+            assert other.info.boot_id == hand.info.boot_id
+            assert other.status().streams == 0  # USB has the word, and the UART's stream has ended
+            assert len(other.read(0.1)) > 0
+    with shake_hands(UartLink(board.uart_path)) as hand:  # which knows no limit
+        status = hand.status()
+        assert (status.messages_dropped, status.rx_errors, status.slots_late) == (0, 0, 0)
+        hand.start(pac=True)
+        hand.read(1.0)
+        assert hand.stats.pac_lost > 0
+        assert hand.stats.crc_errors == hand.stats.other_errors == 0  # whole messages
+        hand.stop()
+        status = hand.status()
+        assert status.messages_dropped > 0 and status.faults & FaultFlags.DROPPED
+    counters = board.counters()["uart"]
+    assert counters["overruns"] == 0 and abs(counters["fastest_bits_per_s"] / BAUD - 1) < 0.005
+
+
+def the_client_prints_what_python_reads(board: EmulatedBoard, folder: Path) -> None:
+    """firmware/client/example.c at the pins, and its bytes again through Python's messages."""
+    program = folder / "example"
+    sources = [str(CLIENT / name) for name in ("example.c", "biotac_client.c")]
+    subprocess.run(["cc", "-std=gnu11", *sources, "-o", str(program)], check=True)
+    came = b""
+    with new_pty() as (its, path), open(board.uart_path, "r+b", buffering=0) as uart:
+        os.set_blocking(uart.fileno(), False)
+        held = os.open(path, os.O_RDWR | os.O_NOCTTY)  # so that its pty never hangs up
+        with subprocess.Popen([str(program), path, str(FRAMES)], stdout=subprocess.PIPE, text=True) as running:
+            while running.poll() is None:
+                ready = select.select([its, uart.fileno()], [], [], 0.05)[0]
+                if its in ready:
+                    uart.write(os.read(its, 4096))
+                if uart.fileno() in ready and (data := uart.read(4096)):
+                    came += data
+                    os.write(its, data)
+            assert running.stdout is not None
+            printed = [line.split() for line in running.stdout]
+        os.close(held)
+    assert running.returncode == 0
+    messages = [message for frame in came.split(b"\0") if frame and (message := open_frame(frame)) is not None]
+    frames = [wire.Frame.unpack(payload) for number, payload in messages if number == wire.Frame.ID]
+    told = [(f.finger, f.t_us, *f.force_100un, f.flags) for f in frames[:FRAMES]]
+    assert told == [(*map(int, words[:5]), int(words[5], 16)) for words in printed]
+    assert len(told) == FRAMES
