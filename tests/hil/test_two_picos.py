@@ -17,7 +17,7 @@ from biotac.sim.two_picos import TwoPicos
 from biotac.wire import messages_gen as wire
 
 SETTLE_US = 50
-DAY_S, NIGHT_S = 0.1, 60.0
+DAY_S, NIGHT_S = 1.0, 60.0
 
 Open = Callable[[float], tuple[biotac.Hand, TwoPicos]]
 
