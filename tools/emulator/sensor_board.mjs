@@ -16,6 +16,7 @@ import { UsbHost } from './usb.mjs'
 
 const [MISO, SCK, MOSI] = [16, 18, 19] // firmware/boards/pico_sensor/pins.h
 export const SELECTS = [2, 3, 4, 5, 6]
+const LEADS = { SCK, MOSI, MISO, SS0: 2, SS1: 3, SS2: 4, SS3: 5, SS4: 6 } // where each goes to when all is well
 const SYNCHRONISER_NS = 16 // two flip-flops behind each input
 const SAMPLE_COMMAND = 0x80 // and above
 const SLOTS = JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url))).sensor.frame.slots.length
@@ -28,6 +29,7 @@ export class SensorBoard {
     this.port = port
     this.frames = tape.readUInt32LE(TAPE_FRAMES_AT)
     this.stretched = false // no lead makes a word longer
+    this.ends = new Map(Object.values(LEADS).map((pin) => [pin, pin])) // of the gateway's leads; null: nowhere
     this.edges = [] // {at: ns, pin, high}, sorted by time; those before `passed` are over
     this.passed = 0
     this.word = 0 // as the gateway's shift register has it
@@ -53,6 +55,16 @@ export class SensorBoard {
   counters() {
     const { transfers, commands, lateEdges, slowestAnswer, leastLeft } = this
     return { transfers, commands, late_edges: lateEdges, answer_ns: slowestAnswer, answer_left_ns: leastLeft, usb: this.usb.state, instructions: this.machine.instructions, slept: this.machine.sleptNanos / this.machine.nanos }
+  }
+
+  /** Have the gateway's lead of this name end where another one should, or nowhere (null); both are names of LEADS. */
+  connect(name, end) {
+    if (!(name in LEADS) || (end !== null && !(end in LEADS))) {
+      throw new Error(`no lead ${name} to ${end}: expected of ${Object.keys(LEADS).join(', ')}`)
+    }
+    const left = this.ends.get(LEADS[name])
+    if (left !== null && left !== MISO) this.pio.input(left, SELECTS.includes(left)) // what is pulled there
+    this.ends.set(LEADS[name], end === null ? null : LEADS[end])
   }
 
   powerCycle() {
@@ -135,10 +147,12 @@ export class SensorBoard {
     const { at, pin, high } = this.edges[this.passed++]
     const left = at - SYNCHRONISER_NS // when it left the gateway
     if (SELECTS.includes(pin)) this.selectFell = high ? null : left
-    this.pio.input(pin, high)
+    const end = this.ends.get(pin)
+    if (end !== null && end !== MISO) this.pio.input(end, high)
     if (pin === SCK && high) {
       const { now, before, since } = this.miso
-      this.word = (this.word << 1) | (since > left ? before : now)
+      const bit = this.ends.get(MISO) !== MISO ? 0 : since > left ? before : now // the gateway pulls its MISO down
+      this.word = (this.word << 1) | bit
     }
     this.#await()
   }
