@@ -395,7 +395,7 @@ typedef struct {
     uint16_t tdc; // [count] temperature; 0xFFFF where no good word came
 } bt_msg_idle;
 
-// A resting finger's gate opened in this slot. A hint, sent at once; CONTACT follows if it stays open for three rounds.
+// A resting finger's trigger fired in this slot. A hint, sent at once; CONTACT follows if it fires in three rounds on end.
 #define BT_TOUCH_ID 0x16
 #define BT_TOUCH_BYTES 12
 typedef struct {

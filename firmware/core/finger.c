@@ -153,7 +153,7 @@ bool bt_finger_idle(const bt_finger *finger)
 {
     const bt_tare *tare = &finger->tare;
     bool untouched =
-        tare->state == BT_TARE_STATE_REST ? tare->gate.room >= 0 : tare->state == BT_TARE_STATE_INIT;
+        tare->state == BT_TARE_STATE_REST ? tare->trigger.room >= 0 : tare->state == BT_TARE_STATE_INIT;
     return untouched && !finger->tare_unsent && !(finger->quantities & BT_QUANTITY_FLAG_REST_FRAMES);
 }
 
@@ -161,7 +161,7 @@ bool bt_finger_moved(const bt_finger *finger)
 {
     uint32_t energy = 0;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        int32_t change = finger->tare.gate.smooth.lane[i] - finger->sent.lane[i];
+        int32_t change = finger->tare.trigger.smooth.lane[i] - finger->sent.lane[i];
         energy += (uint32_t)(change * change);
     }
     return energy > finger->tare.threshold_count2;
@@ -246,7 +246,7 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint3
     tell_results(finger, settings, shed, msg);
     tell_pressure(finger, msg);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
-    finger->sent = finger->tare.gate.smooth;
+    finger->sent = finger->tare.trigger.smooth;
 }
 
 void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg)
@@ -257,7 +257,7 @@ void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_
     msg->tare_state = finger->tare.state;
     msg->flags = bt_channel_flags(&finger->round, &finger->tare) | BT_FRAME_FLAG_NOT_ASKED;
     msg->frames = finger->unsent;
-    msg->energy_count2 = bt_gate_energy(&finger->tare.gate);
+    msg->energy_count2 = bt_trigger_energy(&finger->tare.trigger);
     msg->pdc = finger->round.pdc;
     msg->tdc = finger->round.tdc;
 }

@@ -59,7 +59,7 @@ void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map
         rest[0] = present;
         rest[1] = finger->tare.reason;
         rest[2] = touch_slot;
-        uint32_t measures[3] = {bt_gate_energy(&finger->tare.gate), finger->tare.noise.count2,
+        uint32_t measures[3] = {bt_trigger_energy(&finger->tare.trigger), finger->tare.noise.count2,
                                 finger->tare.threshold_count2};
         memcpy(rest + 3, measures, sizeof measures);
     }

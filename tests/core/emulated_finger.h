@@ -102,7 +102,7 @@ static inline void finger_init(emulated_finger *finger)
     bt_tare_reset(&finger->tare);
 }
 
-// Gives the machine one frame as the slots would; returns the first electrode that opened the gate,
+// Gives the machine one frame as the slots would; returns the first electrode that fired the trigger,
 // BT_LANE_PDC for the pressure, -1 for none.
 static inline int feed(emulated_finger *finger, const bt_round *frame)
 {

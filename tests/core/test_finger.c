@@ -346,7 +346,7 @@ static void a_touch_that_shows_in_a_lost_slot_is_told_in_the_next(void **state)
                 }
             }
             assert_true(bt_finger_end(&copy, &tare_settings)); // for E19, lost last, the FRAME tells
-            assert_int_equal(bt_gate_energy(&copy.tare.gate), (round == 0 ? 1 : 3) * 19 * 19);
+            assert_int_equal(bt_trigger_energy(&copy.tare.trigger), (round == 0 ? 1 : 3) * 19 * 19);
         }
     }
 }

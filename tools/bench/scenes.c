@@ -13,7 +13,7 @@
 static uint16_t rest_count[BT_SLOTS], press_count[BT_SLOTS];
 static uint16_t rest_lane[LANES], press_lane[LANES];
 static bt_tare_settings tare_settings;
-static bt_gate gate;
+static bt_trigger trigger;
 static bt_finger rest_front, press_front, rest_whole, press_whole, press_force, press_poc, press_sigma,
     press_lin;
 static bt_finger rest_five[BT_MAX_FINGERS], press_five[BT_MAX_FINGERS], rest_words, rest_events, press_events,
@@ -63,7 +63,7 @@ static void pressed(bt_finger *finger, const bt_solve_settings *settings, uint32
 static void one_word(const bt_solve_settings *settings)
 {
     (void)settings;
-    sink = (uint32_t)bt_gate_electrode(&gate, 3, rest_lane[3]);
+    sink = (uint32_t)bt_trigger_electrode(&trigger, 3, rest_lane[3]);
 }
 
 static void front_at_rest(const bt_solve_settings *settings)
@@ -233,7 +233,7 @@ static void map_opened(const bt_solve_settings *settings)
 }
 
 const bench_scene bench_scenes[BENCH_SCENES] = {
-    {"gate", "one word", one_word},
+    {"trigger", "one word", one_word},
     {"front end", "at rest", front_at_rest},
     {"front end", "in contact", front_in_contact},
     {"whole frame", "at rest", whole_at_rest},
@@ -295,7 +295,7 @@ void bench_scenes_init(void)
     }
     bt_finger_reset(&rest_front, 0);
     run(&rest_front, rest_count, 400);
-    gate = rest_front.tare.gate;
+    trigger = rest_front.tare.trigger;
     rest_whole = rest_words = press_front = rest_front;
     run(&press_front, press_count, 50);
     press_front.tare.noise.count2 = 400; // exact counts have none

@@ -25,7 +25,7 @@ _Static_assert((uint64_t)LEVEL_MAX * CAP * BT_PAC_PER_FRAME * 745 <= UINT32_MAX,
                "the noise of a round, as a level, must fit its type");
 _Static_assert((uint64_t)LEVEL_MAX * (2 * MOST + CAP * BT_PAC_PER_FRAME) * 2 <= UINT32_MAX,
                "evidence must fit its type");
-_Static_assert((uint64_t)BT_ELECTRODES * BT_GATE_UNREAD * BT_GATE_UNREAD <= UINT32_MAX,
+_Static_assert((uint64_t)BT_ELECTRODES * BT_TRIGGER_UNREAD * BT_TRIGGER_UNREAD <= UINT32_MAX,
                "energy must fit its type");
 _Static_assert((uint64_t)BT_FULL_SCALE_COUNT *BT_FULL_SCALE_COUNT <= INT32_MAX, "a square must fit its type");
 _Static_assert((BT_FULL_SCALE_COUNT & (BT_FULL_SCALE_COUNT + 1)) == 0
@@ -49,7 +49,7 @@ void bt_events_reset(bt_events *events)
 
 static uint32_t square_of(const bt_tare *tare, unsigned electrode)
 {
-    int32_t e = tare->gate.smooth.lane[electrode] - tare->gate.rest.lane[electrode];
+    int32_t e = tare->trigger.smooth.lane[electrode] - tare->trigger.rest.lane[electrode];
     return (uint32_t)(e * e);
 }
 
@@ -90,8 +90,8 @@ uint32_t bt_events_touch(bt_events *events, const bt_tare *tare)
 
 static bool pressed(const bt_tare *tare)
 {
-    int32_t rest = tare->gate.rest.lane[BT_LANE_PDC];
-    return rest != 0 && tare->gate.smooth.lane[BT_LANE_PDC] - rest > BT_PDC_HIT;
+    int32_t rest = tare->trigger.rest.lane[BT_LANE_PDC];
+    return rest != 0 && tare->trigger.smooth.lane[BT_LANE_PDC] - rest > BT_PDC_HIT;
 }
 
 uint32_t bt_events_watch(bt_events *events, const bt_tare *tare)
@@ -109,7 +109,7 @@ uint32_t bt_events_watch(bt_events *events, const bt_tare *tare)
     return TOLD(BT_EVENT_KIND_LIFT);
 }
 
-// The tare machine goes on to call it a contact, so its gate waits for no other.
+// The tare machine goes on to call it a contact, so its trigger waits for no other.
 static BT_NOINLINE uint32_t touched_again(bt_events *events, const bt_tare *tare)
 {
     weigh(events, tare);

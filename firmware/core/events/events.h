@@ -1,10 +1,10 @@
 // Events: that something touches, is let go, jolts or slips.
 //
-// Touch and release go by the electrodes' energy, each with its latest word. A resting finger's gate says
-// touch, in the slot of the word that opens it (signal/gate.h). Of a touched finger one electrode is watched,
-// the strongest: when it falls below half the gate's threshold all are summed up, and when they do, too, and
-// no pressure is left, it is a release; else the strongest of them is watched. So what falls last in a
-// release is the word that tells it.
+// Touch and release go by the electrodes' energy, each with its latest word. A resting finger's trigger says
+// touch, in the slot of the word that fires it (signal/trigger.h). Of a touched finger one electrode is
+// watched, the strongest: when it falls below half the trigger's threshold all are summed up, and when they
+// do, too, and no pressure is left, it is a release; else the strongest of them is watched. So what falls
+// last in a release is the word that tells it.
 //
 // Jolt and slip go by dynamic pressure (PAC), by how much it changed within eight samples, 3.6 ms: 70 to 200
 // Hz, where real slides are 12 to 100 times over the noise, several times what neighbouring samples show.
@@ -51,7 +51,7 @@ typedef struct {
 void bt_events_reset(bt_events *events);
 
 // Each after the slot's word went to the tare machine. They return events, a mask of 1 << BT_EVENT_KIND_*.
-// This word opened a resting finger's gate.
+// This word fired a resting finger's trigger.
 uint32_t bt_events_touch(bt_events *events, const bt_tare *tare);
 // This slot is `watched`.
 uint32_t bt_events_watch(bt_events *events, const bt_tare *tare);

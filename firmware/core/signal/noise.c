@@ -7,7 +7,7 @@
 #define MEAN_SWEEPS 16
 
 _Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX <= INT32_MAX >> 8, "the noise in q8 must fit 31 bits");
-_Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX *(int64_t)FACTOR < BT_GATE_NEVER,
+_Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX *(int64_t)FACTOR < BT_TRIGGER_NEVER,
                "a threshold is a limit");
 
 void bt_noise_add(bt_noise *noise, uint32_t deviation_q6, uint32_t setting_count2)

@@ -9,7 +9,7 @@
 #define SWEEP_US (BT_SWEEP_ROUNDS * ROUND_US)
 
 _Static_assert(UINT32_MAX / SWEEP_US <= UINT16_MAX, "sweeps of the longest silence must fit their type");
-_Static_assert(BT_SILENCE_ROUNDS *BT_GATE_UNREAD <= UINT16_MAX, "a sum must fit its half of a pair");
+_Static_assert(BT_SILENCE_ROUNDS *BT_TRIGGER_UNREAD <= UINT16_MAX, "a sum must fit its half of a pair");
 
 static BT_NOINLINE void begin(bt_silence *silence, uint32_t gap_us)
 {

@@ -6,7 +6,7 @@
 #ifndef BIOTAC_SILENCE_H
 #define BIOTAC_SILENCE_H
 
-#include "signal/gate.h"
+#include "signal/trigger.h"
 
 // After it, that say what the finger reads now: results are good 50 ms after the first.
 #define BT_SILENCE_ROUNDS 5

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-_Static_assert(BT_SWEEP_ROUNDS *BT_GATE_UNREAD <= UINT16_MAX,
+_Static_assert(BT_SWEEP_ROUNDS *BT_TRIGGER_UNREAD <= UINT16_MAX,
                "a sum must fit its half of a pair, or it would carry into its neighbour");
 _Static_assert((BT_SWEEP_ROUNDS - 1) * BT_SWEEP_LANES >= BT_LANES,
                "the last round of a sweep serves no lane: it has the verdicts to reach");

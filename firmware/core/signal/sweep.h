@@ -9,14 +9,14 @@
 #ifndef BIOTAC_SWEEP_H
 #define BIOTAC_SWEEP_H
 
-#include "signal/gate.h"
+#include "signal/trigger.h"
 
 #define BT_SWEEP_ROUNDS 8
 #define BT_SWEEP_LANES  3 // served in one round
 
 #define BT_STILL_SPAN_Q3 (12 * 8) // means of still signals stay this close to where they came to rest
 
-#define BT_SWEEP_UNREAD_Q3 (BT_SWEEP_ROUNDS * BT_GATE_UNREAD)
+#define BT_SWEEP_UNREAD_Q3 (BT_SWEEP_ROUNDS * BT_TRIGGER_UNREAD)
 
 typedef struct {
     bt_lanes sum;

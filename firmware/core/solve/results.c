@@ -48,7 +48,7 @@ static BT_NOINLINE signal_shape all_signals(const uint16_t counts[BT_ELECTRODES]
 static signal_shape signals(const bt_round *round, const bt_tare *tare, int32_t e_q4[BT_ELECTRODES])
 {
     signal_shape shape = {0, 0};
-    if (tare->gate.missing == 0 && !(tare->gate.unknown & ((1u << BT_ELECTRODES) - 1))) {
+    if (tare->trigger.missing == 0 && !(tare->trigger.unknown & ((1u << BT_ELECTRODES) - 1))) {
         shape = all_signals(round->electrode, tare->electrode_q4, e_q4);
     } else {
         bt_signals_q4(round->electrode, tare->electrode_q4, e_q4);
@@ -64,8 +64,8 @@ static signal_shape signals(const bt_round *round, const bt_tare *tare, int32_t 
 static BT_NOINLINE uint32_t trouble(const bt_round *round, const bt_tare *tare)
 {
     uint32_t flags = 0;
-    flags |= tare->gate.missing > 0 ? BT_FRAME_FLAG_ELECTRODE_MISSING : 0;
-    flags |= tare->gate.railed > 0 ? BT_FRAME_FLAG_RAIL : 0;
+    flags |= tare->trigger.missing > 0 ? BT_FRAME_FLAG_ELECTRODE_MISSING : 0;
+    flags |= tare->trigger.railed > 0 ? BT_FRAME_FLAG_RAIL : 0;
     flags |= bt_tare_faulty(tare) ? BT_FRAME_FLAG_FAULT : 0;
     flags |= round->pdc == BT_INVALID_COUNT ? BT_FRAME_FLAG_PDC_MISSING : 0;
     flags |= round->tac == BT_INVALID_COUNT ? BT_FRAME_FLAG_TAC_MISSING : 0;
@@ -82,7 +82,7 @@ uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
     uint32_t flags = BT_FRAME_FLAG_MX_DERIVED | BT_FRAME_FLAG_FX_WEAK;
     // One look for what hardly ever happens: a missing word is above every count.
     uint32_t counts = (uint32_t)(round->pdc | round->tac | round->tdc);
-    if (counts > BT_FULL_SCALE_COUNT || tare->gate.missing + tare->gate.railed > 0) {
+    if (counts > BT_FULL_SCALE_COUNT || tare->trigger.missing + tare->trigger.railed > 0) {
         flags |= trouble(round, tare);
     }
     if (!tare->tared) {

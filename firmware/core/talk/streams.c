@@ -66,7 +66,7 @@ static void send_touch(bt_session *session, const bt_finger *finger, uint8_t slo
         .t_us = t_us,
         .finger = finger->index,
         .slot = slot,
-        .energy_count2 = bt_gate_energy(&finger->tare.gate),
+        .energy_count2 = bt_trigger_energy(&finger->tare.trigger),
     };
     bt_msg_touch_pack(&msg, payload);
     bt_session_send(session, BT_TOUCH_ID, payload);

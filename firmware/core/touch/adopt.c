@@ -8,13 +8,13 @@
 void bt_adopt_aim_pressure(bt_tare *tare)
 {
     uint32_t base_q16 = tare->base.pdc_q16;
-    uint32_t watched_q16 = bt_adopt_gate_base(tare)->pdc_q16;
+    uint32_t watched_q16 = bt_adopt_trigger_base(tare)->pdc_q16;
     // A press that ends in doubt has the pressure low for a second or two; its return is no touch.
     if (base_q16 != BT_TARE_UNKNOWN && watched_q16 != BT_TARE_UNKNOWN && watched_q16 > base_q16) {
         base_q16 = watched_q16;
     }
-    if (!(tare->gate.unknown >> BT_LANE_PDC & 1)) {
-        tare->gate.rest.lane[BT_LANE_PDC] =
+    if (!(tare->trigger.unknown >> BT_LANE_PDC & 1)) {
+        tare->trigger.rest.lane[BT_LANE_PDC] =
             base_q16 == BT_TARE_UNKNOWN ? 0 : (uint16_t)bt_baseline_count(base_q16);
     }
 }
@@ -68,7 +68,7 @@ void bt_adopt_in_place(bt_tare *tare, const bt_baseline *base, uint8_t reason)
 
 static uint32_t present_q16(const bt_tare *tare, unsigned lane)
 {
-    bool unknown = tare->gate.unknown >> lane & 1;
+    bool unknown = tare->trigger.unknown >> lane & 1;
     return unknown ? BT_TARE_UNKNOWN : (uint32_t)tare->sweep.mean_q3.lane[lane] << 13;
 }
 
@@ -109,7 +109,7 @@ void bt_adopt_shift(bt_tare *tare)
 
 void bt_adopt_doubt(bt_tare *tare)
 {
-    bt_watch_take(&tare->watch, &tare->sweep, tare->gate.unknown);
+    bt_watch_take(&tare->watch, &tare->sweep, tare->trigger.unknown);
     tare->state = BT_TARE_STATE_DOUBT;
     tare->hits = 0;
     bt_adopt_aim(tare);
@@ -126,8 +126,8 @@ void bt_adopt_contact(bt_tare *tare)
 // look like a contact. Not so one whose tare the host has set.
 static void meet_lane(bt_tare *tare, unsigned lane)
 {
-    uint32_t first_q16 = (uint32_t)tare->gate.smooth.lane[lane] << 16;
-    bt_sweep_meet(&tare->sweep, lane, tare->gate.smooth.lane[lane]);
+    uint32_t first_q16 = (uint32_t)tare->trigger.smooth.lane[lane] << 16;
+    bt_sweep_meet(&tare->sweep, lane, tare->trigger.smooth.lane[lane]);
     if (lane < BT_ELECTRODES) {
         if (tare->tared && tare->base.electrode_q16[lane] == BT_TARE_UNKNOWN) {
             tare->base.electrode_q16[lane] = first_q16;
@@ -145,12 +145,12 @@ static void meet_lane(bt_tare *tare, unsigned lane)
 
 BT_NOINLINE void bt_adopt_met(bt_tare *tare)
 {
-    for (unsigned lane = 0; tare->gate.met >> lane != 0; lane++) {
-        if (tare->gate.met >> lane & 1) {
+    for (unsigned lane = 0; tare->trigger.met >> lane != 0; lane++) {
+        if (tare->trigger.met >> lane & 1) {
             meet_lane(tare, lane);
         }
     }
-    tare->gate.met = 0;
+    tare->trigger.met = 0;
 }
 
 void bt_adopt_none(bt_tare *tare)

@@ -1,22 +1,22 @@
 // What changes the tare: a new one is adopted, in place of one that may prove wrong or for the first time;
-// and what the gate compares with goes with it. Called by the rounds (tare.c), the verdicts (judge.c) and
+// and what the trigger compares with goes with it. Called by the rounds (tare.c), the verdicts (judge.c) and
 // what follows drift (follow.c).
 #ifndef BIOTAC_ADOPT_H
 #define BIOTAC_ADOPT_H
 
 #include "touch/machine.h"
 
-// What the gate compares with: in doubt where the signals came to rest, else the tare.
-static inline const bt_baseline *bt_adopt_gate_base(const bt_tare *tare)
+// What the trigger compares with: in doubt where the signals came to rest, else the tare.
+static inline const bt_baseline *bt_adopt_trigger_base(const bt_tare *tare)
 {
     return tare->state == BT_TARE_STATE_DOUBT ? &tare->watch.base : &tare->base;
 }
 
 static inline void bt_adopt_aim_electrode(bt_tare *tare, unsigned i)
 {
-    uint32_t base_q16 = bt_adopt_gate_base(tare)->electrode_q16[i];
-    if (base_q16 != BT_TARE_UNKNOWN && !(tare->gate.unknown >> i & 1)) {
-        tare->gate.rest.lane[i] = (uint16_t)bt_baseline_count(base_q16);
+    uint32_t base_q16 = bt_adopt_trigger_base(tare)->electrode_q16[i];
+    if (base_q16 != BT_TARE_UNKNOWN && !(tare->trigger.unknown >> i & 1)) {
+        tare->trigger.rest.lane[i] = (uint16_t)bt_baseline_count(base_q16);
     }
 }
 
@@ -27,7 +27,7 @@ static inline void bt_adopt_electrode(bt_tare *tare, unsigned i)
     bt_adopt_aim_electrode(tare, i);
 }
 
-// The gate compares with another baseline.
+// The trigger compares with another baseline.
 void bt_adopt_aim(bt_tare *tare);
 void bt_adopt_aim_pressure(bt_tare *tare);
 
@@ -48,7 +48,7 @@ void bt_adopt_after_press(bt_tare *tare, uint8_t reason);
 // Pressure as it is, and every electrode by what all have moved: what is left of a pattern stays.
 void bt_adopt_shift(bt_tare *tare);
 
-// The tare stays; the gate looks at where the signals came to rest, or at the tare again.
+// The tare stays; the trigger looks at where the signals came to rest, or at the tare again.
 void bt_adopt_doubt(bt_tare *tare);
 void bt_adopt_contact(bt_tare *tare);
 

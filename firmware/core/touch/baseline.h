@@ -5,7 +5,7 @@
 #ifndef BIOTAC_BASELINE_H
 #define BIOTAC_BASELINE_H
 
-#include "signal/gate.h"
+#include "signal/trigger.h"
 
 #define BT_TARE_UNKNOWN 0xFFFFFFFFu // of a channel that was never read
 #define BT_SNAPSHOTS    8

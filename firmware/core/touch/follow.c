@@ -50,7 +50,7 @@ BT_NOINLINE void bt_follow_resume(bt_tare *tare)
 {
     bool known = bt_drift_known(&tare->drift);
     shift_all(tare, bt_drift_unseen(&tare->drift, tare->silence.sweeps));
-    if (bt_tare_touched(tare) && tare->gate.pressure_now) {
+    if (bt_tare_touched(tare) && tare->trigger.pressure_now) {
         int32_t step_q16 = bt_watch_resume(&tare->watch, &tare->silence, BT_STILL_SPAN_Q3);
         shift_all(tare, known ? 0 : step_q16);
     }
@@ -92,7 +92,7 @@ static void serve_electrode(bt_tare *tare, unsigned i)
         return;
     }
     // Where it is used, every round was below the threshold: the sum stays far below 2^32.
-    int32_t away_q3 = 8 * tare->gate.smooth.lane[i] - mean_q3;
+    int32_t away_q3 = 8 * tare->trigger.smooth.lane[i] - mean_q3;
     tare->deviation_q6 += (uint32_t)(away_q3 * away_q3);
     uint32_t mean_q16 = (uint32_t)mean_q3 << 13;
     bt_watch_side(&tare->watch, mean_q16, *base_q16);

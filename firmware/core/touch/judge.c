@@ -15,7 +15,7 @@ _Static_assert((uint64_t)DRIFT_LIMIT *DRIFT_LIMIT <= UINT32_MAX, "the forgiven d
 BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
 {
     bt_tare_doubt doubt =
-        bt_inverted_judge(&tare->last, &tare->gate.smooth, &tare->base, tare->release.pdc_peak);
+        bt_inverted_judge(&tare->last, &tare->trigger.smooth, &tare->base, tare->release.pdc_peak);
     if (doubt == BT_TARE_UNDO) {
         bt_baseline before = tare->base;
         bt_inverted_undo(&tare->last, &before);
@@ -51,7 +51,7 @@ static uint32_t uneven_count2(const bt_tare *tare)
 static void judge_release(bt_tare *tare)
 {
     int32_t mean = tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3;
-    int32_t now = tare->gate.smooth.lane[BT_LANE_PDC];
+    int32_t now = tare->trigger.smooth.lane[BT_LANE_PDC];
     bt_release_sweep sweep = {
         .energy_count2 = tare->energy_count2,
         .uneven_count2 = uneven_count2(tare),
@@ -88,7 +88,7 @@ static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
         tare->drift.settled = 0;
     }
     if (due || tare->sweep.still_sweeps == BT_WATCH_SWEEPS) {
-        bt_watch_return(&tare->watch, &tare->sweep, tare->gate.unknown, BT_STILL_SPAN_Q3);
+        bt_watch_return(&tare->watch, &tare->sweep, tare->trigger.unknown, BT_STILL_SPAN_Q3);
     }
     if (!tare->partial) { // sums over electrodes that were not all served in one state say nothing
         judge_release(tare);

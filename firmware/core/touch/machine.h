@@ -6,10 +6,10 @@
 #ifndef BIOTAC_MACHINE_H
 #define BIOTAC_MACHINE_H
 
-#include "signal/gate.h"
 #include "signal/noise.h"
 #include "signal/silence.h"
 #include "signal/sweep.h"
+#include "signal/trigger.h"
 #include "touch/baseline.h"
 #include "touch/drift.h"
 #include "touch/inverted.h"
@@ -24,7 +24,7 @@ typedef struct {
 } bt_tare_settings;
 
 typedef struct {
-    bt_gate gate;
+    bt_trigger trigger;
     bt_sweep sweep;
     uint8_t state;        // enum bt_tare_state
     uint8_t reason;       // enum bt_tare_reason of the last change
@@ -50,8 +50,8 @@ typedef struct {
     bt_release release;
 
     int32_t comes_back_q16; // of the pressure that the latest press has left missing, at most
-    uint8_t hits;           // consecutive rounds in which the gate opened
-    bool touched;           // in this round the gate opened, or before it and it is open still
+    uint8_t hits;           // consecutive rounds in which the trigger fired
+    bool touched;           // in this round the trigger fired, or before it and it is over its limit still
     bool partial;           // this sweep did not serve all electrodes in one state
     bool partial_before;    // nor did the one before
     uint32_t deviation_q6;  // count^2; of this sweep: filtered counts from their means
@@ -70,12 +70,12 @@ static inline bool bt_tare_touched(const bt_tare *tare)
 // Static pressure above the tare, in whole counts, where both are known.
 static inline bool bt_tare_pdc_known(const bt_tare *tare)
 {
-    return tare->gate.pressure_now && tare->base.pdc_q16 != BT_TARE_UNKNOWN;
+    return tare->trigger.pressure_now && tare->base.pdc_q16 != BT_TARE_UNKNOWN;
 }
 
 static inline int32_t bt_tare_pdc_above(const bt_tare *tare)
 {
-    return tare->gate.smooth.lane[BT_LANE_PDC] - bt_baseline_count(tare->base.pdc_q16);
+    return tare->trigger.smooth.lane[BT_LANE_PDC] - bt_baseline_count(tare->base.pdc_q16);
 }
 #endif
 

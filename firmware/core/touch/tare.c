@@ -79,7 +79,7 @@ static BT_NOINLINE void fault(bt_tare *tare)
 void bt_tare_reset(bt_tare *tare)
 {
     memset(tare, 0, sizeof *tare);
-    bt_gate_reset(&tare->gate);
+    bt_trigger_reset(&tare->trigger);
     bt_sweep_restart(&tare->sweep);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         tare->base.electrode_q16[i] = BT_TARE_UNKNOWN;
@@ -94,7 +94,7 @@ void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings)
         tare->threshold_count2 = bt_noise_threshold(&tare->noise, settings->contact_energy_count2);
     }
     bool resting = tare->state == BT_TARE_STATE_REST || tare->state == BT_TARE_STATE_DOUBT;
-    bt_gate_begin(&tare->gate, resting ? (int32_t)tare->threshold_count2 : BT_GATE_NEVER);
+    bt_trigger_begin(&tare->trigger, resting ? (int32_t)tare->threshold_count2 : BT_TRIGGER_NEVER);
     tare->touched = tare->hits > 0; // what has begun is not seen to begin again
 }
 
@@ -107,7 +107,7 @@ bool bt_tare_touch(bt_tare *tare)
 
 bool bt_tare_pressure(bt_tare *tare, uint16_t count)
 {
-    return bt_gate_pressure(&tare->gate, count, BT_PDC_HIT) < 0 && bt_tare_touch(tare);
+    return bt_trigger_pressure(&tare->trigger, count, BT_PDC_HIT) < 0 && bt_tare_touch(tare);
 }
 
 void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
@@ -118,33 +118,33 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
         fault(tare);
         return;
     }
-    if (tare->gate.met != 0) {
+    if (tare->trigger.met != 0) {
         bt_adopt_met(tare);
     }
     if (tare->state == BT_TARE_STATE_FAULT) {
-        // A tare from before the fault still holds, and the gate sees by the coming words whether something
-        // touches now: lost words are no touch.
+        // A tare from before the fault still holds, and the trigger sees by the coming words whether
+        // something touches now: lost words are no touch.
         tare->state = tare->tared ? tare->before_fault : BT_TARE_STATE_INIT;
         bt_adopt_aim(tare);
         tare->release.quiet_sweeps = 0;
     } else if (tare->state == BT_TARE_STATE_REST || tare->state == BT_TARE_STATE_DOUBT) {
-        if (tare->gate.room < 0) {
+        if (tare->trigger.room < 0) {
             count_hit(tare, settings);
         } else {
             tare->hits = 0;
         }
     }
-    if (tare->gate.pressure_now && tare->tared && bt_tare_pdc_above(tare) < 0) {
+    if (tare->trigger.pressure_now && tare->tared && bt_tare_pdc_above(tare) < 0) {
         bt_judge_inverted(tare);
     }
     if (bt_tare_touched(tare)) {
         follow_contact(tare);
     }
-    tare->pressure_seen = tare->pressure_seen || tare->gate.pressure_now;
-    if (bt_silence_add(&tare->silence, t_us, &tare->gate.smooth)) {
+    tare->pressure_seen = tare->pressure_seen || tare->trigger.pressure_now;
+    if (bt_silence_add(&tare->silence, t_us, &tare->trigger.smooth)) {
         bt_follow_resume(tare);
     }
-    bt_sweep_add(&tare->sweep, &tare->gate.smooth);
+    bt_sweep_add(&tare->sweep, &tare->trigger.smooth);
     bt_follow_turn(tare);
     if (bt_sweep_next(&tare->sweep)) {
         bt_judge_sweep(tare, settings);
@@ -158,7 +158,7 @@ static bool present_is_still(const bt_tare *tare)
 {
     bool still = tare->sweep.still_sweeps >= BT_STILL_SWEEPS;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        int change_q3 = 8 * tare->gate.smooth.lane[i] - tare->sweep.mean_q3.lane[i];
+        int change_q3 = 8 * tare->trigger.smooth.lane[i] - tare->sweep.mean_q3.lane[i];
         still = still && change_q3 <= NOW_SPAN_Q3 && change_q3 >= -NOW_SPAN_Q3;
     }
     return still;

@@ -28,10 +28,10 @@ bool bt_tare_touch(bt_tare *tare);
 static inline bool bt_tare_electrode(bt_tare *tare, unsigned electrode, uint16_t count)
 {
     if (tare->state != BT_TARE_STATE_REST && tare->state != BT_TARE_STATE_DOUBT) {
-        bt_gate_follow(&tare->gate, electrode, count);
+        bt_trigger_follow(&tare->trigger, electrode, count);
         return false;
     }
-    return bt_gate_electrode(&tare->gate, electrode, count) < 0 && bt_tare_touch(tare);
+    return bt_trigger_electrode(&tare->trigger, electrode, count) < 0 && bt_tare_touch(tare);
 }
 #endif
 bool bt_tare_pressure(bt_tare *tare, uint16_t count);
@@ -52,7 +52,7 @@ void bt_tare_lapse(bt_tare *tare);
 #ifndef BT_CDEF
 static inline bool bt_tare_faulty(const bt_tare *tare)
 {
-    return tare->gate.missing + tare->gate.railed > BT_USABLE_WITHOUT;
+    return tare->trigger.missing + tare->trigger.railed > BT_USABLE_WITHOUT;
 }
 #endif
 

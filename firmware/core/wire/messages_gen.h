@@ -471,7 +471,7 @@ typedef struct {
 void bt_msg_idle_pack(const bt_msg_idle *msg, uint8_t out[BT_IDLE_BYTES]);
 void bt_msg_idle_unpack(bt_msg_idle *msg, const uint8_t in[BT_IDLE_BYTES]);
 
-// A resting finger's gate opened in this slot. A hint, sent at once; CONTACT follows if it stays open for three rounds.
+// A resting finger's trigger fired in this slot. A hint, sent at once; CONTACT follows if it fires in three rounds on end.
 #define BT_TOUCH_ID 0x16
 #define BT_TOUCH_BYTES 12
 typedef struct {

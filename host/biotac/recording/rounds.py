@@ -67,7 +67,7 @@ class Rounds:
 def with_silence(rounds: Rounds) -> Rounds:
     """``rounds`` with one without words wherever time jumps: the sensor was silent there, or was asked who it is.
 
-    The gate and the pressure's filter forget in such a round; how many there were is told by ``t_us`` alone.
+    The trigger and the pressure's filter forget in such a round; how many there were is told by ``t_us`` alone.
     """
     late = np.flatnonzero(np.diff(rounds.t_us) > 3 * ROUND_US // 2) + 1
 

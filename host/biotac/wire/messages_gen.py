@@ -1131,7 +1131,7 @@ class Idle:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """A resting finger's gate opened in this slot. A hint, sent at once; CONTACT follows if it stays open for three rounds."""
+    """A resting finger's trigger fired in this slot. A hint, sent at once; CONTACT follows if it fires in three rounds on end."""
 
     seq: int
     t_us: int

@@ -75,7 +75,7 @@ static void a_lane_met_at_any_phase_has_its_first_word_for_what_was_before(void 
             bt_sweep_restart(&sweep);
             for (int round = 0; round < 5 * ROUNDS; round++) {
                 random_lanes(&seed, &smooth);
-                smooth.lane[lane] = round < at ? BT_GATE_UNREAD : smooth.lane[lane];
+                smooth.lane[lane] = round < at ? BT_TRIGGER_UNREAD : smooth.lane[lane];
                 if (round == at) {
                     bt_sweep_meet(&sweep, lane, smooth.lane[lane]);
                     assert_int_equal(sweep.mean_q3.lane[lane], 8 * smooth.lane[lane]);
@@ -101,7 +101,7 @@ static void a_full_lane_never_carries_into_its_neighbour(void **state)
             bt_lanes smooth;
             bt_sweep_restart(&sweep);
             for (unsigned i = 0; i < BT_LANES; i++) {
-                smooth.lane[i] = (i == full) == only ? BT_GATE_UNREAD : 0;
+                smooth.lane[i] = (i == full) == only ? BT_TRIGGER_UNREAD : 0;
             }
             for (int round = 0; round < 4 * ROUNDS; round++) {
                 bt_sweep_add(&sweep, &smooth);
@@ -239,7 +239,7 @@ static void the_machine_serves_the_means_of_what_the_gate_let_through(void **sta
         unsigned first = bt_sweep_first(&finger.tare.sweep), end = bt_sweep_end(&finger.tare.sweep);
         bt_round frame = fault ? frame_without(&finger, 5, 3, 0) : next_frame(&finger);
         (void)feed(&finger, &frame);
-        memcpy(past.smooth[past.rounds++], finger.tare.gate.smooth.lane, sizeof past.smooth[0]);
+        memcpy(past.smooth[past.rounds++], finger.tare.trigger.smooth.lane, sizeof past.smooth[0]);
         if (fault) { // it starts over with the next good round
             since = past.rounds;
             continue;

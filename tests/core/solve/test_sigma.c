@@ -290,7 +290,7 @@ static void the_noise_is_that_of_nineteen_electrodes(void **state)
     (void)state;
     // An electrode's eight rounds end with a word whose distance from their mean holds 7/8 sigma^2; a
     // sweep adds 8/7 of nineteen. Sixteen sweeps are a plain mean: 16 * 19 independent squares a finger.
-    // Rounding to counts adds 1/12. Up to sigma 4 the gate holds back one word in 40,000.
+    // Rounding to counts adds 1/12. Up to sigma 4 the trigger holds back one word in 40,000.
     static const double noises[] = {1, 1.5, 2.5, 4};
     const unsigned fingers = 1500;
     for (unsigned k = 0; k < 4; k++) {

@@ -186,7 +186,7 @@ static void the_energy_of_a_heartbeat_is_that_of_its_round(void **state)
         }
         play(electrode);
         assert_int_equal(idle_at(0).energy_count2, energy);
-        assert_int_equal(session.finger[0].tare.gate.rest.lane[3], 2000);
+        assert_int_equal(session.finger[0].tare.trigger.rest.lane[3], 2000);
     }
 }
 

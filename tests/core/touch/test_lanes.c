@@ -1,4 +1,4 @@
-// Lanes of the gate that come late, or never.
+// Lanes of the trigger that come late, or never.
 #include "emulated_finger.h"
 
 #define LIMIT 1000
@@ -7,16 +7,16 @@ static void lanes_that_were_never_read_add_no_energy(void **state)
 {
     (void)state;
     static const uint16_t bad[] = {BT_INVALID_COUNT, 0, 4090, 4095};
-    bt_gate gate;
-    bt_gate_reset(&gate);
+    bt_trigger trigger;
+    bt_trigger_reset(&trigger);
     for (int round = 0; round < 20; round++) {
-        bt_gate_begin(&gate, LIMIT);
+        bt_trigger_begin(&trigger, LIMIT);
         for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-            (void)bt_gate_electrode(&gate, i, i % 2 ? 2000 : bad[round % 4]);
+            (void)bt_trigger_electrode(&trigger, i, i % 2 ? 2000 : bad[round % 4]);
         }
-        assert_int_equal(bt_gate_energy(&gate), 0);
+        assert_int_equal(bt_trigger_energy(&trigger), 0);
         for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-            assert_int_equal(gate.unknown >> i & 1, i % 2 == 0);
+            assert_int_equal(trigger.unknown >> i & 1, i % 2 == 0);
         }
     }
 }
@@ -25,17 +25,17 @@ static void any_good_word_can_be_a_lanes_first(void **state)
 {
     (void)state;
     for (uint16_t first = 1; first <= 4089; first++) {
-        bt_gate gate;
-        bt_gate_reset(&gate);
-        bt_gate_begin(&gate, LIMIT);
-        (void)bt_gate_electrode(&gate, 7, first);
-        assert_int_equal(bt_gate_energy(&gate), 0);
-        assert_int_equal(gate.smooth.lane[7], first);
-        assert_int_equal(gate.rest.lane[7], first);
-        assert_false(gate.unknown >> 7 & 1);
-        (void)bt_gate_pressure(&gate, first, 6);
-        assert_true(gate.room >= 0);
-        assert_false(gate.unknown >> BT_LANE_PDC & 1);
+        bt_trigger trigger;
+        bt_trigger_reset(&trigger);
+        bt_trigger_begin(&trigger, LIMIT);
+        (void)bt_trigger_electrode(&trigger, 7, first);
+        assert_int_equal(bt_trigger_energy(&trigger), 0);
+        assert_int_equal(trigger.smooth.lane[7], first);
+        assert_int_equal(trigger.rest.lane[7], first);
+        assert_false(trigger.unknown >> 7 & 1);
+        (void)bt_trigger_pressure(&trigger, first, 6);
+        assert_true(trigger.room >= 0);
+        assert_false(trigger.unknown >> BT_LANE_PDC & 1);
     }
 }
 
@@ -52,11 +52,11 @@ static void a_tare_from_the_host_holds_from_the_second_word_on(void **state)
         assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
         bt_round frame = next_frame(&finger);
         assert_int_equal(feed(&finger, &frame), -1);
-        assert_int_equal(bt_gate_energy(&finger.tare.gate), 0);
+        assert_int_equal(bt_trigger_energy(&finger.tare.trigger), 0);
         // The electrode with which (i + 1) first^2 passes 1000.
         int seen = first == 0 ? BT_ELECTRODES : SETTING_COUNT2 / (first * first);
         assert_int_equal(feed(&finger, &frame), seen < BT_ELECTRODES ? seen : -1);
-        assert_int_equal(bt_gate_energy(&finger.tare.gate), 19 * first * first);
+        assert_int_equal(bt_trigger_energy(&finger.tare.trigger), 19 * first * first);
     }
 }
 

@@ -115,7 +115,8 @@ static void three_frames_over_the_threshold_make_a_contact_and_two_do_not(void *
             assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
         }
     }
-    finger.load = 600; // every electrode moves far: the gate sees the second frame, then three of them count
+    finger.load =
+        600; // every electrode moves far: the trigger sees the second frame, then three of them count
     assert_int_equal(run_until(&finger, BT_TARE_STATE_CONTACT, 10), 4);
 }
 

@@ -97,7 +97,7 @@ static void assert_followed(const emulated_finger *finger, const bt_baseline *fr
                      gain_milli, step, sweeps);
         }
         assert_int_equal(finger->tare.electrode_q4[i], bt_tare_q4(finger->tare.base.electrode_q16[i]));
-        assert_int_equal(finger->tare.gate.rest.lane[i], lround(start + got));
+        assert_int_equal(finger->tare.trigger.rest.lane[i], lround(start + got));
     }
 }
 

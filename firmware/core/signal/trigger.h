@@ -1,4 +1,4 @@
-// The gate: every word of an electrode, or of static pressure, as it arrives. It takes single-sample
+// The trigger: every word of an electrode, or of static pressure, as it arrives. It takes single-sample
 // glitches out and adds the word's distance from rest to the round's energy, so that a touch is seen in
 // the slot in which it happens and not at the round's end.
 //
@@ -13,8 +13,8 @@
 //
 // Units: counts; energies in count^2 summed over electrodes. No rounding, but that `rest` is the tare in
 // whole counts: the energy is off by at most |e| + 1/4 for each electrode.
-#ifndef BIOTAC_GATE_H
-#define BIOTAC_GATE_H
+#ifndef BIOTAC_TRIGGER_H
+#define BIOTAC_TRIGGER_H
 
 #include "signal/round.h"
 
@@ -29,12 +29,12 @@ typedef union {
 
 // What both are of a lane that never had a good word: it adds no energy, every first word is far from it, and
 // eight of it fit the sum of a sweep.
-#define BT_GATE_UNREAD 8191
+#define BT_TRIGGER_UNREAD 8191
 
 typedef struct {
     bt_lanes smooth;  // the filter's value
     bt_lanes rest;    // what it is compared with
-    int32_t room;     // energy left until the gate opens; negative once it has
+    int32_t room;     // energy left until the trigger fires; negative once it has
     int32_t limit;    // the room that the round began with
     uint32_t unknown; // lanes without a good word so far, a bit each
     uint32_t met;     // lanes whose first good word came and that the owner has not taken note of
@@ -43,74 +43,74 @@ typedef struct {
     uint8_t missing; // electrodes of this round
     uint8_t railed;
     bool pressure_now; // this round had a good pressure word
-} bt_gate;
+} bt_trigger;
 
-// More than any round can use up: a gate with this limit never opens.
-#define BT_GATE_NEVER (1 << 30)
+// More than any round can use up: a trigger with this limit never fires.
+#define BT_TRIGGER_NEVER (1 << 30)
 
-void bt_gate_reset(bt_gate *gate);
+void bt_trigger_reset(bt_trigger *trigger);
 
-// A round begins; the gate opens when its energy passes limit_count2, below BT_GATE_NEVER.
+// A round begins; the trigger fires when its energy passes limit_count2, below BT_TRIGGER_NEVER.
 #ifndef BT_CDEF
-static inline void bt_gate_begin(bt_gate *gate, int32_t limit_count2)
+static inline void bt_trigger_begin(bt_trigger *trigger, int32_t limit_count2)
 {
-    gate->limit = limit_count2;
-    gate->room = limit_count2;
-    gate->far_before = gate->far;
-    gate->far = 0;
-    gate->missing = 0;
-    gate->railed = 0;
-    gate->pressure_now = false;
+    trigger->limit = limit_count2;
+    trigger->room = limit_count2;
+    trigger->far_before = trigger->far;
+    trigger->far = 0;
+    trigger->missing = 0;
+    trigger->railed = 0;
+    trigger->pressure_now = false;
 }
 #endif
 
 // Out of the ordinary: a word that is missing or railed, and one that is far off. The first returns the room
 // left, the second the filter's new value.
-int32_t bt_gate_repeat(bt_gate *gate, unsigned electrode, uint16_t count);
-uint16_t bt_gate_far(bt_gate *gate, unsigned lane, uint16_t count);
+int32_t bt_trigger_repeat(bt_trigger *trigger, unsigned electrode, uint16_t count);
+uint16_t bt_trigger_far(bt_trigger *trigger, unsigned lane, uint16_t count);
 
-#define BT_GATE_FAR 24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
+#define BT_TRIGGER_FAR 24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
 
 #ifndef BT_CDEF // in every slot, so these are inlined
-static inline uint16_t bt_gate_filter(bt_gate *gate, unsigned lane, uint16_t count, uint16_t from)
+static inline uint16_t bt_trigger_filter(bt_trigger *trigger, unsigned lane, uint16_t count, uint16_t from)
 {
-    if ((uint32_t)count - from + BT_GATE_FAR > 2 * BT_GATE_FAR) {
-        count = bt_gate_far(gate, lane, count);
+    if ((uint32_t)count - from + BT_TRIGGER_FAR > 2 * BT_TRIGGER_FAR) {
+        count = bt_trigger_far(trigger, lane, count);
     }
-    gate->smooth.lane[lane] = count;
+    trigger->smooth.lane[lane] = count;
     return count;
 }
 
 // One electrode's word, 0..4095 or BT_INVALID_COUNT, where nobody waits for a touch.
-static inline void bt_gate_follow(bt_gate *gate, unsigned electrode, uint16_t count)
+static inline void bt_trigger_follow(bt_trigger *trigger, unsigned electrode, uint16_t count)
 {
     if (bt_count_usable(count)) {
-        (void)bt_gate_filter(gate, electrode, count, gate->smooth.lane[electrode]);
+        (void)bt_trigger_filter(trigger, electrode, count, trigger->smooth.lane[electrode]);
     } else {
-        (void)bt_gate_repeat(gate, electrode, count);
+        (void)bt_trigger_repeat(trigger, electrode, count);
     }
 }
 
 // The same where somebody does. Returns the room left.
-static inline int32_t bt_gate_electrode(bt_gate *gate, unsigned electrode, uint16_t count)
+static inline int32_t bt_trigger_electrode(bt_trigger *trigger, unsigned electrode, uint16_t count)
 {
     if (!bt_count_usable(count)) {
-        return bt_gate_repeat(gate, electrode, count);
+        return bt_trigger_repeat(trigger, electrode, count);
     }
-    uint16_t smooth = bt_gate_filter(gate, electrode, count, gate->rest.lane[electrode]);
-    int32_t e = smooth - gate->rest.lane[electrode]; // a first word sets its own rest
-    return gate->room -= e * e;
+    uint16_t smooth = bt_trigger_filter(trigger, electrode, count, trigger->rest.lane[electrode]);
+    int32_t e = smooth - trigger->rest.lane[electrode]; // a first word sets its own rest
+    return trigger->room -= e * e;
 }
 #endif
 
-// The pressure word; `above` is what the filter's value may be over rest. Opens the gate when it is more.
-int32_t bt_gate_pressure(bt_gate *gate, uint16_t count, int32_t above);
+// The pressure word; `above` is what the filter's value may be over rest. Fires the trigger when it is more.
+int32_t bt_trigger_pressure(bt_trigger *trigger, uint16_t count, int32_t above);
 
 // The round's energy so far.
 #ifndef BT_CDEF
-static inline uint32_t bt_gate_energy(const bt_gate *gate)
+static inline uint32_t bt_trigger_energy(const bt_trigger *trigger)
 {
-    return (uint32_t)(gate->limit - gate->room);
+    return (uint32_t)(trigger->limit - trigger->room);
 }
 #endif
 

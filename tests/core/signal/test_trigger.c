@@ -1,10 +1,10 @@
-// The gate, word by word: what it holds back, what it lets through and in which slot, and that its energy
+// The trigger, word by word: what it holds back, what it lets through and in which slot, and that its energy
 // is the sum that it claims to be.
 #include "emulated_finger.h"
 
 #define LIMIT 1000
 
-// The gate's filter as a story: a word is believed when it is near rest, which the first one was, or when
+// The trigger's filter as a story: a word is believed when it is near rest, which the first one was, or when
 // the round before had one that was not near either.
 typedef struct {
     int rest; // 0: none yet
@@ -30,25 +30,25 @@ static int told(lane_story *story, uint16_t word)
     return story->believed;
 }
 
-// A gate whose electrodes have all read their rest once.
-static bt_gate rested_gate(const uint16_t rest[BT_ELECTRODES])
+// A trigger whose electrodes have all read their rest once.
+static bt_trigger rested_trigger(const uint16_t rest[BT_ELECTRODES])
 {
-    bt_gate gate;
-    bt_gate_reset(&gate);
+    bt_trigger trigger;
+    bt_trigger_reset(&trigger);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        (void)bt_gate_electrode(&gate, i, rest[i]);
+        (void)bt_trigger_electrode(&trigger, i, rest[i]);
     }
-    assert_int_equal(bt_gate_energy(&gate), 0);
-    return gate;
+    assert_int_equal(bt_trigger_energy(&trigger), 0);
+    return trigger;
 }
 
-static uint32_t round_energy(bt_gate *gate, int32_t limit, const uint16_t word[BT_ELECTRODES])
+static uint32_t round_energy(bt_trigger *trigger, int32_t limit, const uint16_t word[BT_ELECTRODES])
 {
-    bt_gate_begin(gate, limit);
+    bt_trigger_begin(trigger, limit);
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-        (void)bt_gate_electrode(gate, i, word[i]);
+        (void)bt_trigger_electrode(trigger, i, word[i]);
     }
-    return bt_gate_energy(gate);
+    return bt_trigger_energy(trigger);
 }
 
 // ---- glitches --------------------------------------------------------------------------------------
@@ -61,15 +61,15 @@ static void lone_glitches_of_any_size_reach_neither_energy_nor_means(void **stat
     for (int i = 0; i < BT_ELECTRODES; i++) {
         rest[i] = i % 2 ? 4045 : 45; // each can glitch by 4000
     }
-    bt_gate gate = rested_gate(rest);
+    bt_trigger trigger = rested_trigger(rest);
     bt_sweep_restart(&sweep);
     for (int round = 0; round < 2 * 3976; round++) {
         memcpy(word, rest, sizeof word);
         int glitching = round / 2 * 7 % BT_ELECTRODES;
         int size = round % 2 ? 0 : 25 + round / 2;
         word[glitching] = (uint16_t)(rest[glitching] + (glitching % 2 ? -size : size));
-        assert_int_equal(round_energy(&gate, LIMIT, word), 0);
-        bt_sweep_add(&sweep, &gate.smooth);
+        assert_int_equal(round_energy(&trigger, LIMIT, word), 0);
+        bt_sweep_add(&sweep, &trigger.smooth);
         for (unsigned i = bt_sweep_first(&sweep); i < bt_sweep_end(&sweep) && i < BT_ELECTRODES; i++) {
             assert_int_equal(bt_sweep_close(&sweep, i, 96), 8 * rest[i]);
         }
@@ -77,7 +77,7 @@ static void lone_glitches_of_any_size_reach_neither_energy_nor_means(void **stat
     }
     // One count less is a word like any other.
     word[3] = (uint16_t)(rest[3] - 24);
-    assert_int_equal(round_energy(&gate, LIMIT, word), 24 * 24);
+    assert_int_equal(round_energy(&trigger, LIMIT, word), 24 * 24);
 }
 
 static void a_glitch_on_every_electrode_at_once_is_held_back_too(void **state)
@@ -90,11 +90,11 @@ static void a_glitch_on_every_electrode_at_once_is_held_back_too(void **state)
             rest[i] = (uint16_t)random_range(&seed, 101, 4000);
             word[i] = (uint16_t)(rest[i] - random_range(&seed, 25, 100));
         }
-        bt_gate gate = rested_gate(rest);
-        assert_int_equal(round_energy(&gate, LIMIT, word), 0);
-        assert_int_equal(round_energy(&gate, LIMIT, rest), 0);
-        assert_int_equal(round_energy(&gate, LIMIT, word), 0); // and the next one is a new one
-        assert_true(round_energy(&gate, LIMIT, word) >= 19 * 25 * 25);
+        bt_trigger trigger = rested_trigger(rest);
+        assert_int_equal(round_energy(&trigger, LIMIT, word), 0);
+        assert_int_equal(round_energy(&trigger, LIMIT, rest), 0);
+        assert_int_equal(round_energy(&trigger, LIMIT, word), 0); // and the next one is a new one
+        assert_true(round_energy(&trigger, LIMIT, word) >= 19 * 25 * 25);
     }
 }
 
@@ -109,7 +109,7 @@ static void a_jump_and_a_gap_are_forgotten(void **state)
         for (int round = 0; round < 6; round++) {
             bt_round frame = frame_without(&finger, 4, 1, course[round]);
             assert_int_equal(feed(&finger, &frame), round == 5 ? 4 : -1);
-            assert_true(round == 5 || bt_gate_energy(&finger.tare.gate) == 0);
+            assert_true(round == 5 || bt_trigger_energy(&finger.tare.trigger) == 0);
         }
         // The same with pressure.
         finger = resting;
@@ -133,9 +133,9 @@ static void a_step_is_seen_with_the_second_word_of_the_electrode_that_stepped(vo
             bt_round frame = next_frame(&finger);
             frame.electrode[i] = (uint16_t)(frame.electrode[i] - size);
             assert_int_equal(feed(&finger, &frame), -1);
-            assert_int_equal(bt_gate_energy(&finger.tare.gate), 0);
+            assert_int_equal(bt_trigger_energy(&finger.tare.trigger), 0);
             assert_int_equal(feed(&finger, &frame), size * size > SETTING_COUNT2 ? i : -1);
-            assert_int_equal(bt_gate_energy(&finger.tare.gate), size * size);
+            assert_int_equal(bt_trigger_energy(&finger.tare.trigger), size * size);
             assert_int_equal(feed(&finger, &frame), -1); // told once
         }
     }
@@ -162,9 +162,9 @@ static void the_slot_told_is_that_in_which_the_sum_passes_the_threshold(void **s
             }
         }
         assert_int_equal(feed(&finger, &frame), expected[0]);
-        assert_int_equal(bt_gate_energy(&finger.tare.gate), sum[0]);
+        assert_int_equal(bt_trigger_energy(&finger.tare.trigger), sum[0]);
         assert_int_equal(feed(&finger, &frame), expected[0] < 0 ? expected[1] : -1);
-        assert_int_equal(bt_gate_energy(&finger.tare.gate), sum[1]);
+        assert_int_equal(bt_trigger_energy(&finger.tare.trigger), sum[1]);
         seen[expected[1] + 1]++;
     }
     for (int i = 0; i <= BT_ELECTRODES; i++) {
@@ -181,7 +181,7 @@ static void motion_that_goes_on_is_followed_word_by_word(void **state)
         rest[i] = 100;
         word[i] = 2000;
     }
-    bt_gate gate = rested_gate(rest);
+    bt_trigger trigger = rested_trigger(rest);
     for (int round = 0; round < 1000; round++) {
         uint32_t energy = 0;
         for (int i = 0; i < BT_ELECTRODES; i++) {
@@ -190,7 +190,7 @@ static void motion_that_goes_on_is_followed_word_by_word(void **state)
             word[i] = (uint16_t)(word[i] + (down ? -size : size));
             energy += round == 0 ? 0 : (uint32_t)((word[i] - 100) * (word[i] - 100));
         }
-        assert_int_equal(round_energy(&gate, BT_GATE_NEVER, word), energy);
+        assert_int_equal(round_energy(&trigger, BT_TRIGGER_NEVER, word), energy);
     }
 }
 
@@ -206,9 +206,9 @@ static void pressure_opens_the_gate_and_leaves_the_energy_alone(void **state)
         int first = above > 6 && above <= 24 ? BT_LANE_PDC : -1;
         int second = above > 24 ? BT_LANE_PDC : -1;
         assert_int_equal(feed(&finger, &frame), first);
-        assert_int_equal(bt_gate_energy(&finger.tare.gate), 400);
+        assert_int_equal(bt_trigger_energy(&finger.tare.trigger), 400);
         assert_int_equal(feed(&finger, &frame), second);
-        assert_int_equal(bt_gate_energy(&finger.tare.gate), 400);
+        assert_int_equal(bt_trigger_energy(&finger.tare.trigger), 400);
         assert_int_equal(feed(&finger, &frame), -1);
         assert_int_equal(finger.tare.hits, above <= 6 ? 0 : above <= 24 ? 0 : 2);
         assert_int_equal(finger.tare.state,
@@ -227,7 +227,7 @@ static void pressure_without_a_known_rest_opens_nothing(void **state)
         finger.pdc_load = 5 * round;
         bt_round frame = next_frame(&finger);
         assert_int_equal(feed(&finger, &frame), -1);
-        assert_true(finger.tare.gate.room >= 0);
+        assert_true(finger.tare.trigger.room >= 0);
     }
     assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
 }
@@ -257,7 +257,7 @@ static void the_gate_stays_shut_where_nobody_rests(void **state)
             frame.pdc = (uint16_t)random_range(&seed, 1, 4089);
             assert_int_equal(fingers[k]->tare.state, states[k]);
             assert_int_equal(feed(fingers[k], &frame), -1);
-            assert_true(fingers[k]->tare.gate.room >= 0);
+            assert_true(fingers[k]->tare.trigger.room >= 0);
         }
     }
 }
@@ -278,7 +278,7 @@ static void the_energy_is_the_brute_force_sum_of_squares(void **state)
             word[i] = rest[i];
             (void)told(&story[i], rest[i]);
         }
-        bt_gate gate = rested_gate(rest);
+        bt_trigger trigger = rested_trigger(rest);
         for (int round = 0; round < 100; round++) {
             uint32_t energy = 0;
             int missing = 0, railed = 0;
@@ -293,10 +293,10 @@ static void the_energy_is_the_brute_force_sum_of_squares(void **state)
                 int e = told(&story[i], word[i]) - rest[i];
                 energy += (uint32_t)(e * e);
             }
-            assert_int_equal(round_energy(&gate, LIMIT, word), energy);
-            assert_int_equal(gate.room<0, energy> LIMIT);
-            assert_int_equal(gate.missing, missing);
-            assert_int_equal(gate.railed, railed);
+            assert_int_equal(round_energy(&trigger, LIMIT, word), energy);
+            assert_int_equal(trigger.room<0, energy> LIMIT);
+            assert_int_equal(trigger.missing, missing);
+            assert_int_equal(trigger.railed, railed);
         }
     }
 }
@@ -312,23 +312,23 @@ static void the_ends_of_the_range_do_not_overflow(void **state)
     }
     for (int k = 0; k < 3; k++) {
         for (int up = 0; up < 2; up++) {
-            bt_gate gate = rested_gate(up ? low : high);
-            bt_gate_begin(&gate, limits[k]);
-            (void)bt_gate_pressure(&gate, 1, 6);
+            bt_trigger trigger = rested_trigger(up ? low : high);
+            bt_trigger_begin(&trigger, limits[k]);
+            (void)bt_trigger_pressure(&trigger, 1, 6);
             uint32_t full = 19u * 4088 * 4088;
-            assert_int_equal(round_energy(&gate, limits[k], up ? high : low), 0);
-            (void)bt_gate_pressure(&gate, 4089, 6);
-            assert_int_equal(round_energy(&gate, limits[k], up ? high : low), full);
-            assert_true(gate.room < 0);
-            assert_true(bt_gate_pressure(&gate, 4089, 6) < 0);
-            assert_int_equal(bt_gate_energy(&gate), full);
+            assert_int_equal(round_energy(&trigger, limits[k], up ? high : low), 0);
+            (void)bt_trigger_pressure(&trigger, 4089, 6);
+            assert_int_equal(round_energy(&trigger, limits[k], up ? high : low), full);
+            assert_true(trigger.room < 0);
+            assert_true(bt_trigger_pressure(&trigger, 4089, 6) < 0);
+            assert_int_equal(bt_trigger_energy(&trigger), full);
             // And with the pressure first, though no slot order has it so.
-            bt_gate_begin(&gate, limits[k]);
-            assert_true(bt_gate_pressure(&gate, 4089, 6) < 0);
+            bt_trigger_begin(&trigger, limits[k]);
+            assert_true(bt_trigger_pressure(&trigger, 4089, 6) < 0);
             for (unsigned i = 0; i < BT_ELECTRODES; i++) {
-                assert_true(bt_gate_electrode(&gate, i, up ? high[i] : low[i]) < 0);
+                assert_true(bt_trigger_electrode(&trigger, i, up ? high[i] : low[i]) < 0);
             }
-            assert_int_equal(bt_gate_energy(&gate), full);
+            assert_int_equal(bt_trigger_energy(&trigger), full);
         }
     }
 }

@@ -1,0 +1,59 @@
+#include "signal/trigger.h"
+
+#include <string.h>
+
+_Static_assert(BT_LANES % 2 == 0 && sizeof(bt_lanes) == BT_LANES * sizeof(uint16_t), "lanes go in pairs");
+_Static_assert(BT_LANES <= 32, "lanes are bits of a word");
+_Static_assert(BT_FULL_SCALE_COUNT + BT_TRIGGER_FAR < BT_TRIGGER_UNREAD, "a first word must be far");
+_Static_assert(BT_ELECTRODES * BT_FULL_SCALE_COUNT * BT_FULL_SCALE_COUNT < BT_TRIGGER_NEVER,
+               "no round's energy reaches BT_TRIGGER_NEVER");
+_Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX * 4LL < BT_TRIGGER_NEVER,
+               "a limit leaves room below zero");
+
+void bt_trigger_reset(bt_trigger *trigger)
+{
+    memset(trigger, 0, sizeof *trigger);
+    trigger->unknown = (1u << BT_LANES) - 1;
+    for (unsigned i = 0; i < BT_LANES; i++) {
+        trigger->smooth.lane[i] = BT_TRIGGER_UNREAD;
+        trigger->rest.lane[i] = BT_TRIGGER_UNREAD;
+    }
+    bt_trigger_begin(trigger, BT_TRIGGER_NEVER);
+}
+
+int32_t bt_trigger_repeat(bt_trigger *trigger, unsigned electrode, uint16_t count)
+{
+    trigger->missing = (uint8_t)(trigger->missing + (count == BT_INVALID_COUNT));
+    trigger->railed = (uint8_t)(trigger->railed + bt_count_railed(count));
+    // A glitch, a gap and a glitch are no touch: what was held back before a gap is forgotten.
+    int32_t e = (int32_t)trigger->smooth.lane[electrode] - trigger->rest.lane[electrode];
+    return trigger->room -= e * e;
+}
+
+uint16_t bt_trigger_far(bt_trigger *trigger, unsigned lane, uint16_t count)
+{
+    uint32_t bit = 1u << lane;
+    if (trigger->unknown & bit) {
+        trigger->unknown &= ~bit;
+        trigger->met |= bit;
+        trigger->rest.lane[lane] = count;
+        return count;
+    }
+    trigger->far |= bit;
+    return trigger->far_before & bit ? count : trigger->smooth.lane[lane];
+}
+
+int32_t bt_trigger_pressure(bt_trigger *trigger, uint16_t count, int32_t above)
+{
+    trigger->pressure_now = bt_count_usable(count);
+    if (trigger->pressure_now) {
+        uint16_t smooth = bt_trigger_filter(trigger, BT_LANE_PDC, count, trigger->smooth.lane[BT_LANE_PDC]);
+        uint16_t rest = trigger->rest.lane[BT_LANE_PDC];
+        if (rest != 0 && smooth - rest > above && trigger->room >= 0 && trigger->limit != BT_TRIGGER_NEVER) {
+            // Both move, so that the energy stays what it is.
+            trigger->limit -= BT_TRIGGER_NEVER;
+            trigger->room -= BT_TRIGGER_NEVER;
+        }
+    }
+    return trigger->room;
+}
