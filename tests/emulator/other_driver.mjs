@@ -33,7 +33,7 @@ for (const { mosi, hz, wait_us } of JSON.parse(course)) {
   now += board.clockOut(now, mosi, 16, 1e9 / hz) + 1e9 / hz
   board.lead(now, SELECTS[0], true)
   board.runUntil(now)
-  words.push(board.bits.reduce((word, bit) => (word << 1) | bit, 0))
+  words.push(board.word)
   now += wait_us * 1000
 }
 console.log(JSON.stringify({ words, counters: board.counters() }))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +11,8 @@ import pytest
 from rig import all_rigs, in_ci, prepare
 
 import biotac
+from biotac.doctor import Facts, PairFacts, leads
+from biotac.doctor.listening import listen
 from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimLink
@@ -17,7 +20,7 @@ from biotac.sim.two_picos import TwoPicos
 from biotac.wire import messages_gen as wire
 
 SETTLE_US = 50
-DAY_S, NIGHT_S = 0.1, 60.0
+DAY_S, NIGHT_S = 1.0, 60.0
 
 Open = Callable[[float], tuple[biotac.Hand, TwoPicos]]
 
@@ -99,6 +102,35 @@ def test_faults_by_command_are_seen_on_their_finger_and_on_no_other(opened: Open
             for name in ("words_parity", "words_stuck", "words_error"):
                 assert getattr(after[finger], name) == 0, (fault.name, finger, name)
     assert board.sensor_board.status().words_late == 0
+
+
+LEADS = {
+    "SCK to nothing": ("lead_clock", ""),
+    "MOSI to nothing": ("lead_mosi", ""),
+    "MISO to nothing": ("lead_miso", ""),
+    "MISO to MOSI": ("lead_miso", ""),
+    "SS2 to nothing": ("lead_select", "finger 2 "),
+}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("lead", LEADS)
+def test_the_doctor_names_the_lead_that_is_wrong(opened: Open, lead: str) -> None:
+    code, words = LEADS[lead]
+    hand, board = opened(1.0)
+    pair = board.sensor_board
+    assert pair is not None
+    board_facts = listen(hand, 0.1)
+    board.do(f"lead {lead}")
+    if lead == "MISO to MOSI":
+        board.do("lead MOSI to MISO")
+    states, before = [hand.sensor_status(finger) for finger in range(5)], pair.status()
+    hand.read_batch(0.3)  # where no sensor is left, to the tape's end
+    after = [hand.sensor_status(finger) for finger in range(5)]
+    board_facts = replace(board_facts, sensors_before=states, sensors_after=after)
+    found = list(leads.check(Facts(hand.port, board=board_facts, pair=PairFacts(before, pair.status(), pair.serials))))
+    assert [finding.code for finding in found] == [code], found
+    assert words in found[0].seen
 
 
 def test_places_on_the_tape_are_told_apart() -> None:

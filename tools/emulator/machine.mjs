@@ -2,6 +2,7 @@
 import { ConsoleLogger, LogLevel, RP2040 } from 'rp2040js'
 
 import { correctCore, DeviceTime, execute, wakes } from './faults.mjs'
+import { speedUp } from './speed.mjs'
 
 export const FLASH_BYTES = 2 * 1024 * 1024 // of a Pico
 const BOOT2_BYTES = 0x100
@@ -136,6 +137,7 @@ export class Machine {
     mcu.logger = new ConsoleLogger(LogLevel.Error, true)
     mcu.flash.set(this.flash)
     correctCore(mcu.core)
+    speedUp(mcu)
     this.mcu = mcu
     this.time = new DeviceTime(mcu)
     this.worldBefore = worldNanos

@@ -104,6 +104,8 @@ export class Rig {
       this.machine.slowness = Number(slow[1])
       return
     }
+    const lead = /^lead (\w+) to (\w+)$/.exec(verb) // of the sensors' board
+    if (lead) return this.sensors.connect(lead[1], lead[2] === 'nothing' ? null : lead[2])
     const file = /^write uf2 (.+)$/.exec(verb)
     if (file) {
       if (this.loader === null) throw new Error('no drive to write a UF2 to: the board is not in its loader')

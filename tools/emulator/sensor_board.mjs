@@ -16,11 +16,11 @@ import { UsbHost } from './usb.mjs'
 
 const [MISO, SCK, MOSI] = [16, 18, 19] // firmware/boards/pico_sensor/pins.h
 export const SELECTS = [2, 3, 4, 5, 6]
+const LEADS = { SCK, MOSI, MISO, SS0: 2, SS1: 3, SS2: 4, SS3: 5, SS4: 6 } // where each goes to when all is well
 const SYNCHRONISER_NS = 16 // two flip-flops behind each input
 const SAMPLE_COMMAND = 0x80 // and above
 const SLOTS = JSON.parse(fs.readFileSync(new URL('../../protocol/schema.json', import.meta.url))).sensor.frame.slots.length
 const TAPE_FRAMES_AT = 12
-const SAMPLE = -1 // in place of a pin: the gateway takes in MISO
 const SPI_BLOCK_BITS = 16
 
 export class SensorBoard {
@@ -29,8 +29,11 @@ export class SensorBoard {
     this.port = port
     this.frames = tape.readUInt32LE(TAPE_FRAMES_AT)
     this.stretched = false // no lead makes a word longer
-    this.edges = [] // [ns, pin, high], sorted by time
-    this.bits = []
+    this.ends = new Map(Object.values(LEADS).map((pin) => [pin, pin])) // of the gateway's leads; null: nowhere
+    this.edges = [] // {at: ns, pin, high}, sorted by time; those before `passed` are over
+    this.passed = 0
+    this.word = 0 // as the gateway's shift register has it
+    this.miso = { now: 0, before: 0, since: 0 }
     this.lateEdges = 0 // that came when the board was already past their time
     this.transfers = this.commands = 0
     this.fell = null // ns, when a select last fell
@@ -54,6 +57,16 @@ export class SensorBoard {
     return { transfers, commands, late_edges: lateEdges, answer_ns: slowestAnswer, answer_left_ns: leastLeft, usb: this.usb.state, instructions: this.machine.instructions, slept: this.machine.sleptNanos / this.machine.nanos }
   }
 
+  /** Have the gateway's lead of this name end where another one should, or nowhere (null); both are names of LEADS. */
+  connect(name, end) {
+    if (!(name in LEADS) || (end !== null && !(end in LEADS))) {
+      throw new Error(`no lead ${name} to ${end}: expected of ${Object.keys(LEADS).join(', ')}`)
+    }
+    const left = this.ends.get(LEADS[name])
+    if (left !== null && left !== MISO) this.pio.input(left, SELECTS.includes(left)) // what is pulled there
+    this.ends.set(LEADS[name], end === null ? null : LEADS[end])
+  }
+
   powerCycle() {
     this.machine.powerCycle()
   }
@@ -74,7 +87,7 @@ export class SensorBoard {
     const spi = mcu.spi[0]
     const done = mcu.clock.createAlarm(() => {
       this.follow()
-      spi.completeTransmit(this.bits.reduce((word, bit) => (word << 1) | bit, 0))
+      spi.completeTransmit(this.word)
     })
     spi.onTransmit = (mosi) => {
       if (!WIDTHS.includes(spi.dataBits) || spi.spiMode !== 0) throw new Error('the gateway speaks another SPI')
@@ -98,10 +111,9 @@ export class SensorBoard {
 
   /** A word's edges, the first bit out half a period before the clock first rises. Returns how long it takes in ns. */
   clockOut(start, mosi, bits, period) {
-    this.bits = []
+    this.word = 0
     for (let k = 0; k < bits; k++) {
       this.lead(start + k * period, MOSI, ((mosi >> (bits - 1 - k)) & 1) === 1)
-      this.lead(start + (k + 0.5) * period, SAMPLE)
       this.lead(start + (k + 0.5) * period, SCK, true)
       this.lead(start + (k + 1) * period, SCK, false)
     }
@@ -109,32 +121,38 @@ export class SensorBoard {
     return bits * period
   }
 
-  /** A lead's level at a time of the gateway's: SELECTS, SCK, MOSI; or when MISO is taken in. */
+  /** A lead's level at a time of the gateway's: SELECTS, SCK, MOSI. */
   lead(nanos, pin, high) {
     if (SELECTS.includes(pin)) this.fell = high ? null : nanos
-    const at = nanos + this.behind + (pin === SAMPLE ? 0 : SYNCHRONISER_NS)
+    const at = nanos + this.behind + SYNCHRONISER_NS
     let k = this.edges.length
-    while (k > 0 && this.edges[k - 1][0] > at) k--
-    this.edges.splice(k, 0, [at, pin, high])
-    if (k === 0) this.#await()
+    while (k > this.passed && this.edges[k - 1].at > at) k--
+    this.edges.splice(k, 0, { at, pin, high })
+    if (k === this.passed) this.#await()
   }
 
   #await() {
-    if (this.edges.length === 0) return
+    if (this.passed === this.edges.length) {
+      this.edges = []
+      this.passed = 0
+      return
+    }
     const { nanos } = this.machine
-    const [at] = this.edges[0]
+    const { at } = this.edges[this.passed]
     if (at < nanos - 1e-3) this.lateEdges++
     this.next.schedule(Math.max(0, at - nanos))
   }
 
   #arrive() {
-    const [at, pin, high] = this.edges.shift()
-    if (pin === SAMPLE) {
-      this.pio.advance()
-      this.bits.push(this.machine.mcu.gpio[MISO].value === GPIOPinState.High ? 1 : 0)
-    } else {
-      if (SELECTS.includes(pin)) this.selectFell = high ? null : at - SYNCHRONISER_NS
-      this.pio.input(pin, high)
+    const { at, pin, high } = this.edges[this.passed++]
+    const left = at - SYNCHRONISER_NS // when it left the gateway
+    if (SELECTS.includes(pin)) this.selectFell = high ? null : left
+    const end = this.ends.get(pin)
+    if (end !== null && end !== MISO) this.pio.input(end, high)
+    if (pin === SCK && high) {
+      const { now, before, since } = this.miso
+      const bit = this.ends.get(MISO) !== MISO ? 0 : since > left ? before : now // the gateway pulls its MISO down
+      this.word = (this.word << 1) | bit
     }
     this.#await()
   }
@@ -144,11 +162,14 @@ export class SensorBoard {
     this.pio = new PioTime(mcu)
     for (const pin of SELECTS) this.pio.input(pin, true) // the gateway's, or the pull-up's
     this.edges = []
+    this.passed = 0
     this.next = mcu.clock.createAlarm(() => this.#arrive())
     mcu.gpio[MISO].addListener((state) => {
-      const driven = state === GPIOPinState.High || state === GPIOPinState.Low
+      const high = state === GPIOPinState.High
+      this.miso = { now: high ? 1 : 0, before: this.miso.now, since: this.pio.nanos }
+      const driven = high || state === GPIOPinState.Low
       if (driven && this.selectFell !== null) {
-        this.slowestAnswer = Math.max(this.slowestAnswer, mcu.clock.nanos - this.selectFell)
+        this.slowestAnswer = Math.max(this.slowestAnswer, this.pio.nanos - this.selectFell)
         this.selectFell = null
       }
     })

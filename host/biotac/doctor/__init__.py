@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from . import bus, connection, sensors, tare, timing, version
+from . import bus, connection, leads, sensors, tare, timing, version
 from .catalogue import CATALOGUE, Entry, Finding, Severity
-from .facts import BoardFacts, Facts, SystemFacts
+from .facts import BoardFacts, Facts, PairFacts, SystemFacts
 
 CHECKS: tuple[Callable[[Facts], Iterator[Finding]], ...] = (
     connection.check,
     version.check,
+    leads.check,
     sensors.check,
     bus.check,
     timing.check,
@@ -27,4 +28,15 @@ def judge(facts: Facts) -> list[Finding]:
     return [finding for check in CHECKS for finding in check(facts)]
 
 
-__all__ = ["CATALOGUE", "CHECKS", "BoardFacts", "Entry", "Facts", "Finding", "Severity", "SystemFacts", "judge"]
+__all__ = [
+    "CATALOGUE",
+    "CHECKS",
+    "BoardFacts",
+    "Entry",
+    "Facts",
+    "Finding",
+    "PairFacts",
+    "Severity",
+    "SystemFacts",
+    "judge",
+]

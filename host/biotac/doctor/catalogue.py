@@ -118,6 +118,32 @@ CATALOGUE: dict[str, Entry] = {
         "The board runs an older release than this package, without what has been mended or added since.",
         "`biotac flash`, which keeps the board's settings, calibrations and maps.",
     ),
+    # ---- leads to a sensor board, with --sensor-port
+    "lead_clock": Entry(
+        E,
+        "The sensor board heard no clock while one of its selects was low.",
+        "Check SCK, then GND, then whether any select is connected at all.",
+    ),
+    "lead_mosi": Entry(
+        E,
+        "The sensors answer, but what they are told is no command: MOSI is open, or on another pin.",
+        "Check MOSI at both ends.",
+    ),
+    "lead_miso": Entry(
+        E,
+        "The sensors answer, and the gateway reads zeros or ones only: MISO is open, or crossed with MOSI.",
+        "Check MISO at both ends: it goes to MISO, not to MOSI.",
+    ),
+    "lead_select": Entry(
+        E,
+        "One finger's select does not come to its sensor; the other leads are right.",
+        "Check this finger's SS at both ends.",
+    ),
+    "lead_crossed": Entry(
+        E,
+        "A select ends at another finger's sensor, which answers with its own serial number.",
+        "Put the leads of SS in the order of the wiring table.",
+    ),
     # ---- sensors
     "no_sensor": Entry(
         E,

@@ -61,6 +61,19 @@ class BoardFacts:
 
 
 @dataclass(frozen=True)
+class PairFacts:
+    """What the sensor board at the other end of the leads heard meanwhile; all five of its sensors are plugged in."""
+
+    before: wire.EmuStatus
+    after: wire.EmuStatus
+    serials: tuple[str, ...]  #: by finger, as they were plugged in
+
+    def more(self, counter: str) -> int:
+        """By how much one of its 32-bit counters has grown."""
+        return int(getattr(self.after, counter) - getattr(self.before, counter)) % 2**32
+
+
+@dataclass(frozen=True)
 class Facts:
     """Everything about one port."""
 
@@ -69,3 +82,4 @@ class Facts:
     error: BiotacError | None = None  #: why it could not be opened, or was lost
     board: BoardFacts | None = None  #: None when it could not be examined
     expected_fingers: int | None = None
+    pair: PairFacts | None = None  #: where the sensors are a board of ours

@@ -34,14 +34,17 @@ class SensorBoard:
             seen = board_text(self.info.board)
             self._board.close()
             raise PortError(f"{link.port} is {seen}, no sensor board; name the other port, or `biotac flash` it")
+        self.serials: tuple[str, ...] = ()  #: of the sensors that are plugged in
         self._samples: npt.NDArray[np.uint16] = np.zeros((0, 1), np.uint16)
 
     def plug(self, source: Source) -> None:
         """Plug in as many sensors as ``source`` has fingers, which begin at its first row; then feed()."""
         frames, fingers, slots = source.samples.shape
         self._samples = source.samples.transpose(0, 2, 1).reshape(frames * slots, fingers)
+        own = tuple(f"BTEMU{finger + 1:011d}" for finger in range(fingers))
+        self.serials = source.serials + own[len(source.serials) :]
         for finger in range(sensor.MAX_SENSORS):
-            serial = source.serials[finger] if finger < len(source.serials) else ""
+            serial = self.serials[finger] if finger < fingers else ""
             padded = tuple(serial.encode().ljust(16, b"\0"))
             self._board.ask(wire.EmuPlug(0, finger, finger < fingers, padded), wire.EmuStatus)
 

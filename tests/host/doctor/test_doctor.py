@@ -18,7 +18,7 @@ import biotac
 from biotac import HandWarning
 from biotac.cli.main import main
 from biotac.clock import Fit
-from biotac.doctor import CATALOGUE, BoardFacts, Facts, SystemFacts, judge, udev
+from biotac.doctor import CATALOGUE, BoardFacts, Facts, PairFacts, SystemFacts, judge, leads, udev
 from biotac.doctor.system import look
 from biotac.doctor.version import release
 from biotac.errors import DeviceLostError, InputError, NotAGatewayError, PortError, WireVersionError
@@ -125,6 +125,42 @@ def port(device: str, number: str) -> SerialPort:
     return SerialPort(device, "", number, wire.USB_VENDOR, wire.USB_PRODUCT)
 
 
+def pair(words: int, *, error: int = 0, good: tuple[int, ...] = (), serials: tuple[str, ...] = ()) -> Facts:
+    """A sensor board that heard so many words; the gateway has good ones of some fingers, and error words."""
+    facts = healthy()
+    after = [
+        dataclasses.replace(before, words_good=100 * (before.finger in good), words_error=error)
+        for before in facts.sensors_before
+    ]
+    rows = rounds(good) if good else rounds()[:0]
+    changed = {"sensors_after": after, "frames": rows, "hello": hello(*RELEASE, fingers_present=0)}
+    status = [message(wire.EmuStatus, words=count) for count in (2**32 - 1, words - 1)]
+    who = [info(finger, f"BTEMU{k}") for k, finger in enumerate(good)]
+    return dataclasses.replace(board(sensors=who, **changed), pair=PairFacts(*status, serials))
+
+
+ALL = tuple(range(5))
+LEADS: list[tuple[Facts, list[tuple[str, str]]]] = [
+    (pair(500, good=ALL, serials=tuple(f"BTEMU{k}" for k in ALL)), []),
+    (pair(0), [("lead_clock", "not once clocked")]),
+    (pair(500, error=9), [("lead_mosi", "understood no command")]),
+    (pair(500), [("lead_miso", "500 words, and none came")]),
+    (pair(500, good=(0, 1, 3, 4)), [("lead_select", "finger 2 gives no word, fingers 0, 1, 3, 4 do")]),
+    (
+        pair(500, good=(1, 0, 2, 3, 4), serials=tuple(f"BTEMU{k}" for k in ALL)),
+        [("lead_crossed", "finger 1 ends at the sensor of finger 0"), ("lead_crossed", "finger 0 ends at")],
+    ),
+]
+
+
+@pytest.mark.parametrize(("facts", "expected"), LEADS)
+def test_the_lead_that_is_wrong_is_told_by_what_either_end_heard(facts: Facts, expected: list[tuple[str, str]]) -> None:
+    found = list(leads.check(facts))
+    assert [finding.code for finding in found] == [code for code, _ in expected]
+    for finding, (_, words) in zip(found, expected, strict=True):
+        assert words in finding.seen
+
+
 BEFORE = {"uptime_s": 10, "fingers_present": 0b11, "slots_late": 2**32 - 1}
 AFTER = {"uptime_s": 11, "fingers_present": 0b11, "slots_late": 2**32 - 1}
 STATS = LinkStats(1000, 200, 0, 0, 0, 0, 0)
@@ -225,7 +261,7 @@ def test_a_development_version_is_not_newer_than_its_release(version: str) -> No
 
 
 def test_every_code_has_a_case_and_a_page() -> None:
-    assert {case[0] for case in CASES} == set(CATALOGUE)
+    assert {case[0] for case in CASES} | {code for _, all_of in LEADS for code, _ in all_of} == set(CATALOGUE)
     page = (ROOT / "host/docs/doctor.md").read_text()
     for code, entry in CATALOGUE.items():
         assert f"## {code}\n" in page
@@ -474,3 +510,14 @@ def test_a_program_on_a_pty_is_not_blamed_for_its_clock(tmp_path: Path, capsys) 
         process.terminate()
         process.wait()
         process.stdout.close()
+
+
+def test_a_report_is_one_file_with_findings_and_what_they_were_judged_by(tmp_path, capsys) -> None:
+    place = tmp_path / "report.json"
+    assert main(["doctor", "sim:press.toml?fingers=2&seconds=2&pace=0", "--seconds", "1", "--report", str(place)]) == 0
+    told = json.loads(place.read_text())
+    assert told["findings"] == []
+    assert told["library"] == __version__
+    assert told["board"]["hello"]["fingers_present"] == 0b11
+    assert len(told["board"]["sensors_after"]) == 5
+    assert told["sensor_board"] is None

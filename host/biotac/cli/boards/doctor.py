@@ -4,15 +4,29 @@ from __future__ import annotations
 
 import argparse
 import json
+import platform
+import sys
 import textwrap
+import threading
+from contextlib import suppress
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
 from typing import Any
 
-from ...doctor import CATALOGUE, Facts, Finding, judge, udev
+from ...doctor import CATALOGUE, Facts, Finding, PairFacts, judge, udev
 from ...doctor.listening import examine
 from ...doctor.timing import slots_per_s
+from ...errors import BiotacError
+from ...link import open_link
+from ...partial_file import whole
+from ...sim.loading import load_source
+from ...sim.sensor_board import SensorBoard
+from ...version import __version__
+from ...wire.sensor_gen import MAX_SENSORS
 from .. import values
 
 EXAMPLE = "biotac doctor --fingers 5"
+PLAYED, PLAYED_S = "press.toml", 60.0
 CODES = f"""
 Exit code 0: healthy; 1: there are findings. Their codes are fixed:
 {textwrap.fill(" ".join(CATALOGUE), 100, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)}"""
@@ -23,20 +37,79 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = f"{parser.description}{CODES}"
     values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, default=3.0, help="how long to listen (default 3)")
+    parser.add_argument("--sensor-port", metavar="SENSOR", help="port of a sensor board that is wired to PORT")
+    parser.add_argument("--report", metavar="FILE", help="also write all of it as one JSON file, to send with a report")
     parser.add_argument("--fingers", type=int, help="how many sensors there should be (default: those that answer)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Examine, print the findings, return 1 if there are any."""
-    facts = examine(args.port, seconds=args.seconds, expected_fingers=args.fingers)
+    if args.sensor_port is None:
+        facts = examine(args.port, seconds=args.seconds, expected_fingers=args.fingers)
+    else:
+        facts = examine_pair(args.port, args.sensor_port, args.seconds)
     findings = judge(facts)
+    if args.report is not None:
+        with whole(Path(args.report), overwrite=True) as place:
+            place.write_text(json.dumps(report(facts, findings), indent=1, default=plain))
     if args.json:
-        print(
-            json.dumps({"port": facts.port, "measured": measured(facts), "findings": [as_facts(f) for f in findings]})
-        )
+        print(json.dumps(summary(facts, findings)))
     else:
         print_words(facts, findings)
     return 1 if findings else 0
+
+
+def examine_pair(port: str | None, sensor_port: str, seconds: float) -> Facts:
+    """A gateway whose sensors are a board of ours, which plays to it meanwhile."""
+    sensors = SensorBoard(open_link(sensor_port))
+    ended = threading.Event()
+    try:
+        sensors.plug(load_source(PLAYED, fingers=MAX_SENSORS, seconds=PLAYED_S))
+        feeding = threading.Thread(target=feed, args=(sensors, ended), name="biotac doctor sensors")
+        before = sensors.feed(until_full=True)
+        feeding.start()
+        facts = examine(port, seconds=seconds, expected_fingers=MAX_SENSORS)
+        ended.set()
+        feeding.join()
+        pair = PairFacts(before, sensors.status(), sensors.serials)
+    finally:
+        ended.set()
+        sensors.close()
+    return replace(facts, pair=pair)
+
+
+def feed(sensors: SensorBoard, ended: threading.Event) -> None:
+    """Until ended; a board that goes away is told by what is asked of it afterwards."""
+    with suppress(BiotacError):
+        sensors.feed(ended=ended)
+
+
+def summary(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
+    """For machines."""
+    return {"port": facts.port, "measured": measured(facts), "findings": [as_facts(f) for f in findings]}
+
+
+def report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
+    """What to send back: the findings, and what they were judged by but for the frames."""
+    board = facts.board
+    told = {} if board is None else {**vars(board), "frames": len(board.frames), "idle": len(board.idle)}
+    return {
+        "library": __version__,
+        "python": sys.version,
+        "computer": platform.platform(),
+        **summary(facts, findings),
+        "system": vars(facts.system),
+        "error": facts.error and str(facts.error),
+        "board": told,
+        "sensor_board": facts.pair and vars(facts.pair),
+    }
+
+
+def plain(value: object) -> object:
+    """A part of the facts as JSON has it."""
+    if not is_dataclass(value):
+        return str(value)
+    return {part.name: getattr(value, part.name) for part in fields(value)}
 
 
 def as_facts(finding: Finding) -> dict[str, str]:

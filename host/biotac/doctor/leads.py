@@ -1,0 +1,44 @@
+"""Which lead between a gateway and a sensor board is wrong, by what either end heard."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..wire.identity import ascii_text
+from ..wire.sensor_gen import MAX_SENSORS
+from .bus import KINDS
+from .catalogue import Finding
+from .facts import BoardFacts, Facts, PairFacts
+
+
+def check(facts: Facts) -> Iterator[Finding]:
+    """One finding at most of the leads that all sensors share; where those are right, one a select."""
+    board, pair = facts.board, facts.pair
+    if board is None or pair is None:
+        return
+    good = [finger for finger in range(MAX_SENSORS) if _well(board, finger)]
+    if good:
+        yield from _selects(board, pair, good)
+    elif not pair.more("words"):
+        yield Finding("lead_clock", "the sensor board was not once clocked with one of its selects low")
+    elif sum(board.more(finger, "words_error") for finger in range(MAX_SENSORS)):
+        seen = f"{pair.more('words')} words were read, and the sensors understood no command"
+        yield Finding("lead_mosi", seen)
+    else:
+        yield Finding("lead_miso", f"the sensors gave {pair.more('words')} words, and none came to the gateway")
+
+
+def _well(board: BoardFacts, finger: int) -> bool:
+    """More of its words were good than not: one or two may be of before a lead came off."""
+    return board.more(finger, "words_good") > sum(board.more(finger, kind) for kind in KINDS)
+
+
+def _selects(board: BoardFacts, pair: PairFacts, good: list[int]) -> Iterator[Finding]:
+    for finger in range(MAX_SENSORS):
+        if finger not in good:
+            yield Finding("lead_select", f"finger {finger} gives no word, fingers {', '.join(map(str, good))} do")
+    for sensor in board.sensors:
+        serial = ascii_text(sensor.serial)
+        if serial in pair.serials and serial != pair.serials[sensor.finger]:
+            ends = pair.serials.index(serial)
+            yield Finding("lead_crossed", f"the select of finger {sensor.finger} ends at the sensor of finger {ends}")
