@@ -184,6 +184,12 @@ bool port_link_up(void)
     return true;
 }
 
+void port_link_uart(uint32_t bits_per_s, uint32_t pins)
+{
+    (void)bits_per_s;
+    (void)pins;
+}
+
 bool port_flash_erase(uint32_t sector_offset)
 {
     memset(flash + sector_offset, 0xFF, BT_FLASH_SECTOR_BYTES);

@@ -319,10 +319,12 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
 {
     uint32_t told = 0;
     unsigned k = events->done < end ? events->done : 0;
-    const uint16_t *before = pac + k - BT_EVENTS_LAG;
-    if (k == 0 && end == BT_EVENTS_LAG) {
+    const uint16_t *before;
+    if (k > 0) {
+        before = pac + k - BT_EVENTS_LAG;
+    } else if (end == BT_EVENTS_LAG) {
         before = pac + BT_PAC_PER_FRAME - BT_EVENTS_LAG; // still those of the round before
-    } else if (k == 0) {
+    } else {
         k = BT_EVENTS_LAG; // they may be gone
         before = pac;
         events->now += BT_EVENTS_LAG;

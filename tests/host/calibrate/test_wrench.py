@@ -366,6 +366,8 @@ def _spoil(arrays: dict[str, Any], how: str) -> None:
         force /= 1000.0
     elif how == "railed":
         counts[:200, 16] = 0
+    elif how == "stuck":
+        counts[:, 6] = 1800 + np.arange(len(counts)) % 2
     elif how == "clipped":
         np.clip(force, None, 1.0, out=force)
     elif how == "other file":
@@ -400,6 +402,7 @@ def _spoil(arrays: dict[str, Any], how: str) -> None:
         ("millinewton", r"units of F per RMS count .* gf or mN"),
         ("kilonewton", r"units of F per RMS count .* kN or kgf"),
         ("railed", r"E17 is saturated .* 5\.0% of the rows"),
+        ("stuck", r"E7 swings over 1 count in 4000 rows: expected more than 2.* stuck"),
         ("clipped", r"read exactly 1 N along [xyz], the most of all: .* saturated"),
         ("other file", r"not aligned: .* lag of -?\d+ rows, .* R2 -?\d\.\d\d held out"),
         ("zero", r"F is 0 in every row"),

@@ -19,7 +19,7 @@ from ...wire.frames import electrode_signals
 from ..reference.samples import Reference
 from ..reference.timing import STEP_S, Alignment, align
 from . import contact
-from .run import MIN_REST_ROWS, REST_N, Run, check_clipping, check_rails, check_rows, check_units, drift_of
+from .run import MIN_REST_ROWS, REST_N, Run, check_clipping, check_electrodes, check_rows, check_units, drift_of
 
 Mask = npt.NDArray[np.bool_]
 
@@ -114,7 +114,7 @@ def _run(
 ) -> Joined:
     its = board.only(there)
     counts, e = its.counts, its.e
-    check_rails(where, counts)
+    check_electrodes(where, counts)
     tare = np.median(counts - e, axis=0)
     moved = float(np.abs(counts - e - tare).max())
     check_units(where, e, truth[:, :3])

@@ -27,6 +27,7 @@ MIN_REST_ROWS = 50
 MAX_REST_SWING_COUNTS = 100.0  # 10 % to 90 %: warming up is 8 counts in 10 s (biotac.md finding 6), a press hundreds
 RAIL_LOW, RAIL_HIGH = 0, 4090  # numerics.md 1.3: beyond these an electrode is railed
 MAX_RAILED_SHARE = 0.01
+LEAST_SWING_COUNTS = 2  # a live electrode's noise alone has more in so many rows
 MAX_CLIPPED_SHARE = 0.005
 # |F| per RMS count: the physics model presses a point and gives 0.06, a flat plate moves all electrodes and gives
 # 0.01 (median rows). Grams (x 102) and millinewtons (x 1000) fall outside however the finger is pressed.
@@ -100,7 +101,7 @@ def load_run(path: Path) -> Run:
         moment = to_lin_frame(numbers(path, "M", fields["M"], (rows, 3), "N mm"))
         about_normal, about_torsion = contact.torsion_truth(path, fields.get("torsion"), force, moment)
         truth = np.column_stack([force, moment, about_normal])
-    check_rails(path, counts)
+    check_electrodes(path, counts)
     rest: npt.NDArray[np.bool_] = np.linalg.norm(force, axis=1) < REST_N
     tare, notes = _tare(path, fields, counts, force, rest)
     check_units(path, counts - tare, force)
@@ -179,13 +180,20 @@ def check_clipping(path: object, name: str, force: Floats) -> None:
                 )
 
 
-def check_rails(path: object, counts: Floats) -> None:
+def check_electrodes(path: object, counts: Floats) -> None:
     share = ((counts <= RAIL_LOW) | (counts >= RAIL_HIGH)).mean(axis=0)
     worst = int(np.argmax(share))
     if share[worst] > MAX_RAILED_SHARE:
         raise RecordingError(
             f"{path}: {_sensor.ELECTRODE_NAMES[worst]} is saturated (count {RAIL_LOW}, or {RAIL_HIGH} and above) in "
             f"{share[worst]:.1%} of the rows: expected at most {MAX_RAILED_SHARE:.0%}; press less or see to it"
+        )
+    swing = np.ptp(counts, axis=0)
+    least = int(np.argmin(swing))
+    if swing[least] <= LEAST_SWING_COUNTS:
+        raise RecordingError(
+            f"{path}: {_sensor.ELECTRODE_NAMES[least]} swings over {swing[least]:.0f} count in {len(counts)} rows: "
+            f"expected more than {LEAST_SWING_COUNTS}; it is stuck, and a map without it is another finger's"
         )
 
 
