@@ -17,7 +17,7 @@ static bt_trigger trigger;
 static bt_finger rest_front, press_front, rest_whole, press_whole, press_force, press_poc, press_sigma,
     press_lin;
 static bt_finger rest_five[BT_MAX_FINGERS], press_five[BT_MAX_FINGERS], rest_words, rest_events, press_events,
-    jolt_events, slip_events;
+    shaken_events, jolt_events, slip_events;
 static bench_map pooled, pooled_6, pooled_7, affine, sign_split, gated, conductance, scaled_population;
 static bt_msg_frame message;
 static bt_msg_frame sent;
@@ -166,6 +166,14 @@ static void events_in_contact(const bt_solve_settings *settings)
     events(&press_events);
 }
 
+// The dearest: a held finger is shaken, and no event has been told of it so far.
+static void events_shaken(const bt_solve_settings *settings)
+{
+    (void)settings;
+    shaken_events.events.rises = shaken_events.events.falls = 1;
+    events(&shaken_events);
+}
+
 // What shakes and never is a slip: nothing touches.
 static void events_jolting(const bt_solve_settings *settings)
 {
@@ -263,6 +271,7 @@ const bench_scene bench_scenes[BENCH_SCENES] = {
     {"population map", "and Lin's, mixed", population},
     {"events", "at rest", events_at_rest},
     {"events", "in contact", events_in_contact},
+    {"events", "shaken, nothing told", events_shaken},
     {"events", "jolting", events_jolting},
     {"events", "slipping", events_slipping},
     {"bands", "a round", bands_of_a_round},
@@ -314,6 +323,10 @@ void bench_scenes_init(void)
     sink = bt_finger_events(&slip_events, 0, true);
     swing(&rest_events, 5);
     swing(&press_events, 5);
+    shaken_events = press_events;
+    shaken_events.events.landing = false;
+    shaken_events.events.level_count2 = 3200; // so that a round of this is not enough for any
+    swing(&shaken_events, 70);
     swing(&jolt_events, 200);
     swing(&slip_events, 200);
     for (int k = 0; k < 110; k++) { // until it has landed
