@@ -118,8 +118,8 @@ def test_record_into_no_folder_is_refused(capsys, tmp_path: Path) -> None:
 def test_an_unknown_port_exits_3(capsys, verb: str) -> None:
     assert "`biotac list`" in fails(capsys, 3, verb, "/dev/ttyNOWHERE7")
     expected = (
-        "expected a device path, serial:NUMBER, spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, "
-        "sim:SOURCE, emu:pico, replay:REC or zenoh:NAME"
+        "expected a device path, serial:NUMBER, uart:DEVICE?baud=N, spidev:BUS.DEVICE, socket://HOST:PORT, "
+        "rfc2217://HOST:PORT, sim:SOURCE, emu:pico, replay:REC or zenoh:NAME"
     )
     assert expected in fails(capsys, 3, verb, "telnet:1")
 
