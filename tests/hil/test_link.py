@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rig import Rig
 
 import biotac
 from biotac.wire import messages_gen as wire
@@ -102,13 +103,19 @@ def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(
     assert len(frames) + hand.stats.frames_lost == 5 * 200
 
 
-def test_a_cable_pulled_in_mid_frame_stops_the_stream_and_a_new_host_is_served(rig) -> None:
+def interrupted(rig: Rig, leave: str, come_back: str) -> biotac.Hand:
+    """A hand that streamed for two seconds, without its host from 1.2345 to 1.5."""
     rig.need("cable")
     hand = rig.open("press.toml?fingers=5&seconds=2")
-    hand.link.board.plan(1.2345, "unplug")
-    hand.link.board.plan(1.5, "plug")
+    hand.link.board.plan(1.2345, leave)
+    hand.link.board.plan(1.5, come_back)
     frames = hand.read(10)
     assert 90 * 5 < len(frames) < 125 * 5
+    return hand
+
+
+def test_a_cable_pulled_in_mid_frame_stops_the_stream_and_a_new_host_is_served(rig) -> None:
+    hand = interrupted(rig, "unplug", "plug")
     assert hand.link.board.counters()["usb"]["state"] == "configured"
     status = hand.status()
     assert status.streams == 0
@@ -117,12 +124,7 @@ def test_a_cable_pulled_in_mid_frame_stops_the_stream_and_a_new_host_is_served(r
 
 
 def test_a_bus_that_is_suspended_ends_the_stream_and_is_served_after_it(rig) -> None:
-    rig.need("cable")
-    hand = rig.open("press.toml?fingers=5&seconds=2")
-    hand.link.board.plan(1.2345, "suspend")
-    hand.link.board.plan(1.5, "resume")
-    frames = hand.read(10)
-    assert 90 * 5 < len(frames) < 125 * 5
+    hand = interrupted(rig, "suspend", "resume")
     usb = hand.link.board.counters()["usb"]
     assert (usb["state"], usb["hangs"], usb["failed"]) == ("configured", 0, [])
     status = hand.status()

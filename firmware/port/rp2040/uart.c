@@ -107,10 +107,7 @@ bool uart_write(const uint8_t *data, size_t bytes)
     if (bytes > TX_RING - (tx_head - tx_tail)) {
         return false;
     }
-    const uint32_t at_once = TX_RING - tx_head % TX_RING;
-    const uint32_t first = bytes < at_once ? (uint32_t)bytes : at_once;
-    dma_copy(DMA_OF_FRAMES, tx + tx_head % TX_RING, data, first);
-    dma_copy(DMA_OF_FRAMES, tx, data + first, (uint32_t)bytes - first);
+    dma_copy_to_ring(DMA_OF_FRAMES, tx, TX_RING, tx_head, data, (uint32_t)bytes);
     tx_head += (uint32_t)bytes;
     uart_watch();
     return true;

@@ -319,9 +319,7 @@ bool usb_link_write(const uint8_t *data, size_t bytes)
     if (!usb_link_up() || bytes > TX_RING - (head - get(&tx_tail))) {
         return false;
     }
-    uint32_t first = min((uint32_t)bytes, TX_RING - head % TX_RING);
-    dma_copy(DMA_OF_FRAMES, tx + head % TX_RING, data, first);
-    dma_copy(DMA_OF_FRAMES, tx, data + first, (uint32_t)bytes - first);
+    dma_copy_to_ring(DMA_OF_FRAMES, tx, TX_RING, head, data, (uint32_t)bytes);
     set(&tx_head, head + (uint32_t)bytes);
     // The interrupt either sees the new bytes, or has left in_busy false by now; likewise when reading.
     atomic_signal_fence(memory_order_seq_cst);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from ..clock import Fit
 from ..errors import BiotacError
@@ -26,6 +27,11 @@ class SystemFacts:
     holders: list[Holder] = field(default_factory=list)  #: who else has the port open
     modem_manager: bool = False  #: it is running
     left_alone: bool = False  #: by it, as udev has been told
+
+
+def grown(before: Any, after: Any, counter: str) -> int:
+    """By how much a 32-bit counter of a message has."""
+    return int(getattr(after, counter) - getattr(before, counter)) % 2**32
 
 
 @dataclass(frozen=True)
@@ -52,12 +58,11 @@ class BoardFacts:
 
     def more(self, finger: int, counter: str) -> int:
         """By how much a sensor's 32-bit counter has grown."""
-        first, last = (getattr(s[finger], counter) for s in (self.sensors_before, self.sensors_after))
-        return int(last - first) % 2**32
+        return grown(self.sensors_before[finger], self.sensors_after[finger], counter)
 
     def more_of_board(self, counter: str) -> int:
         """By how much one of the board's has grown."""
-        return int(getattr(self.after, counter) - getattr(self.before, counter)) % 2**32
+        return grown(self.before, self.after, counter)
 
 
 @dataclass(frozen=True)
@@ -70,7 +75,7 @@ class PairFacts:
 
     def more(self, counter: str) -> int:
         """By how much one of its 32-bit counters has grown."""
-        return int(getattr(self.after, counter) - getattr(self.before, counter)) % 2**32
+        return grown(self.before, self.after, counter)
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from ..errors import InputError
 from ..wire import messages_gen as wire
 from ..wire.framing import encode
 from ..wire.sensor_gen import MAX_SENSORS
+from ..wire.slots import FRAME_HZ
 
 BITS_PER_BYTE = 10  # with start and stop bit
-ROUNDS_PER_S = 100
 _OF_A_ROUND: dict[wire.StreamFlags, Any] = {
     wire.StreamFlags.FRAMES: wire.Frame,
     wire.StreamFlags.PAC: wire.Pac,
@@ -22,7 +22,7 @@ def bits_per_s(streams: int, fingers: int) -> int:
     """What ``streams`` of so many fingers take while all of them are touched, without what comes now and then."""
     a_round = sum(_bytes(message) for stream, message in _OF_A_ROUND.items() if streams & stream)
     a_second = _bytes(wire.Status) + fingers * _bytes(wire.SensorStatus) if streams & wire.StreamFlags.STATUS else 0
-    return BITS_PER_BYTE * (ROUNDS_PER_S * fingers * a_round + a_second)
+    return BITS_PER_BYTE * (round(FRAME_HZ * fingers * a_round) + a_second)
 
 
 def most_fingers(streams: int, line_bits_per_s: int) -> int:

@@ -119,11 +119,11 @@ class Streams:
         self._link.release()
         self._keepalive.start()
 
-    def _start_again(self) -> None:
-        """With what has come to be known since, where it streams."""
+    def _start_again(self, streams: int | None = None) -> None:
+        """With these streams or the same, and with what has come to be known since, where it streams."""
         started = self._subscription.started
         if self.streaming and started is not None:
-            self._start(started.streams, started.fingers)
+            self._start(started.streams if streams is None else streams, started.fingers)
 
     def resume(self) -> None:
         """Have a board that was away stream again, if it did."""
@@ -160,9 +160,7 @@ class Streams:
         wants = Wants.of(names, rest=rest, rate_hz=rate_hz)
         self.subscribe(wants.quantities)
         self._subscription.wants = wants
-        started = self._subscription.started
-        if self.streaming and started is not None:
-            self._start(wants.streams, started.fingers)
+        self._start_again(wants.streams)
 
     # ---- pull ----------------------------------------------------------------------------------
 

@@ -8,7 +8,8 @@ from typing import Any
 from ..errors import InputError
 from ..wire.batches import Batch
 from ..wire.messages_gen import Event, QuantityFlags, Start, Stop, StreamFlags, Subscribe, Touch
-from ..wire.sensor_gen import MAX_SENSORS, SLOT_HZ, SLOTS
+from ..wire.sensor_gen import MAX_SENSORS
+from ..wire.slots import FRAME_HZ
 from . import bandwidth
 from .board import Board
 from .callbacks import Callbacks
@@ -34,7 +35,6 @@ QUANTITIES = {
 IN_EVERY_FRAME = ("raw", "pdc", "temperature")
 STREAMS = {"pac": StreamFlags.PAC, "bands": StreamFlags.BANDS}
 NAMES = (*QUANTITIES, *IN_EVERY_FRAME, *STREAMS, "status")
-FRAME_HZ = SLOT_HZ / len(SLOTS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from ..calibrate.wrench import board, models
 from ..calibrate.wrench.fitted import WrenchMap
 from ..calibrate.wrench.moments import air_sums, smoothed, strip_sums
-from ..calibrate.wrench.run import load_run
+from ..calibrate.wrench.run import run_of
 from ..core.board_map import BoardMap
 from ..core.board_map import on_board_q4 as mapped_q4
 from ..core.compiled import FORCE_GAINS, Settings, on_board_q4
@@ -71,10 +70,7 @@ def own_map(finger: Finger) -> BoardMap:
     loads, cell = random_loads.states(LOADS, LOADS_SEED)
     loads = replace(loads, tip_radius_mm=np.full(LOADS, FLAT_MM / 2.0))
     recorded = random_loads.recording(finger, loads, cell, LOADS_SEED)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "loads.npz"
-        np.savez(path, **{name: recorded[name] for name in ("E", "F", "E_base", "E_idle")})
-        run = load_run(path)
+    run = run_of(Path("loads"), {name: recorded[name] for name in ("E", "F", "E_base", "E_idle")})
     sums, air = strip_sums(smoothed(run, 1), run.truth, run.drift), air_sums(run, 1, len(run.axes))
     assert air is not None
     coefficients = models.pulled(sums.plus(air), [models.JOINED.family])[0][0]

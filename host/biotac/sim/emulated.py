@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tty
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,11 +53,12 @@ class EmulatedBoard(SimBoard):
     def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
         tools = self._tools
         command = [tools.node, str(tools.program), "--image", str(tools.image), "--wasm", str(tools.sensors), *options]
-        with new_pty() as (master, path), new_pty() as (uart_master, uart_path):
+        with ExitStack() as ptys:
+            master, path = ptys.enter_context(new_pty())
             command += ["--pty", path, "--master", str(master)]
             fds = [master, *self._pass_fds]
             if self._has_uart:
-                self.uart_path = uart_path
+                uart_master, self.uart_path = ptys.enter_context(new_pty())
                 command += ["--uart-master", str(uart_master)]
                 fds.append(uart_master)
             pipe = subprocess.PIPE

@@ -147,7 +147,6 @@ static void touch_and_lift_are_told_in_the_slot_that_shows_them(void **state)
     assert_int_equal(told(BT_EVENT_KIND_TOUCH), 1);
 }
 
-// The tare machine waits for a whole sweep until it calls a contact over; a tap on the pad is shorter.
 static void what_still_touches_by_more_than_half_of_what_it_takes_is_no_lift(void **state)
 {
     (void)state;
@@ -163,6 +162,7 @@ static void what_still_touches_by_more_than_half_of_what_it_takes_is_no_lift(voi
     assert_int_equal(told(BT_EVENT_KIND_LIFT), 1);
 }
 
+// The tare machine waits for a whole sweep until it calls a contact over; a tap on the pad is shorter.
 static void touches_in_quick_succession_are_all_told(void **state)
 {
     (void)state;

@@ -83,7 +83,11 @@ def load_run(path: Path) -> Run:
     contact a row belongs to, where rows are not in time; ``serial``, the sensor's number as text. Raises
     RecordingError with what was seen, in numbers.
     """
-    fields = read_npz(path, FIELDS)
+    return run_of(path, read_npz(path, FIELDS))
+
+
+def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
+    """The same from a file's fields; ``path`` is what errors name."""
     missing = [name for name in ("E", "F") if name not in fields]
     if missing:
         seen = ", ".join(fields) or "none of the known fields"

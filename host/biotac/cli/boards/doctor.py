@@ -9,7 +9,7 @@ import sys
 import textwrap
 import threading
 from contextlib import suppress
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import asdict, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -107,9 +107,7 @@ def report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
 
 def plain(value: object) -> object:
     """A part of the facts as JSON has it."""
-    if not is_dataclass(value):
-        return str(value)
-    return {part.name: getattr(value, part.name) for part in fields(value)}
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else str(value)
 
 
 def as_facts(finding: Finding) -> dict[str, str]:

@@ -18,8 +18,7 @@ from ...wire import messages_gen as wire
 from ...wire.batches import Batch
 from ...wire.dtypes_gen import DTYPES
 from ...wire.framing import OVERHEAD_BYTES
-
-FRAME_S = 0.01  # one round of slots
+from ...wire.slots import FRAME_S
 
 
 @dataclass(frozen=True)
