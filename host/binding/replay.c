@@ -119,7 +119,7 @@ int64_t bt_replay_pac(int64_t n, const uint16_t *pac, int held, uint8_t *slips, 
             uint32_t told = bt_finger_events(&finger, pac_slot[p], false);
             keep(&list, told, &finger, pac_slot[p], (uint32_t)(k * BT_FRAME_MS * 1000));
         }
-        slips[k] = finger.events.slips;
+        slips[k] = finger.events.slipping;
     }
     return list.told;
 }

@@ -351,6 +351,63 @@ static void a_touch_that_shows_in_a_lost_slot_is_told_in_the_next(void **state)
     }
 }
 
+static void a_move_of_any_electrode_alone_is_one(void **state)
+{
+    (void)state;
+    for (unsigned i = 0; i < BT_ELECTRODES; i++) {
+        for (int sign = -1; sign <= 1; sign += 2) {
+            bt_finger its;
+            bt_finger_reset(&its, 0);
+            memset(&its.sent, 0, sizeof its.sent);
+            memset(&its.tare.trigger.smooth, 0, sizeof its.tare.trigger.smooth);
+            its.tare.threshold_count2 = 1000;
+            its.sent.lane[i] = 2000;
+            its.tare.trigger.smooth.lane[i] = (uint16_t)(2000 + sign * 31);
+            assert_false(bt_finger_moved(&its)); // 961
+            its.tare.trigger.smooth.lane[i] = (uint16_t)(2000 + sign * 32);
+            assert_true(bt_finger_moved(&its)); // 1024
+        }
+    }
+}
+
+// Of a finger with these signals on E2, E12, E17 and E18, on its pad, and none on all others.
+static bool torsion_ok(const int pad_q4[4], uint32_t threshold_count2)
+{
+    static const int pad[4] = {1, 11, 16, 17};
+    bt_settings all;
+    bt_settings_reset(&all);
+    (void)bt_settings_set(&all, BT_SETTING_FORCE_MODEL, BT_FORCE_MODEL_LIN);
+    const bt_solve_settings settings = bt_solve_settings_from(&all);
+    bt_round round;
+    bt_tare tare;
+    bt_msg_frame msg;
+    bt_tare_reset(&tare);
+    memset(&round, 0, sizeof round);
+    tare.tared = true;
+    tare.trigger.unknown = 0;
+    tare.threshold_count2 = threshold_count2;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        round.electrode[i] = 3000;
+        tare.electrode_q4[i] = 16 * 3000;
+    }
+    for (int k = 0; k < 4; k++) {
+        tare.electrode_q4[pad[k]] = (uint16_t)(16 * 3000 - pad_q4[k]);
+    }
+    bt_results(&round, &tare, &settings, BT_QUANTITY_FLAG_POC, &msg);
+    return msg.flags & BT_FRAME_FLAG_TORSION_OK;
+}
+
+static void torsion_takes_four_electrodes_that_moved_fifteen_counts_and_a_touch(void **state)
+{
+    (void)state;
+    assert_true(torsion_ok((const int[4]){-240, -240, -240, -240}, 899)); // an energy of 900
+    assert_false(torsion_ok((const int[4]){-240, -240, -240, -240}, 900));
+    assert_false(torsion_ok((const int[4]){-240, -240, -240, -239}, 0));
+    assert_true(torsion_ok((const int[4]){-400, -400, -400, 240}, 0));
+    assert_false(torsion_ok((const int[4]){-400, -400, -400, 239}, 0));
+    assert_false(torsion_ok((const int[4]){-900, -900, -900, 0}, 0));
+}
+
 #define T(name) cmocka_unit_test_setup(name, new_finger)
 int main(void)
 {
@@ -369,6 +426,8 @@ int main(void)
         T(an_electrode_without_a_tare_is_no_signal),
         T(a_tare_set_before_the_sensor_answers_is_kept),
         T(a_touch_that_shows_in_a_lost_slot_is_told_in_the_next),
+        T(a_move_of_any_electrode_alone_is_one),
+        T(torsion_takes_four_electrodes_that_moved_fifteen_counts_and_a_touch),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

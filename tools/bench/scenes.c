@@ -170,7 +170,7 @@ static void events_in_contact(const bt_solve_settings *settings)
 static void events_shaken(const bt_solve_settings *settings)
 {
     (void)settings;
-    shaken_events.events.rises = shaken_events.events.falls = 1;
+    shaken_events.events.risen_count2 = shaken_events.events.fallen_count2 = 1;
     events(&shaken_events);
 }
 

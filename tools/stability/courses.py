@@ -113,7 +113,7 @@ class Script:
         still = self.sensor.rest_counts(states.warm_c)
         loaded = self.sensor.counts(states)
         rest = still + drift
-        creep = self.sensor.creep_share * sampling._lag(loaded - still, sampling.CREEP_S)
+        creep = self.sensor.creep_share * sampling.Lag(sampling.CREEP_S)(loaded - still)
         return Course(
             sensor=self.sensor,
             words={

@@ -6,26 +6,28 @@
 
 // In squared changes of a noise of five counts, the worst of public recordings; a board's own noise raises
 // it.
-#define LEVEL_MIN 100
-#define LEVEL_MAX 3200 // sigma 28: a finger that shakes more feels nothing by it
+#define LEVEL_MIN_COUNT2      100
+#define LEVEL_MAX_COUNT2      3200 // sigma 28: a finger that shakes more feels nothing by it
 // In levels. Chosen on 100 real slides and 344 handovers, and on noise.
-#define CAP       12  // of one sample: a glitch, which is two of them, is neither jolt nor slip
-#define JOLT      25  // noise of sigma 5: no false one in ten minutes
-#define SLIP      20  // of each side; likewise
-#define MOST      100 // a slip is over when nothing has shaken for some 0.2 s
-#define DRAG_COUNT2                                                                                          \
-    (75 * 75)           // changes of drags: those of squeezes by up to 6 N/s are less, or last less than
-#define DRAGGED     44  // so many samples, 20 ms
-#define TOGETHER    18  // samples from rise to fall, 8 ms: of one vibration
-#define NOISE_LOG   6   // rounds that its mean is over, as a power of two
-#define LANDING_MIN 220 // samples, 0.1 s
-#define LANDING_MAX 2200
+#define SAMPLE_CAP_LEVELS     12  // of one sample: a glitch, which is two of them, is neither jolt nor slip
+#define JOLT_LEVELS           25  // noise of sigma 5: no false one in ten minutes
+#define SLIP_LEVELS           20  // of each side; likewise
+#define SIDE_CAP_LEVELS       100 // a slip is over when nothing has shaken for some 0.2 s
+// A drag: changes that those of squeezes by up to 6 N/s are below, or do not last for
+#define DRAG_CHANGE_COUNT2    (75 * 75)
+#define DRAG_SAMPLES          44 // 20 ms
+// Times, in samples but for one
+#define ONE_VIBRATION_SAMPLES 18  // from rise to fall, 8 ms
+#define LANDING_MIN_SAMPLES   220 // 0.1 s
+#define LANDING_MAX_SAMPLES   2200
+#define NOISE_ROUNDS_LOG2     6 // that its mean is over
 
-#define TOLD(event) (1u << (event))
+#define EVENT(event) (1u << (event))
 
-_Static_assert((uint64_t)LEVEL_MAX * CAP * BT_PAC_PER_FRAME * 745 <= UINT32_MAX,
+_Static_assert((uint64_t)LEVEL_MAX_COUNT2 * SAMPLE_CAP_LEVELS * BT_PAC_PER_FRAME * 745 <= UINT32_MAX,
                "the noise of a round, as a level, must fit its type");
-_Static_assert((uint64_t)LEVEL_MAX * (2 * MOST + CAP * BT_PAC_PER_FRAME) * 2 <= UINT32_MAX,
+_Static_assert((uint64_t)LEVEL_MAX_COUNT2 * (2 * SIDE_CAP_LEVELS + SAMPLE_CAP_LEVELS * BT_PAC_PER_FRAME) * 2
+                   <= UINT32_MAX,
                "evidence must fit its type");
 _Static_assert((uint64_t)BT_ELECTRODES * BT_TRIGGER_UNREAD * BT_TRIGGER_UNREAD <= UINT32_MAX,
                "energy must fit its type");
@@ -33,20 +35,20 @@ _Static_assert((uint64_t)BT_FULL_SCALE_COUNT *BT_FULL_SCALE_COUNT <= INT32_MAX, 
 _Static_assert((BT_FULL_SCALE_COUNT & (BT_FULL_SCALE_COUNT + 1)) == 0
                    && BT_INVALID_COUNT > BT_FULL_SCALE_COUNT,
                "bits above full scale tell words that are missing");
-_Static_assert(2 * CAP < JOLT && CAP < 2 * SLIP, "one glitch must not be an event");
-_Static_assert(DRAGGED + BT_PAC_PER_FRAME <= UINT8_MAX, "a count must fit its type");
+_Static_assert(2 * SAMPLE_CAP_LEVELS < JOLT_LEVELS && SAMPLE_CAP_LEVELS < 2 * SLIP_LEVELS,
+               "one glitch must not be an event");
+_Static_assert(DRAG_SAMPLES + BT_PAC_PER_FRAME <= UINT8_MAX, "a count must fit its type");
 _Static_assert(BT_PAC_PER_FRAME == 22, "745/8192 is 2/22");
 
 void bt_events_reset(bt_events *events)
 {
     memset(events, 0, sizeof *events);
     events->watched = BT_EVENTS_NO_SLOT;
-    events->level_count2 = LEVEL_MIN;
-    events->noise_count2 = LEVEL_MIN / 2 * BT_PAC_PER_FRAME;
+    events->level_count2 = LEVEL_MIN_COUNT2;
+    events->noise_count2 = LEVEL_MIN_COUNT2 / 2 * BT_PAC_PER_FRAME;
 }
 
 // ---- touch and release
-// ----------------------------------------------------------------------------------------------
 
 static uint32_t square_of(const bt_tare *tare, unsigned electrode)
 {
@@ -77,7 +79,7 @@ static uint32_t begin_touch(bt_events *events)
     events->touched = true;
     events->landing = true;
     events->touch_began = events->now;
-    return TOLD(BT_EVENT_KIND_TOUCH);
+    return EVENT(BT_EVENT_KIND_TOUCH);
 }
 
 uint32_t bt_events_touch(bt_events *events, const bt_tare *tare)
@@ -107,7 +109,7 @@ uint32_t bt_events_watch(bt_events *events, const bt_tare *tare)
     }
     events->touched = false;
     events->watched = BT_EVENTS_NO_SLOT;
-    return TOLD(BT_EVENT_KIND_LIFT);
+    return EVENT(BT_EVENT_KIND_LIFT);
 }
 
 // The tare machine goes on to call it a contact, so its trigger waits for no other.
@@ -122,18 +124,19 @@ static BT_NOINLINE uint32_t touched_again(bt_events *events, const bt_tare *tare
 }
 
 // ---- dynamic pressure
-// -----------------------------------------------------------------------------------------------
 
 static void end_round(bt_events *events, const bt_tare *tare)
 {
     if (!events->touched && tare->state == BT_TARE_STATE_REST) {
-        int32_t more = (int32_t)(events->sum_count2 - events->noise_count2);
-        events->noise_count2 += (uint32_t)bt_shift_down(more, NOISE_LOG);
+        int32_t more = (int32_t)(events->round_sum_count2 - events->noise_count2);
+        events->noise_count2 += (uint32_t)bt_shift_down(more, NOISE_ROUNDS_LOG2);
         uint32_t level = events->noise_count2 * 745 >> 13;
-        events->level_count2 = level < LEVEL_MIN ? LEVEL_MIN : level > LEVEL_MAX ? LEVEL_MAX : level;
+        events->level_count2 = level < LEVEL_MIN_COUNT2   ? LEVEL_MIN_COUNT2
+                               : level > LEVEL_MAX_COUNT2 ? LEVEL_MAX_COUNT2
+                                                          : level;
     }
-    events->sum_count2 = 0;
-    events->done = 0;
+    events->round_sum_count2 = 0;
+    events->samples_done = 0;
 }
 
 // By how much a word differs from the one before it; not at all where either is missing.
@@ -157,18 +160,18 @@ static inline unsigned pass_quiet(bt_events *events, const uint16_t *pac, const 
         }
         sum += square;
     }
-    events->sum_count2 += sum;
+    events->round_sum_count2 += sum;
     return k;
 }
 
-static inline uint32_t less(uint32_t evidence, uint32_t by)
+static inline uint32_t take_off(uint32_t evidence, uint32_t by)
 {
     return evidence > by ? evidence - by : 0;
 }
 
 // The first sample that rises, or falls.
-static BT_NOINLINE uint32_t since(const bt_events *events, const uint16_t *pac, const uint16_t *before,
-                                  bool falls)
+static BT_NOINLINE uint32_t first_change(const bt_events *events, const uint16_t *pac, const uint16_t *before,
+                                         bool falls)
 {
     unsigned k = 0;
     while ((change_of(pac[k], before[k]) <= 0) != falls) {
@@ -182,8 +185,8 @@ static BT_NOINLINE uint32_t since(const bt_events *events, const uint16_t *pac, 
 static BT_NOINLINE void add_shaken(bt_events *events, const uint16_t *pac, const uint16_t *before,
                                    unsigned samples)
 {
-    const uint32_t cap = CAP * events->level_count2;
-    uint32_t most = events->most_count2;
+    const uint32_t cap = SAMPLE_CAP_LEVELS * events->level_count2;
+    uint32_t most = events->peak_count2;
     uint32_t all = 0, rose = 0, last = 0;
     for (unsigned k = 0; k < samples; k++) {
         const uint32_t now = pac[k], then = before[k];
@@ -200,60 +203,61 @@ static BT_NOINLINE void add_shaken(bt_events *events, const uint16_t *pac, const
             rose += capped;
         }
     }
-    events->most_count2 = most;
-    events->sum_count2 += all;
-    if (last >= DRAG_COUNT2 && events->dragged < DRAGGED) {
+    events->peak_count2 = most;
+    events->round_sum_count2 += all;
+    if (last >= DRAG_CHANGE_COUNT2 && events->dragged < DRAG_SAMPLES) {
         events->dragged = (uint8_t)(events->dragged + samples);
     }
     const uint32_t fell = all - rose;
-    if (events->rises == 0 && rose != 0) {
-        events->rises_since = since(events, pac, before, false);
+    if (events->risen_count2 == 0 && rose != 0) {
+        events->rise_began = first_change(events, pac, before, false);
     }
-    if (events->falls == 0 && fell != 0) {
-        events->falls_since = since(events, pac, before, true);
+    if (events->fallen_count2 == 0 && fell != 0) {
+        events->fall_began = first_change(events, pac, before, true);
     }
-    const uint32_t top = MOST * events->level_count2;
+    const uint32_t top = SIDE_CAP_LEVELS * events->level_count2;
     const uint32_t toll = events->level_count2 / 2 * samples;
-    const uint32_t rises = less(events->rises + rose, toll);
-    const uint32_t falls = less(events->falls + fell, toll);
-    events->rises = rises > top ? top : rises;
-    events->falls = falls > top ? top : falls;
+    const uint32_t rises = take_off(events->risen_count2 + rose, toll);
+    const uint32_t falls = take_off(events->fallen_count2 + fell, toll);
+    events->risen_count2 = rises > top ? top : rises;
+    events->fallen_count2 = falls > top ? top : falls;
 }
 
 // What can be no other event until it is over: a slip, or a jolt of what is not held yet.
 static inline bool is_told(const bt_events *events)
 {
-    return events->slips || (events->jolted && (events->landing || !events->touched));
+    return events->slipping || (events->jolt_told && (events->landing || !events->touched));
 }
 
 // Only how long it goes on is asked: both sides are one.
 static BT_NOINLINE void go_on(bt_events *events, const uint16_t *pac, const uint16_t *before,
                               unsigned samples)
 {
-    const uint32_t cap = CAP * events->level_count2;
-    const uint32_t most = 2 * MOST * events->level_count2;
+    const uint32_t cap = SAMPLE_CAP_LEVELS * events->level_count2;
+    const uint32_t most = 2 * SIDE_CAP_LEVELS * events->level_count2;
     uint32_t all = 0;
     for (unsigned k = 0; k < samples; k++) {
         int32_t change = change_of(pac[k], before[k]);
         uint32_t square = (uint32_t)(change * change);
         all += square > cap ? cap : square;
     }
-    events->sum_count2 += all;
-    const uint32_t sum = less(events->rises + events->falls + all, samples * events->level_count2);
-    events->rises = sum > most ? most : sum;
-    events->falls = 0;
+    events->round_sum_count2 += all;
+    const uint32_t sum =
+        take_off(events->risen_count2 + events->fallen_count2 + all, samples * events->level_count2);
+    events->risen_count2 = sum > most ? most : sum;
+    events->fallen_count2 = 0;
 }
 
 static inline bool shakes(const bt_events *events)
 {
-    return (events->rises | events->falls) != 0;
+    return (events->risen_count2 | events->fallen_count2) != 0;
 }
 
 static inline void shake(bt_events *events, const uint16_t *pac, const uint16_t *before, unsigned samples)
 {
     if (!shakes(events)) {
-        events->began = events->now;
-        events->most_count2 = 0;
+        events->shake_began = events->now;
+        events->peak_count2 = 0;
         events->dragged = 0;
     }
     if (is_told(events)) {
@@ -266,15 +270,15 @@ static inline void shake(bt_events *events, const uint16_t *pac, const uint16_t 
 
 static uint32_t end_slip(bt_events *events)
 {
-    uint32_t told = events->slips ? TOLD(BT_EVENT_KIND_STUCK) : 0;
-    events->slips = false;
+    uint32_t told = events->slipping ? EVENT(BT_EVENT_KIND_STUCK) : 0;
+    events->slipping = false;
     return told;
 }
 
-static uint32_t quiet(bt_events *events)
+static uint32_t end_shaking(bt_events *events)
 {
-    events->jolted = false;
-    events->landing = events->landing && events->now - events->touch_began < LANDING_MIN;
+    events->jolt_told = false;
+    events->landing = events->landing && events->now - events->touch_began < LANDING_MIN_SAMPLES;
     return end_slip(events);
 }
 
@@ -282,34 +286,35 @@ static uint32_t quiet(bt_events *events)
 // dragged for so long, and slips from now on.
 static bool begins_to_slip(bt_events *events)
 {
-    const uint32_t each = SLIP * events->level_count2;
-    if (events->rises > each && events->falls > each) {
-        const int32_t apart = (int32_t)(events->falls_since - events->rises_since);
-        const bool one = apart <= TOGETHER && apart >= -TOGETHER;
-        events->slip_began = (apart > 0) == one ? events->rises_since : events->falls_since;
+    const uint32_t each = SLIP_LEVELS * events->level_count2;
+    if (events->risen_count2 > each && events->fallen_count2 > each) {
+        const int32_t apart = (int32_t)(events->fall_began - events->rise_began);
+        const bool one = apart <= ONE_VIBRATION_SAMPLES && apart >= -ONE_VIBRATION_SAMPLES;
+        events->slip_began = (apart > 0) == one ? events->rise_began : events->fall_began;
         return true;
     }
     events->slip_began = events->now - 1;
-    return events->dragged >= DRAGGED;
+    return events->dragged >= DRAG_SAMPLES;
 }
 
 static inline uint32_t judge(bt_events *events)
 {
     uint32_t told = 0;
     if (!shakes(events)) {
-        return quiet(events);
+        return end_shaking(events);
     }
-    if (!events->jolted && events->rises + events->falls > JOLT * events->level_count2) {
-        events->jolted = true;
-        told = TOLD(BT_EVENT_KIND_JOLT);
+    if (!events->jolt_told
+        && events->risen_count2 + events->fallen_count2 > JOLT_LEVELS * events->level_count2) {
+        events->jolt_told = true;
+        told = EVENT(BT_EVENT_KIND_JOLT);
     }
     if (!events->touched) {
         return told | end_slip(events);
     }
-    events->landing = events->landing && events->now - events->touch_began < LANDING_MAX;
-    if (!events->slips && !events->landing && begins_to_slip(events)) {
-        events->slips = true;
-        told |= TOLD(BT_EVENT_KIND_SLIP);
+    events->landing = events->landing && events->now - events->touch_began < LANDING_MAX_SAMPLES;
+    if (!events->slipping && !events->landing && begins_to_slip(events)) {
+        events->slipping = true;
+        told |= EVENT(BT_EVENT_KIND_SLIP);
     }
     return told;
 }
@@ -318,7 +323,7 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
                        unsigned end)
 {
     uint32_t told = 0;
-    unsigned k = events->done < end ? events->done : 0;
+    unsigned k = events->samples_done < end ? events->samples_done : 0;
     const uint16_t *before;
     if (k > 0) {
         before = pac + k - BT_EVENTS_LAG;
@@ -336,8 +341,8 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
     if (passed < samples) {
         shake(events, pac + k + passed, before + passed, samples - passed);
     }
-    events->done = (uint8_t)end;
-    const bool goes_on = events->slips && events->touched && shakes(events);
+    events->samples_done = (uint8_t)end;
+    const bool goes_on = events->slipping && events->touched && shakes(events);
     if ((shook || events->landing) && !goes_on) {
         told = judge(events);
     }
@@ -351,7 +356,6 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
 }
 
 // ---- messages
-// -------------------------------------------------------------------------------------------------------
 
 static uint32_t since_us(const bt_events *events, uint32_t sample)
 {
@@ -360,7 +364,7 @@ static uint32_t since_us(const bt_events *events, uint32_t sample)
            + samples % BT_PAC_PER_FRAME * (BT_FRAME_MS * 1000) / BT_PAC_PER_FRAME;
 }
 
-static uint16_t root(uint32_t square)
+static uint16_t integer_root(uint32_t square)
 {
     uint32_t found = 0;
     for (uint32_t bit = 1u << 12; bit != 0; bit >>= 1) {
@@ -379,13 +383,14 @@ void bt_events_message(bt_events *events, uint8_t event, const bt_tare *tare, ui
     msg->t_us = t_us;
     msg->onset_us = t_us;
     if (event == BT_EVENT_KIND_JOLT) {
-        msg->onset_us -= since_us(events, events->began);
+        msg->onset_us -= since_us(events, events->shake_began);
     } else if (event == BT_EVENT_KIND_SLIP) {
         msg->onset_us = events->slip_us = t_us - since_us(events, events->slip_began);
     } else if (event == BT_EVENT_KIND_STUCK) {
         msg->onset_us = events->slip_us;
     }
     msg->energy_count2 = shaken ? UINT32_MAX : events->energy_count2;
-    msg->peak_count = event == BT_EVENT_KIND_JOLT || event == BT_EVENT_KIND_SLIP ? root(events->most_count2)
-                                                                                 : BT_INVALID_COUNT;
+    msg->peak_count = event == BT_EVENT_KIND_JOLT || event == BT_EVENT_KIND_SLIP
+                          ? integer_root(events->peak_count2)
+                          : BT_INVALID_COUNT;
 }

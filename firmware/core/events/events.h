@@ -27,20 +27,20 @@ typedef struct {
     uint8_t watched; // the slot of the electrode that is; BT_EVENTS_NO_SLOT untouched
     uint8_t dragged; // samples of this vibration that changed by more than squeezes do
     bool touched;
-    bool landing; // touched, and dynamic pressure has not been quiet since
-    bool jolted;  // told of this vibration
-    bool slips;
-    uint8_t done;          // samples of this round
-    uint32_t now;          // number of the next sample
-    uint32_t sum_count2;   // of this round
-    uint32_t noise_count2; // of a round, at rest
-    uint32_t level_count2; // twice the noise: what a change takes to be more than that
-    uint32_t most_count2;  // of one change of this vibration
-    uint32_t rises;        // evidence, count^2
-    uint32_t falls;
-    uint32_t rises_since;
-    uint32_t falls_since;
-    uint32_t began; // either
+    bool landing;   // touched, and dynamic pressure has not been quiet since
+    bool jolt_told; // told of this vibration
+    bool slipping;
+    uint8_t samples_done;      // samples of this round
+    uint32_t now;              // number of the next sample
+    uint32_t round_sum_count2; // of this round
+    uint32_t noise_count2;     // of a round, at rest
+    uint32_t level_count2;     // twice the noise: what a change takes to be more than that
+    uint32_t peak_count2;      // of one change of this vibration
+    uint32_t risen_count2;     // evidence, count^2
+    uint32_t fallen_count2;
+    uint32_t rise_began;
+    uint32_t fall_began;
+    uint32_t shake_began; // either
     uint32_t slip_began;
     uint32_t slip_us; // the same as device time
     uint32_t touch_began;

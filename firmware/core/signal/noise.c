@@ -3,18 +3,19 @@
 #include "fixed_point.h"
 #include "signal/sweep.h"
 
-#define FACTOR      3 // white noise on 19 electrodes passes it once in 10^5 rounds, never three in a row
-#define MEAN_SWEEPS 16
+// White noise on 19 electrodes passes it once in 10^5 rounds, never three in a row
+#define THRESHOLD_TO_NOISE 3
+#define MEAN_SWEEPS        16
 
 _Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX <= INT32_MAX >> 8, "the noise in q8 must fit 31 bits");
-_Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX *(int64_t)FACTOR < BT_TRIGGER_NEVER,
+_Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX *(int64_t)THRESHOLD_TO_NOISE < BT_TRIGGER_NEVER,
                "a threshold is a limit");
 
 void bt_noise_add(bt_noise *noise, uint32_t deviation_q6, uint32_t setting_count2)
 {
     // A count's distance from a mean that it is an eighth of holds seven eighths of the noise's energy.
     // The sample is capped at the setting: a vibration that grows slowly must not raise the threshold
-    // ahead of itself for ever. The threshold so never exceeds FACTOR times the setting.
+    // ahead of itself for ever. The threshold so never exceeds THRESHOLD_TO_NOISE times the setting.
     uint32_t cap_q8 = setting_count2 << 8;
     uint32_t sample_q8 = cap_q8;
     if (deviation_q6 < cap_q8 >> 2) {
@@ -32,6 +33,6 @@ void bt_noise_add(bt_noise *noise, uint32_t deviation_q6, uint32_t setting_count
 
 uint32_t bt_noise_threshold(const bt_noise *noise, uint32_t setting_count2)
 {
-    uint32_t raised = noise->count2 * FACTOR;
+    uint32_t raised = noise->count2 * THRESHOLD_TO_NOISE;
     return raised > setting_count2 ? raised : setting_count2;
 }

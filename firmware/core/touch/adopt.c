@@ -2,8 +2,9 @@
 
 #include "fixed_point.h"
 
-#define BACK_SHARE 64 // of the press's peak; a hundredth seen
-#define UNDERSHOOT 16 // pressure that may be missing right after a press (9 seen); it comes back
+// What pressure may be missing right after a press (9 counts seen); it comes back.
+#define UNDERSHOOT_SHARE         64 // of the press's peak; a hundredth seen
+#define UNDERSHOOT_PDC_COUNT_MAX 16
 
 void bt_adopt_aim_pressure(bt_tare *tare)
 {
@@ -86,10 +87,12 @@ void bt_adopt_after_press(bt_tare *tare, uint8_t reason)
 {
     uint32_t rest_q16 = tare->base.pdc_q16;
     uint32_t present = present_q16(tare, BT_LANE_PDC);
-    int32_t undershoot = tare->release.pdc_peak / BACK_SHARE;
+    int32_t undershoot = tare->release.pdc_peak / UNDERSHOOT_SHARE;
     bt_adopt_present(tare, reason);
-    tare->comes_back_q16 = (undershoot < UNDERSHOOT ? undershoot : UNDERSHOOT) << 16;
-    if (rest_q16 != BT_TARE_UNKNOWN && present < rest_q16 && rest_q16 - present < UNDERSHOOT << 16) {
+    tare->comes_back_q16 = (undershoot < UNDERSHOOT_PDC_COUNT_MAX ? undershoot : UNDERSHOOT_PDC_COUNT_MAX)
+                           << 16;
+    if (rest_q16 != BT_TARE_UNKNOWN && present < rest_q16
+        && rest_q16 - present < UNDERSHOOT_PDC_COUNT_MAX << 16) {
         tare->base.pdc_q16 = rest_q16;
         bt_rollback_start(&tare->rollback, &tare->base);
         bt_adopt_aim_pressure(tare);

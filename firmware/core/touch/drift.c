@@ -3,16 +3,17 @@
 #include "fixed_point.h"
 #include "wire/sensor_gen.h"
 
-#define RATE_Q16      (4 * 328) // a sweep; 15 counts/min, the worst drift measured
-#define NEAR_SHIFT    5         // of the distance, into the step
-#define SETTLE_SWEEPS 16 // until what is followed is drift, and not the noise of the tare's first moment
-#define FIRST_SWEEPS  16 // a mean is of as many at least
-#define KNOWN_SWEEPS  32
-#define MEAN_SWEEPS   128 // and of as many at most
-#define LAST          8   // times as long as it was seen a rate is taken to last
-#define COMMIT_SWEEPS 32  // a load is seen by its pressure within as many
+#define RATE_Q16           (4 * 328) // a sweep; 15 counts/min, the worst drift measured
+#define NEAR_SHIFT         5         // of the distance, into the step
+#define SETTLE_SWEEPS      16 // until what is followed is drift, and not the noise of the tare's first moment
+#define FIRST_SWEEPS       16 // a mean is of as many at least
+#define KNOWN_SWEEPS       32
+#define MEAN_SWEEPS        128 // and of as many at most
+#define EXTRAPOLATED_TIMES 8   // times as long as it was seen a rate is taken to last
+#define COMMIT_SWEEPS      32  // a load is seen by its pressure within as many
 
-_Static_assert(RATE_Q16 * 16LL * LAST * MEAN_SWEEPS <= INT32_MAX, "what is unseen must fit its type");
+_Static_assert(RATE_Q16 * 16LL * EXTRAPOLATED_TIMES * MEAN_SWEEPS <= INT32_MAX,
+               "what is unseen must fit its type");
 
 static int32_t mean_sweeps(const bt_drift *drift)
 {
@@ -63,7 +64,7 @@ bool bt_drift_known(const bt_drift *drift)
 // Of a rate, in so many sweeps, as 1/2^20 count.
 static int32_t made_q20(const bt_drift *drift, int32_t rate_q20, uint32_t sweeps)
 {
-    uint32_t last = (uint32_t)(LAST * mean_sweeps(drift));
+    uint32_t last = (uint32_t)(EXTRAPOLATED_TIMES * mean_sweeps(drift));
     return rate_q20 * (int32_t)(sweeps < last ? sweeps : last);
 }
 
@@ -75,7 +76,7 @@ int32_t bt_drift_over(const bt_drift *drift, uint32_t sweeps)
 int32_t bt_drift_unseen(bt_drift *drift, uint32_t sweeps)
 {
     int32_t made_q16 = bt_drift_over(drift, sweeps);
-    int32_t last = LAST * mean_sweeps(drift);
+    int32_t last = EXTRAPOLATED_TIMES * mean_sweeps(drift);
     drift->rate_q20 -= made_q20(drift, drift->rate_q20, sweeps) / last;
     drift->waiting_q20 -= made_q20(drift, drift->waiting_q20, sweeps) / last;
     drift->sure_q20 -= made_q20(drift, drift->sure_q20, sweeps) / last;

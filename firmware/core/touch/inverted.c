@@ -3,13 +3,13 @@
 #include "fixed_point.h"
 
 // Real skin leaves the pressure up to 9 counts low after a press; 12 counts are 0.1 to 0.2 N.
-#define BELOW_UNDO       12
-#define BELOW_LOSE       20
-#define UNDERSHOOT_SHARE 16 // of a press that lasted a minute, more was missing than that
-#define PRESSED          24 // after a press there is an undershoot, and its tare was one of rest
-#define ENERGY_UNDO      300
-#define ENERGY_LOSE      2000
-#define ROUNDS           3
+#define UNDO_BELOW_COUNT  12
+#define LOSE_BELOW_COUNT  20
+#define UNDERSHOOT_SHARE  16 // of a press that lasted a minute, more was missing than that
+#define PRESSED_PDC_COUNT 24 // after a press there is an undershoot, and its tare was one of rest
+#define UNDO_COUNT2       300
+#define LOSE_COUNT2       2000
+#define DOUBT_ROUNDS      3
 
 _Static_assert(BT_FULL_SCALE_COUNT * 8 <= INT16_MAX, "a change of a count must fit its type");
 
@@ -72,16 +72,17 @@ bt_tare_doubt bt_inverted_judge(bt_tare_change *change, const bt_lanes *smooth, 
 {
     bt_tare_doubt doubt = BT_TARE_STANDS;
     int32_t below = (int32_t)(base->pdc_q16 >> 16) - smooth->lane[BT_LANE_PDC];
-    if (base->pdc_q16 != BT_TARE_UNKNOWN && below > BELOW_UNDO + pdc_peak / UNDERSHOOT_SHARE) {
+    if (base->pdc_q16 != BT_TARE_UNKNOWN && below > UNDO_BELOW_COUNT + pdc_peak / UNDERSHOOT_SHARE) {
         sums s = sums_of(change, smooth, base);
-        if (change->known && s.energy > ENERGY_UNDO && is_the_change(&s)) {
+        if (change->known && s.energy > UNDO_COUNT2 && is_the_change(&s)) {
             doubt = BT_TARE_UNDO;
-        } else if (pdc_peak < PRESSED && below > BELOW_LOSE && s.energy > ENERGY_LOSE && s.net > 0) {
+        } else if (pdc_peak < PRESSED_PDC_COUNT && below > LOSE_BELOW_COUNT && s.energy > LOSE_COUNT2
+                   && s.net > 0) {
             doubt = BT_TARE_LOSE;
         }
     }
     change->rounds = doubt == BT_TARE_STANDS ? 0 : (uint8_t)(change->rounds + 1);
-    return change->rounds < ROUNDS ? BT_TARE_STANDS : doubt;
+    return change->rounds < DOUBT_ROUNDS ? BT_TARE_STANDS : doubt;
 }
 
 void bt_inverted_undo(const bt_tare_change *change, bt_baseline *base)

@@ -7,22 +7,22 @@
 // Pressure above the last tare, from 27 presses of two recordings: what a press left was 5.6 at most (median
 // 1), what was left of it in a hold at a tenth of its peak 11 at least (median 56). Pressure undershoots at a
 // release, so that only too much of it speaks.
-#define PDC_QUIET      4
-#define PDC_REST_MAX   10
-#define PDC_REST_SHARE 40               // of the peak
-#define PRESSED        (4 * BT_PDC_HIT) // pressure that was a press
+#define QUIET_PDC_COUNT    4
+#define REST_PDC_COUNT_MAX 10
+#define REST_PDC_SHARE     40               // of the peak
+#define PRESSED_PDC_COUNT  (4 * BT_PDC_HIT) // pressure that was a press
 // Electrodes: what a press left was .053 of its signal at most, in energy a 356th.
-#define CALM_ENERGY    400
-#define EVEN_ENERGY    200  // of a worn sensor's means, seven sigmas: nothing but noise
-#define RESIDUE_SHARE  64   // of the energy's peak
-#define RESIDUE_ENERGY 6000 // skin that settled: the pressure never knew of a touch
-#define FALL           4    // what has fallen to a quarter is no longer the press it was
-#define STILL_SWEEPS   5    // 400 ms
-#define QUIET_SWEEPS   12   // 960 ms
-#define LEVEL_SWEEPS   18   // 1.4 s
-#define STUCK_SWEEPS   25   // 2 s
-#define EVEN_SWEEPS    100  // 8 s
-#define RISE           2    // pressure above where it was that a slow load makes in a second
+#define CALM_COUNT2        400
+#define EVEN_COUNT2        200  // of a worn sensor's means, seven sigmas: nothing but noise
+#define RESIDUE_SHARE      64   // of the energy's peak
+#define SETTLED_COUNT2     6000 // skin that settled: the pressure never knew of a touch
+#define FALLEN_SHARE       4    // what has fallen to a quarter is no longer the press it was
+#define STILL_SWEEPS       5    // 400 ms
+#define QUIET_SWEEPS       12   // 960 ms
+#define LEVEL_SWEEPS       18   // 1.4 s
+#define STUCK_SWEEPS       25   // 2 s
+#define EVEN_SWEEPS        100  // 8 s
+#define LOADING_PDC_COUNT  2    // pressure above where it was that a slow load makes in a second
 
 void bt_release_begin(bt_release *release)
 {
@@ -37,7 +37,9 @@ void bt_release_pressure(bt_release *release, int32_t above)
 // A press that the pressure did not see is none of which the pressure can tell.
 static bool has_witness(const bt_release *release, const bt_release_sweep *sweep)
 {
-    return sweep->pressure && (release->pdc_peak >= PRESSED || release->uneven_peak < FALL * RESIDUE_ENERGY);
+    return sweep->pressure
+           && (release->pdc_peak >= PRESSED_PDC_COUNT
+               || release->uneven_peak < FALLEN_SHARE * SETTLED_COUNT2);
 }
 
 // Without a witness only electrodes that are back say that nothing touches.
@@ -46,10 +48,10 @@ static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
     bool witness = has_witness(release, sweep);
     uint32_t left = witness ? release->energy_peak / RESIDUE_SHARE : 0;
     uint32_t forgiven = witness || !sweep->pressure ? sweep->forgiven_count2 : 0;
-    left = (left > CALM_ENERGY ? left : CALM_ENERGY) + forgiven;
-    int32_t rest = bt_limited(release->pdc_peak / PDC_REST_SHARE, PDC_QUIET, PDC_REST_MAX);
+    left = (left > CALM_COUNT2 ? left : CALM_COUNT2) + forgiven;
+    int32_t rest = bt_limited(release->pdc_peak / REST_PDC_SHARE, QUIET_PDC_COUNT, REST_PDC_COUNT_MAX);
     bool back = witness ? sweep->above < rest : release->quiet_sweeps >= QUIET_SWEEPS;
-    bool gone = sweep->energy_count2 < left || sweep->uneven_count2 < EVEN_ENERGY + forgiven;
+    bool gone = sweep->energy_count2 < left || sweep->uneven_count2 < EVEN_COUNT2 + forgiven;
     return back && gone && sweep->still_sweeps >= STILL_SWEEPS;
 }
 
@@ -57,14 +59,14 @@ static bool is_untouched(const bt_release *release, const bt_release_sweep *swee
 {
     return has_witness(release, sweep) && release->pdc_peak <= BT_PDC_HIT
            && release->quiet_sweeps >= QUIET_SWEEPS && sweep->still_sweeps >= QUIET_SWEEPS
-           && sweep->energy_count2 < RESIDUE_ENERGY + sweep->forgiven_count2;
+           && sweep->energy_count2 < SETTLED_COUNT2 + sweep->forgiven_count2;
 }
 
 static void count_even(bt_release *release, const bt_release_sweep *sweep)
 {
-    bool low = !sweep->pressure || sweep->above < PRESSED;
-    bool even = low && sweep->uneven_count2 < EVEN_ENERGY;
-    bool rose = sweep->pressure && sweep->above > release->even_above + RISE;
+    bool low = !sweep->pressure || sweep->above < PRESSED_PDC_COUNT;
+    bool even = low && sweep->uneven_count2 < EVEN_COUNT2;
+    bool rose = sweep->pressure && sweep->above > release->even_above + LOADING_PDC_COUNT;
     if (!even || release->even_sweeps == 0 || rose) {
         release->even_above = sweep->above;
         release->even_sweeps = even;
@@ -78,7 +80,7 @@ static void count_even(bt_release *release, const bt_release_sweep *sweep)
 // that a long press leaves takes minutes to go.
 static bool is_shift(const bt_release *release, const bt_release_sweep *sweep)
 {
-    bool pressed = !sweep->pressure || release->pdc_peak >= PRESSED;
+    bool pressed = !sweep->pressure || release->pdc_peak >= PRESSED_PDC_COUNT;
     bool level = pressed ? release->even_sweeps >= EVEN_SWEEPS
                          : sweep->level_sweeps >= LEVEL_SWEEPS && release->even_sweeps >= QUIET_SWEEPS;
     return level && sweep->still_sweeps >= QUIET_SWEEPS;
@@ -86,9 +88,9 @@ static bool is_shift(const bt_release *release, const bt_release_sweep *sweep)
 
 static bool is_doubtful(const bt_release *release, const bt_release_sweep *sweep)
 {
-    bool pressed = sweep->pressure && release->pdc_peak >= PRESSED;
-    bool fallen = pressed ? sweep->above < release->pdc_peak / FALL
-                          : sweep->energy_count2 < release->energy_peak / FALL;
+    bool pressed = sweep->pressure && release->pdc_peak >= PRESSED_PDC_COUNT;
+    bool fallen = pressed ? sweep->above < release->pdc_peak / FALLEN_SHARE
+                          : sweep->energy_count2 < release->energy_peak / FALLEN_SHARE;
     bool stuck = has_witness(release, sweep) && release->quiet_sweeps >= STUCK_SWEEPS;
     return sweep->still_sweeps >= STILL_SWEEPS && (fallen || stuck);
 }
@@ -101,11 +103,12 @@ bt_release_verdict bt_release_judge(bt_release *release, const bt_release_sweep 
     release->uneven_peak = uneven > release->uneven_peak ? uneven : release->uneven_peak;
     // Without pressure the energy itself must have fallen, or the first second of a slow load would
     // pass for a residue.
-    bool quiet = sweep->pressure ? sweep->above < PDC_QUIET : energy < release->energy_peak / FALL;
+    bool quiet =
+        sweep->pressure ? sweep->above < QUIET_PDC_COUNT : energy < release->energy_peak / FALLEN_SHARE;
     release->quiet_sweeps =
         quiet ? (uint8_t)(release->quiet_sweeps + (release->quiet_sweeps < UINT8_MAX)) : 0;
     count_even(release, sweep);
-    if (energy < CALM_ENERGY && (quiet || !sweep->pressure)) {
+    if (energy < CALM_COUNT2 && (quiet || !sweep->pressure)) {
         return BT_RELEASE_CLEAN;
     }
     if (is_residue(release, sweep) || is_untouched(release, sweep)) {

@@ -8,8 +8,8 @@
 
 #include <string.h>
 
-#define HITS        3        // rounds over the threshold that make a contact
-#define NOW_SPAN_Q3 (32 * 8) // of a still signal, from its latest filtered count to the mean: ten sigmas
+#define CONTACT_ROUNDS 3        // rounds over the threshold that make a contact
+#define NOW_SPAN_Q3    (32 * 8) // of a still signal, from its latest filtered count to the mean: ten sigmas
 
 bt_tare_settings bt_tare_settings_from(const bt_settings *settings)
 {
@@ -31,7 +31,7 @@ void bt_tare_temperature(bt_tare *tare, uint16_t tdc)
 static BT_NOINLINE void count_hit(bt_tare *tare, const bt_tare_settings *settings)
 {
     tare->partial = true;
-    if (++tare->hits < HITS) {
+    if (++tare->hits < CONTACT_ROUNDS) {
         return;
     }
     tare->let_go = false;

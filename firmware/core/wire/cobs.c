@@ -54,15 +54,19 @@ void bt_cobs_in_place(uint8_t *block, size_t bytes)
     *code = (uint8_t)(end - code);
 }
 
+// What begins with @ is for the proof that nothing beside in and out is touched (tests/proofs/memory).
 int bt_cobs_decode(const uint8_t *in, size_t bytes, uint8_t *out)
 {
     size_t at = 0;
     size_t k = 0;
+    //@ loop invariant at <= k <= bytes; loop assigns at, k, out[0 .. bytes - 1];
     while (k < bytes) {
         uint8_t code = in[k++];
         if (code == 0 || (size_t)(code - 1) > bytes - k) {
             return -1;
         }
+        /*@ loop invariant at < k && k + code <= bytes + n && n <= code;
+            loop assigns n, at, k, out[0 .. bytes - 1]; */
         for (uint8_t n = 1; n < code; n++) {
             if (in[k] == 0) {
                 return -1;

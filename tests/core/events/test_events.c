@@ -385,6 +385,66 @@ static void the_rails_do_not_wrap(void **state)
     assert_int_equal(told(BT_EVENT_KIND_TOUCH), told(BT_EVENT_KIND_LIFT));
 }
 
+// One stretch of samples, by hand: against what was read eight samples before, at a level of 100.
+static void evidence_is_the_sum_of_squares_of_each_way_less_the_noise(void **state)
+{
+    (void)state;
+    static const int change[8] = {0, 5, 30, -40, 1, -20, 0, 10};
+    uint16_t pac[BT_PAC_PER_FRAME];
+    bt_events events;
+    bt_events_reset(&events);
+    assert_int_equal(events.level_count2, 100);
+    for (int k = 0; k < BT_PAC_PER_FRAME; k++) {
+        pac[k] = (uint16_t)(2000 + (k >= 8 && k < 16 ? change[k - 8] : 0));
+    }
+    pac[14] = BT_INVALID_COUNT;
+    events.samples_done = 8;
+    events.now = 1000;
+    assert_int_equal(bt_events_pac(&events, &its.finger.tare, pac, 16), 0);
+    // The first two are below half of the level; of the other six, 50 each is noise, and none counts for more
+    // than 1200.
+    assert_int_equal(events.risen_count2, 30 * 30 + 1 + 10 * 10 - 6 * 50);
+    assert_int_equal(events.fallen_count2, 1200 + 20 * 20 - 6 * 50);
+    assert_int_equal(events.round_sum_count2, 5 * 5 + 30 * 30 + 1200 + 1 + 20 * 20 + 10 * 10);
+    assert_int_equal(events.peak_count2, 40 * 40);
+    assert_int_equal(events.shake_began, 1002);
+    assert_int_equal(events.rise_began, 1002);
+    assert_int_equal(events.fall_began, 1003);
+    assert_int_equal(events.now, 1008);
+    assert_int_equal(events.samples_done, 16);
+}
+
+// Eight samples into a round its predecessors are the last of the round before, still in their places.
+static void a_round_is_compared_with_the_one_before_it(void **state)
+{
+    (void)state;
+    uint16_t pac[BT_PAC_PER_FRAME];
+    bt_events events;
+    bt_events_reset(&events);
+    for (uint16_t k = 0; k < BT_PAC_PER_FRAME; k++) {
+        pac[k] = (uint16_t)(k < 8 ? 2003 : k < 14 ? 3000 : 2000);
+    }
+    for (uint8_t done = 0; done <= 16; done = (uint8_t)(done + 16)) { // 16: its end was never shown
+        bt_events_reset(&events);
+        events.samples_done = done;
+        (void)bt_events_pac(&events, &its.finger.tare, pac, 8);
+        assert_int_equal(events.round_sum_count2, 8 * 3 * 3);
+        assert_int_equal(events.now, 8);
+    }
+}
+
+// The pressure alone may be what is felt first; the finger is let go of all the same.
+static void a_touch_that_no_electrode_shows_ends(void **state)
+{
+    (void)state;
+    bt_events events;
+    bt_events_reset(&events);
+    const bt_tare tare = {.threshold_count2 = SETTING_COUNT2};
+    assert_int_equal(bt_events_touch(&events, &tare), 1 << BT_EVENT_KIND_TOUCH);
+    assert_int_not_equal(events.watched, BT_EVENTS_NO_SLOT);
+    assert_int_equal(bt_events_watch(&events, &tare), 1 << BT_EVENT_KIND_LIFT);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -405,6 +465,9 @@ int main(void)
         cmocka_unit_test_setup(a_slip_ends_with_the_hold, new_course),
         cmocka_unit_test_setup(missing_words_are_no_event, new_course),
         cmocka_unit_test_setup(the_rails_do_not_wrap, new_course),
+        cmocka_unit_test_setup(evidence_is_the_sum_of_squares_of_each_way_less_the_noise, new_course),
+        cmocka_unit_test_setup(a_round_is_compared_with_the_one_before_it, new_course),
+        cmocka_unit_test_setup(a_touch_that_no_electrode_shows_ends, new_course),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -406,6 +406,24 @@ static void a_record_without_the_force_model_means_lins(void **state)
     assert_int_equal(bt_settings_get(&settings, BT_SETTING_FORCE_MODEL), BT_FORCE_MODEL_POPULATION);
 }
 
+static void no_more_is_read_than_there_is_or_there_is_room_for(void **state)
+{
+    (void)state;
+    uint8_t data[BT_STORAGE_MAX_BYTES], out[BT_STORAGE_MAX_BYTES];
+    uint16_t version;
+    memset(data, 0x5A, sizeof data);
+    for (size_t bytes = 0; bytes <= sizeof data; bytes += sizeof data / 4) {
+        assert_true(bt_storage_write(&flash, 3, 1, data, bytes));
+        for (size_t room = 0; room <= sizeof out; room += sizeof out / 4) {
+            memset(out, 1, sizeof out);
+            assert_int_equal(bt_storage_read(&flash, 3, &version, out, room), bytes);
+            for (size_t k = 0; k < sizeof out; k++) {
+                assert_int_equal(out[k], k < bytes && k < room ? 0x5A : 1);
+            }
+        }
+    }
+}
+
 #define T(test) cmocka_unit_test_setup(test, new_flash)
 
 int main(void)
@@ -423,6 +441,7 @@ int main(void)
         T(each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new),
         T(settings_come_back_and_others_keep_their_defaults),
         T(a_record_without_the_force_model_means_lins),
+        T(no_more_is_read_than_there_is_or_there_is_room_for),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

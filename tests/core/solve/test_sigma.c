@@ -193,11 +193,10 @@ static void sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range(void
 static void one_electrodes_sigma_is_the_root_of_its_share(void **state)
 {
     (void)state;
-    for (uint64_t noise = 1; noise < UINT32_MAX; noise += 1 + noise / 7) {
-        double want = 256 * sqrt((double)noise / 19);
-        double got = bt_sigma_count_q8((uint32_t)noise);
-        // The share is cut to 1/65536 and the root to a whole number.
-        assert_true(got <= want && got > want * sqrt(1 - 19.0 / 65536) - 1);
+    for (uint64_t noise = 1; noise < UINT32_MAX; noise += 1 + noise / 97) {
+        uint64_t got = bt_sigma_count_q8((uint32_t)noise);
+        uint64_t square = noise * (65536 / 19); // the share is cut to 1/65536 and the root to a whole number
+        assert_true(got * got <= square && square < (got + 1) * (got + 1));
     }
 }
 

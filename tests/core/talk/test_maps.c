@@ -217,6 +217,22 @@ static void another_sensor_has_not_the_map_but_not_while_streaming(void **state)
     assert_has(2, blob, bytes, BT_CALIBRATION_STATE_OTHER_SENSOR);
 }
 
+static void a_map_is_not_whole_until_its_last_byte_has_come(void **state)
+{
+    (void)state;
+    memset(blob, 0xFF, sizeof blob); // as flash reads where nothing was written: the CRC cannot tell
+    for (size_t over = 1; over < PART; over++) { // bytes of the last part
+        size_t bytes = 2 * PART + over;
+        uint32_t crc32 = bt_crc32(blob, bytes);
+        assert_int_equal(begin(0, (uint16_t)bytes, crc32), BT_ERROR_OK);
+        assert_int_equal(write_part(0, blob, bytes, 0), BT_ERROR_OK);
+        assert_int_equal(write_part(0, blob, bytes, 1), BT_ERROR_OK);
+        assert_int_equal(end(0, crc32), BT_ERROR_NOT_WHOLE);
+        assert_int_equal(write_part(0, blob, bytes, 2), BT_ERROR_OK);
+        assert_int_equal(end(0, crc32), BT_ERROR_OUT_OF_RANGE); // whole, and no map
+    }
+}
+
 #define T(name) cmocka_unit_test_setup(name, new_board)
 int main(void)
 {
@@ -232,6 +248,7 @@ int main(void)
         T(a_board_without_room_says_so),
         T(another_sensors_is_refused_unless_it_is_for_any),
         T(another_sensor_has_not_the_map_but_not_while_streaming),
+        T(a_map_is_not_whole_until_its_last_byte_has_come),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

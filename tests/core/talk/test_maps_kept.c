@@ -139,6 +139,38 @@ static void whatever_happens_nothing_that_is_kept_is_written_to(void **state)
     }
 }
 
+// What comes back says whether the board's start is to be told as damaged storage.
+static void a_stored_map_that_cannot_be_used_is_said_so(void **state)
+{
+    (void)state;
+    uint8_t packed[BT_MAP_RECORD_BYTES];
+    size_t bytes = make_map(blob, 1, 2, "");
+    assert_int_equal(upload(0, blob, bytes), BT_ERROR_OK);
+    const bt_map_place place = session.map[0].place;
+    bt_finger_map its;
+    (void)bt_map_place_pack(&place, packed);
+    assert_true(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
+    slots[place.slot * (size_t)BT_MAP_SLOT_BYTES + bytes - 1] ^= 1;
+    assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
+    assert_int_equal(its.place.bytes, 0);
+    assert_int_equal(its.stored_slot, place.slot);
+    assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION + 1, packed, sizeof packed));
+    bt_put_u32(packed, BT_MAP_SLOTS);
+    assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
+}
+
+static void slots_that_nobody_has_anything_in_are_free(void **state)
+{
+    (void)state;
+    bt_finger_map none[BT_MAX_FINGERS];
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_finger_map_reset(&none[f]);
+    }
+    for (uint8_t slot = 0; slot < BT_MAP_SLOTS; slot++) {
+        assert_int_equal(bt_map_free_slot(none, slot), (slot + 1) % BT_MAP_SLOTS);
+    }
+}
+
 #define T(name) cmocka_unit_test_setup(name, new_board)
 int main(void)
 {
@@ -148,6 +180,8 @@ int main(void)
         T(flash_that_takes_nothing_is_told_and_passed_by),
         T(there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored),
         T(whatever_happens_nothing_that_is_kept_is_written_to),
+        T(a_stored_map_that_cannot_be_used_is_said_so),
+        T(slots_that_nobody_has_anything_in_are_free),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

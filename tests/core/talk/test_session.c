@@ -314,6 +314,115 @@ static void an_echo_of_our_own_messages_is_not_answered(void **state)
     assert_int_equal(host.count, 0);
 }
 
+static void status_that_nobody_asked_for_has_no_req_id(void **state)
+{
+    (void)state;
+    assert_int_equal(start(BT_STREAM_FLAG_STATUS, 0, 0), BT_ERROR_OK);
+    host_round(&session, 1 << 3, 2000);
+    host_forget();
+    bt_session_tick(&session, session.status_period_us);
+    assert_int_equal(host_count(BT_STATUS_ID), 1);
+    assert_int_equal(host_count(BT_SENSOR_STATUS_ID), 1);
+    for (int k = 0; k < host.count; k++) {
+        bool status = host.message[k].id == BT_STATUS_ID;
+        bt_msg_status of_board;
+        bt_msg_sensor_status of_sensor;
+        if (status) {
+            bt_msg_status_unpack(&of_board, host.message[k].payload);
+        } else {
+            bt_msg_sensor_status_unpack(&of_sensor, host.message[k].payload);
+            assert_int_equal(of_sensor.finger, 3);
+        }
+        assert_int_equal(status ? of_board.req_id : of_sensor.req_id, 0);
+    }
+}
+
+static void a_hold_lapses_after_so_many_milliseconds_of_silence(void **state)
+{
+    (void)state;
+    assert_int_equal(bt_settings_set(&session.settings, BT_SETTING_HOLD_TIMEOUT_MS, 700), BT_ERROR_OK);
+    bt_session_use_settings(&session);
+    assert_int_equal(host_error(&session, BT_HOLD_ID, "\1\4", 2), BT_ERROR_OK); // finger 2, at 0 us
+    bt_session_tick(&session, 700000);
+    assert_true(session.finger[2].tare.held);
+    bt_session_tick(&session, 700001);
+    assert_false(session.finger[2].tare.held);
+}
+
+static void a_tare_from_the_host_is_told_as_it_was_sent(void **state)
+{
+    (void)state;
+    uint8_t payload[BT_TARE_SET_BYTES];
+    bt_msg_tare_set sent = {.req_id = 1, .finger = 2, .pdc_tare_q4 = 20001};
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        sent.tare_q4[i] = (uint16_t)(40003 + 7 * i);
+    }
+    bt_msg_tare_set_pack(&sent, payload);
+    assert_int_equal(host_error(&session, BT_TARE_SET_ID, payload, sizeof payload), BT_ERROR_OK);
+    const bt_tare *tare = &session.finger[2].tare;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        assert_int_equal(bt_tare_q4(tare->base.electrode_q16[i]), sent.tare_q4[i]);
+    }
+    assert_int_equal(bt_tare_q4(tare->base.pdc_q16), sent.pdc_tare_q4);
+}
+
+static void each_finger_has_its_own_flags_of_who_is_there(void **state)
+{
+    (void)state;
+    for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
+        session.unsure = (uint8_t)(1u << f);
+        session.other = session.refused = (uint8_t)(1u << (f + 1) % BT_MAX_FINGERS);
+        for (unsigned k = 0; k < BT_MAX_FINGERS; k++) {
+            bool other = k == (f + 1) % BT_MAX_FINGERS;
+            uint32_t want = k == f ? BT_FRAME_FLAG_SENSOR_UNSURE : other ? BT_FRAME_FLAG_SENSOR_OTHER : 0;
+            assert_int_equal(bt_sensors_flags(&session, k), want);
+            uint8_t ask[2] = {1, (uint8_t)k};
+            assert_int_equal(host_error(&session, BT_GET_POINT_ID, ask, 2),
+                             other ? BT_ERROR_OTHER_SENSOR : BT_ERROR_NO_SUCH_FINGER);
+        }
+    }
+}
+
+static void a_board_saves_all_or_says_that_it_cannot(void **state)
+{
+    (void)state;
+    const bt_board_actions whole = {
+        .save_settings = keep_settings, .save_calibration = keep_calibration, .save_map = keep_no_map};
+    for (int missing = 0; missing <= 3; missing++) {
+        bt_board_actions actions = whole;
+        actions.save_settings = missing == 1 ? NULL : actions.save_settings;
+        actions.save_calibration = missing == 2 ? NULL : actions.save_calibration;
+        actions.save_map = missing == 3 ? NULL : actions.save_map;
+        bt_session_use_board(&session, &actions);
+        assert_int_equal(host_error(&session, BT_SAVE_SETTINGS_ID, "\5", 1),
+                         missing == 0 ? BT_ERROR_OK : BT_ERROR_NOT_HERE);
+    }
+}
+
+static void another_sensor_has_nothing_of_the_one_before(void **state)
+{
+    (void)state;
+    static const uint8_t one[BT_SERIAL_BYTES] = "BT-1", two[BT_SERIAL_BYTES] = "BT-2";
+    bt_sensors_answer(&session, 2, one);
+    for (int k = 0; k < 100; k++) {
+        host_round(&session, 1 << 2, 2000);
+    }
+    bt_sensors_answer(&session, 2, one);
+    assert_true(session.finger[2].tare.tared);
+    bt_sensors_answer(&session, 2, two);
+    assert_false(session.finger[2].tare.tared);
+}
+
+static void sigmas_come_back_after_a_pause(void **state)
+{
+    (void)state;
+    session.sigma_pause = 3;
+    for (int left = 2; left >= -1; left--) {
+        host_round(&session, 1 << 2, 2000);
+        assert_int_equal(session.sigma_pause, left > 0 ? left : 0);
+    }
+}
+
 #define T(name) cmocka_unit_test_setup(name, new_session)
 int main(void)
 {
@@ -330,6 +439,13 @@ int main(void)
         T(an_unknown_command_without_payload_is_unknown_too),
         T(a_wrong_length_is_answered_and_does_nothing),
         T(an_echo_of_our_own_messages_is_not_answered),
+        T(status_that_nobody_asked_for_has_no_req_id),
+        T(a_hold_lapses_after_so_many_milliseconds_of_silence),
+        T(a_tare_from_the_host_is_told_as_it_was_sent),
+        T(each_finger_has_its_own_flags_of_who_is_there),
+        T(a_board_saves_all_or_says_that_it_cannot),
+        T(another_sensor_has_nothing_of_the_one_before),
+        T(sigmas_come_back_after_a_pause),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -210,6 +210,38 @@ static void what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch(void **stat
     assert_true(fabs(shared_error(&finger)) < 0.5); // 4 counts, twice
 }
 
+// Pressure that changes makes what the electrodes came to rest at worth nothing, until four sweeps say it
+// anew.
+static void a_hold_is_watched_again_once_its_means_are_new(void **state)
+{
+    (void)state;
+    emulated_finger finger = touched_finger(400, 100);
+    run_seconds(&finger, 3);
+    assert_int_equal(finger.tare.watch.wait_sweeps, 0);
+    finger.pdc_load = 108; // more than two counts; by twelve the finger would not be still
+    for (int k = 0; k < 4 * BT_SWEEP_ROUNDS && finger.tare.watch.wait_sweeps == 0; k++) {
+        step(&finger);
+    }
+    assert_int_equal(finger.tare.watch.wait_sweeps, 4); // five, less the sweep that has seen it
+    while (finger.tare.watch.wait_sweeps == 4 && finger.tare.watch.level_sweeps == 0) {
+        step(&finger);
+    }
+    run_frames(&finger, 2 * BT_SWEEP_ROUNDS - 1);
+    assert_int_not_equal(finger.tare.watch.wait_sweeps, 0);
+    step(&finger);
+    assert_int_equal(finger.tare.watch.wait_sweeps, 0);
+}
+
+static void what_was_learned_of_a_load_is_forgotten(void **state)
+{
+    (void)state;
+    bt_drift drift = {.rate_q20 = 700, .waiting_q20 = 500, .sure_q20 = 300, .since_commit = 9};
+    bt_drift_revert(&drift);
+    assert_int_equal(drift.rate_q20, 300);
+    assert_int_equal(drift.waiting_q20, 300); // or it would be sure in some seconds
+    assert_int_equal(drift.since_commit, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -222,6 +254,8 @@ int main(void)
         cmocka_unit_test(a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it),
         cmocka_unit_test(a_load_that_changed_in_a_silence_is_no_drift),
         cmocka_unit_test(what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch),
+        cmocka_unit_test(a_hold_is_watched_again_once_its_means_are_new),
+        cmocka_unit_test(what_was_learned_of_a_load_is_forgotten),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -289,6 +289,53 @@ static void one_lost_pressure_word_does_not_end_a_light_contact(void **state)
     }
 }
 
+static void pressure_that_moves_is_no_reason_to_refuse_tare_now(void **state)
+{
+    (void)state;
+    emulated_finger finger = resting_finger();
+    finger.pdc_load = -50; // no touch
+    run_frames(&finger, 3);
+    assert_int_equal(bt_tare_now(&finger.tare), BT_ERROR_OK);
+}
+
+// The pattern of a load upside down, with less pressure than at rest: of the machine's own tare that was the
+// last change, and undone.
+static void what_the_host_has_set_is_lost_rather_than_undone(void **state)
+{
+    (void)state;
+    emulated_finger finger = resting_finger();
+    bt_baseline base = finger.tare.base;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        base.electrode_q16[i] += (uint32_t)(int32_t)lround(65536 * 100 * load_shape(i));
+    }
+    base.pdc_q16 += 60 << 16;
+    assert_int_equal(bt_tare_set(&finger.tare, &base), BT_ERROR_OK);
+    for (int k = 0; k < 10 && finger.tare.reason == BT_TARE_REASON_HOST_SET; k++) {
+        step(&finger);
+    }
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_INVERTED);
+    assert_false(finger.tare.tared);
+}
+
+// One that was met at rest goes back with the others, to what it first read.
+static void an_electrode_that_came_late_is_rolled_back_too(void **state)
+{
+    (void)state;
+    emulated_finger finger;
+    finger_init(&finger);
+    for (int k = 0; k < 200; k++) {
+        bt_round frame = frame_without(&finger, 4, 1, BT_INVALID_COUNT);
+        (void)feed(&finger, &frame);
+    }
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+    run_frames(&finger, 2);
+    finger.load = 400;
+    finger.pdc_load = 100;
+    (void)run_until(&finger, BT_TARE_STATE_CONTACT, 20);
+    assert_int_equal(finger.tare.reason, BT_TARE_REASON_ROLL_BACK);
+    assert_true(tare_error(&finger) < 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -310,6 +357,9 @@ int main(void)
         cmocka_unit_test(published_tares_round_half_away_from_zero),
         cmocka_unit_test(a_held_load_is_kept_while_the_pressure_undershoots),
         cmocka_unit_test(an_electrode_that_was_railed_is_never_tared_at_its_end),
+        cmocka_unit_test(pressure_that_moves_is_no_reason_to_refuse_tare_now),
+        cmocka_unit_test(what_the_host_has_set_is_lost_rather_than_undone),
+        cmocka_unit_test(an_electrode_that_came_late_is_rolled_back_too),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

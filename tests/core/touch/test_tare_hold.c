@@ -239,6 +239,24 @@ static void a_first_tare_taken_of_a_hold_is_lost_when_it_ends(void **state)
     assert_true(tare_error(&finger) < 0.01);
 }
 
+// What a press leaves missing is where it was before the press, for the trigger too.
+static void pressure_that_comes_back_beyond_its_rest_is_no_contact(void **state)
+{
+    (void)state;
+    emulated_finger finger = touched_finger(300, 640);
+    run_seconds(&finger, 1);
+    finger.load = 0;
+    finger.pdc_load = -6;
+    (void)run_until(&finger, BT_TARE_STATE_REST, 300);
+    assert_int_equal(finger.tare.base.pdc_q16, PDC_REST << 16);
+    assert_int_equal(finger.tare.comes_back_q16, 10 << 16); // a 64th of the peak
+    finger.pdc_load = 5;
+    for (int k = 0; k < 20; k++) {
+        step(&finger);
+        assert_int_equal(finger.tare.hits, 0);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -256,6 +274,7 @@ int main(void)
         cmocka_unit_test(a_held_finger_takes_no_first_tare),
         cmocka_unit_test(a_tare_taken_of_a_hold_is_undone_when_it_ends),
         cmocka_unit_test(a_first_tare_taken_of_a_hold_is_lost_when_it_ends),
+        cmocka_unit_test(pressure_that_comes_back_beyond_its_rest_is_no_contact),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

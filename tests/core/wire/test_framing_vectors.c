@@ -109,6 +109,16 @@ static void one_deframer_carries_nothing_from_one_case_into_the_next(void **stat
     }
 }
 
+static void what_is_not_cobs_has_no_length(void **state)
+{
+    (void)state;
+    uint8_t out[4];
+    assert_int_equal(bt_cobs_decode((const uint8_t *)"\0", 1, out), -1);
+    assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\0", 2, out), -1);
+    assert_int_equal(bt_cobs_decode((const uint8_t *)"\1\3\7", 3, out), -1);
+    assert_int_equal(bt_cobs_decode((const uint8_t *)"\2\7\1", 3, out), 2);
+}
+
 static bool discard(const uint8_t *data, size_t bytes)
 {
     (void)data;
@@ -296,6 +306,7 @@ int main(void)
         cmocka_unit_test(no_flipped_bit_is_accepted),
         cmocka_unit_test(after_any_noise_one_delimiter_is_enough_to_go_on),
         cmocka_unit_test(cobs_examples_hold_in_both_directions),
+        cmocka_unit_test(what_is_not_cobs_has_no_length),
         cmocka_unit_test(crc32_known_answers_hold),
         cmocka_unit_test(any_block_comes_back_from_any_address),
     };
