@@ -35,6 +35,13 @@ install_for_proofs_and_fuzzing() {
         clang libclang-rt-dev
 }
 
+install_for_memory_proofs() {
+    need "command -v frama-c" frama-c-base
+    need "command -v why3" why3
+    need "test -x /usr/bin/z3" z3
+    why3 config detect >/dev/null # which provers there are
+}
+
 install_for_boards_and_pages() {
     # The emulated rig: the emulator, its sensors as WebAssembly, and the board's image.
     need "command -v node" nodejs
