@@ -19,6 +19,7 @@ from ..recording.facts import Facts
 from ..wire.fields import FRAME_FIELDS
 from ..wire.frames import FRAME_DTYPE, StructArray, frames_to_wire
 from .layout import RECORDINGS, place
+from .writing import DIGEST, digest_of
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,13 @@ def check(lake: str, topics: dict[str, set[str]], partition: dict[str, str], rec
     folder = Path(lake)
     seal = place(folder, RECORDINGS, partition[recording], recording)
     try:
-        row: dict[str, Any] = pq.read_table(seal, partitioning=None).to_pylist()[0]
+        data = seal.read_bytes()
+        digest = pq.read_metadata(io.BytesIO(data)).metadata[DIGEST]
+        if digest != digest_of(data, digest):
+            raise ValueError("its digest is another")
+        row: dict[str, Any] = pq.read_table(io.BytesIO(data)).to_pylist()[0]
+        if row["recording"] != recording:
+            raise ValueError(f"it is of {row['recording']}")
         facts = Facts.read(dict(row["metadata"]))
         files = {its["topic"]: its for its in row["files"]}
     except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError) as error:

@@ -95,6 +95,9 @@ def take(lake: Lake) -> Inventory:
     """Read all of ``lake``. InputError for damaged files."""
     seals = list(_rows(lake, "SELECT recording, board, begin_ns, duration_s, frames_lost, metadata FROM recordings"))
     seals.sort(key=lambda its: its["begin_ns"])
+    strange = {its["recording"] for its in seals} ^ set(lake.partition)
+    if strange:
+        raise _misplaced(lake, min(strange))
     facts = {its["recording"]: _facts(its) for its in seals}
     rounds = _rounds(lake, {its["recording"]: its for its in seals})
     boards = [_board(mine, facts) for mine in _groups(seals, lambda its: its["board"])]
@@ -119,6 +122,13 @@ def _facts(seal: dict[str, Any]) -> Facts:
         ) from error
 
 
+def _misplaced(lake: Lake, recording: str) -> InputError:
+    return InputError(
+        f"files do not hold the recording that they are named after, {recording}; `biotac lake check {lake.folder}` "
+        "names them"
+    )
+
+
 def _rounds(lake: Lake, seals: dict[str, Any]) -> list[_Round]:
     if "frames" not in lake.topics:
         return []
@@ -130,7 +140,9 @@ def _rounds(lake: Lake, seals: dict[str, Any]) -> list[_Round]:
         f"SELECT recording, board, finger, any_value(sensor) AS sensor, any_value(calibration) AS calibration, "
         f"count(*) AS rounds, [{ranges}] AS ranges, [{tares}] AS tares FROM frames GROUP BY recording, board, finger",
     ):
-        seal = seals[row["recording"]]
+        seal = seals.get(row["recording"])
+        if seal is None:
+            raise _misplaced(lake, row["recording"])
         ends = row.pop("ranges")
         same = [low == high for low, high in zip(ends[::2], ends[1::2], strict=True)]
         dead = [name for name, its in zip(ELECTRODE_NAMES, same, strict=True) if its and row["rounds"] >= DEAD_ROUNDS]

@@ -7,6 +7,7 @@ import hashlib
 import io
 import json
 import os
+import random
 import shutil
 import signal
 import subprocess
@@ -28,7 +29,7 @@ import biotac
 from biotac.cli.main import main
 from biotac.errors import InputError
 from biotac.export.messages import message_tables
-from biotac.lake import identity, layout
+from biotac.lake import checking, identity, layout
 from biotac.recording.file import RecordingFile
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import frames_from_wire, frames_to_wire
@@ -253,6 +254,27 @@ def test_check_finds_what_is_wrong(sources, lake, tmp_path, capsys) -> None:
     assert any("cannot be read" in line and second in line for line in said)
     assert export(sources, folder, "--force") == 0
     assert hashes(folder) == hashes(lake)
+
+
+def test_a_seal_that_says_something_else_is_found(lake, tmp_path, capsys) -> None:
+    folder = tmp_path / "lake"
+    shutil.copytree(lake, folder)
+    its = layout.opened(folder)
+    first, second, *_ = sorted(its.partition)
+    seal = its.path(layout.RECORDINGS, first)
+    good = seal.read_bytes()
+    draw = random.Random(1)
+    for _ in range(200):
+        flipped = bytearray(good)
+        flipped[draw.randrange(len(good))] ^= 1 << draw.randrange(8)
+        seal.write_bytes(flipped)
+        with pytest.raises(InputError, match="is damaged"):
+            checking.check(str(folder), {}, its.partition, first)
+    seal.write_bytes(its.path(layout.RECORDINGS, second).read_bytes())
+    assert main(["lake", "check", str(folder)]) == 1
+    assert f"it is of {second}" in capsys.readouterr().err
+    assert main(["inventory", str(folder)]) == 2
+    assert "names them" in capsys.readouterr().err
 
 
 def test_a_wrong_result_is_found(sources, tmp_path, capsys) -> None:
