@@ -20,7 +20,7 @@ static bool has_odd_parity(unsigned byte)
 
 static uint8_t with_odd_parity(uint8_t byte)
 {
-    return (uint8_t)(byte | !has_odd_parity(byte));
+    return has_odd_parity(byte) ? byte : byte | 1;
 }
 
 static uint16_t data_word(uint16_t count)

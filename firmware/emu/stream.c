@@ -2,21 +2,46 @@
 
 #include <string.h>
 
+#define ROUND_US (BT_FRAME_MS * 1000)
+
 void bt_emu_stream_init(bt_emu_stream *stream, uint16_t *ring, uint32_t samples)
 {
     memset(stream, 0, sizeof *stream);
     stream->ring = ring;
     stream->slots = samples; // until it is known for how many fingers
+    stream->hold = BT_EMU_NO_HOLD;
 }
 
+void bt_emu_stream_loop(bt_emu_stream *stream, const uint16_t *loop, uint8_t fingers, uint32_t slots)
+{
+    bt_emu_stream_init(stream, NULL, slots);
+    stream->loop = loop;
+    stream->fingers = fingers;
+}
+
+const uint16_t *bt_emu_stream_whole(const bt_emu_stream *stream)
+{
+    bool whole = stream->loop == NULL && stream->taken <= stream->slots && stream->taken % BT_SLOTS == 0;
+    return whole ? stream->ring : NULL;
+}
+
+// A round behind the bus stays, to be played again.
 uint32_t bt_emu_stream_room(const bt_emu_stream *stream)
 {
-    return stream->slots - (stream->taken - stream->at);
+    uint32_t used = stream->taken - stream->at + (stream->by_time ? BT_SLOTS : 0);
+    return stream->loop == NULL && used < stream->slots ? stream->slots - used : 0;
+}
+
+// Slots from the one being served on.
+static uint32_t left(const bt_emu_stream *stream)
+{
+    return stream->loop != NULL ? UINT32_MAX : stream->taken - stream->at;
 }
 
 bool bt_emu_stream_put(bt_emu_stream *stream, uint8_t fingers, const uint8_t *samples, uint32_t slots)
 {
-    if (fingers == 0 || fingers > BT_MAX_FINGERS || (stream->fingers != 0 && fingers != stream->fingers)) {
+    if (stream->loop != NULL || fingers == 0 || fingers > BT_MAX_FINGERS
+        || (stream->fingers != 0 && fingers != stream->fingers)) {
         return false;
     }
     if (stream->fingers == 0) {
@@ -68,31 +93,76 @@ static void go_on(bt_emu_stream *stream, uint32_t slots)
 
 static uint16_t sample_now(const bt_emu_stream *stream, uint8_t finger)
 {
-    return stream->ring[stream->ring_at * stream->fingers + finger];
+    const uint16_t *samples = stream->loop != NULL ? stream->loop : stream->ring;
+    return samples[stream->ring_at * stream->fingers + finger];
 }
 
 static uint16_t line_now(const bt_emu_stream *stream, uint8_t finger)
 {
-    bool playing = stream->started && finger < stream->fingers && stream->taken != stream->at;
+    bool playing = stream->started && finger < stream->fingers && left(stream) != 0;
     uint16_t now = playing ? sample_now(stream, finger) : 0;
     return now > BT_FULL_SCALE_COUNT ? now : 0;
 }
 
+// Where a round begins: rounds are left out or played again, as far as there are any.
+static void keep_time(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
+{
+    bool timed = stream->timed;
+    stream->timed = stream->by_time;
+    if (!stream->timed) {
+        return;
+    }
+    uint32_t now_us = (uint32_t)(t_ns / 1000); // a hundred cycles, which only this clock costs
+    int32_t passed_us = (int32_t)(now_us - stream->round_us);
+    stream->round_us = now_us;
+    stream->behind_us = timed ? stream->behind_us + passed_us - ROUND_US : 0;
+    while (stream->behind_us >= ROUND_US && left(stream) > BT_SLOTS + ahead) {
+        go_on(stream, BT_SLOTS);
+        stream->behind_us -= ROUND_US;
+        stream->moved++;
+    }
+    if (stream->behind_us <= -ROUND_US && stream->at >= BT_SLOTS) {
+        stream->at = stream->at - BT_SLOTS;
+        stream->ring_at =
+            (stream->ring_at < BT_SLOTS ? stream->ring_at + stream->slots : stream->ring_at) - BT_SLOTS;
+        stream->behind_us += ROUND_US;
+        stream->moved--;
+    }
+}
+
+// Whether the slot so far ahead may be served. Behind a hold the tape goes on where every finger begins a
+// round.
+static bool may_serve(bt_emu_stream *stream, uint8_t finger, uint32_t ahead)
+{
+    uint8_t all = (uint8_t)((1u << stream->fingers) - 1);
+    bool together = (stream->asked & all) == all;
+    stream->asked = (uint8_t)(stream->asked & ~(1u << finger));
+    if (stream->at + ahead >= stream->hold) {
+        stream->waits = true;
+    } else if (stream->waits && together) {
+        stream->waits = stream->timed = false;
+    }
+    return !stream->waits && left(stream) > ahead;
+}
+
 uint16_t bt_emu_stream_count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
-    (void)t_ns; // the order is what counts
     bt_emu_stream *stream = context;
     uint16_t fault = stream->fault[finger];
     if (channel == BT_EMU_LINE) {
+        stream->asked = (uint8_t)(stream->asked | 1u << finger);
         return fault != BT_EMU_FAULT_NONE ? fault : line_now(stream, finger);
     }
     int ahead = slots_ahead(stream, finger, channel);
     if (ahead < 0) {
         return fault != BT_EMU_FAULT_NONE ? fault : BT_EMU_FAULT_NO_CHANNEL;
     }
-    if (stream->taken - stream->at <= (uint32_t)ahead) {
+    if (!may_serve(stream, finger, (uint32_t)ahead)) {
         stream->starved++;
         return fault != BT_EMU_FAULT_NONE ? fault : BT_EMU_FAULT_STUCK_LOW;
+    }
+    if (stream->slot + ahead >= BT_SLOTS || !stream->started) {
+        keep_time(stream, (uint32_t)ahead, t_ns);
     }
     if (ahead > 0) {
         go_on(stream, (uint32_t)ahead);

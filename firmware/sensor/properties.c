@@ -64,9 +64,12 @@ static bool trim_text(uint8_t *text, unsigned bytes)
     return ends && end > 0;
 }
 
+// Those of 24 electrodes (BioTac SP: BTSP; BTTB) answer to the same commands, with other electrodes
+// elsewhere.
 static bool trim_serial(uint8_t serial[BT_SERIAL_CHARS])
 {
-    return trim_text(serial, BT_SERIAL_CHARS) && serial[0] == 'B' && serial[1] == 'T';
+    return trim_text(serial, BT_SERIAL_CHARS) && memcmp(serial, "BT", 2) == 0
+           && memcmp(serial + 2, "SP", 2) != 0 && memcmp(serial + 2, "TB", 2) != 0;
 }
 
 bool bt_serial_query_answer(const bt_serial_query *query, uint8_t serial[BT_SERIAL_CHARS])
@@ -125,7 +128,6 @@ void bt_properties_read(uint8_t finger, bt_msg_sensor_info *info)
     read_text(finger, BT_PROPERTY_SERIAL, info->serial, sizeof info->serial);
     info->present = trim_serial(info->serial);
     if (!info->present) {
-        memset(info->serial, 0, sizeof info->serial);
         return;
     }
     read_text(finger, BT_PROPERTY_SOFTWARE_VERSION, info->software_version, sizeof info->software_version);

@@ -38,12 +38,13 @@ typedef struct {
 void bt_serial_query_begin(bt_serial_query *query);
 void bt_serial_query_step(bt_serial_query *query, uint8_t finger);
 
-// The serial number, padded with zeros. False when it was not read twice alike, or is none.
+// The serial number, padded with zeros. False when it was not read twice alike, or is none of a BioTac of 19
+// electrodes.
 bool bt_serial_query_answer(const bt_serial_query *query, uint8_t serial[BT_SERIAL_CHARS]);
 
 // All properties, before sampling begins: some 1.3 ms. Fills info; present is 1 when there is a serial
-// number, which begins with "BT", as SynTouch's own library decides it. What was not read twice alike in
-// three tries is zero.
+// number, which begins with "BT", as SynTouch's own library decides it, and is none of a BioTac of 24
+// electrodes. What was not read twice alike in three tries is zero.
 void bt_properties_read(uint8_t finger, bt_msg_sensor_info *info);
 
 #endif

@@ -95,6 +95,32 @@ static void a_line_that_is_stuck_is_nobody(void **state)
     assert_memory_equal(info.serial, none, 16);
 }
 
+// A BioTac SP has 24 electrodes, elsewhere: its counts come, and no force of them is ever sure.
+static void a_sensor_of_another_type_is_named_and_never_sure(void **state)
+{
+    (void)state;
+    static const char *const serial[] = {"BTSP050400018017", "BTTB050400018017"};
+    for (int k = 0; k < 2; k++) {
+        bt_msg_sensor_info info;
+        memcpy(fake.sensor[k].serial, serial[k], 16);
+        bt_properties_read((uint8_t)k, &info);
+        assert_int_equal(info.present, 0);
+        assert_memory_equal(info.serial, serial[k], 16);
+    }
+    trouble.finger = 2;
+    trouble.one_in = 1;
+    trouble.fault = BT_EMU_FAULT_BAD_PARITY;
+    boot(START_NS);
+    memcpy(fake.sensor[2].serial, serial[0], 16); // plugged in while sampling goes on
+    trouble.one_in = 0;
+    run_rounds(300);
+    assert_int_equal(gateway.session.info[2].present, 0);
+    assert_true(host.frames[2] > 200);
+    for (int k = 0; k < host.frames[2]; k++) {
+        assert_true(host.frame[2][k].flags & BT_FRAME_FLAG_SENSOR_UNSURE);
+    }
+}
+
 static void a_mute_sensor_finds_its_voice(void **state)
 {
     (void)state;
@@ -134,6 +160,7 @@ int main(void)
         T(one_flipped_bit_anywhere_changes_nothing),
         T(an_error_word_is_no_value),
         T(a_line_that_is_stuck_is_nobody),
+        T(a_sensor_of_another_type_is_named_and_never_sure),
         T(a_mute_sensor_finds_its_voice),
         T(a_serial_number_that_could_not_be_read_is_read_later),
     };

@@ -111,6 +111,102 @@ static void test_a_channel_that_no_slot_has_and_a_finger_that_is_not_on_the_tape
     assert_int_equal(ask(FINGERS, 0), BT_EMU_FAULT_STUCK_LOW);
 }
 
+static void ask_who(uint8_t finger)
+{
+    (void)bt_emu_stream_count(&stream, finger, BT_EMU_LINE, 0);
+}
+
+static void test_behind_a_hold_all_fingers_begin_in_the_round_after_all_were_asked_who_they_are(void **state)
+{
+    (void)state;
+    (void)put(0, BT_SLOTS);
+    (void)put(BT_SLOTS, BT_SLOTS);
+    stream.hold = BT_SLOTS;
+    for (uint32_t slot = 0; slot < BT_SLOTS; slot++) {
+        assert_int_equal(ask(0, slot), count_at(slot, 0));
+    }
+    assert_int_equal(ask(0, BT_SLOTS), BT_EMU_FAULT_STUCK_LOW);
+    stream.hold = BT_EMU_NO_HOLD;
+    for (uint8_t f = 0; f < FINGERS; f++) {
+        assert_int_equal(ask(f, 1), BT_EMU_FAULT_STUCK_LOW); // in the middle of a round
+    }
+    ask_who(0);
+    ask_who(1);
+    assert_int_equal(ask(2, 0), BT_EMU_FAULT_STUCK_LOW); // one of them is sampled meanwhile
+    assert_int_equal(ask(0, 0), BT_EMU_FAULT_STUCK_LOW);
+    for (uint8_t f = 0; f < FINGERS; f++) {
+        ask_who(f);
+    }
+    for (uint32_t slot = BT_SLOTS; slot < 2 * BT_SLOTS; slot++) {
+        for (uint8_t f = 0; f < FINGERS; f++) {
+            assert_int_equal(ask(f, slot), count_at(slot, f));
+        }
+    }
+}
+
+static void test_a_loop_has_no_end_and_takes_nothing(void **state)
+{
+    (void)state;
+    static uint16_t kept[FINGERS * BT_SLOTS];
+    for (uint32_t k = 0; k < FINGERS * BT_SLOTS; k++) {
+        kept[k] = count_at(k / FINGERS, k % FINGERS);
+    }
+    bt_emu_stream_loop(&stream, kept, FINGERS, BT_SLOTS);
+    for (uint32_t slot = 0; slot < 5 * BT_SLOTS; slot++) {
+        assert_int_equal(ask(1, slot), count_at(slot % BT_SLOTS, 1));
+    }
+    assert_int_equal(put(0, 1), 0);
+    assert_int_equal(bt_emu_stream_room(&stream), 0);
+    assert_true(bt_emu_stream_whole(&stream) == NULL);
+}
+
+static void test_a_tape_is_whole_until_some_of_it_is_overwritten(void **state)
+{
+    (void)state;
+    (void)put(0, BT_SLOTS - 1);
+    assert_true(bt_emu_stream_whole(&stream) == NULL); // no whole round
+    (void)put(BT_SLOTS - 1, BT_SLOTS);
+    (void)put(2 * BT_SLOTS - 1, 1);
+    assert_true(bt_emu_stream_whole(&stream) == ring);
+    for (uint32_t slot = 0; slot <= BT_SLOTS; slot++) {
+        (void)ask(0, slot);
+    }
+    (void)put(2 * BT_SLOTS, BT_SLOTS);
+    assert_true(bt_emu_stream_whole(&stream) == NULL);
+}
+
+// A bus whose rounds take so long; returns the tape's round that its last one got.
+static uint32_t play_by_time(uint32_t rounds, uint32_t round_us)
+{
+    static uint16_t kept[8 * FINGERS * BT_SLOTS];
+    for (uint32_t k = 0; k < 8 * FINGERS * BT_SLOTS; k++) {
+        kept[k] = count_at(k / FINGERS, k % FINGERS);
+    }
+    bt_emu_stream_loop(&stream, kept, FINGERS, 8 * BT_SLOTS);
+    stream.by_time = true;
+    for (uint64_t slot = 0; slot < (uint64_t)rounds * BT_SLOTS; slot++) {
+        uint8_t command = bt_channel_command[bt_slot_channel[slot % BT_SLOTS]];
+        uint64_t t_us = slot / BT_SLOTS * round_us + slot % BT_SLOTS * round_us / BT_SLOTS;
+        uint16_t got =
+            bt_emu_stream_count(&stream, 0, (uint8_t)((command & 0x7E) >> 1), 1000 * (t_us % UINT32_MAX));
+        uint32_t place = stream.at % (8 * BT_SLOTS);
+        assert_int_equal(got, count_at(place, 0));
+        assert_int_equal(place % BT_SLOTS, slot % BT_SLOTS); // whole rounds are moved
+    }
+    assert_int_equal(stream.at / BT_SLOTS, (int32_t)(rounds - 1) + stream.moved);
+    return stream.at / BT_SLOTS;
+}
+
+static void test_by_time_a_slow_bus_misses_rounds_and_a_quick_one_gets_some_twice(void **state)
+{
+    (void)state;
+    assert_int_equal(play_by_time(1001, 10000), 1000);
+    assert_int_equal(stream.moved, 0);
+    assert_int_equal(play_by_time(1001, 10010), 1001); // 1000 ppm of 10 s are one round
+    assert_int_equal(play_by_time(1001, 9990), 999);
+    assert_int_equal(play_by_time(101, 25000), 250);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -119,6 +215,11 @@ int main(void)
         cmocka_unit_test_setup(test_what_has_not_come_is_silence_and_the_order_stays, empty),
         cmocka_unit_test_setup(test_room_is_told_and_kept, empty),
         cmocka_unit_test_setup(test_a_fault_hides_the_tape_and_does_not_hold_it_up, empty),
+        cmocka_unit_test_setup(
+            test_behind_a_hold_all_fingers_begin_in_the_round_after_all_were_asked_who_they_are, empty),
+        cmocka_unit_test_setup(test_a_loop_has_no_end_and_takes_nothing, empty),
+        cmocka_unit_test_setup(test_a_tape_is_whole_until_some_of_it_is_overwritten, empty),
+        cmocka_unit_test_setup(test_by_time_a_slow_bus_misses_rounds_and_a_quick_one_gets_some_twice, empty),
         cmocka_unit_test_setup(test_a_channel_that_no_slot_has_and_a_finger_that_is_not_on_the_tape, empty),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

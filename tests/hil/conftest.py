@@ -1,4 +1,5 @@
-"""Every test here runs against every rig of rigs/*.toml. --rig NAME picks one, --port names a real board."""
+"""Every test here runs against every rig of rigs/*.toml. --rig NAME picks one, --port and --sensor-port
+name real boards."""
 
 from __future__ import annotations
 
@@ -41,10 +42,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture
 def rig(rig_name: str, request: pytest.FixtureRequest) -> Iterator[Rig]:
     """The board under test; whatever was opened on it is closed after the test."""
-    port = request.config.getoption("--port")
+    ports = {name: request.config.getoption(f"--{name.replace('_', '-')}") for name in ("port", "sensor_port")}
     facts = RIGS[rig_name]
-    if "{port}" in facts["port"] and port is None:
-        pytest.skip(f"{rig_name}: no --port was given, so there is no board to test")
+    for name, port in ports.items():
+        if f"{{{name}}}" in facts["port"] and port is None:
+            pytest.skip(f"{rig_name}: no --{name.replace('_', '-')} was given, so there is no board to test")
     if rig_name not in READY:
         READY[rig_name] = prepare(facts)
     why = READY[rig_name]
@@ -52,7 +54,7 @@ def rig(rig_name: str, request: pytest.FixtureRequest) -> Iterator[Rig]:
         if in_ci():
             pytest.fail(f"{rig_name}: {why}")
         pytest.skip(f"{rig_name}: {why}")
-    rig = Rig(rig_name, facts, port)
+    rig = Rig(rig_name, facts, **ports)
     yield rig
     rig.close()
 

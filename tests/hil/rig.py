@@ -14,8 +14,9 @@ import pytest
 import tomllib
 
 import biotac
+from bench import BenchPty, open_bench
 from biotac.sim.loading import load_source
-from biotac.sim.ports import start_board
+from biotac.sim.ports import parse_sim, start_board
 from biotac.sim.process import SimBoard
 
 HERE = Path(__file__).resolve().parent
@@ -29,7 +30,8 @@ class Rig:
     name: str
     facts: dict[str, Any]
     port: str | None
-    opened: list[biotac.Hand | SimBoard] = field(default_factory=list)
+    sensor_port: str | None
+    opened: list[Any] = field(default_factory=list)
 
     def need(self, ability: str) -> None:
         """Skip the test when this rig has not got the ability."""
@@ -37,13 +39,27 @@ class Rig:
         if why is not None:
             pytest.skip(f"{self.name}: {why}")
 
+    def can(self, ability: str) -> bool:
+        """It has the ability: for what is but a part of a test."""
+        return ability not in self.facts.get("cannot", {})
+
     def open(self, source: str = "press.toml") -> biotac.Hand:
         """Open the board; a rig that plays scenarios plays ``source``, which may carry ?options."""
         path, _, options = source.partition("?")
-        port = self.facts["port"].format(source=path, options=options, port=self.port)
-        hand = biotac.open(port)
+        if self.sensors_are_a_board:
+            sim = parse_sim(f"sim:{source}", pace=1.0)
+            hand = open_bench(
+                self.port, self.sensor_port, load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
+            )
+        else:
+            hand = biotac.open(self.facts["port"].format(source=path, options=options, port=self.port))
         self.opened.append(hand)
         return hand
+
+    @property
+    def sensors_are_a_board(self) -> bool:
+        """A real one, beside the real gateway."""
+        return "{sensor_port}" in self.facts["port"]
 
     def play(self, source: str) -> biotac.Hand:
         """Open the board with ``source``, or skip when it cannot be played."""
@@ -53,7 +69,10 @@ class Rig:
     def on_a_pty(self, source: str, *, pace: float) -> SimBoard:
         """The board as ``biotac sim`` starts it; its time runs from the start."""
         self.need("scenarios")
-        board = start_board(self.facts["board"], load_source(source, seconds=60), pace=pace)
+        if self.sensors_are_a_board:
+            board = BenchPty(self.port, self.sensor_port, load_source(source, seconds=60))
+        else:
+            board = start_board(self.facts["board"], load_source(source, seconds=60), pace=pace)
         board.release()
         self.opened.append(board)
         return board

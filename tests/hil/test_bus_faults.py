@@ -49,7 +49,9 @@ def play(board, tmp_path: Path):
         pytest.param("no_channel", "words_error", marks=pytest.mark.long),
     ],
 )
-def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(play, kind: str, counter: str) -> None:
+def test_a_fault_on_one_finger_is_counted_there_and_touches_no_other(rig, play, kind: str, counter: str) -> None:
+    if counter == "words_stuck":
+        rig.need("silence")
     healthy, before = play(HEALTHY)
     faulty, after = play(hurt_by(kind))
     for finger in (0, 2):
@@ -101,7 +103,8 @@ def test_absent_sensors_send_nothing_and_read_as_stuck(play) -> None:
 
 
 @pytest.mark.long
-def test_every_slot_of_every_finger_was_read(play) -> None:
+def test_every_slot_of_every_finger_was_read(rig, play) -> None:
+    rig.need("silence")
     _, status = play(HEALTHY)
     for finger in range(3):
         words = status[finger]

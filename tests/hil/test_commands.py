@@ -117,7 +117,7 @@ def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:
     hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 200))
     hand.link.release()
     frames = 0
-    while hand._board.read(1.0) and not hand.link.ended:
+    while hand._board.read(hand.link.patience) and not hand.link.ended:  # an emulator may take long to the first
         while (batch := hand._streams._pulled.take()) is not None:
             frames += len(batch.frames)
     assert 18 <= frames <= 22  # 200 ms of 10 ms rounds, and what was under way
@@ -137,4 +137,4 @@ def test_a_press_brings_its_tare_and_contact_events(board) -> None:
         assert np.count_nonzero(np.diff(touched.astype(int)) == 1) == np.count_nonzero(
             np.diff(touched.astype(int)) == -1
         )
-        assert touched.any() and not touched[: int(first["seq"][0])].any()
+        assert touched.any() and not touched[frames["seq"] < first["seq"][0]].any()

@@ -103,6 +103,23 @@ def test_another_sensor_is_refused_and_that_is_said(rig: Rig, tmp_path: Path, se
     assert hand.calibration_state(1) == CalibrationState.OTHER_SENSOR
 
 
+def test_a_sensor_of_another_type_is_named_and_its_force_never_sure(rig: Rig, tmp_path: Path) -> None:
+    """A BioTac SP answers to the same commands, and to E20 besides: its electrodes lie elsewhere."""
+    rig.need("scenarios")
+    path = tmp_path / "held.toml"
+    path.write_text(held_press(2) + '[[finger]]\n[[finger]]\nserial = "BTSP050400018017"\n')
+    hand = rig.open(str(path))
+    frames = hand.read(100)
+    assert hand.fingers == [0]
+    told = hand.sensor_info(1)
+    assert (told.present, bytes(told.serial)) == (0, b"BTSP050400018017")
+    mine, other = of(frames, 1), of(frames, 0)
+    assert len(mine) > 200 and np.all(mine["flags"] & FrameFlags.SENSOR_UNSURE)
+    assert not np.any(other["flags"] & (FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER))
+    latched = hand.faults().by_index
+    assert latched[1] & FrameFlags.SENSOR_UNSURE and not latched[0] & FrameFlags.SENSOR_UNSURE
+
+
 def test_two_sensors_swapped_are_both_refused(rig: Rig, tmp_path: Path) -> None:
     rig.need("scenarios")
     path = tmp_path / "swapped.toml"

@@ -26,7 +26,8 @@ def test_the_board_says_what_it_is(rig) -> None:
     for finger in hand.fingers:
         info = hand.sensor_info(finger)
         assert bytes(info.serial).startswith(b"BT")
-        assert info.sampling_hz == 4400
+        if rig.can("properties"):
+            assert info.sampling_hz == 4400
 
 
 def test_usb_enumerates_and_breaks_no_rule(rig) -> None:
@@ -182,10 +183,10 @@ def test_a_board_that_lost_power_is_another_boot(rig, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_recorded_counts_give_the_same_results_as_the_simulated_board(board, shared_data: Path) -> None:
     trial = shared_data / "robotic_finger" / "trial_15330.npz"
-    here = board(f"{trial}?seconds=20").read_batch(1000).wire
-    with biotac.open(f"sim:{trial}?seconds=20") as hand:
+    here = board(str(trial)).read_batch(1000).wire
+    with biotac.open(f"sim:{trial}") as hand:
         there = hand.read_batch(1000).wire
-    assert len(here) == len(there) == 2000
+    assert len(here) == len(there) == 5185
     for field in set(wire_fields(here)) - {"t_us"}:  # boards do not start at the same microsecond
         assert here[field].tobytes() == there[field].tobytes(), field
 

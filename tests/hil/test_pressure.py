@@ -101,6 +101,7 @@ def test_what_is_not_asked_for_is_invalid_and_leaves_no_trace_in_what_is(
 def test_fingers_are_calibrated_and_verified_on_board(rig: Rig, seed: int, profile: Profile) -> None:
     """The issue's figure: at most 5.9 %. Set, read back, streamed; the force is the scenario's."""
     rig.need("scenarios")
+    rig.need("starting")
     board = rig.facts["board"]
     # One finger where emulated time is slow: the board's arithmetic is the same for all.
     fingers = range(5 if board == "posix" else 1)

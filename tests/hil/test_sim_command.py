@@ -12,6 +12,7 @@ import biotac
 
 def test_sim_gives_a_pty_for_this_board(rig, tmp_path: Path) -> None:
     rig.need("scenarios")
+    rig.need("starting")
     link = tmp_path / "ttyBOARD"
     words = [sys.executable, "-m", "biotac", "sim", "press.toml", "--fingers", "2", "--link", str(link), "--json"]
     process = subprocess.Popen([*words, "--board", rig.facts["board"]], stdout=subprocess.PIPE, text=True)

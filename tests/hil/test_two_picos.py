@@ -19,15 +19,17 @@ from biotac.sim.process import SimLink
 from biotac.sim.two_picos import TwoPicos
 from biotac.wire import messages_gen as wire
 
-SETTLE_US = 50
-DAY_S, NIGHT_S = 1.0, 60.0
+RIG = "two_picos"
+DAY_S, NIGHT_S = 5.0, 60.0
 
 Open = Callable[[float], tuple[biotac.Hand, TwoPicos]]
 
 
 @pytest.fixture
-def opened() -> Iterator[Open]:
-    why = prepare(all_rigs()["two_picos"])
+def opened(request: pytest.FixtureRequest) -> Iterator[Open]:
+    if RIG not in (request.config.getoption("--rig") or [RIG]):
+        pytest.skip(f"--rig names others than {RIG}")
+    why = prepare(all_rigs()[RIG])
     if why is not None:
         pytest.fail(why) if in_ci() else pytest.skip(why)
     hands = []
@@ -104,6 +106,10 @@ def test_faults_by_command_are_seen_on_their_finger_and_on_no_other(opened: Open
     assert board.sensor_board.status().words_late == 0
 
 
+def test_every_fault_is_commanded() -> None:
+    assert set(FAULTS) == set(wire.EmuFault) - {wire.EmuFault.NONE}
+
+
 LEADS = {
     "SCK to nothing": ("lead_clock", ""),
     "MOSI to nothing": ("lead_mosi", ""),
@@ -135,5 +141,5 @@ def test_the_doctor_names_the_lead_that_is_wrong(opened: Open, lead: str) -> Non
 
 def test_places_on_the_tape_are_told_apart() -> None:
     """What the comparison rests on: this scenario's rows differ, so that a slot too early or too late is seen."""
-    samples = load_source("press.toml", fingers=5, seconds=DAY_S).samples
+    samples = load_source("press.toml", fingers=5, seconds=1.0).samples
     assert all((one != next_one).any() for one, next_one in pairwise(samples))

@@ -2,10 +2,12 @@
 //
 //   node main.mjs --image BIN --wasm sensors.wasm --tape FILE --pty PATH --master FD
 //                 [--pace X] [--hold] [--serials A,B,...] [--uart-master FD]
-//   node main.mjs --image BIN --sensor BIN --sensor-pty PATH --sensor-master FD --tape FILE --pty PATH --master FD ...
+//   node main.mjs --image BIN --sensor BIN --sensor-pty PATH --sensor-master FD --tape FILE --pty PATH --master FD
+//                 [--endless] ...
 //
 // The second form has a second Pico in place of the sensors (sensor_board.mjs). It writes "sensor PATH" once that board's
-// port can be opened, and gives the first one power when stdin says "power".
+// port can be opened, and gives the first one power when stdin says "power". --endless: however long the tape is, what the
+// sensors play is somebody else's business, and time does not end with it.
 //
 // --uart-master has another pty on the pins of the UART that the image uses.
 //
@@ -43,6 +45,7 @@ const { values: options } = parseArgs({
     'uart-master': text,
     pace: { type: 'string', default: '1' },
     serials: { type: 'string', default: '' },
+    endless: { type: 'boolean', default: false },
     hold: { type: 'boolean', default: false },
   },
 })
@@ -72,7 +75,7 @@ function read(path) {
 function plugIn() {
   try {
     if (sensorPty === null) sensors = new Sensors(read(options.wasm), tape, options.serials)
-    else sensors = new SensorBoard({ image: read(options.sensor), tape, port: sensorPty })
+    else sensors = new SensorBoard({ image: read(options.sensor), tape, endless: options.endless, port: sensorPty })
   } catch (error) {
     die(options.sensor ?? options.tape, error.message)
   }

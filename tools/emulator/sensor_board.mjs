@@ -24,10 +24,10 @@ const TAPE_FRAMES_AT = 12
 const SPI_BLOCK_BITS = 16
 
 export class SensorBoard {
-  /** tape: what the host will play, of which only the length matters here. */
-  constructor({ image, tape, port }) {
+  /** tape: what the host will play, of which only the length matters here, unless it is endless. */
+  constructor({ image, tape, endless, port }) {
     this.port = port
-    this.frames = tape.readUInt32LE(TAPE_FRAMES_AT)
+    this.frames = endless ? Infinity : tape.readUInt32LE(TAPE_FRAMES_AT)
     this.stretched = false // no lead makes a word longer
     this.ends = new Map(Object.values(LEADS).map((pin) => [pin, pin])) // of the gateway's leads; null: nowhere
     this.edges = [] // {at: ns, pin, high}, sorted by time; those before `passed` are over

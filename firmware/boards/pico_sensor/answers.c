@@ -5,6 +5,8 @@
 #include "answers.h"
 
 #include "hold_off.h"
+#include "keep/storage.h"
+#include "loop.h"
 #include "port.h"
 #include "rp2040_regs.h"
 #include "shifter.h"
@@ -12,7 +14,8 @@
 
 #include <string.h>
 
-#define SAMPLE_RAM 76800 // 3.5 s of five sensors, 17 s of one
+#define SAMPLE_RAM 76800 // 3.5 s of five sensors, 17 s of one; whole pages of flash (loop.c)
+_Static_assert(2 * SAMPLE_RAM % BT_FLASH_PAGE_BYTES == 0, "the last page that is kept must lie in it");
 
 // The alarm offers what is settled so long before the 50 us are over: an interrupt that is under way delays
 // it by less.
@@ -173,6 +176,7 @@ void answers_start(bt_emu_stream *stream)
 {
     source = stream;
     answers_forget();
+    loop_play(stream);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         char serial[] = "BTEMU00000000001";
         serial[sizeof serial - 2] = (char)('1' + f);

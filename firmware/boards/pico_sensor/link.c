@@ -1,6 +1,7 @@
 #include "link.h"
 
 #include "answers.h"
+#include "loop.h"
 #include "port.h"
 #include "version.h"
 #include "wire/framing.h"
@@ -47,6 +48,9 @@ static void send_status(uint8_t req_id)
         .words_late = counts.late,
         .samples_starved = stream->starved,
         .slowest_us = (uint16_t)counts.slowest_us,
+        .rounds_moved = stream->moved,
+        .loop_slots = loop_slots(),
+        .looping = stream->loop != NULL,
     };
     uint8_t payload[BT_EMU_STATUS_BYTES];
     bt_msg_emu_status_pack(&status, payload);
@@ -126,6 +130,8 @@ static union {
     bt_msg_emu_plug plug;
     bt_msg_emu_tape tape;
     bt_msg_emu_set_fault fault;
+    bt_msg_emu_play play;
+    bt_msg_emu_keep keep;
     bt_msg_hello_request hello;
     bt_msg_reboot_bootloader reboot;
 } got;
@@ -157,6 +163,15 @@ static void obey(uint8_t id, const uint8_t *payload)
     case BT_EMU_SET_FAULT_ID:
         bt_msg_emu_set_fault_unpack(&got.fault, payload);
         error = set_fault(&got.fault);
+        break;
+    case BT_EMU_PLAY_ID:
+        bt_msg_emu_play_unpack(&got.play, payload);
+        stream->hold = got.play.hold_slot;
+        stream->by_time = got.play.by_time;
+        break;
+    case BT_EMU_KEEP_ID:
+        bt_msg_emu_keep_unpack(&got.keep, payload);
+        error = loop_keep(stream, got.keep.slots, got.keep.crc32);
         break;
     case BT_EMU_GET_STATUS_ID:
         break;

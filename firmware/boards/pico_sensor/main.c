@@ -1,5 +1,6 @@
 #include "answers.h"
 #include "link.h"
+#include "loop.h"
 #include "port.h"
 #include "system.h"
 
@@ -16,6 +17,7 @@ int main(int argc, char **argv)
     link_start(&stream);
     for (;;) {
         link_poll();
+        loop_poll();
         port_idle();
     }
 }

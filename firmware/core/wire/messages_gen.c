@@ -1414,6 +1414,9 @@ void bt_msg_emu_status_pack(const bt_msg_emu_status *msg, uint8_t out[BT_EMU_STA
     at = put(at, (uint32_t)msg->words_late, 4);
     at = put(at, (uint32_t)msg->samples_starved, 4);
     at = put(at, (uint32_t)msg->slowest_us, 2);
+    at = put(at, (uint32_t)msg->rounds_moved, 4);
+    at = put(at, (uint32_t)msg->loop_slots, 4);
+    at = put(at, (uint32_t)msg->looping, 1);
     (void)at;
 }
 
@@ -1441,6 +1444,12 @@ void bt_msg_emu_status_unpack(bt_msg_emu_status *msg, const uint8_t in[BT_EMU_ST
     msg->samples_starved = (uint32_t)value;
     at = get(at, &value, 2);
     msg->slowest_us = (uint16_t)value;
+    at = get(at, &value, 4);
+    msg->rounds_moved = (int32_t)value;
+    at = get(at, &value, 4);
+    msg->loop_slots = (uint32_t)value;
+    at = get(at, &value, 1);
+    msg->looping = (uint8_t)value;
     (void)at;
 }
 
@@ -1540,6 +1549,50 @@ void bt_msg_emu_get_status_unpack(bt_msg_emu_get_status *msg, const uint8_t in[B
     uint32_t value;
     at = get(at, &value, 1);
     msg->req_id = (uint8_t)value;
+    (void)at;
+}
+
+void bt_msg_emu_play_pack(const bt_msg_emu_play *msg, uint8_t out[BT_EMU_PLAY_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->hold_slot, 4);
+    at = put(at, (uint32_t)msg->by_time, 1);
+    (void)at;
+}
+
+void bt_msg_emu_play_unpack(bt_msg_emu_play *msg, const uint8_t in[BT_EMU_PLAY_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->hold_slot = (uint32_t)value;
+    at = get(at, &value, 1);
+    msg->by_time = (uint8_t)value;
+    (void)at;
+}
+
+void bt_msg_emu_keep_pack(const bt_msg_emu_keep *msg, uint8_t out[BT_EMU_KEEP_BYTES])
+{
+    uint8_t *at = out;
+    at = put(at, (uint32_t)msg->req_id, 1);
+    at = put(at, (uint32_t)msg->slots, 4);
+    at = put(at, (uint32_t)msg->crc32, 4);
+    (void)at;
+}
+
+void bt_msg_emu_keep_unpack(bt_msg_emu_keep *msg, const uint8_t in[BT_EMU_KEEP_BYTES])
+{
+    const uint8_t *at = in;
+    uint32_t value;
+    at = get(at, &value, 1);
+    msg->req_id = (uint8_t)value;
+    at = get(at, &value, 4);
+    msg->slots = (uint32_t)value;
+    at = get(at, &value, 4);
+    msg->crc32 = (uint32_t)value;
     (void)at;
 }
 
@@ -1644,6 +1697,10 @@ int bt_wire_payload_bytes(uint8_t id)
         return BT_EMU_SET_FAULT_BYTES;
     case BT_EMU_GET_STATUS_ID:
         return BT_EMU_GET_STATUS_BYTES;
+    case BT_EMU_PLAY_ID:
+        return BT_EMU_PLAY_BYTES;
+    case BT_EMU_KEEP_ID:
+        return BT_EMU_KEEP_BYTES;
     default:
         return -1;
     }

@@ -8,7 +8,7 @@
 
 #define BT_WIRE_MAJOR 1
 #define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0x8E1007F4u
+#define BT_SCHEMA_HASH 0xDB7A8CBFu
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -812,7 +812,7 @@ void bt_msg_clear_faults_unpack(bt_msg_clear_faults *msg, const uint8_t in[BT_CL
 
 // How an emulated sensor board gets on. Reply to every EMU command. Counts are since EMU_PLUG of finger 0.
 #define BT_EMU_STATUS_ID 0x40
-#define BT_EMU_STATUS_BYTES 30
+#define BT_EMU_STATUS_BYTES 39
 typedef struct {
     uint8_t req_id; // [1] of the command
     uint8_t fingers; // [bit mask] plugged in
@@ -824,6 +824,9 @@ typedef struct {
     uint32_t words_late; // [1] of them, not ready in the bus's own time: MISO was let go, or the answer was one of two for other times
     uint32_t samples_starved; // [1] asked for behind what had come of the tape: MISO was let go
     uint16_t slowest_us; // [us] the longest that an answer took from the select's rise; the bus leaves 50 us
+    int32_t rounds_moved; // [1] by time: rounds of the tape left out, less those played again; 10 ms each of this board's clock against the bus's
+    uint32_t loop_slots; // [1] of the tape in flash; 0: there is none
+    uint8_t looping; // [bool] that is what is played
 } bt_msg_emu_status;
 void bt_msg_emu_status_pack(const bt_msg_emu_status *msg, uint8_t out[BT_EMU_STATUS_BYTES]);
 void bt_msg_emu_status_unpack(bt_msg_emu_status *msg, const uint8_t in[BT_EMU_STATUS_BYTES]);
@@ -872,6 +875,28 @@ typedef struct {
 } bt_msg_emu_get_status;
 void bt_msg_emu_get_status_pack(const bt_msg_emu_get_status *msg, uint8_t out[BT_EMU_GET_STATUS_BYTES]);
 void bt_msg_emu_get_status_unpack(bt_msg_emu_get_status *msg, const uint8_t in[BT_EMU_GET_STATUS_BYTES]);
+
+// How the tape is served, until finger 0's EMU_PLUG: as it begins, without a hold and in its order.
+#define BT_EMU_PLAY_ID 0xC4
+#define BT_EMU_PLAY_BYTES 6
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint32_t hold_slot; // [1] a round's first, from which on nothing is served until another EMU_PLAY names a later one: what is asked for meanwhile is samples_starved. The tape then goes on with the first slot of a round before which every finger on it was asked for a property, as a gateway does with sensors that give no samples: so all begin in the same round. 0xFFFFFFFF: no hold
+    uint8_t by_time; // [bool] 1: keep to this board's clock; where the bus has come a round behind, one is left out, where it is a round ahead, one is played again
+} bt_msg_emu_play;
+void bt_msg_emu_play_pack(const bt_msg_emu_play *msg, uint8_t out[BT_EMU_PLAY_BYTES]);
+void bt_msg_emu_play_unpack(bt_msg_emu_play *msg, const uint8_t in[BT_EMU_PLAY_BYTES]);
+
+// Keep the tape in flash, to be played over and over from power-up until a host's EMU_PLUG of finger 0. All of it must be there still, as it was told (NOT_WHOLE): whole rounds, no more than there is room for at once. The flash is written in the seconds after the reply; EMU_STATUS.loop_slots tells when it is. The bus is not served in time meanwhile.
+#define BT_EMU_KEEP_ID 0xC5
+#define BT_EMU_KEEP_BYTES 9
+typedef struct {
+    uint8_t req_id; // [1] any but 0
+    uint32_t slots; // [1] of the tape; 0: keep none
+    uint32_t crc32; // [1] over its samples, u16 little-endian, slot by slot, as zlib's
+} bt_msg_emu_keep;
+void bt_msg_emu_keep_pack(const bt_msg_emu_keep *msg, uint8_t out[BT_EMU_KEEP_BYTES]);
+void bt_msg_emu_keep_unpack(bt_msg_emu_keep *msg, const uint8_t in[BT_EMU_KEEP_BYTES]);
 
 // Payload length of a message id, without id and CRC; -1 when the id is unknown.
 int bt_wire_payload_bytes(uint8_t id);
@@ -922,12 +947,14 @@ int bt_wire_payload_bytes(uint8_t id);
 #define BT_HOLD_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
 #define BT_RELEASE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1)
 #define BT_CLEAR_FAULTS_FIELDS(X) X(req_id, u8, 1) X(faults, u16, 1) X(finger_faults, u32, 5)
-#define BT_EMU_STATUS_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots_taken, u32, 1) X(room_slots, u16, 1) X(slots_served, u32, 1) X(elapsed_us, u32, 1) X(words, u32, 1) X(words_late, u32, 1) X(samples_starved, u32, 1) X(slowest_us, u16, 1)
+#define BT_EMU_STATUS_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots_taken, u32, 1) X(room_slots, u16, 1) X(slots_served, u32, 1) X(elapsed_us, u32, 1) X(words, u32, 1) X(words_late, u32, 1) X(samples_starved, u32, 1) X(slowest_us, u16, 1) X(rounds_moved, i32, 1) X(loop_slots, u32, 1) X(looping, u8, 1)
 #define BT_EMU_PLUG_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(present, u8, 1) X(serial, u8, 16)
 #define BT_EMU_TAPE_FIELDS(X) X(req_id, u8, 1) X(fingers, u8, 1) X(slots, u8, 1) X(first_slot, u32, 1) X(samples, u8, 220)
 #define BT_EMU_SET_FAULT_FIELDS(X) X(req_id, u8, 1) X(finger, u8, 1) X(fault, u16, 1)
 #define BT_EMU_GET_STATUS_FIELDS(X) X(req_id, u8, 1)
-#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status)
+#define BT_EMU_PLAY_FIELDS(X) X(req_id, u8, 1) X(hold_slot, u32, 1) X(by_time, u8, 1)
+#define BT_EMU_KEEP_FIELDS(X) X(req_id, u8, 1) X(slots, u32, 1) X(crc32, u32, 1)
+#define BT_WIRE_MESSAGES(X) X(HELLO, bt_msg_hello) X(REPLY, bt_msg_reply) X(SETTING, bt_msg_setting) X(SENSOR_INFO, bt_msg_sensor_info) X(POINT, bt_msg_point) X(CALIBRATION, bt_msg_calibration) X(MAP_INFO, bt_msg_map_info) X(MAP_DATA, bt_msg_map_data) X(FRAME, bt_msg_frame) X(PAC, bt_msg_pac) X(TARE, bt_msg_tare) X(STATUS, bt_msg_status) X(SENSOR_STATUS, bt_msg_sensor_status) X(IDLE, bt_msg_idle) X(TOUCH, bt_msg_touch) X(EVENT, bt_msg_event) X(BANDS, bt_msg_bands) X(HELLO_REQUEST, bt_msg_hello_request) X(START, bt_msg_start) X(STOP, bt_msg_stop) X(PING, bt_msg_ping) X(SUBSCRIBE, bt_msg_subscribe) X(GET_POINT, bt_msg_get_point) X(TARE_NOW, bt_msg_tare_now) X(TARE_SET, bt_msg_tare_set) X(GET_STATUS, bt_msg_get_status) X(GET_SENSOR_STATUS, bt_msg_get_sensor_status) X(GET_SENSOR_INFO, bt_msg_get_sensor_info) X(GET_SETTING, bt_msg_get_setting) X(SET_SETTING, bt_msg_set_setting) X(REBOOT_BOOTLOADER, bt_msg_reboot_bootloader) X(SAVE_SETTINGS, bt_msg_save_settings) X(GET_CALIBRATION, bt_msg_get_calibration) X(SET_CALIBRATION, bt_msg_set_calibration) X(CLEAR_CALIBRATION, bt_msg_clear_calibration) X(GET_MAP, bt_msg_get_map) X(READ_MAP, bt_msg_read_map) X(BEGIN_MAP, bt_msg_begin_map) X(WRITE_MAP, bt_msg_write_map) X(END_MAP, bt_msg_end_map) X(CLEAR_MAP, bt_msg_clear_map) X(HOLD, bt_msg_hold) X(RELEASE, bt_msg_release) X(CLEAR_FAULTS, bt_msg_clear_faults) X(EMU_STATUS, bt_msg_emu_status) X(EMU_PLUG, bt_msg_emu_plug) X(EMU_TAPE, bt_msg_emu_tape) X(EMU_SET_FAULT, bt_msg_emu_set_fault) X(EMU_GET_STATUS, bt_msg_emu_get_status) X(EMU_PLAY, bt_msg_emu_play) X(EMU_KEEP, bt_msg_emu_keep)
 #endif
 
 #endif

@@ -150,6 +150,12 @@ CATALOGUE: dict[str, Entry] = {
         "The board answers, but none of its chip selects has a BioTac behind it that gives its serial number.",
         "Check V+ (3.3 to 5 V) at the sensor, GND, and MISO, MOSI, SCLK and SS against the board's wiring table.",
     ),
+    "wrong_sensor": Entry(
+        E,
+        "A sensor of another type, as a BioTac SP (BTSP...), whose 24 electrodes lie elsewhere. Its counts are sent; "
+        "all its frames carry SENSOR_UNSURE, for no force can be had of them here.",
+        "Put a BioTac in its place.",
+    ),
     "sensor_missing": Entry(
         E,
         "Fewer sensors answer than `--fingers` says there are.",

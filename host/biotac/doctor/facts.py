@@ -36,7 +36,8 @@ def grown(before: Any, after: Any, counter: str) -> int:
 
 @dataclass(frozen=True)
 class BoardFacts:
-    """What a board said within some seconds. Lists of sensor states are by finger, all five."""
+    """What a board said within some seconds. Lists of sensor states are by finger, all five; ``sensors`` has those that
+    gave a serial number, those of a wrong type, too."""
 
     hello: wire.Hello
     sensors: list[wire.SensorInfo]

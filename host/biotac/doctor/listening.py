@@ -37,7 +37,8 @@ def examine(port: str | None, *, seconds: float = 3.0, expected_fingers: int | N
 
 def listen(hand: Hand, seconds: float) -> BoardFacts:
     """Counters, then a stream, then the counters again."""
-    sensors = [hand.sensor_info(finger) for finger in hand.fingers]
+    told = [hand.sensor_info(finger) for finger in range(MAX_SENSORS)]
+    sensors = [its for its in told if any(its.serial)]
     hand.sync()
     before = hand.status()
     sensors_before = [hand.sensor_status(finger) for finger in range(MAX_SENSORS)]

@@ -13,10 +13,13 @@ from .facts import BoardFacts, Facts
 
 
 def check(facts: Facts) -> Iterator[Finding]:
-    """Absent, fewer than expected, lost or changed on the way, of one serial number, of different versions."""
+    """Of another type, absent, too few, lost or changed on the way, of one serial number, of different versions."""
     board = facts.board
     if board is None:
         return
+    for sensor in board.sensors:
+        if not sensor.present and (serial := ascii_text(sensor.serial)):
+            yield Finding("wrong_sensor", f"finger {sensor.finger} is {serial}, which is no BioTac of 19 electrodes")
     if not board.present:
         yield Finding("no_sensor", "no sensor answers on any of the five chip selects")
         return
@@ -55,7 +58,7 @@ def _changed(board: BoardFacts) -> Iterator[Finding]:
 def _serials(board: BoardFacts) -> Iterator[Finding]:
     by_serial: dict[str, list[int]] = {}
     kinds: dict[tuple[str, str], list[int]] = {}
-    for sensor in board.sensors:
+    for sensor in (its for its in board.sensors if its.present):
         by_serial.setdefault(ascii_text(sensor.serial), []).append(sensor.finger)
         kind = ascii_text(sensor.flex_version), ascii_text(sensor.software_version)
         kinds.setdefault(kind, []).append(sensor.finger)

@@ -29,6 +29,8 @@ def check(facts: Facts) -> Iterator[Finding]:
         yield Finding("board_restarted", f"it has been up for {board.after.uptime_s} s")
         return  # its counters began again: they say nothing
     earlier = replace(board.before, faults=board.before.faults & ~wire.FaultFlags.STARTED)  # so does every board
+    if facts.pair is not None:  # a sensor board is silent until it has a tape
+        earlier = replace(earlier, finger_faults=(0,) * sensor.MAX_SENSORS)
     if faults := faults_of(earlier, DEFAULT_NAMES):
         yield Finding("faults_latched", str(faults).replace("\n", "; "))
     for counter, what in (("slots_late", "slots came too late"), ("messages_dropped", "messages found no room")):

@@ -10,6 +10,7 @@ so this is a sensor like a BioTac, not a given BioTac. sampling.py adds what tim
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -66,6 +67,11 @@ class States:
 
     def __len__(self) -> int:
         return len(self.force_n)
+
+    @cached_property
+    def deformation(self) -> tuple[Floats, Floats]:
+        """What deform() says of these, the same for every finger."""
+        return deform(self)
 
     def of(self, rows: npt.NDArray[Any]) -> States:
         """At some of the instants, as NumPy indexes them."""
@@ -227,7 +233,7 @@ class Finger:
 
     def counts(self, states: States) -> Floats:
         """Counts (n, 19), not rounded, without noise, drift or creep."""
-        return self.counts_of(*deform(states), states.warm_c)
+        return self.counts_of(*states.deformation, states.warm_c)
 
     def counts_of(self, compression: Floats, bulge: Floats, warm_c: Floats) -> Floats:
         """counts() of what deform() says, each (n, 19), at ``warm_c`` (n,) above 30 C."""

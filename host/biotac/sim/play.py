@@ -12,9 +12,9 @@ from ..wire import sensor_gen as _sensor
 from ..wire import slots
 from . import sampling
 from .gains import fit_gains
-from .physics import Finger
+from .physics import Finger, States
 from .scenario import Fault, FingerSpec, Scenario, default_serial
-from .source import Source, Truth
+from .source import Rows, Source, Truth
 
 _REPEAT_SEED_STEP = 100  # apart enough that repeated fingers do not meet the scenario's own seeds
 
@@ -31,40 +31,44 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
     frames = period if seconds is None else max(1, round(seconds * slots.FRAME_HZ))
     specs = [_repeated(scenario.fingers[k % own], k // own) for k in range(count)]
 
-    boundary = np.arange(frames + 1)
+    played = min(frames, period)  # of the timeline
+    frame = np.arange(frames) % period
     # frame numbers, not seconds, so that no rounding shifts a repetition; the very last boundary
     # belongs to the frame before it
-    boundary_s = _seconds(np.append(boundary[:-1] % period, (frames - 1) % period + 1))
-    middle_s = _seconds(boundary[:-1] % period + 0.5)
+    boundary = np.append(frame, frame[-1] + 1)
 
     samples = np.empty((frames, count, slots.SLOTS_PER_FRAME), dtype=np.uint16)
-    truth = Truth(
-        contact=np.zeros((frames, count), dtype=np.bool_),
-        poc_mm=np.full((frames, count, 3), np.nan),
-        force_n=np.zeros((frames, count, 3)),
-        torque_nmm=np.zeros((frames, count, 3)),
-    )
     emulated = tuple(Finger(spec.seed, spec.profile) for spec in specs)
-    for k, finger in enumerate(emulated):
-        track = scenario.tracks[k % own]
-        samples[:, k] = sampling.sample(finger, track.states(boundary_s))
-        for fault in scenario.faults:
-            if fault.finger == k % own:
-                _lay(fault, samples[:, k], period)
-        middle = track.states(middle_s)
-        touched = middle.force_n > 0.0
-        truth.contact[:, k] = touched
-        truth.poc_mm[touched, k] = middle.contact_mm[touched]
-        truth.force_n[:, k], truth.torque_nmm[:, k] = middle.wrench()
+    for index, track in enumerate(scenario.tracks[:count]):
+        states = track.states(_seconds(np.arange(played + 1)))
+        codes = _codes([fault for fault in scenario.faults if fault.finger == index], period)
+        for k in range(index, count, own):
+            samples[:, k] = sampling.sample(emulated[k], states, boundary)
+            if codes is not None:
+                laid = codes[frame]
+                np.copyto(samples[:, k], laid, where=laid > 0)
+
+    def middles(frames: int) -> list[States]:
+        its = [track.states(_seconds(np.arange(frames) + 0.5)) for track in scenario.tracks[:count]]
+        return [its[k % own] for k in range(count)]
 
     return Source(
         name=scenario.name,
         samples=samples,
-        truth=truth,
-        settings=_fit(scenario, emulated, period) if scenario.fit_gains else {},
+        truth=_truth(middles(played), frame),
+        settings=_fit(emulated, middles(period)) if scenario.fit_gains else {},
         serials=tuple(spec.serial for spec in specs),
         emulated=emulated,
     )
+
+
+def _truth(middles: list[States], frame: Rows) -> Truth:
+    """What is applied to each finger, given its states at the middle of each frame of the timeline."""
+    contact = np.stack([its.force_n > 0.0 for its in middles], axis=1)
+    poc_mm = np.stack([its.contact_mm for its in middles], axis=1)
+    wrenches = [its.wrench() for its in middles]
+    force_n, torque_nmm = (np.stack([its[part] for its in wrenches], axis=1) for part in (0, 1))
+    return Truth(contact, np.where(contact[:, :, None], poc_mm, np.nan), force_n, torque_nmm, frame)
 
 
 def _seconds(frame: npt.ArrayLike) -> Floats:
@@ -78,26 +82,27 @@ def _repeated(spec: FingerSpec, repetition: int) -> FingerSpec:
     return replace(spec, seed=seed, serial=default_serial(seed))
 
 
-def _lay(fault: Fault, words: sampling.Words, period: int) -> None:
-    """Put the fault's code into ``words`` (frames, 44) at every slot that begins while it lasts."""
-    frames, slots = words.shape
-    # in slot numbers: comparing seconds would let rounding decide at the edges
-    begin, end = (round(t * _sensor.SLOT_HZ) for t in (fault.at_s, fault.at_s + fault.seconds))
-    mine = np.ones(slots, np.bool_) if fault.channel is None else np.array(_sensor.SLOTS) == fault.channel
-    for first in range(begin // slots, frames, period):
-        rows = words[first : first + -(-end // slots) - begin // slots]
-        slot = np.arange(rows.size).reshape(rows.shape) + begin // slots * slots
-        rows[(slot >= begin) & (slot < end) & mine] = fault.code
+def _codes(faults: list[Fault], period: int) -> sampling.Words | None:
+    """What they put in place of counts, (period, 44): a code in every slot that begins while one lasts, else 0."""
+    if not faults:
+        return None
+    codes = np.zeros((period, slots.SLOTS_PER_FRAME), np.uint16)
+    for fault in faults:
+        # in slot numbers: comparing seconds would let rounding decide at the edges
+        begin, end = (round(t * _sensor.SLOT_HZ) for t in (fault.at_s, fault.at_s + fault.seconds))
+        lasting = np.zeros(codes.size, np.bool_)
+        lasting[begin:end] = True
+        mine = np.ones(slots.SLOTS_PER_FRAME, np.bool_)
+        if fault.channel is not None:
+            mine = np.array(_sensor.SLOTS) == fault.channel
+        codes[lasting.reshape(codes.shape) & mine] = fault.code
+    return codes
 
 
-def _fit(scenario: Scenario, emulated: tuple[Finger, ...], period: int) -> dict[str, int]:
+def _fit(emulated: tuple[Finger, ...], middles: list[States]) -> dict[str, int]:
     """Gains over one whole timeline, whatever part of it is played, and all fingers together."""
-    middle_s = _seconds(np.arange(period) + 0.5)
-    signals, forces, torques = [], [], []
-    for k, finger in enumerate(emulated):
-        states = scenario.tracks[k % len(scenario.tracks)].states(middle_s)
-        signals.append(finger.counts(states) - finger.rest_counts(states.warm_c))
-        force, torque = states.wrench()
-        forces.append(force)
-        torques.append(torque)
+    signals = [
+        finger.counts(its) - finger.rest_counts(its.warm_c) for finger, its in zip(emulated, middles, strict=True)
+    ]
+    forces, torques = zip(*(its.wrench() for its in middles), strict=True)
     return fit_gains(np.concatenate(signals), np.concatenate(forces), np.concatenate(torques))

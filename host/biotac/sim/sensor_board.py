@@ -6,11 +6,13 @@ The board serves its tape in order, a sample for each sample command. It keeps 3
 from __future__ import annotations
 
 import threading
+import time
+import zlib
 
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import PortError
+from ..errors import DeviceLostError, InputError, PortError
 from ..hand.board import Board
 from ..link import Link
 from ..wire import messages_gen as wire
@@ -22,6 +24,8 @@ SAMPLES_A_MESSAGE = 110
 SAMPLE_BYTES = 2 * SAMPLES_A_MESSAGE
 BURST = 16  # messages until the board is asked how far it got
 REST_S = 0.05  # while its room is full
+NOT_HELD = 0xFFFFFFFF
+KEEP_S = 20.0  # 39 sectors of flash that take their longest
 
 
 class SensorBoard:
@@ -35,12 +39,14 @@ class SensorBoard:
             self._board.close()
             raise PortError(f"{link.port} is {seen}, no sensor board; name the other port, or `biotac flash` it")
         self.serials: tuple[str, ...] = ()  #: of the sensors that are plugged in
+        self.held_at = NOT_HELD  #: the slot before which its tape waits
         self._samples: npt.NDArray[np.uint16] = np.zeros((0, 1), np.uint16)
 
     def plug(self, source: Source) -> None:
         """Plug in as many sensors as ``source`` has fingers, which begin at its first row; then feed()."""
         frames, fingers, slots = source.samples.shape
         self._samples = source.samples.transpose(0, 2, 1).reshape(frames * slots, fingers)
+        self.held_at = NOT_HELD
         own = tuple(f"BTEMU{finger + 1:011d}" for finger in range(fingers))
         self.serials = source.serials + own[len(source.serials) :]
         for finger in range(sensor.MAX_SENSORS):
@@ -55,6 +61,41 @@ class SensorBoard:
     def fault(self, finger: int, fault: wire.EmuFault) -> wire.EmuStatus:
         """Have a finger do this from now on, whatever its tape says; EmuFault.NONE ends it."""
         return self._board.ask(wire.EmuSetFault(0, finger, fault), wire.EmuStatus)
+
+    def play(self, *, hold_slot: int | None = None, by_time: bool = False) -> wire.EmuStatus:
+        """How the tape is served, until the next plug().
+
+        Before ``hold_slot``, a round's first, it waits until another play() names a later one or none, and then goes on
+        with all fingers in one round. That is for gateways: a reader that never asks its sensors who they are waits for
+        good. ``by_time``: the tape keeps to the board's clock, and rounds are left out or played again for that.
+        """
+        self.held_at = NOT_HELD if hold_slot is None else hold_slot
+        return self._board.ask(wire.EmuPlay(0, self.held_at, by_time), wire.EmuStatus)
+
+    def keep(self) -> wire.EmuStatus:
+        """Have all that was plugged kept in the board's flash, to be played over and over from power-up on.
+
+        It must fit the board at once, which is 3.5 s of five fingers. Raises InputError when it does not, and
+        CommandRefusedError when the board has lost some of it.
+        """
+        slots, fingers = self._samples.shape
+        taken = self.feed(until_full=True).slots_taken
+        if taken < slots:
+            tape_s, room_s = slots / sensor.SLOT_HZ, taken / sensor.SLOT_HZ
+            raise InputError(f"{tape_s:g} s of {fingers} fingers do not fit the board, {room_s:g} s do")
+        digest = zlib.crc32(self._samples.astype("<u2").tobytes())
+        status = self._board.ask(wire.EmuKeep(0, slots, digest), wire.EmuStatus)
+        until_s = time.monotonic() + KEEP_S * self._board.link.patience
+        while status.loop_slots != slots:
+            if time.monotonic() > until_s:
+                raise DeviceLostError(f"{self._board.link.port}: the tape was not written within {KEEP_S:g} s")
+            time.sleep(REST_S)
+            status = self.status()
+        return status
+
+    def forget(self) -> wire.EmuStatus:
+        """Have nothing in flash to be played."""
+        return self._board.ask(wire.EmuKeep(0, 0, 0), wire.EmuStatus)
 
     def feed(self, until_full: bool = False, ended: threading.Event | None = None) -> wire.EmuStatus:
         """Send what is left of the source as there is room for it; returns once all is there, or ``ended`` is set.

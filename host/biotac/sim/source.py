@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from ..core.geometry import Floats
 from .physics import Finger
+
+Rows = npt.NDArray[np.int64]
 
 MAX_SECONDS = 3600.0  # 5 fingers for an hour are 160 MB of counts
 
 
-@dataclass(frozen=True)
 class Truth:
     """What a scenario applied, at the middle of each frame.
 
@@ -21,10 +24,32 @@ class Truth:
     finger, the torque about the origin: c x f + torsion n. Frame and origin are Lin's, figure 4.
     """
 
-    contact: npt.NDArray[np.bool_]
-    poc_mm: npt.NDArray[np.float64]
-    force_n: npt.NDArray[np.float64]
-    torque_nmm: npt.NDArray[np.float64]
+    def __init__(
+        self, contact: npt.NDArray[np.bool_], poc_mm: Floats, force_n: Floats, torque_nmm: Floats, rows: Rows
+    ) -> None:
+        """Of one timeline; ``rows`` (frames,) says which of its rows each frame is."""
+        self._timeline = contact, poc_mm, force_n, torque_nmm
+        self._rows = rows
+
+    @cached_property
+    def contact(self) -> npt.NDArray[np.bool_]:
+        """See the class."""
+        return self._timeline[0][self._rows]
+
+    @cached_property
+    def poc_mm(self) -> Floats:
+        """See the class."""
+        return self._timeline[1][self._rows]
+
+    @cached_property
+    def force_n(self) -> Floats:
+        """See the class."""
+        return self._timeline[2][self._rows]
+
+    @cached_property
+    def torque_nmm(self) -> Floats:
+        """See the class."""
+        return self._timeline[3][self._rows]
 
 
 @dataclass(frozen=True)

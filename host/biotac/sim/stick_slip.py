@@ -25,19 +25,31 @@ PAC_HZ = _sensor.SLOT_HZ / 2.0
 _PAC = _sensor.SLOTS.count("PAC")
 
 
-def ringing(rng: np.random.Generator, speed_mm_s: Floats) -> Floats:
+class Ringing:
     """PAC counts (n, 22) above rest of skin that slides at ``speed_mm_s`` (n,), a speed a frame.
 
-    Draws the same numbers for a frame whatever comes after it, and 0 where nothing has slid for 50 ms.
+    Each call goes on where the one before has ended. Draws the same numbers for a frame whatever comes after it, and 0
+    where nothing has slid for 50 ms.
     """
-    draw = rng.random((len(speed_mm_s), _PAC, 2))
-    lets_go = draw[:, :, 0] < (speed_mm_s / DRAWN_MM / PAC_HZ)[:, None]
-    sway = 2.0 * draw[:, :, 1] - 1.0
-    blow = np.where(lets_go, AMPLITUDE_COUNTS * np.sign(sway) * np.sqrt(np.abs(sway)), 0.0)
-    slides = speed_mm_s > 0.0
-    begins = slides & ~np.concatenate([[False], slides[:-1]])
-    blow[begins, 0] = AMPLITUDE_COUNTS * np.sign(sway[begins, 0])
-    t_s = np.arange(round(10 * RING_S * PAC_HZ)) / PAC_HZ
-    ring = np.exp(-t_s / RING_S) * np.sin(2.0 * math.pi * SKIN_HZ * t_s)
-    rung: Floats = np.convolve(blow.ravel(), ring)[: blow.size].reshape(blow.shape)
-    return rung
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        t_s = np.arange(round(10 * RING_S * PAC_HZ)) / PAC_HZ
+        self._ring = np.exp(-t_s / RING_S) * np.sin(2.0 * math.pi * SKIN_HZ * t_s)
+        self._rng = rng
+        self._slid = False
+        self._blows: Floats = np.zeros(len(t_s) - 1)  # what still rings
+
+    def __call__(self, speed_mm_s: Floats) -> Floats:
+        draw = self._rng.random((len(speed_mm_s), _PAC, 2))
+        lets_go = draw[:, :, 0] < (speed_mm_s / DRAWN_MM / PAC_HZ)[:, None]
+        sway = 2.0 * draw[:, :, 1] - 1.0
+        blow = np.zeros(sway.shape)
+        blow[lets_go] = AMPLITUDE_COUNTS * np.sign(sway[lets_go]) * np.sqrt(np.abs(sway[lets_go]))
+        slides = speed_mm_s > 0.0
+        begins = slides & ~np.concatenate([[self._slid], slides[:-1]])
+        self._slid = bool(slides[-1])
+        blow[begins, 0] = AMPLITUDE_COUNTS * np.sign(sway[begins, 0])
+        blows = np.concatenate([self._blows, blow.ravel()])
+        self._blows = blows[-len(self._blows) :]
+        rung: Floats = np.convolve(blows, self._ring, "valid").reshape(blow.shape)
+        return rung

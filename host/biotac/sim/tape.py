@@ -31,6 +31,7 @@ CODES = (NO_CHANNEL, BAD_PARITY, STUCK_LOW, STUCK_HIGH, ERROR_WORD, UNPLUGGED, S
 MAGIC = b"BTTAPE01"
 _HEADER = struct.Struct("<8sIIII")
 _SLOTS = len(_sensor.SLOTS)
+_BLOCK = 10_000  # frames at a time, for memory
 
 
 def write_tape(path: str | Path, source: Source) -> None:
@@ -48,7 +49,10 @@ def write_tape(path: str | Path, source: Source) -> None:
     _check(f"source {source.name}", samples)
     header = _HEADER.pack(MAGIC, fingers, frames, slots, 0)
     try:
-        Path(path).write_bytes(header + samples.astype("<u2").tobytes())
+        with Path(path).open("wb") as file:
+            file.write(header)
+            for first in range(0, frames, _BLOCK):
+                file.write(samples[first : first + _BLOCK].astype("<u2").tobytes())
     except OSError as error:
         raise InputError(f"{path}: cannot write the tape: {error.strerror}; choose another place") from error
 
@@ -86,11 +90,13 @@ def _check(where: str, samples: npt.NDArray[np.uint16]) -> None:
             f"{where}: {frames} frames of {fingers} fingers: expected at least one frame "
             f"and 1 to {_sensor.MAX_SENSORS} fingers; load it with load_source"
         )
-    wrong = (samples > _sensor.FULL_SCALE_COUNT) & (samples < min(CODES))
-    if wrong.any():
-        frame, finger, slot = (int(k) for k in np.argwhere(wrong)[0])
-        raise InputError(
-            f"{where}: frame {frame}, finger {finger}, slot {slot} holds {samples[frame, finger, slot]}: "
-            f"expected a count 0..{_sensor.FULL_SCALE_COUNT} or a tape code from {min(CODES):#06X}; "
-            "load it with load_source"
-        )
+    for first in range(0, frames, _BLOCK):
+        block = samples[first : first + _BLOCK]
+        wrong = (block > _sensor.FULL_SCALE_COUNT) & (block < min(CODES))
+        if wrong.any():
+            frame, finger, slot = (int(k) for k in np.argwhere(wrong)[0])
+            raise InputError(
+                f"{where}: frame {first + frame}, finger {finger}, slot {slot} holds {block[frame, finger, slot]}: "
+                f"expected a count 0..{_sensor.FULL_SCALE_COUNT} or a tape code from {min(CODES):#06X}; "
+                "load it with load_source"
+            )

@@ -412,6 +412,9 @@ DTYPES: dict[int, np.dtype[Any]] = {
             ("words_late", "<u4"),
             ("samples_starved", "<u4"),
             ("slowest_us", "<u2"),
+            ("rounds_moved", "<i4"),
+            ("loop_slots", "<u4"),
+            ("looping", "u1"),
         ]
     ),
     wire.EmuPlug.ID: np.dtype(
@@ -441,6 +444,20 @@ DTYPES: dict[int, np.dtype[Any]] = {
     wire.EmuGetStatus.ID: np.dtype(
         [
             ("req_id", "u1"),
+        ]
+    ),
+    wire.EmuPlay.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("hold_slot", "<u4"),
+            ("by_time", "u1"),
+        ]
+    ),
+    wire.EmuKeep.ID: np.dtype(
+        [
+            ("req_id", "u1"),
+            ("slots", "<u4"),
+            ("crc32", "<u4"),
         ]
     ),
 }

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
 WIRE_MINOR = 5
-SCHEMA_HASH = 0x8E1007F4
+SCHEMA_HASH = 0xDB7A8CBF
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -2055,12 +2055,15 @@ class EmuStatus:
     words_late: int
     samples_starved: int
     slowest_us: int
+    rounds_moved: int
+    loop_slots: int
+    looping: int
 
     ID: ClassVar[int] = 0x40
-    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBIHIIIIIH")
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BBIHIIIIIHiIB")
 
     def pack(self) -> bytes:
-        """Payload without id and CRC, 30 bytes."""
+        """Payload without id and CRC, 39 bytes."""
         return self.STRUCT.pack(
             self.req_id,
             self.fingers,
@@ -2072,6 +2075,9 @@ class EmuStatus:
             self.words_late,
             self.samples_starved,
             self.slowest_us,
+            self.rounds_moved,
+            self.loop_slots,
+            self.looping,
         )
 
     @classmethod
@@ -2089,6 +2095,9 @@ class EmuStatus:
             v[7],
             v[8],
             v[9],
+            v[10],
+            v[11],
+            v[12],
         )
 
 
@@ -2215,7 +2224,67 @@ class EmuGetStatus:
         )
 
 
-Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | Bands | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus
+@dataclass(frozen=True, slots=True)
+class EmuPlay:
+    """How the tape is served, until finger 0's EMU_PLUG: as it begins, without a hold and in its order."""
+
+    req_id: int
+    hold_slot: int
+    by_time: int
+
+    ID: ClassVar[int] = 0xC4
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BIB")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 6 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.hold_slot,
+            self.by_time,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuPlay:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EmuKeep:
+    """Keep the tape in flash, to be played over and over from power-up until a host's EMU_PLUG of finger 0. All of it must be there still, as it was told (NOT_WHOLE): whole rounds, no more than there is room for at once. The flash is written in the seconds after the reply; EMU_STATUS.loop_slots tells when it is. The bus is not served in time meanwhile."""
+
+    req_id: int
+    slots: int
+    crc32: int
+
+    ID: ClassVar[int] = 0xC5
+    STRUCT: ClassVar[struct.Struct] = struct.Struct("<BII")
+
+    def pack(self) -> bytes:
+        """Payload without id and CRC, 9 bytes."""
+        return self.STRUCT.pack(
+            self.req_id,
+            self.slots,
+            self.crc32,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EmuKeep:
+        """Inverse of pack; struct.error when the length differs."""
+        v = cls.STRUCT.unpack(payload)
+        return cls(
+            v[0],
+            v[1],
+            v[2],
+        )
+
+
+Message = Hello | Reply | SettingValue | SensorInfo | Point | Calibration | MapInfo | MapData | Frame | Pac | Tare | Status | SensorStatus | Idle | Touch | Event | Bands | HelloRequest | Start | Stop | Ping | Subscribe | GetPoint | TareNow | TareSet | GetStatus | GetSensorStatus | GetSensorInfo | GetSetting | SetSetting | RebootBootloader | SaveSettings | GetCalibration | SetCalibration | ClearCalibration | GetMap | ReadMap | BeginMap | WriteMap | EndMap | ClearMap | Hold | Release | ClearFaults | EmuStatus | EmuPlug | EmuTape | EmuSetFault | EmuGetStatus | EmuPlay | EmuKeep
 
 MESSAGES: dict[int, type[Any]] = {
     Hello.ID: Hello,
@@ -2267,6 +2336,8 @@ MESSAGES: dict[int, type[Any]] = {
     EmuTape.ID: EmuTape,
     EmuSetFault.ID: EmuSetFault,
     EmuGetStatus.ID: EmuGetStatus,
+    EmuPlay.ID: EmuPlay,
+    EmuKeep.ID: EmuKeep,
 }
 
 # What each command is answered by.
@@ -2302,4 +2373,6 @@ ANSWERS: dict[type[Any], type[Any]] = {
     EmuTape: EmuStatus,
     EmuSetFault: EmuStatus,
     EmuGetStatus: EmuStatus,
+    EmuPlay: EmuStatus,
+    EmuKeep: EmuStatus,
 }

@@ -152,6 +152,20 @@ LEADS: list[tuple[Facts, list[tuple[str, str]]]] = [
 ]
 
 
+def test_of_a_pair_a_finger_that_was_silent_before_it_had_a_tape_is_no_finding() -> None:
+    silent = {"finger_faults": (int(biotac.FrameFlags.SENSOR_UNSURE),) * 5}
+
+    def codes(facts: Facts) -> set[str]:
+        return {finding.code for finding in judge(facts)}
+
+    alone = board(before=message(wire.Status, **BEFORE | silent))
+    assert "faults_latched" in codes(alone)
+    status = message(wire.EmuStatus)
+    assert "faults_latched" not in codes(dataclasses.replace(alone, pair=PairFacts(status, status, ())))
+    worn = board(before=message(wire.Status, **BEFORE | silent | {"faults": int(wire.FaultFlags.STORAGE)}))
+    assert "faults_latched" in codes(dataclasses.replace(worn, pair=PairFacts(status, status, ())))
+
+
 @pytest.mark.parametrize(("facts", "expected"), LEADS)
 def test_the_lead_that_is_wrong_is_told_by_what_either_end_heard(facts: Facts, expected: list[tuple[str, str]]) -> None:
     found = list(leads.check(facts))
@@ -195,6 +209,11 @@ CASES: list[tuple[str, Facts, str]] = [
         "firmware_older",
         board(hello=hello(0, 0, 9, fingers_present=0b11)),
         f"firmware 0.0.9, this package {__version__}",
+    ),
+    (
+        "wrong_sensor",
+        board(sensors=[info(0, "BT00001"), dataclasses.replace(info(1, "BTSP050400018017"), present=0)]),
+        "finger 1 is BTSP050400018017",
     ),
     ("no_sensor", board(hello=hello(*RELEASE), sensors=[]), "no sensor answers"),
     ("sensor_missing", dataclasses.replace(board(), expected_fingers=3), "2 of 3 sensors answer: finger 0, 1"),

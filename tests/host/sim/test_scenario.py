@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,10 @@ from biotac.sim import Source, bundled_scenarios, load_source, sampling, tape
 from biotac.sim.gains import fit_gains
 from biotac.sim.physics import Finger
 from biotac.sim.scenario import FAULT_CODES, parse_scenario
+from biotac.sim.timeline import Pose, Track
 from biotac.wire import messages_gen as _wire
 from biotac.wire import slots
+from biotac.wire.slots import ELECTRODE_SLOT, FRAME_S
 
 REST = '[[step]]\ndo = "rest"\nseconds = 1.0\n'
 PRESS = '[[step]]\ndo = "press"\nseconds = 0.5\nat = "E17"\nforce_n = 5.0\n'
@@ -300,3 +303,33 @@ def test_fingers_out_of_range_are_refused(fingers: int) -> None:
 def test_seconds_out_of_range_are_refused(seconds: float) -> None:
     with pytest.raises(InputError, match=r"expected 0\.01 to 3600"):
         load_source("press.toml", seconds=seconds)
+
+
+def test_what_skin_remembers_goes_on_over_thousands_of_frames() -> None:
+    """Creep and the pressure's lags, which are computed in blocks, against their plain recursion."""
+    finger = Finger(1)
+    finger.noise_counts = 0.0
+    finger.drift_per_min[:] = 0.0
+    track = Track()
+    press = Pose(x_mm=-3.0, force_n=4.0, tip_mm=7.0)
+    for _ in range(4):
+        track.ramp(2.0, press, start=replace(press, force_n=0.0))
+        track.ramp(5.0, press)
+        track.ramp(1.0, press.released())
+    states = track.states(np.arange(3001) * FRAME_S)
+    words = sampling.sample(finger, states)[:, ELECTRODE_SLOT]
+    exact, keep = finger.counts(states), np.exp(-FRAME_S / sampling.CREEP_S)
+    lagged = np.zeros(19)
+    for k, pressed in enumerate(exact - finger.rest_counts(states.warm_c)):
+        lagged = keep * lagged + (1.0 - keep) * pressed
+        exact[k] += finger.creep_share * lagged
+    share = ELECTRODE_SLOT / 44.0
+    np.testing.assert_allclose(words, exact[:-1] * (1.0 - share) + exact[1:] * share, atol=0.5000001)
+
+
+def test_a_part_of_a_repeated_scenario_is_its_beginning() -> None:
+    longer, shorter = (load_source("faults.toml", seconds=seconds) for seconds in (40.0, 11.0))
+    np.testing.assert_array_equal(longer.samples[:1100], shorter.samples)
+    assert longer.truth is not None and shorter.truth is not None
+    np.testing.assert_array_equal(longer.truth.force_n[:1100], shorter.truth.force_n)
+    np.testing.assert_array_equal(longer.truth.contact[1200:2400], longer.truth.contact[:1200])

@@ -85,7 +85,7 @@ BAD: list[tuple[str, str, int, str, str]] = [
         'name = "t"\nfingers = 2\n[[step]]\ndo = "press"\nforce_n = 1\nat = "E17"\nseconds = 151\n',
         7,
         "step 1",
-        "expected at most 200 s of changing load",
+        "expected at most 160 s of changing load",
     ),
     (
         "too long",

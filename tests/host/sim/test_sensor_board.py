@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import zlib
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,8 @@ class FakeSensorBoard:
         self.plugged: dict[int, wire.EmuPlug] = {}
         self.faults: dict[int, int] = {}
         self.parts = 0
+        self.play: wire.EmuPlay | None = None
+        self.keeping = self.kept = 0
 
     def answer(self, message_id: int, payload: bytes) -> bytes:
         if message_id == wire.HelloRequest.ID:
@@ -47,12 +50,23 @@ class FakeSensorBoard:
             if fault.finger > 4:
                 return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.NO_SUCH_FINGER).pack())
             self.faults[fault.finger] = fault.fault
+        elif message_id == wire.EmuPlay.ID:
+            self.play = wire.EmuPlay.unpack(payload)
+        elif message_id == wire.EmuKeep.ID:
+            keep = wire.EmuKeep.unpack(payload)
+            if keep.slots and (keep.slots, keep.crc32) != (
+                len(self.rows),
+                zlib.crc32(np.array(self.rows, "<u2").tobytes()),
+            ):
+                return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.NOT_WHOLE).pack())
+            self.keeping = keep.slots
         elif message_id == wire.EmuGetStatus.ID:
+            self.kept = self.keeping
             self.served = min(len(self.rows), self.served + self.serve)
         else:
             return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.UNKNOWN_COMMAND).pack())
         room = self.room - (len(self.rows) - self.served)
-        facts = (0x1F, len(self.rows), min(room, 0xFFFF), self.served, 0, 0, 0, 0, 0)
+        facts = (0x1F, len(self.rows), min(room, 0xFFFF), self.served, 0, 0, 0, 0, 0, 0, self.kept, 0)
         return encode(wire.EmuStatus.ID, wire.EmuStatus(payload[0], *facts).pack())
 
     def _take(self, part: wire.EmuTape) -> None:
@@ -129,3 +143,44 @@ def test_the_verb_plays_a_source_and_says_how_it_went(scripted_board, hello, cap
     assert fake.faults == {1: int(wire.EmuFault.UNPLUGGED)}
     with pytest.raises(InputError, match="expected FINGER=KIND"):
         sensor.fault_of("2=loose")
+
+
+def test_a_tape_is_kept_and_forgotten(scripted_board, hello, capsys) -> None:
+    fake = FakeSensorBoard(hello, room=900)
+    port = scripted_board(fake.answer).path
+    parser = argparse.ArgumentParser()
+    sensor.add_arguments(parser)
+
+    def run(*words: str) -> str:
+        assert sensor.run(argparse.Namespace(**vars(parser.parse_args([port, *words])), json=False)) == 0
+        return capsys.readouterr().out
+
+    assert "0.20 s are kept in its flash" in run("press.toml", "--fingers", "2", "--seconds", "0.2", "--keep")
+    assert fake.kept == 880
+    run("--forget")
+    assert fake.keeping == 0
+    with pytest.raises(InputError, match=r"0.3 s of 2 fingers do not fit the board, 0.2.* s do"):
+        run("press.toml", "--fingers", "2", "--seconds", "0.3", "--keep")
+    with pytest.raises(InputError, match="--keep wants a SOURCE"):
+        run("--keep")
+
+
+def test_a_tape_that_the_board_has_not_whole_is_not_kept(scripted_board, hello) -> None:
+    fake = FakeSensorBoard(hello)
+    board = SensorBoard(SerialLink(scripted_board(fake.answer).path))
+    board.plug(load_source("press.toml", fingers=1, seconds=0.1))
+    board.feed()
+    fake.rows[7] = (1,)
+    with pytest.raises(CommandRefusedError, match="NOT_WHOLE"):
+        board.keep()
+    board.close()
+
+
+def test_the_tape_can_be_held_and_keep_to_the_clock(scripted_board, hello) -> None:
+    fake = FakeSensorBoard(hello)
+    board = SensorBoard(SerialLink(scripted_board(fake.answer).path))
+    board.play(hold_slot=44)
+    assert fake.play is not None and (fake.play.hold_slot, fake.play.by_time) == (44, 0)
+    board.play(by_time=True)
+    assert (fake.play.hold_slot, fake.play.by_time) == (0xFFFFFFFF, 1)
+    board.close()

@@ -8,7 +8,7 @@ import pytest
 import biotac
 from biotac import EventKind
 from biotac.core.events import pac_events
-from biotac.sim.stick_slip import ringing
+from biotac.sim.stick_slip import Ringing
 
 HELD = 60  # rounds
 
@@ -20,7 +20,7 @@ def test_the_onset_of_a_slip_is_told_within_five_milliseconds(speed_mm_s: float)
         rng = np.random.default_rng(seed)
         speed = np.zeros(2 * HELD)
         speed[HELD:] = speed_mm_s
-        pac = np.rint(2038 + ringing(rng, speed) + rng.normal(0.0, 5.0, (2 * HELD, 22))).astype(int)
+        pac = np.rint(2038 + Ringing(rng)(speed) + rng.normal(0.0, 5.0, (2 * HELD, 22))).astype(int)
         events, _ = pac_events(np.clip(pac, 0, 4095))
         slip = events[events["kind"] == EventKind.SLIP][0]
         off_ms.append(int(slip["onset_us"]) / 1000 - 10 * HELD)
@@ -31,11 +31,11 @@ def test_the_onset_of_a_slip_is_told_within_five_milliseconds(speed_mm_s: float)
 
 def test_its_strength_is_that_of_real_slides_and_a_longer_run_begins_alike() -> None:
     speed = np.full(3000, 20.0)
-    pac = ringing(np.random.default_rng(1), speed)
+    pac = Ringing(np.random.default_rng(1))(speed)
     flat = pac.ravel()
     assert 1300 <= np.mean((flat[8:] - flat[:-8]) ** 2) <= 6000
-    np.testing.assert_array_equal(ringing(np.random.default_rng(1), speed[:100]), pac[:100])
-    assert not ringing(np.random.default_rng(1), np.zeros(100)).any()
+    np.testing.assert_array_equal(Ringing(np.random.default_rng(1))(speed[:100]), pac[:100])
+    assert not Ringing(np.random.default_rng(1))(np.zeros(100)).any()
 
 
 def test_a_grasp_is_told_from_touch_to_release() -> None:

@@ -13,7 +13,7 @@ from ...link import open_link
 from ...sim.loading import load_source
 from ...sim.sensor_board import SensorBoard
 from ...wire import messages_gen as wire
-from ...wire.sensor_gen import SLOT_HZ
+from ...wire.sensor_gen import SLOT_HZ, SLOTS
 from .. import values
 
 EXAMPLE = "biotac sensor /dev/ttyACM1 press.toml --fingers 5"
@@ -38,6 +38,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=values.seconds,
         help="device time (default: scenarios repeat for ten minutes, recordings play once)",
     )
+    parser.add_argument(
+        "--by-time",
+        action="store_true",
+        help="keep the tape to the board's clock: rounds are left out or played again where the gateway's differs",
+    )
+    kept = parser.add_mutually_exclusive_group()
+    kept.add_argument(
+        "--keep",
+        action="store_true",
+        help="keep SOURCE in the board's flash, up to 3.5 s of five fingers: it plays from power-up on, over and over",
+    )
+    kept.add_argument("--forget", action="store_true", help="keep nothing there")
     kinds = ", ".join(fault.name.lower() for fault in wire.EmuFault)
     parser.add_argument(
         "--fault",
@@ -51,14 +63,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Plug the sensors in, feed them until their tape is over, or Ctrl-C, and say how the board got on."""
     faults = [fault_of(text) for text in args.fault]
+    if args.source is None and (args.keep or args.by_time):
+        raise InputError(f"{'--keep' if args.keep else '--by-time'} wants a SOURCE, such as press.toml")
     board = SensorBoard(open_link(args.port))
     try:
         if args.source is not None:
-            seconds = args.seconds or (SCENARIO_S if args.source.endswith(".toml") else None)
+            repeats = args.source.endswith(".toml") and not args.keep  # a loop repeats by itself
+            seconds = args.seconds or (SCENARIO_S if repeats else None)
             board.plug(load_source(args.source, fingers=args.fingers, seconds=seconds))
+            board.play(by_time=args.by_time)
+        if args.forget:
+            board.forget()
         for finger, fault in faults:
             board.fault(finger, fault)
-        status = board.status() if args.source is None else play(board)
+        status = board.keep() if args.keep else board.status() if args.source is None else play(board)
     finally:
         board.close()
     print(json.dumps(asdict(status)) if args.json else summary(status))
@@ -95,6 +113,12 @@ def summary(status: wire.EmuStatus) -> str:
         f"the slowest answer was ready {status.slowest_us} us after its select rose",
     ]
     if status.slots_served > 1 and status.elapsed_us:
-        tape_us = (status.slots_served - 1) * 1e6 / SLOT_HZ
+        tape_us = (status.slots_served - 1 - status.rounds_moved * len(SLOTS)) * 1e6 / SLOT_HZ
         lines.append(f"the gateway's clock is {(status.elapsed_us / tape_us - 1) * 1e6:+.0f} ppm slow by this board's")
+    if status.rounds_moved:
+        what = "left out" if status.rounds_moved > 0 else "played again"
+        lines.append(f"{abs(status.rounds_moved)} rounds of 10 ms were {what}, so that the tape kept to its clock")
+    if status.loop_slots:
+        now = "is being played" if status.looping else "plays from its next power-up on"
+        lines.append(f"{status.loop_slots / SLOT_HZ:.2f} s are kept in its flash, which {now}")
     return "\n".join(lines)
