@@ -28,7 +28,8 @@ Answer = Callable[[int, bytes], bytes]
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Here and not in tests/hil: pytest asks only the outermost conftest files for options."""
     parser.addoption("--rig", action="append", help="run tests/hil against this rig only; may be repeated")
-    parser.addoption("--port", help="a real board's port, for the rig 'real' of tests/hil")
+    parser.addoption("--port", help="a real board's port, for the rigs 'real' and 'bench' of tests/hil")
+    parser.addoption("--sensor-port", help="port of the sensor board that is wired to it, for the rig 'bench'")
 
 
 @pytest.fixture(scope="session", autouse=True)

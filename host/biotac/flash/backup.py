@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ..documents import read_json
 from ..errors import CommandRefusedError, InputError
-from ..hand.commands import CALIBRATION_SINCE_MINOR, MAP_SINCE_MINOR
+from ..hand.compatibility import CALIBRATION_SINCE_MINOR, MAP_SINCE_MINOR
 from ..hand.hand import Hand
 from ..keep import Calibration, map_file
 from ..keep.calibration_file import from_dict, to_dict

@@ -52,7 +52,8 @@ class Share:
             session.liveliness().declare_subscriber(network.key(name, "writer/*"), self._writer_changed)
         )
         self._epoch, self._wire = self._new_epoch()
-        self._board.record, self._board.record_gap = self._publish, self._came_back
+        incoming = self._board.incoming
+        incoming.record, incoming.record_gap = self._publish, self._came_back
         hand.start()
         hand.run()
 
@@ -192,7 +193,7 @@ class Share:
 
     def close(self) -> None:
         """Take it off the network. The hand goes on streaming. Safe to call twice."""
-        self._board.record = None
+        self._board.incoming.record = None
         if self._paused is not None:
             self._paused.cancel()
         with self._publishing:

@@ -1,4 +1,4 @@
-"""One board on a link: its bytes are read and decoded, commands are given until they are answered."""
+"""One board on a link: who reads it, who waits, and commands that are given until they are answered."""
 
 from __future__ import annotations
 
@@ -12,23 +12,22 @@ from dataclasses import replace
 from itertools import cycle
 from typing import Any, NoReturn, TypeVar
 
-from ..clock import LAST_SAMPLE_US, Arrivals, DeviceClock
 from ..clock.host_clock import HostClock, SystemClock
 from ..errors import CommandRefusedError, DeviceLostError, InputError
 from ..link import Link
 from ..link.serial_port import went_away
 from ..wire import messages_gen as wire
-from ..wire.batches import Batch, LinkStats, StreamDecoder
+from ..wire.batches import Batch
 from ..wire.framing import encode
 from . import compatibility
-from .gap import Gap, Reason
+from .gap import Reason
 from .handshake import handshake
+from .incoming import Incoming
 
 REPLY_TIMEOUT_S = 1.0
 REPLY_TRIES = 3
 #: What a board says to what only the other side knows.
 NOT_KNOWN = (wire.Error.UNKNOWN_COMMAND, wire.Error.UNKNOWN_SETTING, wire.Error.BAD_LENGTH)
-UNANSWERED = 8  # questions for the time that are remembered
 # How long a link is waited for at most before other things are looked at, such as whether all is to end.
 POLL_S = 0.2
 
@@ -45,14 +44,8 @@ class Board:
     def __init__(self, link: Link, *, host_clock: HostClock | None = None) -> None:
         self.link = link
         self.host_clock = host_clock or SystemClock()
-        #: Device time as host time, fed by whatever is read; known after a first STATUS that was asked for.
-        self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
         #: Takes every batch that has something, on the thread that reads.
         self.deliver: Callable[[Batch], object] = lambda batch: None
-        #: Takes all bytes as they come, and none when none came in time; what it raises ends it, not the reading.
-        self.record: Callable[[bytes], object] | None = None
-        #: Takes the gap before the first batch behind it.
-        self.record_gap: Callable[[Gap], object] = lambda gap: None
         #: The link is gone: raises, or returns once the board is back as it was.
         self.lost: Callable[[DeviceLostError, Reason], None] = self._lost
         #: Whether the caller's thread reads the link; others wait for what it reads.
@@ -63,13 +56,7 @@ class Board:
         self.closed = False
         self._failure: BaseException | None = None
         self._told = False
-        self.trouble: Exception | None = None  #: what ended a recording, until it is told
         self.awaiting = 0  #: replies
-        self.gap: Gap | None = None  #: to go with the next rows
-        self._gaps = self._bytes = self._frames = 0
-        self._past: list[LinkStats] = []  # of decoders before a reboot
-        self._arrivals = Arrivals(self.clock)
-        self._time_asked: dict[int, float] = {}  # when each request left that has no answer yet
         self._replies: deque[Any] = deque()
         self._lasting: dict[tuple[str, int], Callable[[], object]] = {}
         self._req_ids = cycle(range(1, 256))
@@ -83,17 +70,8 @@ class Board:
         except BaseException:
             link.close()
             raise
-        self._decoder = self._new_decoder()
-
-    @property
-    def stats(self) -> LinkStats:
-        """Counts since the handshake, over reboots too."""
-        now = self._decoder.stats(self._bytes, self._frames)
-        lost = {
-            name: sum(getattr(stats, name) for stats in (*self._past, now))
-            for name in ("frames_lost", "pac_lost", "disordered", "crc_errors", "other_errors")
-        }
-        return replace(now, gaps=self._gaps, **lost)
+        #: What it says, once it said hello.
+        self.incoming = Incoming(link, self.info, self._arrived)
 
     def handshake(self) -> wire.Hello:
         """See handshake.py."""
@@ -102,19 +80,6 @@ class Board:
     def _patience_s(self) -> float:
         """How long a reply may take."""
         return REPLY_TIMEOUT_S * self.link.patience
-
-    def restarted(self) -> None:
-        """The board counts anew, its sequence numbers and its time."""
-        self._past.append(self._decoder.stats(0, 0))
-        self._decoder = self._new_decoder()
-        self.clock.restart()
-        self._arrivals.forget()
-
-    def _new_decoder(self) -> StreamDecoder:
-        decoder = StreamDecoder()
-        if self.info.wire_minor > wire.WIRE_MINOR:
-            decoder.accept_newer_minor()
-        return decoder
 
     def _lost(self, error: DeviceLostError, reason: Reason) -> None:
         self.fail(error)
@@ -167,7 +132,7 @@ class Board:
         self._reading, self._writing, self._asking = threading.RLock(), threading.Lock(), threading.RLock()
         self._changed, self.closing = threading.Condition(), threading.Event()
         self.closing.set()
-        self.closed, self.connected, self.record = True, False, None
+        self.closed, self.connected, self.incoming.record = True, False, None
         self._failure = DeviceLostError(
             f"this Hand on {self.link.port} belongs to the process that opened it, not to a fork of it; open boards "
             "in the process that reads them"
@@ -181,91 +146,23 @@ class Board:
         with self._reading:
             if self.closed:
                 self.is_closed()
-            decoder, fd = self._decoder, self.link.fd
             try:
-                if fd is None:
-                    chunk = self.link.read(timeout_s)
-                else:
-                    batch = decoder.read(fd, timeout_s)
+                came = self.incoming.read(timeout_s)
             except DeviceLostError as error:
                 self.lost(error, "unplugged")
                 return True
             except OSError as error:
                 self.lost(went_away(self.link.port, error), "unplugged")
                 return True
-            if fd is None:
-                self._take(chunk)
-                return bool(chunk)
-            if self.record is not None:
-                self._record(b"" if batch is None else decoder.chunk())
-            if batch is None:
-                return False
-            self._arrived(batch, decoder.arrived_s)
-            return True
+            return self.incoming.take(came)
 
-    def end_packet(self) -> None:
-        """Nothing follows the half packet that was on its way, here and in a recording."""
-        self._take(b"\0")
-
-    def _take(self, chunk: bytes) -> None:
-        if self.record is not None:
-            self._record(chunk)
-        if chunk:
-            arrived_s = time.monotonic()
-            self._arrived(self._decoder.feed(chunk), arrived_s)
-
-    def _record(self, chunk: bytes) -> None:
-        assert self.record is not None
-        try:
-            self.record(chunk)
-        except OSError as error:
-            self.record, self.trouble = None, error
-
-    def _arrived(self, batch: Batch, arrived_s: float) -> None:
-        decoder = self._decoder
-        self._bytes += decoder.taken
-        last_us = decoder.last_t_us
-        if last_us is not None:
-            self._arrivals.note(last_us + LAST_SAMPLE_US, arrived_s)
-            self._frames += len(batch.wire)
-        elif not (len(batch.pac) or batch.messages):
-            return
-        if self.gap is not None:
-            self._end_gap(self.gap, batch)
-        if self._time_asked and batch.messages:
-            self._time_told(batch, arrived_s)
+    def _arrived(self, batch: Batch) -> None:
         if self.awaiting:
             self._replies.extend(batch.messages)
         self.deliver(batch)
         # Without a lock where nobody waits: whoever comes to wait after this looks first.
         if self._waiters:
             self.notify()
-
-    def _end_gap(self, gap: Gap, batch: Batch) -> None:
-        first_us = batch.first_t_us()
-        if first_us is None:
-            return
-        gap = replace(gap, next_t_us=first_us)
-        self.gap = None
-        self._gaps += 1
-        batch.messages.insert(0, gap)
-        self.record_gap(gap)
-
-    # ---- its time ------------------------------------------------------------------------------
-
-    def ask_time(self) -> None:
-        """Ask what time it is, and go on: the answer goes to ``clock``, and nowhere else."""
-        req_id = next(self._req_ids)
-        if len(self._time_asked) >= UNANSWERED:
-            self._time_asked = {}  # it does not answer, or restarted
-        self._time_asked[req_id] = time.monotonic()
-        self._write(wire.GetStatus(req_id))
-
-    def _time_told(self, batch: Batch, arrived_s: float) -> None:
-        for answer in [m for m in batch.messages if isinstance(m, wire.Status) and m.req_id in self._time_asked]:
-            sent_s = self._time_asked.pop(answer.req_id)
-            batch.messages.remove(answer)
-            self.clock.round_trip(sent_s, self._decoder.unwrap_t_us(answer.t_us), max(sent_s, arrived_s))
 
     # ---- waiting -------------------------------------------------------------------------------
 
@@ -290,7 +187,7 @@ class Board:
             while (got := done()) is None and left_s > 0:
                 left_s = deadline_s - time.monotonic()
                 # Once more when time is over: it may be this side that was late.
-                self.read(max(0.0, min(left_s, POLL_S)))
+                self._read_or_wait(max(0.0, min(left_s, POLL_S)))
             return got
         found: list[Got] = []
 
@@ -305,11 +202,27 @@ class Board:
             self.check()
         return found[0] if found else None
 
+    def _read_or_wait(self, timeout_s: float) -> None:
+        """Read, or while another thread does wait for what it reads."""
+        if not self._reading.acquire(blocking=False):
+            self.wait_for(lambda: self._replies, timeout_s)
+            return
+        try:
+            self.read(timeout_s)
+        finally:
+            self._reading.release()
+
     # ---- commands ------------------------------------------------------------------------------
 
     def send(self, request: Any) -> None:
         """Send a command and wait for nothing; whatever ``req_id`` it has, it gets the next."""
         self._write(replace(request, req_id=next(self._req_ids)))
+
+    def ask_time(self) -> None:
+        """Ask what time it is, and go on: the answer goes to the clock, and nowhere else."""
+        req_id = next(self._req_ids)
+        self.incoming.time_asked(req_id)
+        self._write(wire.GetStatus(req_id))
 
     def _write(self, message: Any) -> None:
         try:
@@ -342,8 +255,8 @@ class Board:
 
     @contextmanager
     def _turn(self) -> Iterator[None]:
-        """One command at a time. A thread that reads goes on until its turn: another waits for a reply."""
-        while not self._asking.acquire(blocking=not self.is_read_here()):
+        """One command at a time. A thread that reads for all goes on until its turn: another waits for a reply."""
+        while not self._asking.acquire(blocking=self.is_pulled or not self.is_read_here()):
             self.read(POLL_S)
         try:
             yield
@@ -377,7 +290,7 @@ class Board:
                     answer = self.next_message(answers, deadline_s)
                     if isinstance(answer, reply) and not (isinstance(answer, wire.Reply) and answer.error):
                         if isinstance(answer, wire.Status):
-                            self.clock.round_trip(sent_s, self._decoder.unwrap_t_us(answer.t_us), time.monotonic())
+                            self.incoming.round_trip(answer, sent_s, time.monotonic())
                         return answer
                     if answer is not None:
                         raise CommandRefusedError(describe_refusal(request, answer, self.info), answer.error)

@@ -18,17 +18,20 @@ from ..wire.frames import tare_to_q4
 from ..wire.sensor_gen import MAX_SENSORS
 from . import map_transfer as transfer
 from .board import Board
+from .compatibility import (
+    CALIBRATION_SINCE_MINOR,
+    FAULTS_SINCE_MINOR,
+    HOLD_SINCE_MINOR,
+    MAP_SINCE_MINOR,
+    PRESSURE_SINCE_MINOR,
+    need,
+)
 from .faults import Faults, faults_of
 from .views import DEFAULT_NAMES, finger_index
 
 Finger: TypeAlias = str | SupportsIndex
 
 ALL_FINGERS = (1 << MAX_SENSORS) - 1
-CALIBRATION_SINCE_MINOR = 3  # of wire 1.x
-MAP_SINCE_MINOR = 4
-PRESSURE_SINCE_MINOR = 4
-HOLD_SINCE_MINOR = 5
-FAULTS_SINCE_MINOR = 5
 
 
 class Commands:
@@ -58,7 +61,7 @@ class Commands:
 
         Be it for one round: the board keeps it. Raises WireVersionError for firmware that keeps no faults.
         """
-        self._need(FAULTS_SINCE_MINOR, "keeps no faults")
+        need(self._board.info, FAULTS_SINCE_MINOR, "a summary of faults")
         return faults_of(self.status(), self._names)
 
     def clear_faults(self) -> Faults:
@@ -126,12 +129,8 @@ class Commands:
             with suppress(DeviceLostError):  # it is not there to be told; its hold lapses
                 self.release(*fingers)
 
-    def _need(self, minor: int, lacks: str) -> None:
-        if self._board.info.wire_minor < minor:
-            raise WireVersionError(f"the board's firmware {lacks}, expected wire 1.{minor}; update it: biotac flash")
-
     def _mask(self, fingers: tuple[Finger, ...]) -> int:
-        self._need(HOLD_SINCE_MINOR, "knows no HOLD")
+        need(self._board.info, HOLD_SINCE_MINOR, "HOLD")
         if not fingers:
             return ALL_FINGERS
         return sum({1 << finger_index(self._names, finger) for finger in fingers})
@@ -187,7 +186,7 @@ class Commands:
         """
         its = calibration
         if its.pressure_gain_nn:
-            self._need(PRESSURE_SINCE_MINOR, "knows no pressure_gain_nn")
+            need(self._board.info, PRESSURE_SINCE_MINOR, "pressure_gain_nn")
         number = self._index(finger)
         request = wire.SetCalibration(0, number, its.wire_serial(), its.made_s, its.wire_values())
         self._board.tell(request, lasting=("calibration", number))

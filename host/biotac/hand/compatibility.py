@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..errors import WireVersionError
 from ..wire import messages_gen as wire
+
+# The minor of wire 1.x that each came with.
+CALIBRATION_SINCE_MINOR = 3
+MAP_SINCE_MINOR = 4
+PRESSURE_SINCE_MINOR = 4
+HOLD_SINCE_MINOR = 5
+FAULTS_SINCE_MINOR = 5
+EVENTS_SINCE_MINOR = 5
+BANDS_SINCE_MINOR = 5
 
 #: Commands that have grown: the wire minor that did it, and how many bytes the one before knows.
 APPENDED = {wire.SetCalibration.ID: ((4, 50),)}
@@ -30,6 +40,13 @@ def describe_mismatch(hello: wire.Hello) -> str:
     """Both wire versions, and the command that brings them together."""
     mine = f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}"
     return f"wire {hello.wire_major}.{hello.wire_minor}, this library {mine}; {cure(hello)}"
+
+
+def need(hello: wire.Hello, since_minor: int, what: str) -> None:
+    """WireVersionError for a board that is older than ``what``."""
+    if hello.wire_minor < since_minor:
+        seen = f"the board speaks wire {hello.wire_major}.{hello.wire_minor}"
+        raise WireVersionError(f"{seen}, expected 1.{since_minor}, which has {what}; {cure(hello)}")
 
 
 def cut(message_id: int, payload: bytes, minor: int) -> bytes:

@@ -58,7 +58,7 @@ class Hand:
         host_clock = host_clock or SystemClock()
         names = checked_names(fingers)
         self._board = Board(link, host_clock=host_clock)
-        self._latest = Latest(host_clock, names, device_clock=self._board.clock)
+        self._latest = Latest(host_clock, names, device_clock=self._board.incoming.clock)
         self._latest.is_away = self._board.is_away
         self._commands = Commands(self._board, self._latest.names)
         self._streams = Streams(self._board, self._latest)
@@ -72,7 +72,7 @@ class Hand:
         self.link = link
         #: Device time as host time, fed by whatever is read; known after a first ``status`` or ``sync``.
         #: A simulated board's time is no clock: it waits for the computer, which shows as ``resets``.
-        self.clock: DeviceClock = self._board.clock
+        self.clock: DeviceClock = self._board.incoming.clock
 
     # ---- what it is ----------------------------------------------------------------------------
 

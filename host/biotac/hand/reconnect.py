@@ -34,7 +34,7 @@ class Reconnection:
         board.connected = False
         board.notify()
         try:
-            board.end_packet()
+            board.incoming.end_packet()
             before = board.info
             while not self._restored(before, reason, lost_at_ns):
                 if board.closing.is_set():
@@ -52,13 +52,13 @@ class Reconnection:
                 return False
             if board.info.boot_id != before.boot_id:
                 reason = "rebooted"
-                board.restarted()
+                board.incoming.restarted(board.info)
             # Before START: rows may come with its reply. Two losses without a row between them are one gap.
-            gap = board.gap or Gap(reason, self._last_t_us(), None, lost_at_ns, 0, 0)
+            gap = board.incoming.gap or Gap(reason, self._last_t_us(), None, lost_at_ns, 0, 0)
             if gap.reason == "rebooted":
                 reason = "rebooted"
             back_at_ns = board.host_clock.unix_ns()
-            board.gap = replace(gap, reason=reason, back_at_ns=back_at_ns, boot_id=board.info.boot_id)
+            board.incoming.gap = replace(gap, reason=reason, back_at_ns=back_at_ns, boot_id=board.info.boot_id)
             board.tell_again()
             self._resume(reason == "rebooted")
         except DeviceLostError:

@@ -64,8 +64,9 @@ class Recorded:
     def to(self, recorder: Recorder) -> None:
         """Hand it all that comes from now on."""
         self._recorder = recorder
-        self._board.record = recorder.write
-        self._board.record_gap = lambda gap: recorder.mark(GAP, gap.as_text())
+        incoming = self._board.incoming
+        incoming.record = recorder.write
+        incoming.record_gap = lambda gap: recorder.mark(GAP, gap.as_text())
 
     def go_on(self) -> None:
         """The board restarted: its rows go into a file of their own."""
@@ -73,7 +74,8 @@ class Recorded:
             try:
                 self._recorder.go_on(*self._facts())
             except (OSError, InputError) as error:
-                self._recorder, self._board.record, self._board.trouble = None, None, error
+                incoming = self._board.incoming
+                self._recorder, incoming.record, incoming.trouble = None, None, error
 
     def close(self) -> None:
         """Finish the file."""

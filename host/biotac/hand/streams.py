@@ -20,6 +20,7 @@ from ..wire.batches import Batch, LinkStats
 from .board import POLL_S, Board
 from .callbacks import Callbacks, Unsubscribe
 from .commands import ALL_FINGERS
+from .compatibility import BANDS_SINCE_MINOR, EVENTS_SINCE_MINOR, need
 from .gap import Gap
 from .keepalive import KeepAlive
 from .queue import LIMIT_ROWS, BatchQueue
@@ -57,7 +58,7 @@ class Streams:
         """Counts since the handshake, over reboots too."""
         queues = [self._callbacks.queue, *self._all_queues()]
         return replace(
-            self._board.stats,
+            self._board.incoming.stats,
             batches_skipped=self._skipped[0] + sum(queue.batches_skipped for queue in queues),
             frames_skipped=self._skipped[1] + sum(queue.frames_skipped for queue in queues),
         )
@@ -70,7 +71,8 @@ class Streams:
     def report(self) -> None:
         """Raise what nobody was told yet of the board, a recording or callbacks."""
         self._board.report()
-        trouble, self._board.trouble = self._board.trouble, None
+        incoming = self._board.incoming
+        trouble, incoming.trouble = incoming.trouble, None
         if trouble is not None:
             raise trouble
         self._callbacks.report()
@@ -102,7 +104,7 @@ class Streams:
         """Start streaming frames, status and PAC; ``fingers`` are names, or a bit mask.
 
         ``pac``: None for PAC unless the port is a UART, which is slow. ``bands``: BANDS, too (``on_bands``). Raises
-        InputError for a board that knows none, and for more than a UART carries.
+        WireVersionError for a board that knows none, InputError for more than a UART carries.
         """
         streams = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
         if self._link.bits_per_s is None if pac is None else pac:
@@ -276,10 +278,10 @@ class Streams:
     def on_event(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
         """Call ``fn`` with every EVENT: touch, lift, jolt, slip and what ends it (EventKind), as soon as it is told.
 
-        Subscribes every finger to EVENTS besides what it is subscribed to. Raises InputError for a board that knows
-        none.
+        Subscribes every finger to EVENTS besides what it is subscribed to. Raises WireVersionError for a board that
+        knows none.
         """
-        self._subscription.need_wire_1_5("events")
+        need(self._board.info, EVENTS_SINCE_MINOR, "events")
         return self._on_told(wire.Event, fn)
 
     def on_slip(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
@@ -289,9 +291,9 @@ class Streams:
     def on_bands(self, fn: Callable[[wire.Bands], Any]) -> Unsubscribe:
         """Call ``fn`` with how strongly dynamic pressure vibrated, in octaves, a hundred times a second and finger.
 
-        Streams BANDS besides what is streamed. Raises InputError for a board that knows none.
+        Streams BANDS besides what is streamed. Raises WireVersionError for a board that knows none.
         """
-        self._subscription.need_wire_1_5("bands of PAC")
+        need(self._board.info, BANDS_SINCE_MINOR, "bands of PAC")
         unsubscribe = self._on(wire.Bands, fn)
         self._hint(wire.StreamFlags.BANDS)
         return unsubscribe

@@ -13,13 +13,12 @@ from ..wire.slots import FRAME_HZ
 from . import bandwidth
 from .board import Board
 from .callbacks import Callbacks
-from .commands import PRESSURE_SINCE_MINOR
+from .compatibility import BANDS_SINCE_MINOR, EVENTS_SINCE_MINOR, PRESSURE_SINCE_MINOR, need
 from .views import Fingers, Latest
 
 #: What a FRAME can say of a contact, for Hand.subscribe.
 RESULTS = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE | QuantityFlags.PRESSURE
 AT_FIRST = RESULTS | QuantityFlags.REST_FRAMES
-EVENTS_SINCE_MINOR = 5
 # What a board tells of only when somebody is called with it.
 TOLD_OF = {Touch: QuantityFlags.TOUCH, Event: QuantityFlags.EVENTS}
 
@@ -93,7 +92,7 @@ class Subscription:
         """Have it stream."""
         streams |= self._hinted
         if streams & StreamFlags.BANDS:
-            self.need_wire_1_5("bands of PAC")
+            need(self._board.info, BANDS_SINCE_MINOR, "bands of PAC")
         link = self._board.link
         if link.bits_per_s is not None:
             asked = (fingers & self._board.info.fingers_present).bit_count()
@@ -135,12 +134,3 @@ class Subscription:
         """From now on START asks for ``streams``, too; whether the last one did not."""
         self._hinted |= streams
         return self.started is not None and bool(self._hinted & ~self.started.streams)
-
-    def need_wire_1_5(self, what: str) -> None:
-        """InputError for an older board."""
-        info = self._board.info
-        if info.wire_minor < EVENTS_SINCE_MINOR:
-            raise InputError(
-                f"the board speaks wire {info.wire_major}.{info.wire_minor}: expected 1.{EVENTS_SINCE_MINOR}, which "
-                f"has {what}; update it with `biotac flash`"
-            )

@@ -21,7 +21,7 @@ from ..core.compiled import TORQUE_GAINS, Results, Settings, reference_q4
 from ..core.map_columns import tared
 from ..core.map_float64 import exact, replace_gains
 from ..core.map_versions import opened
-from ..hand.commands import PRESSURE_SINCE_MINOR
+from ..hand.compatibility import PRESSURE_SINCE_MINOR
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import UM_PER_MM, StructArray, electrode_signals, to_units

@@ -89,17 +89,36 @@ def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
     ]
 
 
-def test_a_board_whose_time_passes_is_calibrated_in_one_session() -> None:
+PACE = 15  # of boards whose time passes
+
+
+def write_patient_scenario(folder: Path) -> Path:
+    """One finger's presses, the last of them every half minute: a busy computer is late for the first, and others."""
+    rests_s = [1.5, 1.5, *[30.0] * 21]
+    path = folder / "patient.toml"
+    text = 'name = "patient"\n[[step]]\ndo = "rest"\nseconds = 1.5\n'
+    for force_n, rest_s in zip((*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N * 20), rests_s, strict=True):
+        text += (
+            f'[[step]]\ndo = "press"\nseconds = 0.4\nat = "E17"\nforce_n = {force_n}\n'
+            '[[step]]\ndo = "hold"\nseconds = 1.4\n'
+            '[[step]]\ndo = "press"\nseconds = 0.4\nforce_n = 0.0\n'
+            f'[[step]]\ndo = "rest"\nseconds = {rest_s}\n'
+        )
+    path.write_text(text)
+    return path
+
+
+def test_a_board_whose_time_passes_is_calibrated_in_one_session(tmp_path: Path) -> None:
     """As a real one: stopped, set and started again, with what each finger has of its own left as it was."""
     opened = []
+    scenario = write_patient_scenario(tmp_path)
 
     def opened_once() -> biotac.Hand:
-        hand = biotac.open("sim:fingers.toml?fingers=1&pace=15")
+        hand = biotac.open(f"sim:{scenario}?pace={PACE}")
         opened.append(hand)
         hand.set_calibration(0, biotac.Calibration(thermal_gain_milli=321))
         return hand
 
-    # One finger's script: three presses, half a minute of nothing, and the verification press.
     outcome = guided.calibrate(opened_once, guided.Plan((0,)), Silent(), made_s=77)
     assert len(opened) == 1
     its = outcome.calibrations[0]
@@ -116,7 +135,7 @@ class Scale(Silent):
 
 def test_a_board_that_tells_no_force_is_calibrated_to_a_scale(tmp_path: Path) -> None:
     """As on a real port: nothing behind it that knows a truth."""
-    board = SimBoard(load_source("fingers.toml", fingers=1), pace=15, hold=True)
+    board = SimBoard(load_source(str(write_patient_scenario(tmp_path))), pace=PACE, hold=True)
 
     def opened() -> biotac.Hand:
         hand = biotac.open(board.path)

@@ -7,7 +7,7 @@ import pytest
 
 from biotac.errors import InputError
 from biotac.features.grip import GripFilter, GripState, Trained, load_ratio, observations, train
-from biotac.sim.stick_slip import ringing
+from biotac.sim.stick_slip import Ringing
 from biotac.wire.fields import FRAME_FIELDS, dtype_of
 
 FRICTION = 0.6
@@ -26,7 +26,7 @@ def grasp(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     speed[held + loading : held + loading + slides] = 20.0
     states = np.where(speed > 0, GripState.SLIPPING, GripState.STABLE)
     states[(ratio > 0.85 * FRICTION) & (speed == 0)] = GripState.INCIPIENT
-    pac = np.rint(2038 + ringing(rng, speed) + rng.normal(0.0, 3.0, (len(ratio), 22))).clip(0, 4095).astype(np.uint16)
+    pac = np.rint(2038 + Ringing(rng)(speed) + rng.normal(0.0, 3.0, (len(ratio), 22))).clip(0, 4095).astype(np.uint16)
     rows = np.zeros(len(ratio), dtype_of([f for f in FRAME_FIELDS if f.name in ("force_n", "poc_mm")]))
     rows["poc_mm"] = AT_MM
     rows["force_n"][:, 2] = NORMAL_N + rng.normal(0.0, 0.05, len(ratio))

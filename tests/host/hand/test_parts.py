@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -74,6 +75,58 @@ def test_a_board_alone_is_asked_and_answers(scripted_board, hello) -> None:
     board.close()
     with pytest.raises(biotac.DeviceLostError, match="was closed"):
         board.send(wire.Ping(0))
+
+
+class WatchedLink(SerialLink):
+    """Counts reads by another thread than the one that wrote last."""
+
+    def __init__(self, path: str) -> None:
+        super().__init__(path)
+        self.fd = None  # so that ``read`` is called
+        self.strangers = 0
+        self._writer = 0
+
+    def write(self, data: bytes) -> None:
+        self._writer = threading.get_ident()
+        time.sleep(0.02)  # whoever does not write gets to read first
+        super().write(data)
+
+    def read(self, timeout_s: float) -> bytes:
+        self.strangers += threading.get_ident() != self._writer
+        return super().read(timeout_s)
+
+
+def test_a_board_alone_is_read_by_the_thread_that_asks(scripted_board, hello) -> None:
+    """Another that waits for its turn took the answer, and read on: every command took as long as a read may."""
+    board = Board(link := WatchedLink(scripted_board(Firmware(hello)).path))
+    told: dict[int, list[int]] = {3: [], 4: []}
+
+    def ask(setting: int) -> None:
+        for value in range(20):
+            told[setting].append(board.ask(wire.SetSetting(0, setting, value), wire.SettingValue).value)
+
+    threads = [threading.Thread(target=ask, args=(setting,), daemon=True) for setting in told]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(WAIT_S)
+    assert told == {3: [*range(20)], 4: [*range(20)]}
+    assert link.strangers == 0
+    board.close()
+
+
+def test_an_answer_that_another_thread_reads_is_the_askers(scripted_board, hello) -> None:
+    """One who never lets the link go: in ``batches``, while somebody else commands."""
+    board = Board(SerialLink(scripted_board(Firmware(hello)).path))
+    told: list[int] = []
+    asker = threading.Thread(target=lambda: told.append(board.ask(wire.SetSetting(0, 3, 4), wire.SettingValue).value))
+    end_s = time.monotonic() + WAIT_S
+    with board._reading:
+        asker.start()
+        while asker.is_alive() and time.monotonic() < end_s:
+            board.read(0.01)
+        assert told == [4]
+    board.close()
 
 
 def test_what_a_board_is_to_be_told_again_comes_in_the_order_it_was_told_last(scripted_board, hello) -> None:
@@ -149,7 +202,8 @@ def test_a_lost_board_without_reconnection_is_an_error_and_with_it_is_found(scri
     assert board.read(WAIT_S)
     assert (resumed, board.connected, board.info.boot_id) == ([True], True, 2)
     assert [(m.setting, m.value) for m in firmwares[-1].of(wire.SetSetting)] == [(5, 6)]
-    assert board.gap is not None and (board.gap.reason, board.gap.last_t_us) == ("rebooted", 70_000)
+    gap = board.incoming.gap
+    assert gap is not None and (gap.reason, gap.last_t_us) == ("rebooted", 70_000)
     board.close()
 
 

@@ -163,12 +163,8 @@ def test_bands_are_streamed_to_who_wants_them(live: Live) -> None:
     assert seen == [bands]
 
 
-def test_a_board_without_events_is_told_so(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_board_that_knows_no_events_is_not_asked_for_them(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live.hand._board, "info", replace(live.hand.info, wire_minor=4))
-    with pytest.raises(biotac.InputError, match="has events; update it"):
-        live.hand.on_event(print)
-    with pytest.raises(biotac.InputError, match="has bands of PAC; update it"):
-        live.hand.on_bands(print)
     live.hand.subscribe(wire.QuantityFlags.EVENTS | wire.QuantityFlags.FORCE)
     assert live.firmware.of(wire.Subscribe)[-1].quantities == wire.QuantityFlags.FORCE
 
@@ -297,7 +293,7 @@ def test_a_reading_thread_that_gives_a_command_reads_the_reply_that_another_wait
     """As at the end of a simulated source, which the thread that reads asks about while others command."""
     with biotac.open("sim:drift.toml?seconds=60") as hand:
         board, here = hand._board, threading.current_thread()
-        board.is_read_here = lambda: threading.current_thread() is here
+        board.is_read_here, board.is_pulled = (lambda: threading.current_thread() is here), False  # as ``run`` does
         answers: list[int] = []
         other = threading.Thread(target=lambda: answers.append(hand.setting(wire.Setting.STATUS_PERIOD_MS)))
         other.start()
@@ -314,6 +310,7 @@ def test_start_carries_the_keep_alive_and_pings_come_in_time(live: Live) -> None
     live.hand.run()  # streaming already: told again
     assert live.firmware.of(wire.Start)[-1].keepalive_ms == 1000
     signs = (wire.Ping, wire.GetStatus)  # some of them ask for the time
+    live.hand.ping()  # all that was sent until now is heard
     before = len(live.firmware.of(signs))
     for more in range(1, 6):
         live.send(frame(more))  # so that nothing is silent, and the reader has a turn
@@ -437,7 +434,7 @@ SHOWN = [(2,), (0, 1), (3, 3), (200, 0), (), (1,), (0, 1), (0,), *[(1, 0)] * 40]
 def test_a_program_that_was_stopped_reads_before_it_says_silent(live: Live) -> None:
     """SIGSTOP, or a laptop's lid: the clock has gone on, and what the board said meanwhile waits to be read."""
     live.hand.start()
-    live.hand._board.read(0.0)
+    assert live.hand._board.read(WAIT_S)  # what time it is, which start() asks
     live.hand.link.patience = 1.0
     live.clock.now_s += 10.0
     live.send(frame(1))

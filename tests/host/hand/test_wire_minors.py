@@ -213,13 +213,15 @@ def test_an_old_board_keeps_calibrations_as_far_as_it_knows_them(minor: int, boa
 @each_minor
 def test_what_an_old_board_cannot_do_is_said_in_one_line(minor: int, board) -> None:
     _, path = board(minor)
-    since = {"subscribe": 1, "point": 1, "save_settings": 2, "get_map": 4, "hold": 5}
+    since = {"subscribe": 1, "point": 1, "save_settings": 2, "get_map": 4, "hold": 5, "on_event": 5, "on_bands": 5}
     calls = {
         "subscribe": lambda hand: hand.subscribe(biotac.QuantityFlags.FORCE),
         "point": lambda hand: hand.point(0),
         "save_settings": lambda hand: hand.save_settings(),
         "get_map": lambda hand: hand.get_map(0),
         "hold": lambda hand: hand.hold(0),
+        "on_event": lambda hand: hand.on_event(print),
+        "on_bands": lambda hand: hand.on_bands(print),
     }
     with biotac.open(path) as hand:
         assert hand.maps() == {} and hand.status().t_us == 0

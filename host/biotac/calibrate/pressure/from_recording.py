@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import InputError
-from ...hand.commands import PRESSURE_SINCE_MINOR
+from ...hand.compatibility import PRESSURE_SINCE_MINOR
 from ...keep import Calibration
 from ...recording import Recording
 from ...wire import messages_gen as wire

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from ...core.board_map import from_blob, pdc_above_rest_q4
-from ...errors import InputError, PortError
-from ...hand.commands import MAP_SINCE_MINOR
+from ...errors import PortError
+from ...hand.compatibility import MAP_SINCE_MINOR, need
 from ...hand.hand import Hand
 from ...wire import messages_gen as wire
 from ...wire.dtypes_gen import DTYPES
@@ -49,14 +49,10 @@ def upload(
 ) -> Verified:
     """Give ``finger`` the map, for ``serial``'s sensor alone unless forced. It lasts until save_settings or a reboot.
 
-    Not while streaming. Raises InputError for a map that no board takes, CommandRefusedError for another sensor,
-    PortError when the board does not do what was fitted.
+    Not while streaming. Raises WireVersionError for a board older than maps, InputError for a map that no board
+    takes, CommandRefusedError for another sensor, PortError when the board does not do what was fitted.
     """
-    if hand.info.wire_minor < MAP_SINCE_MINOR:
-        raise InputError(
-            f"the board speaks wire {hand.info.wire_major}.{hand.info.wire_minor}: expected 1.{MAP_SINCE_MINOR}, which "
-            "has wrench maps; write newer firmware with `biotac flash`"
-        )
+    need(hand.info, MAP_SINCE_MINOR, "wrench maps")
     sent = board.quantise(its, serial=serial, made_s=made_s).blob
     hand.set_map(finger, sent, force=force)
     blob = hand.get_map(finger)
