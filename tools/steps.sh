@@ -85,7 +85,8 @@ m4f_tests() { # arguments go to ctest
 }
 
 python_tests() { # arguments go to pytest; two processes, each with whole files, for what tests of a file share
-    pytest -n 2 --dist loadfile "$@"
+    # What hangs is told with where it stands, after longer than any test takes on a busy computer.
+    pytest -n 2 --dist loadfile --timeout 900 "$@"
 }
 
 fuzzing() {

@@ -70,9 +70,9 @@ class Rig:
         """The board as ``biotac sim`` starts it; its time runs from the start."""
         self.need("scenarios")
         if self.sensors_are_a_board:
-            board = BenchPty(self.port, self.sensor_port, load_source(source, seconds=60))
+            board = BenchPty(self.port, self.sensor_port, load_source(source, seconds=600))
         else:
-            board = start_board(self.facts["board"], load_source(source, seconds=60), pace=pace)
+            board = start_board(self.facts["board"], load_source(source, seconds=600), pace=pace)
         board.release()
         self.opened.append(board)
         return board

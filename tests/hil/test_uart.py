@@ -33,7 +33,8 @@ class UartLink(SerialLink):
 
 def test_the_same_wire_until_a_host_opens_usb(rig: Rig, tmp_path: Path) -> None:
     rig.need("uart")
-    board = EmulatedBoard("pico", load_source("press.toml", fingers=2, seconds=60.0), pace=1.0, hold=True, uart=True)
+    # Its time runs by the clock while the client is compiled and waited for, and stands still behind the tape.
+    board = EmulatedBoard("pico", load_source("press.toml", fingers=2, seconds=900.0), pace=1.0, hold=True, uart=True)
     rig.opened.append(board)
     board.release()
     with biotac.open(board.path) as hand:

@@ -32,7 +32,7 @@ pytest.importorskip("zenoh")
 class Shared:
     """A simulated board, shared under a name at an endpoint of its own."""
 
-    def __init__(self, name: str = "left", source: str = "sim:press.toml?fingers=2&pace=real&seconds=60") -> None:
+    def __init__(self, name: str = "left", source: str = "sim:press.toml?fingers=2&pace=real&seconds=600") -> None:
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self.name, self.source = name, source
         self.stack = ExitStack()

@@ -203,7 +203,7 @@ def test_values_that_no_message_can_hold_are_refused() -> None:
 
 
 def test_one_recording_at_a_time_and_the_stream_goes_on_after_it(tmp_path) -> None:
-    with biotac.open("sim:drift.toml?seconds=600&pace=10") as hand:
+    with biotac.open("sim:drift.toml?seconds=1800") as hand:
         recorder = hand.record(tmp_path / "a.mcap")
         with pytest.raises(biotac.InputError, match=r"being recorded to .*a\.mcap; close that recorder first"):
             hand.record(tmp_path / "b.mcap")

@@ -351,7 +351,7 @@ def test_a_file_is_read_back_and_one_that_was_changed_is_refused(tmp_path: Path)
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    board = SimBoard(load_source("press.toml", fingers=2, seconds=60), pace=1.0, hold=True)
+    board = SimBoard(load_source("press.toml", fingers=2, seconds=600), pace=1.0, hold=True)
     board.release()
     yield board.path
     board.close()

@@ -218,7 +218,8 @@ def test_the_simulated_board_reboots_and_is_found_again(tmp_path) -> None:
 
     def boot(pauses: int) -> None:
         if not boards or pauses == 2:
-            boards.append(start_board("posix", load_source("press.toml", seconds=60), pace=0.0))
+            # At the pace of life: unpaced, its tape could be over before it is to stream.
+            boards.append(start_board("posix", load_source("press.toml", seconds=600), pace=1.0))
             boards[-1].release()
             point(path, boards[-1].path)
 

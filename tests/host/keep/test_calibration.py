@@ -390,7 +390,7 @@ def test_a_calibration_that_a_newer_board_tells_out_of_range_is_no_crash(scripte
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    board = SimBoard(load_source("press.toml", fingers=2, seconds=60), pace=1.0, hold=True)
+    board = SimBoard(load_source("press.toml", fingers=2, seconds=600), pace=1.0, hold=True)
     board.release()
     yield board.path
     board.close()

@@ -81,7 +81,7 @@ class Shared:
 
 @pytest.fixture(params=["socket", "rfc2217"])
 def shared(request: pytest.FixtureRequest) -> Iterator[Shared]:
-    board = SimBoard(load_source("press.toml", seconds=60), pace=1.0, hold=False)
+    board = SimBoard(load_source("press.toml", seconds=600), pace=1.0, hold=False)
     shared = Shared(board.path, request.param)
     yield shared
     shared.unplug()
