@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from rig import Rig
 
 import biotac
 from biotac.wire import messages_gen as wire
+from biotac.wire.batches import StreamDecoder
 from biotac.wire.framing import encode
 
 BOARDS = {"posix": wire.Board.POSIX_SIM, "pico": wire.Board.PICO}
@@ -131,6 +133,55 @@ def test_a_bus_that_is_suspended_ends_the_stream_and_is_served_after_it(rig) -> 
     status = hand.status()
     assert (status.streams, status.slots_late) == (0, 0)
     assert hand.sensor_status(4).words_good == 200 * 44
+
+
+PIECE = 4000  # bytes; the last two are whole: what comes behind a loss tells it
+
+
+def hurt(sent: bytes, draw: random.Random) -> bytes:
+    """As a bad line has it: pieces lose bytes, come doubled, with bits flipped, behind older bytes, or out of order."""
+    out = sent[:PIECE]
+    end = len(sent) // PIECE * PIECE - 2 * PIECE
+    for at in range(PIECE, end, PIECE):
+        size, whole = draw.randrange(1, PIECE // 2), sent[at : at + PIECE]
+        flipped = bytearray(whole)
+        for _ in range(draw.randint(1, 8)):
+            flipped[draw.randrange(32)] ^= 1 << draw.randrange(8)
+        doubled, spliced = sent[at - size : at] + whole, sent[at - 2 * size : at - size] + whole
+        swapped = whole[size : 2 * size] + whole[:size] + whole[2 * size :]
+        out += draw.choice((whole[size:], bytes(flipped), doubled, spliced, swapped))
+    return out + sent[end:]
+
+
+@pytest.mark.long
+def test_of_what_a_bad_line_brings_each_frame_is_as_sent_and_the_rest_counted(board, monkeypatch) -> None:
+    hand = board("press.toml?fingers=5&seconds=1")
+    sent = bytearray()
+    read = hand.link.read
+
+    def overheard(timeout_s: float) -> bytes:
+        chunk = read(timeout_s)
+        sent.extend(chunk)
+        return chunk
+
+    hand.link.fd = None  # so that it is this that reads
+    monkeypatch.setattr(hand.link, "read", overheard)
+    hand.read(10)
+    truth = StreamDecoder().feed(sent)
+    assert len(truth.wire) == 500
+    for seed in range(20):
+        decoder = StreamDecoder()
+        came = decoder.feed(hurt(bytes(sent), random.Random(seed)))
+        missing = doubled = 0
+        for finger in range(5):
+            its, mine = (np.flatnonzero(one.wire["finger"] == finger) for one in (truth, came))
+            at = its[np.searchsorted(truth.seq[its], came.seq[mine])]
+            assert (came.wire[mine] == truth.wire[at]).all() and (came.t_us[mine] == truth.t_us[at]).all()
+            missing += len(its) - len(np.unique(at))
+            doubled += len(mine) - len(np.unique(at))
+        stats = decoder.stats(0, 0)
+        assert missing == stats.frames_lost > 0
+        assert doubled <= stats.disordered
 
 
 def test_windows_takes_it_for_a_device_of_several_interfaces(rig) -> None:
