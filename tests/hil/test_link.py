@@ -106,6 +106,28 @@ def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(
     assert len(frames) + hand.stats.frames_lost == 5 * 200
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("seconds", [20, pytest.param(600, marks=pytest.mark.nightly)])
+def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
+    rig: Rig, tmp_path: Path, seconds: int
+) -> None:
+    rig.need("starting")
+    source = tmp_path / "rest.toml"
+    source.write_text(f'name = "rest"\n[[step]]\ndo = "rest"\nseconds = {seconds}\n')
+    hand = rig.play(f"{source}?pace=1e6")  # what it cannot hand over by then it drops
+    hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 0))
+    hand.link.release()
+    while not hand.link.board.wait():
+        pass
+    status = hand.status()  # behind all that waited
+    rounds = 100 * seconds
+    tares = 1
+    assert rounds <= hand.stats.frames + status.messages_dropped <= rounds + tares
+    assert hand.stats.frames < 1000 and hand.stats.crc_errors == hand.stats.other_errors == 0
+    assert status.faults & biotac.FaultFlags.DROPPED
+    assert status.slots_late == 0 and hand.sensor_status(0).words_good == 44 * rounds
+
+
 def interrupted(rig: Rig, leave: str, come_back: str) -> biotac.Hand:
     """A hand that streamed for two seconds, without its host from 1.2345 to 1.5."""
     rig.need("cable")
