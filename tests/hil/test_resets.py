@@ -19,7 +19,7 @@ from biotac.wire import messages_gen as wire
 
 pytestmark = pytest.mark.long
 
-FINGERS = 5
+FINGERS = 3
 PRESSED, AT_REST = 0, 1
 # Pressed from 1.5 s on for as long as any test takes; the other fingers feel nothing.
 WORLD = f"""
@@ -37,7 +37,7 @@ at = "E17"
 force_n = 3.0
 [[step]]
 do = "hold"
-seconds = 100
+seconds = 280
 """
 KEPT, NEW = make_map(1), make_map(2)
 
@@ -69,7 +69,7 @@ def touched(its: Restarts) -> None:
 def held(its: Restarts) -> None:
     touched(its)
     its.hand.hold(PRESSED)
-    assert of(its.hand.read(0.5), PRESSED)["flags"][-1] & FrameFlags.HELD
+    assert of(its.hand.read(0.1, fresh=True), PRESSED)["flags"][-1] & FrameFlags.HELD
 
 
 def uploading_a_map(its: Restarts) -> None:
