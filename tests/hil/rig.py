@@ -15,9 +15,11 @@ import tomllib
 
 import biotac
 from bench import BenchPty, open_bench
+from biotac.hand.opening import shake_hands
 from biotac.sim.loading import load_source
 from biotac.sim.ports import parse_sim, start_board
-from biotac.sim.process import SimBoard
+from biotac.sim.process import SimBoard, SimLink
+from biotac.sim.source import Source
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -48,11 +50,18 @@ class Rig:
         path, _, options = source.partition("?")
         if self.sensors_are_a_board:
             sim = parse_sim(f"sim:{source}", pace=1.0)
-            hand = open_bench(
-                self.port, self.sensor_port, load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds)
-            )
+            return self.open_with(load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds))
+        hand = biotac.open(self.facts["port"].format(source=path, options=options, port=self.port))
+        self.opened.append(hand)
+        return hand
+
+    def open_with(self, source: Source) -> biotac.Hand:
+        """Open the board with words that no file holds."""
+        self.need("scenarios")
+        if self.sensors_are_a_board:
+            hand = open_bench(self.port, self.sensor_port, source)
         else:
-            hand = biotac.open(self.facts["port"].format(source=path, options=options, port=self.port))
+            hand = shake_hands(SimLink(self.name, start_board(self.facts["board"], source, pace=0.0)))
         self.opened.append(hand)
         return hand
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac import FrameFlags, Setting, TareReason, TareState
+from biotac import FaultFlags, FrameFlags, Setting, TareReason, TareState
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
@@ -110,6 +110,45 @@ def test_a_command_from_the_future_and_one_of_wrong_length_are_answered_in_words
     (short,) = replies_to(hand, wire.GetSetting.ID, bytes([7]))
     assert (short.command, short.error) == (wire.GetSetting.ID, wire.Error.BAD_LENGTH)
     assert short.req_id == 0  # where it would stand in a message of another length is anybody's guess
+
+
+def hurt(message: Any) -> list[bytes]:
+    """What may become of a message on its way, one a piece; the last is the half of it, without an end."""
+    whole = encode(message.ID, message.pack())
+    flipped = [whole[:at] + bytes([whole[at] ^ 1 << at % 8]) + whole[at + 1 :] for at in range(1, len(whole) - 1)]
+    short, doubled = whole[:2] + whole[3:], whole[:3] + whole[2:]
+    return [*flipped, short, doubled, b"\x01" * 2000 + b"\0", bytes(range(255, -1, -1)), whole[: len(whole) // 2]]
+
+
+def test_what_is_damaged_on_its_way_is_counted_and_never_obeyed(board) -> None:
+    hand = board("press.toml")
+    before = hand.status()
+    pieces = hurt(wire.SetSetting(7, int(Setting.IDLE_PERIOD_MS), 250))
+    for piece in pieces:
+        hand.link.write(piece)
+    hand.link.write(b"\0")  # as every program begins
+    hand.ping()
+    after = hand.status()
+    assert after.rx_errors - before.rx_errors >= len(pieces)
+    assert after.rx_frames - before.rx_frames == 2  # PING and GET_STATUS
+    assert after.faults & FaultFlags.LINK_DAMAGED
+    assert hand.setting(Setting.IDLE_PERIOD_MS) == 100
+
+
+def test_a_command_that_comes_twice_is_answered_twice_and_done_once(board) -> None:
+    hand = board("press.toml")
+    start = wire.Start(7, int(wire.StreamFlags.FRAMES), 1, 0)
+    set_it = wire.SetSetting(7, int(Setting.IDLE_PERIOD_MS), 250)
+    for message in (set_it, wire.Hold(7, 1), wire.Release(7, 1), wire.ClearFaults(7, 0, (0,) * 5), start, wire.Stop(7)):
+        hand.link.write(encode(message.ID, message.pack()))
+        first, again = replies_to(hand, message.ID, message.pack())
+        assert first == again and getattr(first, "error", wire.Error.OK) == wire.Error.OK
+    assert (hand.setting(Setting.IDLE_PERIOD_MS), hand.status().streams) == (250, 0)
+    hand.start(pac=False)
+    hand.link.write(2 * encode(start.ID, start.pack()))
+    frames = hand.read(0.3)
+    assert len(np.unique(frames["seq"])) == len(frames) == 30
+    assert (hand.stats.disordered, hand.stats.frames_lost) == (0, 0)
 
 
 def test_a_stream_whose_host_says_nothing_any_more_stops(board) -> None:

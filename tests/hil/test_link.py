@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from rig import Rig
 
 import biotac
 from biotac.wire import messages_gen as wire
+from biotac.wire.batches import StreamDecoder
 from biotac.wire.framing import encode
 
 BOARDS = {"posix": wire.Board.POSIX_SIM, "pico": wire.Board.PICO}
@@ -104,6 +106,29 @@ def test_a_host_that_stops_reading_loses_whole_frames_and_the_board_counts_them(
     assert len(frames) + hand.stats.frames_lost == 5 * 200
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("seconds", [20, pytest.param(600, marks=pytest.mark.nightly)])
+def test_of_a_host_that_stands_still_for_so_long_every_message_is_counted(
+    rig: Rig, tmp_path: Path, seconds: int
+) -> None:
+    rig.need("starting")
+    source = tmp_path / "rest.toml"
+    source.write_text(f'name = "rest"\n[[step]]\ndo = "rest"\nseconds = {seconds}\n')
+    hand = rig.play(f"{source}?pace=1e6")  # what it cannot hand over by then it drops
+    hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 1, 0))
+    hand.link.release()
+    while not hand.link.board.wait():
+        pass
+    while hand._board.read(0.5):  # there is no room for an answer before, and it would be said again in a minute
+        pass
+    status = hand.status()
+    rounds, others = 100 * seconds, 1 + 3  # a TARE, and answers without room
+    assert rounds <= hand.stats.frames + status.messages_dropped <= rounds + others
+    assert hand.stats.frames < 1000 and hand.stats.crc_errors == hand.stats.other_errors == 0
+    assert status.faults & biotac.FaultFlags.DROPPED
+    assert status.slots_late == 0 and hand.sensor_status(0).words_good == 44 * rounds
+
+
 def interrupted(rig: Rig, leave: str, come_back: str) -> biotac.Hand:
     """A hand that streamed for two seconds, without its host from 1.2345 to 1.5."""
     rig.need("cable")
@@ -131,6 +156,55 @@ def test_a_bus_that_is_suspended_ends_the_stream_and_is_served_after_it(rig) -> 
     status = hand.status()
     assert (status.streams, status.slots_late) == (0, 0)
     assert hand.sensor_status(4).words_good == 200 * 44
+
+
+PIECE = 4000  # bytes; the last two are whole: what comes behind a loss tells it
+
+
+def hurt(sent: bytes, draw: random.Random) -> bytes:
+    """As a bad line has it: pieces lose bytes, come doubled, with bits flipped, behind older bytes, or out of order."""
+    out = sent[:PIECE]
+    end = len(sent) // PIECE * PIECE - 2 * PIECE
+    for at in range(PIECE, end, PIECE):
+        size, whole = draw.randrange(1, PIECE // 2), sent[at : at + PIECE]
+        flipped = bytearray(whole)
+        for _ in range(draw.randint(1, 8)):
+            flipped[draw.randrange(32)] ^= 1 << draw.randrange(8)
+        doubled, spliced = sent[at - size : at] + whole, sent[at - 2 * size : at - size] + whole
+        swapped = whole[size : 2 * size] + whole[:size] + whole[2 * size :]
+        out += draw.choice((whole[size:], bytes(flipped), doubled, spliced, swapped))
+    return out + sent[end:]
+
+
+@pytest.mark.long
+def test_of_what_a_bad_line_brings_each_frame_is_as_sent_and_the_rest_counted(board, monkeypatch) -> None:
+    hand = board("press.toml?fingers=5&seconds=1")
+    sent = bytearray()
+    read = hand.link.read
+
+    def overheard(timeout_s: float) -> bytes:
+        chunk = read(timeout_s)
+        sent.extend(chunk)
+        return chunk
+
+    hand.link.fd = None  # so that it is this that reads
+    monkeypatch.setattr(hand.link, "read", overheard)
+    hand.read(10)
+    truth = StreamDecoder().feed(sent)
+    assert len(truth.wire) == 500
+    for seed in range(20):
+        decoder = StreamDecoder()
+        came = decoder.feed(hurt(bytes(sent), random.Random(seed)))
+        missing = doubled = 0
+        for finger in range(5):
+            its, mine = (np.flatnonzero(one.wire["finger"] == finger) for one in (truth, came))
+            at = its[np.searchsorted(truth.seq[its], came.seq[mine])]
+            assert (came.wire[mine] == truth.wire[at]).all() and (came.t_us[mine] == truth.t_us[at]).all()
+            missing += len(its) - len(np.unique(at))
+            doubled += len(mine) - len(np.unique(at))
+        stats = decoder.stats(0, 0)
+        assert missing == stats.frames_lost > 0
+        assert doubled <= stats.disordered
 
 
 def test_windows_takes_it_for_a_device_of_several_interfaces(rig) -> None:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from held_press import held_press, of
 from maps import BIG, make_map
 from rig import Rig
 
-from biotac import FrameFlags, QuantityFlags
+import biotac
+from biotac import FaultFlags, FrameFlags, QuantityFlags
+from biotac.wire.messages_gen import INVALID_COUNT
+from biotac.wire.sensor_gen import SLOT_HZ
 
 FINGERS = 5
 SECONDS = 2
@@ -56,6 +62,35 @@ def test_at_150_percent_work_is_shed_in_order_and_slots_and_commands_are_kept(ri
     assert (rows["wrench_age_ms"][repeated] <= 100).all()
     lost = FINGERS * 300 - len(rows)
     assert abs(lost - status.frames_shed) <= FINGERS * 2  # counted, but for what came before and after the reading
+
+
+@pytest.mark.long
+def test_slots_that_overrun_are_counted_and_marked_and_time_does_not_move(rig: Rig, tmp_path: Path) -> None:
+    """For 40 ms the core is so slow that neither the sampling interrupt nor the main loop comes to anything."""
+    rig.need("counters")
+    source = tmp_path / "held.toml"
+    source.write_text(held_press(2, hold_s=0.7))
+    hand = rig.open(str(source))
+    board = hand.link.board  # type: ignore[attr-defined]
+    board.plan(1.6, "slow the core 100 times")
+    board.plan(1.64, "slow the core 1 times")
+    frames, status, counters = hand.read(100), hand.status(), board.counters()
+    assert status.slots_late > 50 and status.faults & FaultFlags.SLOTS_LATE
+    assert (counters["boots"], hand.stats.frames_lost) == (1, status.frames_shed)
+    with biotac.open(f"sim:{source}") as other:
+        whole = other.read(100)
+    for finger in range(2):
+        mine, its = of(frames, finger), of(whole, finger)
+        after_us = (mine["t_us"] - mine["t_us"][0]).astype(np.int64)
+        rounds, late_us = np.divmod(after_us + 1, 10_000)  # without slot 0 its time is worked out, to whole us
+        assert (late_us <= 1_000_000 // SLOT_HZ + 1).all() and (late_us[-50:] == 1).all()
+        its = its[rounds]
+        came = mine["counts"] != INVALID_COUNT
+        assert np.array_equal(mine["counts"][came], its["counts"][came])
+        marked = mine["flags"] & FrameFlags.ELECTRODE_MISSING != 0
+        assert np.array_equal(marked, ~came.all(axis=1)) and marked.any()
+        off_n = np.abs(mine["force_n"] - its["force_n"]).max(axis=1)
+        assert not (off_n[~marked] > 0.1).any()
 
 
 def slept_s(counters: dict[str, Any]) -> float:

@@ -81,6 +81,7 @@ export class Rig {
       'stretch a word': () => (this.sensors.stretched = true),
       'corrupt a handshake': () => (this.usb.corrupting = true),
       'wear the flash out': () => (this.board.worn = true),
+      'flip a written bit': () => (this.machine.mcu.flash[this.board.writtenAt + 40] ^= 1),
       'switch off quad reads': () => (this.board.quad = false),
       'silence the flash': () => (this.board.quad = null),
       unplug: () => this.#cable(false),

@@ -30,6 +30,7 @@ export class Board {
     this.cutAfter = null // bytes erased or programmed until power fails
     this.worn = false // its flash takes the longest that it may
     this.quad = true // its flash has all four lines switched on; null: it does not even say
+    this.writtenAt = null // where it was programmed last
     this.counters = { erases: 0, programs: 0, bytes: 0, misses: 0, wrong: [] }
   }
 
@@ -128,6 +129,7 @@ export class BootRom {
     if (!this.#allowed(at, bytes, PAGE, 'program')) return
     this.board.counters.programs++
     this.#spend(((this.board.worn ? WORN_PROGRAM_NS : PROGRAM_NS) * bytes) / PAGE)
+    this.board.writtenAt = at
     this.#change(at, bytes, (k) => this.mcu.flash[at + k] & this.mcu.readUint8(from + k))
   }
 

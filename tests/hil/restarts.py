@@ -1,0 +1,93 @@
+"""A board that loses power or hangs and starts again, on rigs whose power is a program's to cut."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+from rig import Rig
+
+import biotac
+from biotac.hand.opening import shake_hands
+from biotac.sim.emulated import EmulatedBoard
+from biotac.sim.loading import load_source
+from biotac.sim.ports import start_board
+from biotac.sim.process import SimBoard, SimLink
+from biotac.sim.source import Source
+
+BOOT_S = 10  # of the board's time, with the second that its watchdog takes
+
+
+class KeptBoard(SimBoard):
+    """A simulated board whose flash is a file, and outlives it."""
+
+    def __init__(self, source: Source, flash: Path) -> None:
+        self._flash = flash
+        super().__init__(source, pace=0.0, hold=True)
+
+    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
+        return super()._start([*options, "--flash", str(self._flash)])
+
+
+class Restarts:
+    """A rig's board, and a new Hand on it after each start."""
+
+    def __init__(self, rig: Rig, folder: Path, world: str) -> None:
+        self._rig = rig
+        self._flash = folder / "flash.bin"
+        self._met: list[biotac.Hand] = []  # one that is forgotten closes its link
+        path = folder / "world.toml"
+        path.write_text(world)
+        self._source = load_source(path)
+        if rig.name != "posix":
+            rig.need("power")
+        self._open()
+
+    def _open(self) -> None:
+        if self._rig.name == "posix":
+            self.board: Any = KeptBoard(self._source, self._flash)
+        else:
+            self.board = start_board(self._rig.facts["board"], self._source, pace=0.0)
+        self.link = SimLink(self._rig.name, self.board)
+        self._rig.opened.append(self.link)
+        self._meet()
+
+    def _meet(self) -> None:
+        self.hand: biotac.Hand = shake_hands(self.link)
+        self._met.append(self.hand)
+
+    def lose_power(self) -> None:
+        """Off and on again, at once: a process is killed, and another has its flash."""
+        if isinstance(self.board, EmulatedBoard):
+            self._start_by("cut power")
+        else:
+            self.link.close()
+            self._open()
+
+    def hang(self) -> None:
+        """Until the watchdog starts it."""
+        self._start_by("lose interrupts")
+
+    def _start_by(self, verb: str) -> None:
+        self.link.release()  # a watchdog's second passes only while time does
+        before = self.board.counters()
+        self.board.do(verb)
+        # What comes has to be read: an unpaced board waits for its reader.
+        while (now := self.board.counters())["boots"] == before["boots"] or now["usb"]["state"] != "configured":
+            assert now["emulated_s"] < before["emulated_s"] + BOOT_S
+            self.link.read(0.05)
+        self._meet()
+
+    def flip_saved_bit(self, save: Any) -> None:
+        """``save()``, and of what that wrote one bit turns over."""
+        if isinstance(self.board, EmulatedBoard):
+            save()
+            self.board.do("flip a written bit")
+            return
+        before = self._flash.read_bytes()
+        save()
+        after = bytearray(self._flash.read_bytes())
+        written = [at for at, (old, new) in enumerate(zip(before, after, strict=True)) if old != new]
+        after[written[len(written) // 2]] ^= 1
+        self._flash.write_bytes(after)

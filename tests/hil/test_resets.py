@@ -1,0 +1,140 @@
+"""Power lost, and the watchdog's reset, whatever the board was about: it says so, and nothing of before goes on."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from held_press import of
+from maps import make_map
+from restarts import Restarts
+from rig import Rig
+
+from biotac import FaultFlags, FrameFlags, Setting, TareReason
+from biotac.keep.map_blob import PART_BYTES, part
+from biotac.wire import messages_gen as wire
+
+pytestmark = pytest.mark.long
+
+FINGERS = 3
+PRESSED, AT_REST = 0, 1
+# Pressed from 1.5 s on for as long as any test takes; the other fingers feel nothing.
+WORLD = f"""
+name = "reset"
+seed = 5
+fingers = {FINGERS}
+[[step]]
+do = "rest"
+seconds = 1.0
+[[step]]
+do = "press"
+fingers = [{PRESSED}]
+seconds = 0.5
+at = "E17"
+force_n = 3.0
+[[step]]
+do = "hold"
+seconds = 280
+"""
+KEPT, NEW = make_map(1), make_map(2)
+
+
+def idle(its: Restarts) -> None:
+    its.hand.ping()
+
+
+def taring(its: Restarts) -> None:
+    frames = its.hand.read(0.05)
+    assert (frames["flags"] & FrameFlags.UNTARED != 0).all()
+
+
+def streaming(its: Restarts) -> None:
+    frames = its.hand.read(0.5)
+    assert not (frames["flags"][-FINGERS:] & FrameFlags.UNTARED).any()
+
+
+def with_a_keep_alive(its: Restarts) -> None:
+    its.hand._board.tell(wire.Start(9, int(wire.StreamFlags.FRAMES), 31, 60_000))
+    its.link.release()
+
+
+def touched(its: Restarts) -> None:
+    frames = of(its.hand.read(2.0), PRESSED)
+    assert frames["flags"][-1] & FrameFlags.CONTACT and frames["force_n"][-1].max() > 0.3
+
+
+def held(its: Restarts) -> None:
+    touched(its)
+    its.hand.hold(PRESSED)
+    assert of(its.hand.read(0.1, fresh=True), PRESSED)["flags"][-1] & FrameFlags.HELD
+
+
+def uploading_a_map(its: Restarts) -> None:
+    its.hand._board.tell(wire.BeginMap(0, AT_REST, len(NEW), zlib.crc32(NEW)))
+    for offset in range(0, len(NEW) - PART_BYTES, PART_BYTES):
+        its.hand._board.tell(wire.WriteMap(0, AT_REST, offset, part(NEW, offset)))
+
+
+def storing(its: Restarts) -> None:
+    its.hand.set_setting(Setting.IDLE_PERIOD_MS, 260)
+    its.hand._board.send(wire.SaveSettings(0))
+
+
+STATES = [idle, taring, streaming, with_a_keep_alive, touched, held, uploading_a_map, storing]
+
+
+def restarted(rig: Rig, folder: Path, state: Callable[[Restarts], None], how: str, said: FaultFlags) -> None:
+    """In a state, and then not: what the board must say, and may not know any more."""
+    its = Restarts(rig, folder, WORLD)
+    its.hand.set_setting(Setting.IDLE_PERIOD_MS, 250)
+    its.hand.set_map(AT_REST, KEPT)
+    its.hand.save_settings()
+    at_first_ms = its.hand.setting(Setting.HOLD_TIMEOUT_MS)
+    its.hand.set_setting(Setting.HOLD_TIMEOUT_MS, 60_000)  # not saved, but by storing()
+    before = its.hand.info
+    state(its)
+    getattr(its, how)()
+    hand, after = its.hand, its.hand.info
+    assert after.boot_id != before.boot_id
+    assert after.board_serial == before.board_serial
+    status, faults = hand.status(), hand.faults()
+    assert faults.board == said and not faults.fingers
+    assert status.streams == 0 and status.rx_errors == 0
+    found = hand.setting(Setting.IDLE_PERIOD_MS), hand.setting(Setting.HOLD_TIMEOUT_MS)
+    assert found == (250, at_first_ms) or (state is storing and found == (260, 60_000))
+    assert hand.maps() == {AT_REST: KEPT}
+    frames = hand.read(0.5)
+    flags = frames["flags"]
+    tared = flags & FrameFlags.UNTARED == 0
+    assert np.isnan(frames["force_n"][~tared]).all()
+    assert not (flags & (FrameFlags.HELD | FrameFlags.SENSOR_UNSURE | FrameFlags.SENSOR_OTHER)).any()
+    for finger in set(range(FINGERS)) - {PRESSED}:  # which has no tare while the force grows
+        assert tared[frames["finger"] == finger][-1]
+        assert hand.sensor_status(finger).tare_reason == TareReason.START
+    others = frames[tared & (frames["finger"] != PRESSED) & (frames["finger"] != AT_REST)]
+    assert not (others["flags"] & FrameFlags.CONTACT).any() and np.abs(others["force_n"]).max() < 0.1
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_after_power_was_lost_it_begins_anew_and_says_so(rig: Rig, tmp_path: Path, state: Callable) -> None:
+    restarted(rig, tmp_path, state, "lose_power", FaultFlags.STARTED)
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_after_it_hung_it_begins_anew_and_says_so(rig: Rig, tmp_path: Path, state: Callable) -> None:
+    rig.need("flash")
+    restarted(rig, tmp_path, state, "hang", FaultFlags.HUNG)
+
+
+def test_saved_settings_that_lose_a_bit_are_told_and_the_ones_before_hold(rig: Rig, tmp_path: Path) -> None:
+    its = Restarts(rig, tmp_path, WORLD)
+    its.hand.set_setting(Setting.IDLE_PERIOD_MS, 250)
+    its.hand.save_settings()
+    its.hand.set_setting(Setting.IDLE_PERIOD_MS, 260)
+    its.flip_saved_bit(its.hand.save_settings)
+    its.lose_power()
+    assert its.hand.setting(Setting.IDLE_PERIOD_MS) == 250
+    assert its.hand.faults().board == FaultFlags.STARTED | FaultFlags.STORAGE
