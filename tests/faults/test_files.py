@@ -32,6 +32,7 @@ from biotac.flash import read_backup
 from biotac.flash.backup import FORMAT as BACKUP
 from biotac.keep import calibration_file, map_file
 from biotac.keep.values import Calibration
+from biotac.sim import physics
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire
 
@@ -263,8 +264,8 @@ REST = '[[step]]\ndo = "rest"\nseconds = {}\n'
 PRESS = '[[step]]\ndo = "press"\nforce_n = 3.0\nat = "E17"\nseconds = {}\n'
 SLIP = '[[step]]\ndo = "slip"\nmm_s = 5.0\nseconds = {}\n'
 WORN = '[[finger]]\nprofile = "worn"\n'
-LONGEST = WORN + REST.format(1) + PRESS.format(159) + SLIP.format(740)
-FITTED = 'gains = "fit"\n' + WORN + REST.format(1) + PRESS.format(79) + SLIP.format(370)
+LONGEST = WORN + REST.format(1) + PRESS.format(79) + SLIP.format(520)
+FITTED = 'gains = "fit"\n' + WORN + REST.format(1) + PRESS.format(39) + SLIP.format(260)
 FAULT = '[[fault]]\nat_s = 0\nseconds = {}\nfinger = 0\nkind = "stuck_low"\n'
 
 
@@ -308,7 +309,7 @@ print(used.ru_utime + used.ru_stime, int(most) * 1024, told)
     "text",
     [
         NAME + REST.format(3600) + FAULT.format(3600) * 2000,
-        pytest.param(NAME + LONGEST + FAULT.format(900) * 11, marks=pytest.mark.nightly),
+        pytest.param(NAME + LONGEST + FAULT.format(600) * 16, marks=pytest.mark.nightly),
         NAME + REST.format(20) + FAULT.format(0.01) * 3_000,
         NAME + REST.format(600) + FAULT.format(0.01) * 13_000,
         pytest.param("\n".join(f"k{k}" + ".b" * 3 + " = 1" for k in range(70_000)), marks=pytest.mark.nightly),
@@ -316,6 +317,27 @@ print(used.ru_utime + used.ru_stime, int(most) * 1024, told)
 )
 def test_a_scenario_made_to_take_long_does_not(tmp_path: Path, text: str) -> None:
     assert played_by_another(text, tmp_path).isprintable()
+
+
+def test_the_most_that_a_scenario_computes_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work in rows, not seconds: states of a timeline, and of those the ones with a load of their own."""
+    states, loads = [0], [0]
+
+    def deform(its: physics.States) -> tuple[np.ndarray, np.ndarray]:
+        states[0] += len(its)
+        loads[0] += len(np.unique(its.force_n))
+        return np.zeros((len(its), 19)), np.zeros((len(its), 19))
+
+    monkeypatch.setattr(physics, "deform", deform)
+    path = tmp_path / "long.toml"
+    for text in (LONGEST, FITTED, WORN * 5 + REST.format(1) + PRESS.format(15) + SLIP.format(100)):
+        states[0] = loads[0] = 0
+        path.write_text(NAME + text)
+        load_source(path)
+        assert states[0] <= 60_500 + 30_100 and loads[0] <= 8_100 + 4_100, text
+    for seconds in (SLIP.format(521), PRESS.format(81)):  # a second more is refused
+        path.write_text(NAME + WORN + REST.format(1) + PRESS.format(79) + seconds)
+        assert refused_or_read(load_source, path)
 
 
 @pytest.mark.nightly
