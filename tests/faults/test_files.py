@@ -264,8 +264,8 @@ REST = '[[step]]\ndo = "rest"\nseconds = {}\n'
 PRESS = '[[step]]\ndo = "press"\nforce_n = 3.0\nat = "E17"\nseconds = {}\n'
 SLIP = '[[step]]\ndo = "slip"\nmm_s = 5.0\nseconds = {}\n'
 WORN = '[[finger]]\nprofile = "worn"\n'
-LONGEST = WORN + REST.format(1) + PRESS.format(79) + SLIP.format(520)
-FITTED = 'gains = "fit"\n' + WORN + REST.format(1) + PRESS.format(39) + SLIP.format(260)
+LONGEST = WORN + REST.format(1) + PRESS.format(159) + SLIP.format(440)
+FITTED = 'gains = "fit"\n' + WORN + REST.format(1) + PRESS.format(79) + SLIP.format(220)
 FAULT = '[[fault]]\nat_s = 0\nseconds = {}\nfinger = 0\nkind = "stuck_low"\n'
 
 
@@ -330,13 +330,13 @@ def test_the_most_that_a_scenario_computes_is_bounded(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(physics, "deform", deform)
     path = tmp_path / "long.toml"
-    for text in (LONGEST, FITTED, WORN * 5 + REST.format(1) + PRESS.format(15) + SLIP.format(100)):
+    for text in (LONGEST, FITTED, WORN * 5 + REST.format(1) + PRESS.format(31) + SLIP.format(88)):
         states[0] = loads[0] = 0
         path.write_text(NAME + text)
         load_source(path)
-        assert states[0] <= 60_500 + 30_100 and loads[0] <= 8_100 + 4_100, text
-    for seconds in (SLIP.format(521), PRESS.format(81)):  # a second more is refused
-        path.write_text(NAME + WORN + REST.format(1) + PRESS.format(79) + seconds)
+        assert states[0] <= 60_500 + 30_100 and loads[0] <= 16_100 + 8_100, text
+    for seconds in (SLIP.format(441), PRESS.format(2)):  # a second more is refused
+        path.write_text(NAME + WORN + REST.format(1) + PRESS.format(159) + seconds)
         assert refused_or_read(load_source, path)
 
 
