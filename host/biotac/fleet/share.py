@@ -133,8 +133,8 @@ class Share:
             return
         message_id, payload = frame
         secret = query.attachment.to_bytes() if query.attachment else b""
-        may = not rights.needs_writer(message_id)
-        if not may:
+        may = message_id in rights.READS
+        if rights.needs_writer(message_id):
             with self._deciding:
                 may = self.writer is not None and hmac.compare_digest(secret, self._secret)
         try:
