@@ -1,5 +1,7 @@
 #include "fake_port.h"
 
+#include "support.h"
+
 #include "port.h"
 #include "spi_word_by_word.h"
 #include "wire/messages_gen.h"
@@ -24,7 +26,7 @@ void fake_reset(bt_emu_source source, uint64_t start_ns)
 {
     memset(&fake, 0, sizeof fake);
     memset(fake.flash, 0xFF, sizeof fake.flash);
-    fake.flash_left = -1;
+    fake.flash_left = fake.operations_left = -1;
     fake.now_ns = start_ns;
     fake.shortest_gap_ns = UINT64_MAX;
     fake.link_up = true;
@@ -176,9 +178,23 @@ static void change(uint32_t at, uint8_t value)
     fake.flash[at] = value;
 }
 
+static void operation(uint32_t at, uint32_t bytes, const uint8_t *page)
+{
+    if (fake.operations_left == 0) {
+        for (uint32_t k = 0; fake.flash_inside && k < bytes; k++) {
+            uint8_t *byte = &fake.flash[at + k];
+            uint8_t value = page == NULL ? 0xFF : *byte & page[k];
+            *byte ^= (uint8_t)((*byte ^ value) & random_u64(&fake.flash_seed));
+        }
+        longjmp(fake.power_fails, 1);
+    }
+    fake.operations_left -= fake.operations_left > 0;
+}
+
 bool port_flash_erase(uint32_t sector_offset)
 {
     fake.erases++;
+    operation(sector_offset, BT_FLASH_SECTOR_BYTES, NULL);
     for (uint32_t k = 0; k < BT_FLASH_SECTOR_BYTES; k++) {
         change(sector_offset + k, 0xFF);
     }
@@ -190,6 +206,7 @@ bool port_flash_program(uint32_t page_offset, const uint8_t *page)
     if (fake.flash_broken) {
         return false;
     }
+    operation(page_offset, BT_FLASH_PAGE_BYTES, page);
     for (uint32_t k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
         change(page_offset + k, fake.flash[page_offset + k] & page[k]);
     }

@@ -35,8 +35,11 @@ typedef struct {
     bool link_up;
 
     _Alignas(4) uint8_t flash[BT_KEPT_BYTES];
-    bool flash_broken; // programs nothing
-    long flash_left;   // bytes that are still erased or programmed before power fails; -1: it holds
+    bool flash_broken;    // programs nothing
+    long flash_left;      // bytes that are still erased or programmed before power fails; -1: it holds
+    long operations_left; // erases and programs that are still done before it fails; -1: it holds
+    bool flash_inside;    // it fails within the next one: of its bits that change some are done, all over it
+    uint64_t flash_seed;
     bool flash_ragged; // of the byte at which it fails some bits are done
     int erases;
     jmp_buf power_fails; // where to go then

@@ -128,3 +128,20 @@ def test_a_block_that_is_cut_out_is_told(tmp_path: Path, recorded: bytes) -> Non
         if begin < until:
             path.write_bytes(recorded[:begin] + recorded[end:])
             assert outcome(path, good) == "told"
+
+
+def test_records_that_changed_places_or_came_twice_are_told(tmp_path: Path, recorded: bytes) -> None:
+    """Every one of them whole: its own checksum knows nothing, and who loads a part does not look at the file's."""
+    path, draw = tmp_path / "rec.mcap", random.Random(19)
+    path.write_bytes(recorded)
+    good = said(path)[0], loaded(path)[0]
+    its = [recorded[begin:end] for _, begin, end in records(recorded)]
+    until = next(k for k, (opcode, *_) in enumerate(records(recorded)) if opcode == DATA_END)
+    for _ in range(60):
+        order, one, other = list(its), draw.randrange(until), draw.randrange(until)
+        if draw.random() < 0.5:
+            order[one], order[other] = order[other], order[one]
+        else:
+            order.insert(other, order[one])
+        path.write_bytes(recorded[:8] + b"".join(order) + recorded[-8:])
+        assert outcome(path, good) != "silent", (one, other)

@@ -10,13 +10,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, PortError
+from ..documents import parse_json
+from ..errors import InputError, PortError, printable
 
 ROOT = "biotac"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+WRITER = re.compile(r"[^\s/*$?#]{1,200}")
 FIND_S = 1.0  # who does not tell of itself by then is not there
 
 LEASE_MS = 30_000  # a computer that says nothing for so long is gone; a program that ends is gone at once
+
+INFO_BYTES = 4096  # of what a board tells of itself, which has these and more
+TEXTS = ("name", "board", "serial_number", "firmware", "wire")
 
 #: Before each batch: its number, by which a reader knows what it missed.
 NUMBER = struct.Struct("<Q")
@@ -74,19 +79,39 @@ def shared(session: Any, name: str = "*") -> list[dict[str, Any]]:
     told = []
     for reply in session.get(key(name, "info"), target=_zenoh().QueryTarget.ALL, timeout=FIND_S):
         if reply.ok is not None:
-            try:
-                facts = json.loads(reply.ok.payload.to_bytes())
-            except ValueError:
-                continue  # of something else that has our key
-            if isinstance(facts, dict) and isinstance(facts.get("name"), str):
+            facts = _facts(reply.ok.payload.to_bytes())
+            if facts is not None:
                 told.append(facts)
     return sorted(told, key=lambda facts: facts["name"])
+
+
+def _facts(data: bytes) -> dict[str, Any] | None:
+    """What a board tells of itself; None for what something else says that has our key."""
+    try:
+        facts = parse_json(data) if len(data) <= INFO_BYTES else None
+    except ValueError:
+        return None
+    if not isinstance(facts, dict) or not all(isinstance(facts.get(key), str) for key in TEXTS):
+        return None
+    fingers, writer = facts.get("fingers"), facts.get("writer")
+    known = isinstance(fingers, list) and all(type(finger) is int for finger in fingers)
+    if not known or not isinstance(writer, str | None) or not NAME.fullmatch(facts["name"]):
+        return None
+    return {key: printable(value) if isinstance(value, str) else value for key, value in facts.items()}
 
 
 def alive(session: Any, name: str) -> set[str]:
     """Epochs under which a board of that name is shared: one, or none, or two that are called the same."""
     replies = session.liveliness().get(key(name, "live/*"), timeout=FIND_S)
     return {str(reply.ok.key_expr).rpartition("/")[2] for reply in replies if reply.ok is not None}
+
+
+def lives(session: Any, name: str, writer: str) -> bool:
+    """Whether somebody who calls himself ``writer`` is there, by his token."""
+    if not WRITER.fullmatch(writer) or not writer.isprintable():
+        return False
+    replies = session.liveliness().get(key(name, f"writer/{writer}"), timeout=FIND_S)
+    return any(reply.ok is not None for reply in replies)
 
 
 def found(facts: Mapping[str, Any]) -> str:

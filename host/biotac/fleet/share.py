@@ -111,9 +111,11 @@ class Share:
     def _claim(self, query: Any) -> None:
         """A claim is who (its token's name) and a secret that goes with its commands; the answer, who may command."""
         who, _, secret = (query.payload.to_bytes() if query.payload else b"").partition(b"\0")
+        name = who.decode(errors="replace")
         with self._deciding:
-            if self.writer is None and len(secret) >= 16:
-                self.writer, self._secret = who.decode(errors="replace"), secret
+            # Who has no token could never be seen to go, and nobody could command after him.
+            if self.writer is None and len(secret) >= 16 and network.lives(self._session, self.name, name):
+                self.writer, self._secret = name, secret
             mine = hmac.compare_digest(secret, self._secret)
             answer = b"" if mine else (self.writer or "nobody").encode()
         query.reply(network.key(self.name, "claim"), answer)
@@ -131,8 +133,8 @@ class Share:
             return
         message_id, payload = frame
         secret = query.attachment.to_bytes() if query.attachment else b""
-        may = not rights.needs_writer(message_id)
-        if not may:
+        may = message_id in rights.READS
+        if rights.needs_writer(message_id):
             with self._deciding:
                 may = self.writer is not None and hmac.compare_digest(secret, self._secret)
         try:

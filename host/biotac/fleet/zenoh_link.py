@@ -22,6 +22,7 @@ from . import network, rights
 
 FORM = "zenoh:NAME?connect=tcp/HOST:7447&write=yes&config=FILE"
 MAX_WAITING_BYTES = 4 << 20  # of batches that nobody reads; about half a minute of five fingers
+REPLAYED, FOREIGN = 1 << 12, 1 << 32  # batches back, or ahead, of the one that is due
 ANSWER_S = 1.0
 # Whose connection was cut, or who was stopped for as long as Zenoh waits, finds the same board again by itself.
 GONE_S = 1.0
@@ -145,8 +146,11 @@ class ZenohLink:
             return
         (number,) = network.NUMBER.unpack_from(data)
         with self._came:
-            if self._next is not None and self._started:
-                self.batches_lost += max(0, number - self._next)
+            ahead = 0 if self._next is None else number - self._next
+            if -REPLAYED <= ahead < 0 or ahead >= FOREIGN:
+                return  # it was here, or is nobody's who counts batches
+            if self._started:
+                self.batches_lost += max(0, ahead)
             self._next = number + 1
             if not self._started:
                 return

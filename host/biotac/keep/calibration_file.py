@@ -7,7 +7,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from ..documents import parse_json
+from ..documents import JSON_BYTES, parse_json, read_text
 from ..errors import InputError
 from ..wire import messages_gen as wire
 from .values import Calibration
@@ -107,11 +107,14 @@ def loads(text: str, where: str) -> Calibration:
 def load(path: Path) -> Calibration:
     """Read a file; InputError when it cannot be read or used."""
     try:
-        return loads(path.read_text(encoding="utf-8"), str(path))
+        text = read_text(path, JSON_BYTES)
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is no text; expected JSON that `biotac calibration get` wrote") from error
+    except ValueError as error:
+        raise InputError(f"{path} is no calibration: {error}; `biotac calibration get` writes one") from error
+    return loads(text, str(path))
 
 
 def save(

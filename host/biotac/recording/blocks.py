@@ -71,6 +71,8 @@ class Blocks:
                 continue
             topic, message = record
             if message.sequence != number:
+                if parts or message.sequence < number:
+                    self._told_misplaced()
                 parts, number = {}, message.sequence
             if topic == layout.TOPIC:
                 none = [np.empty(0, table_dtype(kind)) for kind in range(len(KINDS))]
@@ -101,6 +103,12 @@ class Blocks:
         elif record.name == f"{layout.METADATA_NAME}.{GAP}":
             self.gaps.append(facts)
 
+    def _told_misplaced(self) -> None:
+        """Parts of a second that are missing, or are not with the rest of it; damage that explains it was told."""
+        if not self.scan.problems:
+            name = self.scan.path.name
+            self.scan.problems.append(f"{name} is damaged: what it has is not in its order, and some of it left out")
+
     def _piece(self, message: Message, parts: dict[int, bytes]) -> Piece | None:
         try:
             rest = Rest.unpack(message.data)
@@ -110,11 +118,12 @@ class Blocks:
             wanted = rest.all_fingers if self._fingers is None else rest.all_fingers & self._fingers
             whole = set(parts) >= wanted
             if not whole:
+                self._told_misplaced()
                 rest = rest.without(wanted - set(parts))
             rows = self._tables(rest, self._readings)
             for finger, data in parts.items():
                 read_part(data, self._readings, rows, finger)
-        except (KeyError, TypeError, ValueError, struct.error, IndexError) as error:
+        except (KeyError, TypeError, ValueError, struct.error, IndexError, RecursionError) as error:
             self.scan.damaged_chunks += 1
             self.scan.problems.append(f"one second of {self.scan.path.name} is damaged and left out ({error})")
             return None

@@ -22,7 +22,9 @@ from ..wire.messages_gen import INVALID_COUNT
 
 _FIRST_PAIR = 4
 _BEGIN = b"Begin File"
-_MAX_BYTES = 1 << 30  # a day of three sensors is larger; a compressed bomb is stopped here
+_MAX_BYTES = 1 << 30  # a day of three sensors is larger
+# Packed, real ones have a tenth of their bytes; in memory each becomes four.
+_PACKED_RATIO, _PACKED_FREE_BYTES = 30, 1 << 24
 
 
 @dataclass(frozen=True)
@@ -100,19 +102,21 @@ def _complete_frames(
 
 
 def _bytes(path: Path) -> bytes:
+    limit = _MAX_BYTES
     try:
         if path.name.lower().endswith(".gz"):
+            limit = min(_MAX_BYTES, _PACKED_FREE_BYTES + _PACKED_RATIO * path.stat().st_size)
             with gzip.open(path) as packed:
-                data = packed.read(_MAX_BYTES + 1)
+                data = packed.read(limit + 1)
         else:
             with path.open("rb") as plain:
-                data = plain.read(_MAX_BYTES + 1)
+                data = plain.read(limit + 1)
     except (OSError, EOFError, zlib.error) as error:
         seen = getattr(error, "strerror", None)  # of the system; what damage raises has none
         cure = "check the path" if seen else "copy it again"
         raise RecordingError(f"{path}: cannot be read ({seen or error}): expected a .btd; {cure}") from None
-    if len(data) > _MAX_BYTES:
-        raise RecordingError(f"{path}: more than {_MAX_BYTES >> 20} MB of text: expected less; split it")
+    if len(data) > limit:
+        raise RecordingError(f"{path}: more than {limit >> 20} MB of text: expected less; split it")
     return data
 
 

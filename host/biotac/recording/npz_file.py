@@ -12,7 +12,10 @@ import numpy.typing as npt
 from ..errors import RecordingError
 from ..wire import sensor_gen as _sensor
 
-FIELD_MAX_BYTES = 256 << 20  # an hour of 19 electrodes as float64 is 55 MB; zip makes 1000 bytes of one
+MAX_BYTES = (
+    192 << 20
+)  # of all wanted fields: an hour of every channel as float64 is 150 MB; zip makes 1000 bytes of one
+MAX_ROWS = 360_000  # an hour
 
 
 def read_npz(path: Path, wanted: Collection[str]) -> dict[str, npt.NDArray[Any]]:
@@ -24,14 +27,20 @@ def read_npz(path: Path, wanted: Collection[str]) -> dict[str, npt.NDArray[Any]]
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise RecordingError(f"{path}: one bare array: expected an .npz with field E; use numpy.savez")
             names = [name for name in archive.files if name in wanted]
+            assert archive.zip is not None  # until it is closed
+            size = sum(archive.zip.getinfo(f"{name}.npy").file_size for name in names)
+            if size > MAX_BYTES:
+                raise RecordingError(
+                    f"{path}: its fields have {size >> 20} MiB: expected at most {MAX_BYTES >> 20}; split it"
+                )
+            fields = {}
             for name in names:
-                assert archive.zip is not None  # until it is closed
-                size = archive.zip.getinfo(f"{name}.npy").file_size
-                if size > FIELD_MAX_BYTES:
+                fields[name] = np.asarray(archive[name])
+                if fields[name].shape[:1] > (MAX_ROWS,):
                     raise RecordingError(
-                        f"{path}: field {name} has {size >> 20} MiB: expected at most {FIELD_MAX_BYTES >> 20}; split it"
+                        f"{path}: field {name} has {len(fields[name])} rows: expected at most {MAX_ROWS}; split it"
                     )
-            return {name: np.asarray(archive[name]) for name in names}
+            return fields
     except RecordingError:
         raise
     except Exception as error:  # a damaged header is taken for Python's text, and fails in many ways

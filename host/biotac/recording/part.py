@@ -109,7 +109,10 @@ def _fingers(place: Path, fingers: Iterable[int | str]) -> set[int]:
         pieces = Blocks(place, {}, (), check=False)
         for _ in pieces:
             break
-        names = layout.names_of(pieces.metadata or {})
+        try:
+            names = layout.names_of(pieces.metadata or {})
+        except (TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
+            raise RecordingError(f"{place} has damaged metadata ({error}); name its fingers by number") from error
     try:
         return {layout.finger_of(finger, names) for finger in wanted}
     except KeyError as error:

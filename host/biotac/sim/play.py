@@ -16,6 +16,7 @@ from .physics import Finger, States
 from .scenario import Fault, FingerSpec, Scenario, default_serial
 from .source import Rows, Source, Truth
 
+_IS_CHANNEL = {name: np.array(_sensor.SLOTS) == name for name in _sensor.SLOTS}
 _REPEAT_SEED_STEP = 100  # apart enough that repeated fingers do not meet the scenario's own seeds
 
 
@@ -90,12 +91,11 @@ def _codes(faults: list[Fault], period: int) -> sampling.Words | None:
     for fault in faults:
         # in slot numbers: comparing seconds would let rounding decide at the edges
         begin, end = (round(t * _sensor.SLOT_HZ) for t in (fault.at_s, fault.at_s + fault.seconds))
-        lasting = np.zeros(codes.size, np.bool_)
-        lasting[begin:end] = True
-        mine = np.ones(slots.SLOTS_PER_FRAME, np.bool_)
-        if fault.channel is not None:
-            mine = np.array(_sensor.SLOTS) == fault.channel
-        codes[lasting.reshape(codes.shape) & mine] = fault.code
+        hit = codes.reshape(-1)[begin:end]  # no more than it lasts: there may be many
+        if fault.channel is None:
+            hit[:] = fault.code
+        else:
+            hit[_IS_CHANNEL[fault.channel][np.arange(begin, begin + len(hit)) % slots.SLOTS_PER_FRAME]] = fault.code
     return codes
 
 

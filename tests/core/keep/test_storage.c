@@ -12,6 +12,8 @@
 // ---- NOR flash on a failing supply -----------------------------------------------------------------
 
 static uint8_t flash_bytes[BT_STORAGE_BYTES];
+static long operations_left; // erases and programs that are still done before power fails; -1: it holds
+static bool inside;     // it fails within the next one: of its bits that change some are done, all over it
 static long steps_left; // bytes that are still erased or programmed before power fails; -1: it holds
 static bool backwards;  // of a sector or page, the last byte first
 static bool ragged;     // the byte at which power fails has only some of its bits done
@@ -32,6 +34,18 @@ static void step(size_t at, uint8_t value)
     flash_bytes[at] = value;
 }
 
+static void operation(size_t at, size_t bytes, const uint8_t *page)
+{
+    if (operations_left == 0) {
+        for (size_t k = 0; inside && k < bytes; k++) {
+            uint8_t value = page == NULL ? 0xFF : flash_bytes[at + k] & page[k];
+            flash_bytes[at + k] ^= (uint8_t)((flash_bytes[at + k] ^ value) & random_u64(&seed));
+        }
+        longjmp(power_fails, 1);
+    }
+    operations_left -= operations_left > 0;
+}
+
 static size_t in_order(size_t k, size_t bytes)
 {
     return backwards ? bytes - 1 - k : k;
@@ -41,6 +55,7 @@ static bool erase(uint32_t offset)
 {
     assert_true(offset % BT_FLASH_SECTOR_BYTES == 0 && offset < BT_STORAGE_BYTES);
     erases++;
+    operation(offset, BT_FLASH_SECTOR_BYTES, NULL);
     for (size_t k = 0; k < BT_FLASH_SECTOR_BYTES; k++) {
         step(offset + in_order(k, BT_FLASH_SECTOR_BYTES), 0xFF);
     }
@@ -50,6 +65,7 @@ static bool erase(uint32_t offset)
 static bool program(uint32_t offset, const uint8_t *page)
 {
     assert_true(offset % BT_FLASH_PAGE_BYTES == 0 && offset < BT_STORAGE_BYTES);
+    operation(offset, BT_FLASH_PAGE_BYTES, page);
     for (size_t k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
         size_t at = offset + in_order(k, BT_FLASH_PAGE_BYTES);
         step(at, flash_bytes[at] & page[at - offset]); // programming never sets a bit
@@ -69,8 +85,8 @@ static int new_flash(void **state)
 {
     (void)state;
     memset(flash_bytes, 0xFF, sizeof flash_bytes);
-    steps_left = -1;
-    backwards = ragged = false;
+    steps_left = operations_left = -1;
+    backwards = ragged = inside = false;
     erases = 0;
     return 0;
 }
@@ -326,16 +342,29 @@ static int stored_calibration(int f)
     return number;
 }
 
-static bool save_all_with_cut(int number, long cut)
+// `left` counts down to the cut.
+static bool save_all_with_cut(int number, long *left, long cut)
 {
-    steps_left = cut;
+    *left = cut;
     if (setjmp(power_fails) != 0) {
-        steps_left = -1;
+        *left = -1;
         return false;
     }
     save_all(number);
-    steps_left = -1;
+    *left = -1;
     return true;
+}
+
+// They are written one after the other: where the old one begins, the rest is old.
+static void assert_old_then_new(int number)
+{
+    int found = stored_settings();
+    assert_true(found == number || found == number - 1);
+    for (int f = 0; f < FINGERS; f++) {
+        int next = stored_calibration(f);
+        assert_true(next == found || (found == number && next == number - 1));
+        found = next;
+    }
 }
 
 static void each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new(void **state)
@@ -345,20 +374,41 @@ static void each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new(void **s
     save_all(0);
     for (int number = 1; number <= ALL_CUTS; number++) {
         memcpy(before, flash_bytes, sizeof before);
-        for (long cut = 0; !save_all_with_cut(number, cut); cut++) {
-            // They are written one after the other: where the old one begins, the rest is old.
-            int found = stored_settings();
-            assert_true(found == number || found == number - 1);
-            for (int f = 0; f < FINGERS; f++) {
-                int next = stored_calibration(f);
-                assert_true(next == found || (found == number && next == number - 1));
-                found = next;
-            }
+        for (long cut = 0; !save_all_with_cut(number, &steps_left, cut); cut++) {
+            assert_old_then_new(number);
             memcpy(flash_bytes, before, sizeof before);
         }
         assert_int_equal(stored_calibration(FINGERS - 1), number);
     }
     assert_true(erases > 2 * BT_FLASH_SECTOR_BYTES); // a cut at every byte of two erases, at least
+}
+
+// Cells of a sector that is erased, or of a page that is programmed, are done in no order: seed 17.
+static void so_it_is_before_every_operation_and_wherever_inside_of_one_power_fails(void **state)
+{
+    (void)state;
+    static uint8_t before[BT_STORAGE_BYTES];
+    int at = 0, within = 0;
+    seed = 17;
+    save_all(0);
+    for (int number = 1; number <= 2 * ALL_CUTS; number++) {
+        memcpy(before, flash_bytes, sizeof before);
+        for (int turn = 0; turn < 4; turn++) {
+            inside = turn > 0;
+            memcpy(flash_bytes, before, sizeof before);
+            for (long cut = 0; !save_all_with_cut(number, &operations_left, cut); cut++) {
+                *(inside ? &within : &at) += 1;
+                assert_old_then_new(number);
+                save_all(number); // what the cut left behind is no obstacle
+                assert_int_equal(stored_settings(), number);
+                assert_int_equal(stored_calibration(FINGERS - 1), number);
+                memcpy(flash_bytes, before, sizeof before);
+            }
+        }
+    }
+    print_message("settings and calibrations: power cut before %d operations, inside %d\n", at, within);
+    assert_in_range(at, 50, 1000);
+    assert_in_range(within, 150, 1000);
 }
 
 // ---- settings ------------------------------------------------------------------------------------------
@@ -439,6 +489,7 @@ int main(void)
         T(nor_does_the_order_within_a_page_matter),
         T(nor_do_half_done_bytes),
         T(each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new),
+        T(so_it_is_before_every_operation_and_wherever_inside_of_one_power_fails),
         T(settings_come_back_and_others_keep_their_defaults),
         T(a_record_without_the_force_model_means_lins),
         T(no_more_is_read_than_there_is_or_there_is_room_for),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 import socket
 import subprocess
 import sys
@@ -143,7 +144,13 @@ def test_the_sharing_side_enforces_it(shared) -> None:
     """Of a client that does not keep to the rules: no claim, a wrong secret, damaged bytes, an unknown command."""
     before = shared.hand.setting(wire.Setting.CONTACT_ENERGY_COUNT2)
     change = wire.SetSetting(9, wire.Setting.CONTACT_ENERGY_COUNT2, before + 5)
-    with shared.client() as session, biotac.open(shared.port("&write=yes")):
+    with shared.client() as session, biotac.open(shared.port("&write=yes")) as writer:
+        stop = encode(wire.Stop.ID, wire.Stop(9).pack())[:-1]  # each reader's own affair, not to be done to all
+        (reply,) = session.get(network.key("left", "command"), payload=stop)
+        refused = open_frame(reply.ok.payload.to_bytes()[:-1])
+        assert refused is not None
+        assert wire.Reply.unpack(refused[1]) == wire.Reply(9, wire.Stop.ID, wire.Error.NOT_HERE)
+        until(writer, 20)
         for secret in (b"", b"\0" * 32):
             replies = list(
                 session.get(
@@ -156,6 +163,72 @@ def test_the_sharing_side_enforces_it(shared) -> None:
         for payload in (b"", b"\0", b"no frame", encode(0x89, b"")[:-1]):
             list(session.get(network.key("left", "command"), payload=payload, timeout=0.2))
     assert shared.hand.setting(wire.Setting.CONTACT_ENERGY_COUNT2) == before
+
+
+def garbage(draw: random.Random) -> bytes:
+    """No message, half of one, many, too long, or a whole one of any id with bytes that mean nothing."""
+    message = encode(draw.choice([*wire.MESSAGES, draw.randrange(1, 256)]), draw.randbytes(draw.randrange(60)))[:-1]
+    known = draw.choice(list(wire.ANSWERS))
+    of_its_length = encode(known.ID, draw.randbytes(known.STRUCT.size))[:-1]
+    cut = message[: draw.randrange(len(message))]
+    noise = draw.randbytes(draw.choice([0, 1, 7, 9, 300, 70_000]))
+    return draw.choice([noise, cut, message, message, of_its_length, of_its_length, (message + b"\0") * 1000])
+
+
+@pytest.mark.parametrize("tries", [150, pytest.param(1500, marks=pytest.mark.nightly)])
+def test_what_means_nothing_is_left_alone(shared, capfd, tries: int) -> None:
+    """At every key that is asked, and no claim of somebody who is not there."""
+    before, draw = shared.hand.settings(), random.Random(tries)
+    with shared.client() as session:
+        for _ in range(tries):
+            what = draw.choice(["command", "command", "claim", "info"])
+            secret = draw.choice([None, b"", draw.randbytes(32)])
+            list(session.get(network.key("left", what), payload=garbage(draw), attachment=secret, timeout=5.0))
+        for who in (b"", b"nobody", b"x" * 70_000, b"\xff", b"*", b"a/b"):
+            list(session.get(network.key("left", "claim"), payload=who + b"\0" + bytes(32), timeout=5.0))
+        assert [facts["name"] for facts in network.shared(session)] == ["left"]
+    assert shared.share.writer is None and shared.hand.settings() == before
+    with biotac.open(shared.port("&write=yes")) as writer:
+        until(writer, 20)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_batches_that_are_not_the_boards_are_left_alone(shared) -> None:
+    """Played again, of no number or of a wild one, too long."""
+    draw, kept = random.Random(3), []
+    with shared.client() as session, biotac.open(shared.port()) as hand:
+        (epoch,) = network.alive(session, "left")
+        place = network.key("left", f"wire/{epoch}")
+        listening = session.declare_subscriber(place, lambda sample: kept.append(sample.payload.to_bytes()))
+        until(hand, 60)
+        listening.undeclare()
+        for data in [*kept[:5], b"", bytes(8), network.NUMBER.pack(2**64 - 1) + b"\1\0", *kept[:5]]:
+            session.put(place, data)
+        for _ in range(20):
+            session.put(place, network.NUMBER.pack(2**63) + draw.randbytes(draw.choice([1, 300, 5 << 20])))
+        rows = 0
+        seen: dict[int, int] = {}
+        for batch in hand.batches():
+            for finger, seq in zip(batch.frames["finger"].tolist(), batch.seq.tolist(), strict=True):
+                assert seq > seen.get(finger, -1)
+                seen[finger] = seq
+            rows += len(batch.frames)
+            if rows > 200:
+                break
+        assert hand.link.batches_lost == hand.stats.frames_lost == hand.stats.disordered == 0
+
+
+def test_who_says_nonsense_of_himself_is_not_listed(shared, capsys) -> None:
+    good = {"name": "x", "board": "b", "serial_number": "s", "firmware": "f", "wire": "1.0", "fingers": [0]}
+    said = [b"", b"\xff", b"[]", b"[" * 200_000, b"{}", b'{"name": "x"}', json.dumps(good | {"fingers": 5}).encode()]
+    said += [json.dumps(good | {"writer": 5}).encode(), json.dumps(good | {"name": "a\x1b[2J"}).encode()]
+    with shared.client() as session:
+        for data in said:
+            here = session.declare_queryable(network.key("x", "info"), lambda q, d=data: q.reply(q.key_expr, d))
+            assert [facts["name"] for facts in network.shared(session)] == ["left"], data[:40]
+            assert main(["list", "--zenoh", shared.endpoint]) == 0
+            here.undeclare()
+    assert capsys.readouterr().err == ""
 
 
 def test_a_slow_reader_loses_whole_batches_counted_and_hurts_nobody(shared, monkeypatch) -> None:

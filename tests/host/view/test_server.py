@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import json
 import os
+import random
+import re
 import socket
 import subprocess
 import sys
 import threading
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -78,6 +82,88 @@ def test_the_secret_is_in_the_pages_address_and_nowhere_that_is_served(make_play
     with stream, stream.makefile("rb") as lines:
         told = b"".join(next(lines) for _ in range(20))
     assert b"token_header" in told and token.encode() not in told
+
+
+def malformed(draw: random.Random, host: bytes, token: bytes) -> bytes:
+    """A request with one to three things wrong, or one that asks for an upgrade and sends frames of a websocket."""
+    lines = [b"GET / HTTP/1.1", b"Host: " + host, TOKEN_HEADER.encode() + b": " + token]
+    body = b'{"do": "fly", "finger": 3}'
+    others = [b"HEAD", b"PUT", b"OPTIONS", b"CONNECT", b"PRI", b"get", b"\0"]
+    method = draw.choice([b"GET", b"POST", draw.choice(others)])
+    path = draw.choice(
+        [
+            b"/",
+            b"/command",
+            b"/events/..",
+            b"/../server.py",
+            b"/..%2fserver.py",
+            b"//",
+            b"*",
+            b"\\..\\",
+            b"http://x/",
+            b"\xff",
+        ]
+    )
+    lines[0] = b" ".join([method, path, draw.choice([b"HTTP/1.1"] * 5 + [b"HTTP/1.0", b"HTTP/9.9", b"HTTP/x", b""])])
+    lines += draw.sample(
+        [
+            b"Content-Length: " + draw.choice([b"-1", b"9" * 5000, b"1e3", b"+5", b"1001", b"\xb2", b"5, 5", b"27"]),
+            b"Transfer-Encoding: chunked",
+            b"Expect: 100-continue",
+            b"X: " + b"y" * draw.choice([1, 70_000, 1 << 20]),
+            b"no colon",
+            b" folded: 1",
+            b"\0\x1b[2J: \xff",
+            b"Host: example.org",
+            b"Origin: null",
+            TOKEN_HEADER.encode() + b": \xff\xe9",
+            b"Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAA",
+            *[b"A%d: 1" % k for k in range(3)],
+        ],
+        draw.randrange(3),
+    )
+    if draw.random() < 0.1:
+        lines += [b"B%d: 1" % k for k in range(200)]
+    frames = [b"\x81\xfe\xff\xff", b"\xf1\x05hello", b"\x89\x7e\x00\x80" + bytes(128), b"\x81\x02\xc3\x28", b"\x00\x00"]
+    text = draw.choice([b"\r\n"] * 3 + [b"\n"]).join(lines) + b"\r\n\r\n" + draw.choice([b"", body, *frames])
+    kind = draw.randrange(8)
+    if kind == 0:
+        return text[: draw.randrange(len(text))]
+    if kind == 1:
+        return draw.randbytes(draw.choice([1, 300, 100_000]))
+    return text
+
+
+@pytest.mark.parametrize("tries", [300, pytest.param(10_000, marks=pytest.mark.nightly)])
+def test_requests_that_are_none_are_refused_and_forgotten(make_player, view_of, capfd, tries: int) -> None:
+    """Nothing of the page's is told but its own files, nothing is done, no thread dies of it or stays."""
+    player, draw = make_player(), random.Random(tries)
+    viewing = view_of(lambda: player)
+    host = f"127.0.0.1:{viewing.server.server_port}".encode()
+    answers: Counter[bytes] = Counter()
+    for k in range(tries):
+        token = draw.choice([b"guess", viewing.server.token.encode()])
+        with socket.create_connection(("127.0.0.1", viewing.server.server_port)) as one:
+            with contextlib.suppress(OSError):  # refused before all of it was read
+                one.sendall(malformed(draw, host, token))
+                one.shutdown(socket.SHUT_WR)
+            got = b""
+            with contextlib.suppress(OSError):
+                while len(got) < 1 << 20 and (part := one.recv(1 << 16)):
+                    got += part
+        told = re.match(rb"HTTP/\S+ (\d+)", got) or re.search(
+            rb"Error code: (\d+)", got
+        )  # without a head, as 0.9 had it
+        status = told[1] if told else b""
+        answers[status] += 1
+        assert status in {b"", b"100", b"200", b"400", b"403", b"404", b"409", b"414", b"431", b"501", b"505"}, (
+            k,
+            got[:200],
+        )
+        assert b"101 " not in got[:20] and viewing.server.token.encode() not in got and b"import " not in got
+    assert ask(viewing, "GET", "/")[0] == 200 and player.commands == []
+    assert min(answers[status] for status in (b"200", b"400", b"403", b"404", b"501")) > 0, answers
+    assert capfd.readouterr().err == ""
 
 
 def test_connections_that_drip_make_room(make_player, view_of) -> None:

@@ -20,6 +20,7 @@ from ...core.board_map import BoardMap
 from ...core.geometry import Floats
 from ...core.map_columns import ELECTRODES
 from ...core.population import SHIPPED, shipped
+from ...documents import JSON_BYTES, parse_json, read_text
 from ...errors import InputError
 from ...version import __version__
 from ...wire.map_gen import Gate, Kind
@@ -82,7 +83,7 @@ def dumps(kept: Kept) -> str:
 def loads(text: str, where: str) -> Kept:
     """Inverse of dumps, but for the digits. Raises InputError naming what is wrong with it."""
     try:
-        facts = json.loads(text)
+        facts = parse_json(text)
         if facts["format"] != FORMAT:
             raise ValueError(f"format {facts['format']!r}")
         if facts["blocks"] != _block_names():
@@ -94,7 +95,7 @@ def loads(text: str, where: str) -> Kept:
         if not all(np.isfinite(one).all() for one in (rows, *sigmas)) or (rows[:, -1] <= 0.0).any():
             raise ValueError("a coefficient that is no number, or a variance that is not above 0")
         return Kept(Population(rows[:, :-1], rows[:, -1]), sigmas[0], sigmas[1], dict(facts["provenance"]))
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, OverflowError) as error:
         seen = str(error) or type(error).__name__
         cure = "expected a " + FORMAT + " as `biotac calibrate population --out` writes it"
         raise InputError(f"{where}: {seen}: {cure}") from None
@@ -105,9 +106,10 @@ def load(path: Path | None) -> Kept:
     if path is None:
         return loads(shipped(), SHIPPED)
     try:
-        return loads(path.read_text(encoding="utf-8"), str(path))
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_text(path, JSON_BYTES)
+    except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read ({error}); check the path") from None
+    return loads(text, str(path))
 
 
 def _short(values: Floats) -> list[float]:

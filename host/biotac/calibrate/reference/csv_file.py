@@ -27,7 +27,7 @@ COLUMNS = ("t_s", "Fx_N", "Fy_N", "Fz_N", "Mx_Nmm", "My_Nmm", "Mz_Nmm")
 # in the order they are wanted; torque goes by M or T
 _NAMES = ("t", "fx", "fy", "fz", "mx", "my", "mz")
 _UNITS = {"t": {"s": 1.0}, "f": {"N": 1.0}, "m": {"Nmm": 1.0, "Nm": 1000.0}}
-_COLUMN = re.compile(r"^(t|time|[FMT][xyz])(?:\s*[\[(]\s*([^\])]*?)\s*[\])]|_(.+))?$", re.IGNORECASE)
+_COLUMN = re.compile(r"^(t|time|[FMT][xyz])(?:\s*[\[(]([^\])]*)[\])]|_(.+))?$", re.IGNORECASE)
 _WANTED = "t in s, forces in N, torques in N mm or N m"
 
 
@@ -84,16 +84,14 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequenc
 def _split(text: str) -> tuple[dict[str, str], str | None, str]:
     """What '# key: value' lines say, the header, and the rest."""
     own: dict[str, str] = {}
-    rest = text
-    while rest:
-        line, _, rest = rest.partition("\n")
-        line = line.strip()
+    for match in re.finditer(r"[^\n]*\n?", text):
+        line = match[0].strip()
         if line.startswith("#"):
             key, colon, value = line.lstrip("# ").partition(":")
             if colon:
                 own[key.strip()] = value.strip()
         elif line:
-            return own, line, rest
+            return own, line, text[match.end() :]
     return own, None, ""
 
 
@@ -109,7 +107,7 @@ def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[
             continue
         word = match[1].lower()
         name = "t" if word in ("t", "time") else word.replace("t", "m", 1)
-        unit = match[2] or match[3]
+        unit = (match[2] or match[3] or "").strip()
         if not unit:
             raise RecordingError(f"{path}: column {cell!r} has no unit: expected {_WANTED}, as in {COLUMNS[4]}")
         factor = _UNITS[name[0]].get(re.sub(r"[\s*.·-]", "", unit))
