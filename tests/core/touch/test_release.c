@@ -65,7 +65,8 @@ static void below_four_hundred_and_with_the_pressure_back_it_is_over(void **stat
 static void what_a_press_leaves_is_a_share_of_it(void **state)
 {
     (void)state;
-    static const int32_t peak_rest[][2] = {{24, 4}, {199, 4}, {200, 5}, {239, 5}, {320, 8}, {400, 10}, {4000, 10}};
+    static const int32_t peak_rest[][2] = {{24, 4},  {199, 4},  {200, 5},  {239, 5},
+                                           {320, 8}, {400, 10}, {4000, 10}};
     for (size_t k = 0; k < sizeof peak_rest / sizeof *peak_rest; k++) {
         bt_release release = pressed;
         bt_release_sweep sweep = held;
