@@ -1,6 +1,8 @@
 // Who is there, and what one says when asked.
 #include "fake_host.h"
 
+#include "talk/sensors.h"
+
 #include <math.h>
 
 static void each_finger_has_its_own_flags_of_who_is_there(void **state)
