@@ -123,6 +123,44 @@ static void while_it_slips_both_sides_are_one(void **state)
     assert_int_equal(stretch(), 0);
 }
 
+static void what_was_told_of_shakes_on_until_it_is_over(void **state)
+{
+    static const struct {
+        bool jolt_told, landing, touched, one;
+    } cases[] = {{true, true, true, true},
+                 {true, false, true, false},
+                 {true, false, false, true},
+                 {false, true, true, false},
+                 {false, false, false, false}};
+    for (int k = 0; k < 5; k++) {
+        (void)held(state);
+        tare.state = BT_TARE_STATE_REST;
+        events.touch_began = events.now;
+        events.jolt_told = cases[k].jolt_told;
+        events.landing = cases[k].landing;
+        events.touched = cases[k].touched;
+        events.risen_count2 = events.fallen_count2 = 1000;
+        (void)stretch();
+        assert_int_equal(events.risen_count2, cases[k].one ? 2000 - 8 * LEVEL : 1000 - TOLL);
+        assert_int_equal(events.fallen_count2, cases[k].one ? 0 : 1000 - TOLL);
+    }
+}
+
+// The sample that begins it, be it ever so small.
+static void each_side_begins_with_its_first_change(void **state)
+{
+    static const int change[2][8] = {{60, 5, -1, -50}, {-60, -5, 1, 50}};
+    for (int side = 0; side < 2; side++) {
+        (void)held(state);
+        for (int k = 0; k < 8; k++) {
+            pac[8 + k] = (uint16_t)(2000 + change[side][k]);
+        }
+        (void)stretch();
+        assert_int_equal(side ? events.fall_began : events.rise_began, 100000);
+        assert_int_equal(side ? events.rise_began : events.fall_began, 100002);
+    }
+}
+
 // For a tenth of a second after a touch, and as long as it shakes for a second, it lands.
 static void what_has_just_been_touched_lands(void **state)
 {
@@ -346,6 +384,8 @@ int main(void)
         T(a_jolt_is_more_than_25_levels_and_told_once),
         T(evidence_is_no_more_than_a_hundred_levels_of_each_side),
         T(while_it_slips_both_sides_are_one),
+        T(what_was_told_of_shakes_on_until_it_is_over),
+        T(each_side_begins_with_its_first_change),
         T(what_has_just_been_touched_lands),
         T(a_drag_is_a_slip_of_one_sign),
         T(a_slip_began_with_its_vibration),

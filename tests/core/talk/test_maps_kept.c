@@ -167,6 +167,11 @@ static void a_stored_map_that_cannot_be_used_is_said_so(void **state)
     assert_int_equal(its.place.bytes, 0);
     assert_true(its.map.axes == 0 && its.map.blocks == NULL);
     assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION + 1, packed, sizeof packed));
+    bt_put_u32(packed + 4, 0); // none is stored, as is right
+    assert_true(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
+    assert_true(its.place.bytes == 0 && its.map.axes == 0);
+    bt_put_u32(packed + 4, BT_MAP_MAX_BYTES + 1);
+    assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
     bt_put_u32(packed, BT_MAP_SLOTS);
     assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
 }

@@ -76,13 +76,33 @@ static void a_point_is_that_of_what_is_read_now(void **state)
     }
 }
 
+// 22 words in a row that did not come.
+static void who_is_silent_for_half_a_round_is_in_doubt(void **state)
+{
+    (void)state;
+    static const uint8_t serial[BT_SERIAL_BYTES] = "BT-1";
+    bt_sensors_answer(&session, 2, serial);
+    for (int k = 0; k < 200; k++) {
+        bt_sensors_word(&session, 2, k % 22 == 21);
+    }
+    assert_int_equal(session.unsure >> 2 & 1, 0);
+    session.who[2].bad_words = 0;
+    for (int k = 1; k <= 22; k++) {
+        bt_sensors_word(&session, 2, false);
+        assert_int_equal(session.unsure >> 2 & 1, k == 22);
+    }
+    bt_sensors_answer(&session, 2, serial); // it is the same
+    assert_int_equal(session.unsure >> 2 & 1, 0);
+    bt_sensors_word(&session, 2, false);
+    assert_int_equal(session.unsure >> 2 & 1, 0);
+}
+
 #define T(name) cmocka_unit_test_setup(name, new_session)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        T(each_finger_has_its_own_flags_of_who_is_there),
-        T(another_sensor_has_nothing_of_the_one_before),
-        T(a_sensor_that_is_unplugged_is_not_present),
+        T(each_finger_has_its_own_flags_of_who_is_there), T(another_sensor_has_nothing_of_the_one_before),
+        T(a_sensor_that_is_unplugged_is_not_present),     T(who_is_silent_for_half_a_round_is_in_doubt),
         T(a_point_is_that_of_what_is_read_now),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

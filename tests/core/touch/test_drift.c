@@ -91,6 +91,7 @@ static void a_hold_drifts_on(void **state)
             assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
             assert_true(fabs(shared_error(&finger)) < 2); // 15 counts, were it not followed
         }
+        assert_int_equal(finger.tare.sweep.still_sweeps, UINT8_MAX); // what is followed is no motion
     }
 }
 
@@ -139,6 +140,33 @@ static void an_hour_of_hold_keeps_a_force_down_to_the_noise(void **state)
     }
 }
 
+// A finger that the host says holds something follows, untouched, each electrode's own drift.
+static void what_is_held_at_rest_follows_each_electrodes_own_drift(void **state)
+{
+    (void)state;
+    emulated_finger finger;
+    finger_init(&finger);
+    run_seconds(&finger, 20);
+    bt_tare_hold(&finger.tare);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const bt_baseline before = finger.tare.base;
+        for (int k = 1; k <= 300 * FRAMES_PER_S; k++) {
+            const double drift = (sign < 0 ? 0 : -60) + sign * 0.2 * k / FRAMES_PER_S;
+            bt_round frame = next_frame(&finger);
+            for (int i = 0; i < BT_ELECTRODES; i++) {
+                frame.electrode[i] = to_count(rest_count(&finger, i) + loading(i) * drift);
+            }
+            (void)feed(&finger, &frame);
+        }
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            double moved = ((double)finger.tare.base.electrode_q16[i] - before.electrode_q16[i]) / 65536;
+            // All alike would be off by .18 * 60 = 11 counts.
+            assert_true(fabs(moved - sign * 60 * loading(i)) < 4);
+        }
+    }
+}
+
 static void drift_that_stops_in_a_hold_is_found_out(void **state)
 {
     (void)state;
@@ -166,9 +194,14 @@ static void a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it(void
         press(&finger, 400, 300);
         run_seconds(&finger, 1);
         double before = shared_error(&finger);
+        const bt_baseline base = finger.tare.base;
         finger.t_s += 10;
         run_frames(&finger, BT_SILENCE_ROUNDS);
         assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+        for (int i = 0; i < BT_ELECTRODES; i++) { // each of them
+            double moved = ((double)finger.tare.base.electrode_q16[i] - base.electrode_q16[i]) / 65536;
+            assert_true(fabs(moved - 10 * finger.drift_per_s) < 0.6);
+        }
         assert_true(fabs(shared_error(&finger) - before) < 0.5); // of 2.5
     }
 }
@@ -375,6 +408,7 @@ int main(void)
         cmocka_unit_test(a_slow_load_is_not_learned),
         cmocka_unit_test(a_hold_drifts_on),
         cmocka_unit_test(an_hour_of_hold_keeps_a_force_down_to_the_noise),
+        cmocka_unit_test(what_is_held_at_rest_follows_each_electrodes_own_drift),
         cmocka_unit_test(drift_that_stops_in_a_hold_is_found_out),
         cmocka_unit_test(a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it),
         cmocka_unit_test(a_load_that_changed_in_a_silence_is_no_drift),

@@ -136,6 +136,10 @@ static void the_sweep_under_way_counts_from_there(void **state)
     assert_int_equal(its.watch.side, 0);
     assert_int_equal(its.watch.away_q3, 0);
     assert_int_equal(its.watch.shared_q16, 0);
+    its = after_even(8, 11 * 8); // a load: nothing was followed
+    its.watch.side = 5;
+    (void)bt_watch_resume(&its.watch, &its.silence, SPAN_Q3);
+    assert_int_equal(its.watch.side, 5);
 }
 
 static void what_is_watched_are_the_means_of_lanes_that_are_known(void **state)
@@ -256,6 +260,12 @@ static void one_way_is_a_low_pass_of_four_sweeps_either_way(void **state)
             bt_watch_end(&watch, &(const uint16_t){REST_Q3});
             assert_int_equal(watch.one_way_q2, one_way_q2);
             assert_int_equal(watch.one_way, abs(one_way_q2) >= 26);
+        }
+        for (int side = 25; side <= 26; side++) {
+            watch.one_way_q2 = 0;
+            watch.side = (int8_t)(sign * side);
+            bt_watch_end(&watch, &(const uint16_t){REST_Q3});
+            assert_int_equal(watch.one_way, side == 26);
         }
         // A step of it is half a count a second at most.
         watch.one_way = true;
