@@ -97,12 +97,66 @@ static void who_is_silent_for_half_a_round_is_in_doubt(void **state)
     assert_int_equal(session.unsure >> 2 & 1, 0);
 }
 
+// Every tenth round at first, then every hundredth; anew when it is back from a silence.
+static void who_does_not_say_who_it_is_is_asked_again(void **state)
+{
+    (void)state;
+    int last = -1, times = 0;
+    bt_sensors_doubt(&session, 2);
+    for (int k = 0; k < 1000; k++) {
+        uint8_t mask = bt_sensors_to_ask(&session);
+        assert_true(mask == 0 || mask == 1 << 2);
+        if (mask == 0) {
+            continue;
+        }
+        if (last >= 0) {
+            assert_in_range(k - last, times < 10 ? 10 : 100, times < 10 ? 11 : 101);
+        }
+        last = k;
+        times++;
+    }
+    assert_in_range(times, 10 + 8, 10 + 9);
+    session.finger[2].present = true;
+    assert_int_equal(bt_sensors_to_ask(&session), 1 << 2);
+    assert_int_equal(bt_sensors_to_ask(&session), 0);
+    session.asked = 1 << 2; // in this round it is not seen
+    session.finger[2].present = false;
+    assert_int_equal(bt_sensors_to_ask(&session), 0);
+    session.asked = 0;
+    session.finger[2].present = true;
+    assert_int_equal(bt_sensors_to_ask(&session), 0); // so it was there all along
+}
+
+// Who may be another sensor than the one whose calibration is in force has no results.
+static void who_is_refused_has_no_results(void **state)
+{
+    (void)state;
+    session.finger[2].quantities = 0x7F;
+    for (int k = 0; k < 60; k++) {
+        host_round(&session, 1 << 2, 2000);
+    }
+    assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1 << 2, 0), BT_ERROR_OK);
+    for (int refused = 0; refused <= 1; refused++) {
+        bt_msg_frame frame;
+        session.refused = (uint8_t)(refused << 2);
+        host_forget();
+        host_round(&session, 1 << 2, 1950);
+        bt_msg_frame_unpack(&frame, host.message[host.count - 1].payload);
+        assert_int_equal(host.message[host.count - 1].id, BT_FRAME_ID);
+        assert_int_equal(frame.poc_um[0] == BT_INVALID_I16, refused);
+        assert_int_equal(frame.force_100un[0] == BT_INVALID_I32, refused);
+        assert_int_equal(frame.pdc_filtered_q4 == BT_INVALID_COUNT, refused);
+        assert_int_equal(session.finger[2].quantities, 0x7F); // asked for as before
+    }
+}
+
 #define T(name) cmocka_unit_test_setup(name, new_session)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         T(each_finger_has_its_own_flags_of_who_is_there), T(another_sensor_has_nothing_of_the_one_before),
         T(a_sensor_that_is_unplugged_is_not_present),     T(who_is_silent_for_half_a_round_is_in_doubt),
+        T(who_does_not_say_who_it_is_is_asked_again),     T(who_is_refused_has_no_results),
         T(a_point_is_that_of_what_is_read_now),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -108,6 +108,20 @@ static void drift_and_temperature_are_forgiven_by_their_squares(void **state)
     assert_false(is_residue(limit - 64, 59000, 0, true));
 }
 
+// One sweep's share of the rate, where pressure does not say whether it is drift; which fades.
+static void a_sweep_that_tells_nothing_goes_on_as_before(void **state)
+{
+    (void)state;
+    emulated_finger finger = held();
+    finger.tare.drift.sweeps = 128; // it lasts for 1024 of them
+    finger.tare.drift.rate_q20 = finger.tare.drift.sure_q20 = finger.tare.drift.waiting_q20 = 16 * 1024;
+    finger.tare.pressure_seen = false;
+    finger.tare.partial = true;
+    bt_judge_sweep(&finger.tare, &finger.settings);
+    assert_int_equal(finger.tare.drift_q16, 1024);
+    assert_int_equal(finger.tare.drift.rate_q20, 16 * 1023);
+}
+
 // ---- what is adopted ---------------------------------------------------------------------------
 
 static emulated_finger used(void)
@@ -222,6 +236,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(uneven_is_the_energy_around_the_mean),
         cmocka_unit_test(drift_and_temperature_are_forgiven_by_their_squares),
+        cmocka_unit_test(a_sweep_that_tells_nothing_goes_on_as_before),
         cmocka_unit_test(a_new_tare_begins_with_nothing_of_the_contact),
         cmocka_unit_test(every_change_of_state_waits_for_three_hits_again),
         cmocka_unit_test(a_touch_right_after_a_doubt_is_one),
