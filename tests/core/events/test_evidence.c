@@ -229,6 +229,12 @@ static void noise_is_half_a_level_and_no_more(void **state)
     pac[12] = 2007; // 49
     (void)stretch();
     assert_true(events.risen_count2 == 0 && events.round_sum_count2 == 49);
+    pac[14] = 2020; // what is no more than that is before it begins
+    (void)stretch();
+    assert_int_equal(events.risen_count2, 400 - 2 * 49);
+    assert_int_equal(events.shake_began, events.now - 2);
+    (void)held(state);
+    events.level_count2 = 98;
     pac[12] = 2008;
     (void)stretch();
     assert_int_equal(events.risen_count2, 0); // four samples of noise take it away again

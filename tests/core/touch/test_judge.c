@@ -122,6 +122,25 @@ static void a_sweep_that_tells_nothing_goes_on_as_before(void **state)
     assert_int_equal(finger.tare.drift.rate_q20, 16 * 1023);
 }
 
+// By 32 counts and no further from a mean may a word be that is to be tared.
+static void what_moves_now_is_not_still(void **state)
+{
+    (void)state;
+    const emulated_finger before = resting_finger();
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        for (int off = -33; off <= 33; off++) {
+            bt_tare tare = before.tare;
+            tare.trigger.smooth.lane[i] = (uint16_t)(tare.sweep.mean_q3.lane[i] / 8 + off);
+            assert_int_equal(bt_tare_now(&tare), abs(off) <= 32 ? BT_ERROR_OK : BT_ERROR_NOT_STILL);
+        }
+    }
+    for (uint8_t still = 1; still <= 2; still++) {
+        bt_tare tare = before.tare;
+        tare.sweep.still_sweeps = still;
+        assert_int_equal(bt_tare_now(&tare), still == 2 ? BT_ERROR_OK : BT_ERROR_NOT_STILL);
+    }
+}
+
 // ---- what is adopted ---------------------------------------------------------------------------
 
 static emulated_finger used(void)
@@ -237,6 +256,7 @@ int main(void)
         cmocka_unit_test(uneven_is_the_energy_around_the_mean),
         cmocka_unit_test(drift_and_temperature_are_forgiven_by_their_squares),
         cmocka_unit_test(a_sweep_that_tells_nothing_goes_on_as_before),
+        cmocka_unit_test(what_moves_now_is_not_still),
         cmocka_unit_test(a_new_tare_begins_with_nothing_of_the_contact),
         cmocka_unit_test(every_change_of_state_waits_for_three_hits_again),
         cmocka_unit_test(a_touch_right_after_a_doubt_is_one),
