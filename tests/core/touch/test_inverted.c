@@ -75,6 +75,7 @@ static void signals_must_be_the_change_upside_down(void **state)
     (void)state;
     assert_int_equal(verdict(tared(3, 10, 10, 15)), BT_TARE_STANDS); // an energy of 300
     assert_int_equal(verdict(tared(4, 10, 10, 15)), BT_TARE_UNDO);
+    assert_int_equal(verdict(tared(4, 1, 10, 15)), BT_TARE_UNDO); // however little it was
     assert_int_equal(verdict(tared(4, 10, -10, 15)), BT_TARE_STANDS); // the right way up
     finger its = tared(4, 20, 20, 15);
     its.change.known = false;
