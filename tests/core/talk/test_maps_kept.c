@@ -167,6 +167,10 @@ static void a_stored_map_that_cannot_be_used_is_said_so(void **state)
     assert_int_equal(its.place.bytes, 0);
     assert_true(its.map.axes == 0 && its.map.blocks == NULL);
     assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION + 1, packed, sizeof packed));
+    for (size_t bytes = 0; bytes <= 5; bytes++) { // of a later version, the slot is all that is to be known
+        assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, bytes));
+        assert_int_equal(its.stored_slot, bytes < 4 ? BT_MAP_SLOTS : place.slot);
+    }
     bt_put_u32(packed + 4, 0); // none is stored, as is right
     assert_true(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
     assert_true(its.place.bytes == 0 && its.map.axes == 0);
