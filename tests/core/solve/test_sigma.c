@@ -203,6 +203,19 @@ static void sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range(void
     }
 }
 
+// Whatever its noise, the point stays where the electrode is.
+static void a_point_of_one_electrode_is_where_it_is(void **state)
+{
+    (void)state;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        for (int weights = 0; weights < 3; weights++) {
+            double e[BT_ELECTRODES] = {0};
+            e[i] = -700;
+            assert_int_equal(sigmas(e, weights, 19 * 25).poc_sigma_um, 0);
+        }
+    }
+}
+
 static void one_electrodes_sigma_is_the_root_of_its_share(void **state)
 {
     (void)state;
@@ -364,6 +377,7 @@ int main(void)
         cmocka_unit_test(sigmas_of_squared_compression),
         cmocka_unit_test(sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range),
         cmocka_unit_test(one_electrodes_sigma_is_the_root_of_its_share),
+        cmocka_unit_test(a_point_of_one_electrode_is_where_it_is),
         cmocka_unit_test(a_point_on_the_seam_is_one_on_the_cylinder),
         cmocka_unit_test(what_is_not_known_is_marked),
         cmocka_unit_test(sigmas_saturate_below_the_mark),

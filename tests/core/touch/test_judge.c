@@ -210,6 +210,10 @@ static void every_change_of_state_waits_for_three_hits_again(void **state)
     assert_int_equal(finger.tare.hits, 0);
     assert_int_equal(finger.tare.thermal.step_q16, 0); // lost rather than had twice
     assert_true(finger.tare.partial && !finger.tare.sweep.begun);
+    finger.tare.release.quiet_sweeps = 9; // those were in a row, and no longer are
+    step(&finger);
+    assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    assert_int_equal(finger.tare.release.quiet_sweeps, 0);
 }
 
 // A press from rest fires in three rounds; the second of them is the first that tells no more.
