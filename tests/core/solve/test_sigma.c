@@ -312,6 +312,22 @@ static void sigmas_saturate_below_the_mark(void **state)
     assert_true(msg.force_sigma_100un[1] < 65534);
 }
 
+static void a_forces_sigma_is_rounded_to_the_nearest(void **state)
+{
+    (void)state;
+    bt_solve_settings settings = kernel_settings(BT_POC_WEIGHTS_ABS_N2);
+    for (uint32_t noise = 19; noise < 19 * 200; noise += 7) {
+        int32_t e_q4[BT_ELECTRODES] = {0};
+        bt_msg_frame msg = {.poc_um = {BT_INVALID_I16}};
+        bt_sigma_unknown(&msg);
+        bt_sigma(e_q4, &settings, noise, &msg);
+        for (int d = 0; d < 3; d++) {
+            double want = settings.force_per_count_100un_q16[d] / 65536.0 * bt_sigma_count_q8(noise) / 256;
+            assert_true(fabs(msg.force_sigma_100un[d] - want) <= 0.5);
+        }
+    }
+}
+
 static void only_what_is_asked_for_has_a_sigma(void **state)
 {
     (void)state;
@@ -381,6 +397,7 @@ int main(void)
         cmocka_unit_test(a_point_on_the_seam_is_one_on_the_cylinder),
         cmocka_unit_test(what_is_not_known_is_marked),
         cmocka_unit_test(sigmas_saturate_below_the_mark),
+        cmocka_unit_test(a_forces_sigma_is_rounded_to_the_nearest),
         cmocka_unit_test(only_what_is_asked_for_has_a_sigma),
         cmocka_unit_test(the_noise_is_that_of_nineteen_electrodes),
     };

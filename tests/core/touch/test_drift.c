@@ -152,7 +152,11 @@ static void what_is_held_at_rest_follows_each_electrodes_own_drift(void **state)
         const bt_baseline before = finger.tare.base;
         for (int k = 1; k <= 300 * FRAMES_PER_S; k++) {
             const double drift = (sign < 0 ? 0 : -60) + sign * 0.2 * k / FRAMES_PER_S;
-            bt_round frame = next_frame(&finger);
+            bt_round frame;
+            bt_round_clear(&frame);
+            finger.t_s += 1.0 / FRAMES_PER_S;
+            frame.t_us = (uint32_t)llround(finger.t_s * 1e6);
+            frame.pdc = PDC_REST;
             for (int i = 0; i < BT_ELECTRODES; i++) {
                 frame.electrode[i] = to_count(rest_count(&finger, i) + loading(i) * drift);
             }

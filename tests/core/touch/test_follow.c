@@ -6,12 +6,15 @@
 // At rest, at the begin of a sweep.
 static emulated_finger at_rest(void)
 {
-    emulated_finger finger = resting_finger();
-    while (finger.tare.sweep.round != 0) {
-        step(&finger);
+    static emulated_finger finger; // the same each time
+    if (finger.t_s == 0) {
+        finger = resting_finger();
+        while (finger.tare.sweep.round != 0) {
+            step(&finger);
+        }
+        finger.tare.drift = (bt_drift){0};
+        finger.tare.drift_q16 = 0;
     }
-    finger.tare.drift = (bt_drift){0};
-    finger.tare.drift_q16 = 0;
     return finger;
 }
 

@@ -16,9 +16,12 @@ static void ends(emulated_finger *finger, uint32_t energy_count2, int32_t sum_q4
 
 static emulated_finger held(void)
 {
-    emulated_finger finger = touched_finger(400, 300);
-    run_seconds(&finger, 3);
-    assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    static emulated_finger finger; // the same each time
+    if (finger.t_s == 0) {
+        finger = touched_finger(400, 300);
+        run_seconds(&finger, 3);
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+    }
     return finger;
 }
 
@@ -54,14 +57,10 @@ static void uneven_is_the_energy_around_the_mean(void **state)
 // With sums of which all is a pattern, after so many rounds in contact and so many counts of temperature.
 static bool is_residue(uint32_t energy_count2, uint32_t contact_rounds, int warm_count, bool pressure)
 {
-    static emulated_finger before;
-    if (before.t_s == 0) {
-        before = held();
-        before.settings.thermal_gain_q16 = 1 << 16;
-        before.tare.sweep.mean_q3.lane[BT_LANE_PDC] = 8 * PDC_REST;
-        before.tare.trigger.smooth.lane[BT_LANE_PDC] = PDC_REST;
-    }
-    emulated_finger finger = before;
+    emulated_finger finger = held();
+    finger.settings.thermal_gain_q16 = 1 << 16;
+    finger.tare.sweep.mean_q3.lane[BT_LANE_PDC] = 8 * PDC_REST;
+    finger.tare.trigger.smooth.lane[BT_LANE_PDC] = PDC_REST;
     finger.tare.release.energy_peak = finger.tare.release.uneven_peak = 0;
     finger.tare.release.quiet_sweeps = pressure ? 0 : 100;
     finger.tare.contact_rounds = contact_rounds;
