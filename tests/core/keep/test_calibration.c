@@ -319,6 +319,11 @@ static void a_record_of_a_firmware_before_pressure_keeps_all_that_it_has(void **
     bt_calibration_unpack(&back, 1, record, 48); // seven values, then nothing
     out.value[7] = 0;                            // not calibrated
     assert_memory_equal(&back, &out, sizeof out);
+    for (size_t bytes = 0; bytes <= sizeof record; bytes++) { // of a version that is not known
+        back.present = false;
+        bt_calibration_unpack(&back, 99, record, bytes);
+        assert_false(back.present);
+    }
 }
 
 // Its SET_CALIBRATION ends before pressure_gain_nn, which is then 0: not calibrated.

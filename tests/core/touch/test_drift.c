@@ -150,8 +150,8 @@ static void what_is_held_at_rest_follows_each_electrodes_own_drift(void **state)
     bt_tare_hold(&finger.tare);
     for (int sign = -1; sign <= 1; sign += 2) {
         const bt_baseline before = finger.tare.base;
-        for (int k = 1; k <= 300 * FRAMES_PER_S; k++) {
-            const double drift = (sign < 0 ? 0 : -60) + sign * 0.2 * k / FRAMES_PER_S;
+        for (int k = 1; k <= 150 * FRAMES_PER_S; k++) {
+            const double drift = (sign < 0 ? 0 : -36) + sign * 0.24 * k / FRAMES_PER_S;
             bt_round frame;
             bt_round_clear(&frame);
             finger.t_s += 1.0 / FRAMES_PER_S;
@@ -165,8 +165,8 @@ static void what_is_held_at_rest_follows_each_electrodes_own_drift(void **state)
         assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
         for (int i = 0; i < BT_ELECTRODES; i++) {
             double moved = ((double)finger.tare.base.electrode_q16[i] - before.electrode_q16[i]) / 65536;
-            // All alike would be off by .18 * 60 = 11 counts.
-            assert_true(fabs(moved - sign * 60 * loading(i)) < 4);
+            // All alike would be off by .18 * 36 = 6.5 counts.
+            assert_true(fabs(moved - sign * 36 * loading(i)) < 4);
         }
     }
 }
