@@ -393,8 +393,47 @@ static bool torsion_ok(const int pad_q4[4], uint32_t threshold_count2)
     for (int k = 0; k < 4; k++) {
         tare.electrode_q4[pad[k]] = (uint16_t)(16 * 3000 - pad_q4[k]);
     }
+    bt_results(&round, &tare, &settings, 0, &msg);
+    assert_false(msg.flags & BT_FRAME_FLAG_TORSION_OK); // without a point nobody knows
     bt_results(&round, &tare, &settings, BT_QUANTITY_FLAG_POC, &msg);
     return msg.flags & BT_FRAME_FLAG_TORSION_OK;
+}
+
+// A finger with these signals on its first electrodes; the last one is missing, or not.
+static uint32_t shape_flags(const int e_q4[7], bool missing, uint32_t threshold_count2)
+{
+    bt_round round;
+    bt_tare tare;
+    bt_msg_frame msg;
+    bt_tare_reset(&tare);
+    memset(&round, 0, sizeof round);
+    tare.tared = true;
+    tare.trigger.unknown = 0;
+    tare.trigger.missing = missing;
+    tare.threshold_count2 = threshold_count2;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        round.electrode[i] = missing && i == BT_ELECTRODES - 1 ? BT_INVALID_COUNT : 3000;
+        tare.electrode_q4[i] = (uint16_t)(16 * 3000 - (i < 7 ? e_q4[i] : 0));
+    }
+    bt_results(&round, &tare, &settings, BT_QUANTITY_FLAG_POC, &msg);
+    return msg.flags & (BT_FRAME_FLAG_POC_LOW | BT_FRAME_FLAG_SHEAR_MIX);
+}
+
+// Of energies in 1/4 count^2, cut to whole ones.
+static void more_than_half_as_bulge_is_shear_and_below_four_thresholds_a_point_is_noise(void **state)
+{
+    (void)state;
+    for (int missing = 0; missing <= 1; missing++) {
+        // 21^2 three times is 1323, 330 whole; 36^2 + 4^2 + 2^2 + 1 is 1317, of all 660.
+        const int half[7] = {168, 168, 168, -288, -32, -16, -8}, more[7] = {168, 168, 168, -288, -16, 0, 0};
+        assert_int_equal(shape_flags(half, missing, 165), 0);
+        assert_int_equal(shape_flags(half, missing, 166), BT_FRAME_FLAG_POC_LOW);
+        assert_int_equal(shape_flags(more, missing, 0), BT_FRAME_FLAG_SHEAR_MIX);
+        const int even[7] = {160, -160}, bulge[7] = {161, -160}, above[7] = {168, -160};
+        assert_int_equal(shape_flags(even, missing, 0), 0);
+        assert_int_equal(shape_flags(bulge, missing, 0), 0); // cut to half a count
+        assert_int_equal(shape_flags(above, missing, 0), BT_FRAME_FLAG_SHEAR_MIX);
+    }
 }
 
 static void torsion_takes_four_electrodes_that_moved_fifteen_counts_and_a_touch(void **state)
@@ -427,6 +466,7 @@ int main(void)
         T(a_tare_set_before_the_sensor_answers_is_kept),
         T(a_touch_that_shows_in_a_lost_slot_is_told_in_the_next),
         T(a_move_of_any_electrode_alone_is_one),
+        T(more_than_half_as_bulge_is_shear_and_below_four_thresholds_a_point_is_noise),
         T(torsion_takes_four_electrodes_that_moved_fifteen_counts_and_a_touch),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

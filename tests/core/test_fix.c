@@ -89,6 +89,22 @@ static void magnitudes_hold_at_the_ends(void **state)
     assert_true(bt_abs(INT64_MIN) == (uint64_t)1 << 63);
     assert_true(bt_abs(INT64_MAX) == (uint64_t)INT64_MAX);
     assert_true(bt_abs(-1) == 1 && bt_abs(0) == 0);
+    for (int64_t value = -2000; value <= 2000; value++) {
+        assert_true(bt_abs(value) == (uint64_t)(value < 0 ? -value : value));
+        for (int bits = 1; bits < 12; bits++) {
+            assert_int_equal(bt_shift_round(value, bits), rounded(value, (int64_t)1 << bits));
+        }
+    }
+    for (int32_t value = -9; value <= 9; value++) {
+        assert_int_equal(bt_limited(value, -5, 7), value < -5 ? -5 : value > 7 ? 7 : value);
+        assert_int_equal(bt_abs32(value), abs(value));
+        assert_int_equal(bt_with_sign(9, value), value < 0 ? -9 : 9);
+    }
+    assert_int_equal(bt_bit_length(0), 0);
+    for (int bits = 1; bits <= 32; bits++) {
+        assert_int_equal(bt_bit_length(1u << (bits - 1)), bits);
+        assert_int_equal(bt_bit_length(UINT32_MAX >> (32 - bits)), bits);
+    }
     assert_true(bt_abs32(INT32_MIN) == (uint32_t)1 << 31 && bt_abs32(-1) == 1 && bt_abs32(0) == 0);
     assert_int_equal(bt_with_sign(7, -1), -7);
     assert_int_equal(bt_with_sign(7, 0), 7);

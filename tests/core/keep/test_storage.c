@@ -454,6 +454,13 @@ static void a_record_without_the_force_model_means_lins(void **state)
     assert_int_equal(bt_settings_get(&settings, BT_SETTING_FORCE_MODEL), BT_FORCE_MODEL_LIN);
     bt_settings_unpack(&settings, BT_SETTINGS_RECORD_VERSION, record, sizeof record);
     assert_int_equal(bt_settings_get(&settings, BT_SETTING_FORCE_MODEL), BT_FORCE_MODEL_POPULATION);
+    for (int k = 0; k < BT_SETTINGS; k++) {
+        settings.value[k] = bt_setting_specs[k].before + 1;
+    }
+    bt_settings_unpack(&settings, BT_SETTINGS_RECORD_VERSION, record, 0);
+    for (int k = 0; k < BT_SETTINGS; k++) { // likewise of every other
+        assert_int_equal(settings.value[k], bt_setting_specs[k].before);
+    }
 }
 
 static void no_more_is_read_than_there_is_or_there_is_room_for(void **state)

@@ -69,8 +69,12 @@ static void every_byte_of_the_head_is_judged(void **state)
 static void every_length_but_one_is_refused(void **state)
 {
     (void)state;
-    static blob its;
+    static blob its; // of zeros, no map at all
     bt_map map;
+    assert_int_equal(bt_map_open(&map, bytes_of(&its), BT_MAP_HEADER_BYTES - 1), BT_ERROR_BAD_LENGTH);
+    assert_int_equal(bt_map_open(&map, bytes_of(&its), BT_MAP_HEADER_BYTES), BT_ERROR_OUT_OF_RANGE);
+    assert_int_equal(bt_map_open(&map, bytes_of(&its), BT_MAP_MAX_BYTES), BT_ERROR_OUT_OF_RANGE);
+    assert_int_equal(bt_map_open(&map, bytes_of(&its), BT_MAP_MAX_BYTES + 1), BT_ERROR_BAD_LENGTH);
     for (size_t k = 0; k < SOME_AXES; k++) {
         one_block(&its, axes_of[k], BT_MAP_KIND_BULGE, BT_MAP_GATE_YY, 1, 5);
         assert_int_equal(4 * its.words, 24 + 12 + 2 * 20 * axes_of[k]);

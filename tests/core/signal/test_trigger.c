@@ -216,6 +216,35 @@ static void pressure_opens_the_gate_and_leaves_the_energy_alone(void **state)
     }
 }
 
+// What is above by as much as it may be is no touch, nor is what uses up all room; one more of either is.
+static void the_edges_of_pressure_and_room_are_no_touch(void **state)
+{
+    (void)state;
+    uint16_t counts[BT_ELECTRODES];
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        counts[i] = 2000;
+    }
+    for (int room = 0; room <= 1; room++) {
+        for (int above = 6; above <= 7; above++) {
+            bt_trigger trigger = rested_trigger(counts);
+            trigger.rest.lane[BT_LANE_PDC] = trigger.smooth.lane[BT_LANE_PDC] = 1000;
+            trigger.unknown = 0;
+            bt_trigger_begin(&trigger, 100 + room);
+            assert_int_equal(bt_trigger_electrode(&trigger, 3, 2010), room);
+            assert_int_equal(bt_trigger_pressure(&trigger, (uint16_t)(1000 + above), 6) < 0, above == 7);
+            assert_int_equal(bt_trigger_energy(&trigger), 100);
+        }
+    }
+    for (int off = 24; off <= 25; off++) { // a word that is far is held back
+        for (int sign = -1; sign <= 1; sign += 2) {
+            bt_trigger trigger = rested_trigger(counts);
+            bt_trigger_begin(&trigger, 10000);
+            (void)bt_trigger_electrode(&trigger, 3, (uint16_t)(2000 + sign * off));
+            assert_int_equal(bt_trigger_energy(&trigger), off == 24 ? 24 * 24 : 0);
+        }
+    }
+}
+
 static void pressure_without_a_known_rest_opens_nothing(void **state)
 {
     (void)state;
@@ -343,6 +372,7 @@ int main(void)
         cmocka_unit_test(the_slot_told_is_that_in_which_the_sum_passes_the_threshold),
         cmocka_unit_test(motion_that_goes_on_is_followed_word_by_word),
         cmocka_unit_test(pressure_opens_the_gate_and_leaves_the_energy_alone),
+        cmocka_unit_test(the_edges_of_pressure_and_room_are_no_touch),
         cmocka_unit_test(pressure_without_a_known_rest_opens_nothing),
         cmocka_unit_test(the_gate_stays_shut_where_nobody_rests),
         cmocka_unit_test(the_energy_is_the_brute_force_sum_of_squares),

@@ -172,6 +172,8 @@ static void sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range(void
     (void)state;
     static const int counts[] = {30, 300, 3000, 8000};
     uint64_t seed = 5;
+    double off[3] = {0};
+    int counted[3] = {0};
     for (int run = 0; run < 8000; run++) {
         const int most = counts[run % 4], weights = run / 4 % 3, middle = run / 12 % BT_ELECTRODES;
         const uint32_t noise = 19 * (uint32_t)random_range(&seed, 1, 36);
@@ -187,6 +189,30 @@ static void sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range(void
             fail_msg("%d counts at E%d, weights %d: %d um, by the formula %.2f", most, middle + 1, weights,
                      msg.poc_sigma_um, want);
         }
+        // What is rounded is not cut: where a um is little, only the steps' own cuts are left in the mean.
+        if (want > 50) {
+            const double exact = first_order_um(e, weights, msg.poc_um, bt_sigma_count_q8(noise) / 256.0);
+            off[weights] += (msg.poc_sigma_um - exact) / exact;
+            counted[weights]++;
+        }
+    }
+    for (int weights = 0; weights < 3; weights++) {
+        print_message("weights %d: off by %.2e in the mean of %d\n", weights, off[weights] / counted[weights],
+                      counted[weights]);
+        assert_true(fabs(off[weights] / counted[weights]) < 8.0 / 32768); // of eight steps
+    }
+}
+
+// Whatever its noise, the point stays where the electrode is.
+static void a_point_of_one_electrode_is_where_it_is(void **state)
+{
+    (void)state;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        for (int weights = 0; weights < 3; weights++) {
+            double e[BT_ELECTRODES] = {0};
+            e[i] = -700;
+            assert_int_equal(sigmas(e, weights, 19 * 25).poc_sigma_um, 0);
+        }
     }
 }
 
@@ -197,6 +223,34 @@ static void one_electrodes_sigma_is_the_root_of_its_share(void **state)
         uint64_t got = bt_sigma_count_q8((uint32_t)noise);
         uint64_t square = noise * (65536 / 19); // the share is cut to 1/65536 and the root to a whole number
         assert_true(got * got <= square && square < (got + 1) * (got + 1));
+    }
+    // Right below a square and right above it, where a quotient that is one too high would show.
+    for (uint64_t root = 2; root * root / 3449 <= UINT32_MAX; root += 1 + root / 4099) {
+        const uint64_t below = (root * root - 1) / 3449;
+        for (uint64_t noise = below; noise <= below + 1 && noise <= UINT32_MAX; noise++) {
+            uint64_t got = bt_sigma_count_q8((uint32_t)noise);
+            assert_true(got * got <= noise * 3449 && noise * 3449 < (got + 1) * (got + 1));
+        }
+    }
+}
+
+// On the seam between tip and cylinder, x = 0: the cylinder's.
+static void a_point_on_the_seam_is_one_on_the_cylinder(void **state)
+{
+    (void)state;
+    bt_solve_settings settings = kernel_settings(BT_POC_WEIGHTS_COMPRESS_N1);
+    for (int16_t x = -1; x <= 1; x++) {
+        double e[BT_ELECTRODES];
+        int32_t e_q4[BT_ELECTRODES];
+        bt_msg_frame msg = {.poc_um = {x, 0, -BT_CORE_RADIUS_UM}};
+        press(9, e);
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            e_q4[i] = (int32_t)lround(16 * e[i]);
+        }
+        bt_sigma_unknown(&msg);
+        bt_sigma(e_q4, &settings, 400, &msg);
+        const double want = first_order_um(e, BT_POC_WEIGHTS_COMPRESS_N1, msg.poc_um, sqrt(400 / 19.0));
+        assert_true(fabs(msg.poc_sigma_um - want) < 0.5 + want / 100);
     }
 }
 
@@ -256,6 +310,22 @@ static void sigmas_saturate_below_the_mark(void **state)
     bt_sigma(e_q4, &settings, BT_SETTING_CONTACT_ENERGY_COUNT2_MAX, &msg);
     assert_int_equal(msg.force_sigma_100un[0], 65534); // 0.1 N a count
     assert_true(msg.force_sigma_100un[1] < 65534);
+}
+
+static void a_forces_sigma_is_rounded_to_the_nearest(void **state)
+{
+    (void)state;
+    bt_solve_settings settings = kernel_settings(BT_POC_WEIGHTS_ABS_N2);
+    for (uint32_t noise = 19; noise < 19 * 200; noise += 7) {
+        int32_t e_q4[BT_ELECTRODES] = {0};
+        bt_msg_frame msg = {.poc_um = {BT_INVALID_I16}};
+        bt_sigma_unknown(&msg);
+        bt_sigma(e_q4, &settings, noise, &msg);
+        for (int d = 0; d < 3; d++) {
+            double want = settings.force_per_count_100un_q16[d] / 65536.0 * bt_sigma_count_q8(noise) / 256;
+            assert_true(fabs(msg.force_sigma_100un[d] - want) <= 0.5);
+        }
+    }
 }
 
 static void only_what_is_asked_for_has_a_sigma(void **state)
@@ -323,8 +393,11 @@ int main(void)
         cmocka_unit_test(sigmas_of_squared_compression),
         cmocka_unit_test(sigmas_are_their_formula_from_a_whisper_to_the_end_of_the_range),
         cmocka_unit_test(one_electrodes_sigma_is_the_root_of_its_share),
+        cmocka_unit_test(a_point_of_one_electrode_is_where_it_is),
+        cmocka_unit_test(a_point_on_the_seam_is_one_on_the_cylinder),
         cmocka_unit_test(what_is_not_known_is_marked),
         cmocka_unit_test(sigmas_saturate_below_the_mark),
+        cmocka_unit_test(a_forces_sigma_is_rounded_to_the_nearest),
         cmocka_unit_test(only_what_is_asked_for_has_a_sigma),
         cmocka_unit_test(the_noise_is_that_of_nineteen_electrodes),
     };

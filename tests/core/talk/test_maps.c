@@ -38,7 +38,9 @@ static void parts_may_come_in_any_order_and_more_than_once(void **state)
     assert_int_equal(erases, BT_MAP_SLOT_BYTES / BT_FLASH_SECTOR_BYTES);
     assert_int_equal(programs, parts); // once each
     assert_int_equal(end(3, crc32), BT_ERROR_OK);
+    assert_false(session.upload.open);
     assert_int_equal(end(3, crc32), BT_ERROR_OK); // its reply was lost
+    assert_int_equal(write_part(3, blob, bytes, 0), BT_ERROR_NOT_BEGUN);
     assert_has(3, blob, bytes, BT_CALIBRATION_STATE_IN_FORCE);
 }
 

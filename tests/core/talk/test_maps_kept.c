@@ -80,6 +80,13 @@ static void flash_that_takes_nothing_is_told_and_passed_by(void **state)
     assert_int_equal(save(), BT_ERROR_NOT_STORED);
     power_on();
     assert_has(0, other, more, BT_CALIBRATION_STATE_IN_FORCE);
+    // What is stored no more leaves its slot to the next.
+    assert_int_equal(session.map[0].stored_slot, session.map[0].place.slot);
+    assert_int_equal(clear(0), BT_ERROR_OK);
+    assert_int_equal(session.map[0].stored_slot, record[0].slot);
+    refused_finger = 0xFF;
+    assert_int_equal(save(), BT_ERROR_OK);
+    assert_int_equal(session.map[0].stored_slot, BT_MAP_SLOTS);
 }
 
 static void there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored(void **state)
@@ -154,7 +161,21 @@ static void a_stored_map_that_cannot_be_used_is_said_so(void **state)
     assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
     assert_int_equal(its.place.bytes, 0);
     assert_int_equal(its.stored_slot, place.slot);
+    // One that is in force and whose flash has gone leaves none when another cannot be had.
+    its.place = place;
+    assert_int_equal(bt_finger_map_use(&its, &map_flash, 0, &place, NULL), BT_ERROR_NOT_WHOLE);
+    assert_int_equal(its.place.bytes, 0);
+    assert_true(its.map.axes == 0 && its.map.blocks == NULL);
     assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION + 1, packed, sizeof packed));
+    for (size_t bytes = 0; bytes <= 5; bytes++) { // of a later version, the slot is all that is to be known
+        assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, bytes));
+        assert_int_equal(its.stored_slot, bytes < 4 ? BT_MAP_SLOTS : place.slot);
+    }
+    bt_put_u32(packed + 4, 0); // none is stored, as is right
+    assert_true(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
+    assert_true(its.place.bytes == 0 && its.map.axes == 0);
+    bt_put_u32(packed + 4, BT_MAP_MAX_BYTES + 1);
+    assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
     bt_put_u32(packed, BT_MAP_SLOTS);
     assert_false(bt_finger_map_load(&its, &map_flash, 0, BT_MAP_RECORD_VERSION, packed, sizeof packed));
 }

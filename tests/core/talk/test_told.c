@@ -53,6 +53,10 @@ static void who_subscribes_is_told_in_the_slot_that_shows_it(void **state)
     subscribe(1 << 3, BT_QUANTITY_FLAG_EVENTS | BT_QUANTITY_FLAG_TOUCH);
     assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1 << 0 | 1 << 3, 0), BT_ERROR_OK);
     host_forget();
+    (void)played(3000);
+    uint8_t due[BT_SLOTS];
+    memcpy(due, session.events_due, sizeof due);
+    host_forget();
     uint8_t slot = played(2900);
     slot = slot == BT_SLOTS ? played(2900) : slot; // a far word waits for its second
     assert_in_range(slot, 0, BT_SLOTS - 1);
@@ -74,8 +78,11 @@ static void who_subscribes_is_told_in_the_slot_that_shows_it(void **state)
     assert_int_equal(event.seq, touch.seq);
     assert_int_equal(event.t_us, touch.t_us);
     play(10, 2900);
+    uint8_t watched = session.finger[3].events.watched;
+    assert_int_equal(session.events_due[watched], 1 << 3);
     host_forget();
     play(2, 3000);
+    assert_memory_equal(session.events_due, due, sizeof due); // nothing more to be watched
     assert_int_equal(host_count(BT_EVENT_ID), 1);
     bt_msg_event_unpack(&event, host.message[0].payload);
     for (int k = 0; k < host.count; k++) {

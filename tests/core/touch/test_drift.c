@@ -91,6 +91,7 @@ static void a_hold_drifts_on(void **state)
             assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
             assert_true(fabs(shared_error(&finger)) < 2); // 15 counts, were it not followed
         }
+        assert_int_equal(finger.tare.sweep.still_sweeps, UINT8_MAX); // what is followed is no motion
     }
 }
 
@@ -139,6 +140,37 @@ static void an_hour_of_hold_keeps_a_force_down_to_the_noise(void **state)
     }
 }
 
+// A finger that the host says holds something follows, untouched, each electrode's own drift.
+static void what_is_held_at_rest_follows_each_electrodes_own_drift(void **state)
+{
+    (void)state;
+    emulated_finger finger;
+    finger_init(&finger);
+    run_seconds(&finger, 20);
+    bt_tare_hold(&finger.tare);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const bt_baseline before = finger.tare.base;
+        for (int k = 1; k <= 150 * FRAMES_PER_S; k++) {
+            const double drift = (sign < 0 ? 0 : -36) + sign * 0.24 * k / FRAMES_PER_S;
+            bt_round frame;
+            bt_round_clear(&frame);
+            finger.t_s += 1.0 / FRAMES_PER_S;
+            frame.t_us = (uint32_t)llround(finger.t_s * 1e6);
+            frame.pdc = PDC_REST;
+            for (int i = 0; i < BT_ELECTRODES; i++) {
+                frame.electrode[i] = to_count(rest_count(&finger, i) + loading(i) * drift);
+            }
+            (void)feed(&finger, &frame);
+        }
+        assert_int_equal(finger.tare.state, BT_TARE_STATE_REST);
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            double moved = ((double)finger.tare.base.electrode_q16[i] - before.electrode_q16[i]) / 65536;
+            // All alike would be off by .18 * 36 = 6.5 counts.
+            assert_true(fabs(moved - sign * 36 * loading(i)) < 4);
+        }
+    }
+}
+
 static void drift_that_stops_in_a_hold_is_found_out(void **state)
 {
     (void)state;
@@ -166,9 +198,14 @@ static void a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it(void
         press(&finger, 400, 300);
         run_seconds(&finger, 1);
         double before = shared_error(&finger);
+        const bt_baseline base = finger.tare.base;
         finger.t_s += 10;
         run_frames(&finger, BT_SILENCE_ROUNDS);
         assert_int_equal(finger.tare.state, BT_TARE_STATE_CONTACT);
+        for (int i = 0; i < BT_ELECTRODES; i++) { // each of them
+            double moved = ((double)finger.tare.base.electrode_q16[i] - base.electrode_q16[i]) / 65536;
+            assert_true(fabs(moved - 10 * finger.drift_per_s) < 0.6);
+        }
         assert_true(fabs(shared_error(&finger) - before) < 0.5); // of 2.5
     }
 }
@@ -242,6 +279,131 @@ static void what_was_learned_of_a_load_is_forgotten(void **state)
     assert_int_equal(drift.since_commit, 0);
 }
 
+// ---- by hand ---------------------------------------------------------------------------------------
+
+#define WORST_Q16 1312 // 15 counts a minute, in a sweep of 80 ms
+
+// The mean is of sixteen sweeps at least and of 128 at most; sixteen in which the tare settles say nothing.
+static void a_rate_is_learned_as_a_mean_that_grows(void **state)
+{
+    (void)state;
+    bt_drift drift = {0};
+    int32_t want_q20 = 0, sure = 0, waiting = 0;
+    for (int n = 1; n <= 300; n++) {
+        drift.moved_q16 = 19 * (n < 200 ? 500 : -300);
+        bt_drift_learn(&drift);
+        const int learned = n - 16;
+        if (learned <= 0) {
+            assert_int_equal(drift.settled, n);
+            assert_int_equal(drift.sweeps, 0);
+            continue;
+        }
+        const int over = learned < 16 ? 16 : learned > 128 ? 128 : learned;
+        want_q20 += (16 * drift.moved_q16 / 19 - want_q20) / over;
+        assert_int_equal(drift.rate_q20, want_q20);
+        assert_int_equal(drift.sweeps, learned < 128 ? learned : 128);
+        assert_int_equal(bt_drift_known(&drift), learned >= 32);
+        if (learned % 32 == 0) { // what was seen two and a half seconds ago is sure
+            sure = waiting;
+            waiting = want_q20;
+        }
+        assert_int_equal(drift.sure_q20, sure);
+        assert_int_equal(drift.waiting_q20, waiting);
+    }
+    for (int sign = -1; sign <= 1; sign += 2) {
+        for (int n = 0; n < 2000; n++) {
+            drift.moved_q16 = sign * 19 * 3000;
+            bt_drift_learn(&drift);
+        }
+        assert_int_equal(drift.rate_q20, sign * 16 * WORST_Q16);
+    }
+    drift.since_commit = 31;
+    bt_drift_revert(&drift);
+    assert_int_equal(drift.since_commit, 0);
+    bt_drift_learn(&drift);
+    assert_int_equal(drift.since_commit, 1);
+}
+
+// For eight times as long as it was seen; what is left of it fades by as much as was used.
+static void a_rate_that_is_not_seen_lasts_for_a_while(void **state)
+{
+    (void)state;
+    static const struct {
+        uint8_t sweeps;
+        int last;
+    } cases[] = {{0, 128}, {16, 128}, {17, 136}, {128, 1024}};
+    for (int k = 0; k < 4; k++) {
+        const int last = cases[k].last;
+        bt_drift drift = {.sweeps = cases[k].sweeps};
+        for (int sign = -1; sign <= 1; sign += 2) {
+            drift.rate_q20 = sign * 1600;
+            assert_int_equal(bt_drift_over(&drift, 1), sign * 100);
+            assert_int_equal(bt_drift_over(&drift, (uint32_t)last), sign * 100 * last);
+            assert_int_equal(bt_drift_over(&drift, (uint32_t)last - 1), sign * 100 * (last - 1));
+            assert_int_equal(bt_drift_over(&drift, (uint32_t)last + 1), sign * 100 * last);
+            assert_int_equal(bt_drift_over(&drift, UINT32_MAX), sign * 100 * last);
+            drift.rate_q20 = sign * 1024 * 8;
+            drift.waiting_q20 = sign * 1024 * 4;
+            drift.sure_q20 = sign * 1024 * 2;
+            bt_drift half = drift;
+            assert_int_equal(bt_drift_unseen(&half, (uint32_t)last / 2), sign * 512 * last / 2);
+            assert_int_equal(half.rate_q20, sign * 1024 * 4);
+            assert_int_equal(half.waiting_q20, sign * 1024 * 2);
+            assert_int_equal(half.sure_q20, sign * 1024);
+            (void)bt_drift_unseen(&drift, 100000);
+            assert_true(drift.rate_q20 == 0 && drift.waiting_q20 == 0 && drift.sure_q20 == 0);
+        }
+    }
+}
+
+// What temperature explains of a rate is taken out of it: no more than there is, and nothing the other way.
+static void a_rate_that_temperature_makes_is_none_of_drift(void **state)
+{
+    (void)state;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        static const int warming[][2] = {{0, 160}, {3, 112}, {10, 0}, {11, 0}, {-1, 160}};
+        for (int k = 0; k < 5; k++) {
+            bt_drift drift = {.rate_q20 = sign * 160, .waiting_q20 = 1, .sure_q20 = 2};
+            bt_drift_cool(&drift, sign * warming[k][0]);
+            assert_int_equal(drift.rate_q20, sign * warming[k][1]);
+            assert_int_equal(drift.waiting_q20, drift.rate_q20);
+            assert_int_equal(drift.sure_q20, drift.rate_q20);
+        }
+        // Of the distance a 32nd is added, and never more than the worst drift.
+        const bt_drift drift = {.rate_q20 = sign * 160};
+        assert_int_equal(bt_drift_step_q16(&drift, 0), sign * 10);
+        assert_int_equal(bt_drift_step_q16(&drift, sign * 320), sign * 20);
+        assert_int_equal(bt_drift_step_q16(&drift, sign * 32 * (WORST_Q16 - 10)), sign * WORST_Q16);
+        assert_int_equal(bt_drift_step_q16(&drift, sign * 32 * (WORST_Q16 - 9)), sign * WORST_Q16);
+    }
+}
+
+// Nothing drifted before: a silence and a fault leave a hold's tare as it was, to the last bit.
+static void a_hold_without_drift_stays_as_it_is(void **state)
+{
+    (void)state;
+    emulated_finger finger;
+    finger_init(&finger);
+    run_seconds(&finger, 20);
+    press(&finger, 400, 300);
+    run_seconds(&finger, 5);
+    const bt_baseline before = finger.tare.base;
+    assert_true(bt_drift_known(&finger.tare.drift));
+    finger.t_s += 10;
+    run_seconds(&finger, 1);
+    assert_memory_equal(&finger.tare.base, &before, sizeof before);
+    bt_round faulty = frame_without(&finger, 2, 3, 0);
+    (void)feed(&finger, &faulty);
+    run_seconds(&finger, 1);
+    assert_memory_equal(&finger.tare.base, &before, sizeof before);
+    run_seconds(&finger, 12); // after 20 s in all, skin creeps no longer
+    assert_int_equal(finger.tare.drift.settled, 16);
+    for (int k = 0; k < 2 * FRAMES_PER_S && finger.tare.drift.settled == 16; k++) {
+        step(&finger);
+    }
+    assert_int_equal(finger.tare.drift.settled, 0); // what comes now is told from what was before
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -250,12 +412,17 @@ int main(void)
         cmocka_unit_test(a_slow_load_is_not_learned),
         cmocka_unit_test(a_hold_drifts_on),
         cmocka_unit_test(an_hour_of_hold_keeps_a_force_down_to_the_noise),
+        cmocka_unit_test(what_is_held_at_rest_follows_each_electrodes_own_drift),
         cmocka_unit_test(drift_that_stops_in_a_hold_is_found_out),
         cmocka_unit_test(a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it),
         cmocka_unit_test(a_load_that_changed_in_a_silence_is_no_drift),
         cmocka_unit_test(what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch),
         cmocka_unit_test(a_hold_is_watched_again_once_its_means_are_new),
         cmocka_unit_test(what_was_learned_of_a_load_is_forgotten),
+        cmocka_unit_test(a_rate_is_learned_as_a_mean_that_grows),
+        cmocka_unit_test(a_rate_that_is_not_seen_lasts_for_a_while),
+        cmocka_unit_test(a_rate_that_temperature_makes_is_none_of_drift),
+        cmocka_unit_test(a_hold_without_drift_stays_as_it_is),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

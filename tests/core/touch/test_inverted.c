@@ -75,6 +75,7 @@ static void signals_must_be_the_change_upside_down(void **state)
     (void)state;
     assert_int_equal(verdict(tared(3, 10, 10, 15)), BT_TARE_STANDS); // an energy of 300
     assert_int_equal(verdict(tared(4, 10, 10, 15)), BT_TARE_UNDO);
+    assert_int_equal(verdict(tared(4, 1, 10, 15)), BT_TARE_UNDO);     // however little it was
     assert_int_equal(verdict(tared(4, 10, -10, 15)), BT_TARE_STANDS); // the right way up
     finger its = tared(4, 20, 20, 15);
     its.change.known = false;
@@ -145,6 +146,31 @@ static void undone_is_the_tare_before_as_it_would_have_drifted(void **state)
     assert_int_equal(its.base.pdc_q16, (PDC - 40) << 16);
 }
 
+static void what_is_lost_bulges_by_more_than_it_is_compressed(void **state)
+{
+    (void)state;
+    finger its = tared(0, 0, 0, 21);
+    its.smooth.lane[2] = REST + 40;
+    its.smooth.lane[5] = REST - 39;
+    assert_int_equal(verdict(its), BT_TARE_LOSE);
+    its.smooth.lane[5] = REST - 40;
+    assert_int_equal(verdict(its), BT_TARE_STANDS);
+    its = tared(0, 0, 0, 21);
+    its.smooth.lane[2] = REST + 44; // with the other an energy of 2000
+    its.smooth.lane[5] = REST + 8;
+    assert_int_equal(verdict(its), BT_TARE_STANDS);
+    its.smooth.lane[6] = REST + 1;
+    assert_int_equal(verdict(its), BT_TARE_LOSE);
+    its.pdc_peak = 23;
+    its.smooth.lane[BT_LANE_PDC]--; // a 16th of it: one count further down
+    assert_int_equal(verdict(its), BT_TARE_LOSE);
+    its.pdc_peak = 24;
+    assert_int_equal(verdict(its), BT_TARE_STANDS);
+    its.pdc_peak = 0;
+    its.smooth.lane[BT_LANE_PDC] = PDC - 20;
+    assert_int_equal(verdict(its), BT_TARE_STANDS);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -154,6 +180,7 @@ int main(void)
         cmocka_unit_test(electrodes_without_a_tare_or_a_word_say_nothing),
         cmocka_unit_test(a_tare_without_one_before_it_is_lost),
         cmocka_unit_test(undone_is_the_tare_before_as_it_would_have_drifted),
+        cmocka_unit_test(what_is_lost_bulges_by_more_than_it_is_compressed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
