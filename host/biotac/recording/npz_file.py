@@ -12,9 +12,8 @@ import numpy.typing as npt
 from ..errors import RecordingError
 from ..wire import sensor_gen as _sensor
 
-MAX_BYTES = (
-    192 << 20
-)  # of all wanted fields: an hour of every channel as float64 is 150 MB; zip makes 1000 bytes of one
+# Of all wanted fields: an hour of every channel as float64 is 150 MB, and zip makes 1000 bytes of one.
+MAX_BYTES = 192 << 20
 MAX_ROWS = 360_000  # an hour
 
 

@@ -127,7 +127,7 @@ def judge(about: dict[str, Any], frames: list[dict[str, Any]]) -> list[str]:
         if not mine:
             problems.append(f"finger {finger} sent nothing")
         steps = {b["seq"] - a["seq"] for a, b in pairwise(mine)}
-        if steps - {1}:
+        if min(steps, default=1) < 1:  # a busy computer loses frames, which the page counts
             problems.append(f"finger {finger}: sequence numbers step by {sorted(steps)}")
         if any(len(row["signal_q4"]) != electrodes for row in mine):
             problems.append(f"finger {finger}: a frame without its {electrodes} electrodes")
