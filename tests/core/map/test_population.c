@@ -3,6 +3,7 @@
 #include "keep/settings.h"
 #include "map/population.h"
 #include "signal/signals.h"
+#include "solve/solve.h"
 #include "solve/wrench.h"
 #include "support.h"
 
@@ -177,6 +178,57 @@ static void the_share_is_what_it_is_defined_as(void **state)
     assert_int_equal(bt_population_share(none), 0);
 }
 
+// Whoever gave one axis a gain of his own means Lin's force by his gains, on all axes.
+static void any_gain_of_ones_own_takes_the_population_away(void **state)
+{
+    (void)state;
+    static const uint8_t gains[] = {BT_SETTING_FORCE_GAIN_X_NN, BT_SETTING_FORCE_GAIN_Y_NN,
+                                    BT_SETTING_FORCE_GAIN_Z_NN};
+    bt_settings all;
+    bt_settings_reset(&all);
+    assert_true(bt_solve_settings_from(&all).population);
+    for (int d = 0; d < 3; d++) {
+        int32_t gain_nn = bt_settings_get(&all, gains[d]);
+        assert_int_equal(bt_settings_set(&all, gains[d], gain_nn + 1), BT_ERROR_OK);
+        assert_false(bt_solve_settings_from(&all).population);
+        assert_int_equal(bt_settings_set(&all, gains[d], gain_nn), BT_ERROR_OK);
+    }
+    assert_int_equal(bt_settings_set(&all, BT_SETTING_FORCE_MODEL, BT_FORCE_MODEL_LIN), BT_ERROR_OK);
+    assert_false(bt_solve_settings_from(&all).population);
+}
+
+// A poke of one electrode, of four at different depths, and a plate: Lin's force, some of both, the map's.
+static void what_is_published_is_mixed_by_its_share_and_says_so(void **state)
+{
+    (void)state;
+    static const int deep[3][BT_ELECTRODES] = {
+        {[6] = 300}, {[6] = 300, [7] = 250, [8] = 280, [16] = 120}, {[0 ... BT_ELECTRODES - 1] = 200}};
+    bt_settings all;
+    bt_settings_reset(&all);
+    const bt_solve_settings settings = bt_solve_settings_from(&all);
+    for (int k = 0; k < 3; k++) {
+        uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
+        int32_t e_q4[BT_ELECTRODES], lin[3], map[3], force[3], torque[3];
+        int16_t poc[3];
+        for (int i = 0; i < BT_ELECTRODES; i++) {
+            counts[i] = (uint16_t)(2800 - deep[k][i]);
+            tare_q4[i] = 16 * 2800;
+        }
+        bt_signals_q4(counts, tare_q4, e_q4);
+        uint32_t share = bt_population_share(e_q4);
+        assert_int_equal((share > 0) + (share == BT_POPULATION_ALL), k);
+        bt_force(e_q4, &settings.gains, lin);
+        bt_population_force(e_q4, counts, tare_q4, map);
+        const bt_map_input frame = {.counts = counts, .tare_q4 = tare_q4};
+        uint32_t flags = bt_solve_uncalibrated(e_q4, &frame, &settings, BT_WANT_FORCE, poc, force, torque);
+        assert_int_equal(flags, BT_FRAME_FLAG_POPULATION | (k < 2 ? BT_FRAME_FLAG_OUTSIDE : 0));
+        for (int d = 0; d < 3; d++) {
+            double expected = lin[d] + share / 256.0 * (map[d] - lin[d]);
+            assert_true(expected - force[d] <= 1.0 && force[d] - expected <= 1.0);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -187,6 +239,8 @@ int main(void)
         cmocka_unit_test(a_mirrored_finger_feels_the_mirrored_force),
         cmocka_unit_test(a_poke_keeps_lins_sign_and_size_and_is_told),
         cmocka_unit_test(the_share_is_what_it_is_defined_as),
+        cmocka_unit_test(any_gain_of_ones_own_takes_the_population_away),
+        cmocka_unit_test(what_is_published_is_mixed_by_its_share_and_says_so),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
