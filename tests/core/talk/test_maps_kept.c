@@ -87,6 +87,10 @@ static void flash_that_takes_nothing_is_told_and_passed_by(void **state)
     refused_finger = 0xFF;
     assert_int_equal(save(), BT_ERROR_OK);
     assert_int_equal(session.map[0].stored_slot, BT_MAP_SLOTS);
+    // What is stored is not written again.
+    refused_finger = 0;
+    assert_int_equal(save(), BT_ERROR_OK);
+    refused_finger = 0xFF;
 }
 
 static void there_is_room_for_one_more_when_every_finger_has_another_than_it_has_stored(void **state)

@@ -150,14 +150,40 @@ static void who_is_refused_has_no_results(void **state)
     }
 }
 
+// Two sensors changed while they stream, for ones of other calibrations; then one of them for one of the
+// same.
+static void a_refused_finger_stays_so_whatever_becomes_of_the_others(void **state)
+{
+    (void)state;
+    static const uint8_t serial[3][BT_SERIAL_BYTES] = {"BT-1", "BT-2", "BT-3"};
+    for (unsigned f = 1; f <= 3; f += 2) {
+        bt_sensors_answer(&session, f, serial[0]);
+    }
+    assert_int_equal(start(BT_STREAM_FLAG_FRAMES, 1 << 1 | 1 << 3, 0), BT_ERROR_OK);
+    const uint8_t same = session.calibration_state[1];
+    session.calibration_state[1] = session.calibration_state[3] = (uint8_t)(same + 1);
+    bt_sensors_answer(&session, 1, serial[1]);
+    assert_int_equal(session.refused, 1 << 1);
+    bt_sensors_answer(&session, 3, serial[1]);
+    assert_int_equal(session.refused, 1 << 1 | 1 << 3);
+    session.calibration_state[1] = same;
+    bt_sensors_answer(&session, 1, serial[2]);
+    assert_int_equal(session.refused, 1 << 3);
+    assert_int_equal(session.other, 1 << 1 | 1 << 3);
+}
+
 #define T(name) cmocka_unit_test_setup(name, new_session)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        T(each_finger_has_its_own_flags_of_who_is_there), T(another_sensor_has_nothing_of_the_one_before),
-        T(a_sensor_that_is_unplugged_is_not_present),     T(who_is_silent_for_half_a_round_is_in_doubt),
-        T(who_does_not_say_who_it_is_is_asked_again),     T(who_is_refused_has_no_results),
+        T(each_finger_has_its_own_flags_of_who_is_there),
+        T(another_sensor_has_nothing_of_the_one_before),
+        T(a_sensor_that_is_unplugged_is_not_present),
+        T(who_is_silent_for_half_a_round_is_in_doubt),
+        T(who_does_not_say_who_it_is_is_asked_again),
+        T(who_is_refused_has_no_results),
         T(a_point_is_that_of_what_is_read_now),
+        T(a_refused_finger_stays_so_whatever_becomes_of_the_others),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
