@@ -140,11 +140,11 @@ static void the_pace_of_temperature_is_how_far_the_slow_low_pass_is_behind(void 
         bt_thermal_add(&thermal, tdc, true);
         quick_q8 += floor((tdc * 256 - quick_q8) / 8);
         slow_q14 += floor((quick_q8 * 64 - slow_q14) / 128);
-        assert_int_equal(thermal.tdc_q8, quick_q8);
-        assert_int_equal(thermal.slow_q14, slow_q14);
+        assert_int_equal(thermal.tdc_q8, (int)quick_q8);
+        assert_int_equal(thermal.slow_q14, (int)slow_q14);
         for (int gain_q16 = -100000; gain_q16 <= 100000; gain_q16 += 50000) {
             const double rate_q16 = (quick_q8 * 64 - slow_q14) * gain_q16 / 2097152;
-            assert_int_equal(bt_thermal_rate_q16(&thermal, gain_q16), trunc(rate_q16));
+            assert_int_equal(bt_thermal_rate_q16(&thermal, gain_q16), (int)trunc(rate_q16));
         }
     }
     // 500 counts at most, either way; a step is what is not applied yet.
