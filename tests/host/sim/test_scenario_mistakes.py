@@ -75,10 +75,10 @@ BAD: list[tuple[str, str, int, str, str]] = [
     ),
     (
         "too long for its fingers",
-        'name = "t"\nfingers = 5\n[[step]]\ndo = "rest"\nseconds = 121\n',
+        'name = "t"\nfingers = 5\n[[step]]\ndo = "rest"\nseconds = 181\n',
         5,
         "step 1",
-        "expected at most 120 s in all with 5 finger(s)",
+        "expected at most 180 s in all with 5 finger(s)",
     ),
     (
         "too long a change",
