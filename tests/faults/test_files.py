@@ -315,7 +315,7 @@ print(used.ru_utime + used.ru_stime, int(most) * 1024, told)
         pytest.param(NAME + LONGEST + FAULT.format(900) * 11, marks=pytest.mark.nightly),
         NAME + REST.format(20) + FAULT.format(0.01) * 3_000,
         NAME + REST.format(600) + FAULT.format(0.01) * 13_000,
-        pytest.param("\n".join(f"k{k}" + ".b" * 3 + " = 1" for k in range(70_000)), marks=pytest.mark.nightly),
+        pytest.param("\n".join(f"k{k}" + ".b" * 3 + " = 1" for k in range(60_000)), marks=pytest.mark.nightly),
     ],
 )
 def test_a_scenario_made_to_take_long_does_not(tmp_path: Path, text: str) -> None:
