@@ -127,6 +127,21 @@ static void who_does_not_say_who_it_is_is_asked_again(void **state)
     assert_int_equal(bt_sensors_to_ask(&session), 0); // so it was there all along
 }
 
+static void a_tares_age_is_told_in_milliseconds(void **state)
+{
+    (void)state;
+    static const uint8_t ask[2] = {1, 2};
+    while (!session.finger[2].tare.tared) {
+        host_round(&session, 1 << 2, 2000);
+    }
+    for (unsigned rounds = 0; rounds < 100; rounds++) {
+        bt_msg_sensor_status status;
+        bt_msg_sensor_status_unpack(&status, host_ask(&session, BT_GET_SENSOR_STATUS_ID, ask, 2)->payload);
+        assert_int_equal(status.tare_age_ms, 10 * rounds);
+        host_round(&session, 1 << 2, 2000);
+    }
+}
+
 // Who may be another sensor than the one whose calibration is in force has no results.
 static void who_is_refused_has_no_results(void **state)
 {
@@ -183,6 +198,7 @@ int main(void)
         T(who_does_not_say_who_it_is_is_asked_again),
         T(who_is_refused_has_no_results),
         T(a_point_is_that_of_what_is_read_now),
+        T(a_tares_age_is_told_in_milliseconds),
         T(a_refused_finger_stays_so_whatever_becomes_of_the_others),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
