@@ -89,7 +89,7 @@ def test_the_guided_calibration_of_five_fingers(tmp_path: Path, capsys) -> None:
     ]
 
 
-PACE = 15  # of boards whose time passes
+PACE = 5  # of boards whose time passes: what waits in the pipe to a slow program is 2 s of its own time
 
 
 def write_patient_scenario(folder: Path) -> Path:
