@@ -63,7 +63,7 @@ static inline FILE *open_vectors(const char *name)
     (void)snprintf(path, sizeof path, "%s/%s", BT_VECTORS, name);
     FILE *file = fopen(path, "r");
     if (file == NULL) {
-        fail_msg("%s is missing: run tools/make_vectors.py", path);
+        fail_msg("%s is missing: run tools/make/vectors.py", path);
     }
     return file;
 }

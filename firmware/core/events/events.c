@@ -4,23 +4,22 @@
 
 #include <string.h>
 
-// In squared changes of a noise of five counts, the worst of public recordings; a board's own noise raises
-// it.
+// For noise of five counts, the worst in public recordings; a board's own noise raises it.
 #define LEVEL_MIN_COUNT2      100
-#define LEVEL_MAX_COUNT2      3200 // sigma 28: a finger that shakes more feels nothing by it
-// In levels. Chosen on 100 real slides and 344 handovers, and on noise.
-#define SAMPLE_CAP_LEVELS     12  // of one sample: a glitch, which is two of them, is neither jolt nor slip
-#define JOLT_LEVELS           25  // noise of sigma 5: no false one in ten minutes
-#define SLIP_LEVELS           20  // of each side; likewise
-#define SIDE_CAP_LEVELS       100 // a slip is over when nothing has shaken for some 0.2 s
-// A drag: changes that those of squeezes by up to 6 N/s are below, or do not last for
+#define LEVEL_MAX_COUNT2      3200 // sigma 28; a noisier finger cannot feel anything by PAC
+// In levels; chosen on 100 real slides, 344 handovers and noise.
+#define SAMPLE_CAP_LEVELS     12  // per sample: a glitch, which is two changes, must be no event
+#define JOLT_LEVELS           25  // no false jolt in ten minutes of noise of sigma 5
+#define SLIP_LEVELS           20  // on each side; likewise
+#define SIDE_CAP_LEVELS       100 // a slip ends once nothing has shaken for some 0.2 s
+// A drag: changes larger or longer than squeezes of up to 6 N/s make
 #define DRAG_CHANGE_COUNT2    (75 * 75)
 #define DRAG_SAMPLES          44 // 20 ms
-// Times, in samples but for one
-#define ONE_VIBRATION_SAMPLES 18  // from rise to fall, 8 ms
+// Times in samples, except NOISE_ROUNDS_LOG2
+#define ONE_VIBRATION_SAMPLES 18  // between rise and fall; 8 ms
 #define LANDING_MIN_SAMPLES   220 // 0.1 s
 #define LANDING_MAX_SAMPLES   2200
-#define NOISE_ROUNDS_LOG2     6 // that its mean is over
+#define NOISE_ROUNDS_LOG2     6 // rounds that the noise is averaged over
 
 #define EVENT(event) (1u << (event))
 
@@ -34,7 +33,7 @@ _Static_assert((uint64_t)BT_ELECTRODES * BT_TRIGGER_UNREAD * BT_TRIGGER_UNREAD <
 _Static_assert((uint64_t)BT_FULL_SCALE_COUNT *BT_FULL_SCALE_COUNT <= INT32_MAX, "a square must fit its type");
 _Static_assert((BT_FULL_SCALE_COUNT & (BT_FULL_SCALE_COUNT + 1)) == 0
                    && BT_INVALID_COUNT > BT_FULL_SCALE_COUNT,
-               "bits above full scale tell words that are missing");
+               "a bit above full scale must mark a missing word");
 _Static_assert(2 * SAMPLE_CAP_LEVELS < JOLT_LEVELS && SAMPLE_CAP_LEVELS < 2 * SLIP_LEVELS,
                "one glitch must not be an event");
 _Static_assert(DRAG_SAMPLES + BT_PAC_PER_FRAME <= UINT8_MAX, "a count must fit its type");
@@ -56,7 +55,7 @@ static uint32_t square_of(const bt_tare *tare, unsigned electrode)
     return (uint32_t)(e * e);
 }
 
-// Energy of now; the slot of the strongest electrode is watched.
+// Sum up the energy, and watch the slot of the strongest electrode.
 static BT_NOINLINE void weigh(bt_events *events, const bt_tare *tare)
 {
     uint32_t strongest = 0;
@@ -112,7 +111,7 @@ uint32_t bt_events_watch(bt_events *events, const bt_tare *tare)
     return EVENT(BT_EVENT_KIND_LIFT);
 }
 
-// The tare machine goes on to call it a contact, so its trigger waits for no other.
+// The tare machine may stay in contact after a LIFT; its trigger then waits for no new touch.
 static BT_NOINLINE uint32_t touched_again(bt_events *events, const bt_tare *tare)
 {
     weigh(events, tare);
@@ -139,13 +138,14 @@ static void end_round(bt_events *events, const bt_tare *tare)
     events->samples_done = 0;
 }
 
-// By how much a word differs from the one before it; not at all where either is missing.
+// The difference of two words; 0 where either is missing.
 static inline int32_t change_of(uint32_t count, uint32_t before)
 {
     return (count | before) > BT_FULL_SCALE_COUNT ? 0 : (int32_t)(count - before);
 }
 
-// Samples that are noise and add nothing to nothing: most. Returns how many there are until one does.
+// Skip samples that are mere noise while there is no evidence for it to reduce, which is most of the time.
+// Returns how many.
 static inline unsigned pass_quiet(bt_events *events, const uint16_t *pac, const uint16_t *before,
                                   unsigned samples)
 {
@@ -169,19 +169,21 @@ static inline uint32_t take_off(uint32_t evidence, uint32_t by)
     return evidence > by ? evidence - by : 0;
 }
 
-// The first sample that rises, or falls.
+// The number of the first sample that rises, or falls.
 static BT_NOINLINE uint32_t first_change(const bt_events *events, const uint16_t *pac, const uint16_t *before,
                                          bool falls)
 {
     unsigned k = 0;
-    while ((change_of(pac[k], before[k]) <= 0) != falls) {
-        k++;
+    for (;; k++) {
+        int32_t change = change_of(pac[k], before[k]);
+        if (falls ? change < 0 : change > 0) {
+            return events->now + k;
+        }
     }
-    return events->now + k;
 }
 
-// What the noise takes away again is taken at the end: these are at most eight samples. A drag changes
-// slowly: the last of them stands for all.
+// Add samples, at most eight, to the evidence, and subtract the noise once for all of them. For a drag only
+// the last is checked: it stands for all, because a drag changes slowly.
 static BT_NOINLINE void add_shaken(bt_events *events, const uint16_t *pac, const uint16_t *before,
                                    unsigned samples)
 {
@@ -223,13 +225,14 @@ static BT_NOINLINE void add_shaken(bt_events *events, const uint16_t *pac, const
     events->fallen_count2 = falls > top ? top : falls;
 }
 
-// What can be no other event until it is over: a slip, or a jolt of what is not held yet.
+// True while no other event may begin: during a slip, and after a jolt of a finger that is untouched or
+// landing.
 static inline bool is_told(const bt_events *events)
 {
     return events->slipping || (events->jolt_told && (events->landing || !events->touched));
 }
 
-// Only how long it goes on is asked: both sides are one.
+// All that matters now is how long it lasts, so both sides are summed as one.
 static BT_NOINLINE void go_on(bt_events *events, const uint16_t *pac, const uint16_t *before,
                               unsigned samples)
 {
@@ -282,8 +285,8 @@ static uint32_t end_shaking(bt_events *events)
     return end_slip(events);
 }
 
-// Goes to and fro, since the earlier of the two where it is one vibration, else since the later; or has been
-// dragged for so long, and slips from now on.
+// Either rises and falls have both shown enough: the slip began with the earlier of the two if they are one
+// vibration, else with the later. Or the skin has been dragged for long enough: the slip begins now.
 static bool begins_to_slip(bt_events *events)
 {
     const uint32_t each = SLIP_LEVELS * events->level_count2;
@@ -328,9 +331,9 @@ uint32_t bt_events_pac(bt_events *events, const bt_tare *tare, const uint16_t pa
     if (k > 0) {
         before = pac + k - BT_EVENTS_LAG;
     } else if (end == BT_EVENTS_LAG) {
-        before = pac + BT_PAC_PER_FRAME - BT_EVENTS_LAG; // still those of the round before
+        before = pac + BT_PAC_PER_FRAME - BT_EVENTS_LAG; // still the previous round's
     } else {
-        k = BT_EVENTS_LAG; // they may be gone
+        k = BT_EVENTS_LAG; // the previous round's may be gone
         before = pac;
         events->now += BT_EVENTS_LAG;
     }

@@ -90,6 +90,21 @@ static void evidence_is_no_more_than_a_hundred_levels_of_each_side(void **state)
     assert_true(events.risen_count2 == 10000 && events.fallen_count2 == 10000);
 }
 
+// Where the other side shakes already, nothing was passed over as noise before the first word.
+static void a_side_begins_at_the_first_sample_that_moved_its_way(void **state)
+{
+    static const uint16_t words[8] = {BT_INVALID_COUNT, 2000, 2100, 2000, 1900, 2100, 1900, 2000};
+    memcpy(pac + 8, words, sizeof words);
+    events.risen_count2 = 1;
+    (void)stretch();
+    assert_int_equal(events.fall_began, 100000 + 4);
+    (void)held(state);
+    memcpy(pac + 8, words, sizeof words);
+    events.fallen_count2 = 1;
+    (void)stretch();
+    assert_int_equal(events.rise_began, 100000 + 2);
+}
+
 // A stretch of changes, none of them below the noise; twelve levels are the most of a sample.
 static void while_it_slips_both_sides_are_one(void **state)
 {
@@ -389,6 +404,7 @@ int main(void)
         T(a_slip_goes_both_ways_by_more_than_twenty_levels),
         T(a_jolt_is_more_than_25_levels_and_told_once),
         T(evidence_is_no_more_than_a_hundred_levels_of_each_side),
+        T(a_side_begins_at_the_first_sample_that_moved_its_way),
         T(while_it_slips_both_sides_are_one),
         T(what_was_told_of_shakes_on_until_it_is_over),
         T(each_side_begins_with_its_first_change),
