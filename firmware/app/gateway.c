@@ -19,8 +19,8 @@ _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS <= BT_RECORD_MAP
 
 #define ALL_FINGERS ((1u << BT_MAX_FINGERS) - 1)
 
-// The gap after the last property read, and the time a slow board takes from here until its alarm is set: an
-// alarm that is past by then would make the first slot late, and its frame's time with it.
+// The gap after the last property read, plus the time a slow board takes from here to setting its alarm. If
+// the alarm's time had passed by then, the first slot and its frame's time would be late.
 #define START_AHEAD_US (BT_GAP_US + 50)
 
 static const bt_flash flash = {
@@ -29,7 +29,7 @@ static const bt_flash flash = {
     .read = port_flash_read,
 };
 
-// Maps lie behind the settings.
+// Maps follow the settings in flash.
 static bool erase_map_sector(uint32_t sector_offset)
 {
     return port_flash_erase(BT_STORAGE_BYTES + sector_offset);
@@ -105,7 +105,7 @@ static void load_settings(bt_session *session)
     bt_session_use_settings(session);
 }
 
-// Slower ones are none: a round's FRAME would take longer than all that a link may wait.
+// A slower UART is not used: one FRAME would take longer than a link may wait.
 #define UART_LEAST_BITS_PER_S 1200
 
 static void start_uart(const bt_settings *settings)
@@ -145,7 +145,7 @@ void bt_gateway_init(bt_gateway *gateway)
             bt_sensors_doubt(&gateway->session, f);
         }
     }
-    load_settings(&gateway->session); // now that it is known which sensors a calibration can be for
+    load_settings(&gateway->session); // only now is it known which sensors a calibration can be for
     start_uart(&gateway->session.settings);
     gateway->round_open = false;
     gateway->link_was_up = false;
@@ -180,8 +180,7 @@ static void count_word(bt_word_counts *counts, enum bt_word kind, uint16_t word)
     }
 }
 
-// An asking takes effect a round later than it could where the main loop is quick: then it does so on every
-// board.
+// A request takes effect a round later than a fast main loop would need, so that every board does it alike.
 #define ASK_AHEAD_ROUNDS 2
 
 static void close_round(bt_gateway *gateway)
@@ -242,8 +241,7 @@ void bt_gateway_poll(bt_gateway *gateway)
     if ((n = port_link_read(bytes, sizeof bytes)) > 0) {
         bt_session_receive(session, bytes, n, port_now_us());
     }
-    // A round's worth and no more: whoever is behind must still hear the host, and feed what watches over
-    // him.
+    // At most a round's worth: a main loop that is behind must still hear the host and feed the watchdog.
     bt_slot slot;
     for (int k = 0; k < BT_SLOTS && bt_sampler_pop(&gateway->sampler, &slot); k++) {
         take_slot(gateway, &slot);

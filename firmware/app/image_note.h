@@ -1,6 +1,7 @@
-// What an image says of itself, for whoever flashes it: a block of constants that is found by its first 12
-// bytes, anywhere in the image at a multiple of 4. `biotac flash` refuses an image that has not exactly one,
-// or one for another board, and by the same code (host/biotac/flash/note.py) the build refuses to make it.
+// What an image says about itself, for whoever flashes it: a block of constants, found by its first 12 bytes
+// at a multiple of 4 anywhere in the image. `biotac flash` refuses an image that does not have exactly one,
+// or has one for another board. The build refuses to make such an image, by the same code
+// (host/biotac/flash/note.py).
 #ifndef BIOTAC_IMAGE_NOTE_H
 #define BIOTAC_IMAGE_NOTE_H
 
@@ -20,10 +21,9 @@ typedef struct {
     uint8_t wire_major;
     uint8_t wire_minor;
     uint8_t zero[3];
-    // Of the whole image from its first byte on, the four of crc32 taken as zeros. Written by
-    // tools/image/note.py once the image is linked, held against the file by `biotac flash` before the first
-    // byte is written, and against what the board computes of its own flash when it is back (HELLO's
-    // image_crc32).
+    // Size and CRC of the whole image, with the four bytes of crc32 taken as zeros. tools/image/note.py
+    // writes them once the image is linked. `biotac flash` compares them with the file before it writes the
+    // first byte, and later with what the board computes from its own flash (HELLO's image_crc32).
     uint32_t image_bytes;
     uint32_t crc32;
 } bt_image_note;

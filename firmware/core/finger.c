@@ -60,7 +60,7 @@ static bool place(bt_finger *finger, uint8_t slot, uint16_t count)
     return false;
 }
 
-// What was left out before slot.
+// Fill the skipped slots before this one with missing words.
 static BT_NOINLINE bool fill(bt_finger *finger, uint8_t slot)
 {
     bool touched = false;
@@ -114,7 +114,7 @@ void bt_finger_event(bt_finger *finger, uint8_t event, uint8_t slot, uint32_t t_
 static void fall_silent(bt_finger *finger)
 {
     finger->present = false;
-    finger->bands.begun = false; // before and after do not belong together
+    finger->bands.begun = false; // samples before and after the gap do not belong together
     if (finger->silent_rounds < BT_UNPLUGGED_ROUNDS) {
         finger->silent_rounds++;
     }
@@ -132,7 +132,7 @@ static void close_round(bt_finger *finger)
     if (finger->next_slot < BT_SLOTS) {
         (void)fill(finger, BT_SLOTS);
     }
-    finger->next_slot = 0; // POINT between two rounds is of the coming one, of which nothing has come yet
+    finger->next_slot = 0; // a POINT between rounds belongs to the next, of which no word has come yet
     bt_pressure_add(&finger->pressure, finger->round.pdc);
 }
 
@@ -152,7 +152,7 @@ bool bt_finger_end(bt_finger *finger, const bt_tare_settings *settings)
     finger->present = true;
     finger->answered = true;
     finger->silent_rounds = 0;
-    // A TARE command between two rounds has changed the tare already.
+    // A tare command between two rounds may already have changed the tare.
     finger->tare_unsent = finger->tare.changed;
     bt_tare_end(&finger->tare, finger->round.t_us, settings);
     finger->tare_unsent = finger->tare_unsent || finger->tare.changed;
@@ -222,7 +222,7 @@ static void repeat_wrench(const bt_finger *finger, bt_msg_frame *msg)
     msg->wrench_age_ms = (uint16_t)((uint16_t)(msg->seq - kept->seq) * BT_FRAME_MS);
 }
 
-// The results, but for what is left out; flags tell that from what nobody asked for.
+// The results without what is shed; flags distinguish that from what nobody asked for.
 static void tell_results(bt_finger *finger, const bt_solve_settings *settings, uint32_t shed,
                          bt_msg_frame *msg)
 {

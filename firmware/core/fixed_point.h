@@ -1,29 +1,29 @@
-// How the core divides, splits and rounds. What is published is rounded half away from zero
-// (protocol/SPEC.md). Nothing here saturates: every caller's range is bounded at compile time.
+// Division, shifting and rounding in the core. Published values round half away from zero (protocol/SPEC.md).
+// Nothing here saturates: every caller's range is bounded at compile time.
 #ifndef BIOTAC_FIX_H
 #define BIOTAC_FIX_H
 
 #include <stdint.h>
 
-// 32-bit unsigned division. A board with a hardware divider defines it in its build; every
-// definition gives the same quotient.
+// 32-bit unsigned division. The build of a board with a hardware divider overrides it; every definition gives
+// the same quotient.
 #ifndef BT_DIVIDE_U32
 #define BT_DIVIDE_U32(num, den) ((num) / (den))
 #endif
 
-// For what is cheaper called than inlined.
+// For functions that are cheaper to call than to inline.
 #define BT_NOINLINE __attribute__((noinline))
 
-// Before a loop over all electrodes: on a core without a pipeline to hide them, counting and branching cost
-// as much as the work.
+// For loops over all electrodes: on a core whose pipeline does not hide them, counting and branching cost as
+// much as the work.
 #if defined(__GNUC__) && !defined(__clang__)
 #define BT_UNROLL _Pragma("GCC unroll 20")
 #else
 #define BT_UNROLL
 #endif
 
-// num / den for den > 0. Works on magnitudes, so that -2.5 and 2.5 both move away from zero, and
-// never adds to num, so that no input near INT64_MAX can wrap.
+// num / den, rounded half away from zero, for den > 0. Never adds to num, so no input near INT64_MAX can
+// wrap.
 static inline int64_t bt_div_round(int64_t num, int64_t den)
 {
     int64_t quotient = num / den;
@@ -35,7 +35,7 @@ static inline int64_t bt_div_round(int64_t num, int64_t den)
     return quotient;
 }
 
-// The same for a magnitude below 2^32 - den / 2: one 32-bit division.
+// The same for num below 2^32 - den / 2, in one 32-bit division.
 static inline uint32_t bt_div_round_u32(uint32_t num, uint32_t den)
 {
     return BT_DIVIDE_U32(num + den / 2, den);
@@ -51,15 +51,15 @@ static inline uint32_t bt_abs32(int32_t value)
     return value < 0 ? 0 - (uint32_t)value : (uint32_t)value;
 }
 
-// value / 2^bits towards minus infinity. Right-shifting a negative number is the compiler's choice;
-// every one we use copies the sign, and this line fails to compile with one that does not.
+// value / 2^bits, rounded towards minus infinity. Right-shifting a negative number is implementation-defined;
+// every compiler we use copies the sign, and one that does not fails this assertion.
 _Static_assert(-1 >> 1 == -1, "the compiler must shift signed numbers arithmetically");
 static inline int32_t bt_shift_down(int32_t value, int bits)
 {
     return value >> bits;
 }
 
-// value / 2^bits, for bits > 0 and |value| < 2^62.
+// value / 2^bits, rounded half away from zero, for bits > 0 and |value| < 2^62.
 static inline int64_t bt_shift_round(int64_t value, int bits)
 {
     uint64_t magnitude = (bt_abs(value) + ((uint64_t)1 << (bits - 1))) >> bits;
@@ -71,7 +71,7 @@ static inline int32_t bt_limited(int32_t value, int32_t low, int32_t high)
     return value < low ? low : value > high ? high : value;
 }
 
-// Without a branch. magnitude < 2^31.
+// magnitude with the sign of `sign`, without a branch. magnitude < 2^31.
 static inline int32_t bt_with_sign(uint32_t magnitude, int32_t sign)
 {
     int32_t mask = bt_shift_down(sign, 31);
@@ -83,10 +83,10 @@ static inline int bt_bit_length(uint32_t value)
     return value == 0 ? 0 : 32 - __builtin_clz(value);
 }
 
-// magnitude * multiplier / 2^(32 + bits), rounded half up. magnitude < 2^31, bits 1..7; the multiplier,
-// at most 2^30, comes in halves.
-// Four 16-bit products: a core without a long multiply would call a 64-bit routine instead. The sum
-// of the middle products stays below 2^32 because magnitude < 2^31 and multiplier <= 2^30.
+// magnitude * multiplier / 2^(32 + bits), rounded half up. magnitude < 2^31, bits 1..7; the multiplier, at
+// most 2^30, comes as two 16-bit halves.
+// Uses four 16-bit products, because a core without a long multiply would call a 64-bit routine. The sum of
+// the middle products stays below 2^32 because magnitude < 2^31 and multiplier <= 2^30.
 static inline uint32_t bt_scale(uint32_t magnitude, uint32_t m_high, uint32_t m_low, int bits)
 {
     uint32_t high = magnitude >> 16;

@@ -2,18 +2,14 @@
 
 #include <string.h>
 
-#define SERIAL_CHARS (sizeof((bt_emu_device *)0)->serial - 1)
-
 void bt_emu_bus_init(bt_emu_bus *bus, uint32_t fingers, const char *serials, bt_emu_source source,
                      void *context)
 {
     bus->selected = 0;
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        char serial[] = "BTEMU00000000001";
-        serial[SERIAL_CHARS - 1] = (char)('1' + f);
+        char serial[sizeof bus->sensor[f].serial] = "";
         size_t given = strcspn(serials, ",");
-        if (given > 0 && given <= SERIAL_CHARS) {
-            memset(serial, 0, sizeof serial);
+        if (given < sizeof serial) {
             memcpy(serial, serials, given);
         }
         serials += given + (serials[given] == ',');

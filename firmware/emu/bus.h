@@ -1,5 +1,5 @@
-// One to five emulated BioTacs on one SPI bus, each behind its own chip select. Every rig drives
-// this one: the posix board natively, the emulated microcontroller as WebAssembly.
+// One to five emulated BioTacs on one SPI bus, each behind its own chip select. Every rig uses this code: the
+// posix board natively, the emulated microcontroller as WebAssembly.
 #ifndef BIOTAC_EMU_BUS_H
 #define BIOTAC_EMU_BUS_H
 
@@ -13,15 +13,15 @@ typedef struct {
     uint8_t selected; // bit mask of the chip selects that are low
 } bt_emu_bus;
 
-// The first `fingers` sensors are plugged in. serials: one a finger, separated by commas; a finger
-// without one gets one made up.
+// The first `fingers` sensors are plugged in. serials: one per finger, separated by commas; a finger without
+// one gets a made-up one.
 void bt_emu_bus_init(bt_emu_bus *bus, uint32_t fingers, const char *serials, bt_emu_source source,
                      void *context);
 
-// Chip selects of the sensors in mask are low from now on, all others high.
+// Pull low the chip selects of the sensors in mask, release all others.
 void bt_emu_bus_select(bt_emu_bus *bus, uint8_t mask, uint64_t t_ns);
 
-// What MISO carries while the master sends mosi. Several that are selected drive at once:
+// Returns what MISO carries while the master sends mosi. Several selected sensors drive it at once:
 // contention.
 uint8_t bt_emu_bus_transfer8(bt_emu_bus *bus, uint8_t mosi, uint64_t t_ns);
 uint16_t bt_emu_bus_transfer16(bt_emu_bus *bus, uint16_t mosi, uint64_t t_ns);

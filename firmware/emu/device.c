@@ -5,10 +5,10 @@
 #include <string.h>
 
 enum pending {
-    NOTHING,  // nothing was asked for, or its answer was already taken
-    SAMPLE,   // word holds a sample, which settles
-    PROPERTY, // property bytes
-    REFUSAL,  // word holds an error word
+    NOTHING, // nothing was asked for, or its answer was already taken
+    SAMPLE,  // word holds a sample, once it has settled
+    PROPERTY,
+    REFUSAL, // word holds an error word
 };
 
 static bool has_odd_parity(unsigned byte)
@@ -38,10 +38,14 @@ void bt_emu_init(bt_emu_device *device, uint8_t finger, bool present, const char
     device->finger = finger;
     device->source = source;
     device->context = context;
-    strncpy(device->serial, serial, sizeof device->serial - 1);
+    memcpy(device->serial, "BTEMU00000000001", sizeof device->serial);
+    device->serial[sizeof device->serial - 2] = (char)('1' + finger);
+    if (serial[0] != '\0') {
+        strncpy(device->serial, serial, sizeof device->serial - 1);
+    }
 }
 
-// Unplugged, and so without power: what was asked for is forgotten.
+// Unplugged and so without power: what was asked for is forgotten.
 static void lose_power(bt_emu_device *device, bool swapped)
 {
     device->pending = NOTHING;
@@ -54,7 +58,7 @@ static void lose_power(bt_emu_device *device, bool swapped)
     device->unplugged = true;
 }
 
-// A fault of the line as it is now, or 0.
+// The line's present fault, or 0.
 static uint16_t line_fault(bt_emu_device *device, uint16_t said)
 {
     if (said == BT_EMU_FAULT_SWAPPED || said == BT_EMU_FAULT_UNPLUGGED) {
@@ -171,7 +175,7 @@ static void look_up_property(bt_emu_device *device, uint8_t selector, uint64_t t
 
 // ---- the shift register -----------------------------------------------------------------------------
 
-// What the line makes of a byte that is no sample's, the low one of two or the other.
+// What the line makes of a byte that is not a sample's; low: the second byte of two.
 static uint8_t on_the_line(uint8_t byte, uint16_t fault, bool low)
 {
     switch (fault) {
@@ -190,7 +194,7 @@ static uint8_t on_the_line(uint8_t byte, uint16_t fault, bool low)
     }
 }
 
-// Two bytes of what is no property.
+// The next two bytes, unless they are a property's.
 static uint16_t word_now(const bt_emu_device *device, bool settled)
 {
     if (device->pending == NOTHING) {
@@ -202,7 +206,7 @@ static uint16_t word_now(const bt_emu_device *device, bool settled)
     return device->word;
 }
 
-// As of the moment at which the first of its bytes begins; they count as given.
+// Decided when the first of its bytes begins; both then count as given.
 static uint16_t answer(bt_emu_device *device)
 {
     uint16_t word = word_now(device, device->settled);
@@ -258,7 +262,7 @@ static void take_first_byte(bt_emu_device *device, uint8_t mosi, uint64_t t_ns)
     device->settled = false;
     if (mosi & 0x80) {
         if (has_odd_parity(mosi)) {
-            latch_sample(device, (uint8_t)((mosi & 0x7E) >> 1), t_ns);
+            latch_sample(device, BT_EMU_CHANNEL(mosi), t_ns);
         } else {
             refuse(device, BT_ERROR_WORD_COMMAND_PARITY);
         }
@@ -278,7 +282,7 @@ void bt_emu_select(bt_emu_device *device, bool low, uint64_t t_ns)
     }
     if (low && !device->selected) {
         device->position = 0;
-        // Of an answer that had its 50 us once, the rest has no need of them.
+        // An answer that has had its 50 us once needs no more for its other bytes.
         device->settled = device->settled || t_ns - device->released_ns >= BT_SETTLE_US * 1000ull;
     }
     device->selected = low;
@@ -289,7 +293,7 @@ uint8_t bt_emu_transfer8(bt_emu_device *device, uint8_t mosi, uint64_t t_ns)
     if (!device->present) {
         return 0x00;
     }
-    // The first bit is out before the master's first is in.
+    // The first bit goes out before the master's first comes in.
     uint8_t miso = shift_out(device, t_ns);
     if (device->position % 2 == 0) {
         take_first_byte(device, mosi, t_ns);

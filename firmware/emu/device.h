@@ -1,25 +1,24 @@
 // One emulated BioTac as its SPI bus sees it: chip select edges and bytes in, bytes out.
 //
-// Written against what the sensor's makers and users say of it, not against the driver. Sources: SPM, the
-// BioTac SP product manual V2; CLIB, SynTouch's C library for the Cheetah adapter.
-// - The answer is in the shift register when the chip select falls: its bits do not depend on what the master
-// sends
-//   meanwhile. A public PIC32 driver (mattmongeon/finger_force_control) listens with 0x0100, CLIB with
-//   0x0000, SPM asks for 0x0001, and all of them have read real sensors.
-// - An answer needs 50 us with the chip select high (SPM 8.2, CLIB, PIC32); before, and as long as it stays
-// low, there
-//   are error words: 0xA52D after a sample command, 0xA52E after any other (SPM, CLIB).
-// - One sample is given once; resend (SPM 0x50, CLIB 0x20) gives the last two bytes again, or 0xA55F (CLIB).
-// - Write (0x40) answers 0xA552, read-only: SPM documents no variable that is not. Property 0x73 is the list
-// of
-//   channels as pairs of command and 0x01, the last pair's second byte 0xFE (SPM 8.4).
+// Written from what the sensor's makers and users say, not from our driver. Sources: SPM, the BioTac SP
+// product manual V2; CLIB, SynTouch's C library for the Cheetah adapter.
+// - The answer is in the shift register when the chip select falls, so its bits do not depend on what the
+//   master sends meanwhile. A public PIC32 driver (mattmongeon/finger_force_control) listens with 0x0100,
+//   CLIB with 0x0000, SPM asks for 0x0001, and all of them have read real sensors.
+// - An answer needs 50 us with the chip select high (SPM 8.2, CLIB, PIC32). Until then, and as long as it
+//   stays low, there are error words: 0xA52D after a sample command, 0xA52E after any other (SPM, CLIB).
+// - A sample is given once; resend (SPM 0x50, CLIB 0x20) gives the last two bytes again, or 0xA55F (CLIB).
+// - Write (0x40) answers 0xA552, read-only: SPM documents no writable variable. Property 0x73 is the list of
+//   channels as pairs of command and 0x01; the last pair's second byte is 0xFE (SPM 8.4).
 // - Property bytes have no parity. They go on from chip select to chip select until the next command (CLIB
-// reads
-//   them one by one); behind the last come zeros.
-// - `mute`: some sensors "sent all zeroes" until a property had been read (users of CLIB), so with power
-// coming back. What a real sensor says to a read that nothing asked for is not known: here 0xA55F, so that no
-// old data is taken for new. Where the counts come from is a function; faults are counts too: enum
-// bt_emu_fault of the wire. Times are ns since the emulation began.
+//   reads them one by one); zeros follow the last one.
+// - `mute`: some sensors "sent all zeroes" until a property had been read (users of CLIB). Here they do so
+//   when power comes back.
+// - What a real sensor answers to a read that nothing asked for is unknown. Here it is 0xA55F, so that no old
+//   data is taken for new.
+//
+// Counts come from a function, which may also return faults: enum bt_emu_fault of the wire. Times are ns
+// since the emulation began.
 #ifndef BIOTAC_EMU_DEVICE_H
 #define BIOTAC_EMU_DEVICE_H
 
@@ -29,18 +28,22 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-// The channel that stands for the line itself, of which a source is asked where no sample is taken: 0, or the
-// fault that it has now.
+// The channel number of the line itself, for which a source is asked when no sample is taken; it returns 0 or
+// the present fault.
 #define BT_EMU_LINE 64
 
-// Count of a channel (its number on the bus, 0..63) of one finger at a time; 0..4095 or an enum bt_emu_fault.
+// The channel number, on the bus, that a sample command asks for.
+#define BT_EMU_CHANNEL(command) ((uint8_t)(((command) & 0x7E) >> 1))
+
+// The count of one finger's channel (its number on the bus, 0..63) at a time; 0..4095 or an enum
+// bt_emu_fault.
 typedef uint16_t (*bt_emu_source)(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns);
 
 #define BT_EMU_PROPERTY_BYTES (2 * BT_SLOTS) // the list of channels
 
 typedef struct {
     bool present;
-    bool mute; // says only zeros until it is asked for a property
+    bool mute; // sends only zeros until it is asked for a property
     uint8_t finger;
     char serial[17];
     bt_emu_source source;
@@ -53,7 +56,7 @@ typedef struct {
     uint8_t out[2];       // what they shift out
     uint64_t released_ns; // when the chip select last rose
     uint8_t pending;      // what the next read gives: see device.c
-    bool settled;         // the chip select has risen since it was asked for
+    bool settled;         // the answer has had its 50 us
     uint16_t word;        // the latched sample
     uint16_t last_word;   // what resend gives
     bool has_last;
@@ -63,6 +66,7 @@ typedef struct {
     uint32_t early_reads; // reads that broke the 50 us rule
 } bt_emu_device;
 
+// serial: up to 16 characters; empty: one made up.
 void bt_emu_init(bt_emu_device *device, uint8_t finger, bool present, const char *serial,
                  bt_emu_source source, void *context);
 
@@ -72,8 +76,8 @@ void bt_emu_select(bt_emu_device *device, bool low, uint64_t t_ns);
 uint8_t bt_emu_transfer8(bt_emu_device *device, uint8_t mosi, uint64_t t_ns);
 uint16_t bt_emu_transfer16(bt_emu_device *device, uint16_t mosi, uint64_t t_ns);
 
-// The two bytes that it would say if it were selected now, its 50 us over or not, whatever the master sends;
-// of a property those so many bytes further on.
+// The two bytes that the device would send if it were selected now, whatever the master sends. settled: its
+// 50 us are over. bytes: how much further on in a property.
 uint16_t bt_emu_word_ahead(const bt_emu_device *device, unsigned bytes, bool settled, uint64_t t_ns);
 
 #endif

@@ -8,7 +8,7 @@ void bt_emu_stream_init(bt_emu_stream *stream, uint16_t *ring, uint32_t samples)
 {
     memset(stream, 0, sizeof *stream);
     stream->ring = ring;
-    stream->slots = samples; // until it is known for how many fingers
+    stream->slots = samples; // in samples until the number of fingers is known
     stream->hold = BT_EMU_NO_HOLD;
 }
 
@@ -25,14 +25,14 @@ const uint16_t *bt_emu_stream_whole(const bt_emu_stream *stream)
     return whole ? stream->ring : NULL;
 }
 
-// A round behind the bus stays, to be played again.
+// With by_time, a round behind the bus stays, to be repeated.
 uint32_t bt_emu_stream_room(const bt_emu_stream *stream)
 {
     uint32_t used = stream->taken - stream->at + (stream->by_time ? BT_SLOTS : 0);
     return stream->loop == NULL && used < stream->slots ? stream->slots - used : 0;
 }
 
-// Slots from the one being served on.
+// Slots left, from the one being served on.
 static uint32_t left(const bt_emu_stream *stream)
 {
     return stream->loop != NULL ? UINT32_MAX : stream->taken - stream->at;
@@ -60,20 +60,15 @@ bool bt_emu_stream_put(bt_emu_stream *stream, uint8_t fingers, const uint8_t *sa
     return true;
 }
 
-static bool is_channel(uint8_t slot, uint8_t channel)
-{
-    return (bt_channel_command[bt_slot_channel[slot]] & 0x7E) >> 1 == channel;
-}
-
-// The next slot of this channel, from the one being served on unless the finger has had that; 0 to BT_SLOTS
-// ahead, or -1.
+// How far ahead this channel's next slot is: 0 to BT_SLOTS, counting from the one being served, or from the
+// next if the finger has had that; -1: there is none.
 static int slots_ahead(const bt_emu_stream *stream, uint8_t finger, uint8_t channel)
 {
     int first = stream->served >> finger & 1;
     uint8_t slot = (uint8_t)(stream->slot + first);
     for (int k = first; k <= BT_SLOTS; k++) {
         slot = slot >= BT_SLOTS ? 0 : slot;
-        if (is_channel(slot, channel)) {
+        if (BT_EMU_CHANNEL(bt_channel_command[bt_slot_channel[slot]]) == channel) {
             return k;
         }
         slot++;
@@ -104,7 +99,7 @@ static uint16_t line_now(const bt_emu_stream *stream, uint8_t finger)
     return now > BT_FULL_SCALE_COUNT ? now : 0;
 }
 
-// Where a round begins: rounds are left out or played again, as far as there are any.
+// At the start of a round: skip or repeat rounds to keep to the clock, as far as there are any.
 static void keep_time(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
 {
     bool timed = stream->timed;
@@ -112,7 +107,7 @@ static void keep_time(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
     if (!stream->timed) {
         return;
     }
-    uint32_t now_us = (uint32_t)(t_ns / 1000); // a hundred cycles, which only this clock costs
+    uint32_t now_us = (uint32_t)(t_ns / 1000); // a hundred cycles, spent only with by_time
     int32_t passed_us = (int32_t)(now_us - stream->round_us);
     stream->round_us = now_us;
     stream->behind_us = timed ? stream->behind_us + passed_us - ROUND_US : 0;
@@ -130,7 +125,7 @@ static void keep_time(bt_emu_stream *stream, uint32_t ahead, uint64_t t_ns)
     }
 }
 
-// Whether the slot so far ahead may be served. Behind a hold the tape goes on where every finger begins a
+// True if the slot so far ahead may be served. After a hold the tape goes on when every finger begins a
 // round.
 static bool may_serve(bt_emu_stream *stream, uint8_t finger, uint32_t ahead)
 {

@@ -41,6 +41,12 @@ static uint64_t slot_number(const bt_tape *tape, uint64_t t_ns)
     return (t_ns - tape->start_ns + HALF_SLOT_NS) * BT_SLOT_HZ / 1000000000ull;
 }
 
+static uint16_t sample(const bt_tape *tape, uint64_t frame, uint8_t finger, uint64_t slot)
+{
+    size_t at = (size_t)((frame * tape->fingers + finger) * BT_SLOTS + slot) * 2;
+    return (uint16_t)(tape->samples[at] | tape->samples[at + 1] << 8);
+}
+
 uint16_t bt_tape_count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns)
 {
     bt_tape *tape = context;
@@ -60,17 +66,15 @@ uint16_t bt_tape_count(void *context, uint8_t finger, uint8_t channel, uint64_t 
         frame = tape->frames - 1;
     }
     if (channel == BT_EMU_LINE) {
-        size_t at = (size_t)((frame * tape->fingers + finger) * BT_SLOTS + number % BT_SLOTS) * 2;
-        uint16_t now = (uint16_t)(tape->samples[at] | tape->samples[at + 1] << 8);
+        uint16_t now = sample(tape, frame, finger, number % BT_SLOTS);
         return now > BT_FULL_SCALE_COUNT ? now : 0;
     }
-    // In the default sequence the slot tells the channel. Another sequence gets its channel's next
+    // In the default sequence the slot determines the channel. Another sequence gets its channel's next
     // sample of the same frame.
     for (uint64_t k = 0; k < BT_SLOTS; k++) {
         uint64_t slot = (number + k) % BT_SLOTS;
-        if ((bt_channel_command[bt_slot_channel[slot]] & 0x7E) >> 1 == channel) {
-            size_t at = (size_t)((frame * tape->fingers + finger) * BT_SLOTS + slot) * 2;
-            return (uint16_t)(tape->samples[at] | tape->samples[at + 1] << 8);
+        if (BT_EMU_CHANNEL(bt_channel_command[bt_slot_channel[slot]]) == channel) {
+            return sample(tape, frame, finger, slot);
         }
     }
     return BT_EMU_FAULT_NO_CHANNEL;

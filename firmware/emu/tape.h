@@ -22,7 +22,7 @@ const char *bt_tape_open(bt_tape *tape, const uint8_t *bytes, size_t size);
 // A bt_emu_source; context is the tape. The first sample command starts the tape.
 uint16_t bt_tape_count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns);
 
-// The last frame's last slot is over, or would be by t_ns.
+// True if the last frame's last slot is over by t_ns.
 bool bt_tape_over(const bt_tape *tape, uint64_t t_ns);
 
 #endif

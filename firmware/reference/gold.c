@@ -5,8 +5,8 @@
 // N_x in um times 1000 is the dividend of x in nm.
 _Static_assert(BT_SUM_SQUARES_R_MAX_Q8_UM <= INT64_MAX / 1000, "the x dividend must fit int64");
 _Static_assert(BT_SUM_SQUARES_MAX_Q8 <= INT64_MAX, "the weight sum must fit int64");
-// Every electrode lies below the axis, so a positive weight sum keeps (y, z) away from 0: the
-// direction below never is 0/0 (SPEC.md, Degenerate input).
+// Every electrode has z < 0, so with a positive weight sum (y, z) cannot be 0: the direction below is never
+// 0/0 (SPEC.md, Degenerate input).
 _Static_assert(BT_ELECTRODE_Z_MAX_UM < 0, "electrodes must have z < 0");
 
 uint32_t gold_isqrt64(uint64_t n)
@@ -81,7 +81,7 @@ bool gold_poc(const int32_t e_q4[BT_ELECTRODES], int weights, int32_t poc_nm[3])
     }
     if (moment[0] > 0) { // tip: a point on the sphere; its direction needs no division by W
         scale_to_radius(moment, 0, poc_nm);
-    } else { // cylinder: keep x, move (y, z) out to the radius, which the paper's Eq 2 leaves out
+    } else { // cylinder: keep x, move (y, z) out to the radius, which the paper's Eq 2 omits
         scale_to_radius(moment, 1, poc_nm);
         poc_nm[0] = (int32_t)bt_div_round(moment[0] * 1000, sum);
     }

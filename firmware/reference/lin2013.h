@@ -1,14 +1,14 @@
-// Lin, Fishel and Loeb 2013 in double, line for line from the formulas, with the paper's misprints
-// corrected. The judge of the integer core; never built for a board.
+// Lin, Fishel and Loeb 2013 in double, line for line from the formulas, with the paper's misprints corrected.
+// The reference for the integer core; never built for a board.
 //
 // Corrections, each with its place in the paper:
 //  Eq 2, cylinder   y and z lack the factor r: without it the result has length 1, not r.
-//  Eq 2, x = 0      undefined there; Eq 7 counts it to the sphere. Both limits agree; x > 0 is the
-//                   sphere here, as in Eq 2's first line.
-//  Eq 3, Eq 4       the text says the normalised signal e*, the formula prints e: e* it is, signed,
-//                   compression negative, so positive gains give the force ON the finger.
+//  Eq 2, x = 0      undefined there; Eq 7 counts it as sphere. Both limits agree; here the sphere is x > 0,
+//                   as in Eq 2's first line.
+//  Eq 3, Eq 4       the text says the normalised signal e*, the formula prints e. It is e*, signed, with
+//                   compression negative, so that positive gains give the force ON the finger.
 //  Eq 4, x          only E8 and E9 have an arm about x; M_x is replaced by the lever c x F.
-//  III.D            "cross product of force and the moment": r x F, as Eq 4 itself has it.
+//  III.D            "cross product of force and the moment" means r x F, as in Eq 4 itself.
 //
 // Units: counts for signals (double), mm, N, N*mm; gains N per count.
 #ifndef BIOTAC_LIN2013_H
@@ -27,7 +27,7 @@ typedef struct {
 
 typedef struct {
     double centroid_mm[3]; // Eq 1, before it is moved to the surface
-    double poc_mm[3];      // Eq 2; NaN when nothing weighs
+    double poc_mm[3];      // Eq 2; NaN when all weights are 0
     double force_sum[3];   // sum of e n, count
     double torque_sum[3];  // sum of e (r x n), count*mm
     double force_n[3];     // Eq 3
@@ -36,8 +36,8 @@ typedef struct {
 
 void lin2013(const double e[BT_ELECTRODES], const lin2013_settings *settings, lin2013_result *result);
 
-// For n frames: counts (n, 19) and tare_q4 (n, 19) in 1/16 count, either BT_INVALID_COUNT for an
-// electrode that then counts as zero signal; poc_mm, force_n, torque_nmm (n, 3).
+// For n frames: counts (n, 19) and tare_q4 (n, 19) in 1/16 count; an electrode with BT_INVALID_COUNT in
+// either has zero signal; poc_mm, force_n, torque_nmm (n, 3).
 void lin2013_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                     const lin2013_settings *settings, double *poc_mm, double *force_n, double *torque_nmm);
 

@@ -10,7 +10,7 @@
 #define VERSION_BYTES 4
 #define QUERY_READS   3
 #define QUERY_STEPS   (1 + VERSION_BYTES + 2 * (1 + BT_SERIAL_CHARS))
-_Static_assert(QUERY_STEPS <= BT_SLOTS, "a round is enough to ask who is there");
+_Static_assert(QUERY_STEPS <= BT_SLOTS, "one round must suffice to ask");
 
 bool bt_property_step(bt_property *property, uint8_t finger)
 {
@@ -52,7 +52,7 @@ void bt_serial_query_step(bt_serial_query *query, uint8_t finger)
 
 // ---- what may be taken for a property ---------------------------------------------------------------
 
-// 0x00 and 0xFF end a text (CLIB); what stands behind is cut off. False when it is none.
+// 0x00 and 0xFF end a text (CLIB); the rest is cut off. Returns false if it is not a text.
 static bool trim_text(uint8_t *text, unsigned bytes)
 {
     unsigned end = 0;
@@ -64,8 +64,8 @@ static bool trim_text(uint8_t *text, unsigned bytes)
     return ends && end > 0;
 }
 
-// Those of 24 electrodes (BioTac SP: BTSP; BTTB) answer to the same commands, with other electrodes
-// elsewhere.
+// Sensors with 24 electrodes (BioTac SP: BTSP; BTTB) answer the same commands, but have other electrodes in
+// other places.
 static bool trim_serial(uint8_t serial[BT_SERIAL_CHARS])
 {
     return trim_text(serial, BT_SERIAL_CHARS) && memcmp(serial, "BT", 2) == 0

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-// port_now_us() truncates, so a time that must not be short needs one us more.
+// port_now_us() truncates, so a minimum time needs one us more.
 #define SETTLE_TICKS_US (BT_SETTLE_US + 1)
 
 _Static_assert((BT_SLOT_RING & (BT_SLOT_RING - 1)) == 0 && BT_SLOT_RING <= 128,
@@ -17,8 +17,8 @@ void bt_sampler_start(bt_sampler *sampler, uint8_t fingers, uint32_t start_us)
     sampler->slot_start_us = start_us;
 }
 
-// Only the interrupt writes it: a plain load and store, where ++ would ask for an atomic
-// read-modify-write that a Cortex-M0+ does not have.
+// Only the interrupt writes it, so a plain load and store will do; ++ would need an atomic read-modify-write,
+// which a Cortex-M0+ does not have.
 static void count_late(bt_sampler *sampler)
 {
     uint32_t late = atomic_load_explicit(&sampler->late, memory_order_relaxed);
@@ -91,7 +91,7 @@ static void advance(bt_sampler *sampler)
     }
 }
 
-// To every sensor at once. Returns when to go on: when they have settled, or been read.
+// Command every sensor at once. Returns when to go on: when they have settled or, by hardware, been read.
 static uint32_t command(bt_sampler *sampler)
 {
     uint8_t code = bt_channel_command[bt_slot_channel[sampler->current.slot]];
@@ -104,7 +104,7 @@ static uint32_t command(bt_sampler *sampler)
         return port_now_us() + busy_us;
     }
     port_spi_select(mask);
-    // All selected sensors drive MISO at once here; whatever it carries means nothing.
+    // All selected sensors drive MISO at once here, so what it carries means nothing.
     (void)port_spi_transfer16((uint16_t)(code << 8));
     port_spi_select(0);
     return port_now_us() + SETTLE_TICKS_US;
@@ -118,7 +118,7 @@ static uint16_t read_one(uint8_t f)
     return word;
 }
 
-// One by one; those that are not there read as silent.
+// Read the sensors one by one; absent ones read as silent.
 static void read_sensors(bt_sampler *sampler)
 {
     if (sampler->by_itself) {
@@ -134,7 +134,7 @@ static void read_sensors(bt_sampler *sampler)
             continue;
         }
         if (asked) {
-            bt_serial_query_step(&sampler->query[f], f); // waits for its byte: one round in a long while
+            bt_serial_query_step(&sampler->query[f], f); // waits for its byte, but only rarely
         } else {
             sampler->current.word[f] = read_one(f);
         }
@@ -153,8 +153,8 @@ uint32_t bt_sampler_alarm(bt_sampler *sampler)
     sampler->commanded = false;
     push(sampler);
     advance(sampler);
-    // An interrupt held off for longer than a slot loses slots, never the time base; and the next command is
-    // no sooner after the last read than the bus allows.
+    // An interrupt held off for longer than a slot loses slots, but not the time base. The next command must
+    // not follow the last read sooner than the bus allows.
     while ((int32_t)(sampler->slot_start_us - port_now_us()) <= BT_GAP_US) {
         count_late(sampler);
         advance(sampler);

@@ -1,11 +1,11 @@
 // Slot sampling of one to five sensors, driven by one timer alarm.
 //
-// A slot: all chip selects low, sample command to every sensor at once, chip selects high; at least
-// 50 us later each sensor is read by its own chip select. Nothing spins through the 50 us; where the board's
-// hardware does the whole slot, the core only begins and ends it. Words go to the main
-// loop undecoded through a single-producer, single-consumer ring; when the main loop is late, whole slots are
-// lost and counted, and the channels they held are missing from their frame. A word stays with the finger
-// whose chip select was low, whatever its neighbours answered.
+// A slot: all chip selects low, sample command to every sensor at once, chip selects high; at least 50 us
+// later each sensor is read by its own chip select. The core does not spin through the 50 us, and where the
+// board's hardware does the whole slot, the core only begins and ends it. Words go to the main loop undecoded
+// through a single-producer, single-consumer ring. When the main loop is late, whole slots are lost and
+// counted, and their channels are missing from the frame. A word belongs to the finger whose chip select was
+// low, whatever its neighbours answered.
 #ifndef BIOTAC_SAMPLER_H
 #define BIOTAC_SAMPLER_H
 
@@ -22,21 +22,20 @@ typedef struct {
     uint32_t round; // frame number since start
     uint32_t t_us;  // when the sample command was sent
     uint8_t slot;
-    uint8_t
-        asked; // bit mask: these were not sampled, but asked who they are; the same in all slots of a round
+    uint8_t asked; // bit mask of fingers asked for their serial number in this round, not sampled
     uint16_t word[BT_MAX_FINGERS];
 } bt_slot;
 
 typedef struct {
     uint8_t fingers; // bit mask of the sensors that are read
     bool commanded;  // the command is out, the reads are due
-    bool by_itself;  // the slot under way is the hardware's, see port_spi_slot_begin
+    bool by_itself;  // hardware does the slot under way (port_spi_slot_begin)
     bt_slot current;
     uint32_t slot_start_us;
-    uint32_t fraction;                     // of slot_start_us, in 1/BT_SLOT_HZ us
-    atomic_uchar ask;                      // whom to ask; set by the main loop when 0, taken by the interrupt
-    uint32_t ask_round;                    // from this round on; written before ask
-    bt_serial_query query[BT_MAX_FINGERS]; // of the fingers asked last; whole when their round is
+    uint32_t fraction;  // of slot_start_us, in 1/BT_SLOT_HZ us
+    atomic_uchar ask;   // fingers to ask; set by the main loop when 0, taken by the interrupt
+    uint32_t ask_round; // from this round on; written before ask
+    bt_serial_query query[BT_MAX_FINGERS]; // of the fingers asked last; whole once their round is
     bt_slot ring[BT_SLOT_RING];
     atomic_uchar head;     // written by the interrupt only
     atomic_uchar tail;     // written by the main loop only
@@ -50,9 +49,9 @@ void bt_sampler_start(bt_sampler *sampler, uint8_t fingers, uint32_t start_us);
 // over.
 uint32_t bt_sampler_alarm(bt_sampler *sampler);
 
-// Main loop: ask these fingers who they are instead of sampling them, for one whole round, the given one or
-// the first after it. The answers are theirs in query, once that round's slots have come. False: another
-// asking is still to come.
+// Main loop: ask these fingers for their serial numbers instead of sampling them, for one whole round: the
+// given one or the first after it. Their answers are in query once that round's slots have come. Returns
+// false if an earlier request is still pending.
 bool bt_sampler_ask(bt_sampler *sampler, uint8_t fingers, uint32_t round);
 
 // Main loop: take the oldest slot. False when there is none.

@@ -15,7 +15,7 @@ enum bt_word bt_word_decode(uint16_t word, uint16_t *count)
     uint8_t high = (uint8_t)(word >> 8);
     uint8_t low = (uint8_t)word;
     *count = BT_INVALID_COUNT;
-    // Parity decides first: an error word begins 0xA5, which is even, and so never is data.
+    // Parity decides first: an error word begins with 0xA5, which has even parity, so it is never data.
     if (odd_parity(high) && odd_parity(low)) {
         *count = (uint16_t)((high >> 1) * 32 + (low >> 3));
         return BT_WORD_GOOD;

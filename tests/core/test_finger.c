@@ -370,6 +370,20 @@ static void a_move_of_any_electrode_alone_is_one(void **state)
     }
 }
 
+// A finger whose electrodes stand at 3000, and were tared there.
+static void tared_at_3000(bt_round *round, bt_tare *tare, uint32_t threshold_count2)
+{
+    bt_tare_reset(tare);
+    memset(round, 0, sizeof *round);
+    tare->tared = true;
+    tare->trigger.unknown = 0;
+    tare->threshold_count2 = threshold_count2;
+    for (int i = 0; i < BT_ELECTRODES; i++) {
+        round->electrode[i] = 3000;
+        tare->electrode_q4[i] = 16 * 3000;
+    }
+}
+
 // Of a finger with these signals on E2, E12, E17 and E18, on its pad, and none on all others.
 static bool torsion_ok(const int pad_q4[4], uint32_t threshold_count2)
 {
@@ -381,15 +395,7 @@ static bool torsion_ok(const int pad_q4[4], uint32_t threshold_count2)
     bt_round round;
     bt_tare tare;
     bt_msg_frame msg;
-    bt_tare_reset(&tare);
-    memset(&round, 0, sizeof round);
-    tare.tared = true;
-    tare.trigger.unknown = 0;
-    tare.threshold_count2 = threshold_count2;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        round.electrode[i] = 3000;
-        tare.electrode_q4[i] = 16 * 3000;
-    }
+    tared_at_3000(&round, &tare, threshold_count2);
     for (int k = 0; k < 4; k++) {
         tare.electrode_q4[pad[k]] = (uint16_t)(16 * 3000 - pad_q4[k]);
     }
@@ -405,15 +411,13 @@ static uint32_t shape_flags(const int e_q4[7], bool missing, uint32_t threshold_
     bt_round round;
     bt_tare tare;
     bt_msg_frame msg;
-    bt_tare_reset(&tare);
-    memset(&round, 0, sizeof round);
-    tare.tared = true;
-    tare.trigger.unknown = 0;
-    tare.trigger.missing = missing;
-    tare.threshold_count2 = threshold_count2;
-    for (int i = 0; i < BT_ELECTRODES; i++) {
-        round.electrode[i] = missing && i == BT_ELECTRODES - 1 ? BT_INVALID_COUNT : 3000;
-        tare.electrode_q4[i] = (uint16_t)(16 * 3000 - (i < 7 ? e_q4[i] : 0));
+    tared_at_3000(&round, &tare, threshold_count2);
+    if (missing) {
+        tare.trigger.missing = true;
+        round.electrode[BT_ELECTRODES - 1] = BT_INVALID_COUNT;
+    }
+    for (int i = 0; i < 7; i++) {
+        tare.electrode_q4[i] = (uint16_t)(16 * 3000 - e_q4[i]);
     }
     bt_results(&round, &tare, &settings, BT_QUANTITY_FLAG_POC, &msg);
     return msg.flags & (BT_FRAME_FLAG_POC_LOW | BT_FRAME_FLAG_SHEAR_MIX);

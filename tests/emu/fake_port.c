@@ -1,7 +1,5 @@
 #include "fake_port.h"
 
-#include "support.h"
-
 #include "port.h"
 #include "spi_word_by_word.h"
 #include "wire/messages_gen.h"
@@ -25,8 +23,7 @@ static uint64_t seed;
 void fake_reset(bt_emu_source source, uint64_t start_ns)
 {
     memset(&fake, 0, sizeof fake);
-    memset(fake.flash, 0xFF, sizeof fake.flash);
-    fake.flash_left = fake.operations_left = -1;
+    flash_new(&fake.flash, fake.kept, sizeof fake.kept);
     fake.now_ns = start_ns;
     fake.shortest_gap_ns = UINT64_MAX;
     fake.link_up = true;
@@ -36,9 +33,7 @@ void fake_reset(bt_emu_source source, uint64_t start_ns)
     incoming_bytes = 0;
     seed = 1;
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        char serial[17] = "BTEMU00000000000";
-        serial[15] = (char)('1' + f);
-        bt_emu_init(&fake.sensor[f], f, true, serial, source, NULL);
+        bt_emu_init(&fake.sensor[f], f, true, "", source, NULL);
     }
 }
 
@@ -167,37 +162,9 @@ void port_link_uart(uint32_t bits_per_s, uint32_t pins)
     (void)pins;
 }
 
-static void change(uint32_t at, uint8_t value)
-{
-    if (fake.flash_left == 0) {
-        uint8_t changing = (uint8_t)(fake.flash[at] ^ value);
-        fake.flash[at] ^= fake.flash_ragged ? changing & 0x5A : 0;
-        longjmp(fake.power_fails, 1);
-    }
-    fake.flash_left -= fake.flash_left > 0;
-    fake.flash[at] = value;
-}
-
-static void operation(uint32_t at, uint32_t bytes, const uint8_t *page)
-{
-    if (fake.operations_left == 0) {
-        for (uint32_t k = 0; fake.flash_inside && k < bytes; k++) {
-            uint8_t *byte = &fake.flash[at + k];
-            uint8_t value = page == NULL ? 0xFF : *byte & page[k];
-            *byte ^= (uint8_t)((*byte ^ value) & random_u64(&fake.flash_seed));
-        }
-        longjmp(fake.power_fails, 1);
-    }
-    fake.operations_left -= fake.operations_left > 0;
-}
-
 bool port_flash_erase(uint32_t sector_offset)
 {
-    fake.erases++;
-    operation(sector_offset, BT_FLASH_SECTOR_BYTES, NULL);
-    for (uint32_t k = 0; k < BT_FLASH_SECTOR_BYTES; k++) {
-        change(sector_offset + k, 0xFF);
-    }
+    flash_erase(&fake.flash, sector_offset);
     return true;
 }
 
@@ -206,21 +173,18 @@ bool port_flash_program(uint32_t page_offset, const uint8_t *page)
     if (fake.flash_broken) {
         return false;
     }
-    operation(page_offset, BT_FLASH_PAGE_BYTES, page);
-    for (uint32_t k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
-        change(page_offset + k, fake.flash[page_offset + k] & page[k]);
-    }
+    flash_program(&fake.flash, page_offset, page);
     return true;
 }
 
 void port_flash_read(uint32_t offset, uint8_t *data, size_t bytes)
 {
-    memcpy(data, fake.flash + offset, bytes);
+    memcpy(data, fake.kept + offset, bytes);
 }
 
 const uint8_t *port_flash_maps(void)
 {
-    return fake.flash + BT_STORAGE_BYTES;
+    return fake.kept + BT_STORAGE_BYTES;
 }
 
 bool port_reboot_bootloader(void)

@@ -3,12 +3,13 @@
 #ifndef BIOTAC_TEST_FAKE_PORT_H
 #define BIOTAC_TEST_FAKE_PORT_H
 
+#include "failing_flash.h"
+
 #include "device.h"
 #include "map/store.h"
 #include "port.h"
 #include "wire/sensor_gen.h"
 
-#include <setjmp.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -34,15 +35,9 @@ typedef struct {
 
     bool link_up;
 
-    _Alignas(4) uint8_t flash[BT_KEPT_BYTES];
-    bool flash_broken;    // programs nothing
-    long flash_left;      // bytes that are still erased or programmed before power fails; -1: it holds
-    long operations_left; // erases and programs that are still done before it fails; -1: it holds
-    bool flash_inside;    // it fails within the next one: of its bits that change some are done, all over it
-    uint64_t flash_seed;
-    bool flash_ragged; // of the byte at which it fails some bits are done
-    int erases;
-    jmp_buf power_fails; // where to go then
+    _Alignas(4) uint8_t kept[BT_KEPT_BYTES];
+    failing_flash flash; // of what is kept
+    bool flash_broken;   // programs nothing
     bool has_loader;
     int reboots; // how often the loader was asked for
 } fake_port;

@@ -91,7 +91,7 @@ static uint32_t has(uint8_t finger, int blocks)
 static bool upload_and_save_with_cut(uint32_t number, int blocks, long *left, long cut)
 {
     *left = cut;
-    if (setjmp(fake.power_fails) != 0) {
+    if (setjmp(fake.flash.power_fails) != 0) {
         *left = -1;
         return false;
     }
@@ -105,9 +105,9 @@ static void cut_everywhere(int blocks, uint32_t first, uint32_t saves, long at_l
 {
     long cuts = 0;
     for (uint32_t number = first + 1; number <= first + saves; number++) {
-        memcpy(before, fake.flash, sizeof before);
+        memcpy(before, fake.kept, sizeof before);
         long cut = 0;
-        for (; !upload_and_save_with_cut(number, blocks, &fake.flash_left, cut); cut++) {
+        for (; !upload_and_save_with_cut(number, blocks, &fake.flash.bytes_left, cut); cut++) {
             power_on();
             uint32_t found = has(0, blocks);
             assert_true(found == number - 1 || found == number);
@@ -118,7 +118,7 @@ static void cut_everywhere(int blocks, uint32_t first, uint32_t saves, long at_l
                 assert_int_equal(has(0, blocks), 500);
                 assert_int_equal(has(1, 3), 77);
             }
-            memcpy(fake.flash, before, sizeof before);
+            memcpy(fake.kept, before, sizeof before);
             power_on();
         }
         cuts += cut;
@@ -148,7 +148,7 @@ static void a_cut_at_any_byte_leaves_the_old_map_or_the_new(void **state)
 static void nor_do_half_done_bytes_matter(void **state)
 {
     (void)state;
-    fake.flash_ragged = true;
+    fake.flash.ragged = true;
     upload_and_save(0, 1, 5);
     cut_everywhere(5, 1, 2, 2 * (BT_FLASH_SECTOR_BYTES + 5 * BT_FLASH_PAGE_BYTES));
 }
@@ -160,11 +160,11 @@ static void nor_while_the_records_sector_changes(void **state)
     int erases;
     upload_and_save(0, number, 1);
     do { // until the save after this one needs the other sector too, beside the map's
-        memcpy(before, fake.flash, sizeof before);
-        erases = fake.erases;
+        memcpy(before, fake.kept, sizeof before);
+        erases = fake.flash.erases;
         upload_and_save(0, ++number, 1);
-    } while (fake.erases - erases == 1);
-    memcpy(fake.flash, before, sizeof before);
+    } while (fake.flash.erases - erases == 1);
+    memcpy(fake.kept, before, sizeof before);
     power_on();
     cut_everywhere(1, number - 1, 1, 2 * BT_FLASH_SECTOR_BYTES + 5 * BT_FLASH_PAGE_BYTES);
 }
@@ -174,16 +174,17 @@ static void nor_where_and_how_an_operation_is_cut(void **state)
 {
     (void)state;
     int at = 0, within = 0;
-    fake.flash_seed = 17;
+    fake.flash.seed = 17;
     upload_and_save(0, 1, 5);
     for (uint32_t number = 2; number <= 6; number++) {
-        memcpy(before, fake.flash, sizeof before);
+        memcpy(before, fake.kept, sizeof before);
         for (int turn = 0; turn < 4; turn++) {
-            fake.flash_inside = turn > 0;
-            memcpy(fake.flash, before, sizeof before);
+            fake.flash.inside = turn > 0;
+            memcpy(fake.kept, before, sizeof before);
             power_on();
-            for (long cut = 0; !upload_and_save_with_cut(number, 5, &fake.operations_left, cut); cut++) {
-                *(fake.flash_inside ? &within : &at) += 1;
+            for (long cut = 0; !upload_and_save_with_cut(number, 5, &fake.flash.operations_left, cut);
+                 cut++) {
+                *(fake.flash.inside ? &within : &at) += 1;
                 power_on();
                 uint32_t found = has(0, 5);
                 assert_true(found == number - 1 || found == number);
@@ -191,7 +192,7 @@ static void nor_where_and_how_an_operation_is_cut(void **state)
                 upload_and_save(0, 500, 5); // what the cut left behind is no obstacle
                 power_on();
                 assert_int_equal(has(0, 5), 500);
-                memcpy(fake.flash, before, sizeof before);
+                memcpy(fake.kept, before, sizeof before);
                 power_on();
             }
         }

@@ -7,7 +7,7 @@
 #define MADE_AT  BT_SERIAL_BYTES
 #define VALUE_AT (MADE_AT + 4)
 
-#define VALUES_OF_VERSION_1 7 // the first by id; what came later is as by default
+#define VALUES_OF_VERSION_1 7 // the first by id; the rest take their defaults
 
 _Static_assert(BT_SERIAL_BYTES == sizeof(((bt_msg_sensor_info *)NULL)->serial)
                    && BT_SERIAL_BYTES == sizeof(((bt_msg_calibration *)NULL)->serial)

@@ -61,7 +61,7 @@ void bt_settings_unpack(bt_settings *settings, uint16_t version, const uint8_t *
     for (; bytes >= BT_SETTING_PAIR_BYTES; record += BT_SETTING_PAIR_BYTES, bytes -= BT_SETTING_PAIR_BYTES) {
         int at = find(record[0]);
         named |= at < 0 ? 0 : 1u << at;
-        // Refused: the default stays.
+        // A refused value leaves the default.
         (void)bt_settings_set(settings, record[0], (int32_t)bt_get_u32(record + 1));
     }
     for (int k = 0; k < BT_SETTINGS; k++) {
@@ -70,4 +70,4 @@ void bt_settings_unpack(bt_settings *settings, uint16_t version, const uint8_t *
         }
     }
 }
-_Static_assert(BT_SETTINGS <= 32, "a bit a setting");
+_Static_assert(BT_SETTINGS <= 32, "each setting must have a bit");

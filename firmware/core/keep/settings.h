@@ -21,9 +21,10 @@ uint8_t bt_settings_set(bt_settings *settings, uint8_t id, int32_t value);
 
 uint8_t bt_settings_has(uint8_t id);
 
-// As a stored record: pairs of u8 id and i32 value, so that a firmware with more or fewer settings, or other
-// ranges, takes over what it knows. What the record does not name stays as it was with the firmware that
-// wrote it, which had no such setting; a value that is refused leaves the default.
+// The stored record: pairs of u8 id and i32 value, so that firmware with more or fewer settings, or other
+// ranges, takes over what it knows. A setting that the record does not name was unknown to the firmware that
+// wrote it, and gets the value that behaves like that firmware (`before`). A value that is refused leaves the
+// default.
 #define BT_SETTINGS_RECORD_VERSION 1
 #define BT_SETTING_PAIR_BYTES      5
 #define BT_SETTINGS_RECORD_BYTES   (BT_SETTINGS * BT_SETTING_PAIR_BYTES)

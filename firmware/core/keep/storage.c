@@ -7,8 +7,8 @@
 
 #define PAGES     (BT_FLASH_SECTOR_BYTES / BT_FLASH_PAGE_BYTES)
 #define MAGIC     0x52544F42u // "BOTR"
-#define IN_USE_ID 0xFFFE      // of a sector's first page, whose data is the generation
-#define CRC_AT    12          // the CRC covers the page up to it, and the data behind it
+#define IN_USE_ID 0xFFFE      // id of a sector's first page, whose data is the generation
+#define CRC_AT    12          // the CRC covers the whole page, with its own four bytes taken as erased
 #define NO_SECTOR (-1)
 
 _Static_assert(BT_STORAGE_IDS < PAGES - 1, "one record of each id and a new one must fit a sector");
@@ -16,7 +16,6 @@ _Static_assert(BT_STORAGE_IDS < PAGES - 1, "one record of each id and a new one 
 // ---- one page -------------------------------------------------------------------------------------
 // u32 magic, u16 id, u16 version, u32 size, u32 CRC-32, data; the rest stays erased.
 
-// The CRC's own four bytes count as erased ones.
 static uint32_t page_crc(const uint8_t page[BT_FLASH_PAGE_BYTES])
 {
     uint8_t copy[BT_FLASH_PAGE_BYTES];
@@ -75,7 +74,7 @@ static bool keep_page(const bt_flash *flash, int sector, int page, const uint8_t
 
 // ---- sectors ---------------------------------------------------------------------------------------
 
-// The sector in use: of two that say so, the one that was taken into use later.
+// The sector in use; if both say so, the one that took over later.
 static int sector_in_use(const bt_flash *flash, uint32_t *generation)
 {
     int found = NO_SECTOR;
@@ -95,7 +94,7 @@ static int sector_in_use(const bt_flash *flash, uint32_t *generation)
     return found;
 }
 
-// The page of the latest whole record of this id, left in out; 0 when there is none.
+// The number of the page with the latest whole record of this id, read into out; 0 when there is none.
 static int latest(const bt_flash *flash, int sector, uint16_t id, uint8_t out[BT_FLASH_PAGE_BYTES])
 {
     for (int page = PAGES - 1; page > 0; page--) {
@@ -107,7 +106,7 @@ static int latest(const bt_flash *flash, int sector, uint16_t id, uint8_t out[BT
     return 0;
 }
 
-// The page after the last one that was ever written to; PAGES when there is none left.
+// The page after the last one ever written; PAGES when none is left.
 static int first_free(const bt_flash *flash, int sector)
 {
     uint8_t page[BT_FLASH_PAGE_BYTES];
@@ -122,7 +121,7 @@ static int first_free(const bt_flash *flash, int sector)
     return at;
 }
 
-// The record and the latest of every other id into the other sector, then that one into use.
+// Write the record and the latest one of every other id to the other sector, then switch to that sector.
 static bool move_on(const bt_flash *flash, int from, uint32_t generation, uint16_t id,
                     const uint8_t record[BT_FLASH_PAGE_BYTES])
 {
@@ -171,7 +170,7 @@ bool bt_storage_damaged(const bt_flash *flash)
     uint32_t generation;
     int used = sector_in_use(flash, &generation);
     for (int sector = 0; sector < 2; sector++) {
-        // Of the sector that is not in use the first page alone counts: the rest is of before, or half moved.
+        // In the unused sector only the first page counts: the rest is old, or a copy cut short.
         for (int at = 0; at < (sector == used ? PAGES : 1); at++) {
             read_page(flash, sector, at, page);
             if (!page_blank(page) && !page_whole(page)) {
@@ -198,7 +197,7 @@ bool bt_storage_write(const bt_flash *flash, uint16_t id, uint16_t version, cons
     if (latest(flash, sector, id, page) != 0 && memcmp(page, record, sizeof page) == 0) {
         return true;
     }
-    // A page that does not take the record stays behind as torn; the next one may.
+    // A page that fails to take the record stays damaged; the next one may take it.
     for (int at = first_free(flash, sector); at < PAGES; at++) {
         if (keep_page(flash, sector, at, record)) {
             return true;

@@ -1,5 +1,4 @@
-// The largest magnitudes of a map's factors: what bt_map_open bounds sums with, and what bt_map_wrench
-// asserts.
+// The largest magnitudes of a map's factors, by which bt_map_open bounds its sums; evaluate.c asserts them.
 #ifndef BIOTAC_MAP_BOUNDS_H
 #define BIOTAC_MAP_BOUNDS_H
 
@@ -8,7 +7,7 @@
 #define BT_MAP_SIGNAL_MAX   (BT_FULL_SCALE_COUNT << BT_MAP_SIGNAL_Q)
 #define BT_MAP_PRESSURE_MAX (BT_FULL_SCALE_COUNT << BT_MAP_PRESSURE_Q)
 
-// By kind, as enum bt_map_kind has them.
+// In the order of enum bt_map_kind.
 #define BT_MAP_FACTOR_MAX                                                                                    \
     {1 << BT_MAP_ONE_Q, BT_MAP_SIGNAL_MAX,  BT_MAP_SIGNAL_MAX,  BT_MAP_SIGNAL_MAX,                           \
      BT_MAP_SIGNAL_MAX, BT_CONDUCTANCE_MAX, BT_CONDUCTANCE_MAX, BT_MAP_PRESSURE_MAX}

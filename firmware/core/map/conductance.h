@@ -1,5 +1,5 @@
-// By how much an electrode conducts otherwise than at rest: G(count) / G(tare) - 1 = e 4095 / ((4095 - count)
-// tare), e = count - tare, without a division.
+// An electrode's relative change of conductance since rest, computed without a division:
+// G(count) / G(tare) - 1 = e 4095 / ((4095 - count) tare), e = count - tare.
 #ifndef BIOTAC_CONDUCTANCE_H
 #define BIOTAC_CONDUCTANCE_H
 
@@ -14,17 +14,18 @@
 #define BT_CONDUCTANCE_MAX_Q4 (16 * BT_MAP_COUNT_MAX)
 #define BT_CONDUCTANCE_MAX    (BT_MAP_RATIO_MAX << BT_MAP_CONDUCTANCE_Q)
 
-// Of the product below. From the least divisor on, shifting it up by 17 at most fills these bits.
+// Bits of the divisor, (4095 - count) tare. From BT_DIVISOR_MIN on, shifting it up by at most 17 fills them.
 #define BT_DIVISOR_BITS 28
 #define BT_DIVISOR_MIN  1024
 _Static_assert((int64_t)BT_CONDUCTANCE_MAX_Q4 *BT_FULL_SCALE_COUNT < 1 << BT_DIVISOR_BITS, "must fit");
-_Static_assert(BT_DIVISOR_MIN << 17 == 1 << (BT_DIVISOR_BITS - 1), "must be shifted up by 17 at most");
+_Static_assert(BT_DIVISOR_MIN << 17 == 1 << (BT_DIVISOR_BITS - 1), "must be shifted up by 17");
 _Static_assert(((int64_t)BT_FULL_SCALE_COUNT << BT_MAP_CONDUCTANCE_Q) / BT_DIVISOR_MIN > BT_CONDUCTANCE_MAX,
                "with the least divisor even a sixteenth of a count must be limited");
 _Static_assert(BT_MAP_CONDUCTANCE_Q == 13 && BT_MAP_GUESS_BITS == 6, "the shifts below are for these");
 
-// e 4095 / den in 2^-CONDUCTANCE_Q, off by at most 0.5 + 0.52 times its size of such units (tests/core/map).
-// |e| y < 2^32, and over 2^18 it is u, of a divisor that has all its bits.
+// e 4095 / den in units of 2^-CONDUCTANCE_Q, off by at most 0.5 + 0.52 |e 4095 / den| of them
+// (tests/core/map). y is the reciprocal of the normalised divisor: |e| y < 2^32, and |e| y / 2^18 is u for a
+// divisor that has all its bits.
 static inline int32_t bt_conductance_of(int32_t e_q4, uint32_t den)
 {
     static const uint16_t guesses[1 << BT_MAP_GUESS_BITS] = BT_MAP_GUESSES;
@@ -39,10 +40,11 @@ static inline int32_t bt_conductance_of(int32_t e_q4, uint32_t den)
     return bt_with_sign(u < BT_CONDUCTANCE_MAX ? u : BT_CONDUCTANCE_MAX, e_q4);
 }
 
-// What most counts and tares are: within what maps were trained on, and no divisor below the least.
+// True for most counts and tares: they are within the range that maps were trained on, and their divisor is
+// not below BT_DIVISOR_MIN.
 #define BT_PLAIN_TARE_Q4 1024
 _Static_assert((BT_FULL_SCALE_COUNT - BT_MAP_COUNT_MAX) * BT_PLAIN_TARE_Q4 >= BT_DIVISOR_MIN,
-               "no divisor below");
+               "a plain count and tare must make no divisor below the least");
 
 static inline bool bt_is_plain(uint32_t count, uint32_t tare_q4)
 {
@@ -50,7 +52,7 @@ static inline bool bt_is_plain(uint32_t count, uint32_t tare_q4)
            && tare_q4 - BT_PLAIN_TARE_Q4 <= BT_CONDUCTANCE_MAX_Q4 - BT_PLAIN_TARE_Q4;
 }
 
-// Of any count and tare, brought into what maps were trained on; 0 where either is missing.
+// For any count and tare, limited to the range that maps were trained on; 0 where either is missing.
 static inline int32_t bt_conductance_of_any(int32_t count, int32_t tare_q4)
 {
     int32_t now = bt_limited(count, BT_MAP_COUNT_MIN, BT_MAP_COUNT_MAX);
@@ -59,7 +61,7 @@ static inline int32_t bt_conductance_of_any(int32_t count, int32_t tare_q4)
     if (count == BT_INVALID_COUNT || tare_q4 == BT_INVALID_COUNT) {
         return 0;
     }
-    // below the least divisor it is limited all the same
+    // with a smaller divisor the result is limited anyway
     return bt_conductance_of(16 * now - at_rest_q4, den < BT_DIVISOR_MIN ? BT_DIVISOR_MIN : den);
 }
 

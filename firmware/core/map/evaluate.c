@@ -1,11 +1,11 @@
-// A map's sums: factors and coefficients of 16 bits, sums of 32.
+// Evaluates a map: 16-bit factors and coefficients, 32-bit sums.
 #include "map/bounds.h"
 #include "map/map.h"
 #include "map/words.h"
 #include "signal/signals.h"
 
-// What bt_map_open sees to: no row's, block's or pairs' sum is above INT32_MAX with its rounding, nor is the
-// sum of all blocks. What no coefficient has a say in:
+// bt_map_open makes sure that the sums of rows, pairs, blocks and all blocks stay within INT32_MAX, rounding
+// included. The following bounds do not depend on coefficients.
 _Static_assert(((INT32_MAX >> BT_MAP_GATE_CUT) + (int64_t)1) * BT_MAP_GATE_MAX
                        + (1 << (BT_MAP_EXPONENT_MAX - 1))
                    <= INT32_MAX,
@@ -13,7 +13,7 @@ _Static_assert(((INT32_MAX >> BT_MAP_GATE_CUT) + (int64_t)1) * BT_MAP_GATE_MAX
 _Static_assert(BT_MAP_RESULT_MAX < INT32_MAX, "a result must fit the message");
 _Static_assert(BT_E_MAX_Q4 >> (4 - BT_MAP_SIGNAL_Q) == BT_MAP_SIGNAL_MAX, "a signal must be a factor");
 
-// The factors of a kind: of the electrodes, and the first ones again for pairs that go round the ring.
+// A factor for each electrode, then the first ones again, for pairs that wrap around the ring.
 #define RING (BT_ELECTRODES + BT_MAP_ROW - 1)
 
 typedef struct {
@@ -36,7 +36,7 @@ static const uint16_t factors_at[BT_MAP_KINDS] = {
     [BT_MAP_KIND_PRESSURE] = offsetof(features, pressure),
 };
 
-// Half up; adding before the last bit goes needs no constant, and cannot overflow.
+// Rounds half up. Adding 1 before the last bit is shifted out needs no constant, and cannot overflow.
 static int32_t rounded(int32_t value, int bits)
 {
     return bt_shift_down(bt_shift_down(value, bits - 1) + 1, 1);
@@ -58,7 +58,8 @@ _Static_assert((MOMENT_MAX << GATE_SHIFT) + BT_ELECTRODES * (BT_MAP_SIGNAL_MAX +
                "a moment must fit int32");
 _Static_assert((int64_t)BT_MAP_GATE_MAX *BT_MAP_GATE_MAX <= INT32_MAX, "a gate's square must fit int32");
 
-// Of the compressions, weighed so that noise throws their centroid nowhere.
+// Moments of the compressions. FLOOR is added to each weight, so that noise alone cannot move the centroid
+// far.
 typedef struct {
     int32_t weight, along, across;
 } moments;
@@ -103,7 +104,7 @@ static int32_t gate_of(int32_t moment, int32_t weight)
     return bt_with_sign(bt_div_round_u32(bt_abs32(moment) << GATE_SHIFT, (uint32_t)weight), moment);
 }
 
-// Of the compressions' centroid over its reaches.
+// The compressions' centroid, in units of its reach, and its products.
 static void gates(const moments *of, int32_t gate[BT_MAP_GATES])
 {
     int32_t x = gate_of(of->along, of->weight);
@@ -136,9 +137,9 @@ static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
 
 // ---- sums ----------------------------------------------------------------------------------------------
 
-// Adds a row of so many axes side by side, two columns at a time: as many words as axes. Everything here is
-// inlined for either width, and in this order one factor, one word and the sums are all that needs a
-// register.
+// Add a row's products to the sums of `width` axes. The axes' coefficients lie side by side, so two columns
+// are as many words as axes. All of this is inlined for each width; in this order, only one factor, one word
+// and the sums need a register.
 static inline void add_row(const int32_t f[BT_MAP_ROW], const bt_map_word *word, int width, int32_t sum[])
 {
     BT_UNROLL
@@ -159,7 +160,7 @@ static inline void add_row(const int32_t f[BT_MAP_ROW], const bt_map_word *word,
     }
 }
 
-// The sums are in a room of their own until they are done: what is written through a pointer might be a word.
+// Sums are kept in a local array: the compiler must assume that a write through `sum` changes a word.
 static inline void line(const int32_t f[BT_MAP_LINE_HALVES], const bt_map_word *word, int width,
                         int32_t sum[])
 {
@@ -172,7 +173,7 @@ static inline void line(const int32_t f[BT_MAP_LINE_HALVES], const bt_map_word *
     }
 }
 
-// A row's sum times the factor that its products share, over 2^ROW_CUT, in two products of 16 bits.
+// A row's sum times the factor that its products share, divided by 2^ROW_CUT, in two 16-bit products.
 static inline int32_t cut_product(int32_t row, int32_t factor)
 {
     return bt_shift_down(row, 16) * factor + bt_shift_down((int32_t)(uint16_t)row * factor, 16);
@@ -182,7 +183,7 @@ _Static_assert(BT_MAP_ROW_CUT == 16 && BT_CONDUCTANCE_MAX <= INT32_MAX / UINT16_
                    && BT_MAP_SIGNAL_MAX <= INT32_MAX / UINT16_MAX,
                "a low half times a factor must fit int32");
 
-// Row by row. Here the whole's sums are better kept outside.
+// Row by row. Here the totals are better kept in `sum`.
 static inline void pairs(const int32_t f[RING], const bt_map_word *word, int width, int32_t sum[])
 {
     for (int a = 0; a < width; a++) {
@@ -217,7 +218,7 @@ static BT_NOINLINE void pairs_of_4(const int32_t *f, const bt_map_word *word, in
     pairs(f, word, 4, sum);
 }
 
-// Of a kind of one column.
+// For a kind with a single column.
 static void single(int32_t factor, const bt_map_word *word, int width, int32_t sum[])
 {
     const bt_map_half *its = (const bt_map_half *)word;
@@ -226,7 +227,7 @@ static void single(int32_t factor, const bt_map_word *word, int width, int32_t s
     }
 }
 
-// A block of a group of axes, side by side from the given one on, into the totals.
+// Add a block to the totals of `width` axes from `axis` on.
 static inline void add_block(const uint8_t *head, const features *of, const bt_map_word *word, int axis,
                              int width, int32_t total[BT_MAP_AXES_MAX])
 {
@@ -263,11 +264,11 @@ void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
     features of;
     const bt_map_word *word = bt_map_words(map);
     int32_t total[BT_MAP_AXES_MAX];
-    total[0] = total[1] = total[2] = total[3] = total[4] = total[5] = total[6] = 0; // no call of memset
+    total[0] = total[1] = total[2] = total[3] = total[4] = total[5] = total[6] = 0; // spares a memset
     prepare(map, e_q4, counts, tare_q4, pdc_above_rest_q4, &of);
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;
-        int words = bt_map_halves[head[0]] / 2; // of an axis
+        int words = bt_map_halves[head[0]] / 2; // per axis
         add_block(head, &of, word, 0, 3, total);
         if (axes == BT_MAP_AXES_TORSION) {
             add_block(head, &of, word + 3 * words, 3, 4, total);

@@ -21,7 +21,7 @@ void bt_map_close(bt_map *map)
 static size_t judge_blocks(bt_map *map)
 {
     size_t halves = 0;
-    uint8_t seen[BT_MAP_KINDS] = {0}; // the gates that each kind has had
+    uint8_t seen[BT_MAP_KINDS] = {0}; // gates that each kind has had so far
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *block = map->blocks + b * BT_MAP_BLOCK_BYTES;
         uint8_t kind = block[0];
@@ -43,8 +43,8 @@ static size_t judge_blocks(bt_map *map)
     return 2 * halves * map->axes;
 }
 
-// The largest magnitude of an axis's sum over so many columns with factors up to most. its: the axis's first
-// coefficient, of width side by side.
+// The largest magnitude of an axis's sum over `columns` columns, with factors up to `most`. its: the axis's
+// first coefficient, one of `width` side by side.
 static uint64_t largest(const bt_map_half *its, int columns, int width, uint32_t most)
 {
     uint32_t sum = 0;
@@ -54,7 +54,7 @@ static uint64_t largest(const bt_map_half *its, int columns, int width, uint32_t
     return (uint64_t)sum * most;
 }
 
-// What cut leaves of a sum, one more for its rounding.
+// A sum shifted down by cut, plus one for its rounding.
 static uint64_t left(uint64_t sum, int cut)
 {
     return (sum >> cut) + 1;
@@ -62,7 +62,7 @@ static uint64_t left(uint64_t sum, int cut)
 
 #define REFUSED UINT64_MAX
 
-// The largest magnitude of what an axis of a block comes to, or REFUSED where a sum on the way may not fit.
+// The largest magnitude that a block adds to an axis, or REFUSED where a sum on the way might not fit.
 static uint64_t block_largest(const uint8_t *head, const bt_map_half *its, int width, int exponent)
 {
     static const uint16_t factor_max[BT_MAP_KINDS] = BT_MAP_FACTOR_MAX;
@@ -89,7 +89,7 @@ static uint64_t block_largest(const uint8_t *head, const bt_map_half *its, int w
     return sum + (1u << (exponent - 1)) > INT32_MAX ? REFUSED : left(sum, exponent);
 }
 
-// Columns are an even number: a last one is behind 19 electrodes, and behind a single column.
+// The number of columns is even: 19 electrodes, or a single column, have one more behind them, which is 0.
 static bool last_is_zero(uint8_t kind, const bt_map_half *its, int width)
 {
     int halves = bt_map_halves[kind];

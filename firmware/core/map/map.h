@@ -1,10 +1,9 @@
 // The wrench map: a calibrated finger's force, and torque, as a sum of blocks (SPEC.md, Wrench maps). A block
 // is a vector of columns (its kind: signals, their pairs, conductances...) times a scalar (its gate: where
-// the contact is), with a coefficient per column and axis. A map is read where it lies, as a rule in flash;
-// nothing is copied.
+// the contact is), with a coefficient per column and axis. A map is read where it lies; nothing is copied.
 //
-// Factors and coefficients have 16 bits, sums 32. No input overflows: bt_map_open bounds every sum that a map
-// can come to, by its coefficients' magnitudes. Results saturate at BT_MAP_RESULT_MAX.
+// Factors and coefficients have 16 bits, sums 32. No input overflows: bt_map_open bounds every sum by the
+// magnitudes of the coefficients. Results saturate at BT_MAP_RESULT_MAX.
 #ifndef BIOTAC_MAP_H
 #define BIOTAC_MAP_H
 
@@ -17,37 +16,39 @@
 #include <stdint.h>
 
 typedef struct {
-    uint8_t axes;        // BT_MAP_AXES_FORCE, _TORQUE: that too, _TORSION: all; 0: there is no map
-    uint8_t block_count; // the rest points into the blob
-    uint16_t kinds;      // bit mask of the kinds that its blocks are of: what no block needs is not computed
-    uint16_t gates;      // likewise
-    uint32_t made_s;     // since 1970 UTC; 0: unknown
-    const uint8_t *serial; // [BT_MAP_SERIAL_BYTES] of the sensor it was made for; all zero: any sensor
+    uint8_t axes; // BT_MAP_AXES_FORCE, _TORQUE (force too) or _TORSION (all); 0: there is no map
+    uint8_t block_count;
+    uint16_t kinds;        // bit mask of the blocks' kinds: what no block needs is not computed
+    uint16_t gates;        // likewise
+    uint32_t made_s;       // since 1970 UTC; 0: unknown
+    const uint8_t *serial; // [BT_MAP_SERIAL_BYTES], in the blob like the rest: of the sensor it was made for;
+                           // all zero: any sensor
     const uint8_t *blocks;
     const uint8_t *coefficients;
 } bt_map;
 
-// No map: what bt_map_open leaves of a blob that it refuses.
+// Make this no map, as bt_map_open does with a blob that it refuses.
 void bt_map_close(bt_map *map);
 
-// Judge a blob and point map into it; blob stays where it is, unchanged, for as long as map is used, and
-// begins at a multiple of four bytes. Returns an enum bt_error: OK, BAD_LENGTH or OUT_OF_RANGE (version,
-// axes, kind, gate, exponent, a block twice, coefficients that could overflow, an odd address).
+// Check a blob and point map into it. The blob must be aligned to 4 bytes, and stay unchanged in its place as
+// long as map is used. Returns an enum bt_error: OK, BAD_LENGTH or OUT_OF_RANGE (version, axes, kind, gate,
+// exponent, a block twice, coefficients that could overflow, a bad alignment).
 uint8_t bt_map_open(bt_map *map, const uint8_t *blob, size_t bytes);
 
-// Whether results need PDC.
+// True if results need PDC.
 bool bt_map_needs_pdc(const bt_map *map);
 
-// One frame's results in axes of the map's, 3 or all, of which those of torque are in mN*mm. e_q4: of
-// bt_signals_q4; the rest as below. Pressure counts as none where it is unknown.
+// One frame's results for 3 axes or all of the map's: force in 100 uN, then torque and torsion in mN*mm.
+// e_q4: from bt_signals_q4; the rest as below, but a map that needs PDC must be given it.
 void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
                     const uint16_t counts[BT_ELECTRODES], const uint16_t tare_q4[BT_ELECTRODES],
                     int32_t pdc_above_rest_q4, int axes, int32_t result[]);
 
-// One frame's results. counts: 0..4095 or BT_INVALID_COUNT; an electrode without a count or without a tare
-// counts as signal 0. pdc_above_rest_q4: BT_INVALID_I32 where it is unknown; then a map that needs it gives
-// BT_INVALID_I32. torque_mnmm, about the centre of the tip sphere, and torsion_mnmm, about the outward normal
-// at the contact, are written by a map that has them. torque_mnmm NULL: neither is wanted.
+// One frame's results: force in 100 uN, torque and torsion in mN*mm. counts: 0..4095 or BT_INVALID_COUNT; an
+// electrode without a count or a tare has signal 0. pdc_above_rest_q4: BT_INVALID_I32 if unknown; a map that
+// needs it then gives BT_INVALID_I32. torque_mnmm, about the centre of the tip sphere, and torsion_mnmm,
+// about the outward normal at the contact, are written by a map that has them. torque_mnmm NULL: neither is
+// wanted.
 void bt_map_wrench(const bt_map *map, const uint16_t counts[BT_ELECTRODES],
                    const uint16_t tare_q4[BT_ELECTRODES], int32_t pdc_above_rest_q4, int32_t force_100un[3],
                    int32_t *torque_mnmm, int32_t *torsion_mnmm);

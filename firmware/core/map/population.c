@@ -5,7 +5,7 @@
 
 const uint16_t bt_population_sigma_100un[3] = BT_POPULATION_SIGMA_100UN;
 
-// As bt_map_open leaves it (tests/core/map/test_population.c): judged once, when it is built.
+// As bt_map_open would fill it in (tests/core/map/test_population.c): the map is checked when it is built.
 #define BLOCKS_AT ((const uint8_t *)bt_population_blob + BT_MAP_HEADER_BYTES)
 static const bt_map population = {
     .axes = BT_MAP_AXES_FORCE,
@@ -29,15 +29,15 @@ void bt_population_force(const int32_t e_q4[BT_ELECTRODES], const uint16_t count
     bt_map_results(&population, e_q4, counts, tare_q4, 0, BT_MAP_AXES_FORCE, force_100un);
 }
 
-// ---- is it a frame like those it was learnt from --------------------------------------------------------
+// ---- is the frame like those that the map was trained on ------------------------------------------------
 
-#define NOISE_Q4 (8 * 16) // of an electrode: it is no part of the pattern
+#define NOISE_Q4 (8 * 16) // per electrode: not part of the pattern
 #define MOST     ((BT_E_MAX_Q4 - NOISE_Q4) >> 3)
-#define SUM_BITS 15 // so that three energies and what is over them by eight fit
+#define SUM_BITS 15 // so that 3 energies fit, and 8 times what exceeds them
 
 _Static_assert((int64_t)BT_ELECTRODES * MOST * MOST <= UINT32_MAX, "energies must fit");
 _Static_assert(12ll * MOST << SUM_BITS <= UINT32_MAX,
-               "1.5 energies by eight must fit: each is below sum * size");
+               "8 times 1.5 energies must fit: an energy is below sum * size");
 
 uint32_t bt_population_share(const int32_t e_q4[BT_ELECTRODES])
 {
@@ -60,7 +60,7 @@ uint32_t bt_population_share(const int32_t e_q4[BT_ELECTRODES])
     if (square <= 3 * energy) {
         return 0;
     }
-    // at most 1.5 energies over 1.5 energies, in 1/256; energy is at least 2^20, or all are small
+    // over / (1.5 energy) in 1/256, where over <= 1.5 energy; energy is at least 2^20, or all are small
     uint32_t over = square - 3 * energy;
     uint32_t share = bt_div_round_u32(over << 3, (3 * energy + 63) >> 6);
     return share < BT_POPULATION_ALL ? share : BT_POPULATION_ALL;

@@ -30,7 +30,7 @@ const uint8_t *bt_map_bytes(const bt_map_flash *flash, const bt_map_place *place
     return flash->bytes + (size_t)place->slot * BT_MAP_SLOT_BYTES;
 }
 
-// NOT_WHOLE or OUT_OF_RANGE, see bt_finger_map_use.
+// Returns OK, NOT_WHOLE or OUT_OF_RANGE, see bt_finger_map_use.
 static uint8_t copy_to_ram(bt_map *map, const bt_map_flash *flash, uint8_t finger, const bt_map_place *place)
 {
     uint8_t *ram = flash->ram[finger];
@@ -53,7 +53,7 @@ uint8_t bt_finger_map_use(bt_finger_map *its, const bt_map_flash *flash, uint8_t
         its->map = map;
         its->place = *place;
     } else if (its->place.bytes != 0 && copy_to_ram(&its->map, flash, finger, &its->place) != BT_ERROR_OK) {
-        its->place.bytes = 0; // the flash does not hold what it held: no map, rather than half of two
+        its->place.bytes = 0; // the flash has changed: rather no map than half of each
         bt_map_close(&its->map);
     }
     return error;
@@ -66,7 +66,7 @@ bool bt_finger_map_load(bt_finger_map *its, const bt_map_flash *flash, uint8_t f
     if (bytes < 4 || bt_get_u32(record) >= BT_MAP_SLOTS) {
         return false;
     }
-    its->stored_slot = (uint8_t)bt_get_u32(record); // whatever else is new in a later version
+    its->stored_slot = (uint8_t)bt_get_u32(record); // also in later versions, which may differ in the rest
     if (version != BT_MAP_RECORD_VERSION || bytes != BT_MAP_RECORD_BYTES) {
         return false;
     }
@@ -95,7 +95,7 @@ static bool is_free(const bt_finger_map maps[BT_MAX_FINGERS], uint8_t slot)
 uint8_t bt_map_free_slot(const bt_finger_map maps[BT_MAX_FINGERS], uint8_t last)
 {
     uint8_t slot = last;
-    do { // ends: five fingers have two slots each at most, and there is one more
+    do { // ends, as five fingers use at most two slots each and there is one more
         slot = (uint8_t)((slot + 1) % BT_MAP_SLOTS);
     } while (!is_free(maps, slot));
     return slot;

@@ -1,8 +1,8 @@
-// Where wrench maps lie: in flash, in slots of whole sectors. A record in storage.h says which slot holds a
-// finger's map; what is in force is a copy in RAM, because a board's flash may take ten times as long to
-// read. There is a slot for what each finger has stored, one for what it has in force since, and one for what
-// is being uploaded: so nothing that is stored or in force is ever written to, and power may fail at any
-// byte.
+// Where wrench maps are kept: in flash, in slots of whole sectors. A record (storage.h) says which slot holds
+// a finger's map. The map in force is a copy in RAM, because a board's flash may take ten times as long to
+// read. Each finger has a slot for the map it has stored and one for the map put in force since, and one more
+// slot is for an upload under way. So a map that is stored or in force is never overwritten, and power may
+// fail at any byte.
 #ifndef BIOTAC_MAP_STORE_H
 #define BIOTAC_MAP_STORE_H
 
@@ -16,8 +16,8 @@
 #define BT_MAPS_BYTES     (BT_MAP_SLOTS * BT_MAP_SLOT_BYTES)
 #define BT_KEPT_BYTES     (BT_STORAGE_BYTES + BT_MAPS_BYTES) // all that a board keeps: settings, then maps
 
-// Offsets count bytes from the first slot. erase and program as in bt_flash; bytes is all slots as memory,
-// which changes with them. ram: room for what each finger has in force, aligned to 4 bytes.
+// Offsets are bytes from the first slot. erase and program: as in bt_flash. bytes: all slots as memory, which
+// changes with the flash. ram: room for each finger's map in force, aligned to 4 bytes.
 typedef struct {
     bool (*erase)(uint32_t sector_offset);
     bool (*program)(uint32_t page_offset, const uint8_t page[BT_FLASH_PAGE_BYTES]);
@@ -25,48 +25,47 @@ typedef struct {
     uint8_t (*ram)[BT_MAP_MAX_BYTES];
 } bt_map_flash;
 
-// A map in a slot; none where bytes is 0.
+// A map in a slot; no map if bytes is 0.
 typedef struct {
     uint8_t slot;
     uint16_t bytes;
     uint32_t crc32;
 } bt_map_place;
 
-// What a finger has.
 typedef struct {
     bt_map_place place;
     bt_map map;
     bool unsaved;        // set or cleared since it was stored
-    uint8_t stored_slot; // that its record names; BT_MAP_SLOTS: none
+    uint8_t stored_slot; // the slot that its record names; BT_MAP_SLOTS: none
 } bt_finger_map;
 
-// As a stored record, little-endian: u32 slot, u32 bytes, u32 CRC-32. A cleared one is a record of no bytes.
-// Every version begins with the slot, so that no firmware writes to another one's.
+// The stored record, little-endian: u32 slot, u32 bytes, u32 CRC-32. A cleared map is a record of no bytes.
+// Every version begins with the slot, so that no firmware overwrites the map of another version.
 #define BT_MAP_RECORD_VERSION 1
 #define BT_MAP_RECORD_BYTES   12
 
 // Returns the record's size.
 size_t bt_map_place_pack(const bt_map_place *place, uint8_t record[BT_MAP_RECORD_BYTES]);
 
-// No map, nothing stored.
+// Reset to no map and nothing stored.
 void bt_finger_map_reset(bt_finger_map *its);
 
-// From a record. A map that is damaged or that this firmware cannot compute is none, but stays stored: false.
+// Load a map from its record. Returns false, with no map, if it is damaged or this firmware cannot compute
+// it; it stays stored.
 bool bt_finger_map_load(bt_finger_map *its, const bt_map_flash *flash, uint8_t finger, uint16_t version,
                         const uint8_t *record, size_t bytes);
 
-// Copy a map to the finger's RAM and judge it there; OK: it is the finger's. Otherwise the one that the
-// finger had is in RAM again. serial: of the sensor that it must be made for. Returns an enum bt_error:
-// NOT_WHOLE when its bytes have another CRC-32, OUT_OF_RANGE when it is no map that this firmware can
-// compute, OTHER_SENSOR.
+// Copy a map to the finger's RAM, check it there and put it in force. If that fails, the finger's previous
+// map is in RAM again. serial: of the sensor that the map must be made for. Returns an enum bt_error: OK,
+// NOT_WHOLE (wrong CRC-32), OUT_OF_RANGE (no map that this firmware can compute) or OTHER_SENSOR.
 uint8_t bt_finger_map_use(bt_finger_map *its, const bt_map_flash *flash, uint8_t finger,
                           const bt_map_place *place, const uint8_t *serial);
 
-// The map as bytes, in flash.
+// The map's bytes in flash.
 const uint8_t *bt_map_bytes(const bt_map_flash *flash, const bt_map_place *place);
 
-// A slot that no finger has anything in; the first behind `last`, so that they wear alike and one that takes
-// nothing is passed by.
+// The first slot after `last` that no finger uses, so that all slots wear alike, and one that failed to take
+// a map is passed over.
 uint8_t bt_map_free_slot(const bt_finger_map maps[BT_MAX_FINGERS], uint8_t last);
 
 #endif

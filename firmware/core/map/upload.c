@@ -5,7 +5,7 @@
 _Static_assert(BT_MAP_SLOT_BYTES / BT_FLASH_SECTOR_BYTES <= 8, "a bit for every sector of a slot");
 _Static_assert(BT_FLASH_PAGE_BYTES % BT_MAP_PART_BYTES == 0, "a part lies in one page");
 _Static_assert(BT_MAP_PARTS % 8 == 0, "the parts' bits fill their bytes");
-_Static_assert(BT_MAP_PART_BYTES == sizeof(((bt_msg_map_data *)NULL)->data), "read as it is written");
+_Static_assert(BT_MAP_PART_BYTES == sizeof(((bt_msg_map_data *)NULL)->data), "parts must be read as written");
 
 void bt_upload_begin(bt_upload *upload, uint8_t finger, const bt_map_place *place)
 {
@@ -30,18 +30,18 @@ uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t o
     const size_t bytes =
         (size_t)(size - offset) < BT_MAP_PART_BYTES ? (size_t)(size - offset) : BT_MAP_PART_BYTES;
     const uint8_t *there = bt_map_bytes(flash, &upload->place) + offset;
-    if (is_written(upload, part)) { // its reply was lost, or somebody else writes too
+    if (is_written(upload, part)) { // its reply was lost, or another host writes too
         return memcmp(there, data, bytes) == 0 ? BT_ERROR_OK : BT_ERROR_NOT_STORED;
     }
     const uint32_t at = (uint32_t)(upload->place.slot * BT_MAP_SLOT_BYTES + offset);
     if (!(upload->erased & sector)) {
-        // Even where it reads as erased: an erase that power cut short may read so, and not stay so.
+        // Even if it reads as erased: after an erase cut short by a power failure, that may not last.
         if (!flash->erase(at - at % BT_FLASH_SECTOR_BYTES)) {
             return BT_ERROR_NOT_STORED;
         }
         upload->erased |= sector;
     }
-    memset(page, 0xFF, sizeof page); // what is programmed to 0xFF stays as it is
+    memset(page, 0xFF, sizeof page); // programming 0xFF changes nothing
     memcpy(page + at % BT_FLASH_PAGE_BYTES, data, bytes);
     if (!flash->program(at - at % BT_FLASH_PAGE_BYTES, page) || memcmp(there, data, bytes) != 0) {
         return BT_ERROR_NOT_STORED;

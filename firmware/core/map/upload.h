@@ -1,4 +1,4 @@
-// A wrench map on its way into a slot of flash, part by part. Nobody uses the slot until it is whole.
+// Upload of a wrench map into a slot of flash, part by part. Nothing uses the slot until the map is whole.
 #ifndef BIOTAC_UPLOAD_H
 #define BIOTAC_UPLOAD_H
 
@@ -15,17 +15,16 @@ typedef struct {
     uint8_t written[BT_MAP_PARTS / 8]; // bit mask of the parts
 } bt_upload;
 
-// place says where to, how much and its CRC-32; an earlier upload ends.
+// place: the slot, the size and the CRC-32. Ends an earlier upload.
 void bt_upload_begin(bt_upload *upload, uint8_t finger, const bt_map_place *place);
 
-// One part, at a multiple of BT_MAP_PART_BYTES; what lies behind the map's end is not written. Erases a
-// sector at most, the first time that a part comes to lie in it. Returns an enum bt_error: OK, also for a
-// part that is there already, OUT_OF_RANGE, or NOT_STORED when the flash did not take it or holds another
-// part in that place.
+// Write one part; offset is a multiple of BT_MAP_PART_BYTES. What lies beyond the map's end is not written.
+// Erases at most one sector, before its first part. Returns an enum bt_error: OK, also if the part is already
+// there; OUT_OF_RANGE; or NOT_STORED when the flash did not take it or holds another part in its place.
 uint8_t bt_upload_write(bt_upload *upload, const bt_map_flash *flash, uint16_t offset,
                         const uint8_t data[BT_MAP_PART_BYTES]);
 
-// Every part has come.
+// True once every part has come.
 bool bt_upload_whole(const bt_upload *upload);
 
 #endif

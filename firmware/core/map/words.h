@@ -1,23 +1,24 @@
-// A map's coefficients as they lie in the blob: 16 bits each, column by column, of a group of axes side by
-// side. Sums read two at a time.
+// A map's coefficients as stored in the blob: 16 bits each, column by column, those of a group of axes side
+// by side. Sums read them two at a time.
 #ifndef BIOTAC_MAP_WORD_H
 #define BIOTAC_MAP_WORD_H
 
 #include "fixed_point.h"
 #include "map/map.h"
 
-// The blob is bytes; these words are read out of it as they are, on cores of the same byte order only.
+// These words are read directly from the bytes of the blob, which requires a little-endian core.
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "a map is read in place");
 typedef uint32_t __attribute__((may_alias)) bt_map_word;
 typedef int16_t __attribute__((may_alias)) bt_map_half;
 
-#define BT_MAP_ROW 10 // columns that are summed before anything else: a row of pairs, half of 19 and one
-#define BT_MAP_ROW_WORDS (BT_MAP_ROW / 2) // of an axis
+#define BT_MAP_ROW       10 // columns summed at a time: a row of pairs, or half of 19 + 1 electrodes
+#define BT_MAP_ROW_WORDS (BT_MAP_ROW / 2) // per axis
 #define BT_MAP_GROUP_MAX 4
 
 static const uint8_t bt_map_halves[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
 
-// Coefficients of an axis in a block whose pairs make up a row for each electrode.
+// Coefficients per axis of a block of pairs, which has a row for each electrode, and of a block with a column
+// for each electrode.
 #define BT_MAP_PAIR_HALVES (BT_ELECTRODES * BT_MAP_ROW)
 #define BT_MAP_LINE_HALVES (2 * BT_MAP_ROW)
 _Static_assert(BT_MAP_LINE_HALVES == BT_ELECTRODES + 1 && BT_MAP_PAIR_HALVES == BT_ELECTRODES * 20 / 2,
@@ -28,8 +29,8 @@ static inline const bt_map_word *bt_map_words(const bt_map *map)
     return (const bt_map_word *)(const void *)map->coefficients;
 }
 
-// Axes whose coefficients lie side by side, from the given one on: three of force; three of torque, or four
-// with torsion.
+// How many axes have their coefficients side by side, from the given one on: three of force; three of torque,
+// or four with torsion.
 static inline int bt_map_group_width(const bt_map *map, int axis)
 {
     return axis == 0 ? 3 : map->axes - axis;

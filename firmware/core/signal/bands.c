@@ -6,14 +6,13 @@
 
 _Static_assert(16 * LARGEST + 8 <= UINT32_MAX && LARGEST <= UINT16_MAX,
                "a smoothed sample must fit its type");
-// The middle tap weighs 6/16, so at most 10/16 of the range is taken away, and a unit by rounding.
+// The middle tap weighs 6/16, so at most 10/16 of the range is removed, and one unit by rounding.
 _Static_assert((uint64_t)BT_PAC_PER_FRAME *(LARGEST * 10 / 16 + 1) * (LARGEST * 10 / 16 + 1) < UINT32_MAX,
-               "a round's energy must fit its type, below what marks none");
-_Static_assert(BT_PAC_PER_FRAME % 2 == 0, "each round must have as many slow samples");
-_Static_assert(sizeof((bt_msg_bands *)0)->energy_q4 == BT_BANDS * sizeof(uint32_t), "a message is all bands");
+               "a round's energy must fit its type, below the mark for none");
+_Static_assert(BT_PAC_PER_FRAME % 2 == 0, "each round must have the same number of slow samples");
+_Static_assert(sizeof((bt_msg_bands *)0)->energy_q4 == BT_BANDS * sizeof(uint32_t), "one field per band");
 
-// Smooths the n samples behind line[4 * apart] to out, and moves the line on by them. Returns the energy of
-// what was taken away.
+// Smooth the n samples from line[4 * apart] on into out, and shift the line by n. Returns the energy removed.
 static uint32_t smooth(uint16_t *line, unsigned apart, unsigned n, uint16_t *out)
 {
     uint32_t energy = 0;
@@ -75,7 +74,7 @@ uint8_t bt_bands_round(bt_bands *bands, const uint16_t pac[BT_PAC_PER_FRAME], ui
     unsigned apart = 1;
     for (int band = BT_BANDS - 2; band >= 0; band--) {
         uint16_t *next = line + 4 * apart + BT_BANDS_SLOW;
-        // One sample stands for two.
+        // Each slow sample stands for two.
         energy_q4[band] = 2 * smooth(line, apart, BT_BANDS_SLOW, band > 0 ? next + 8 * apart : left);
         line = next;
         apart *= 2;

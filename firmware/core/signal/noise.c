@@ -3,19 +3,19 @@
 #include "fixed_point.h"
 #include "signal/sweep.h"
 
-// White noise on 19 electrodes passes it once in 10^5 rounds, never three in a row
+// White noise on 19 electrodes exceeds it once in 10^5 rounds, and never three times in a row
 #define THRESHOLD_TO_NOISE 3
 #define MEAN_SWEEPS        16
 
 _Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX <= INT32_MAX >> 8, "the noise in q8 must fit 31 bits");
 _Static_assert(BT_SETTING_CONTACT_ENERGY_COUNT2_MAX *(int64_t)THRESHOLD_TO_NOISE < BT_TRIGGER_NEVER,
-               "a threshold is a limit");
+               "a threshold must be a valid limit");
 
 void bt_noise_add(bt_noise *noise, uint32_t deviation_q6, uint32_t setting_count2)
 {
-    // A count's distance from a mean that it is an eighth of holds seven eighths of the noise's energy.
-    // The sample is capped at the setting: a vibration that grows slowly must not raise the threshold
-    // ahead of itself for ever. The threshold so never exceeds THRESHOLD_TO_NOISE times the setting.
+    // A count is itself an eighth of the mean, so its distance from the mean has 7/8 of the noise's energy.
+    // The sample is capped at the setting, or a slowly growing vibration could raise the threshold ahead of
+    // itself for ever. So the threshold never exceeds THRESHOLD_TO_NOISE times the setting.
     uint32_t cap_q8 = setting_count2 << 8;
     uint32_t sample_q8 = cap_q8;
     if (deviation_q6 < cap_q8 >> 2) {

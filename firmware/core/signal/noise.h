@@ -9,11 +9,11 @@
 typedef struct {
     uint32_t count2; // 0 until measured
     uint32_t mean_q8;
-    uint8_t sweeps; // in the mean, up to its length
+    uint8_t sweeps; // in the mean, at most its length
 } bt_noise;
 
-// A sweep at rest: the sum of squared distances of each electrode's count from the mean of the eight
-// it belongs to. A slow load hardly shows in it.
+// Add a sweep at rest. deviation_q6: over all electrodes, the squared distance of a count from the mean of
+// its sweep, summed. A slow load hardly shows in it.
 void bt_noise_add(bt_noise *noise, uint32_t deviation_q6, uint32_t setting_count2);
 
 // Energy above which a round counts as touched: the setting, or three times the noise if larger.

@@ -1,6 +1,6 @@
 #include "signal/round.h"
 
-// The arrays follow the channel table; a new channel must be given a place (finger.c).
+// The arrays follow the channel table; a new channel needs a place in finger.c.
 _Static_assert(BT_CHANNEL_E19 - BT_CHANNEL_E1 + 1 == BT_ELECTRODES, "electrode channels must be consecutive");
 
 void bt_round_clear(bt_round *round)

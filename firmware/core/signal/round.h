@@ -17,15 +17,15 @@ typedef struct {
     uint16_t tac;
     uint16_t tdc;
     uint16_t pac[BT_PAC_PER_FRAME];
-    uint8_t good_words; // 0 means that nothing answered
+    uint8_t good_words; // 0: nothing answered
 } bt_round;
 
 void bt_round_clear(bt_round *round);
 
-#define BT_RAIL_COUNT 4090 // from here on, and at 0, a count is at the end of its range
+#define BT_RAIL_COUNT 4090 // from this count on, and at 0, a reading is at the end of its range
 
-#ifndef BT_CDEF // asked for every electrode of every round, so they are inlined
-// Neither missing nor railed; one comparison, in which 0 wraps to the top.
+#ifndef BT_CDEF // called for every electrode in every round, hence inline
+// Neither missing nor railed. One comparison: 0 wraps to the top.
 static inline bool bt_count_usable(uint16_t count)
 {
     return (uint32_t)count - 1 < BT_RAIL_COUNT - 1;

@@ -1,5 +1,4 @@
-// Signals: what a channel reads above what it reads at rest, e = count - tare; compression is negative.
-// Units: 1/16 count (q4), |e| <= 4095 counts; exact, nothing is rounded.
+// Signals: a channel's reading relative to rest, e = count - tare; compression is negative.
 #ifndef BIOTAC_SIGNALS_H
 #define BIOTAC_SIGNALS_H
 

@@ -7,7 +7,7 @@
 _Static_assert(BT_SWEEP_ROUNDS *BT_TRIGGER_UNREAD <= UINT16_MAX,
                "a sum must fit its half of a pair, or it would carry into its neighbour");
 _Static_assert((BT_SWEEP_ROUNDS - 1) * BT_SWEEP_LANES >= BT_LANES,
-               "the last round of a sweep serves no lane: it has the verdicts to reach");
+               "the last round of a sweep must serve no lane: it judges the sweep");
 
 void bt_sweep_restart(bt_sweep *sweep)
 {
@@ -16,8 +16,8 @@ void bt_sweep_restart(bt_sweep *sweep)
 
 void bt_sweep_meet(bt_sweep *sweep, unsigned lane, uint16_t smooth)
 {
-    // The rounds since the lane's last turn, as if the word had been there all along. Its turn comes in
-    // round lane / BT_SWEEP_LANES, which adds the word once more.
+    // Sum as many rounds as have passed since the lane's last turn, as if the word had been there all along.
+    // The lane's turn comes in round lane / BT_SWEEP_LANES, which adds the word once more.
     unsigned turn = lane / BT_SWEEP_LANES;
     unsigned left = (turn + BT_SWEEP_ROUNDS - sweep->round) % BT_SWEEP_ROUNDS;
     sweep->sum.lane[lane] = (uint16_t)((BT_SWEEP_ROUNDS - 1 - left) * smooth);

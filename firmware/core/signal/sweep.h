@@ -1,9 +1,9 @@
 // Means over eight rounds, a few lanes at a time.
 //
-// Release, drift and a new tare rest on means of eight rounds, and nothing about them is urgent. So
-// each lane's eight rounds end in another round than its neighbours', and a round serves only the
-// lanes whose turn it is: no round pays for all. Eight rounds are a sweep; after its last round every
-// lane has been served once.
+// Release, drift and a new tare depend on means of eight rounds, and none of them is urgent. So each round
+// serves only the lanes whose turn it is, and no round pays for all of them: a lane's eight rounds end at
+// another round than its neighbours'. Eight rounds are a sweep; after its last round every lane has been
+// served once.
 //
 // Units: a sum of eight filtered counts is a mean in 1/8 count (q3), exact.
 #ifndef BIOTAC_SWEEP_H
@@ -25,19 +25,19 @@ typedef struct {
     uint8_t round;        // of the sweep, 0..BT_SWEEP_ROUNDS - 1
     uint8_t still_sweeps; // whole sweeps since the means came to rest; saturates
     bool begun;           // the first round after a restart has been added
-    bool moved;           // in this sweep, a mean left the settled one
+    bool moved;           // a mean left its settled value in this sweep
 } bt_sweep;
 
-// Forget everything: the next sweep fills its windows anew.
+// Forget everything: the next sweep refills its windows.
 void bt_sweep_restart(bt_sweep *sweep);
 
 // Add a round's filtered counts.
 void bt_sweep_add(bt_sweep *sweep, const bt_lanes *smooth);
 
-// A lane that had its first word in the middle of a sweep: its window is filled with that word.
+// Fill the window of a lane whose first word came in the middle of a sweep with that word.
 void bt_sweep_meet(bt_sweep *sweep, unsigned lane, uint16_t smooth);
 
-// The lanes of this round's turn: first <= lane < end.
+// The lanes whose turn it is in this round: first <= lane < end.
 #ifndef BT_CDEF
 static inline unsigned bt_sweep_first(const bt_sweep *sweep)
 {
@@ -66,10 +66,10 @@ static inline uint16_t bt_sweep_close(bt_sweep *sweep, unsigned lane, int span_q
 }
 #endif
 
-// After a sweep's last round: brings still_sweeps up to date and starts over.
+// After a sweep's last round: update still_sweeps and start over.
 void bt_sweep_start_over(bt_sweep *sweep);
 
-// The round is over. True after a sweep's last one.
+// End a round. Returns true after the last one of a sweep.
 #ifndef BT_CDEF
 static inline bool bt_sweep_next(bt_sweep *sweep)
 {

@@ -25,7 +25,7 @@ int32_t bt_trigger_repeat(bt_trigger *trigger, unsigned electrode, uint16_t coun
 {
     trigger->missing = (uint8_t)(trigger->missing + (count == BT_INVALID_COUNT));
     trigger->railed = (uint8_t)(trigger->railed + bt_count_railed(count));
-    // A glitch, a gap and a glitch are no touch: what was held back before a gap is forgotten.
+    // A glitch, a gap and a glitch are not a touch: a word held back before a gap is forgotten.
     int32_t e = (int32_t)trigger->smooth.lane[electrode] - trigger->rest.lane[electrode];
     return trigger->room -= e * e;
 }
@@ -50,7 +50,7 @@ int32_t bt_trigger_pressure(bt_trigger *trigger, uint16_t count, int32_t above)
         uint16_t smooth = bt_trigger_filter(trigger, BT_LANE_PDC, count, trigger->smooth.lane[BT_LANE_PDC]);
         uint16_t rest = trigger->rest.lane[BT_LANE_PDC];
         if (rest != 0 && smooth - rest > above && trigger->room >= 0 && trigger->limit != BT_TRIGGER_NEVER) {
-            // Both move, so that the energy stays what it is.
+            // Both change, so that the energy stays the same.
             trigger->limit -= BT_TRIGGER_NEVER;
             trigger->room -= BT_TRIGGER_NEVER;
         }

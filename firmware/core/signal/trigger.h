@@ -1,18 +1,18 @@
-// The trigger: every word of an electrode, or of static pressure, as it arrives. It takes single-sample
-// glitches out and adds the word's distance from rest to the round's energy, so that a touch is seen in
-// the slot in which it happens and not at the round's end.
+// The trigger takes every word of an electrode, or of static pressure, as it arrives. It removes
+// single-sample glitches and adds the word's squared distance from rest to the round's energy, so that a
+// touch is seen in the slot in which it happens and not at the end of the round.
 //
-// A real sensor's glitches are single samples 28 to 66 counts off; one alone is over the contact
-// threshold, and one round in ten has one. So a word far from rest is held back until the next one: if that
-// is far, too, it is a touch. (Far from the word before would be worse: that one's own noise counts as well,
-// and the way back from a glitch that passed would be held in its turn.) Where no touch is waited for,
-// because there is no tare or it is frozen, it is the jump from word to word that must be confirmed.
+// A real sensor's glitches are single samples that are 28 to 66 counts off. One round in ten has one, and one
+// alone exceeds the contact threshold. So a word far from rest is held back until the lane's next word: if
+// that is far too, it is a touch. (Measuring from the previous word would be worse: its noise would count as
+// well, and the return from a glitch that slipped through would be held back too.) While no touch is
+// expected, because there is no tare or it is frozen, a jump from word to word must be confirmed instead.
 //
 // A missing or railed word repeats the filter's value, so that it neither looks like motion nor enters
 // a tare; what is repeated is never published.
 //
-// Units: counts; energies in count^2 summed over electrodes. No rounding, but that `rest` is the tare in
-// whole counts: the energy is off by at most |e| + 1/4 for each electrode.
+// Units: counts; energies in count^2 summed over electrodes. Nothing is rounded except `rest`, which is the
+// tare in whole counts: that changes the energy by at most |e| + 1/4 per electrode.
 #ifndef BIOTAC_TRIGGER_H
 #define BIOTAC_TRIGGER_H
 
@@ -21,23 +21,23 @@
 #define BT_LANES    (BT_ELECTRODES + 1) // what is filtered: the electrodes, then static pressure
 #define BT_LANE_PDC BT_ELECTRODES
 
-// One value for each lane; as pairs, two are added at once (sweep.c).
+// One value per lane; pairs are for adding two at a time (sweep.c).
 typedef union {
     uint16_t lane[BT_LANES];
     uint32_t pair[BT_LANES / 2];
 } bt_lanes;
 
-// What both are of a lane that never had a good word: it adds no energy, every first word is far from it, and
-// eight of it fit the sum of a sweep.
+// `smooth` and `rest` of a lane that never had a good word: it adds no energy, every first word is far from
+// it, and a sweep's sum has room for eight of it.
 #define BT_TRIGGER_UNREAD 8191
 
 typedef struct {
     bt_lanes smooth;  // the filter's value
     bt_lanes rest;    // what it is compared with
     int32_t room;     // energy left until the trigger fires; negative once it has
-    int32_t limit;    // the room that the round began with
-    uint32_t unknown; // lanes without a good word so far, a bit each
-    uint32_t met;     // lanes whose first good word came and that the owner has not taken note of
+    int32_t limit;    // `room` at the start of the round
+    uint32_t unknown; // bit mask of lanes without a good word so far
+    uint32_t met;     // lanes whose first good word has come, until the owner takes note of it
     uint32_t far;     // lanes whose word of this round was far off, held back or not
     uint32_t far_before;
     uint8_t missing; // electrodes of this round
@@ -50,7 +50,7 @@ typedef struct {
 
 void bt_trigger_reset(bt_trigger *trigger);
 
-// A round begins; the trigger fires when its energy passes limit_count2, below BT_TRIGGER_NEVER.
+// Begin a round; the trigger fires when its energy exceeds limit_count2.
 #ifndef BT_CDEF
 static inline void bt_trigger_begin(bt_trigger *trigger, int32_t limit_count2)
 {
@@ -64,14 +64,14 @@ static inline void bt_trigger_begin(bt_trigger *trigger, int32_t limit_count2)
 }
 #endif
 
-// Out of the ordinary: a word that is missing or railed, and one that is far off. The first returns the room
-// left, the second the filter's new value.
+// The rare cases: a word that is missing or railed, and one that is far off. The first returns the room left,
+// the second the filter's new value.
 int32_t bt_trigger_repeat(bt_trigger *trigger, unsigned electrode, uint16_t count);
 uint16_t bt_trigger_far(bt_trigger *trigger, unsigned lane, uint16_t count);
 
 #define BT_TRIGGER_FAR 24 // counts: less than any glitch, nearly five sigma of a worn sensor's noise
 
-#ifndef BT_CDEF // in every slot, so these are inlined
+#ifndef BT_CDEF // called in every slot, hence inline
 static inline uint16_t bt_trigger_filter(bt_trigger *trigger, unsigned lane, uint16_t count, uint16_t from)
 {
     if ((uint32_t)count - from + BT_TRIGGER_FAR > 2 * BT_TRIGGER_FAR) {
@@ -81,7 +81,7 @@ static inline uint16_t bt_trigger_filter(bt_trigger *trigger, unsigned lane, uin
     return count;
 }
 
-// One electrode's word, 0..4095 or BT_INVALID_COUNT, where nobody waits for a touch.
+// Take an electrode's word, 0..4095 or BT_INVALID_COUNT, while no touch is expected.
 static inline void bt_trigger_follow(bt_trigger *trigger, unsigned electrode, uint16_t count)
 {
     if (bt_count_usable(count)) {
@@ -91,7 +91,7 @@ static inline void bt_trigger_follow(bt_trigger *trigger, unsigned electrode, ui
     }
 }
 
-// The same where somebody does. Returns the room left.
+// The same while a touch is expected. Returns the room left.
 static inline int32_t bt_trigger_electrode(bt_trigger *trigger, unsigned electrode, uint16_t count)
 {
     if (!bt_count_usable(count)) {
@@ -103,7 +103,8 @@ static inline int32_t bt_trigger_electrode(bt_trigger *trigger, unsigned electro
 }
 #endif
 
-// The pressure word; `above` is what the filter's value may be over rest. Fires the trigger when it is more.
+// Take the pressure word. Fires the trigger when the filter's value exceeds rest by more than `above`.
+// Returns the room left.
 int32_t bt_trigger_pressure(bt_trigger *trigger, uint16_t count, int32_t above);
 
 // The round's energy so far.

@@ -4,15 +4,15 @@
 #include "solve/rsqrt.h"
 #include "solve/sums_gen.h"
 
-// Every electrode lies below the axis, so a positive weight sum keeps (y, z) away from 0: the
-// direction below never is 0/0 (SPEC.md, Degenerate input), and |N_z| always is large enough to normalise by.
+// Every electrode has z < 0, so with a positive weight sum (y, z) cannot be 0: the direction below is never
+// 0/0 (SPEC.md, Degenerate input), and |N_z| is always large enough to normalise by.
 _Static_assert(BT_ELECTRODE_Z_MAX_UM < 0, "electrodes must have z < 0");
 
-// The moments N = sum w r, whole or divided by 4 or 256, cut towards 0: what is left always fits int32.
-// The sum of x is known besides to the last bit, modulo 2^32: enough to round N_x / W correctly.
+// The moments N = sum w r, whole or divided by 4 or 256 and truncated towards 0, so that they always fit
+// int32. N_x is also kept whole, modulo 2^32, which is enough to round N_x / W correctly.
 typedef struct {
     int32_t n[3];
-    int bits;            // N / 2^bits
+    int bits;            // n is N / 2^bits
     uint32_t x_backward; // -N_x whole, modulo 2^32
     uint32_t total;      // W
 } moments;
@@ -23,7 +23,7 @@ typedef struct {
 
 _Static_assert(BT_SUMS_X_UNIT_UM % 4 == 0, "a quarter of the unit of x must be whole");
 
-// Weights of n = 1 are below 2^16. Up to this sum of them every moment fits as it is.
+// Weights with n = 1 are below 2^16. Up to this sum of weights every moment fits undivided.
 #define WHOLE_TOTAL (INT32_MAX / BT_ELECTRODE_MAX_UM)
 
 _Static_assert(-BT_ELECTRODE_Z_MAX_UM <= BT_ELECTRODE_MAX_UM, "x must be the longest coordinate");
@@ -50,10 +50,10 @@ static void linear_moments(const bt_linear_sums *sums, moments *m)
     }
 }
 
-// Squares are shifted until the largest has exactly BT_SUMS_WEIGHT_BITS: only the ratios count, and
-// what is shifted out is below 2^-21 of it.
+// Squares are shifted so that the largest has exactly BT_SUMS_WEIGHT_BITS: only ratios count, and what is
+// shifted out is below 2^-21 of the largest.
 #define WEIGHT_MAX ((1LL << BT_SUMS_WEIGHT_BITS) - 1)
-#define LOW_BITS   (SPLIT_BITS - BT_SUMS_SPLIT_BITS) // what hi is divided by
+#define LOW_BITS   (SPLIT_BITS - BT_SUMS_SPLIT_BITS) // what is still shifted out of the high sums
 
 _Static_assert(WEIGHT_MAX *((BT_SUMS_AHEAD_UM >> BT_SUMS_SPLIT_BITS) + 1) <= INT32_MAX, "ahead must fit");
 _Static_assert(WEIGHT_MAX *((BT_SUMS_Y_UM >> BT_SUMS_SPLIT_BITS) + 1) <= INT32_MAX, "y must fit int32");
@@ -61,14 +61,14 @@ _Static_assert(WEIGHT_MAX *((BT_SUMS_Z_UM >> BT_SUMS_SPLIT_BITS) + 1) <= UINT32_
 _Static_assert(WEIGHT_MAX *BT_SUMS_LOW_MAX <= INT32_MAX && WEIGHT_MAX * BT_SUMS_Y_LOW_MAX <= INT32_MAX,
                "the low parts must fit int32");
 _Static_assert(WEIGHT_MAX * BT_SUMS_BEHIND_UNITS * BT_SUMS_X_UNIT_UM >> SPLIT_BITS <= INT32_MAX,
-               "x behind the seam must fit int32 once it is divided");
+               "x behind the seam must fit int32 after the shift");
 _Static_assert(WEIGHT_MAX *BT_SUMS_BEHIND_UNITS / 2 <= UINT32_MAX,
                "half of x behind the seam must fit uint32");
 _Static_assert(LOW_BITS == 2 && BT_SUMS_X_UNIT_UM * 2 == QUARTER_X << (SPLIT_BITS - 5),
-               "halves behind the seam times QUARTER_X are 2^5 of what they become");
+               "half the sum behind the seam times QUARTER_X must be 2^5 times the result");
 
-// The squares of all e, or of the compressed ones; returns all of them ORed together. As unsigned, so
-// that squares up to 2^32 - 1 are exact.
+// The squares of all signals, or of the compressed ones; return their bitwise OR. Unsigned, so that squares
+// up to 2^32 - 1 are exact.
 static uint32_t squares_of(const int32_t e_q4[BT_ELECTRODES], uint32_t w[BT_ELECTRODES])
 {
     uint32_t all = 0;
@@ -116,9 +116,9 @@ static void square_moments(const int32_t e_q4[BT_ELECTRODES], int weights, momen
     m->n[2] = -(int32_t)((sums.z_hi >> LOW_BITS) + (sums.z_lo >> SPLIT_BITS));
 }
 
-// N_x / W on the cylinder, where N_x <= 0, correctly rounded. A quotient of what is at hand is less than
-// 1.5 um off: W / 2^bits has 13 bits at least and is rounded to half a unit. What is left over then tells
-// the rest; it is small, and so known in spite of the modulo.
+// N_x / W on the cylinder, where N_x <= 0, correctly rounded. The quotient of the shifted values is less than
+// 1.5 um off: W / 2^bits has at least 13 bits and is rounded to half a unit. The remainder then corrects it;
+// being small, it is known despite the modulo.
 _Static_assert(WHOLE_TOTAL >> LINEAR_BITS >= 1 << 13 && BT_SUMS_WEIGHT_BITS - 1 - SPLIT_BITS >= 13
                    && BT_ELECTRODE_MAX_UM < 7 << 11,
                "13600 um of half a unit in 2^13 must stay below 0.9 um");
@@ -133,17 +133,17 @@ static int16_t ratio_um(const moments *m)
     return (int16_t)-(int32_t)um;
 }
 
-#define DIRECTION_BITS 16 // a direction's components
+#define DIRECTION_BITS 16 // of a direction's components
 
 _Static_assert(2001 * (int64_t)BT_CORE_RADIUS_UM < 4000LL * BT_ROOT_UM_FACTOR,
-               "a component at the radius must stay below 2^32, though the table be off by 2^-14");
+               "a component at the radius must stay below 2^32, even if the table is off by 2^-14");
 _Static_assert(((int64_t)BT_ROOT_UM_FACTOR << 20) + (1 << BT_ROOT_UM_BITS) <= UINT32_MAX, "um must fit");
 _Static_assert(((int64_t)BT_ROOT_LEVER_FACTOR << 17) + BT_ROOT_LEVER_FACTOR + (1 << BT_ROOT_LEVER_BITS)
                    <= UINT32_MAX,
                "the lever must fit");
 
-// The direction n[first..2] put out to the core's radius. The largest component is at least 2^15, so that
-// a quarter of the length's square is at least 2^28.
+// Scale the direction n[first..2] to the core's radius. The largest component is brought to at least 2^15, so
+// that a quarter of the squared length is at least 2^28.
 static void to_radius(const int32_t n[3], int first, bt_point *point)
 {
     uint32_t component[3];
@@ -153,11 +153,11 @@ static void to_radius(const int32_t n[3], int first, bt_point *point)
         largest |= component[d];
     }
     int down = bt_bit_length(largest) - DIRECTION_BITS;
-    uint32_t quarter = 0; // of the squares: what fits 32 bits
+    uint32_t quarter = 0; // of the sum of squares, to fit 32 bits
     for (int d = first; d < 3; d++) {
         if (down > 0) {
             uint32_t rounded = (component[d] + (1u << (down - 1))) >> down;
-            component[d] = rounded - (rounded >> DIRECTION_BITS); // 2^16 itself would not square
+            component[d] = rounded - (rounded >> DIRECTION_BITS); // the square of 2^16 would not fit
         } else {
             component[d] <<= -down;
         }
@@ -167,12 +167,12 @@ static void to_radius(const int32_t n[3], int first, bt_point *point)
     uint32_t inverse = bt_root_inverse(is_short ? 4 * quarter : quarter);
     inverse = is_short ? inverse : (inverse + 1) >> 1;
     for (int d = first; d < 3; d++) {
-        uint32_t at_radius = component[d] * inverse; // share of 2^32
+        uint32_t at_radius = component[d] * inverse; // direction's component * BT_ROOT_SHARE * 2^32
         uint32_t um =
             ((at_radius >> 12) * BT_ROOT_UM_FACTOR + (1u << (BT_ROOT_UM_BITS - 1))) >> BT_ROOT_UM_BITS;
         point->um[d] = (int16_t)bt_with_sign(um, n[d]);
         if (d > 0) {
-            // The middle of what was cut: values cut to 17 bits would pull the lever towards the axis.
+            // Round to the middle of what is cut: truncation would pull the lever towards the axis.
             uint32_t middle = BT_ROOT_LEVER_FACTOR / 2 + (1u << (BT_ROOT_LEVER_BITS - 1));
             uint32_t lever = ((at_radius >> 15) * BT_ROOT_LEVER_FACTOR + middle) >> BT_ROOT_LEVER_BITS;
             point->lever_yz[d - 1] = bt_with_sign(lever, n[d]);
@@ -187,7 +187,7 @@ static bool point_of(const moments *m, bt_point *point)
     }
     if (m->n[0] >= 0) { // tip: a point on the sphere; its direction needs no division by W
         to_radius(m->n, 0, point);
-    } else { // cylinder: keep x, move (y, z) out to the radius, which the paper's Eq 2 leaves out
+    } else { // cylinder: keep x, move (y, z) out to the radius, which the paper's Eq 2 omits
         to_radius(m->n, 1, point);
         point->um[0] = ratio_um(m);
     }

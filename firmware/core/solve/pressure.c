@@ -7,11 +7,11 @@
 #define MILLI        1000
 
 _Static_assert((int64_t)(BT_FULL_SCALE_COUNT * 256) * BT_SETTING_PRESSURE_FILTER_MILLI_MAX <= INT32_MAX,
-               "a weighed step must fit 32 bits");
+               "a weighted step must fit 32 bits");
 _Static_assert((int64_t)BT_E_MAX_Q4 *BT_SETTING_PRESSURE_GAIN_NN_MAX / 16 / NN_PER_100UN <= INT32_MAX,
                "a force must fit its type");
 _Static_assert(BT_SETTING_PRESSURE_GAIN_NN_MIN == 0 && BT_SETTING_PRESSURE_FILTER_MILLI_MAX == MILLI,
-               "no pressure pulls, and no filter overshoots");
+               "no gain may be negative, and no filter may overshoot");
 
 void bt_pressure_use(bt_pressure *pressure, const bt_settings *settings)
 {

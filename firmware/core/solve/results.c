@@ -11,10 +11,10 @@
 #define POC_LOW            4                     // times the contact threshold
 #define BASE_OLD_FRAMES    (60000 / BT_FRAME_MS) // one minute
 
-// Of a round's own signals, cut to 1/2 count.
+// Energies of a round's signals, truncated to 1/2 count.
 typedef struct {
     uint32_t energy; // count^2
-    uint32_t bulge;  // count^2 of electrodes that gained
+    uint32_t bulge;  // count^2, electrodes above rest only
 } signal_shape;
 
 _Static_assert(BT_ELECTRODES *(BT_E_MAX_Q4 / 8 + 1LL) * (BT_E_MAX_Q4 / 8 + 1LL) <= UINT32_MAX,
@@ -30,8 +30,8 @@ static inline void add_to_shape(signal_shape *shape_q2, int32_t e_q4)
     }
 }
 
-// Signals and shape in one pass where every electrode has a count and a tare. Called, not inlined: then the
-// compiler walks plain pointers.
+// Signals and shape in one pass, for when every electrode has a count and a tare. Not inlined: the compiler
+// then makes plain pointer loops.
 static BT_NOINLINE signal_shape all_signals(const uint16_t counts[BT_ELECTRODES],
                                             const uint16_t tare_q4[BT_ELECTRODES],
                                             int32_t e_q4[BT_ELECTRODES])
@@ -75,12 +75,12 @@ static BT_NOINLINE uint32_t trouble(const bt_round *round, const bt_tare *tare)
 
 _Static_assert((BT_FULL_SCALE_COUNT & (BT_FULL_SCALE_COUNT + 1)) == 0
                    && BT_INVALID_COUNT > BT_FULL_SCALE_COUNT,
-               "counts ORed are no more than a count, but with a missing word among them they are");
+               "the OR of counts must exceed full scale only where a word is missing");
 
 uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare)
 {
     uint32_t flags = BT_FRAME_FLAG_MX_DERIVED | BT_FRAME_FLAG_FX_WEAK;
-    // One look for what hardly ever happens: a missing word is above every count.
+    // One comparison for what hardly ever happens: a missing word is above every count.
     uint32_t counts = (uint32_t)(round->pdc | round->tac | round->tdc);
     if (counts > BT_FULL_SCALE_COUNT || tare->trigger.missing + tare->trigger.railed > 0) {
         flags |= trouble(round, tare);
@@ -107,7 +107,7 @@ static bool enough_active(const int32_t e_q4[BT_ELECTRODES])
 {
     int wanted = ACTIVE_FOR_TORSION;
     for (int i = 0; i < BT_ELECTRODES; i++) {
-        // One comparison for both signs: what is in between wraps to below.
+        // One comparison for both signs: what is in between stays below.
         if ((uint32_t)(e_q4[i] + ACTIVE_Q4 - 1) > 2 * (ACTIVE_Q4 - 1) && --wanted == 0) {
             return true;
         }
@@ -137,10 +137,10 @@ void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_setti
 {
     uint32_t flags = bt_channel_flags(round, tare) | bt_not_asked(quantities);
     bt_sigma_unknown(msg);
-    msg->torsion_mnmm = BT_INVALID_I32; // but by a map
+    msg->torsion_mnmm = BT_INVALID_I32; // only a map gives it
     if (flags & BT_FRAME_FLAG_UNTARED) {
         msg->flags = flags;
-        // Asked for nothing, the kernel marks everything and looks at no signal.
+        // With nothing wanted, the kernel marks everything invalid and reads no signal.
         (void)bt_solve(NULL, settings, 0, msg->poc_um, msg->force_100un, msg->torque_mnmm);
         return;
     }

@@ -1,6 +1,6 @@
-// One frame's results: point of contact, force, torque and what to think of them.
-// Output units are those of the FRAME message: um, 100 uN, mN*mm, rounded half away from zero;
-// a result that cannot be given is the type's minimum, never 0 and never an older one.
+// One frame's results: point of contact, force and torque, and the flags that qualify them.
+// Output units are those of the FRAME message: um, 100 uN, mN*mm, rounded half away from zero; a result that
+// cannot be given is the type's minimum, never 0 and never an older one.
 #ifndef BIOTAC_RESULTS_H
 #define BIOTAC_RESULTS_H
 
@@ -8,13 +8,13 @@
 #include "solve/solve.h"
 #include "touch/tare.h"
 
-// Fill flags, poc_um, force_100un, torque_mnmm and their sigmas of msg. quantities is a mask of
-// BT_QUANTITY_FLAG_*; what is not in it is not computed and marked invalid.
+// Fill in flags, poc_um, force_100un, torque_mnmm, torsion_mnmm and sigmas of msg. quantities is a mask of
+// BT_QUANTITY_FLAG_*; the others are not computed, and marked invalid.
 void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,
                 uint32_t quantities, bt_msg_frame *msg);
 
 #ifndef BT_CDEF
-// NOT_ASKED, or none: sigma is asked for by few, and does not count.
+// NOT_ASKED or 0. Sigma does not count: few ask for it.
 static inline uint32_t bt_not_asked(uint32_t quantities)
 {
     uint32_t every = BT_WANT_ALL | BT_QUANTITY_FLAG_PRESSURE;
@@ -22,7 +22,7 @@ static inline uint32_t bt_not_asked(uint32_t quantities)
 }
 #endif
 
-// The flags that need no computing.
+// The flags that do not depend on any result.
 uint32_t bt_channel_flags(const bt_round *round, const bt_tare *tare);
 
 #endif

@@ -1,12 +1,11 @@
-// One over a square root, by table and a straight line between its entries.
+// Reciprocal square root, by table and linear interpolation.
 #ifndef BIOTAC_ROOT_H
 #define BIOTAC_ROOT_H
 
 #include "solve/rsqrt_gen.h"
 
-// share * 2^32 / sqrt(q) for q >= 2^30, see rsqrt_gen.h: 17 bits, off by at most 2^-17.4 of itself, for
-// that is how far a chord is from the curve, and by one unit that rounding the entries and the
-// product adds.
+// BT_ROOT_SHARE * 2^32 / sqrt(q) for q >= 2^30 (rsqrt_gen.h): 17 bits. It is off by at most 2^-17.4 of
+// itself, the distance of a chord from the curve, and by one unit from rounding the entries and the product.
 static inline uint32_t bt_root_inverse(uint32_t q)
 {
     const uint16_t *at = bt_root_table + ((q >> BT_ROOT_STEP_BITS) - (1u << (30 - BT_ROOT_STEP_BITS)));

@@ -6,14 +6,15 @@
 
 _Static_assert(BT_ELECTRODE_MAX_UM <= INT16_MAX, "a PoC must fit the message");
 
-// |gain| times the length of the electrodes' normals along one axis: nN * 1/1000, of which 1e8 are 100 uN.
+// |gain| times the length of all electrodes' normals along one axis, as a vector: nN * 1/1000, and 1e8 of
+// these are 100 uN.
 static uint32_t force_per_count(int32_t gain_nn, int axis)
 {
     uint64_t product = (uint64_t)bt_abs32(gain_nn) * bt_normal_length_milli[axis];
     return (uint32_t)((product << 16) / 100000000u);
 }
 
-// Whoever gave a finger, or the board, force gains knows more of it than what fingers have in common.
+// Not for a finger or board that was given force gains: they say more about it than other fingers do.
 static bool wants_population(const bt_settings *settings)
 {
     static const uint8_t gains[3] = {BT_SETTING_FORCE_GAIN_X_NN, BT_SETTING_FORCE_GAIN_Y_NN,
@@ -45,7 +46,7 @@ bt_solve_settings bt_solve_settings_from(const bt_settings *settings)
     return kernel;
 }
 
-// Not initialised by a copy: the board would call memcpy for it in every frame.
+// Element by element: for a copy the board would call memcpy in every frame.
 static void mark_poc(int16_t poc_um[3])
 {
     poc_um[0] = BT_INVALID_I16;
@@ -89,7 +90,7 @@ static uint32_t population_force(const int32_t e_q4[BT_ELECTRODES], const bt_map
     return BT_FRAME_FLAG_POPULATION | BT_FRAME_FLAG_OUTSIDE;
 }
 
-// Force by the gains, or where there is a frame by the population map; the rest of both is one.
+// Force comes from the gains, or from the population map if `frame` is given; all else is the same.
 static inline uint32_t solve_without_map(const int32_t e_q4[BT_ELECTRODES], const bt_map_input *frame,
                                          const bt_solve_settings *settings, uint32_t wanted,
                                          int16_t poc_um[3], int32_t force_100un[3], int32_t torque_mnmm[3])

@@ -30,9 +30,8 @@ static uint32_t root32(uint32_t n)
     return r;
 }
 
-// The same of 64 bits, by halves (Zimmermann, Karatsuba Square Root, 1999): the upper half's root, then one
-// division for the lower bits, which is one too high at most. n is first shifted up by an even number of
-// bits.
+// The same for 64 bits, by halves (Zimmermann, Karatsuba Square Root, 1999): the upper half's root, then the
+// lower bits by one division, at most one too high. n is first shifted up by an even number of bits.
 static uint32_t root(uint64_t n)
 {
     if (n >> 32 == 0) {
@@ -41,10 +40,9 @@ static uint32_t root(uint64_t n)
     int shift = __builtin_clz((uint32_t)(n >> 32)) & ~1;
     n <<= shift;
     uint32_t high = (uint32_t)(n >> 32), low = (uint32_t)n;
-    uint32_t s = root32(high);    // 2^15 <= s < 2^16
-    uint32_t rest = high - s * s; // at most 2 s
-    uint32_t half =
-        rest << 15 | low >> 17; // half of (rest * 2^16 + low's upper half), which needs a bit more
+    uint32_t s = root32(high);              // 2^15 <= s < 2^16
+    uint32_t rest = high - s * s;           // at most 2 s
+    uint32_t half = rest << 15 | low >> 17; // half of (rest << 16 | low >> 16), which itself takes 33 bits
     uint32_t q = BT_DIVIDE_U32(half, s);
     uint32_t left = (half - q * s) << 1 | (low >> 16 & 1);
     uint64_t r = ((uint64_t)s << 16) + q;
@@ -52,7 +50,7 @@ static uint32_t root(uint64_t n)
     return (uint32_t)(r - (remainder < 0)) >> (shift / 2);
 }
 
-// By four products of halves: a core without a long multiply would call a 64-bit routine.
+// Four products of halves: a core without a long multiply would call a 64-bit routine.
 static inline uint64_t times(uint32_t a, uint32_t b)
 {
     uint32_t a_high = a >> 16, a_low = a & 0xFFFF;
@@ -69,8 +67,8 @@ uint32_t bt_sigma_count_q8(uint32_t noise_count2)
 
 // ---- the point of contact ------------------------------------------------------------------------------
 
-// m * 2^e, m of 16 bits with the highest one set, or zero. Each step is off by 2^-15 of itself at most, which
-// is a thirtieth of what a um is of the largest sigma that fits.
+// m * 2^e, where m has 16 bits with the highest one set, or is zero. Each step is off by at most 2^-15 of
+// itself: 0.03 um in a sigma of 1 mm.
 typedef struct {
     uint32_t m;
     int e;
@@ -127,10 +125,10 @@ static uint16_t rounded(scaled value)
 }
 
 #define WEIGHT_BITS 13 // of all weights together
-#define SQUARE_BITS 10 // that distances^2 in um^2 do without
-#define EQUAL_BITS  8  // of slopes that are all 1
+#define SQUARE_BITS 10 // cut off distances^2 in um^2
+#define EQUAL_BITS  8  // of slopes that are all 1 (n = 1)
 #define FARTHEST_UM 18400u
-// Between electrodes along the finger, and from one to the line through the middle of the tip.
+// FARTHEST_UM is between electrodes along the finger, or from one to a line through the middle of the tip.
 _Static_assert(((FARTHEST_UM * FARTHEST_UM >> SQUARE_BITS) + 1) * ((1ull << WEIGHT_BITS) + BT_ELECTRODES)
                    <= UINT32_MAX,
                "sums of weighted squares fit");
@@ -154,14 +152,14 @@ static uint16_t poc_sigma_um(const int32_t e_q4[BT_ELECTRODES], int weights, con
     const bool tip = poc_um[0] > 0;
     uint32_t weight[BT_ELECTRODES];
     bool counts[BT_ELECTRODES];
-    uint32_t total = 0; // W: 19 of 26 bits
+    uint32_t total = 0; // W: 19 weights of 24 bits
     for (int i = 0; i < BT_ELECTRODES; i++) {
         counts[i] = e_q4[i] < 0 || (e_q4[i] > 0 && weights == BT_POC_WEIGHTS_ABS_N2);
         uint32_t e = counts[i] ? (bt_abs32(e_q4[i]) + 8) >> 4 : 0;
         weight[i] = once ? e : e * e;
         total += weight[i];
     }
-    int down = 0; // what weights are shifted by; even, for it is halved
+    int down = 0; // what weights are shifted by; even, because it is halved below
     while (total >> down >= 1u << WEIGHT_BITS) {
         down += 2;
     }
@@ -173,16 +171,16 @@ static uint16_t poc_sigma_um(const int32_t e_q4[BT_ELECTRODES], int weights, con
     if (!tip) {
         n_q15[0] = 0;
     }
-    uint32_t along = 0;   // of w'^2 (x - c_x)^2, on the cylinder
-    uint32_t across = 0;  // of w'^2 |r x n|^2; on the cylinder without x
-    int32_t lever_q3 = 0; // of w r n
+    uint32_t along = 0;   // sum of w'^2 (x - c_x)^2, on the cylinder
+    uint32_t across = 0;  // sum of w'^2 |r x n|^2; on the cylinder without x
+    int32_t lever_q3 = 0; // sum of w r n
     for (int i = 0; i < BT_ELECTRODES; i++) {
         if (!counts[i]) {
             continue;
         }
         const int16_t *r = bt_electrode_um[i];
         const uint32_t w = (weight[i] + half) >> down;
-        const uint32_t slope2 = once ? 1u << EQUAL_BITS : w; // of a square, a quarter
+        const uint32_t slope2 = once ? 1u << EQUAL_BITS : w; // w'^2; for squares a quarter of it
         int32_t out_q15 = r[1] * n_q15[1] + r[2] * n_q15[2];
         uint32_t off = square_of((r[1] * n_q15[2] - r[2] * n_q15[1]) >> 15);
         if (tip) {
@@ -195,7 +193,7 @@ static uint16_t poc_sigma_um(const int32_t e_q4[BT_ELECTRODES], int weights, con
         across += slope2 * less_bits(off);
         lever_q3 += (int32_t)w * ((out_q15 + (1 << 11)) >> 12);
     }
-    if (lever_q3 <= 0) { // nothing weighs, or too little to say where
+    if (lever_q3 <= 0) { // all weights are 0, or too small to locate the contact
         return UNKNOWN;
     }
     const int slope_e = once ? (SQUARE_BITS - EQUAL_BITS) / 2 : SQUARE_BITS / 2 + 1 + down / 2;
@@ -231,7 +229,7 @@ void bt_sigma(const int32_t e_q4[BT_ELECTRODES], const bt_solve_settings *settin
     if (msg->poc_um[0] != BT_INVALID_I16) {
         msg->poc_sigma_um = poc_sigma_um(e_q4, settings->poc_weights, msg->poc_um, sigma_q8);
     }
-    if (forced && settings->map == NULL && !settings->population) { // a map's depends on where it is touched
+    if (forced && settings->map == NULL && !settings->population) { // a map's depends on the place
         force_sigma(settings, sigma_q8, msg);
     }
 }

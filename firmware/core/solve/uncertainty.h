@@ -1,16 +1,15 @@
 // One standard deviation of the point of contact and of the force, from the noise measured at rest.
 //
-// To first order, an electrode's noise moves Eq 1's centroid m by w'(e) (r_i - m) / W, and Eq 2 takes that to
-// the surface: of a move across the normal n it makes r / |m| times as much, of one along n nothing. On the
-// cylinder that is so of y and z, and x stays. With |m| = sum w r_i n / W and independent noise of one size s
-// on all electrodes:
+// To first order, an electrode's noise moves Eq 1's centroid m by w'(e) (r_i - m) / W. Eq 2 takes that to the
+// surface: a move across the normal n grows by r / |m|, one along n vanishes. On the cylinder this applies to
+// y and z, and x stays. With |m| = sum w r_i n / W and independent noise of size s on every electrode:
 //
 //     tip        s sqrt(sum w'^2 |r_i x n|^2) r / sum w r_i n
 //     cylinder   the same in the y-z plane, and s sqrt(sum w'^2 (x_i - c_x)^2) / W along x
 //
-// n is c / r, of the published point c. The force is linear: S_d s |n_d|.
+// n is c / r for the published point c. Force is linear in the signals: its sigma is S_d s |n_d|.
 //
-// Units: um and 100 uN, rounded to the nearest; saturates at 65534. 0xFFFF is not known.
+// Units: um and 100 uN, rounded to nearest; saturates at 65534. 0xFFFF: unknown.
 #ifndef BIOTAC_SIGMA_H
 #define BIOTAC_SIGMA_H
 

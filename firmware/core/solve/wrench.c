@@ -4,9 +4,8 @@
 #include "map/map_gen.h"
 #include "solve/sums_gen.h"
 
-// sum * gain / FORCE_DIVISOR is 100 uN: 1/16 count * 1/1000 * nN. sum * gain / TORQUE_DIVISOR is mN*mm:
-// 1/16 count * BT_SUMS_TORQUE_UNIT_NM * nN. Multiplying by 2^bits / divisor and shifting replaces both
-// divisions.
+// sum * gain / FORCE_DIVISOR is 100 uN: 1/16 count * 1/1000 * nN. sum * gain / TORQUE_DIVISOR is mN*mm: 1/16
+// count * BT_SUMS_TORQUE_UNIT_NM * nN. Multiplying by 2^bits / divisor and shifting replaces both divisions.
 #define FORCE_DIVISOR  1600000000LL
 #define FORCE_BITS     34
 #define TORQUE_BITS    35
@@ -19,14 +18,14 @@
 
 #define FORCE_MAX_100UN (BT_SUM_NORMAL_MAX_Q4_MILLI * BT_GAIN_MAX_NN / FORCE_DIVISOR + 1)
 
-// The bounds below are for gains of one range, the same on both sides of 0.
+// The bounds below assume that all gains have one range, symmetric about 0.
 #define HAS_GAIN_RANGE(name)                                                                                 \
     (BT_SETTING_##name##_MAX == BT_GAIN_MAX_NN && BT_SETTING_##name##_MIN == -BT_GAIN_MAX_NN)
 _Static_assert(HAS_GAIN_RANGE(FORCE_GAIN_X_NN) && HAS_GAIN_RANGE(FORCE_GAIN_Y_NN)
                    && HAS_GAIN_RANGE(FORCE_GAIN_Z_NN),
-               "the force gains' ranges must be one");
+               "the force gains must have one range");
 _Static_assert(HAS_GAIN_RANGE(TORQUE_GAIN_Y_NN) && HAS_GAIN_RANGE(TORQUE_GAIN_Z_NN),
-               "the torque gains' ranges must be that of the force gains");
+               "the torque gains must have the force gains' range");
 
 _Static_assert(BT_SUM_NORMAL_MAX_Q4_MILLI <= INT32_MAX, "a force sum must fit int32");
 _Static_assert(((int64_t)BT_GAIN_MAX_NN << FORCE_BITS) / FORCE_DIVISOR <= 1 << 30,
@@ -35,7 +34,7 @@ _Static_assert(((int64_t)BT_GAIN_MAX_NN << TORQUE_BITS) / TORQUE_DIVISOR <= 1 <<
                "a torque gain must fit bt_scale");
 _Static_assert(BT_SUM_ARM_MAX_Q4_NM / BT_SUMS_TORQUE_UNIT_NM + 2 + BT_ELECTRODES * (int64_t)BT_E_MAX_Q4
                    <= INT32_MAX,
-               "a torque sum must fit int32, though arms be rounded to whole units");
+               "a torque sum must fit int32, even with arms rounded to whole units");
 _Static_assert((int64_t)BT_E_MAX_Q4 *(BT_SUMS_LINE_PARTS_MAX + BT_ELECTRODES) <= INT32_MAX
                    && (int64_t)BT_E_MAX_Q4 * BT_ELECTRODES << (BT_SUMS_ARM_BITS - 1) <= INT32_MAX,
                "a torque sum's fractions must fit int32");

@@ -1,8 +1,8 @@
 // Force and torque on the finger: Lin 2013 Eq 3 and 4, one gain per axis, in 32-bit arithmetic.
 // In: e = count - tare in 1/16 count (q4), |e| <= 4095 counts; gains in nN per count.
-// Force and torque act on the finger; the torque is about the origin (centre of the tip sphere).
-// Outputs round half away from zero. No input overflows: the gains' range sees to it (assertions in
-// wrench.c), so there is nothing to saturate.
+// Force and torque act on the finger; the torque is about the origin (centre of the tip sphere). Outputs
+// round half away from zero. No input overflows: the gains' range prevents it (assertions in wrench.c), so
+// nothing saturates.
 #ifndef BIOTAC_WRENCH_H
 #define BIOTAC_WRENCH_H
 
@@ -11,7 +11,7 @@
 
 #include <stdint.h>
 
-// Gains as the sums are multiplied by them, worked out once per change of settings.
+// Gains as multipliers of the sums, computed once per change of settings.
 typedef struct {
     uint16_t high, low; // magnitude
     int32_t sign;       // 0 or -1
@@ -32,8 +32,8 @@ void bt_force(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t 
 // Torque y and z in mN*mm.
 void bt_torque_yz(const int32_t e_q4[BT_ELECTRODES], const bt_gains *gains, int32_t torque_mnmm[2]);
 
-// Torque x from the lever, in mN*mm: (c x F)_x. Only E8 and E9 have any moment arm about x, so
-// Eq 4 cannot measure it; what is published is this derived value, and it is flagged so.
+// Torque x from the lever, in mN*mm: (c x F)_x. Only E8 and E9 have any moment arm about x, so Eq 4 cannot
+// measure it; this derived value is published instead, and flagged as such.
 int32_t bt_torque_x_derived(const int32_t lever_yz[2], const int32_t force_100un[3]);
 
 #endif

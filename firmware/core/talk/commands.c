@@ -99,7 +99,7 @@ static uint8_t tare_set(bt_session *session, const uint8_t *payload)
 {
     bt_msg_tare_set msg;
     bt_msg_tare_set_unpack(&msg, payload);
-    // Not refused for a finger that has not answered yet: a stored tare may come before frame one.
+    // Accepted even if the finger has not answered yet: a stored tare may come before the first frame.
     if (msg.finger >= BT_MAX_FINGERS) {
         return BT_ERROR_NO_SUCH_FINGER;
     }
@@ -239,7 +239,7 @@ static uint8_t clear_calibration(bt_session *session, uint8_t finger)
 static uint8_t save_calibrations(bt_session *session)
 {
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        // The others stay as they are stored, be it by a firmware that knows more than this one.
+        // The others stay as stored, maybe by newer firmware with records that this one cannot read.
         if (session->calibration[f].unsaved) {
             uint8_t error = session->board.save_calibration(f, &session->calibration[f]);
             if (error != BT_ERROR_OK) {
@@ -254,7 +254,7 @@ static uint8_t save_calibrations(bt_session *session)
 static uint8_t save(bt_session *session)
 {
     if (session->streams != 0) {
-        return BT_ERROR_BUSY; // sampling stands still while flash is written
+        return BT_ERROR_BUSY; // sampling stops while flash is written
     }
     const bt_board_actions *board = &session->board;
     if (board->save_settings == NULL || board->save_calibration == NULL || board->save_map == NULL) {
@@ -277,12 +277,12 @@ static uint8_t reboot_bootloader(const bt_session *session, const uint8_t *paylo
     return session->board.reboot_bootloader == NULL ? BT_ERROR_NOT_HERE : session->board.reboot_bootloader();
 }
 
-// payload is NULL when its length does not fit the id; then nothing of it can be trusted, not
-// even where req_id is.
+// payload is NULL if its length does not match the id. Then nothing in it can be trusted, not even where
+// req_id is.
 void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_t now_us)
 {
     if (id < 0x80) {
-        return; // one of our own, echoed by a terminal driver
+        return; // one of our own messages, echoed by a terminal driver
     }
     session->heard_us = now_us;
     if (payload == NULL) {

@@ -4,7 +4,7 @@
 
 #include "talk/session.h"
 
-// One good packet from the host; payload NULL: its length does not fit its id.
+// Handle one good packet from the host; payload is NULL if its length does not match its id.
 void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_t now_us);
 
 #endif

@@ -1,6 +1,6 @@
 #include "talk/faults.h"
 
-// Not DOUBT and OUTSIDE, which the best finger has at the beginning and the end of a touch.
+// Without DOUBT and OUTSIDE, which even the best finger has at the beginning and the end of a touch.
 #define AGAINST_ITS_NUMBERS                                                                                  \
     (BT_FRAME_FLAG_ELECTRODE_MISSING | BT_FRAME_FLAG_RAIL | BT_FRAME_FLAG_PDC_MISSING                        \
      | BT_FRAME_FLAG_TAC_MISSING | BT_FRAME_FLAG_TDC_MISSING | BT_FRAME_FLAG_BASE_OLD | BT_FRAME_FLAG_FAULT  \
@@ -10,7 +10,7 @@
 void bt_faults_of_round(bt_session *session, unsigned f, uint32_t flags)
 {
     uint32_t against = AGAINST_ITS_NUMBERS;
-    // Before its first tare a finger is untared by nature.
+    // Before its first tare a finger is untared in any case.
     against |= session->finger[f].tare.reason != BT_TARE_REASON_NONE ? BT_FRAME_FLAG_UNTARED : 0;
     session->finger_faults[f] |= flags & against;
 }

@@ -1,11 +1,10 @@
-// What went wrong, kept until the host clears it: a fault of one round is not missed by who looks now and
-// then.
+// Faults are kept until the host clears them, so that one that lasted a single round is not missed.
 #ifndef BIOTAC_FAULTS_H
 #define BIOTAC_FAULTS_H
 
 #include "talk/session.h"
 
-// Finger f's round carries these BT_FRAME_FLAG_*; those that speak against its numbers are kept.
+// Keep those of finger f's BT_FRAME_FLAG_* in this round that speak against its numbers.
 void bt_faults_of_round(bt_session *session, unsigned f, uint32_t flags);
 
 // CLEAR_FAULTS.

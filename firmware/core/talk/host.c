@@ -5,17 +5,18 @@
 
 #include <string.h>
 
-// A host of wire 1.3 ends SET_CALIBRATION before pressure_gain_nn: 0, not calibrated, as it would have said.
+// A host of wire 1.3 ends SET_CALIBRATION before pressure_gain_nn. This is then filled up with 0, not
+// calibrated.
 #define SET_CALIBRATION_1_3_BYTES 50
 _Static_assert(BT_SET_CALIBRATION_BYTES == SET_CALIBRATION_1_3_BYTES + 4,
-               "who appends more fills it up, too");
+               "a field that is appended must be filled up too");
 
 static bool filled_up(bt_deframer *deframer)
 {
     if (deframer->id != BT_SET_CALIBRATION_ID || deframer->payload_bytes != SET_CALIBRATION_1_3_BYTES) {
         return false;
     }
-    memset(deframer->buffer + 1 + SET_CALIBRATION_1_3_BYTES, 0, 4); // over its CRC
+    memset(deframer->buffer + 1 + SET_CALIBRATION_1_3_BYTES, 0, 4); // overwrites the CRC
     return true;
 }
 
@@ -34,10 +35,10 @@ void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, 
         }
         if (outcome == BT_DEFRAMED_GOOD) {
             session->rx_frames++;
-            bool empty = session->deframer.payload_bytes == 0; // of an unknown id; no req_id in it
+            bool empty = session->deframer.payload_bytes == 0; // the id is unknown; there is no req_id
             bt_command(session, session->deframer.id, empty ? NULL : session->deframer.buffer + 1, now_us);
         } else if (outcome == BT_DEFRAMED_BAD_LENGTH) {
-            // The CRC is right, so somebody meant this: bt_command answers it in words.
+            // The CRC is right, so this was sent on purpose: bt_command answers it with an error.
             damaged(session);
             bt_command(session, session->deframer.id, NULL, now_us);
         } else if (outcome != BT_DEFRAMED_NOTHING) {
@@ -46,7 +47,7 @@ void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, 
     }
 }
 
-// A hand whose controller is gone holds on for a while, and is then judged by its signals again.
+// If the controller is gone, holds last for a while; then the fingers are judged by their signals again.
 static void lapse_holds(bt_session *session, uint32_t now_us)
 {
     if (session->hold_timeout_us == 0 || now_us - session->heard_us <= session->hold_timeout_us) {

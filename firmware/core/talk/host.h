@@ -1,5 +1,5 @@
-// The host as the board hears it: its bytes, its silence, its going. Times are device time in us, wrapping
-// at 2^32.
+// What the board sees of the host: its bytes, its silence and its disconnection. Times are device time in us,
+// wrapping at 2^32.
 #ifndef BIOTAC_HOST_H
 #define BIOTAC_HOST_H
 
@@ -11,7 +11,7 @@ void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, 
 // Call often: keep-alive and periodic status.
 void bt_session_tick(bt_session *session, uint32_t now_us);
 
-// The host closed the port: nobody is there to stream to.
+// The host closed the port: stop streaming.
 void bt_session_link_down(bt_session *session);
 
 #endif

@@ -28,7 +28,7 @@ static uint8_t read_map(bt_session *session, const uint8_t *payload)
         return BT_ERROR_NO_SUCH_FINGER;
     }
     const bt_map_place *place = &session->map[asked.finger].place;
-    if (asked.offset >= place->bytes) { // so too where there is none
+    if (asked.offset >= place->bytes) { // also if there is no map
         return BT_ERROR_OUT_OF_RANGE;
     }
     bt_msg_map_data msg = {.req_id = asked.req_id, .finger = asked.finger, .offset = asked.offset};
@@ -41,14 +41,14 @@ static uint8_t read_map(bt_session *session, const uint8_t *payload)
     return BT_ERROR_OK;
 }
 
-// What holds for every command that changes a map.
+// Checks for every command that changes a map.
 static uint8_t may_change(const bt_session *session, uint8_t finger)
 {
     if (finger >= BT_MAX_FINGERS) {
         return BT_ERROR_NO_SUCH_FINGER;
     }
     if (session->streams != 0) {
-        return BT_ERROR_BUSY; // one recording, one map; and sampling stands still while flash is written
+        return BT_ERROR_BUSY; // one recording, one map; and sampling stops while flash is written
     }
     return session->board.maps == NULL ? BT_ERROR_NOT_HERE : BT_ERROR_OK;
 }
@@ -98,7 +98,7 @@ static uint8_t end_map(bt_session *session, const uint8_t *payload)
     bt_upload *upload = &session->upload;
     bt_finger_map *its = &session->map[msg.finger];
     if (!upload->open || upload->finger != msg.finger || upload->place.crc32 != msg.crc32) {
-        // The reply to the end of it was lost, or there was no beginning.
+        // Either the reply to an earlier END_MAP was lost, or there was no BEGIN_MAP.
         bool has_it = its->place.bytes != 0 && its->place.crc32 == msg.crc32;
         return has_it ? BT_ERROR_OK : BT_ERROR_NOT_BEGUN;
     }
@@ -163,7 +163,7 @@ uint8_t bt_save_maps(bt_session *session)
 {
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         bt_finger_map *its = &session->map[f];
-        // The others stay as they are stored, be it by a firmware that knows more than this one.
+        // The others stay as stored, maybe by newer firmware with records that this one cannot read.
         if (its->unsaved) {
             uint8_t error = session->board.save_map(f, &its->place);
             if (error != BT_ERROR_OK) {

@@ -4,8 +4,7 @@
 
 #include "talk/session.h"
 
-// Both return an enum bt_error; *answered tells whether a message of the command's own has gone out in place
-// of a REPLY.
+// Both return an enum bt_error. *answered: the command has sent a message of its own instead of a REPLY.
 uint8_t bt_map_command(bt_session *session, uint8_t id, const uint8_t *payload, bool *answered);
 uint8_t bt_save_maps(bt_session *session);
 

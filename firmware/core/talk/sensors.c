@@ -2,11 +2,11 @@
 
 #include <string.h>
 
-// How often one that does not answer is asked, in rounds: each time costs a round of its samples, if it has
-// any.
+// How often a sensor that does not answer is asked, in rounds. Each time costs a round of its samples, if it
+// has any.
 #define ASK_PERIOD      10
 #define ASK_PERIOD_LATE 100
-#define LATE_AFTER      10 // times
+#define LATE_AFTER      10 // times asked
 
 void bt_sensors_doubt(bt_session *session, unsigned f)
 {
@@ -51,7 +51,7 @@ uint8_t bt_sensors_to_ask(bt_session *session)
 {
     uint8_t mask = 0;
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
-        bool asked = session->asked >> f & 1; // its round says nothing of whether it answers
+        bool asked = session->asked >> f & 1; // this round does not show whether it answers
         if (!asked && session->unsure >> f & 1 && wants(session, f)) {
             mask = (uint8_t)(mask | 1u << f);
         }

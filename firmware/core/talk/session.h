@@ -1,6 +1,6 @@
-// What one session with the host consists of: fingers, settings, calibrations, maps, streams, link
-// statistics. Knows no transport: bytes leave through one function that takes a whole frame or nothing;
-// host.h takes those that come. Times are device time in us, wrapping at 2^32.
+// One session with the host: fingers, settings, calibrations, maps, streams and link statistics. It knows no
+// transport: bytes leave through one function that takes a whole frame or nothing, and arrive through host.h.
+// Times are device time in us, wrapping at 2^32.
 #ifndef BIOTAC_SESSION_H
 #define BIOTAC_SESSION_H
 
@@ -18,43 +18,43 @@ typedef struct {
     uint32_t image_crc32; // 0xFFFFFFFF: unknown
 } bt_identity;
 
-// What a sensor says of itself, as it is sent.
+// What a sensor says about itself, as sent to the host.
 typedef bt_msg_sensor_info bt_sensor_info;
 
-// Takes all bytes or none; false means no room, or nobody there.
+// Takes all bytes or none; false: no room, or no host.
 typedef bool (*bt_link_write)(const uint8_t *data, size_t bytes);
 
-// What the session asks of its board. All return an enum bt_error.
+// What the session needs from its board. The actions return an enum bt_error.
 typedef struct {
     uint8_t (*save_settings)(const bt_settings *settings);
     uint8_t (*save_calibration)(uint8_t finger, const bt_calibration *calibration);
     uint8_t (*save_map)(uint8_t finger, const bt_map_place *place);
     uint8_t (*reboot_bootloader)(void); // OK: it happens once the reply is out
     const bt_map_flash *maps;           // where wrench maps are kept; NULL: nowhere
-    uint32_t (*now_us)(void);           // device time; NULL: a board that is never short of it
+    uint32_t (*now_us)(void);           // device time; NULL: the board is never short of time
 } bt_board_actions;
 
-// What FRAMEs did without for want of time, in the order in which it goes; wrap at 2^32.
+// What FRAMEs lacked because time was short, in the order of shedding; wrap at 2^32.
 typedef struct {
     uint32_t sigma;
     uint32_t wrench; // repeated
     uint32_t frames;
 } bt_sheds;
 
-// Finger-rounds of a FRAME stream in which something was not done because nobody needed it; wrap at 2^32.
+// Finger-rounds of FRAME streams in which something was skipped because nobody needed it; wrap at 2^32.
 typedef struct {
-    uint32_t frames; // an IDLE spoke instead
+    uint32_t frames; // an IDLE was sent instead
     uint32_t poc;
     uint32_t force;
     uint32_t torque;
     uint32_t sigma;
 } bt_skips;
 
-// What is known of who is there, for sensors.c.
+// What sensors.c knows about which sensor is there.
 typedef struct {
-    uint8_t bad_words; // in a row, at most BT_AWAY_WORDS
+    uint8_t bad_words; // consecutive, at most BT_AWAY_WORDS
     uint8_t to_wait;   // rounds until it is asked again
-    uint8_t times;     // that it was asked, as far as that matters
+    uint8_t times;     // it was asked, up to a limit
     bool answered;     // in the last round
 } bt_who;
 
@@ -62,16 +62,15 @@ typedef struct {
     bt_finger finger[BT_MAX_FINGERS];
     bt_sensor_info info[BT_MAX_FINGERS];
     bt_who who[BT_MAX_FINGERS];
-    uint8_t
-        asked; // these are bit masks of fingers: in this round asked for the serial number, and not sampled
+    uint8_t asked;   // bit masks of fingers: asked for their serial number in this round, not sampled
     uint8_t unsure;  // may be another sensor than info says
     uint8_t other;   // is another one than at START
-    uint8_t refused; // and calibration or map are not its own
+    uint8_t refused; // likewise, and calibration or map are not its own
     bt_settings settings;
     bt_calibration calibration[BT_MAX_FINGERS];
-    uint8_t calibration_state[BT_MAX_FINGERS]; // enum; these follow from what is above, once per change
+    uint8_t calibration_state[BT_MAX_FINGERS]; // enum bt_calibration_state; derived from the above
     bt_finger_map map[BT_MAX_FINGERS];
-    uint8_t map_state[BT_MAX_FINGERS]; // enum bt_calibration_state, likewise
+    uint8_t map_state[BT_MAX_FINGERS]; // likewise
     bt_upload upload;
     bt_solve_settings kernel[BT_MAX_FINGERS];
     bt_tare_settings tare[BT_MAX_FINGERS];
@@ -85,8 +84,8 @@ typedef struct {
 
     uint8_t streams;              // BT_STREAM_FLAG_*
     uint8_t fingers;              // bit mask of the fingers that START named
-    uint8_t eventful;             // bit mask of those who tell EVENTs in this round
-    uint8_t events_due[BT_SLOTS]; // and of those for whom each slot may show one
+    uint8_t eventful;             // bit mask of the fingers that send EVENTs in this round
+    uint8_t events_due[BT_SLOTS]; // and of those for which each slot may show one
     uint16_t keepalive_ms;
     uint32_t heard_us; // when the host last said anything
     uint32_t status_us;
@@ -99,9 +98,9 @@ typedef struct {
     uint32_t messages_dropped;
     bt_skips skips;
     bt_sheds sheds;
-    uint8_t sigma_pause; // rounds in which nobody gets one
-    uint8_t first;       // finger of the next round: 0, or who went without in this one
-    uint8_t first_next;  // of the round under way; BT_MAX_FINGERS: nobody yet
+    uint8_t sigma_pause; // rounds left in which no finger gets a sigma
+    uint8_t first;       // first finger of the next round: 0, or the first that something was left out for
+    uint8_t first_next;  // the same, as found in this round; BT_MAX_FINGERS: none so far
     uint32_t slots_late;
     uint32_t rx_frames;
     uint32_t rx_errors;
@@ -111,22 +110,22 @@ typedef struct {
 
 void bt_session_init(bt_session *session, const bt_identity *identity, bt_link_write write, uint32_t now_us);
 
-// Until this is called, or where an action is NULL, the commands for it are answered NOT_HERE.
+// Until this is called, or where an action is NULL, its commands are answered NOT_HERE.
 void bt_session_use_board(bt_session *session, const bt_board_actions *actions);
 
-// Settings, calibrations or sensors have changed. Not while streaming: one recording, one set of settings.
+// Apply changed settings, calibrations or sensors. Not while streaming: one recording, one set of settings.
 void bt_session_use_settings(bt_session *session);
 
-// End every stream. What waited for that, a sensor unplugged meanwhile, then counts.
+// End every stream. A change of sensor that had to wait for this takes effect.
 void bt_session_stop(bt_session *session);
 
-// Finger f's sensor has said its serial number; other: it is not the one that was there before.
+// Finger f's sensor has told its serial number; other: it is not the one that was there before.
 void bt_session_sensor_changed(bt_session *session, unsigned f, bool other);
 
 // Bit mask of the fingers whose sensor answers.
 uint8_t bt_session_present(const bt_session *session);
 
-// Send what lies at frame + BT_PAYLOAD_AT as one message, see bt_frame_seal.
+// Send the payload at frame + BT_PAYLOAD_AT as one message (bt_frame_seal).
 void bt_session_send_sealed(bt_session *session, uint8_t id, uint8_t *frame);
 
 // Send one message, counting it as sent or dropped.

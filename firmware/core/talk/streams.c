@@ -5,19 +5,19 @@
 
 #include <string.h>
 
-// How late a finger's FRAME may be, after its round's last slot, until something is left out. At full load
-// the last of five is begun 8 ms late; slots wait for 29 ms (BT_SLOT_RING).
+// How long after its round's last slot a finger's FRAME may begin before something is left out. At full load
+// the last of five begins 8 ms late; slots are buffered for 29 ms (BT_SLOT_RING).
 #define SIGMA_LATE_US      9000
 #define MAP_LATE_US        11000
 #define FRAME_LATE_US      22000
-#define SIGMA_PAUSE_ROUNDS 50 // for all fingers, or the first ones' would cost the last ones more than theirs
+#define SIGMA_PAUSE_ROUNDS 50 // for all fingers, or the first ones' sigmas would cost the last ones even more
 
 static bool streams(const bt_session *session, const bt_finger *finger, uint8_t what)
 {
     return (session->streams & what) && (session->fingers >> finger->index & 1);
 }
 
-// Who begins knows nothing of what was before.
+// A finger that starts sending events starts without a history.
 static void begin_events(bt_session *session)
 {
     static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
@@ -158,7 +158,7 @@ static void count_skips(bt_skips *skips, uint32_t quantities)
     skips->sigma += !(quantities & BT_QUANTITY_FLAG_SIGMA);
 }
 
-// How long ago the round's last slot was over. A round that is still to end, by a clock that stands, is not
+// How long ago the round's last slot ended. By a clock that stands still, a round that has not ended is not
 // late.
 static int32_t late_us(const bt_session *session, const bt_finger *finger)
 {
@@ -178,7 +178,7 @@ static uint32_t to_shed(bt_session *session, const bt_finger *finger, int32_t la
            | (late > MAP_LATE_US && age <= BT_REPEAT_MAX_ROUNDS ? BT_SHED_MAP : 0);
 }
 
-// Whoever goes without comes first in the next round.
+// The first finger for which something is left out comes first in the next round.
 static void went_without(bt_session *session, uint8_t finger)
 {
     if (session->first_next == BT_MAX_FINGERS) {
@@ -217,8 +217,8 @@ static void send_frame(bt_session *session, bt_finger *finger)
     count_skips(&session->skips, finger->quantities);
 }
 
-// A FRAME, or the silence that an IDLE ends: when its period is over, and before the next FRAME, so that
-// every round is accounted for and a gap is a loss.
+// Send a FRAME, or count the round for an IDLE. An IDLE is sent when its period is over and before the next
+// FRAME, so that every round is accounted for and a gap is a loss.
 static void send_round(bt_session *session, bt_finger *finger)
 {
     bool idle = bt_finger_idle(finger) && !finger->fresh;
@@ -276,7 +276,7 @@ void bt_session_round(bt_session *session)
             bt_faults_of_round(session, (unsigned)f, bt_sensors_flags(session, (unsigned)f));
         }
         if (!bt_finger_end(finger, &session->tare[f])) {
-            // One that never said who it is cannot be told from the next one by anything else.
+            // Without a serial number, only the silence shows that another sensor may come.
             if (finger->silent_rounds == BT_UNPLUGGED_ROUNDS && finger->answered
                 && !session->info[f].present) {
                 bt_finger_forget(finger);
@@ -290,7 +290,7 @@ void bt_session_round(bt_session *session)
         }
     }
     session->first = (uint8_t)(session->first_next % BT_MAX_FINGERS);
-    // Vibration after all fingers' forces: who closes a grip waits for those.
+    // Vibration after the forces of all fingers, as a controller closing a grip waits for those.
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         bt_finger *finger = &session->finger[f];
         if (!(answering >> f & 1)) {

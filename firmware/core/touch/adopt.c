@@ -2,7 +2,7 @@
 
 #include "fixed_point.h"
 
-// What pressure may be missing right after a press (9 counts seen); it comes back.
+// Pressure that may be missing right after a press (9 counts seen) and comes back.
 #define UNDERSHOOT_SHARE         64 // of the press's peak; a hundredth seen
 #define UNDERSHOOT_PDC_COUNT_MAX 16
 
@@ -10,7 +10,7 @@ void bt_adopt_aim_pressure(bt_tare *tare)
 {
     uint32_t base_q16 = tare->base.pdc_q16;
     uint32_t watched_q16 = bt_adopt_trigger_base(tare)->pdc_q16;
-    // A press that ends in doubt has the pressure low for a second or two; its return is no touch.
+    // After a press that ends in doubt, pressure is low for a second or two; its return is no touch.
     if (base_q16 != BT_TARE_UNKNOWN && watched_q16 != BT_TARE_UNKNOWN && watched_q16 > base_q16) {
         base_q16 = watched_q16;
     }
@@ -125,8 +125,8 @@ void bt_adopt_contact(bt_tare *tare)
     bt_adopt_aim(tare);
 }
 
-// A channel whose first word comes only now begins at rest: against any other baseline it would
-// look like a contact. Not so one whose tare the host has set.
+// A channel whose first word comes only now begins at rest, or it would look like a contact. Not if the host
+// has set its tare.
 static void meet_lane(bt_tare *tare, unsigned lane)
 {
     uint32_t first_q16 = (uint32_t)tare->trigger.smooth.lane[lane] << 16;

@@ -1,5 +1,5 @@
-// A baseline: what every electrode and the static pressure read at rest; and the ones of the last two
-// seconds, for a touch to go back to.
+// A baseline: what every electrode and the static pressure read at rest. Those of the last two seconds are
+// kept for a touch to go back to.
 //
 // Units: counts in 1/65536 (q16); rounds half away from zero when published in 1/16 count.
 #ifndef BIOTAC_BASELINE_H
@@ -22,13 +22,13 @@ typedef struct {
     uint8_t countdown; // sweeps until the next
 } bt_rollback;
 
-// A new baseline: nothing from before it may come back.
+// A new baseline: none from before may come back.
 void bt_rollback_start(bt_rollback *rollback, const bt_baseline *base);
 
-// After each sweep at rest.
+// Call after each sweep at rest.
 void bt_rollback_keep(bt_rollback *rollback, const bt_baseline *base);
 
-// A lane's first value, for all snapshots.
+// Put a lane's first value into all snapshots.
 void bt_rollback_meet(bt_rollback *rollback, unsigned lane, uint32_t first_q16);
 
 // The baseline of at least a second ago, or the oldest there is.
@@ -40,13 +40,13 @@ uint32_t bt_rollback_sweeps(const bt_rollback *rollback);
 #ifndef BT_CDEF
 #include "fixed_point.h"
 
-// A value that moves to its target by step_q16 at most.
+// The value, moved towards its target by at most step_q16.
 static inline uint32_t bt_baseline_follow(uint32_t base_q16, uint32_t target_q16, int32_t step_q16)
 {
     return base_q16 + (uint32_t)bt_limited((int32_t)(target_q16 - base_q16), -step_q16, step_q16);
 }
 
-// A value moved by step_q16; it stays within 0..full scale, and an unknown one stays unknown.
+// The value, moved by step_q16. It stays within 0..full scale, and an unknown one stays unknown.
 static inline uint32_t bt_baseline_moved(uint32_t base_q16, int32_t step_q16)
 {
     if (base_q16 == BT_TARE_UNKNOWN) {
@@ -55,13 +55,13 @@ static inline uint32_t bt_baseline_moved(uint32_t base_q16, int32_t step_q16)
     return (uint32_t)bt_limited((int32_t)base_q16 + step_q16, 0, BT_FULL_SCALE_COUNT << 16);
 }
 
-// In whole counts. Of a known one.
+// A known value in whole counts.
 static inline int32_t bt_baseline_count(uint32_t base_q16)
 {
     return (int32_t)((base_q16 + (1 << 15)) >> 16);
 }
 
-// As it is subtracted and published: 1/16 count; BT_INVALID_COUNT when unknown.
+// The value as subtracted and published: 1/16 count; BT_INVALID_COUNT when unknown.
 static inline uint16_t bt_tare_q4(uint32_t base_q16)
 {
     return base_q16 == BT_TARE_UNKNOWN ? BT_INVALID_COUNT : (uint16_t)((base_q16 + (1 << 11)) >> 12);

@@ -3,14 +3,14 @@
 #include "fixed_point.h"
 #include "wire/sensor_gen.h"
 
-#define RATE_Q16           (4 * 328) // a sweep; 15 counts/min, the worst drift measured
-#define NEAR_SHIFT         5         // of the distance, into the step
-#define SETTLE_SWEEPS      16 // until what is followed is drift, and not the noise of the tare's first moment
-#define FIRST_SWEEPS       16 // a mean is of as many at least
+#define RATE_Q16           (4 * 328) // per sweep; 15 counts/min, the worst drift measured
+#define NEAR_SHIFT         5         // share of the distance in a step
+#define SETTLE_SWEEPS      16        // until what is followed is drift and not the noise of taking the tare
+#define FIRST_SWEEPS       16        // a mean is over at least this many
 #define KNOWN_SWEEPS       32
-#define MEAN_SWEEPS        128 // and of as many at most
-#define EXTRAPOLATED_TIMES 8   // times as long as it was seen a rate is taken to last
-#define COMMIT_SWEEPS      32  // a load is seen by its pressure within as many
+#define MEAN_SWEEPS        128 // and at most this many
+#define EXTRAPOLATED_TIMES 8   // a rate is taken to last for this many times as long as it was seen
+#define COMMIT_SWEEPS      32  // pressure shows a load within this many
 
 _Static_assert(RATE_Q16 * 16LL * EXTRAPOLATED_TIMES * MEAN_SWEEPS <= INT32_MAX,
                "what is unseen must fit its type");
@@ -61,7 +61,7 @@ bool bt_drift_known(const bt_drift *drift)
     return drift->sweeps >= KNOWN_SWEEPS;
 }
 
-// Of a rate, in so many sweeps, as 1/2^20 count.
+// The drift at a rate in so many sweeps, in 1/2^20 count.
 static int32_t made_q20(const bt_drift *drift, int32_t rate_q20, uint32_t sweeps)
 {
     uint32_t last = (uint32_t)(EXTRAPOLATED_TIMES * mean_sweeps(drift));

@@ -1,7 +1,6 @@
-// Drift that all electrodes share: a real sensor's is one rate, times .82 to 1.16 for each of them, and lasts
-// for minutes. It is learned while the static pressure says that nothing is pressed any harder, and is taken
-// to go on for a while where nothing can be seen of it: in the first seconds of a touch, and while the finger
-// is silent.
+// Drift that all electrodes share. A real sensor drifts at one rate, times .82 to 1.16 for each electrode,
+// for minutes. The rate is learned while static pressure shows that no load changes, and is taken to go on
+// for a while when drift cannot be seen: in the first seconds of a touch, and while the finger is silent.
 //
 // Units: counts in 1/65536 (q16) and 1/2^20 (q20); time in sweeps of 80 ms. Rounds half away from zero.
 #ifndef BIOTAC_DRIFT_H
@@ -12,33 +11,33 @@
 
 typedef struct {
     int32_t rate_q20;     // counts that every electrode gains in a sweep
-    int32_t waiting_q20;  // what it was some seconds ago
-    int32_t sure_q20;     // and before that: no load that is seen now was learned in it
+    int32_t waiting_q20;  // the rate some seconds ago
+    int32_t sure_q20;     // the rate before that: no load that is seen now was learned in it
     uint8_t since_commit; // sweeps
-    uint8_t settled;      // sweeps in which the tare came to rest
-    int32_t moved_q16;    // what electrodes followed by in this sweep, the sum
-    uint8_t sweeps;       // it was learned in; saturates
+    uint8_t settled;      // sweeps that the tare has had to come to rest
+    int32_t moved_q16;    // sum of what the electrodes followed by in this sweep
+    uint8_t sweeps;       // sweeps it was learned in; saturates
 } bt_drift;
 
-// A sweep in which the electrodes have followed by moved_q16, and all of it was drift.
+// Learn from a sweep in which the electrodes followed by moved_q16, all of it drift.
 void bt_drift_learn(bt_drift *drift);
 
-// From now on temperature is followed by itself, by so much in a sweep: that is no drift any more.
+// From now on temperature is followed separately, by warming_q16 a sweep: take that out of the drift.
 void bt_drift_cool(bt_drift *drift, int32_t warming_q16);
 
-// A load is seen: what was learned of it is forgotten.
+// A load is seen: forget what was learned from it.
 void bt_drift_revert(bt_drift *drift);
 
-// It has been learned for long enough.
+// True once drift has been learned for long enough.
 bool bt_drift_known(const bt_drift *drift);
 
-// What it makes of so many sweeps.
+// The drift of so many sweeps.
 int32_t bt_drift_over(const bt_drift *drift, uint32_t sweeps);
 
-// So many sweeps that told nothing of it. Returns what it is taken to have made in them.
+// So many sweeps showed nothing of the drift. Returns what is assumed for them, and reduces the rate.
 int32_t bt_drift_unseen(bt_drift *drift, uint32_t sweeps);
 
-// What every electrode is to follow by in a sweep, this far behind.
+// The step of every electrode in a sweep, when they are behind by away_q16.
 int32_t bt_drift_step_q16(const bt_drift *drift, int32_t away_q16);
 
 #endif

@@ -4,20 +4,20 @@
 
 #include "fixed_point.h"
 
-#define SLEW_Q16     (8 * 328)  // a sweep; 0.5 count/s: drift is followed no faster, so a load is not
+#define SLEW_Q16     (8 * 328)  // per sweep; 0.5 count/s: drift is followed no faster, so that no load is
 #define PDC_SLEW_Q16 (8 * 131)  // 0.2 count/s
 #define PDC_SINK_Q16 (8 * 655)  // 1 count/s: no load takes pressure away
 #define PDC_BACK_Q16 (8 * 2621) // 4 counts/s: an undershoot comes back within seconds
-#define BACK_ROUNDS  400        // and after these is over
+#define BACK_ROUNDS  400        // and is over after these
 
-// The square of a difference in count^2, rounded down. Differences are below 2^16 in 1/16 count: as unsigned,
-// the square fits, and so does the sum over all electrodes.
+// The square of a difference in count^2, rounded down. Differences are below 2^16 in 1/16 count, so the
+// unsigned square fits, and so does the sum over all electrodes.
 static uint32_t square(int32_t difference_q4)
 {
     return (uint32_t)difference_q4 * (uint32_t)difference_q4 >> 8;
 }
 
-// By what moves the tare and the watched baseline alike.
+// Move the tare and the watched baseline alike.
 static BT_NOINLINE void shift_electrode(bt_tare *tare, unsigned i, int32_t step_q16)
 {
     tare->base.electrode_q16[i] = bt_baseline_moved(tare->base.electrode_q16[i], step_q16);
@@ -25,14 +25,14 @@ static BT_NOINLINE void shift_electrode(bt_tare *tare, unsigned i, int32_t step_
     bt_adopt_electrode(tare, i);
 }
 
-// Only in a sweep that began at rest: a tare that was just set stays as given for a round at least, and
-// of a touch nothing is followed.
+// Only in a sweep that began at rest: a tare just set stays as given for at least a round, and nothing of a
+// touch is followed.
 static bool rests(const bt_tare *tare)
 {
     return tare->state == BT_TARE_STATE_REST && tare->hits == 0 && !tare->partial;
 }
 
-// Where the host says that something is held, only drift.
+// While the host says that something is held, only drift is followed.
 static bool tracks(const bt_tare *tare)
 {
     return rests(tare) && !tare->held;
@@ -91,7 +91,7 @@ static void serve_electrode(bt_tare *tare, unsigned i)
         serve_touched(tare, i, mean_q3);
         return;
     }
-    // Where it is used, every round was below the threshold: the sum stays far below 2^32.
+    // The sum is used only if every round was below the threshold, so it stays far below 2^32.
     int32_t away_q3 = 8 * tare->trigger.smooth.lane[i] - mean_q3;
     tare->deviation_q6 += (uint32_t)(away_q3 * away_q3);
     uint32_t mean_q16 = (uint32_t)mean_q3 << 13;

@@ -5,8 +5,8 @@
 // Real skin leaves the pressure up to 9 counts low after a press; 12 counts are 0.1 to 0.2 N.
 #define UNDO_BELOW_COUNT  12
 #define LOSE_BELOW_COUNT  20
-#define UNDERSHOOT_SHARE  16 // of a press that lasted a minute, more was missing than that
-#define PRESSED_PDC_COUNT 24 // after a press there is an undershoot, and its tare was one of rest
+#define UNDERSHOOT_SHARE  16 // of the press's peak: after a minute of pressing, more was missing
+#define PRESSED_PDC_COUNT 24 // such a press leaves an undershoot though its tare was one of rest
 #define UNDO_COUNT2       300
 #define LOSE_COUNT2       2000
 #define DOUBT_ROUNDS      3
@@ -60,7 +60,7 @@ static sums sums_of(const bt_tare_change *change, const bt_lanes *smooth, const 
     return s;
 }
 
-// The signals are the last change of the tare upside down: within 45 degrees of it.
+// True if the signals are the last change of the tare upside down, within 45 degrees.
 static bool is_the_change(const sums *s)
 {
     uint64_t along = s->along < 0 ? (uint64_t)-(int64_t)s->along : 0;

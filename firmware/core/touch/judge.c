@@ -6,7 +6,7 @@
 
 #include <stddef.h>
 
-#define FAINT_Q16              (1 << 16) // what all electrodes have moved by, that may be drift
+#define FAINT_Q16              (1 << 16) // what all electrodes share and may be drift
 #define DRIFT_ROUNDS_PER_COUNT 400       // 15 counts/min, the worst drift measured
 #define DRIFT_LIMIT            60000
 
@@ -26,8 +26,9 @@ BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
     }
 }
 
-// Where drift and temperature went untracked: 15 counts a minute, the worst drift measured, while there is
-// pressure to tell it from a load; and a third of what temperature was followed by may be wrong.
+// Energy that may be due to untracked drift and temperature. Drift is 15 counts a minute, the worst measured,
+// as long as there is pressure to tell it from a load. Of what was followed for temperature, a third may be
+// wrong.
 static uint32_t forgiven_count2(const bt_tare *tare)
 {
     uint32_t rounds = tare->contact_rounds < DRIFT_LIMIT ? tare->contact_rounds : DRIFT_LIMIT;
@@ -37,8 +38,8 @@ static uint32_t forgiven_count2(const bt_tare *tare)
            * ((tare->pressure_seen ? drift_count2 : 0) + BT_DIVIDE_U32(warm_count * warm_count, 9));
 }
 
-// What is left of the energy when every electrode loses what all have moved. A 19th is a product and a shift;
-// it is off by less than a millionth.
+// The energy without what all electrodes have moved by. The division by 19 is a product and a shift, off by
+// less than a millionth.
 static uint32_t uneven_count2(const bt_tare *tare)
 {
     uint64_t sum_q4 = bt_abs32(tare->sum_q4);
@@ -46,8 +47,8 @@ static uint32_t uneven_count2(const bt_tare *tare)
     return tare->energy_count2 > even_count2 ? tare->energy_count2 - even_count2 : 0;
 }
 
-// After a sweep in contact: has it ended? What would be tared are means, and in the rounds right after a
-// release they still are those of the press: the pressure and its mean must both have fallen.
+// After a sweep in contact: has it ended? A tare is made of means, and right after a release these are still
+// the press's, so both the pressure and its mean must have fallen.
 static void judge_release(bt_tare *tare)
 {
     int32_t mean = tare->sweep.mean_q3.lane[BT_LANE_PDC] >> 3;
@@ -90,15 +91,15 @@ static void end_touched_sweep(bt_tare *tare, const bt_tare_settings *settings)
     if (due || tare->sweep.still_sweeps == BT_WATCH_SWEEPS) {
         bt_watch_return(&tare->watch, &tare->sweep, tare->trigger.unknown, BT_STILL_SPAN_Q3);
     }
-    if (!tare->partial) { // sums over electrodes that were not all served in one state say nothing
+    if (!tare->partial) { // else the sums mix electrodes served in different states
         judge_release(tare);
     }
 }
 
-// What of the sweep was drift, and what the next one follows by. While pressure is level; of a touch, or what
-// the host says is one, only once skin no longer creeps, and either what is faint or what has clearly gone
-// one way: shear makes no pressure, either. Until then it goes on as it was, or is followed as well as may be
-// if that is not known.
+// How much of the sweep was drift, and what the next one follows by. Drift is seen only while pressure is
+// level. In a touch, or in what the host says is one, also only once skin no longer creeps, and only if it is
+// faint or clearly one way, because shear makes no pressure either. Until then known drift is taken to go on,
+// and unknown drift is followed as well as possible.
 static void judge_drift(bt_tare *tare)
 {
     bt_watch *watch = &tare->watch;
@@ -134,7 +135,7 @@ BT_NOINLINE void bt_judge_sweep(bt_tare *tare, const bt_tare_settings *settings)
         }
     } else if (tare->state == BT_TARE_STATE_REST && !tare->partial) {
         bt_rollback_keep(&tare->rollback, &tare->base);
-        if (!tare->partial_before) { // or its windows reach back into a touch
+        if (!tare->partial_before) { // else its windows reach back into a touch
             bt_noise_add(&tare->noise, tare->deviation_q6, settings->contact_energy_count2);
         }
     } else if (bt_tare_touched(tare)) {

@@ -1,14 +1,13 @@
-// What a sweep says, or a round that speaks against the tare: has a contact begun or ended, is the tare
-// wrong, what was drift? The rules are release.h's, inverted.h's and drift.h's; here they are asked and
-// obeyed.
+// The verdicts after a sweep, or after a round that speaks against the tare: has a contact ended, is the tare
+// wrong, what was drift? The rules are in release.h, inverted.h and drift.h; here they are applied.
 #ifndef BIOTAC_JUDGE_H
 #define BIOTAC_JUDGE_H
 
 #include "touch/machine.h"
 
-#define BT_STILL_SWEEPS 2 // to tare from; the first one may hold what came before it
+#define BT_STILL_SWEEPS 2 // needed for a tare; the first may hold what came before it
 
-// A round with pressure below the tare: one that was taken of a hold shows when that ends.
+// A round with pressure below the tare: a tare taken of a hold shows when the hold ends.
 void bt_judge_inverted(bt_tare *tare);
 
 // The sweep is over, all of its lanes were served.

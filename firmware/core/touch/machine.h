@@ -1,5 +1,4 @@
-// What the tare machine (tare.h) knows of one finger; its rounds, what follows drift, what judges a sweep and
-// what adopts a tare all work on it.
+// The tare machine's (tare.h) state of one finger, on which tare.c, follow.c, judge.c and adopt.c work.
 //
 // Units: counts; baselines in 1/65536 count (q16); energies in count^2; time in rounds of 10 ms and sweeps of
 // eight.
@@ -17,7 +16,7 @@
 #include "touch/thermal.h"
 #include "touch/watch.h"
 
-// What the machine needs of the settings.
+// What the machine needs from the settings.
 typedef struct {
     uint32_t contact_energy_count2;
     int32_t thermal_gain_q16; // counts that a resting electrode gains per count of TDC
@@ -29,10 +28,10 @@ typedef struct {
     uint8_t state;        // enum bt_tare_state
     uint8_t reason;       // enum bt_tare_reason of the last change
     uint8_t before_fault; // the state to go back to
-    bool changed; // the last round changed the tare by more than drift tracking, or the host's word did
-    bool tared;   // there is one
-    bool held;    // the host says so: no new tare is taken
-    bool let_go;  // the host says so: what is in doubt is residue
+    bool changed;         // by the last round, beyond drift tracking, or by the host
+    bool tared;           // there is a tare
+    bool held;            // the host says so: no new tare is taken
+    bool let_go;          // the host says so: what is in doubt is residue
     bt_baseline base;
     uint16_t electrode_q4[BT_ELECTRODES]; // base as it is subtracted; BT_INVALID_COUNT when unknown
     uint32_t threshold_count2;            // energy above which a round counts as touched
@@ -45,18 +44,18 @@ typedef struct {
     bt_rollback rollback;
     bt_noise noise;
     bt_drift drift;
-    int32_t drift_q16; // what it adds to each electrode in this sweep
+    int32_t drift_q16; // drift added to each electrode in this sweep
     bt_thermal thermal;
     bt_release release;
 
-    int32_t comes_back_q16; // of the pressure that the latest press has left missing, at most
+    int32_t comes_back_q16; // what may come back of the pressure that the latest press left missing
     uint8_t hits;           // consecutive rounds in which the trigger fired
-    bool touched;           // in this round the trigger fired, or before it and it is over its limit still
+    bool touched;           // the trigger fired in this round, or earlier and is still over its limit
     bool partial;           // this sweep did not serve all electrodes in one state
     bool partial_before;    // nor did the one before
-    uint32_t deviation_q6;  // count^2; of this sweep: filtered counts from their means
-    uint32_t energy_count2; // of this sweep: means from the tare
-    int32_t sum_q4;         // of the same distances
+    uint32_t deviation_q6;  // this sweep's squared distances of filtered counts from their means
+    uint32_t energy_count2; // this sweep's squared distances of means from the tare
+    int32_t sum_q4;         // sum of the same distances
     bool pressure_seen;     // in this sweep at least one pressure word was good
 } bt_tare;
 
@@ -67,7 +66,7 @@ static inline bool bt_tare_touched(const bt_tare *tare)
     return tare->state == BT_TARE_STATE_CONTACT || tare->state == BT_TARE_STATE_DOUBT;
 }
 
-// Static pressure above the tare, in whole counts, where both are known.
+// Static pressure above the tare, in whole counts, and whether both are known.
 static inline bool bt_tare_pdc_known(const bt_tare *tare)
 {
     return tare->trigger.pressure_now && tare->base.pdc_q16 != BT_TARE_UNKNOWN;

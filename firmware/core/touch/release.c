@@ -4,25 +4,25 @@
 
 #include <string.h>
 
-// Pressure above the last tare, from 27 presses of two recordings: what a press left was 5.6 at most (median
-// 1), what was left of it in a hold at a tenth of its peak 11 at least (median 56). Pressure undershoots at a
-// release, so that only too much of it speaks.
+// Pressure above the last tare, from 27 presses of two recordings: a press left at most 5.6 (median 1), and a
+// hold at a tenth of the press's peak at least 11 (median 56). Pressure undershoots at a release, so only
+// pressure that is too high is evidence.
 #define QUIET_PDC_COUNT    4
 #define REST_PDC_COUNT_MAX 10
 #define REST_PDC_SHARE     40               // of the peak
-#define PRESSED_PDC_COUNT  (4 * BT_PDC_HIT) // pressure that was a press
-// Electrodes: what a press left was .053 of its signal at most, in energy a 356th.
+#define PRESSED_PDC_COUNT  (4 * BT_PDC_HIT) // pressure that makes a press
+// Electrodes: a press left at most .053 of its signal, a 356th of its energy.
 #define CALM_COUNT2        400
-#define EVEN_COUNT2        200  // of a worn sensor's means, seven sigmas: nothing but noise
-#define RESIDUE_SHARE      64   // of the energy's peak
-#define SETTLED_COUNT2     6000 // skin that settled: the pressure never knew of a touch
+#define EVEN_COUNT2        200  // seven sigmas of a worn sensor's means: nothing but noise
+#define RESIDUE_SHARE      64   // of the peak energy
+#define SETTLED_COUNT2     6000 // skin that settled, if pressure never showed a touch
 #define FALLEN_SHARE       4    // what has fallen to a quarter is no longer the press it was
 #define STILL_SWEEPS       5    // 400 ms
 #define QUIET_SWEEPS       12   // 960 ms
 #define LEVEL_SWEEPS       18   // 1.4 s
 #define STUCK_SWEEPS       25   // 2 s
 #define EVEN_SWEEPS        100  // 8 s
-#define LOADING_PDC_COUNT  2    // pressure above where it was that a slow load makes in a second
+#define LOADING_PDC_COUNT  2    // rise of pressure that a slow load makes in a second
 
 void bt_release_begin(bt_release *release)
 {
@@ -34,7 +34,7 @@ void bt_release_pressure(bt_release *release, int32_t above)
     release->pdc_peak = above > release->pdc_peak ? above : release->pdc_peak;
 }
 
-// A press that the pressure did not see is none of which the pressure can tell.
+// True if pressure can tell whether the press has ended: not if pressure did not show the press.
 static bool has_witness(const bt_release *release, const bt_release_sweep *sweep)
 {
     return sweep->pressure
@@ -42,7 +42,7 @@ static bool has_witness(const bt_release *release, const bt_release_sweep *sweep
                || release->uneven_peak < FALLEN_SHARE * SETTLED_COUNT2);
 }
 
-// Without a witness only electrodes that are back say that nothing touches.
+// Without a witness only electrodes that are back at rest say that nothing touches.
 static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
 {
     bool witness = has_witness(release, sweep);
@@ -76,8 +76,8 @@ static void count_even(bt_release *release, const bt_release_sweep *sweep)
 }
 
 // A load makes a pattern. Without one and with little pressure, what was never a press is no touch after a
-// second, and what was one, or may have been where pressure is not known, is over after eight: the pressure
-// that a long press leaves takes minutes to go.
+// second. A press, or what may have been one as pressure is unknown, is over after eight seconds: the
+// pressure that a long press leaves takes minutes to go.
 static bool is_shift(const bt_release *release, const bt_release_sweep *sweep)
 {
     bool pressed = !sweep->pressure || release->pdc_peak >= PRESSED_PDC_COUNT;

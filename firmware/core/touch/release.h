@@ -1,8 +1,8 @@
-// Has a contact ended? Judged after each sweep of eight rounds, on the strongest moment since the tare was
-// taken and on what the signals are now.
+// Has a contact ended? Judged after each sweep of eight rounds, by the peaks since the tare was taken and by
+// what the signals are now.
 //
-// What a press leaves in the skin looks like a light hold: its size, its pattern and its stillness do not
-// tell them apart. Pressure against the last tare does. Where it does not, either, the answer is DOUBT.
+// What a press leaves in the skin looks like a light hold: size, pattern and stillness do not tell them
+// apart. Pressure above the last tare does. Where it does not either, the answer is DOUBT.
 //
 // Units: counts; pressure above its tare in whole counts; energies in count^2 over all electrodes.
 #ifndef BIOTAC_RELEASE_H
@@ -16,8 +16,8 @@
 typedef enum {
     BT_RELEASE_NO,      // the contact goes on
     BT_RELEASE_CLEAN,   // back at the tare
-    BT_RELEASE_RESIDUE, // ended; what the signals are now is the tare
-    BT_RELEASE_SHIFT,   // no touch: pressure alone has moved, or all electrodes alike
+    BT_RELEASE_RESIDUE, // ended; the present signals are the new tare
+    BT_RELEASE_SHIFT,   // no touch: only pressure has moved, or all electrodes alike
     BT_RELEASE_DOUBT,   // still: a light hold or a residue
 } bt_release_verdict;
 
@@ -26,26 +26,25 @@ typedef struct {
     uint32_t energy_peak;
     uint32_t uneven_peak;
     int32_t pdc_peak;
-    uint8_t quiet_sweeps; // in a row, with the pressure (without one: the energy) back
-    uint8_t
-        even_sweeps; // in a row, with nothing but a shift on the electrodes while the pressure did not rise
-    int32_t even_above; // pressure when those began
+    uint8_t quiet_sweeps; // consecutive sweeps with pressure (if there is none: energy) back at rest
+    uint8_t even_sweeps;  // consecutive sweeps with only a shift of all electrodes and no rise of pressure
+    int32_t even_above;   // pressure when those began
 } bt_release;
 
-// What a sweep has shown.
+// What a sweep showed.
 typedef struct {
-    uint32_t energy_count2;   // of the means from the tare
+    uint32_t energy_count2;   // of means minus tare
     uint32_t uneven_count2;   // the same without what all electrodes share
-    uint32_t forgiven_count2; // of it, what drift and temperature may have made
+    uint32_t forgiven_count2; // of that, what drift and temperature may have made
     bool pressure;            // at least one pressure word was good
-    int32_t above; // pressure over its tare: what it is now or its mean of eight rounds, whichever is more
+    int32_t above;            // pressure above its tare: now or the mean of eight rounds, whichever is more
     uint8_t still_sweeps;
-    uint8_t level_sweeps; // of the pressure
+    uint8_t level_sweeps; // with level pressure
 } bt_release_sweep;
 
 void bt_release_begin(bt_release *release);
 
-// A round in contact with a good pressure word.
+// Add a round in contact with a good pressure word.
 void bt_release_pressure(bt_release *release, int32_t above);
 
 bt_release_verdict bt_release_judge(bt_release *release, const bt_release_sweep *sweep);

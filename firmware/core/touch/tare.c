@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define CONTACT_ROUNDS 3        // rounds over the threshold that make a contact
-#define NOW_SPAN_Q3    (32 * 8) // of a still signal, from its latest filtered count to the mean: ten sigmas
+#define NOW_SPAN_Q3    (32 * 8) // from a still signal's latest filtered count to its mean: ten sigmas
 
 bt_tare_settings bt_tare_settings_from(const bt_settings *settings)
 {
@@ -58,16 +58,16 @@ static void follow_contact(bt_tare *tare)
     }
 }
 
-// Nothing of a faulty round may reach a tare: the sweep starts over when it clears.
+// Nothing of a faulty round may reach a tare: the sweep starts over when the fault clears.
 static BT_NOINLINE void fault(bt_tare *tare)
 {
     if (tare->state != BT_TARE_STATE_FAULT) {
         tare->before_fault = tare->state;
     }
     if (tare->state == BT_TARE_STATE_REST) {
-        bt_thermal_begin(&tare->thermal); // the tare that is frozen now holds for the temperature of now
+        bt_thermal_begin(&tare->thermal); // the tare is frozen now, at this temperature
     }
-    tare->thermal.step_q16 = 0; // some lanes have had it: rather lost for the others than twice for these
+    tare->thermal.step_q16 = 0; // some lanes have had it: better lost for the rest than added twice
     tare->state = BT_TARE_STATE_FAULT;
     tare->hits = 0;
     tare->partial = true;
@@ -90,12 +90,12 @@ void bt_tare_reset(bt_tare *tare)
 
 void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings)
 {
-    if (tare->sweep.round == 0) { // the noise is as old as the last sweep
+    if (tare->sweep.round == 0) { // the noise only changes with a sweep
         tare->threshold_count2 = bt_noise_threshold(&tare->noise, settings->contact_energy_count2);
     }
     bool resting = tare->state == BT_TARE_STATE_REST || tare->state == BT_TARE_STATE_DOUBT;
     bt_trigger_begin(&tare->trigger, resting ? (int32_t)tare->threshold_count2 : BT_TRIGGER_NEVER);
-    tare->touched = tare->hits > 0; // what has begun is not seen to begin again
+    tare->touched = tare->hits > 0; // a touch under way must not be reported as a new one
 }
 
 bool bt_tare_touch(bt_tare *tare)
@@ -122,8 +122,8 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
         bt_adopt_met(tare);
     }
     if (tare->state == BT_TARE_STATE_FAULT) {
-        // A tare from before the fault still holds, and the trigger sees by the coming words whether
-        // something touches now: lost words are no touch.
+        // A tare from before the fault still holds. Whether something touches now, the trigger sees from the
+        // coming words: lost words are no touch.
         tare->state = tare->tared ? tare->before_fault : BT_TARE_STATE_INIT;
         bt_adopt_aim(tare);
         tare->release.quiet_sweeps = 0;
@@ -153,7 +153,7 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
 
 // ---- host commands --------------------------------------------------------------------------
 
-// Means are up to two sweeps old: what the signals do now must agree with them.
+// Means are up to two sweeps old, so the present signals must agree with them.
 static bool present_is_still(const bt_tare *tare)
 {
     bool still = tare->sweep.still_sweeps >= BT_STILL_SWEEPS;
@@ -182,7 +182,7 @@ uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base)
         return BT_ERROR_RAILED;
     }
     bt_adopt_in_place(tare, base, BT_TARE_REASON_HOST_SET);
-    tare->last.known = false; // the host knows better than what was there before
+    tare->last.known = false; // never undone: the host knows better
     return BT_ERROR_OK;
 }
 
@@ -199,8 +199,8 @@ void bt_tare_hold(bt_tare *tare)
     bt_adopt_tell(tare, BT_TARE_REASON_HOST_HOLD);
 }
 
-// What is no longer held is judged by a whole sweep: a verdict in the coming round would take the place of
-// the reason that is still to be told, and nobody would hear of the host's word.
+// A whole sweep must judge what is no longer held: a verdict in the coming round would replace the reason
+// before it is sent, and the host's command would leave no trace.
 static void let_judge(bt_tare *tare, uint8_t reason)
 {
     tare->held = false;

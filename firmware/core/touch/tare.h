@@ -1,11 +1,11 @@
-// The tare machine: what the sensor reads at rest, per electrode and for static pressure.
+// The tare machine finds what the sensor reads at rest, per electrode and for static pressure.
 //
-// Lin's rule (re-tare whenever the sum of squares stays under 1000 count^2) zeroes every load that
-// grows slower than about 5 N/s and locks out after the first contact. This machine follows drift
-// at a bounded rate while nothing touches, freezes on contact, takes the tare back to before the
-// contact began, and re-tares after release once the signals are quiet and the pressure says that it was one.
-// Where a light hold and a press's residue cannot be told apart the tare stays, and a second baseline
-// (watch.h) detects the next contact (protocol/SPEC.md, Tare).
+// Lin's rule (re-tare whenever the sum of squares stays under 1000 count^2) zeroes every load that grows
+// slower than about 5 N/s and locks out after the first contact. This machine follows drift at a bounded rate
+// while nothing touches, freezes on contact, takes the tare back to before the contact began, and re-tares
+// after release once the signals are quiet and pressure confirms the release. Where a light hold and a
+// press's residue cannot be told apart the tare stays, and a second baseline (watch.h) detects the next
+// contact (protocol/SPEC.md, Tare).
 //
 // Units: counts; baselines in 1/65536 count (q16); energies in count^2; time in rounds of 10 ms and
 // sweeps of eight rounds. Baselines round half away from zero when published in 1/16 count.
@@ -19,9 +19,9 @@ bt_tare_settings bt_tare_settings_from(const bt_settings *settings);
 
 void bt_tare_reset(bt_tare *tare);
 
-// A round: begin, then each electrode's and the pressure's word as it comes, then end.
-// Every channel is given once in a round, BT_INVALID_COUNT where no good word came. t_us: device time.
-// A word's function returns true in the slot in which a resting finger is first touched.
+// A round: begin, then each electrode's and the pressure's word as it comes, then end. Every channel is given
+// once in a round, BT_INVALID_COUNT where no good word came. t_us: device time. The functions for words
+// return true in the slot in which a resting finger is first touched.
 void bt_tare_begin(bt_tare *tare, const bt_tare_settings *settings);
 bool bt_tare_touch(bt_tare *tare);
 #ifndef BT_CDEF
@@ -38,12 +38,11 @@ bool bt_tare_pressure(bt_tare *tare, uint16_t count);
 void bt_tare_temperature(bt_tare *tare, uint16_t tdc);
 void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings);
 
-// Host commands; enum bt_error. NOW needs two sweeps that hold still; both are refused in FAULT.
+// Host commands; they return an enum bt_error. NOW needs two still sweeps; both are refused in FAULT.
 uint8_t bt_tare_now(bt_tare *tare);
 uint8_t bt_tare_set(bt_tare *tare, const bt_baseline *base);
 
-// The host's word: the finger holds something; it holds nothing any more; or the host has been silent too
-// long.
+// The host says that the finger holds something, or no longer does; or the host has been silent for too long.
 void bt_tare_hold(bt_tare *tare);
 void bt_tare_release(bt_tare *tare);
 void bt_tare_lapse(bt_tare *tare);

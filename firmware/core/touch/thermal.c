@@ -3,7 +3,7 @@
 #include "fixed_point.h"
 #include "signal/round.h"
 
-#define TDC_SHIFT   3 // a low-pass of eight sweeps: TDC has steps of half an electrode count
+#define TDC_SHIFT   3 // a low-pass of eight sweeps, as a step of TDC is half an electrode count
 #define SLOW_SHIFT  7
 #define APPLIED_MAX (500 << 16) // 15 degrees; more is a broken thermometer
 
@@ -32,7 +32,7 @@ void bt_thermal_add(bt_thermal *thermal, uint16_t tdc, bool end_of_sweep)
     }
 }
 
-// On a ramp the slow low-pass is 128 sweeps behind the other.
+// On a ramp the slow low-pass lags the other by 128 sweeps.
 int32_t bt_thermal_rate_q16(const bt_thermal *thermal, int32_t gain_q16)
 {
     int32_t ahead_q14 = (int32_t)(thermal->tdc_q8 << 6) - thermal->slow_q14;

@@ -4,16 +4,15 @@
 
 #include <stddef.h>
 
-#define LEVEL_Q3     16 // two counts: four sigmas; a load of 0.02 N/s is past it in one second
-#define LEVEL_SWEEPS 32 // 2.6 s
-#define WAIT_SWEEPS  5  // until means say nothing of before
-#define ONE_WAY_Q2   26 // thirteen electrodes one way for six the other: three sigmas of noise
-#define CREEP_Q3                                                                                             \
-    (5 * LEVEL_Q3)             // of a silence, however long: what skin creeps by at the pace of level in 13 s
-#define CREEP_SWEEPS 250       // 20 s, two of its time constants
-#define SLEW_Q16     (8 * 328) // a sweep; 0.5 count/s, as at rest
-#define MISSED_Q16   (SLEW_Q16 / 2)         // 15 counts/min, the worst drift measured: few rounds are noisy
-#define EACH_Q16     (8192 / BT_ELECTRODES) // of a sum over all electrodes in 1/8 count
+#define LEVEL_Q3     16             // two counts, four sigmas; a load of 0.02 N/s exceeds it within a second
+#define LEVEL_SWEEPS 32             // 2.6 s
+#define WAIT_SWEEPS  5              // until means are free of what came before
+#define ONE_WAY_Q2   26             // 13 electrodes one way and 6 the other: three sigmas of noise
+#define CREEP_Q3     (5 * LEVEL_Q3) // at most in a silence: 13 s of skin creep at the limit of level
+#define CREEP_SWEEPS 250            // 20 s, two of its time constants
+#define SLEW_Q16     (8 * 328)      // per sweep; 0.5 count/s, as at rest
+#define MISSED_Q16   (SLEW_Q16 / 2) // 15 counts/min, the worst drift measured, as so few rounds are noisy
+#define EACH_Q16     (8192 / BT_ELECTRODES) // the mean in q16, from a sum over all electrodes in 1/8 count
 
 _Static_assert((int64_t)BT_ELECTRODES * BT_SWEEP_UNREAD_Q3 * EACH_Q16 <= INT32_MAX,
                "a sum of distances must fit its type");
@@ -46,7 +45,7 @@ void bt_watch_pause(bt_watch *watch)
 void bt_watch_begin(bt_watch *watch)
 {
     bt_watch_pause(watch);
-    watch->base.electrode_q16[0] = BT_TARE_UNKNOWN; // nothing is near to that
+    watch->base.electrode_q16[0] = BT_TARE_UNKNOWN; // far from any reading
     watch->creeps = 0;
 }
 
@@ -93,7 +92,7 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
     watch->creeps = (uint8_t)(watch->creeps + (watch->creeps < UINT8_MAX));
     int change_q3 = pressure_mean_q3 == NULL ? LEVEL_Q3 + 1 : *pressure_mean_q3 - watch->level_q3;
     if (change_q3 > LEVEL_Q3 || change_q3 < -LEVEL_Q3) {
-        // Skin creeps: what took so long to move by so little goes on as level.
+        // Skin creeps: pressure that took so long to move by so little still counts as level.
         watch->slow = pressure_mean_q3 != NULL && watch->level_sweeps >= LEVEL_SWEEPS;
         watch->level_q3 = pressure_mean_q3 == NULL ? 0 : *pressure_mean_q3;
         watch->level_sweeps = 0;
@@ -110,8 +109,7 @@ void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3)
     watch->away_q3 = 0;
 }
 
-// Would the pressure have been level all along? `due` becomes the sweeps in which drift would have been
-// followed.
+// True if pressure would have been level all along. *due: the sweeps in which drift would have been followed.
 static bool resume_level(bt_watch *watch, const bt_silence *silence, int32_t *due)
 {
     int32_t pressure_q3 = silence->sum.lane[BT_LANE_PDC] * 8 / BT_SILENCE_ROUNDS;
@@ -153,7 +151,8 @@ int32_t bt_watch_resume(bt_watch *watch, const bt_silence *silence, int span_q3)
         bool known = watch->base.electrode_q16[i] != BT_TARE_UNKNOWN;
         even = even && (!known || (apart_q3 <= span_q3 && apart_q3 >= -span_q3));
     }
-    // Of this sweep's lanes so far, against what is now to move; and what the others would be moved by twice.
+    // The first two hold this sweep's lanes so far, against a baseline that now moves; the third would move
+    // the other lanes twice.
     watch->side = 0;
     watch->away_q3 = 0;
     watch->shared_q16 = 0;

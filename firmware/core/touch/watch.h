@@ -1,10 +1,9 @@
-// What a finger has read since its signals came to rest: the baseline that detects the next contact where the
-// one that is subtracted from the force must stay; and what moves while nothing touches, which is drift.
+// What a finger has read since its signals came to rest. It is a second baseline, which detects the next
+// contact while the tare must stay; and what moves from it while nothing touches is drift.
 //
 // A load moves the static pressure, and presses some electrodes while others bulge. Drift moves nearly all
-// electrodes one way while the pressure stays level. So a tare may follow what is drift by that word, even
-// under a load; without pressure nothing is followed. What is followed is what all electrodes share: a real
-// sensor's drift is one rate, times .82 to 1.16 for each of them.
+// electrodes one way while the pressure stays level. So a tare may follow what passes for drift by this rule,
+// even under a load; without pressure nothing is followed. Only what all share is followed (drift.h).
 //
 // Units: counts in 1/65536 (q16) and 1/8 (q3); time in sweeps of 80 ms.
 #ifndef BIOTAC_WATCH_H
@@ -14,63 +13,63 @@
 #include "signal/sweep.h"
 #include "touch/baseline.h"
 
-#define BT_WATCH_SWEEPS 5 // of still signals, after which what is read is where they came to rest
+#define BT_WATCH_SWEEPS 5 // of still signals, after which they count as at rest
 
 typedef struct {
     bt_baseline base;     // where the signals came to rest
-    uint8_t wait_sweeps;  // until what is read now is that; 0 once it was
+    uint8_t wait_sweeps;  // until the present reading is taken as base; 0 once it was
     uint16_t level_q3;    // the pressure's mean when it last moved
-    uint8_t level_sweeps; // for which it has stayed near that; saturates
-    bool slow;            // and it had stayed long before it moved
+    uint8_t level_sweeps; // sweeps it has stayed near that; saturates
+    bool slow;            // it had stayed for long before it moved
     uint8_t creeps;       // sweeps since the load changed; saturates
-    int8_t side;        // electrodes whose mean of this sweep is above the watched baseline, less those below
-    int16_t one_way_q2; // the same through a low-pass of four sweeps
-    int32_t away_q3;    // sum of the distances of this sweep's means from the watched baseline
-    int32_t shared_q16; // the mean of those of the last whole sweep
-    bool one_way;       // the last whole sweep says: nearly all have moved one way
-    bool follows;       // and each electrode follows what is drift at its own pace
+    int8_t side;          // electrodes with a mean of this sweep above the watched baseline, less those below
+    int16_t one_way_q2;   // the same through a low-pass of four sweeps
+    int32_t away_q3;      // sum of the distances of this sweep's means from the watched baseline
+    int32_t shared_q16;   // their mean in the last whole sweep
+    bool one_way;         // in the last whole sweep nearly all had moved one way
+    bool follows;         // each electrode follows drift at its own pace
 } bt_watch;
 
-// A contact begins, or the load changes: what was watched before says nothing.
+// A contact begins, or the load changes: the baseline no longer means anything.
 void bt_watch_begin(bt_watch *watch);
 
-// A touch that may prove none: what was watched holds on, if the signals come back to it.
+// A touch that may prove to be none: keep the baseline in case the signals come back to it.
 void bt_watch_pause(bt_watch *watch);
 
 // The signals have come to rest: their means are the baseline. Lanes in `unknown` have none.
 void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown);
 
-// The same, of signals that may have come back to where they were: within span_q3 of it nothing changes, and
-// what has drifted is not lost; within twice that skin has crept, and what all electrodes share is still to
-// be followed.
+// The same for signals that may have come back to where they were. Within span_q3 of the baseline nothing
+// changes, so that drift is not lost. Within twice that, skin has crept: what all electrodes share is left
+// out of the new baseline, still to be followed.
 void bt_watch_return(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown, int span_q3);
 
-// After a sweep; pressure_mean_q3 is NULL without a good pressure word in it.
+// After a sweep; pressure_mean_q3 is NULL if it had no good pressure word.
 void bt_watch_end(bt_watch *watch, const uint16_t *pressure_mean_q3);
 
-// The load changed not long ago, so that skin still creeps by more than it drifts.
+// True if the load changed not long ago, so that skin still creeps by more than it drifts.
 bool bt_watch_creeps(const bt_watch *watch);
-bool bt_watch_crept(const bt_watch *watch); // this was the last sweep of it
+bool bt_watch_crept(const bt_watch *watch); // true in the sweep in which that ends
 
-// Pressure has stayed where it was for long enough to tell drift from a load.
+// True if pressure has stayed where it was for long enough to tell drift from a load.
 bool bt_watch_level(const bt_watch *watch);
 
-// A finger that was silent is back, with a good pressure word: as if it had answered all along, the time
-// counts as level if pressure moved by no more than what creeps. Returns what all electrodes would have been
-// followed by, in counts as q16: 0 if any has moved by more than span_q3 that not all share.
+// A finger is back from a silence, with a good pressure word. The silence counts as level if pressure moved
+// by no more than creep would. Returns what all electrodes would have followed by in that time, in q16
+// counts; 0 if one has moved by more than span_q3 that not all share.
 int32_t bt_watch_resume(bt_watch *watch, const bt_silence *silence, int span_q3);
 
-// By what all electrodes have clearly moved one way, as a step of drift; 0 if they have not.
+// What all electrodes have clearly moved one way by, as a step of drift; 0 if they have not.
 int32_t bt_watch_drifts_q16(const bt_watch *watch);
 
 #ifndef BT_CDEF
-// In a touch: signals have come to rest, so that their means tell what has moved since.
+// True if the signals of a touch have come to rest, so that their means tell what has moved since.
 static inline bool bt_watch_sees(const bt_watch *watch, const bt_sweep *sweep)
 {
     return watch->wait_sweeps == 0 && sweep->still_sweeps >= BT_WATCH_SWEEPS;
 }
 
-// An electrode's mean of this sweep, against the baseline that it is to be compared with.
+// Add an electrode's mean of this sweep, compared with its baseline.
 static inline void bt_watch_side(bt_watch *watch, uint32_t mean_q16, uint32_t base_q16)
 {
     if (base_q16 == BT_TARE_UNKNOWN) {
@@ -80,8 +79,8 @@ static inline void bt_watch_side(bt_watch *watch, uint32_t mean_q16, uint32_t ba
     watch->away_q3 += (int32_t)(mean_q16 >> 13) - (int32_t)(base_q16 >> 13);
 }
 
-// An electrode's step of drift: where each goes at its own pace, a quarter more than all have where it lags
-// behind them, else a quarter less.
+// An electrode's step of drift. If each goes at its own pace: a quarter more than step_q16 where it lags,
+// else a quarter less.
 static inline int32_t bt_watch_step_q16(const bt_watch *watch, int32_t step_q16, uint32_t mean_q16,
                                         uint32_t base_q16)
 {

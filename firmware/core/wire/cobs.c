@@ -4,13 +4,13 @@
 
 #include <stdint.h>
 
-// A byte of the word is zero; exact for whether, not for which.
+// True if one of the word's bytes is zero.
 static inline int has_zero(uint32_t word)
 {
     return ((word - 0x01010101u) & ~word & 0x80808080u) != 0;
 }
 
-// code waits for the distance to the next zero, and here it is: from now on its own place waits.
+// Put the distance to this zero where the last one was; its own place is the next to be patched.
 static inline uint8_t *patched(uint8_t *code, uint8_t *zero)
 {
     *code = (uint8_t)(zero - code);
@@ -39,7 +39,7 @@ static inline uint8_t *wordwise(uint8_t *code, uint8_t *at)
     return code;
 }
 
-// Most words have no zero: these are passed by four bytes at a time.
+// Most words have no zero; these are passed over four bytes at a time.
 void bt_cobs_in_place(uint8_t *block, size_t bytes)
 {
     const size_t before = -(uintptr_t)(block + 1) & 3;
@@ -54,7 +54,7 @@ void bt_cobs_in_place(uint8_t *block, size_t bytes)
     *code = (uint8_t)(end - code);
 }
 
-// What begins with @ is for the proof that nothing beside in and out is touched (tests/proofs/memory).
+// Comments that begin with @ are for the proof that only in and out are touched (tests/proofs/memory).
 int bt_cobs_decode(const uint8_t *in, size_t bytes, uint8_t *out)
 {
     size_t at = 0;

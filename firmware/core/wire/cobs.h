@@ -8,8 +8,8 @@
 // One block: at most 254 bytes, for which COBS adds exactly one.
 #define BT_COBS_BLOCK_BYTES 254
 
-// Of the bytes behind the first of block, each zero becomes the distance to the next one, and the first that
-// to the first zero; the block's end counts as one. bytes: of the whole block, 1 to 255.
+// Encode in place: the first byte of block becomes the distance to the first zero after it, and each zero the
+// distance to the next one; the end of the block counts as a zero. bytes: of the whole block, 1 to 255.
 void bt_cobs_in_place(uint8_t *block, size_t bytes);
 
 // in holds no delimiter; out has room for bytes. Returns the length, or -1 when in is not COBS.

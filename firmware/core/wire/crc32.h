@@ -10,12 +10,12 @@ extern const uint32_t bt_crc32_table[256];
 
 uint32_t bt_crc32(const uint8_t *data, size_t bytes);
 
-// The same, by a board's hardware where its build defines it; for frames that go out.
+// The same for outgoing frames; a board's build may define it to use hardware.
 #ifndef BT_CRC32
 #define BT_CRC32(data, bytes) bt_crc32(data, bytes)
 #endif
 
-// The same byte by byte, for who looks at each byte anyway: start, one step for each, end.
+// The same byte by byte, for code that handles each byte anyway: start, a step for each, end.
 #define BT_CRC32_START 0xFFFFFFFFu
 #ifndef BT_CDEF
 static inline uint32_t bt_crc32_step(uint32_t crc, uint8_t byte)

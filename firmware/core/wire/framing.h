@@ -9,14 +9,14 @@
 #define BT_CRC_BYTES         4
 #define BT_ENCODED_MAX_BYTES (BT_FRAME_MAX_BYTES + 2) // COBS and the delimiter add one each
 
-// Make a frame of a payload that lies at out + BT_PAYLOAD_AT, where it is: id before it, CRC and delimiter
-// behind it, COBS over all. A board spends more on this than on the maths; out aligned to 4 bytes saves it a
-// third. payload_bytes and the result as below.
+// Make a frame in place, around a payload at out + BT_PAYLOAD_AT: id before it, CRC and delimiter after it,
+// COBS over all. A board spends more time on this than on the maths; with out aligned to 4 bytes it takes a
+// third less. payload_bytes and the result as below.
 #define BT_PAYLOAD_AT 2
 size_t bt_frame_seal(uint8_t id, size_t payload_bytes, uint8_t *out);
 
-// Appends nothing and keeps nothing: out receives one whole frame with its delimiter.
-// payload_bytes <= BT_FRAME_MAX_BYTES - 5. Returns the number of bytes written.
+// Write one whole frame with its delimiter to out. payload_bytes <= BT_FRAME_MAX_BYTES - 5. Returns the
+// number of bytes written.
 size_t bt_frame_encode(uint8_t id, const uint8_t *payload, size_t payload_bytes, uint8_t *out);
 
 // What became of the bytes between two delimiters.

@@ -1,4 +1,4 @@
-// Numbers as bytes, the lowest first, as on the wire and in stored records.
+// Numbers as bytes, lowest byte first, as on the wire and in stored records.
 #ifndef BIOTAC_LITTLE_ENDIAN_H
 #define BIOTAC_LITTLE_ENDIAN_H
 
@@ -16,7 +16,7 @@ static inline uint32_t bt_get_u32(const uint8_t *at)
     return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
 }
 
-// Of what lies at a multiple of four: one load. Its bytes are in this order, lowest first, on every board.
+// For an address that is a multiple of four: one load. Every board is little-endian.
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "words are read as they lie");
 typedef uint32_t __attribute__((may_alias)) bt_word_in_place;
 static inline uint32_t bt_get_aligned_u32(const uint8_t *at)

@@ -1,5 +1,6 @@
 // Records in flash whose power is cut at every byte of every erase and every program: after each cut the old
 // record or the new one is there, whole, and the storage goes on working.
+#include "failing_flash.h"
 #include "support.h"
 
 #include "keep/calibration.h"
@@ -9,74 +10,27 @@
 #define NEIGHBOUR 7  // another record that must outlive everything
 #define SAVES     40 // over two changes of sector
 
-// ---- NOR flash on a failing supply -----------------------------------------------------------------
-
-static uint8_t flash_bytes[BT_STORAGE_BYTES];
-static long operations_left; // erases and programs that are still done before power fails; -1: it holds
-static bool inside;     // it fails within the next one: of its bits that change some are done, all over it
-static long steps_left; // bytes that are still erased or programmed before power fails; -1: it holds
-static bool backwards;  // of a sector or page, the last byte first
-static bool ragged;     // the byte at which power fails has only some of its bits done
-static uint64_t seed = 1;
-static long steps;
-static int erases;
-static jmp_buf power_fails;
-
-static void step(size_t at, uint8_t value)
-{
-    uint8_t changing = (uint8_t)(flash_bytes[at] ^ value);
-    if (steps_left == 0) {
-        flash_bytes[at] ^= ragged ? (uint8_t)(changing & random_u64(&seed)) : 0;
-        longjmp(power_fails, 1);
-    }
-    steps_left -= steps_left > 0;
-    steps++;
-    flash_bytes[at] = value;
-}
-
-static void operation(size_t at, size_t bytes, const uint8_t *page)
-{
-    if (operations_left == 0) {
-        for (size_t k = 0; inside && k < bytes; k++) {
-            uint8_t value = page == NULL ? 0xFF : flash_bytes[at + k] & page[k];
-            flash_bytes[at + k] ^= (uint8_t)((flash_bytes[at + k] ^ value) & random_u64(&seed));
-        }
-        longjmp(power_fails, 1);
-    }
-    operations_left -= operations_left > 0;
-}
-
-static size_t in_order(size_t k, size_t bytes)
-{
-    return backwards ? bytes - 1 - k : k;
-}
+static uint8_t bytes_of_flash[BT_STORAGE_BYTES];
+static failing_flash nor;
 
 static bool erase(uint32_t offset)
 {
     assert_true(offset % BT_FLASH_SECTOR_BYTES == 0 && offset < BT_STORAGE_BYTES);
-    erases++;
-    operation(offset, BT_FLASH_SECTOR_BYTES, NULL);
-    for (size_t k = 0; k < BT_FLASH_SECTOR_BYTES; k++) {
-        step(offset + in_order(k, BT_FLASH_SECTOR_BYTES), 0xFF);
-    }
+    flash_erase(&nor, offset);
     return true;
 }
 
 static bool program(uint32_t offset, const uint8_t *page)
 {
     assert_true(offset % BT_FLASH_PAGE_BYTES == 0 && offset < BT_STORAGE_BYTES);
-    operation(offset, BT_FLASH_PAGE_BYTES, page);
-    for (size_t k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
-        size_t at = offset + in_order(k, BT_FLASH_PAGE_BYTES);
-        step(at, flash_bytes[at] & page[at - offset]); // programming never sets a bit
-    }
+    flash_program(&nor, offset, page);
     return true;
 }
 
 static void read_flash(uint32_t offset, uint8_t *data, size_t bytes)
 {
     assert_true(offset + bytes <= BT_STORAGE_BYTES);
-    memcpy(data, flash_bytes + offset, bytes);
+    memcpy(data, bytes_of_flash + offset, bytes);
 }
 
 static const bt_flash flash = {erase, program, read_flash};
@@ -84,10 +38,7 @@ static const bt_flash flash = {erase, program, read_flash};
 static int new_flash(void **state)
 {
     (void)state;
-    memset(flash_bytes, 0xFF, sizeof flash_bytes);
-    steps_left = operations_left = -1;
-    backwards = ragged = inside = false;
-    erases = 0;
+    flash_new(&nor, bytes_of_flash, sizeof bytes_of_flash);
     return 0;
 }
 
@@ -128,7 +79,7 @@ static void a_new_flash_holds_nothing(void **state)
 {
     (void)state;
     assert_int_equal(stored(BT_RECORD_SETTINGS), -1);
-    memset(flash_bytes, 0, sizeof flash_bytes); // nor does one that is full of something else
+    memset(bytes_of_flash, 0, sizeof bytes_of_flash); // nor does one that is full of something else
     assert_int_equal(stored(BT_RECORD_SETTINGS), -1);
     assert_true(write_one(BT_RECORD_SETTINGS, 1));
     assert_int_equal(stored(BT_RECORD_SETTINGS), 1);
@@ -139,7 +90,7 @@ static void the_latest_record_of_each_id_is_found_over_many_writes(void **state)
     (void)state;
     int last[BT_STORAGE_IDS + 1] = {0};
     for (int number = 1; number < 1000; number++) {
-        uint16_t id = (uint16_t)random_range(&seed, 1, BT_STORAGE_IDS);
+        uint16_t id = (uint16_t)random_range(&nor.seed, 1, BT_STORAGE_IDS);
         assert_true(write_one(id, number));
         last[id] = number;
         for (uint16_t other = 1; other <= BT_STORAGE_IDS; other++) {
@@ -147,7 +98,7 @@ static void the_latest_record_of_each_id_is_found_over_many_writes(void **state)
         }
     }
     // Twelve of fifteen pages are taken after a change of sector: three writes lie between two, at least.
-    assert_in_range(erases, 1000 / 15, 1000 / 4);
+    assert_in_range(nor.erases, 1000 / 15, 1000 / 4);
 }
 
 static void a_damaged_page_is_told(void **state)
@@ -159,18 +110,19 @@ static void a_damaged_page_is_told(void **state)
         assert_false(bt_storage_damaged(&flash));
     }
     size_t last = 0;
-    for (size_t at = 0; at < sizeof flash_bytes; at += BT_FLASH_PAGE_BYTES) {
-        last =
-            bt_storage_page_is(flash_bytes + at, 1) && bt_get_u16(flash_bytes + at + 6) == SAVES ? at : last;
+    for (size_t at = 0; at < sizeof bytes_of_flash; at += BT_FLASH_PAGE_BYTES) {
+        last = bt_storage_page_is(bytes_of_flash + at, 1) && bt_get_u16(bytes_of_flash + at + 6) == SAVES
+                   ? at
+                   : last;
     }
     for (size_t at = last; at < last + BT_FLASH_PAGE_BYTES; at++) { // what is read is then an older one
-        flash_bytes[at] ^= (uint8_t)(1u << at % 8);
+        bytes_of_flash[at] ^= (uint8_t)(1u << at % 8);
         assert_true(bt_storage_damaged(&flash));
         assert_int_equal(stored(1), SAVES - 1);
-        flash_bytes[at] ^= (uint8_t)(1u << at % 8);
+        bytes_of_flash[at] ^= (uint8_t)(1u << at % 8);
     }
     const size_t used = last / BT_FLASH_SECTOR_BYTES * BT_FLASH_SECTOR_BYTES;
-    flash_bytes[used] ^= 1; // the sector in use: what is read is then of the one before
+    bytes_of_flash[used] ^= 1; // the sector in use: what is read is then of the one before
     assert_true(bt_storage_damaged(&flash));
 }
 
@@ -178,9 +130,9 @@ static void the_same_again_wears_nothing(void **state)
 {
     (void)state;
     assert_true(write_one(1, 5));
-    long before = steps;
+    nor.bytes_left = 1000;
     assert_true(write_one(1, 5));
-    assert_int_equal(steps, before);
+    assert_int_equal(nor.bytes_left, 1000);
 }
 
 static void what_does_not_fit_is_refused(void **state)
@@ -198,7 +150,7 @@ static void generations_may_wrap(void **state)
     (void)state;
     assert_true(write_one(1, 0));
     // The sector in use claims generation 2^32 - 1; its CRC follows from its own bytes by a second CRC-32.
-    uint8_t *page = flash_bytes;
+    uint8_t *page = bytes_of_flash;
     uint32_t crc = 0xFFFFFFFFu;
     memset(page + 16, 0xFF, 4);
     for (int k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
@@ -223,13 +175,13 @@ static void generations_may_wrap(void **state)
 // Save `number` with power failing after `cut` bytes. True when it was through before that.
 static bool save_with_cut(int number, long cut)
 {
-    steps_left = cut;
-    if (setjmp(power_fails) != 0) {
-        steps_left = -1;
+    nor.bytes_left = cut;
+    if (setjmp(nor.power_fails) != 0) {
+        nor.bytes_left = -1;
         return false;
     }
     assert_true(write_one(BT_RECORD_SETTINGS, number));
-    steps_left = -1;
+    nor.bytes_left = -1;
     return true;
 }
 
@@ -241,7 +193,7 @@ static void cut_everywhere(void)
     assert_true(write_one(NEIGHBOUR, 77));
     assert_true(write_one(BT_RECORD_SETTINGS, 0));
     for (int number = 1; number < SAVES; number++) {
-        memcpy(before, flash_bytes, sizeof before);
+        memcpy(before, bytes_of_flash, sizeof before);
         for (long cut = 0; !save_with_cut(number, cut); cut++) {
             cuts++;
             int found = stored(BT_RECORD_SETTINGS);
@@ -249,19 +201,19 @@ static void cut_everywhere(void)
             assert_int_equal(stored(NEIGHBOUR), 77);
             // What the cut left behind is no obstacle, and neither is a second cut in the next save.
             uint8_t after_cut[BT_STORAGE_BYTES];
-            memcpy(after_cut, flash_bytes, sizeof after_cut);
-            (void)save_with_cut(500, (long)random_range(&seed, 0, 5000));
+            memcpy(after_cut, bytes_of_flash, sizeof after_cut);
+            (void)save_with_cut(500, (long)random_range(&nor.seed, 0, 5000));
             int again = stored(BT_RECORD_SETTINGS);
             assert_true(again == found || again == 500);
-            memcpy(flash_bytes, after_cut, sizeof after_cut);
+            memcpy(bytes_of_flash, after_cut, sizeof after_cut);
             assert_true(write_one(BT_RECORD_SETTINGS, 999));
             assert_int_equal(stored(BT_RECORD_SETTINGS), 999);
             assert_int_equal(stored(NEIGHBOUR), 77);
-            memcpy(flash_bytes, before, sizeof before);
+            memcpy(bytes_of_flash, before, sizeof before);
         }
         assert_int_equal(stored(BT_RECORD_SETTINGS), number);
     }
-    assert_in_range(erases, 3, 1000000);
+    assert_in_range(nor.erases, 3, 1000000);
 }
 
 static void a_cut_at_any_byte_leaves_the_old_record_or_the_new(void **state)
@@ -276,14 +228,14 @@ static void a_cut_at_any_byte_leaves_the_old_record_or_the_new(void **state)
 static void nor_does_the_order_within_a_page_matter(void **state)
 {
     (void)state;
-    backwards = true;
+    nor.backwards = true;
     cut_everywhere();
 }
 
 static void nor_do_half_done_bytes(void **state)
 {
     (void)state;
-    ragged = true;
+    nor.ragged = true;
     cut_everywhere();
 }
 
@@ -346,7 +298,7 @@ static int stored_calibration(int f)
 static bool save_all_with_cut(int number, long *left, long cut)
 {
     *left = cut;
-    if (setjmp(power_fails) != 0) {
+    if (setjmp(nor.power_fails) != 0) {
         *left = -1;
         return false;
     }
@@ -373,14 +325,14 @@ static void each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new(void **s
     static uint8_t before[BT_STORAGE_BYTES];
     save_all(0);
     for (int number = 1; number <= ALL_CUTS; number++) {
-        memcpy(before, flash_bytes, sizeof before);
-        for (long cut = 0; !save_all_with_cut(number, &steps_left, cut); cut++) {
+        memcpy(before, bytes_of_flash, sizeof before);
+        for (long cut = 0; !save_all_with_cut(number, &nor.bytes_left, cut); cut++) {
             assert_old_then_new(number);
-            memcpy(flash_bytes, before, sizeof before);
+            memcpy(bytes_of_flash, before, sizeof before);
         }
         assert_int_equal(stored_calibration(FINGERS - 1), number);
     }
-    assert_true(erases > 2 * BT_FLASH_SECTOR_BYTES); // a cut at every byte of two erases, at least
+    assert_true(nor.erases > 2 * BT_FLASH_SECTOR_BYTES); // a cut at every byte of two erases, at least
 }
 
 // Cells of a sector that is erased, or of a page that is programmed, are done in no order: seed 17.
@@ -389,78 +341,26 @@ static void so_it_is_before_every_operation_and_wherever_inside_of_one_power_fai
     (void)state;
     static uint8_t before[BT_STORAGE_BYTES];
     int at = 0, within = 0;
-    seed = 17;
+    nor.seed = 17;
     save_all(0);
     for (int number = 1; number <= 2 * ALL_CUTS; number++) {
-        memcpy(before, flash_bytes, sizeof before);
+        memcpy(before, bytes_of_flash, sizeof before);
         for (int turn = 0; turn < 4; turn++) {
-            inside = turn > 0;
-            memcpy(flash_bytes, before, sizeof before);
-            for (long cut = 0; !save_all_with_cut(number, &operations_left, cut); cut++) {
-                *(inside ? &within : &at) += 1;
+            nor.inside = turn > 0;
+            memcpy(bytes_of_flash, before, sizeof before);
+            for (long cut = 0; !save_all_with_cut(number, &nor.operations_left, cut); cut++) {
+                *(nor.inside ? &within : &at) += 1;
                 assert_old_then_new(number);
                 save_all(number); // what the cut left behind is no obstacle
                 assert_int_equal(stored_settings(), number);
                 assert_int_equal(stored_calibration(FINGERS - 1), number);
-                memcpy(flash_bytes, before, sizeof before);
+                memcpy(bytes_of_flash, before, sizeof before);
             }
         }
     }
     print_message("settings and calibrations: power cut before %d operations, inside %d\n", at, within);
     assert_in_range(at, 50, 1000);
     assert_in_range(within, 150, 1000);
-}
-
-// ---- settings ------------------------------------------------------------------------------------------
-
-static void settings_come_back_and_others_keep_their_defaults(void **state)
-{
-    (void)state;
-    bt_settings settings, back;
-    uint8_t record[BT_SETTINGS_RECORD_BYTES + 7];
-    bt_settings_reset(&settings);
-    for (int k = 0; k < BT_SETTINGS; k++) {
-        settings.value[k] = k % 2 == 0 ? bt_setting_specs[k].min : bt_setting_specs[k].max;
-    }
-    bt_settings_pack(&settings, record);
-    bt_settings_reset(&back);
-    bt_settings_unpack(&back, BT_SETTINGS_RECORD_VERSION, record, BT_SETTINGS_RECORD_BYTES);
-    assert_memory_equal(&back, &settings, sizeof back);
-    // An unknown id, a value out of range and half a pair are passed over.
-    memcpy(record + BT_SETTINGS_RECORD_BYTES, "\xFA\1\0\0\0\1\2", 7);
-    record[1] = record[2] = record[3] = record[4] = 0x7F;
-    bt_settings_reset(&back);
-    settings.value[0] = bt_setting_specs[0].initial;
-    bt_settings_unpack(&back, BT_SETTINGS_RECORD_VERSION, record, sizeof record);
-    assert_memory_equal(&back, &settings, sizeof back);
-    bt_settings_reset(&back);
-    bt_settings_unpack(&back, BT_SETTINGS_RECORD_VERSION + 1, record, sizeof record);
-    bt_settings_reset(&settings);
-    assert_memory_equal(&back, &settings, sizeof back);
-}
-
-// Whoever saved settings with a firmware before wire 1.5 goes on with the force that it computed.
-static void a_record_without_the_force_model_means_lins(void **state)
-{
-    (void)state;
-    bt_settings settings;
-    uint8_t record[BT_SETTINGS_RECORD_BYTES];
-    bt_settings_reset(&settings);
-    assert_int_equal(bt_settings_get(&settings, BT_SETTING_FORCE_MODEL), BT_FORCE_MODEL_POPULATION);
-    bt_settings_pack(&settings, record);
-    const size_t without = (BT_SETTING_FORCE_MODEL - 1) * BT_SETTING_PAIR_BYTES; // it and what came later
-    assert_int_equal(record[without], BT_SETTING_FORCE_MODEL);
-    bt_settings_unpack(&settings, BT_SETTINGS_RECORD_VERSION, record, without);
-    assert_int_equal(bt_settings_get(&settings, BT_SETTING_FORCE_MODEL), BT_FORCE_MODEL_LIN);
-    bt_settings_unpack(&settings, BT_SETTINGS_RECORD_VERSION, record, sizeof record);
-    assert_int_equal(bt_settings_get(&settings, BT_SETTING_FORCE_MODEL), BT_FORCE_MODEL_POPULATION);
-    for (int k = 0; k < BT_SETTINGS; k++) {
-        settings.value[k] = bt_setting_specs[k].before + 1;
-    }
-    bt_settings_unpack(&settings, BT_SETTINGS_RECORD_VERSION, record, 0);
-    for (int k = 0; k < BT_SETTINGS; k++) { // likewise of every other
-        assert_int_equal(settings.value[k], bt_setting_specs[k].before);
-    }
 }
 
 static void no_more_is_read_than_there_is_or_there_is_room_for(void **state)
@@ -497,8 +397,6 @@ int main(void)
         T(nor_do_half_done_bytes),
         T(each_record_of_a_save_that_is_cut_is_the_old_one_or_the_new),
         T(so_it_is_before_every_operation_and_wherever_inside_of_one_power_fails),
-        T(settings_come_back_and_others_keep_their_defaults),
-        T(a_record_without_the_force_model_means_lins),
         T(no_more_is_read_than_there_is_or_there_is_room_for),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
