@@ -3,8 +3,8 @@
 
     tools/qemu.py [--seconds N] IMAGE.elf
 
-Prints what the image prints and exits as it does. An image that has not ended after N seconds (default 1800) is
-ended, and what it said last is told.
+Prints what the image prints and exits with its code. An image still running after N seconds (default 1800) is killed,
+and its last output is printed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-SECONDS = 1800.0  # only an image that hangs meets it, however busy the computer is
+SECONDS = 1800.0  # only an image that hangs takes this long, however busy the computer is
 
 
 class Failed(Exception):
@@ -28,7 +28,7 @@ def words(elf: Path) -> list[str]:
 
 
 def run(elf: Path, seconds: float = SECONDS) -> tuple[int, str]:
-    """The image's exit code, and what it printed."""
+    """The image's exit code, and its output."""
     if not elf.is_file():
         raise Failed(f"{elf} is missing; build it: cmake -S firmware --preset m4f && cmake --build build/m4f")
     try:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 from typing import Any
 
+from kept_board import KeptBoard
 from rig import Rig
 
 import biotac
@@ -13,21 +13,9 @@ from biotac.hand.opening import shake_hands
 from biotac.sim.emulated import EmulatedBoard
 from biotac.sim.loading import load_source
 from biotac.sim.ports import start_board
-from biotac.sim.process import SimBoard, SimLink
-from biotac.sim.source import Source
+from biotac.sim.process import SimLink
 
 BOOT_S = 10  # of the board's time, with the second that its watchdog takes
-
-
-class KeptBoard(SimBoard):
-    """A simulated board whose flash is a file, and outlives it."""
-
-    def __init__(self, source: Source, flash: Path) -> None:
-        self._flash = flash
-        super().__init__(source, pace=0.0, hold=True)
-
-    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
-        return super()._start([*options, "--flash", str(self._flash)])
 
 
 class Restarts:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kept_board import serial_of
 from maps import BIG, make_map
 from rig import Rig
 from test_calibration import reboot
@@ -24,10 +25,6 @@ from biotac.wire import messages_gen as wire
 SECTOR = 4096
 PAGE = 256
 PATIENCE_S = 5  # of the board's time, for what takes some ms of it
-
-
-def serial_of(hand: biotac.Hand, finger: int) -> str:
-    return bytes(hand.sensor_info(finger).serial).rstrip(b"\0").decode()
 
 
 def begin(hand: biotac.Hand, finger: int, blob: bytes) -> None:

@@ -3,6 +3,7 @@
 // rp2040js answers buffers as soon as they are armed, storms OUT endpoints with empty packets and knows no NAK.
 // This takes over DPRAMUpdated: a buffer stays with the controller until the host's token has come for it. What
 // silicon would not forgive is counted: wrong data toggles, AVAILABLE written together with the rest of its word.
+import { onReset } from './faults.mjs'
 
 const AVAILABLE = 1 << 10
 const STALL = 1 << 11
@@ -21,8 +22,6 @@ const DATA_SEQ_ERROR = 1 << 31
 const SETUP_REC = 1 << 17
 const SUSPENDED = 1 << 4
 const SOF_RD = 0x48
-const RESETS = 0x4000c
-const RESET = 0
 const RESET_USBCTRL = 1 << 24
 const FRAME_NS = 1e6
 const OVERHEAD_BYTES = 13 // token, handshake, sync, CRC, gaps: what leaves 19 bulk packets of 64 bytes a frame
@@ -35,7 +34,7 @@ export class UsbBus {
     this.view = mcu.usbDPRAMView
     this.toggles = new Map() // what the host expects or sends next: endpoint*2 + out -> 0 or 1
     this.written = new Map()
-    this.counters = { toggle_errors: 0, available_not_last: 0, in_packets: 0, out_packets: 0, hangs: 0, resets: 0 }
+    this.counters = { toggle_errors: 0, available_not_last: 0, hangs: 0, resets: 0 }
     this.onArmed = () => {}
     this.onSetupSeen = () => {}
     this.onReset = () => {}
@@ -121,7 +120,6 @@ export class UsbBus {
   /** The host has it; null when its toggle says that it is one that it had already. */
   takeIn(endpoint, { control, data }) {
     const fresh = this.#toggled(endpoint, false, control)
-    this.counters.in_packets++
     this.#done(endpoint, false, control & ~(AVAILABLE | FULL))
     return fresh ? data : null
   }
@@ -129,7 +127,6 @@ export class UsbBus {
   /** Fill an armed OUT buffer. */
   putOut(endpoint, data) {
     const control = this.control(endpoint, true)
-    this.counters.out_packets++
     if (!this.#toggled(endpoint, true, control)) {
       this.usb.sieStatus |= DATA_SEQ_ERROR // the controller drops it; the buffer stays armed
       this.usb.sieStatusUpdated()
@@ -182,7 +179,6 @@ export class UsbBus {
     this.onArmed()
   }
 
-  /** As published the block keeps its state over its reset. */
   #resetBlock() {
     const { usb } = this
     this.abort()
@@ -196,12 +192,7 @@ export class UsbBus {
 
   #correctRegisters() {
     const { usb } = this
-    const resets = this.mcu.peripherals[RESETS]
-    const writeReset = resets.writeUint32.bind(resets)
-    resets.writeUint32 = (offset, value) => {
-      writeReset(offset, value)
-      if (offset === RESET && value & RESET_USBCTRL) this.#resetBlock()
-    }
+    onReset(this.mcu, RESET_USBCTRL, () => this.#resetBlock())
     const write = usb.writeUint32.bind(usb)
     const read = usb.readUint32.bind(usb)
     usb.writeUint32 = (offset, value) => {

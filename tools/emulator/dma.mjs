@@ -13,14 +13,14 @@ const TIMER3 = 0x3e
 const TIMERS = 0x420
 const POLYNOMIAL = 0x04c11db7
 
-export function reversed(value, bits) {
+function reversed(value, bits) {
   let out = 0
   for (let k = 0; k < bits; k++) out = (out << 1) | ((value >>> k) & 1)
   return out >>> 0
 }
 
 /** One byte into a CRC that is not reflected. */
-export function step(crc, byte) {
+export function crcStep(crc, byte) {
   let next = crc ^ (byte << 24)
   for (let bit = 0; bit < 8; bit++) next = next & 0x80000000 ? (next << 1) ^ POLYNOMIAL : next << 1
   return next >>> 0
@@ -66,7 +66,7 @@ export function correctDma(mcu, time, wrong) {
         const calculation = (control >>> 5) & 15
         if (calculation > 1 || channel.dataSize !== 1) wrong('a sniffer that is not for the CRC-32 of bytes')
         const byte = mcu.readUint8(channel.readAddr)
-        data = step(data, calculation === 1 ? reversed(byte, 8) : byte)
+        data = crcStep(data, calculation === 1 ? reversed(byte, 8) : byte)
       }
       transfer()
     }

@@ -4,6 +4,19 @@
 const ENTRY_CYCLES = 15 // Cortex-M0+ manual, zero wait states
 const RETURN_CYCLES = 13
 
+const RESETS = 0x4000c
+const RESET = 0
+
+/** Call then() whenever the program puts this block into reset: as published it keeps its state. */
+export function onReset(mcu, bit, then) {
+  const resets = mcu.peripherals[RESETS]
+  const write = resets.writeUint32.bind(resets)
+  resets.writeUint32 = (offset, value) => {
+    write(offset, value)
+    if (offset === RESET && value & bit) then()
+  }
+}
+
 /** Something would end a WFI; PRIMASK has no say in that. */
 export function wakes(core) {
   return !!(

@@ -5,7 +5,12 @@
 // A miss costs what the interface's registers say: clocks for command, address, waiting and 32 bits of data, times its
 // divider. That is 256 cycles for 03h at clk_sys / 4, and 40 for EBh without its command at clk_sys / 2.
 
-const XIP = 0x10000000
+export const SECTOR = 4096
+export const PAGE = 256
+export const ERASE_NS = 45e6 // of a sector, typical of a W25Q16JV
+export const PROGRAM_NS = 0.7e6 // of a page
+
+export const XIP = 0x10000000
 const XIP_END = 0x14000000
 const NO_ALLOCATE = 1 << 24 // in the address: nothing is kept
 const NO_CACHE = 1 << 25 // nothing is looked up
@@ -47,6 +52,7 @@ class Cache {
     this.older = new Uint8Array(SETS)
   }
 
+  /** The ROM's function of this name: what is here is forgotten. */
   flush() {
     this.halves.fill(0)
   }
@@ -102,11 +108,6 @@ export class Flash {
     this.sent = []
     this.readable = false
     this.continuous = false
-  }
-
-  /** Another: what the cache holds is forgotten. */
-  flush() {
-    this.cache.flush()
   }
 
   #memory() {
@@ -165,9 +166,9 @@ export class Flash {
       if (offset === SSIENR) {
         this.answer = []
         this.sent = []
-        if (value === 1) this.#setUp(registers)
+        if (value === 1) this.#setUp()
       }
-      if (offset === DR0) this.#send(registers, value, select)
+      if (offset === DR0) this.#send(value, (select & OUTOVER) === OUTOVER_LOW)
     }
     const pins = this.mcu.peripherals[IO_QSPI]
     pins.readUint32 = (offset) => (offset === IO_QSPI_SS_CTRL ? select : 0)
@@ -179,27 +180,30 @@ export class Flash {
   }
 
   /** What a read of the window is from now on. */
-  #setUp(registers) {
-    const quad = ((registers[CTRLR0] >>> 21) & 3) === FORMAT_QUAD
-    const control = registers[SPI_CTRLR0]
+  #setUp() {
+    const control = this.registers[SPI_CTRLR0]
     const instruction = [0, 4, 8, 16][(control >>> 8) & 3]
     const transfer = control & 3 // 0: all serial; 1: address wide; 2: command, too
-    const wide = quad ? 4 : 1
+    this.quad = this.#isQuad
+    const wide = this.quad ? 4 : 1
     const clocks =
       instruction / (transfer === 2 ? wide : 1) +
       (4 * ((control >>> 2) & 15)) / (transfer >= 1 ? wide : 1) +
       ((control >>> 11) & 31) +
       32 / wide
-    this.missCycles = clocks * registers[BAUDR]
-    this.quad = quad
+    this.missCycles = clocks * this.registers[BAUDR]
     const command = control >>> 24
-    this.readable = quad ? instruction === 0 : instruction === 8 && command === READ && !this.continuous
+    this.readable = this.quad ? instruction === 0 : instruction === 8 && command === READ && !this.continuous
   }
 
-  #send(registers, value, select) {
-    const quad = ((registers[CTRLR0] >>> 21) & 3) === FORMAT_QUAD
+  get #isQuad() {
+    return ((this.registers[CTRLR0] >>> 21) & 3) === FORMAT_QUAD
+  }
+
+  /** selected: chip select is held low, by hand. */
+  #send(value, selected) {
     this.sent.push(value)
-    if (quad) {
+    if (this.#isQuad) {
       // Command, then address and mode in one: only a chip that has its four lines on takes it.
       const [command, mode] = this.sent
       if (this.sent.length < 2) return
@@ -208,7 +212,7 @@ export class Flash {
       return
     }
     if (this.continuous && (value & 0xff) === 0xff) this.continuous = false // its mode bits: go back to commands
-    const listens = this.readable || (select & OUTOVER) === OUTOVER_LOW || !this.continuous
+    const listens = this.readable || selected || !this.continuous
     this.answer.push(listens ? this.#byte() : NOTHING)
   }
 

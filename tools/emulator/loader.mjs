@@ -1,15 +1,12 @@
 // Our model of the boot ROM's UF2 loader: what it does to the flash with a file that is copied onto its drive. From
 // the RP2040 data sheet (2.8.4) and the boot ROM's published source; neither the drive nor its USB are modelled.
+import { ERASE_NS, PAGE, PROGRAM_NS, SECTOR, XIP } from './flash.mjs'
+
 const BLOCK = 512
-const PAGE = 256
-const SECTOR = 4096
 const MAGIC = [0x0a324655, 0x9e5d5157, 0x0ab16f30]
 const FLAG_FAMILY = 0x2000
 const FLAG_NOT_FLASH = 1
 const FAMILY_RP2040 = 0xe48bff56
-const XIP = 0x10000000
-const ERASE_NS = 45e6 // typical of a W25Q16JV
-const PROGRAM_NS = 0.7e6
 
 export class Loader {
   /** flash: the chip's bytes, changed through board, which counts them and cuts power. onDone(): the chip restarts. */

@@ -1,6 +1,7 @@
 // One emulated Pico: the chip with an image in its flash, run instruction by instruction in emulated time.
 import { ConsoleLogger, LogLevel, RP2040 } from 'rp2040js'
 
+import { crcStep } from './dma.mjs'
 import { correctCore, DeviceTime, execute, wakes } from './faults.mjs'
 import { speedUp } from './speed.mjs'
 
@@ -11,24 +12,14 @@ const SRAM = 0x20000000
 const REASON_TIMER = 1
 const LOADER_DONE = Symbol('the boot ROM has a whole image')
 
-/** CRC-32 as the boot ROM checks it over boot2: polynomial 0x04C11DB7, MSB first, no final inversion. */
-function bootCrc(bytes) {
-  let crc = 0xffffffff
-  for (const byte of bytes) {
-    crc ^= byte << 24
-    for (let bit = 0; bit < 8; bit++) crc = crc & 0x80000000 ? (crc << 1) ^ 0x04c11db7 : crc << 1
-  }
-  return crc >>> 0
-}
-
-/** The boot ROM would run this second-stage boot, and not go to its loader. */
+/** The boot ROM would run this second-stage boot, and not go to its loader: its CRC-32 is right, with no final inversion. */
 function bootable(flash) {
   const stored = Buffer.from(flash.subarray(BOOT2_BYTES - 4, BOOT2_BYTES)).readUInt32LE(0)
-  return bootCrc(flash.subarray(0, BOOT2_BYTES - 4)) === stored
+  return flash.subarray(0, BOOT2_BYTES - 4).reduce(crcStep, 0xffffffff) === stored
 }
 
 /** Throws an Error that says why the boot ROM would not start this image. */
-export function checkImage(image) {
+function checkImage(image) {
   if (image.length <= BOOT2_BYTES || image.length > FLASH_BYTES) {
     throw new Error(`has ${image.length} bytes: expected a flash image of 257 bytes to 2 MiB`)
   }

@@ -164,7 +164,7 @@ function turn() {
     if (asked && rig.waiting) {
       rig.release()
     } else {
-      if (rig.ended && !told) {
+      if (sensors.over && !told) {
         told = true
         console.log('end')
       }

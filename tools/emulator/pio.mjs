@@ -18,15 +18,14 @@ class Stepper {
     this.machine = machine
     this.pio = pio
     this.at = 0 // ns, stepped until here
-    this.mark = {} // its state after its last jump back
     this.wake()
   }
 
   /** Something changed. */
   wake() {
     this.round = 0 // cycles after which it is where it was, once that is known
-    this.pins = 0 // that it has looked at since it was at `mark`
-    this.marked = false
+    this.mark = null // its state after its last jump back
+    this.pins = 0 // that it has looked at since
     this.since = 0
   }
 
@@ -58,7 +57,7 @@ class Stepper {
     this.since++
     if (pio.pinValues !== pio.oldPinValues || pio.pinDirections !== pio.oldPinDirections) {
       this.onPins(this.at)
-      this.marked = false // a loop that drives pins is no waiting
+      this.mark = null // a loop that drives pins is no waiting
     }
     if (machine.waiting) {
       this.round = 1
@@ -70,31 +69,13 @@ class Stepper {
 
   #compare() {
     const { machine: m, mark } = this
-    const same =
-      this.marked &&
-      mark.pc === m.pc &&
-      mark.x === m.x &&
-      mark.y === m.y &&
-      mark.in === m.inputShiftReg &&
-      mark.inCount === m.inputShiftCount &&
-      mark.out === m.outputShiftReg &&
-      mark.outCount === m.outputShiftCount &&
-      mark.heard === m.rxFIFO.itemCount &&
-      mark.told === m.txFIFO.itemCount
-    if (same) {
+    const shifted = [m.inputShiftReg, m.inputShiftCount, m.outputShiftReg, m.outputShiftCount]
+    const state = [m.pc, m.x, m.y, ...shifted, m.rxFIFO.itemCount, m.txFIFO.itemCount]
+    if (mark !== null && state.every((value, k) => value === mark[k])) {
       this.round = this.since
       return
     }
-    this.marked = true
-    mark.pc = m.pc
-    mark.x = m.x
-    mark.y = m.y
-    mark.in = m.inputShiftReg
-    mark.inCount = m.inputShiftCount
-    mark.out = m.outputShiftReg
-    mark.outCount = m.outputShiftCount
-    mark.heard = m.rxFIFO.itemCount
-    mark.told = m.txFIFO.itemCount
+    this.mark = state
     this.since = this.pins = 0
   }
 }

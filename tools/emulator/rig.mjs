@@ -18,7 +18,6 @@ export class Rig {
     this.reading = true
     this.plugged = true
     this.waiting = hold // for release()
-    this.received = 0
     this.latency = new Latency()
     this.timing = new SlotTiming()
     this.events = [] // [world ns, verb], sorted
@@ -34,10 +33,6 @@ export class Rig {
   /** Device time stands still, and the board has done all that can be done meanwhile. */
   get still() {
     return this.machine.time.held && this.machine.quiet && !this.usb.bus.busy && !this.uarts.some((one) => one.busy)
-  }
-
-  get ended() {
-    return this.sensors.over
   }
 
   /** Run for so long in emulated time, less when everything stands still. */
@@ -92,37 +87,29 @@ export class Rig {
         this.sensors.powerCycle()
         this.machine.powerCycle()
       },
+      'cut power after (\\d+) flash bytes': (bytes) => (this.board.cutAfter = Number(bytes)),
+      'two setups (\\d+)': (nanos) => this.usb.hurry(Number(nanos)), // so far apart
+      'slow the core ([0-9.]+) times': (times) => (this.machine.slowness = Number(times)),
+      // of the sensors' board
+      'lead (\\w+) to (\\w+)': (name, end) => this.sensors.connect(name, end === 'nothing' ? null : end),
+      'write uf2 (.+)': (file) => {
+        if (this.loader === null) throw new Error('no drive to write a UF2 to: the board is not in its loader')
+        this.loader.copy(fs.readFileSync(file))
+      },
     }
-    const cut = /^cut power after (\d+) flash bytes$/.exec(verb)
-    if (cut) {
-      this.board.cutAfter = Number(cut[1])
-      return
+    for (const [words, run] of Object.entries(verbs)) {
+      const said = new RegExp(`^${words}$`).exec(verb)
+      if (said === null) continue
+      run(...said.slice(1))
+      return this.usb.poke()
     }
-    const two = /^two setups (\d+)$/.exec(verb) // so many ns apart
-    if (two) return this.usb.hurry(Number(two[1]))
-    const slow = /^slow the core ([0-9.]+) times$/.exec(verb)
-    if (slow) {
-      this.machine.slowness = Number(slow[1])
-      return
-    }
-    const lead = /^lead (\w+) to (\w+)$/.exec(verb) // of the sensors' board
-    if (lead) return this.sensors.connect(lead[1], lead[2] === 'nothing' ? null : lead[2])
-    const file = /^write uf2 (.+)$/.exec(verb)
-    if (file) {
-      if (this.loader === null) throw new Error('no drive to write a UF2 to: the board is not in its loader')
-      this.loader.copy(fs.readFileSync(file[1]))
-      return
-    }
-    if (!(verb in verbs)) throw new Error(`no verb ${verb}: expected one of ${Object.keys(verbs).join(', ')}`)
-    verbs[verb]()
-    this.usb.poke()
+    throw new Error(`no verb ${verb}: expected one of ${Object.keys(verbs).join(', ')}`)
   }
 
   counters() {
     const { machine, usb } = this
     return {
       emulated_s: machine.nanos / 1e9,
-      world_s: machine.worldNanos / 1e9,
       boots: machine.boots,
       watchdog_resets: machine.watchdogResets,
       instructions: machine.instructions,
@@ -139,7 +126,6 @@ export class Rig {
         device: usb.device,
         failed: usb.failed,
         hurried: usb.hurried,
-        received: this.received,
         ...usb.bus.counters,
       },
       uart: this.uarts.find((one) => one.wired)?.counters ?? null,
@@ -195,7 +181,6 @@ export class Rig {
     }
     this.usb = new UsbHost(machine.mcu, {
       onData: (bytes) => {
-        this.received += bytes.length
         this.latency.received(bytes, machine.time.nanos)
         this.port.put(bytes)
       },

@@ -2,7 +2,7 @@
 // random bit. Modelled from the RP2040 data sheet (2.8.3, 2.17). The ROM's calls are real calls, to two
 // instructions: BKPT, which comes here, and BX LR.
 import { correctDma } from './dma.mjs'
-import { Flash } from './flash.mjs'
+import { ERASE_NS, Flash, PAGE, PROGRAM_NS, SECTOR } from './flash.mjs'
 
 const FUNC_TABLE = 0x40
 const LOOKUP = 0x20
@@ -11,10 +11,6 @@ const BKPT = 0xbe00
 const BX_LR = 0x4770
 const WFI_FOREVER = [0xbf30, 0xe7fd] // wfi; b back to it
 const THUMB = 1
-const SECTOR = 4096
-const PAGE = 256
-const ERASE_NS = 45e6 // typical
-const PROGRAM_NS = 0.7e6
 const WORN_ERASE_NS = 400e6 // the most that the data sheet allows
 const WORN_PROGRAM_NS = 3e6
 const CYCLE_NS = 8
@@ -70,20 +66,26 @@ export class BootRom {
   }
 
   #install() {
-    const names = ['IF', 'EX', 'FC', 'RE', 'RP', 'UB']
-    this.actions = [() => this.#lookup(), () => {}, () => this.flash.leaveXip(), () => this.flash.flush()]
-    this.actions.push(() => this.#erase(), () => this.#program(), () => this.#loader())
+    const functions = {
+      IF: () => {},
+      EX: () => this.flash.leaveXip(),
+      FC: () => this.flash.cache.flush(),
+      RE: () => this.#erase(),
+      RP: () => this.#program(),
+      UB: () => this.#loader(),
+    }
+    const actions = [() => this.#lookup(), ...Object.values(functions)]
     const words = new Uint16Array(0x200)
     words[0x14 / 2] = FUNC_TABLE
     words[0x18 / 2] = LOOKUP | THUMB
     words.set([BKPT, BX_LR], LOOKUP / 2)
-    names.forEach((name, k) => {
+    Object.keys(functions).forEach((name, k) => {
       const at = FIRST_STUB + 8 * k
       words.set([name.charCodeAt(0) | (name.charCodeAt(1) << 8), at | THUMB], FUNC_TABLE / 2 + 2 * k)
       words.set([BKPT | (k + 1), ...(name === 'UB' ? WFI_FOREVER : [BX_LR])], at / 2)
     })
     this.mcu.bootrom.set(new Uint32Array(words.buffer))
-    this.mcu.onBreak = (number) => this.actions[number]?.()
+    this.mcu.onBreak = (number) => actions[number]?.()
   }
 
   get #r() {

@@ -35,7 +35,7 @@ export class SensorBoard {
     this.word = 0 // as the gateway's shift register has it
     this.miso = { now: 0, before: 0, since: 0 }
     this.lateEdges = 0 // that came when the board was already past their time
-    this.transfers = this.commands = 0
+    this.commands = 0 // to sample
     this.fell = null // ns, when a select last fell
     this.slowestAnswer = 0 // ns from there until MISO was driven, and the least that the bus has left for it
     this.leastLeft = Infinity
@@ -53,8 +53,8 @@ export class SensorBoard {
   }
 
   counters() {
-    const { transfers, commands, lateEdges, slowestAnswer, leastLeft } = this
-    return { transfers, commands, late_edges: lateEdges, answer_ns: slowestAnswer, answer_left_ns: leastLeft, usb: this.usb.state, instructions: this.machine.instructions, slept: this.machine.sleptNanos / this.machine.nanos }
+    const { commands, lateEdges, slowestAnswer, leastLeft } = this
+    return { commands, late_edges: lateEdges, answer_ns: slowestAnswer, answer_left_ns: leastLeft, usb: this.usb.state, instructions: this.machine.instructions, slept: this.machine.sleptNanos / this.machine.nanos }
   }
 
   /** Have the gateway's lead of this name end where another one should, or nowhere (null); both are names of LEADS. */
@@ -91,7 +91,6 @@ export class SensorBoard {
     })
     spi.onTransmit = (mosi) => {
       if (!WIDTHS.includes(spi.dataBits) || spi.spiMode !== 0) throw new Error('the gateway speaks another SPI')
-      this.transfers++
       this.commands += spi.dataBits === SPI_BLOCK_BITS && mosi >> 8 >= SAMPLE_COMMAND ? 1 : 0
       done.schedule(this.clockOut(mcu.clock.nanos, mosi, spi.dataBits, 1e9 / spi.clockFrequency))
     }

@@ -2,6 +2,8 @@
 // that what a sensor answers follows from the exact emulated time of each edge.
 import { GPIOPinState } from 'rp2040js'
 
+import { onReset } from './faults.mjs'
+
 const MISO = 16
 const SCK = 18
 const MOSI = 19
@@ -10,8 +12,6 @@ const SPI_FUNCTION = 1
 export const WIDTHS = [8, 16] // of a property's byte; of all else
 const STRETCH_NS = 150e3
 const FASTEST_HZ = 10e6 // data sheet
-const RESETS = 0x4000c
-const RESET = 0
 const RESET_SPI0 = 1 << 16
 
 /** The sensors, whatever board they are wired to. Throws an Error that says what is wrong with the tape. */
@@ -25,7 +25,6 @@ export class Sensors {
     this.#bytes().set(Buffer.from(`${serials}\0`), this.calls.serials())
     const wrong = this.calls.plug_in(tape.length)
     if (wrong !== 0) throw new Error(this.#text(wrong))
-    this.transfers = 0
     this.overlaps = 0 // transfers with more than one chip select low: commands to all, else contention
     this.misconfigured = 0
     this.stretched = false // the next word takes longer than any driver waits
@@ -45,8 +44,8 @@ export class Sensors {
 
   counters() {
     const early = CHIP_SELECTS.map((_, finger) => this.calls.early_reads(finger))
-    const { transfers, overlaps, misconfigured } = this
-    return { transfers, overlaps, misconfigured, early_reads: early, select_setup_ns: this.shortestSetup }
+    const { overlaps, misconfigured } = this
+    return { overlaps, misconfigured, early_reads: early, select_setup_ns: this.shortestSetup }
   }
 
   powerCycle() {
@@ -70,20 +69,14 @@ export class Sensors {
     })
     let word = 0
     const done = mcu.clock.createAlarm(() => spi.completeTransmit(word))
-    // As published the block keeps what it was about over its reset.
-    const resets = mcu.peripherals[RESETS]
-    const write = resets.writeUint32.bind(resets)
-    resets.writeUint32 = (offset, value) => {
-      write(offset, value)
-      if (offset !== RESET || !(value & RESET_SPI0)) return
+    onReset(mcu, RESET_SPI0, () => {
       done.cancel()
       spi.busy = false
       spi.rxFIFO.reset()
       spi.txFIFO.reset()
       spi.fifosUpdated()
-    }
+    })
     spi.onTransmit = (mosi) => {
-      this.transfers++
       this.shortestSetup = Math.min(this.shortestSetup, mcu.clock.nanos - this.selected)
       const late = this.stretched ? STRETCH_NS : 0
       this.stretched = false

@@ -23,7 +23,7 @@ export class Uart {
     this.heard = []
     this.silent = false // after what was heard
     this.dma = false
-    this.counters = { sent: 0, heard: 0, overruns: 0, unread: 0, fastest_bits_per_s: 0 }
+    this.counters = { sent: 0, overruns: 0, unread: 0, fastest_bits_per_s: 0 }
     this.sender = mcu.clock.createAlarm(() => this.#sent())
     this.hearer = mcu.clock.createAlarm(() => this.#hear())
     this.silence = mcu.clock.createAlarm(() => {
@@ -60,7 +60,6 @@ export class Uart {
     const bytes = this.port.take(1)
     this.hearing = false
     if (bytes?.length > 0) {
-      this.counters.heard++
       if (this.heard.length < FIFO) this.heard.push(bytes[0])
       else this.counters.overruns++
       this.silent = false

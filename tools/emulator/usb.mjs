@@ -41,6 +41,7 @@ export class UsbHost {
     this.take = take // take(n): up to n bytes to send, or null
     this.open = false // the port, by some program
     this.plugged = true
+    this.pulledUp = false // by the program, which so says that it is there
     this.asleep = false
     this.state = 'detached'
     this.device = {} // what enumeration found
@@ -66,7 +67,7 @@ export class UsbHost {
 
   /** Some program opens the port at this rate and closes it again. */
   touch(rate) {
-    this.request(TO_INTERFACE, SET_LINE_CODING, 0, 0, [...u16(rate & 0xffff), ...u16(rate >>> 16), 0, 0, 8])
+    this.#setRate(rate)
     this.request(TO_INTERFACE, SET_CONTROL_LINE_STATE, DTR | RTS, 0, [])
     this.request(TO_INTERFACE, SET_CONTROL_LINE_STATE, 0, 0, [])
   }
@@ -112,7 +113,7 @@ export class UsbHost {
     this.timer.cancel()
     this.transfers = []
     this.state = 'detached'
-    this.isGone()
+    this.pulledUp = false
   }
 
   /** Start the next transaction, if there is one to do and the wire is free. */
@@ -237,19 +238,16 @@ export class UsbHost {
   #watchPullup() {
     const { usb } = this
     const write = usb.writeUint32.bind(usb)
-    let pulled = false
     usb.writeUint32 = (offset, value) => {
       write(offset, value)
       const up = !!(usb.sieCtrl & PULLUP) && !!(usb.mainCtrl & CONTROLLER_ON)
-      if (up && !pulled) this.#attach()
-      pulled = up
+      if (up && !this.pulledUp) this.#attach()
+      this.pulledUp = up
     }
     usb.onUSBEnabled = undefined
     usb.onResetReceived = () => {
       if (this.state === 'reset') this.#after(DEBOUNCE_NS, () => this.#enumerate())
     }
-    this.isPulled = () => pulled
-    this.isGone = () => (pulled = false)
   }
 
   #attach() {
@@ -287,7 +285,6 @@ export class UsbHost {
     const word = (at) => device[at] | (device[at + 1] << 8)
     this.device = { vendor: word(8), product: word(10), release: word(12), address: this.usb.addrEndp & 0x7f }
     this.device.class = [...device.slice(4, 7)]
-    this.device.configuration_bytes = all.length
     for (let at = 0; at < all.length && all[at] > 0; at += all[at]) {
       if (all[at + 1] !== ENDPOINT_DESCRIPTOR || (all[at + 3] & 3) !== BULK) continue
       this.device[all[at + 2] & IN ? 'in' : 'out'] = all[at + 2] & 15
@@ -308,10 +305,11 @@ export class UsbHost {
   }
 
   #tellLines() {
-    if (this.open) {
-      const coding = [...u16(115200 & 0xffff), ...u16(115200 >>> 16), 0, 0, 8]
-      this.request(TO_INTERFACE, SET_LINE_CODING, 0, 0, coding)
-    }
+    if (this.open) this.#setRate(115200)
     this.request(TO_INTERFACE, SET_CONTROL_LINE_STATE, this.open ? DTR | RTS : 0, 0, [])
+  }
+
+  #setRate(rate) {
+    this.request(TO_INTERFACE, SET_LINE_CODING, 0, 0, [...u16(rate & 0xffff), ...u16(rate >>> 16), 0, 0, 8])
   }
 }

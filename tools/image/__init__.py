@@ -1,1 +1,1 @@
-"""What is made of a linked firmware image, and what is checked on it."""
+"""Tools that process and check a linked firmware image."""

@@ -13,7 +13,7 @@ CODE_BYTES = 252
 
 
 def crc32_mpeg2(data: bytes) -> int:
-    """CRC-32 as the boot ROM computes it (data sheet 2.8.1.3.1): not reflected, nothing inverted at the end."""
+    """CRC-32 as in the boot ROM (data sheet 2.8.1.3.1): not reflected, not inverted at the end."""
     crc = 0xFFFFFFFF
     for byte in data:
         crc ^= byte << 24
@@ -23,7 +23,7 @@ def crc32_mpeg2(data: bytes) -> int:
 
 
 def block(code: bytes) -> bytes:
-    """The code, padded with zeros, and its CRC; raises ValueError when it is too long."""
+    """The code padded with zeros, and its CRC. Raises ValueError if it is too long."""
     if len(code) > CODE_BYTES:
         raise ValueError(f"second-stage boot has {len(code)} bytes; there is room for {CODE_BYTES}")
     padded = code.ljust(CODE_BYTES, b"\0")

@@ -3,9 +3,9 @@
 
     check.py IMAGE.elf [--objdump PROGRAM]
 
-Prints flash, RAM and the deepest stack. Refuses an image over its budget, with a heap, printf or floating
-point in it, with a stack that may grow past its room, with code in flash that is not there to boot, or with
-a wait in the port that has no bound. None of it depends on what the compiler inlined.
+Prints flash, RAM and the deepest stack. Refuses an image over its budget, with a heap, printf or floating point in it,
+with a stack that may outgrow its room, with code run from flash after boot, or with an unbounded wait in the port. None
+of it depends on what the compiler inlined.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from image.symbols import FLOAT_SYMBOL, LIBRARY_SYMBOL
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PORT = ROOT / "firmware" / "port" / "rp2040"
-FLASH_BUDGET = 68 * 1024  # of 1820 KiB: what boot has to copy
+FLASH_BUDGET = 68 * 1024  # of 1820 KiB: boot has to copy it
 RAM_BUDGET = 200 * 1024  # of 256 KiB: the image, five maps of 20 KiB, 16 KiB of data and the stack
 SRAM = 0x20000000
 RAM_PARTS = (("program", ".text"), ("data", ".data"), ("bss", ".bss"), ("stack", ".stack"))
 
 ROM = "(boot ROM)"
-ROM_STACK_BYTES = 256  # an allowance: the ROM does not tell
-EXCEPTION_BYTES = 32 + 4  # what the core pushes, with alignment
+ROM_STACK_BYTES = 256  # an allowance: the ROM's use is not documented
+EXCEPTION_BYTES = 32 + 4  # pushed by the core, with alignment
 
-# What may be called where the source calls through a pointer, as the source has it.
+# The functions that each call through a pointer in the source may reach.
 POINTERS = {
     "session->write(": ("port_link_write",),
     "board->save_settings(": ("save_settings",),
@@ -49,7 +49,7 @@ POINTERS = {
     "lookup(": (ROM,),
     "loader(": (ROM,),
 }
-# One may interrupt the next one; the last two are the sensor board's.
+# The worst case nests all that the image has; the last two are the sensor board's.
 INTERRUPTS = ("usb_interrupt", "uart_interrupt", "timer_interrupt", "exchanged", "heard")
 
 
@@ -68,14 +68,14 @@ def interrupts(program: stack.Program) -> list[str]:
 
 
 def stack_depth(program: stack.Program) -> tuple[int, str]:
-    """With all interrupts on top of the main loop's deepest chain."""
+    """Bytes with all interrupts on top of the main loop's deepest chain, and the chains in words."""
     chains = [program.deepest(name) for name in ("main", *interrupts(program))]
     depth = sum(bytes_ for bytes_, _ in chains) + EXCEPTION_BYTES * (len(chains) - 1)
     return depth, "; ".join(f"{' > '.join(chain)} {bytes_}" for bytes_, chain in chains)
 
 
 def misplaced(program: stack.Program) -> list[str]:
-    """What would be run from the slow flash, or from SRAM before it is there."""
+    """Functions that would run from the slow flash, or from SRAM before they are copied there."""
     early = program.reached("clocks_start") | {"image_reset"}
     late = program.reached("main").union(*(program.reached(name) for name in interrupts(program))) - {ROM}
     wrong = [f"{name} in flash" for name in late if program.functions[name].address < SRAM]
@@ -85,7 +85,7 @@ def misplaced(program: stack.Program) -> list[str]:
 
 
 def check(elf: Path, objdump: str) -> list[str]:
-    """Prints the figures; returns what is wrong."""
+    """Print the figures; return what is wrong."""
     size = section_sizes(elf, objdump)
     kept = (".boot2", ".vectors", ".binary_info", ".image_note", ".boot_code", ".data", ".text")
     flash = sum(size.get(name, 0) for name in kept)

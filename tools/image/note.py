@@ -21,7 +21,7 @@ def main() -> int:
     spec = importlib.util.spec_from_file_location("biotac_image_note", CODE)
     assert spec is not None and spec.loader is not None
     code = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = code  # dataclasses look their module up
+    sys.modules[spec.name] = code  # dataclasses look up their module here
     spec.loader.exec_module(code)
     path = Path(sys.argv[1])
     try:

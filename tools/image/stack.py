@@ -1,8 +1,8 @@
-"""How deep a linked image's stack can get: frames from gcc's -fstack-usage, calls from the disassembly.
+"""The largest stack depth of a linked image: frames from gcc's -fstack-usage, calls from the disassembly.
 
-Library functions have no .su file; theirs are the sum of all they push. A call through a pointer is known by the
-source line that it comes from, whatever function the compiler put that line into. What such a line may call must
-be in the board's list, or the depth is unknown and the build fails.
+Library functions have no .su file; their frame is the sum of all they push. A call through a pointer is identified by
+its source line, whatever function the compiler put that line into. The board's list must say what such a line may call,
+or the depth is unknown and the build fails.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ BRANCHES = re.compile(r"(bl|b(eq|ne|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le)?)(\.[nw
 
 
 class Unknown(Exception):
-    """The depth cannot be told; one sentence why."""
+    """The depth cannot be determined; one sentence says why."""
 
 
 @dataclass
@@ -31,11 +31,11 @@ class Function:
     address: int
     pushed: int = 0
     calls: set[str] = field(default_factory=set)
-    indirect: set[str] = field(default_factory=set)  # where it calls through a pointer: FILE:LINE
+    indirect: set[str] = field(default_factory=set)  # FILE:LINE of its calls through a pointer
 
 
 def read_functions(listing: Iterable[str]) -> dict[str, Function]:
-    """Functions of an `objdump -dl`, by name; those of one name are taken together."""
+    """Functions of an `objdump -dl` by name; those of the same name are merged."""
     functions: dict[str, Function] = {}
     name = where = ""
     for line in listing:
@@ -51,6 +51,9 @@ def read_functions(listing: Iterable[str]) -> dict[str, Function]:
 
 
 def read_line(function: Function, name: str, where: str, instruction: str, operands: str) -> None:
+    veneer = VENEER.match(name)
+    if veneer:
+        function.calls.add(veneer.group(1))
     if instruction == "push":
         function.pushed += 4 * count_registers(operands)
     elif instruction == "sub" and operands.startswith("sp,"):
@@ -59,16 +62,12 @@ def read_line(function: Function, name: str, where: str, instruction: str, opera
         target = TARGET.search(operands)
         if target and target.group(1) != name:
             function.calls.add(target.group(1))
-    elif (instruction == "blx" or (instruction == "bx" and operands not in ("lr", "pc"))) and not VENEER.match(name):
+    elif (instruction == "blx" or (instruction == "bx" and operands not in ("lr", "pc"))) and not veneer:
         function.indirect.add(where)
-    if instruction == "bx" and operands == "pc" and (veneer := VENEER.match(name)):
-        function.calls.add(veneer.group(1))
-    if (veneer := VENEER.match(name)) and not function.calls:
-        function.calls.add(veneer.group(1))
 
 
 def source_line(where: str) -> str | None:
-    """None where objdump named none (no -g) or the file is not here (a library's)."""
+    """The text of FILE:LINE; None if objdump gave none (no -g), or the file is not here (a library's)."""
     path, _, line = where.rpartition(":")
     try:
         return Path(path).read_text(encoding="utf-8").splitlines()[int(line) - 1].strip()
@@ -85,7 +84,7 @@ def count_registers(operands: str) -> int:
 
 
 def read_usage(folder: Path) -> dict[str, int]:
-    """Frames by function name from every .su file below folder; the largest of those of one name."""
+    """Frames by function name from every .su file below ``folder``; the largest for functions of the same name."""
     frames: dict[str, int] = {}
     for path in folder.rglob("*.su"):
         for line in path.read_text(encoding="utf-8").splitlines():
@@ -101,10 +100,10 @@ def read_usage(folder: Path) -> dict[str, int]:
 class Program:
     functions: dict[str, Function]
     frames: Mapping[str, int]
-    pointers: Mapping[str, tuple[str, ...]]  # what may be called where a line of source has this in it
+    pointers: Mapping[str, tuple[str, ...]]  # what a source line that contains the key may call
 
     def named(self, name: str) -> str:
-        """The function as it is called in the image, where the compiler may have made a variant of it."""
+        """The function's name in the image, where the compiler may have renamed it as a variant."""
         found = [key for key in self.functions if CLONE.sub("", key) == name]
         if len(found) != 1:
             raise Unknown(f"{len(found)} functions in the image are called {name}; there must be one")
@@ -127,7 +126,7 @@ class Program:
         raise Unknown(f"{name} calls through a pointer at {where}: {line}; tools/image/check.py must list what that is")
 
     def deepest(self, name: str, above: tuple[str, ...] = ()) -> tuple[int, tuple[str, ...]]:
-        """Bytes, and the chain of calls that needs them."""
+        """The most bytes it needs, and the chain of calls that needs them."""
         if name in above:
             raise Unknown(f"recursion: {' -> '.join([*above, name])}")
         if name not in self.functions:
@@ -150,6 +149,6 @@ class Program:
 
 
 def load(elf: Path, objdump: str, usage: Path, pointers: Mapping[str, tuple[str, ...]]) -> Program:
-    """A Program from an ELF file and the .su files of its build."""
+    """The Program of an ELF file and the .su files of its build."""
     done = subprocess.run([objdump, "-dl", str(elf)], capture_output=True, text=True, check=True)
     return Program(read_functions(done.stdout.splitlines()), read_usage(usage), pointers)

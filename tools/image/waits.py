@@ -1,8 +1,8 @@
-"""Waits without a bound, looked for in a port's C source.
+"""Finds unbounded waits in a port's C source.
 
-Every loop on a register goes through the helpers of wait.h. Elsewhere a `while` is refused whatever
-it waits for, and so is a `for` whose condition reads a register or is missing, but for the one after a reset
-was asked for.
+Every loop on a register goes through the helpers of wait.h. Elsewhere any `while` is refused, whatever it waits for. So
+is a `for` whose condition reads a register or is missing; the only exception is the endless loop after a requested
+reset.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ def unbounded(port: Path) -> list[str]:
     """One line for each loop that is not allowed."""
     registers = set(DEFINED.findall((port / REGISTERS).read_text(encoding="utf-8")))
     wrong = []
-    for path in sorted(port.glob("*.[ch]")):
+    for path in sorted(port.rglob("*.[ch]")):
         if path.name != HELPERS:
             text = COMMENT.sub(lambda m: re.sub(r"[^\n]", " ", m.group()), path.read_text(encoding="utf-8"))
-            wrong += [f"{path.name}:{line}: {why}" for line, why in loops(text, registers)]
+            wrong += [f"{path.relative_to(port)}:{line}: {why}" for line, why in loops(text, registers)]
     return wrong
 
 

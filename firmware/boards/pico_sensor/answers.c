@@ -4,7 +4,6 @@
 // is over; where it would have said something else than was offered, the word was late.
 #include "answers.h"
 
-#include "hold_off.h"
 #include "keep/storage.h"
 #include "loop.h"
 #include "port.h"
@@ -78,7 +77,7 @@ static void offer(uint8_t finger)
     uint32_t settled = offer_at(device, 0, true);
     uint32_t after_byte = offer_at(device, 1, true);
     uint32_t early = device->settled ? settled : offer_at(device, 0, false);
-    uint32_t primask = hold_off();
+    uint32_t primask = interrupts_disable();
     bool newest = shifter_offer(finger, early, device->settled ? after_byte : 0);
     settling[finger].waits = newest && !device->settled;
     if (settling[finger].waits) {
@@ -87,7 +86,7 @@ static void offer(uint8_t finger)
         settling[finger].at_us = shifter_released_us(finger) + BT_SETTLE_US - AHEAD_US;
         set_alarm();
     }
-    go_on(primask);
+    interrupts_restore(primask);
 }
 
 // ---- what a sensor hears -------------------------------------------------------------------------------
@@ -137,39 +136,29 @@ static void exchanged(void)
 
 // ---- for the main loop: with the model's own interrupt held off, and no other ----------------------------
 
-static void hold_off_model(void)
-{
-    interrupt_hold_off(PIO0_IRQ_1);
-}
-
-static void let_go_model(void)
-{
-    interrupt_let_go(PIO0_IRQ_1);
-}
-
 void answers_renew(void)
 {
-    hold_off_model();
+    interrupt_hold_off(PIO0_IRQ_1);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         offer(f);
     }
-    let_go_model();
+    interrupt_let_go(PIO0_IRQ_1);
 }
 
 void answers_plug(uint8_t finger, bool present, const char *serial)
 {
-    hold_off_model();
+    interrupt_hold_off(PIO0_IRQ_1);
     bt_emu_init(&sensor[finger], finger, present, serial, bt_emu_stream_count, source);
     offer(finger);
-    let_go_model();
+    interrupt_let_go(PIO0_IRQ_1);
 }
 
 void answers_forget(void)
 {
-    hold_off_model();
+    interrupt_hold_off(PIO0_IRQ_1);
     bt_emu_stream_init(source, samples, SAMPLE_RAM);
     memset(&counts, 0, sizeof counts);
-    let_go_model();
+    interrupt_let_go(PIO0_IRQ_1);
 }
 
 void answers_start(bt_emu_stream *stream)
@@ -178,9 +167,7 @@ void answers_start(bt_emu_stream *stream)
     answers_forget();
     loop_play(stream);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        char serial[] = "BTEMU00000000001";
-        serial[sizeof serial - 2] = (char)('1' + f);
-        bt_emu_init(&sensor[f], f, true, serial, bt_emu_stream_count, source);
+        bt_emu_init(&sensor[f], f, true, "", bt_emu_stream_count, source);
     }
     shifter_start(exchanged);
     answers_renew();
@@ -188,9 +175,9 @@ void answers_start(bt_emu_stream *stream)
 
 bt_answer_counts answers_counts(void)
 {
-    hold_off_model();
+    interrupt_hold_off(PIO0_IRQ_1);
     bt_answer_counts now = counts;
-    let_go_model();
+    interrupt_let_go(PIO0_IRQ_1);
     now.late += shifter_lost();
     return now;
 }

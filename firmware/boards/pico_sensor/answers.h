@@ -15,7 +15,7 @@ typedef struct {
 // stream: where samples come from; it stays.
 void answers_start(bt_emu_stream *stream);
 
-// Plug a sensor in, or out. serial: 16 characters, ended by a zero where there are fewer.
+// Plug a sensor in, or out. serial: up to 16 characters; empty: one made up.
 void answers_plug(uint8_t finger, bool present, const char *serial);
 
 // A new tape, for sensors that remember nothing of the one before.

@@ -85,12 +85,8 @@ static uint8_t plug(const bt_msg_emu_plug *command)
     if (command->finger >= BT_MAX_FINGERS) {
         return BT_ERROR_NO_SUCH_FINGER;
     }
-    char serial[sizeof command->serial + 1] = "BTEMU00000000001";
-    if (command->serial[0] != 0) {
-        memcpy(serial, command->serial, sizeof command->serial);
-    } else {
-        serial[sizeof command->serial - 1] = (char)('1' + command->finger);
-    }
+    char serial[sizeof command->serial + 1] = "";
+    memcpy(serial, command->serial, sizeof command->serial);
     if (command->finger == 0) {
         answers_forget();
     }

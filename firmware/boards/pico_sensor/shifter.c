@@ -8,7 +8,6 @@
 #include "shifter.h"
 
 #include "dma.h"
-#include "hold_off.h"
 #include "pins.h"
 #include "system.h"
 #include "wait.h"
@@ -180,12 +179,12 @@ bool shifter_take(exchange *out)
         return false;
     }
     *out = done[tail % EXCHANGES];
-    uint32_t primask = hold_off();
+    uint32_t primask = interrupts_disable();
     done_tail = (uint8_t)(tail + 1);
     for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
         finger_state[f].waiting = (uint8_t)(finger_state[f].waiting - (out->selected >> f & 1));
     }
-    go_on(primask);
+    interrupts_restore(primask);
     return true;
 }
 
@@ -199,15 +198,10 @@ uint32_t shifter_lost(void)
 // The DMA's two who hand addresses on, one when the other has come to its end, and the one who fetches.
 enum { ASKER = DMA_DEALER, FETCHER = DMA_WORKER, ASKER_TOO = DMA_OF_USB + 1 };
 
-static uint32_t address(const volatile void *at)
-{
-    return (uint32_t)(uintptr_t)at;
-}
-
 static void start_asker(uint32_t channel, uint32_t next)
 {
-    DMA_READ_ADDR(channel) = address(&PIO0_RXF(WATCHER));
-    DMA_WRITE_ADDR(channel) = address(&DMA_READ_TRIG(FETCHER));
+    DMA_READ_ADDR(channel) = dma_address(&PIO0_RXF(WATCHER));
+    DMA_WRITE_ADDR(channel) = dma_address(&DMA_READ_TRIG(FETCHER));
     DMA_TRANS_COUNT(channel) = UINT32_MAX; // 17 hours
     DMA_CTRL(channel) = DMA_QUIET | DMA_BY_PIO0_RX(WATCHER) | DMA_CHAIN_TO(next) | DMA_WORDS
                         | DMA_HIGH_PRIORITY | DMA_CHANNEL_EN;
@@ -215,7 +209,7 @@ static void start_asker(uint32_t channel, uint32_t next)
 
 static void start_lookup(void)
 {
-    DMA_WRITE_ADDR(FETCHER) = address(&PIO0_TXF(SHIFTER));
+    DMA_WRITE_ADDR(FETCHER) = dma_address(&PIO0_TXF(SHIFTER));
     DMA_TRANS_COUNT(FETCHER) = 1;
     DMA_CTRL(FETCHER) = DMA_QUIET | DMA_UNPACED | DMA_CHAIN_TO_ITSELF(FETCHER) | DMA_WORDS | DMA_HIGH_PRIORITY
                         | DMA_CHANNEL_EN;
@@ -244,7 +238,7 @@ void shifter_start(void (*exchanged)(void))
     }
     start_machine(SHIFTER, SHIFTER_END, NEXT_BIT, PIN_MOSI);
     start_machine(WATCHER, WATCHER_END, LOOK, PIN_SELECT_0);
-    PIO0_TXF(WATCHER) = address(offers) >> (BT_MAX_FINGERS + 2);
+    PIO0_TXF(WATCHER) = dma_address(offers) >> (BT_MAX_FINGERS + 2);
     PIO0_EXEC(WATCHER) = PULL_OR_WAIT; // into OSR
     start_lookup();
 

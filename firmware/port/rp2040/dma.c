@@ -6,8 +6,8 @@
 
 bool dma_move(enum dma_channel channel, uint32_t options, volatile void *to, const void *from, uint32_t bytes)
 {
-    DMA_READ_ADDR(channel) = (uint32_t)(uintptr_t)from;
-    DMA_WRITE_ADDR(channel) = (uint32_t)(uintptr_t)to;
+    DMA_READ_ADDR(channel) = dma_address(from);
+    DMA_WRITE_ADDR(channel) = dma_address(to);
     DMA_TRANS_COUNT(channel) = bytes;
     __asm volatile("" ::: "memory"); // what the DMA reads is written
     DMA_CTRL_TRIG(channel) =

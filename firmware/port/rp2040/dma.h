@@ -13,6 +13,12 @@ enum dma_channel {
     DMA_OF_UART,
 };
 
+// An address as the DMA's registers take it.
+static inline uint32_t dma_address(const volatile void *at)
+{
+    return (uint32_t)(uintptr_t)at;
+}
+
 // Waits until they are moved, at most 254. More of the channel's control bits than every move has go into
 // options. False when the DMA came to no end and was stopped: what it moved is then unknown.
 bool dma_move(enum dma_channel channel, uint32_t options, volatile void *to, const void *from,

@@ -55,8 +55,7 @@ void flash_start(void)
 
 static uint32_t leave_xip(void)
 {
-    uint32_t primask;
-    __asm volatile("mrs %0, primask\n cpsid i" : "=r"(primask)::"memory");
+    uint32_t primask = interrupts_disable();
     rom.connect();
     rom.exit_xip();
     return primask;
@@ -66,22 +65,7 @@ static void back_to_xip(uint32_t primask)
 {
     rom.flush();
     ((rom_action)((uintptr_t)boot2_copy | 1))(); // Thumb
-    __asm volatile("msr primask, %0" ::"r"(primask) : "memory");
-}
-
-static void erase_sector(uint32_t offset)
-{
-    uint32_t primask = leave_xip();
-    rom.erase(offset, BT_FLASH_SECTOR_BYTES, BT_FLASH_SECTOR_BYTES, SECTOR_ERASE);
-    back_to_xip(primask);
-}
-
-// page must not be in flash.
-static void program_page(uint32_t offset, const uint8_t *page)
-{
-    uint32_t primask = leave_xip();
-    rom.program(offset, page, BT_FLASH_PAGE_BYTES);
-    back_to_xip(primask);
+    interrupts_restore(primask);
 }
 
 // Where the chip has what port.h counts from the settings' first byte.
@@ -96,16 +80,21 @@ bool port_flash_erase(uint32_t sector_offset)
         return false;
     }
     watchdog_feed(); // at the beginning of 0.4 s in which the main loop cannot
-    erase_sector(on_chip(sector_offset));
+    uint32_t primask = leave_xip();
+    rom.erase(on_chip(sector_offset), BT_FLASH_SECTOR_BYTES, BT_FLASH_SECTOR_BYTES, SECTOR_ERASE);
+    back_to_xip(primask);
     return true;
 }
 
+// page must not be in flash.
 bool port_flash_program(uint32_t page_offset, const uint8_t *page)
 {
     if (!usable || page_offset >= BT_KEPT_BYTES) {
         return false;
     }
-    program_page(on_chip(page_offset), page);
+    uint32_t primask = leave_xip();
+    rom.program(on_chip(page_offset), page, BT_FLASH_PAGE_BYTES);
+    back_to_xip(primask);
     return true;
 }
 

@@ -45,28 +45,24 @@ static volatile uint32_t command, listen, low, high, nowhere;
 static volatile uint32_t got[BT_MAX_FINGERS];
 static uint8_t read_mask;
 
-static uint32_t address(const volatile void *at)
-{
-    return (uint32_t)(uintptr_t)at;
-}
-
 static void set_step(int at, const volatile uint32_t *from, const volatile uint32_t *to)
 {
-    steps[at] = (step){address(from), address(to)};
+    steps[at] = (step){dma_address(from), dma_address(to)};
 }
 
 // Those of mask are selected for their word; for the others a word passes that nobody hears.
 static void set_reads(uint8_t mask)
 {
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        step select = {address(&low), address(&IO_BANK0_GPIO_CTRL(select_pin[f]))};
+        step select = {dma_address(&low), dma_address(&IO_BANK0_GPIO_CTRL(select_pin[f]))};
         steps[READS_AT + f * READ_STEPS] = mask >> f & 1 ? select : (step){0, 0};
     }
     read_mask = mask;
 }
 
-void slot_start(void)
+void bus_start(void)
 {
+    spi_start();
     low = GPIO_FUNC_SIO | GPIO_OUTOVER_LOW;
     high = GPIO_FUNC_SIO | GPIO_OUTOVER_HIGH;
     listen = BT_LISTEN_WORD;
@@ -94,8 +90,8 @@ uint32_t port_spi_slot_begin(uint16_t mosi, uint8_t mask)
         set_reads(mask);
     }
     spi_select_at_once(mask);
-    DMA_READ_ADDR(DMA_DEALER) = address(steps);
-    DMA_WRITE_ADDR(DMA_DEALER) = address(&DMA_READ_THEN_WRITE_TRIG(DMA_WORKER));
+    DMA_READ_ADDR(DMA_DEALER) = dma_address(steps);
+    DMA_WRITE_ADDR(DMA_DEALER) = dma_address(&DMA_READ_THEN_WRITE_TRIG(DMA_WORKER));
     DMA_TRANS_COUNT(DMA_DEALER) = STEPS * (sizeof(step) / sizeof(uint32_t));
     DMA_TREQS_DUE(DMA_DEALER) = 0;   // ticks that came while there was nothing to do
     __asm volatile("" ::: "memory"); // what the DMA reads is written

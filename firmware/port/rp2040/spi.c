@@ -38,7 +38,7 @@ void spi_reset(void)
     configure();
 }
 
-void bus_start(void)
+void spi_start(void)
 {
     static const uint8_t selects[BT_MAX_FINGERS] = {PIN_SELECT_0, PIN_SELECT_1, PIN_SELECT_2, PIN_SELECT_3,
                                                     PIN_SELECT_4};
@@ -59,7 +59,6 @@ void bus_start(void)
     // Pulled down: where no sensor drives the line, words read 0x0000, which the driver takes for absent.
     PADS_BANK0_GPIO(PIN_MISO) = PADS_IE | PADS_SCHMITT | PADS_PDE;
     IO_BANK0_GPIO_CTRL(PIN_MISO) = GPIO_FUNC_SPI;
-    slot_start();
 }
 
 void spi_select_at_once(uint8_t mask)

@@ -25,6 +25,19 @@ static inline void interrupt_let_go(uint32_t number)
     NVIC_ISER = 1u << number;
 }
 
+// ---- all of them, for the few cycles in which two must see the same
+static inline uint32_t interrupts_disable(void)
+{
+    uint32_t primask;
+    __asm volatile("mrs %0, primask\n cpsid i" : "=r"(primask)::"memory");
+    return primask;
+}
+
+static inline void interrupts_restore(uint32_t primask)
+{
+    __asm volatile("msr primask, %0" ::"r"(primask) : "memory");
+}
+
 // ---- startup.c: who takes an interrupt, beside the timer's and the USB's
 void use_interrupt(uint32_t number, void (*handler)(void));
 
@@ -45,15 +58,13 @@ void timer_sleep(void);
 // Something came that the main loop should look at; port_idle will not sleep over it. For interrupts.
 void timer_wake(void);
 
-// ---- what the image is for: a gateway's side of the sensors' bus (spi.c), or the sensors'
+// ---- what the image is for: a gateway's side of the sensors' bus (slot.c), or the sensors'
 void bus_start(void);
 
 // ---- spi.c
+void spi_start(void);
 void spi_reset(void);                  // whatever it was about
 void spi_select_at_once(uint8_t mask); // port_spi_select without its waits
-
-// ---- slot.c
-void slot_start(void);
 
 // ---- rom.c: functions of the chip's boot ROM; NULL when it has none of that name
 void *rom_function(char first, char second);
@@ -67,7 +78,7 @@ void flash_start(void);
 // The flash's own unique number, which is the board's. False when the flash tells none.
 bool flash_unique_id(uint8_t id[FLASH_ID_BYTES]);
 
-// ---- usb.c
+// ---- usb/
 // serial: text that stays; what the host shows as the serial number.
 void usb_start(const char *serial);
 void usb_interrupt(void);

@@ -92,8 +92,8 @@ void uart_watch(void)
     const uint32_t at_once = TX_RING - tx_tail % TX_RING; // the rest lies at the ring's start
     tx_given = waiting < at_once ? waiting : at_once;
     if (tx_given > 0) {
-        DMA_READ_ADDR(DMA_OF_UART) = (uint32_t)(uintptr_t)(tx + tx_tail % TX_RING);
-        DMA_WRITE_ADDR(DMA_OF_UART) = (uint32_t)(uintptr_t)&UART_DR(number);
+        DMA_READ_ADDR(DMA_OF_UART) = dma_address(tx + tx_tail % TX_RING);
+        DMA_WRITE_ADDR(DMA_OF_UART) = dma_address(&UART_DR(number));
         DMA_TRANS_COUNT(DMA_OF_UART) = tx_given;
         __asm volatile("" ::: "memory"); // what the DMA reads is written
         DMA_CTRL_TRIG(DMA_OF_UART) = DMA_QUIET | DMA_BY_UART_TX(number) | DMA_CHAIN_TO_ITSELF(DMA_OF_UART)

@@ -1,4 +1,4 @@
-#include "usb_descriptors.h"
+#include "usb/descriptors.h"
 
 #include "pins.h"
 #include "version.h"

@@ -1,10 +1,13 @@
 // Endpoint 0: standard requests (USB 2.0, 9.4) and those of a CDC-ACM port (PSTN 1.2, 6.3). What is not asked
 // of such a device is answered with a stall.
-#include "usb.h"
+#include "usb/control.h"
 
 #include "rp2040_regs.h"
-#include "usb_descriptors.h"
+#include "usb/buffers.h"
+#include "usb/data.h"
+#include "usb/descriptors.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 
 // bmRequestType | bRequest << 8
@@ -87,10 +90,9 @@ static void send_packet(void)
 
 static void receive(uint32_t bytes)
 {
-    if (superseded()) {
-        return;
+    if (!superseded()) {
+        usb_hand_over(&USB_BUFFER_OUT(0), bytes | USB_BUFFER_DATA1);
     }
-    usb_hand_over(&USB_BUFFER_OUT(0), bytes | USB_BUFFER_DATA1);
 }
 
 static void answer(const uint8_t *data, uint32_t bytes, uint32_t asked)
