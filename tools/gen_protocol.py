@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from committed import ROOT, write_or_check
+from make.committed import ROOT, write_or_check
 from protogen import (
     c_client,
     c_crc,
@@ -28,7 +28,7 @@ from protogen import (
 
 
 def outputs(root: Path) -> dict[Path, str]:
-    """Map every generated path to the text it must have."""
+    """Every generated path, with the text it must have."""
     contract = schema.load(root / "protocol")
     return {
         root / "firmware/core/wire/sensor_gen.h": c_sensor.header(contract),

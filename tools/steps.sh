@@ -54,7 +54,7 @@ install_for_boards_and_pages() {
 
 generated_files() {
     python tools/gen_protocol.py --check
-    python tools/make_vectors.py --check
+    python tools/make/vectors.py --check
 }
 
 style() {

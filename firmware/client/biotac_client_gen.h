@@ -15,67 +15,67 @@
 
 // Why a command was refused.
 enum bt_error {
-    BT_ERROR_OK = 0, // done
-    BT_ERROR_UNKNOWN_COMMAND = 1, // this firmware has no such command; update it
-    BT_ERROR_BAD_LENGTH = 2, // payload length does not fit the command
+    BT_ERROR_OK = 0, // success
+    BT_ERROR_UNKNOWN_COMMAND = 1, // this firmware does not know the command; update it
+    BT_ERROR_BAD_LENGTH = 2, // the payload has the wrong length for this command
     BT_ERROR_UNKNOWN_SETTING = 3, // no setting has this id
-    BT_ERROR_OUT_OF_RANGE = 4, // value outside the range given in MESSAGES.md
-    BT_ERROR_NO_SUCH_FINGER = 5, // finger index is not 0..4, or no sensor answers there
-    BT_ERROR_BUSY = 6, // not while streaming: send STOP first
-    BT_ERROR_NOT_STILL = 7, // the signals move too much to tare: release the finger and try again
-    BT_ERROR_RAILED = 8, // more than two electrodes are at the end of their range: check the sensor
+    BT_ERROR_OUT_OF_RANGE = 4, // a value is outside the range given in MESSAGES.md
+    BT_ERROR_NO_SUCH_FINGER = 5, // the finger index is not 0 to 4, or no sensor answers there
+    BT_ERROR_BUSY = 6, // not possible while streaming: send STOP first
+    BT_ERROR_NOT_STILL = 7, // the signals are moving too much to tare: release the finger and try again
+    BT_ERROR_RAILED = 8, // more than two electrodes are railed or missing: check the sensor
     BT_ERROR_NOT_HERE = 9, // this kind of board cannot do that
-    BT_ERROR_NOT_STORED = 10, // the flash did not take it; what was stored before still stands
-    BT_ERROR_OTHER_SENSOR = 11, // made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it
-    BT_ERROR_NOT_BEGUN = 12, // no upload of this finger's map is under way: begin it; another beginning, STOP and a closed port end one
-    BT_ERROR_NOT_WHOLE = 13, // bytes of the map are missing or differ from its CRC-32: send it again
+    BT_ERROR_NOT_STORED = 10, // not written to flash; what was stored before is intact
+    BT_ERROR_OTHER_SENSOR = 11, // made for a sensor with another serial number: plug that sensor in, or send no serial number to force it
+    BT_ERROR_NOT_BEGUN = 12, // no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload
+    BT_ERROR_NOT_WHOLE = 13, // data are missing or do not match the CRC-32: upload them again
 };
 
-// Where a finger's tare machine is (SPEC.md, Tare).
+// State of a finger's tare machine (SPEC.md, Tare).
 enum bt_tare_state {
-    BT_TARE_STATE_INIT = 0, // no tare yet: waiting for still frames
-    BT_TARE_STATE_REST = 1, // tared, nothing touches; the tare follows slow drift
-    BT_TARE_STATE_CONTACT = 2, // touched; the tare is frozen but for temperature and drift that all electrodes share
-    BT_TARE_STATE_FAULT = 3, // railed or dead electrodes; the tare is frozen and no new one is taken
-    BT_TARE_STATE_DOUBT = 4, // still, and either a light hold or what a press left in the skin: the tare stays, and the next contact is seen
+    BT_TARE_STATE_INIT = 0, // no tare yet: waiting for still signals
+    BT_TARE_STATE_REST = 1, // tared and untouched; the tare follows slow drift
+    BT_TARE_STATE_CONTACT = 2, // touched; the tare follows only temperature and drift common to all electrodes
+    BT_TARE_STATE_FAULT = 3, // more than two electrodes railed or missing; the tare is frozen, and no new one is taken
+    BT_TARE_STATE_DOUBT = 4, // still, and either held lightly or with residue of a press in the skin; the tare stays, and a new contact is detected
 };
 
-// Why the tare last changed by more than drift tracking.
+// The latest change of a tare other than drift tracking, or the host's HOLD or RELEASE.
 enum bt_tare_reason {
     BT_TARE_REASON_NONE = 0, // never tared
     BT_TARE_REASON_START = 1, // first still frames after power-up or plug-in
-    BT_TARE_REASON_RELEASE = 2, // contact ended: signals back at the tare
-    BT_TARE_REASON_RESIDUE = 3, // contact ended with skin hysteresis left over
-    BT_TARE_REASON_ROLL_BACK = 4, // contact began: tare taken from at least one second before
+    BT_TARE_REASON_RELEASE = 2, // contact ended: the signals returned to the tare
+    BT_TARE_REASON_RESIDUE = 3, // contact ended; the residue that it left in the skin is tared out
+    BT_TARE_REASON_ROLL_BACK = 4, // contact began: back to a tare from at least 1.2 s before, plus drift
     BT_TARE_REASON_HOST_NOW = 5, // TARE_NOW command
     BT_TARE_REASON_HOST_SET = 6, // TARE_SET command
-    BT_TARE_REASON_SHIFT = 7, // pressure alone or all electrodes alike had moved: no touch; the tare moved by that and nothing else
-    BT_TARE_REASON_UNDONE = 8, // inverted signals proved the tare wrong: the one before it holds again
-    BT_TARE_REASON_INVERTED = 9, // inverted signals proved the tare wrong and there is none before it: untared until still
-    BT_TARE_REASON_HOST_HOLD = 10, // HOLD command: the tare is as it was, and stays
-    BT_TARE_REASON_HOST_RELEASE = 11, // RELEASE command: the tare is as it was, until still
-    BT_TARE_REASON_HOLD_LAPSED = 12, // the host that said HOLD has been silent for hold_timeout_ms: the tare is as it was
+    BT_TARE_REASON_SHIFT = 7, // not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much
+    BT_TARE_REASON_UNDONE = 8, // inverted signals showed that the tare was wrong: the previous one is restored
+    BT_TARE_REASON_INVERTED = 9, // inverted signals showed that the tare was wrong, with no previous one to restore: untared until still
+    BT_TARE_REASON_HOST_HOLD = 10, // HOLD command: the tare is unchanged, and kept
+    BT_TARE_REASON_HOST_RELEASE = 11, // RELEASE command: the tare is unchanged until the signals are still
+    BT_TARE_REASON_HOLD_LAPSED = 12, // HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged
 };
 
-// How electrode signals weigh in the point of contact (Lin Eq 1). On real plates compression does best.
+// Weight of an electrode's signal e in the point of contact (Lin Eq 1).
 enum bt_poc_weights {
-    BT_POC_WEIGHTS_ABS_N2 = 0, // |e|^2, the paper's
+    BT_POC_WEIGHTS_ABS_N2 = 0, // e^2, as in the paper
     BT_POC_WEIGHTS_COMPRESS_N1 = 1, // max(-e, 0)
     BT_POC_WEIGHTS_COMPRESS_N2 = 2, // min(e, 0)^2
 };
 
-// What the force of a finger without a wrench map comes from.
+// Where the force of a finger without a wrench map comes from.
 enum bt_force_model {
-    BT_FORCE_MODEL_LIN = 0, // Lin's three scales, force_gain_*_nn
-    BT_FORCE_MODEL_POPULATION = 1, // the population map, made of other fingers (host/docs/population.md), while all three force gains are the defaults; with others it is LIN
+    BT_FORCE_MODEL_LIN = 0, // Lin's three gains, force_gain_*_nn
+    BT_FORCE_MODEL_POPULATION = 1, // the population map, trained on other fingers (host/docs/population.md), if all three force gains are defaults; otherwise LIN
 };
 
-// Which pins a board's UART is on. A Pico has four pairs that its sensors leave free.
+// Pins of a board's UART. On a Pico, four pairs are not used by the sensors.
 enum bt_uart_pins {
-    BT_UART_PINS_GPIO_0_1 = 0, // sends on GPIO 0, hears on GPIO 1
-    BT_UART_PINS_GPIO_4_5 = 1, // sends on GPIO 4, hears on GPIO 5
-    BT_UART_PINS_GPIO_8_9 = 2, // sends on GPIO 8, hears on GPIO 9
-    BT_UART_PINS_GPIO_12_13 = 3, // sends on GPIO 12, hears on GPIO 13
+    BT_UART_PINS_GPIO_0_1 = 0, // TX on GPIO 0, RX on GPIO 1
+    BT_UART_PINS_GPIO_4_5 = 1, // TX on GPIO 4, RX on GPIO 5
+    BT_UART_PINS_GPIO_8_9 = 2, // TX on GPIO 8, RX on GPIO 9
+    BT_UART_PINS_GPIO_12_13 = 3, // TX on GPIO 12, RX on GPIO 13
 };
 
 // What the firmware runs on.
@@ -83,95 +83,95 @@ enum bt_board {
     BT_BOARD_POSIX_SIM = 1, // a process on a pty with emulated sensors
     BT_BOARD_PICO = 2, // Raspberry Pi Pico (RP2040)
     BT_BOARD_LINUX_SBC = 3, // a Linux computer with the sensors on its own SPI bus (spidev)
-    BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico that is itself one to five emulated sensors (firmware/boards/pico_sensor): it knows HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages, and nothing else
+    BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico that emulates one to five sensors (firmware/boards/pico_sensor): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
 };
 
-// What an emulated sensor does instead of answering rightly. A tape holds the same codes in place of counts.
+// Faults of an emulated sensor. On a tape, these codes stand in place of counts.
 enum bt_emu_fault {
-    BT_EMU_FAULT_NONE = 0, // nothing: it answers
-    BT_EMU_FAULT_SWAPPED = 65529, // unplugged, and it will be another sensor that is plugged in
-    BT_EMU_FAULT_UNPLUGGED = 65530, // no sensor or no power: MISO let go; afterwards it is mute until asked for a property
-    BT_EMU_FAULT_TOO_EARLY = 65531, // late: it answers as if the 50 us had not passed
-    BT_EMU_FAULT_STUCK_HIGH = 65532, // MISO high throughout
-    BT_EMU_FAULT_STUCK_LOW = 65533, // silence: MISO low throughout
-    BT_EMU_FAULT_BAD_PARITY = 65534, // one bit of the word flipped
+    BT_EMU_FAULT_NONE = 0, // no fault
+    BT_EMU_FAULT_SWAPPED = 65529, // unplugged; the sensor plugged in afterwards has another serial number
+    BT_EMU_FAULT_UNPLUGGED = 65530, // no sensor or no power: MISO is not driven; afterwards the sensor sends zeros until a property is read
+    BT_EMU_FAULT_TOO_EARLY = 65531, // it answers as if read before its 50 us had passed
+    BT_EMU_FAULT_STUCK_HIGH = 65532, // MISO is always high
+    BT_EMU_FAULT_STUCK_LOW = 65533, // MISO is always low
+    BT_EMU_FAULT_BAD_PARITY = 65534, // one bit of the word is flipped
     BT_EMU_FAULT_NO_CHANNEL = 65535, // the sensor has no such channel
 };
 
-// Whether a finger's calibration, or map, is what its results come from.
+// Whether a finger's calibration or wrench map is used.
 enum bt_calibration_state {
-    BT_CALIBRATION_STATE_NONE = 0, // there is none: the board's settings hold; for a map: the gains
-    BT_CALIBRATION_STATE_IN_FORCE = 1, // it holds in place of the settings, or gains
-    BT_CALIBRATION_STATE_OTHER_SENSOR = 2, // kept, but made for another sensor than the one read at start and there since: the settings, or gains, hold
+    BT_CALIBRATION_STATE_NONE = 0, // there is none: the board's settings are used, or for a map force_model and the gains
+    BT_CALIBRATION_STATE_IN_FORCE = 1, // it is used
+    BT_CALIBRATION_STATE_OTHER_SENSOR = 2, // kept but not used: it is for a sensor with another serial number
 };
 
-// What an EVENT tells (SPEC.md, Events).
+// What an EVENT reports (SPEC.md, Events).
 enum bt_event_kind {
-    BT_EVENT_KIND_TOUCH = 1, // the sample of this slot shows that something touches a resting finger
-    BT_EVENT_KIND_LIFT = 2, // the sample of this slot shows that the finger is let go; one for each TOUCH
-    BT_EVENT_KIND_JOLT = 3, // dynamic pressure jolts: a tap on the finger or on what it holds, a quick squeeze, or a slip's beginning
-    BT_EVENT_KIND_SLIP = 4, // what is held slips: dynamic pressure vibrates to and fro
-    BT_EVENT_KIND_STUCK = 5, // the slip is over; one for each SLIP
+    BT_EVENT_KIND_TOUCH = 1, // something touches a resting finger
+    BT_EVENT_KIND_LIFT = 2, // the finger is no longer touched; one for each TOUCH
+    BT_EVENT_KIND_JOLT = 3, // a jolt of dynamic pressure: a tap on the finger or the held object, a quick squeeze, or the beginning of a slip
+    BT_EVENT_KIND_SLIP = 4, // the held object slips: dynamic pressure vibrates in both directions
+    BT_EVENT_KIND_STUCK = 5, // the slip has ended; one for each SLIP
 };
 
-// State of one frame's results.
-#define BT_FRAME_FLAG_CONTACT (1u << 0) // the finger is touched
-#define BT_FRAME_FLAG_UNTARED (1u << 1) // no tare yet: PoC, force and torque are invalid
-#define BT_FRAME_FLAG_POC_INVALID (1u << 2) // no weight on any electrode, or no tare: PoC and torque x are invalid
-#define BT_FRAME_FLAG_POC_LOW (1u << 3) // signal energy below four times the contact threshold: the PoC is noisy
-#define BT_FRAME_FLAG_ELECTRODE_MISSING (1u << 4) // an electrode had no good word in this frame and counts as zero signal
+// State of a frame's counts and results.
+#define BT_FRAME_FLAG_CONTACT (1u << 0) // the finger is touched (tare state CONTACT)
+#define BT_FRAME_FLAG_UNTARED (1u << 1) // no tare: point of contact (PoC), force, torque and torsion are invalid
+#define BT_FRAME_FLAG_POC_INVALID (1u << 2) // all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it
+#define BT_FRAME_FLAG_POC_LOW (1u << 3) // the signal energy is below four times the contact threshold: the PoC is noisy
+#define BT_FRAME_FLAG_ELECTRODE_MISSING (1u << 4) // an electrode had no good word in this frame; its signal counts as 0
 #define BT_FRAME_FLAG_RAIL (1u << 5) // an electrode reads 0 or at least 4090
-#define BT_FRAME_FLAG_PDC_MISSING (1u << 6) // no good pressure word; contact rests on the electrodes alone
+#define BT_FRAME_FLAG_PDC_MISSING (1u << 6) // no good static pressure word; contact is judged by the electrodes alone
 #define BT_FRAME_FLAG_TAC_MISSING (1u << 7) // no good thermal flux word
 #define BT_FRAME_FLAG_TDC_MISSING (1u << 8) // no good temperature word
-#define BT_FRAME_FLAG_MX_DERIVED (1u << 9) // torque x is PoC x force, not measured: the electrodes hardly see it
-#define BT_FRAME_FLAG_FX_WEAK (1u << 10) // force x has two to three times the noise of y and z (always)
-#define BT_FRAME_FLAG_TORSION_OK (1u << 11) // PoC normal within 60 deg of -z, energy over the threshold, four electrodes active
-#define BT_FRAME_FLAG_SHEAR_MIX (1u << 12) // more than half the energy is bulge: the PoC is likely biased
-#define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s: only drift that all electrodes share was followed
-#define BT_FRAME_FLAG_TARE_CHANGED (1u << 14) // this frame is the first with a new tare, or after HOLD or RELEASE (see the TARE message)
-#define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes railed or missing: do not trust the results
-#define BT_FRAME_FLAG_TEMP (1u << 16) // since the contact began the temperature has moved by over a degree: the tare is doubtful
-#define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to and marked invalid (SUBSCRIBE)
-#define BT_FRAME_FLAG_MAPPED (1u << 18) // force, and torque and torsion where it has them, come from the finger's wrench map
-#define BT_FRAME_FLAG_DOUBT (1u << 19) // the force may be a light hold or what a press left in the skin: the tare stays (tare state DOUBT)
-#define BT_FRAME_FLAG_HELD (1u << 20) // the host said HOLD: no new tare is taken
-#define BT_FRAME_FLAG_REPEATED (1u << 21) // the board was short of time: force, torque and torsion are those of wrench_age_ms before, from the same map
-#define BT_FRAME_FLAG_SHED (1u << 22) // the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out
-#define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not said its serial number since: tare, calibration and map may be another's
-#define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with a tare of its own; no results where it has not the same calibration and map
-#define BT_FRAME_FLAG_POPULATION (1u << 25) // force comes from the population map, or in part
-#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // fewer electrodes carry the signal than on any plate that the population map was made of: force is pulled towards Lin's, or is Lin's
+#define BT_FRAME_FLAG_MX_DERIVED (1u << 9) // (always) torque x is derived from PoC and force unless a wrench map gives it: electrodes hardly sense it
+#define BT_FRAME_FLAG_FX_WEAK (1u << 10) // (always) force x has two to three times the noise of y and z
+#define BT_FRAME_FLAG_TORSION_OK (1u << 11) // suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
+#define BT_FRAME_FLAG_SHEAR_MIX (1u << 12) // more than half of the signal energy is bulge: the PoC is probably biased
+#define BT_FRAME_FLAG_BASE_OLD (1u << 13) // in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes
+#define BT_FRAME_FLAG_TARE_CHANGED (1u << 14) // first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
+#define BT_FRAME_FLAG_FAULT (1u << 15) // more than two electrodes are railed or missing: do not trust the results
+#define BT_FRAME_FLAG_TEMP (1u << 16) // the temperature has changed by over a degree since the contact began: the tare is uncertain
+#define BT_FRAME_FLAG_NOT_ASKED (1u << 17) // some quantity is not subscribed to, and marked invalid (SUBSCRIBE)
+#define BT_FRAME_FLAG_MAPPED (1u << 18) // force, and torque and torsion if the map has them, come from the finger's wrench map
+#define BT_FRAME_FLAG_DOUBT (1u << 19) // tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays
+#define BT_FRAME_FLAG_HELD (1u << 20) // the host sent HOLD: no new tare is taken
+#define BT_FRAME_FLAG_REPEATED (1u << 21) // the board was short of time: force, torque and torsion repeat the map's results of wrench_age_ms before
+#define BT_FRAME_FLAG_SHED (1u << 22) // the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent
+#define BT_FRAME_FLAG_SENSOR_UNSURE (1u << 23) // the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
+#define BT_FRAME_FLAG_SENSOR_OTHER (1u << 24) // another sensor than at START, with its own tare; no results if it needs another calibration or map
+#define BT_FRAME_FLAG_POPULATION (1u << 25) // force comes from the population map; if OUTSIDE, only partly or not at all
+#define BT_FRAME_FLAG_OUTSIDE (1u << 26) // fewer electrodes carry the signal than on any plate that the population map was trained on: force is mixed with LIN's, or is LIN's
 #define BT_FRAME_FLAGS 0x7FFFFFFu // all there are
 
-// What went wrong on a board (STATUS); a bit stays until CLEAR_FAULTS.
-#define BT_FAULT_FLAG_STARTED (1u << 0) // it was switched on, lost power for a moment, or was reset from outside
-#define BT_FAULT_FLAG_HUNG (1u << 1) // the firmware stood still for a second, and the watchdog started it again
-#define BT_FAULT_FLAG_CRASHED (1u << 2) // the firmware started itself again after an exception
-#define BT_FAULT_FLAG_STORAGE (1u << 3) // what was saved is damaged or half written: settings, calibrations and maps may be older ones, or the defaults
+// What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS.
+#define BT_FAULT_FLAG_STARTED (1u << 0) // it was switched on, lost power briefly, or was reset externally
+#define BT_FAULT_FLAG_HUNG (1u << 1) // the firmware hung for a second, and the watchdog restarted it
+#define BT_FAULT_FLAG_CRASHED (1u << 2) // the firmware restarted itself after an exception
+#define BT_FAULT_FLAG_STORAGE (1u << 3) // stored data are damaged or incomplete: settings, calibrations and maps may be older ones, or the defaults
 #define BT_FAULT_FLAG_SLOTS_LATE (1u << 4) // the main loop fell behind and slots were lost
-#define BT_FAULT_FLAG_DROPPED (1u << 5) // messages found no room: the host read too slowly
-#define BT_FAULT_FLAG_LINK_DAMAGED (1u << 6) // bytes from the host came damaged
-#define BT_FAULT_FLAG_HOST_SILENT (1u << 7) // a stream was ended because the host said nothing for keepalive_ms
-#define BT_FAULT_FLAG_HOLD_LAPSED (1u << 8) // a HOLD ended because the host said nothing for hold_timeout_ms
+#define BT_FAULT_FLAG_DROPPED (1u << 5) // messages were dropped for lack of room: the host read too slowly
+#define BT_FAULT_FLAG_LINK_DAMAGED (1u << 6) // frames from the host were damaged or had a wrong length
+#define BT_FAULT_FLAG_HOST_SILENT (1u << 7) // a stream ended because the host sent nothing for keepalive_ms
+#define BT_FAULT_FLAG_HOLD_LAPSED (1u << 8) // a HOLD ended because the host sent nothing for hold_timeout_ms
 #define BT_FAULT_FLAGS 0x1FFu // all there are
 
 // What START turns on.
-#define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME messages
+#define BT_STREAM_FLAG_FRAMES (1u << 0) // FRAME and TARE messages; IDLE and TOUCH as subscribed
 #define BT_STREAM_FLAG_PAC (1u << 1) // PAC messages
-#define BT_STREAM_FLAG_STATUS (1u << 2) // STATUS and SENSOR_STATUS once per status_period_ms
+#define BT_STREAM_FLAG_STATUS (1u << 2) // STATUS and SENSOR_STATUS every status_period_ms
 #define BT_STREAM_FLAG_BANDS (1u << 3) // BANDS messages
 #define BT_STREAM_FLAGS 0xFu // all there are
 
-// What SUBSCRIBE asks for. What is not asked for is not computed.
-#define BT_QUANTITY_FLAG_POC (1u << 0) // point of contact; without it TORSION_OK is never set
+// What a host can SUBSCRIBE to. The board does not compute the rest.
+#define BT_QUANTITY_FLAG_POC (1u << 0) // point of contact; TORSION_OK needs it
 #define BT_QUANTITY_FLAG_FORCE (1u << 1) // force
 #define BT_QUANTITY_FLAG_TORQUE (1u << 2) // torque and torsion
-#define BT_QUANTITY_FLAG_SIGMA (1u << 3) // one-sigma of point of contact and force
-#define BT_QUANTITY_FLAG_REST_FRAMES (1u << 4) // a FRAME in every round; without it an untouched finger sends IDLE heartbeats
+#define BT_QUANTITY_FLAG_SIGMA (1u << 3) // standard deviations of point of contact and force
+#define BT_QUANTITY_FLAG_REST_FRAMES (1u << 4) // a FRAME in every round; without it, an untouched finger sends IDLE heartbeats
 #define BT_QUANTITY_FLAG_TOUCH (1u << 5) // TOUCH messages
-#define BT_QUANTITY_FLAG_PRESSURE (1u << 6) // filtered static pressure, and the force that it tells of a calibrated finger
-#define BT_QUANTITY_FLAG_EVENTS (1u << 7) // EVENT messages, with FRAMEs or without
+#define BT_QUANTITY_FLAG_PRESSURE (1u << 6) // filtered static pressure and, if calibrated, the force from it
+#define BT_QUANTITY_FLAG_EVENTS (1u << 7) // EVENT messages; sent while FRAMES or PAC is on
 #define BT_QUANTITY_FLAGS 0xFFu // all there are
 
 enum bt_setting {
@@ -194,554 +194,554 @@ enum bt_setting {
 };
 #define BT_SETTINGS 16
 
-// Who is there. Reply to HELLO_REQUEST.
+// Identifies the board. Reply to HELLO_REQUEST.
 #define BT_HELLO_ID 0x01
 #define BT_HELLO_BYTES 39
 typedef struct {
-    uint8_t req_id; // [1] of the request
-    uint32_t nonce; // [1] echo of the request's, so that an old HELLO in a buffer is not taken for this one
-    uint8_t wire_major; // [1] peers with different majors do not talk
-    uint8_t wire_minor; // [1] appended messages and fields
-    uint32_t schema_hash; // [1] CRC-32 of schema.json
-    uint8_t firmware_major; // [1] firmware release
-    uint8_t firmware_minor; // [1] firmware release
-    uint8_t firmware_patch; // [1] firmware release
+    uint8_t req_id; // [1] as in the command
+    uint32_t nonce; // [1] copied from the request, so that an old HELLO in a buffer is not taken for this one
+    uint8_t wire_major; // [1] a host and a board with different majors do not talk
+    uint8_t wire_minor; // [1] raised by appended messages, fields and settings
+    uint32_t schema_hash; // [1] CRC-32 of the contract without its texts (SPEC.md, Versions)
+    uint8_t firmware_major; // [1] firmware version, major
+    uint8_t firmware_minor; // [1] firmware version, minor
+    uint8_t firmware_patch; // [1] firmware version, patch
     uint16_t board; // [enum board] what the firmware runs on
     uint8_t board_serial[12]; // [1] unique id of the microcontroller
-    uint32_t boot_id; // [1] random at each boot: a change means the board restarted
-    uint16_t slot_hz; // [Hz] channels sampled per second and sensor
-    uint8_t fingers_present; // [bit mask] sensors that answer
-    uint32_t image_crc32; // [1] of the flash image it runs, computed at boot as the image's note says (firmware/app/image_note.h); 0xFFFFFFFF where there is none
+    uint32_t boot_id; // [1] random at each boot: if it changes, the board has restarted
+    uint16_t slot_hz; // [Hz] slots per second; each slot samples one channel of every sensor
+    uint8_t fingers_present; // [bit mask] bit f is set if finger f's sensor answers
+    uint32_t image_crc32; // [1] CRC-32 of the running flash image, computed at boot (firmware/app/image_note.h); 0xFFFFFFFF: unknown
 } bt_msg_hello;
 
-// Outcome of a command that has no message of its own, or the refusal of any command.
+// Result of a command that has no reply message of its own, or refusal of any command.
 #define BT_REPLY_ID 0x02
 #define BT_REPLY_BYTES 3
 typedef struct {
-    uint8_t req_id; // [1] of the command
-    uint8_t command; // [message id] id of the command
-    uint8_t error; // [enum error] OK or why not
+    uint8_t req_id; // [1] as in the command; 0 if its length was wrong
+    uint8_t command; // [message id] message id of the command
+    uint8_t error; // [enum error] OK, or why it was refused
 } bt_msg_reply;
 
 // Value of one setting. Reply to GET_SETTING and SET_SETTING.
 #define BT_SETTING_ID 0x03
 #define BT_SETTING_BYTES 6
 typedef struct {
-    uint8_t req_id; // [1] of the command
-    uint8_t setting; // [setting id] which one
-    int32_t value; // [the setting's] in force now
+    uint8_t req_id; // [1] as in the command
+    uint8_t setting; // [setting id] id of the setting
+    int32_t value; // [the setting's] current value
 } bt_msg_setting;
 
-// What a sensor says of itself, read at power-up, and the serial number again whenever it was away; of one that came later it is all that is known. What was not read twice alike is zero. Reply to GET_SENSOR_INFO.
+// What a sensor reports about itself, read when the board starts. After an absence only the serial number is read again; for a new sensor, the rest is then 0. A value is 0 unless two reads agreed. Reply to GET_SENSOR_INFO.
 #define BT_SENSOR_INFO_ID 0x04
 #define BT_SENSOR_INFO_BYTES 29
 typedef struct {
-    uint8_t req_id; // [1] of the command
+    uint8_t req_id; // [1] as in the command
     uint8_t finger; // [1] chip select index
-    uint8_t present; // [bool] 1 when its serial number began with BT and it is not unplugged
-    uint8_t flex_version[2]; // [ASCII] MN means M.N
-    uint8_t software_version[4]; // [ASCII] MMNN means MM.NN
-    uint8_t serial[16]; // [ASCII] serial number
+    uint8_t present; // [bool] 1: its serial number began with BT (but not BTSP or BTTB), and it is not unplugged; else 0
+    uint8_t flex_version[2]; // [ASCII] digits: MN means M.N
+    uint8_t software_version[4]; // [ASCII] digits: MMNN means MM.NN
+    uint8_t serial[16]; // [ASCII] serial number, padded with zeros
     uint16_t cpu_khz; // [kHz] CPU speed
     uint16_t sampling_hz; // [Hz] internal sampling frequency
 } bt_msg_sensor_info;
 
-// Where a finger is touched right now, inside a round, from the latest word of every electrode. Reply to GET_POINT.
+// Where a finger is touched now, within a round, from the latest word of every electrode. Reply to GET_POINT.
 #define BT_POINT_ID 0x05
 #define BT_POINT_BYTES 12
 typedef struct {
-    uint8_t req_id; // [1] of the request
+    uint8_t req_id; // [1] as in the command
     uint8_t finger; // [1] chip select index
-    uint16_t seq; // [1] of the round that is under way
-    uint8_t slot; // [1] slots of it that were taken in
-    uint8_t tare_state; // [enum tare_state] after the round before
-    int16_t poc_um[3]; // [um] point of contact on the core's surface; invalid without weight or tare
+    uint16_t seq; // [1] seq of the current round
+    uint8_t slot; // [1] how many of its slots have been read
+    uint8_t tare_state; // [enum tare_state] state after the previous round
+    int16_t poc_um[3]; // [um] x, y, z of the point of contact on the core's surface; -32768: no weight or no tare
 } bt_msg_point;
 
 // Calibration of one finger. Reply to GET_CALIBRATION and SET_CALIBRATION.
 #define BT_CALIBRATION_ID 0x06
 #define BT_CALIBRATION_BYTES 55
 typedef struct {
-    uint8_t req_id; // [1] of the command
+    uint8_t req_id; // [1] as in the command
     uint8_t finger; // [1] chip select index
-    uint8_t state; // [enum calibration_state] whether it is in force; never changes while streaming
-    uint8_t serial[16]; // [ASCII] of the sensor it was made for; all zero: any sensor, or none is there
-    uint32_t made_s; // [s] when it was made, since 1970 UTC; 0: unknown
-    int32_t value[8]; // [the per-finger settings'] one for each, by id; with NONE the board's own
+    uint8_t state; // [enum calibration_state] whether it is used; never changes while streaming
+    uint8_t serial[16]; // [ASCII] serial number of the sensor it is for; all zero: any sensor, or state NONE
+    uint32_t made_s; // [s] creation time, seconds since 1970 UTC; 0: unknown
+    int32_t value[8]; // [the per-finger settings'] one per per-finger setting, in order of id; with NONE the board's settings
 } bt_msg_calibration;
 
-// Which wrench map a finger has. Reply to GET_MAP and END_MAP.
+// The wrench map of one finger. Reply to GET_MAP and END_MAP.
 #define BT_MAP_INFO_ID 0x07
 #define BT_MAP_INFO_BYTES 29
 typedef struct {
-    uint8_t req_id; // [1] of the command
+    uint8_t req_id; // [1] as in the command
     uint8_t finger; // [1] chip select index
-    uint8_t state; // [enum calibration_state] whether it is in force; never changes while streaming
-    uint8_t serial[16]; // [ASCII] of the sensor it was made for; all zero: any sensor, or none is there
-    uint32_t made_s; // [s] when it was made, since 1970 UTC; 0: unknown
-    uint16_t size_bytes; // [byte] its size; 0 with NONE
-    uint32_t crc32; // [1] over all of them, as zlib's; 0 with NONE
+    uint8_t state; // [enum calibration_state] whether it is used; never changes while streaming
+    uint8_t serial[16]; // [ASCII] serial number of the sensor it is for; all zero: any sensor, or state NONE
+    uint32_t made_s; // [s] creation time, seconds since 1970 UTC; 0: unknown
+    uint16_t size_bytes; // [byte] size of the map; 0 with NONE
+    uint32_t crc32; // [1] CRC-32 of the map, as zlib's; 0 with NONE
 } bt_msg_map_info;
 
 // Part of a finger's wrench map. Reply to READ_MAP.
 #define BT_MAP_DATA_ID 0x08
 #define BT_MAP_DATA_BYTES 132
 typedef struct {
-    uint8_t req_id; // [1] of the command
+    uint8_t req_id; // [1] as in the command
     uint8_t finger; // [1] chip select index
-    uint16_t offset; // [byte] of the first byte
-    uint8_t data[128]; // [1] the map's bytes; 0xFF behind its end
+    uint16_t offset; // [byte] position of the first byte in the map
+    uint8_t data[128]; // [1] bytes of the map; 0xFF after its end
 } bt_msg_map_data;
 
-// One finger, one round of slots: counts, the tare that was subtracted, and the results.
+// One round of one finger: counts, the tare that was subtracted, and the results (axes: SPEC.md).
 #define BT_FRAME_ID 0x10
 #define BT_FRAME_BYTES 146
 typedef struct {
-    uint16_t seq; // [1] counts this finger's frames, sent or not
-    uint32_t t_us; // [us] device time at which slot 0 was sampled; slot k is k/4400 s later
+    uint16_t seq; // [1] counts this finger's rounds with a good word, sent or not; wraps
+    uint32_t t_us; // [us] device time at which slot 0 was sampled; slot k is k/4400 s later; wraps
     uint8_t finger; // [1] chip select index
-    uint8_t tare_state; // [enum tare_state] after this frame
-    uint32_t flags; // [flags frame] what to think of the results
-    uint16_t counts[19]; // [count] E1..E19; 0xFFFF where no good word came
-    uint16_t pdc; // [count] static pressure; 0xFFFF where no good word came
-    uint16_t tac; // [count] thermal flux; 0xFFFF where no good word came
-    uint16_t tdc; // [count] temperature; 0xFFFF where no good word came
-    int16_t poc_um[3]; // [um] point of contact on the core's surface
-    int32_t force_100un[3]; // [100 uN] force on the finger
-    int32_t torque_mnmm[3]; // [mN*mm] torque on the finger about the origin; x is derived
-    uint16_t tare_q4[19]; // [count q4] tare subtracted from counts for these results; 0xFFFF for an electrode never read
-    uint16_t pdc_tare_q4; // [count q4] pressure at rest; 0xFFFF when never read
-    uint16_t poc_sigma_um; // [um] one standard deviation of the PoC from the measured noise, saturating; 0xFFFF when not computed or not measured yet
-    uint16_t force_sigma_100un[3]; // [100 uN] one standard deviation of the force, likewise
-    uint16_t pdc_filtered_q4; // [count q4] static pressure through the filter of pressure_filter_milli; 0xFFFF without a good word or when not asked for
-    int32_t pressure_force_100un; // [100 uN] magnitude of the force from pdc_filtered_q4 - pdc_tare_q4, negative below rest; invalid when either is, or without pressure_gain_nn
-    int32_t torsion_mnmm; // [mN*mm] torque about the outward normal at the contact, of a finger whose wrench map has it; else invalid
-    uint16_t wrench_age_ms; // [ms] how much older than this FRAME force, torque and torsion are; 0 unless REPEATED, saturating
+    uint8_t tare_state; // [enum tare_state] state after this round
+    uint32_t flags; // [flags frame] validity and quality of the results
+    uint16_t counts[19]; // [count] E1 to E19; 0xFFFF: no good word
+    uint16_t pdc; // [count] static pressure; 0xFFFF: no good word
+    uint16_t tac; // [count] thermal flux; 0xFFFF: no good word
+    uint16_t tdc; // [count] temperature; 0xFFFF: no good word
+    int16_t poc_um[3]; // [um] x, y, z of the point of contact on the core's surface; -32768: invalid
+    int32_t force_100un[3]; // [100 uN] x, y, z of the force on the finger; -2147483648: invalid
+    int32_t torque_mnmm[3]; // [mN*mm] x, y, z of the torque on the finger about the origin; -2147483648: invalid; for x see MX_DERIVED
+    uint16_t tare_q4[19]; // [count q4] tare subtracted from counts, in 1/16 count; 0xFFFF: electrode never read
+    uint16_t pdc_tare_q4; // [count q4] static pressure at rest, in 1/16 count; 0xFFFF: never read
+    uint16_t poc_sigma_um; // [um] standard deviation of the PoC due to noise, saturating; 0xFFFF: not computed, or noise not measured yet
+    uint16_t force_sigma_100un[3]; // [100 uN] standard deviation of the force, likewise; 0xFFFF also if MAPPED or OUTSIDE
+    uint16_t pdc_filtered_q4; // [count q4] static pressure filtered by pressure_filter_milli, in 1/16 count; 0xFFFF: no good word, or not subscribed to
+    int32_t pressure_force_100un; // [100 uN] force magnitude from pdc_filtered_q4 - pdc_tare_q4, negative below rest; -2147483648: either is invalid, or pressure_gain_nn is 0
+    int32_t torsion_mnmm; // [mN*mm] torque about the outward normal at the contact, if the finger's wrench map gives it; else -2147483648
+    uint16_t wrench_age_ms; // [ms] how much older than this FRAME force, torque and torsion are; 0 unless REPEATED
 } bt_msg_frame;
 
-// The 22 dynamic pressure samples of one finger and one round of slots.
+// The 22 dynamic pressure samples of one finger in one round.
 #define BT_PAC_ID 0x11
 #define BT_PAC_BYTES 51
 typedef struct {
-    uint16_t seq; // [1] that of the FRAME of the same round
-    uint32_t t_us; // [us] device time of the first sample; the k-th is k/2200 s later
+    uint16_t seq; // [1] seq of the same round's FRAME
+    uint32_t t_us; // [us] device time of the first sample; sample k is k/2200 s later
     uint8_t finger; // [1] chip select index
-    uint16_t pac[22]; // [count] 0xFFFF where no good word came
+    uint16_t pac[22]; // [count] dynamic pressure; 0xFFFF: no good word
 } bt_msg_pac;
 
-// The tare changed by more than drift tracking. Sent with FRAMES.
+// The tare changed by more than drift tracking, or the host sent HOLD or RELEASE. Sent with FRAMES.
 #define BT_TARE_ID 0x12
 #define BT_TARE_BYTES 93
 typedef struct {
-    uint16_t seq; // [1] that of the first FRAME that uses it
-    uint32_t t_us; // [us] that of the first FRAME that uses it
+    uint16_t seq; // [1] as in the first FRAME that uses this tare
+    uint32_t t_us; // [us] as in the first FRAME that uses this tare
     uint8_t finger; // [1] chip select index
-    uint8_t tare_state; // [enum tare_state] after the change
-    uint8_t reason; // [enum tare_reason] why
-    uint32_t noise_count2; // [count^2] noise energy over 19 electrodes at rest; 0 until measured
-    uint32_t tare_q16[19]; // [count q16] new tare; 0xFFFFFFFF for an electrode never read
-    uint32_t pdc_tare_q16; // [count q16] new pressure at rest; 0xFFFFFFFF when never read
+    uint8_t tare_state; // [enum tare_state] state after the change
+    uint8_t reason; // [enum tare_reason] why it was sent
+    uint32_t noise_count2; // [count^2] noise energy at rest, summed over 19 electrodes; 0: not measured yet
+    uint32_t tare_q16[19]; // [count q16] new tare, in 1/65536 count; 0xFFFFFFFF: electrode never read
+    uint32_t pdc_tare_q16; // [count q16] new static pressure at rest, in 1/65536 count; 0xFFFFFFFF: never read
 } bt_msg_tare;
 
-// Health of the board and the link. Periodic, and reply to GET_STATUS.
+// Health of the board and the link. Sent periodically, and as reply to GET_STATUS. Counters start at boot.
 #define BT_STATUS_ID 0x13
 #define BT_STATUS_BYTES 87
 typedef struct {
     uint16_t seq; // [1] counts STATUS messages
-    uint32_t t_us; // [us] device time of packing
-    uint8_t req_id; // [1] of GET_STATUS, 0 when periodic
-    uint32_t uptime_s; // [s] since boot
-    uint8_t fingers_present; // [bit mask] sensors that answer
-    uint8_t streams; // [flags stream] what is on
-    uint32_t messages_sent; // [1] handed to the link whole
-    uint32_t messages_dropped; // [1] whole messages that found no room
+    uint32_t t_us; // [us] device time at which the message was made
+    uint8_t req_id; // [1] req_id of GET_STATUS; 0: periodic
+    uint32_t uptime_s; // [s] time since boot
+    uint8_t fingers_present; // [bit mask] bit f is set if finger f's sensor answers
+    uint8_t streams; // [flags stream] streams that are on
+    uint32_t messages_sent; // [1] messages passed to the link
+    uint32_t messages_dropped; // [1] messages dropped because the link had no room
     uint32_t slots_late; // [1] slots lost because the main loop fell behind
     uint32_t rx_frames; // [1] good frames from the host
-    uint32_t rx_errors; // [1] bad CRC, bad COBS, too long
-    uint32_t frames_idle; // [1] rounds of streamed fingers for which an IDLE spoke instead of a FRAME
-    uint32_t poc_skipped; // [1] rounds of streamed fingers in which no PoC was computed
-    uint32_t force_skipped; // [1] the same of force
-    uint32_t torque_skipped; // [1] the same of torque
-    uint32_t sigma_skipped; // [1] the same of the standard deviations
-    uint32_t sigma_shed; // [1] FRAMEs without standard deviations that were asked for, for want of time: the first to go
-    uint32_t wrench_repeated; // [1] FRAMEs that repeat the wrench of the finger's map, likewise: the second to go
-    uint32_t frames_shed; // [1] FRAMEs that were not sent, likewise: the last to go
-    uint16_t faults; // [flags fault] what went wrong since CLEAR_FAULTS cleared it, or since boot
-    uint32_t finger_faults[5]; // [flags frame] of each finger, likewise: the flags of its rounds, sent or not, that speak against its numbers, but DOUBT and OUTSIDE, which are of any touch; UNTARED only where a tare was lost
+    uint32_t rx_errors; // [1] bad frames from the host: too long, bad COBS, bad CRC or bad length
+    uint32_t frames_idle; // [1] rounds of streamed fingers covered by an IDLE instead of a FRAME
+    uint32_t poc_skipped; // [1] rounds of streamed fingers in which no PoC was computed because it was not needed
+    uint32_t force_skipped; // [1] the same for force
+    uint32_t torque_skipped; // [1] the same for torque
+    uint32_t sigma_skipped; // [1] the same for standard deviations
+    uint32_t sigma_shed; // [1] FRAMEs without subscribed standard deviations, for lack of time; these are shed first
+    uint32_t wrench_repeated; // [1] FRAMEs with a repeated wrench of the finger's map, for lack of time; shed second
+    uint32_t frames_shed; // [1] FRAMEs not sent, for lack of time; shed last
+    uint16_t faults; // [flags fault] what went wrong since boot or the last CLEAR_FAULTS
+    uint32_t finger_faults[5]; // [flags frame] per finger, likewise: flags of its rounds, sent or not, that make its values doubtful; not DOUBT or OUTSIDE, which occur in any touch; UNTARED only if a tare was lost
 } bt_msg_status;
 
-// Health of one sensor. Periodic for each present sensor, and reply to GET_SENSOR_STATUS.
+// Health of one sensor. Sent periodically for each present sensor, and as reply to GET_SENSOR_STATUS. Counters start at boot.
 #define BT_SENSOR_STATUS_ID 0x14
 #define BT_SENSOR_STATUS_BYTES 37
 typedef struct {
     uint16_t seq; // [1] counts SENSOR_STATUS messages
-    uint32_t t_us; // [us] device time of packing
-    uint8_t req_id; // [1] of GET_SENSOR_STATUS, 0 when periodic
+    uint32_t t_us; // [us] device time at which the message was made
+    uint8_t req_id; // [1] req_id of GET_SENSOR_STATUS; 0: periodic
     uint8_t finger; // [1] chip select index
-    uint8_t present; // [bool] a good word came in the last frame
-    uint8_t tare_state; // [enum tare_state] now
-    uint8_t tare_reason; // [enum tare_reason] of the last change
-    uint32_t tare_age_ms; // [ms] since the last change
-    uint32_t noise_count2; // [count^2] noise energy over 19 electrodes at rest
+    uint8_t present; // [bool] 1: a good word came in the last round; else 0
+    uint8_t tare_state; // [enum tare_state] current state
+    uint8_t tare_reason; // [enum tare_reason] reason of the last change
+    uint32_t tare_age_ms; // [ms] time since the last change
+    uint32_t noise_count2; // [count^2] noise energy at rest, summed over 19 electrodes; 0: not measured yet
     uint32_t words_good; // [1] words with good parity
-    uint32_t words_stuck; // [1] 0x0000 or 0xFFFF: absent, unpowered or open
+    uint32_t words_stuck; // [1] words 0x0000 or 0xFFFF: sensor absent, unpowered or not connected
     uint32_t words_error; // [1] error words from the sensor
     uint32_t words_parity; // [1] other words with bad parity
-    uint16_t last_error_word; // [1] last error word, 0 if none
+    uint16_t last_error_word; // [1] last error word; 0: none
 } bt_msg_sensor_status;
 
-// Heartbeat of an untouched finger: it stands for the FRAMEs that were not sent.
+// Heartbeat of an untouched finger, in place of the FRAMEs that were not sent.
 #define BT_IDLE_ID 0x15
 #define BT_IDLE_BYTES 22
 typedef struct {
-    uint16_t seq; // [1] of the latest round it stands for
-    uint32_t t_us; // [us] of the round that this and the next fields are of: that of seq, or the one after it when a FRAME follows at once
+    uint16_t seq; // [1] seq of the latest round that it covers
+    uint32_t t_us; // [us] t_us of the round that the other fields describe: that of seq, or the one after it if a FRAME follows at once
     uint8_t finger; // [1] chip select index
-    uint8_t tare_state; // [enum tare_state] after that round
+    uint8_t tare_state; // [enum tare_state] state after that round
     uint32_t flags; // [flags frame] of that round; results were not computed
-    uint16_t frames; // [1] rounds it stands for: since the last FRAME or IDLE of this finger
+    uint16_t frames; // [1] number of rounds covered: all since this finger's last FRAME or IDLE
     uint32_t energy_count2; // [count^2] sum of squares of the filtered signals
-    uint16_t pdc; // [count] static pressure; 0xFFFF where no good word came
-    uint16_t tdc; // [count] temperature; 0xFFFF where no good word came
+    uint16_t pdc; // [count] static pressure; 0xFFFF: no good word
+    uint16_t tdc; // [count] temperature; 0xFFFF: no good word
 } bt_msg_idle;
 
-// A resting finger's trigger fired in this slot. A hint, sent at once; CONTACT follows if it fires in three rounds on end.
+// A resting finger's trigger fired in this slot. An early hint: CONTACT follows if it fires in three rounds in a row.
 #define BT_TOUCH_ID 0x16
 #define BT_TOUCH_BYTES 12
 typedef struct {
-    uint16_t seq; // [1] of the round that is under way
+    uint16_t seq; // [1] seq of the current round
     uint32_t t_us; // [us] device time at which the slot was sampled
     uint8_t finger; // [1] chip select index
-    uint8_t slot; // [1] which slot of the round
-    uint32_t energy_count2; // [count^2] sum of squares of the filtered signals of the round so far
+    uint8_t slot; // [1] slot within the round
+    uint32_t energy_count2; // [count^2] sum of squares of the filtered signals in the round so far
 } bt_msg_touch;
 
-// Something has happened to a finger, told in the slot of the sample that shows it. Sent to who subscribes to EVENTS, while a stream of FRAMEs or PAC is on.
+// Something happened to a finger. Sent in the slot whose sample shows it, to hosts that subscribe to EVENTS, while FRAMES or PAC is on.
 #define BT_EVENT_ID 0x17
 #define BT_EVENT_BYTES 20
 typedef struct {
-    uint16_t seq; // [1] of the round that is under way
+    uint16_t seq; // [1] seq of the current round
     uint32_t t_us; // [us] device time at which the slot was sampled
     uint8_t finger; // [1] chip select index
-    uint8_t slot; // [1] which slot of the round
-    uint8_t kind; // [enum event_kind] what happened; a host passes over one that it does not know
-    uint8_t tare_state; // [enum tare_state] after the round before
-    uint32_t onset_us; // [us] device time at which it began: of SLIP and STUCK when the slip began, of JOLT when dynamic pressure left its noise, else t_us
-    uint32_t energy_count2; // [count^2] of TOUCH and LIFT: sum of squares of the filtered signals, from the latest word of every electrode; invalid of others
-    uint16_t peak_count; // [count] of JOLT and SLIP: the most that dynamic pressure changed by within 3.6 ms since it began; 0xFFFF of others
+    uint8_t slot; // [1] slot within the round
+    uint8_t kind; // [enum event_kind] what happened; ignore a kind that you do not know
+    uint8_t tare_state; // [enum tare_state] state after the previous round
+    uint32_t onset_us; // [us] device time at which it began. SLIP, STUCK: when the slip began; JOLT: when dynamic pressure left its noise; else t_us
+    uint32_t energy_count2; // [count^2] TOUCH, LIFT: sum of squares of the filtered signals, from the latest word of every electrode; else 0xFFFFFFFF
+    uint16_t peak_count; // [count] JOLT, SLIP: largest change of dynamic pressure within 3.6 ms since it began; else 0xFFFF
 } bt_msg_event;
 
-// How strongly dynamic pressure vibrated in one round, in six octaves (SPEC.md, Bands).
+// How strongly dynamic pressure vibrated in one round, in six octave bands (SPEC.md, Bands).
 #define BT_BANDS_ID 0x18
 #define BT_BANDS_BYTES 32
 typedef struct {
-    uint16_t seq; // [1] that of the FRAME of the same round
-    uint32_t t_us; // [us] that of the PAC of the same round
+    uint16_t seq; // [1] seq of the same round's FRAME
+    uint32_t t_us; // [us] t_us of the same round's PAC
     uint8_t finger; // [1] chip select index
-    uint8_t good; // [1] samples of which a good word came; for each other one stands the last good one
-    uint32_t energy_q4[6]; // [count^2 q4] sum of squares over the round's 22 samples of what is in the band, the lowest first; 0xFFFFFFFF where no good word came
+    uint8_t good; // [1] number of samples with a good word; the others repeat the last good one
+    uint32_t energy_q4[6]; // [count^2 q4] energy of each band over the round, in 1/16 count^2, lowest band first; 0xFFFFFFFF: no good word
 } bt_msg_bands;
 
-// First message of a host. Allowed at any time.
+// First command of a host. Allowed at any time.
 #define BT_HELLO_REQUEST_ID 0x80
 #define BT_HELLO_REQUEST_BYTES 5
 typedef struct {
-    uint8_t req_id; // [1] any but 0; comes back in the reply
-    uint32_t nonce; // [1] random
+    uint8_t req_id; // [1] 1 to 255; repeated in the reply
+    uint32_t nonce; // [1] random number
 } bt_msg_hello_request;
 
-// Start streaming. Sequence numbers go on from where they were.
+// Start streaming. Sequence numbers continue.
 #define BT_START_ID 0x81
 #define BT_START_BYTES 5
 typedef struct {
-    uint8_t req_id; // [1] any but 0
+    uint8_t req_id; // [1] 1 to 255
     uint8_t streams; // [flags stream] what to send
-    uint8_t fingers; // [bit mask] for which fingers
-    uint16_t keepalive_ms; // [ms] stop when the host says nothing for this long; 0: never
+    uint8_t fingers; // [bit mask] bit f: stream finger f
+    uint16_t keepalive_ms; // [ms] stop streaming when the host has sent nothing for this long; 0: never
 } bt_msg_start;
 
 // Stop streaming.
 #define BT_STOP_ID 0x82
 #define BT_STOP_BYTES 1
 typedef struct {
-    uint8_t req_id; // [1] any but 0
+    uint8_t req_id; // [1] 1 to 255
 } bt_msg_stop;
 
-// Keep-alive, and a barrier: its reply comes after all that was sent before.
+// Keep-alive and barrier: its reply comes after everything sent before.
 #define BT_PING_ID 0x83
 #define BT_PING_BYTES 1
 typedef struct {
-    uint8_t req_id; // [1] any but 0
+    uint8_t req_id; // [1] 1 to 255
 } bt_msg_ping;
 
-// What FRAMEs hold from the next round on; until then POC, FORCE, TORQUE, PRESSURE and REST_FRAMES. Kept until the next reboot.
+// Choose what FRAMEs contain from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES. Kept until the next reboot.
 #define BT_SUBSCRIBE_ID 0x8B
 #define BT_SUBSCRIBE_BYTES 3
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t fingers; // [bit mask] for which fingers; others keep theirs
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t fingers; // [bit mask] bit f: finger f; others keep theirs
     uint8_t quantities; // [flags quantity] what to compute and send
 } bt_msg_subscribe;
 
-// Ask for POINT, without waiting for the round's end.
+// Ask for POINT, without waiting for the round to end. Refused (OTHER_SENSOR) if SENSOR_OTHER leaves no results.
 #define BT_GET_POINT_ID 0x8C
 #define BT_GET_POINT_BYTES 2
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] which finger
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
 } bt_msg_get_point;
 
-// Take the latest means of eight rounds as the new tare; refused while the signals move.
+// Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL).
 #define BT_TARE_NOW_ID 0x84
 #define BT_TARE_NOW_BYTES 2
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] which finger
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
 } bt_msg_tare_now;
 
-// Use this tare from the next frame on, such as one stored for a finger that is already loaded.
+// Use this tare from the next FRAME on, such as one stored for a finger that is already loaded.
 #define BT_TARE_SET_ID 0x85
 #define BT_TARE_SET_BYTES 42
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] which finger
-    uint16_t tare_q4[19]; // [count q4] tare
-    uint16_t pdc_tare_q4; // [count q4] pressure at rest; 0xFFFF: unknown
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
+    uint16_t tare_q4[19]; // [count q4] tare of E1 to E19, in 1/16 count
+    uint16_t pdc_tare_q4; // [count q4] static pressure at rest, in 1/16 count; 0xFFFF: unknown
 } bt_msg_tare_set;
 
 // Ask for STATUS.
 #define BT_GET_STATUS_ID 0x86
 #define BT_GET_STATUS_BYTES 1
 typedef struct {
-    uint8_t req_id; // [1] any but 0
+    uint8_t req_id; // [1] 1 to 255
 } bt_msg_get_status;
 
 // Ask for SENSOR_STATUS.
 #define BT_GET_SENSOR_STATUS_ID 0x87
 #define BT_GET_SENSOR_STATUS_BYTES 2
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] which finger
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
 } bt_msg_get_sensor_status;
 
 // Ask for SENSOR_INFO.
 #define BT_GET_SENSOR_INFO_ID 0x88
 #define BT_GET_SENSOR_INFO_BYTES 2
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] which finger
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
 } bt_msg_get_sensor_info;
 
-// Ask for a setting.
+// Ask for SETTING.
 #define BT_GET_SETTING_ID 0x89
 #define BT_GET_SETTING_BYTES 2
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t setting; // [setting id] which one
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t setting; // [setting id] id of the setting
 } bt_msg_get_setting;
 
-// Change a setting until the next reboot, or for good with SAVE_SETTINGS; refused while streaming, so that one recording has one set.
+// Change a setting until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming, so that a recording has one set of settings.
 #define BT_SET_SETTING_ID 0x8A
 #define BT_SET_SETTING_BYTES 6
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t setting; // [setting id] which one
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t setting; // [setting id] id of the setting
     int32_t value; // [the setting's] new value
 } bt_msg_set_setting;
 
-// Leave the firmware for the board's loader: it replies, is gone from the bus, and comes back as a drive. Allowed at any time.
+// Restart into the board's boot loader: the board replies, leaves USB and comes back as a drive. Allowed at any time.
 #define BT_REBOOT_BOOTLOADER_ID 0x8D
 #define BT_REBOOT_BOOTLOADER_BYTES 5
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint32_t magic; // [1] 0xB0071DE5; anything else is OUT_OF_RANGE, so that no stray frame takes a hand down
+    uint8_t req_id; // [1] 1 to 255
+    uint32_t magic; // [1] 0xB0071DE5; anything else is refused (OUT_OF_RANGE), so that a stray frame cannot restart a board
 } bt_msg_reboot_bootloader;
 
-// Keep the settings, calibrations and maps over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves what was stored before, or this, whole: of the settings, of each finger's calibration and of each finger's map.
+// Store settings, calibrations and maps permanently. Refused while streaming, as slots are lost while flash is written. If power fails, the settings and each finger's calibration and map are each either old or new, never mixed.
 #define BT_SAVE_SETTINGS_ID 0x8E
 #define BT_SAVE_SETTINGS_BYTES 1
 typedef struct {
-    uint8_t req_id; // [1] any but 0
+    uint8_t req_id; // [1] 1 to 255
 } bt_msg_save_settings;
 
 // Ask for CALIBRATION.
 #define BT_GET_CALIBRATION_ID 0x8F
 #define BT_GET_CALIBRATION_BYTES 2
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] which finger
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
 } bt_msg_get_calibration;
 
-// Give a finger values of its own in place of the per-finger settings, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming.
+// Give a finger its own values for the per-finger settings, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming.
 #define BT_SET_CALIBRATION_ID 0x90
 #define BT_SET_CALIBRATION_BYTES 54
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] which finger
-    uint8_t serial[16]; // [ASCII] of the sensor it was made for, which must be the one there (OTHER_SENSOR); all zero: any sensor
-    uint32_t made_s; // [s] when it was made, since 1970 UTC; 0: unknown
-    int32_t value[8]; // [the per-finger settings'] one for each, by id and in its range
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
+    uint8_t serial[16]; // [ASCII] serial number of the sensor it is for; if not this finger's, refused (OTHER_SENSOR); all zero: any sensor
+    uint32_t made_s; // [s] creation time, seconds since 1970 UTC; 0: unknown
+    int32_t value[8]; // [the per-finger settings'] one per per-finger setting, in order of id, within its range
 } bt_msg_set_calibration;
 
-// Return a finger to the board's settings, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming.
+// Use the board's settings for a finger again, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming.
 #define BT_CLEAR_CALIBRATION_ID 0x91
 #define BT_CLEAR_CALIBRATION_BYTES 2
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] which finger
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
 } bt_msg_clear_calibration;
 
 // Ask for MAP_INFO.
 #define BT_GET_MAP_ID 0x92
 #define BT_GET_MAP_BYTES 2
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] which finger
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
 } bt_msg_get_map;
 
-// Ask for a part of the map that MAP_INFO tells of, in force or not.
+// Ask for a part of the map that MAP_INFO describes, whether it is used or not.
 #define BT_READ_MAP_ID 0x93
 #define BT_READ_MAP_BYTES 4
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] which finger
-    uint16_t offset; // [byte] of the first byte; below the map's size
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
+    uint16_t offset; // [byte] position of the first byte, below the map's size
 } bt_msg_read_map;
 
-// Begin to upload a wrench map; what is in force and what is stored stays until END_MAP. One upload at a time: an earlier one ends. Refused while streaming.
+// Begin to upload a wrench map. The finger keeps its present map until END_MAP. One upload at a time: a new one ends the one before. Refused while streaming.
 #define BT_BEGIN_MAP_ID 0x94
 #define BT_BEGIN_MAP_BYTES 8
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] for which finger
-    uint16_t size_bytes; // [byte] the map's size
-    uint32_t crc32; // [1] over all its bytes, as zlib's
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
+    uint16_t size_bytes; // [byte] size of the map
+    uint32_t crc32; // [1] CRC-32 of the map, as zlib's
 } bt_msg_begin_map;
 
-// Write a part of the map that is being uploaded, in any order; the same part again is harmless. It may take as long as the flash takes to erase a sector, 0.4 s. Refused while streaming.
+// Write a part of the map, in any order. The same part again is harmless; other bytes for it are refused (NOT_STORED). Takes up to 0.4 s if a flash sector must be erased. Refused while streaming.
 #define BT_WRITE_MAP_ID 0x95
 #define BT_WRITE_MAP_BYTES 132
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] for which finger
-    uint16_t offset; // [byte] of the first byte: a multiple of 128 below the map's size
-    uint8_t data[128]; // [1] the map's bytes; what lies behind its end is ignored
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
+    uint16_t offset; // [byte] position of the first byte: a multiple of 128, below the map's size
+    uint8_t data[128]; // [1] bytes of the map; those after its end are ignored
 } bt_msg_write_map;
 
-// Put the uploaded map into force, until the next reboot, or for good with SAVE_SETTINGS. Every part must be there and the CRC right (NOT_WHOLE), the map one that this firmware can compute (OUT_OF_RANGE), and its sensor the one there (OTHER_SENSOR); a map with an all-zero serial number is for any. Refused while streaming.
+// Use the uploaded map until the next reboot, or permanently with SAVE_SETTINGS. All parts must be there and match the CRC-32 (NOT_WHOLE), the firmware must be able to compute the map (OUT_OF_RANGE), and its serial number must be this sensor's or all zero (OTHER_SENSOR). Refused while streaming.
 #define BT_END_MAP_ID 0x96
 #define BT_END_MAP_BYTES 6
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] for which finger
-    uint32_t crc32; // [1] BEGIN_MAP's; where the finger's map has it already, that is the answer
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
+    uint32_t crc32; // [1] as in BEGIN_MAP; the command also succeeds if the finger's map already has it
 } bt_msg_end_map;
 
-// Return a finger to its gains, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming.
+// Remove a finger's wrench map, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming.
 #define BT_CLEAR_MAP_ID 0x97
 #define BT_CLEAR_MAP_BYTES 2
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t finger; // [1] which finger
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t finger; // [1] chip select index
 } bt_msg_clear_map;
 
-// These fingers hold something: no new tare is taken until RELEASE, or until the host has been silent for hold_timeout_ms. Again is harmless.
+// These fingers hold something: no new tare is taken until RELEASE, or until the host has been silent for hold_timeout_ms. Repeating it is harmless.
 #define BT_HOLD_ID 0x98
 #define BT_HOLD_BYTES 2
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t fingers; // [bit mask] which fingers; others stay as they are
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t fingers; // [bit mask] bit f: finger f; others stay as they are
 } bt_msg_hold;
 
-// These fingers hold nothing any more: where a light hold and a press's residue cannot be told apart, it is residue, until the next contact.
+// These fingers hold nothing: until the next contact, what may be a light hold or residue of a press (DOUBT) is tared as residue.
 #define BT_RELEASE_ID 0x99
 #define BT_RELEASE_BYTES 2
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t fingers; // [bit mask] which fingers; others stay as they are
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t fingers; // [bit mask] bit f: finger f; others stay as they are
 } bt_msg_release;
 
-// Clear what STATUS told of: these bits and no others, so that what came meanwhile stays. What still goes on is set again in the next round.
+// Clear faults that STATUS reported. Only these bits are cleared, so that new faults stay. A fault that persists is set again in the next round.
 #define BT_CLEAR_FAULTS_ID 0x9A
 #define BT_CLEAR_FAULTS_BYTES 23
 typedef struct {
-    uint8_t req_id; // [1] any but 0
+    uint8_t req_id; // [1] 1 to 255
     uint16_t faults; // [flags fault] STATUS.faults as it was read
-    uint32_t finger_faults[5]; // [flags frame] STATUS.finger_faults, likewise
+    uint32_t finger_faults[5]; // [flags frame] STATUS.finger_faults as it was read
 } bt_msg_clear_faults;
 
-// How an emulated sensor board gets on. Reply to every EMU command. Counts are since EMU_PLUG of finger 0.
+// State of an emulated sensor board. Reply to every EMU command. Counters start at EMU_PLUG of finger 0.
 #define BT_EMU_STATUS_ID 0x40
 #define BT_EMU_STATUS_BYTES 39
 typedef struct {
-    uint8_t req_id; // [1] of the command
-    uint8_t fingers; // [bit mask] plugged in
-    uint32_t slots_taken; // [1] of the tape, from the host: the next EMU_TAPE begins here
-    uint16_t room_slots; // [1] that fit behind them now
-    uint32_t slots_served; // [1] of the tape, that the bus has come past
-    uint32_t elapsed_us; // [us] by this board's clock, from its first sample command to the latest; wraps
-    uint32_t words; // [1] answers that the bus has read
-    uint32_t words_late; // [1] of them, not ready in the bus's own time: MISO was let go, or the answer was one of two for other times
-    uint32_t samples_starved; // [1] asked for behind what had come of the tape: MISO was let go
-    uint16_t slowest_us; // [us] the longest that an answer took from the select's rise; the bus leaves 50 us
-    int32_t rounds_moved; // [1] by time: rounds of the tape left out, less those played again; 10 ms each of this board's clock against the bus's
-    uint32_t loop_slots; // [1] of the tape in flash; 0: there is none
-    uint8_t looping; // [bool] that is what is played
+    uint8_t req_id; // [1] as in the command
+    uint8_t fingers; // [bit mask] bit f is set if finger f's sensor is plugged in
+    uint32_t slots_taken; // [1] slots of the tape received; the next EMU_TAPE begins here
+    uint16_t room_slots; // [1] further slots that fit now
+    uint32_t slots_served; // [1] slots of the tape that the bus has reached
+    uint32_t elapsed_us; // [us] time from the first sample command to the latest, by this board's clock; wraps
+    uint32_t words; // [1] words that the bus has read
+    uint32_t words_late; // [1] words not ready in time: MISO was not driven, or the answer was for another time
+    uint32_t samples_starved; // [1] samples requested beyond what has come of the tape, or during a hold; they read 0x0000
+    uint16_t slowest_us; // [us] longest time from the select's rise until the next answer was ready; the bus allows 50 us
+    int32_t rounds_moved; // [1] with by_time: rounds skipped less rounds replayed; each makes up 10 ms between this board's clock and the bus's
+    uint32_t loop_slots; // [1] slots of the tape in flash; 0: none
+    uint8_t looping; // [bool] 1: the tape in flash is being played
 } bt_msg_emu_status;
 
-// Plug a sensor in or out. Finger 0's forgets the tape, the faults and the counts, and so comes first.
+// Plug a sensor in or out. For finger 0 this also clears the tape, the faults and the counters, so plug it first.
 #define BT_EMU_PLUG_ID 0xC0
 #define BT_EMU_PLUG_BYTES 19
 typedef struct {
-    uint8_t req_id; // [1] any but 0
+    uint8_t req_id; // [1] 1 to 255
     uint8_t finger; // [1] chip select index
-    uint8_t present; // [bool] 0: nothing is there
-    uint8_t serial[16]; // [ASCII] serial number; all zero: one is made up
+    uint8_t present; // [bool] 1: plugged in; 0: not
+    uint8_t serial[16]; // [ASCII] serial number; all zero: a made-up one
 } bt_msg_emu_plug;
 
-// The next slots of the tape. What does not fit, or begins elsewhere than at slots_taken, is left: EMU_STATUS tells where to go on. The bus is served in the tape's order, sample by sample as it asks.
+// The next slots of the tape. They are ignored if they do not fit or do not begin at slots_taken; EMU_STATUS tells where to go on. The bus gets samples in the tape's order, as it asks for them.
 #define BT_EMU_TAPE_ID 0xC1
 #define BT_EMU_TAPE_BYTES 227
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint8_t fingers; // [1] on the tape; the same in all of it
-    uint8_t slots; // [1] in this message: slots * fingers is at most 110
-    uint32_t first_slot; // [1] since the tape's begin
-    uint8_t samples[220]; // [1] u16, little-endian, of slots * fingers samples, slot by slot: a count or an emu_fault; the rest is ignored
+    uint8_t req_id; // [1] 1 to 255
+    uint8_t fingers; // [1] fingers on the tape; the same for the whole tape
+    uint8_t slots; // [1] slots in this message; slots * fingers is at most 110
+    uint32_t first_slot; // [1] position of the first slot on the tape
+    uint8_t samples[220]; // [1] slots * fingers samples (u16, little-endian), slot by slot: a count or an emu_fault; the rest is ignored
 } bt_msg_emu_tape;
 
-// What a sensor does from now on, whatever its tape says.
+// Give a sensor a fault from now on, whatever the tape says.
 #define BT_EMU_SET_FAULT_ID 0xC2
 #define BT_EMU_SET_FAULT_BYTES 4
 typedef struct {
-    uint8_t req_id; // [1] any but 0
+    uint8_t req_id; // [1] 1 to 255
     uint8_t finger; // [1] chip select index
     uint16_t fault; // [enum emu_fault] NONE ends it
 } bt_msg_emu_set_fault;
 
-// Ask how the board gets on.
+// Ask for EMU_STATUS.
 #define BT_EMU_GET_STATUS_ID 0xC3
 #define BT_EMU_GET_STATUS_BYTES 1
 typedef struct {
-    uint8_t req_id; // [1] any but 0
+    uint8_t req_id; // [1] 1 to 255
 } bt_msg_emu_get_status;
 
-// How the tape is served, until finger 0's EMU_PLUG: as it begins, without a hold and in its order.
+// How to serve the tape. EMU_PLUG of finger 0 restores the defaults: no hold, in the tape's order.
 #define BT_EMU_PLAY_ID 0xC4
 #define BT_EMU_PLAY_BYTES 6
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint32_t hold_slot; // [1] a round's first, from which on nothing is served until another EMU_PLAY names a later one: what is asked for meanwhile is samples_starved. The tape then goes on with the first slot of a round before which every finger on it was asked for a property, as a gateway does with sensors that give no samples: so all begin in the same round. 0xFFFFFFFF: no hold
-    uint8_t by_time; // [bool] 1: keep to this board's clock; where the bus has come a round behind, one is left out, where it is a round ahead, one is played again
+    uint8_t req_id; // [1] 1 to 255
+    uint32_t hold_slot; // [1] first slot of a round at which the tape stops until another EMU_PLAY names a later slot; samples requested meanwhile count as samples_starved. It resumes with a round before which every finger on the tape was asked for a property, as a gateway asks sensors that give no samples, so that all fingers begin in the same round. 0xFFFFFFFF: no hold
+    uint8_t by_time; // [bool] 1: follow this board's clock: skip a round when the bus is a round behind, replay one when it is a round ahead
 } bt_msg_emu_play;
 
-// Keep the tape in flash, to be played over and over from power-up until a host's EMU_PLUG of finger 0. All of it must be there still, as it was told (NOT_WHOLE): whole rounds, no more than there is room for at once. The flash is written in the seconds after the reply; EMU_STATUS.loop_slots tells when it is. The bus is not served in time meanwhile.
+// Keep the tape in flash, and play it in a loop from power-up until EMU_PLUG of finger 0. It must be whole rounds, still be in memory from its first slot, and match slots and crc32 (NOT_WHOLE). The flash is written in the seconds after the reply, during which the bus is not served in time; EMU_STATUS.loop_slots is 0 until it is done.
 #define BT_EMU_KEEP_ID 0xC5
 #define BT_EMU_KEEP_BYTES 9
 typedef struct {
-    uint8_t req_id; // [1] any but 0
-    uint32_t slots; // [1] of the tape; 0: keep none
-    uint32_t crc32; // [1] over its samples, u16 little-endian, slot by slot, as zlib's
+    uint8_t req_id; // [1] 1 to 255
+    uint32_t slots; // [1] slots on the tape; 0: keep none
+    uint32_t crc32; // [1] CRC-32, as zlib's, of its samples (u16, little-endian), slot by slot
 } bt_msg_emu_keep;
 
 #ifdef BT_CLIENT_LAYOUT

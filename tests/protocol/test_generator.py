@@ -53,7 +53,7 @@ def replace(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
 
 
-@pytest.mark.parametrize("tool", ["gen_protocol.py", "make_vectors.py"])
+@pytest.mark.parametrize("tool", ["gen_protocol.py", "make/vectors.py"])
 def test_what_is_committed_is_current(tool: str) -> None:
     result = run(ROOT, tool, "--check")
     assert (result.returncode, result.stderr) == (0, "")
@@ -75,10 +75,10 @@ def test_a_drifted_generated_file_is_named_and_mended(copy: Path, name: str) -> 
 @pytest.mark.parametrize("name", VECTORS)
 def test_a_drifted_vector_file_is_named_and_mended(copy: Path, name: str) -> None:
     (copy / name).unlink()
-    result = run(copy, "make_vectors.py", "--check")
+    result = run(copy, "make/vectors.py", "--check")
     assert result.returncode == 1
     assert [other for other in VECTORS if other in result.stderr] == [name]
-    assert run(copy, "make_vectors.py").returncode == 0
+    assert run(copy, "make/vectors.py").returncode == 0
     assert (copy / name).read_bytes() == (ROOT / name).read_bytes()
 
 
@@ -89,7 +89,7 @@ def test_a_changed_contract_drifts_everything_made_of_it(copy: Path) -> None:
     for room, suffix in (("firmware/core", "h"), ("firmware/core", "c"), ("host/biotac", "py")):
         assert f"{room}/wire/messages_gen.{suffix}" in result.stderr
     assert "sensor_gen" not in result.stderr
-    vectors = run(copy, "make_vectors.py", "--check")
+    vectors = run(copy, "make/vectors.py", "--check")
     assert vectors.returncode == 1
     assert "messages.txt" in vectors.stderr and "framing.txt" in vectors.stderr
 

@@ -1,17 +1,17 @@
-"""The client's header: the wire's words and structs, and where each struct's fields are on the wire."""
+"""The client's header: the wire's constants and structs, and where each struct's fields are on the wire."""
 
 from __future__ import annotations
 
 from itertools import groupby
 
 from .c_wire import constants, define, field_lists, struct_name, vocabulary
-from .schema import GENERATED, TYPE_BYTES, Contract, Message
+from .schema import TYPE_BYTES, Contract, Message, c_header
 
-_MOST = 0x3F  # numbers in a run; a run is a byte, the size's logarithm above the count
+_MOST = 0x3F  # numbers in a run; a run is one byte, with the logarithm of the size above the count
 
 
 def runs(message: Message) -> list[tuple[int, int]]:
-    """Neighbours of one size, as (size in bytes, how many): in a struct there is no padding between them."""
+    """Runs of numbers of equal size, as (size in bytes, how many): inside a run a struct has no padding."""
     sizes = [TYPE_BYTES[field.type] for field in message.fields for _ in range(field.count)]
     out = []
     for size, group in groupby(sizes):
@@ -23,7 +23,7 @@ def runs(message: Message) -> list[tuple[int, int]]:
 
 
 def struct_bytes(message: Message) -> int:
-    """As every ABI of today lays it out: numbers lie at multiples of their size."""
+    """The struct's size in every common ABI: numbers lie at multiples of their size."""
     at, most = 0, 1
     for size, count in runs(message):
         at = -(-at // size) * size + size * count
@@ -32,18 +32,7 @@ def struct_bytes(message: Message) -> int:
 
 
 def header(contract: Contract) -> str:
-    out = [
-        f"// {GENERATED}",
-        "// The words and structs of the wire for biotac_client.c; units and Q formats stand beside each field.",
-        "#ifndef BIOTAC_CLIENT_GEN_H",
-        "#define BIOTAC_CLIENT_GEN_H",
-        "",
-        "#include <stdint.h>",
-        "",
-        *constants(contract),
-        "",
-        *vocabulary(contract),
-    ]
+    out = ["#include <stdint.h>", "", *constants(contract), "", *vocabulary(contract)]
     for message in contract.messages:
         out += [*define(message), ""]
     out += [
@@ -61,4 +50,5 @@ def header(contract: Contract) -> str:
         for m in contract.messages
     ]
     out += ["#endif", "", "#ifdef BT_CLIENT_FIELDS // for tests: X(name, type, count) for every field"]
-    return "\n".join([*out, *field_lists(contract), "#endif", "", "#endif", ""])
+    about = "The words and structs of the wire for biotac_client.c; units and Q formats stand beside each field."
+    return c_header("CLIENT", [about], [*out, *field_lists(contract), "#endif"])

@@ -1,4 +1,4 @@
-"""The table of CRC-32 (IEEE): what each byte does to it."""
+"""The table of CRC-32 (IEEE): the effect of each byte value."""
 
 from __future__ import annotations
 

@@ -7,10 +7,10 @@ from itertools import pairwise
 from typing import Any
 
 from .c_sensor import electrodes
-from .schema import GENERATED, Contract
+from .schema import Contract, c_header
 
 HEADER_BYTES = 24  # u8 version, axes, blocks, 0; serial; u32 made_s
-EXPONENTS = 10  # room for those of all axes, so that what follows is aligned
+EXPONENTS = 10  # room for those of all axes, which also aligns what follows
 BLOCK_BYTES = 2 + EXPONENTS  # u8 kind, gate, exponents
 
 
@@ -20,7 +20,7 @@ def columns(contract: Contract, kind: dict[str, Any]) -> int:
 
 
 def gate_max(contract: Contract) -> int:
-    """The largest gate in 2^-gate_q: the centroid stays inside the electrodes' hull. With room for rounding."""
+    """The largest gate in 2^-gate_q, with room for rounding: the centroid stays inside the electrodes' hull."""
     centroid, reach = contract.map["centroid"], [0.0, 0.0]
     for d, name in enumerate(("reach_x_um", "reach_y_um")):
         reach[d] = max(abs(r[d]) for _, r, _ in electrodes(contract)) / centroid[name]
@@ -29,27 +29,27 @@ def gate_max(contract: Contract) -> int:
 
 
 def halves(contract: Contract, kind: dict[str, Any]) -> int:
-    """Coefficients of a kind and axis as they lie in the blob: two a word, a sum of an even number of columns."""
+    """Coefficients of one kind and axis as stored in the blob: two per word, so that each sum has an even length."""
     n = len(electrodes(contract))
     return {"one": 2, "electrodes": n + n % 2, "pairs": n * ((n + 1) // 2)}[str(kind["columns"])]
 
 
 def places(contract: Contract) -> list[list[int]]:
-    """Each electrode's x and y over their reaches, in 2^-place_q."""
+    """Each electrode's x and y divided by their reaches, in 2^-place_q."""
     centroid, q = contract.map["centroid"], contract.map["fixed"]["place_q"]
     reach = centroid["reach_x_um"], centroid["reach_y_um"]
     return [[round(r[d] * 2**q / reach[d]) for d in range(2)] for _, r, _ in electrodes(contract)]
 
 
-#: The reciprocal's first guess is by this many bits of the divisor.
+#: The reciprocal's first guess depends on this many bits of the divisor.
 GUESS_BITS = 6
 
 
 def reciprocal(contract: Contract) -> tuple[list[int], int]:
-    """Guesses t and a constant c: t (c - d t) is 2^46 full/(full + 1) / d but for 2^-14, d in 2^15..2^16.
+    """Guesses t and a constant c such that t ((c - d t) >> 16) is 2^46 full/(full + 1) / d, for d in 2^15..2^16.
 
-    Newton's step t (2 K - d t) / K for K / d, with K / 2^31 taken into both numbers: that is the full scale's share,
-    and what centres the errors of guess and cuts, all of which fall to one side.
+    The relative error is below 2^-14. This is Newton's step t (2 K - d t) / K for K / d, with a factor K / 2^31 moved
+    into both numbers. The factor holds the full scale's share, and centres the one-sided errors of guess and cut.
     """
     full = contract.sensor["bus"]["full_scale_count"]
     centred = 3.6e-5
@@ -63,11 +63,6 @@ def header(contract: Contract) -> str:
     blob, fixed, centroid, conductance = its["blob"], its["fixed"], its["centroid"], its["conductance"]
     guesses, twice = reciprocal(contract)
     lines = [
-        f"// {GENERATED}",
-        "// The wrench map: its blocks' kinds and gates, and the formats of its numbers (SPEC.md, Wrench maps).",
-        "#ifndef BIOTAC_MAP_GEN_H",
-        "#define BIOTAC_MAP_GEN_H",
-        "",
         f"#define BT_MAP_VERSION {blob['version']}",
         f"#define BT_MAP_MAX_BYTES {blob['max_bytes']}",
         f"#define BT_MAP_HEADER_BYTES {HEADER_BYTES}",
@@ -111,8 +106,6 @@ def header(contract: Contract) -> str:
         f"#define BT_MAP_GUESS_BITS {GUESS_BITS}",
         f"#define BT_MAP_GUESSES {{{', '.join(map(str, guesses))}}}",
         f"#define BT_MAP_GUESS_TWICE {twice}u",
-        "",
-        "#endif",
-        "",
     ]
-    return "\n".join(lines)
+    about = "The wrench map: its blocks' kinds and gates, and the formats of its numbers (SPEC.md, Wrench maps)."
+    return c_header("MAP", [about], lines)

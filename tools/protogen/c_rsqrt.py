@@ -1,18 +1,17 @@
-"""The table behind the direction's length: 1 / sqrt, which spares a root and three divisions.
+"""The table of 1 / sqrt for the direction's length, which saves a square root and three divisions.
 
-A component times what the table gives is the component at the core's radius, in fractions of 2^32. The
-fractions are chosen so that both units they end up in, um and that of the lever, are one product and
-one shift away: SHARE is that of 2^32 that the radius itself becomes, and is a little below 1 so that
-nothing wraps.
+A component times the table's value is the component at the core's radius, in fractions of 2^32. The fractions are
+chosen so that both final units, um and that of the lever, are one product and one shift away. SHARE is the share of
+2^32 that the radius itself becomes; it is a little below 1 so that nothing wraps.
 """
 
 from __future__ import annotations
 
 from math import isqrt
 
-from .schema import GENERATED, Contract
+from .schema import GENERATED, Contract, c_header
 
-STEP_BITS = 23  # 384 steps from 2^30 to 2^32: linear between them is within 2^-17.4
+STEP_BITS = 23  # 384 steps from 2^30 to 2^32: linear interpolation is within 2^-17.4
 FIRST = 1 << 30 - STEP_BITS
 LAST = 1 << 32 - STEP_BITS
 UM_BITS = 19  # a component of 20 bits times UM_FACTOR, shifted by this, is in um
@@ -21,7 +20,7 @@ UM_FACTORS_TRIED = 32
 
 
 def factors(radius_um: int) -> tuple[int, int]:
-    """um and lever: the two are in proportion, so of the first few the pair that rounds least."""
+    """Factors of um and of the lever, which are in proportion: of the first few pairs the one that rounds least."""
     first = radius_um * (1 << UM_BITS) // (1 << 20) + 1
 
     def lever(um: int) -> tuple[int, int]:
@@ -34,7 +33,7 @@ def factors(radius_um: int) -> tuple[int, int]:
 
 
 def entry(k: int, radius_um: int, um_factor: int) -> int:
-    """SHARE * 2^32 / sqrt(k * 2^STEP_BITS), rounded to the nearest; SHARE = radius / (2 um_factor)."""
+    """SHARE * 2^32 / sqrt(k * 2^STEP_BITS), rounded to nearest; SHARE = radius / (2 um_factor)."""
     top = (radius_um << 32 + 32) // (2 * um_factor)
     root = isqrt((k << STEP_BITS) << 64)
     return (2 * top + root) // (2 * root)
@@ -43,12 +42,6 @@ def entry(k: int, radius_um: int, um_factor: int) -> int:
 def header(contract: Contract) -> str:
     um, lever = factors(contract.sensor["geometry"]["core_radius_um"])
     lines = [
-        f"// {GENERATED}",
-        "// BT_ROOT_SHARE * 2^32 / sqrt(q) for q from 2^30 on, at steps of 2^BT_ROOT_STEP_BITS, less",
-        "// BT_ROOT_BASE. The share is the radius / (2 * BT_ROOT_UM_FACTOR).",
-        "#ifndef BIOTAC_ROOT_GEN_H",
-        "#define BIOTAC_ROOT_GEN_H",
-        "",
         "#include <stdint.h>",
         "",
         f"#define BT_ROOT_STEP_BITS {STEP_BITS}",
@@ -59,11 +52,12 @@ def header(contract: Contract) -> str:
         f"#define BT_ROOT_LEVER_BITS {LEVER_BITS}",
         "",
         f"extern const uint16_t bt_root_table[{LAST - FIRST + 1}];",
-        "",
-        "#endif",
-        "",
     ]
-    return "\n".join(lines)
+    about = [
+        "BT_ROOT_SHARE * 2^32 / sqrt(q) for q from 2^30 on, at steps of 2^BT_ROOT_STEP_BITS, less",
+        "BT_ROOT_BASE. The share is the radius / (2 * BT_ROOT_UM_FACTOR).",
+    ]
+    return c_header("ROOT", about, lines)
 
 
 def base(contract: Contract) -> int:

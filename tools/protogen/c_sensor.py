@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from .schema import GENERATED, Contract
+from .schema import GENERATED, Contract, c_header
 
 E_MAX_Q4 = 4095 * 16  # |count - tare| in 1/16 count
 
@@ -12,6 +13,18 @@ E_MAX_Q4 = 4095 * 16  # |count - tare| in 1/16 count
 def electrodes(contract: Contract) -> list[tuple[str, tuple[int, ...], tuple[int, ...]]]:
     rows = contract.sensor["geometry"]["electrodes"]
     return [(row[0], tuple(row[1:4]), tuple(row[4:7])) for row in rows]
+
+
+def mirror_image(table: list[Any], i: int) -> int | None:
+    """The electrode on the other side from i; None on the midline. Raises ValueError if there is none."""
+    name, r, n = table[i]
+    if r[1] == 0:
+        return None
+    image = ((r[0], -r[1], r[2]), (n[0], -n[1], n[2]))
+    twins = [j for j, (_, q, m) in enumerate(table) if (q, m) == image]
+    if len(twins) != 1:
+        raise ValueError(f"sensor.toml: {name} has no mirror image; the sums go over pairs")
+    return twins[0]
 
 
 def arm_nm(r_um: tuple[int, ...], n_milli: tuple[int, ...]) -> tuple[int, int, int]:
@@ -25,7 +38,7 @@ def row(values: tuple[int, ...], width: int = 6) -> str:
 
 
 def frame_ms(contract: Contract) -> int:
-    """A round of slots is a whole number of ms, or all frame counts that stand for times are wrong."""
+    """Length of a round in ms. Raises ValueError if it is no whole number: times are given as frame counts."""
     slots, hz = len(contract.sensor["frame"]["slots"]), contract.sensor["bus"]["slot_hz"]
     if slots * 1000 % hz:
         raise ValueError(f"sensor.toml: {slots} slots at {hz} Hz are no whole number of ms")
@@ -39,12 +52,6 @@ def header(contract: Contract) -> str:
     l1 = lambda vectors: max(sum(abs(v[d]) for v in vectors) for d in range(3))  # noqa: E731
     arms = [arm_nm(r, n) for _, r, n in table]
     lines = [
-        f"// {GENERATED}",
-        "// The sensor's side: channels and their command bytes, slot order, electrode geometry.",
-        "// Units stand in the names: um, milli (1/1000), nm, us, Hz.",
-        "#ifndef BIOTAC_SENSOR_GEN_H",
-        "#define BIOTAC_SENSOR_GEN_H",
-        "",
         "#include <stdint.h>",
         "",
         f"#define BT_CHANNELS {len(channels)}",
@@ -100,11 +107,12 @@ def header(contract: Contract) -> str:
         "extern const int16_t bt_normal_milli[BT_ELECTRODES][3];",
         "extern const int32_t bt_arm_nm[BT_ELECTRODES][3]; // r x n, exact",
         "extern const uint16_t bt_normal_length_milli[3];  // of all normals' x, y and z, as three vectors",
-        "",
-        "#endif",
-        "",
     ]
-    return "\n".join(lines)
+    about = [
+        "The sensor's side: channels and their command bytes, slot order, electrode geometry.",
+        "Units stand in the names: um, milli (1/1000), nm, us, Hz.",
+    ]
+    return c_header("SENSOR", about, lines)
 
 
 def source(contract: Contract) -> str:

@@ -1,10 +1,9 @@
-"""Straight-line C for the electrode sums, walked line by line along the finger.
+"""Straight-line C for the electrode sums, line by line along the finger.
 
-Seven pairs of electrodes mirror each other in y: they share x, z, n_x and n_z, and differ in the sign
-of y and n_y. Electrodes that share |y|, z and the normal besides form a line along the finger. So a
-pair is added and subtracted once, a line multiplied once, and only x is multiplied electrode by
-electrode; behind the seam x is a whole number of 100 um, which leaves it eight bits. Which electrodes
-pair and line up is found in Table 1, not written down here.
+Seven pairs of electrodes mirror each other in y: they share x, z, n_x and n_z, and differ in the sign of y and n_y.
+Electrodes that also share |y|, z and the normal form a line along the finger. So each pair is added and subtracted
+once, each line multiplied once, and only x is multiplied per electrode. Behind the seam x is a multiple of 100 um,
+which leaves it eight bits. Pairs and lines are found from Table 1, not written down here.
 """
 
 from __future__ import annotations
@@ -13,20 +12,19 @@ from dataclasses import dataclass
 from functools import reduce
 from math import gcd
 
-from .c_sensor import electrodes
-from .pairs import mirror_image
-from .schema import GENERATED, Contract
+from .c_sensor import electrodes, mirror_image
+from .schema import GENERATED, Contract, c_header
 
 UINT32_MAX = 2**32 - 1
-WEIGHT_BITS = 22  # of one shifted weight: below that the sums would lose what the PoC needs
-SPLIT_BITS = 6  # of a coordinate, where weights have WEIGHT_BITS: its parts' sums fit 32 bits
+WEIGHT_BITS = 22  # of one shifted weight: with fewer the sums would lose what the PoC needs
+SPLIT_BITS = 6  # of a coordinate, for weights of WEIGHT_BITS: the sums of its parts fit 32 bits
 ARM_SHIFT = 5  # torque sums are in 1/16 count * (x_unit / 1000) * 2^ARM_SHIFT
-ARM_SPLIT_BITS = 8  # fraction of an arm that no line's product gives
+ARM_SPLIT_BITS = 8  # fraction bits of an arm that is not in a line's product
 
 
 @dataclass(frozen=True)
 class Line:
-    """Electrodes that differ in x and in the sign of y only; right is None on the midline."""
+    """Electrodes that differ only in x and in the sign of y; right is None on the midline."""
 
     y: int
     z: int
@@ -62,41 +60,25 @@ class MirroredLines:
         if any(line.z >= 0 for line in self.lines):
             raise ValueError("sensor.toml: an electrode is not below the axis; the sums of z have one sign")
 
-    def ahead(self) -> int:
-        return sum(line.width * x for line in self.lines for _, _, x in line.members if x > 0)
-
-    def behind(self) -> int:
-        """In units of x_unit."""
-        return sum(line.width * -x for line in self.lines for _, _, x in line.members if x < 0) // self.x_unit
-
-    def across(self) -> int:
-        return sum(line.y * len(line.members) for line in self.lines)
-
-    def below(self) -> int:
-        return sum(line.width * -line.z * len(line.members) for line in self.lines)
-
-    def low(self, axis: str) -> int:
-        """The largest sum of split-off coordinate bits."""
-        mask = (1 << SPLIT_BITS) - 1
-        of = {
-            "x": [(line.width, x) for line in self.lines for _, _, x in line.members if x > 0],
-            "y": [(1, line.y) for line in self.lines for _ in line.members],
-            "z": [(line.width, -line.z) for line in self.lines for _ in line.members],
-        }[axis]
-        return sum(width * (c & mask) for width, c in of)
+    def summed(self, bits: int) -> dict[str, int]:
+        """For each sum, the sum over the electrodes of the lower ``bits`` of |coordinate|."""
+        members = [(line, x) for line in self.lines for _, _, x in line.members]
+        coordinates = {
+            "ahead": [(line.width, x) for line, x in members if x > 0],
+            "behind": [(line.width, -x // self.x_unit) for line, x in members if x < 0],
+            "y": [(1, line.y) for line, _ in members],
+            "z": [(line.width, -line.z) for line, _ in members],
+        }
+        mask = (1 << bits) - 1
+        return {name: sum(width * (c & mask) for width, c in its) for name, its in coordinates.items()}
 
 
-class Sum:
-    """C that adds up products; a product with 0 is not written, one with 1 needs no factor."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-
-    def add(self, factor: int, term: str) -> list[str]:
-        if factor == 0:
-            return []
-        sign = "-" if factor < 0 else "+"
-        return [f"    {self.name} {sign}= {term if abs(factor) == 1 else f'{abs(factor)} * {term}'};"]
+def add(name: str, factor: int, term: str) -> list[str]:
+    """C that adds a product to a sum: nothing for factor 0, no factor for 1."""
+    if factor == 0:
+        return []
+    sign = "-" if factor < 0 else "+"
+    return [f"    {name} {sign}= {term if abs(factor) == 1 else f'{abs(factor)} * {term}'};"]
 
 
 def title(line: Line) -> str:
@@ -105,7 +87,7 @@ def title(line: Line) -> str:
 
 
 def load(line: Line, member: tuple[int, int | None, int], k: int, form: str) -> list[str]:
-    """Reads one pair or single into even (and odd), summing up along the line."""
+    """C that reads one pair or single into even (and odd), summing along the line."""
     a, b, _ = member
     out = [f"    a = {form.format(f'v[{a}]')};"]
     if b is None:
@@ -116,7 +98,7 @@ def load(line: Line, member: tuple[int, int | None, int], k: int, form: str) -> 
 
 
 def moments(finger: MirroredLines, *, split: bool) -> list[str]:
-    """The moments' body; split: coordinates in two parts, and x behind the seam in two sums."""
+    """The moments' body; ``split``: coordinates in two parts, and x behind the seam in two sums."""
     out = ["    uint32_t a, b, pair, even, odd;"]
     names = ["ahead_hi", "ahead_lo", "y_hi", "y_lo", "z_hi", "z_lo"] if split else ["ahead", "y", "z"]
     names += ["behind", "total"]
@@ -125,11 +107,11 @@ def moments(finger: MirroredLines, *, split: bool) -> list[str]:
 
     def product(name: str, coefficient: int, term: str) -> list[str]:
         if not split:
-            return Sum(name).add(-coefficient, term)
+            return add(name, -coefficient, term)
         mask = (1 << SPLIT_BITS) - 1
         return [
-            *Sum(f"{name}_hi").add(coefficient >> SPLIT_BITS, term),
-            *Sum(f"{name}_lo").add(coefficient & mask, term),
+            *add(f"{name}_hi", coefficient >> SPLIT_BITS, term),
+            *add(f"{name}_lo", coefficient & mask, term),
         ]
 
     used = 0
@@ -148,11 +130,11 @@ def moments(finger: MirroredLines, *, split: bool) -> list[str]:
                 if split and not moved and used > UINT32_MAX >> WEIGHT_BITS:
                     out += ["    sums->behind[0] = behind;", "    behind = 0;"]
                     used, moved = line.width * unit, True
-                out += Sum("behind").add(unit if split else -unit, "pair")
+                out += add("behind", unit if split else -unit, "pair")
         out += product("z", -line.z, "even")
         if line.mirrored:
             out += product("y", line.y, "odd")
-        out += Sum("total").add(1 if split else -1, "even")
+        out += add("total", 1 if split else -1, "even")
     if split:
         if not moved or used > UINT32_MAX >> WEIGHT_BITS:
             raise ValueError("sensor.toml: x behind the seam does not fit two sums")
@@ -170,12 +152,12 @@ def force(finger: MirroredLines) -> list[str]:
         for k, member in enumerate(line.members):
             out += load(line, member, k, "{}")
         for d, (axis, term) in enumerate((("x", "even"), ("y", "odd"), ("z", "even"))):
-            out += Sum(axis).add(line.normal[d] if d != 1 or line.mirrored else 0, term)
+            out += add(axis, line.normal[d] if d != 1 or line.mirrored else 0, term)
     return [*out, *(f"    sum[{d}] = {axis};" for d, axis in enumerate("xyz"))]
 
 
 def fraction(finger: MirroredLines, arm_nm: int) -> tuple[int, int]:
-    """An arm in units of a torque sum, as a whole part and 2^-ARM_SPLIT_BITS, rounded half up."""
+    """An arm in units of a torque sum: whole part and fraction in 2^-ARM_SPLIT_BITS, rounded half up."""
     unit_nm = finger.x_unit << ARM_SHIFT
     scaled = (2 * (arm_nm << ARM_SPLIT_BITS) + unit_nm) // (2 * unit_nm)
     hi = (scaled + (1 << ARM_SPLIT_BITS - 1)) >> ARM_SPLIT_BITS
@@ -183,18 +165,18 @@ def fraction(finger: MirroredLines, arm_nm: int) -> tuple[int, int]:
 
 
 def arms(line: Line) -> tuple[int, int]:
-    """Of a line of one, in nm: y for the even sum, z for the odd one."""
+    """Arms in nm of a line of one electrode: about y for the even sum, about z for the odd one."""
     (_, _, x), (nx, ny, nz) = line.members[0], line.normal
     return line.z * nx - x * nz, x * ny - line.y * nx
 
 
 def by_line(line: Line) -> bool:
-    """MirroredLines behind the seam that face straight away from the axis: arms are x times the normal."""
+    """Whether a line is behind the seam and faces straight away from the axis: its arms are x times the normal."""
     return line.normal[0] == 0 and all(x < 0 for _, _, x in line.members)
 
 
 def torque(finger: MirroredLines) -> list[str]:
-    """Three sums each: whole units; 2^-ARM_SHIFT, exact, of the lines; 2^-ARM_SPLIT_BITS of rounded arms."""
+    """Per axis three sums: whole units, the lines' exact 2^-ARM_SHIFT, and the rounded arms' 2^-ARM_SPLIT_BITS."""
     out = ["    int32_t a, b, pair, even, odd, x_even, x_odd;"]
     out += [f"    int32_t {axis}_{part} = 0;" for axis in "yz" for part in ("hi", "line", "lo")]
     for line in finger.lines:
@@ -206,7 +188,7 @@ def torque(finger: MirroredLines) -> list[str]:
             for axis, term, arm in zip("yz", ("even", "odd"), arms(line), strict=True):
                 if term == "even" or line.mirrored:
                     hi, lo = fraction(finger, arm)
-                    out += Sum(f"{axis}_hi").add(hi, term) + Sum(f"{axis}_lo").add(lo, term)
+                    out += add(f"{axis}_hi", hi, term) + add(f"{axis}_lo", lo, term)
             continue
         for k, (a, b, x) in enumerate(line.members):
             unit, sign = -x // finger.x_unit, "" if k == 0 else "+"
@@ -219,19 +201,19 @@ def torque(finger: MirroredLines) -> list[str]:
         for axis, term, n in line_factors(line):
             whole, part = divmod(abs(n), 1 << ARM_SHIFT)
             flip = -1 if n < 0 else 1
-            out += Sum(f"{axis}_hi").add(flip * whole, term) + Sum(f"{axis}_line").add(flip * part, term)
+            out += add(f"{axis}_hi", flip * whole, term) + add(f"{axis}_line", flip * part, term)
     fine, line_parts = 1 << ARM_SPLIT_BITS - ARM_SHIFT, 1 << ARM_SHIFT
     return out + [f"    sum[{d}] = {a}_hi + ({a}_line + {a}_lo / {fine}) / {line_parts};" for d, a in enumerate("yz")]
 
 
 def line_factors(line: Line) -> list[tuple[str, str, int]]:
-    """What the sum of -x e enters the torques with."""
+    """The factors with which a line's sum of -x e enters the torques: (axis, C variable, factor)."""
     pairs = [("y", "x_even", line.normal[2])]
     return [*pairs, ("z", "x_odd", -line.normal[1])] if line.mirrored else pairs
 
 
 def line_parts_max(finger: MirroredLines) -> int:
-    """The largest sum of the lines' fractions, per unit of |e|."""
+    """The largest sum of the lines' fractions per unit of |e|."""
     sums = {"y": 0, "z": 0}
     for line in finger.lines:
         if by_line(line):
@@ -243,16 +225,8 @@ def line_parts_max(finger: MirroredLines) -> int:
 
 def header(contract: Contract) -> str:
     finger = MirroredLines(contract)
-    top = 1 << WEIGHT_BITS
-    low = {axis: finger.low(axis) * top for axis in "xyz"}
+    whole, low = finger.summed(32), finger.summed(SPLIT_BITS)
     lines = [
-        f"// {GENERATED}",
-        "// Sums over mirrored pairs of electrodes, each within 32 bits. ahead: over the",
-        "// electrodes with x > 0, in um; behind: over the others, -x in BT_SUMS_X_UNIT_UM; y and z (downwards)",
-        "// in um.",
-        "#ifndef BIOTAC_SUMS_GEN_H",
-        "#define BIOTAC_SUMS_GEN_H",
-        "",
         "#include <stdint.h>",
         "",
         f"#define BT_SUMS_X_UNIT_UM {finger.x_unit}",
@@ -261,12 +235,12 @@ def header(contract: Contract) -> str:
         "",
         "// The coordinates' sums of magnitudes, and those of their split-off low bits: what the largest",
         "// weight is multiplied by. The core asserts that everything fits.",
-        f"#define BT_SUMS_AHEAD_UM {finger.ahead()}",
-        f"#define BT_SUMS_BEHIND_UNITS {finger.behind()}",
-        f"#define BT_SUMS_Y_UM {finger.across()}",
-        f"#define BT_SUMS_Z_UM {finger.below()}",
-        f"#define BT_SUMS_LOW_MAX {max(low['x'] // top, low['z'] // top)}",
-        f"#define BT_SUMS_Y_LOW_MAX {low['y'] // top}",
+        f"#define BT_SUMS_AHEAD_UM {whole['ahead']}",
+        f"#define BT_SUMS_BEHIND_UNITS {whole['behind']}",
+        f"#define BT_SUMS_Y_UM {whole['y']}",
+        f"#define BT_SUMS_Z_UM {whole['z']}",
+        f"#define BT_SUMS_LOW_MAX {max(low['ahead'], low['z'])}",
+        f"#define BT_SUMS_Y_LOW_MAX {low['y']}",
         "",
         "// With weights max(-e, 0), as they are.",
         "typedef struct {",
@@ -292,11 +266,13 @@ def header(contract: Contract) -> str:
         f"#define BT_SUMS_ARM_BITS {ARM_SPLIT_BITS}",
         f"#define BT_SUMS_LINE_PARTS_MAX {line_parts_max(finger)} // what the largest e is multiplied by",
         f"void bt_sums_torque(const int32_t v[{finger.count}], int32_t sum[2]);",
-        "",
-        "#endif",
-        "",
     ]
-    return "\n".join(lines)
+    about = [
+        "Sums over mirrored pairs of electrodes, each within 32 bits. ahead: over the",
+        "electrodes with x > 0, in um; behind: over the others, -x in BT_SUMS_X_UNIT_UM; y and z (downwards)",
+        "in um.",
+    ]
+    return c_header("SUMS", about, lines)
 
 
 def source(contract: Contract) -> str:

@@ -1,7 +1,6 @@
 """C for the benchmark's own kernels: sums over mirrored electrode pairs in float32 and int64, and tables.
 
-Here a processor has a multiplier that is wide enough (SMLAL) or an FPU,
-so that nothing is split in two.
+The processors for these have an FPU, or a multiplier wide enough (SMLAL), so that nothing is split in two.
 """
 
 from __future__ import annotations
@@ -9,11 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .c_sensor import arm_nm
-from .pairs import Mirror, join
-from .schema import GENERATED, Contract
+from .c_sensor import arm_nm, electrodes, mirror_image
+from .schema import Contract, c_header
 
 Q15_ONE = 1 << 15
+# Axes, and whether a value of that axis flips with y.
+VECTOR = {0: False, 1: True, 2: False}
+TORQUE = {1: False, 2: True}
 
 
 @dataclass(frozen=True)
@@ -24,19 +25,47 @@ class Kind:
     narrow: str
     wide: str
     force: str
-    literal: str  # format of a coefficient
+    literal: str  # format string of a coefficient
 
 
 F32 = Kind("f32", "float", "float", "float", "{}.0F")
 I64 = Kind("i64", "int32_t", "int64_t", "int32_t", "{}")
 
 
+class Mirror:
+    """Pairs and singles of Table 1, and sums over them grouped by equal coefficient."""
+
+    def __init__(self, contract: Contract) -> None:
+        self.table = electrodes(contract)
+        self.pairs: list[tuple[int, int]] = []  # (negative y, positive y)
+        for i, (_, r, _) in enumerate(self.table):
+            image = mirror_image(self.table, i)
+            if image is not None and r[1] < 0:
+                self.pairs.append((i, image))
+        paired = {k for pair in self.pairs for k in pair}
+        self.singles = [i for i in range(len(self.table)) if i not in paired]
+
+    def groups(self, values: list[int], *, odd: bool) -> dict[int, list[str]]:
+        """Coefficient -> the terms that it multiplies, as C. ``odd``: the coefficient flips with y."""
+        out: dict[int, list[str]] = {}
+        terms = [(values[b], f"(v[{b}] - v[{a}])" if odd else f"(v[{a}] + v[{b}])") for a, b in self.pairs]
+        for coefficient, term in [*terms, *((values[i], f"v[{i}]") for i in self.singles)]:
+            # Coefficients that differ only in sign share a product.
+            if -coefficient in out:
+                out[-coefficient].append(f"-{term}")
+            elif coefficient:
+                out.setdefault(coefficient, []).append(term)
+        return out
+
+
 def products(kind: Kind, groups: dict[int, list[str]], wide: str) -> str:
-    """A sum of products, one a line. In int64 the coefficients carry the sign: SMLAL only adds."""
+    """A sum of products, one per line. In int64 the coefficients carry the sign, because SMLAL only adds."""
     cast = "" if wide == kind.narrow else f"({wide})"
     out = ""
     for coefficient, parts in groups.items():
-        inner = parts[0] if len(parts) == 1 and parts[0].startswith(("(", "v")) else f"({join(parts)})"
+        inner = " + ".join(parts).replace("+ -", "- ")
+        if len(parts) > 1 or inner.startswith("-"):
+            inner = f"({inner})"
         subtract = coefficient < 0 and kind is F32
         text = f"{cast}{inner} * {kind.literal.format(abs(coefficient) if subtract else coefficient)}"
         first = ("-" if subtract else "") if not out else f"\n             {'-' if subtract else '+'} "
@@ -44,23 +73,31 @@ def products(kind: Kind, groups: dict[int, list[str]], wide: str) -> str:
     return out
 
 
+def sums(mirror: Mirror, kind: Kind, wide: str, vectors: list[tuple[int, ...]], odd: dict[int, bool]) -> list[str]:
+    """C that sets sum[k] to v times the vectors, along the k-th axis of ``odd`` (axis -> whether it flips with y)."""
+    groups = [mirror.groups([vector[d] for vector in vectors], odd=flips) for d, flips in odd.items()]
+    return [f"    sum[{k}] = {products(kind, its, wide)};" for k, its in enumerate(groups)]
+
+
 def mirrored_moments(mirror: Mirror) -> list[str]:
     r = [line[1] for line in mirror.table]
     pairs = [f"(v[{a}] + v[{b}])" for a, b in mirror.pairs] + [f"v[{i}]" for i in mirror.singles]
-    lines = [
+    return [
         "// sum w r in um; returns sum w.",
         f"static inline float mirrored_f32_moments(const float v[{len(r)}], float sum[3])",
+        "{",
+        *sums(mirror, F32, "float", r, VECTOR),
+        f"    return {' + '.join(pairs)};",
+        "}",
+        "",
     ]
-    lines.append("{")
-    for d in range(3):
-        groups = mirror.groups(lambda i, d=d: r[i][d], odd=d == 1)
-        lines.append(f"    sum[{d}] = {products(F32, groups, 'float')};")
-    return [*lines, f"    return {' + '.join(pairs)};", "}", ""]
 
 
 def moment_lists(mirror: Mirror) -> list[str]:
-    """Table 1's places pair by pair, for a kernel that keeps every sum in registers: taken axis by axis,
-    all the weights would have to be kept instead. Coefficients are not negative: they then are immediates."""
+    """Table 1's places pair by pair, for a kernel that keeps every sum in a register.
+
+    Axis by axis it would have to keep all the weights instead. Coefficients are not negative, to be immediates.
+    """
     r = [line[1] for line in mirror.table]
     behind = -min(p[0] for p in r)
     pairs = [f"PAIR({a}, {b}, {r[b][0] + behind}, {r[b][1]}, {-r[b][2]})" for a, b in mirror.pairs]
@@ -77,55 +114,36 @@ def moment_lists(mirror: Mirror) -> list[str]:
 
 
 def mirrored(contract: Contract, kind: Kind) -> str:
-    """A header with the sums of one number type, inline: these cores have the registers."""
+    """A header with the sums of one number type, inline because these cores have enough registers."""
     mirror = Mirror(contract)
     n = len(mirror.table)
-    normal = [line[2] for line in mirror.table]
-    arms = [arm_nm(a, b) for _, a, b in mirror.table]
-    guard = f"BIOTAC_MIRRORED_{kind.name.upper()}_GEN_H"
     lines = [
-        f"// {GENERATED}",
-        f"// Sums over mirrored pairs of electrodes, in {kind.wide}.",
-        f"#ifndef {guard}",
-        f"#define {guard}",
-        "",
         "#include <stdint.h>",
         "",
-    ]
-    lines += mirrored_moments(mirror) if kind is F32 else moment_lists(mirror)
-    lines += [
+        *(mirrored_moments(mirror) if kind is F32 else moment_lists(mirror)),
         "// sum e n in e * 1/1000.",
         f"static inline void mirrored_{kind.name}_force(const {kind.narrow} v[{n}], {kind.force} sum[3])",
         "{",
-    ]
-    for d in range(3):
-        groups = mirror.groups(lambda i, d=d: normal[i][d], odd=d == 1)
-        lines.append(f"    sum[{d}] = {products(kind, groups, kind.force)};")
-    lines += [
+        *sums(mirror, kind, kind.force, [line[2] for line in mirror.table], VECTOR),
         "}",
         "",
         "// sum e (r x n) for y and z in e * nm.",
         f"static inline void mirrored_{kind.name}_torque(const {kind.narrow} v[{n}], {kind.wide} sum[2])",
         "{",
+        *sums(mirror, kind, kind.wide, [arm_nm(r, n) for _, r, n in mirror.table], TORQUE),
+        "}",
     ]
-    for k, (d, odd) in enumerate(((1, False), (2, True))):
-        groups = mirror.groups(lambda i, d=d: arms[i][d], odd=odd)
-        lines.append(f"    sum[{k}] = {products(kind, groups, kind.wide)};")
-    return "\n".join([*lines, "}", "", "#endif", ""])
+    about = f"Sums over mirrored pairs of electrodes, in {kind.wide}."
+    return c_header(f"MIRRORED_{kind.name.upper()}", [about], lines)
 
 
 def tables(contract: Contract) -> str:
-    """Table 1 for the loops over single electrodes: in float32, and in Q15 of its largest numbers."""
+    """Table 1 for the loops over single electrodes: in float32, and in Q15 relative to its largest numbers."""
     table = Mirror(contract).table
     arms = [arm_nm(r, n)[1:] for _, r, n in table]
     place = max(abs(v) for _, r, _ in table for v in r)
     arm = max(abs(v) for a in arms for v in a)
     lines = [
-        f"// {GENERATED}",
-        "// Table 1 for loops over single electrodes. arm: y and z of r x n.",
-        "#ifndef BIOTAC_TABLES_GEN_H",
-        "#define BIOTAC_TABLES_GEN_H",
-        "",
         "#include <stdint.h>",
         "",
         f"#define Q15_PLACE_UM {place} // what 1.0 is",
@@ -143,11 +161,11 @@ def tables(contract: Contract) -> str:
             for line, vector in zip(table, values, strict=True):
                 lines.append("    {" + ", ".join(cell(v) for v in vector) + f"}}, // {line[0]}")
             lines += ["};", ""]
-    return "\n".join([*lines, "#endif", ""])
+    return c_header("TABLES", ["Table 1 for loops over single electrodes. arm: y and z of r x n."], lines[:-1])
 
 
 def q15(full: int) -> Callable[[int], str]:
-    """value / full in Q15, rounded half away from zero and saturated, as a textbook has it."""
+    """value / full in Q15, rounded half away from zero and saturated, as in textbooks."""
 
     def cell(value: int) -> str:
         size = min((2 * abs(value) * Q15_ONE + full) // (2 * full), Q15_ONE - 1)
@@ -157,5 +175,5 @@ def q15(full: int) -> Callable[[int], str]:
 
 
 def f32(one: int) -> Callable[[int], str]:
-    """value / one as a literal; its decimals are exact, the compiler rounds them once."""
+    """value / one as a literal; its decimals are exact, so the compiler rounds once."""
     return lambda value: f"{value / one:.{len(str(one)) - 1}f}F"

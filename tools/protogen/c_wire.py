@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .schema import GENERATED, TYPE_BYTES, Contract, Field, Message, before
+from .schema import GENERATED, TYPE_BYTES, Contract, Field, Message, before, c_header, entries
 
-PACKED_AS_HALFWORDS = ("FRAME",)  # what a board sends most, and most of
+PACKED_AS_HALFWORDS = ("FRAME",)  # what a board sends most of, in messages and in bytes
 C_TYPE = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "i16": "int16_t", "i32": "int32_t"}
 
 
@@ -19,7 +19,7 @@ def declare(field: Field) -> str:
 
 
 def define(message: Message) -> list[str]:
-    """Its number, its length on the wire, its struct."""
+    """A message's number, its length on the wire, and its struct."""
     out = [f"// {message.doc}", f"#define BT_{message.name}_ID 0x{message.id:02X}"]
     out += [f"#define BT_{message.name}_BYTES {message.payload_bytes}", "typedef struct {"]
     out += [declare(field) for field in message.fields]
@@ -42,20 +42,15 @@ def vocabulary(contract: Contract) -> list[str]:
     out = []
     for name, enum in link["enum"].items():
         out += [f"// {enum['doc']}", f"enum bt_{name} {{"]
-        out += [
-            f"    BT_{name.upper()}_{key} = {entry['value']}, // {entry['doc']}"
-            for key, entry in enum.items()
-            if key != "doc"
-        ]
+        out += [f"    BT_{name.upper()}_{key} = {e['value']}, // {e['doc']}" for key, e in entries(enum).items()]
         out += ["};", ""]
     for name, flags in link["flags"].items():
         out += [f"// {flags['doc']}"]
         out += [
             f"#define BT_{name.upper()}_FLAG_{key} (1u << {entry['bit']}) // {entry['doc']}"
-            for key, entry in flags.items()
-            if key != "doc"
+            for key, entry in entries(flags).items()
         ]
-        known = sum(1 << entry["bit"] for key, entry in flags.items() if key != "doc")
+        known = sum(1 << entry["bit"] for entry in entries(flags).values())
         out += [f"#define BT_{name.upper()}_FLAGS 0x{known:X}u // all there are", ""]
     out += ["enum bt_setting {"]
     out += [f"    BT_SETTING_{n.upper()} = {s['id']}, // [{s['unit']}]" for n, s in link["setting"].items()]
@@ -64,7 +59,7 @@ def vocabulary(contract: Contract) -> list[str]:
 
 
 def constants(contract: Contract) -> list[str]:
-    """Which wire it is, and what stands for no value."""
+    """The wire's version and sizes, and the values that mean "invalid"."""
     wire = contract.link["wire"]
     return [
         f"#define BT_WIRE_MAJOR {wire['major']}",
@@ -80,12 +75,6 @@ def constants(contract: Contract) -> list[str]:
 def header(contract: Contract) -> str:
     wire, link = contract.link["wire"], contract.link
     out = [
-        f"// {GENERATED}",
-        "// Messages of the USB link: structs, sizes, pack and unpack. Little-endian, packed.",
-        "// Units and Q formats stand beside each field; see protocol/MESSAGES.md.",
-        "#ifndef BIOTAC_WIRE_GEN_H",
-        "#define BIOTAC_WIRE_GEN_H",
-        "",
         "#include <stdint.h>",
         "",
         *constants(contract),
@@ -129,8 +118,11 @@ def header(contract: Contract) -> str:
         "#ifndef BT_CDEF // the rest is macros for the C tests",
         "// X(name, type, count) for every field, so that tests can compare by name.",
     ]
-    out += [*field_lists(contract), "#endif", "", "#endif", ""]
-    return "\n".join(out)
+    about = [
+        "Messages of the USB link: structs, sizes, pack and unpack. Little-endian, packed.",
+        "Units and Q formats stand beside each field; see protocol/MESSAGES.md.",
+    ]
+    return c_header("WIRE", about, [*out, *field_lists(contract), "#endif"])
 
 
 def source(contract: Contract) -> str:
@@ -171,14 +163,12 @@ def source(contract: Contract) -> str:
     return "\n".join(out)
 
 
-def each(field: Field, statement: str) -> list[str]:
+def each(field: Field, *statements: str) -> list[str]:
+    """The statements for a field, or for each of its elements; {ref} stands for it."""
     if field.count == 1:
-        return [f"    {statement.format(ref=field.name)}"]
-    return [
-        f"    for (int k = 0; k < {field.count}; k++) {{",
-        f"        {statement.format(ref=field.name + '[k]')}",
-        "    }",
-    ]
+        return [f"    {statement.format(ref=field.name)}" for statement in statements]
+    lines = [f"        {statement.format(ref=field.name + '[k]')}" for statement in statements]
+    return [f"    for (int k = 0; k < {field.count}; k++) {{", *lines, "    }"]
 
 
 def pack(message: Message) -> list[str]:
@@ -191,7 +181,7 @@ def pack(message: Message) -> list[str]:
 
 
 def pack_even(message: Message) -> list[str]:
-    """Bytes come in pairs, and all else at even offsets, or there is no such function."""
+    """A pack function that stores halfwords. Raises ValueError if a wider field is at an odd offset."""
     struct = struct_name(message)
     out = ['_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "halfwords are stored as they are");', ""]
     out += [f"void {struct}_pack_even(const {struct} *msg, uint16_t out[BT_{message.name}_BYTES / 2])", "{"]
@@ -219,14 +209,6 @@ def unpack(message: Message) -> list[str]:
     out = [f"void {struct}_unpack({struct} *msg, const uint8_t in[BT_{message.name}_BYTES])", "{"]
     out += ["    const uint8_t *at = in;", "    uint32_t value;"]
     for field in message.fields:
-        size = TYPE_BYTES[field.type]
-        if field.count == 1:
-            out += [f"    at = get(at, &value, {size});", f"    msg->{field.name} = ({C_TYPE[field.type]})value;"]
-        else:
-            out += [
-                f"    for (int k = 0; k < {field.count}; k++) {{",
-                f"        at = get(at, &value, {size});",
-                f"        msg->{field.name}[k] = ({C_TYPE[field.type]})value;",
-                "    }",
-            ]
+        take = f"at = get(at, &value, {TYPE_BYTES[field.type]});"
+        out += each(field, take, f"msg->{{ref}} = ({C_TYPE[field.type]})value;")
     return [*out, "    (void)at;", "}", ""]

@@ -1,8 +1,8 @@
-"""protocol/MESSAGES.md: the tables a reader wants beside SPEC.md."""
+"""protocol/MESSAGES.md: the tables that go with SPEC.md."""
 
 from __future__ import annotations
 
-from .schema import GENERATED, Contract, Message, type_range
+from .schema import GENERATED, Contract, Message, entries, type_range
 
 
 def messages(contract: Contract) -> str:
@@ -25,12 +25,10 @@ def messages(contract: Contract) -> str:
         out.append(f"| 0x{m.id:02X} | `{m.name}` | {direction} | {m.payload_bytes} B | {whole} B | {reply} |")
     for m in contract.messages:
         out += ["", f"## {m.name} (0x{m.id:02X})", "", m.doc, "", *field_table(m)]
-    for name, enum in link["enum"].items():
-        out += ["", f"## enum {name}", "", enum["doc"], "", "| value | name | meaning |", "|---|---|---|"]
-        out += [f"| {e['value']} | `{k}` | {e['doc']} |" for k, e in enum.items() if k != "doc"]
-    for name, flags in link["flags"].items():
-        out += ["", f"## flags {name}", "", flags["doc"], "", "| bit | name | meaning |", "|---|---|---|"]
-        out += [f"| {e['bit']} | `{k}` | {e['doc']} |" for k, e in flags.items() if k != "doc"]
+    for kind, number in (("enum", "value"), ("flags", "bit")):
+        for name, its in link[kind].items():
+            out += ["", f"## {kind} {name}", "", its["doc"], "", f"| {number} | name | meaning |", "|---|---|---|"]
+            out += [f"| {e[number]} | `{k}` | {e['doc']} |" for k, e in entries(its).items()]
     out += ["", "## Settings", "", "`per finger`: a finger's CALIBRATION has a value of its own for it.", ""]
     out += ["| id | name | per finger | unit | range | default | meaning |", "|---|---|---|---|---|---|---|"]
     for name, s in link["setting"].items():

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from .c_map import BLOCK_BYTES, EXPONENTS, HEADER_BYTES, columns, gate_max, halves
-from .schema import GENERATED, Contract, Field, Message, before
+from .schema import GENERATED, Contract, Field, Message, before, entries
 
 STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
 NUMPY_CODE = {"u8": "u1", "u16": "<u2", "u32": "<u4", "i16": "<i2", "i32": "<i4"}
@@ -117,11 +117,11 @@ def wire(contract: Contract) -> str:
         out += enum_class(camel(name), "IntEnum", enum, "value", "{}")
     for name, flags in link["flags"].items():
         out += enum_class(camel(name) + "Flags", "IntFlag", flags, "bit", "1 << {}")
-    # What each value means, in the contract's words, for whoever shows one to a person.
+    # The meaning of each value, in the contract's words, for showing it to people.
     for name, enum in link["enum"].items():
-        out += doc_table(f"{name.upper()}_DOC", ((e["value"], e) for k, e in enum.items() if k != "doc"))
+        out += doc_table(f"{name.upper()}_DOC", ((e["value"], e) for e in entries(enum).values()))
     for name, flags in link["flags"].items():
-        out += doc_table(f"{name.upper()}_FLAG_DOC", ((1 << e["bit"], e) for k, e in flags.items() if k != "doc"))
+        out += doc_table(f"{name.upper()}_FLAG_DOC", ((1 << e["bit"], e) for e in entries(flags).values()))
     out += ["", "class Setting(IntEnum):", '    """Ids of the settings; see SETTINGS for units and ranges."""', ""]
     out += [f"    {name.upper()} = {s['id']}" for name, s in link["setting"].items()]
     out += ["", "", "class SettingSpec(NamedTuple):", '    """Unit, range and default of one setting."""', ""]
@@ -150,7 +150,7 @@ def wire(contract: Contract) -> str:
 
 
 def dtypes(contract: Contract) -> str:
-    """The array types, apart from the messages: these alone need NumPy."""
+    """The array types, apart from the messages, because only these need NumPy."""
     out = [
         f'"""{GENERATED}',
         "",
@@ -178,20 +178,17 @@ def camel(name: str) -> str:
 
 
 def class_name(message: Message) -> str:
-    """Setting is the enum of setting ids; the message that carries one value is SettingValue."""
+    """The message's class. Setting is the enum of setting ids; the message that carries one value is SettingValue."""
     return "SettingValue" if message.name == "SETTING" else camel(message.name)
 
 
-def enum_class(name: str, base: str, entries: dict[str, Any], key: str, form: str) -> list[str]:
-    out = ["", f"class {name}({base}):", f'    """{entries["doc"]}"""', ""]
-    for member, entry in entries.items():
-        if member != "doc":
-            out.append(f"    {member} = {form.format(entry[key])}  # {entry['doc']}")
-    return [*out, ""]
+def enum_class(name: str, base: str, its: dict[str, Any], key: str, form: str) -> list[str]:
+    members = [f"    {member} = {form.format(e[key])}  # {e['doc']}" for member, e in entries(its).items()]
+    return ["", f"class {name}({base}):", f'    """{its["doc"]}"""', "", *members, ""]
 
 
-def doc_table(name: str, entries: Iterable[tuple[int, dict[str, Any]]]) -> list[str]:
-    return ["", f"{name}: dict[int, str] = {{", *(f'    {value}: "{e["doc"]}",' for value, e in entries), "}", ""]
+def doc_table(name: str, rows: Iterable[tuple[int, dict[str, Any]]]) -> list[str]:
+    return ["", f"{name}: dict[int, str] = {{", *(f'    {value}: "{e["doc"]}",' for value, e in rows), "}", ""]
 
 
 def dtype_entry(field: Field) -> str:

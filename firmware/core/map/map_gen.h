@@ -17,14 +17,14 @@
 #define BT_MAP_EXPONENTS 10
 
 enum bt_map_kind {
-    BT_MAP_KIND_OFFSET = 0, // 1
+    BT_MAP_KIND_OFFSET = 0, // the constant 1
     BT_MAP_KIND_SIGNAL = 1, // e = count - tare
     BT_MAP_KIND_COMPRESSION = 2, // min(e, 0)
     BT_MAP_KIND_BULGE = 3, // max(e, 0)
     BT_MAP_KIND_SIGNAL_PAIRS = 4, // e_i e_j
     BT_MAP_KIND_CONDUCTANCE = 5, // u = G(count) / G(tare) - 1, G(c) = c / (4095 - c)
     BT_MAP_KIND_CONDUCTANCE_PAIRS = 6, // u_i u_j
-    BT_MAP_KIND_PRESSURE = 7, // PDC above rest
+    BT_MAP_KIND_PRESSURE = 7, // PDC above its tare
 };
 #define BT_MAP_KINDS 8
 // Columns of each kind, in this order.
@@ -33,7 +33,7 @@ enum bt_map_kind {
 #define BT_MAP_KIND_HALVES {2, 20, 20, 20, 190, 20, 190, 2}
 
 enum bt_map_gate {
-    BT_MAP_GATE_ONE = 0, // 1
+    BT_MAP_GATE_ONE = 0, // the constant 1
     BT_MAP_GATE_X = 1, // x
     BT_MAP_GATE_Y = 2, // y
     BT_MAP_GATE_XX = 3, // x^2

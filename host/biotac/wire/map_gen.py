@@ -37,20 +37,20 @@ RESULT_MAX = 49000000
 class Kind(IntEnum):
     """A block's columns."""
 
-    OFFSET = 0  # 1
+    OFFSET = 0  # the constant 1
     SIGNAL = 1  # e = count - tare
     COMPRESSION = 2  # min(e, 0)
     BULGE = 3  # max(e, 0)
     SIGNAL_PAIRS = 4  # e_i e_j
     CONDUCTANCE = 5  # u = G(count) / G(tare) - 1, G(c) = c / (4095 - c)
     CONDUCTANCE_PAIRS = 6  # u_i u_j
-    PRESSURE = 7  # PDC above rest
+    PRESSURE = 7  # PDC above its tare
 
 
 class Gate(IntEnum):
     """What a block's columns are multiplied by."""
 
-    ONE = 0  # 1
+    ONE = 0  # the constant 1
     X = 1  # x
     Y = 2  # y
     XX = 3  # x^2

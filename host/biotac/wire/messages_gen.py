@@ -28,72 +28,72 @@ INVALID_I32 = -(2**31)
 class Error(IntEnum):
     """Why a command was refused."""
 
-    OK = 0  # done
-    UNKNOWN_COMMAND = 1  # this firmware has no such command; update it
-    BAD_LENGTH = 2  # payload length does not fit the command
+    OK = 0  # success
+    UNKNOWN_COMMAND = 1  # this firmware does not know the command; update it
+    BAD_LENGTH = 2  # the payload has the wrong length for this command
     UNKNOWN_SETTING = 3  # no setting has this id
-    OUT_OF_RANGE = 4  # value outside the range given in MESSAGES.md
-    NO_SUCH_FINGER = 5  # finger index is not 0..4, or no sensor answers there
-    BUSY = 6  # not while streaming: send STOP first
-    NOT_STILL = 7  # the signals move too much to tare: release the finger and try again
-    RAILED = 8  # more than two electrodes are at the end of their range: check the sensor
+    OUT_OF_RANGE = 4  # a value is outside the range given in MESSAGES.md
+    NO_SUCH_FINGER = 5  # the finger index is not 0 to 4, or no sensor answers there
+    BUSY = 6  # not possible while streaming: send STOP first
+    NOT_STILL = 7  # the signals are moving too much to tare: release the finger and try again
+    RAILED = 8  # more than two electrodes are railed or missing: check the sensor
     NOT_HERE = 9  # this kind of board cannot do that
-    NOT_STORED = 10  # the flash did not take it; what was stored before still stands
-    OTHER_SENSOR = 11  # made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it
-    NOT_BEGUN = 12  # no upload of this finger's map is under way: begin it; another beginning, STOP and a closed port end one
-    NOT_WHOLE = 13  # bytes of the map are missing or differ from its CRC-32: send it again
+    NOT_STORED = 10  # not written to flash; what was stored before is intact
+    OTHER_SENSOR = 11  # made for a sensor with another serial number: plug that sensor in, or send no serial number to force it
+    NOT_BEGUN = 12  # no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload
+    NOT_WHOLE = 13  # data are missing or do not match the CRC-32: upload them again
 
 
 class TareState(IntEnum):
-    """Where a finger's tare machine is (SPEC.md, Tare)."""
+    """State of a finger's tare machine (SPEC.md, Tare)."""
 
-    INIT = 0  # no tare yet: waiting for still frames
-    REST = 1  # tared, nothing touches; the tare follows slow drift
-    CONTACT = 2  # touched; the tare is frozen but for temperature and drift that all electrodes share
-    FAULT = 3  # railed or dead electrodes; the tare is frozen and no new one is taken
-    DOUBT = 4  # still, and either a light hold or what a press left in the skin: the tare stays, and the next contact is seen
+    INIT = 0  # no tare yet: waiting for still signals
+    REST = 1  # tared and untouched; the tare follows slow drift
+    CONTACT = 2  # touched; the tare follows only temperature and drift common to all electrodes
+    FAULT = 3  # more than two electrodes railed or missing; the tare is frozen, and no new one is taken
+    DOUBT = 4  # still, and either held lightly or with residue of a press in the skin; the tare stays, and a new contact is detected
 
 
 class TareReason(IntEnum):
-    """Why the tare last changed by more than drift tracking."""
+    """The latest change of a tare other than drift tracking, or the host's HOLD or RELEASE."""
 
     NONE = 0  # never tared
     START = 1  # first still frames after power-up or plug-in
-    RELEASE = 2  # contact ended: signals back at the tare
-    RESIDUE = 3  # contact ended with skin hysteresis left over
-    ROLL_BACK = 4  # contact began: tare taken from at least one second before
+    RELEASE = 2  # contact ended: the signals returned to the tare
+    RESIDUE = 3  # contact ended; the residue that it left in the skin is tared out
+    ROLL_BACK = 4  # contact began: back to a tare from at least 1.2 s before, plus drift
     HOST_NOW = 5  # TARE_NOW command
     HOST_SET = 6  # TARE_SET command
-    SHIFT = 7  # pressure alone or all electrodes alike had moved: no touch; the tare moved by that and nothing else
-    UNDONE = 8  # inverted signals proved the tare wrong: the one before it holds again
-    INVERTED = 9  # inverted signals proved the tare wrong and there is none before it: untared until still
-    HOST_HOLD = 10  # HOLD command: the tare is as it was, and stays
-    HOST_RELEASE = 11  # RELEASE command: the tare is as it was, until still
-    HOLD_LAPSED = 12  # the host that said HOLD has been silent for hold_timeout_ms: the tare is as it was
+    SHIFT = 7  # not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much
+    UNDONE = 8  # inverted signals showed that the tare was wrong: the previous one is restored
+    INVERTED = 9  # inverted signals showed that the tare was wrong, with no previous one to restore: untared until still
+    HOST_HOLD = 10  # HOLD command: the tare is unchanged, and kept
+    HOST_RELEASE = 11  # RELEASE command: the tare is unchanged until the signals are still
+    HOLD_LAPSED = 12  # HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged
 
 
 class PocWeights(IntEnum):
-    """How electrode signals weigh in the point of contact (Lin Eq 1). On real plates compression does best."""
+    """Weight of an electrode's signal e in the point of contact (Lin Eq 1)."""
 
-    ABS_N2 = 0  # |e|^2, the paper's
+    ABS_N2 = 0  # e^2, as in the paper
     COMPRESS_N1 = 1  # max(-e, 0)
     COMPRESS_N2 = 2  # min(e, 0)^2
 
 
 class ForceModel(IntEnum):
-    """What the force of a finger without a wrench map comes from."""
+    """Where the force of a finger without a wrench map comes from."""
 
-    LIN = 0  # Lin's three scales, force_gain_*_nn
-    POPULATION = 1  # the population map, made of other fingers (host/docs/population.md), while all three force gains are the defaults; with others it is LIN
+    LIN = 0  # Lin's three gains, force_gain_*_nn
+    POPULATION = 1  # the population map, trained on other fingers (host/docs/population.md), if all three force gains are defaults; otherwise LIN
 
 
 class UartPins(IntEnum):
-    """Which pins a board's UART is on. A Pico has four pairs that its sensors leave free."""
+    """Pins of a board's UART. On a Pico, four pairs are not used by the sensors."""
 
-    GPIO_0_1 = 0  # sends on GPIO 0, hears on GPIO 1
-    GPIO_4_5 = 1  # sends on GPIO 4, hears on GPIO 5
-    GPIO_8_9 = 2  # sends on GPIO 8, hears on GPIO 9
-    GPIO_12_13 = 3  # sends on GPIO 12, hears on GPIO 13
+    GPIO_0_1 = 0  # TX on GPIO 0, RX on GPIO 1
+    GPIO_4_5 = 1  # TX on GPIO 4, RX on GPIO 5
+    GPIO_8_9 = 2  # TX on GPIO 8, RX on GPIO 9
+    GPIO_12_13 = 3  # TX on GPIO 12, RX on GPIO 13
 
 
 class Board(IntEnum):
@@ -102,170 +102,170 @@ class Board(IntEnum):
     POSIX_SIM = 1  # a process on a pty with emulated sensors
     PICO = 2  # Raspberry Pi Pico (RP2040)
     LINUX_SBC = 3  # a Linux computer with the sensors on its own SPI bus (spidev)
-    PICO_SENSOR = 4  # Raspberry Pi Pico that is itself one to five emulated sensors (firmware/boards/pico_sensor): it knows HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages, and nothing else
+    PICO_SENSOR = 4  # Raspberry Pi Pico that emulates one to five sensors (firmware/boards/pico_sensor): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
 
 
 class EmuFault(IntEnum):
-    """What an emulated sensor does instead of answering rightly. A tape holds the same codes in place of counts."""
+    """Faults of an emulated sensor. On a tape, these codes stand in place of counts."""
 
-    NONE = 0  # nothing: it answers
-    SWAPPED = 65529  # unplugged, and it will be another sensor that is plugged in
-    UNPLUGGED = 65530  # no sensor or no power: MISO let go; afterwards it is mute until asked for a property
-    TOO_EARLY = 65531  # late: it answers as if the 50 us had not passed
-    STUCK_HIGH = 65532  # MISO high throughout
-    STUCK_LOW = 65533  # silence: MISO low throughout
-    BAD_PARITY = 65534  # one bit of the word flipped
+    NONE = 0  # no fault
+    SWAPPED = 65529  # unplugged; the sensor plugged in afterwards has another serial number
+    UNPLUGGED = 65530  # no sensor or no power: MISO is not driven; afterwards the sensor sends zeros until a property is read
+    TOO_EARLY = 65531  # it answers as if read before its 50 us had passed
+    STUCK_HIGH = 65532  # MISO is always high
+    STUCK_LOW = 65533  # MISO is always low
+    BAD_PARITY = 65534  # one bit of the word is flipped
     NO_CHANNEL = 65535  # the sensor has no such channel
 
 
 class CalibrationState(IntEnum):
-    """Whether a finger's calibration, or map, is what its results come from."""
+    """Whether a finger's calibration or wrench map is used."""
 
-    NONE = 0  # there is none: the board's settings hold; for a map: the gains
-    IN_FORCE = 1  # it holds in place of the settings, or gains
-    OTHER_SENSOR = 2  # kept, but made for another sensor than the one read at start and there since: the settings, or gains, hold
+    NONE = 0  # there is none: the board's settings are used, or for a map force_model and the gains
+    IN_FORCE = 1  # it is used
+    OTHER_SENSOR = 2  # kept but not used: it is for a sensor with another serial number
 
 
 class EventKind(IntEnum):
-    """What an EVENT tells (SPEC.md, Events)."""
+    """What an EVENT reports (SPEC.md, Events)."""
 
-    TOUCH = 1  # the sample of this slot shows that something touches a resting finger
-    LIFT = 2  # the sample of this slot shows that the finger is let go; one for each TOUCH
-    JOLT = 3  # dynamic pressure jolts: a tap on the finger or on what it holds, a quick squeeze, or a slip's beginning
-    SLIP = 4  # what is held slips: dynamic pressure vibrates to and fro
-    STUCK = 5  # the slip is over; one for each SLIP
+    TOUCH = 1  # something touches a resting finger
+    LIFT = 2  # the finger is no longer touched; one for each TOUCH
+    JOLT = 3  # a jolt of dynamic pressure: a tap on the finger or the held object, a quick squeeze, or the beginning of a slip
+    SLIP = 4  # the held object slips: dynamic pressure vibrates in both directions
+    STUCK = 5  # the slip has ended; one for each SLIP
 
 
 class FrameFlags(IntFlag):
-    """State of one frame's results."""
+    """State of a frame's counts and results."""
 
-    CONTACT = 1 << 0  # the finger is touched
-    UNTARED = 1 << 1  # no tare yet: PoC, force and torque are invalid
-    POC_INVALID = 1 << 2  # no weight on any electrode, or no tare: PoC and torque x are invalid
-    POC_LOW = 1 << 3  # signal energy below four times the contact threshold: the PoC is noisy
-    ELECTRODE_MISSING = 1 << 4  # an electrode had no good word in this frame and counts as zero signal
+    CONTACT = 1 << 0  # the finger is touched (tare state CONTACT)
+    UNTARED = 1 << 1  # no tare: point of contact (PoC), force, torque and torsion are invalid
+    POC_INVALID = 1 << 2  # all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it
+    POC_LOW = 1 << 3  # the signal energy is below four times the contact threshold: the PoC is noisy
+    ELECTRODE_MISSING = 1 << 4  # an electrode had no good word in this frame; its signal counts as 0
     RAIL = 1 << 5  # an electrode reads 0 or at least 4090
-    PDC_MISSING = 1 << 6  # no good pressure word; contact rests on the electrodes alone
+    PDC_MISSING = 1 << 6  # no good static pressure word; contact is judged by the electrodes alone
     TAC_MISSING = 1 << 7  # no good thermal flux word
     TDC_MISSING = 1 << 8  # no good temperature word
-    MX_DERIVED = 1 << 9  # torque x is PoC x force, not measured: the electrodes hardly see it
-    FX_WEAK = 1 << 10  # force x has two to three times the noise of y and z (always)
-    TORSION_OK = 1 << 11  # PoC normal within 60 deg of -z, energy over the threshold, four electrodes active
-    SHEAR_MIX = 1 << 12  # more than half the energy is bulge: the PoC is likely biased
-    BASE_OLD = 1 << 13  # in contact for over 60 s: only drift that all electrodes share was followed
-    TARE_CHANGED = 1 << 14  # this frame is the first with a new tare, or after HOLD or RELEASE (see the TARE message)
-    FAULT = 1 << 15  # more than two electrodes railed or missing: do not trust the results
-    TEMP = 1 << 16  # since the contact began the temperature has moved by over a degree: the tare is doubtful
-    NOT_ASKED = 1 << 17  # some quantity is not subscribed to and marked invalid (SUBSCRIBE)
-    MAPPED = 1 << 18  # force, and torque and torsion where it has them, come from the finger's wrench map
-    DOUBT = 1 << 19  # the force may be a light hold or what a press left in the skin: the tare stays (tare state DOUBT)
-    HELD = 1 << 20  # the host said HOLD: no new tare is taken
-    REPEATED = 1 << 21  # the board was short of time: force, torque and torsion are those of wrench_age_ms before, from the same map
-    SHED = 1 << 22  # the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out
-    SENSOR_UNSURE = 1 << 23  # the sensor was away and has not said its serial number since: tare, calibration and map may be another's
-    SENSOR_OTHER = 1 << 24  # another sensor than at START, with a tare of its own; no results where it has not the same calibration and map
-    POPULATION = 1 << 25  # force comes from the population map, or in part
-    OUTSIDE = 1 << 26  # fewer electrodes carry the signal than on any plate that the population map was made of: force is pulled towards Lin's, or is Lin's
+    MX_DERIVED = 1 << 9  # (always) torque x is derived from PoC and force unless a wrench map gives it: electrodes hardly sense it
+    FX_WEAK = 1 << 10  # (always) force x has two to three times the noise of y and z
+    TORSION_OK = 1 << 11  # suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing
+    SHEAR_MIX = 1 << 12  # more than half of the signal energy is bulge: the PoC is probably biased
+    BASE_OLD = 1 << 13  # in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes
+    TARE_CHANGED = 1 << 14  # first frame with a new tare, or after HOLD or RELEASE (see the TARE message)
+    FAULT = 1 << 15  # more than two electrodes are railed or missing: do not trust the results
+    TEMP = 1 << 16  # the temperature has changed by over a degree since the contact began: the tare is uncertain
+    NOT_ASKED = 1 << 17  # some quantity is not subscribed to, and marked invalid (SUBSCRIBE)
+    MAPPED = 1 << 18  # force, and torque and torsion if the map has them, come from the finger's wrench map
+    DOUBT = 1 << 19  # tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays
+    HELD = 1 << 20  # the host sent HOLD: no new tare is taken
+    REPEATED = 1 << 21  # the board was short of time: force, torque and torsion repeat the map's results of wrench_age_ms before
+    SHED = 1 << 22  # the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent
+    SENSOR_UNSURE = 1 << 23  # the sensor was away and has not given its serial number since: tare, calibration and map may belong to another
+    SENSOR_OTHER = 1 << 24  # another sensor than at START, with its own tare; no results if it needs another calibration or map
+    POPULATION = 1 << 25  # force comes from the population map; if OUTSIDE, only partly or not at all
+    OUTSIDE = 1 << 26  # fewer electrodes carry the signal than on any plate that the population map was trained on: force is mixed with LIN's, or is LIN's
 
 
 class FaultFlags(IntFlag):
-    """What went wrong on a board (STATUS); a bit stays until CLEAR_FAULTS."""
+    """What went wrong on a board (STATUS). A bit stays set until CLEAR_FAULTS."""
 
-    STARTED = 1 << 0  # it was switched on, lost power for a moment, or was reset from outside
-    HUNG = 1 << 1  # the firmware stood still for a second, and the watchdog started it again
-    CRASHED = 1 << 2  # the firmware started itself again after an exception
-    STORAGE = 1 << 3  # what was saved is damaged or half written: settings, calibrations and maps may be older ones, or the defaults
+    STARTED = 1 << 0  # it was switched on, lost power briefly, or was reset externally
+    HUNG = 1 << 1  # the firmware hung for a second, and the watchdog restarted it
+    CRASHED = 1 << 2  # the firmware restarted itself after an exception
+    STORAGE = 1 << 3  # stored data are damaged or incomplete: settings, calibrations and maps may be older ones, or the defaults
     SLOTS_LATE = 1 << 4  # the main loop fell behind and slots were lost
-    DROPPED = 1 << 5  # messages found no room: the host read too slowly
-    LINK_DAMAGED = 1 << 6  # bytes from the host came damaged
-    HOST_SILENT = 1 << 7  # a stream was ended because the host said nothing for keepalive_ms
-    HOLD_LAPSED = 1 << 8  # a HOLD ended because the host said nothing for hold_timeout_ms
+    DROPPED = 1 << 5  # messages were dropped for lack of room: the host read too slowly
+    LINK_DAMAGED = 1 << 6  # frames from the host were damaged or had a wrong length
+    HOST_SILENT = 1 << 7  # a stream ended because the host sent nothing for keepalive_ms
+    HOLD_LAPSED = 1 << 8  # a HOLD ended because the host sent nothing for hold_timeout_ms
 
 
 class StreamFlags(IntFlag):
     """What START turns on."""
 
-    FRAMES = 1 << 0  # FRAME messages
+    FRAMES = 1 << 0  # FRAME and TARE messages; IDLE and TOUCH as subscribed
     PAC = 1 << 1  # PAC messages
-    STATUS = 1 << 2  # STATUS and SENSOR_STATUS once per status_period_ms
+    STATUS = 1 << 2  # STATUS and SENSOR_STATUS every status_period_ms
     BANDS = 1 << 3  # BANDS messages
 
 
 class QuantityFlags(IntFlag):
-    """What SUBSCRIBE asks for. What is not asked for is not computed."""
+    """What a host can SUBSCRIBE to. The board does not compute the rest."""
 
-    POC = 1 << 0  # point of contact; without it TORSION_OK is never set
+    POC = 1 << 0  # point of contact; TORSION_OK needs it
     FORCE = 1 << 1  # force
     TORQUE = 1 << 2  # torque and torsion
-    SIGMA = 1 << 3  # one-sigma of point of contact and force
-    REST_FRAMES = 1 << 4  # a FRAME in every round; without it an untouched finger sends IDLE heartbeats
+    SIGMA = 1 << 3  # standard deviations of point of contact and force
+    REST_FRAMES = 1 << 4  # a FRAME in every round; without it, an untouched finger sends IDLE heartbeats
     TOUCH = 1 << 5  # TOUCH messages
-    PRESSURE = 1 << 6  # filtered static pressure, and the force that it tells of a calibrated finger
-    EVENTS = 1 << 7  # EVENT messages, with FRAMEs or without
+    PRESSURE = 1 << 6  # filtered static pressure and, if calibrated, the force from it
+    EVENTS = 1 << 7  # EVENT messages; sent while FRAMES or PAC is on
 
 
 ERROR_DOC: dict[int, str] = {
-    0: "done",
-    1: "this firmware has no such command; update it",
-    2: "payload length does not fit the command",
+    0: "success",
+    1: "this firmware does not know the command; update it",
+    2: "the payload has the wrong length for this command",
     3: "no setting has this id",
-    4: "value outside the range given in MESSAGES.md",
-    5: "finger index is not 0..4, or no sensor answers there",
-    6: "not while streaming: send STOP first",
-    7: "the signals move too much to tare: release the finger and try again",
-    8: "more than two electrodes are at the end of their range: check the sensor",
+    4: "a value is outside the range given in MESSAGES.md",
+    5: "the finger index is not 0 to 4, or no sensor answers there",
+    6: "not possible while streaming: send STOP first",
+    7: "the signals are moving too much to tare: release the finger and try again",
+    8: "more than two electrodes are railed or missing: check the sensor",
     9: "this kind of board cannot do that",
-    10: "the flash did not take it; what was stored before still stands",
-    11: "made for another sensor than the one read at start: restart the board if that was plugged in since, or send no serial number to force it",
-    12: "no upload of this finger's map is under way: begin it; another beginning, STOP and a closed port end one",
-    13: "bytes of the map are missing or differ from its CRC-32: send it again",
+    10: "not written to flash; what was stored before is intact",
+    11: "made for a sensor with another serial number: plug that sensor in, or send no serial number to force it",
+    12: "no upload of this finger's map is in progress: send BEGIN_MAP; another BEGIN_MAP, STOP or a closed port ends an upload",
+    13: "data are missing or do not match the CRC-32: upload them again",
 }
 
 
 TARE_STATE_DOC: dict[int, str] = {
-    0: "no tare yet: waiting for still frames",
-    1: "tared, nothing touches; the tare follows slow drift",
-    2: "touched; the tare is frozen but for temperature and drift that all electrodes share",
-    3: "railed or dead electrodes; the tare is frozen and no new one is taken",
-    4: "still, and either a light hold or what a press left in the skin: the tare stays, and the next contact is seen",
+    0: "no tare yet: waiting for still signals",
+    1: "tared and untouched; the tare follows slow drift",
+    2: "touched; the tare follows only temperature and drift common to all electrodes",
+    3: "more than two electrodes railed or missing; the tare is frozen, and no new one is taken",
+    4: "still, and either held lightly or with residue of a press in the skin; the tare stays, and a new contact is detected",
 }
 
 
 TARE_REASON_DOC: dict[int, str] = {
     0: "never tared",
     1: "first still frames after power-up or plug-in",
-    2: "contact ended: signals back at the tare",
-    3: "contact ended with skin hysteresis left over",
-    4: "contact began: tare taken from at least one second before",
+    2: "contact ended: the signals returned to the tare",
+    3: "contact ended; the residue that it left in the skin is tared out",
+    4: "contact began: back to a tare from at least 1.2 s before, plus drift",
     5: "TARE_NOW command",
     6: "TARE_SET command",
-    7: "pressure alone or all electrodes alike had moved: no touch; the tare moved by that and nothing else",
-    8: "inverted signals proved the tare wrong: the one before it holds again",
-    9: "inverted signals proved the tare wrong and there is none before it: untared until still",
-    10: "HOLD command: the tare is as it was, and stays",
-    11: "RELEASE command: the tare is as it was, until still",
-    12: "the host that said HOLD has been silent for hold_timeout_ms: the tare is as it was",
+    7: "not a touch: only pressure, or all electrodes alike, had moved; the tare moved by as much",
+    8: "inverted signals showed that the tare was wrong: the previous one is restored",
+    9: "inverted signals showed that the tare was wrong, with no previous one to restore: untared until still",
+    10: "HOLD command: the tare is unchanged, and kept",
+    11: "RELEASE command: the tare is unchanged until the signals are still",
+    12: "HOLD ended, as the host was silent for hold_timeout_ms: the tare is unchanged",
 }
 
 
 POC_WEIGHTS_DOC: dict[int, str] = {
-    0: "|e|^2, the paper's",
+    0: "e^2, as in the paper",
     1: "max(-e, 0)",
     2: "min(e, 0)^2",
 }
 
 
 FORCE_MODEL_DOC: dict[int, str] = {
-    0: "Lin's three scales, force_gain_*_nn",
-    1: "the population map, made of other fingers (host/docs/population.md), while all three force gains are the defaults; with others it is LIN",
+    0: "Lin's three gains, force_gain_*_nn",
+    1: "the population map, trained on other fingers (host/docs/population.md), if all three force gains are defaults; otherwise LIN",
 }
 
 
 UART_PINS_DOC: dict[int, str] = {
-    0: "sends on GPIO 0, hears on GPIO 1",
-    1: "sends on GPIO 4, hears on GPIO 5",
-    2: "sends on GPIO 8, hears on GPIO 9",
-    3: "sends on GPIO 12, hears on GPIO 13",
+    0: "TX on GPIO 0, RX on GPIO 1",
+    1: "TX on GPIO 4, RX on GPIO 5",
+    2: "TX on GPIO 8, RX on GPIO 9",
+    3: "TX on GPIO 12, RX on GPIO 13",
 }
 
 
@@ -273,99 +273,99 @@ BOARD_DOC: dict[int, str] = {
     1: "a process on a pty with emulated sensors",
     2: "Raspberry Pi Pico (RP2040)",
     3: "a Linux computer with the sensors on its own SPI bus (spidev)",
-    4: "Raspberry Pi Pico that is itself one to five emulated sensors (firmware/boards/pico_sensor): it knows HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages, and nothing else",
+    4: "Raspberry Pi Pico that emulates one to five sensors (firmware/boards/pico_sensor): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages",
 }
 
 
 EMU_FAULT_DOC: dict[int, str] = {
-    0: "nothing: it answers",
-    65529: "unplugged, and it will be another sensor that is plugged in",
-    65530: "no sensor or no power: MISO let go; afterwards it is mute until asked for a property",
-    65531: "late: it answers as if the 50 us had not passed",
-    65532: "MISO high throughout",
-    65533: "silence: MISO low throughout",
-    65534: "one bit of the word flipped",
+    0: "no fault",
+    65529: "unplugged; the sensor plugged in afterwards has another serial number",
+    65530: "no sensor or no power: MISO is not driven; afterwards the sensor sends zeros until a property is read",
+    65531: "it answers as if read before its 50 us had passed",
+    65532: "MISO is always high",
+    65533: "MISO is always low",
+    65534: "one bit of the word is flipped",
     65535: "the sensor has no such channel",
 }
 
 
 CALIBRATION_STATE_DOC: dict[int, str] = {
-    0: "there is none: the board's settings hold; for a map: the gains",
-    1: "it holds in place of the settings, or gains",
-    2: "kept, but made for another sensor than the one read at start and there since: the settings, or gains, hold",
+    0: "there is none: the board's settings are used, or for a map force_model and the gains",
+    1: "it is used",
+    2: "kept but not used: it is for a sensor with another serial number",
 }
 
 
 EVENT_KIND_DOC: dict[int, str] = {
-    1: "the sample of this slot shows that something touches a resting finger",
-    2: "the sample of this slot shows that the finger is let go; one for each TOUCH",
-    3: "dynamic pressure jolts: a tap on the finger or on what it holds, a quick squeeze, or a slip's beginning",
-    4: "what is held slips: dynamic pressure vibrates to and fro",
-    5: "the slip is over; one for each SLIP",
+    1: "something touches a resting finger",
+    2: "the finger is no longer touched; one for each TOUCH",
+    3: "a jolt of dynamic pressure: a tap on the finger or the held object, a quick squeeze, or the beginning of a slip",
+    4: "the held object slips: dynamic pressure vibrates in both directions",
+    5: "the slip has ended; one for each SLIP",
 }
 
 
 FRAME_FLAG_DOC: dict[int, str] = {
-    1: "the finger is touched",
-    2: "no tare yet: PoC, force and torque are invalid",
-    4: "no weight on any electrode, or no tare: PoC and torque x are invalid",
-    8: "signal energy below four times the contact threshold: the PoC is noisy",
-    16: "an electrode had no good word in this frame and counts as zero signal",
+    1: "the finger is touched (tare state CONTACT)",
+    2: "no tare: point of contact (PoC), force, torque and torsion are invalid",
+    4: "all weights are 0, or no tare: the PoC is invalid, and torque x unless a wrench map gives it",
+    8: "the signal energy is below four times the contact threshold: the PoC is noisy",
+    16: "an electrode had no good word in this frame; its signal counts as 0",
     32: "an electrode reads 0 or at least 4090",
-    64: "no good pressure word; contact rests on the electrodes alone",
+    64: "no good static pressure word; contact is judged by the electrodes alone",
     128: "no good thermal flux word",
     256: "no good temperature word",
-    512: "torque x is PoC x force, not measured: the electrodes hardly see it",
-    1024: "force x has two to three times the noise of y and z (always)",
-    2048: "PoC normal within 60 deg of -z, energy over the threshold, four electrodes active",
-    4096: "more than half the energy is bulge: the PoC is likely biased",
-    8192: "in contact for over 60 s: only drift that all electrodes share was followed",
-    16384: "this frame is the first with a new tare, or after HOLD or RELEASE (see the TARE message)",
-    32768: "more than two electrodes railed or missing: do not trust the results",
-    65536: "since the contact began the temperature has moved by over a degree: the tare is doubtful",
-    131072: "some quantity is not subscribed to and marked invalid (SUBSCRIBE)",
-    262144: "force, and torque and torsion where it has them, come from the finger's wrench map",
-    524288: "the force may be a light hold or what a press left in the skin: the tare stays (tare state DOUBT)",
-    1048576: "the host said HOLD: no new tare is taken",
-    2097152: "the board was short of time: force, torque and torsion are those of wrench_age_ms before, from the same map",
-    4194304: "the board was short of time: this FRAME's standard deviations, or whole FRAMEs before it, were left out",
-    8388608: "the sensor was away and has not said its serial number since: tare, calibration and map may be another's",
-    16777216: "another sensor than at START, with a tare of its own; no results where it has not the same calibration and map",
-    33554432: "force comes from the population map, or in part",
-    67108864: "fewer electrodes carry the signal than on any plate that the population map was made of: force is pulled towards Lin's, or is Lin's",
+    512: "(always) torque x is derived from PoC and force unless a wrench map gives it: electrodes hardly sense it",
+    1024: "(always) force x has two to three times the noise of y and z",
+    2048: "suits torsion: PoC normal within 60 deg of -z, energy over the threshold, four electrodes active, none railed or missing",
+    4096: "more than half of the signal energy is bulge: the PoC is probably biased",
+    8192: "in contact for over 60 s: the tare has followed only temperature and drift common to all electrodes",
+    16384: "first frame with a new tare, or after HOLD or RELEASE (see the TARE message)",
+    32768: "more than two electrodes are railed or missing: do not trust the results",
+    65536: "the temperature has changed by over a degree since the contact began: the tare is uncertain",
+    131072: "some quantity is not subscribed to, and marked invalid (SUBSCRIBE)",
+    262144: "force, and torque and torsion if the map has them, come from the finger's wrench map",
+    524288: "tare state DOUBT: the force may be a light hold or residue of a press in the skin; the tare stays",
+    1048576: "the host sent HOLD: no new tare is taken",
+    2097152: "the board was short of time: force, torque and torsion repeat the map's results of wrench_age_ms before",
+    4194304: "the board was short of time: this FRAME lacks standard deviations, or FRAMEs before it were not sent",
+    8388608: "the sensor was away and has not given its serial number since: tare, calibration and map may belong to another",
+    16777216: "another sensor than at START, with its own tare; no results if it needs another calibration or map",
+    33554432: "force comes from the population map; if OUTSIDE, only partly or not at all",
+    67108864: "fewer electrodes carry the signal than on any plate that the population map was trained on: force is mixed with LIN's, or is LIN's",
 }
 
 
 FAULT_FLAG_DOC: dict[int, str] = {
-    1: "it was switched on, lost power for a moment, or was reset from outside",
-    2: "the firmware stood still for a second, and the watchdog started it again",
-    4: "the firmware started itself again after an exception",
-    8: "what was saved is damaged or half written: settings, calibrations and maps may be older ones, or the defaults",
+    1: "it was switched on, lost power briefly, or was reset externally",
+    2: "the firmware hung for a second, and the watchdog restarted it",
+    4: "the firmware restarted itself after an exception",
+    8: "stored data are damaged or incomplete: settings, calibrations and maps may be older ones, or the defaults",
     16: "the main loop fell behind and slots were lost",
-    32: "messages found no room: the host read too slowly",
-    64: "bytes from the host came damaged",
-    128: "a stream was ended because the host said nothing for keepalive_ms",
-    256: "a HOLD ended because the host said nothing for hold_timeout_ms",
+    32: "messages were dropped for lack of room: the host read too slowly",
+    64: "frames from the host were damaged or had a wrong length",
+    128: "a stream ended because the host sent nothing for keepalive_ms",
+    256: "a HOLD ended because the host sent nothing for hold_timeout_ms",
 }
 
 
 STREAM_FLAG_DOC: dict[int, str] = {
-    1: "FRAME messages",
+    1: "FRAME and TARE messages; IDLE and TOUCH as subscribed",
     2: "PAC messages",
-    4: "STATUS and SENSOR_STATUS once per status_period_ms",
+    4: "STATUS and SENSOR_STATUS every status_period_ms",
     8: "BANDS messages",
 }
 
 
 QUANTITY_FLAG_DOC: dict[int, str] = {
-    1: "point of contact; without it TORSION_OK is never set",
+    1: "point of contact; TORSION_OK needs it",
     2: "force",
     4: "torque and torsion",
-    8: "one-sigma of point of contact and force",
-    16: "a FRAME in every round; without it an untouched finger sends IDLE heartbeats",
+    8: "standard deviations of point of contact and force",
+    16: "a FRAME in every round; without it, an untouched finger sends IDLE heartbeats",
     32: "TOUCH messages",
-    64: "filtered static pressure, and the force that it tells of a calibrated finger",
-    128: "EVENT messages, with FRAMEs or without",
+    64: "filtered static pressure and, if calibrated, the force from it",
+    128: "EVENT messages; sent while FRAMES or PAC is on",
 }
 
 
@@ -404,11 +404,11 @@ class SettingSpec(NamedTuple):
 SETTINGS: dict[Setting, SettingSpec] = {
     Setting.POC_WEIGHTS: SettingSpec(
         "enum poc_weights", 0, 2, 1, 1,
-        "weights of the point of contact; compression n=1 is best on real plates",
+        "electrode weights of the point of contact; COMPRESS_N1 is best on real plates",
     ),
     Setting.FORCE_GAIN_X_NN: SettingSpec(
         "nN/count", -100000000, 100000000, 1063440, 1063440,
-        "S_x of Lin Eq 3; default: one real finger, least squares without offset; calibrate yours",
+        "S_x of Lin Eq 3; default: fitted to one real finger, by least squares without offset; calibrate yours",
     ),
     Setting.FORCE_GAIN_Y_NN: SettingSpec(
         "nN/count", -100000000, 100000000, 252325, 252325,
@@ -420,51 +420,51 @@ SETTINGS: dict[Setting, SettingSpec] = {
     ),
     Setting.TORQUE_GAIN_Y_NN: SettingSpec(
         "nN/count", -100000000, 100000000, 2262234, 2262234,
-        "scale of M_y, Lin Eq 4; default: S_z, whose force is its lever load; no torque truth exists for a real finger",
+        "scale of M_y in Lin Eq 4; default: S_z, as the force along z makes M_y; there is no measured torque of a real finger",
     ),
     Setting.TORQUE_GAIN_Z_NN: SettingSpec(
         "nN/count", -100000000, 100000000, 252325, 252325,
-        "scale of M_z, Lin Eq 4; default: S_y",
+        "scale of M_z in Lin Eq 4; default: S_y",
     ),
     Setting.CONTACT_ENERGY_COUNT2: SettingSpec(
         "count^2", 50, 1000000, 1000, 1000,
-        "sum of e^2 above which a finger is touched (Lin IV.B); raised to three times the measured noise energy",
+        "sum of e^2 above which a finger is touched (Lin IV.B); or three times the measured noise energy if that is more, but at most three times this setting",
     ),
     Setting.STATUS_PERIOD_MS: SettingSpec(
         "ms", 100, 60000, 1000, 1000,
-        "between two periodic STATUS rounds",
+        "time between periodic STATUS messages",
     ),
     Setting.IDLE_PERIOD_MS: SettingSpec(
         "ms", 20, 60000, 100, 100,
-        "between two IDLE heartbeats of an untouched finger",
+        "time between IDLE heartbeats of an untouched finger",
     ),
     Setting.THERMAL_GAIN_MILLI: SettingSpec(
         "count/1000 per TDC count", -5000, 5000, 500, 500,
-        "how much a resting electrode gains per count of temperature: the tare follows it in contact; 700 to 970 seen on real fingers, where TDC alone does not tell all",
+        "change of a resting electrode per count of TDC, which the tare follows in contact; real fingers showed 700 to 970, but TDC does not explain all of it",
     ),
     Setting.PRESSURE_GAIN_NN: SettingSpec(
         "nN/count", 0, 100000000, 0, 0,
-        "K of Navarro 2015 Eq 1, force per count of static pressure; 0: not calibrated, and no force is told. 9 to 16 million there; `biotac calibrate pressure` finds yours",
+        "K of Navarro 2015 Eq 1, force per count of static pressure; 0: not calibrated, no force. Navarro has 9 to 16 million; `biotac calibrate pressure` finds yours",
     ),
     Setting.PRESSURE_FILTER_MILLI: SettingSpec(
         "1/1000", 10, 1000, 500, 500,
-        "alpha of Navarro 2015 Eq 3, the weight of a new pressure word in the filter; 1000: no filter",
+        "alpha of Navarro 2015 Eq 3, the weight of a new static pressure word in the filter; 1000: no filter",
     ),
     Setting.HOLD_TIMEOUT_MS: SettingSpec(
         "ms", 0, 3600000, 2000, 2000,
-        "how long HOLD outlives the host's last word; 0: for ever",
+        "how long a HOLD lasts after the host's last message; 0: without limit",
     ),
     Setting.FORCE_MODEL: SettingSpec(
         "enum force_model", 0, 1, 1, 0,
-        "force of a finger that has neither a wrench map nor force gains of its own; firmware, records and recordings that do not know it: LIN",
+        "force of a finger without a wrench map or force gains of its own; firmware, records and recordings without this setting: LIN",
     ),
     Setting.UART_BITS_PER_S: SettingSpec(
         "bit/s", 0, 3000000, 0, 0,
-        "of a UART that speaks this protocol while no host has the USB port open: 8 data bits, no parity, one stop bit; below 1200: there is none. Saved, it holds from the board's next start on; boards that are no Pico have none",
+        "bit rate of a UART for this protocol while no host has the USB port open: 8 data bits, no parity, one stop bit; below 1200: off. Used from the board's next start if saved; only a Pico has one",
     ),
     Setting.UART_PINS: SettingSpec(
         "enum uart_pins", 0, 3, 0, 0,
-        "where that UART is; from the next start on, too",
+        "pins of that UART; likewise from the next start",
     ),
 }
 
@@ -483,7 +483,7 @@ CALIBRATION_SETTINGS: tuple[Setting, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """Who is there. Reply to HELLO_REQUEST."""
+    """Identifies the board. Reply to HELLO_REQUEST."""
 
     req_id: int
     nonce: int
@@ -546,7 +546,7 @@ class Hello:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """Outcome of a command that has no message of its own, or the refusal of any command."""
+    """Result of a command that has no reply message of its own, or refusal of any command."""
 
     req_id: int
     command: int
@@ -606,7 +606,7 @@ class SettingValue:
 
 @dataclass(frozen=True, slots=True)
 class SensorInfo:
-    """What a sensor says of itself, read at power-up, and the serial number again whenever it was away; of one that came later it is all that is known. What was not read twice alike is zero. Reply to GET_SENSOR_INFO."""
+    """What a sensor reports about itself, read when the board starts. After an absence only the serial number is read again; for a new sensor, the rest is then 0. A value is 0 unless two reads agreed. Reply to GET_SENSOR_INFO."""
 
     req_id: int
     finger: int
@@ -651,7 +651,7 @@ class SensorInfo:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """Where a finger is touched right now, inside a round, from the latest word of every electrode. Reply to GET_POINT."""
+    """Where a finger is touched now, within a round, from the latest word of every electrode. Reply to GET_POINT."""
 
     req_id: int
     finger: int
@@ -729,7 +729,7 @@ class Calibration:
 
 @dataclass(frozen=True, slots=True)
 class MapInfo:
-    """Which wrench map a finger has. Reply to GET_MAP and END_MAP."""
+    """The wrench map of one finger. Reply to GET_MAP and END_MAP."""
 
     req_id: int
     finger: int
@@ -804,7 +804,7 @@ class MapData:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One finger, one round of slots: counts, the tare that was subtracted, and the results."""
+    """One round of one finger: counts, the tare that was subtracted, and the results (axes: SPEC.md)."""
 
     seq: int
     t_us: int
@@ -885,7 +885,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Pac:
-    """The 22 dynamic pressure samples of one finger and one round of slots."""
+    """The 22 dynamic pressure samples of one finger in one round."""
 
     seq: int
     t_us: int
@@ -918,7 +918,7 @@ class Pac:
 
 @dataclass(frozen=True, slots=True)
 class Tare:
-    """The tare changed by more than drift tracking. Sent with FRAMES."""
+    """The tare changed by more than drift tracking, or the host sent HOLD or RELEASE. Sent with FRAMES."""
 
     seq: int
     t_us: int
@@ -963,7 +963,7 @@ class Tare:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """Health of the board and the link. Periodic, and reply to GET_STATUS."""
+    """Health of the board and the link. Sent periodically, and as reply to GET_STATUS. Counters start at boot."""
 
     seq: int
     t_us: int
@@ -1047,7 +1047,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True)
 class SensorStatus:
-    """Health of one sensor. Periodic for each present sensor, and reply to GET_SENSOR_STATUS."""
+    """Health of one sensor. Sent periodically for each present sensor, and as reply to GET_SENSOR_STATUS. Counters start at boot."""
 
     seq: int
     t_us: int
@@ -1110,7 +1110,7 @@ class SensorStatus:
 
 @dataclass(frozen=True, slots=True)
 class Idle:
-    """Heartbeat of an untouched finger: it stands for the FRAMEs that were not sent."""
+    """Heartbeat of an untouched finger, in place of the FRAMEs that were not sent."""
 
     seq: int
     t_us: int
@@ -1158,7 +1158,7 @@ class Idle:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """A resting finger's trigger fired in this slot. A hint, sent at once; CONTACT follows if it fires in three rounds on end."""
+    """A resting finger's trigger fired in this slot. An early hint: CONTACT follows if it fires in three rounds in a row."""
 
     seq: int
     t_us: int
@@ -1194,7 +1194,7 @@ class Touch:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something has happened to a finger, told in the slot of the sample that shows it. Sent to who subscribes to EVENTS, while a stream of FRAMEs or PAC is on."""
+    """Something happened to a finger. Sent in the slot whose sample shows it, to hosts that subscribe to EVENTS, while FRAMES or PAC is on."""
 
     seq: int
     t_us: int
@@ -1242,7 +1242,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Bands:
-    """How strongly dynamic pressure vibrated in one round, in six octaves (SPEC.md, Bands)."""
+    """How strongly dynamic pressure vibrated in one round, in six octave bands (SPEC.md, Bands)."""
 
     seq: int
     t_us: int
@@ -1278,7 +1278,7 @@ class Bands:
 
 @dataclass(frozen=True, slots=True)
 class HelloRequest:
-    """First message of a host. Allowed at any time."""
+    """First command of a host. Allowed at any time."""
 
     req_id: int
     nonce: int
@@ -1305,7 +1305,7 @@ class HelloRequest:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Start streaming. Sequence numbers go on from where they were."""
+    """Start streaming. Sequence numbers continue."""
 
     req_id: int
     streams: int
@@ -1362,7 +1362,7 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class Ping:
-    """Keep-alive, and a barrier: its reply comes after all that was sent before."""
+    """Keep-alive and barrier: its reply comes after everything sent before."""
 
     req_id: int
 
@@ -1386,7 +1386,7 @@ class Ping:
 
 @dataclass(frozen=True, slots=True)
 class Subscribe:
-    """What FRAMEs hold from the next round on; until then POC, FORCE, TORQUE, PRESSURE and REST_FRAMES. Kept until the next reboot."""
+    """Choose what FRAMEs contain from the next one on. Default: POC, FORCE, TORQUE, PRESSURE and REST_FRAMES. Kept until the next reboot."""
 
     req_id: int
     fingers: int
@@ -1416,7 +1416,7 @@ class Subscribe:
 
 @dataclass(frozen=True, slots=True)
 class GetPoint:
-    """Ask for POINT, without waiting for the round's end."""
+    """Ask for POINT, without waiting for the round to end. Refused (OTHER_SENSOR) if SENSOR_OTHER leaves no results."""
 
     req_id: int
     finger: int
@@ -1443,7 +1443,7 @@ class GetPoint:
 
 @dataclass(frozen=True, slots=True)
 class TareNow:
-    """Take the latest means of eight rounds as the new tare; refused while the signals move."""
+    """Take the latest means over eight rounds as the new tare. Refused while the signals move (NOT_STILL)."""
 
     req_id: int
     finger: int
@@ -1470,7 +1470,7 @@ class TareNow:
 
 @dataclass(frozen=True, slots=True)
 class TareSet:
-    """Use this tare from the next frame on, such as one stored for a finger that is already loaded."""
+    """Use this tare from the next FRAME on, such as one stored for a finger that is already loaded."""
 
     req_id: int
     finger: int
@@ -1581,7 +1581,7 @@ class GetSensorInfo:
 
 @dataclass(frozen=True, slots=True)
 class GetSetting:
-    """Ask for a setting."""
+    """Ask for SETTING."""
 
     req_id: int
     setting: int
@@ -1608,7 +1608,7 @@ class GetSetting:
 
 @dataclass(frozen=True, slots=True)
 class SetSetting:
-    """Change a setting until the next reboot, or for good with SAVE_SETTINGS; refused while streaming, so that one recording has one set."""
+    """Change a setting until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming, so that a recording has one set of settings."""
 
     req_id: int
     setting: int
@@ -1638,7 +1638,7 @@ class SetSetting:
 
 @dataclass(frozen=True, slots=True)
 class RebootBootloader:
-    """Leave the firmware for the board's loader: it replies, is gone from the bus, and comes back as a drive. Allowed at any time."""
+    """Restart into the board's boot loader: the board replies, leaves USB and comes back as a drive. Allowed at any time."""
 
     req_id: int
     magic: int
@@ -1665,7 +1665,7 @@ class RebootBootloader:
 
 @dataclass(frozen=True, slots=True)
 class SaveSettings:
-    """Keep the settings, calibrations and maps over reboots; refused while streaming, as slots are lost while the flash is written. A loss of power leaves what was stored before, or this, whole: of the settings, of each finger's calibration and of each finger's map."""
+    """Store settings, calibrations and maps permanently. Refused while streaming, as slots are lost while flash is written. If power fails, the settings and each finger's calibration and map are each either old or new, never mixed."""
 
     req_id: int
 
@@ -1716,7 +1716,7 @@ class GetCalibration:
 
 @dataclass(frozen=True, slots=True)
 class SetCalibration:
-    """Give a finger values of its own in place of the per-finger settings, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming."""
+    """Give a finger its own values for the per-finger settings, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming."""
 
     req_id: int
     finger: int
@@ -1752,7 +1752,7 @@ class SetCalibration:
 
 @dataclass(frozen=True, slots=True)
 class ClearCalibration:
-    """Return a finger to the board's settings, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming."""
+    """Use the board's settings for a finger again, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming."""
 
     req_id: int
     finger: int
@@ -1806,7 +1806,7 @@ class GetMap:
 
 @dataclass(frozen=True, slots=True)
 class ReadMap:
-    """Ask for a part of the map that MAP_INFO tells of, in force or not."""
+    """Ask for a part of the map that MAP_INFO describes, whether it is used or not."""
 
     req_id: int
     finger: int
@@ -1836,7 +1836,7 @@ class ReadMap:
 
 @dataclass(frozen=True, slots=True)
 class BeginMap:
-    """Begin to upload a wrench map; what is in force and what is stored stays until END_MAP. One upload at a time: an earlier one ends. Refused while streaming."""
+    """Begin to upload a wrench map. The finger keeps its present map until END_MAP. One upload at a time: a new one ends the one before. Refused while streaming."""
 
     req_id: int
     finger: int
@@ -1869,7 +1869,7 @@ class BeginMap:
 
 @dataclass(frozen=True, slots=True)
 class WriteMap:
-    """Write a part of the map that is being uploaded, in any order; the same part again is harmless. It may take as long as the flash takes to erase a sector, 0.4 s. Refused while streaming."""
+    """Write a part of the map, in any order. The same part again is harmless; other bytes for it are refused (NOT_STORED). Takes up to 0.4 s if a flash sector must be erased. Refused while streaming."""
 
     req_id: int
     finger: int
@@ -1902,7 +1902,7 @@ class WriteMap:
 
 @dataclass(frozen=True, slots=True)
 class EndMap:
-    """Put the uploaded map into force, until the next reboot, or for good with SAVE_SETTINGS. Every part must be there and the CRC right (NOT_WHOLE), the map one that this firmware can compute (OUT_OF_RANGE), and its sensor the one there (OTHER_SENSOR); a map with an all-zero serial number is for any. Refused while streaming."""
+    """Use the uploaded map until the next reboot, or permanently with SAVE_SETTINGS. All parts must be there and match the CRC-32 (NOT_WHOLE), the firmware must be able to compute the map (OUT_OF_RANGE), and its serial number must be this sensor's or all zero (OTHER_SENSOR). Refused while streaming."""
 
     req_id: int
     finger: int
@@ -1932,7 +1932,7 @@ class EndMap:
 
 @dataclass(frozen=True, slots=True)
 class ClearMap:
-    """Return a finger to its gains, until the next reboot, or for good with SAVE_SETTINGS; refused while streaming."""
+    """Remove a finger's wrench map, until the next reboot, or permanently with SAVE_SETTINGS. Refused while streaming."""
 
     req_id: int
     finger: int
@@ -1959,7 +1959,7 @@ class ClearMap:
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """These fingers hold something: no new tare is taken until RELEASE, or until the host has been silent for hold_timeout_ms. Again is harmless."""
+    """These fingers hold something: no new tare is taken until RELEASE, or until the host has been silent for hold_timeout_ms. Repeating it is harmless."""
 
     req_id: int
     fingers: int
@@ -1986,7 +1986,7 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """These fingers hold nothing any more: where a light hold and a press's residue cannot be told apart, it is residue, until the next contact."""
+    """These fingers hold nothing: until the next contact, what may be a light hold or residue of a press (DOUBT) is tared as residue."""
 
     req_id: int
     fingers: int
@@ -2013,7 +2013,7 @@ class Release:
 
 @dataclass(frozen=True, slots=True)
 class ClearFaults:
-    """Clear what STATUS told of: these bits and no others, so that what came meanwhile stays. What still goes on is set again in the next round."""
+    """Clear faults that STATUS reported. Only these bits are cleared, so that new faults stay. A fault that persists is set again in the next round."""
 
     req_id: int
     faults: int
@@ -2043,7 +2043,7 @@ class ClearFaults:
 
 @dataclass(frozen=True, slots=True)
 class EmuStatus:
-    """How an emulated sensor board gets on. Reply to every EMU command. Counts are since EMU_PLUG of finger 0."""
+    """State of an emulated sensor board. Reply to every EMU command. Counters start at EMU_PLUG of finger 0."""
 
     req_id: int
     fingers: int
@@ -2103,7 +2103,7 @@ class EmuStatus:
 
 @dataclass(frozen=True, slots=True)
 class EmuPlug:
-    """Plug a sensor in or out. Finger 0's forgets the tape, the faults and the counts, and so comes first."""
+    """Plug a sensor in or out. For finger 0 this also clears the tape, the faults and the counters, so plug it first."""
 
     req_id: int
     finger: int
@@ -2136,7 +2136,7 @@ class EmuPlug:
 
 @dataclass(frozen=True, slots=True)
 class EmuTape:
-    """The next slots of the tape. What does not fit, or begins elsewhere than at slots_taken, is left: EMU_STATUS tells where to go on. The bus is served in the tape's order, sample by sample as it asks."""
+    """The next slots of the tape. They are ignored if they do not fit or do not begin at slots_taken; EMU_STATUS tells where to go on. The bus gets samples in the tape's order, as it asks for them."""
 
     req_id: int
     fingers: int
@@ -2172,7 +2172,7 @@ class EmuTape:
 
 @dataclass(frozen=True, slots=True)
 class EmuSetFault:
-    """What a sensor does from now on, whatever its tape says."""
+    """Give a sensor a fault from now on, whatever the tape says."""
 
     req_id: int
     finger: int
@@ -2202,7 +2202,7 @@ class EmuSetFault:
 
 @dataclass(frozen=True, slots=True)
 class EmuGetStatus:
-    """Ask how the board gets on."""
+    """Ask for EMU_STATUS."""
 
     req_id: int
 
@@ -2226,7 +2226,7 @@ class EmuGetStatus:
 
 @dataclass(frozen=True, slots=True)
 class EmuPlay:
-    """How the tape is served, until finger 0's EMU_PLUG: as it begins, without a hold and in its order."""
+    """How to serve the tape. EMU_PLUG of finger 0 restores the defaults: no hold, in the tape's order."""
 
     req_id: int
     hold_slot: int
@@ -2256,7 +2256,7 @@ class EmuPlay:
 
 @dataclass(frozen=True, slots=True)
 class EmuKeep:
-    """Keep the tape in flash, to be played over and over from power-up until a host's EMU_PLUG of finger 0. All of it must be there still, as it was told (NOT_WHOLE): whole rounds, no more than there is room for at once. The flash is written in the seconds after the reply; EMU_STATUS.loop_slots tells when it is. The bus is not served in time meanwhile."""
+    """Keep the tape in flash, and play it in a loop from power-up until EMU_PLUG of finger 0. It must be whole rounds, still be in memory from its first slot, and match slots and crc32 (NOT_WHOLE). The flash is written in the seconds after the reply, during which the bus is not served in time; EMU_STATUS.loop_slots is 0 until it is done."""
 
     req_id: int
     slots: int

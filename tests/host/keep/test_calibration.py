@@ -314,7 +314,7 @@ def test_a_board_of_before_pressure_is_spoken_to_in_its_own_words(scripted_board
 
 def test_another_sensors_calibration_is_refused_in_words() -> None:
     with biotac.open("sim:press.toml") as hand:
-        with pytest.raises(biotac.CommandRefusedError, match=r"SetCalibration: OTHER_SENSOR .*restart the board"):
+        with pytest.raises(biotac.CommandRefusedError, match=r"SetCalibration: OTHER_SENSOR .*plug that sensor in"):
             hand.set_calibration(0, ODD)
         with pytest.raises(biotac.CommandRefusedError, match="NO_SUCH_FINGER"):
             hand.calibration(5)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Write host/docs/frames.svg, the frame of reference, from the sensor's geometry.
 
-tools/make_frames_drawing.py           write it
-tools/make_frames_drawing.py --check   exit 1 when it has drifted
+tools/make/frames_drawing.py           write it
+tools/make/frames_drawing.py --check   exit 1 when it has drifted
 """
 
 from __future__ import annotations
@@ -10,47 +10,59 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
+import numpy as np
+
+from biotac.core.geometry import ELECTRODE_MM, ELECTRODE_NORMAL, RADIUS_MM, Floats
 from biotac.wire import sensor_gen as sensor
 from committed import ROOT, write_or_check
 
 WIDTH, HEIGHT = 980, 560
 PX_PER_MM = 15.0
-RADIUS_MM = sensor.CORE_RADIUS_UM / 1000
 TAIL_MM = -16.5  # how much of the finger is drawn
 AXIS_MM = 8.5
 INK, GREY, CORE, TOUCH = "#1f2937", "#6b7280", "#f3f4f6", "#7c3aed"
 AXIS_COLOR = {"x": "#dc2626", "y": "#15803d", "z": "#2563eb"}
+EXCITATION_MM = np.array(sensor.EXCITATION_UM) / 1000
 
-Point = tuple[float, float, float]
+Point = tuple[float, float, float] | Floats  # mm
+Pixel = tuple[float, float]
 
-#: Electrodes at which the drawing shows a push, which goes against the outward normal.
+#: Electrodes where the drawing shows a push, which acts against the outward normal.
 PRESSED = ("E17", "E13", "E7")
 
 
-class View:
+def axis(signed: str) -> Floats:
+    """The unit vector of a signed axis such as +x or -x."""
+    unit: Floats = np.eye(3)["xyz".index(signed[1])]
+    return unit if signed[0] == "+" else -unit
+
+
+class View(NamedTuple):
     """Sensor axes to picture: ``right`` and ``up`` are signed axes such as +x, ``at`` is the origin's pixel."""
 
-    def __init__(self, title: str, right: str, up: str, at: tuple[float, float], title_at: tuple[float, float]) -> None:
-        self.title, self.title_at, self.at = title, title_at, at
-        self.right, self.up = right, up
+    title: str
+    right: str
+    up: str
+    at: Pixel
+    title_at: Pixel
 
-    def px(self, point_mm: Point) -> tuple[float, float]:
-        """Where a point is drawn."""
-        across, upward = (sign(axis) * point_mm["xyz".index(axis[1])] for axis in (self.right, self.up))
+    def px(self, point_mm: Point) -> Pixel:
+        """The pixel of a point."""
+        across, upward = (float(axis(signed) @ point_mm) for signed in (self.right, self.up))
         return self.at[0] + across * PX_PER_MM, self.at[1] - upward * PX_PER_MM
 
     @property
     def toward(self) -> str:
-        """The signed axis that points at who looks."""
-        right, up = ([sign(a) * (a[1] == axis) for axis in "xyz"] for a in (self.right, self.up))
-        out = [right[i - 2] * up[i - 1] - right[i - 1] * up[i - 2] for i in range(3)]
-        k = next(i for i in range(3) if out[i])
+        """The signed axis that points at the viewer."""
+        out = np.cross(axis(self.right), axis(self.up))
+        k = int(np.flatnonzero(out)[0])
         return f"{'+' if out[k] > 0 else '-'}{'xyz'[k]}"
 
-    def depth(self, point_mm: Point) -> float:
-        """Larger is nearer to who looks."""
-        return sign(self.toward) * point_mm["xyz".index(self.toward[1])]
+    def shows(self, point_mm: Point) -> bool:
+        """Not behind the core; from the tip only the tip's own, because the others lie one behind the other."""
+        return bool(axis(self.toward) @ point_mm >= (0.5 if self is TIP else -0.5))
 
 
 SIDE = View("from E1's side", "+x", "+z", (310, 150), (40, 34))
@@ -58,52 +70,28 @@ PALMAR = View("from below: the palmar side", "+y", "+x", (810, 200), (640, 34))
 TIP = View("from the tip", "+y", "+z", (150, 400), (40, 300))
 
 
-def sign(axis: str) -> int:
-    """Of +x or -x."""
-    return 1 if axis[0] == "+" else -1
-
-
-def push(normal_milli: tuple[int, int, int]) -> Point:
-    """Direction of the force on the finger that presses where the outward normal is this."""
-    length = math.hypot(*normal_milli)
-    return tuple(-n / length for n in normal_milli)  # type: ignore[return-value]
-
-
-def torque(at_mm: Point, force: Point) -> Point:
-    """Of a force about the origin, right-handed: r x F."""
-    (a, b, c), (x, y, z) = at_mm, force
-    return (b * z - c * y, c * x - a * z, a * y - b * x)
+def push(name: str) -> tuple[Floats, Floats]:
+    """The electrode's place, and the direction of the force on the finger of a push there."""
+    k = sensor.ELECTRODE_NAMES.index(name)
+    return ELECTRODE_MM[k], -ELECTRODE_NORMAL[k] / np.linalg.norm(ELECTRODE_NORMAL[k])
 
 
 def readings(name: str) -> str:
-    """Signs of the components that a push on an electrode reads; components below a tenth of the largest left out."""
-    k = sensor.ELECTRODE_NAMES.index(name)
-    force = push(sensor.ELECTRODE_NORMAL_MILLI[k])
-    about = torque(mm(sensor.ELECTRODE_UM[k]), force)
+    """Signs of the components that a push on an electrode gives, without those below a tenth of the largest."""
+    at_mm, force = push(name)
     words = []
-    for letter, vector in (("F", force), ("M", about)):
-        largest = max(map(abs, vector))
-        if largest < 1e-9:
-            continue
-        signs = [
-            f"{letter}{axis} {'>' if v > 0 else '<'} 0"
-            for axis, v in zip("xyz", vector, strict=True)
-            if abs(v) > largest / 10
-        ]
-        words += signs
+    for letter, vector in (("F", force), ("M", np.cross(at_mm, force))):
+        largest = abs(vector).max()
+        if largest > 1e-9:
+            sizes = zip("xyz", vector, strict=True)
+            words += [f"{letter}{along} {'>' if v > 0 else '<'} 0" for along, v in sizes if abs(v) > largest / 10]
     return ", ".join(words)
-
-
-def mm(point_um: tuple[int, int, int]) -> Point:
-    """um to mm."""
-    x, y, z = point_um
-    return (x / 1000, y / 1000, z / 1000)
 
 
 # ---- pieces of SVG -------------------------------------------------------------------------------
 
 
-def text(at: tuple[float, float], words: str, *, size: int = 13, color: str = INK, anchor: str = "start") -> str:
+def text(at: Pixel, words: str, *, size: int = 13, color: str = INK, anchor: str = "start") -> str:
     """A line of words."""
     words = words.replace("<", "&lt;").replace(">", "&gt;")
     return (
@@ -111,7 +99,7 @@ def text(at: tuple[float, float], words: str, *, size: int = 13, color: str = IN
     )
 
 
-def arrow(a: tuple[float, float], b: tuple[float, float], color: str, width: float = 2.0) -> str:
+def arrow(a: Pixel, b: Pixel, color: str, width: float = 2.0) -> str:
     """A line from a with its head at b."""
     length = math.hypot(b[0] - a[0], b[1] - a[1])
     ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
@@ -125,30 +113,30 @@ def arrow(a: tuple[float, float], b: tuple[float, float], color: str, width: flo
     )
 
 
-def outline(view: View, points: list[Point], extra: str = "") -> str:
-    """A closed shape of the core."""
+def outline(view: View, points: list[Point]) -> str:
+    """A closed outline of the core."""
     corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(view.px, points))
-    return f'<polygon points="{corners}" fill="{CORE}" stroke="{GREY}" {extra}/>'
+    return f'<polygon points="{corners}" fill="{CORE}" stroke="{GREY}" />'
 
 
 def arc(make: Callable[[float, float], Point], first_deg: int, last_deg: int) -> list[Point]:
-    """Points of a circle of the core's radius; ``make`` places its cosine and sine."""
+    """Points of a circle of the core's radius; ``make`` makes a point of cosine and sine."""
     steps = range(first_deg, last_deg + 1, 6)
     return [make(RADIUS_MM * math.cos(math.radians(deg)), RADIUS_MM * math.sin(math.radians(deg))) for deg in steps]
 
 
 def axes(view: View) -> Iterator[str]:
-    """Two axes as arrows, the third as a dot (towards who looks) or a cross (away)."""
+    """Two axes as arrows, the third as a dot (towards the viewer) or a cross (away)."""
     for signed in (view.right, view.up):
-        axis = signed[1]
-        end: Point = tuple(AXIS_MM * (axis == name) for name in "xyz")  # type: ignore[assignment]
-        yield arrow(view.px((0, 0, 0)), view.px(end), AXIS_COLOR[axis], 2.5)
-        x, y = view.px(tuple(1.09 * v for v in end))  # type: ignore[arg-type]
-        yield text((x, y + 5), axis, size=17, color=AXIS_COLOR[axis], anchor="middle")
+        color = AXIS_COLOR[signed[1]]
+        end = AXIS_MM * axis(f"+{signed[1]}")
+        yield arrow(view.at, view.px(end), color, 2.5)
+        x, y = view.px(1.09 * end)
+        yield text((x, y + 5), signed[1], size=17, color=color, anchor="middle")
     x, y = view.at
     color = AXIS_COLOR[view.toward[1]]
     yield f'<circle cx="{x}" cy="{y}" r="7" fill="#fff" stroke="{color}" stroke-width="2"/>'
-    if sign(view.toward) > 0:
+    if view.toward[0] == "+":
         yield f'<circle cx="{x}" cy="{y}" r="2.5" fill="{color}"/>'
     else:
         for a in (-4, 4):
@@ -157,23 +145,17 @@ def axes(view: View) -> Iterator[str]:
 
 
 def electrodes(view: View) -> Iterator[str]:
-    """Those that can be seen from there, with names; excitation electrodes as squares."""
-    for name, um in zip(sensor.EXCITATION_NAMES, sensor.EXCITATION_UM, strict=True):
-        x, y = view.px(mm(um))
-        if visible(view, mm(um)):
+    """The electrodes visible from there, with names; excitation electrodes as squares."""
+    for name, at_mm in zip(sensor.EXCITATION_NAMES, EXCITATION_MM, strict=True):
+        x, y = view.px(at_mm)
+        if view.shows(at_mm):
             yield f'<rect x="{x - 5:.1f}" y="{y - 5:.1f}" width="10" height="10" fill="#fff" stroke="{GREY}"/>'
             yield text((x, y + 17), name, size=10, color=GREY, anchor="middle")
-    for name, um in zip(sensor.ELECTRODE_NAMES, sensor.ELECTRODE_UM, strict=True):
-        if not visible(view, mm(um)):
-            continue
-        x, y = view.px(mm(um))
-        yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="10" fill="#fef3c7" stroke="#b45309"/>'
-        yield text((x, y + 3.5), name.removeprefix("E"), size=10, anchor="middle")
-
-
-def visible(view: View, point_mm: Point) -> bool:
-    """Not behind the core; from the tip only the tip's own, for the others lie one behind the other."""
-    return view.depth(point_mm) >= (0.5 if view is TIP else -0.5)
+    for name, at_mm in zip(sensor.ELECTRODE_NAMES, ELECTRODE_MM, strict=True):
+        x, y = view.px(at_mm)
+        if view.shows(at_mm):
+            yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="10" fill="#fef3c7" stroke="#b45309"/>'
+            yield text((x, y + 3.5), name.removeprefix("E"), size=10, anchor="middle")
 
 
 def bodies() -> Iterator[str]:
@@ -187,17 +169,15 @@ def bodies() -> Iterator[str]:
 def pushes() -> Iterator[str]:
     """A force on the finger at each pressed electrode, in a view that shows it."""
     for name, view in zip(PRESSED, (SIDE, TIP, SIDE), strict=True):
-        k = sensor.ELECTRODE_NAMES.index(name)
-        at, force = mm(sensor.ELECTRODE_UM[k]), push(sensor.ELECTRODE_NORMAL_MILLI[k])
-        begin: Point = tuple(p - 5.5 * f for p, f in zip(at, force, strict=True))  # type: ignore[assignment]
-        end: Point = tuple(p - 1.0 * f for p, f in zip(at, force, strict=True))  # type: ignore[assignment]
-        yield arrow(view.px(begin), view.px(end), TOUCH, 3)
-        x, y = view.px(begin)
+        at_mm, force = push(name)
+        begin = view.px(at_mm - 5.5 * force)
+        yield arrow(begin, view.px(at_mm - force), TOUCH, 3)
+        x, y = begin
         yield text((x + 8, y + 6), f"pressed at {name}", size=12, color=TOUCH)
 
 
 def legend() -> Iterator[str]:
-    """Words that no view can show."""
+    """Text that belongs to no view."""
     lines = [
         "Right-handed. Origin: the centre of the tip's sphere,",
         f"r = {RADIUS_MM:g} mm; points of contact lie on the core's surface.",
@@ -216,7 +196,7 @@ def drawing() -> str:
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" '
         'font-family="sans-serif" role="img">',
-        "<!-- Generated by tools/make_frames_drawing.py from protocol/sensor.toml; do not edit. -->",
+        "<!-- Generated by tools/make/frames_drawing.py from protocol/sensor.toml; do not edit. -->",
         "<title>The finger's frame of reference, its electrodes and the signs of force and torque</title>",
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>',
         *bodies(),

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Write the golden vectors in protocol/vectors/ that the C and the Python tests read.
 
-    tools/make_vectors.py           write the files
-    tools/make_vectors.py --check   exit 1, naming the files, when any of them has drifted
+    tools/make/vectors.py           write the files
+    tools/make/vectors.py --check   exit 1, naming the files, when any of them has drifted
 
-Nothing here uses the project's own code: COBS comes from the `cobs` package, CRC-32 from zlib, the
-layout from link.toml by struct. What a hostile case must give is stated by hand beside it, and a
-second opinion (`judge`) from the same libraries must agree before anything is written.
+Nothing here uses the project's own code: COBS comes from the `cobs` package, CRC-32 from zlib, the layout from
+link.toml by struct. The result of each hostile case is stated by hand beside it. A second opinion (`judge`), from the
+same libraries, must agree before anything is written.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from committed import ROOT, write_or_check
 
 LINK: dict[str, Any] = tomllib.loads((ROOT / "protocol/link.toml").read_text(encoding="utf-8"))
 
-HEADER = "# Written by tools/make_vectors.py; do not edit. Format: README.md beside this file.\n"
+HEADER = "# Written by tools/make/vectors.py; do not edit. Format: README.md beside this file.\n"
 CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
 LIMITS = {"u8": (0, 2**8 - 1), "u16": (0, 2**16 - 1), "u32": (0, 2**32 - 1)} | {
     "i16": (-(2**15), 2**15 - 1),
@@ -60,12 +60,12 @@ def payload_bytes() -> dict[int, int]:
 
 
 def filled(name: str, end: int) -> dict[str, list[int]]:
-    """Every value at the lower (0) or the upper (1) end of its type."""
+    """Every value at the lower (0) or the upper (1) end of its type's range."""
     return {f: [LIMITS[kind][end]] * count for f, kind, count in layout(name)}
 
 
 def counting(name: str) -> dict[str, list[int]]:
-    """Payload bytes 1, 2, 3...: no two fields or elements alike, so none can be swapped unseen."""
+    """Payload bytes 1, 2, 3...: no two fields or elements are equal, so that swapping any two shows."""
     values, at = {}, 1
     for f, kind, count in layout(name):
         size = struct.calcsize(CODE[kind]) * count
@@ -75,7 +75,7 @@ def counting(name: str) -> dict[str, list[int]]:
 
 
 def special_values() -> list[tuple[str, str, dict[str, list[int]]]]:
-    """(message, case, values) that mean something."""
+    """(message, case, values) with a meaning."""
     untared = filled("FRAME", 0) | {
         "counts": [2048, 0xFFFF, 0, 4095] + [0xFFFF] * 15,
         "pdc": [0xFFFF],
@@ -142,7 +142,7 @@ def flipped(data: bytes, at: int, mask: int) -> bytes:
 
 
 def judge(wire: bytes) -> tuple[Frames, dict[str, int]]:
-    """Second opinion on a case, from the libraries alone."""
+    """A second opinion on a case, from the libraries alone."""
     accepted: Frames = []
     counts = dict.fromkeys(COUNTS, 0)
     known = payload_bytes()
@@ -168,7 +168,7 @@ def judge(wire: bytes) -> tuple[Frames, dict[str, int]]:
 
 
 def longest_without_zero() -> bytes:
-    """A payload with which id 0x7F, payload and CRC fill 254 bytes, none of them zero."""
+    """A payload such that id 0x7F, payload and CRC fill 254 bytes, none of them zero."""
     rng = random.Random(7)
     while True:
         payload = bytes(rng.randrange(1, 256) for _ in range(249))
@@ -213,7 +213,7 @@ def hostile_cases() -> list[Case]:
     bad = {"bad_cobs": 1}
     start_big_endian = bytes([start[0]]) + start[1]
     start_big_endian += struct.pack(">I", zlib.crc32(start_big_endian))
-    # 255 bytes without delimiter are the longest possible frame, of 256 none can be.
+    # 255 bytes without delimiter are the longest possible frame; 256 can be none.
     full = bytes([0xFF]) + b"U" * 254
     return [
         Case("cut_at_the_start_by_one_byte", pac_wire[1:] + end, [ping], bad),
@@ -327,4 +327,4 @@ def outputs() -> dict[Path, str]:
 
 
 if __name__ == "__main__":
-    sys.exit(write_or_check(outputs(), "tools/make_vectors.py"))
+    sys.exit(write_or_check(outputs(), "tools/make/vectors.py"))

@@ -1,4 +1,4 @@
-"""Generated files are committed: write them, or check that nobody let them drift."""
+"""Generated files are committed: write them, or check that none has drifted."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 
 import __main__
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def write_or_check(outputs: dict[Path, str], source: str) -> int:
-    """The whole command line of a generator: of the program that runs, whose docstring is its help.
+    """Run a generator's whole command line; its help is the first docstring line of the program that runs.
 
-    Without arguments writes what differs; with --check writes nothing, names what drifted from
-    ``source``, and returns 1.
+    Without arguments it writes the files that differ. With --check it writes nothing, names the files that drifted from
+    ``source``, and returns 1 if there are any.
     """
     parser = argparse.ArgumentParser(description=(__main__.__doc__ or "").splitlines()[0])
     parser.add_argument("--check", action="store_true", help="compare, do not write")
@@ -23,7 +23,7 @@ def write_or_check(outputs: dict[Path, str], source: str) -> int:
     drifted = [path for path, text in outputs.items() if not path.exists() or path.read_text(encoding="utf-8") != text]
     if check and drifted:
         names = ", ".join(str(path.relative_to(ROOT)) for path in drifted)
-        print(f"drifted from {source}: {names}; run tools/{Path(sys.argv[0]).name}", file=sys.stderr)
+        print(f"drifted from {source}: {names}; run {Path(sys.argv[0]).resolve().relative_to(ROOT)}", file=sys.stderr)
         return 1
     if not check:
         for path in drifted:

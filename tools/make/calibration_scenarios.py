@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Write the bundled scenarios that calibrate a finger: everywhere, everywhere but in some places, and by weights.
 
-tools/make_calibration_scenarios.py           write them
-tools/make_calibration_scenarios.py --check   exit 1 when one has drifted
+tools/make/calibration_scenarios.py           write them
+tools/make/calibration_scenarios.py --check   exit 1 when one has drifted
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from committed import ROOT, write_or_check
 
 FOLDER = ROOT / "host" / "biotac" / "sim" / "scenarios"
 
-# Degrees around the finger (0: the pad's middle, positive: E11's side) and mm along it; on the tip degrees towards it.
+# Degrees around the finger (0: the pad's middle, positive: E11's side) and mm along it; degrees towards it on the tip.
 SIDES = {"E1's side": (-68.0, -42.0), "pad": (-15.0, 15.0), "E11's side": (42.0, 68.0)}
 ALONG_MM = (-12.0, -8.5, -5.0, -1.5)
 TIP_AROUND, TIP_UP = (-55.0, -18.0, 18.0, 55.0), (17.0, 48.0)
@@ -25,7 +25,7 @@ TURNS = 2  # every place twice, in another order and with another force
 
 
 def places(without: tuple[str, ...]) -> list[tuple[float, float]]:
-    """x and y in mm of everything that is pressed."""
+    """x and y in mm of every place that is pressed."""
     found = []
     for side, angles in SIDES.items():
         if side not in without:
@@ -38,9 +38,9 @@ def places(without: tuple[str, ...]) -> list[tuple[float, float]]:
 
 
 def scenario(name: str, words: str, without: tuple[str, ...] = (), *, shear_to_tip: bool = True) -> str:
-    """The TOML text; the same every time."""
+    """The TOML text, the same on every run."""
     rng = random.Random(6)
-    # three degrees in the first 40 s: too much drift to begin with; then a minute of quiet
+    # Three degrees in the first 40 s, which is too much drift to begin with; then a minute of quiet.
     steps = [
         "{do = 'temperature', seconds = 0.1, celsius = 27.0}",
         "{do = 'temperature', seconds = 40.0, celsius = 30.0}",
@@ -51,13 +51,13 @@ def scenario(name: str, words: str, without: tuple[str, ...] = (), *, shear_to_t
         rng.shuffle(spots)
         for x, y in spots:
             steps += contact(rng, x, y, turn, shear_to_tip=shear_to_tip)
-    lines = [f"# {line}" for line in (*words.splitlines(), "Made by tools/make_calibration_scenarios.py.")]
+    lines = [f"# {line}" for line in (*words.splitlines(), "Made by tools/make/calibration_scenarios.py.")]
     lines += [f'name = "{name}"', "seed = 6", "step = ["]
     return "\n".join([*lines, *(f"  {step}," for step in steps), "]", ""])
 
 
 def contact(rng: random.Random, x: float, y: float, turn: int, *, shear_to_tip: bool) -> list[str]:
-    """A press with shears and twists; times differ, as a hand's do."""
+    """A press with shears and twists; times vary, as a hand's do."""
     force = rng.uniform(1.5, 3.5) if turn == 0 else rng.uniform(4.0, 7.0)
 
     def after(do: str) -> str:
@@ -89,10 +89,10 @@ def contact(rng: random.Random, x: float, y: float, turn: int, *, shear_to_tip: 
 
 
 def weighed() -> str:
-    """A finger under the loads that `biotac calibrate weights` asks for, here and there along the pad."""
+    """A finger under the loads that `biotac calibrate weights` asks for, at several places along the pad."""
     lines = [
         "# Weights on a finger's pad, its block tilted to every side: what `biotac calibrate weights` asks for.",
-        "# Made by tools/make_calibration_scenarios.py.",
+        "# Made by tools/make/calibration_scenarios.py.",
         'name = "weights"',
         "seed = 3",
         "step = [",
@@ -102,7 +102,7 @@ def weighed() -> str:
         x, y, z = (load.size_n * part for part in load.toward)
         at_mm = ALONG_MM[k % len(ALONG_MM)]
         lines += [
-            # sheared while it hardly touches: what follows is one load that comes, lies still, and goes
+            # Sheared while barely touched, so that what follows is one load that rises, holds still and falls.
             f"  {{do = 'press', at_mm = [{at_mm}, 0.0], tip_mm = 4.0, force_n = 0.05, seconds = 0.05}},",
             f"  {{do = 'shear', shear_n = [{x:.4f}, {y:.4f}], seconds = 0.05}},",
             f"  {{do = 'press', force_n = {z:.4f}, seconds = 0.4}},",
@@ -128,7 +128,7 @@ def main() -> int:
     )
     files = {FOLDER / "calibrate.toml": everywhere, FOLDER / "calibrate_gaps.toml": with_gaps}
     files[FOLDER / "weights.toml"] = weighed()
-    return write_or_check(files, "tools/make_calibration_scenarios.py")
+    return write_or_check(files, "tools/make/calibration_scenarios.py")
 
 
 if __name__ == "__main__":
