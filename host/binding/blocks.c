@@ -125,8 +125,8 @@ SPECIALISED void transpose(const uint8_t *restrict rows, int64_t stride, uint16_
 }
 
 // e = count - tare in 1/16 count, 0 for a missing electrode; false if a count is out of range.
-SPECIALISED bool signals(const uint16_t *restrict counts, const int32_t *restrict tare_q4,
-                         int32_t *restrict e, int width)
+SPECIALISED bool signals_of(const uint16_t *restrict counts, const int32_t *restrict tare_q4,
+                            int32_t *restrict e, int width)
 {
     uint16_t any = 0; // of 16 bits: twice as many in a vector
     for (int j = 0; j < BT_ELECTRODES * width; j++) {
@@ -297,7 +297,7 @@ SPECIALISED bool block(const bt_block_plan *plan, const uint8_t *rows, int64_t s
     sides f;
     columns c;
     transpose(rows, stride, counts, width);
-    if (!signals(counts, tare_q4, e, width)) {
+    if (!signals_of(counts, tare_q4, e, width)) {
         return false;
     }
     switch (plan->poc_weights) {

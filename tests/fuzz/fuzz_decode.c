@@ -4,7 +4,7 @@
 // guesses a CRC.
 #include "input.h"
 
-#include "intake.h"
+#include "decode/intake.h"
 
 #include <string.h>
 

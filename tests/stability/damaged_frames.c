@@ -7,7 +7,7 @@
 // those accepted wrong. Exit 0: none of those; 1: some, and the first is printed. --stream writes N damaged
 // FRAMEs to stdout instead, each tenth intact, for what judges the whole library (tools/damage, which has the
 // law that their bytes follow).
-#include "decode.h"
+#include "decode/decode.h"
 #include "wire/framing.h"
 #include "wire/little_endian.h"
 

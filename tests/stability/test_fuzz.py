@@ -39,7 +39,7 @@ def spoilt(monkeypatch: pytest.MonkeyPatch, change) -> list[str]:
             change(rows)
             return rows
 
-    monkeypatch.setattr(fuzz, "Finger", Spoilt)
+    monkeypatch.setattr("stability.courses.Finger", Spoilt)
     return fuzz.judge(next(filter(is_plain, map(fuzz.draw, range(200))))).broken
 
 

@@ -1,1 +1,1 @@
-"""Courses of loads for the tare machine, and the verdicts on them; used by tools/stress and tests/stability."""
+"""Courses of loads for the tare machine, and their verdicts; used by tools/stress and tests/stability."""

@@ -1,5 +1,6 @@
-"""What a finger goes through: a script of loads and temperatures, the counts the sensor model makes of it,
-and, from the model and not from the board, what it reads at rest and under load.
+"""A finger's course: a script of loads and temperatures, and the counts that the sensor model makes of it.
+
+The truth, what the finger reads at rest and under load, is the model's and not the board's.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from biotac.wire import slots
 from biotac.wire.frames import StructArray
 
 PAD = Pose(x_mm=-2.8, y_mm=0.0, tip_mm=2.0)  # over E17
-LEAD_S = 10.0  # of rest before anything happens: the tare is taken and the noise measured
+LEAD_S = 10.0  # of rest at the start, in which the tare is taken and the noise measured
 
 
 class Sensor(physics.Finger):
-    """The model's finger, whose answer to the latest states is worked out once: twice is asked for it."""
+    """The model's finger. It caches its answer to the latest states, because each is asked for twice."""
 
     def counts(self, states: physics.States) -> Floats:
-        """As physics.Finger's, and as new each time: who asks writes into it."""
+        """As physics.Finger's; a fresh copy each time, because callers write into it."""
         latest, answer = self.__dict__.get("_latest", (None, None))
         if latest is not states:
             answer = super().counts(states)
@@ -34,12 +35,11 @@ class Sensor(physics.Finger):
 
 @dataclass(frozen=True)
 class Course:
-    """n frames of one finger. ``words`` are what Finger.feed takes; the rest is the model's truth.
+    """n frames of one finger. ``words`` are the input of Finger.feed; the rest is the model's truth.
 
-    ``force_n`` (n,): the greatest normal force within the frame. ``rest`` (n, 19): counts without load at the
-    frame's middle, with drift and temperature; ``reads`` (n, 19): counts with load and creep, without noise;
-    ``signal`` (n, 19): what the load alone makes of ``rest``; ``pressure`` (n,): PDC with load, undershoot and creep,
-    without noise.
+    ``force_n`` (n,): the largest normal force within the frame. ``rest`` (n, 19): counts without load at the frame's
+    middle, with drift and temperature; ``reads`` (n, 19): counts with load and creep, without noise; ``signal``
+    (n, 19): what the load alone adds to ``rest``; ``pressure`` (n,): PDC with load, undershoot and creep, no noise.
     """
 
     sensor: physics.Finger
@@ -61,37 +61,37 @@ class Course:
         return Finger(settings).feed(**{name: words for name, words in self.words.items() if name not in skipped})
 
     def kept(self, rows: StructArray) -> Floats:
-        """Share of the signal (n,) that the tare leaves: 1 when it is the true rest; NaN without a load."""
+        """Share of the signal (n,) that the tare leaves: 1 if the tare is the true rest; NaN without a load."""
         missing = self.rest - rows["tare_q4"] / 16.0
         with np.errstate(divide="ignore", invalid="ignore"):
             share: Floats = 1.0 + (missing * self.signal).sum(axis=1) / (self.signal**2).sum(axis=1)
         return share
 
     def tare_error(self, rows: StructArray) -> Floats:
-        """Greatest distance (n,) of an electrode's tare from what it reads at rest, in counts."""
+        """Largest distance (n,), in counts, of an electrode's tare from its reading at rest."""
         error: Floats = np.abs(self.rest - rows["tare_q4"] / 16.0).max(axis=1)
         return error
 
 
 @dataclass
 class Script:
-    """A course as it is written: ``track`` grows, ``sensor`` may be changed before make()."""
+    """A course in the making: ``track`` grows; ``sensor`` may be changed before make()."""
 
     sensor: physics.Finger
     track: Track = field(default_factory=Track)
 
     def rest(self, seconds: float) -> Script:
-        """Nothing touches."""
+        """Nothing touches the finger."""
         self.track.ramp(seconds, self.track.pose.released())
         return self
 
     def hold(self, seconds: float) -> Script:
-        """Everything stays."""
+        """Load and temperature stay as they are."""
         self.track.ramp(seconds, self.track.pose)
         return self
 
     def load(self, force_n: float, n_per_s: float, at: Pose | None = None) -> Script:
-        """To this normal force at this rate; ``at`` is where, after a release."""
+        """Go to this normal force at this rate; ``at`` is the place, after a release."""
         place = at or self.track.pose
         seconds = max(abs(force_n - self.track.pose.force_n) / n_per_s, slots.FRAME_S)
         start = replace(place, force_n=self.track.pose.force_n, celsius=self.track.pose.celsius) if at else None
@@ -99,12 +99,12 @@ class Script:
         return self
 
     def warm(self, celsius: float, seconds: float) -> Script:
-        """By this much within this time, all else staying."""
+        """Warm by ``celsius`` within ``seconds``; all else stays."""
         self.track.ramp(seconds, replace(self.track.pose, celsius=self.track.pose.celsius + celsius))
         return self
 
     def make(self) -> Course:
-        """The counts and the truth."""
+        """The course: its counts and its truth."""
         frames = round(self.track.seconds / slots.FRAME_S)
         times: Floats = np.arange(frames + 1, dtype=np.float64) * slots.FRAME_S
         states = self.track.states(times)
@@ -131,14 +131,14 @@ class Script:
 
 
 def script(seed: int, profile: physics.Profile = "new", lead_s: float = LEAD_S) -> Script:
-    """A sensor of its own that has rested for ``lead_s``."""
+    """A new sensor that has rested for ``lead_s``."""
     begun = Script(Sensor(seed, profile))
     begun.track.pose = PAD
     return begun.rest(lead_s)
 
 
 def resting(sensor: physics.Finger, seconds: float, seed: int, start_s: float = 0.0) -> dict[str, np.ndarray]:
-    """Words of a finger that nothing touches, from ``start_s`` of its drift on: cheap enough for hours."""
+    """Words of an untouched finger, from ``start_s`` of its drift on; cheap enough for hours."""
     frames = round(seconds * slots.FRAME_HZ)
     rng = np.random.default_rng([seed, round(start_s)])
     time_min = (start_s + np.arange(frames) * slots.FRAME_S) / 60.0

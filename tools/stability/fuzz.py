@@ -1,6 +1,6 @@
-"""Tare courses drawn at random, and what must hold in every frame of each, whatever was drawn.
+"""Random tare courses, and the invariants that must hold in every frame of each.
 
-A course is a list of steps, so that one that fails can be shortened to the steps that matter.
+A course is a list of steps, so that a failing one can be shortened to the steps that matter.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from biotac.wire.frames import StructArray
 
 from .courses import LEAD_S, Course, Script, Sensor, resting
 
-# With pressure, and nothing held any more: within a second at rest, or in doubt while what the press has left is still
-# shown; and at rest within ten seconds of that falling below what counts as a touch.
+# With pressure, after a release: at rest within a second, or in doubt while the press's residue still shows; and at
+# rest within ten seconds of the residue falling below what counts as a touch.
 LET_GO_WITHIN = 100
 TARED_WITHIN = 1000
-PDC_HIT, PDC_NOISE = 6, 3 * sampling.PDC_NOISE  # counts above rest that are a touch; what three rounds may add to them
-HELD_N = 1.0  # what is pressed harder than this is never tared away
-LATE = 10  # frames after a touch in which it is still its cause: three hits, a glitch, one lost word
+PDC_HIT, PDC_NOISE = 6, 3 * sampling.PDC_NOISE  # counts above rest that are a touch; what noise may add in three rounds
+HELD_N = 1.0  # a load above this is never tared away
+LATE = 10  # frames after a touch that may still be due to it: three hits, a glitch, one lost word
 RELEASES = (TareReason.RELEASE, TareReason.RESIDUE)
 
 Step = tuple[str, dict[str, float]]
@@ -34,7 +34,7 @@ Step = tuple[str, dict[str, float]]
 
 @dataclass(frozen=True)
 class Recipe:
-    """All that makes a course; printed when it fails."""
+    """All that makes a course; printed if the course fails."""
 
     seed: int
     profile: str
@@ -47,19 +47,19 @@ class Recipe:
 
 @dataclass
 class Outcome:
-    """What was found in a course. ``broken``: invariants that did not hold, in words; empty: good."""
+    """What a course showed. ``broken``: invariants that did not hold, in words; empty if it is good."""
 
     broken: list[str] = field(default_factory=list)
     frames: int = 0
     poc_um: float = 0.0
     force_mn: float = 0.0
     torque_share: float = 0.0
-    let_go_frames: int = 0  # the longest from a release to rest or doubt, with pressure
-    tared_frames: int = 0  # and from what the press has left being no touch any more to rest
+    let_go_frames: int = 0  # with pressure, the longest from a release to rest or doubt
+    tared_frames: int = 0  # the longest from the end of a residue that counts as a touch to rest
     releases: int = 0
-    held_frames: int = 0  # over HELD_N with pressure
-    tared_away: int = 0  # re-zeroed with a load of that
-    idle_touches: int = 0  # contacts begun without a load, which creep or temperature explain
+    held_frames: int = 0  # with a load over HELD_N
+    tared_away: int = 0  # tared although loaded with more than HELD_N
+    idle_touches: int = 0  # contacts that begin without a load, explained by creep or temperature
     locked: int = 0  # without pressure: still in contact at the end of a course
 
 
@@ -80,7 +80,7 @@ def draw(seed: int) -> Recipe:
         steps.append(("rest", {"seconds": float(rng.uniform(4.0, 10.0))}))
         if rng.random() < 0.3:
             steps.append(("warm", {"celsius": float(rng.uniform(-0.05, 0.05)), "seconds": 5.0}))
-    steps.append(("rest", {"seconds": 25.0}))  # what was in doubt has had its ten seconds
+    steps.append(("rest", {"seconds": 25.0}))  # whatever was in doubt has had its ten seconds
     return Recipe(
         seed=seed,
         profile=str(rng.choice(["new", "worn"])),
@@ -118,7 +118,7 @@ def _during(rng: np.random.Generator, force_n: float) -> Step:
 
 
 def make(recipe: Recipe) -> Course:
-    """The recipe's course, with words lost as it says."""
+    """The recipe's course, with the words lost that it names."""
     script = Script(Sensor(recipe.seed, "worn" if recipe.profile == "worn" else "new"))
     script.sensor.drift_per_min = script.sensor.drift_per_min * recipe.drift_scale
     script.rest(LEAD_S)
@@ -143,12 +143,11 @@ def make(recipe: Recipe) -> Course:
 
 
 def judge(recipe: Recipe) -> Outcome:
-    """Run the course through the board's code and look at every frame."""
+    """Run the course through the board's code and check every frame."""
     course = make(recipe)
     settings = {setting: spec.default for setting, spec in wire.SETTINGS.items()}
     settings |= {Setting[name.upper()]: value for name, value in recipe.settings.items()}
-    words = {name: value for name, value in course.words.items() if recipe.pdc or name != "pdc"}
-    rows = Finger(settings).feed(**words)
+    rows = course.run(settings, pdc=recipe.pdc)
     outcome = Outcome(frames=len(rows))
     _judge_results(rows, settings, outcome)
     _judge_ranges(rows, settings, outcome)
@@ -186,16 +185,16 @@ def _judge_ranges(rows: StructArray, settings: dict[Setting, int], outcome: Outc
 
 
 def _judge_touches(course: Course, rows: StructArray, outcome: Outcome) -> None:
-    """A contact begins with a load, or because what the finger reads has left its tare."""
+    """A contact must begin with a load, or because the finger's reading has left its tare."""
     begins = (rows["tare_reason"] == TareReason.ROLL_BACK) & ((rows["flags"] & FrameFlags.TARE_CHANGED) != 0)
-    # Noise of 2.5 times its mean on 19 electrodes comes once in 3,000 rounds, in three running once in 10^10.
+    # On 19 electrodes noise reaches 2.5 times its mean once in 3,000 rounds, and in three rounds running once in 10^10.
     noise = np.sqrt(2.5 * 19) * course.sensor.noise_counts
     for k in np.flatnonzero(begins).tolist():
         if course.force_n[max(k - LATE, 0) : k + 1].max() > 0:
             continue
         outcome.idle_touches += 1
         away = np.linalg.norm(course.reads[k] - rows["tare_q4"][k - 1] / 16.0)
-        above = course.pressure[k] - rows["pdc_tare_q4"][k - 1] / 16.0  # by the undershoot that comes back
+        above = course.pressure[k] - rows["pdc_tare_q4"][k - 1] / 16.0  # of the undershoot that recovers
         if away + noise < np.sqrt(rows["threshold_count2"][k]) and above + PDC_NOISE < PDC_HIT:
             outcome.broken.append(f"frame {k}: contact without load, {away:.1f} counts from the tare")
 
@@ -208,7 +207,7 @@ def _judge_loads(course: Course, rows: StructArray, outcome: Outcome) -> None:
     outcome.tared_away = int((released & held).sum())
     for k in np.flatnonzero(released & held)[:3].tolist():
         outcome.broken.append(f"frame {k}: a load of {course.force_n[k]:.2f} N was tared away")
-    # Seen once it has lasted; a lost word and the glitch filter each take a round.
+    # A load must have lasted to be seen; a lost word and the glitch filter each take a round.
     lasting = held.copy()
     for back in range(1, LATE + 1):
         lasting[back:] &= held[:-back]
@@ -243,7 +242,7 @@ def _judge_releases(course: Course, rows: StructArray, outcome: Outcome) -> None
 
 
 def _is_touch(course: Course, rows: StructArray) -> np.ndarray:
-    """What the finger reads by the model, against the tare in force, would be a touch (n,)."""
+    """Whether the finger's reading by the model would be a touch against the tare in force (n,)."""
     above = course.pressure - rows["pdc_tare_q4"] / 16.0
     away = course.reads - rows["tare_q4"] / 16.0
     touch: np.ndarray = (above > PDC_HIT) | ((away**2).sum(axis=1) > rows["threshold_count2"])
@@ -251,9 +250,9 @@ def _is_touch(course: Course, rows: StructArray) -> np.ndarray:
 
 
 def rest(seed: int, seconds: float, *, worn: bool) -> int:
-    """Contacts that the board sees on a drifting finger that nothing touches; any is one too many."""
+    """The number of contacts that the board sees on a drifting, untouched finger; each is a defect."""
     sensor = Sensor(seed, "worn" if worn else "new")
-    # The worst drift that was measured, either way.
+    # The worst drift measured, in either direction.
     sensor.drift_per_min = np.full(19, 15.0 if seed % 2 else -15.0)
     rows = Finger().feed(**resting(sensor, seconds, seed))
     changed = (rows["flags"] & FrameFlags.TARE_CHANGED) != 0
@@ -261,13 +260,13 @@ def rest(seed: int, seconds: float, *, worn: bool) -> int:
 
 
 def shortest(recipe: Recipe) -> Recipe:
-    """Steps left out, and what is random calmed down, as long as something is still broken."""
+    """The recipe with steps left out and random parts calmed down, as long as it still breaks something."""
     calm: list[dict[str, Any]] = [{"lost_share": 0.0}, {"drift_scale": 0.0}, {"profile": "new"}, {"settings": {}}]
     for change in calm:
         tried = replace(recipe, **change)
         recipe = tried if judge(tried).broken else recipe
     left_out = True
-    while left_out:  # what is left may spare a step that could not be spared before
+    while left_out:  # a step that was needed before may not be needed now
         left_out = False
         for k in reversed(range(len(recipe.steps))):
             tried = replace(recipe, steps=recipe.steps[:k] + recipe.steps[k + 1 :])

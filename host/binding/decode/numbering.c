@@ -1,4 +1,4 @@
-#include "numbering.h"
+#include "decode/numbering.h"
 
 #include <string.h>
 

@@ -1,4 +1,4 @@
-#include "crc_fast.h"
+#include "decode/crc_fast.h"
 
 #include "wire/crc32.h"
 

@@ -10,7 +10,7 @@
 #ifndef BIOTAC_DECODE_H
 #define BIOTAC_DECODE_H
 
-#include "crc_fast.h"
+#include "decode/crc_fast.h"
 #include "wire/framing.h"
 
 #define BT_DECODE_BYTES    65536 // what one call takes

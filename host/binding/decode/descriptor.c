@@ -1,7 +1,7 @@
 #if !defined(_WIN32)
 #define _DEFAULT_SOURCE
 #endif
-#include "descriptor.h"
+#include "decode/descriptor.h"
 
 #if defined(_WIN32)
 

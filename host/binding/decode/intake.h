@@ -3,8 +3,8 @@
 #ifndef BIOTAC_INTAKE_H
 #define BIOTAC_INTAKE_H
 
-#include "decode.h"
-#include "numbering.h"
+#include "decode/decode.h"
+#include "decode/numbering.h"
 
 #define BT_INTAKE_GAPS      (BT_DECODE_ROOM / 16) // no message is as short on the wire
 #define BT_INTAKE_OUT       (2 * BT_DECODE_ROOM / 8)

@@ -1,6 +1,6 @@
-#include "intake.h"
+#include "decode/intake.h"
 
-#include "descriptor.h"
+#include "decode/descriptor.h"
 #include "wire/little_endian.h"
 #include "wire/sensor_gen.h"
 

@@ -1,4 +1,4 @@
-#include "rebuild.h"
+#include "decode/rebuild.h"
 
 #include "wire/framing.h"
 
