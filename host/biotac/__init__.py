@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from .wire.messages_gen import TareState as TareState
     from .wire.messages_gen import Touch as Touch
 
-#: Where each name is; its module is imported when somebody asks for the first name in it.
+#: The names of each module, which is imported when one of them is first used.
 _HOMES = {
     ".core.compute": "MAPPED_RESULT_DTYPE RESULT_DTYPE compute per_frame",
     ".core.finger": "FINGER_DTYPE Finger",

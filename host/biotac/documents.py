@@ -1,7 +1,7 @@
-"""JSON and TOML that somebody gives us: bounded in size and depth, and every number finite.
+"""Reading JSON and TOML from outside: size and depth are bounded, and every number is finite.
 
-A file may be damaged, or made to hurt: 200 KB of brackets end in a RecursionError, and 1e999 is read as infinity. Here
-all of it is ValueError, which the callers put into words about their kind of file.
+A file may be damaged or malicious: 200 KB of brackets cause a RecursionError, and 1e999 is read as infinity. All of
+this becomes ValueError here, which callers turn into a message about their kind of file.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ else:
 
 TOMLDecodeError = tomllib.TOMLDecodeError
 
-#: A wrench map with every block is 2 MB of JSON; a scenario of thousands of steps 1 MB of TOML. `[],` takes 21 times as
-#: much memory as text.
+#: A wrench map with every block is 2 MB of JSON; a scenario of thousands of steps is 1 MB of TOML. Parsed, `[],` takes
+#: 21 times as much memory as its text.
 JSON_BYTES = 16 << 20
 TOML_BYTES = 1 << 20
-# Each dot of a key makes a table, and the parser remembers all that are above it; ours need two. What TOML is made of,
-# so that no key is taken for a text or a comment; what does not end is one piece, and nothing is read twice.
+# Each dot in a key makes a table, and the parser remembers all the tables above it; our files need two. These patterns
+# match TOML's tokens, so that no key is mistaken for a string or a comment. An unterminated string is one token, so
+# nothing is scanned twice.
 _PART = r"""(?:[\w-]+|"[^"\\\n]*(?:\\.[^"\\\n]*)*"?|'[^'\n]*'?)"""
 _TOKEN = re.compile(
     r"""#[^\n]*|"{3}[^"\\]*(?:(?:\\.|"(?!""))[^"\\]*)*(?:"{3,5}|\Z)|'{3}.*?(?:'{3,5}|\Z)"""
@@ -37,12 +38,12 @@ _DOTS_MAX = 3
 
 
 def read_json(path: Path) -> Any:
-    """A JSON file's value. Raises OSError, or ValueError saying what is wrong with it."""
+    """The value in a JSON file. Raises OSError, or ValueError saying what is wrong with the file."""
     return parse_json(read_text(path, JSON_BYTES))
 
 
 def read_text(path: Path, limit_bytes: int) -> str:
-    """A file's text. Raises OSError, or ValueError for a file that is longer, or no UTF-8."""
+    """The text of a file. Raises OSError, or ValueError for a file that is longer than the limit or not UTF-8."""
     with path.open("rb") as file:
         data = file.read(limit_bytes + 1)
     if len(data) > limit_bytes:
@@ -51,7 +52,7 @@ def read_text(path: Path, limit_bytes: int) -> str:
 
 
 def parse_json(text: str | bytes, object_hook: Callable[[dict[str, Any]], Any] | None = None) -> Any:
-    """The value of JSON text. Raises ValueError saying what is wrong with it."""
+    """The value of JSON text. Raises ValueError saying what is wrong with the text."""
     try:
         return json.loads(text, object_hook=object_hook, parse_float=_finite, parse_constant=_no_constant)
     except RecursionError:
@@ -59,7 +60,7 @@ def parse_json(text: str | bytes, object_hook: Callable[[dict[str, Any]], Any] |
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """The table of TOML text. Raises ValueError, of which TOMLDecodeError is one."""
+    """The table of TOML text. Raises ValueError, or its subclass TOMLDecodeError."""
     if len(text) > TOML_BYTES:
         raise ValueError(f"it has over {TOML_BYTES >> 20} MiB")
     if any(_is_deep(match["dots"] or "") for match in _TOKEN.finditer(text)):

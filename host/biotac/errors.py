@@ -1,4 +1,4 @@
-"""Everything this package raises on purpose, ordered by who failed.
+"""The exceptions that this package raises on purpose, ordered by who is at fault.
 
 Each message is one line: what was seen, what was expected, and the cure. The command line maps
 ``exit_code`` to its exit status; the codes are fixed (see ``biotac --help``).
@@ -33,11 +33,11 @@ class RecordingError(InputError):
 
 
 class RecordingWarning(UserWarning):
-    """Something of a recording is missing or damaged, and the rest was read."""
+    """Part of a recording is missing or damaged; the rest was read."""
 
 
 class PortError(BiotacError):
-    """The port does not exist, is busy or may not be opened."""
+    """The port does not exist, is busy or cannot be opened."""
 
     exit_code = 3
 
@@ -55,7 +55,7 @@ class WireVersionError(BiotacError):
 
 
 class DeviceLostError(BiotacError):
-    """The board went away or fell silent in the middle of a conversation."""
+    """The board went away or fell silent while in use."""
 
     exit_code = 6
 
@@ -75,13 +75,13 @@ class CallbackError(BiotacError):
 
 
 class FlashError(BiotacError):
-    """Writing an image to a board did not come to its end; the message says where the settings are."""
+    """Writing an image to a board failed; the message says where the backup of its settings is, if there is one."""
 
     exit_code = 8
 
 
 def printable(text: str) -> str:
-    """``text`` as one line of bounded length: what was seen may be a damaged file's, or made to move a terminal."""
+    """``text`` as one line of bounded length: it may quote a damaged file, or contain terminal escape sequences."""
     if len(text) > LONGEST:
         text = f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
     return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -1,4 +1,4 @@
-"""The link's framing in plain Python over `cobs` and `zlib`: what host/binding/decode.c answers to, and what a
+"""The link's framing in plain Python over `cobs` and `zlib`: what host/binding/decode/decode.c answers to, and what a
 scripted board speaks.
 """
 
@@ -12,7 +12,7 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.framing import FramingCounts
 
 CRC_BYTES = 4
-# What an older peer's message lacks at its end, and is filled up with (host/binding/decode.h).
+# What an older peer's message lacks at its end, and is filled up with (host/binding/decode/decode.h).
 LACKS = {
     wire.Frame.ID: (b"\xff" * 10 + b"\0\0\0\x80\0\0\0\x80\0\0", b"\xff\xff\0\0\0\x80\0\0\0\x80\0\0", bytes(2)),
     wire.Hello.ID: (b"\xff" * 4,),

@@ -14,12 +14,6 @@
 
 #define BITS_FRAMES 100000
 
-static inline uint32_t bits_step(uint32_t *seed)
-{
-    *seed = *seed * 1664525u + 1013904223u;
-    return *seed >> 8;
-}
-
 #define BITS_MAP_FRAMES 2000
 
 // A wrench map of all seven axes, and the population map, over counts and tares of the whole range, missing
@@ -36,14 +30,14 @@ static inline uint32_t bits_map_hash(void)
         uint16_t counts[BT_ELECTRODES], tare_q4[BT_ELECTRODES];
         uint32_t spread = 65521u >> (k % 12);
         for (int i = 0; i < BT_ELECTRODES; i++) {
-            tare_q4[i] = (uint16_t)(65520 - bits_step(&seed) % (k % 3 == 0 ? 65521u : 30000u));
-            uint32_t moved = (uint32_t)tare_q4[i] + bits_step(&seed) % spread;
+            tare_q4[i] = (uint16_t)(65520 - bench_step(&seed) % (k % 3 == 0 ? 65521u : 30000u));
+            uint32_t moved = (uint32_t)tare_q4[i] + bench_step(&seed) % spread;
             counts[i] = (uint16_t)((moved > spread / 2 ? moved - spread / 2 : 0) / 16 % 4096);
-            if (bits_step(&seed) % 64 == 0) {
+            if (bench_step(&seed) % 64 == 0) {
                 counts[i] = BT_INVALID_COUNT;
             }
         }
-        int32_t pdc_q4 = (int32_t)(bits_step(&seed) % 65521u) - 20000;
+        int32_t pdc_q4 = (int32_t)(bench_step(&seed) % 65521u) - 20000;
         bt_map_wrench(&whole.map, counts, tare_q4, pdc_q4, (int32_t *)chain + 1, (int32_t *)chain + 4,
                       (int32_t *)chain + 7);
         int32_t e_q4[BT_ELECTRODES], population_100un[3];
@@ -61,7 +55,7 @@ static inline uint32_t bits_map_hash(void)
 // A word of a finger that rests, is pressed and let go, slips, and now and then does not answer.
 static inline uint16_t bits_word(uint32_t *seed, int round, uint8_t slot)
 {
-    const uint32_t noise = bits_step(seed);
+    const uint32_t noise = bench_step(seed);
     const int phase = round % 60;
     const int pressed = phase < 25 ? 0 : phase < 35 ? (phase - 25) * 12 : phase < 50 ? 120 : 0;
     const uint8_t channel = bt_slot_channel[slot];
@@ -136,8 +130,8 @@ static inline uint32_t bits_hash(void)
         int32_t force_100un[3], torque_mnmm[3];
         int32_t size = BT_E_MAX_Q4 >> (k % 16);
         for (int i = 0; i < BT_ELECTRODES; i++) {
-            int32_t magnitude = (int32_t)(bits_step(&seed) % (uint32_t)(size + 1));
-            e_q4[i] = bits_step(&seed) & 3 ? -magnitude : magnitude;
+            int32_t magnitude = (int32_t)(bench_step(&seed) % (uint32_t)(size + 1));
+            e_q4[i] = bench_step(&seed) & 3 ? -magnitude : magnitude;
         }
         settings.poc_weights = k % 3;
         uint32_t flags = bt_solve(e_q4, &settings, BT_WANT_ALL, poc_um, force_100un, torque_mnmm);

@@ -1,4 +1,4 @@
-"""The emulated boards: how their images are built, run, and what comes back."""
+"""The emulated boards: builds their images, runs them, and reads their output."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ FIRMWARE = ROOT / "firmware"
 BUILD = ROOT / "build" / "bench"
 FRAMES = 12  # per weighting
 WEIGHTS = ("abs n=2", "compress n=1", "compress n=2")  # in the order of enum bt_poc_weights, as image.c counts
-# What some files want compiled otherwise than with -O3; the boards' images are built by the same facts.
+# Files that need other options than -O3; the boards' images are built from the same list.
 OPTIONS = json.loads((FIRMWARE / "boards" / "compile_options.json").read_text(encoding="utf-8"))["files"]
 
 
 def of_room(source: Path) -> str:
-    """As compile_options.json names it."""
+    """The file's name in compile_options.json."""
     return f"{source.parent.name}/{source.name}"
 
 
@@ -75,7 +75,7 @@ M0PLUS = ("-mcpu=cortex-m0plus",)
 M4F = ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
 RP2040JS = "rp2040js 1.4.1, by the Cortex-M0+ manual without flash wait states or bus contention"
 M0PLUS_START = (HERE / "m0plus.c",)
-REFERENCE = FIRMWARE / "boards" / "m4f"  # the M4F's reset and memory are those of its board
+REFERENCE = FIRMWARE / "boards" / "m4f"  # the M4F's reset code and memory map are those of its board
 QEMU = "instructions counted in QEMU mps2-an386, cycles by a model of the Cortex-M4 manual without memory wait states"
 BOARDS = (
     Board("m0plus", "Cortex-M0+", RP2040JS, M0PLUS, M0PLUS_START, HERE / "m0plus.ld"),
@@ -92,7 +92,7 @@ def need() -> None:
             raise Failed(f"{tool} is missing; install it: apt-get install {package}")
     BUILD.mkdir(parents=True, exist_ok=True)
     installed, wanted = HERE.parent / "node_modules" / ".package-lock.json", HERE.parent / "package-lock.json"
-    # Only when it is out of date: tools/emulator, which shares it, may be running.
+    # Only if it is out of date: tools/emulator shares it and may be running.
     if not installed.is_file() or installed.stat().st_mtime < wanted.stat().st_mtime:
         command("npm", "ci", "--silent", "--prefix", HERE.parent)
 
@@ -105,7 +105,7 @@ def command(*words: object) -> str:
 
 
 def build(board: Board, name: str, *sources: object) -> Path:
-    """An image of these sources, the core and what it is compared with."""
+    """An image of these sources, the core, and the kernels it is compared with."""
     elf = BUILD / f"{board.key}_{name}.elf"
     compiler = ["arm-none-eabi-gcc", "-std=c11", "-mthumb", *board.machine, "-ffunction-sections", "-fdata-sections"]
     # As everywhere else: no products fused into sums, and no errno for a square root.
@@ -152,7 +152,7 @@ def run_m4f(elf: Path) -> list[Row]:
     rows: list[Row] = []
     try:
         for k, run in enumerate(runs(_log(elf), addresses(elf)["bench_mark"])):
-            # the last instruction is neighbour to the closing mark, whose address starts no pair
+            # the last instruction is followed by the closing mark, whose address starts no pair
             pairs = Counter(pairwise(run))
             rows.append((names[k][0], names[k][1], len(run), model.cycles(pairs)))
     except UnknownInstruction as unknown:
@@ -163,7 +163,7 @@ def run_m4f(elf: Path) -> list[Row]:
 
 
 def _log(elf: Path) -> Iterator[bytes]:
-    """QEMU's log, one line per instruction, through a pipe: it would be a gigabyte on disk."""
+    """QEMU's log, one line per instruction, through a pipe, because it would take a gigabyte on disk."""
     reader, writer = os.pipe()
     words = [*qemu.words(elf), "-singlestep", "-d", "exec,nochain", "-D", f"/dev/fd/{writer}"]
     process = subprocess.Popen(words, pass_fds=[writer], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -183,7 +183,7 @@ def count(board: Board) -> list[Row]:
 
 
 def tally(rows: list[Row]) -> dict[str, dict[str, list[dict[str, int]]]]:
-    """Kernel -> scene -> per weighting, the median and largest counts over the frames."""
+    """Kernel -> scene -> for each weighting, the median and largest counts over the frames."""
     counts: dict[tuple[str, str], list[tuple[int, int]]] = defaultdict(list)
     for kernel, scene, instructions, cycles in rows:
         counts[kernel, scene].append((instructions, cycles))
@@ -204,7 +204,7 @@ def tally(rows: list[Row]) -> dict[str, dict[str, list[dict[str, int]]]]:
 
 
 def counts() -> dict[str, Any]:
-    """Of every board: key -> title, where its cycles are from, and its kernels' counts as tally() has them."""
+    """For every board: key -> title, source of its cycles, and its kernels' counts as given by tally()."""
     return {
         board.key: {"title": board.title, "cycles_by": board.cycles_by, "kernels": tally(count(board))}
         for board in BOARDS
@@ -218,20 +218,20 @@ def bits_frames() -> int:
 
 
 def bits(board: Board) -> int:
-    """The hash over the shipped kernels' results on this board."""
+    """The hash of the shipped kernels' results on this board."""
     elf = build(board, "bits", HERE / "bits_image.c")
     return int(qemu_says(elf)[0], 16) if board.machine == M4F else run_rp2040(elf)[1][0]
 
 
 def bits_here() -> int:
-    """The same by this machine's own compiler."""
+    """The same hash for this machine's own compiler."""
     program = BUILD / "bits"
     command("cc", "-std=c11", "-O2", *INCLUDE, *CORE, *APART, HERE / "bits.c", "-o", program)
     return int(command(program), 16)
 
 
 def float_symbols() -> list[str]:
-    """Floating-point helpers in an M0+ image of the shipped files alone. The port is left open."""
+    """Floating-point helpers in an M0+ image of the shipped files alone, with the port's functions undefined."""
     elf = BUILD / "shipped.elf"
     words = ["-std=c11", "-mthumb", *M0PLUS, "-O2", *INCLUDE, *SHIPPED, "-nostartfiles", "--specs=nano.specs"]
     link = ["--specs=nosys.specs", "-Wl,-e,main", "-Wl,--unresolved-symbols=ignore-all", "-Wl,--no-warn-mismatch"]

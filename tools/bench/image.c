@@ -65,10 +65,10 @@ static void one_frame(const int32_t e_q4[BT_ELECTRODES], const variant_settings 
     }
     bt_solve_settings by_default = settings->shipped;
     by_default.population = true; // as on a board that nobody calibrated
-    for (int s = 0; s < BENCH_SCENES; s++) {
-        bench_name(bench_scenes[s].kernel, bench_scenes[s].name);
+    for (const bench_scene *scene = bench_scenes; scene->kernel != NULL; scene++) {
+        bench_name(scene->kernel, scene->name);
         bench_mark();
-        bench_scenes[s].run(&by_default);
+        scene->run(&by_default);
         bench_mark();
     }
 }

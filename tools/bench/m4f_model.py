@@ -1,9 +1,8 @@
-"""Cycles of a Cortex-M4F from the addresses it went through: a model, no silicon was measured.
+"""Cycles of a Cortex-M4F from the addresses it executed: a model, not measured on silicon.
 
-Per instruction as the Cortex-M4 technical reference manual (r0p1, 3.3.1 and 7.2.2) has it, with memory
-that never waits. Where the manual gives a range, the worst is taken: integer division 12, a taken branch 3.
-What it leaves open is left out: an IT that is folded away, VDIV beside integer work. An instruction that
-its IT block skips costs what it would cost if it ran.
+Costs are those of the Cortex-M4 technical reference manual (r0p1, 3.3.1 and 7.2.2), with memory that never waits. Where
+the manual gives a range, the worst is taken: integer division 12, a taken branch 3. What it leaves open is left out:
+folded ITs, VDIV in parallel with integer work. An instruction skipped by its IT block costs as much as if it ran.
 """
 
 from __future__ import annotations
@@ -12,8 +11,9 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 
-TAKEN = 2  # cycles that a taken branch adds to its one: the pipeline is filled again
+TAKEN = 2  # cycles that a taken branch adds to its one, to refill the pipeline
 BRANCHES = re.compile(r"(b|bl|bx|blx|b(eq|ne|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le|hs|lo)|cbn?z|tb[bh])$")
 SINGLE = re.compile(r"(ldr|str)s?[bh]?t?$")
 MANY = re.compile(r"(ldm|stm|push|pop|vldm|vstm|vpush|vpop)")
@@ -34,7 +34,7 @@ PLAIN = frozenset(ONE_CYCLE.split())
 
 
 class UnknownInstruction(ValueError):
-    """The model has no cost for it."""
+    """The model has no cost for this instruction."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Instruction:
 
 
 def decode(disassembly: str) -> dict[int, Instruction]:
-    """Address -> instruction, from `objdump -d --no-show-raw-insn`'s longer form with the raw bytes."""
+    """Address -> instruction, from the output of `objdump -d` with raw bytes."""
     out: dict[int, Instruction] = {}
     for line in disassembly.splitlines():
         cells = line.split("\t")
@@ -75,7 +75,7 @@ def base_name(text: str) -> str:
 
 
 def registers_in(operands: str) -> int:
-    """How many words a register list moves."""
+    """Number of registers in a register list."""
     count = 0
     found = REGISTER_LIST.search(operands)
     for part in (found.group(1) if found else "").split(","):
@@ -86,7 +86,7 @@ def registers_in(operands: str) -> int:
 
 
 def alone(i: Instruction) -> int:
-    """Cycles of one instruction, before its neighbours are looked at."""
+    """Cycles of one instruction by itself."""
     if i.name in ("sdiv", "udiv"):
         return 12
     if i.name in ("vdiv", "vsqrt"):
@@ -109,14 +109,15 @@ def alone(i: Instruction) -> int:
     raise UnknownInstruction(f"the Cortex-M4F model has no cycles for {i.name} {i.operands}; add them to m4f_model.py")
 
 
+@cache  # the same pairs recur in every frame
 def step(a: Instruction, b: Instruction) -> int:
-    """Cycles of ``a`` when ``b`` follows: what a branch, a result that is awaited or a pipelined load do."""
+    """Cycles of ``a`` when ``b`` follows, including taken branches, waits for a result and pipelined loads."""
     cycles = alone(a)
     jumped = b.address != a.address + a.size
     if jumped:
         cycles += TAKEN
     if SINGLE.match(a.name) and SINGLE.match(b.name) and alone(b) == 2 and not jumped:
-        cycles -= 1  # of b, whose address goes out while a's data comes in
+        cycles -= 1  # b's cycle: its address goes out while a's data comes in
     if a.name in FP_ARITHMETIC and reads(b, a.operands.split(",")[0]):
         cycles += 1
     return cycles
@@ -130,27 +131,21 @@ def reads(i: Instruction, register: str) -> bool:
 
 
 class Model:
-    """Cycles over a run, each pair of neighbours worked out once."""
+    """Cycles of a run of an image."""
 
     def __init__(self, disassembly: str) -> None:
         self.code = decode(disassembly)
-        self.known: dict[tuple[int, int], int] = {}
 
     def cycles(self, pairs: Counter[tuple[int, int]]) -> int:
-        """Of every first instruction of ``pairs`` of neighbours, with how often they came."""
-        return sum(times * self._pair(pair) for pair, times in pairs.items())
-
-    def _pair(self, pair: tuple[int, int]) -> int:
-        if pair not in self.known:
-            self.known[pair] = step(self.code[pair[0]], self.code[pair[1]])
-        return self.known[pair]
+        """Cycles of the first instruction of each pair of neighbours, times how often the pair occurred."""
+        return sum(times * step(self.code[first], self.code[second]) for (first, second), times in pairs.items())
 
 
 TRACE = re.compile(rb"\[[0-9a-f]+/([0-9a-f]+)/")
 
 
 def runs(chunks: Iterable[bytes], mark: int) -> Iterable[list[int]]:
-    """Addresses between two marks, run by run, from QEMU's log of executed blocks of one instruction."""
+    """The addresses between two marks, run by run, from QEMU's log of executed one-instruction blocks."""
     wanted = b"%08x" % mark
     rest = b""
     open_run: list[bytes] | None = None

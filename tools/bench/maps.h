@@ -25,7 +25,7 @@ static const uint8_t bench_map_affine[][2] = {
     {BT_MAP_KIND_SIGNAL, BT_MAP_GATE_ONE},
 };
 
-static inline uint32_t bench_map_step(uint32_t *seed)
+static inline uint32_t bench_step(uint32_t *seed)
 {
     *seed = *seed * 1664525u + 1013904223u;
     return *seed >> 8;
@@ -42,7 +42,7 @@ static inline bool bench_map_make(bench_map *out, const uint8_t (*blocks)[2], ui
     }
     out->blob[0] = BT_MAP_VERSION | axes << 8 | count << 16;
     for (uint32_t b = 0; b < count; b++) { // both builds are little-endian
-        uint32_t exponents = 0x0A0A0A0A + (bench_map_step(&seed) & 0x03030303);
+        uint32_t exponents = 0x0A0A0A0A + (bench_step(&seed) & 0x03030303);
         out->blob[words++] = blocks[b][0] | (uint32_t)blocks[b][1] << 8 | exponents << 16;
         out->blob[words++] = axes >= 6 ? exponents : exponents & 0xFF;
         out->blob[words++] = axes == 7 ? exponents & 0xFF : 0;
@@ -53,8 +53,8 @@ static inline bool bench_map_make(bench_map *out, const uint8_t (*blocks)[2], ui
             uint32_t width = axis == 0 ? 3 : axes - 3; // of the group
             uint32_t its = halves[blocks[b][0]] * width;
             for (uint32_t k = 0; k < its; k += 2) {
-                uint32_t first = bench_map_step(&seed) % 2001 - 1000; // a row of ten stays in bounds
-                uint32_t second = bench_map_step(&seed) % 2001 - 1000;
+                uint32_t first = bench_step(&seed) % 2001 - 1000; // a row of ten stays in bounds
+                uint32_t second = bench_step(&seed) % 2001 - 1000;
                 first = pairs || k < its - width ? first & 0xFFFF : 0; // behind 19 columns, or one
                 second = pairs || k + 1 < its - width ? second << 16 : 0;
                 out->blob[words++] = first | second;

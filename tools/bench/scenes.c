@@ -26,6 +26,8 @@ static _Alignas(4) uint16_t encoded[(BT_ENCODED_MAX_BYTES + 1) / 2];
 // What keeps the compiler from dropping a result.
 static volatile uint32_t sink;
 
+#define SCENE(its) static void its(__attribute__((unused)) const bt_solve_settings *settings)
+
 static void words(bt_finger *finger, const uint16_t count[BT_SLOTS])
 {
     bool touched = false;
@@ -60,75 +62,69 @@ static void pressed(bt_finger *finger, const bt_solve_settings *settings, uint32
     bt_results(&finger->round, &finger->tare, settings, quantities, &message);
 }
 
-static void one_word(const bt_solve_settings *settings)
+SCENE(one_word)
 {
-    (void)settings;
     sink = (uint32_t)bt_trigger_electrode(&trigger, 3, rest_lane[3]);
 }
 
-static void front_at_rest(const bt_solve_settings *settings)
+SCENE(front_at_rest)
 {
-    (void)settings;
     front_end(&rest_front, rest_lane);
 }
 
-static void front_in_contact(const bt_solve_settings *settings)
+SCENE(front_in_contact)
 {
-    (void)settings;
     front_end(&press_front, press_lane);
 }
 
-static void whole_at_rest(const bt_solve_settings *settings)
+SCENE(whole_at_rest)
 {
-    (void)settings;
     untouched(&rest_whole);
 }
 
-static void whole_in_contact(const bt_solve_settings *settings)
+SCENE(whole_in_contact)
 {
     pressed(&press_whole, settings, BT_WANT_ALL);
 }
 
-static void whole_by_lin(const bt_solve_settings *settings)
+SCENE(whole_by_lin)
 {
     bt_solve_settings lins = *settings;
     lins.population = false;
     pressed(&press_lin, &lins, BT_WANT_ALL);
 }
 
-static void force_only(const bt_solve_settings *settings)
+SCENE(force_only)
 {
     pressed(&press_force, settings, BT_WANT_FORCE);
 }
 
-static void poc_only(const bt_solve_settings *settings)
+SCENE(poc_only)
 {
     pressed(&press_poc, settings, BT_WANT_POC);
 }
 
-static void with_sigma(const bt_solve_settings *settings)
+SCENE(with_sigma)
 {
     pressed(&press_sigma, settings, BT_WANT_ALL | BT_QUANTITY_FLAG_SIGMA);
 }
 
-static void five_at_rest(const bt_solve_settings *settings)
+SCENE(five_at_rest)
 {
-    (void)settings;
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         untouched(&rest_five[f]);
     }
 }
 
-static void five_in_contact(const bt_solve_settings *settings)
+SCENE(five_in_contact)
 {
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         pressed(&press_five[f], settings, BT_WANT_ALL);
     }
 }
 
-static void all_words(const bt_solve_settings *settings)
+SCENE(all_words)
 {
-    (void)settings;
     words(&rest_words, rest_count);
     sink = bt_finger_end(&rest_words, &tare_settings);
 }
@@ -154,51 +150,44 @@ static void events(bt_finger *finger)
     sink = told;
 }
 
-static void events_at_rest(const bt_solve_settings *settings)
+SCENE(events_at_rest)
 {
-    (void)settings;
     events(&rest_events);
 }
 
-static void events_in_contact(const bt_solve_settings *settings)
+SCENE(events_in_contact)
 {
-    (void)settings;
     events(&press_events);
 }
 
 // The dearest: a held finger is shaken, and no event has been told of it so far.
-static void events_shaken(const bt_solve_settings *settings)
+SCENE(events_shaken)
 {
-    (void)settings;
     shaken_events.events.risen_count2 = shaken_events.events.fallen_count2 = 1;
     events(&shaken_events);
 }
 
 // What shakes and never is a slip: nothing touches.
-static void events_jolting(const bt_solve_settings *settings)
+SCENE(events_jolting)
 {
-    (void)settings;
     events(&jolt_events);
 }
 
-static void events_slipping(const bt_solve_settings *settings)
+SCENE(events_slipping)
 {
-    (void)settings;
     events(&slip_events);
 }
 
-static void bands_of_a_round(const bt_solve_settings *settings)
+SCENE(bands_of_a_round)
 {
-    (void)settings;
     static bt_msg_bands bands;
     bt_finger_bands(&slip_events, &bands);
     sink = bands.energy_q4[0];
 }
 
 // A FRAME to bytes for the link, with the table's CRC: on an RP2040 the DMA makes it, in 1100 cycles less.
-static void framed(const bt_solve_settings *settings)
+SCENE(framed)
 {
-    (void)settings;
     bt_msg_frame_pack_even(&sent, encoded + BT_PAYLOAD_AT / 2);
     sink = (uint32_t)bt_frame_seal(BT_FRAME_ID, BT_FRAME_BYTES, (uint8_t *)encoded);
 }
@@ -212,9 +201,8 @@ static void mapped(const bt_map *map)
 }
 
 #define MAP_SCENE(its)                                                                                       \
-    static void map_##its(const bt_solve_settings *settings)                                                 \
+    SCENE(map_##its)                                                                                         \
     {                                                                                                        \
-        (void)settings;                                                                                      \
         mapped(&its.map);                                                                                    \
     }
 
@@ -227,7 +215,7 @@ MAP_SCENE(pooled)
 MAP_SCENE(pooled_6)
 MAP_SCENE(pooled_7)
 
-static void population(const bt_solve_settings *settings)
+SCENE(population)
 {
     int32_t force_100un[3], lin_100un[3], e_q4[BT_ELECTRODES];
     bt_signals_q4(press_whole.round.electrode, press_whole.tare.electrode_q4, e_q4);
@@ -240,14 +228,13 @@ static void population(const bt_solve_settings *settings)
     sink = (uint32_t)force_100un[0];
 }
 
-static void map_opened(const bt_solve_settings *settings)
+SCENE(map_opened)
 {
-    (void)settings;
     bt_map map;
     sink = bt_map_open(&map, (const uint8_t *)pooled.blob, pooled.bytes);
 }
 
-const bench_scene bench_scenes[BENCH_SCENES] = {
+const bench_scene bench_scenes[] = {
     {"trigger", "one word", one_word},
     {"front end", "at rest", front_at_rest},
     {"front end", "in contact", front_in_contact},
@@ -277,6 +264,7 @@ const bench_scene bench_scenes[BENCH_SCENES] = {
     {"bands", "a round", bands_of_a_round},
     {"link", "44 words taken in, at rest", all_words},
     {"link", "FRAME packed, with CRC and COBS", framed},
+    {NULL, NULL, NULL},
 };
 
 static void run(bt_finger *finger, const uint16_t count[BT_SLOTS], int rounds)

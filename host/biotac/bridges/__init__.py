@@ -1,1 +1,1 @@
-"""Streams handed on to other live systems."""
+"""Bridges that pass live streams on to other systems."""

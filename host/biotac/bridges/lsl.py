@@ -1,4 +1,4 @@
-"""Fingers as Lab Streaming Layer streams, beside EEG and motion capture. Needs the extra ``lsl``.
+"""Fingers as Lab Streaming Layer streams, alongside EEG and motion capture. Needs the extra ``lsl``.
 
 >>> import biotac
 >>> from biotac.bridges.lsl import Outlet
@@ -12,7 +12,6 @@
 
 from __future__ import annotations
 
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -42,17 +41,17 @@ _PAC_PER_ROUND = len(_PAC_COLUMN.parts)
 
 
 class Outlet:
-    """Two streams for each finger of ``hand``; use as a context manager, and push every batch.
+    """Three streams for each finger of ``hand``; use as a context manager, and push every batch.
 
-    ``BioTac finger0``: a sample a round, 100 a second, of force (N), torque (N*mm), point of contact (mm), flags,
-    counts of E1..E19, PDC, TAC and TDC; NaN and 65535 where invalid, as in exports. ``BioTac finger0 PAC``: 2200 a
-    second, counts. ``BioTac finger0 events``: a marker, its kind's name (EventKind), for each EVENT, which are there
-    when the hand is subscribed to them. All others are double64; labels, units and meanings stand in the streams'
-    descriptions.
+    ``BioTac finger0``: one sample per round, 100 per second, of force (N), torque (N*mm), point of contact (mm),
+    flags, and counts of E1..E19, PDC, TAC and TDC; NaN or 65535 where invalid, as in exports. ``BioTac finger0 PAC``:
+    counts, 2200 per second. ``BioTac finger0 events``: for each EVENT a marker, the name of its kind (EventKind);
+    markers come only if the hand is subscribed to events. The first two streams are double64; their descriptions hold
+    labels, units and meanings.
 
-    Stamps are device times on ``local_clock()``, by ``hand.clock``: of a frame the beginning of its round, of PAC
-    each sample's own. Where the clock knows nothing (a simulated board's time is none), a batch is stamped by its
-    arrival, and ``by_arrival`` counts its samples. ``push`` asks the board for its time twice a second.
+    Stamps are device times converted to ``local_clock()`` by ``hand.clock``: the start of the round for a frame, each
+    sample's own time for PAC. If the clock cannot convert (a simulated board has no real clock), a batch is stamped
+    with its arrival, and ``by_arrival`` counts its samples. ``push`` asks the board for its time twice a second.
 
     Raises InputError when pylsl or its liblsl is missing.
     """
@@ -85,7 +84,7 @@ class Outlet:
 
         for event in batch.messages:
             if isinstance(event, wire.Event) and (event.finger, EVENTS) in self._outlets:
-                t_us = np.array([nearest(event.t_us, batch.last_t_us() or event.t_us, 32)], np.float64)
+                t_us = np.array([nearest(event.t_us, batch.last_t_us() or event.t_us)], np.float64)
                 (stamp_s,) = self._stamps.of(t_us, (event.finger, EVENTS)).tolist()
                 self._outlets[event.finger, EVENTS].push_sample([kind_name(event)], stamp_s)
 
@@ -97,14 +96,14 @@ class Outlet:
     def __enter__(self) -> Outlet:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _add(self, finger: int, suffix: str, columns: tuple[Field, ...], rate_hz: float) -> None:
         lsl = self._lsl
-        labels = [c for column in columns for c in channels(column)] if not suffix else [("PAC", columns[0])]
+        labels = [("PAC", columns[0])]
+        if not suffix:
+            labels = [(name, column) for column in columns for name in column.flat_names()]
         source = f"biotac-{serial_text(self._hand.info)}-{finger}{suffix.replace(' ', '-')}"
         info = lsl.StreamInfo(f"BioTac finger{finger}{suffix}", TYPE, len(labels), rate_hz, lsl.cf_double64, source)
         about = info.desc()
@@ -132,22 +131,17 @@ class Outlet:
 
     @property
     def by_arrival(self) -> int:
-        """Samples so far that were stamped by their arrival."""
+        """Number of samples so far that were stamped with their arrival."""
         return self._stamps.by_arrival
 
 
 def samples(frames: StructArray) -> NDArray[np.float64]:
-    """FRAME_DTYPE (n,) as the rows (n, 31) of a frame stream."""
+    """FRAME_DTYPE (n,) as samples of a frame stream, float64 (n, 32)."""
     return np.column_stack([frames[name].astype(np.float64) for name in _SENT])
 
 
-def channels(column: Field) -> list[tuple[str, Field]]:
-    """Label and column of each component, named as in flat exports."""
-    return [(name, column) for name in column.flat_names()]
-
-
 def describe(hand: Hand, finger: int) -> dict[str, str]:
-    """What holds for all channels of a finger's streams."""
+    """Description entries that apply to all channels of a finger's streams."""
     late_ms = float(electrode_t_us(0.0).mean()) / 1000
     return {
         "manufacturer": "SynTouch",
@@ -163,7 +157,7 @@ def describe(hand: Hand, finger: int) -> dict[str, str]:
 def _pylsl() -> Any:
     try:
         import pylsl
-    except (ImportError, RuntimeError) as error:  # RuntimeError: pylsl is there, liblsl is not
+    except (ImportError, RuntimeError) as error:  # RuntimeError: pylsl is installed, liblsl is not
         seen = str(error).splitlines()[0]
         raise InputError(f"LSL needs pylsl and liblsl ({seen}); pip install 'biotac-gateway[lsl]'") from error
     return pylsl

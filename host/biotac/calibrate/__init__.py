@@ -1,1 +1,1 @@
-"""From touch to newtons: wrench and pressure calibrations, and the reference sensors they are made with."""
+"""From counts to newtons: wrench and pressure calibrations, and the reference sensors they are made with."""

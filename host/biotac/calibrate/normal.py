@@ -1,7 +1,7 @@
-"""The normal at the point of contact, corrected by contacts of a flat plate whose normal was recorded.
+"""The normal at the point of contact, corrected with contacts of a flat plate whose normal was recorded.
 
-The formula's normal, and what the electrodes' pattern says beyond it, linear and with ridge: 66 numbers. Frames of one
-contact are one look at the finger, so whatever is chosen or judged is held out by whole contacts.
+The correction to the formula's normal is a ridge regression on that normal and the electrodes' pattern: 69 numbers.
+Frames of one contact are one look at the finger, so whatever is chosen or judged is held out by whole contacts.
 """
 
 from __future__ import annotations
@@ -30,17 +30,20 @@ Contacts = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Normal:
-    """``coefficients`` (23, 3): what is added to the formula's normal, of it, of the pattern, and always."""
+    """A correction that is added to the formula's normal.
+
+    ``coefficients`` (23, 3) are for the formula's normal (3 rows), the pattern (19) and a constant.
+    """
 
     coefficients: Floats
 
     def corrected(self, points_mm: Floats, e: Floats) -> Floats:
-        """Unit normals (n, 3) of published points (n, 3) and counts above the tare (n, 19); NaN without a point."""
+        """Unit normals (n, 3) from published points (n, 3) and counts above the tare (n, 19); NaN without a point."""
         formula, inputs = _inputs(points_mm, e)
         return _unit(formula + inputs @ self.coefficients[:-1] + self.coefficients[-1])
 
     def point_mm(self, points_mm: Floats, e: Floats) -> Floats:
-        """Where the finger's outward normal is that (n, 3). Along the cylinder it turns alone, and x stays."""
+        """Points (n, 3) in mm where the core has the corrected normal. On the cylinder a point only turns; x stays."""
         normal = self.corrected(points_mm, e)
         x = points_mm[:, 0]
         normal[:, 0] = np.where(x > 0.0, np.maximum(normal[:, 0], 0.0), 0.0)
@@ -51,8 +54,9 @@ class Normal:
 
 @dataclass(frozen=True)
 class Looks:
-    """Frames (n,) of a plate on the finger: published ``points_mm`` (n, 3), counts above the tare ``e`` (n, 19), the
-    plate's unit ``normals`` (n, 3) outward, and which ``contact`` (n,) each is of.
+    """n frames of a plate on the finger: published ``points_mm`` (n, 3) and counts above the tare ``e`` (n, 19).
+
+    ``normals`` (n, 3) are the plate's unit normals, outward from the finger; ``contact`` (n,) is each frame's contact.
     """
 
     points_mm: Floats
@@ -62,12 +66,12 @@ class Looks:
 
 
 def fit(looks: Looks) -> Normal:
-    """With the ridge that is best on contacts held out. Raises InputError for too few contacts."""
+    """The correction, with the ridge that is best on held-out contacts. Raises InputError for too few contacts."""
     return Normal(_Fitting(looks).all_but(None))
 
 
 def held_out(looks: Looks) -> Floats:
-    """Normals (n, 3) of each contact by fit() of the others, its choice of ridge included. Raises InputError."""
+    """Normals (n, 3) of each contact by fit() to the others, ridge included. Raises InputError for too few contacts."""
     fitting = _Fitting(looks)
     result = np.empty_like(looks.normals)
     for k, rows in enumerate(fitting.rows):
@@ -76,20 +80,20 @@ def held_out(looks: Looks) -> Floats:
 
 
 def angles_deg(one: Floats, other: Floats) -> Floats:
-    """Between unit vectors (n, 3)."""
-    # atan2 keeps small angles that acos rounds to nothing
+    """Angles (n,) in degrees between unit vectors (n, 3)."""
+    # atan2 is exact for small angles, which acos rounds to 0
     cross = np.linalg.norm(np.cross(one, other), axis=1)
     result: Floats = np.degrees(np.arctan2(cross, (one * other).sum(axis=1)))
     return result
 
 
 def dumps(its: Normal) -> str:
-    """As JSON."""
+    """The correction as JSON."""
     return json.dumps({"format": FORMAT, "coefficients": its.coefficients.tolist()}) + "\n"
 
 
 def load(path: Path) -> Normal:
-    """Inverse of dumps. Raises InputError naming what is wrong with it."""
+    """The correction in a file. Raises InputError that says what is wrong with it."""
     try:
         facts = read_json(path)
         if facts["format"] != FORMAT:
@@ -104,7 +108,7 @@ def load(path: Path) -> Normal:
 
 
 class _Fitting:
-    """Sums of every contact, so that any choice of contacts costs a solve of 22 numbers."""
+    """Sums for every contact, so that a fit to any choice of contacts is one solve for 22 unknowns."""
 
     def __init__(self, looks: Looks) -> None:
         names, of = np.unique(looks.contact, return_inverse=True)
@@ -125,7 +129,7 @@ class _Fitting:
         return _unit(self._formula[rows] + self._z[rows] @ coefficients)
 
     def all_but(self, out: int | None) -> Floats:
-        """Coefficients (23, 3) without contact ``out``, whose ridge is chosen without it, too."""
+        """Coefficients (23, 3) fitted without contact ``out``; their ridge is chosen without it, too."""
         kept = [k for k in range(len(self.rows)) if k != out]
         errors = []
         for ridge in RIDGES:
@@ -139,14 +143,14 @@ class _Fitting:
         n = gram[-1, -1]
         mean = gram[-1, :-1] / n
         about_mean = gram[:-1, :-1] / n - mean[:, None] * mean
-        # the core's normals lie in a plane where nothing touched the tip: a column that stands still is worth nothing
+        # if nothing touched the tip, all normals lie in a plane: a column that does not vary must get no weight
         pull = ridge * np.maximum(np.diag(about_mean), VARIANCE_FLOOR)
         its = np.linalg.solve(about_mean + np.diag(pull), cross[:-1] / n - mean[:, None] * (cross[-1] / n))
         return np.vstack([its, cross[-1] / n - mean @ its])
 
 
 def _inputs(points_mm: Floats, e: Floats) -> tuple[Floats, Floats]:
-    """The formula's normals (n, 3), and with them the pattern of the counts, whatever their size (n, 22)."""
+    """The formula's normals (n, 3), and the regression's inputs (n, 22): these and the counts as a unit vector."""
     known = np.isfinite(points_mm).all(axis=1, keepdims=True)
     formula = np.where(known, surface.normals_at(np.where(known, points_mm, [0.0, 0.0, -1.0])), np.nan)
     return formula, np.column_stack([formula, _unit(e)])
@@ -154,5 +158,4 @@ def _inputs(points_mm: Floats, e: Floats) -> tuple[Floats, Floats]:
 
 def _unit(of: Floats) -> Floats:
     length = np.linalg.norm(of, axis=1, keepdims=True)
-    result: Floats = of / np.where(length > 0.0, length, 1.0)
-    return result
+    return of / np.where(length > 0.0, length, 1.0)

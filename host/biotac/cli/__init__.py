@@ -1,4 +1,4 @@
-"""The ``biotac`` command: one module per verb, fixed exit codes, the only place that prints."""
+"""The ``biotac`` command: one module per verb, fixed exit codes. Only this package prints."""
 
 from __future__ import annotations
 

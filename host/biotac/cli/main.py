@@ -12,7 +12,7 @@ from collections.abc import Collection, Sequence
 
 from ..errors import BiotacError, InputError
 
-#: In the order of ``biotac --help``: where each is, imported when it is called, and what it does.
+#: In the order of ``biotac --help``: each verb's module, imported when it is called, and what it does.
 VERBS = {
     "demo": (
         "biotac.cli.lab.demo",
@@ -26,7 +26,7 @@ VERBS = {
         "biotac.cli.boards.doctor",
         "Find what is wrong with a board, its sensors or this computer, and the cure.",
     ),
-    "info": ("biotac.cli.boards.info", "Say who is on a port: board, firmware, sensors, settings, counters."),
+    "info": ("biotac.cli.boards.info", "Show what is on a port: board, firmware, sensors, settings, counters."),
     "view": ("biotac.cli.live.view", "Show a board or a recording live in the browser."),
     "stream": ("biotac.cli.live.stream", "Print frames as they arrive: one line each, or one JSON object each."),
     "lsl": ("biotac.cli.live.lsl", "Publish fingers on the Lab Streaming Layer."),
@@ -42,7 +42,7 @@ VERBS = {
         "biotac.cli.recordings.export",
         "Write a recording as CSV, Parquet, HDF5, NPZ or ROS 2 bag, many to a lake.",
     ),
-    "lake": ("biotac.cli.recordings.lake", "Check a lake of recordings, or ask it in SQL."),
+    "lake": ("biotac.cli.recordings.lake", "Check a lake of recordings, or query it in SQL."),
     "inventory": (
         "biotac.cli.recordings.inventory",
         "List a lake's boards and sensors, their ages, and their health against their own history.",
@@ -50,7 +50,7 @@ VERBS = {
     "import": ("biotac.cli.recordings.import_btd", "Turn a SynTouch .btd file into a recording."),
     "calibrate": (
         "biotac.cli.calibrate",
-        "Fit a finger's wrench or pressure to a reference, measure it held out, give it to the board.",
+        "Fit a finger's wrench or pressure to a reference, test it on held-out data, upload it.",
     ),
     "calibration": ("biotac.cli.boards.calibration", "Show, get, put or store a finger's calibration."),
     "map": (
@@ -59,17 +59,17 @@ VERBS = {
     ),
     "experiment": (
         "biotac.cli.lab.experiment",
-        "Do a paper's experiment again: figure, table against the paper, JSON.",
+        "Repeat a paper's experiment: figure, table against the paper, JSON.",
     ),
     "sim": ("biotac.cli.live.sim", "Run a simulated or emulated board on a pty that any serial program can open."),
     "sensor": (
         "biotac.cli.live.sensor",
-        "Have a Pico that is wired to a gateway play scenarios and recordings as its sensors.",
+        "Let a Pico that is wired to a gateway play scenarios and recordings as its sensors.",
     ),
     "flash": ("biotac.cli.boards.flash", "Write a firmware image to a board, and give it its settings back."),
     "bench": (
         "biotac.cli.lab.bench",
-        "Measure batch maths, decoding, starting, the live path, an idle link, recording sizes.",
+        "Measure batch maths, decoding, start-up, the live path, an idle link, recording sizes.",
     ),
     "udev-setup": ("biotac.cli.boards.udev_setup", "Install the Linux rule that lets you open boards (needs root)."),
     "version": ("biotac.cli.version", "Print the release, the wire version and the schema hash."),
@@ -87,11 +87,11 @@ exit codes: 0 done  1 something was found wrong  2 unusable file or argument  3 
 
 
 class OneLineEach(argparse.RawDescriptionHelpFormatter):
-    """Wide enough for a verb a line, so that all of them fit a screen."""
+    """Wide enough for one verb per line, so that all of them fit a screen."""
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog, max_help_position=18, width=110)
-        # argparse measures verbs without their indent, and then breaks the line after the longest ones
+        # argparse measures verbs without their indent and would break the line after the longest ones
         self._action_max_length = 16
 
 
@@ -104,7 +104,7 @@ def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
         formatter_class=OneLineEach,
         add_help=False,
     )
-    top.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)  # whoever reads it has found it
+    top.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)  # who can read its help needs no help line
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
     for name, (place, text) in VERBS.items():
         verb = verbs.add_parser(name, help=text, description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -122,7 +122,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else argv
     args = parser(words[:1]).parse_args(words)
     if threading.current_thread() is threading.main_thread():
-        # A terminated command leaves no simulator and no temporary file behind either.
+        # SIGTERM must not leave a simulator or a temporary file behind either.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return int(args.run(args))
@@ -130,11 +130,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"biotac: {one_line(error)}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt as interrupt:
-        # What became of a file that was being written.
+        # The message says what became of a file that was being written.
         print(f"biotac: interrupted{f'; {interrupt}' if interrupt.args else ''}", file=sys.stderr)
         return 130
     except BrokenPipeError:
-        # Whoever read our output has had enough; keep Python from complaining while it shuts down.
+        # The reader of our output closed it; keep Python from complaining while it shuts down.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
@@ -144,5 +144,5 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def one_line(error: Exception) -> str:
-    """A message as one line, whatever a file name has in it."""
+    """The message as one line, even if a file name in it has line breaks."""
     return " ".join(str(error).split())

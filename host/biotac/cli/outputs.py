@@ -1,4 +1,4 @@
-"""Where a verb's results go, looked at before minutes of work and not after them."""
+"""Checks where a verb's results go, before minutes of work and not after."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from ..errors import InputError
 
 
 def check_file(place: Path | None, *, overwrite: bool) -> None:
-    """Raises InputError when a file, if one is named, is there and may not be overwritten."""
+    """Raises InputError if the file, where one is named, exists and may not be overwritten."""
     if place is not None and place.exists() and not overwrite:
         raise InputError(f"{place} exists and would be overwritten; choose another name or say --force")
 
 
 def check(folder: Path, places: Sequence[Path], *, overwrite: bool) -> None:
-    """Raises InputError when a place in ``folder`` is named twice, or is there and may not be overwritten."""
+    """Raises InputError if a place in ``folder`` is named twice, or exists and may not be overwritten."""
     for place in places:
         if places.count(place) > 1:
             raise InputError(f"{place} would be written twice; give files of the same name a folder each")
@@ -26,7 +26,7 @@ def check(folder: Path, places: Sequence[Path], *, overwrite: bool) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """With those above it. Raises InputError."""
+    """Make ``folder`` and its parents. Raises InputError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""A progress line on stderr for whatever takes longer than a second, on a terminal only."""
+"""A progress line on stderr for work of more than a second, on a terminal only."""
 
 from __future__ import annotations
 
@@ -7,15 +7,21 @@ import time
 
 
 class Progress:
-    """Call ``show`` as often as you like; it prints a few times a second and cleans up after itself."""
+    """Call ``show`` as often as you like: it prints a few times a second. As a context manager it clears the line."""
 
     def __init__(self, *, enabled: bool = True) -> None:
         self._enabled = enabled and sys.stderr.isatty()
         self._next = time.monotonic() + 1.0
         self._width = 0
 
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.done()
+
     def show(self, text: str) -> None:
-        """Replace the line by text, at most five times a second, not before a second has passed."""
+        """Replace the line by ``text``, at most five times a second and not within the first second."""
         now = time.monotonic()
         if not self._enabled or now < self._next:
             return

@@ -6,30 +6,32 @@ import argparse
 import math
 
 
+def number(text: str) -> float:
+    """The number in ``text``; NaN, which is in no range, if there is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
 def seconds(text: str) -> float:
     """A time above 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number(text)
     if not 0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"{text!r} is no time; expected seconds above 0")
     return value
 
 
 def rate(text: str) -> float:
-    """Lines per second; 0 means all, and one a day is the least."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    """Lines per second: 0 for all, or at least one a day."""
+    value = number(text)
     if not (value == 0 or 1 / 86400 <= value < math.inf):
         raise argparse.ArgumentTypeError(f"{text!r} is no rate; expected lines per second, or 0 for all")
     return value
 
 
 def pace(text: str) -> float:
-    """real, fast, or device seconds per second."""
+    """``real``, ``fast``, or device seconds per second."""
     from ..link.port_text import parse_pace
 
     try:
@@ -39,7 +41,7 @@ def pace(text: str) -> float:
 
 
 def workers(text: str) -> int:
-    """How many processes."""
+    """A number of processes."""
     if not (text.isascii() and text.isdigit() and 1 <= int(text[:9]) <= 1024):
         raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; expected 1 to 1024")
     return int(text)
@@ -56,12 +58,12 @@ def finger(text: str) -> int:
 
 
 def fingers(text: str) -> tuple[int, ...]:
-    """Several of them, with commas between."""
+    """Several fingers, separated by commas."""
     return tuple(finger(part) for part in text.split(","))
 
 
 def add_port(parser: argparse.ArgumentParser) -> None:
-    """PORT, which may be left out."""
+    """Add PORT, which may be left out."""
     parser.add_argument(
         "port",
         metavar="PORT",
@@ -72,5 +74,5 @@ def add_port(parser: argparse.ArgumentParser) -> None:
 
 
 def numbers(text: str) -> tuple[float, ...]:
-    """Several, with commas between; none of an empty text."""
+    """Several numbers, separated by commas; empty for an empty text."""
     return tuple(float(part) for part in text.split(",")) if text else ()

@@ -12,7 +12,7 @@ EXAMPLE = "biotac version"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """None of its own."""
+    """Add nothing: the verb has no arguments of its own."""
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""When things happened: device time as host time, with a bound on the error.
+"""When things happened: converts device time to host time, with a bound on the error.
 
 >>> import numpy as np
 >>> from biotac.clock import DeviceClock
@@ -18,13 +18,4 @@ from .device_clock import DeviceClock
 from .sample_times import LAST_SAMPLE_US, channel_t_us, electrode_t_us, pac_t_us
 from .segment import Fit, Segment
 
-__all__ = [
-    "LAST_SAMPLE_US",
-    "Arrivals",
-    "DeviceClock",
-    "Fit",
-    "Segment",
-    "channel_t_us",
-    "electrode_t_us",
-    "pac_t_us",
-]
+__all__ = ["LAST_SAMPLE_US", "Arrivals", "DeviceClock", "Fit", "Segment", "channel_t_us", "electrode_t_us", "pac_t_us"]

@@ -1,4 +1,4 @@
-"""What a fast link tells a DeviceClock."""
+"""What a fast link passes on to a DeviceClock."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import math
 
 from .device_clock import DeviceClock
 
-# A drift of 500 ppm, beyond any crystal, moves the clocks against each other by 10 us meanwhile.
+# During this time a drift of 500 ppm, more than any crystal has, moves the clocks against each other by 10 us.
 EVERY_S = 0.02
 
 
 class Arrivals:
-    """Hands the quickest message of every EVERY_S to a clock.
+    """Passes the quickest message of every EVERY_S to a clock.
 
-    Its bound is made by the quickest of a second: to look at each of thousands of chunks a second would cost the
-    reading thread as much as decoding them.
+    The clock's bound depends only on the quickest message of each second. Passing on each of thousands of chunks a
+    second would cost the reading thread as much as decoding them.
     """
 
     def __init__(self, clock: DeviceClock) -> None:
@@ -23,7 +23,7 @@ class Arrivals:
         self.forget()
 
     def forget(self) -> None:
-        """The device started again: what came before is not of its new time."""
+        """Forget what came before: the device restarted, and its time began anew."""
         self._lag_s = math.inf
         self._t_us = 0
         self._host_s = 0.0

@@ -1,8 +1,8 @@
 """All straight lines that lie below some points and above others.
 
-Clocks are told apart from delays with it (clock.py): a message's arrival is a point no clock line may lie above,
-a question's sending one it may not lie below. Every line that keeps to all of them is a possible clock, so their
-extremes bound the truth without any assumption on how delays are distributed.
+This separates clocks from delays (segment.py): the clock's line may not lie above the point of any message's arrival,
+nor below the point of any question's sending. Every line that meets all these conditions is a possible clock, so the
+extremes of these lines bound the truth without any assumption about how delays are distributed.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# How much likelier a line is that leaves more room: quick messages are rare on either side, so the true slope leaves
-# near the most. How much is of no weight: the bound does not rest on it.
+# How strongly to favour slopes that leave more room: quick messages are rare in both directions, so the true slope
+# leaves nearly the most. The value is not critical: the bound does not depend on it.
 ROOM_POWER = 3
 STEPS = 257
 
@@ -24,7 +24,7 @@ STEPS = 257
 class Band:
     """The lines y = a + slope x that fit: for each of ``slopes`` (n,), a is between ``low`` and ``high`` (n,).
 
-    Between two slopes the limits are straight, so the set is the polygon with these corners.
+    Between two of these slopes the limits are linear, so the set is the polygon with these corners.
     """
 
     slopes: Array
@@ -32,11 +32,11 @@ class Band:
     high: Array
 
     def at_zero(self) -> tuple[float, float]:
-        """Least and largest y at x = 0."""
+        """Smallest and largest y at x = 0."""
         return float(self.low.min()), float(self.high.max())
 
     def centre(self) -> tuple[float, float]:
-        """The y at x = 0 and the slope of a line amid all, where there is most room."""
+        """The y at x = 0 and the slope of a line in the middle of all, where there is most room."""
         slopes = np.linspace(self.slopes[0], self.slopes[-1], STEPS)
         low, high = np.interp(slopes, self.slopes, self.low), np.interp(slopes, self.slopes, self.high)
         widest = float((high - low).max())
@@ -45,18 +45,18 @@ class Band:
 
 
 def between(below: tuple[Array, Array], above: tuple[Array, Array], slopes: tuple[float, float]) -> Band | None:
-    """The lines under the points ``below`` (x, y) and over the points ``above`` (x, y); None when none is.
+    """The lines under the points ``below`` (x, y) and over the points ``above`` (x, y); None when there are none.
 
-    Both need one point at least; ``slopes`` are the least and the largest slope that is considered.
+    Both need at least one point; ``slopes`` are the smallest and the largest slope to consider.
     """
     ux, uy = hull(*below, side=1.0)
     lx, ly = hull(*above, side=-1.0)
-    with np.errstate(over="ignore"):  # a slope too steep for a float is clipped like any other
+    with np.errstate(over="ignore"):  # a slope too steep for a float is clipped like any other steep one
         turns = np.concatenate([slopes, np.diff(uy) / np.diff(ux), np.diff(ly) / np.diff(lx)])
     b = np.unique(np.clip(turns, *slopes))
     high = (uy - b[:, None] * ux).min(axis=1)
     low = (ly - b[:, None] * lx).max(axis=1)
-    # The width is concave in the slope, with its turns in b: slopes that fit are one stretch of it.
+    # The width is concave in the slope, and linear between the values in b: the slopes that fit are one interval.
     width = high - low
     fits = np.flatnonzero(width >= 0)
     if not len(fits):
@@ -73,9 +73,9 @@ def between(below: tuple[Array, Array], above: tuple[Array, Array], slopes: tupl
 
 
 def hull(x: Array, y: Array, *, side: float) -> tuple[Array, Array]:
-    """Corners of the points' convex hull, left to right: its lower side for 1, its upper one for -1.
+    """Corners of the points' convex hull, left to right: its lower side for ``side`` 1, its upper one for -1.
 
-    Of points with one x only the outermost counts.
+    Of points with the same x only the outermost counts.
     """
     order = np.lexsort((side * y, x))
     corners: list[tuple[float, float]] = []

@@ -1,4 +1,4 @@
-"""A device's clock as the host sees it, over restarts."""
+"""A device's clock as the host sees it, across restarts."""
 
 from __future__ import annotations
 
@@ -15,38 +15,39 @@ SEGMENTS_KEPT = 16
 
 
 class DeviceClock:
-    """Turns device time into host time, with a bound on the error.
+    """Converts device time to host time, with a bound on the error.
 
-    Feed it with ``arrived`` for what streams and ``round_trip`` for questions: five at the start, then about two a
-    second, not in step with the board. Device times are unwrapped us (``frames["t_us"]``); ``extend`` unwraps one of
-    a message. Host times are seconds of one steady clock, ``time.monotonic()``; a delay before it is read does no
-    harm but a wider bound. ``unix_offset_s`` is ``time.time() - time.monotonic()``, for unix_time_s.
+    Feed it with ``arrived`` for streamed messages and with ``round_trip`` for questions: five at the start, then about
+    two a second, not in step with the board. Device times are unwrapped, in us (``frames["t_us"]``); ``extend`` unwraps
+    that of a single message. Host times are seconds of one steady clock, ``time.monotonic()``; reading it late only
+    widens the bound. ``unix_offset_s`` is ``time.time() - time.monotonic()``, for unix_time_s.
 
-    A stated uncertainty is a bound on the error, not a deviation: see segment.py for what it takes for granted. Half
-    the quickest round trip of it is a constant that cannot be seen from here. Without any round trip nothing is
-    known, unless ``promised_delay_s`` is given: the caller's word that in every 5 s one message took no longer.
+    An uncertainty is a bound on the error, not a standard deviation; segment.py says what it assumes. It includes half
+    the quickest round trip, for a constant error that cannot be seen from here. Without any round trip nothing is
+    known, unless ``promised_delay_s`` is given: the caller's promise that in every 5 s at least one message took no
+    longer than that.
 
-    A device that starts again, and a step of either clock, begin a new segment; times are of the latest unless
-    another of ``segments`` is asked. No I/O here, and no clock.
+    A restart of the device, or a step of either clock, begins a new segment. Times are those of the latest segment
+    unless another of ``segments`` is given. This class does no I/O and reads no clock.
     """
 
     def __init__(self, *, promised_delay_s: float | None = None, unix_offset_s: float | None = None) -> None:
         if promised_delay_s is not None and not 0 <= promised_delay_s < math.inf:
             raise ValueError(f"promised_delay_s is {promised_delay_s}, expected seconds of 0 or more")
         self.unix_offset_s = unix_offset_s
-        self.segments: list[Segment] = []  #: the latest last; not more than SEGMENTS_KEPT
-        self.resets = 0  #: segments begun after the first
+        self.segments: list[Segment] = []  #: the latest last; at most SEGMENTS_KEPT
+        self.resets = 0  #: how many segments began after the first
         self.quickest_round_trip_s = math.inf
         self._promised_delay_s = promised_delay_s
         self._because = ""
-        self._lock = threading.RLock()  # one thread reads, others ask
+        self._lock = threading.RLock()  # one thread feeds the clock, others ask it
 
     # ---- observations ----------------------------------------------------------------------------
 
     def arrived(self, t_us: int, host_s: float) -> None:
-        """A message made at device time ``t_us`` or later was here at ``host_s``.
+        """Note that a message made at device time ``t_us`` or later had arrived at ``host_s``.
 
-        Of a chunk the newest message is enough. Of a round's messages take t_us + LAST_SAMPLE_US.
+        For a chunk, the newest message is enough. For a round's messages, give t_us + LAST_SAMPLE_US.
         """
         with self._lock:
             self._segment(t_us, -math.inf, host_s).arrive(t_us, host_s)
@@ -55,7 +56,10 @@ class DeviceClock:
                 self.segments[-1].arrive(t_us, host_s)
 
     def round_trip(self, sent_s: float, t_us: int, received_s: float) -> None:
-        """A question sent at ``sent_s`` was answered at device time ``t_us``; the answer was here at ``received_s``."""
+        """Note a question sent at ``sent_s``, answered at device time ``t_us``, the answer received at ``received_s``.
+
+        Raises ValueError when ``received_s`` is before ``sent_s``.
+        """
         if not sent_s <= received_s:
             raise ValueError(f"received_s is {received_s}, before sent_s {sent_s}; both are of one steady clock")
         with self._lock:
@@ -64,13 +68,14 @@ class DeviceClock:
             self.arrived(t_us, received_s)
 
     def restart(self, because: str = "the board restarted") -> None:
-        """What comes next is of another run of the device, as after another boot_id."""
+        """Begin a new segment with the next observation: the device restarted, as another boot_id shows."""
         self._because = because
 
     def extend(self, t_us: int, host_s: float) -> int:
-        """A message's 32-bit ``t_us`` as unwrapped device time, by when it came.
+        """A message's 32-bit ``t_us`` as unwrapped device time, given when it arrived.
 
-        Right as long as the guess from the host's time is within 35 minutes: for any silence but one of months.
+        Correct while the guess from the host's time is off by less than 35 minutes: with a crystal's drift, for months
+        after the segment began.
         """
         if not self.segments:
             return t_us
@@ -93,29 +98,29 @@ class DeviceClock:
     # ---- answers ---------------------------------------------------------------------------------
 
     def host_time_s(self, t_us: ArrayLike, *, segment: int = -1) -> NDArray[np.float64]:
-        """Host times of device times, in the shape of ``t_us``; NaN while nothing is known.
+        """Host times in s of device times, in the shape of ``t_us``; NaN while nothing is known.
 
-        The same time can come out differently as more is observed, by no more than the uncertainties stated.
+        The result for the same time can change as more is observed, by no more than the two uncertainties together.
         """
         return self._times(t_us, segment)[0]
 
     def uncertainty_s(self, t_us: ArrayLike, *, segment: int = -1) -> NDArray[np.float64]:
-        """Bounds on the error of host_time_s, in the shape of ``t_us``; infinite while nothing is known."""
+        """Bounds on the error of host_time_s in s, in the shape of ``t_us``; infinite while nothing is known."""
         return self._times(t_us, segment)[1]
 
     def unix_time_s(self, t_us: ArrayLike, *, segment: int = -1) -> NDArray[np.float64]:
-        """Like host_time_s, in seconds since 1970. ValueError without a ``unix_offset_s``."""
+        """Like host_time_s, in seconds since 1970. Raises ValueError without a ``unix_offset_s``."""
         if self.unix_offset_s is None:
             raise ValueError("unix_offset_s is not set; it is time.time() - time.monotonic()")
         return self.host_time_s(t_us, segment=segment) + self.unix_offset_s
 
     def estimate_s(self, t_us: float) -> float:
-        """About the host time of one device time, at no cost; NaN while nothing is known."""
+        """A cheap estimate of the host time of one device time, in s; NaN while nothing is known."""
         with self._lock:
             return self.segments[-1].estimate_s(t_us) if self.segments else math.nan
 
     def now(self) -> Fit:
-        """Offset and drift at the newest device time; ``known`` is false while nothing is."""
+        """Host time and drift at the newest device time; ``known`` is false while nothing is known."""
         with self._lock:
             if not self.segments:
                 return Fit(math.nan)

@@ -1,4 +1,4 @@
-"""This computer's clock, which reading and waiting go by; tests pass one of their own, so that they need not wait."""
+"""This computer's clock, which reading and waiting use; tests pass their own, so that they need not wait."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ class HostClock(Protocol):
     """Time on this side of the link."""
 
     def monotonic_s(self) -> float:
-        """Time since anything; never steps."""
+        """Time since some fixed moment; never steps."""
 
     def unix_ns(self) -> int:
         """Time since 1970 UTC."""
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass."""
+        """Let time pass, until ``wake`` at most."""
 
     def wake(self) -> None:
-        """End all sleeps, present and to come."""
+        """End all sleeps, current and future ones."""
 
 
 class SystemClock:
-    """The operating system's."""
+    """The operating system's clock."""
 
     def __init__(self) -> None:
         self._awake = threading.Event()
 
-    monotonic_s = staticmethod(time.monotonic)  # asked thousands of times a second
+    monotonic_s = staticmethod(time.monotonic)  # not a method: it is called thousands of times a second
     unix_ns = staticmethod(time.time_ns)
 
     def sleep(self, seconds: float) -> None:

@@ -1,17 +1,18 @@
 """One run of the device's clock against the host's, from observations that are never early.
 
-A message with device time t arrives after t; a question was sent before the device time in its answer. Nothing else
-is assumed of delays: no distribution, no typical value. Of the clocks it is assumed that the drift stays within
-MAX_DRIFT and changes no faster than WANDER_PER_S. Then the tangent to the true course at any device time t0 lies
-below every arrival and above every sending, each loosened by WANDER_PER_S / 2 * (t - t0)^2. The estimate is amid
-all lines that do (band.py), and the stated uncertainty reaches to the farthest of them: a bound, not a deviation.
-Old observations loosen until they say nothing; that is the forgetting.
+A message with device time t arrives after t, and a question was sent before the device time in its answer. Nothing
+else is assumed about delays: no distribution, no typical value. About the clocks it is assumed that the drift stays
+within MAX_DRIFT and changes no faster than WANDER_PER_S. Then the tangent to the true course at any device time t0
+lies below every arrival and above every sending, each loosened by WANDER_PER_S / 2 * (t - t0)^2. The estimate is in
+the middle of all such lines (band.py), and the stated uncertainty reaches to the farthest of them: it is a bound, not
+a standard deviation. Old observations are loosened until they say nothing; this is how they are forgotten.
 
-What cannot be seen is how the quickest round trip divides into the way there and the way back. The estimate takes
-about half, so it is off by a constant of at most half the quickest round trip. The stated uncertainty contains it.
+It cannot be observed how the quickest round trip divides into the way there and the way back. The estimate assumes
+about half each, so it is off by a constant of at most half the quickest round trip. The stated uncertainty includes
+this.
 
-Sources: Moon, Skelly, Towsley, "Estimation and removal of clock skew from network delay measurements" (1999), for
-lines below arrivals; Klipper's clocksync.py and liblsl's time_receiver.cpp for round trips.
+Sources: for lines below arrivals, Moon, Skelly, Towsley, "Estimation and removal of clock skew from network delay
+measurements" (1999); for round trips, Klipper's clocksync.py and liblsl's time_receiver.cpp.
 """
 
 from __future__ import annotations
@@ -31,19 +32,19 @@ Array = NDArray[np.float64]
 MAX_DRIFT = 500e-6
 #: A crystal that warms by 10 K in five minutes changes by some ppm: 0.02 ppm a second is above that.
 WANDER_PER_S = 0.02e-6
-#: Device time is in whole us, and so is never nearer than that.
+#: Device time is in whole us, so it is never more exact than that.
 TICK_S = 1e-6
-#: Farther than this from a time, an observation has loosened by 0.2 ms and tells nothing new of it.
+#: This far from a time, an observation has been loosened by 0.2 ms and adds nothing about it.
 REACH_S = 150.0
-#: Of the arrivals of so much host time, the quickest is kept.
+#: Of the arrivals in each such span of host time, the quickest is kept.
 BUCKET_S = 1.0
-#: Between knots the course is taken as straight: WANDER_PER_S bends it by a quarter of a us.
+#: Between knots the course is taken as straight: WANDER_PER_S bends it by at most a quarter of a us.
 KNOT_S = 10.0
-#: Older observations are forgotten, and the times they were for become uncertain.
+#: Older observations are dropped, and times near them become uncertain.
 KEEP_S = 3600.0
-#: Without round trips: in every so many seconds one message was as quick as was promised.
+#: Without round trips: in every span of this length one message was as quick as promised.
 PROMISE_S = 5.0
-#: A clock that goes back by more than this was started again; messages overtake each other by less.
+#: A clock that goes back by more than this was restarted; messages overtake each other by less.
 STEP_BACK_US = 1_000_000
 
 
@@ -53,17 +54,17 @@ class Fit:
 
     t_us: float
     host_s: float = math.nan
-    uncertainty_s: float = math.inf  #: the truth is within plus or minus this
+    uncertainty_s: float = math.inf  #: bound: the true host time is within plus or minus this
     drift_ppm: float = math.nan  #: of the device's clock against the host's; positive: the device's is fast
-    drift_uncertainty_ppm: float = math.inf  #: likewise a bound
+    drift_uncertainty_ppm: float = math.inf  #: bound, likewise
 
     @property
     def known(self) -> bool:
-        """There were observations enough for a bound."""
+        """Whether there were enough observations for a bound."""
         return math.isfinite(self.uncertainty_s)
 
     def extended(self, t_us: Array) -> tuple[Array, Array]:
-        """Host times and bounds at other device times, along the straight line of this one."""
+        """Host times and bounds in s at other device times, along the straight line through this one."""
         away_s = (t_us - self.t_us) / 1e6
         bend_s = WANDER_PER_S / 2 * away_s**2
         host_s = self.host_s + away_s * (1.0 - self.drift_ppm / 1e6)
@@ -71,34 +72,34 @@ class Fit:
 
 
 class Points:
-    """x: device time in s since the segment's start; y: host time since then minus x. In order of x."""
+    """Observations in order of x. x: device time in s since the segment's start; y: host time since then minus x."""
 
     def __init__(self) -> None:
         self._x: list[float] = []
         self._y: list[float] = []
 
     def add(self, x: float, y: float) -> None:
-        """Almost always behind the last."""
+        """Insert a point, almost always at the end."""
         at = bisect.bisect_right(self._x, x)
         self._x.insert(at, x)
         self._y.insert(at, y)
 
     def around(self, x0: float) -> tuple[Array, Array]:
-        """Those within reach, with x counted from x0."""
+        """The points within REACH_S of x0, with x counted from x0."""
         cut = slice(bisect.bisect_left(self._x, x0 - REACH_S), bisect.bisect_right(self._x, x0 + REACH_S))
         return np.array(self._x[cut]) - x0, np.array(self._y[cut])
 
     def forget_before(self, x: float) -> None:
-        """Drop what is older."""
+        """Drop the points before x."""
         n = bisect.bisect_left(self._x, x)
         del self._x[:n], self._y[:n]
 
 
 class Segment:
-    """From a boot, or a jump of either clock, to the next."""
+    """The time from a boot of the device, or a jump of either clock, to the next."""
 
     def __init__(self, t_us: int, host_s: float, *, promised_delay_s: float | None = None, because: str = "") -> None:
-        self.because = because  #: why this is not the first
+        self.because = because  #: why it began; empty for the first
         self.first_t_us = t_us
         self.last_t_us = t_us
         self._first_host_s = host_s
@@ -109,13 +110,13 @@ class Segment:
         self._bucket_from_s = host_s
         self._latest = Fit(t_us)
         self.contradicted = False  #: enough was observed, but no course of the clocks agrees with it
-        self._knots: dict[float, Fit] = {}  # those that no later observation will change
-        self._fresh: dict[float, Fit] = {}  # the others, until the next one
+        self._knots: dict[float, Fit] = {}  # fits that no later observation will change
+        self._fresh: dict[float, Fit] = {}  # other fits, valid until the next observation
 
     # ---- observations ----------------------------------------------------------------------------
 
     def refuses(self, t_us: int, sent_s: float, arrived_s: float) -> str:
-        """Why an observation cannot be of this run; empty when it can."""
+        """Why an observation cannot belong to this run; empty when it can."""
         if t_us < self.last_t_us - STEP_BACK_US:
             return "device time stepped back"
         if self._latest.known:
@@ -127,7 +128,7 @@ class Segment:
         return ""
 
     def arrive(self, t_us: int, host_s: float) -> None:
-        """A message that was made at device time t_us, or later, is here."""
+        """Note that a message made at device time t_us or later had arrived at host_s."""
         x, y = self._xy(t_us, host_s)
         slope = -self._latest.drift_ppm / 1e6 if self._latest.known else 0.0
         self.last_t_us = max(self.last_t_us, t_us)
@@ -139,7 +140,7 @@ class Segment:
             self._bucket = (x, y)
 
     def send(self, t_us: int, host_s: float) -> None:
-        """A question that was answered at device time t_us had left at host_s."""
+        """Note that a question answered at device time t_us was sent at host_s."""
         self._sent.add(*self._xy(t_us, host_s))
         self._fresh.clear()
 
@@ -162,14 +163,14 @@ class Segment:
         return self._fresh[t_us]
 
     def estimate_s(self, t_us: float) -> float:
-        """Along the line of a second ago at most; NaN while nothing is known."""
+        """Host time of device time t_us, along a line that is at most a second old; NaN while nothing is known."""
         fit = self._latest if self._latest.known else self.fit(self.last_t_us)
         return fit.host_s + (t_us - fit.t_us) / 1e6 * (1.0 - fit.drift_ppm / 1e6) if fit.known else math.nan
 
     def times(self, t_us: Array) -> tuple[Array, Array]:
-        """Host times and their bounds at ``t_us`` (n,); NaN and infinity where nothing is known.
+        """Host times and their bounds in s at ``t_us`` (n,); NaN and infinity while nothing is known.
 
-        Straight between knots, so that times never run backwards and do not jump.
+        Linear between knots, so that times never run backwards and do not jump.
         """
         if not t_us.size:
             return t_us.copy(), t_us.copy()
@@ -192,7 +193,7 @@ class Segment:
         return host_s, bound_s
 
     def guess_t_us(self, host_s: float) -> float:
-        """About which device time it is at host_s."""
+        """Roughly the device time at host_s, without any drift."""
         return self.first_t_us + (host_s - self._first_host_s) * 1e6
 
     def _knot(self, t_us: float) -> Fit:
@@ -202,7 +203,7 @@ class Segment:
         return fit
 
     def _observed(self, x0: float) -> tuple[tuple[Array, Array], tuple[Array, Array]] | None:
-        """Loosened arrivals and sendings around x0; None without one of each."""
+        """Loosened arrivals and sendings around x0; None without at least one of each."""
         x, y = self._arrived.around(x0)
         if self._bucket is not None and abs(self._bucket[0] - x0) <= REACH_S:
             x, y = np.append(x, self._bucket[0] - x0), np.append(y, self._bucket[1])
@@ -239,7 +240,7 @@ class Segment:
 
 
 def quickest(x: Array, y: Array) -> tuple[Array, Array]:
-    """The least y of every PROMISE_S of x."""
+    """The points with the smallest y in every PROMISE_S of x."""
     groups = np.floor(x / PROMISE_S)
     best = [np.flatnonzero(groups == g)[np.argmin(y[groups == g])] for g in np.unique(groups)]
     return x[best], y[best]

@@ -1,4 +1,4 @@
-"""Device times on another clock of this computer (LSL's, ROS'), for those who pass a stream on."""
+"""Device times on another clock of this computer (LSL's, ROS's), for programs that pass a stream on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .device_clock import DeviceClock
 
 RENEW_S = 0.5  # between questions for the board's time
-UNKNOWN_S = 0.05  # the same while it is unknown
+UNKNOWN_S = 0.05  # the same, while the board's time is unknown
 
 
 class Board(Protocol):
@@ -23,18 +23,19 @@ class Board(Protocol):
 
     @property
     def ended(self) -> bool:
-        """There is nothing more to stamp."""
+        """Whether there is nothing more to stamp."""
 
     def sync(self, round_trips: int = 5) -> None:
         """Feed ``clock`` with round trips. Raises DeviceLostError."""
 
 
 class Stamps:
-    """Stamps for what ``board`` streams, in seconds of the clock that ``now_s`` reads.
+    """Time stamps for what ``board`` streams, in seconds of the clock that ``now_s`` reads.
 
-    By ``board.clock``, which ``keep`` feeds. Where that knows nothing, as of a simulated board, whose time is no
-    clock, what is stamped together is stamped by its arrival; ``by_arrival`` counts. The stamps of one ``stream``
-    never step back, unless the clock itself does: where an estimate is earlier than the one before, it waits.
+    They come from ``board.clock``, which ``keep`` feeds. While that knows nothing, as with a simulated board, whose
+    time is not a real clock, rows that came together are stamped by their arrival; ``by_arrival`` counts these. The
+    stamps of one ``stream`` never step back, unless the clock itself does: an estimate that is earlier than the stamp
+    before it is raised to that stamp.
     """
 
     def __init__(self, board: Board, now_s: Callable[[], float]) -> None:
@@ -47,14 +48,14 @@ class Stamps:
         self._asked_s = time.monotonic()
 
     def keep(self) -> None:
-        """Call it with every batch: asks the board for its time when that is due. Raises DeviceLostError."""
+        """Call this with every batch: it asks the board for its time when that is due. Raises DeviceLostError."""
         wait_s = RENEW_S if self._board.clock.now().known else UNKNOWN_S
         if not self._board.ended and time.monotonic() - self._asked_s > wait_s:
             self._board.sync(1)
             self._asked_s = time.monotonic()
 
     def of(self, t_us: NDArray[np.float64], stream: Hashable = None) -> NDArray[np.float64]:
-        """Stamps (n,) in s of unwrapped device times (n,) in us that came together; the last is the newest."""
+        """Stamps (n,) in s for unwrapped device times (n,) in us that came together; the last is the newest."""
         if not len(t_us):
             return np.empty(0)
         stamps_s: NDArray[np.float64] = np.maximum(self._estimated(t_us), self._last_s.get(stream, -math.inf))
@@ -63,11 +64,11 @@ class Stamps:
         return stamps_s
 
     def _estimated(self, t_us: NDArray[np.float64]) -> NDArray[np.float64]:
-        # The two clocks may be stepped against each other at any time: the offset is taken anew.
+        # The two clocks may step against each other at any time, so the offset is measured anew.
         before_s = time.monotonic()
         now_s = self._now_s()
         if now_s < self._asked_of_s:
-            self._last_s.clear()  # it was set back
+            self._last_s.clear()  # the clock was set back
         self._asked_of_s = now_s
         offset_s = now_s - (before_s + time.monotonic()) / 2
         stamps_s: NDArray[np.float64] = self._board.clock.host_time_s(t_us) + offset_s

@@ -1,1 +1,1 @@
-"""The compiled firmware core under Python: results, a finger's tare machine, wrench maps, geometry."""
+"""The compiled firmware core in Python: results, a finger's tare machine, wrench maps, geometry."""

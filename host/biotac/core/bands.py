@@ -1,4 +1,4 @@
-"""Bands of dynamic pressure (BANDS), by the board's own code (firmware/core/signal/bands.h)."""
+"""Bands of dynamic pressure (BANDS), computed by the board's own code (firmware/core/signal/bands.h)."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray, bands_from_wire
 from ..wire.native import ffi, lib
 
-#: Between which frequencies each band has at least half its power, Hz.
+#: The frequencies between which each band has at least half its power, Hz.
 BANDS_HZ = ((11, 26), (22, 53), (45, 106), (91, 214), (190, 454), (527, 1100))
 SAMPLES = sensor.SLOTS.count("PAC")  # of a round of 10 ms
 _WIRE = DTYPES[wire.Bands.ID]
 
 
 def bands_of(pac: StructArray) -> StructArray:
-    """BANDS_DTYPE (n,) of one finger's PAC_DTYPE rows (n,), as the board would tell them.
+    """BANDS_DTYPE (n,) from one finger's PAC_DTYPE rows (n,), as the board would send them.
 
-    It begins anew where rounds are missing. Raises ValueError for rows of several fingers.
+    The filters restart where rounds are missing. Raises ValueError for rows of several fingers.
     """
     if len(np.unique(pac["finger"])) > 1:
         raise ValueError(f"rows of fingers {np.unique(pac['finger']).tolist()}, expected those of one")
@@ -35,10 +35,11 @@ def bands_of(pac: StructArray) -> StructArray:
 
 
 def pac_bands(pac: Any) -> NDArray[np.float64]:
-    """Energy of each round and band (n, 6), count^2, the lowest first (BANDS_HZ); NaN where a round has no good word.
+    """Energy of each round and band (n, 6), in count^2, the lowest band first; NaN where a round has no valid word.
 
-    ``pac`` (n, 22) are integers 0..4095, a round of 10 ms each and without a gap, 0xFFFF where no good word came. An
-    energy is the sum of squares over the round's 22 samples. Raises ValueError for another shape, type or range.
+    The bands are BANDS_HZ. ``pac`` (n, 22) are integers 0..4095, or 0xFFFF where no valid word came; each row is a
+    round of 10 ms, and no rounds are missing. An energy is the sum of squares over the round's 22 samples. Raises
+    ValueError for another shape, type or range.
     """
     words = pac_words(pac)
     sent = np.zeros(len(words), _WIRE)
@@ -49,7 +50,7 @@ def pac_bands(pac: Any) -> NDArray[np.float64]:
 
 
 def pac_words(pac: Any) -> NDArray[np.uint16]:
-    """``pac`` as C takes it; ValueError unless it is (n, 22) integers 0..4095, or 0xFFFF."""
+    """``pac`` as C takes it. Raises ValueError unless it is (n, 22) integers 0..4095, or 0xFFFF."""
     words = np.asarray(pac)
     if words.ndim != 2 or words.shape[1] != SAMPLES or words.dtype.kind not in "iu":
         raise ValueError(f"pac is {words.dtype} of shape {words.shape}, expected integers of (n, {SAMPLES})")

@@ -1,7 +1,7 @@
-"""A wrench map as a board keeps it: its blob, and the board's own code on it.
+"""A wrench map as a board stores it: its blob, and the board's own code that runs it.
 
-The blob's layout and the meaning of its integers are in protocol/SPEC.md, Wrench maps. Where a map comes
-from is ``biotac.calibrate.wrench``.
+The blob's layout and the meaning of its integers are in protocol/SPEC.md, Wrench maps. Maps are made by
+``biotac.calibrate.wrench``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _ELECTRODES = _map.KINDS[Kind.SIGNAL].columns
 
 
 def _ring() -> NDArray[np.intp]:
-    """Of each pair in the blob's order, its place in i <= j, row by row: an electrode with itself and nine behind."""
+    """For each pair in the blob's order, its index in i <= j, row by row: each electrode with itself and the next 9."""
     place = np.zeros((_ELECTRODES, _ELECTRODES), np.intp)
     upper = np.triu_indices(_ELECTRODES)
     place[upper] = np.arange(len(upper[0]))
@@ -56,9 +56,9 @@ class BoardBlock:
 
 @dataclass(frozen=True)
 class BoardMap:
-    """``axes`` is 3 (force), 6 (and torque) or 7 (and torsion). ``serial`` is of the sensor it was made for, "": any.
+    """A wrench map. ``axes`` is 3 (force), 6 (and torque) or 7 (and torsion).
 
-    ``made_s`` counts from 1970 UTC, 0: unknown.
+    ``serial`` is that of the sensor it was made for, "" for any. ``made_s`` counts from 1970 UTC, 0: unknown.
     """
 
     axes: int
@@ -97,7 +97,7 @@ class BoardMap:
 
     @property
     def handle(self) -> Any:
-        """The C struct bt_map, good for as long as this object lives."""
+        """The C struct bt_map, valid as long as this object lives."""
         return self._opened[0]
 
     @cached_property
@@ -109,8 +109,8 @@ class BoardMap:
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
         """force_100un, torque_mnmm (n, 3), torsion_mnmm (n,) as on the board; counts, tare_q4 (n, 19), pressure (n,).
 
-        -2^31 where invalid: what the map does not have, and all where pressure, -2^31 itself, is needed and missing.
-        Raises ValueError for other shapes or ranges.
+        A result is -2^31 where invalid: if the map does not have it, and in rows where the map needs pressure and that
+        is missing (-2^31). Raises ValueError for other shapes or ranges.
         """
         raw = integers("counts", counts, np.uint16, None, ELECTRODES)
         tare = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
@@ -150,7 +150,7 @@ def from_blob(blob: bytes) -> BoardMap:
 
 
 def on_board_q4(frames: StructArray, settings: Settings, its: BoardMap) -> BoardResults:
-    """core.on_board_q4() with a map in force, on FRAME messages (n,), whose PDC it may need; and torsion_mnmm (n,)."""
+    """compiled.on_board_q4() with a map in force, on FRAME messages (n,), whose PDC it may need; adds torsion_mnmm."""
     raw, tare_q4 = (integers(name, frames[name], np.uint16, len(frames), ELECTRODES) for name in ("counts", "tare_q4"))
     pdc, pdc_tare_q4 = (integers(name, frames[name], np.uint16, len(frames)) for name in ("pdc", "pdc_tare_q4"))
     kernel = ffi.new("bt_solve_settings *", lib.bt_solve_settings_from(board_settings(settings)))
@@ -172,14 +172,14 @@ def on_board_q4(frames: StructArray, settings: Settings, its: BoardMap) -> Board
 
 
 def pdc_above_rest_q4(frames: StructArray) -> NDArray[np.int32]:
-    """Of FRAME messages (n,): PDC above its tare in 1/16 count, -2^31 where either is missing."""
+    """PDC above its tare from FRAME messages (n,), in 1/16 count; -2^31 where either is missing."""
     missing = (frames["pdc"] == wire.INVALID_COUNT) | (frames["pdc_tare_q4"] == wire.INVALID_COUNT)
     above = 16 * frames["pdc"].astype(np.int32) - frames["pdc_tare_q4"]
     return np.where(missing, wire.INVALID_I32, above).astype(np.int32)
 
 
 def _halves(kind: Kind, values: Integers) -> bytes:
-    """A group of axes (columns, width) as it lies in the blob. Raises ValueError beyond 16 bits."""
+    """The bytes of a group of axes (columns, width) in the blob. Raises ValueError for values beyond 16 bits."""
     spec = _map.KINDS[kind]
     halves = integers(f"coefficients of {kind.name}", values, "<i2", None, None)
     laid = np.zeros((spec.halves, values.shape[1]), "<i2")
@@ -188,7 +188,7 @@ def _halves(kind: Kind, values: Integers) -> bytes:
 
 
 def _columns(kind: Kind, laid: NDArray[Any]) -> Integers:
-    """Inverse of _halves, of what is read already."""
+    """Inverse of _halves, on an array of what was read."""
     spec = _map.KINDS[kind]
     values = np.zeros((spec.columns, laid.shape[1]), np.int64)
     if len(laid):
@@ -197,8 +197,8 @@ def _columns(kind: Kind, laid: NDArray[Any]) -> Integers:
 
 
 def _judged(blob: bytes) -> tuple[Any, Any]:
-    """The board's own judgement: a bt_map into a copy of the blob, and that copy."""
-    room = ffi.new("uint32_t[]", len(blob) // 4 + 1)  # words, so that it is aligned
+    """A bt_map into a copy of the blob, and that copy. Raises InputError when the board's own check refuses it."""
+    room = ffi.new("uint32_t[]", len(blob) // 4 + 1)  # of words, for alignment
     ffi.memmove(room, blob, len(blob))
     handle = ffi.new("bt_map *")
     error = lib.bt_map_open(handle, ffi.cast("uint8_t *", room), len(blob))

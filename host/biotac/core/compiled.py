@@ -1,6 +1,6 @@
 """The compiled firmware core and its float64 reference, over whole arrays.
 
-Both run over the same recorded integers, so that any difference is arithmetic and nothing else.
+Both run over the same recorded integers, so that any difference comes from arithmetic alone.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Results:
 
 
 def default_settings() -> Settings:
-    """What a board starts with."""
+    """The settings that a board starts with."""
     return {setting: spec.default for setting, spec in wire.SETTINGS.items()}
 
 
@@ -51,7 +51,7 @@ def on_board(counts: Any, tare: Any, settings: Settings | None = None) -> Result
 def on_board_q4(
     counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settings: Settings
 ) -> tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]:
-    """on_board() on the integers of FRAME messages, both (n, 19), to such integers and the kernel's flags.
+    """on_board() on the integers of FRAME messages, both (n, 19), giving such integers and the kernel's flags.
 
     Returns poc_um, force_100un, torque_mnmm, each (n, 3), and flags (n,). Raises ValueError for other shapes or ranges.
     """
@@ -80,13 +80,13 @@ def on_board_q4(
 def pressure_force_100un(
     filtered_q4: NDArray[np.uint16], tare_q4: NDArray[np.uint16], gain_nn: int
 ) -> NDArray[np.int32]:
-    """The board's force from pressure, of the integers of FRAME messages, all (n,); see core/solve/pressure.h.
+    """The board's force from pressure, from the integers of FRAME messages, all (n,); see core/solve/pressure.h.
 
     Raises ValueError for other shapes or ranges.
     """
     filtered_q4 = integers("filtered_q4", filtered_q4, np.uint16, None)
     tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(filtered_q4))
-    board_settings({wire.Setting.PRESSURE_GAIN_NN: gain_nn})  # in its range, or ValueError
+    board_settings({wire.Setting.PRESSURE_GAIN_NN: gain_nn})  # raises ValueError out of range
     out = np.empty(len(filtered_q4), np.int32)
     lib.bt_pressure_forces(
         len(out),
@@ -99,12 +99,12 @@ def pressure_force_100un(
 
 
 def pressure_filtered_q4(pdc: NDArray[np.uint16], filter_milli: int) -> NDArray[np.uint16]:
-    """The board's filter over the PDC words (n,) of consecutive rounds, from its beginning; 1/16 count.
+    """The board's filter over the PDC words (n,) of consecutive rounds, from its initial state; in 1/16 count.
 
     Raises ValueError for other shapes or ranges.
     """
     pdc = integers("pdc", pdc, np.uint16, None)
-    board_settings({wire.Setting.PRESSURE_FILTER_MILLI: filter_milli})  # in its range, or ValueError
+    board_settings({wire.Setting.PRESSURE_FILTER_MILLI: filter_milli})  # raises ValueError out of range
     out = np.empty(len(pdc), np.uint16)
     pointers = ffi.from_buffer("uint16_t[]", pdc), ffi.from_buffer("uint16_t[]", out)
     lib.bt_pressure_filter(len(out), pointers[0], filter_milli, pointers[1])
@@ -112,7 +112,7 @@ def pressure_filtered_q4(pdc: NDArray[np.uint16], filter_milli: int) -> NDArray[
 
 
 def board_settings(settings: Settings) -> Any:
-    """The C struct bt_settings with these values; what they do not name has its default.
+    """The C struct bt_settings with these values; settings left out have their defaults.
 
     Raises ValueError for a value out of the setting's range.
     """
@@ -126,7 +126,7 @@ def board_settings(settings: Settings) -> Any:
 
 
 def reference(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
-    """The same from firmware/reference: Lin 2013 Eq 1-4 in float64. Arguments as on_board()."""
+    """The results of firmware/reference: Lin 2013 Eq 1-4 in float64. Arguments as on_board()."""
     raw, tare_q4 = checked(counts, tare)
     return reference_q4(raw, tare_q4, settings or default_settings())
 
@@ -148,7 +148,7 @@ def reference_q4(counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settin
 
 
 def formula_settings(settings: Settings) -> Any:
-    """The C struct lin2013_settings, gains in N per count."""
+    """The C struct lin2013_settings, with gains in N per count."""
     return ffi.new(
         "lin2013_settings *",
         {
@@ -164,9 +164,9 @@ TORQUE_GAINS = (wire.Setting.TORQUE_GAIN_Y_NN, wire.Setting.TORQUE_GAIN_Z_NN)
 
 
 def integers(name: str, values: Any, dtype: Any, *shape: int | None) -> NDArray[Any]:
-    """A contiguous array of ``shape`` (None: any length) and ``dtype`` for C, which looks at neither.
+    """A contiguous array of ``shape`` (None: any length) and ``dtype`` for C, which checks neither.
 
-    ValueError for another shape, for what is no integer, and for one that ``dtype`` would wrap.
+    Raises ValueError for another shape, for values that are not integers, and for ones that do not fit ``dtype``.
     """
     array = np.asarray(values)
     if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape, strict=True)):
@@ -180,7 +180,7 @@ def integers(name: str, values: Any, dtype: Any, *shape: int | None) -> NDArray[
 
 
 def checked(counts: Any, tare: Any) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
-    """Contiguous uint16 counts and tare_q4 of one shape, or ValueError."""
+    """Contiguous uint16 counts and tare_q4 of the same shape (n, 19). Raises ValueError for other shapes or ranges."""
     raw = np.atleast_2d(np.asarray(counts))
     base = np.broadcast_to(np.asarray(tare, dtype=np.float64), raw.shape)
     if raw.ndim != 2 or raw.shape[1] != 19:

@@ -1,6 +1,7 @@
 """Point of contact, force and torque of whole recordings, in float64.
 
-The same formulas as core.reference and core.population, in C: host/binding/blocks.c, population_float64.c.
+The formulas are those of core.compiled.reference and core.population, in C: host/binding/blocks.c,
+population_float64.c.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from .board_map import BoardMap
 from .compiled import FORCE_GAINS, TORQUE_GAINS, default_settings, formula_settings
 from .map_versions import opened
 
-#: poc_mm, force_n and torque_nmm of one frame, named, in units and with axes as in FRAME_DTYPE.
+#: poc_mm, force_n and torque_nmm of one frame; names, units and axes are as in FRAME_DTYPE.
 RESULT_DTYPE = np.dtype([("poc_mm", "<f8", (3,)), ("force_n", "<f8", (3,)), ("torque_nmm", "<f8", (3,))])
-#: The same and ``torsion_nmm``, which a wrench map may have.
+#: RESULT_DTYPE and ``torsion_nmm``, which a wrench map may have.
 MAPPED_RESULT_DTYPE = np.dtype([*RESULT_DTYPE.descr, ("torsion_nmm", "<f8")])
 
 _COUNT = np.dtype(np.uint16)
@@ -48,28 +49,27 @@ def compute(
 ) -> StructArray:
     """Results of recorded counts, as RESULT_DTYPE: shape (n,) for counts (n, 19), () for counts (19,).
 
-    ``counts`` are integers 0..4095, 0xFFFF where missing, which weighs nothing; uint16 is read in place,
-    also from a field of a structured array. ``tare`` is (19,) or of the shape of ``counts``, 0..4095
-    counts, rounded to 1/16 count as the board does. ``settings`` are those of a board; what they do not
-    name has its default, and what is no biotac.Setting is refused with ValueError. By default, then, force is the
-    population map's (host/docs/population.md); Lin's three scales are {Setting.FORCE_MODEL: ForceModel.LIN}, or
-    force gains of your own. ``out``, a contiguous
-    RESULT_DTYPE array of the result's shape, is filled and returned: a buffer that was used before spares the page
-    faults of a new one.
+    ``counts`` are integers 0..4095, or 0xFFFF where missing, which has no weight. uint16 is read in place, also from a
+    field of a structured array. ``tare`` is (19,) or has the shape of ``counts``; it is 0..4095 counts, rounded to
+    1/16 count as on the board. ``settings`` are those of a board. What they leave out has its default, and a key that
+    is not a biotac.Setting raises ValueError. By default, force comes from the population map
+    (host/docs/population.md); for Lin's three scales give {Setting.FORCE_MODEL: ForceModel.LIN}, or force gains of
+    your own. ``out``, a contiguous RESULT_DTYPE array of the result's shape, is filled and returned: a reused buffer
+    saves the page faults of a new one.
 
-    ``wrench_map``, or its blob, gives the force in place of the gains, and the torque where it has six
-    axes; else torque x is made of its force. The result, and ``out``, are MAPPED_RESULT_DTYPE then: with
-    torsion about the outward normal at the contact, NaN unless the map has it. ``pdc_above_rest`` (n,) or
-    one number, in counts, NaN where missing, is what it may need. Raises InputError for a blob that a board
-    would refuse.
+    ``wrench_map``, a map or its blob, gives the force in place of the gains, and also the torque if it has six axes or
+    more; otherwise torque x is derived from its force. The result, and ``out``, are then MAPPED_RESULT_DTYPE: they
+    have the torsion about the outward normal at the contact, NaN unless the map has it. ``pdc_above_rest``, which a map
+    may need, is (n,) or one number, in counts, NaN where missing. Raises InputError for a blob that a board would
+    refuse.
 
-    ``compute(rows)``, with rows of FRAME_DTYPE as ``load`` and ``Hand.read`` give them, takes counts, tare and pressure
-    from them; an electrode whose tare is unknown weighs nothing. They do not tell the board's settings: for what the
-    board made of them give its ``Recording.settings``.
+    ``compute(rows)``, with rows of FRAME_DTYPE as from ``load`` and ``Hand.read``, takes counts, tare and pressure
+    from them; an electrode whose tare is unknown has no weight. Rows do not contain the board's settings: to get what
+    the board computed, give its ``Recording.settings``.
 
-    NaN where there is no answer: poc_mm and torque_nmm x if nothing weighs. Where the board rounds to
-    its wire units this does not, and it never saturates. Raises ValueError for other shapes, types and
-    ranges, with the first bad row, what was seen and what was expected; ``out`` then holds no results.
+    Values are NaN where there is no answer: poc_mm and torque_nmm x if no electrode has weight. Unlike the board, this
+    does not round to wire units and never saturates. Raises ValueError for other shapes, types and ranges, naming the
+    first bad row, what was seen and what was expected; ``out`` then holds no results.
     """
     if tare is None:
         counts, tare, pdc_above_rest = _of_rows(counts, pdc_above_rest)
@@ -83,8 +83,8 @@ def compute(
             out[name] = plain[name]
         return by_map(out, opened(wrench_map), counts, tare, pdc_above_rest)
     plan = _default_plan() if settings is None else _plan(settings)
-    # One frame in the types that frames have, as on the live path, where the checks would take longer
-    # than the maths. Copying 38 and 152 bytes is faster than borrowing two buffers.
+    # The fast path for one frame with the types of a live frame: there the checks would take longer than the maths.
+    # Copying 38 and 152 bytes is faster than borrowing two buffers.
     try:
         one = counts.dtype is _COUNT and tare.dtype is _TARE and counts.shape == _ONE == tare.shape
     except AttributeError:
@@ -102,7 +102,7 @@ def compute(
     n = 1 if raw.ndim == 1 else len(raw)
     raw_stride = raw.strides[0] if raw.ndim == 2 else 0
     base_stride = base.strides[0] if base.ndim == 2 else 0
-    if base.size == 0:  # of no rows, where NumPy may have a stride of 0, which is one row to C
+    if base.size == 0:  # no rows: NumPy may give a stride of 0, which means a single row to C
         return out
     bad = _blocks(plan, n, _address(raw), raw_stride, _address(base), base_stride, _buffer(out))
     if bad != _ALL_GOOD:
@@ -111,7 +111,7 @@ def compute(
 
 
 def _of_rows(rows: Any, pdc_above_rest: Any) -> tuple[NDArray[np.uint16], NDArray[np.float64], Any]:
-    """Counts (n, 19), tare (n, 19) and pressure above rest (n,) of rows that have them."""
+    """Counts (n, 19), tare (n, 19) and pressure above rest (n,) from rows that have these fields."""
     names = getattr(getattr(rows, "dtype", None), "names", None) or ()
     if "counts" not in names or "tare" not in names:
         raise ValueError("no tare: expected compute(counts, tare), or compute(rows) with fields counts and tare")
@@ -128,14 +128,13 @@ def per_frame(
 ) -> Callable[[NDArray[np.uint16]], StructArray]:
     """compute() for a live stream: a function from one frame's counts, uint16 (19,), to its results.
 
-    Tare and settings are looked at once, and every call fills and returns the same RESULT_DTYPE array of
-    shape (): copy what has to last. compute() spends half of its time for one frame on just that. Raises
-    ValueError as compute().
+    Tare and settings are checked once, and every call fills and returns the same RESULT_DTYPE array of shape (): copy
+    what has to last. This saves half of the time that compute() takes for one frame. Raises ValueError as compute().
     """
     plan = _default_plan() if settings is None else _plan(settings)
     base = _checked_tare(tare, _ONE)
     out = np.empty((), RESULT_DTYPE)
-    compute(np.zeros(_ONE, _COUNT), base, settings, out)  # refuses a tare that is out of range
+    compute(np.zeros(_ONE, _COUNT), base, settings, out)  # raises for a tare that is out of range
     base_bytes, result, one_frame, dtype, shape = base.tobytes(), _buffer(out), lib.bt_one_frame, _COUNT, _ONE
 
     def results(counts: NDArray[np.uint16]) -> StructArray:
@@ -166,7 +165,7 @@ def _plan(settings: Mapping[wire.Setting, int]) -> Any:
 
 @lru_cache(maxsize=16)
 def _plan_of(items: tuple[tuple[Any, Any], ...]) -> Any:
-    """The bt_block_plan of settings. It is only read, so that calls may share it."""
+    """The bt_block_plan for these settings. It is only read, so calls may share it."""
     settings = dict(items)
     for key in settings:
         if key not in _DEFAULTS:
@@ -189,7 +188,7 @@ def _population(settings: Mapping[wire.Setting, int]) -> Any:
 
 
 def _checked_counts(counts: Any) -> NDArray[np.uint16]:
-    """uint16 (n, 19) or (19,) with adjoining columns; other integers only if they are in range."""
+    """uint16 (n, 19) or (19,) with adjacent columns; other integer types are converted if in range."""
     raw = np.asarray(counts)
     if raw.ndim not in (1, 2) or raw.shape[-1] != _ELECTRODES:
         raise ValueError(f"counts have shape {raw.shape}, expected (n, 19) or (19,)")
@@ -204,7 +203,7 @@ def _checked_counts(counts: Any) -> NDArray[np.uint16]:
 
 
 def _checked_tare(tare: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """float64 (19,) or ``shape`` with adjoining columns. The range is for C to check."""
+    """float64 (19,) or ``shape`` with adjacent columns. The range is checked in C."""
     base = np.asarray(tare)
     if base.shape not in (_ONE, shape):
         raise ValueError(f"the tare has shape {base.shape}, expected (19,) or {shape} as the counts")
@@ -226,7 +225,7 @@ def _checked_out(out: StructArray, shape: tuple[int, ...], dtype: np.dtype[np.vo
 
 
 def _address(array: NDArray[Any]) -> Any:
-    """For C, valid as long as the caller holds the array; cffi itself lends only contiguous ones."""
+    """The address for C, valid while the caller holds the array; cffi's from_buffer takes only contiguous ones."""
     return _buffer(array) if array.flags.c_contiguous else ffi.cast("void *", array.ctypes.data)
 
 
@@ -236,7 +235,7 @@ def _countlike(values: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def _explain(row: int, counts: NDArray[Any], tare: NDArray[Any]) -> str:
-    """What is out of range in a row that C refused."""
+    """The message that says what is out of range in a row that C refused."""
     base = tare if tare.ndim == 1 else tare[row]
     bad = np.flatnonzero(~((base >= 0) & (base <= sensor.FULL_SCALE_COUNT)))
     if len(bad):

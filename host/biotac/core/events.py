@@ -1,4 +1,4 @@
-"""EVENTs of recorded words, by the board's own code (firmware/core/events)."""
+"""EVENTs from recorded words, found by the board's own code (firmware/core/events)."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _MOST_A_ROUND = 8
 
 
 def pac_events(pac: Any, *, held: bool = True) -> tuple[StructArray, NDArray[np.bool_]]:
-    """Jolts and slips of dynamic pressure alone.
+    """Jolts and slips from dynamic pressure alone.
 
-    ``pac`` (n, 22) are integers 0..4095, a round of 10 ms each and without a gap, 0xFFFF where no good word came. The
-    finger is ``held`` throughout, or else nothing touches it: then its noise is learned and nothing slips. Returns
-    EVENT_DTYPE (k,), whose times count from the first round, and bool (n,): it slips at the end of the round.
-    Raises ValueError for another shape, type or range.
+    ``pac`` (n, 22) are integers 0..4095, or 0xFFFF where no valid word came; each row is a round of 10 ms, and no
+    rounds are missing. With ``held`` the finger holds something throughout; otherwise nothing touches it, its noise is
+    learned and nothing slips. Returns EVENT_DTYPE (k,), whose times count from the first round, and bool (n,), whether
+    it slips at the end of each round. Raises ValueError for another shape, type or range.
     """
     words = pac_words(pac)
     slips = np.zeros(len(words), np.uint8)

@@ -1,7 +1,7 @@
-"""One finger as the board runs it: recorded counts in, every frame's tare, flags and results out.
+"""One finger as the board runs it: recorded counts in, the tare, flags and results of every frame out.
 
-The compiled firmware core (firmware/core/finger.h) round by round, so that a recording is recomputed on
-the board's own code, bit for bit, with other settings if need be.
+This runs the compiled firmware core (firmware/core/finger.h) round by round, so that a recording can be recomputed by
+the board's own code, bit for bit, and with other settings.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from ..errors import CommandRefusedError
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
+from ..wire import slots
 from ..wire.dtypes_gen import DTYPES
+from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
 from ..wire.native import ffi, lib
 from .board_map import BoardMap
@@ -24,16 +26,14 @@ from .events import EVENT_DTYPE
 from .map_versions import opened
 
 ROUND_US = 10_000
-NO_TOUCH = 255
-TARE_UNKNOWN_Q16 = 0xFFFFFFFF
 _EVENTS_A_ROUND = 24  # more than there can be: a touch and a lift in every other slot
 
-#: What Finger.feed returns: the fields of a FRAME message as the board sends them (protocol/MESSAGES.md:
-#: integers, tare in 1/16 count, invalid marks), then ``present`` (0: no word was good, the board sends nothing
-#: and only seq, t_us and the marks mean anything), ``tare_reason`` (TareReason), ``touch_slot`` (slot in which a
-#: resting finger was first touched, 255: in none), ``energy_count2`` (of the filtered signals of a
-#: finger at rest, count^2; 0 in the other states, where nobody asks),
-#: ``noise_count2`` (at rest, 0 until measured) and ``threshold_count2`` (energy that counts as touched).
+#: What Finger.feed returns: the fields of a FRAME message as the board sends them (protocol/MESSAGES.md: integers, tare
+#: in 1/16 count, invalid marks), then ``present`` (0: no valid word came, so the board sends nothing and only seq, t_us
+#: and the invalid marks mean anything), ``tare_reason`` (TareReason), ``touch_slot`` (the slot in which a resting
+#: finger was first touched, 255: none), ``energy_count2`` (of the filtered signals of a finger at rest, in count^2; 0
+#: in other states, where it is not used), ``noise_count2`` (at rest; 0 until measured) and ``threshold_count2`` (the
+#: energy that counts as touched).
 FINGER_DTYPE = np.dtype(
     [
         *DTYPES[wire.Frame.ID].descr,
@@ -47,9 +47,6 @@ FINGER_DTYPE = np.dtype(
 )
 
 _ELECTRODES = len(sensor.ELECTRODE_NAMES)
-_SLOTS = np.array(sensor.SLOTS)
-_ELECTRODE_SLOTS = np.array([sensor.SLOTS.index(name) for name in sensor.ELECTRODE_NAMES])
-_SLOW = ("PDC", "TAC", "TDC")
 if FINGER_DTYPE.itemsize != lib.bt_replay_row_bytes():
     raise ImportError(
         "the compiled core has other rows than this Python code; install the package again: pip install ."
@@ -57,12 +54,12 @@ if FINGER_DTYPE.itemsize != lib.bt_replay_row_bytes():
 
 
 class Finger:
-    """One finger of a board: its tare machine and its kernels, in the state that all rounds so far left.
+    """One finger of a board: its tare machine and its kernels, in the state after all rounds so far.
 
-    ``settings`` are the board's; what they do not name has its default. ``index`` (0..4) is the finger's
-    number in the rows. ``quantities`` is the subscription, by default the board's own; QuantityFlags.SIGMA adds
-    standard deviations. ``wrench_map``, or its blob, is in force in place of the gains. Raises ValueError for a
-    setting or an index out of range, InputError for a blob that a board would refuse.
+    ``settings`` are the board's; what they leave out has its default. ``index`` (0..4) is the finger's number in the
+    rows. ``quantities`` is the subscription, by default the board's own; QuantityFlags.SIGMA adds standard deviations.
+    ``wrench_map``, a map or its blob, replaces the gains. Raises ValueError for a setting or an index out of range,
+    InputError for a blob that a board would refuse.
 
     >>> finger = Finger()
     >>> rows = finger.feed(np.full((30, 19), 3000))
@@ -89,38 +86,31 @@ class Finger:
         self.reset()
 
     def reset(self) -> None:
-        """As after power-up: no tare, seq 0 comes next."""
+        """Return to the state after power-up: no tare, and seq 0 comes next."""
         lib.bt_finger_reset(self._finger, self._index)
         if self._quantities is not None:
             self._finger.quantities = int(self._quantities)
         self._next_us = 0
 
     def feed(
-        self,
-        counts: Any,
-        pdc: Any = None,
-        tac: Any = None,
-        tdc: Any = None,
-        pac: Any = None,
-        *,
-        t_us: Any = None,
+        self, counts: Any, pdc: Any = None, tac: Any = None, tdc: Any = None, pac: Any = None, *, t_us: Any = None
     ) -> StructArray:
-        """Give the finger n rounds of 10 ms and return FINGER_DTYPE (n,), a row for each.
+        """Give the finger n rounds of 10 ms and return FINGER_DTYPE (n,), one row per round.
 
-        ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,) and ``pac`` (n, 22) are integers 0..4095, 0xFFFF where no
-        good word came; a channel that is not given has none. PAC takes no part in any result. ``t_us`` (n,), the
-        rounds' device times, wraps at 2^32 as the board's; by default each is 10 ms after the one before. A
-        jump of 90 ms and more is a silence, in which drift went on. Raises ValueError for other shapes, types and
-        ranges, before any round is taken.
+        ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,) and ``pac`` (n, 22) are integers 0..4095, or 0xFFFF where no
+        valid word came; a channel that is not given is missing throughout. PAC has no effect on any result. ``t_us``
+        (n,), the rounds' device times in us, wraps at 2^32 like the board's; by default each is 10 ms after the one
+        before. A jump of 90 ms or more is a silence, during which drift went on. Raises ValueError for other shapes,
+        types and ranges, before any round is processed.
         """
         return self._run(*self._words_of(counts, pdc, tac, tdc, pac, t_us))
 
     def events(
         self, counts: Any, pdc: Any = None, tac: Any = None, tdc: Any = None, pac: Any = None, *, t_us: Any = None
     ) -> StructArray:
-        """Give the finger n rounds, as ``feed`` does, and return the EVENTs that a board tells of them.
+        """Give the finger n rounds, as ``feed`` does, and return the EVENTs that a board sends for them.
 
-        EVENT_DTYPE (k,) of biotac.core.events. The rounds are taken: their frames are not computed.
+        Returns EVENT_DTYPE (k,) of biotac.core.events. The finger's state advances, but no frames are computed.
         """
         words, times = self._words_of(counts, pdc, tac, tdc, pac, t_us)
         events = np.zeros(_EVENTS_A_ROUND * len(words), EVENT_DTYPE)
@@ -142,13 +132,14 @@ class Finger:
     ) -> tuple[NDArray[np.uint16], NDArray[np.uint32]]:
         electrodes = _words("counts", counts, None, _ELECTRODES)
         n = len(electrodes)
-        words = np.full((n, len(_SLOTS)), wire.INVALID_COUNT, np.uint16)
-        words[:, _ELECTRODE_SLOTS] = electrodes
-        for name, channel in zip(_SLOW, (pdc, tac, tdc), strict=True):
+        words = np.full((n, slots.SLOTS_PER_FRAME), wire.INVALID_COUNT, np.uint16)
+        words[:, slots.ELECTRODE_SLOT] = electrodes
+        slow = (("pdc", slots.PDC_SLOT, pdc), ("tac", slots.TAC_SLOT, tac), ("tdc", slots.TDC_SLOT, tdc))
+        for name, slot, channel in slow:
             if channel is not None:
-                words[:, name == _SLOTS] = _words(name.lower(), channel, n, None)[:, None]
+                words[:, slot] = _words(name, channel, n, None)
         if pac is not None:
-            words[:, _SLOTS == "PAC"] = _words("pac", pac, n, int((_SLOTS == "PAC").sum()))
+            words[:, slots.PAC_SLOT] = _words("pac", pac, n, len(slots.PAC_SLOT))
         return words, self._times(t_us, n)
 
     def _times(self, t_us: Any, n: int) -> NDArray[np.uint32]:
@@ -174,14 +165,14 @@ class Finger:
         return rows
 
     def tare_now(self) -> None:
-        """TARE_NOW: the latest means become the tare. Raises CommandRefusedError while the signals move."""
+        """Do TARE_NOW: the latest means become the tare. Raises CommandRefusedError while the signals move."""
         _accept("TARE_NOW", lib.bt_tare_now(ffi.addressof(self._finger, "tare")))
 
     def set_tare(self, counts: Any, pdc: float | None = None) -> None:
-        """TARE_SET: use ``counts`` (19,), in counts 0..4095, from the next round on; ``pdc`` likewise, None: unknown.
+        """Do TARE_SET: use ``counts`` (19,), 0..4095 counts, from the next round on; ``pdc`` likewise, None: unknown.
 
-        Rounded to 1/16 count, which is what the message holds. Raises ValueError for other shapes and ranges,
-        CommandRefusedError with more than two electrodes railed.
+        Values are rounded to 1/16 count, as in the message. Raises ValueError for other shapes and ranges,
+        CommandRefusedError if more than two electrodes are railed.
         """
         tare = np.asarray(counts, dtype=np.float64)
         values = tare if pdc is None else np.append(tare, pdc)
@@ -192,23 +183,23 @@ class Finger:
         q16 = (tare_to_q4(values).astype(np.uint32) << 12).tolist()
         base = ffi.new("bt_baseline *")
         base.electrode_q16 = q16[:_ELECTRODES]
-        base.pdc_q16 = TARE_UNKNOWN_Q16 if pdc is None else q16[_ELECTRODES]
+        base.pdc_q16 = INVALID_U32 if pdc is None else q16[_ELECTRODES]
         _accept("TARE_SET", lib.bt_tare_set(ffi.addressof(self._finger, "tare"), base))
 
     def hold(self) -> None:
-        """HOLD: no new tare is taken until release() or lapse()."""
+        """Do HOLD: no new tare is taken until release() or lapse()."""
         lib.bt_tare_hold(ffi.addressof(self._finger, "tare"))
 
     def release(self) -> None:
-        """RELEASE: nothing is held any more; what is in doubt is a press's residue."""
+        """Do RELEASE: nothing is held any more, so that a signal in DOUBT is a press's residue."""
         lib.bt_tare_release(ffi.addressof(self._finger, "tare"))
 
     def lapse(self) -> None:
-        """What the board does when the host that said HOLD has been silent for too long."""
+        """End a hold as the board does when the host has been silent for hold_timeout_ms."""
         lib.bt_tare_lapse(ffi.addressof(self._finger, "tare"))
 
     def tare_message(self) -> wire.Tare:
-        """The TARE message a board sends when the latest round changed the tare; ``seq`` counts from reset."""
+        """The TARE message that a board sends when the latest round changed the tare; ``seq`` counts from reset."""
         tare = self._finger.tare
         return wire.Tare(
             seq=(self._finger.seq - 1) % 2**16,
@@ -223,13 +214,13 @@ class Finger:
 
     @property
     def tare_counts(self) -> NDArray[np.float64]:
-        """The tare in force (19,), in counts with the machine's own 1/65536; NaN where unknown."""
+        """The tare in force (19,), in counts, to the tare machine's 1/65536 count; NaN where unknown."""
         q16 = np.array(list(self._finger.tare.base.electrode_q16), np.uint32)
-        return np.where(q16 == TARE_UNKNOWN_Q16, np.nan, q16 / 65536.0)
+        return np.where(q16 == INVALID_U32, np.nan, q16 / 65536.0)
 
 
 def to_frames(rows: StructArray) -> StructArray:
-    """FRAME_DTYPE (n,) in mm, N and N*mm of FINGER_DTYPE rows; rounds in which nothing answered are left out.
+    """FRAME_DTYPE (n,), in mm, N and N*mm, from FINGER_DTYPE rows; rounds in which nothing answered are left out.
 
     ``seq`` and ``t_us`` are as in the rows, not unwrapped.
     """

@@ -1,4 +1,4 @@
-"""The finger's core: electrode places, the surface a contact lies on, and a mesh over it.
+"""The finger's core: electrode positions, the surface on which a contact lies, and a mesh over it.
 
 Frame (Lin, Fishel and Loeb 2013, figure 4): x to the tip, y to E11's side, z dorsal, origin at the
 centre of the tip sphere. The ventral surface is a half-cylinder (x <= 0) with a quarter-sphere cap

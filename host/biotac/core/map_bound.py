@@ -1,6 +1,6 @@
-"""How far a board's results may be off what its map means, frame by frame, from the formats of its numbers alone.
+"""A bound on the error of a board's results against its exact map, for each frame, from the number formats alone.
 
-protocol/SPEC.md, Wrench maps, "What that costs". Everything here is in the board's integers' units.
+See protocol/SPEC.md, Wrench maps, "What that costs". Everything here is in the units of the board's integers.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from .map_float64 import Unrounded
 from .map_quantise import FACTOR, unit
 
 _FIRST, _BEHIND = np.indices((ELECTRODES, len(RING) // ELECTRODES)).reshape(2, -1)
-_CONDUCTANCE_OFF = 0.52  # of its size, besides half a unit
+_CONDUCTANCE_OFF = 0.52  # relative error in 1 / FACTOR["conductance"], in addition to half a unit
 
 
 def bound_of(its: BoardMap, wanted: Unrounded | None, signals: Signals) -> Floats:
-    """(n, axes) in the results' units, from ``wanted``, or without it from what the integers mean."""
+    """The bound (n, axes) in the results' units, against the coefficients ``wanted``, or None: the integers' own."""
     columns, gate_values = kinds(signals), gates(signals.e)
     factors = {kind: columns[kind] * FACTOR[_map.KINDS[kind].of] for kind in _LINES if kind in columns}
     gate_off = _gates_off(signals, gate_values)
@@ -40,12 +40,12 @@ def bound_of(its: BoardMap, wanted: Unrounded | None, signals: Signals) -> Float
     return total
 
 
-# Whose columns other kinds are made of, or are themselves.
+# The kinds whose own columns are factors; pairs are products of them.
 _LINES = (Kind.OFFSET, Kind.SIGNAL, Kind.COMPRESSION, Kind.BULGE, Kind.CONDUCTANCE, Kind.PRESSURE)
 
 
 def _factor_off(kind: Kind, factor: Floats) -> Floats:
-    """Of each factor (n, columns): half a unit, and a conductance's reciprocal."""
+    """The error of each factor (n, columns): half a unit, and for a conductance that of its reciprocal."""
     if kind == Kind.OFFSET:
         return np.zeros_like(factor)
     share = _CONDUCTANCE_OFF / FACTOR["conductance"] if kind == Kind.CONDUCTANCE else 0.0
@@ -54,14 +54,14 @@ def _factor_off(kind: Kind, factor: Floats) -> Floats:
 
 
 def _line(block: BoardBlock, exact: Floats, factors: dict[Kind, Floats]) -> tuple[Floats, Floats]:
-    """A block's sum (n, axes), and by how much it may be off."""
+    """A block's sum (n, axes), and the bound on its error."""
     factor = factors[block.kind]
     size, rounding = np.abs(block.coefficients), np.abs(exact - block.coefficients)
     return factor @ exact, np.abs(factor) @ rounding + _factor_off(block.kind, factor) @ size
 
 
 def _pairs(block: BoardBlock, exact: Floats, factors: dict[Kind, Floats]) -> tuple[Floats, Floats]:
-    """The same row by row of the ring, of each of whose products less than a unit is cut."""
+    """Like _line, row by row of the ring; each of its products loses less than a unit to a shift."""
     kind = Kind.SIGNAL if block.kind == Kind.SIGNAL_PAIRS else Kind.CONDUCTANCE
     factor, cut = factors[kind], 2.0**_map.ROW_CUT
     factor_off = _factor_off(kind, factor)
@@ -79,14 +79,14 @@ def _pairs(block: BoardBlock, exact: Floats, factors: dict[Kind, Floats]) -> tup
 
 
 def _square(pairs: Floats) -> Floats:
-    """(19, 19) of coefficients (190,): a row of the ring in each row."""
+    """The coefficients (190,) as (19, 19), with a row of the ring in each row."""
     square = np.zeros((ELECTRODES, ELECTRODES))
     square[_FIRST, (_FIRST + _BEHIND) % ELECTRODES] = pairs[RING]
     return square
 
 
 def _gates_off(signals: Signals, value: dict[Gate, Floats]) -> dict[Gate, Floats]:
-    """Of each gate (n, 1): weights and places to half a unit, and the quotient."""
+    """The error of each gate (n, 1): weights and places are off by up to half a unit, and the quotient is rounded."""
     centre = centroid_mm(signals.e)
     weight = (np.maximum(-signals.e, 0.0) + _map.FLOOR_COUNTS).sum(axis=1, keepdims=True) * 2.0**_map.SIGNAL_Q
     off = []

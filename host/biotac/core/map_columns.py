@@ -1,7 +1,7 @@
-"""The columns that a wrench map is linear in (protocol/map.toml): kinds of columns, and the gates that weigh them.
+"""The columns in which a wrench map is linear (protocol/map.toml): kinds of columns, and the gates that weight them.
 
-Functions of one frame's tared counts alone (and of PDC where there is one). Columns are scaled to be of the order
-of one; none is centred or standardised by the run itself, because a fitted map has to mean the same on the next run.
+They are functions of one frame's tared counts (and of PDC if there is any) alone. Columns are scaled to be of the order
+of one. None is centred or standardised by a run's own data, because a fitted map has to mean the same on the next run.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .geometry import Floats
 ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 SIGNAL_COUNTS = 500.0  # a firm press; only sets the columns' size
 PRESSURE_COUNTS = 100.0
-#: What a map can give, in the order in which it does: N, N mm.
+#: The axes that a map can have, in its order; N for forces, N mm for the others.
 AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz", "torsion")
 REACH_MM = (_map.REACH_X_UM / 1000, _map.REACH_Y_UM / 1000)
 
@@ -39,19 +39,19 @@ class Signals:
     pdc: Floats | None = None
 
     def drifted(self, counts: Floats) -> Signals:
-        """As if every row had drifted by ``counts`` (19,)."""
+        """The signals as if every row had drifted by ``counts`` (19,)."""
         return Signals(self.e + counts, self.tare, self.pdc)
 
 
 def tared(counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16]) -> Signals:
-    """Signals (n, 19) of a FRAME's integers (n, 19); what is missing is as its tare."""
+    """Signals (n, 19) from the integers (n, 19) of FRAMEs; 0 where the count or the tare is missing."""
     missing = (counts == wire.INVALID_COUNT) | (tare_q4 == wire.INVALID_COUNT)
     tare = np.where(missing, 0.0, tare_q4 / Q4_PER_COUNT)
     return Signals(np.where(missing, 0.0, counts - tare), tare)
 
 
 def summed(blocks: Iterable[tuple[Kind, Gate, Floats]], signals: Signals) -> Floats:
-    """What blocks add up to (n, axes), of coefficients (columns, axes) each."""
+    """The sum of blocks (n, axes), each with coefficients (columns, axes)."""
     columns, gate = kinds(signals), gates(signals.e)
     total: Floats = np.zeros(())
     for kind, which, its in blocks:
@@ -60,7 +60,7 @@ def summed(blocks: Iterable[tuple[Kind, Gate, Floats]], signals: Signals) -> Flo
 
 
 def kinds(signals: Signals) -> dict[Kind, Floats]:
-    """Each kind's columns (n, width); PRESSURE only where there is one."""
+    """The columns (n, width) of each kind; PRESSURE only if the signals have it."""
     e = signals.e / SIGNAL_COUNTS
     conductance = conductance_change(signals.e, signals.tare)
     result = {
@@ -78,17 +78,17 @@ def kinds(signals: Signals) -> dict[Kind, Floats]:
 
 
 def gates(e: Floats) -> dict[Gate, Floats]:
-    """Each gate (n, 1)."""
+    """The values (n, 1) of each gate."""
     centre = centroid_mm(e)
     x, y = centre[:, :1] / REACH_MM[0], centre[:, 1:2] / REACH_MM[1]
     return {Gate.ONE: np.ones_like(x), Gate.X: x, Gate.Y: y, Gate.XX: x * x, Gate.XY: x * y, Gate.YY: y * y}
 
 
 def conductance_change(e: Floats, tare: Floats) -> Floats:
-    """Electrodes' conductance (n, 19) over that at rest, less one."""
+    """The conductance of each electrode (n, 19) divided by that at rest, minus one."""
     count = np.clip(e + tare, _map.COUNT_MIN, _map.COUNT_MAX)
     at_rest = np.clip(tare, _map.COUNT_MIN, _map.COUNT_MAX)
-    # a wet or shorted electrode must not square to anything
+    # clipped, so that the square of a wet or shorted electrode stays bounded
     return np.clip(_conductance(count) / _conductance(at_rest) - 1.0, -1.0, _map.RATIO_MAX)
 
 

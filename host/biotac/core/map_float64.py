@@ -1,4 +1,4 @@
-"""What a board's wrench map means, in float64 and without any of the board's rounding."""
+"""A board's wrench map evaluated in float64, without any of the board's rounding."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _CHUNK_ROWS = 4096
 
 
 def result_units(axes: int) -> Floats:
-    """The board's units of a result (axes,) in 1 N and 1 N mm."""
+    """How many of the board's units make 1 N or 1 N mm, for each axis (axes,)."""
     units: Floats = np.array([FORCE_LSB_PER_N] * 3 + [MNMM_PER_NMM] * 4, dtype=np.float64)
     return units[:axes]
 
 
 def by_map(results: StructArray, its: BoardMap, counts: Any, tare: Any, pdc_above_rest: Any) -> StructArray:
-    """``results`` of biotac.compute, MAPPED_RESULT_DTYPE, with what a map has in place of the gains'; the same array.
+    """Replace in ``results`` of biotac.compute, MAPPED_RESULT_DTYPE, what the map has; returns the same array.
 
-    Shapes as there; ``pdc_above_rest`` in counts, (n,), one number, or None: missing. Raises ValueError for
-    a pressure of another shape.
+    Shapes are as there. ``pdc_above_rest``, in counts, is (n,), one number, or None: missing. Raises ValueError for a
+    pressure of another shape.
     """
     rows = results.reshape(-1)
     raw = np.asarray(counts).reshape(len(rows), -1).astype(np.uint16)
@@ -49,10 +49,10 @@ def by_map(results: StructArray, its: BoardMap, counts: Any, tare: Any, pdc_abov
 def replace_gains(
     its: BoardMap, wrench: Floats, poc_mm: Floats, force_n: Floats, torque_nmm: Floats, torsion_nmm: Floats
 ) -> None:
-    """Put a map's ``wrench`` (n, axes), as of exact, into the gains' results: (n, 3) each, torsion (n,).
+    """Put a map's ``wrench`` (n, axes), as from exact(), into the gains' results: (n, 3) each, torsion (n,).
 
-    Without torque of its own the map's force makes torque x, by the lever to ``poc_mm`` (n, 3), and the rest of the
-    torque stays; without torsion there is none, NaN.
+    If the map has no torque, torque x is derived from its force with the lever to ``poc_mm`` (n, 3), and the rest of
+    the torque stays. If it has no torsion, that is NaN.
     """
     force_n[:] = wrench[:, :3]
     if its.axes > 3:
@@ -63,14 +63,14 @@ def replace_gains(
 
 
 def derived_torque_x(poc_mm: Floats, force_n: Floats) -> Floats:
-    """(n,) in N mm, of force (n, 3 or more) at ``poc_mm`` (n, 3)."""
+    """Torque x (n,) in N mm, from force (n, 3 or more) in N at ``poc_mm`` (n, 3)."""
     return poc_mm[:, 1] * force_n[:, 2] - poc_mm[:, 2] * force_n[:, 1]
 
 
 def exact(
     its: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
 ) -> Floats:
-    """What the integers mean, without any of the board's rounding: (n, axes) in N and N mm; arguments as results()."""
+    """The map's results without the board's rounding: (n, axes) in N and N mm; arguments as BoardMap.results()."""
     blocks = [(block.kind, block.gate, unrounded(block)) for block in its.blocks]
     parts = [summed(blocks, signals) for signals in tared_chunks(its, counts, tare_q4, pdc_q4)]
     limit = _map.RESULT_MAX
@@ -81,7 +81,7 @@ def exact(
 def tared_chunks(
     its: BoardMap, counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], pdc_q4: npt.NDArray[np.int32]
 ) -> Iterator[Signals]:
-    """Signals of so many frames at a time that their columns fit memory; arguments as exact()."""
+    """Signals in chunks of frames whose columns fit in memory; arguments as exact()."""
     every = tared(counts, tare_q4)
     known = np.where(pdc_q4 == wire.INVALID_I32, np.nan, pdc_q4 / Q4_PER_COUNT)
     pressure = known if its.with_pdc else np.zeros(len(counts))
@@ -91,6 +91,6 @@ def tared_chunks(
 
 
 def unrounded(block: BoardBlock) -> Floats:
-    """What a block's coefficients mean (columns, axes), in the results' units per 1 of a column of features."""
+    """A block's coefficients (columns, axes) as real numbers, in the results' units per 1 of a column of features."""
     scale = unit(block.kind, block.gate) / 2.0 ** np.array(block.exponent)
     return np.asarray(block.coefficients * scale, dtype=np.float64)

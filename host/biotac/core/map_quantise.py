@@ -1,7 +1,6 @@
-"""From real coefficients to a board's: 16 bits, and the exponents at which no sum on a board can overflow.
+"""From real coefficients to a board's: 16 bits, with exponents at which no sum on a board can overflow.
 
-The bounds are those of firmware/core/map/judge.c, which has the last word: a block gets the largest exponent that
-passes them.
+The bounds are those of firmware/core/map/judge.c, which decides: a block gets the largest exponent that passes them.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from . import map_columns as columns
 from .board_map import RING, BoardBlock, Integers
 from .geometry import Floats
 
-# A board's factor of what is 1 in map_columns, and the largest one that there is.
+# The board's factor for 1 in map_columns, and below the largest factor possible.
 FACTOR = {
     "one": 2.0**_map.ONE_Q,
     "signal": 2.0**_map.SIGNAL_Q * columns.SIGNAL_COUNTS,
@@ -33,7 +32,7 @@ _LARGEST = 2**31 - 1
 
 
 def unit(kind: Kind, gate: Gate) -> float:
-    """What a coefficient of 1 makes of a column that is 1 and a gate that is 1, over 2^exponent: in results' units."""
+    """The result, in its units times 2^exponent, of a coefficient of 1 where column and gate are 1."""
     spec = _map.KINDS[kind]
     its = FACTOR[spec.of]
     if spec.shape == "pairs":
@@ -42,9 +41,9 @@ def unit(kind: Kind, gate: Gate) -> float:
 
 
 def block(kind: Kind, gate: Gate, values: Floats, names: tuple[str, ...]) -> BoardBlock:
-    """``values`` (columns, axes) in the results' units, of map_columns' columns and gates.
+    """The block for ``values`` (columns, axes), in the results' units for map_columns' columns and gates.
 
-    Raises InputError naming the axis of ``names`` whose coefficients are beyond the formats.
+    Raises InputError, with the axis from ``names``, when its coefficients do not fit the formats.
     """
     exponents, whole = [], []
     for axis, name in enumerate(names):

@@ -1,7 +1,7 @@
-"""Maps as boards kept them up to wire 1.4 (version 1): read, and made into ones of today.
+"""Reading maps as boards stored them up to wire 1.4 (version 1), and converting them to the current version.
 
-Coefficients had 32 bits, x y and z of a column side by side, torsion's behind them; pairs came row by row. Rounded to
-16 bits a map means the same within some mN.
+Coefficients had 32 bits, with x, y and z of a column side by side and torsion's after them; pairs came row by row.
+Rounded to 16 bits, a map gives the same results within some mN.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from .board_map import BLOCK, HEADER, BoardMap, from_blob
 from .map_columns import AXES, PRESSURE_COUNTS, SIGNAL_COUNTS
 
 VERSION = 1
-# What 1 in a column of features was as a factor, of which 2^16 was a coefficient's unit.
+# The factor that stood for 1 in a column of features; its product with a coefficient was divided by 2^16.
 _FACTOR = {"one": 2.0**15, "signal": 16 * SIGNAL_COUNTS, "conductance": 2.0**14, "pressure": 16 * PRESSURE_COUNTS}
 
 
 def current(blob: bytes) -> bytes:
-    """``blob`` itself, or the map of today that one of version 1 means. Raises InputError when that one is no map."""
+    """``blob`` itself, or one of version 1 converted to the current version. Raises InputError if that fails."""
     if blob[:1] != bytes([VERSION]):
         return blob
     try:
@@ -34,7 +34,7 @@ def current(blob: bytes) -> bytes:
 
 
 def opened(its: BoardMap | bytes) -> BoardMap:
-    """A map, or the one that a blob of any version holds. Raises InputError when a board would refuse it."""
+    """The map itself, or the one in a blob of any version. Raises InputError when a board would refuse the blob."""
     return its if isinstance(its, BoardMap) else from_blob(current(its))
 
 

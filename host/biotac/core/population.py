@@ -1,8 +1,8 @@
-"""The force of a finger that nobody has calibrated, in float64: the population map that comes with the package.
+"""The force of an uncalibrated finger, in float64, by the population map that comes with the package.
 
-The board's own is firmware/core/map/population.c, board_map() of them, in 16 bits. This reads them as they were
-trained, and makes the columns as training does: what a board is held against. biotac.compute runs the same formulas in
-host/binding/population_float64.c. SPEC.md, Population map.
+The board has the same map in 16 bits, firmware/core/map/population.c, made by board_map(). This module reads the
+coefficients as trained, and makes the columns as training does; boards are checked against it. biotac.compute runs the
+same formulas in host/binding/population_float64.c. See SPEC.md, Population map.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .map_float64 import derived_torque_x
 SHIPPED = "population.json"
 Block = tuple[Kind, Gate, Floats]
 
-ALL = 256  # a share
+ALL = 256  # the share 1
 _NOISE_Q4 = 8 * 16
 _SUM_BITS = 15
 _CHUNK_ROWS = 4096
@@ -42,14 +42,14 @@ _COMPILED = [
 
 
 def in_force(settings: Mapping[wire.Setting, int]) -> bool:
-    """Whether force of a finger with these settings, without a wrench map, comes from the population map."""
+    """Whether the force of a finger with these settings and no wrench map comes from the population map."""
     model = settings.get(wire.Setting.FORCE_MODEL, wire.SETTINGS[wire.Setting.FORCE_MODEL].default)
     own = any(settings.get(gain, wire.SETTINGS[gain].default) != wire.SETTINGS[gain].default for gain in FORCE_GAINS)
     return model == wire.ForceModel.POPULATION and not own
 
 
 def shipped() -> str:
-    """The package's population map as JSON (biotac.calibrate.population.keeping)."""
+    """The package's population map as JSON text (biotac.calibrate.population.keeping)."""
     return resources.files(__package__).joinpath(SHIPPED).read_text(encoding="utf-8")
 
 
@@ -62,26 +62,27 @@ def blocks() -> list[Block]:
 
 
 def split(named: list[tuple[Kind, Gate]], coefficients: Floats) -> list[Block]:
-    """Coefficients (columns, 3) of blocks one behind the other, block by block."""
+    """Split the coefficients (columns, 3) of concatenated blocks into those of each block."""
     ends = np.cumsum([KINDS[kind].columns for kind, _ in named])
     return [(*name, its) for name, its in zip(named, np.split(coefficients, ends[:-1]), strict=True)]
 
 
 def board_map(of: list[Block]) -> BoardMap:
-    """As the board computes it. Raises InputError when it is beyond a board's formats."""
+    """The blocks as a board's map. Raises InputError when they do not fit the board's formats."""
     made = (map_quantise.block(kind, gate, its * FORCE_LSB_PER_N, AXES[:3]) for kind, gate, its in of)
     return BoardMap(3, tuple(made))
 
 
 def alone(signals: Signals) -> Floats:
-    """The map's force (n, 3) in N, whatever it has seen."""
+    """The map's force (n, 3) in N, whatever its share."""
     return summed(blocks(), signals)
 
 
 def share(signals: Signals) -> npt.NDArray[np.int64]:
-    """How much of the force the map makes (n,), in 1/256: defined in whole numbers, so that all boards agree.
+    """The share of the force that comes from the map (n,), in 1/256; defined in integers, so that all boards agree.
 
-    All where |e| less 8 counts spreads over 4.5 electrodes, (sum s)^2 / sum s^2, and nothing below 3.
+    With s = |e| less 8 counts, (sum s)^2 / sum s^2 says over how many electrodes a signal spreads. The share is all
+    from 4.5 electrodes on, and nothing up to 3.
     """
     size = np.rint(16 * np.abs(signals.e)).astype(np.int64)
     beyond = np.maximum(size - _NOISE_Q4, 0) >> 3  # half counts
@@ -97,9 +98,9 @@ def share(signals: Signals) -> npt.NDArray[np.int64]:
 def replace_force(
     counts: npt.NDArray[np.uint16], tare_q4: npt.NDArray[np.uint16], poc_mm: Floats, force_n: Floats, torque_nmm: Floats
 ) -> None:
-    """Put the map's force, where it has a share, in place of Lin's ``force_n``, and the torque x that it makes.
+    """Blend the map's force by its share into Lin's ``force_n``, in place, and derive torque x from the result.
 
-    Arrays are of n rows. In place; NaN in ``poc_mm`` makes a torque x of NaN.
+    All arrays have n rows. NaN in ``poc_mm`` makes torque x NaN.
     """
     for start in range(0, len(counts), _CHUNK_ROWS):
         rows = slice(start, start + _CHUNK_ROWS)
@@ -111,7 +112,7 @@ def replace_force(
 
 @cache
 def compiled_coefficients() -> Any:
-    """The coefficients as host/binding/population_float64.h wants them, for the life of the process."""
+    """The coefficients as host/binding/population_float64.h wants them; they live as long as the process."""
     its = blocks()
     if [(kind, gate) for kind, gate, _ in its] != _COMPILED:
         raise ValueError(

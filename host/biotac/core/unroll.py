@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 def unroll(points_mm: NDArray[Any]) -> tuple[Floats, Floats]:
-    """Surface points (n, 3) to arc lengths (n,): across from the ventral line, along the finger, mm."""
+    """Arc lengths (n,) of surface points (n, 3), in mm: across, from the ventral line, and along the finger."""
     x, y, z = points_mm.T
     across = RADIUS_MM * np.arctan2(y, -z)
     along = np.where(x > 0, RADIUS_MM * np.arcsin(np.clip(x / RADIUS_MM, 0, 1)), x)

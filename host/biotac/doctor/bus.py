@@ -1,4 +1,4 @@
-"""What became of the words that the sensors sent."""
+"""Checks the words received from the sensors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ KINDS = {"words_stuck": "of 0x0000 or 0xFFFF", "words_parity": "with bad parity"
 
 
 def check(facts: Facts) -> Iterator[Finding]:
-    """Stuck, damaged and refused; of sensors that are there, since an open chip select reads as stuck for ever."""
+    """Stuck words, parity errors and error words, of sensors that are present: an open chip select reads as stuck."""
     board = facts.board
     for finger in board.present if board else []:
         assert board is not None

@@ -1,4 +1,4 @@
-"""Every finding there is: how bad, what it means, what cures it. host/docs/doctor.md is made of this."""
+"""Every finding: its severity, meaning and cure. host/docs/doctor.md is generated from this."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from enum import Enum
 
 
 class Severity(Enum):
-    """How bad."""
+    """How severe a finding is."""
 
     ERROR = "error"  # no data, or data that must not be trusted
-    WARNING = "warning"  # data come, and something is not as it should be
+    WARNING = "warning"  # data arrive, but something is not as it should be
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,14 @@ class Entry:
 
 @dataclass(frozen=True)
 class Finding:
-    """One finding: ``seen`` is what was observed here, the rest is the catalogue's."""
+    """One finding: ``seen`` is what was observed here; the rest is in the catalogue."""
 
     code: str
     seen: str
 
     @property
     def entry(self) -> Entry:
-        """Its place in the catalogue."""
+        """This finding's entry in the catalogue."""
         return CATALOGUE[self.code]
 
 
@@ -72,12 +72,12 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "port_busy": Entry(
         E,
-        "Another program has the port for itself; two readers would each get half of the bytes.",
+        "Another program has the port to itself; two readers would each get half of the bytes.",
         "Close that program; then try again.",
     ),
     "port_shared": Entry(
         W,
-        "Another program has the port open too, without asking for it alone: it may take bytes away from us.",
+        "Another program has the port open too, though not exclusively: it may take some of our bytes.",
         "Close that program.",
     ),
     "modem_manager": Entry(
@@ -89,7 +89,7 @@ CATALOGUE: dict[str, Entry] = {
     "port_failed": Entry(
         E,
         "The port is there or was named, but cannot be opened.",
-        "See what was seen; `biotac list` shows the ports of this machine.",
+        "Read the message above; `biotac list` shows this machine's ports.",
     ),
     "not_a_gateway": Entry(
         E,
@@ -126,7 +126,7 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "lead_mosi": Entry(
         E,
-        "The sensors answer, but what they are told is no command: MOSI is open, or on another pin.",
+        "The sensors answer, but receive no valid command: MOSI is open, or on another pin.",
         "Check MOSI at both ends.",
     ),
     "lead_miso": Entry(
@@ -136,7 +136,7 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "lead_select": Entry(
         E,
-        "One finger's select does not come to its sensor; the other leads are right.",
+        "One finger's select does not reach its sensor; the other leads are right.",
         "Check this finger's SS at both ends.",
     ),
     "lead_crossed": Entry(
@@ -152,9 +152,9 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "wrong_sensor": Entry(
         E,
-        "A sensor of another type, as a BioTac SP (BTSP...), whose 24 electrodes lie elsewhere. Its counts are sent; "
-        "all its frames carry SENSOR_UNSURE, for no force can be had of them here.",
-        "Put a BioTac in its place.",
+        "A sensor of another type, such as a BioTac SP (BTSP...), whose 24 electrodes lie elsewhere. Its counts are "
+        "sent, but no force can be computed from them; all its frames carry SENSOR_UNSURE.",
+        "Replace it with a BioTac.",
     ),
     "sensor_missing": Entry(
         E,
@@ -163,22 +163,22 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "sensor_lost": Entry(
         E,
-        "A sensor that answered at first gave no data, or stopped: a loose plug, or a supply that gives way.",
+        "A sensor that answered at first gave no data, or stopped: a loose plug, or a weak supply.",
         "Reseat the flex connector; measure V+ at the sensor while all are running.",
     ),
     "sensor_unsure": Entry(
         W,
         "A sensor was away while the board streamed, and has not said its serial number since: tare, calibration and "
         "map may be another sensor's. Results go on as before, with the flag SENSOR_UNSURE.",
-        "Reseat the flex connector, and take the strain off its cable. If it never says who it is, see words_error and "
-        "words_parity, and plug it in again.",
+        "Reseat the flex connector, and take the strain off its cable. If its serial number never comes, see "
+        "words_error and words_parity, and plug it in again.",
     ),
     "sensor_other": Entry(
         E,
-        "Another sensor answers than when the stream began. It has a tare of its own, and no results where it has not "
-        "the same calibration and map; the flag SENSOR_OTHER says so.",
-        "If you changed it: open the board again, and give this sensor its own calibration and map. If not, look for a "
-        "wire of SS that goes to two sensors, or to another one than you think.",
+        "A different sensor answers than when the stream began. It gets a tare of its own, and no results unless it "
+        "has the same calibration and map; the flag SENSOR_OTHER says so.",
+        "If you changed it: open the board again, and give this sensor its own calibration and map. If not, look for "
+        "an SS wire that goes to two sensors, or to the wrong one.",
     ),
     "same_serial": Entry(
         E,
@@ -187,8 +187,8 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "mixed_sensors": Entry(
         W,
-        "The sensors are of different flex or software versions. They work together; scale and noise may differ.",
-        "Nothing, if you know; calibrate each finger of its own, and do not carry a calibration over.",
+        "The sensors have different flex or software versions. They work together; scale and noise may differ.",
+        "Nothing, if that is intended; calibrate each finger separately, and do not copy a calibration to another.",
     ),
     # ---- bus
     "words_stuck": Entry(
@@ -213,21 +213,19 @@ CATALOGUE: dict[str, Entry] = {
     # ---- timing
     "board_restarted": Entry(
         E,
-        "The board started again while it was being examined: its supply gave way, its watchdog bit, or somebody reset "
-        "it.",
-        "Another cable and socket; feed the sensors from a supply of their own if they draw more than the board gives.",
+        "The board restarted during the examination: its supply failed, its watchdog fired, or somebody reset it.",
+        "Try another cable and socket; give the sensors their own supply if they draw more than the board provides.",
     ),
     "faults_latched": Entry(
         W,
-        "The board remembers faults of before this examination, be they of a single round: they stay until somebody "
-        "clears them.",
-        "See each flag in MESSAGES.md and safety.md; once its cause is known, `Hand.clear_faults()`.",
+        "The board remembers faults from before this examination, even of a single round, until somebody clears them.",
+        "Look up each flag in MESSAGES.md and safety.md; once you know its cause, call `Hand.clear_faults()`.",
     ),
     "slots_late": Entry(
         E,
-        "The board missed times at which it should have sampled: those channels are missing from their frames.",
-        "On a Pico report it, with `biotac info --json`. On a Linux computer's own bus: fewer fingers, a faster bus, "
-        "less other load.",
+        "The board missed sampling times: those channels are missing from their frames.",
+        "On a Pico, report it with the output of `biotac info --json`. On a Linux computer's own bus, use fewer "
+        "fingers, a faster bus, or run less else.",
     ),
     "messages_dropped": Entry(
         W,
@@ -236,30 +234,30 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "frames_lost": Entry(
         W,
-        "Frames that the board made did not come, by their sequence numbers.",
+        "Frames that the board sent did not arrive, by their sequence numbers.",
         "See messages_dropped and bytes_damaged: one of them usually says why.",
     ),
     "bytes_damaged": Entry(
         W,
         "Frames came with a bad checksum or length: something else writes to the port, takes bytes from it, or the "
         "cable is bad.",
-        "Close other programs that use the port; another cable.",
+        "Close other programs that use the port; try another cable.",
     ),
     "rate_wrong": Entry(
         E,
         "The board does not sample as often as it says, by its own clock.",
-        "Report it, with `biotac info --json`; do not trust times within a frame.",
+        "Report it with the output of `biotac info --json`; do not trust times within a frame.",
     ),
     "clock_drift": Entry(
         W,
         "The board's clock runs fast or slow against this computer's by more than a crystal should.",
-        "Is this computer's clock being set at this moment? Ask again in a few minutes. If it stays, the board's "
-        "crystal is off; `Hand.clock` corrects for it as long as it is steady.",
+        "This computer's clock may just be being set: run the doctor again in a few minutes. If it stays, the board's "
+        "crystal is off; `Hand.clock` corrects for that while it is steady.",
     ),
     "clock_jumped": Entry(
         W,
-        "The board's time and this computer's stopped to agree on the way: one of the clocks was set, or stood still.",
-        "See board_restarted; otherwise let this computer not sleep while it records.",
+        "The board's time and this computer's drifted apart at once: one of the clocks was set, or stood still.",
+        "See board_restarted; otherwise keep this computer from sleeping while it records.",
     ),
     # ---- tare
     "no_tare": Entry(
@@ -274,7 +272,8 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "base_old": Entry(
         W,
-        "The finger counts as touched for over a minute, in which drift went untracked: forces creep.",
+        "The finger has counted as touched for over a minute. Only drift that all electrodes share is tracked "
+        "meanwhile, so forces may creep.",
         "Let go of it. If nothing touches it, tare it now: `Hand.tare(finger)`.",
     ),
     "electrodes_railed": Entry(
@@ -285,7 +284,7 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "channel_missing": Entry(
         E,
-        "A channel had no good word in most frames. What is computed goes on without it, and is flagged.",
-        "See words_error, words_parity and slots_late: one of them says why. A model can be without a channel.",
+        "A channel had no good word in most frames. Results are computed without it and flagged.",
+        "See words_error, words_parity and slots_late: one of them says why. Some models lack a channel.",
     ),
 }

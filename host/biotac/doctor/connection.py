@@ -1,4 +1,4 @@
-"""From the plug to the first answer."""
+"""Checks everything from the plug to the first answer."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .facts import Facts
 
 
 def check(facts: Facts) -> Iterator[Finding]:
-    """Plug, loader, permission, other programs, and whoever answers."""
+    """Boot loader, permission, other programs, ModemManager, and whether a gateway answers."""
     system, error = facts.system, facts.error
     for place in system.loaders:
         yield Finding("in_loader", f"a board waits in its loader at {place}")

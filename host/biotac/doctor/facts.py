@@ -1,4 +1,4 @@
-"""What the checks judge. Plain values, so that a test can make any case up."""
+"""The facts that the checks judge: plain values, so that a test can make up any case."""
 
 from __future__ import annotations
 
@@ -17,27 +17,30 @@ from ..wire.frames import StructArray
 
 @dataclass(frozen=True)
 class SystemFacts:
-    """This computer, without opening anything."""
+    """Facts about this computer, found without opening a port."""
 
     boards: list[SerialPort] = field(default_factory=list)
-    usb_boards: int = 0  #: devices with our ids, whether they have a port or not; Linux only
-    loaders: list[str] = field(default_factory=list)  #: where boards wait in their loader
+    usb_boards: int = 0  #: devices with our USB ids, with or without a serial port; Linux only
+    loaders: list[str] = field(default_factory=list)  #: where boards wait in their boot loader
     permitted: bool = True  #: this user may read and write the port
     owner: str = ""  #: of the port, in words
-    holders: list[Holder] = field(default_factory=list)  #: who else has the port open
-    modem_manager: bool = False  #: it is running
-    left_alone: bool = False  #: by it, as udev has been told
+    holders: list[Holder] = field(default_factory=list)  #: other programs that have the port open
+    modem_manager: bool = False  #: ModemManager is running
+    left_alone: bool = False  #: udev tells ModemManager to leave the port alone
 
 
 def grown(before: Any, after: Any, counter: str) -> int:
-    """By how much a 32-bit counter of a message has."""
+    """Increase of a message's 32-bit counter."""
     return int(getattr(after, counter) - getattr(before, counter)) % 2**32
 
 
 @dataclass(frozen=True)
 class BoardFacts:
-    """What a board said within some seconds. Lists of sensor states are by finger, all five; ``sensors`` has those that
-    gave a serial number, those of a wrong type, too."""
+    """What a board reported within some seconds.
+
+    Lists of sensor states have all five fingers, in order. ``sensors`` has those that gave a serial number, including
+    those of a wrong type.
+    """
 
     hello: wire.Hello
     sensors: list[wire.SensorInfo]
@@ -48,22 +51,18 @@ class BoardFacts:
     frames: StructArray  #: FRAME_DTYPE
     idle: StructArray  #: IDLE_DTYPE
     stats: LinkStats
-    clock: Fit | None  #: None where the board's time is no clock: a simulated one
+    clock: Fit | None  #: None where the board's time is no clock, as on a simulated board
     clock_resets: int
     warnings: list[HandWarning]
 
     @property
     def present(self) -> list[int]:
-        """Fingers whose sensor answered at first."""
+        """Fingers whose sensor answered at the start."""
         return [finger for finger in range(len(self.sensors_before)) if self.hello.fingers_present >> finger & 1]
 
     def more(self, finger: int, counter: str) -> int:
-        """By how much a sensor's 32-bit counter has grown."""
+        """Increase of one of a sensor's 32-bit counters."""
         return grown(self.sensors_before[finger], self.sensors_after[finger], counter)
-
-    def more_of_board(self, counter: str) -> int:
-        """By how much one of the board's has grown."""
-        return grown(self.before, self.after, counter)
 
 
 @dataclass(frozen=True)
@@ -75,17 +74,17 @@ class PairFacts:
     serials: tuple[str, ...]  #: by finger, as they were plugged in
 
     def more(self, counter: str) -> int:
-        """By how much one of its 32-bit counters has grown."""
+        """Increase of one of the sensor board's 32-bit counters."""
         return grown(self.before, self.after, counter)
 
 
 @dataclass(frozen=True)
 class Facts:
-    """Everything about one port."""
+    """All facts about one port."""
 
     port: str | None  #: None: there is nothing to open
     system: SystemFacts = field(default_factory=SystemFacts)
-    error: BiotacError | None = None  #: why it could not be opened, or was lost
+    error: BiotacError | None = None  #: why the port could not be opened, or was lost
     board: BoardFacts | None = None  #: None when it could not be examined
     expected_fingers: int | None = None
-    pair: PairFacts | None = None  #: where the sensors are a board of ours
+    pair: PairFacts | None = None  #: set if the sensors are a sensor board of ours

@@ -1,4 +1,4 @@
-"""Which lead between a gateway and a sensor board is wrong, by what either end heard."""
+"""Finds which lead between a gateway and a sensor board is wrong, from what each end heard."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .facts import BoardFacts, Facts, PairFacts
 
 
 def check(facts: Facts) -> Iterator[Finding]:
-    """One finding at most of the leads that all sensors share; where those are right, one a select."""
+    """At most one finding about the leads that all sensors share; if those are right, one for each chip select."""
     board, pair = facts.board, facts.pair
     if board is None or pair is None:
         return
@@ -29,7 +29,7 @@ def check(facts: Facts) -> Iterator[Finding]:
 
 
 def _well(board: BoardFacts, finger: int) -> bool:
-    """More of its words were good than not: one or two may be of before a lead came off."""
+    """More than half of its words were good; one or two may date from before a lead came off."""
     return board.more(finger, "words_good") > sum(board.more(finger, kind) for kind in KINDS)
 
 

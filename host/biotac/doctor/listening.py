@@ -1,4 +1,4 @@
-"""Asking a board for some seconds. Changes nothing on it but that its stream is stopped afterwards."""
+"""Queries a board for some seconds. The board's state is unchanged, except that its stream is stopped afterwards."""
 
 from __future__ import annotations
 
@@ -7,28 +7,25 @@ import os
 from ..errors import BiotacError, PortError
 from ..hand.hand import Hand
 from ..hand.opening import open as open_board
+from ..link.discovery import SERIAL_PREFIX
 from ..wire.batches import join
 from ..wire.sensor_gen import MAX_SENSORS
 from .facts import BoardFacts, Facts
-from .system import look
+from .system import device_of, look
 
 
 def examine(port: str | None, *, seconds: float = 3.0, expected_fingers: int | None = None) -> Facts:
-    """All facts of ``port``, of the only board without one; errors become facts."""
+    """All facts about ``port``, or about the only board if ``port`` is None; errors become facts."""
     system = look(port)
-    device = port
-    if port is None or port.startswith("serial:"):
-        number = None if port is None else port.removeprefix("serial:").upper()
-        fitting = [b.device for b in system.boards if number in (None, (b.serial_number or "").upper())]
-        device = fitting[0] if len(fitting) == 1 else None
-        if device is None and number is not None and system.boards:
-            there = ", ".join(f"serial:{b.serial_number}" for b in system.boards)
-            error = PortError(f"no board has serial number {number}; there is {there}")
-            return Facts(port, system, error, None, expected_fingers)
+    device = device_of(port, system.boards)
+    if device is None and port is not None and system.boards:
+        there = ", ".join(f"{SERIAL_PREFIX}{b.serial_number}" for b in system.boards)
+        error = PortError(f"no board has serial number {port.removeprefix(SERIAL_PREFIX).upper()}; there is {there}")
+        return Facts(port, system, error, None, expected_fingers)
     if device is None:
         return Facts(None, system, None, None, expected_fingers)
     try:
-        # A simulated board's own time at its own pace, unless its PORT says otherwise.
+        # pace=1.0: a simulated board runs in real time, unless its PORT says otherwise.
         with open_board(device, pace=1.0) as hand:
             return Facts(device, system, None, listen(hand, seconds), expected_fingers)
     except BiotacError as error:
@@ -65,5 +62,5 @@ def listen(hand: Hand, seconds: float) -> BoardFacts:
 
 
 def has_crystal(hand: Hand) -> bool:
-    """Behind a pty is a program: its time waits for the computer, and is no clock."""
+    """Whether the board has a clock of its own: behind a pty is a program, whose time waits for the computer."""
     return hand.link.source is None and not os.path.realpath(hand.port).startswith("/dev/pts/")

@@ -1,4 +1,4 @@
-"""Which sensors are there, and whether they belong together."""
+"""Checks which sensors are there, and whether they belong together."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .facts import BoardFacts, Facts
 
 
 def check(facts: Facts) -> Iterator[Finding]:
-    """Of another type, absent, too few, lost or changed on the way, of one serial number, of different versions."""
+    """Wrong type, none, too few, lost or changed while listening, equal serial numbers, different versions."""
     board = facts.board
     if board is None:
         return
@@ -50,7 +50,7 @@ def _changed(board: BoardFacts) -> Iterator[Finding]:
         other = flags & wire.FrameFlags.SENSOR_OTHER != 0
         if other.any():
             yield Finding("sensor_other", f"finger {finger}: another sensor answers than when the stream began")
-        elif unsure[-1:].any():  # one that has said who it is by now is told by the words that were lost
+        elif unsure[-1:].any():  # one that has identified itself since is reported by its lost words instead
             seen = f"finger {finger} was away and has not said who it is since"
             yield Finding("sensor_unsure", f"{seen}: {unsure.sum()} of {len(flags)} messages are unsure")
 

@@ -1,32 +1,30 @@
-"""What this computer says of boards and ports without opening any: USB, permissions, other programs."""
+"""What this computer knows of boards and ports without opening any: USB, permissions, other programs."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..link.discovery import boards
+from ..link.discovery import SERIAL_PREFIX, SerialPort, boards, same_serial
 from ..link.holders import holders
 from ..wire import messages_gen as wire
 from .facts import SystemFacts
 
-#: Where the loader's drive turns up: macOS, then Linux desktops.
+#: Where the boot loader's drive is mounted: macOS, then Linux desktops.
 DRIVES = ("Volumes/RPI-RP2", "media/*/RPI-RP2", "run/media/*/RPI-RP2")
 
 
 def look(port: str | None, *, root: Path = Path("/"), entries: Iterable[Any] | None = None) -> SystemFacts:
     """Facts about this computer and ``port``; ``root`` is where /sys, /proc, /run and /dev are.
 
-    Without ``port``, or with serial:NUMBER, about the only board there is. Windows has none of these trees: there
-    only the boards are known.
+    Windows has none of these trees; there only the boards are found.
     """
     found = boards(entries)
-    device = port
-    if port is None or port.startswith("serial:"):
-        device = found[0].device if len(found) == 1 else None
+    device = device_of(port, found)
     usb = list(usb_ids(root))
     loaders = [name for name, ids in usb if ids == (wire.USB_LOADER_VENDOR, wire.USB_LOADER_PRODUCT)]
     if not loaders:
@@ -39,10 +37,8 @@ def look(port: str | None, *, root: Path = Path("/"), entries: Iterable[Any] | N
     if device is None or not device.startswith("/dev/"):
         return facts
     path = root / device.lstrip("/")
-    return SystemFacts(
-        facts.boards,
-        facts.usb_boards,
-        facts.loaders,
+    return replace(
+        facts,
         permitted=not path.exists() or os.access(path, os.R_OK | os.W_OK),
         owner=owner(path),
         holders=[h for h in holders(device, root / "proc") if h.pid != os.getpid()],
@@ -51,8 +47,17 @@ def look(port: str | None, *, root: Path = Path("/"), entries: Iterable[Any] | N
     )
 
 
+def device_of(port: str | None, found: list[SerialPort]) -> str | None:
+    """The device of ``port``, or of the only board if ``port`` is None; None if no board or several match."""
+    if port is not None and not port.startswith(SERIAL_PREFIX):
+        return port
+    number = None if port is None else port.removeprefix(SERIAL_PREFIX)
+    fitting = [board.device for board in found if number is None or same_serial(board.serial_number, number)]
+    return fitting[0] if len(fitting) == 1 else None
+
+
 def usb_ids(root: Path) -> Iterable[tuple[str, tuple[int, int]]]:
-    """Name on the bus, vendor and product of each USB device (Linux)."""
+    """Name on the bus, vendor id and product id of each USB device (Linux)."""
     for folder in sorted((root / "sys/bus/usb/devices").glob("*")):
         with suppress(OSError, ValueError):
             vendor, product = (int((folder / name).read_text(), 16) for name in ("idVendor", "idProduct"))
@@ -60,7 +65,7 @@ def usb_ids(root: Path) -> Iterable[tuple[str, tuple[int, int]]]:
 
 
 def owner(path: Path) -> str:
-    """Whose a port is, in words."""
+    """Who owns the port, in words."""
     with suppress(OSError, KeyError, ImportError):
         import grp
         import pwd
@@ -72,7 +77,7 @@ def owner(path: Path) -> str:
 
 
 def modem_manager_runs(root: Path) -> bool:
-    """By the names of all processes."""
+    """Whether a ModemManager process runs."""
     for name in (root / "proc").glob("[0-9]*/comm"):
         with suppress(OSError):
             if name.read_text().strip() == "ModemManager":

@@ -1,4 +1,4 @@
-"""Tares and electrodes."""
+"""Checks tares and electrodes."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ..wire import messages_gen as wire
 from .catalogue import Finding
 from .facts import BoardFacts, Facts
 
-#: FrameFlags.RAIL's own limits.
+#: The limits of FrameFlags.RAIL.
 RAIL_LOW, RAIL_HIGH = 0, 4090
 
 
 def check(facts: Facts) -> Iterator[Finding]:
-    """Of each finger that sent frames."""
+    """The tare of each finger that is present; electrodes and channels of those that sent frames."""
     board = facts.board
     for finger in board.present if board else []:
         assert board is not None

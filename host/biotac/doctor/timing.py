@@ -1,4 +1,4 @@
-"""Whether everything came, and when."""
+"""Checks whether everything arrived, and when."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from ..hand.views import DEFAULT_NAMES
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from .catalogue import Finding
-from .facts import BoardFacts, Facts
+from .facts import BoardFacts, Facts, grown
 
-#: A crystal is within 100 ppm, with its age and temperature.
+#: A crystal stays within 100 ppm over age and temperature.
 CRYSTAL_PPM = 100.0
-#: Slots come from the board's own clock: a hundredth off is no rounding.
+#: Slots are timed by the board's own clock: 1 % off cannot be rounding.
 RATE_SHARE = 0.01
 
 
 def check(facts: Facts) -> Iterator[Finding]:
-    """Restarts, faults of before, late slots, losses on either side, rate, drift."""
+    """Restarts, latched faults, late slots, losses on either side, slot rate, clock drift."""
     board = facts.board
     if board is None:
         return
     if board.after.uptime_s < board.before.uptime_s or board.stats.disordered:
         yield Finding("board_restarted", f"it has been up for {board.after.uptime_s} s")
-        return  # its counters began again: they say nothing
-    earlier = replace(board.before, faults=board.before.faults & ~wire.FaultFlags.STARTED)  # so does every board
+        return  # its counters restarted and tell nothing
+    earlier = replace(board.before, faults=board.before.faults & ~wire.FaultFlags.STARTED)  # set on every board
     if facts.pair is not None:  # a sensor board is silent until it has a tape
         earlier = replace(earlier, finger_faults=(0,) * sensor.MAX_SENSORS)
     if faults := faults_of(earlier, DEFAULT_NAMES):
         yield Finding("faults_latched", str(faults).replace("\n", "; "))
     for counter, what in (("slots_late", "slots came too late"), ("messages_dropped", "messages found no room")):
-        more = board.more_of_board(counter)
+        more = grown(board.before, board.after, counter)
         if more:
             yield Finding(counter, f"{more} {what}")
     if board.stats.frames_lost or board.stats.pac_lost:
@@ -52,9 +52,9 @@ def check(facts: Facts) -> Iterator[Finding]:
 
 
 def slots_per_s(board: BoardFacts, finger: int) -> float | None:
-    """By the board's own clock; None with less than two rounds.
+    """Slots per second of a finger by the board's own clock; None with less than two rounds.
 
-    The median from one round to the next: rounds without a good word are not numbered, and leave holes.
+    The median over consecutive frames and heartbeats: rounds without a good word are not numbered and leave holes.
     """
     rounds = [rows[["seq", "t_us"]][rows["finger"] == finger] for rows in (board.frames, board.idle)]
     seq, t_us = (np.concatenate([r[name] for r in rounds]) for name in ("seq", "t_us"))

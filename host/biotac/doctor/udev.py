@@ -1,4 +1,4 @@
-"""The udev rule that gives our boards to whoever sits at a Linux computer, and keeps ModemManager away."""
+"""The udev rule that lets the user at a Linux computer open our boards, and keeps ModemManager away from them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from pathlib import Path
 from ..errors import InputError, PortError
 from ..wire import messages_gen as wire
 
-# Before 73-seat-late.rules, or uaccess comes too late to have an effect.
+# Must come before 73-seat-late.rules, or uaccess has no effect.
 RULES = Path("/etc/udev/rules.d/70-biotac.rules")
 
 
 def rule() -> str:
-    """The file's text."""
+    """The text of the file."""
     ours = f'ATTRS{{idVendor}}=="{wire.USB_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_PRODUCT:04x}"'
     loader = f'ATTRS{{idVendor}}=="{wire.USB_LOADER_VENDOR:04x}", ATTRS{{idProduct}}=="{wire.USB_LOADER_PRODUCT:04x}"'
     ignore = 'ENV{ID_MM_DEVICE_IGNORE}="1", ENV{ID_MM_PORT_IGNORE}="1"'
@@ -30,7 +30,7 @@ def rule() -> str:
 
 
 def install(path: Path = RULES) -> None:
-    """Write the rule. PortError without the right to, InputError where there is no udev."""
+    """Write the rule. Raises PortError without the permission to, InputError where there is no udev."""
     if not path.parent.is_dir():
         raise InputError(f"no folder {path.parent}: this system has no udev; rules are for Linux")
     try:

@@ -1,4 +1,4 @@
-"""Firmware against library."""
+"""Checks the firmware against the library."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .facts import Facts
 
 
 def check(facts: Facts) -> Iterator[Finding]:
-    """Another major, another schema, an image older than the package."""
+    """Another major version, another schema, firmware older than the package."""
     if isinstance(facts.error, WireVersionError):
         yield Finding("wire_version", str(facts.error))
     for warning in facts.board.warnings if facts.board else []:
@@ -24,6 +24,6 @@ def check(facts: Facts) -> Iterator[Finding]:
 
 
 def release(version: str) -> tuple[int, ...]:
-    """The numbers of a version, without what a development version has behind them."""
+    """The numbers of a version, without a development version's suffix."""
     numbers = re.match(r"\d+(\.\d+)*", version)
     return tuple(map(int, numbers[0].split("."))) if numbers else ()

@@ -1,7 +1,7 @@
-"""Recordings as files for other programs, one format a module.
+"""Exporting recordings to files for other programs, one module per format.
 
-The rows' own names and units, a frame_id per finger, flags beside them, invalid values as the format has them; the
-columns stand in wire/fields.py and in host/docs/rows.md. A ROS 2 bag has its own messages and SI units.
+Exports keep the rows' names, units and flags, have a frame_id per finger, and write invalid values as is usual in the
+format. The columns are listed in wire/fields.py and host/docs/rows.md. A ROS 2 bag has ROS messages and SI units.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What every export holds: the rows' own fields (wire/fields.py) and a stamp on the host's clock."""
+"""The columns of every export: the rows' own fields (wire/fields.py) and a stamp on the host's clock."""
 
 from __future__ import annotations
 
@@ -13,37 +13,37 @@ from ..recording.reader import Recording
 from ..wire.fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field
 from ..wire.frames import StructArray
 
-#: Told a share 0..1 of the work that is done.
+#: Called with the share of the work done, 0 to 1.
 Show = Callable[[float], None]
 
 STAMP = Field("stamp_ns", "<i8", "ns", "device time on the host's clock (Unix), by the drift that the recording shows")
 
 
 def _stamped(fields: Sequence[Field]) -> tuple[Field, ...]:
-    """A table is one finger's, and has stamps behind its times."""
+    """A table's columns: without the finger, as a table is one finger's, and with stamps after the times."""
     _, seq, t_us, *rest = fields
     return (seq, t_us, STAMP, *rest)
 
 
-#: One row a finger and round of 10 ms.
+#: One row per finger and round of 10 ms.
 COLUMNS = _stamped(FRAME_FIELDS)
-#: One row a finger and round: 22 samples, the k-th k/2200 s after t_us.
+#: One row per finger and round: 22 samples, the k-th (from 0) k/2200 s after t_us.
 PAC_COLUMNS = _stamped(PAC_FIELDS)
-#: One row a finger and round: a spectrogram of PAC, in octaves.
+#: One row per finger and round: a spectrogram of PAC, in octaves.
 BANDS_COLUMNS = _stamped(BANDS_FIELDS)
-#: One row a heartbeat of a finger that nobody touches.
+#: One row per heartbeat of an untouched finger.
 IDLE_COLUMNS = _stamped(IDLE_FIELDS)
 
-#: What the exports to one file have. A lake has heartbeats, too.
+#: Tables in every export. A lake has heartbeats, too.
 EXPORTED: Mapping[str, tuple[Field, ...]] = {"frames": COLUMNS, "pac": PAC_COLUMNS, "bands": BANDS_COLUMNS}
 HEARTBEATS: Mapping[str, tuple[Field, ...]] = {"idle": IDLE_COLUMNS}
 
 
 @dataclass(frozen=True)
 class Table:
-    """One finger's rows of one kind (``frames``, ``pac``, ``bands``); arrays (n,) or (n, parts) by column name.
+    """One finger's rows of one kind, such as ``frames``, ``pac`` or ``bands``.
 
-    ``finger`` is None for rows that are the board's.
+    ``arrays`` are (n,) or (n, parts), by column name. ``finger`` is None for rows of the board itself.
     """
 
     kind: str
@@ -60,7 +60,7 @@ class Table:
         return len(self.arrays["t_us"])
 
     def flat(self) -> Iterator[tuple[str, Field, NDArray[Any]]]:
-        """Scalar columns (n,), vectors taken apart: ``force_x_n`` of force_n, ``counts_E1`` of counts."""
+        """Scalar columns (n,), with vectors split up: ``force_x_n`` from force_n, ``counts_E1`` from counts."""
         for column in self.columns:
             values = self.arrays[column.name]
             if not column.parts:
@@ -70,7 +70,7 @@ class Table:
 
 
 def tables(recording: Recording, kinds: Mapping[str, tuple[Field, ...]] = EXPORTED) -> list[Table]:
-    """The ``kinds`` of rows of every finger that has any, in the fingers' order."""
+    """Tables of the given ``kinds`` for every finger that has such rows, ordered by finger."""
     made = []
     for finger in recording.fingers:
         for kind, columns in kinds.items():

@@ -1,4 +1,4 @@
-"""CSV: a header line, then the rows of all fingers in the order of time."""
+"""CSV: a header line, then the rows of all fingers in order of time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ROWS = 10_000
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """Numbers in their shortest exact form, NaN as ``nan``."""
+    """Write the file, with numbers in their shortest exact form and NaN as ``nan``."""
     names = ["finger", "frame_id", *(name for name, _, _ in made[0].flat())]
     stamps = np.concatenate([table.arrays["t_us"] for table in made])
     of_table = np.repeat(np.arange(len(made)), [len(table) for table in made])

@@ -1,4 +1,4 @@
-"""Formats by suffix."""
+"""Export formats, by file suffix."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from ..partial_file import whole
 from ..recording.reader import Recording
 from .columns import Show, Table, tables
 
-#: Writes tables to a place; called by export() alone.
+#: Writes tables to a path; called only by export().
 Write = Callable[[Path, list[Table], Recording, Show], None]
 
 
 @dataclass(frozen=True)
 class Format:
-    """``module`` is imported when it is asked for, ``extra`` what has to be installed for it."""
+    """An export format. ``module`` is imported when needed; ``extra`` is the extra that must be installed for it."""
 
     module: str
     what: str
@@ -36,10 +36,10 @@ FORMATS = {
 
 
 def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Show = lambda share: None) -> list[Path]:
-    """Write ``recording`` as the format of ``out``'s suffix; return what was written.
+    """Write ``recording`` in the format given by ``out``'s suffix; return the paths written.
 
-    An interrupted or failed export leaves nothing behind. Raises InputError for an unknown suffix, an
-    extra that is not installed, or a place that exists or cannot be written.
+    An interrupted or failed export leaves nothing behind. Raises InputError for an unknown suffix, an extra that is
+    not installed, a recording without rows, or a path that exists or cannot be written.
     """
     kind = FORMATS.get(out.suffix.lower())
     if kind is None:
@@ -55,7 +55,7 @@ def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Sh
         raise InputError(f"{recording.path} holds no frame and no PAC; there is nothing to export")
     written: list[Path] = []
     write: Write = module.write
-    with ExitStack() as together:  # none is in its place before all are whole
+    with ExitStack() as together:  # no file is put in place before all are complete
         for path, part in parts(out, made, apart=module.KINDS_APART):
             write(together.enter_context(whole(path, overwrite=overwrite)), part, recording, show)
             written.append(path)
@@ -63,7 +63,7 @@ def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Sh
 
 
 def parts(out: Path, made: list[Table], *, apart: bool) -> list[tuple[Path, list[Table]]]:
-    """Which tables go into which file: ``a.csv`` has the frames, ``a.pac.csv`` PAC, where formats are flat."""
+    """The tables of each file. With ``apart`` (flat formats), ``a.csv`` has the frames and ``a.pac.csv`` PAC."""
     if not apart:
         return [(out, made)]
     by_kind: dict[str, list[Table]] = {}

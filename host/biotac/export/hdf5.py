@@ -1,4 +1,4 @@
-"""HDF5: ``/finger0/frames/force_n`` and so on, a dataset a column; opens in h5py, MATLAB and Octave."""
+"""HDF5: ``/finger0/frames/force_n`` and so on, one dataset per column; opens in h5py, MATLAB and Octave."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ KINDS_APART = False
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """Units and meanings as attributes of the datasets, frame_id of the groups, metadata of the file.
+    """Write the file. Units and meanings are attributes of the datasets, frame_id of the groups, metadata of the file.
 
-    It is made in memory and written by Python: on a full disk HDF5 itself ends the process (SIGSEGV as it closes).
+    The file is built in memory and written by Python: on a full disk, HDF5 itself crashes the process (SIGSEGV while
+    closing).
     """
     with h5py.File(place.name, "w", driver="core", backing_store=False, block_size=1 << 22) as file:
         file.attrs.update(recording.metadata)

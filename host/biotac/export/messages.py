@@ -1,4 +1,4 @@
-"""Messages besides rows (TARE, STATUS and whatever a board tells with its time), as tables of the wire's integers."""
+"""Timed messages that are not rows (TARE, STATUS and so on), as tables of the wire's integers."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from ..wire.sensor_gen import ELECTRODE_NAMES
 from .columns import STAMP, Table
 
 _T_US = Field("t_us", "<i8", "us", "device time, unwrapped from the first value seen")
-_ITS_OWN = ("seq", "t_us", "req_id", "finger")  # of the message, which the tables have otherwise or not
+_ITS_OWN = ("seq", "t_us", "req_id", "finger")  # fields of a message that its table leaves out or has in another form
 
 
 def message_tables(recording: Recording) -> list[Table]:
-    """A table a kind of message and finger, whose kind is the message's name in small letters; BANDS are rows."""
+    """One table per kind of message and finger; its kind is the message's name in lower case. BANDS are rows."""
     timed = [m for m in recording.messages if "t_us" in (DTYPES[m.ID].names or ()) and not isinstance(m, wire.Bands)]
     t_us = unwrapped_us(recording.begin_us, [m.t_us for m in timed])
     groups: dict[tuple[int, int | None], list[int]] = defaultdict(list)
@@ -64,7 +64,7 @@ def _schema() -> dict[str, Any]:
 
 @cache
 def _fields(message_id: int) -> tuple[Field, ...]:
-    """With the units and meanings that protocol/link.toml gives them."""
+    """A message's fields, with their units and meanings from protocol/link.toml."""
     dtype = DTYPES[message_id]
     told = {field["name"]: field for field in _schema()[_name(message_id)]["fields"]}
     made = []
@@ -75,7 +75,7 @@ def _fields(message_id: int) -> tuple[Field, ...]:
         count = shape[0] if shape else 0
         parts = tuple(ELECTRODE_NAMES) if count == len(ELECTRODE_NAMES) else tuple(str(k) for k in range(count))
         about = told[name]
-        # link.toml marks no value of these messages by all ones, and says so of the field.
+        # In these messages, all ones means "no value" where the field's text in link.toml says so.
         ones = int(np.iinfo(base).max)
         invalid = ones if f"0x{ones:X} " in about["doc"] else None
         made.append(Field(name, base.str, about["unit"], about["doc"], parts, invalid=invalid))

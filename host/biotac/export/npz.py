@@ -1,4 +1,4 @@
-"""NPZ: arrays ``finger0/frames/force_n`` and so on, and ``columns``, JSON that says what they are."""
+"""NPZ: arrays ``finger0/frames/force_n`` and so on, and ``columns``, JSON that describes them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ KINDS_APART = False
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """As numpy.savez_compressed, array by array so that it can say how far it is."""
+    """Write the file as numpy.savez_compressed would, but array by array, in order to report progress."""
     about = {
         "metadata": recording.metadata,
         **{kind: [asdict(column) for column in columns] for kind, columns in EXPORTED.items()},

@@ -1,4 +1,4 @@
-"""Parquet: flat columns of all fingers, units and meanings as the fields' metadata."""
+"""Parquet: flat columns of all fingers, with units and meanings as the fields' metadata."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _ROWS = 1 << 17  # in memory at once
 
 @dataclass(frozen=True)
 class Label:
-    """A column of text that a whole table has in common, None where there is none; dictionary-encoded, so it is small.
+    """A text column with one value for each whole table, None for no value; small because it is dictionary-encoded.
 
-    ``texts`` has one for each of the tables.
+    ``texts`` holds the value for each of the tables.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Label:
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """All fingers in the order of time, sorted by t_us and finger; null where there is no value."""
+    """Write the rows of all fingers, sorted by t_us and finger; null where there is no value."""
     metadata = {f"biotac.{key}": value for key, value in recording.metadata.items()}
     write_labelled(place, made, [frame_ids(made)], metadata, show)
 
@@ -47,9 +47,9 @@ def frame_ids(made: list[Table]) -> Label:
 def write_labelled(
     place: Path, made: list[Table], labels: list[Label], metadata: Mapping[str, str], show: Show = lambda share: None
 ) -> None:
-    """The rows of tables of one kind, in the order of time, each with its table's labels.
+    """Write the rows of tables of one kind in order of time, each row with its table's labels.
 
-    Integers are delta-encoded, which is what makes zstd small.
+    Integers are delta-encoded, so that zstd compresses them well.
     """
     times = np.concatenate([table.arrays["t_us"] for table in made])
     of_table = np.repeat(np.arange(len(made)), [len(table) for table in made])

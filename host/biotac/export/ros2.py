@@ -1,4 +1,4 @@
-"""ROS 2 bag (rosbag2, mcap storage): standard messages only, so that it plays without a package of ours."""
+"""ROS 2 bag (rosbag2, mcap storage), with standard messages only, so that it plays without our own package."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ _SHOW_ROWS = 1000
 
 
 def write(place: Path, made: list[Table], recording: Recording, show: Show) -> None:
-    """Topics ``/biotac/finger0/wrench``, ``poc``, ``flags``, ``counts`` (with PDC, TAC, TDC), ``pac``, ``bands``."""
+    """Write a bag with topics ``/biotac/finger0/wrench``, ``poc``, ``flags``, ``counts`` (with PDC, TAC, TDC), ``pac``
+    and ``bands``.
+    """
     total = sum(len(table) for table in made)
     done = 0
     with Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
@@ -53,7 +55,7 @@ class _Topics:
             for name, kind in kinds.items()
         }
         columns = ("stamp_ns", *(("force_n", "torque_nmm", "poc_mm", "flags") if table.kind == "frames" else ()))
-        # as REP 103 has it: m and N*m
+        # REP 103 asks for m and N*m
         self._lists = {
             name: (table.arrays[name] / 1000 if name.endswith("mm") else table.arrays[name]).tolist()
             for name in columns

@@ -1,5 +1,6 @@
-"""What touch means: where, how sharp, which way, how many, by formula and by learning (seed 000).
+"""Features of a touch: its place, sharpness, direction and number of contacts, by formula and by learning (seed 000).
 
-A module an idea: paf, smooth, scores, roc, force, several, edge, grip, thermal; ``levenberg`` is the net and
-``inputs`` what goes into it. All but paf, several, grip, thermal need the extra `features`.
+Each module has one idea: paf, smooth, scores, roc, force, several, edge, grip, texture, thermal. ``levenberg`` is the
+neural net and ``inputs`` prepares its inputs. The extra `features` is needed by scores, roc, force, edge, levenberg and
+inputs, and by smooth.lowess() and texture.classifier().
 """

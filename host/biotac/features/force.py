@@ -1,4 +1,4 @@
-"""Force by nets: seed 000, II.D, one net for everything or one for each class of probe and place."""
+"""Force from neural nets (seed 000, II.D): one net for everything, or one for each class of probe and place."""
 
 from __future__ import annotations
 
@@ -21,21 +21,20 @@ STOPPING_SHARE = 0.15
 
 
 def classes(d_mm: Floats, large: Bools) -> Integers:
-    """Which of CLASSES (n,): ``d_mm`` of the PAF, and whether the probe is the 10 mm or the flat one."""
-    result: Integers = 2 * (np.asarray(d_mm) >= FORWARD_D_MM).astype(np.int64) + np.asarray(large).astype(np.int64)
-    return result
+    """Index into CLASSES (n,): ``d_mm`` is that of the PAF, ``large`` is true for the 10 mm or the flat probe."""
+    return 2 * (np.asarray(d_mm) >= FORWARD_D_MM).astype(np.int64) + np.asarray(large).astype(np.int64)
 
 
 @dataclass(frozen=True)
 class ForceNets:
-    """A net a class, each with its reductions; ``nets[c]`` is one for all axes, or one an axis."""
+    """Nets and their reductions by class: ``nets[c]`` holds one net for all axes, or one for each axis."""
 
     nets: dict[int, list[tuple[inputs.Reduction, levenberg.Net]]]
 
     def __call__(self, above: Floats, kind: Integers | None = None) -> Floats:
-        """Force (n, 3) in N of signals (n, 19); ``kind`` (n,) is each row's class where there are several nets.
+        """Force (n, 3) in N from signals (n, 19); ``kind`` (n,) is each row's class, 0 for all if not given.
 
-        Raises InputError for a class no net was trained for.
+        Raises InputError for a class that no net was trained for.
         """
         of = np.zeros(len(above), np.int64) if kind is None else np.asarray(kind)
         unknown = sorted(set(of.tolist()) - set(self.nets))
@@ -60,10 +59,11 @@ def train(
     seed: int = 0,
     steps: int = levenberg.STEPS,
 ) -> ForceNets:
-    """Nets from signals (n, 19) to force (n, 3) in N.
+    """Train nets from signals (n, 19) to force (n, 3) in N.
 
-    ``groups`` (n,) is what may not be on both sides of the early stop: contacts, blocks. ``kind`` (n,) makes a net
-    for each class of it. ``by_spearman`` gives each axis a net of its own with the electrodes that follow that axis.
+    Rows of one of the ``groups`` (n,), e.g. a contact or a block, are all used for training or all for early stopping.
+    With ``kind`` (n,) each class has its own net. With ``by_spearman`` each axis has its own net, fed with the
+    electrodes that correlate with that axis.
     """
     of = np.zeros(len(above), np.int64) if kind is None else np.asarray(kind)
     made: dict[int, list[tuple[inputs.Reduction, levenberg.Net]]] = {}
@@ -71,7 +71,7 @@ def train(
         x, f, names = above[of == c], force_n[of == c], groups[of == c]
         if by_spearman:
             kept = inputs.correlated(x, f)
-            kept[:, ~kept.any(axis=0)] = True  # an axis that nothing follows gets what there is
+            kept[:, ~kept.any(axis=0)] = True  # an axis that no electrode correlates with gets all of them
             parts = [(inputs.only(x, kept[:, axis]), f[:, [axis]]) for axis in range(3)]
         else:
             parts = [(reduce(x), f)]
@@ -86,16 +86,18 @@ def _net(x: Floats, target: Floats, stopping: Bools, seed: int, steps: int) -> l
 
 
 def _aside(groups: Integers, seed: int) -> Bools:
-    """STOPPING_SHARE of the groups, and none of a single one."""
+    """Mask of the rows for early stopping: STOPPING_SHARE of the groups, rounded down; fewer than 7 give none."""
     names = np.random.default_rng([seed, 9]).permutation(np.unique(groups))
-    result: Bools = np.isin(groups, names[: int(len(names) * STOPPING_SHARE)])
-    return result
+    return np.isin(groups, names[: int(len(names) * STOPPING_SHARE)])
 
 
 def cross_validated(
     above: Floats, groups: Integers, folds: int, predict: Callable[[Bools, Bools], Floats], axes: int = 3
 ) -> Floats:
-    """Held-out predictions (n, axes): ``predict(training, test)`` for each of ``folds``, no group on both sides."""
+    """Held-out predictions (n, axes) by ``predict(training, test)``, masks (n,), in each of ``folds``.
+
+    No group is both in training and in test.
+    """
     from sklearn.model_selection import GroupKFold
 
     said = np.full((len(above), axes), np.nan)

@@ -1,8 +1,8 @@
-"""Grip state by a particle filter: seed 000, Eq 7, with histograms as the table from sensor values to states.
+"""Grip state by a particle filter (seed 000, Eq 7), with histograms to relate sensor values to states.
 
-A particle is a guess of the state: the grip holds, it is about to give, or it slips. Each round particles move as
-states did in training, weigh what the histograms give what was sensed, and are drawn anew by weight; what is published
-is their mean. Only NumPy is needed.
+A particle is a guess of the state: the grip holds, it is about to give, or it slips. In each round the particles change
+state as often as the states did in training, are weighted by the histograms' probability of the sensed values, and are
+resampled by weight. The result is the weighted share of particles in each state. Only NumPy is needed.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from ..wire.messages_gen import INVALID_COUNT
 
 Floats = npt.NDArray[np.float64]
 
-LAG = 8  # PAC samples that a change is over, as the board's events
-EDGES = 4  # of bins, by state
+LAG = 8  # PAC samples over which a change is taken, as in the board's events
+EDGES = 4  # bin edges for each state
 PARTICLES = 500
 NAMES = ("shake", "ratio")
 
 
 class GripState(IntEnum):
-    """Seed 000's X."""
+    """State of the grip, X in seed 000."""
 
     STABLE = 0
     INCIPIENT = 1
@@ -38,7 +38,7 @@ STATES = len(GripState)
 
 
 def load_ratio(force_n: npt.ArrayLike, poc_mm: npt.ArrayLike) -> Floats:
-    """Tangential over normal force (n,), of force (n, 3) on the finger at a point of contact (n, 3).
+    """Ratio of tangential to normal force (n,), for force (n, 3) in N on the finger at a point of contact (n, 3) in mm.
 
     NaN where either is unknown or nothing presses.
     """
@@ -51,11 +51,11 @@ def load_ratio(force_n: npt.ArrayLike, poc_mm: npt.ArrayLike) -> Floats:
 
 
 def observations(rows: npt.NDArray[Any], pac: npt.ArrayLike) -> Floats:
-    """What is sensed in each round of one finger (n, 2): NAMES; NaN where unknown.
+    """The filter's inputs for each round of one finger (n, 2), in the order of NAMES; NaN where unknown.
 
-    ``rows`` (n,) are frames with ``force_n`` and ``poc_mm``, ``pac`` (n, 22) the counts of the same rounds, one after
-    the other. ``shake`` is the logarithm (base 10) of the mean squared change of PAC over 8 samples, count^2, ``ratio``
-    that of load_ratio(). Raises InputError for other shapes.
+    ``rows`` (n,) are frames with ``force_n`` and ``poc_mm``; ``pac`` (n, 22) are the counts of the same rounds, which
+    follow each other without a gap. ``shake`` is log10 of the mean squared change of PAC over 8 samples, in count^2 and
+    at least 1; ``ratio`` is load_ratio(). Raises InputError for other shapes.
     """
     counts = np.asarray(pac)
     if counts.ndim != 2 or len(counts) != len(rows) or counts.shape[1] <= LAG:
@@ -71,10 +71,11 @@ def observations(rows: npt.NDArray[Any], pac: npt.ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class Trained:
-    """``edges`` (k, b - 1) of each channel's b bins; ``likelihood`` (k, b, 3) of a bin in a state.
+    """What training found about k channels, with b bins each, and the three states.
 
-    ``transition`` (3, 3) is from row to column, ``start`` (3,) how often each state was. ``friction`` is the least load
-    ratio at which training began to slip, NaN if it never did.
+    ``edges`` (k, b - 1) are the bins' inner edges, ``likelihood`` (k, b, 3) the probability of a bin in a state,
+    ``transition`` (3, 3) that of moving from row to column, and ``start`` (3,) the share of each state.
+    ``friction`` is the lowest load ratio at which a slip began in training, NaN if unknown.
     """
 
     edges: Floats
@@ -84,7 +85,7 @@ class Trained:
     friction: float
 
     def weigh(self, observed: Floats) -> Floats:
-        """P(observed | state) (n, 3), but for a factor; channels count as independent, and a NaN says nothing."""
+        """P(observed | state) (n, 3), up to a factor; channels are taken as independent, and a NaN is ignored."""
         weight = np.ones((len(observed), STATES))
         for edges, table, values in zip(self.edges, self.likelihood, observed.T, strict=True):
             known = np.isfinite(values)
@@ -92,7 +93,7 @@ class Trained:
         return weight
 
     def margin_n(self, force_n: npt.ArrayLike, poc_mm: npt.ArrayLike) -> Floats:
-        """Newtons (n,) of tangential force until it slips, below 0 when it should; NaN where unknown."""
+        """Tangential force (n,) in N that is left before a slip, below 0 if it should slip already; NaN if unknown."""
         force = np.asarray(force_n, dtype=np.float64)
         ratio = load_ratio(force, poc_mm)
         normal = np.linalg.norm(force, axis=1) / np.sqrt(1.0 + ratio**2)
@@ -101,10 +102,10 @@ class Trained:
 
 
 def train(observed: npt.ArrayLike, states: npt.ArrayLike) -> Trained:
-    """Histograms and transitions from rounds (n, k) whose ``states`` (n,) are known, one after the other.
+    """Histograms and transitions from consecutive rounds (n, k) whose ``states`` (n,) are known.
 
-    Every bin and every transition counts once more than it was seen, so that nothing is impossible. Raises InputError
-    when a state is missing.
+    Every bin and every transition is counted once more than it was seen, so that nothing is impossible. Raises
+    InputError when a state is missing.
     """
     values, labels = _rounds(observed), np.asarray(states)
     if labels.shape != (len(values),) or labels.dtype.kind not in "iu" or not np.isin(labels, list(GripState)).all():
@@ -114,7 +115,7 @@ def train(observed: npt.ArrayLike, states: npt.ArrayLike) -> Trained:
         counted = ", ".join(f"{n} {GripState(k).name.lower()}" for k, n in enumerate(seen))
         raise InputError(f"training has {counted} rounds: expected some of each; record a grip that gives")
     at = np.arange(1, EDGES + 1) / (EDGES + 1)
-    # of each state's own values: slips are rare, and what tells them lies where they are
+    # Quantiles of each state's own values: slips are rare, and edges must lie among their values to tell them apart.
     of_states = np.array([np.nanquantile(values[labels == state], at, axis=0) for state in GripState])
     edges = np.sort(of_states.reshape(-1, values.shape[1]).T, axis=1)
     tables = np.ones((len(edges), edges.shape[1] + 1, STATES))
@@ -131,12 +132,12 @@ def train(observed: npt.ArrayLike, states: npt.ArrayLike) -> Trained:
 
 
 class GripFilter:
-    """Follows one finger's grip, round by round; the same ``seed`` gives the same particles."""
+    """Tracks one finger's grip, round by round; the same ``seed`` gives the same particles."""
 
     def __init__(self, trained: Trained, *, particles: int = PARTICLES, seed: int = 0) -> None:
         self._trained = trained
         self._rng = np.random.default_rng(seed)
-        # as many of each as there were in training
+        # each state's share as in training
         self._particles = np.searchsorted(np.cumsum(trained.start), (np.arange(particles) + 0.5) / particles)
         self._reach = np.cumsum(trained.transition, axis=1)
 
@@ -148,7 +149,7 @@ class GripFilter:
         return np.array([self._step(weight) for weight in self._trained.weigh(values)]).reshape(-1, STATES)
 
     def _step(self, of_state: Floats) -> Floats:
-        """Eq 7: by the transitions, then by the weights; drawn anew at even steps, which adds the least chance."""
+        """Eq 7: move by the transitions, then weight; resampled at even steps, which adds the least randomness."""
         n = len(self._particles)
         draw = self._rng.random(n)
         moved = np.minimum((draw[:, None] > self._reach[self._particles]).sum(axis=1), STATES - 1)

@@ -1,9 +1,10 @@
 """A perceptron of one tanh layer and linear outputs, trained by Levenberg-Marquardt with Bayesian regularisation.
 
-Seed 000's Eq 1-3 and its training: Gauss-Newton on F = beta E_D + alpha E_W, E_D and E_W the squared errors and
-weights, damped by mu (Hagan and Menhaj 1994); alpha and beta by MacKay's evidence (1992), as Foresee and Hagan (1997)
-put it into the loop; stopped early by rows kept aside. scikit-learn has neither. The outputs are linear, so the squared
-Jacobian of all of them is that of the hidden layer times W2's own: it costs as much as one output.
+Seed 000's Eq 1-3 and its training: Gauss-Newton on F = beta E_D + alpha E_W, where E_D and E_W are the sums of squared
+errors and weights, damped by mu (Hagan and Menhaj 1994). alpha and beta come from MacKay's evidence (1992), updated in
+each step as in Foresee and Hagan (1997). Held-out rows stop the training early. scikit-learn has neither method. The
+outputs are linear, so J'J over all outputs is a product of the hidden layer's and W2's parts and costs as much as for
+one output.
 """
 
 from __future__ import annotations
@@ -20,17 +21,17 @@ from ..errors import InputError
 Floats = npt.NDArray[np.float64]
 
 STEPS = 60
-PATIENCE = 5  # seed 000: no better over five iterations
+PATIENCE = 5  # seed 000: stop after five iterations without improvement
 MU, MU_DOWN, MU_UP, MU_MAX = 5e-3, 0.1, 10.0, 1e10  # the Neural Network Toolbox's trainbr
-_ROWS = 4096  # of the Jacobian at a time
+_ROWS = 4096  # rows of the Jacobian at a time
 
 
 @dataclass(frozen=True)
 class Net:
-    """``hidden`` (inputs + 1, units) and ``output`` (units + 1, outputs), the biases last; inputs and targets scaled.
+    """A trained net: ``hidden`` (inputs + 1, units) and ``output`` (units + 1, outputs), with the biases last.
 
-    ``gamma`` is how many weights the data determines, of ``weights``; ``steps`` how many were taken, the one kept is
-    the best on the rows kept aside.
+    Its weights are for scaled inputs and targets. ``gamma`` is how many of the ``weights`` the data determines.
+    ``steps`` is how many steps were taken; the weights kept are the best on the held-out rows.
     """
 
     mean: Floats
@@ -44,7 +45,7 @@ class Net:
 
     @property
     def weights(self) -> int:
-        """Weights and biases."""
+        """Number of weights and biases."""
         return self.hidden.size + self.output.size
 
     def __call__(self, inputs: npt.ArrayLike) -> Floats:
@@ -65,11 +66,11 @@ def train(
     seed: int = 0,
     steps: int = STEPS,
 ) -> Net:
-    """Fit ``targets`` (n, k) on ``inputs`` (n, d); ``aside`` is the same of rows that stop the training early.
+    """Fit ``targets`` (n, k) to ``inputs`` (n, d); ``aside`` is such a pair of held-out rows for early stopping.
 
-    ``units`` default to twice the inputs (seed 000). Columns are centred and divided by their standard deviation,
-    targets by one deviation for all: the errors of all outputs weigh alike, as they do in the unit they came in.
-    Raises InputError for other shapes, or values that are not finite.
+    ``units`` defaults to twice the number of inputs (seed 000). Inputs are centred and divided by their standard
+    deviations. Targets are centred and divided by one deviation for all, so that the errors of all outputs weigh the
+    same, as they do in their own unit. Raises InputError for other shapes, or values that are not finite.
     """
     x, t = _pair(inputs, targets)
     mean, deviation = x.mean(axis=0), x.std(axis=0)
@@ -86,7 +87,7 @@ def train(
     rng = np.random.default_rng([seed, 7])
     hidden = rng.normal(0.0, 1.0, (x.shape[1] + 1, units)) / np.sqrt(x.shape[1])
     output = rng.normal(0.0, 1.0, (units + 1, t.shape[1])) / np.sqrt(units)
-    with threadpool_limits(limits=1, user_api="blas"):  # many small systems: its threads would wait for each other
+    with threadpool_limits(limits=1, user_api="blas"):  # many small systems: threads would wait for each other
         hidden, output, gamma, taken = _descend(x, t, kept, hidden, output, steps)
     return Net(mean, scale, target_mean, target_scale, hidden, output, gamma, taken)
 
@@ -107,10 +108,11 @@ def _forward(x: Floats, hidden: Floats, output: Floats) -> tuple[Floats, Floats]
 
 
 def squared_jacobian(x: Floats, t: Floats, hidden: Floats, output: Floats) -> tuple[Floats, Floats, float]:
-    """J'J (p, p), J'e (p,) and e'e of e = said - t over all rows and outputs; p: hidden row by row, then output's.
+    """J'J (p, p), J'e (p,) and e'e for e = said - t over all rows and outputs.
 
-    With Z = [z, 1], A = (1 - z^2) (x) [x, 1] and W the output weights: J'J is (A'A) * (W W') for the hidden
-    weights, Z'Z for each output's own, and W_k * (A'Z) between them.
+    The p weights are those of ``hidden`` row by row, then those of ``output``. With Z = [z, 1], A = (1 - z^2) (x)
+    [x, 1] and W the output weights, J'J is (A'A) * (W W') for the hidden weights, Z'Z for each output's own, and
+    W_k * (A'Z) between them.
     """
     d, units = hidden.shape
     first, second = d * units, output.shape[1]
@@ -174,7 +176,7 @@ def _descend(
             break
         w, data = step, after
         taken += 1
-        # the Hessian is the one before the step: a further one would cost as much as the step itself
+        # with the Hessian from before the step: a new one would cost as much as the step itself
         gamma = _gamma(jj, alpha, beta)
         alpha = gamma / max(2.0 * float(w @ w), 1e-12)
         beta = max(t.size - gamma, 1.0) / max(2.0 * data, 1e-12)
@@ -190,7 +192,7 @@ def _descend(
 
 
 def _gamma(jj: Floats, alpha: float, beta: float) -> float:
-    """How many weights the data determines: p - alpha tr((beta J'J + alpha)^-1)."""
+    """Number of weights that the data determines: p - alpha tr((beta J'J + alpha)^-1)."""
     system = beta * jj
     system[np.diag_indices(len(jj))] += alpha
     factor, _ = cho_factor(system, lower=True, overwrite_a=True)

@@ -1,8 +1,9 @@
-"""Point of application of force by the three strongest electrodes: seed 000, II.C, Eq 4 and 5.
+"""Point of application of force (PAF) from the three strongest electrodes: seed 000, II.C, Eq 4 and 5.
 
-As printed, Eq 4 says 3.08 N for an electrode that nothing touches, so a threshold of 1 N holds nothing back, and three
-electrodes at rest pull as hard as one under 3 N (numerics.md 1.2). Without that offset an electrode at rest weighs
-nothing: the default here. Its pole at V - V0 = -1.976 V is reached by real presses; there it saturates.
+As printed, Eq 4 gives 3.08 N for an electrode that nothing touches, so a threshold of 1 N rejects nothing, and an
+electrode at rest weighs as much as one that is pressed with 3 N (numerics.md 1.2). The default here subtracts that
+offset, so that an electrode at rest weighs nothing. Real presses reach Eq 4's pole at V - V0 = -1.976 V; near it the
+force saturates (EQ4_MAX_N).
 """
 
 from __future__ import annotations
@@ -16,23 +17,23 @@ from ..wire import sensor_gen as _sensor
 from .signals import ELECTRODE_DR_MM, Floats, signals
 
 VOLT_PER_COUNT = 3.3 / _sensor.FULL_SCALE_COUNT
-EQ4_N_V, EQ4_V = 6.083, 1.976  # R^2 0.9615 for a 1 mm probe on one electrode, says the paper
+EQ4_N_V, EQ4_V = 6.083, 1.976  # the paper: R^2 0.9615 for a 1 mm probe on one electrode
 EQ4_REST_N = EQ4_N_V / EQ4_V
-EQ4_MAX_N = 40.0  # what the paper pressed with at most
+EQ4_MAX_N = 40.0  # the largest force in the paper
 STRONGEST = 3
 THRESHOLD_N = 1.0  # seed 000: "> 1 N"
 
-#: ``dr_mm`` (d, r) on the skin laid flat, NaN unless ``valid``; ``force_n`` by Eq 4, of the three strongest electrodes.
+#: ``dr_mm`` is (d, r) on the skin laid flat, NaN unless ``valid``; ``force_n`` is Eq 4's sum over the three strongest.
 PAF_DTYPE = np.dtype([("dr_mm", "<f8", (2,)), ("force_n", "<f8"), ("valid", "?")])
 
 
 def electrode_force(rows: npt.NDArray[Any], *, as_printed: bool = False) -> Floats:
-    """Eq 4 for each electrode (n, 19) in N; NaN where it is missing.
+    """Force by Eq 4 for each electrode (n, 19) in N; NaN where the electrode is missing.
 
-    ``rows`` as in signals(). ``as_printed`` keeps the 3.08 N at rest; else they are taken off and a bulge is 0 N.
+    ``rows`` as in signals(). ``as_printed`` keeps the 3.08 N at rest; otherwise it is subtracted and a bulge is 0 N.
     """
     volt = signals(rows) * VOLT_PER_COUNT
-    floor = EQ4_N_V / EQ4_MAX_N  # of the denominator: beyond the pole Eq 4 would be negative
+    floor = EQ4_N_V / EQ4_MAX_N  # least denominator: beyond the pole Eq 4 would be negative
     force: Floats = EQ4_N_V / np.maximum(volt + EQ4_V, floor)
     return force if as_printed else np.maximum(force - EQ4_REST_N, 0.0)
 
@@ -40,9 +41,10 @@ def electrode_force(rows: npt.NDArray[Any], *, as_printed: bool = False) -> Floa
 def paf(rows: npt.NDArray[Any], *, as_printed: bool = False, threshold_n: float = THRESHOLD_N) -> npt.NDArray[np.void]:
     """Where the force is applied: PAF_DTYPE (n,).
 
-    ``dr_mm`` is Eq 5 in the (d, r) of signals.skin(), a mean of the three strongest electrodes' places weighed by
-    Eq 4; ``force_n`` is the sum of these three, an estimate that ranks and does not measure. Where it is under
-    ``threshold_n``, or an electrode is missing, ``dr_mm`` is NaN and ``valid`` False; 0 asks for any force.
+    ``dr_mm`` is Eq 5 in the (d, r) of signals.skin(): the mean of the three strongest electrodes' places, weighted by
+    their forces from Eq 4. ``force_n`` is the sum of these forces: good for ranking, not a measurement. Where it is
+    below ``threshold_n`` or not above 0, or an electrode is missing, ``dr_mm`` is NaN and ``valid`` False. A threshold
+    of 0 accepts any force.
     """
     force = electrode_force(rows, as_printed=as_printed)
     best = np.argpartition(-force, STRONGEST, axis=1)[:, :STRONGEST]

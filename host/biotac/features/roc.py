@@ -1,10 +1,11 @@
-"""Radius of curvature as one of four classes: seed 000, II.B, by frames as there, and by loading trajectories.
+"""Radius of curvature as one of four classes (seed 000, II.B), from single frames as there, or from whole loadings.
 
-The paper's perceptron is train(); machine() is of today, and better.
+The paper's perceptron is train(); machine() is a newer method, and better.
 
-A frame's electrodes name their place first, and a net that has not seen the place is lost: held out by contact, frames
-do badly on the emulated finger (host/docs/features.md has the figures). What a contact looks like from its own middle
-depends on the place far less, and how that grows with the load says more than any frame: so shape() and trajectories().
+A frame's electrodes depend mostly on the place of contact, and a net fails at places that it has not seen: held out by
+contact, frames do badly on the emulated finger (figures in host/docs/features.md). The shape of a contact about its own
+middle depends far less on the place, and how that shape grows with the load says more than any single frame. Hence
+shape() and trajectories().
 """
 
 from __future__ import annotations
@@ -27,29 +28,31 @@ Integers = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 SHARES = (0.70, 0.15, 0.15)  # seed 000: training, stopping, test
-LEVELS = (0.15, 0.5, 1.0)  # of a press's own largest signal
-COMPONENTS = 20  # the net has twice as many units, as the paper's with its 19 electrodes
-LOG_RANGE = (-1.0, 6.0)  # a bulge's, and that of an electrode whose counts ran out
+LEVELS = (0.15, 0.5, 1.0)  # shares of a press's own largest signal
+COMPONENTS = 20  # the net has twice as many units, as in the paper with its 19 electrodes
+LOG_RANGE = (-1.0, 6.0)  # from a bulge to an electrode at the end of its range
 STRONGEST, WEAKEST = 8, 3
 
 
 def log_change(above: Floats, tare: Floats) -> Floats:
-    """ln of resistance over that at rest (n, 19), > 0 where pressed, of counts ``above`` the ``tare``, both (n, 19)."""
+    """ln of each electrode's resistance over that at rest (n, 19), > 0 where pressed, limited to LOG_RANGE.
+
+    ``above`` (n, 19) are counts above the ``tare`` (n, 19).
+    """
     full = float(_sensor.FULL_SCALE_COUNT)
 
     def log_ohm(counts: Floats) -> Floats:
         held = np.clip(counts, 1.0, full - 1.0)
-        result: Floats = np.log(full / held - 1.0)
-        return result
+        return np.log(full / held - 1.0)
 
     return np.clip(log_ohm(above + tare) - log_ohm(tare), *LOG_RANGE)
 
 
 def shape(above: Floats, tare: Floats) -> Floats:
-    """A frame's contact from its own middle: (n, 17).
+    """Shape of each frame's contact about its own middle (n, 17), from log_change().
 
-    Of log_change() where pressed: the middle (d, r) in mm, the log of the sum, the second moments about the middle in
-    mm^2 (dd, rr, dr), the eight strongest electrodes in order, and of all the three lowest, which tell a bulge.
+    Over the pressed electrodes: the middle (d, r) in mm, the log of the sum, and the second moments about the middle in
+    mm^2 (dd, rr, dr). Over all electrodes: the eight highest values in order, and the three lowest, which show a bulge.
     """
     change = log_change(above, tare)
     pressed = np.maximum(change, 0.0)
@@ -65,10 +68,10 @@ def shape(above: Floats, tare: Floats) -> Floats:
 
 
 def trajectories(above: Floats, tare: Floats, press: Integers) -> tuple[Floats, Integers]:
-    """shape() of each press at LEVELS of its own largest signal on its way up, (presses, 51), and each one's number.
+    """shape() of each press (presses, 51) at LEVELS of its own largest signal while loading, and its number (presses,).
 
-    ``press`` (n,) numbers the rows; those of a press stand together, in order. A press that jumps over a level is read
-    at the first row beyond it. No force is needed.
+    ``press`` (n,) is each row's press; the rows of a press are consecutive and in order of time. A press that jumps
+    over a level is read at the first row beyond it. No force is needed. Raises InputError if a press's rows are apart.
     """
     rows = shape(above, tare)
     size = np.exp(rows[:, 2])
@@ -84,7 +87,7 @@ def trajectories(above: Floats, tare: Floats, press: Integers) -> tuple[Floats, 
 
 
 def split(groups: npt.NDArray[np.generic], seed: int = 0) -> tuple[Bools, Bools, Bools]:
-    """Rows (n,) for training, stopping and test by SHARES, each of the ``groups`` (n,) whole on one side."""
+    """Masks (n,) of the rows for training, stopping and test by SHARES; each of the ``groups`` (n,) is in one only."""
     names = np.random.default_rng([seed, 8]).permutation(np.unique(groups))
     ends = np.rint(np.cumsum(SHARES) * len(names)).astype(int)[:-1]
     training, stopping, test = (np.isin(groups, part) for part in np.split(names, ends))
@@ -93,13 +96,13 @@ def split(groups: npt.NDArray[np.generic], seed: int = 0) -> tuple[Bools, Bools,
 
 @dataclass(frozen=True)
 class Classifier:
-    """A net behind its reduction; ``classes`` outputs."""
+    """A trained net and the reduction of its inputs; one output for each class."""
 
     reduction: inputs.Reduction
     net: levenberg.Net
 
     def outputs(self, columns: Floats) -> Floats:
-        """(n, classes), about 1 for the class it is and 0 for others; not probabilities."""
+        """Outputs (n, classes), about 1 for the right class and 0 for the others; not probabilities."""
         return self.net(self.reduction(columns))
 
     def __call__(self, columns: Floats, together: npt.NDArray[np.generic] | None = None) -> Integers:
@@ -108,8 +111,9 @@ class Classifier:
 
 
 def decide(outputs: Floats, together: npt.NDArray[np.generic] | None = None) -> Integers:
-    """The class (n,) of each row of ``outputs`` (n, classes), the largest; rows of one number in ``together`` (n,) are
-    decided by their mean output.
+    """The class (n,) with the largest output in each row of ``outputs`` (n, classes).
+
+    Rows with the same number in ``together`` (n,) are decided together, by the sum of their outputs.
     """
     if together is not None:
         _, of = np.unique(together, return_inverse=True)
@@ -123,9 +127,10 @@ def decide(outputs: Floats, together: npt.NDArray[np.generic] | None = None) -> 
 def train(
     columns: Floats, kind: Integers, training: Bools, stopping: Bools, *, seed: int = 0, steps: int = levenberg.STEPS
 ) -> Classifier:
-    """Of ``columns`` (n, d), those of frames or of trajectories, and the class ``kind`` (n,) of each, 0 and up.
+    """Train on ``columns`` (n, d) of frames or trajectories and the class ``kind`` (n,) of each, from 0.
 
-    More than COMPONENTS columns are reduced to as many principal components.
+    ``training`` and ``stopping`` (n,) are masks of the rows. More than COMPONENTS columns are reduced to that many
+    principal components.
     """
     targets = np.eye(int(kind.max()) + 1)[kind]
     wide = columns.shape[1] > COMPONENTS
@@ -137,8 +142,10 @@ def train(
 
 
 def machine(**options: Any) -> Pipeline:
-    """A support vector machine with a radial kernel on scaled columns, to be fitted: ``fit(columns, kind)``; its
-    ``decision_function(columns)`` goes to decide(). ``options`` are those of sklearn's SVC.
+    """An unfitted support vector machine with a radial kernel on scaled columns.
+
+    Fit it with ``fit(columns, kind)``; decide() takes its ``decision_function(columns)``. ``options`` are those of
+    sklearn's SVC.
     """
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
@@ -148,7 +155,7 @@ def machine(**options: Any) -> Pipeline:
 
 
 def confusion(said: Integers, truth: Integers, classes: int) -> Integers:
-    """How often each class (row: said) was each (column: true), (classes, classes): seed 000's figure 7."""
+    """Confusion matrix (classes, classes), rows as said, columns as true: seed 000's figure 7."""
     table = np.zeros((classes, classes), np.int64)
     np.add.at(table, (said, truth), 1)
     return table

@@ -1,9 +1,9 @@
-"""Several contacts at once: what seed 000, II.C, leaves to others, by clusters on the skin's graph.
+"""Several contacts at once, which seed 000, II.C, leaves to others: clusters on a graph of electrodes.
 
 Electrodes are neighbours when they are at most REACH_MM apart on the skin laid flat. Each pressed electrode belongs to
-the strongest one that it can climb to, step by step to its strongest neighbour; two such summits are one contact when
-the pass between them is not much lower than the lower one. The electrodes stand 4 to 7 mm apart: two contacts that
-share a summit are one here, and are told as one.
+the summit that it climbs to, step by step to its strongest neighbour. Two summits are one contact when the pass between
+them is above PASS_SHARE of the lower summit. The electrodes are 4 to 7 mm apart: two contacts that share a summit are
+reported as one.
 """
 
 from __future__ import annotations
@@ -20,22 +20,21 @@ from .signals import ELECTRODE_DR_MM, ELECTRODES, Floats
 
 REACH_MM = 5.5
 PASS_SHARE = 0.5  # of the lower summit
-SHARE_POWER = 1.0 / 3.0  # how near an electrode a contact lies says more than its force: drawn towards equal shares
-LEAST_SHARE = 0.1  # of the strongest electrode: below it, what two contacts bulge and noise are
+# An electrode's signal depends more on how near the contact is than on its force: this pulls towards equal shares.
+SHARE_POWER = 1.0 / 3.0
+LEAST_SHARE = 0.1  # of the strongest electrode: below it are noise and the bulge between two contacts
 
 
-def _graph() -> npt.NDArray[np.bool_]:
-    between = np.linalg.norm(ELECTRODE_DR_MM[:, None] - ELECTRODE_DR_MM[None], axis=2)
-    result: npt.NDArray[np.bool_] = (between <= REACH_MM) & ~np.eye(ELECTRODES, dtype=bool)
-    return result
-
-
-NEIGHBOURS = _graph()
+_BETWEEN_MM = np.linalg.norm(ELECTRODE_DR_MM[:, None] - ELECTRODE_DR_MM[None], axis=2)
+NEIGHBOURS = (_BETWEEN_MM <= REACH_MM) & ~np.eye(ELECTRODES, dtype=bool)
 
 
 @dataclass(frozen=True)
 class Contact:
-    """``poc_mm`` (3,) on the core's surface; ``share`` of the force, 0 to 1; ``electrodes``, strongest first."""
+    """One contact: its ``poc_mm`` (3,) on the core's surface and its ``share`` of the force, 0 to 1.
+
+    ``electrodes`` are the indices, from 0, of those that belong to it, strongest first.
+    """
 
     poc_mm: Floats
     share: float
@@ -43,10 +42,11 @@ class Contact:
 
 
 def contacts(row: npt.NDArray[Any], *, least_n: float = 0.05) -> list[Contact]:
-    """The contacts of one frame, strongest first; none where no electrode has ``least_n`` by Eq 4 or one is missing.
+    """The contacts of one frame, strongest first.
 
-    ``row`` is a frame of ``biotac.load`` or a live hand, or signals (19,). Shares are a guess from Eq 4, good to
-    about 0.1 (host/docs/features.md).
+    There are none if every electrode is below ``least_n`` by Eq 4, or one is missing. ``row`` is a frame of
+    ``biotac.load`` or of a live hand, or signals (19,). Shares are an estimate from Eq 4, good to about 0.1
+    (host/docs/features.md).
     """
     force = electrode_force(row if row.dtype.names else row[None, :])[0]
     if np.isnan(force).any() or force.max() < least_n:
@@ -65,7 +65,7 @@ def contacts(row: npt.NDArray[Any], *, least_n: float = 0.05) -> list[Contact]:
 
 
 def _climb(force: Floats, pressed: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
-    """The summit (19,) above each electrode; its own number where nothing near is stronger."""
+    """The summit (19,) that each electrode climbs to; its own index where no neighbour is stronger."""
     up = np.arange(ELECTRODES)
     for k in np.flatnonzero(pressed):
         near = np.flatnonzero(NEIGHBOURS[k] & pressed)
@@ -77,7 +77,7 @@ def _climb(force: Floats, pressed: npt.NDArray[np.bool_]) -> npt.NDArray[np.int6
 
 
 def _merged(force: Floats, pressed: npt.NDArray[np.bool_], summit: npt.NDArray[np.int64]) -> list[int]:
-    """Summits that stand for themselves; ``summit`` is changed where a lower one joins a higher."""
+    """The summits that are contacts of their own; ``summit`` is changed in place where a lower one joins a higher."""
     tops = sorted(set(summit[pressed].tolist()), key=lambda k: -force[k])
     kept: list[int] = []
     for top in tops:

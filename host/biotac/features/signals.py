@@ -1,4 +1,4 @@
-"""What every feature is made of: electrodes above their tare, and places on the skin laid flat."""
+"""What every feature is computed from: electrode counts above the tare, and places on the skin laid flat."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 def signals(rows: npt.NDArray[Any]) -> Floats:
     """Counts above the tare (n, 19) float64, compression < 0; NaN where an electrode or its tare is missing.
 
-    ``rows`` are those of ``biotac.load`` or of a live hand (their ``counts`` and ``tare``), or an array (n, 19) that
-    is tared already and is taken as it is. Raises InputError for anything else.
+    ``rows`` are those of ``biotac.load`` or of a live hand, with ``counts`` and ``tare``, or an array (n, 19) of counts
+    above the tare, which is returned as float64. Raises InputError for anything else.
     """
     rows = np.atleast_1d(rows)
     if rows.dtype.names is None:
@@ -36,15 +36,15 @@ def signals(rows: npt.NDArray[Any]) -> Floats:
     if missing:
         raise InputError(f"rows have no {' and no '.join(missing)}: expected frames; load those fields too")
     counts = rows["counts"]
-    above: Floats = np.where(counts == INVALID_COUNT, np.nan, counts - rows["tare"].astype(np.float64))
-    return above
+    return np.where(counts == INVALID_COUNT, np.nan, counts - rows["tare"].astype(np.float64))
 
 
 def skin(points_mm: Floats) -> Floats:
-    """Core points (n, 3) as seed 000's (d, r) in mm, (n, 2): its figure 3.
+    """Points on the core (n, 3) in mm as seed 000's (d, r) in mm, (n, 2): its figure 3.
 
-    d runs along the finger from the proximal end of the pattern, x = -16 mm, to the tip; r is the arc from the ventral
-    line, + on E11's side (the paper's left is -). Over the cap they are those of a globe with its pole at the tip.
+    d runs along the finger from the proximal end of the pattern, x = -16 mm, to the tip. r is the arc from the ventral
+    line, positive on E11's side (the paper's left is negative). On the cap they are like latitude and longitude on a
+    globe with its pole at the tip.
     """
     across, along = unroll(surface.project(points_mm))
     return np.column_stack([along - surface.PROXIMAL_END_MM, across])

@@ -1,4 +1,4 @@
-"""Seed 000's 11-point robust LOWESS, and what of it can be had while the finger is still being touched."""
+"""Seed 000's 11-point robust LOWESS, and a causal smoother for use while the finger is still being touched."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ ROBUST_STEPS = 3  # statsmodels' default; MATLAB's rlowess takes 5
 
 
 def lowess(values: npt.ArrayLike, taps: int = TAPS) -> Floats:
-    """Values (n,) or (n, k) smoothed by local lines over ``taps`` rows, outliers beyond six medians left out.
+    """Values (n,) or (n, k) smoothed by local lines over ``taps`` rows, without outliers beyond six median residuals.
 
-    Cleveland's robust LOWESS (statsmodels', three robust steps) over the row number, each column by itself; rows that
-    are NaN stay NaN and are skipped. Needs the rows after a row, too: causal() does not.
-    An outlier a thousand times the noise takes its neighbours with it and stays. Raises InputError where fewer than
-    ``taps`` rows are numbers.
+    Cleveland's robust LOWESS (statsmodels', three robust steps) over the row number, each column by itself. NaN rows
+    are skipped and stay NaN. It needs the rows after a row, too; causal() does not. An outlier of a thousand times the
+    noise distorts its neighbours and is not rejected. Raises InputError where fewer than ``taps`` rows are finite.
     """
     from statsmodels.nonparametric.smoothers_lowess import lowess as theirs  # half a second to import
 
@@ -35,10 +34,10 @@ def lowess(values: npt.ArrayLike, taps: int = TAPS) -> Floats:
 
 
 def causal_taps(taps: int = TAPS) -> Floats:
-    """Weights (taps,), oldest first, of the line through the last ``taps`` rows, read at the newest.
+    """Weights (taps,), oldest first, that evaluate at the newest row a line fitted to the last ``taps`` rows.
 
-    Tricube weights that reach zero at the oldest, as LOWESS has at its end: sum 1, and a steady slope is followed
-    without a lag.
+    The line is fitted with tricube weights that fall to zero one row before the oldest, as in LOWESS at the end of its
+    data. The weights sum to 1, and a steady slope is followed without lag.
     """
     age = np.arange(taps - 1, -1, -1.0)
     weight = (1.0 - (age / taps) ** 3) ** 3
@@ -48,9 +47,9 @@ def causal_taps(taps: int = TAPS) -> Floats:
 
 
 def causal(values: npt.ArrayLike, taps: int = TAPS) -> Floats:
-    """Values (n,) or (n, k) by causal_taps() of the rows before and at each; NaN until there are so many.
+    """Values (n,) or (n, k) smoothed by causal_taps() over each row and those before; the first taps - 1 rows are NaN.
 
-    Linear, not robust: a single outlier passes with 0.4 of its size. A NaN makes the rows NaN that it is part of.
+    Linear, not robust: a single outlier passes with 0.4 of its size. A NaN makes every row NaN whose window holds it.
     """
     columns = np.asarray(values, dtype=np.float64)
     result = np.full(columns.shape, np.nan)

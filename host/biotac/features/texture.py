@@ -1,10 +1,10 @@
-"""What is rubbed, tapped or poked, by how dynamic pressure (PAC) vibrates: band energies and a linear classifier.
+"""Texture from the vibration of dynamic pressure (PAC) in pokes, taps and slides: band energies, linear classifier.
 
     found = classifier().fit(describe_all(recordings), labels)     # recordings: PAC of one poke, tap or slide each
     found.predict(describe_all(others))
 
-A description is of logarithms, so that how hard it was rubbed is a shift; and of quantiles over time, so that it does
-not matter when it was, nor how long. The same comes of BANDS messages: describe(bands["energy_count2"]).
+A description holds logarithms, so that rubbing harder is only a shift, and quantiles over time, so that it does not
+matter when the contact was or how long it lasted. BANDS messages give the same: describe(bands["energy_count2"]).
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 QUANTILES = (0.1, 0.5, 0.9, 1.0)  # over rounds
-FLOOR_COUNT2 = 1.0  # added to the mean square: no logarithm of nothing
+FLOOR_COUNT2 = 1.0  # added to the mean square, so that there is no logarithm of 0
 _MIDDLE = (FULL_SCALE_COUNT + 1) // 2
 
 
 def energies(pac: npt.ArrayLike) -> Floats:
-    """Energy of each band in each round of 10 ms (n // 22, 6), count^2, by the board's own code.
+    """Energy of each band in each round of 10 ms (n // 22, 6), in count^2, by the board's own code.
 
-    ``pac`` is (n,) samples at 2200 Hz in counts, one after the other, as read or tared, whole or not; a rest behind the
-    last whole round is left out. Only changes count. What lies more than 2047 counts from the median is cut off. Raises
-    InputError for another shape, for less than a round, or where a sample is NaN.
+    ``pac`` is (n,) consecutive samples at 2200 Hz in counts, as read or tared, whole numbers or not. Samples after the
+    last whole round are left out. Only changes matter. Samples more than 2047 counts from the median are clipped.
+    Raises InputError for another shape, for less than a round, or if a sample is not finite.
     """
     samples = np.asarray(pac, dtype=np.float64)
     if samples.ndim != 1 or len(samples) < SAMPLES:
@@ -47,7 +47,7 @@ def energies(pac: npt.ArrayLike) -> Floats:
 
 
 def describe(energy_count2: npt.ArrayLike) -> Floats:
-    """Energies (n, 6) of one recording as a row for a classifier (24,): each band's quantiles over rounds, log10.
+    """Energies (n, 6) of one recording as a row (24,) for a classifier: quantiles over rounds of each band's log10.
 
     Rounds with a NaN are left out. Raises InputError for another shape or where no round is left.
     """
@@ -58,17 +58,16 @@ def describe(energy_count2: npt.ArrayLike) -> Floats:
     if not len(known):
         raise InputError(f"none of {len(energy)} rounds has all its energies: expected one at least")
     level = np.log10(known / SAMPLES + FLOOR_COUNT2)
-    row: Floats = np.quantile(level, QUANTILES, axis=0).ravel()
-    return row
+    return np.quantile(level, QUANTILES, axis=0).ravel()
 
 
 def describe_all(recordings: Iterable[npt.ArrayLike]) -> Floats:
-    """A row of describe() for each of some recordings of PAC, (k, 24); they may be of different lengths."""
+    """describe() of each recording of PAC, (k, 24); they may have different lengths."""
     return np.array([describe(energies(pac)) for pac in recordings]).reshape(-1, len(QUANTILES) * len(BANDS_HZ))
 
 
 def classifier(**options: Any) -> Pipeline:
-    """A linear classifier of such rows, to be fitted: logistic regression on columns scaled to one deviation.
+    """An unfitted linear classifier of such rows: logistic regression on columns scaled to unit variance.
 
     ``options`` are LogisticRegression's. Needs the extra ``features``.
     """

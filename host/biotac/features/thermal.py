@@ -1,4 +1,4 @@
-"""Temperature in degrees C, and what can be said of heat flux."""
+"""Temperature in degrees C, and heat flux in counts."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from ..wire import sensor_gen as _sensor
 from ..wire.messages_gen import INVALID_COUNT
 
 KELVIN_AT_0_C = 273.15
-RANGE_C = (0.0, 75.0)  # the SynTouch manual's; a BioTac SP reads 47 to 63 by it, which nobody can tell from here
+RANGE_C = (0.0, 75.0)  # from SynTouch's manual; a BioTac SP reads 47 to 63 by it, which looks valid
 
-#: ``celsius`` is NaN where missing, railed or beyond RANGE_C, ``flux_counts`` TAC above that of the first row that has
-#: one; ``flux_is_si`` is False until somebody knows its gain.
+#: ``celsius`` is NaN where missing, railed or beyond RANGE_C. ``flux_counts`` is TAC above that of the first row that
+#: has one. ``flux_is_si`` is False as long as TAC's gain is unknown.
 THERMAL_DTYPE = np.dtype([("celsius", "<f8"), ("valid", "?"), ("flux_counts", "<f8"), ("flux_is_si", "?")])
 
 
 def thermal(rows: npt.NDArray[Any]) -> npt.NDArray[np.void]:
-    """THERMAL_DTYPE (n,) of rows with ``tdc`` and ``tac``.
+    """Temperature and heat flux, THERMAL_DTYPE (n,), of rows with ``tdc`` and ``tac``.
 
     TDC is a thermistor in a divider: T = beta / ln(A / x - B) - 273.15 with x = TDC / 4095 (sensor.toml, the product
     manual). TAC is high-pass filtered and amplified by stages whose gain in W no public document gives, so heat flux
-    stays in counts against the first valid row, and ``flux_is_si`` is False. Raises InputError for rows without them.
+    stays in counts above the first row that has a TAC, and ``flux_is_si`` is False. Raises InputError for rows without
+    ``tdc`` or ``tac``.
     """
     rows = np.atleast_1d(rows)
     missing = [name for name in ("tdc", "tac") if name not in (rows.dtype.names or ())]
@@ -33,7 +34,7 @@ def thermal(rows: npt.NDArray[Any]) -> npt.NDArray[np.void]:
     result = np.zeros(len(rows), THERMAL_DTYPE)
     share = np.clip(rows["tdc"].astype(np.float64), 1.0, _sensor.FULL_SCALE_COUNT) / _sensor.FULL_SCALE_COUNT
     inside = _sensor.TDC_A / share - _sensor.TDC_B
-    # a railed converter says only that it is
+    # a railed reading is no measurement
     known = (rows["tdc"] != INVALID_COUNT) & (rows["tdc"] < _sensor.FULL_SCALE_COUNT) & (inside > 1.0)
     celsius = _sensor.TDC_BETA_K / np.log(np.where(known, inside, np.e)) - KELVIN_AT_0_C
     result["valid"] = known & (celsius >= RANGE_C[0]) & (celsius <= RANGE_C[1])

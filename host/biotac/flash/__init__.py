@@ -1,4 +1,4 @@
-"""Putting an image onto a board, and its settings back: ``biotac flash``."""
+"""Writing an image to a board and restoring its settings: ``biotac flash``."""
 
 from __future__ import annotations
 

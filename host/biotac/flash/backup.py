@@ -1,6 +1,6 @@
-"""A board's settings, and the calibrations and wrench maps in force: read over the wire, kept in a file, put back.
+"""Backing up and restoring a board's settings, and the calibrations and wrench maps in force.
 
-What was saved outlives flashing by itself; what is in force and was not saved needs this.
+Whatever is saved on the board survives flashing anyway; whatever is in force but not saved needs this backup.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from ..wire.identity import board_text, serial_text, version_text
 
 FORMAT = "biotac settings 1"
 LAST_ID = 255
-#: Settings by id whose default is not what firmware without them does, and that.
+#: Settings whose default differs from how firmware without them acts: the value for that, by setting id.
 _BEFORE = {int(key): spec.before for key, spec in wire.SETTINGS.items() if spec.before != spec.default}
 
 
 @dataclass(frozen=True)
 class Backup:
-    """Values by setting id: a board may have settings that this library does not know. The rest by finger."""
+    """A backup. ``values`` by setting id, as a board may have settings unknown to this library; the rest by finger."""
 
     path: Path
     values: dict[int, int]
@@ -38,7 +38,7 @@ class Backup:
 
 @dataclass(frozen=True)
 class Restored:
-    """What became of a backup's settings; the rest were as they should be."""
+    """Names of the settings that were changed or left out; the others already had the right values."""
 
     changed: tuple[str, ...]
     unknown: tuple[str, ...]  # to the new firmware
@@ -50,7 +50,7 @@ def setting_name(setting: int) -> str:
 
 
 def read_settings(hand: Hand) -> dict[int, int]:
-    """All settings of the board: those of this library that it has, and those that follow them."""
+    """All settings of the board, by id, including those newer than this library."""
     values: dict[int, int] = {}
     for setting in range(1, LAST_ID + 1):
         try:
@@ -59,17 +59,20 @@ def read_settings(hand: Hand) -> dict[int, int]:
             if refused.error != wire.Error.UNKNOWN_SETTING:
                 raise
             if setting > max(wire.Setting):
-                break  # ids are given without gaps, so nothing newer follows
+                break  # ids have no gaps, so nothing newer follows
     return values
 
 
 def default_path(hello: wire.Hello) -> Path:
-    """A name that says whose settings and when, in the working directory."""
+    """A file in the working directory, named after the board's serial number and the time."""
     return Path(f"biotac-settings-{serial_text(hello)}-{datetime.now():%Y%m%d-%H%M%S}.json")
 
 
 def save(hand: Hand, path: Path | None) -> Backup:
-    """All of the board's settings, and the calibrations and maps in force, into a new file; never over another."""
+    """Save all of the board's settings, and the calibrations and maps in force, to a new file.
+
+    Raises InputError when the file exists or cannot be written.
+    """
     hello = hand.info
     its = Backup((path or default_path(hello)).resolve(), read_settings(hand), hand.calibrations(), _maps(hand))
     facts = {
@@ -93,12 +96,12 @@ def save(hand: Hand, path: Path | None) -> Backup:
 
 
 def _maps(hand: Hand) -> dict[int, bytes]:
-    """As the new firmware takes them: an older one's are made into maps of today."""
+    """Maps by finger in the current format, which the new firmware takes; older ones are converted."""
     return {finger: as_blob(blob) for finger, blob in hand.maps().items()}
 
 
 def read_backup(path: Path) -> Backup:
-    """Read what save() wrote."""
+    """Read a file that save() wrote. Raises InputError when it cannot be read or is not such a file."""
     try:
         facts = read_json(path)
         if facts["format"] != FORMAT:
@@ -116,10 +119,11 @@ def read_backup(path: Path) -> Backup:
 
 
 def restore(hand: Hand, wanted: Backup) -> Restored:
-    """Set and save what differs, and read all back.
+    """Set and save the values that differ, then read them all back.
 
-    What the firmware does not know is left out; of what the backup's firmware did not know, it goes on doing what that
-    did. Raises CommandRefusedError for a value that it does not take, and InputError when one does not read back.
+    Settings that the board's firmware does not know are left out. Settings that the backup's firmware did not know are
+    set so that the board acts as that firmware did. Raises CommandRefusedError for a value that the board refuses, and
+    InputError when one does not read back.
     """
     found = read_settings(hand)
     values = {key: value for key, value in _BEFORE.items() if key in found} | wanted.values
@@ -152,10 +156,10 @@ def restore(hand: Hand, wanted: Backup) -> Restored:
 
 
 def calibration_name(finger: int) -> str:
-    """As it is called where settings are listed."""
+    """The name of a finger's calibration in lists of settings."""
     return f"calibration of finger {finger}"
 
 
 def map_name(finger: int) -> str:
-    """As it is called where settings are listed."""
+    """The name of a finger's wrench map in lists of settings."""
     return f"wrench map of finger {finger}"

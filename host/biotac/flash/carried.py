@@ -1,4 +1,4 @@
-"""The image that is flashed when none is named: the package's own, which a released wheel carries."""
+"""The image that is flashed by default: the package's own, included in released wheels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ BUILT = Path("build/pico/biotac-pico.uf2")  # of a clone
 
 
 def find_image() -> Path:
-    """The image that this package carries; without one that of the clone around the working directory.
+    """The image included in this package or, if there is none, the one built in the clone around the working directory.
 
     Raises InputError when there is neither.
     """

@@ -1,6 +1,6 @@
-"""A board's image as UF2 (https://github.com/microsoft/uf2): read, and refused unless a board can take all of it.
+"""Reading a board's UF2 image (https://github.com/microsoft/uf2) and checking that a board can take all of it.
 
-The boot ROM skips, without a word, what it does not like in a UF2. So everything it could skip is an error here.
+The boot ROM silently skips blocks that it does not accept, so everything that it could skip is an error here.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FLASH_AT = 0x10000000
 FLASH_BYTES = 2 * 1024 * 1024  # of a Pico
 SETTINGS_BYTES = 2 * 4096  # at the flash's end: firmware/core/keep/storage.h
 MAPS_BYTES = (2 * MAX_SENSORS + 1) * _map.MAX_BYTES  # before them: firmware/core/map/store.h
-BOOT2_BYTES = 252  # and its CRC behind it
+BOOT2_BYTES = 252  # followed by its CRC
 
 
 @dataclass(frozen=True)
@@ -39,16 +39,17 @@ class Image:
     note: Note
 
     def boot_last(self) -> tuple[bytes, ...]:
-        """The blocks with the second-stage boot's at the end.
+        """The blocks, with that of the second-stage boot last.
 
-        Its sector is erased with the first of them, so until the very last block the chip has nothing to boot: a
-        loss of power leaves the board in its loader, not in half an image. The boot ROM takes blocks in any order.
+        Its sector is erased with the first block written, so the chip has nothing to boot until the very last block:
+        after a loss of power the board is in its loader and does not run half an image. The boot ROM takes blocks in
+        any order.
         """
         return (*self.blocks[1:], self.blocks[0])
 
 
 def read_image(path: Path) -> Image:
-    """Read and check a UF2 file; InputError says what is wrong with it."""
+    """Read and check a UF2 file. Raises InputError saying what is wrong with it."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -63,14 +64,14 @@ def read_image(path: Path) -> Image:
 
 
 def split(data: bytes) -> tuple[bytes, ...]:
-    """Blocks of a UF2 file."""
+    """The blocks of a UF2 file. Raises ValueError for a wrong size."""
     if not data or len(data) % BLOCK_BYTES:
         raise ValueError(f"{len(data)} bytes are no UF2, which has blocks of {BLOCK_BYTES}; take the build's .uf2 file")
     return tuple(data[at : at + BLOCK_BYTES] for at in range(0, len(data), BLOCK_BYTES))
 
 
 def join_payloads(blocks: tuple[bytes, ...]) -> bytes:
-    """The flash's bytes from its first on."""
+    """The flash's contents from its first byte on. Raises ValueError for a block that the boot ROM would not write."""
     end = FLASH_AT + FLASH_BYTES - SETTINGS_BYTES - MAPS_BYTES
     pages = []
     for k, block in enumerate(blocks):
@@ -103,7 +104,10 @@ def join_payloads(blocks: tuple[bytes, ...]) -> bytes:
 
 
 def check_boot2(payload: bytes) -> None:
-    """The chip starts only what has the right CRC behind its second-stage boot (RP2040 data sheet 2.8.1.3.1)."""
+    """Raise ValueError unless the right CRC follows the second-stage boot (RP2040 data sheet 2.8.1.3.1).
+
+    The chip does not start an image without it.
+    """
     crc = 0xFFFFFFFF
     for byte in payload[:BOOT2_BYTES]:
         crc ^= byte << 24
@@ -115,5 +119,5 @@ def check_boot2(payload: bytes) -> None:
 
 
 def note_text(its: Note) -> str:
-    """A note for people."""
+    """A note as text for users."""
     return f"{board_text(its.board)}, firmware {its.version}, wire {'.'.join(map(str, its.wire))}"

@@ -1,4 +1,4 @@
-"""What flashing needs of a way to a board that is in its loader."""
+"""The interface that flashing needs to reach a board in its loader."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from typing import Protocol
 
 from .image import Image
 
-#: Called with the blocks written so far and how many there are.
+#: Called with the number of blocks written so far and the total.
 Show = Callable[[int, int], None]
 
 
 class Loader(Protocol):
-    """One way to hand an image to a board in its loader."""
+    """A way to transfer an image to a board in its loader."""
 
     #: For messages: "drive RPI-RP2", "picotool".
     name: str
 
     def ready(self) -> bool:
-        """A board in its loader can be reached this way. FlashError when it is more than one."""
+        """True when a board in its loader can be reached this way. Raises FlashError when there are several."""
 
     def write(self, image: Image, show: Show) -> None:
-        """Hand the image over. The board restarts by itself; FlashError when not all of it went over."""
+        """Transfer the image; the board then restarts by itself. Raises FlashError if not all of it was transferred."""
 
     def cure(self) -> str:
-        """What to do when this way is not ready, though a board should be there."""
+        """What the user can do when this way is not ready although a board should be there."""

@@ -1,4 +1,4 @@
-"""The drive that an RP2040's loader shows: a file that is written to it goes into the flash, block by block."""
+"""The drive that an RP2040's loader presents: a file written to it goes into the flash, block by block."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ..errors import FlashError
 from .image import Image
-from .loader import Show
+from .loader import Loader, Show
 
 LABEL = "RPI-RP2"
 INFO = "INFO_UF2.TXT"
@@ -20,8 +20,8 @@ INFO_LINE = f"Board-ID: {LABEL}"
 FILE = "BIOTAC.UF2"
 
 
-class DriveLoader:
-    """``folders`` lists where drives are mounted, ``attached`` says whether one is there that is not mounted."""
+class DriveLoader(Loader):
+    """Loader on a USB drive. ``folders`` lists mount points, ``attached`` tells whether a drive is there at all."""
 
     name = f"drive {LABEL}"
 
@@ -36,7 +36,6 @@ class DriveLoader:
         return [folder for folder in self._folders() if is_loader(folder)]
 
     def ready(self) -> bool:
-        """See Loader.ready."""
         drives = self.drives()
         if len(drives) > 1:
             raise FlashError(
@@ -45,13 +44,11 @@ class DriveLoader:
         return len(drives) == 1
 
     def cure(self) -> str:
-        """See Loader.cure."""
         if not self._attached():
             return f"no drive {LABEL} is there: plug the board in with BOOTSEL held, or look at the cable"
         return f"the drive {LABEL} is there but not mounted: `udisksctl mount -b {disk_by_label()}`, or open it by hand"
 
     def write(self, image: Image, show: Show) -> None:
-        """See Loader.write."""
         path = self.drives()[0] / FILE
         *most, last = image.boot_last()
         written = 0
@@ -67,7 +64,7 @@ class DriveLoader:
                 file.write(last)
                 os.fsync(file.fileno())
         except OSError as error:
-            # With the last block the board restarts, and the drive is gone under whoever still closes the file.
+            # The board restarts with the last block, so the drive may be gone before the file is closed.
             if written < len(image.blocks):
                 raise FlashError(
                     f"{path} took {written} of {len(image.blocks)} blocks ({error.strerror}); the board stays in its "
@@ -77,7 +74,7 @@ class DriveLoader:
 
 
 def is_loader(folder: Path) -> bool:
-    """A drive with an RP2040's loader behind it says so in a file."""
+    """True if a file on the drive says that it belongs to an RP2040's loader."""
     try:
         return INFO_LINE in (folder / INFO).read_text(encoding="ascii", errors="replace").splitlines()
     except OSError:
@@ -85,7 +82,7 @@ def is_loader(folder: Path) -> bool:
 
 
 def mounted_folders() -> list[Path]:
-    """Where this system mounts drives."""
+    """Folders where drives may be mounted on this system."""
     if os.name == "nt":
         return [Path(f"{letter}:\\") for letter in string.ascii_uppercase[2:]]
     if sys.platform == "darwin":
@@ -94,7 +91,7 @@ def mounted_folders() -> list[Path]:
 
 
 def linux_folders(root: Path) -> list[Path]:
-    """The customary places, and wherever else somebody mounted something by hand."""
+    """The usual mount points, and all others of devices in /proc/mounts."""
     places = [found for pattern in ("media/*", "media/*/*", "run/media/*/*") for found in sorted(root.glob(pattern))]
     try:
         mounts = (root / "proc/mounts").read_text(encoding="utf-8", errors="replace").splitlines()
@@ -103,10 +100,10 @@ def linux_folders(root: Path) -> list[Path]:
     for line in mounts:
         device, folder, *_ = [*line.split(), "", ""]
         if device.startswith("/dev/"):
-            places.append(Path(re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), folder)))  # a blank is \040
+            places.append(Path(re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), folder)))  # a space is \040
     return list(dict.fromkeys(place.resolve() for place in places))
 
 
 def disk_by_label() -> Path:
-    """Linux names an attached drive by its label, mounted or not."""
+    """Linux's path of an attached drive by its label, mounted or not."""
     return Path("/dev/disk/by-label") / LABEL

@@ -1,4 +1,4 @@
-"""The loader of an emulated board, which is this project's model of it (tools/emulator/loader.mjs)."""
+"""The loader of an emulated board: this project's model of the real one (tools/emulator/loader.mjs)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from pathlib import Path
 
 from ..sim.emulated import EmulatedBoard
 from .image import Image
-from .loader import Show
+from .loader import Loader, Show
 
 WRITE_S = 5.0  # of emulated time; an image of 48 KiB takes 0.7 s
 
 
-class EmulatedLoader:
-    """Hands files to the emulator in place of the drive."""
+class EmulatedLoader(Loader):
+    """Passes files to the emulator instead of writing them to a drive."""
 
     name = "emulated loader"
 
@@ -21,15 +21,12 @@ class EmulatedLoader:
         self._board = board
 
     def ready(self) -> bool:
-        """See Loader.ready."""
         return self._board.counters()["loader"] is not None
 
     def cure(self) -> str:
-        """See Loader.cure."""
         return "the emulated program did not leave for its loader: is that image this gateway's?"
 
     def write(self, image: Image, show: Show) -> None:
-        """See Loader.write."""
         show(0, len(image.blocks))
         before = self._board.counters()["images"]
         with tempfile.TemporaryDirectory(prefix="biotac-flash-") as folder:

@@ -1,4 +1,4 @@
-"""Raspberry Pi's picotool, where it is installed: it needs no mounted drive, but permission for the USB device."""
+"""Raspberry Pi's picotool, if installed: it needs no mounted drive, but permission for the USB device."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import subprocess
 
 from ..errors import FlashError
 from .image import Image
-from .loader import Show
+from .loader import Loader, Show
 
 TOOL = "picotool"
 ASK_S = 10
 LOAD_S = 120
 
 
-class PicotoolLoader:
+class PicotoolLoader(Loader):
     """Never ready without picotool on PATH."""
 
     name = TOOL
@@ -23,17 +23,15 @@ class PicotoolLoader:
         self._heard = ""
 
     def ready(self) -> bool:
-        """See Loader.ready."""
         return shutil.which(TOOL) is not None and self._run("info", seconds=ASK_S)
 
     def cure(self) -> str:
-        """See Loader.cure."""
         if shutil.which(TOOL) is None:
             return "or install picotool, which needs no mounted drive"
         return f"picotool says: {self._heard}"
 
     def write(self, image: Image, show: Show) -> None:
-        """See Loader.write. Picotool reads back what it wrote, and starts the board."""
+        """Write the image with picotool, which verifies it and starts the board."""
         show(0, len(image.blocks))
         if not self._run("load", "-v", "-x", str(image.path), seconds=LOAD_S):
             raise FlashError(f"picotool did not load {image.path}: {self._heard}; plug the board in with BOOTSEL held")

@@ -1,6 +1,6 @@
-"""What an image says of itself: reads and writes firmware/app/image_note.h, for flashing and for the build.
+"""The note in an image that identifies it (firmware/app/image_note.h): read for flashing, written by the build.
 
-Nothing but the standard library: tools/image/note.py loads this file where the package is not installed.
+Uses only the standard library: tools/image/note.py loads this file where the package is not installed.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 MAGIC = b"BIOTAC image"
 LAYOUT = 2
 FIELDS = struct.Struct("<12sHH3BBB3x")
-PROOF = struct.Struct("<II")  # behind them: how many bytes the image has, and their CRC-32
+PROOF = struct.Struct("<II")  # after FIELDS: the image's size in bytes and its CRC-32
 CRC_AT = FIELDS.size + 4
 CRC_BYTES = 4
 ALIGNMENT = 4
@@ -20,7 +20,7 @@ ALIGNMENT = 4
 
 @dataclass(frozen=True)
 class Note:
-    """Which board (wire.Board) an image is for, and what it will answer in its HELLO."""
+    """The board (wire.Board) that an image is for, and what its HELLO will say."""
 
     board: int
     firmware: tuple[int, int, int]
@@ -34,9 +34,9 @@ class Note:
 
 
 def find(image: bytes) -> Note:
-    """The note of an image that may be followed by zeros.
+    """The note of an image, which may be followed by zeros.
 
-    Raises ValueError unless it has exactly one note, of this layout, and the bytes are those it was made of.
+    Raises ValueError unless there is exactly one note, of this layout, and the image matches its size and CRC-32.
     """
     at = _place(image)
     _, layout, board, *numbers = FIELDS.unpack_from(image, at)
@@ -52,7 +52,7 @@ def find(image: bytes) -> Note:
 
 
 def seal(image: bytes) -> bytes:
-    """The same image, its note filled in with its size and CRC-32; ValueError unless it has exactly one note."""
+    """The image with size and CRC-32 filled in in its note. Raises ValueError unless there is exactly one note."""
     at = _place(image)
     sized = bytearray(image)
     PROOF.pack_into(sized, at + FIELDS.size, len(image), 0)
@@ -69,6 +69,6 @@ def _place(image: bytes) -> int:
 
 
 def _crc32(image: bytes, note_at: int) -> int:
-    """Of all bytes, those of the CRC itself taken as zeros."""
+    """CRC-32 of all bytes, with those of the CRC field itself taken as zeros."""
     field = note_at + CRC_AT
     return zlib.crc32(image[field + CRC_BYTES :], zlib.crc32(bytes(CRC_BYTES), zlib.crc32(image[:field])))

@@ -1,8 +1,8 @@
-"""Flashing from end to end: nothing is touched before the settings are in a file, and nothing is believed but HELLO."""
+"""Flashing from end to end: the settings are saved to a file first, and only the board's HELLO counts as success."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,13 +18,16 @@ from .loader import Show as ShowBlocks
 from .target import Target
 from .waiting import wait_for
 
-LOADER_S = 20.0  # from the command to a drive that is mounted; desktops take some seconds
+LOADER_S = 20.0  # from the command to a mounted drive; desktops take some seconds
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """``before`` is None when nothing answered before; ``backup`` is what was put back, if anything was."""
+    """Result of flashing a board.
+
+    ``before`` is None when no firmware answered before; ``backup`` is what was restored, None if nothing was.
+    """
 
     port: str
     loader: str
@@ -46,15 +49,15 @@ def flash(
     say: Say = lambda text: None,
     show: ShowBlocks = lambda done, of: None,
 ) -> Outcome:
-    """Write ``image`` to the board, and give it its settings back.
+    """Write ``image`` to the board and restore its settings.
 
-    The settings go to ``backup_path`` (default: a new file in the working directory) first; without ``keep`` they
-    do not, and a board whose firmware does not answer is flashed too. A board that is in its loader already cannot
-    be asked for its settings; ``restore_from`` is what it gets then, and otherwise too. An image older than what
-    runs is refused without ``downgrade``.
+    The settings are first saved to ``backup_path`` (default: a new file in the working directory). Without ``keep``
+    they are not saved, and a board whose firmware does not answer is flashed too. ``restore_from`` replaces the
+    settings just saved; a board already in its loader cannot be asked for its settings and gets only these. An image
+    older than the board's firmware is refused without ``downgrade``.
 
-    Raises InputError before anything is touched for an image that is not the board's, FlashError for whatever fails
-    from then on.
+    Raises InputError, before the board is changed, for an image that does not fit it, and FlashError for whatever
+    fails after that.
     """
     if image.note.wire[0] != wire.WIRE_MAJOR:
         raise InputError(
@@ -89,14 +92,14 @@ def flash(
 
 
 def first_ready(loaders: Sequence[Loader]) -> Loader | None:
-    """A way to a board that is in its loader now."""
+    """The first loader that reaches a board now; None if there is none."""
     return next((loader for loader in loaders if loader.ready()), None)
 
 
 def leave(
     image: Image, target: Target, *, backup_path: Path | None, keep: bool, downgrade: bool, say: Say
 ) -> tuple[wire.Hello | None, Backup | None]:
-    """Ask the board who it is, save its settings, and send it to its loader."""
+    """Identify the board, save its settings, and send it to its loader; return its HELLO and the backup."""
     try:
         hand = target.open()
     except (NotAGatewayError, WireVersionError) as error:
@@ -117,7 +120,7 @@ def leave(
                 "older one may not know what newer settings mean; --downgrade if you mean it"
             )
         say(f"{target.port} runs firmware {version_text(hand.info)}, serial {serial_text(hand.info)}")
-        # A sensor board keeps nothing over a reboot.
+        # A sensor board has no settings to save.
         backup = save(hand, backup_path) if keep and hand.info.board != wire.Board.PICO_SENSOR else None
         if backup is not None:
             say(f"{len(backup.values)} settings are in {backup.path}")
@@ -130,7 +133,7 @@ def leave(
 
 
 def command_loader(hand: Hand) -> bool:
-    """Send the board to its loader; False when its firmware is from before there was a command for that."""
+    """Send the board to its loader; return False when its firmware is too old to have a command for that."""
     try:
         hand.reboot_bootloader()
     except CommandRefusedError as refused:
@@ -141,12 +144,12 @@ def command_loader(hand: Hand) -> bool:
 
 
 def firmware(hello: wire.Hello) -> tuple[int, int, int]:
-    """Its release, to compare with another."""
+    """The board's firmware release, for comparison."""
     return hello.firmware_major, hello.firmware_minor, hello.firmware_patch
 
 
 def check(image: Image, before: wire.Hello | None, after: wire.Hello) -> None:
-    """Only what the board itself says counts as success."""
+    """Raise FlashError unless the board's HELLO proves that it runs ``image`` and has restarted."""
     if before is not None and after.board_serial != before.board_serial:
         raise FlashError(
             f"serial {serial_text(after)} came back, not {serial_text(before)}; leave only one board plugged in"
@@ -167,9 +170,55 @@ def check(image: Image, before: wire.Hello | None, after: wire.Hello) -> None:
 
 @contextmanager
 def step(backup: Backup | None) -> Iterator[None]:
-    """Whatever fails ends in one sentence that says where the settings are."""
+    """Turn any BiotacError into a FlashError that also says where the settings are."""
     try:
         yield
     except BiotacError as error:
         where = "" if backup is None else f"; the settings are in {backup.path}, for --restore"
         raise FlashError(f"{error}{where}") from error
+
+
+@dataclass(frozen=True)
+class Result:
+    """Result for one board. ``outcome`` is None if the board already ran this image, or if there is an ``error``."""
+
+    port: str
+    outcome: Outcome | None = None
+    error: BiotacError | None = None
+
+
+def flash_every(
+    image: Image,
+    targets: Iterable[Target],
+    loaders: Sequence[Loader],
+    *,
+    keep: bool = True,
+    downgrade: bool = False,
+    say: Say = lambda text: None,
+    show: ShowBlocks = lambda done, of: None,
+) -> Iterator[Result]:
+    """Flash each of ``targets`` as ``flash`` does, unless it already runs this image.
+
+    A failure is reported in its Result, and the next board follows. Boards are flashed one after the other, because a
+    loader does not say which board it is.
+    """
+    for target in targets:
+        try:
+            if runs(image, target):
+                yield Result(target.port)
+                continue
+            outcome = flash(image, target, loaders, keep=keep, downgrade=downgrade, say=say, show=show)
+            yield Result(target.port, outcome)
+        except BiotacError as error:
+            yield Result(target.port, error=error)
+        finally:
+            target.close()
+
+
+def runs(image: Image, target: Target) -> bool:
+    """True if the board's HELLO has the image's CRC-32; False if it differs or the board does not answer."""
+    try:
+        with target.open() as hand:
+            return bool(hand.info.image_crc32 == image.note.crc32)
+    except BiotacError:
+        return False

@@ -1,4 +1,4 @@
-"""What flashing needs of a board that runs its firmware, before and after."""
+"""The interface that flashing needs to a board running its firmware, before and after."""
 
 from __future__ import annotations
 
@@ -8,22 +8,23 @@ from ..hand.hand import Hand
 
 
 class Target(Protocol):
-    """The board on its link, which goes away and comes back."""
+    """A board on its link, which goes away and comes back."""
 
     #: For messages.
     port: str
 
     def there(self) -> bool:
-        """Its port exists, whatever is behind it."""
+        """True if its port exists, whatever is connected to it."""
 
     def open(self) -> Hand:
-        """Shake hands. Raises what biotac.open raises."""
+        """Open the board. Raises what biotac.open raises."""
 
     def touch(self) -> None:
-        """Open the port at 1200 baud and close it: the customary way into a loader."""
+        """Open the port at 1200 baud and close it: the usual way to send a board to its loader."""
 
     def reopen(self) -> Hand:
-        """Wait for the board that was flashed and shake hands. DeviceLostError when it does not come back."""
+        """Wait for the flashed board and open it. Raises DeviceLostError when it does not come back."""
 
     def close(self) -> None:
-        """Give everything back."""
+        """Release all resources."""
+        return

@@ -1,4 +1,4 @@
-"""An emulated board: its process stays while it restarts, and its port keeps its name."""
+"""An emulated board: its process outlives a restart, and its port keeps its name."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from ..link.serial_port import SerialLink
 from ..sim.emulated import EmulatedBoard
 from ..sim.loading import load_source
 from ..sim.ports import parse_sim
+from .target import Target
 
 BACK_S = 10.0  # of emulated time
-WORLD_S = 600.0  # the tape must outlast all that is done here: behind its end time stands still
+WORLD_S = 600.0  # the tape must outlast everything done here: time stands still after its end
 
 
-class EmulatedTarget:
-    """Starts the board that an ``emu:`` PORT names."""
+class EmulatedTarget(Target):
+    """The board named by an ``emu:`` PORT, started here."""
 
     def __init__(self, port: str) -> None:
         self.port = port
@@ -26,22 +27,17 @@ class EmulatedTarget:
         self.board.release()
 
     def there(self) -> bool:
-        """See Target.there."""
         return bool(self.board.counters()["usb"]["state"] == "configured")
 
     def open(self) -> Hand:
-        """See Target.open."""
         return Hand(SerialLink(self.board.path))
 
     def touch(self) -> None:
-        """See Target.touch."""
         self.board.say("touch at 1200 baud")
 
     def reopen(self) -> Hand:
-        """See Target.reopen."""
         self.board.until(BACK_S, loader=None, usb={"state": "configured"})
         return self.open()
 
     def close(self) -> None:
-        """See Target.close."""
         self.board.close()

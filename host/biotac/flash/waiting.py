@@ -1,4 +1,4 @@
-"""Looking again until something is there: for what no operating system tells alike."""
+"""Polling until something is there, for events that each operating system reports differently."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ EVERY_S = 0.2
 
 
 def wait_for(look: Callable[[], Found | None], seconds: float) -> Found | None:
-    """What ``look`` found within so many seconds; it looks once at least."""
+    """The first result of ``look`` other than None; None after ``seconds``. Calls ``look`` at least once."""
     end = time.monotonic() + seconds
     while True:
         found = look()

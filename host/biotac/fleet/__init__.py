@@ -1,8 +1,8 @@
 """Boards on a network, by Zenoh: ``biotac serve PORT --name left`` shares one, ``zenoh:left`` is a PORT like any other.
 
-The wire goes over as it comes: whole messages, in batches that are numbered, so that whoever is too slow loses whole
-ones and knows how many. Commands are queries that the sharing computer answers. host/docs/network.md describes it.
-Needs the extra ``zenoh``.
+The wire is passed on as it comes: whole messages in numbered batches, so that a reader that is too slow loses whole
+batches and knows how many. Commands are queries that the sharing computer answers. See host/docs/network.md. Needs the
+extra ``zenoh``.
 """
 
 from __future__ import annotations

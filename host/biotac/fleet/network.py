@@ -1,4 +1,4 @@
-"""Zenoh sessions, the keys that boards are shared under, and who is there."""
+"""Zenoh sessions, the keys under which boards are shared, and finding shared boards."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import json
 import os
 import re
 import struct
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,24 +15,24 @@ from ..errors import InputError, PortError, printable
 ROOT = "biotac"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 WRITER = re.compile(r"[^\s/*$?#]{1,200}")
-FIND_S = 1.0  # who does not tell of itself by then is not there
+FIND_S = 1.0  # a board that has not replied by then is not there
 
-LEASE_MS = 30_000  # a computer that says nothing for so long is gone; a program that ends is gone at once
+LEASE_MS = 30_000  # a computer that is silent this long counts as gone; a program that ends is gone at once
 
-INFO_BYTES = 4096  # of what a board tells of itself, which has these and more
+INFO_BYTES = 4096  # largest description of a board, which has at least the texts below
 TEXTS = ("name", "board", "serial_number", "firmware", "wire")
 
-#: Before each batch: its number, by which a reader knows what it missed.
+#: Precedes each batch: its number, which tells a reader how many it missed.
 NUMBER = struct.Struct("<Q")
 
 
 def key(name: str, what: str) -> str:
-    """``wire/EPOCH``, ``command``, ``claim``, ``info`` or a liveliness token's: ``live/EPOCH``, ``writer/ID``."""
+    """Key of a board's ``wire/EPOCH``, ``command``, ``claim`` or ``info``, or token ``live/EPOCH``, ``writer/ID``."""
     return f"{ROOT}/{name}/{what}"
 
 
 def checked_name(name: str) -> str:
-    """``name``, or InputError."""
+    """``name``. Raises InputError if it is not a valid name for a board."""
     if not NAME.fullmatch(name):
         raise InputError(f"{name!r} is no name for a board; expected up to 64 letters, digits, '_', '-' and '.'")
     return name
@@ -42,10 +41,11 @@ def checked_name(name: str) -> str:
 def open_session(
     where: str, *, connect: str | None = None, listen: str | None = None, config: str | os.PathLike[str] | None = None
 ) -> Any:
-    """A zenoh.Session. ``connect`` and ``listen`` are Zenoh's endpoints (tcp/HOST:7447), which end the looking around.
+    """A zenoh.Session. ``connect`` and ``listen`` are Zenoh endpoints (tcp/HOST:7447); either turns off discovery.
 
-    ``config`` is Zenoh's own file (users and passwords, TLS, access rules); without it the one that ZENOH_CONFIG names.
-    Raises InputError without Zenoh or for a bad file, PortError, beginning with ``where``, when nobody is reached.
+    ``config`` is a Zenoh configuration file (users and passwords, TLS, access rules); by default the one that
+    ZENOH_CONFIG names. Raises InputError if Zenoh is missing or the file is bad, and PortError, with a text that begins
+    with ``where``, if the network cannot be reached.
     """
     zenoh = _zenoh()
     try:
@@ -53,7 +53,7 @@ def open_session(
             facts = zenoh.Config.from_file(str(config))
         else:
             facts = zenoh.Config.from_env() if os.environ.get("ZENOH_CONFIG") else zenoh.Config()
-            # Who is stopped for a while (a debugger, a laptop's lid) goes on from there; Zenoh's own 10 s cut it off.
+            # So that a program stopped for a while (debugger, laptop lid) can go on; Zenoh's default 10 s is too short.
             facts.insert_json5("transport/link/tx/lease", str(LEASE_MS))
         for what, endpoint in (("connect", connect), ("listen", listen)):
             if endpoint is not None:
@@ -75,7 +75,7 @@ def open_session(
 
 
 def shared(session: Any, name: str = "*") -> list[dict[str, Any]]:
-    """What the boards of that name (by default all) tell of themselves, in the order of their names."""
+    """Descriptions of the boards shared under that name (by default all), sorted by name."""
     told = []
     for reply in session.get(key(name, "info"), target=_zenoh().QueryTarget.ALL, timeout=FIND_S):
         if reply.ok is not None:
@@ -86,7 +86,7 @@ def shared(session: Any, name: str = "*") -> list[dict[str, Any]]:
 
 
 def _facts(data: bytes) -> dict[str, Any] | None:
-    """What a board tells of itself; None for what something else says that has our key."""
+    """A board's description of itself; None if the reply is invalid, as from another program that uses our key."""
     try:
         facts = parse_json(data) if len(data) <= INFO_BYTES else None
     except ValueError:
@@ -101,22 +101,17 @@ def _facts(data: bytes) -> dict[str, Any] | None:
 
 
 def alive(session: Any, name: str) -> set[str]:
-    """Epochs under which a board of that name is shared: one, or none, or two that are called the same."""
+    """Epochs under which boards of that name are shared: normally one or none; two if two boards have the same name."""
     replies = session.liveliness().get(key(name, "live/*"), timeout=FIND_S)
     return {str(reply.ok.key_expr).rpartition("/")[2] for reply in replies if reply.ok is not None}
 
 
 def lives(session: Any, name: str, writer: str) -> bool:
-    """Whether somebody who calls himself ``writer`` is there, by his token."""
+    """True if a writer of that name is there, by its token."""
     if not WRITER.fullmatch(writer) or not writer.isprintable():
         return False
     replies = session.liveliness().get(key(name, f"writer/{writer}"), timeout=FIND_S)
     return any(reply.ok is not None for reply in replies)
-
-
-def found(facts: Mapping[str, Any]) -> str:
-    """The PORT of what ``shared`` lists."""
-    return f"zenoh:{facts['name']}"
 
 
 def _zenoh() -> Any:
@@ -130,5 +125,5 @@ def _zenoh() -> Any:
 
 
 def _short(error: Exception) -> str:
-    """Zenoh's words without the place in its source."""
+    """Zenoh's error text without the location in its source."""
     return str(error).partition("  at ")[0].strip().rstrip("!")

@@ -1,7 +1,7 @@
-"""Who may tell a shared board what: everybody reads, one writes.
+"""Who may send a shared board which commands: everybody may read, one may write.
 
-By the names in link.toml: GET_... and READ_... change nothing. START, STOP and PING are each reader's own affair, and
-never reach the board, which streams to all.
+Commands named GET_... and READ_... in link.toml change nothing. START, STOP and PING concern only the reader that sends
+them and never reach the board, which streams to all.
 """
 
 from __future__ import annotations
@@ -10,21 +10,15 @@ from typing import Any
 
 from ..wire import messages_gen as wire
 
-#: Answered for the reader alone, where the reader is.
+#: Answered locally, for the reader alone.
 OWN = frozenset({wire.Start.ID, wire.Stop.ID, wire.Ping.ID})
-#: Anybody's.
+#: Allowed to everybody.
 READS = frozenset({wire.HelloRequest.ID} | {m.ID for m in wire.ANSWERS if m.__name__.startswith(("Get", "Read"))})
-#: What comes as an answer to one who asked, and is not for the others.
+#: Answers to a request, which are not passed on to others.
 _ANSWERS: list[type[Any]] = [wire.Reply, *wire.ANSWERS.values()]
 ANSWERS = frozenset(m.ID for m in _ANSWERS)
 
 
 def needs_writer(message_id: int) -> bool:
-    """The command changes something, or nobody here knows what it does."""
+    """True if the command changes something, or is unknown."""
     return message_id not in OWN | READS
-
-
-def command_name(message_id: int) -> str:
-    """For messages."""
-    known = wire.MESSAGES.get(message_id)
-    return known.__name__ if known is not None else f"command 0x{message_id:02X}"

@@ -1,4 +1,4 @@
-"""A board of this computer for all on the network: the other end of ``zenoh:NAME``."""
+"""Sharing a board of this computer on the network: the other end of ``zenoh:NAME``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import struct
 import threading
 from contextlib import suppress
 from dataclasses import replace
-from types import TracebackType
 from typing import Any
 
 from ..errors import BiotacError, CommandRefusedError, PortError
@@ -20,25 +19,26 @@ from ..wire.framing import encode, open_frame
 from ..wire.identity import board_text, serial_text, version_text
 from . import network, rights
 
-PAUSE_S = 0.5  # of the stream, after a command that it was stopped for
+PAUSE_S = 0.5  # how long the stream stays stopped after a command that needed it stopped
 
 
 class Share:
-    """Shares ``hand`` as ``name`` on ``session`` until it is closed; use as a context manager. Both are the caller's.
+    """Shares ``hand`` as ``name`` on ``session`` until closed; use as a context manager.
 
-    The hand streams from then on, whoever listens. Raises PortError when the name is taken.
+    Does not close ``hand`` or ``session``. The hand streams from now on, whether or not anybody listens. Raises
+    PortError when the name is taken.
     """
 
     def __init__(self, hand: Hand, session: Any, name: str) -> None:
         self.name = network.checked_name(name)
         self.batches = 0  #: published so far
-        self.writer: str | None = None  #: who may command now
+        self.writer: str | None = None  #: who may send commands now
         self._hand, self._session = hand, session
-        self._board = hand._board  # its bytes, and commands of any kind
+        self._board = hand._board  # gives access to the raw bytes and to all commands
         self._secret = b""
         self._deciding = threading.Lock()
         self._commanding = threading.Lock()
-        self._publishing = threading.Lock()  # Zenoh's things are not to be given up while they are in use
+        self._publishing = threading.Lock()  # Zenoh objects must not be undeclared while in use
         self._paused: threading.Timer | None = None
         self._pauses = 0
         self._tail = b""
@@ -58,16 +58,16 @@ class Share:
         hand.run()
 
     def _new_epoch(self) -> tuple[Any, Any]:
-        """Its token, and the publisher for those who have seen it: no reader goes on as if the board were the same.
+        """A new epoch's token and publisher. Readers follow one epoch, so none goes on as if the board were unchanged.
 
-        A publisher drops for whoever is too slow, and goes on.
+        The publisher drops batches for readers that are too slow.
         """
         epoch = secrets.token_hex(8)
         wire = self._session.declare_publisher(network.key(self.name, f"wire/{epoch}"))
         return self._session.liveliness().declare_token(network.key(self.name, f"live/{epoch}")), wire
 
     def _came_back(self, gap: Gap) -> None:
-        """Its readers are to meet the board anew, which may have restarted."""
+        """Begin a new epoch, so that readers connect anew: the board may have restarted."""
         with self._publishing:
             before = self._epoch, self._wire
             self._epoch, self._wire = self._new_epoch()
@@ -77,13 +77,13 @@ class Share:
     # ---- what it sends -------------------------------------------------------------------------
 
     def _publish(self, chunk: bytes) -> None:
-        """Whole messages only: what is lost is lost whole. Answers to somebody's questions go to nobody else."""
+        """Publish whole messages only, so that no message is lost in part. Answers to requests are left out."""
         if not chunk:
             return
         data = self._tail + chunk
         end = data.rfind(b"\0") + 1
         data, self._tail = data[:end], data[end:]
-        # COBS: the second byte of what stands between two delimiters is the message's id, as no id is 0.
+        # COBS: the second byte after a delimiter is the message's id, as no id is 0.
         kept = [
             part for part in data.split(b"\0") if len(part) > 1 and not (part[1] in rights.ANSWERS and _asked(part))
         ]
@@ -109,11 +109,14 @@ class Share:
         query.reply(network.key(self.name, "info"), json.dumps(facts).encode())
 
     def _claim(self, query: Any) -> None:
-        """A claim is who (its token's name) and a secret that goes with its commands; the answer, who may command."""
+        """Answer a claim to write: its token's name and a secret that its commands will carry.
+
+        The answer is empty if the claim holds, otherwise who may send commands.
+        """
         who, _, secret = (query.payload.to_bytes() if query.payload else b"").partition(b"\0")
         name = who.decode(errors="replace")
         with self._deciding:
-            # Who has no token could never be seen to go, and nobody could command after him.
+            # Without a token, the writer could never be seen to leave, and nobody else could ever write.
             if self.writer is None and len(secret) >= 16 and network.lives(self._session, self.name, name):
                 self.writer, self._secret = name, secret
             mine = hmac.compare_digest(secret, self._secret)
@@ -127,7 +130,7 @@ class Share:
                 self.writer, self._secret = None, b""
 
     def _command(self, query: Any) -> None:
-        """Nothing is answered while the board is away, so that whoever asks looks for it again."""
+        """Answer a command. There is no answer while the board is away, so that the reader looks for it again."""
         frame = open_frame(query.payload.to_bytes()) if query.payload else None
         if frame is None:
             return
@@ -167,7 +170,7 @@ class Share:
         return encode(answer.ID, answer.pack())
 
     def _ask(self, request: Any, answers: type[Any]) -> Any:
-        """What a streaming board is too busy for (maps, saving) pauses the stream, for all, until a while after."""
+        """Ask the board; if it is too busy while streaming (maps, saving), pause the stream for all, for a while."""
         if self._paused is None:
             try:
                 return self._board.ask(request, answers)
@@ -188,13 +191,13 @@ class Share:
     def _go_on(self, pause: int) -> None:
         with self._commanding:
             if pause != self._pauses:
-                return  # another command has come in between
+                return  # another command came in between
             self._paused = None
-            with suppress(BiotacError):  # a board that is away is told when it is back
+            with suppress(BiotacError):  # a board that is away is started when it is back
                 self._hand.start()
 
     def close(self) -> None:
-        """Take it off the network. The hand goes on streaming. Safe to call twice."""
+        """Take the board off the network. The hand goes on streaming. Safe to call twice."""
         self._board.incoming.record = None
         if self._paused is not None:
             self._paused.cancel()
@@ -206,14 +209,12 @@ class Share:
     def __enter__(self) -> Share:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 
 def _asked(part: bytes) -> bool:
-    """Its request's number is not 0: somebody waits for it. Boards send STATUS by themselves, too."""
+    """True if the message answers a request (its req_id is not 0). Boards also send STATUS on their own."""
     frame = open_frame(part)
     if frame is None:
         return False

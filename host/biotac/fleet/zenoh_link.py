@@ -1,4 +1,4 @@
-"""``zenoh:NAME``: a board that another computer shares."""
+"""``zenoh:NAME``: a board shared by another computer."""
 
 from __future__ import annotations
 
@@ -10,66 +10,41 @@ import threading
 import time
 from collections import deque
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any
 
 from ..errors import CommandRefusedError, DeviceLostError, PortError
-from ..link.base import Played
+from ..link.base import Link
 from ..link.port_text import options_of
 from ..wire import messages_gen as wire
 from ..wire.framing import encode, open_frame
+from ..wire.identity import command_name
 from . import network, rights
 
 FORM = "zenoh:NAME?connect=tcp/HOST:7447&write=yes&config=FILE"
-MAX_WAITING_BYTES = 4 << 20  # of batches that nobody reads; about half a minute of five fingers
 REPLAYED, FOREIGN = 1 << 12, 1 << 32  # batches back, or ahead, of the one that is due
 ANSWER_S = 1.0
-# Whose connection was cut, or who was stopped for as long as Zenoh waits, finds the same board again by itself.
+# After a cut connection, or a stop shorter than Zenoh's lease, a reader finds the same board again by itself.
 GONE_S = 1.0
 
 
-@dataclass(frozen=True)
-class ZenohPort:
-    """A parsed ``zenoh:NAME?...``."""
+class ZenohLink(Link):
+    """A Link to a shared board: a reader, or with ``write=yes`` in the port its writer, one at a time.
 
-    name: str
-    connect: str | None
-    config: str | None
-    write: bool
-
-
-def parse_zenoh(port: str) -> ZenohPort:
-    """Raises PortError."""
-    name, options = options_of(port, ("connect", "config", "write"), FORM)
-    if not network.NAME.fullmatch(name) or options.get("write", "yes") not in ("yes", "no"):
-        raise PortError(f"{port}: expected {FORM}; `biotac list --zenoh` lists names")
-    return ZenohPort(name, options.get("connect"), options.get("config"), options.get("write") == "yes")
-
-
-def open_zenoh(port: str, pace: float) -> ZenohLink:
-    """Open a zenoh: port; its time is its own, whatever ``pace`` is. Raises PortError or InputError."""
-    return ZenohLink(port, parse_zenoh(port))
-
-
-class ZenohLink:
-    """A byte pipe to a shared board. A reader, unless its port says ``write=yes``, of which there is one at a time.
-
-    What would change the board raises CommandRefusedError for readers. ``batches_lost`` counts what this side was too
-    slow for: whole batches, which are also lost frames to whoever counts those.
+    For readers, commands that would change the board raise CommandRefusedError. ``batches_lost`` counts the whole
+    batches lost because this side was too slow; their frames also count as lost frames. Raises PortError or InputError.
     """
 
-    patience = 2.0  # its answers come through a second program
-    keeps_time = True
-    bits_per_s: int | None = None
+    patience = 2.0  # answers come through a second program
+    max_waiting_bytes = 4 << 20  # of unread batches; about half a minute of five fingers
 
-    def __init__(self, port: str, its: ZenohPort) -> None:
+    def __init__(self, port: str) -> None:
+        self._name, options = options_of(port, ("connect", "config", "write"), FORM)
+        if not network.NAME.fullmatch(self._name) or options.get("write", "yes") not in ("yes", "no"):
+            raise PortError(f"{port}: expected {FORM}; `biotac list --zenoh` lists names")
+        self._zenoh = {"connect": options.get("connect"), "config": options.get("config")}
+        self._write = options.get("write") == "yes"
         self.port = port
-        self.source: Played | None = None
-        self.ended = False
-        self.pace = 1.0
-        self.fd: int | None = None
         self.batches_lost = 0
-        self._its = its
         self._session: Any = None
         self._secret = b""
         self._came = threading.Condition()
@@ -86,21 +61,19 @@ class ZenohLink:
         return [self.port]
 
     def reopen(self, place: str) -> None:
-        """See Link.reopen."""
         self.close()
-        its = self._its
-        session = network.open_session(self.port, connect=its.connect, config=its.config)
+        session = network.open_session(self.port, **self._zenoh)
         try:
-            epochs = network.alive(session, its.name)
+            epochs = network.alive(session, self._name)
             if not epochs:
                 raise PortError(
-                    f"nobody shares a board as {its.name}; see `biotac list --zenoh`, start `biotac serve PORT --name "
-                    f"{its.name}`, or name its computer: {FORM}"
+                    f"nobody shares a board as {self._name}; see `biotac list --zenoh`, start `biotac serve PORT "
+                    f"--name {self._name}`, or name its computer: {FORM}"
                 )
             if len(epochs) > 1:
-                raise PortError(f"{len(epochs)} boards are shared as {its.name}; give them different names")
+                raise PortError(f"{len(epochs)} boards are shared as {self._name}; give them different names")
             self._listen(session, next(iter(epochs)))
-            if its.write:
+            if self._write:
                 self._claim(session)
         except BaseException:
             session.close()
@@ -119,19 +92,19 @@ class ZenohLink:
                     self._came.notify_all()
 
         tokens = session.liveliness()
-        # Zenoh ends what nobody holds.
+        # Zenoh undeclares objects that nothing refers to.
         self._declared = [
-            session.declare_subscriber(network.key(self._its.name, f"wire/{epoch}"), self._take),
-            tokens.declare_subscriber(network.key(self._its.name, "live/*"), came_or_went, history=True),
+            session.declare_subscriber(network.key(self._name, f"wire/{epoch}"), self._take),
+            tokens.declare_subscriber(network.key(self._name, "live/*"), came_or_went, history=True),
         ]
 
     def _claim(self, session: Any) -> None:
         who = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}".replace("/", "_")
         self._secret = secrets.token_bytes(32)
-        token = session.liveliness().declare_token(network.key(self._its.name, f"writer/{who}"))
+        token = session.liveliness().declare_token(network.key(self._name, f"writer/{who}"))
         self._declared.append(token)
         replies = session.get(
-            network.key(self._its.name, "claim"), payload=who.encode() + b"\0" + self._secret, timeout=ANSWER_S
+            network.key(self._name, "claim"), payload=who.encode() + b"\0" + self._secret, timeout=ANSWER_S
         )
         answer = next((reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None), None)
         if answer != b"":
@@ -148,7 +121,7 @@ class ZenohLink:
         with self._came:
             ahead = 0 if self._next is None else number - self._next
             if -REPLAYED <= ahead < 0 or ahead >= FOREIGN:
-                return  # it was here, or is nobody's who counts batches
+                return  # a repeated batch, or not from a board of ours
             if self._started:
                 self.batches_lost += max(0, ahead)
             self._next = number + 1
@@ -157,16 +130,15 @@ class ZenohLink:
             self._put(data[network.NUMBER.size :])
 
     def _put(self, data: bytes) -> None:
-        """With ``_came`` held."""
+        """Queue ``data``; call with ``_came`` held."""
         self._batches.append(data)
         self._waiting += len(data)
-        while self._waiting > MAX_WAITING_BYTES:
+        while self._waiting > self.max_waiting_bytes:
             self._waiting -= len(self._batches.popleft())
             self.batches_lost += 1
         self._came.notify_all()
 
     def read(self, timeout_s: float) -> bytes:
-        """See Link.read."""
         with self._came:
             if not self._batches:
                 self._came.wait_for(lambda: self._batches, timeout_s)
@@ -180,7 +152,7 @@ class ZenohLink:
             return data
 
     def write(self, data: bytes) -> None:
-        """See Link.write. Waits for the answer, which ``read`` gives."""
+        """Send commands and wait for their answers, which ``read`` returns."""
         for part in data.split(b"\0"):
             frame = open_frame(part) if part else None
             if frame is not None:
@@ -196,34 +168,30 @@ class ZenohLink:
                     self._started = message_id == wire.Start.ID
                 self._put(encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.OK).pack()))
             return
-        if rights.needs_writer(message_id) and not self._its.write:
+        if rights.needs_writer(message_id) and not self._write:
             raise CommandRefusedError(
-                f"{self.port} is for reading: {rights.command_name(message_id)} changes the board; open it with "
+                f"{self.port} is for reading: {command_name(message_id)} changes the board; open it with "
                 f"{'&' if '?' in self.port else '?'}write=yes, which one program may at a time",
                 wire.Error.NOT_HERE,
             )
         replies = session.get(
-            network.key(self._its.name, "command"), payload=part, attachment=self._secret, timeout=ANSWER_S
+            network.key(self._name, "command"), payload=part, attachment=self._secret, timeout=ANSWER_S
         )
         for reply in replies:
             if reply.ok is not None:
                 with self._came:
                     self._put(reply.ok.payload.to_bytes())
 
-    def release(self) -> None:
-        """A shared board's time always runs."""
-
     def abandon(self) -> None:
-        """See Link.abandon: a child has none of the threads, and so nothing that it could disturb."""
+        """Drop the session in a forked child: it has none of the threads, so nothing needs closing."""
         self._session = None
         self._declared = []
 
     def close(self) -> None:
-        """See Link.close."""
         session, self._session = self._session, None
         declared, self._declared = self._declared, []
         if session is not None:
             for its in declared:
-                with suppress(Exception):  # a network that is gone is no obstacle to leaving it
+                with suppress(Exception):  # the network may be gone already
                     its.undeclare()
             session.close()

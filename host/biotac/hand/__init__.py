@@ -1,1 +1,1 @@
-"""A board and its fingers: commands, streams, reconnection, and what a program sees of them."""
+"""A board and its fingers: commands, streams, reconnection, and the Hand that programs use."""

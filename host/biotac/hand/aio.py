@@ -1,6 +1,6 @@
 """The live API for asyncio: ``async with biotac.aio.open(port) as hand: async for batch in hand.batches(): ...``
 
-A Hand's own threads read (reader.py) and wake the event loop; nothing here blocks it.
+The Hand's own threads read (reader.py) and wake the event loop; nothing here blocks the loop.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class AsyncHand:
         try:
             await asyncio.to_thread(open_it)
         except asyncio.CancelledError:
-            # The other thread cannot be interrupted; what it opens yet is nobody's.
+            # The other thread cannot be interrupted; a hand that it still opens has no user and is closed.
             with taking:
                 given_up, hand, self._hand = True, self._hand, None
             if hand is not None:
@@ -63,7 +63,7 @@ class AsyncHand:
 
     @property
     def hand(self) -> Hand:
-        """The Hand itself, whose commands block: see ``ask``."""
+        """The Hand itself. Its commands block: see ``ask``. Raises DeviceLostError before ``async with``."""
         if self._hand is None:
             raise DeviceLostError("this hand is not open yet; use `async with biotac.aio.open(port) as hand:`")
         return self._hand
@@ -78,14 +78,14 @@ class AsyncHand:
         return self.hand[finger]
 
     async def ask(self, command: Callable[[Hand], Answer]) -> Answer:
-        """Give a command in another thread: ``await hand.ask(lambda h: h.status())``."""
+        """Run a command in another thread: ``await hand.ask(lambda h: h.status())``."""
         return await asyncio.to_thread(command, self.hand)
 
     async def batches(self) -> AsyncIterator[Batch]:
-        """Batches as they arrive, starting the stream if need be; each iteration has its own, from its start on.
+        """Batches as they arrive, starting the stream if need be. Each iteration gets all batches from its start on.
 
-        Ends with a simulated source, and when the stream is stopped. A loop that is slow loses the oldest, which
-        ``stats.batches_skipped`` counts; with a simulated board that is not paced, its time waits instead.
+        Ends when a simulated source ends, and when the stream is stopped. A slow loop loses the oldest batches, which
+        ``stats.batches_skipped`` counts; a simulated board that is not paced waits instead.
         """
         hand = self.hand
         streams = hand._streams
@@ -93,7 +93,7 @@ class AsyncHand:
         news = asyncio.Event()
 
         def wake() -> None:
-            # The loop may be closed already while the reader ends.
+            # The loop may already be closed while the reading threads are ending.
             with suppress(RuntimeError):
                 loop.call_soon_threadsafe(news.set)
 
@@ -103,7 +103,7 @@ class AsyncHand:
                 await asyncio.to_thread(hand.run)
             while True:
                 news.clear()
-                ended = hand.ended or not hand.streaming  # before looking: what came until then is in the queue
+                ended = hand.ended or not hand.streaming  # before the queue is emptied, so that nothing is left in it
                 while (batch := queue.take()) is not None:
                     yield batch
                 hand.check()
@@ -127,5 +127,5 @@ def open(
     reconnect: bool = False,
     fingers: Mapping[str, int] | None = None,
 ) -> AsyncHand:
-    """See biotac.open; the board is opened by ``async with``."""
+    """Like biotac.open; the board is opened by ``async with``."""
     return AsyncHand(lambda: open_hand(port, pace=pace, reconnect=reconnect, fingers=fingers))

@@ -1,4 +1,4 @@
-"""What of a stream fits through a UART: the bytes of its messages against the bits that the line carries."""
+"""How much of a stream fits through a UART: the bytes of its messages against the bit rate of the line."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ _OF_A_ROUND: dict[wire.StreamFlags, Any] = {
 
 
 def bits_per_s(streams: int, fingers: int) -> int:
-    """What ``streams`` of so many fingers take while all of them are touched, without what comes now and then."""
+    """The bit rate of ``streams`` for so many fingers, all touched; without messages that come only now and then."""
     a_round = sum(_bytes(message) for stream, message in _OF_A_ROUND.items() if streams & stream)
     a_second = _bytes(wire.Status) + fingers * _bytes(wire.SensorStatus) if streams & wire.StreamFlags.STATUS else 0
     return BITS_PER_BYTE * (round(FRAME_HZ * fingers * a_round) + a_second)
 
 
 def most_fingers(streams: int, line_bits_per_s: int) -> int:
-    """How many fingers' ``streams`` fit, 0 to 5."""
+    """How many fingers' ``streams`` fit the line, 0 to 5."""
     return max(n for n in range(MAX_SENSORS + 1) if n == 0 or bits_per_s(streams, n) <= line_bits_per_s)
 
 
 def check(port: str, line_bits_per_s: int, streams: int, fingers: int) -> None:
-    """Raise InputError when ``streams`` of so many fingers are more than the line carries."""
+    """Raise InputError when ``streams`` of so many fingers exceed what the line carries."""
     needed = bits_per_s(streams, fingers)
     if needed <= line_bits_per_s:
         return

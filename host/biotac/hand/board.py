@@ -1,4 +1,4 @@
-"""One board on a link: who reads it, who waits, and commands that are given until they are answered."""
+"""One board on a link: who reads it, who waits, and commands that are repeated until they are answered."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from .incoming import Incoming
 
 REPLY_TIMEOUT_S = 1.0
 REPLY_TRIES = 3
-#: What a board says to what only the other side knows.
+#: The errors with which a board refuses what only the other side knows.
 NOT_KNOWN = (wire.Error.UNKNOWN_COMMAND, wire.Error.UNKNOWN_SETTING, wire.Error.BAD_LENGTH)
-# How long a link is waited for at most before other things are looked at, such as whether all is to end.
+# The longest wait for a link before other conditions are checked, such as closing.
 POLL_S = 0.2
 
 Got = TypeVar("Got")
@@ -38,88 +38,84 @@ Reply = TypeVar("Reply")
 class Board:
     """The board that answers on ``link``, which is closed when the handshake fails.
 
-    Alone it reads when it waits for a reply. Others take a part by the callables below, set before anything is read.
+    By itself it reads only while it waits for a reply. Other parts hook in through the callables below, which are to be
+    set before anything is read.
     """
 
     def __init__(self, link: Link, *, host_clock: HostClock | None = None) -> None:
         self.link = link
         self.host_clock = host_clock or SystemClock()
-        #: Takes every batch that has something, on the thread that reads.
+        #: Called with every batch that is not empty, on the thread that reads.
         self.deliver: Callable[[Batch], object] = lambda batch: None
-        #: The link is gone: raises, or returns once the board is back as it was.
+        #: Called when the link is lost: raises, or returns once the board is back as it was.
         self.lost: Callable[[DeviceLostError, Reason], None] = self._lost
-        #: Whether the caller's thread reads the link; others wait for what it reads.
+        #: Whether the caller's thread reads the link; other threads wait for what it reads.
         self.is_read_here: Callable[[], bool] = lambda: True
-        self.is_pulled = True  #: no thread reads by itself
-        self.connected = True  #: it can be talked to; false while it is looked for
-        self.closing = threading.Event()  #: set when everything is to come to its end
+        self.is_pulled = True  #: no reading threads: whoever waits reads
+        self.connected = True  #: the board can be reached; false while it is looked for, lost or closed
+        self.closing = threading.Event()  #: set when everything is to end
         self.closed = False
-        self._failure: BaseException | None = None
-        self._told = False
-        self.awaiting = 0  #: replies
+        self.failure: BaseException | None = None  #: the error that ended all reading for good
+        self._told = False  # the failure was raised to a caller
+        self.awaiting = 0  #: how many replies are waited for
         self._replies: deque[Any] = deque()
         self._lasting: dict[tuple[str, int], Callable[[], object]] = {}
         self._req_ids = cycle(range(1, 256))
-        self._reading = threading.RLock()  # whose holder reads the link
+        self._reading = threading.RLock()  # its holder reads the link
         self._writing = threading.Lock()
         self._asking = threading.RLock()  # one command at a time
         self._changed = threading.Condition()
-        self._waiters = 0  # for _changed
+        self._waiters = 0  # how many threads wait for _changed
         try:
             self.info = self.handshake()
         except BaseException:
             link.close()
             raise
-        #: What it says, once it said hello.
+        #: Everything it sends after its HELLO.
         self.incoming = Incoming(link, self.info, self._arrived)
 
     def handshake(self) -> wire.Hello:
-        """See handshake.py."""
+        """The board's HELLO; see handshake.py."""
         return handshake(self.link, self.send, timeout_s=self._patience_s())
 
     def _patience_s(self) -> float:
-        """How long a reply may take."""
+        """How long one reply may take, s."""
         return REPLY_TIMEOUT_S * self.link.patience
 
     def _lost(self, error: DeviceLostError, reason: Reason) -> None:
         self.fail(error)
-        self._told = self.is_pulled  # else it is a thread of ours that is told
+        self._told = self.is_pulled  # otherwise it is raised in one of our own threads
         raise error
 
-    @property
-    def failure(self) -> BaseException | None:
-        """What has ended all reading for good."""
-        return self._failure
-
     def fail(self, error: BaseException) -> None:
-        """It is over: every call from now on raises ``error``, the first of several."""
-        self._failure = self._failure or error
+        """End everything with ``error``: every call from now on raises it. The first of several errors counts."""
+        self.failure = self.failure or error
         self.connected = False
         self.notify()
 
     def check(self) -> None:
-        """Raise what it has failed of, if it has."""
-        if self._failure is not None:
+        """Raise the failure, if there is one."""
+        if self.failure is not None:
             self._told = True
-            raise self._failure
+            raise self.failure
 
     def report(self) -> None:
-        """The same, unless somebody was told already."""
+        """Raise the failure, if there is one that has not been raised to a caller before."""
         if not self._told:
             self.check()
 
     def is_away(self) -> bool:
-        """It is being looked for; raises what it has failed of."""
+        """Whether the board is being looked for. Raises the failure, if there is one."""
         self.check()
         return not (self.connected or self.closed)
 
     def is_closed(self) -> NoReturn:
-        """Raise that, or what it has failed of."""
+        """Raise the failure, or else DeviceLostError saying that the hand was closed."""
         self.check()
         raise DeviceLostError(f"this Hand on {self.link.port} was closed; open the port again")
 
     def close(self) -> None:
-        """Give the port back, once nobody reads it any more."""
+        """Give the port back as soon as no thread reads or writes it."""
         self.closing.set()
         with self._reading, self._writing:
             self.closed = True
@@ -127,13 +123,13 @@ class Board:
             self.link.close()
 
     def forked(self) -> None:
-        """This process is a child of the one that opened the board, which alone may use it."""
-        # Whoever held these locks is in the other process.
+        """Let go of the board in a forked child: only the process that opened it may use it."""
+        # The holders of these locks are threads of the parent process.
         self._reading, self._writing, self._asking = threading.RLock(), threading.Lock(), threading.RLock()
         self._changed, self.closing = threading.Condition(), threading.Event()
         self.closing.set()
         self.closed, self.connected, self.incoming.record = True, False, None
-        self._failure = DeviceLostError(
+        self.failure = DeviceLostError(
             f"this Hand on {self.link.port} belongs to the process that opened it, not to a fork of it; open boards "
             "in the process that reads them"
         )
@@ -142,7 +138,7 @@ class Board:
     # ---- reading -------------------------------------------------------------------------------
 
     def read(self, timeout_s: float) -> bool:
-        """Read once; False when nothing came within timeout_s. Raises what ``lost`` raises."""
+        """Read once; false when nothing came within timeout_s. Raises what ``lost`` raises."""
         with self._reading:
             if self.closed:
                 self.is_closed()
@@ -160,19 +156,19 @@ class Board:
         if self.awaiting:
             self._replies.extend(batch.messages)
         self.deliver(batch)
-        # Without a lock where nobody waits: whoever comes to wait after this looks first.
+        # No lock is needed when nobody waits: a thread that waits after this checks its condition first.
         if self._waiters:
             self.notify()
 
     # ---- waiting -------------------------------------------------------------------------------
 
     def notify(self) -> None:
-        """Whoever waits is to look again."""
+        """Wake everyone in ``wait_for``, to check again."""
         with self._changed:
             self._changed.notify_all()
 
     def wait_for(self, so: Callable[[], Any], timeout_s: float | None = None) -> bool:
-        """Until ``so``, as a reading thread makes it; false after timeout_s without it."""
+        """Wait until ``so`` is true, by what another thread reads; false when it is not within timeout_s."""
         with self._changed:
             self._waiters += 1
             try:
@@ -181,12 +177,12 @@ class Board:
                 self._waiters -= 1
 
     def _until(self, done: Callable[[], Got | None], deadline_s: float) -> Got | None:
-        """Read, or wait for whoever reads, until ``done`` gives something; None after deadline_s without it."""
+        """Read, or wait for the thread that reads, until ``done`` returns something; None at deadline_s."""
         if self.is_read_here():
             left_s = 1.0
             while (got := done()) is None and left_s > 0:
                 left_s = deadline_s - time.monotonic()
-                # Once more when time is over: it may be this side that was late.
+                # Once more when the time is over: this side may have been late.
                 self._read_or_wait(max(0.0, min(left_s, POLL_S)))
             return got
         found: list[Got] = []
@@ -203,7 +199,7 @@ class Board:
         return found[0] if found else None
 
     def _read_or_wait(self, timeout_s: float) -> None:
-        """Read, or while another thread does wait for what it reads."""
+        """Read; while another thread reads, wait for what it gets."""
         if not self._reading.acquire(blocking=False):
             self.wait_for(lambda: self._replies, timeout_s)
             return
@@ -215,11 +211,11 @@ class Board:
     # ---- commands ------------------------------------------------------------------------------
 
     def send(self, request: Any) -> None:
-        """Send a command and wait for nothing; whatever ``req_id`` it has, it gets the next."""
+        """Send a command without waiting for a reply. Its ``req_id`` is replaced by the next one."""
         self._write(replace(request, req_id=next(self._req_ids)))
 
     def ask_time(self) -> None:
-        """Ask what time it is, and go on: the answer goes to the clock, and nowhere else."""
+        """Ask for the board's time without waiting: the answer goes to the clock and nowhere else."""
         req_id = next(self._req_ids)
         self.incoming.time_asked(req_id)
         self._write(wire.GetStatus(req_id))
@@ -238,7 +234,7 @@ class Board:
             self.link.write(encode(message.ID, payload))
 
     def next_message(self, wanted: Callable[[Any], bool], deadline_s: float) -> Any:
-        """The first message to come that passes ``wanted``; None after deadline_s without it."""
+        """The first message to arrive that passes ``wanted``; None if there is none until deadline_s."""
 
         def found() -> Any:
             while self._replies:
@@ -255,7 +251,7 @@ class Board:
 
     @contextmanager
     def _turn(self) -> Iterator[None]:
-        """One command at a time. A thread that reads for all goes on until its turn: another waits for a reply."""
+        """One command at a time. A reading thread keeps reading until its turn, as another thread awaits a reply."""
         while not self._asking.acquire(blocking=self.is_pulled or not self.is_read_here()):
             self.read(POLL_S)
         try:
@@ -264,21 +260,22 @@ class Board:
             self._asking.release()
 
     def ask(self, request: Any, reply: type[Reply]) -> Reply:
-        """Send a command, whatever its ``req_id`` with the next, until it is answered, and return its reply.
+        """Send a command, up to REPLY_TRIES times until it is answered, and return its reply.
 
-        CommandRefusedError when the board says no; DeviceLostError when it says nothing, or is away.
+        Its ``req_id`` is replaced by the next one. Raises CommandRefusedError when the board refuses; DeviceLostError
+        when it does not answer, or is away.
         """
 
         def answers(m: Any) -> bool:
             if isinstance(m, wire.Reply) and (m.req_id, m.command) == (0, request.ID):
-                return True  # of another length than the board knows, so that it read no number in it
+                return True  # the command had a length that the board does not know, so it read no req_id
             return isinstance(m, (reply, wire.Reply)) and bool(getattr(m, "req_id", 0) == request.req_id)
 
         self.check()
         with self._turn():
             request = replace(request, req_id=next(self._req_ids))
             self._replies.clear()
-            # Of several tries the first one's time holds: whichever was answered had left by then, or later.
+            # The time of the first try counts: whichever try was answered was sent then or later.
             sent_s = time.monotonic()
             self.awaiting += 1
             try:
@@ -302,29 +299,29 @@ class Board:
         )
 
     def tell(self, request: Any, *, lasting: tuple[str, int] | None = None) -> None:
-        """Give a command whose reply says no more than that it was obeyed; ``lasting``: see remember."""
+        """Send a command whose reply only confirms it; with ``lasting`` it is remembered, see ``remember``."""
         answers = wire.ANSWERS[type(request)]
         self.ask(request, answers)
         if lasting is not None:
             self.remember(lasting, lambda: self.ask(request, answers))
 
     def remember(self, what: tuple[str, int], again: Callable[[], object]) -> None:
-        """A board that lost it is told ``what`` (kind, number) by ``again``, in the order in which it was told last."""
+        """Remember to tell a board that restarted ``what`` (kind, number) again, by ``again``; the latest goes last."""
         with self._turn():
             self._lasting.pop(what, None)
             self._lasting[what] = again
 
     def tell_again(self) -> None:
-        """All that lasts until the board restarts: settings, calibrations, maps and subscriptions.
+        """Repeat everything that lasts until the board restarts: settings, calibrations, maps and subscriptions.
 
-        Not tares: after a restart the board takes its own, and a former one may be wrong by then.
+        Not tares: after a restart the board takes its own, and an earlier one may be wrong by then.
         """
         for again in list(self._lasting.values()):
             again()
 
 
 def describe_refusal(request: Any, reply: wire.Reply, board: wire.Hello) -> str:
-    """One line naming the command and the board's reason; where their versions may be it, also those and the cure."""
+    """One line with the command and the board's reason; if the versions may be the cause, also those and the cure."""
     name = wire.Error(reply.error).name if reply.error in list(wire.Error) else f"error {reply.error}"
     text = f"the board refused {type(request).__name__}: {name} ({wire.ERROR_DOC.get(reply.error, 'unknown')})"
     if reply.error in NOT_KNOWN and (board.wire_major, board.wire_minor) != (wire.WIRE_MAJOR, wire.WIRE_MINOR):

@@ -1,4 +1,4 @@
-"""Functions that are called with what arrives, and what they raised."""
+"""Functions that are called with what arrives, and the errors they raised."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ Unsubscribe = Callable[[], None]
 
 
 class Callbacks:
-    """Who wants what, and the batches that wait for them.
+    """The callbacks, and the batches that wait for them.
 
-    What a callback raises is kept for ``report``: the first error, and how many more there were. It stays
-    subscribed, and so do the others.
+    What callbacks raise is kept for ``report``: the first error, and how many more there were. A callback that raised
+    stays subscribed.
     """
 
     def __init__(self) -> None:
         self.queue = BatchQueue()
         self.thread_id = 0  #: the thread that calls ``dispatch``, by threading.get_ident()
-        self._next: Batch | None = None  # before all that waits in the queue
+        self._next: Batch | None = None  # comes before everything in the queue
         self._lock = threading.Lock()
         self._wanted: list[tuple[type[Any], Callable[[Any], Any]]] = []  # replaced, never changed
         self._error: BaseException | None = None
@@ -31,7 +31,7 @@ class Callbacks:
         self._more = 0
 
     def add(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
-        """Call ``fn`` with every message of a kind, or with every Batch; returns what ends that."""
+        """Call ``fn`` with every message of a kind, or with every Batch; returns a function that ends this."""
         entry = (kind, fn)
 
         def unsubscribe() -> None:
@@ -43,20 +43,20 @@ class Callbacks:
         return unsubscribe
 
     def wants(self, kind: type[Any]) -> bool:
-        """Somebody is called with such messages."""
+        """Whether a callback wants such messages."""
         return any(one is kind for one, _ in self._wanted)
 
     def put(self, batch: Batch) -> None:
-        """It has arrived."""
+        """Take a batch that has arrived, for ``dispatch``."""
         if not self._wanted:
             return
         if self._next is None and not self.queue.rows and self.thread_id == threading.get_ident():
-            self._next = batch  # it is this thread's turn to hand it out, as the next thing it does
+            self._next = batch  # this thread dispatches it next
         else:
             self.queue.put(batch)
 
     def dispatch(self) -> bool:
-        """Call with the oldest batch all who want it or its messages; False when none waits."""
+        """Call every callback that wants the oldest batch or its messages; false when no batch waits."""
         batch = self._next
         if batch is not None:
             self._next = None
@@ -73,7 +73,7 @@ class Callbacks:
         return True
 
     def leave(self) -> None:
-        """What waits is handed out to nobody any more."""
+        """Discard what waits and count it as skipped."""
         if self._next is not None:
             self.queue.put_back(self._next)
             self._next = None
@@ -87,7 +87,7 @@ class Callbacks:
                 self._more += 1
 
     def report(self) -> None:
-        """Raise CallbackError once for what callbacks have raised since the last report."""
+        """Raise CallbackError for what callbacks have raised since the last report, if anything."""
         if self._error is None:
             return
         with self._lock:

@@ -1,4 +1,4 @@
-"""What a board can be asked and told, a method each; what it streams is streams.py's."""
+"""The commands of a board, one method each; streaming is in streams.py."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ ALL_FINGERS = (1 << MAX_SENSORS) - 1
 
 
 class Commands:
-    """Each raises CommandRefusedError with the board's reason, or DeviceLostError.
+    """Each command raises CommandRefusedError with the board's reason, or DeviceLostError.
 
-    A finger is a name or a chip select; KeyError for a name that there is not.
+    A finger is a name or a chip select; an unknown name raises KeyError.
     """
 
     def __init__(self, board: Board, names: Mapping[str, int] = DEFAULT_NAMES) -> None:
@@ -45,33 +45,34 @@ class Commands:
         self._names = names
 
     def _index(self, finger: Finger) -> int:
-        # Of numbers the board knows best which there are.
+        # Numbers are not checked here: the board knows which ones there are.
         return finger_index(self._names, finger) if isinstance(finger, str) else index(finger)
 
     def ping(self) -> None:
-        """Wait for the board; everything it sent before has arrived afterwards."""
+        """Wait for the board; when this returns, everything it sent before its reply has arrived."""
         self._board.tell(wire.Ping(0))
 
     def status(self) -> wire.Status:
-        """Counters of the board and its link. Its time of answering also feeds ``clock``."""
+        """Counters of the board and its link. The round trip also feeds ``clock``."""
         return self._board.ask(wire.GetStatus(0), wire.Status)
 
     def faults(self) -> Faults:
-        """What went wrong on the board since ``clear_faults`` or its start, whoever read it meanwhile.
+        """What went wrong on the board since ``clear_faults`` or its start, even if only for one round.
 
-        Be it for one round: the board keeps it. Raises WireVersionError for firmware that keeps no faults.
+        The board keeps faults until they are cleared; reading does not clear them. Raises WireVersionError for
+        firmware that does not keep faults.
         """
         need(self._board.info, FAULTS_SINCE_MINOR, "a summary of faults")
         return faults_of(self.status(), self._names)
 
     def clear_faults(self) -> Faults:
-        """The same, and have the board forget these; what comes meanwhile stays for the next call."""
+        """Like ``faults``, and clears those on the board. A fault that is new meanwhile stays for the next call."""
         told = self.faults()
         self._board.tell(wire.ClearFaults(0, int(told.board), told.by_index))
         return told
 
     def sync(self, round_trips: int = 5) -> None:
-        """Ask for the board's time: ``clock`` gets its bound from round trips, and the drift from later ones."""
+        """Feed ``clock`` with round trips: they give it the bound on its error, and later ones the drift."""
         for _ in range(round_trips):
             self.status()
 
@@ -80,24 +81,24 @@ class Commands:
         return self._board.ask(wire.GetSensorStatus(0, self._index(finger)), wire.SensorStatus)
 
     def sensor_info(self, finger: Finger) -> wire.SensorInfo:
-        """What the sensor says of itself."""
+        """What the sensor says about itself."""
         return self._board.ask(wire.GetSensorInfo(0, self._index(finger)), wire.SensorInfo)
 
     def point(self, finger: Finger) -> wire.Point:
         """Where ``finger`` is touched right now (``poc_um``), without waiting for the end of a round.
 
-        INVALID_I16 throughout without a touch or a tare. CommandRefusedError when no sensor answers there.
+        All INVALID_I16 without a touch or a tare. Raises CommandRefusedError when no sensor answers there.
         """
         return self._board.ask(wire.GetPoint(0, self._index(finger)), wire.Point)
 
     def tare(self, finger: Finger) -> None:
-        """Tare now; CommandRefusedError while the signals move."""
+        """Tare now. Raises CommandRefusedError while the signals move."""
         self._board.tell(wire.TareNow(0, self._index(finger)))
 
     def set_tare(self, finger: Finger, tare_counts: Any, pdc_counts: float | None = None) -> None:
-        """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, kept to 1/16 count.
+        """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, rounded to 1/16 count; ``pdc_counts`` likewise.
 
-        Raises ValueError for another shape or range.
+        Raises ValueError when ``tare_counts`` has another shape or range.
         """
         tare = np.asarray(tare_counts, dtype=np.float64)
         if tare.shape != (19,) or not np.all((tare >= 0) & (tare <= 4095)):
@@ -107,26 +108,26 @@ class Commands:
         self._board.tell(wire.TareSet(0, self._index(finger), tare_q4, pdc_q4))
 
     def hold(self, *fingers: Finger) -> None:
-        """These fingers (names or chip selects; none: all) hold something: no new tare until ``release``.
+        """Say that these fingers (names or chip selects; none: all) hold something: no new tare until ``release``.
 
-        The board forgets it when it has heard nothing for ``hold_timeout_ms`` (2 s by default): a Hand with
-        callbacks speaks by itself; one that is pulled calls this again, or ``ping``. Raises KeyError for a finger
-        that there is not, WireVersionError for a board whose firmware knows of no holds.
+        The hold lapses when the board has heard nothing for ``hold_timeout_ms`` (2 s by default). A streaming Hand with
+        callbacks or ``run`` pings by itself; with pull alone, call this again, or ``ping``. Raises KeyError for an
+        unknown finger, WireVersionError for firmware without HOLD.
         """
         self._board.tell(wire.Hold(0, self._mask(fingers)))
 
     def release(self, *fingers: Finger) -> None:
-        """These fingers hold nothing any more: what a press left in the skin is tared without doubt. See ``hold``."""
+        """Say that these fingers hold nothing any more, so that a press's residue is tared. See ``hold``."""
         self._board.tell(wire.Release(0, self._mask(fingers)))
 
     @contextmanager
     def grasp(self, *fingers: Finger) -> Iterator[None]:
-        """``with hand.grasp("thumb", "index"):`` is ``hold`` and, however it ends, ``release``."""
+        """``with hand.grasp("thumb", "index"):`` calls ``hold`` and, however the block ends, ``release``."""
         self.hold(*fingers)
         try:
             yield
         finally:
-            with suppress(DeviceLostError):  # it is not there to be told; its hold lapses
+            with suppress(DeviceLostError):  # the board cannot be told; its hold lapses
                 self.release(*fingers)
 
     def _mask(self, fingers: tuple[Finger, ...]) -> int:
@@ -136,7 +137,7 @@ class Commands:
         return sum({1 << finger_index(self._names, finger) for finger in fingers})
 
     def setting(self, setting: wire.Setting | int) -> int:
-        """Value of a setting, in its own unit (see wire.SETTINGS)."""
+        """The value of a setting, in the unit that wire.SETTINGS names."""
         return self._board.ask(wire.GetSetting(0, setting), wire.SettingValue).value
 
     def set_setting(self, setting: wire.Setting | int, value: int) -> None:
@@ -144,18 +145,18 @@ class Commands:
         self._board.tell(wire.SetSetting(0, setting, value), lasting=("setting", int(setting)))
 
     def save_settings(self) -> None:
-        """Keep the settings, calibrations and maps in force over reboots.
+        """Save the settings, calibrations and maps in force, so that they survive reboots.
 
         Not while streaming: the board loses slots meanwhile.
         """
         self._board.tell(wire.SaveSettings(0))
 
     def reboot_bootloader(self) -> None:
-        """Send the board into its loader; it goes away and comes back as a drive."""
+        """Send the board to its bootloader; it disconnects and comes back as a drive."""
         self._board.tell(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
 
     def settings(self) -> dict[wire.Setting, int]:
-        """All settings; of one that the board's firmware does not have yet, what it does."""
+        """All settings. For one that the board's firmware does not have yet, the value that matches what it does."""
         return {setting: self._known_setting(setting) for setting in wire.Setting}
 
     def _known_setting(self, setting: wire.Setting) -> int:
@@ -169,20 +170,20 @@ class Commands:
     # ---- calibrations --------------------------------------------------------------------------
 
     def calibration(self, finger: Finger) -> Calibration | None:
-        """The finger's own values in place of the settings, None without; see calibration_state."""
+        """The finger's calibration, its own values in place of the settings; None without. See calibration_state."""
         told = self._calibration(finger)
         return None if told.state == wire.CalibrationState.NONE else _known(told)
 
     def calibration_state(self, finger: Finger) -> wire.CalibrationState:
-        """Whether the finger's results come from its calibration, or the sensor is another than its own."""
+        """Whether the finger has a calibration, and whether it is in force or belongs to another sensor."""
         return wire.CalibrationState(self._calibration(finger).state)
 
     def set_calibration(self, finger: Finger, calibration: Calibration) -> None:
-        """Give a finger values of its own until the next reboot, or for good with save_settings.
+        """Give a finger a calibration until the next reboot, or for good with save_settings.
 
-        Refused while streaming, and for another sensor's serial number than the one that answered there when
-        the board started; ``serial=""`` is for any. Raises WireVersionError for a pressure gain on a board whose
-        firmware knows of none.
+        Refused while streaming, and when its serial number is not that of the sensor that answered there when the
+        board started; ``serial=""`` fits any. Raises WireVersionError for a pressure gain on a board whose firmware
+        has none.
         """
         its = calibration
         if its.pressure_gain_nn:
@@ -197,36 +198,36 @@ class Commands:
         self._board.tell(wire.ClearCalibration(0, number), lasting=("calibration", number))
 
     def calibrations(self) -> dict[int, Calibration]:
-        """The calibrations in force, by finger; none on a board whose firmware knows of none."""
+        """The calibrations in force, by finger; empty for firmware without calibrations."""
         if self._board.info.wire_minor < CALIBRATION_SINCE_MINOR:
             return {}
         told = [self._calibration(finger) for finger in range(MAX_SENSORS)]
         return {m.finger: _known(m) for m in told if m.state == wire.CalibrationState.IN_FORCE}
 
     def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
-        """All settings that a finger's results come from, for the fingers with a calibration in force."""
+        """All settings that a finger's results are computed with, for the fingers with a calibration in force."""
         return own_settings(self.settings(), self.calibrations())
 
     # ---- wrench maps ---------------------------------------------------------------------------
 
     def get_map(self, finger: Finger) -> bytes | None:
-        """The finger's wrench map as the board holds it, None without; see map_state.
+        """The finger's wrench map as the board stores it, None without; see map_state.
 
-        Raises PortError when its bytes do not come whole.
+        Raises PortError when it does not arrive intact.
         """
         return transfer.read(self._board, self._index(finger))
 
     def map_state(self, finger: Finger) -> wire.CalibrationState:
-        """Whether the finger's force comes from its map, or the sensor is another than its own."""
+        """Whether the finger has a map, and whether it is in force or belongs to another sensor."""
         return wire.CalibrationState(transfer.info(self._board, self._index(finger)).state)
 
     def set_map(self, finger: Finger, its: bytes | BoardMap, *, force: bool = False) -> None:
         """Upload a wrench map and read it back; it is in force until the next reboot, or for good with save_settings.
 
-        Refused while streaming, and for another sensor's serial number than the one that answered there when the
-        board started; with ``force`` it goes there without its serial number, which is for any sensor, and is read
-        back so. What the finger had is in force until all of the new one is there. Raises InputError for more bytes
-        than a board takes (20 KiB), and PortError when other bytes come back.
+        Refused while streaming, and when its serial number is not that of the sensor that answered there when the
+        board started. With ``force`` it is sent without its serial number, so that it fits any sensor, and reads back
+        like that. The former map stays in force until the new one is complete. Raises InputError for more bytes than a
+        board takes (20 KiB), and PortError when other bytes read back.
         """
         blob = maps.for_any_sensor(maps.as_blob(its)) if force else maps.as_blob(its)
         number = self._index(finger)
@@ -234,12 +235,15 @@ class Commands:
         self._board.remember(("map", number), lambda: transfer.restore(self._board, number, blob))
 
     def clear_map(self, finger: Finger) -> None:
-        """Return a finger to what its settings say, until the next reboot or, with save_settings, for good."""
+        """Remove a finger's wrench map, until the next reboot or, with save_settings, for good.
+
+        Its force then comes from the setting force_model and the gains again.
+        """
         number = self._index(finger)
         self._board.tell(wire.ClearMap(0, number), lasting=("map", number))
 
     def maps(self) -> dict[int, bytes]:
-        """The maps in force, by finger; none on a board whose firmware knows of none."""
+        """The maps in force, by finger; empty for firmware without maps."""
         if self._board.info.wire_minor < MAP_SINCE_MINOR:
             return {}
         told = [transfer.info(self._board, finger) for finger in range(MAX_SENSORS)]

@@ -1,4 +1,4 @@
-"""Whether a board's firmware and this library go together, in words with the command that cures it."""
+"""Whether a board's firmware and this library fit together, and the command that makes them fit."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..errors import WireVersionError
 from ..wire import messages_gen as wire
 
-# The minor of wire 1.x that each came with.
+# The minor version of wire 1.x in which each feature appeared.
 CALIBRATION_SINCE_MINOR = 3
 MAP_SINCE_MINOR = 4
 PRESSURE_SINCE_MINOR = 4
@@ -16,20 +16,20 @@ FAULTS_SINCE_MINOR = 5
 EVENTS_SINCE_MINOR = 5
 BANDS_SINCE_MINOR = 5
 
-#: Commands that have grown: the wire minor that did it, and how many bytes the one before knows.
+#: Commands that have grown: the wire minor in which they grew, and how many bytes older boards know.
 APPENDED = {wire.SetCalibration.ID: ((4, 50),)}
 
 
 @dataclass(frozen=True)
 class HandWarning:
-    """Something about a board that works, but not as well as it could."""
+    """Something about a board that keeps it from working as well as it could."""
 
     code: str
     text: str  # one line with the cure
 
 
 def warnings(hello: wire.Hello, port: str) -> list[HandWarning]:
-    """What speaks against this board and this library together; empty when nothing does."""
+    """Where this board's firmware and this library do not fit together; empty when they fit."""
     if hello.schema_hash == wire.SCHEMA_HASH:
         return []
     text = f"the firmware on {port} has schema {hello.schema_hash:08x}, this library {wire.SCHEMA_HASH:08x}"
@@ -37,20 +37,20 @@ def warnings(hello: wire.Hello, port: str) -> list[HandWarning]:
 
 
 def describe_mismatch(hello: wire.Hello) -> str:
-    """Both wire versions, and the command that brings them together."""
+    """Both wire versions, and the command that makes them the same."""
     mine = f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}"
     return f"wire {hello.wire_major}.{hello.wire_minor}, this library {mine}; {cure(hello)}"
 
 
 def need(hello: wire.Hello, since_minor: int, what: str) -> None:
-    """WireVersionError for a board that is older than ``what``."""
+    """Raise WireVersionError for a board whose wire minor is older than the one that introduced ``what``."""
     if hello.wire_minor < since_minor:
         seen = f"the board speaks wire {hello.wire_major}.{hello.wire_minor}"
         raise WireVersionError(f"{seen}, expected 1.{since_minor}, which has {what}; {cure(hello)}")
 
 
 def cut(message_id: int, payload: bytes, minor: int) -> bytes:
-    """``payload`` as a board of this wire minor knows it: without what was appended to a command since."""
+    """``payload`` as a board of this wire minor knows it: without the fields appended to the command since."""
     for since, known_bytes in APPENDED.get(message_id, ()):
         if minor < since:
             return payload[:known_bytes]
@@ -58,7 +58,7 @@ def cut(message_id: int, payload: bytes, minor: int) -> bytes:
 
 
 def cure(hello: wire.Hello) -> str:
-    """The command that updates the older side; of one wire version the firmware, which is told from this library."""
+    """The command that updates the older side; the firmware if both have the same wire version."""
     if (hello.wire_major, hello.wire_minor) > (wire.WIRE_MAJOR, wire.WIRE_MINOR):
         return "update this library: pip install -U biotac-gateway"
     return "update the firmware: biotac flash"

@@ -1,4 +1,4 @@
-"""What went wrong on a board, latched there: a fault of a single frame is not missed by who looks once a minute."""
+"""What went wrong on a board. The board latches faults, so that one in a single frame is seen even once a minute."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ..wire import messages_gen as wire
 
 @dataclass(frozen=True)
 class Faults:
-    """Since ``Hand.clear_faults``, or the board's start. False when there is nothing; as text, a line each."""
+    """Faults since ``Hand.clear_faults``, or the board's start. False when there are none; as text, a line for each."""
 
     board: wire.FaultFlags
-    fingers: Mapping[str, wire.FrameFlags]  #: by name, of those fingers that have any
+    fingers: Mapping[str, wire.FrameFlags]  #: by name, only fingers that have faults
 
-    by_index: tuple[int, ...]  #: of all five fingers, as STATUS has them
+    by_index: tuple[int, ...]  #: all five fingers, as in STATUS
 
     def __bool__(self) -> bool:
         return bool(self.board or self.fingers)
@@ -28,7 +28,7 @@ class Faults:
 
 
 def faults_of(status: wire.Status, names: Mapping[str, int]) -> Faults:
-    """What a STATUS tells, of fingers with these names; one without a name has its chip select's."""
+    """The faults in a STATUS, for fingers with these names; one without a name goes by its chip select."""
     name_of = {finger: name for name, finger in names.items()}
     fingers = {name_of.get(f, str(f)): wire.FrameFlags(flags) for f, flags in enumerate(status.finger_faults) if flags}
     return Faults(wire.FaultFlags(status.faults), fingers, status.finger_faults)

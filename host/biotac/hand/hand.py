@@ -1,4 +1,4 @@
-"""One board with its fingers, as users see it: what it is composed of, and its life."""
+"""Hand: one board with its fingers, as users see it, composed of the parts in this folder."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ R = TypeVar("R")
 
 
 def _of(part: str, method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Hand, P], R]:
-    """A method of Hand that is its part's."""
+    """A method of Hand that calls the same method of one of its parts."""
 
     @wraps(method)
     def call(self: Hand, /, *args: P.args, **kwargs: P.kwargs) -> R:
@@ -45,7 +45,7 @@ def _of(part: str, method: Callable[Concatenate[Any, P], R]) -> Callable[Concate
 
 
 class Hand:
-    """A board. Use as a context manager; made by ``biotac.open``."""
+    """A board with its fingers. Made by ``biotac.open``; use it as a context manager."""
 
     def __init__(
         self,
@@ -65,13 +65,13 @@ class Hand:
         self._recorded = Recorded(self._board, self._commands, self._latest.names)
         if reconnect:
             Reconnection(self._board, self._latest.last_t_us, partial(_resume, self._recorded, self._streams))
-        # The parts know nothing of this object, and neither do their threads: so it can go.
+        # Neither the parts nor their threads refer to this object, so that it can be garbage-collected.
         self._finalizer = weakref.finalize(self, _end, self._board, self._streams, self._recorded)
         _HANDS.add(self)
-        #: What carries the bytes.
+        #: The link that carries the bytes.
         self.link = link
-        #: Device time as host time, fed by whatever is read; known after a first ``status`` or ``sync``.
-        #: A simulated board's time is no clock: it waits for the computer, which shows as ``resets``.
+        #: Converts device time to host time, fed by whatever is read; known after a first ``status`` or ``sync``.
+        #: A simulated board's time is not a real clock: it waits for the computer, which shows up as ``resets``.
         self.clock: DeviceClock = self._board.incoming.clock
 
     # ---- what it is ----------------------------------------------------------------------------
@@ -83,17 +83,17 @@ class Hand:
 
     @property
     def info(self) -> wire.Hello:
-        """What the board said of itself when it was opened, or came back."""
+        """What the board said about itself when it was opened, or when it last came back."""
         return self._board.info
 
     @property
     def fingers(self) -> list[int]:
-        """Indices of the fingers whose sensor answered when this was opened."""
+        """Chip selects of the fingers whose sensor answered when the board was opened, or last came back."""
         return [f for f in range(MAX_SENSORS) if self.info.fingers_present >> f & 1]
 
     @property
     def warnings(self) -> list[HandWarning]:
-        """What speaks against this board and this library together, in words; empty when nothing does."""
+        """Where this board's firmware and this library do not fit together; empty when they fit."""
         return compatibility.warnings(self.info, self.port)
 
     @property
@@ -103,25 +103,28 @@ class Hand:
 
     @property
     def connected(self) -> bool:
-        """The board can be talked to; false while it is looked for."""
+        """Whether the board can be reached; false while reconnecting, once it is lost, and after ``close``."""
         return self._board.connected
 
     @property
     def streaming(self) -> bool:
-        """The board was told to stream, and has not ended or been stopped."""
+        """Whether the board was told to stream, and has neither ended nor been stopped."""
         return self._streams.streaming
 
     @property
     def ended(self) -> bool:
-        """A simulated source has played to its end and everything of it has arrived."""
+        """Whether a simulated source has played to its end and all of it has arrived."""
         return self._streams.ended
 
     def __getitem__(self, finger: str | SupportsIndex) -> FingerView:
-        """The latest of one finger, by name or chip select; KeyError in words. Follows what is read: see ``run``."""
+        """The latest values of one finger, by name or chip select. They follow what is read: see ``run``.
+
+        Raises KeyError when there is no such finger.
+        """
         return FingerView((its := self._latest[finger]).name, its.finger, self._latest, self)
 
     def __iter__(self) -> Iterator[str]:
-        """Names of the fingers whose sensor answered; a chip select as text where it has none."""
+        """Names of the fingers whose sensor answered; a chip select without a name is given as text."""
         return iter([self._latest.name(finger) for finger in self.fingers])
 
     def __len__(self) -> int:
@@ -132,7 +135,7 @@ class Hand:
         return True
 
     def __contains__(self, finger: object) -> bool:
-        """Whether the sensor of that name or chip select answered."""
+        """Whether the sensor with that name or chip select answered."""
         with suppress(KeyError):
             return finger_index(self._latest.names, cast(Any, finger)) in self.fingers
         return False
@@ -158,13 +161,13 @@ class Hand:
         )
 
     def close(self) -> None:
-        """Stop the stream, finish a recording, give the port back. Safe to call twice.
+        """Stop the stream, finish a recording and give the port back. Safe to call twice.
 
-        Raises, after all that, what nobody was told yet: DeviceLostError for a board that was lost meanwhile,
-        CallbackError for what a callback has raised. A ``with`` block ends the same way, unless by an error of its
-        own. Callbacks get what has come for one more second, and a callback that runs is waited for; what is left is
-        counted (``stats.batches_skipped``). A hand that nobody refers to any more, and one that is left open when its
-        program ends, is closed too.
+        Afterwards raises the first error that has not been raised before: DeviceLostError if the board was lost,
+        OSError or InputError if a recording failed, CallbackError if a callback raised. The end of a ``with`` block
+        does the same, unless its body raised. What has arrived is passed to callbacks for up to one more second, and a
+        running callback is waited for; the rest is counted in ``stats.batches_skipped``. A hand that is
+        garbage-collected, or still open when its program ends, is closed too.
         """
         self._end()
         self._streams.report()
@@ -227,12 +230,12 @@ class Hand:
     check = _of("_streams", Streams.check)
 
     def run(self, *, queue: bool = False) -> Hand:
-        """Have threads read the board from now on, and let it stream; returns this hand.
+        """Read the board in threads from now on, and start the stream if need be; returns this hand.
 
-        ``hand["index"]`` and callbacks then follow by themselves, the board stops within a second of this
-        process's death, and with ``reconnect`` its return is noticed by itself. Batches are kept for ``batches``,
-        ``frames`` and ``read`` from their first call on, or from now on with ``queue``; a caller that is slow
-        loses the oldest (``stats.batches_skipped``). A simulated board that is not paced waits instead.
+        ``hand["index"]`` and callbacks then follow without further calls, and with ``reconnect`` so does the return of
+        a lost board. The board stops within a second of this process's death. Batches are kept for ``batches``,
+        ``frames`` and ``read`` from their first call on, or from now on with ``queue``. A slow caller loses the oldest
+        (``stats.batches_skipped``); a simulated board that is not paced waits instead.
         """
         self._streams.run(queue=queue)
         return self
@@ -240,13 +243,13 @@ class Hand:
     def batches(self) -> Iterator[Batch]:
         """Yield batches as they arrive, starting the stream if need be.
 
-        Ends with a simulated source, and when ``stop`` is called. All such iterations, ``frames`` and ``read`` share
-        one queue, so that one thread at a time may be in the middle of them: InputError in another.
+        Ends when a simulated source ends, and when ``stop`` is called. All iterations of ``batches`` and ``frames``,
+        and ``read``, share one queue. Only one thread at a time may use it; another gets InputError.
         """
-        yield from self._streams.batches()  # in here, for this hand is to last as long as its iteration
+        yield from self._streams.batches()  # a generator here, so that this hand lives as long as its iteration
 
     def frames(self) -> Iterator[Frame]:
-        """Yield typed frames as they arrive; ends only with a simulated source."""
+        """Yield typed frames as they arrive; starts and ends like ``batches``."""
         for batch in self.batches():
             for row in batch.frames:
                 yield Frame.from_row(row)
@@ -254,15 +257,15 @@ class Hand:
     def read(self, seconds: float, *, fresh: bool = False) -> StructArray:
         """Return the frames of the next ``seconds`` of device time as one FRAME_DTYPE array (n,).
 
-        They follow those of the read before: after a pause they are as old as the pause, as far as buffers reach,
-        and none is left out unknown to ``stats``. With ``fresh`` they are of now: what was made before is let go.
-        Shorter when a simulated source ends first; empty when it has ended before, or when no sensor
-        answered in that time. Raises ValueError unless seconds is a number above 0.
+        They follow those of the previous read: after a pause they are as old as the pause, as far as the buffers
+        reach, and any frame that is missing is counted in ``stats``. With ``fresh``, frames made before this call are
+        discarded. The array is shorter when a simulated source ends first, and empty when it had ended before or when
+        no sensor answered in that time. Raises ValueError unless seconds is a number above 0.
         """
         return self.read_batch(seconds, fresh=fresh).frames
 
     def read_batch(self, seconds: float, *, fresh: bool = False) -> Batch:
-        """Like read, with the wire messages, PAC and events of the same time."""
+        """Like ``read``, but returns the Batch: also the wire messages, PAC and events of the same time."""
         if fresh:
             self._streams.skip_old()
         batch, later = take(self.batches(), seconds, silence_s=SILENCE_S)
@@ -273,33 +276,33 @@ class Hand:
     # ---- recording -----------------------------------------------------------------------------
 
     def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
-        """Write everything that arrives from now on to an MCAP file, until close or the recorder's close.
+        """Write everything that arrives from now on to an MCAP file, until this hand or the recorder is closed.
 
-        Frames that have arrived already and wait to be read are not in it; call it before ``start`` or
-        the first read to have all. A board that restarts (reconnect) begins a further file (Recorder.paths).
-        A program that ends without ``close`` loses nothing that has arrived; one that is killed, a second.
+        Frames that have arrived but not been read yet are not recorded; to have all, call this before ``start`` or the
+        first read. When the board restarts (``reconnect``), a new file is begun (``Recorder.paths``). A program that
+        ends without ``close`` loses nothing that has arrived; one that is killed loses up to a second.
 
-        Raises InputError when the file exists and may not be overwritten, cannot be written, or when
-        another recording of this hand is still open.
+        Raises InputError when the file exists and ``overwrite`` is false, when it cannot be written, or when another
+        recording of this hand is still open.
         """
         return self._recorded.record(Path(path), self.streaming, overwrite=overwrite)
 
 
 def _resume(recorded: Recorded, streams: Streams, restarted: bool) -> None:
-    """The board is back."""
+    """Go on recording and streaming after the board came back."""
     if restarted:
         recorded.go_on()
     streams.resume()
 
 
 def _end(board: Board, streams: Streams, recorded: Recorded) -> None:
-    """What is left to do for a hand that is gone, or whose program ends."""
+    """Close a hand's parts; also called when the hand is garbage-collected or the program ends."""
     if board.closed:
         return
-    if streams.is_read_here():  # the collector may run on any thread, and this one is to be waited for
+    if streams.is_read_here():  # the garbage collector may run on a reading thread, which cannot wait for itself
         threading.Thread(target=_end, args=(board, streams, recorded), name="biotac end").start()
         return
-    with ExitStack() as last:  # whatever fails before
+    with ExitStack() as last:  # these run even when streams.close() fails
         last.callback(board.close)
         last.callback(recorded.close)
         streams.close()

@@ -17,24 +17,24 @@ TRIES = 3
 
 
 def handshake(link: Link, send: Callable[[Any], None], *, timeout_s: float) -> wire.Hello:
-    """The board's HELLO, asked for TRIES times, ``timeout_s`` each; ``send`` numbers a command and writes it.
+    """The board's HELLO, asked for up to TRIES times, ``timeout_s`` each; ``send`` numbers a command and writes it.
 
-    A board may still be streaming to whoever was here before: it is stopped, and all is let pass but the one HELLO
+    A board may still be streaming to an earlier program: it is stopped, and everything is ignored except the HELLO
     that carries our nonce. Raises NotAGatewayError, WireVersionError or DeviceLostError.
     """
     nonce = secrets.randbits(32)
     decoder = StreamDecoder()
-    # The known fields of HELLO never change place, so that any peer can be told its version.
+    # The known fields of HELLO never move, so that the version of any peer can be read.
     decoder.accept_newer_minor()
     seen = 0
     for _ in range(TRIES):
         deadline_s = time.monotonic() + timeout_s
-        link.write(b"\0")  # ends whatever half packet a former program left behind
+        link.write(b"\0")  # ends a half packet that an earlier program left behind
         send(wire.Stop(0))
         send(wire.HelloRequest(0, nonce))
         left_s = timeout_s
         while left_s > 0:
-            # What has come is looked at before the time is said to be over: it may be this side that was late.
+            # Read what has arrived before calling it a timeout: this side may have been late.
             left_s = deadline_s - time.monotonic()
             chunk = link.read(max(0.0, left_s))
             seen += len(chunk)

@@ -1,4 +1,4 @@
-"""What a board says as it comes: bytes of a link into batches, recorded, counted and timed."""
+"""What a board sends, as it arrives: bytes from a link become batches, and are recorded, counted and timed."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats, StreamDecoder
 from .gap import Gap
 
-UNANSWERED = 8  # questions for the time that are remembered
+UNANSWERED = 8  # how many unanswered questions for the time are remembered
 
 
 class Incoming:
-    """Of the board on ``link`` that said ``hello``; one thread at a time reads.
+    """What the board on ``link`` sends after its ``hello``; only one thread at a time may read.
 
-    ``deliver`` takes every batch that has something, on the thread that reads. What others take is set before that.
+    ``deliver`` is called with every batch that is not empty, on the thread that reads.
     """
 
     def __init__(self, link: Link, hello: wire.Hello, deliver: Callable[[Batch], object]) -> None:
-        #: Device time as host time, fed by whatever is read; known after a first STATUS that was asked for.
+        #: Converts device time to host time, fed by whatever is read; known after the first STATUS that was asked for.
         self.clock = DeviceClock(unix_offset_s=time.time() - time.monotonic())
-        #: Takes all bytes as they come, and none when none came in time; what it raises ends it, not the reading.
+        #: Called with all bytes as they arrive, and with b"" when none came in time. Its OSError ends it, not reading.
         self.record: Callable[[bytes], object] | None = None
-        #: Takes the gap before the first batch behind it.
+        #: Called with a gap, before the first batch after it is delivered.
         self.record_gap: Callable[[Gap], object] = lambda gap: None
-        self.trouble: Exception | None = None  #: what ended a recording, until it is told
-        self.gap: Gap | None = None  #: to go with the next rows
+        self.trouble: Exception | None = None  #: the error that ended a recording, until it is raised to a caller
+        self.gap: Gap | None = None  #: to be delivered with the next rows
         self._link = link
         self._deliver = deliver
         self._decoder = _decoder(hello)
         self._past: list[LinkStats] = []  # of decoders before a reboot
         self._gaps = self._bytes = self._frames = 0
         self._arrivals = Arrivals(self.clock)
-        self._time_asked: dict[int, float] = {}  # when each request left that has no answer yet
+        self._time_asked: dict[int, float] = {}  # by req_id: when each request without an answer yet was sent
 
     @property
     def stats(self) -> LinkStats:
@@ -49,19 +49,19 @@ class Incoming:
         return replace(now, gaps=self._gaps, **lost)
 
     def restarted(self, hello: wire.Hello) -> None:
-        """The board counts anew, its sequence numbers and its time."""
+        """Start over with a board that restarted: its sequence numbers and its time begin anew."""
         self._past.append(self._decoder.stats(0, 0))
         self._decoder = _decoder(hello)
         self.clock.restart()
         self._arrivals.forget()
 
     def read(self, timeout_s: float) -> Batch | bytes | None:
-        """Read the link once, for ``take``: what came within timeout_s. Raises what the link raises."""
+        """Read the link once: what arrived within timeout_s, for ``take``. Raises what the link raises."""
         fd = self._link.fd
         return self._link.read(timeout_s) if fd is None else self._decoder.read(fd, timeout_s)
 
     def take(self, came: Batch | bytes | None) -> bool:
-        """Record, count and deliver what ``read`` gave; False when that was nothing."""
+        """Record, count and deliver what ``read`` returned; false when that was nothing."""
         decoder = self._decoder
         if isinstance(came, Batch):
             if self.record is not None:
@@ -77,7 +77,7 @@ class Incoming:
         return True
 
     def end_packet(self) -> None:
-        """Nothing follows the half packet that was on its way, here and in a recording."""
+        """End a packet that was cut off halfway, here and in a recording: the rest of it will not come."""
         self.take(b"\0")
 
     def _record(self, chunk: bytes) -> None:
@@ -115,9 +115,9 @@ class Incoming:
     # ---- its time ------------------------------------------------------------------------------
 
     def time_asked(self, req_id: int) -> None:
-        """A GET_STATUS of this number is about to leave: its answer goes to ``clock``, and nowhere else."""
+        """Note that a GET_STATUS with this number is about to be sent: its answer goes only to ``clock``."""
         if len(self._time_asked) >= UNANSWERED:
-            self._time_asked = {}  # it does not answer, or restarted
+            self._time_asked = {}  # the board does not answer, or it restarted
         self._time_asked[req_id] = time.monotonic()
 
     def _time_told(self, batch: Batch, arrived_s: float) -> None:
@@ -127,7 +127,7 @@ class Incoming:
             self.round_trip(answer, sent_s, max(sent_s, arrived_s))
 
     def round_trip(self, answer: wire.Status, sent_s: float, arrived_s: float) -> None:
-        """``answer`` was made between these two times of time.monotonic()."""
+        """Feed ``clock``: ``answer`` was made between these two times of time.monotonic()."""
         self.clock.round_trip(sent_s, self._decoder.unwrap_t_us(answer.t_us), arrived_s)
 
 

@@ -1,4 +1,4 @@
-"""Moving a wrench map to a board and back, in parts, each of which is asked for or told until it is answered."""
+"""Moving a wrench map to a board and back, in parts; each part is a command, repeated until it is answered."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ TRIES = 3
 
 
 def write(board: Board, finger: int, blob: bytes) -> None:
-    """Upload a map and put it into force; afterwards it has been read back.
+    """Upload a map, put it into force, and read it back to check it.
 
-    Raises CommandRefusedError with the board's reason; PortError when other bytes come back.
+    Raises CommandRefusedError with the board's reason; PortError when other bytes read back.
     """
     for left in reversed(range(TRIES)):
         try:
             _write(board, finger, blob)
             break
         except CommandRefusedError as refused:
-            # The board was away in the middle, or somebody else began another one.
+            # The board was away in the middle, or somebody else began another upload.
             if refused.error not in (wire.Error.NOT_BEGUN, wire.Error.NOT_WHOLE) or not left:
                 raise
     if read(board, finger) != blob:
@@ -43,15 +43,15 @@ def info(board: Board, finger: int) -> wire.MapInfo:
 
 
 def restore(board: Board, finger: int, blob: bytes) -> None:
-    """Have the finger have this map, which it may have already."""
+    """Upload this map to the finger unless it has it already."""
     told = info(board, finger)
     if (told.size_bytes, told.crc32) != (len(blob), zlib.crc32(blob)):
         write(board, finger, blob)
 
 
 def read(board: Board, finger: int) -> bytes | None:
-    """A finger's map, in force or not; None without one. PortError when its bytes do not come whole."""
-    for _ in range(TRIES):  # it may be replaced meanwhile
+    """A finger's map, in force or not; None without one. Raises PortError when it does not arrive intact."""
+    for _ in range(TRIES):  # the map may be replaced meanwhile
         told = info(board, finger)
         if told.state == wire.CalibrationState.NONE:
             return None

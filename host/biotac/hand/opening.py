@@ -1,4 +1,4 @@
-"""Opening a board: link, handshake, and what a simulated board is given before its time starts."""
+"""Opening a board: the link, the handshake, and what a simulated board is given before its time starts."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ def open(
 ) -> Hand:
     """Open a board and shake hands.
 
-    Without ``port`` it is the only board on USB, found by its USB ids; nothing else is opened. ``port`` is
+    Without ``port``, opens the only board on USB, found by its USB ids; no other port is opened. ``port`` is
     ``serial:E6605838831F5B2C``, a board's serial number; a device path (``/dev/ttyACM0``, ``COM3``);
-    ``spidev:0.0,0.1`` for sensors on this computer's own SPI bus, one BUS.DEVICE a finger
-    (``?calibration=1:0x50:24c02``, one for each, loads what the EEPROMs on their harnesses hold); ``sim:SOURCE``
-    for a simulated board, where SOURCE is a scenario (``press.toml``) or a recording of counts (``.npz``, ``.btd``); or
-    ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the same.
-    ``replay:press.mcap?from=12.5&to=20`` plays a recording, or that part of it: the board's stream again, while
-    commands that would change a board raise CommandRefusedError.
-    ``pace`` is for simulated and emulated boards and recordings: device seconds per second, 0 for as fast as
-    this side reads.
+    ``spidev:0.0,0.1`` for sensors on this computer's own SPI bus, one BUS.DEVICE per finger
+    (``?calibration=1:0x50:24c02``, one for each, loads the calibrations stored in the EEPROMs on their harnesses);
+    ``sim:SOURCE`` for a simulated board, where SOURCE is a scenario (``press.toml``) or a recording of counts
+    (``.npz``, ``.btd``); or ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the
+    same. ``replay:press.mcap?from=12.5&to=20`` plays a recording, or that part of it: the board's stream again, while
+    commands that would change a board raise CommandRefusedError. ``uart:DEVICE?baud=N`` is a board's UART, and
+    ``zenoh:NAME`` a board that another computer shares. ``pace`` is for simulated and emulated boards and recordings:
+    device seconds per second, or 0 for as fast as this side reads.
 
-    ``reconnect`` has a board that went away looked for until it is back, by its serial number; what this session
-    changed (settings, calibrations, subscriptions) and the stream are put back, and the first batch has a
-    ``biotac.Gap`` in its messages. Without it, and for spidev, DeviceLostError is raised. ``fingers`` names
-    chip selects 0..4 for ``hand["thumb"]``; by default index, middle, ring, little, thumb.
+    With ``reconnect``, a board that went away is looked for, by its serial number, until it is back. Then what this
+    session changed (settings, calibrations, maps, subscriptions) is restored, the stream resumes, and the first batch
+    with rows has a ``biotac.Gap`` in its messages. Without it, and for spidev, DeviceLostError is raised. ``fingers``
+    names chip selects 0..4 for ``hand["thumb"]``; the default names are index, middle, ring, little, thumb.
 
-    Raises PortError, NotAGatewayError, WireVersionError, InputError for a source or a recording that cannot be
-    played or an EEPROM without a calibration, or CommandRefusedError for another sensor's.
+    Raises PortError, NotAGatewayError or WireVersionError; InputError for a source or a recording that cannot be
+    played, or an EEPROM without a calibration; CommandRefusedError for a calibration of another sensor.
     """
     text = None if port is None else os.fspath(port)
     if text is None or text.startswith(SERIAL_PREFIX):
@@ -57,10 +57,10 @@ def shake_hands(
     fingers: Mapping[str, int] | None = None,
     calibrations: Mapping[int, Calibration] | None = None,
 ) -> Hand:
-    """Make a Hand of an open link, and give it each finger's calibration.
+    """Make a Hand from an open link, and give it each finger's calibration.
 
-    A simulated board gets its source's settings (an emulated finger's own gains) and stored tare
-    first, as a real one would from its user. Closes the link when that fails.
+    A simulated board gets its source's settings (an emulated finger's own gains) and stored tare, as a real one would
+    from its user. Closes the link when any of this fails.
     """
     hand = Hand(link, reconnect=reconnect, fingers=fingers)
     source = link.source

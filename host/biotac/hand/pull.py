@@ -1,4 +1,4 @@
-"""What arrives in a given time of the board's clock."""
+"""What arrives during a given time of the board's clock."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from ..wire.batches import Batch, join, split
 
 
 def take(batches: Iterator[Batch], seconds: float, *, silence_s: float) -> tuple[Batch, Batch | None]:
-    """The next ``seconds`` of device time, and what came with the last of them and is later.
+    """The next ``seconds`` of device time, and the later rows that came with the last of them, None without any.
 
-    Less when ``batches`` end, or when no row comes and the board's statuses are ``silence_s`` further than that.
+    Less when ``batches`` end, or when no row comes while the board's statuses advance by ``seconds + silence_s``.
+    Raises ValueError unless ``seconds`` is a finite number above 0.
     """
     if not 0 < seconds < float("inf"):
         raise ValueError(f"seconds is {seconds}, expected a number above 0")

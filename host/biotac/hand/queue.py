@@ -8,34 +8,34 @@ from collections.abc import Callable
 
 from ..wire.batches import Batch
 
-# Ten to twenty seconds of five fingers with PAC, a few tens of megabytes.
+# Ten to twenty seconds of five fingers with PAC; a few tens of megabytes.
 LIMIT_ROWS = 16_384
 
 
 class BatchQueue:
-    """First in, first out. ``bound`` gives it a limit: then, when full, the oldest go, and are counted."""
+    """First in, first out. With a limit (``bound``), a full queue drops its oldest batches and counts them."""
 
     def __init__(self, wake: Callable[[], None] | None = None, taken: Callable[[], None] | None = None) -> None:
-        self._wake = wake  # the consumer is to look
-        self._taken = taken  # there is room again
+        self._wake = wake  # tells the consumer to look
+        self._taken = taken  # tells that there is room again
         self._limit_rows: int | None = None
         self._batches: deque[Batch] = deque()
-        #: How much waits; a batch of messages alone counts as one.
+        #: How many rows wait; a batch of messages alone counts as one.
         self.rows = 0
         self._lock = threading.Lock()
         self.batches_skipped = 0
         self.frames_skipped = 0
 
     def bound(self, limit_rows: int | None) -> None:
-        """Let go of the oldest above so many frames, PAC blocks and heartbeats; None: keep all."""
+        """Keep at most so many rows (frames, PAC blocks and heartbeats), dropping the oldest; None: keep all."""
         self._limit_rows = limit_rows
 
     def put(self, batch: Batch) -> None:
-        """Add the newest."""
+        """Add the newest batch."""
         with self._lock:
             self._batches.append(batch)
             self.rows += weight(batch)
-            # The newest stays, however large it is.
+            # The newest batch stays, however large it is.
             while self._limit_rows is not None and self.rows > self._limit_rows and len(self._batches) > 1:
                 oldest = self._batches.popleft()
                 self.rows -= weight(oldest)
@@ -52,23 +52,23 @@ class BatchQueue:
             self._wake()
 
     def put_back(self, batch: Batch) -> None:
-        """Return what was taken and not used."""
+        """Return a batch that was taken and not used."""
         with self._lock:
             self._batches.appendleft(batch)
             self.rows += weight(batch)
 
     def clear(self) -> None:
-        """Forget what waits; the consumer wants none of it."""
+        """Discard what waits without counting it; the consumer does not want it."""
         while self.take() is not None:
             pass
 
     def leave(self) -> None:
-        """Count what waits as skipped: the consumer has no more time for it."""
+        """Discard what waits and count it as skipped: the consumer has no more time for it."""
         while (batch := self.take()) is not None:
             self._skip(batch)
 
     def take(self) -> Batch | None:
-        """The oldest; None when there is none."""
+        """Take the oldest batch; None when there is none."""
         if not self._batches:
             return None
         with self._lock:
@@ -82,5 +82,5 @@ class BatchQueue:
 
 
 def weight(batch: Batch) -> int:
-    """Rows of a batch, at least one."""
+    """How many rows a batch has, at least one."""
     return len(batch.wire) + len(batch.pac) + len(batch.idle) or 1

@@ -1,7 +1,7 @@
-"""The threads that read a link, so that nobody has to ask for it and the board's ring never fills.
+"""The threads that read a link, so that no caller has to and the board's ring buffer does not fill.
 
-Callbacks run on the reading thread, for the least delay. One that takes long would keep the link waiting: then a
-second thread, the relief, reads until it is done. With a board whose time waits for its reader (Link.pace 0) it is
+Callbacks run on the reading thread, for the least delay. A slow callback would keep the link waiting, so a second
+thread, the relief, reads until the callback is done. With a board whose time waits for its reader (Link.pace 0) it is
 the other way round: reading waits for slow consumers, and nothing is dropped.
 """
 
@@ -16,23 +16,23 @@ from typing import Protocol
 from .board import POLL_S
 from .callbacks import Callbacks
 
-# A callback that runs for two of these is relieved. The Pico's ring holds 16 KiB, of five fingers 0.2 s.
+# A callback that runs for two of these is relieved. The Pico's ring holds 16 KiB, which is 0.2 s of five fingers.
 RELIEF_S = 0.04
-# What waits for callbacks at the end has so long to be handed out; the rest is left.
+# At the end, what waits is passed to callbacks for this long; the rest is skipped.
 BACKLOG_S = 1.0
 
 
 class Source(Protocol):
-    """What is read."""
+    """What a Reader reads."""
 
     def read(self, at_most_s: float) -> None:
-        """Wait for bytes and hand out what they complete."""
+        """Wait for bytes and deliver what they complete."""
 
     def may_relieve(self) -> bool:
-        """Whether it may be read on while a callback takes its time."""
+        """Whether reading may go on while a callback is slow."""
 
     def fail(self, error: BaseException) -> None:
-        """The reader is over; everybody is to know why."""
+        """The reader has ended with ``error``; callers are to get it."""
 
 
 class Reader:
@@ -51,25 +51,25 @@ class Reader:
         self._give_up_s = math.inf
 
     def start(self) -> None:
-        """Begin."""
+        """Start the threads."""
         for thread in self._threads:
             thread.start()
 
     def join(self) -> None:
-        """Wait for the end; in a callback only for the other thread's."""
+        """Wait for the threads to end; on one of them, only for the other."""
         self._give_up_s = time.monotonic() + BACKLOG_S
         for thread in self._threads:
             if thread is not threading.current_thread():
                 thread.join()
 
     def is_here(self) -> bool:
-        """The caller runs on one of these threads."""
+        """Whether the caller runs on one of these threads."""
         return threading.current_thread() in self._threads
 
     def _guarded(self, work: Callable[[], None]) -> None:
         try:
             work()
-        except BaseException as error:  # also what nobody foresaw: a silent end would look like silence
+        except BaseException as error:  # unforeseen errors too: a thread that just ended would look like a silent board
             self._source.fail(error)
 
     def _run(self) -> None:

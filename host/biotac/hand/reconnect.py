@@ -1,4 +1,4 @@
-"""Coming back after a lost link: the board is looked for, told what it was told before, and the gap is marked."""
+"""Reconnecting after a lost link: find the board, restore what it was told before, and mark the gap."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ RETRY_S = 0.25
 class Reconnection:
     """Takes over ``board.lost``.
 
-    ``last_t_us`` gives the device time of the latest row, None before any. ``resume`` is called when the board has
-    been told its settings, calibrations, subscriptions and maps again, with whether it had restarted.
+    ``last_t_us`` returns the device time of the latest row, None before any. ``resume`` is called with whether the
+    board had restarted, once it has been told its settings, calibrations, subscriptions and maps again.
     """
 
     def __init__(self, board: Board, last_t_us: Callable[[], int | None], resume: Callable[[bool], object]) -> None:
@@ -45,7 +45,7 @@ class Reconnection:
             board.notify()
 
     def _restored(self, before: wire.Hello, reason: Reason, lost_at_ns: int) -> bool:
-        """One try: find the board, tell it what it was told before, and let it stream."""
+        """Try once to find the board, tell it again what it was told before, and let it stream."""
         board = self._board
         try:
             if not self._found(before):
@@ -53,7 +53,7 @@ class Reconnection:
             if board.info.boot_id != before.boot_id:
                 reason = "rebooted"
                 board.incoming.restarted(board.info)
-            # Before START: rows may come with its reply. Two losses without a row between them are one gap.
+            # Before START, because rows may come with its reply. Two losses without a row in between are one gap.
             gap = board.incoming.gap or Gap(reason, self._last_t_us(), None, lost_at_ns, 0, 0)
             if gap.reason == "rebooted":
                 reason = "rebooted"

@@ -1,4 +1,4 @@
-"""What a board says, into a recording: the one that is open, if any."""
+"""Writing what a board sends to a recording, if one is open."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .gap import GAP
 
 
 class Recorder(Protocol):
-    """What Hand.record returns: a recording.Recorder, of which nothing else is needed here."""
+    """What Hand.record returns: the part of recording.Recorder that is needed here."""
 
     path: Path
     paths: list[Path]
@@ -25,13 +25,13 @@ class Recorder(Protocol):
     def closed(self) -> bool: ...
     def write(self, chunk: bytes) -> None: ...
     def mark(self, what: str, facts: dict[str, str]) -> None: ...
-    def go_on(self, *board: Any) -> None: ...
+    def go_on(self, facts: Any) -> None: ...
     def close(self) -> None: ...
     def fileno(self) -> int: ...
 
 
 class Recorded:
-    """Begins a recording of ``board``, carries it over restarts, ends it."""
+    """Begins a recording of ``board``, continues it after restarts, and ends it."""
 
     def __init__(self, board: Board, commands: Commands, names: Mapping[str, int]) -> None:
         self._names = names
@@ -43,53 +43,45 @@ class Recorded:
         """See Hand.record."""
         if self._recorder is not None and not self._recorder.closed:
             raise InputError(f"this hand is being recorded to {self._recorder.path}; close that recorder first")
-        hello, settings, calibrations, sensors, maps = self._facts()
-        # The one way up from this room.
-        writer = importlib.import_module("...recording.writer", __name__)
-        recorder: Recorder = writer.Recorder(
-            path,
-            hello,
-            settings,
-            calibrations,
-            sensors,
-            self._board.link.port,
-            maps=maps,
-            names=self._names,
-            overwrite=overwrite,
-            mid_stream=mid_stream,
-        )
+        port = self._board.link.port
+        recorder: Recorder = _writer().Recorder(path, self._facts(), port, overwrite=overwrite, mid_stream=mid_stream)
         self.to(recorder)
         return recorder
 
     def to(self, recorder: Recorder) -> None:
-        """Hand it all that comes from now on."""
+        """Send everything that arrives from now on to ``recorder``."""
         self._recorder = recorder
         incoming = self._board.incoming
         incoming.record = recorder.write
         incoming.record_gap = lambda gap: recorder.mark(GAP, gap.as_text())
 
     def go_on(self) -> None:
-        """The board restarted: its rows go into a file of their own."""
+        """Begin a new file after the board restarted."""
         if self._recorder is not None and not self._recorder.closed:
             try:
-                self._recorder.go_on(*self._facts())
+                self._recorder.go_on(self._facts())
             except (OSError, InputError) as error:
                 incoming = self._board.incoming
                 self._recorder, incoming.record, incoming.trouble = None, None, error
 
     def close(self) -> None:
-        """Finish the file."""
+        """Finish the recording, if there is one."""
         if self._recorder is not None:
             self._recorder.close()
 
     def forked(self) -> None:
-        """The file is the other process's: whatever this one still holds of it goes nowhere."""
+        """Let go of the file in a forked child: it is the parent's, and what the child still buffers goes nowhere."""
         recorder, self._recorder = self._recorder, None
         if recorder is not None and not recorder.closed:
             nowhere(recorder.fileno())
 
-    def _facts(self) -> tuple[Any, ...]:
-        """HELLO, settings, calibrations, sensors and maps: what a recording's results rest on."""
+    def _facts(self) -> Any:
+        """What a recording says about the board."""
         its, hello = self._commands, self._board.info
         sensors = [its.sensor_info(finger) for finger in range(MAX_SENSORS) if hello.fingers_present >> finger & 1]
-        return hello, its.settings(), its.calibrations(), sensors, its.maps()
+        return _writer().Facts(hello, sensors, its.settings(), its.calibrations(), its.maps(), dict(self._names))
+
+
+def _writer() -> Any:
+    """The module recording.writer, the only one above this folder that is used here; imported when needed."""
+    return importlib.import_module("...recording.writer", __name__)

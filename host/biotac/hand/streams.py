@@ -1,9 +1,9 @@
 """A board's streams, and who reads them.
 
-Two ways to read. Pull: whoever wants batches reads the link, one thread, the same every time; a slow caller makes the
-operating system's buffer fill and then the board drop whole frames, and one who gives commands alone loses the oldest.
-Live: after ``run``, or with callbacks or biotac.aio, threads of this package read always (reader.py), and a slow caller
-loses the oldest batches on this side.
+There are two ways to read. Pull: the one thread that wants batches reads the link itself. If it is slow, the operating
+system's buffer fills and then the board drops whole frames; if it only gives commands, it loses the oldest batches.
+Live: after ``run``, or with callbacks or biotac.aio, threads of this package read all the time (reader.py), and a slow
+caller loses the oldest batches on this side.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from .views import Fingers, Latest
 
 
 class Streams:
-    """Takes what ``board`` delivers, keeps ``latest`` up to date, and hands batches to all who want them."""
+    """Takes what ``board`` delivers, keeps ``latest`` up to date, and passes batches to all consumers."""
 
     def __init__(self, board: Board, latest: Latest) -> None:
-        #: The board was told to stream, and has not ended or been stopped.
+        #: Whether the board was told to stream, and has neither ended nor been stopped.
         self.streaming = False
-        #: A simulated source has played to its end and everything of it has arrived.
+        #: Whether a simulated source has played to its end and all of it has arrived.
         self.ended = False
         self._board = board
         self._link = board.link
@@ -45,11 +45,11 @@ class Streams:
         self._keepalive = KeepAlive(board)
         self._reader: Reader | None = None
         self._has_pulled = False
-        self._pulled: BatchQueue | None = self._new_queue()  # for whoever pulls; without threads always
-        self._puller: threading.Thread | None = None  # in the middle of ``batches``
+        self._pulled: BatchQueue | None = self._new_queue()  # for the pulling thread; never None without threads
+        self._puller: threading.Thread | None = None  # the last to enter ``batches``
         self._pulling = 0
         self._queues: list[BatchQueue] = []  # for others, such as biotac.aio
-        self._skipped = [0, 0]  # batches and frames, of queues that are closed
+        self._skipped = [0, 0]  # batches and frames skipped in queues that are now closed
         self._claiming = threading.Lock()
         board.deliver = self._deliver
 
@@ -64,12 +64,12 @@ class Streams:
         )
 
     def check(self) -> None:
-        """Raise what the reading threads, callbacks or a recording have come to, if anything."""
+        """Raise an error of the board or the reading threads, of a recording or of a callback, if there was one."""
         self._board.check()
         self.report()
 
     def report(self) -> None:
-        """Raise what nobody was told yet of the board, a recording or callbacks."""
+        """Raise the first error of the board, a recording or a callback that has not been raised before."""
         self._board.report()
         incoming = self._board.incoming
         trouble, incoming.trouble = incoming.trouble, None
@@ -78,7 +78,7 @@ class Streams:
         self._callbacks.report()
 
     def is_read_here(self) -> bool:
-        """The caller runs on a reading thread."""
+        """Whether the caller runs on a reading thread."""
         return self._reader is not None and self._reader.is_here()
 
     def close(self) -> None:
@@ -92,7 +92,7 @@ class Streams:
                 self.streaming = False
                 board.send(wire.Stop(0))
         except DeviceLostError:
-            pass  # it is gone already, which is what closing wants
+            pass  # a board that is gone does not stream either
         finally:
             if self._reader is not None:
                 self._reader.join()
@@ -103,8 +103,9 @@ class Streams:
     def start(self, *, pac: bool | None = None, bands: bool = False, fingers: Fingers = ALL_FINGERS) -> None:
         """Start streaming frames, status and PAC; ``fingers`` are names, or a bit mask.
 
-        ``pac``: None for PAC unless the port is a UART, which is slow. ``bands``: BANDS, too (``on_bands``). Raises
-        WireVersionError for a board that knows none, InputError for more than a UART carries.
+        ``pac``: None streams PAC unless the port is a UART, which is slow. ``bands`` adds BANDS (``on_bands``). After
+        ``want``, its streams are started instead of these. Raises WireVersionError for a board without BANDS,
+        InputError for more than a UART can carry.
         """
         streams = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
         if self._link.bits_per_s is None if pac is None else pac:
@@ -115,20 +116,20 @@ class Streams:
         self._start(wants.streams if wants else streams, self._latest.mask(fingers))
 
     def _start(self, streams: int, fingers: int) -> None:
-        # Pull alone has no keep-alive: it reads, and so could ping, only when its caller asks.
+        # There is no keep-alive with pull alone, which reads, and so could ping, only when its caller asks.
         self._subscription.start(streams, fingers, self._keepalive.timeout_ms(self._reader is not None))
         self.streaming = True
         self._link.release()
         self._keepalive.start()
 
     def _start_again(self, streams: int | None = None) -> None:
-        """With these streams or the same, and with what has come to be known since, where it streams."""
+        """Send START again if the board streams: with these streams (None: the same) and the current keep-alive."""
         started = self._subscription.started
         if self.streaming and started is not None:
             self._start(started.streams if streams is None else streams, started.fingers)
 
     def resume(self) -> None:
-        """Have a board that was away stream again, if it did."""
+        """Make a board that was away stream again, if it did before."""
         self._subscription.resume()
 
     def stop(self) -> None:
@@ -138,26 +139,27 @@ class Streams:
         self._wake_all()
 
     def subscribe(self, quantities: wire.QuantityFlags, *, fingers: Fingers = ALL_FINGERS) -> None:
-        """Choose what the board computes and sends of ``fingers`` (names, or a bit mask) in its frames.
+        """Choose what the board computes and sends in the frames of ``fingers`` (names, or a bit mask).
 
-        What is left out is not computed; it arrives as NaN, under the flag NOT_ASKED. Without REST_FRAMES
-        an untouched finger sends heartbeats (``Batch.idle``) in place of frames, without loss of a touch:
-        a frame comes as soon as the signals move. At first it is POC | FORCE | TORQUE | PRESSURE | REST_FRAMES;
-        the choice lasts until the board restarts. A board that knows no PRESSURE or EVENTS is not asked
-        for them.
+        What is left out is not computed; it arrives as NaN, with the flag NOT_ASKED. Without REST_FRAMES, an untouched
+        finger sends heartbeats (``Batch.idle``) in place of frames. No touch is missed: a frame comes as soon as the
+        signals move. The default is POC | FORCE | TORQUE | PRESSURE | REST_FRAMES; the choice lasts until the board
+        restarts. A board without PRESSURE or EVENTS is not asked for them.
         """
         self._subscription.subscribe(quantities, fingers)
 
     def want(self, *names: str, rest: bool = True, rate_hz: float | None = None) -> None:
-        """Choose what the board computes and sends.
+        """Choose what the board computes and sends, by name.
 
-        Names are force, poc, torque, pressure, sigma, touch, events, raw, pdc, temperature, pac and bands. Raw
-        counts, pdc and temperature travel in every FRAME, so each of them asks for frames and no more. Status always
-        comes, it is the link's sign of life, whether ``status`` is named or not. With ``rest=False`` an untouched
-        finger sends heartbeats in place of frames. ``rate_hz``, above 0 to 100, takes every n-th frame with n = 100 /
-        rate_hz rounded, by seq: on this side only, for boards cannot leave frames out; a recording has them all, and
-        PAC and messages are not thinned. Holds for all fingers until the next ``want``; what ``on_touch``,
-        ``on_event`` and ``on_tare`` need comes besides. Raises InputError for a name or rate that there is not.
+        Names are force, poc, torque, pressure, sigma, touch, events, raw, pdc, temperature, pac, bands and status. Raw
+        counts, pdc and temperature are in every FRAME, so each of them only asks for frames. Status is always sent,
+        named or not: it is the link's sign of life. With ``rest=False`` an untouched finger sends heartbeats in place
+        of frames.
+
+        ``rate_hz``, above 0 and up to 100, keeps every n-th frame by seq, with n = 100 / rate_hz rounded. This happens
+        on this side only, because boards cannot leave frames out: a recording has all of them, and PAC and messages
+        are not thinned. The choice holds for all fingers until the next ``want``; what ``on_touch``, ``on_event`` and
+        ``on_tare`` need is added to it. Raises InputError for an unknown name or a rate out of range.
         """
         wants = Wants.of(names, rest=rest, rate_hz=rate_hz)
         self.subscribe(wants.quantities)
@@ -205,14 +207,14 @@ class Streams:
                     self._pulling -= 1
 
     def skip_old(self) -> None:
-        """Forget what has come, and what was on its way until now."""
+        """Discard what has arrived, and what was on its way until now."""
         if self.streaming:
-            self._board.tell(wire.Ping(0))  # a barrier: its reply comes behind all that was made before
+            self._board.tell(wire.Ping(0))  # a barrier: its reply comes after everything made before
         if self._pulled is not None:
             self._pulled.clear()
 
     def _await_batch(self, queue: BatchQueue) -> None:
-        """Wait until there may be one."""
+        """Wait until there may be a batch in ``queue``."""
         board = self._board
         if not board.is_read_here():
             board.wait_for(lambda: queue.rows or not self.streaming or board.failure or board.closing.is_set(), 1.0)
@@ -228,7 +230,7 @@ class Streams:
                     return
 
     def put_back(self, batch: Batch) -> None:
-        """Return what ``batches`` has given and was not used."""
+        """Return a batch that ``batches`` yielded and that was not used."""
         if self._pulled is not None:
             self._pulled.put_back(batch)
 
@@ -250,7 +252,7 @@ class Streams:
         if self._reader is not None:
             return
         if not (pulled or self._has_pulled):
-            # Nobody takes them: kept, they would be stale later, or hold up a board that waits for room.
+            # Nobody takes these batches. If kept, they would be stale later, or hold up a board that waits for room.
             self._pulled = None
         self._reader = Reader(self, self._callbacks, board.closing, self._link.port)
         board.is_read_here, board.is_pulled = self._reader.is_here, False
@@ -260,38 +262,37 @@ class Streams:
         self._start_again()  # now with keep-alive
 
     def on_batch(self, fn: Callable[[Batch], Any]) -> Unsubscribe:
-        """Call ``fn`` with every batch, on the reading thread; returns what ends that.
+        """Call ``fn`` with every batch, on the reading thread; returns a function that ends this.
 
-        As with all ``on_...``: this starts the reading threads, the stream starts with ``run`` or ``start``. ``fn``
-        may give commands. While it is slow the link is read all the same, and callbacks lose the oldest batches.
-        What it raises comes up as CallbackError at the next call or at ``close``.
+        Like every ``on_...``, this starts the reading threads; the stream starts with ``run`` or ``start``. ``fn`` may
+        give commands. The link is read even while ``fn`` is slow, but then callbacks lose the oldest batches. What it
+        raises is raised as CallbackError by the next ``check``, ``run``, ``on_...`` or read, or by ``close``.
         """
         return self._on(Batch, fn)
 
     def on_touch(self, fn: Callable[[wire.Touch], Any]) -> Unsubscribe:
-        """Call ``fn`` as soon as a resting finger's signals move, inside the round: a hint, CONTACT may follow.
+        """Call ``fn`` as soon as a resting finger's signals move, within the round: a hint that CONTACT may follow.
 
-        Subscribes every finger to TOUCH besides what it is subscribed to.
+        Adds TOUCH to every finger's subscription.
         """
         return self._on_told(wire.Touch, fn)
 
     def on_event(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
-        """Call ``fn`` with every EVENT: touch, lift, jolt, slip and what ends it (EventKind), as soon as it is told.
+        """Call ``fn`` with every EVENT (touch, lift, jolt, slip and its end, see EventKind) as soon as it arrives.
 
-        Subscribes every finger to EVENTS besides what it is subscribed to. Raises WireVersionError for a board that
-        knows none.
+        Adds EVENTS to every finger's subscription. Raises WireVersionError for a board without events.
         """
         need(self._board.info, EVENTS_SINCE_MINOR, "events")
         return self._on_told(wire.Event, fn)
 
     def on_slip(self, fn: Callable[[wire.Event], Any]) -> Unsubscribe:
-        """Call ``fn`` when what a finger holds begins to slip: the events of ``on_event`` that are SLIP."""
+        """Call ``fn`` when what a finger holds begins to slip: with the events of ``on_event`` that are SLIP."""
         return self.on_event(lambda event: fn(event) if event.kind == wire.EventKind.SLIP else None)
 
     def on_bands(self, fn: Callable[[wire.Bands], Any]) -> Unsubscribe:
-        """Call ``fn`` with how strongly dynamic pressure vibrated, in octaves, a hundred times a second and finger.
+        """Call ``fn`` with how strongly dynamic pressure vibrated, by octave, 100 times a second for each finger.
 
-        Streams BANDS besides what is streamed. Raises WireVersionError for a board that knows none.
+        Adds BANDS to what is streamed. Raises WireVersionError for a board without BANDS.
         """
         need(self._board.info, BANDS_SINCE_MINOR, "bands of PAC")
         unsubscribe = self._on(wire.Bands, fn)
@@ -311,16 +312,16 @@ class Streams:
         return unsubscribe
 
     def _hint(self, streams: wire.StreamFlags) -> None:
-        """Have ``streams``, with which it comes, streamed besides."""
+        """Add ``streams``, which carry what a callback waits for, to what is streamed."""
         if self._subscription.hint(streams):
             self._start_again()
 
     def on_status(self, fn: Callable[[wire.Status], Any]) -> Unsubscribe:
-        """Call ``fn`` with the board's counters, every second."""
+        """Call ``fn`` with each STATUS, the board's counters, which comes every second by default."""
         return self._on(wire.Status, fn)
 
     def on_gap(self, fn: Callable[[Gap], Any]) -> Unsubscribe:
-        """Call ``fn`` when the board has come back and sends again."""
+        """Call ``fn`` when the board was away (``reconnect``), and is back and sending again."""
         return self._on(Gap, fn)
 
     def _on(self, kind: type[Any], fn: Callable[[Any], Any]) -> Unsubscribe:
@@ -328,14 +329,14 @@ class Streams:
         return self._callbacks.add(kind, fn)
 
     def open_queue(self, wake: Callable[[], None] | None = None) -> BatchQueue:
-        """A queue of one's own for what arrives from now on; ``wake`` is called on the reading thread."""
+        """A separate queue for what arrives from now on; ``wake`` is called on the reading thread."""
         self._read_always()
         queue = self._new_queue(wake)
         self._queues = [*self._queues, queue]
         return queue
 
     def close_queue(self, queue: BatchQueue) -> None:
-        """End what open_queue began."""
+        """Close a queue made by open_queue."""
         if queue in self._queues:
             self._queues = [one for one in self._queues if one is not queue]
             self._skipped[0] += queue.batches_skipped
@@ -345,19 +346,19 @@ class Streams:
     # ---- queues --------------------------------------------------------------------------------
 
     def _new_queue(self, wake: Callable[[], None] | None = None) -> BatchQueue:
-        # A board that waits for room may go on when something was taken.
+        # A board that waits for room may go on once something has been taken.
         queue = BatchQueue(wake, None if self._link.pace else self._board.notify)
         queue.bound(self._limit_rows())
         return queue
 
     def _limit_rows(self) -> int | None:
-        return LIMIT_ROWS if self._link.pace else None  # a board that waits for its reader can be let wait
+        return LIMIT_ROWS if self._link.pace else None  # pace 0: the board waits for its reader
 
     def _all_queues(self) -> list[BatchQueue]:
         return self._queues if self._pulled is None else [self._pulled, *self._queues]
 
     def _wake_all(self) -> None:
-        """Whoever waits is to look again."""
+        """Wake everyone who waits, to look again."""
         self._board.notify()
         for queue in self._queues:
             queue.wake()
@@ -367,7 +368,7 @@ class Streams:
     def _deliver(self, batch: Batch) -> None:
         if self._subscription.wants is not None:
             batch = self._subscription.wants.thin(batch)
-        now_s = self._keepalive.heard()  # before anybody is woken by it
+        now_s = self._keepalive.heard()  # before this batch wakes anybody
         self._latest.update(batch, now_s)
         if self._pulled is not None:
             self._pulled.put(batch)
@@ -376,7 +377,7 @@ class Streams:
             queue.put(batch)
 
     def read(self, at_most_s: float) -> None:
-        """See reader.Source: waits for bytes, and does what is due: ping, notice silence or the end of a source."""
+        """Wait for bytes, and do what is due: ping, or notice silence or the end of a source."""
         if self._link.pace == 0:
             self._wait_for_room()
         if self.streaming and self._link.ended:
@@ -386,11 +387,11 @@ class Streams:
         self._board.read(at_most_s)
 
     def _wait_for_room(self) -> None:
-        """Where nothing may be dropped: until consumers have room, or somebody awaits a reply."""
+        """Where nothing may be dropped, wait until consumers have room or somebody awaits a reply."""
         if self._is_full():
             board = self._board
             board.wait_for(lambda: board.awaiting or board.closing.is_set() or not self._is_full())
-            self._keepalive.heard()  # it was not the board that was silent
+            self._keepalive.heard()  # the silence was ours, not the board's
 
     def _is_full(self) -> bool:
         return any(one.rows >= LIMIT_ROWS for one in self._all_queues())
@@ -407,8 +408,8 @@ class Streams:
             self._wake_all()
 
     def _finish(self) -> None:
-        """A simulated source is over."""
-        self._board.tell(wire.Ping(0))  # a barrier: its reply comes behind the last frame
+        """Note that a simulated source has ended, once all of it has arrived."""
+        self._board.tell(wire.Ping(0))  # a barrier: its reply comes after the last frame
         self.ended = True
         self.streaming = False
         self._wake_all()

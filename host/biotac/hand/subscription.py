@@ -1,4 +1,4 @@
-"""What a program wants of the board, by name, as the flags that SUBSCRIBE and START carry; and what it was told."""
+"""What a program wants from the board: by name, as the flags of SUBSCRIBE and START, and what the board was told."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .callbacks import Callbacks
 from .compatibility import BANDS_SINCE_MINOR, EVENTS_SINCE_MINOR, PRESSURE_SINCE_MINOR, need
 from .views import Fingers, Latest
 
-#: What a FRAME can say of a contact, for Hand.subscribe.
+#: What a FRAME can say about a contact, for Hand.subscribe.
 RESULTS = QuantityFlags.POC | QuantityFlags.FORCE | QuantityFlags.TORQUE | QuantityFlags.PRESSURE
 AT_FIRST = RESULTS | QuantityFlags.REST_FRAMES
-# What a board tells of only when somebody is called with it.
+# Messages that a board sends only when a callback wants them.
 TOLD_OF = {Touch: QuantityFlags.TOUCH, Event: QuantityFlags.EVENTS}
 
 QUANTITIES = {
@@ -38,7 +38,7 @@ NAMES = (*QUANTITIES, *IN_EVERY_FRAME, *STREAMS, "status")
 
 @dataclass(frozen=True, slots=True)
 class Wants:
-    """Flags for the board, and every how many frames this side takes one."""
+    """Flags for the board; this side keeps one of ``every`` frames."""
 
     quantities: QuantityFlags
     streams: StreamFlags
@@ -46,7 +46,7 @@ class Wants:
 
     @classmethod
     def of(cls, names: tuple[str, ...], *, rest: bool, rate_hz: float | None) -> Wants:
-        """InputError for a name or a rate that there is not."""
+        """The flags for ``names``. Raises InputError for an unknown name, no name, or a rate out of range."""
         for name in names:
             if name not in NAMES:
                 raise InputError(f"nothing is called {name!r}; expected some of {', '.join(NAMES)}")
@@ -59,7 +59,7 @@ class Wants:
             quantities |= QUANTITIES.get(name, QuantityFlags(0))
         if rest:
             quantities |= QuantityFlags.REST_FRAMES
-        # The link's sign of life, 36 bytes a second: without it a hand without sensors would be a dead one.
+        # The link's sign of life, 36 bytes a second: without it, a hand without sensors would look dead.
         streams = StreamFlags.STATUS
         if any(name in QUANTITIES or name in IN_EVERY_FRAME for name in names):
             streams |= StreamFlags.FRAMES
@@ -68,7 +68,7 @@ class Wants:
         return cls(quantities, streams, 1 if rate_hz is None else round(FRAME_HZ / rate_hz))
 
     def thin(self, batch: Batch) -> Batch:
-        """Frames whose seq is a multiple of ``every``; everything else stays."""
+        """The batch with only those frames whose seq is a multiple of ``every``; everything else stays."""
         if self.every == 1 or not len(batch.wire):
             return batch
         kept = batch.seq % self.every == 0
@@ -76,20 +76,20 @@ class Wants:
 
 
 class Subscription:
-    """What a board was told to compute and to send: what was asked for, and what ``callbacks`` need besides."""
+    """What a board was told to compute and send: what was asked for, and what ``callbacks`` need in addition."""
 
     def __init__(self, board: Board, latest: Latest, callbacks: Callbacks) -> None:
-        #: The last START, None before it and after a STOP.
+        #: The last START; None before the first and after a STOP.
         self.started: Start | None = None
         self.wants: Wants | None = None
         self._board = board
         self._latest = latest
         self._callbacks = callbacks
-        self._hinted = StreamFlags(0)  # what somebody waits for comes with these
+        self._hinted = StreamFlags(0)  # the streams that carry what callbacks wait for
         self._quantities = dict.fromkeys(range(MAX_SENSORS), AT_FIRST)
 
     def start(self, streams: int, fingers: int, keepalive_ms: int) -> None:
-        """Have it stream."""
+        """Start the stream. Raises InputError when it does not fit a UART, WireVersionError for missing BANDS."""
         streams |= self._hinted
         if streams & StreamFlags.BANDS:
             need(self._board.info, BANDS_SINCE_MINOR, "bands of PAC")
@@ -102,12 +102,12 @@ class Subscription:
         self.started = started
 
     def resume(self) -> None:
-        """Have a board that was away stream again, if it did."""
+        """Make a board that was away stream again, if it did before."""
         if self.started is not None:
             self._board.tell(self.started)
 
     def stop(self) -> None:
-        """Have it stream no more."""
+        """Stop the stream."""
         self._board.tell(Stop(0))
         self.started = None
 
@@ -125,12 +125,12 @@ class Subscription:
         self._quantities.update({f: asked for f in range(MAX_SENSORS) if mask >> f & 1})
 
     def tell_of(self, kind: type[Any]) -> None:
-        """Somebody is called with such messages: have every finger's told."""
+        """Subscribe every finger to messages of this kind, which a callback wants."""
         for quantities in {q for q in self._quantities.values() if TOLD_OF[kind] not in q}:
             mask = sum(1 << f for f, q in self._quantities.items() if q == quantities)
             self.subscribe(quantities, mask)
 
     def hint(self, streams: StreamFlags) -> bool:
-        """From now on START asks for ``streams``, too; whether the last one did not."""
+        """Add ``streams`` to every START from now on; true when the last one lacked any of them."""
         self._hinted |= streams
         return self.started is not None and bool(self._hinted & ~self.started.streams)

@@ -1,4 +1,4 @@
-"""Fingers by name, and the latest that each has said."""
+"""Fingers by name, and the latest values of each."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ NOTHING_YET = (
 
 
 def checked_names(names: Mapping[str, int] | None) -> dict[str, int]:
-    """A copy; InputError unless each name has a chip select of its own."""
+    """A copy of ``names``, None for the default. Raises InputError unless each name has a chip select of its own."""
     chosen = dict(DEFAULT_NAMES if names is None else names)
     for name, finger in chosen.items():
         if not isinstance(finger, int) or not 0 <= finger < MAX_SENSORS:
@@ -51,7 +51,7 @@ def checked_names(names: Mapping[str, int] | None) -> dict[str, int]:
 
 
 def finger_index(names: Mapping[str, int], key: str | SupportsIndex) -> int:
-    """Chip select of a name or number, NumPy's too; KeyError in words."""
+    """Chip select of a name or an integer, NumPy's included. Raises KeyError for an unknown finger."""
     if isinstance(key, str):
         if key in names:
             return names[key]
@@ -60,15 +60,15 @@ def finger_index(names: Mapping[str, int], key: str | SupportsIndex) -> int:
     raise KeyError(f"no finger {key!r}; expected one of {', '.join(map(repr, names))}, or 0 to {MAX_SENSORS - 1}")
 
 
-# Batches that wait until somebody looks, or there are so many.
+# Batches wait until somebody looks at them, or until there are this many.
 UNSEEN_BATCHES = 16
 
 
 class Latest:
     """The newest frame or heartbeat of each finger, and when it came.
 
-    Whoever reads the link only notes the batch: to look into each costs as much as to decode it, and most are never
-    looked at.
+    The thread that reads the link only stores the batch: searching each one costs as much as decoding it, and most are
+    never looked at.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Latest:
         self._monotonic_s = host_clock.monotonic_s
         self._device_clock = device_clock or DeviceClock()
         self.names = checked_names(names)
-        #: Whether the board is looked for, so that what it said last says nothing of now; raises when it is lost.
+        #: Whether the board is being looked for, so that its last values say nothing about now; raises once it is lost.
         self.is_away: Callable[[], bool] = lambda: False
         self._unseen: deque[tuple[Batch, float]] = deque()
         self._unseen_fingers = 0  # bit mask
@@ -86,16 +86,16 @@ class Latest:
         self._looking = threading.Lock()
 
     def __getitem__(self, key: str | SupportsIndex) -> FingerView:
-        """A finger by name or chip select; KeyError in words."""
+        """A finger by name or chip select. Raises KeyError for an unknown one."""
         finger = finger_index(self.names, key)
         return FingerView(self.name(finger), finger, self)
 
     def name(self, finger: int) -> str:
-        """Of a chip select; the number as text where it has none."""
+        """The name of a chip select, or its number as text if it has no name."""
         return next((name for name, number in self.names.items() if number == finger), str(finger))
 
     def mask(self, fingers: Fingers) -> int:
-        """Bit mask of several; KeyError in words."""
+        """Bit mask of several fingers. Raises KeyError for an unknown one."""
         if isinstance(fingers, str):
             return 1 << finger_index(self.names, fingers)
         if isinstance(fingers, Iterable):
@@ -103,14 +103,14 @@ class Latest:
         return index(fingers)
 
     def forked(self) -> None:
-        """Whoever looked is in the other process."""
+        """Renew the lock in a forked child: its holder may be a thread of the parent process."""
         self._looking = threading.Lock()
 
     def update(self, batch: Batch, when_s: float) -> None:
-        """Take note of it. One thread at a time."""
+        """Store a batch that has arrived. To be called by one thread at a time."""
         unseen, fingers = self._unseen, batch.fingers
         if not unseen or (fingers >= 0 and not self._unseen_fingers & ~fingers):
-            unseen.clear()  # nobody will look at those: all their fingers are in this one
+            unseen.clear()  # nobody needs the older batches: all their fingers are in this one
             self._unseen_fingers = fingers
         else:
             self._unseen_fingers |= fingers
@@ -122,12 +122,12 @@ class Latest:
         with self._looking:
             batches = []
             while self._unseen:
-                with suppress(IndexError):  # the reader may clear it at the same time
+                with suppress(IndexError):  # the reading thread may clear it at the same time
                     batches.append(self._unseen.popleft())
             seen = 0
             for batch, when_s in reversed(batches):
                 if not batch.fingers & ~seen:
-                    continue  # later ones had all of these
+                    continue  # later batches had all of these fingers
                 for finger, (row, idle) in _last_of(batch).items():
                     if not seen >> finger & 1:
                         self._entries[finger] = (batch, row, idle, when_s)
@@ -135,7 +135,7 @@ class Latest:
             return self._entries
 
     def last_t_us(self) -> int | None:
-        """Device time of the latest of all; None before any."""
+        """Device time of the latest frame or heartbeat of any finger, in us; None before any."""
         return max((self._t_us(*entry[:3]) for entry in list(self._look().values())), default=None)
 
     @staticmethod
@@ -143,7 +143,7 @@ class Latest:
         return int(batch.idle["t_us"][row] if idle else batch.t_us[row])
 
     def row(self, finger: int) -> StructArray:
-        """FRAME_DTYPE (1,): the frame, or what a heartbeat says, or nothing: all invalid, t_us -1."""
+        """FRAME_DTYPE (1,): the latest frame, or the values of a heartbeat; without either all invalid, t_us -1."""
         is_away = self.is_away()
         entry = self._look().get(finger)
         if entry is None or is_away:
@@ -159,30 +159,30 @@ class Latest:
         return out
 
     def age_s(self, finger: int) -> float:
-        """Since its samples were taken, or at least since the row came; inf before any."""
+        """Time since the samples of a finger's latest row were taken, at least since the row came; inf before any."""
         entry = self._look().get(finger)
         if entry is None:
             return math.inf
         now_s = self._monotonic_s()
         since_arrival_s = now_s - entry[3]
-        # NaN where the clock knows nothing. A row was there when it came, whatever a clock's estimate says.
+        # NaN while the clock knows nothing. A row was taken before it came, whatever the clock's estimate says.
         taken_s = self._device_clock.estimate_s(self._t_us(*entry[:3]) + LAST_SAMPLE_US)
         return max(since_arrival_s, now_s - taken_s)  # NaN is never larger
 
 
 def _last_of(batch: Batch) -> dict[int, tuple[int, bool]]:
-    """Finger to its latest row, and whether that is a heartbeat's."""
+    """Each finger's latest row, and whether it is a heartbeat."""
     rows = _last_rows(batch.wire)
     out = {finger: (row, False) for finger, row in rows.items()}
     for finger, row in _last_rows(batch.idle).items() if len(batch.idle) else ():
-        # A batch can hold both: what is later in device time is the latest.
+        # A batch can hold a frame and a heartbeat of one finger: the later in device time counts.
         if finger not in rows or batch.idle["t_us"][row] > batch.t_us[rows[finger]]:
             out[finger] = (row, True)
     return out
 
 
 def _last_rows(messages: StructArray) -> dict[int, int]:
-    """Finger to its last row."""
+    """Each finger's last row."""
     return {finger: row for row, finger in enumerate(messages["finger"].tolist())}
 
 
@@ -198,7 +198,7 @@ def _empty(finger: int, t_us: int, seq: int, flags: FrameFlags) -> StructArray:
 
 
 def _value(name: str, convert: Callable[[Any], T], doc: str) -> T:
-    """A property of FingerView, for the type checker what it gives."""
+    """A property of FingerView; for the type checker, the type of its value."""
     return cast(T, property(lambda view: convert(view._row()[name]), doc=doc))
 
 
@@ -211,19 +211,20 @@ def _counts(row: Any) -> NDArray[np.uint16]:
 
 
 class FingerView:
-    """The latest of one finger, ``hand["index"]``: a look at it now, without waiting.
+    """The latest values of one finger, ``hand["index"]``, read without waiting.
 
-    Values are those of the latest frame, NaN or 65535 where invalid, as in FRAME_DTYPE. Of an untouched finger
-    that sends heartbeats they are the latest heartbeat's: results are NaN, ``flags`` has NOT_ASKED. Before anything
-    came, and while a board that went away is looked for, everything is invalid and ``t_us`` is -1. Two properties may
-    be of two frames; ``frame`` is one. DeviceLostError when the board is lost for good.
+    Values are those of the latest frame, NaN or 65535 where invalid, as in FRAME_DTYPE. For an untouched finger that
+    sends heartbeats they are those of the latest heartbeat: results are NaN, and ``flags`` has NOT_ASKED. Before
+    anything has arrived, and while a lost board is looked for, everything is invalid and ``t_us`` is -1. Two
+    properties may come from different frames; those of ``frame`` come from one. Raises DeviceLostError when the board
+    is lost for good.
     """
 
     def __init__(self, name: str, finger: int, latest: Latest, keeps: object = None) -> None:
         self.name = name
         self.finger = finger
         self._latest = latest
-        self._keeps = keeps  # the Hand, which would end with its last reference
+        self._keeps = keeps  # the Hand, which would be closed with its last reference
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(f"{self!r} is of this process and cannot be sent to another; open the board there")
@@ -236,7 +237,7 @@ class FingerView:
 
     @property
     def frame(self) -> Frame:
-        """All values, of one moment."""
+        """All values of one frame or heartbeat."""
         return Frame.from_row(self._row())
 
     force_n = _vector("force_n", "Force on the finger, (3,) in N.")
@@ -256,8 +257,8 @@ class FingerView:
 
     @property
     def age_s(self) -> float:
-        """How long ago the round's last sample was taken, in s, by ``Hand.clock``; inf before anything came.
+        """How long ago the round's last sample was taken, in s, by ``Hand.clock``; inf before anything arrived.
 
-        Where that knows nothing, as with a simulated board that is not in real time, how long ago it was read.
+        While that clock knows nothing, as with a simulated board that is not in real time: how long ago it was read.
         """
         return self._latest.age_s(self.finger)

@@ -1,4 +1,4 @@
-"""A calibration as JSON: for people to read, keep and send, with where it comes from."""
+"""A calibration as JSON: for people to read, keep and send, with its provenance."""
 
 from __future__ import annotations
 
@@ -13,27 +13,14 @@ from ..wire import messages_gen as wire
 from .values import Calibration
 
 FORMAT = "biotac-calibration"
-VERSION = 2  # 1 had no pressure_gain_nn
-KEYS = (
-    "format",
-    "version",
-    "serial",
-    "made_s",
-    "poc_weights",
-    "force_gain_nn",
-    "torque_gain_nn",
-    "thermal_gain_milli",
-    "pressure_gain_nn",
-    "provenance",
-)
-AXES = {"force_gain_nn": "xyz", "torque_gain_nn": "yz"}
+VERSION = 2  # version 1 had no pressure_gain_nn
 
-#: How a calibration came about, for people: any keys, texts or numbers. Nothing is computed from it.
+#: How a calibration was made, for people to read: any keys, any JSON values. Nothing is computed from it.
 Provenance = dict[str, Any]
 
 
 def to_dict(calibration: Calibration, provenance: Provenance | None = None) -> dict[str, Any]:
-    """The keys of a file, in their order."""
+    """The contents of a file, its keys in order."""
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -48,8 +35,11 @@ def to_dict(calibration: Calibration, provenance: Provenance | None = None) -> d
     }
 
 
+KEYS = tuple(to_dict(Calibration()))
+
+
 def from_dict(tree: Any) -> Calibration:
-    """Inverse of to_dict, provenance left out. ValueError says which key is wrong, and why."""
+    """Inverse of to_dict, without the provenance. Raises ValueError that says which key is wrong, and why."""
     if not isinstance(tree, dict) or tree.get("format") != FORMAT:
         raise ValueError(f'it has no "format": "{FORMAT}"')
     if type(tree.get("version")) is not int or not 1 <= tree["version"] <= VERSION:
@@ -61,16 +51,16 @@ def from_dict(tree: Any) -> Calibration:
     for key in tree:
         if key not in KEYS:
             raise ValueError(f"key {key!r} is unknown; expected {', '.join(KEYS)}")
-    for key in KEYS[:-1]:
-        if key not in tree:
+    for key in KEYS:
+        if key not in tree and key != "provenance":
             raise ValueError(f"key {key!r} is missing")
     if not isinstance(tree.get("provenance", {}), dict):
         raise ValueError("provenance is no object; put its facts under keys of their own")
     weights = [w.name for w in wire.PocWeights]
     if tree["poc_weights"] not in weights:
         raise ValueError(f"poc_weights is {tree['poc_weights']!r}, expected {', '.join(weights)}")
-    x, y, z = _axes(tree, "force_gain_nn")
-    torque_y, torque_z = _axes(tree, "torque_gain_nn")
+    x, y, z = _axes(tree, "force_gain_nn", "xyz")
+    torque_y, torque_z = _axes(tree, "torque_gain_nn", "yz")
     return Calibration(
         wire.PocWeights[tree["poc_weights"]],
         (x, y, z),
@@ -82,8 +72,7 @@ def from_dict(tree: Any) -> Calibration:
     )
 
 
-def _axes(tree: dict[str, Any], key: str) -> list[Any]:
-    axes = AXES[key]
+def _axes(tree: dict[str, Any], key: str, axes: str) -> list[Any]:
     if not isinstance(tree[key], dict) or sorted(tree[key]) != list(axes):
         raise ValueError(f"{key} is {tree[key]!r}, expected an object with {', '.join(axes)}")
     return [tree[key][axis] for axis in axes]
@@ -95,7 +84,7 @@ def dumps(calibration: Calibration, provenance: Provenance | None = None) -> str
 
 
 def loads(text: str, where: str) -> Calibration:
-    """Read a file's text; InputError beginning with ``where`` says what is wrong with it."""
+    """The calibration in a file's text. Raises InputError that begins with ``where`` and says what is wrong."""
     try:
         return from_dict(parse_json(text))
     except ValueError as error:
@@ -105,7 +94,7 @@ def loads(text: str, where: str) -> Calibration:
 
 
 def load(path: Path) -> Calibration:
-    """Read a file; InputError when it cannot be read or used."""
+    """The calibration in a file. Raises InputError when it cannot be read or used."""
     try:
         text = read_text(path, JSON_BYTES)
     except OSError as error:
@@ -120,10 +109,15 @@ def load(path: Path) -> Calibration:
 def save(
     path: Path, calibration: Calibration, provenance: Provenance | None = None, *, overwrite: bool = False
 ) -> None:
-    """Write a file. InputError when it exists and may not be overwritten, or cannot be written."""
+    """Write a file. Raises InputError when it exists and may not be overwritten, or cannot be written."""
+    write(path, dumps(calibration, provenance), overwrite=overwrite)
+
+
+def write(path: Path, text: str, *, overwrite: bool) -> None:
+    """Write the text of a calibration's or a map's file; raises as save() does."""
     try:
         with path.open("w" if overwrite else "x", encoding="utf-8") as file:
-            file.write(dumps(calibration, provenance))
+            file.write(text)
     except FileExistsError as error:
         raise InputError(f"{path} exists and would be overwritten; choose another name or say --force") from error
     except OSError as error:
@@ -131,7 +125,7 @@ def save(
 
 
 def when(made_s: int) -> str:
-    """``made_s`` for people."""
+    """``made_s`` as text for people."""
     if made_s == 0:
         return "made at an unknown time"
     return f"made {datetime.fromtimestamp(made_s, timezone.utc):%Y-%m-%d %H:%M} UTC"

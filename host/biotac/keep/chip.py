@@ -1,29 +1,28 @@
 """A 24Cxx EEPROM on this computer's own I2C bus, through ``smbus2``.
 
-What such a chip asks of who writes to it: a write stays within one page, or it wraps to the page's beginning; and while
-the chip keeps a page, for up to 10 ms, it acknowledges nothing. So the next page waits until it does, and it is asked a
-bounded number of times rather than left alone for a guessed time.
+A write must stay within one page, or it wraps to the page's beginning. While the chip stores a page, for up to 10 ms,
+it acknowledges nothing. So the next page waits until it does; the chip is polled a bounded number of times rather than
+given a guessed time.
 """
 
 from __future__ import annotations
 
 import errno
 import re
-from types import TracebackType
 from typing import Any, NamedTuple
 
 from ..errors import InputError, PortError
 
 
 class Kind(NamedTuple):
-    """Size, largest write and address length of one type."""
+    """Size, page size (the largest write) and address length of one type of chip."""
 
     size_bytes: int
     page_bytes: int
     address_bytes: int
 
 
-# By the data sheets (Microchip and Atmel agree, but for pages of 16 in a few 24C02; 8 fits those too).
+# From the data sheets. Microchip and Atmel agree, except that a few 24C02 have pages of 16; 8 works with those too.
 KINDS = {
     "24c01": Kind(128, 8, 1),
     "24c02": Kind(256, 8, 1),
@@ -37,15 +36,15 @@ KINDS = {
     "24c512": Kind(65536, 128, 2),
 }
 FIRST_ADDRESS, LAST_ADDRESS = 0x50, 0x57  # of every 24Cxx
-REACH_BYTES = 256  # a chip of one address byte has its further bytes at further bus addresses; nobody needs those here
-# A question takes 2 bytes on the bus, 18 us at 1 MHz, and a call of the system: together over 20 ms, twice a write.
+REACH_BYTES = 256  # chips with one address byte have the rest at further bus addresses, which are not needed here
+# A poll takes 2 bytes on the bus, 18 us at 1 MHz, and a system call: over 20 ms for all, twice as long as a write.
 QUESTIONS = 1000
-# What drivers say when nothing acknowledged.
+# Errors that drivers report when nothing acknowledged.
 NOT_ACKNOWLEDGED = {errno.ENXIO, errno.EREMOTEIO, errno.EIO}
 
 
 def parse_place(text: str) -> tuple[int, int]:
-    """Bus and address of ``1:0x50``; PortError for anything else."""
+    """Bus and address from text such as ``1:0x50``. Raises PortError for anything else."""
     match = re.fullmatch(r"(\d{1,3}):(0[xX][0-9a-fA-F]{1,2}|\d{1,3})", text, re.ASCII)
     if match is None:
         raise PortError(f"{text!r} is no place on an I2C bus; expected BUS:ADDRESS, such as 1:0x50 (see i2cdetect -l)")
@@ -56,7 +55,10 @@ def parse_place(text: str) -> tuple[int, int]:
 
 
 class Chip:
-    """One EEPROM; use as a context manager. Raises PortError when it cannot be reached."""
+    """One EEPROM; use it as a context manager.
+
+    Raises PortError when its bus cannot be opened, InputError for a kind below 256 bytes.
+    """
 
     def __init__(self, place: str, kind: str) -> None:
         self.place = f"EEPROM {place}"
@@ -81,23 +83,17 @@ class Chip:
     def __enter__(self) -> Chip:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Give the bus back."""
+    def __exit__(self, *error: object) -> None:
         self._bus.close()
 
     def read(self, at: int, count: int) -> bytes:
-        """``count`` bytes from ``at`` on."""
+        """``count`` bytes from address ``at``. Raises PortError when the chip does not answer or the bus fails."""
         answer = self._message.read(self._address, count)
         self._transfer(self._message.write(self._address, self._pointer(at)), answer)
         return bytes(answer)
 
     def write(self, at: int, data: bytes) -> None:
-        """Page by page; returns once the chip has kept the last."""
+        """Write page by page; returns once the chip has stored the last. Raises PortError as read() does."""
         while data:
             room = self.kind.page_bytes - at % self.kind.page_bytes
             self._transfer(self._message.write(self._address, [*self._pointer(at), *data[:room]]))
@@ -120,7 +116,7 @@ class Chip:
             raise PortError(f"{self.place}: the bus failed ({error}); check its wires and try again") from error
 
     def _wait(self) -> None:
-        """Until a write is kept. A read is the question: whatever the chip is, it changes nothing there."""
+        """Wait until a write is stored. It polls with reads, which change nothing whatever the chip is."""
         for _ in range(QUESTIONS):
             try:
                 self._bus.i2c_rdwr(self._message.read(self._address, 1))

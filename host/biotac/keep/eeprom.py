@@ -1,8 +1,9 @@
-"""A calibration in an EEPROM: two places, written in turn, so that a torn write never costs the old one.
+"""A calibration in an EEPROM: two places, written in turn, so that an interrupted write never destroys the old one.
 
-Each place is a CRC-32 over the rest of it, a generation, and the record as a board's flash holds it
-(protocol/SPEC.md, Calibrations). The valid place with the later generation holds; a write goes to the other one, whose
-CRC is wrong until its last byte is kept. The places are the same in every chip: naming another size moves none.
+Each place holds a CRC-32 over the rest of it, a generation, and the record as in a board's flash (protocol/SPEC.md,
+Calibrations). The valid place with the later generation counts. A write goes to the other place, whose CRC is wrong
+until its last byte is stored. The places have the same addresses in every chip, so naming a wrong size does not move
+them.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ GENERATION = struct.Struct("<I")
 
 
 class Kept(NamedTuple):
-    """What one place holds."""
+    """Contents of one place."""
 
     place: int
     generation: int
-    record: bytes  # and 0xFF behind it
+    record: bytes  # followed by 0xFF
 
 
 def load(chip: Chip) -> Calibration:
-    """The calibration in this chip. InputError when there is none that can be used."""
+    """The calibration in this chip. Raises InputError when there is none that can be used."""
     raw = [_read(chip, place) for place in range(PLACES)]
     newest = _newest(raw)
     if newest is None:
@@ -44,7 +45,10 @@ def load(chip: Chip) -> Calibration:
 
 
 def store(chip: Chip, calibration: Calibration) -> bool:
-    """Keep the calibration; false when it was there already, and nothing is worn. PortError when it is not kept."""
+    """Store the calibration; False if it was there already, and nothing is written to spare the chip.
+
+    Raises PortError when it is not stored.
+    """
     newest = _newest([_read(chip, place) for place in range(PLACES)])
     body = record.pack(calibration).ljust(PLACE_BYTES - CRC.size - GENERATION.size, b"\xff")
     if newest is not None and newest.record == body:
@@ -72,7 +76,7 @@ def _newest(raw: list[bytes]) -> Kept | None:
         if CRC.unpack_from(data) != (zlib.crc32(covered),):
             continue
         (generation,) = GENERATION.unpack_from(covered)
-        # Modulo 2^32: later is what comes within half the circle.
+        # Modulo 2^32: a generation is later if it is less than 2^31 ahead.
         if newest is None or 0 < (generation - newest.generation) % 2**32 < 2**31:
             newest = Kept(place, generation, covered[GENERATION.size :])
     return newest

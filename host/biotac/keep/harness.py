@@ -1,6 +1,6 @@
-"""The EEPROMs on the harnesses of sensors on this computer's own bus: ``spidev:0.0,0.1?calibration=...``.
+"""EEPROMs on the harnesses of sensors that are on this computer's own bus: ``spidev:0.0,0.1?calibration=...``.
 
-Such a board has no flash of its own; what its fingers' harnesses hold is given to it when it is opened.
+Such a port has no flash. The calibrations in its fingers' harnesses are loaded when it is opened.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ FORM = "spidev:0.0,0.1?calibration=1:0x50:24c02,1:0x51:24c02"
 
 
 def parse(port: str) -> tuple[str, dict[int, tuple[str, str]]]:
-    """The port without its option, and each finger's (place, kind); PortError for what is neither.
+    """The port without its option, and each finger's EEPROM as (place, kind). Raises PortError for anything else.
 
-    Places stand in the order of the fingers; a finger whose place is empty has none.
+    EEPROMs are listed in the order of the fingers; an empty entry is a finger without one.
     """
     bare, _, option = port.partition("?")
     key, _, texts = option.partition("=")
@@ -38,7 +38,7 @@ def parse(port: str) -> tuple[str, dict[int, tuple[str, str]]]:
 
 
 def load(port: str) -> tuple[str, dict[int, Calibration]]:
-    """The port without its option, and what each finger's EEPROM holds.
+    """The port without its option, and the calibration in each finger's EEPROM.
 
     Raises PortError for an EEPROM that cannot be reached, InputError for one without a calibration.
     """

@@ -1,4 +1,4 @@
-"""A wrench map as the board holds it: bytes, of which this side reads the header alone."""
+"""A wrench map as the board holds it: bytes, of which only the header is read here."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ MADE_AT = SERIAL_AT + _map.SERIAL_BYTES
 
 
 def as_blob(its: bytes | BoardMap) -> bytes:
-    """The bytes of a map, of today's version. InputError for what cannot be one by its size, or is none of version 1.
+    """The bytes of a map, in the current version. The board checks all but the size.
 
-    The board judges the rest.
+    Raises InputError for a size that no map has, or a map of version 1 that cannot be read.
     """
     blob = its.blob if isinstance(its, BoardMap) else current(bytes(its))
     if not _map.HEADER_BYTES <= len(blob) <= _map.MAX_BYTES:
@@ -29,12 +29,12 @@ def as_blob(its: bytes | BoardMap) -> bytes:
 
 
 def serial(blob: bytes) -> str:
-    """Of the sensor that it was made for; "" for any."""
+    """Serial number of the sensor that the map was made for; "" for any sensor."""
     return ascii_text(blob[SERIAL_AT : SERIAL_AT + _map.SERIAL_BYTES])
 
 
 def made_s(blob: bytes) -> int:
-    """When it was made, in seconds since 1970 UTC; 0 when unknown."""
+    """When the map was made, in seconds since 1970 UTC; 0 when unknown."""
     return int.from_bytes(blob[MADE_AT : MADE_AT + 4], "little")
 
 
@@ -44,13 +44,13 @@ def for_any_sensor(blob: bytes) -> bytes:
 
 
 def info(blob: bytes, req_id: int, finger: int) -> wire.MapInfo:
-    """What a board says of such a map in force."""
+    """The MAP_INFO that a board with this map in force sends."""
     told = tuple(blob[SERIAL_AT : SERIAL_AT + _map.SERIAL_BYTES])
     return wire.MapInfo(req_id, finger, wire.CalibrationState.IN_FORCE, told, made_s(blob), len(blob), zlib.crc32(blob))
 
 
 def part(blob: bytes, offset: int) -> tuple[int, ...]:
-    """What READ_MAP and WRITE_MAP carry of it at ``offset``."""
+    """The part of the map at ``offset`` that READ_MAP and WRITE_MAP carry, padded with 0xFF."""
     return tuple(blob[offset : offset + PART_BYTES].ljust(PART_BYTES, b"\xff"))
 
 

@@ -1,4 +1,4 @@
-"""A board's wrench map as a file: JSON with where it comes from, the map itself as base64."""
+"""A board's wrench map as a file: JSON with its provenance and the map itself in base64."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ..core.map_versions import opened
 from ..documents import read_json
 from ..errors import InputError
 from . import map_blob as of
-from .calibration_file import Provenance, when
+from .calibration_file import Provenance, when, write
 
 FORMAT = "biotac-board-map"
 VERSION = 1
 
 
 def to_dict(blob: bytes, provenance: Provenance | None = None) -> dict[str, Any]:
-    """The keys of a file, in their order. All but ``map`` are there to be read: the map has them too."""
+    """The contents of a file, its keys in order. ``serial`` to ``crc32`` are for people: they follow from the map."""
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -35,9 +35,9 @@ def to_dict(blob: bytes, provenance: Provenance | None = None) -> dict[str, Any]
 
 
 def from_dict(tree: Any) -> bytes:
-    """Inverse of to_dict, provenance left out; a map of version 1 comes out as one of today.
+    """Inverse of to_dict, without the provenance; a map of version 1 is converted to the current version.
 
-    ValueError says what is wrong with the file, InputError that no board would take the map.
+    Raises ValueError that says what is wrong with the file, InputError for a map that a board would refuse.
     """
     if not isinstance(tree, dict) or tree.get("format") != FORMAT:
         raise ValueError(f'it has no "format": "{FORMAT}"')
@@ -56,7 +56,7 @@ def from_dict(tree: Any) -> bytes:
 
 
 def load(path: Path) -> bytes:
-    """Read a file; InputError when it cannot be read or used."""
+    """The map in a file. Raises InputError when it cannot be read or used."""
     try:
         return from_dict(read_json(path))
     except OSError as error:
@@ -68,19 +68,12 @@ def load(path: Path) -> bytes:
 
 
 def save(path: Path, blob: bytes, provenance: Provenance | None = None, *, overwrite: bool = False) -> None:
-    """Write a file. InputError when it exists and may not be overwritten, or cannot be written."""
-    text = json.dumps(to_dict(blob, provenance), indent=2) + "\n"
-    try:
-        with path.open("w" if overwrite else "x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError as error:
-        raise InputError(f"{path} exists and would be overwritten; choose another name or say --force") from error
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
+    """Write a file. Raises InputError when it exists and may not be overwritten, or cannot be written."""
+    write(path, json.dumps(to_dict(blob, provenance), indent=2) + "\n", overwrite=overwrite)
 
 
 def title(blob: bytes) -> str:
-    """Whose it is, for people."""
+    """What the map gives, its size, its sensor and when it was made, as text for people."""
     whose = f"sensor {of.serial(blob)}" if of.serial(blob) else "any sensor"
     its = from_blob(blob)
     what = {3: "force", 6: "force and torque", 7: "force, torque and torsion"}[its.axes]

@@ -1,6 +1,6 @@
-"""A calibration as the board's flash holds it, bit for bit: the board's own code packs and judges it.
+"""A calibration as in the board's flash, bit for bit: the board's own code packs and checks it.
 
-The layout stands in protocol/SPEC.md, Calibrations.
+The layout is in protocol/SPEC.md, Calibrations.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _WHY = {
 
 
 def pack(calibration: Calibration) -> bytes:
-    """Header and data, as they stand in a page of the board's flash as finger 0's."""
+    """Header and data, as in a page of the board's flash for finger 0."""
     its = ffi.new("bt_calibration *")
     its.present = True
     its.serial = calibration.wire_serial()
@@ -32,7 +32,10 @@ def pack(calibration: Calibration) -> bytes:
 
 
 def unpack(data: bytes, where: str) -> Calibration:
-    """The calibration in ``data``, which may be followed by 0xFF. InputError beginning with ``where`` says why not."""
+    """The calibration in ``data``, which may end in 0xFF bytes.
+
+    Raises InputError that begins with ``where`` and says why there is none that can be used.
+    """
     its = ffi.new("bt_calibration *")
     judgement = lib.bt_record_unpack(its, data, len(data))
     if judgement != lib.BT_RECORD_GOOD:

@@ -1,4 +1,4 @@
-"""What a calibration is: values for the per-finger settings, made for one sensor."""
+"""Calibration: values of the per-finger settings, made for one sensor."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _DEFAULT = {setting: spec.default for setting, spec in wire.SETTINGS.items()}
 
 @dataclass(frozen=True)
 class Calibration:
-    """Values of one finger's own in place of the board's settings, for one sensor.
+    """One finger's own values, made for one sensor; they replace the board's settings for that finger.
 
-    ``force_gain_nn`` is x, y, z and ``torque_gain_nn`` y, z, in nN per count; ``pressure_gain_nn`` in nN per count of
-    pressure, 0 for a finger that is not calibrated by pressure. ``serial`` is the number of the
-    sensor it was made for, "" for any sensor; ``made_s`` when, in seconds since 1970 UTC, 0 when unknown. Raises
-    ValueError for a value out of its setting's range (wire.SETTINGS).
+    ``force_gain_nn`` is x, y, z and ``torque_gain_nn`` is y, z, in nN per count. ``pressure_gain_nn`` is in nN per
+    count of pressure, 0 for a finger that is not calibrated by pressure. ``serial`` is the serial number of the sensor
+    it was made for, "" for any sensor. ``made_s`` is when it was made, in seconds since 1970 UTC, 0 when unknown.
+    Raises ValueError for a value of the wrong type or out of range (for settings: wire.SETTINGS).
     """
 
     poc_weights: int = _DEFAULT[wire.Setting.POC_WEIGHTS]
@@ -52,62 +52,39 @@ class Calibration:
                 raise ValueError(f"{setting.name.lower()} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
         if not 0 <= self.made_s < 2**32:
             raise ValueError(f"made_s is {self.made_s}, expected seconds since 1970, or 0 when unknown")
-        plain = isinstance(self.serial, str) and self.serial.isascii() and (self.serial.isprintable())
+        plain = isinstance(self.serial, str) and self.serial.isascii() and self.serial.isprintable()
         if not plain or len(self.serial) > SERIAL_BYTES:
             raise ValueError(f"serial is {self.serial!r}, expected up to {SERIAL_BYTES} ASCII characters")
 
     def settings(self) -> dict[wire.Setting, int]:
         """The per-finger settings with these values."""
-        x, y, z = self.force_gain_nn
-        torque_y, torque_z = self.torque_gain_nn
-        return {
-            wire.Setting.POC_WEIGHTS: self.poc_weights,
-            wire.Setting.FORCE_GAIN_X_NN: x,
-            wire.Setting.FORCE_GAIN_Y_NN: y,
-            wire.Setting.FORCE_GAIN_Z_NN: z,
-            wire.Setting.TORQUE_GAIN_Y_NN: torque_y,
-            wire.Setting.TORQUE_GAIN_Z_NN: torque_z,
-            wire.Setting.THERMAL_GAIN_MILLI: self.thermal_gain_milli,
-            wire.Setting.PRESSURE_GAIN_NN: self.pressure_gain_nn,
-        }
+        return dict(zip(wire.CALIBRATION_SETTINGS, self.wire_values(), strict=True))
 
     def wire_values(self) -> tuple[int, ...]:
-        """The values in the order of the messages and records."""
-        own = self.settings()
-        return tuple(own[setting] for setting in wire.CALIBRATION_SETTINGS)
+        """The values in the order of messages and records, wire.CALIBRATION_SETTINGS."""
+        gains = (*self.force_gain_nn, *self.torque_gain_nn)
+        return (self.poc_weights, *gains, self.thermal_gain_milli, self.pressure_gain_nn)
 
     def wire_serial(self) -> tuple[int, ...]:
-        """The serial number as the messages and records hold it."""
+        """The serial number as messages and records hold it: 16 bytes, padded with zeros."""
         return tuple(self.serial.encode("ascii").ljust(SERIAL_BYTES, b"\0"))
 
     def changed(self, changes: Mapping[wire.Setting, int]) -> Calibration:
-        """The same with other values for some settings; those that are not a finger's own are left out."""
+        """A copy with other values for some settings; ``changes`` to settings that are not per-finger are ignored."""
         own = {**self.settings(), **changes}
         return self.from_wire(self.wire_serial(), self.made_s, [own[s] for s in wire.CALIBRATION_SETTINGS])
 
     @classmethod
     def from_wire(cls, serial: Sequence[int], made_s: int, value: Sequence[int]) -> Calibration:
-        """Of what a message or a record holds; ValueError for what none may."""
-        own = dict(zip(wire.CALIBRATION_SETTINGS, value, strict=True))
-        return cls(
-            own[wire.Setting.POC_WEIGHTS],
-            (
-                own[wire.Setting.FORCE_GAIN_X_NN],
-                own[wire.Setting.FORCE_GAIN_Y_NN],
-                own[wire.Setting.FORCE_GAIN_Z_NN],
-            ),
-            (own[wire.Setting.TORQUE_GAIN_Y_NN], own[wire.Setting.TORQUE_GAIN_Z_NN]),
-            own[wire.Setting.THERMAL_GAIN_MILLI],
-            ascii_text(serial),
-            made_s,
-            own[wire.Setting.PRESSURE_GAIN_NN],
-        )
+        """The calibration that a message or a record holds. Raises ValueError for values that none may hold."""
+        weights, x, y, z, torque_y, torque_z, thermal, pressure = value
+        return cls(weights, (x, y, z), (torque_y, torque_z), thermal, ascii_text(serial), made_s, pressure)
 
 
 def own_settings(
     settings: Mapping[wire.Setting, int], calibrations: Mapping[int, Calibration]
 ) -> dict[int, dict[wire.Setting, int]]:
-    """Finger to the settings that its results come from, for those with a calibration in force."""
+    """The settings that each finger's results are computed with, for the fingers in ``calibrations``."""
     return {finger: {**settings, **its.settings()} for finger, its in calibrations.items()}
 
 

@@ -1,1 +1,1 @@
-"""Experiments, benchmarks, the demo and the cross-check: what few programs import."""
+"""Experiments, benchmarks, the demo and the cross-check, which few programs import."""

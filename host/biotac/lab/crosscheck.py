@@ -1,13 +1,14 @@
-"""Every on-board result against the float64 reference, fed with the counts and the tare of its frame.
+"""Every on-board result against the float64 reference, computed from the frame's own counts and tare.
 
-The bounds follow from the board's number formats alone; firmware/reference/kernel_bounds.h derives them, and
-tests/core/solve/test_kernels.c searches for inputs that come near.
+The bounds follow from the board's number formats alone. firmware/reference/kernel_bounds.h derives them, and
+tests/core/solve/test_kernels.c searches for inputs that come close.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,28 +19,31 @@ from ..calibrate.wrench import board
 from ..core import population
 from ..core.board_map import BoardMap, pdc_above_rest_q4
 from ..core.compiled import TORQUE_GAINS, Results, Settings, reference_q4
-from ..core.map_columns import tared
+from ..core.map_bound import bound_of
+from ..core.map_columns import Signals, tared
 from ..core.map_float64 import exact, replace_gains
 from ..core.map_versions import opened
 from ..hand.compatibility import PRESSURE_SINCE_MINOR
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
-from ..wire.frames import UM_PER_MM, StructArray, electrode_signals, to_units
+from ..wire.frames import FORCE_LSB_PER_N, UM_PER_MM, StructArray, electrode_signals, to_units
 from ..wire.native import ffi, lib
 from ..wire.sensor_gen import CORE_RADIUS_UM
-from .population_bound import force_bound_n
 
-#: The PoC's distance and the force of each axis, see firmware/reference/kernel_bounds.h.
+#: Of the PoC's distance and of each axis of force, see firmware/reference/kernel_bounds.h.
 POC_BOUND_UM: float = lib.bt_poc_bound_um()
 FORCE_BOUND_MN: float = lib.bt_force_bound_mn()
 
-FINDINGS = 20  # violations that are put into words; the rest is counted
+#: Name, unit, value sent, steps per unit, true value, and largest difference allowed; each (n, axes).
+Quantity = tuple[str, str, NDArray[Any], int, NDArray[np.float64], NDArray[np.float64] | float]
+
+FINDINGS = 20  # violations described in words; the rest are only counted
 
 
 def torque_bound_nmm(messages: StructArray, truth: Results, settings: Settings) -> NDArray[np.float64]:
     """Bound of each torque axis, N*mm, shape (n, 3): it grows with the signals and, for x, the force.
 
-    The formulas stand in firmware/reference/kernel_bounds.h.
+    firmware/reference/kernel_bounds.h has the formulas.
     """
     size = np.nansum(np.abs(electrode_signals(messages)), axis=1)
     gains = np.array([abs(settings[s]) / 1e9 for s in TORQUE_GAINS])
@@ -55,22 +59,22 @@ def torque_bound_nmm(messages: StructArray, truth: Results, settings: Settings) 
 
 @dataclass
 class CrossCheck:
-    """Outcome over any number of frames. Maxima are over valid results; 0 while there are none."""
+    """Outcome over any number of frames. Maxima are over valid results, and 0 while there are none."""
 
     frames: int = 0
     violations: int = 0
     poc_um_max: float = 0.0
     force_mn_max: float = 0.0
     torque_nmm_max: float = 0.0
-    torque_nmm_bound: float = 0.0  # the largest that any frame was held to
-    wire_minor: int = wire.WIRE_MINOR  # of the board: before 1.4 none told a force from pressure
+    torque_nmm_bound: float = 0.0  # the largest that applied to any frame
+    wire_minor: int = wire.WIRE_MINOR  # of the board: before 1.4 no board sent a force from pressure
     pressure: PressureCheck = field(default_factory=PressureCheck)
-    mapped: int = 0  # frames by a wrench map, whose force has a bound of its own
-    mapped_force_mn_bound: float = 0.0  # the largest of those, and of frames by the population map
+    mapped: int = 0  # frames with a wrench map, whose force has a bound of its own
+    mapped_force_mn_bound: float = 0.0  # the largest of those, and of frames with the population map
     findings: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: the maxima beside the bounds they are held to."""
+        """As JSON types: the maxima beside their bounds."""
         return {
             "frames": self.frames,
             "violations": self.violations,
@@ -96,14 +100,14 @@ class CrossCheck:
         own: Mapping[int, Settings] | None = None,
         maps: Mapping[int, BoardMap | bytes] | None = None,
     ) -> None:
-        """Check FRAME messages (n,) as they came over the wire; live or from a file.
+        """Check FRAME messages (n,) as sent on the wire, live or from a file.
 
-        ``own`` has the settings of the fingers with a calibration (Hand.finger_settings, Recording.finger_settings),
-        ``maps`` the wrench maps in force or their blobs (Hand.maps, Recording.maps). Raises InputError for a map that
-        a board would refuse.
+        ``own`` has the settings of fingers with a calibration (Hand.finger_settings, Recording.finger_settings).
+        ``maps`` has the wrench maps in force or their blobs (Hand.maps, Recording.maps). Raises InputError for a map
+        that a board would refuse.
         """
         own, maps = own or {}, maps or {}
-        # A repeated wrench is that of an earlier FRAME, which is judged where it stands.
+        # A repeated wrench belongs to an earlier FRAME, and is judged there.
         messages = messages[(messages["flags"] & wire.FrameFlags.REPEATED) == 0]
         mapped = (messages["flags"] & wire.FrameFlags.MAPPED) != 0
         for finger in np.unique(messages["finger"][mapped]).tolist():
@@ -137,40 +141,33 @@ class CrossCheck:
             force_bound, torque_bound, torsion, torsion_bound = _by_map(messages, its, truth, settings)
             self.mapped += len(messages)
             self.mapped_force_mn_bound = max(self.mapped_force_mn_bound, float(force_bound.max()))
-        sent_torsion = messages["torsion_mnmm"][:, None]
-        for values in (truth.poc_mm, truth.force_n, truth.torque_nmm, torsion):
-            values[untared] = np.nan  # without a tare there is nothing to be right about
-        for values, sent in (
-            (truth.poc_mm, messages["poc_um"]),
-            (truth.force_n, messages["force_100un"]),
-            (truth.torque_nmm, messages["torque_mnmm"]),
-            (torsion, sent_torsion),
-        ):
-            values[not_asked(messages, sent)] = np.nan
-        for bound in (torque_bound, torsion_bound):
-            self.torque_nmm_bound = max(self.torque_nmm_bound, float(bound[~untared].max(initial=0.0)))
-
-        # The PoC is one point: its error is a distance. Force and torque count per axis.
-        poc_um = to_units(messages["poc_um"], 1) - truth.poc_mm * 1e3
-        distance_um = np.sqrt((poc_um**2).sum(axis=1, keepdims=True))
-        force_mn = np.abs(to_units(messages["force_100un"], 10) - truth.force_n * 1e3)
-        torque_nmm = np.abs(to_units(messages["torque_mnmm"], 1000) - truth.torque_nmm)
-        self.poc_um_max = max(self.poc_um_max, worst(distance_um))
-        self.force_mn_max = max(self.force_mn_max, worst(force_mn))
-        torsion_nmm = np.abs(to_units(sent_torsion, 1000) - torsion)
-        self.torque_nmm_max = max(self.torque_nmm_max, worst(torque_nmm), worst(torsion_nmm))
-        self._judge("PoC", "um", messages, messages["poc_um"], truth.poc_mm, distance_um, POC_BOUND_UM)
-        self._judge("force", "mN", messages, messages["force_100un"], truth.force_n, force_mn, force_bound)
-        self._judge("torque", "N*mm", messages, messages["torque_mnmm"], truth.torque_nmm, torque_nmm, torque_bound)
-        self._judge("torsion", "N*mm", messages, sent_torsion, torsion, torsion_nmm, torsion_bound)
+        for own_bound in (torque_bound, torsion_bound):
+            self.torque_nmm_bound = max(self.torque_nmm_bound, float(own_bound[~untared].max(initial=0.0)))
+        quantities: tuple[Quantity, ...] = (
+            ("PoC", "um", messages["poc_um"], 1, truth.poc_mm * 1e3, POC_BOUND_UM),
+            ("force", "mN", messages["force_100un"], 10, truth.force_n * 1e3, force_bound),
+            ("torque", "N*mm", messages["torque_mnmm"], 1000, truth.torque_nmm, torque_bound),
+            ("torsion", "N*mm", messages["torsion_mnmm"][:, None], 1000, torsion, torsion_bound),
+        )
+        largest = {}
+        for name, unit, sent, per_unit, values, bound in quantities:
+            values[untared | not_asked(messages, sent)] = np.nan  # without a tare there is no true value
+            error = np.abs(to_units(sent, per_unit) - values)
+            if name == "PoC":  # the PoC is one point: its error is a distance; force and torque count per axis
+                error = np.sqrt((error**2).sum(axis=1, keepdims=True))
+            largest[name] = worst(error)
+            self._judge(name, unit, messages, sent, values, error, bound)
+        self.poc_um_max = max(self.poc_um_max, largest["PoC"])
+        self.force_mn_max = max(self.force_mn_max, largest["force"])
+        self.torque_nmm_max = max(self.torque_nmm_max, largest["torque"], largest["torsion"])
         self._judge_flag(messages)
         if self.wire_minor >= PRESSURE_SINCE_MINOR:
-            for finding in self.pressure.add(messages, settings):
-                self._find(messages, finding.row, finding.what)
+            for row, what in self.pressure.add(messages, settings):
+                self._find(messages, row, what)
         self.frames += len(messages)
 
     def _judge_flag(self, messages: StructArray) -> None:
-        """POC_INVALID must stand exactly where the PoC is marked invalid."""
+        """POC_INVALID must be set exactly where the PoC is marked invalid."""
         flagged = (messages["flags"] & wire.FrameFlags.POC_INVALID) != 0
         marked = (messages["poc_um"] == wire.INVALID_I16).any(axis=1)
         skipped = not_asked(messages, messages["poc_um"])
@@ -178,7 +175,7 @@ class CrossCheck:
             self._find(messages, int(k), "the POC_INVALID flag contradicts the PoC")
 
     def _judge_model(self, messages: StructArray) -> None:
-        """POPULATION and OUTSIDE must stand exactly where force was made, and the map had not all of it."""
+        """With a force POPULATION must be set, and OUTSIDE exactly where the population map did not make all of it."""
         made = (messages["force_100un"] != wire.INVALID_I32).all(axis=1)
         signals = tared(messages["counts"], messages["tare_q4"])
         outside = np.where(population.share(signals) < population.ALL, wire.FrameFlags.OUTSIDE, 0)
@@ -219,8 +216,10 @@ class CrossCheck:
 def _by_map(
     messages: StructArray, its: BoardMap, truth: Results, settings: Settings
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Put what the map's integers mean into ``truth``. Bounds of force, mN, and torque, N*mm, (n, 3); torsion and its
-    bound, N*mm, (n, 1), NaN and 0 without.
+    """Replace force and torque in ``truth`` by what the map's integers mean.
+
+    Returns the bounds of force, mN, and torque, N*mm, both (n, 3); then torsion and its bound, N*mm, both (n, 1), NaN
+    and 0 for a map without torsion.
     """
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
     wrench, off = exact(its, *frames), board.bound(its, None, *frames)
@@ -230,7 +229,7 @@ def _by_map(
     if its.axes < _map.AXES_TORSION:
         torsion_off = np.zeros_like(torsion)
     if its.axes == 3:
-        # x is derived from this force, by a lever of the core's radius at most
+        # Mx is derived from this force, with a lever of at most the core's radius
         torque_off = torque_bound_nmm(messages, truth, settings)
         torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * force_off[:, 1:].sum(axis=1)
     return 1e3 * force_off, torque_off, torsion, torsion_off
@@ -239,21 +238,35 @@ def _by_map(
 def _by_population(
     messages: StructArray, truth: Results, settings: Settings
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Put the population map's force into ``truth``. Bounds of force, mN, and torque, N*mm, (n, 3)."""
+    """Replace force and torque in ``truth`` by the population map's. Bounds of force, mN, and torque, N*mm, (n, 3)."""
     counts, tare_q4 = messages["counts"], messages["tare_q4"]
-    off = force_bound_n(tared(counts, tare_q4), FORCE_BOUND_MN / 1e3)
+    off = _population_bound_n(tared(counts, tare_q4), FORCE_BOUND_MN / 1e3)
     population.replace_force(counts, tare_q4, truth.poc_mm, truth.force_n, truth.torque_nmm)
     torque_off = torque_bound_nmm(messages, truth, settings)
     torque_off[:, 0] += CORE_RADIUS_UM / UM_PER_MM * off[:, 1:].sum(axis=1)
     return 1e3 * off, torque_off
 
 
+@cache
+def _population_map() -> BoardMap:
+    return population.board_map(population.blocks())
+
+
+def _population_bound_n(signals: Signals, lin_bound_n: float) -> NDArray[np.float64]:
+    """Bound (n, 3) of the population map's force in N from its formats; Lin's part is off by up to ``lin_bound_n``."""
+    part = (population.share(signals) / population.ALL)[:, None]
+    wanted = {(kind, gate): its * FORCE_LSB_PER_N for kind, gate, its in population.blocks()}
+    off = bound_of(_population_map(), wanted, signals) / FORCE_LSB_PER_N
+    result: NDArray[np.float64] = np.where(part > 0, part * off, 0.0) + (1 - part) * lin_bound_n + 0.5 / FORCE_LSB_PER_N
+    return result
+
+
 def not_asked(messages: StructArray, sent: NDArray[Any]) -> NDArray[np.bool_]:
-    """Frames (n,) whose result ``sent`` (n, k) nobody subscribed to: it is marked invalid altogether."""
+    """Frames (n,) whose result ``sent`` (n, k) nobody subscribed to: all of it is marked invalid."""
     asked_for_all = (messages["flags"] & wire.FrameFlags.NOT_ASKED) == 0
     return np.asarray(~asked_for_all & np.isnan(to_units(sent, 1)).all(axis=1))
 
 
 def worst(error: NDArray[np.float64]) -> float:
-    """Largest valid error, 0 without any."""
+    """The largest valid error, 0 if there is none."""
     return float(np.nanmax(error, initial=0.0)) if not np.isnan(error).all() else 0.0

@@ -1,37 +1,42 @@
-"""The whole chain once: simulated board, stream, recording, cross-check, report, picture."""
+"""The whole chain in one run: simulated board, stream, recording, cross-check, report, picture."""
 
 from __future__ import annotations
 
 import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..calibrate.wrench.report import AXIS_COLORS
+from ..core.geometry import ELECTRODE_MM
+from ..core.unroll import unroll
 from ..errors import InputError
 from ..hand.opening import shake_hands
 from ..markdown import table
-from ..picture import check_drawable
+from ..picture import check_drawable, picture
 from ..recording import Recording
 from ..sim.loading import load_source
 from ..sim.process import SimBoard, SimLink
 from ..sim.source import Source
 from ..wire import messages_gen as wire
+from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch, join
+from ..wire.frames import electrode_signals
 from ..wire.slots import FRAME_HZ, PAC_SLOT
 from .crosscheck import CrossCheck
-from .demo_answers import answers_to
+from .demo_answers import Answers, answers_to
 
 Show = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class DemoRun:
-    """What a demo produced: the source it played, all that arrived, and the facts of its report."""
+    """What a demo produced: the source it played, everything received, and the facts of its report."""
 
     source: Source
     batch: Batch
@@ -55,8 +60,6 @@ def run_demo(
 
     Raises InputError when the source cannot be played or the folder cannot be written.
     """
-    from .demo_picture import draw
-
     check_drawable()
     source = load_source(source_name, fingers=fingers, seconds=seconds)
     try:
@@ -65,10 +68,10 @@ def run_demo(
         raise InputError(f"{folder} cannot be made a folder ({error.strerror}); choose another --out") from error
     recording_path = folder / "demo.mcap"
     wall = time.monotonic()
-    # The board's counts are made; from here on it is a host with a board, and its cost is measured.
+    # The board's counts are ready; from here on this process is a host with a board, and its cost is measured.
     with shake_hands(SimLink(f"sim:{source.name}", SimBoard(source, pace=0.0, hold=True))) as hand:
-        # What is checked is the board's arithmetic on Lin's formulas, to a twentieth of a millinewton. What a
-        # calibrated board would say is computed below, and drawn beside it.
+        # The check is on the board's arithmetic with Lin's formulas, to a twentieth of a millinewton. What a calibrated
+        # board would publish is computed below and drawn beside it.
         hand.set_setting(wire.Setting.FORCE_MODEL, wire.ForceModel.LIN)
         settings = hand.settings()
         has_pac = bool(np.any(source.samples[:, :, PAC_SLOT] <= 4095))
@@ -128,14 +131,14 @@ def run_demo(
 
 
 def expected_frames(source: Source) -> int:
-    """Frames that the board owes: every round of every finger in which any word was good."""
+    """Frames that the board must send: one for each round of a finger with at least one good word."""
     return int(np.count_nonzero(np.any((source.samples <= 4095), axis=2)))
 
 
 def source_rows(source: Source, batch: Batch) -> NDArray[np.int64]:
     """The source's row that each frame was sampled from, shape (n,).
 
-    By time and not by seq: a round in which a finger gave no good word has a row but no seq.
+    Found by time, because a round in which a finger gave no good word has a row but no seq.
     """
     t_us = batch.frames["t_us"]
     if not len(t_us):
@@ -155,9 +158,9 @@ def tare_changes(messages: list[Any]) -> list[dict[str, Any]]:
 
 
 def force_error(source: Source, batch: Batch, force_n: NDArray[np.float64] | None = None) -> list[float] | None:
-    """RMS difference to the source's own force over contact frames, N per axis; None without one.
+    """RMS difference to the source's own force over contact frames, N per axis; None if the source has no force.
 
-    Of ``force_n`` (n, 3), or of what the board sent.
+    Judges ``force_n`` (n, 3) if given, else what the board sent.
     """
     truth = source.known_force_n
     if truth is None:
@@ -208,3 +211,65 @@ def report_text(facts: dict[str, Any]) -> str:
         changes = [[str(t["finger"]), str(t["seq"]), t["reason"]] for t in facts["tare_changes"][:50]]
         lines += ["", *table(["finger", "frame", "tare changed because"], changes)[:-1]]
     return "\n".join(lines) + "\n"
+
+
+def draw(source: Source, batch: Batch, source_rows: NDArray[np.int64], answers: Answers, path: Path) -> None:
+    """Write a PNG of finger 0; ``source_rows`` (n,) gives the source's row of each frame."""
+    mine = batch.frames["finger"] == 0
+    frames, messages = batch.frames[mine], batch.wire[mine]
+    with picture(path) as figure:
+        figure.set_size_inches(13, 5.6)
+        axes = figure.subplots(1, 2, width_ratios=(1, 1.9))
+        figure.suptitle(f"{source.name}: finger 0 through the simulated board")
+        draw_fingertip(figure, axes[0], frames, messages)
+        lin_n, calibrated_n = answers.lin_n[mine], answers.calibrated_n[mine]
+        draw_force(axes[1], source, frames, source_rows[mine], replace(answers, lin_n=lin_n, calibrated_n=calibrated_n))
+
+
+def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
+    """Electrodes at the moment of largest force, and every PoC of the contacts."""
+    across, along = unroll(ELECTRODE_MM)
+    signals = np.nan_to_num(electrode_signals(messages)) if len(messages) else np.zeros((1, 19))
+    tared = (frames["flags"] & wire.FrameFlags.UNTARED) == 0
+    energy = np.where(tared, (signals**2).sum(axis=1), 0.0) if len(messages) else np.zeros(1)
+    strongest = int(np.argmax(energy))
+    limit = max(float(np.abs(signals[strongest]).max()), 1.0)
+    dots = axes.scatter(
+        across, along, c=signals[strongest], s=520, cmap="RdBu", vmin=-limit, vmax=limit, edgecolors="#444444"
+    )
+    for name, a, b in zip(sensor.ELECTRODE_NAMES, across, along, strict=True):
+        axes.annotate(name, (a, b), ha="center", va="center", fontsize=7)
+    flags = frames["flags"]
+    contact = ((flags & wire.FrameFlags.CONTACT) != 0) & ((flags & wire.FrameFlags.POC_LOW) == 0)
+    poc_across, poc_along = unroll(frames["poc_mm"][contact])
+    axes.plot(poc_across, poc_along, ".", color="#7c3aed", markersize=3, alpha=0.5, label="point of contact")
+    if len(frames) and contact.any():
+        a, b = unroll(frames["poc_mm"][strongest : strongest + 1])
+        axes.plot(a, b, "x", color="#7c3aed", markersize=13, markeredgewidth=3, label="at the strongest moment")
+        axes.set_title(f"electrodes at {frames['t_us'][strongest] / 1e6:.2f} s", fontsize=10)
+    axes.set(xlabel="around the finger [mm], + is E11's side", ylabel="along the finger [mm], tip up")
+    axes.set_aspect("equal")
+    axes.margins(0.15)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.06), fontsize=8, ncols=2, frameon=False)
+    figure.colorbar(dots, ax=axes, shrink=0.7, label="signal [count]: compressed < 0 < bulged")
+
+
+def draw_force(axes: Any, source: Source, frames: Any, rows: NDArray[np.int64], answers: Answers) -> None:
+    """Both answers' force on the finger over device time, with the source's own force behind them."""
+    t_s = frames["t_us"] / 1e6
+    truth_n = source.known_force_n
+    for axis, color in enumerate(AXIS_COLORS):
+        if truth_n is not None:
+            truth = truth_n[rows, 0, axis]
+            axes.plot(t_s, truth, color=color, linewidth=4, alpha=0.25, label=f"{'xyz'[axis]}, truth")
+        axes.plot(t_s, answers.lin_n[:, axis], ":", color=color, linewidth=1, label=f"{'xyz'[axis]}, Lin")
+        axes.plot(t_s, answers.calibrated_n[:, axis], color=color, linewidth=1, label=f"{'xyz'[axis]}, calibrated")
+    contact = (frames["flags"] & wire.FrameFlags.CONTACT) != 0
+    axes.fill_between(
+        t_s, 0, 1, where=contact, transform=axes.get_xaxis_transform(), color="#000000", alpha=0.06, label="contact"
+    )
+    axes.set(xlabel="device time [s]", ylabel="force on the finger [N]")
+    words = f"force: calibrated (thin: {answers.calibrated_by}), Lin's scales as shipped (dotted)"
+    axes.set_title(f"{words}, truth (broad)" if truth_n is not None else words, fontsize=10)
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8, ncols=5, loc="upper center", bbox_to_anchor=(0.5, -0.12), frameon=False)

@@ -1,4 +1,4 @@
-"""The forces that a demo shows beside each other: by Lin's scales as shipped, and by what the finger is calibrated."""
+"""The two forces that a demo compares: by Lin's scales as shipped, and by the finger's calibration."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from ..wire.batches import Batch
 from ..wire.frames import FORCE_LSB_PER_N, to_units
 from .experiments import random_loads
 
-LOADS = 4000  # the least that `biotac calibrate wrench` takes
+LOADS = 4000  # the minimum of `biotac calibrate wrench`
 LOADS_SEED = 1
 
 
 @dataclass(frozen=True)
 class Answers:
-    """Force (n, 3) in N of each frame: by Lin's scales as the firmware has them, and as the finger is calibrated.
+    """Force (n, 3) in N of each frame: by Lin's scales as in the firmware, and by the finger's calibration.
 
-    ``calibrated_n`` is NaN but for finger 0 where the source's finger is emulated: its map is its own.
+    If the source's finger is emulated, ``calibrated_n`` is by finger 0's own map and NaN for the other fingers.
     """
 
     lin_n: NDArray[np.float64]
@@ -41,7 +41,7 @@ class Answers:
 
 
 def answers_to(batch: Batch, settings: Settings, source: Source) -> Answers:
-    """By the board's own code, over the counts and tares that it sent."""
+    """Both answers, computed by the board's own code from the counts and tares that it sent."""
     frames = batch.wire
 
     def newtons(force_100un: NDArray[np.int32]) -> NDArray[np.float64]:
@@ -63,15 +63,15 @@ def answers_to(batch: Batch, settings: Settings, source: Source) -> Answers:
 
 
 def own_map(finger: Finger) -> BoardMap:
-    """What a force plate's recording of other loads on ``finger`` gives: a flat, pressed and sheared at random.
+    """The map fitted to a force plate's recording of other loads on ``finger``: a flat, pressed and sheared at random.
 
-    One model and lambda in place of `biotac calibrate wrench`'s choice among them, which takes a minute.
+    It takes one model and lambda; `biotac calibrate wrench` would choose among them, which takes a minute.
     """
     loads, cell = random_loads.states(LOADS, LOADS_SEED)
     loads = replace(loads, tip_radius_mm=np.full(LOADS, FLAT_MM / 2.0))
     recorded = random_loads.recording(finger, loads, cell, LOADS_SEED)
     run = run_of(Path("loads"), {name: recorded[name] for name in ("E", "F", "E_base", "E_idle")})
-    sums, air = strip_sums(smoothed(run, 1), run.truth, run.drift), air_sums(run, 1, len(run.axes))
+    sums, air = strip_sums(smoothed(run, 1), run.truth, run.drift), air_sums(run, 1)
     assert air is not None
     coefficients = models.pulled(sums.plus(air), [models.JOINED.family])[0][0]
     lag_rows = (0,) * len(run.axes)

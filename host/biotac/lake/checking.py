@@ -1,4 +1,4 @@
-"""A recording of a lake against what seals it, and its results against the float64 reference."""
+"""Checking a lake's recording against its seal, and its results against the float64 reference."""
 
 from __future__ import annotations
 
@@ -24,19 +24,17 @@ from .writing import DIGEST, digest_of
 
 @dataclass(frozen=True)
 class Checked:
-    """``wrong`` in words: files that are not what was sealed, and results out of their bounds (``violations``)."""
+    """Result of a check. ``wrong``, in words: files that differ from the seal, and out-of-bounds results."""
 
-    recording: str
-    frames: int
-    violations: int
-    poc_um_max: float
-    force_mn_max: float
-    torque_nmm_max: float
+    outcome: CrossCheck
     wrong: list[str]
 
 
 def check(lake: str, topics: dict[str, set[str]], partition: dict[str, str], recording: str) -> Checked:
-    """Read all files of ``recording``; ``topics`` and ``partition`` are the lake's. InputError for a damaged seal."""
+    """Check all files of ``recording``; ``topics`` and ``partition`` are the lake's.
+
+    Raises InputError for a damaged seal.
+    """
     folder = Path(lake)
     seal = place(folder, RECORDINGS, partition[recording], recording)
     try:
@@ -70,19 +68,11 @@ def check(lake: str, topics: dict[str, set[str]], partition: dict[str, str], rec
             rows = frames_of(pq.read_table(io.BytesIO(data)))
             outcome.add(frames_to_wire(rows), facts.settings, facts.finger_settings, facts.maps)
     wrong += [f"{recording} ({row['source']}): {finding}" for finding in outcome.findings]
-    return Checked(
-        recording,
-        outcome.frames,
-        outcome.violations,
-        outcome.poc_um_max,
-        outcome.force_mn_max,
-        outcome.torque_nmm_max,
-        wrong,
-    )
+    return Checked(outcome, wrong)
 
 
 def frames_of(table: pa.Table) -> StructArray:
-    """The topic ``frames`` as FRAME_DTYPE (n,): null as the marks that rows have."""
+    """The topic ``frames`` as FRAME_DTYPE (n,), with null turned into the fields' invalid values."""
     out = np.empty(table.num_rows, FRAME_DTYPE)
     for field in FRAME_FIELDS:
         values = [_numbers(table[name], field.invalid) for name in field.flat_names()]

@@ -1,6 +1,6 @@
-"""What a lake knows of each board and each sensor, and what is not as it used to be: from its topics, in SQL.
+"""Facts about each board and sensor in a lake, and unusual findings, gathered from its topics with SQL.
 
-A sensor's health is that of its last recording, against its own earlier ones: no two fingers have the same noise.
+A sensor's last recording is compared with its own earlier ones, because no two fingers have the same noise.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from ..wire.sensor_gen import ELECTRODE_NAMES
 from .layout import INVENTORY, Lake
 from .sql import query
 
-ENOUGH = 3  # earlier recordings, to know what is usual
-BEYOND = 2.0  # times the worst of them is not usual
-DEAD_ROUNDS = 100  # without a change or a value: noise alone moves a living electrode
+ENOUGH = 3  # earlier recordings needed to know what is usual
+BEYOND = 2.0  # more than this many times the worst of them is unusual
+DEAD_ROUNDS = 100  # an electrode without a change or value for so long is dead: noise alone moves a working one
 
 
 @dataclass(frozen=True)
 class BoardFacts:
-    """Times are Unix ns; ``frames_lost`` is the sum over its recordings."""
+    """Facts about a board. Times are Unix ns; ``frames_lost`` is the sum over its recordings."""
 
     board: str
     firmware: str  #: of its last recording
@@ -42,10 +42,10 @@ class BoardFacts:
 
 @dataclass(frozen=True)
 class SensorFacts:
-    """Of a sensor, or of a board's finger where none is told. None: its last recording does not tell."""
+    """Facts about a sensor, or a board's finger if its sensor is unknown. None: not known from its last recording."""
 
     sensor: str | None
-    board: str  #: it was last on
+    board: str  #: the board it was last on
     finger: int
     recordings: int
     hours: float
@@ -55,14 +55,14 @@ class SensorFacts:
     calibration_made_ns: int | None
     noise_count: float | None  #: RMS of an electrode at rest
     drift_count: float | None  #: mean distance of the electrodes' tares from the median of its earlier recordings
-    residues_per_hour: float  #: presses that left something in the skin
+    residues_per_hour: float  #: presses that left a residue in the skin
     dead: list[str]  #: electrodes without a value, or whose value never changed
     findings: list[str]  #: in words
 
 
 @dataclass(frozen=True)
 class Inventory:
-    """Boards and sensors, in the order of their numbers."""
+    """Boards and sensors, each sorted by serial number."""
 
     boards: list[BoardFacts]
     sensors: list[SensorFacts]
@@ -87,12 +87,12 @@ class _Round:
 
     @property
     def who(self) -> tuple[str, str, int]:
-        """A sensor is the same on any board; without a number it is a board's finger."""
+        """Identity: the sensor on whichever board, or the board's finger if the sensor has no serial number."""
         return (self.sensor, "", 0) if self.sensor else ("", self.board, self.finger)
 
 
 def take(lake: Lake) -> Inventory:
-    """Read all of ``lake``. InputError for damaged files."""
+    """The inventory of all of ``lake``. Raises InputError for damaged files."""
     seals = list(_rows(lake, "SELECT recording, board, begin_ns, duration_s, frames_lost, metadata FROM recordings"))
     seals.sort(key=lambda its: its["begin_ns"])
     strange = {its["recording"] for its in seals} ^ set(lake.partition)
@@ -106,7 +106,7 @@ def take(lake: Lake) -> Inventory:
 
 
 def keep(lake: Lake, its: Inventory) -> Path:
-    """Write it into the lake as JSON, in the place of the one before."""
+    """Write the inventory into the lake as JSON, replacing the previous one."""
     path = lake.folder / INVENTORY
     with whole(path, overwrite=True) as place:
         place.write_text(json.dumps(asdict(its), indent=1) + "\n", encoding="utf-8")
@@ -204,7 +204,7 @@ def _sensor(mine: list[_Round], facts: dict[str, Facts]) -> SensorFacts:
 
 
 def _drift_count(its: _Round, earlier: list[_Round]) -> float | None:
-    """None without tares, or without an earlier recording that has some."""
+    """Mean distance of the tares from the median of earlier ones; None if there are none to compare."""
     away = []
     for k, tare in enumerate(its.tares):
         usual = [known for one in earlier if (known := one.tares[k]) is not None]
@@ -214,7 +214,7 @@ def _drift_count(its: _Round, earlier: list[_Round]) -> float | None:
 
 
 def _unusual(what: str, unit: str, values: list[float | None] | list[float]) -> list[str]:
-    """In words, when the last is far beyond all before it."""
+    """A finding in words if the last value far exceeds all earlier ones."""
     *earlier, last = values
     known = [value for value in earlier if value is not None]
     if last is None or len(known) < ENOUGH or last <= BEYOND * max(known):
@@ -223,7 +223,7 @@ def _unusual(what: str, unit: str, values: list[float | None] | list[float]) -> 
 
 
 def _groups(items: list[Any], key: Callable[[Any], Any]) -> Iterable[list[Any]]:
-    """In the order of their keys; the items of each in their own order."""
+    """Items grouped by key, sorted by key; order within a group is kept."""
     groups: dict[Any, list[Any]] = {}
     for its in items:
         groups.setdefault(key(its), []).append(its)
@@ -236,5 +236,5 @@ def _rows(lake: Lake, text: str) -> Iterable[dict[str, Any]]:
 
 
 def day(at_ns: int) -> str:
-    """For people, UTC."""
+    """The day of a Unix time in ns, as text (UTC)."""
     return f"{datetime.fromtimestamp(at_ns // 10**9, timezone.utc):%Y-%m-%d}"

@@ -1,4 +1,4 @@
-"""Where everything is in a lake, and what is in its way."""
+"""A lake's folder layout: where files are, and which ones do not belong there."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ from pathlib import Path
 
 from ..errors import InputError
 
-#: The topic with a row a recording, whose file seals the recording's others.
+#: The topic with one row per recording; its file seals the recording's other files.
 RECORDINGS = "recordings"
-#: Files that are not whole yet. Readers leave out what begins with a dot.
+#: Folder of incomplete files. Readers skip names that begin with a dot.
 PARTIAL = ".partial"
 LOCK = ".lock"
-#: Of boards and sensors, at the top; made anew by each `biotac inventory`.
+#: Inventory of boards and sensors, in the lake's top folder; rewritten by each `biotac inventory`.
 INVENTORY = "inventory.json"
 _PLACE = re.compile(r"([a-z][a-z0-9_]*)/(board=[^/]+/date=\d{4}-\d\d-\d\d)/([0-9a-f]{16})\.parquet")
 
 
 @dataclass
 class Lake:
-    """What is in ``folder`` now, by recording: its partition, and its topics' files."""
+    """The contents of ``folder`` now: partitions by recording, and recordings by topic."""
 
     folder: Path
     partition: dict[str, str] = field(default_factory=dict)
     topics: dict[str, set[str]] = field(default_factory=dict)  # recordings by topic
-    unfinished: int = 0  # files of recordings whose export did not come to its end
+    unfinished: int = 0  # files of recordings whose export did not finish
 
     def path(self, topic: str, recording: str) -> Path:
-        """Of a recording that is in the lake."""
+        """The file of a topic for a recording that is in the lake."""
         return place(self.folder, topic, self.partition[recording], recording)
 
     def paths(self, topic: str) -> list[Path]:
-        """All files of a topic, in the order of their recordings' ids."""
+        """All files of a topic, sorted by recording id."""
         return [self.path(topic, recording) for recording in sorted(self.topics.get(topic, ()))]
 
 
 def place(folder: Path, topic: str, partition: str, recording: str) -> Path:
-    """Of one file."""
+    """Path of one file."""
     return folder / topic / partition / f"{recording}.parquet"
 
 
 def opened(folder: Path, *, create: bool = False) -> Lake:
-    """What is there. InputError for no lake, and for files that no export put there."""
+    """The lake in ``folder``. Raises InputError if it is not a lake, or holds files that no export wrote."""
     if create:
         with contextlib.suppress(FileExistsError):
             folder.mkdir(parents=True)
@@ -84,7 +84,7 @@ def opened(folder: Path, *, create: bool = False) -> Lake:
 
 
 def _files(folder: Path) -> Iterator[str]:
-    """All files below, as POSIX paths; nothing that begins with a dot."""
+    """All files below ``folder``, as relative POSIX paths; skips names that begin with a dot."""
     for at, folders, files in os.walk(folder):
         folders[:] = [name for name in folders if not name.startswith(".")]
         where = Path(at).relative_to(folder).as_posix()
@@ -95,9 +95,9 @@ def _files(folder: Path) -> Iterator[str]:
 
 @contextlib.contextmanager
 def sole_writer(folder: Path) -> Iterator[None]:
-    """While an export writes; what one that was killed left half-written is removed. InputError when there is another.
+    """Lock the lake while an export writes, and remove what a killed one left half-written.
 
-    Nothing is locked where the system has no flock.
+    Raises InputError when another export is writing. Nothing is locked on systems without flock.
     """
     try:
         import fcntl

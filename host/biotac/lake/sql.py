@@ -1,4 +1,4 @@
-"""A lake asked in SQL, by DuckDB: a view a topic."""
+"""SQL queries on a lake with DuckDB: one view per topic."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import duckdb
 from ..errors import InputError
 from .layout import Lake
 
-# Told, or a board's number that has no letter in it would be read as a number, without its zeros.
+# Stated explicitly, or a serial number of digits alone would be read as a number and lose its leading zeros.
 _TYPES = "hive_types = {'board': VARCHAR, 'date': DATE}"
 
 
 def query(lake: Lake, text: str) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
-    """Names of the result's columns, and its rows as they are read.
+    """Run a query; return the names of the result's columns, and an iterator over its rows.
 
-    Each topic is a view, over recordings that are whole. InputError for what DuckDB refuses.
+    Each topic is a view over the complete recordings. Raises InputError for what DuckDB refuses.
     """
     connection = duckdb.connect(":memory:")
     connection.execute("SET TimeZone = 'UTC'")

@@ -1,4 +1,4 @@
-"""The same work on many items: here, in processes of this computer, or on a Dask cluster."""
+"""The same work on many items: in this process, in several processes, or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _ENDED = "its worker ended before it was done (memory?); run it again with fewer
 def each(
     work: Callable[[Item], Result], items: Sequence[Item], jobs: int = 1, dask: str | None = None
 ) -> Iterator[tuple[Item, Result | BiotacError]]:
-    """Items and what ``work`` made of them, or its error, as they come; ``work`` and items can be pickled.
+    """Yield each item with the result of ``work`` or its error, as they complete; ``work`` and items must be picklable.
 
-    ``dask`` is a scheduler's address, whose workers have this package and see the same files. InputError when it is not
-    there, or Dask is not installed.
+    ``dask`` is the address of a scheduler whose workers have this package and see the same files. Raises InputError
+    when it cannot be reached, or Dask is not installed.
     """
     if dask is not None:
         yield from _on_dask(work, items, dask)
@@ -61,9 +61,9 @@ def _in_processes(
 
 
 def _begin(work: Callable[[Any], Any]) -> None:
-    """A worker's start. ``work`` comes once: with each item it would cost more, the larger the lake that it knows of.
+    """Initialize a worker. ``work`` is sent once, not with each item, because it can hold the index of a large lake.
 
-    Ctrl-C reaches all of a terminal's processes; the one that gives out work ends the others.
+    Ctrl-C is ignored here: it reaches all processes of a terminal, and the parent ends its workers.
     """
     global _work
     _work = work
@@ -84,7 +84,7 @@ def _on_dask(
         raise InputError(
             f"--dask needs {error.name}, which is not installed; pip install 'biotac-gateway[dask]'"
         ) from error
-    connect: Any = distributed.Client  # which has no types
+    connect: Any = distributed.Client  # untyped
     as_completed: Any = distributed.as_completed
     try:
         client = connect(address, timeout="10s", set_as_default=False)

@@ -1,4 +1,4 @@
-"""One recording into a lake: its topics' files first, then the file that seals them."""
+"""Writing a recording into a lake: first its topics' files, then the file that seals them."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from ..recording.layout import CHECKSUM
 from . import identity
 from .layout import PARTIAL, RECORDINGS, place
 
-SIZE = b"biotac.size_bytes"  # of the source: one that has grown is exported again
-DIGEST = b"biotac.sha256"  # of the seal; its other files' are in the seal
+SIZE = b"biotac.size_bytes"  # of the source: a recording that has grown is exported again
+DIGEST = b"biotac.sha256"  # of the seal itself; those of the other files are in the seal
 NO_DIGEST = b"0" * 64
 
 _SEAL = pa.schema(
@@ -55,7 +55,7 @@ _SEAL = pa.schema(
 
 @dataclass(frozen=True)
 class Written:
-    """``rows`` by topic; ``new`` is False for what was in the lake before."""
+    """Result of ``put``. ``rows`` by topic; ``new`` is False if the recording was already in the lake."""
 
     recording: str
     new: bool
@@ -63,10 +63,10 @@ class Written:
 
 
 def put(lake: str, known: dict[str, str], force: bool, source: str) -> Written:
-    """Write the recording ``source`` into ``lake``, unless it is there already, at least as long.
+    """Write the recording ``source`` into ``lake``, unless it is there already from a file of at least the same size.
 
-    ``known`` are partitions by recording. Same bytes from the same recording and version, wherever it runs. Raises
-    RecordingError or InputError for what cannot be read or written; then nothing of it has got into the lake.
+    ``known`` are partitions by recording. The same recording and version give the same bytes on any machine. Raises
+    RecordingError or InputError if ``source`` cannot be read or ``lake`` not written; the recording is then not sealed.
     """
     folder, path = Path(lake), Path(source)
     name = identity.recording_id(path)
@@ -75,7 +75,7 @@ def put(lake: str, known: dict[str, str], force: bool, source: str) -> Written:
         return Written(name, False, {})
     recording = Recording(path)
     partition = identity.partition(recording)
-    if name not in known and _sealed(folder, partition, name) >= size:  # by a copy of it that is put in, too
+    if name not in known and _sealed(folder, partition, name) >= size:  # written meanwhile from a copy of it
         return Written(name, True, {})
     topics: dict[str, list[Table]] = {}
     for table in [*tables(recording, {**EXPORTED, **HEARTBEATS}), *message_tables(recording)]:
@@ -88,7 +88,7 @@ def put(lake: str, known: dict[str, str], force: bool, source: str) -> Written:
         with tempfile.TemporaryDirectory(prefix=f"{name}.", dir=partial) as stage:
             files = [_write(Path(stage), topic, made, recording, name) for topic, made in sorted(topics.items())]
             _seal(Path(stage) / RECORDINGS, recording, name, size, files)
-            for topic in [*sorted(topics), RECORDINGS]:  # in this order: what is sealed is whole
+            for topic in [*sorted(topics), RECORDINGS]:  # the seal comes last: what is sealed is complete
                 target = place(folder, topic, partition, name)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 os.replace(Path(stage) / topic, target)
@@ -100,7 +100,7 @@ def put(lake: str, known: dict[str, str], force: bool, source: str) -> Written:
 
 
 def _sealed(folder: Path, partition: str, name: str) -> int:
-    """How long the source was of what is there; -1 where nothing is."""
+    """Size in bytes of the source of the recording in the lake; -1 if it is not there."""
     try:
         facts = pq.read_metadata(place(folder, RECORDINGS, partition, name)).metadata or {}
         return int(facts.get(SIZE, 0))
@@ -110,20 +110,14 @@ def _sealed(folder: Path, partition: str, name: str) -> int:
 
 def _write(stage: Path, topic: str, made: list[Table], recording: Recording, name: str) -> dict[str, Any]:
     sensors, calibrations = identity.sensors(recording), identity.calibrations(recording)
-    fingers = [table.finger for table in made]
+    fingers = [table.finger for table in made if table.finger is not None]
     labels = [Label("recording", "id of the recording", (name,) * len(made))]
-    if None not in fingers:
+    if len(fingers) == len(made):
         labels += [
             frame_ids(made),
+            Label("sensor", "serial number, null where none is told", tuple(map(sensors.get, fingers))),
             Label(
-                "sensor",
-                "serial number, null where none is told",
-                tuple(sensors.get(f) for f in fingers if f is not None),
-            ),
-            Label(
-                "calibration",
-                "id of calibration and map in force, null without",
-                tuple(calibrations.get(f) for f in fingers if f is not None),
+                "calibration", "id of calibration and map in force, null without", tuple(map(calibrations.get, fingers))
             ),
         ]
     write_labelled(stage / topic, made, labels, {"biotac.recording": name})
@@ -156,5 +150,5 @@ def _seal(place: Path, recording: Recording, name: str, size: int, files: list[d
 
 
 def digest_of(data: bytes, its: bytes) -> bytes:
-    """SHA-256 of a seal's bytes, as if ``its`` digest were NO_DIGEST: Parquet has no checksum of its footer."""
+    """SHA-256 of a seal's bytes with its digest ``its`` replaced by NO_DIGEST: Parquet's footer has no checksum."""
     return hashlib.sha256(data.replace(its, NO_DIGEST)).hexdigest().encode()

@@ -3,11 +3,13 @@
 ``/dev/ttyACM0``, ``COM3``   a serial port
 ``serial:NUMBER``            the board with that serial number
 ``uart:DEVICE?baud=N``       a board's UART, at its setting uart_bits_per_s
-``socket://HOST:PORT``   a port that another computer shares as a TCP connection, ``rfc2217://`` with its line settings
-``spidev:0.0,0.1``           sensors on this computer's own SPI bus, one device a finger
+``socket://HOST:PORT``       a serial port that another computer shares over TCP
+``rfc2217://HOST:PORT``      the same, with its line settings
+``spidev:0.0,0.1``           sensors on this computer's own SPI bus, one device per finger
 ``sim:SOURCE``               a simulated board playing a scenario or a recording
-``emu:pico?source=SOURCE``   the same with a board's flash image in an emulator
+``emu:pico?source=SOURCE``   the same, with a board's flash image in an emulator
 ``replay:REC``               a recording, which answers as its board did
+``zenoh:NAME``               a board that another computer shares (biotac serve)
 """
 
 from __future__ import annotations

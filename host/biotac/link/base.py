@@ -1,4 +1,4 @@
-"""What the rest of the package needs of a link."""
+"""What the rest of the package needs from a link."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import PortError
+
 
 class Played(Protocol):
-    """What a simulated board plays, and what its user would know of it; sim/source.py says more of each."""
+    """What a simulated board plays, and what its user would know about it; sim/source.py has the details."""
 
     @property
     def name(self) -> str:
-        """For messages."""
+        """Its name, for messages."""
 
     @property
     def samples(self) -> NDArray[np.uint16]:
@@ -22,63 +24,68 @@ class Played(Protocol):
 
     @property
     def settings(self) -> Mapping[str, int]:
-        """What to set before streaming, by name in link.toml."""
+        """Settings to make before streaming, by their names in link.toml."""
 
     @property
     def tare_q4(self) -> NDArray[np.uint16] | None:
-        """(fingers, 19) to be given before streaming, or None."""
+        """The tare (fingers, 19) to give the board before streaming, in 1/16 count, or None."""
 
     @property
     def known_force_n(self) -> NDArray[np.float64] | None:
-        """The force that is applied (frames, fingers, 3), or None."""
+        """The applied force (frames, fingers, 3) in N, or None."""
 
 
 class Link(Protocol):
-    """A byte pipe to a board. Raises DeviceLostError when the board goes away."""
+    """A byte pipe to a board. Raises DeviceLostError when the board goes away. The defaults here suit a real board."""
 
-    #: The PORT it was opened as, for messages.
+    #: The PORT that was opened, for messages.
     port: str
 
     #: What a simulated board plays; None for a real one.
-    source: Played | None
+    source: Played | None = None
 
-    #: The source is over: nothing new will come until a command asks for it.
-    ended: bool
+    #: Whether the source has ended: nothing new will come until a command asks for it.
+    ended: bool = False
 
-    #: Device seconds per second here. 0: device time waits for whoever reads, and nothing need be dropped.
-    pace: float
+    #: Device seconds per second of this computer. 0: device time waits for the reader, and nothing has to be dropped.
+    pace: float = 1.0
 
-    #: Times as long as a board on a cable it is waited for. More than 1 where the board is a process on this computer:
-    #: that is as slow as the computer is busy, and its end is noticed at once.
-    patience: float
+    #: Factor on all timeouts, 1 for a board on a cable. More where the board is a process on this computer: it slows
+    #: down when the computer is busy, and its end is noticed at once.
+    patience: float = 1.0
 
-    #: Its device time is a clock's, which GET_STATUS tells: a recording's is not, nor a time that waits for its reader.
-    keeps_time: bool
+    #: Whether device time is a real clock, which GET_STATUS reads. The time of a recording is not, nor one that waits
+    #: for its reader.
+    keeps_time: bool = True
 
-    #: Of a UART: what it carries. None where messages fit whatever is asked for: USB, a network, this computer.
-    bits_per_s: int | None
+    #: The bit rate of a UART. None where everything fits: USB, a network, this computer.
+    bits_per_s: int | None = None
 
-    #: What can be read in place of ``read``: a file descriptor that gives the same bytes, and OSError when the board
-    #: goes away. None where there is none, or ``read`` does more.
-    fd: int | None
+    #: A file descriptor to read in place of ``read``: it gives the same bytes, and OSError when the board goes away.
+    #: None where there is none, or where ``read`` does more.
+    fd: int | None = None
 
     def read(self, timeout_s: float) -> bytes:
-        """Return all bytes that are there, waiting up to timeout_s for the first; may be empty."""
+        """Return all bytes that have arrived, waiting up to timeout_s for the first; may be empty."""
 
     def write(self, data: bytes) -> None:
         """Send all of data."""
 
     def release(self) -> None:
-        """Let device time run, if it was held until the host was ready."""
+        """Let device time run, if it was held back until the host was ready."""
+        return
 
     def places(self) -> list[str]:
-        """Where the board may be found after it went away, likeliest first; nowhere when it cannot come back."""
+        """Where the board may be found after it went away, likeliest first; empty when it cannot come back."""
+        return []
 
     def reopen(self, place: str) -> None:
         """Open one of ``places`` in place of the lost port. Raises PortError."""
+        raise PortError(f"{self.port} cannot be opened again; make a new one")
 
     def abandon(self) -> None:
-        """In a child of the process that opened it: let go of what the parent goes on using. Nobody is told."""
+        """In a forked child, let go of what the parent process goes on using, without sending anything."""
+        return
 
     def close(self) -> None:
         """Give the port back. Safe to call twice."""

@@ -1,4 +1,4 @@
-"""Finding boards by their USB ids, and choosing one by its serial number. Nothing is opened here."""
+"""Finding boards by their USB ids, and choosing one by its serial number. Looking for boards opens no port."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SERIAL_PREFIX = "serial:"
 
 @dataclass(frozen=True)
 class SerialPort:
-    """What the operating system says of one serial port."""
+    """What the operating system says about one serial port."""
 
     device: str
     description: str
@@ -27,12 +27,12 @@ class SerialPort:
 
     @property
     def is_board(self) -> bool:
-        """It has the USB ids of our firmware."""
+        """Whether it has the USB ids of our firmware."""
         return (self.vendor, self.product) == (wire.USB_VENDOR, wire.USB_PRODUCT)
 
 
 def serial_ports(entries: Iterable[Any] | None = None) -> list[SerialPort]:
-    """All serial ports, COM3 before COM10; ``entries`` are pyserial's, by default this computer's.
+    """All serial ports, COM3 before COM10; ``entries`` are pyserial's, by default those of this computer.
 
     On macOS a port has two names; /dev/cu.* is kept, because opening /dev/tty.* waits for a modem's carrier.
     """
@@ -48,9 +48,9 @@ def boards(entries: Iterable[Any] | None = None) -> list[SerialPort]:
 
 
 def choose(serial_number: str | None = None, entries: Iterable[Any] | None = None) -> str:
-    """Device path of the board with this serial number; of the only board without one.
+    """Device path of the board with this serial number; None: of the only board.
 
-    Raises PortError naming the boards that are there when none or several fit.
+    Raises PortError, naming the boards that are there, when none or several fit.
     """
     found = boards(entries)
     fitting = [p for p in found if serial_number is None or same_serial(p.serial_number, serial_number)]
@@ -65,11 +65,11 @@ def choose(serial_number: str | None = None, entries: Iterable[Any] | None = Non
     raise PortError(f"{len(fitting)} boards: {there}; name the one you mean as PORT")
 
 
-def open_serial(port: str, pace: float) -> SerialLink:
-    """Open a serial: port, the board with that number; its time is its own, whatever ``pace`` is."""
+def open_serial(port: str) -> SerialLink:
+    """Open a ``serial:`` port, the board with that serial number."""
     return SerialLink(choose(port.removeprefix(SERIAL_PREFIX)))
 
 
 def same_serial(seen: str | None, wanted: str) -> bool:
-    """Serial numbers are told in either case by some systems."""
+    """Whether two serial numbers are the same, ignoring case, in which some systems change them."""
     return seen is not None and seen.upper() == wanted.upper()

@@ -1,4 +1,4 @@
-"""Which programs have a port open, on Linux, from /proc; elsewhere nobody is known."""
+"""Which programs have a port open: from /proc on Linux, unknown elsewhere."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PROC = Path("/proc")
 
 @dataclass(frozen=True)
 class Holder:
-    """A program with the port open."""
+    """A program that has the port open."""
 
     pid: int
     name: str
@@ -22,7 +22,7 @@ class Holder:
 
 
 def holders(path: str, proc: Path = PROC) -> list[Holder]:
-    """Programs that have ``path`` open, as far as this user may know: other users' processes hide their files."""
+    """Programs that have ``path`` open, as far as this user may see: other users' processes hide their files."""
     target = os.path.realpath(path)
     found = []
     for process in sorted(proc.glob("[0-9]*"), key=lambda p: p.name):
@@ -34,7 +34,7 @@ def holders(path: str, proc: Path = PROC) -> list[Holder]:
 
 
 def in_words(found: list[Holder]) -> str:
-    """A list for a sentence."""
+    """The holders as text for use in a sentence."""
     return ", ".join(map(str, found)) if found else "another program"
 
 

@@ -1,4 +1,4 @@
-"""What the text of a PORT says: ``SCHEME:WHAT?key=value&...``."""
+"""Parsing the text of a PORT: ``SCHEME:WHAT?key=value&...``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..errors import PortError
 
 
 def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[str, str]]:
-    """WHAT, and the options by their keys; PortError for one that is not ``known``, with the ``form`` expected."""
+    """WHAT, and the options by key. Raises PortError, with the expected ``form``, for an option not in ``known``."""
     what, _, query = port.partition(":")[2].partition("?")
     options = dict(parse_qsl(query))
     unknown = sorted(set(options) - set(known))
@@ -20,7 +20,7 @@ def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[
 
 
 def parse_pace(text: str) -> float:
-    """``real``, ``fast`` or device seconds per second."""
+    """Device seconds per second: ``real`` is 1, ``fast`` is 0, else a number. Raises ValueError for anything else."""
     named = {"real": 1.0, "fast": 0.0}
     try:
         pace = named[text] if text in named else float(text)

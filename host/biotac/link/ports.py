@@ -1,27 +1,29 @@
-"""PORT strings to links."""
+"""Opening the link that a PORT string names."""
 
 from __future__ import annotations
 
 import importlib
 import os
+from collections.abc import Callable
 
 from ..errors import PortError
 from .base import Link
 
-#: Who opens which kind of port: MODULE:FUNCTION of the port and the default pace. By name, and imported when a port
-#: of that kind is opened: this room knows none of those above it, and a user of a real board waits for no physics.
+#: What opens each kind of port, as MODULE:FUNCTION. These are names, imported only when such a port is opened: this
+#: folder does not depend on those above it, and the user of a real board does not wait for the simulator to load.
 OPENERS = {
     "serial": "biotac.link.discovery:open_serial",
     "uart": "biotac.link.serial_port:open_uart",
-    "spidev": "biotac.link.spidev:open_spidev",
-    "socket": "biotac.link.url_port:open_url",
-    "rfc2217": "biotac.link.url_port:open_url",
+    "spidev": "biotac.link.spidev:SpidevLink",
+    "socket": "biotac.link.url_port:UrlLink",
+    "rfc2217": "biotac.link.url_port:UrlLink",
     "sim": "biotac.sim.ports:open_sim",
     "emu": "biotac.sim.ports:open_sim",
-    "replay": "biotac.recording.replay_link:open_replay",
-    "zenoh": "biotac.fleet.zenoh_link:open_zenoh",
+    "replay": "biotac.recording.replay.link:open_replay",
+    "zenoh": "biotac.fleet.zenoh_link:ZenohLink",
 }
-PATH = "biotac.link.serial_port:open_path"
+PATH = "biotac.link.serial_port:SerialLink"
+PACED = ("sim", "emu", "replay")  # their functions take the default pace; the others have a time of their own
 
 
 def open_link(port: str, *, pace: float = 0.0) -> Link:
@@ -39,5 +41,5 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
             "replay:REC or zenoh:NAME"
         )
     module, _, function = (OPENERS[scheme] if known else PATH).partition(":")
-    link: Link = getattr(importlib.import_module(module), function)(port, pace)
-    return link
+    opener: Callable[..., Link] = getattr(importlib.import_module(module), function)
+    return opener(port, pace) if scheme in PACED else opener(port)

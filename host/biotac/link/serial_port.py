@@ -12,30 +12,23 @@ import serial
 from serial.tools.list_ports import comports
 
 from ..errors import DeviceLostError, PortError
-from .base import Played
+from .base import Link
 from .holders import holders, in_words
 from .port_text import options_of
 
 READ_BYTES = 65536
-USB_BITS_PER_S = 115200  # whatever it is
-TTY_BYTES = 4000  # nearly what one tty read gives at most
+USB_BITS_PER_S = 115200  # any value will do
+TTY_BYTES = 4000  # nearly the most that one tty read gives
 UART_FORM = "uart:DEVICE?baud=N"
 ONE_READ_BYTES = 8192  # more would be allocated for nothing, thousands of times a second
 
 
-class SerialLink:
-    """A byte pipe over a serial port: USB's, where a bit rate is meaningless and left at a common one, or a UART's."""
-
-    patience = 1.0
-    keeps_time = True
+class SerialLink(Link):
+    """A byte pipe over a serial port: a UART with its bit rate, or USB, where the bit rate means nothing."""
 
     def __init__(self, path: str, bits_per_s: int | None = None) -> None:
         self.port = path
         self.bits_per_s = bits_per_s
-        self.source: Played | None = None
-        self.ended = False
-        self.pace = 1.0
-        self.fd: int | None = None
         self._path = path
         self._serial: Any = None
         self._poll: Any = None
@@ -43,12 +36,11 @@ class SerialLink:
         self._usb_serial = usb_serial(path)
 
     def places(self) -> list[str]:
-        """The same path, and wherever a USB device with the same serial number is now. Strangers are left alone."""
+        """The same path, and wherever a USB device with the same serial number is now. Other ports are left alone."""
         moved = [p.device for p in comports() if self._usb_serial and p.serial_number == self._usb_serial]
         return [self._path, *(path for path in moved if path != self._path)]
 
     def reopen(self, place: str) -> None:
-        """See Link.reopen."""
         self._close_port()
         try:
             rate = self.bits_per_s or USB_BITS_PER_S
@@ -62,7 +54,6 @@ class SerialLink:
             self._poll.register(self._serial.fileno(), select.POLLIN)
 
     def read(self, timeout_s: float) -> bytes:
-        """See Link.read."""
         try:
             if os.name != "posix":
                 return self._read_blocking(timeout_s)
@@ -71,22 +62,19 @@ class SerialLink:
             raise went_away(self.port, error) from error
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until something can be read."""
-        # One object for all waits where there is poll(): select() builds and takes apart three lists for each.
+        """Wait until something can be read; false when nothing can within timeout_s."""
+        # One poll() object serves all waits; select() would build and take apart three lists for each.
         if self._poll is None:
             return bool(select.select([self._serial.fileno()], [], [], timeout_s)[0])
         return bool(self._poll.poll(1000 * timeout_s))
 
     def _drain(self) -> bytes:
-        # The descriptor itself: pyserial's read() and in_waiting cost as much again as all decoding.
+        # Read the descriptor itself: pyserial's read() and in_waiting would cost as much as all the decoding.
         fd = self._serial.fileno()
-        first = os.read(fd, ONE_READ_BYTES)
-        if not first:
+        pieces = [os.read(fd, ONE_READ_BYTES)]
+        if not pieces[0]:
             raise OSError("it hung up")
-        if len(first) < TTY_BYTES:
-            return first
         # One tty read gives 4 KiB at most, and a reader that takes only one per wake-up loses data at high rates.
-        pieces = [first]
         while len(pieces[-1]) >= TTY_BYTES and len(pieces) < READ_BYTES // TTY_BYTES:
             try:
                 pieces.append(os.read(fd, ONE_READ_BYTES))
@@ -95,14 +83,13 @@ class SerialLink:
         return b"".join(pieces)
 
     def _read_blocking(self, timeout_s: float) -> bytes:
-        # No select() on serial handles there: block on the first byte instead.
+        # On Windows select() cannot wait for serial handles: block on the first byte instead.
         self._serial.timeout = timeout_s
         first = bytes(self._serial.read(1))
         self._serial.timeout = 0
         return first + bytes(self._serial.read(READ_BYTES))
 
     def write(self, data: bytes) -> None:
-        """See Link.write."""
         try:
             self._serial.write(data)
         except (serial.SerialException, OSError) as error:
@@ -110,16 +97,11 @@ class SerialLink:
                 f"{self.port} takes no data ({error}); plug the board in and open it again"
             ) from error
 
-    def release(self) -> None:
-        """A real board's time always runs."""
-
     def abandon(self) -> None:
-        """See Link.abandon."""
-        with suppress(OSError, serial.SerialException, AttributeError):  # there is none to let go of
+        with suppress(OSError, serial.SerialException, AttributeError):  # no open port to let go of
             nowhere(self._serial.fileno())
 
     def close(self) -> None:
-        """See Link.close."""
         self._close_port()
 
     def _close_port(self) -> None:
@@ -127,13 +109,8 @@ class SerialLink:
             self._serial.close()
 
 
-def open_path(path: str, pace: float) -> SerialLink:
-    """Open a serial port; its time is its own, whatever ``pace`` is."""
-    return SerialLink(path)
-
-
-def open_uart(port: str, pace: float) -> SerialLink:
-    """Open a ``uart:`` port, an adapter at a board's UART; its time is its own, whatever ``pace`` is."""
+def open_uart(port: str) -> SerialLink:
+    """Open a ``uart:`` port, an adapter on a board's UART. Raises PortError."""
     path, options = options_of(port, {"baud"}, UART_FORM)
     baud = options.get("baud", "")
     if not path or not baud.isdecimal() or int(baud) == 0:
@@ -142,35 +119,35 @@ def open_uart(port: str, pace: float) -> SerialLink:
 
 
 def went_away(port: str, error: Exception) -> DeviceLostError:
-    """What to raise for what reading an open port has come to."""
+    """The DeviceLostError to raise when reading an open port failed with ``error``."""
     return DeviceLostError(f"{port} went away while it was open ({error}); plug the board in and open it again")
 
 
 def nowhere(fd: int) -> None:
-    """Have a descriptor lead to nowhere, in this process only; its number stays in use."""
+    """Point a descriptor to the null device, in this process only; its number stays in use."""
     null = os.open(os.devnull, os.O_RDWR)
     os.dup2(null, fd)
     os.close(null)
 
 
 def usb_serial(path: str) -> str | None:
-    """Serial number of the USB device behind a port; None when there is none."""
+    """Serial number of the USB device behind a port; None without one."""
     real = os.path.realpath(path)
     return next((p.serial_number for p in comports() if os.path.realpath(p.device) == real), None)
 
 
 def exclusive() -> bool | None:
-    """Ask for the port alone where the platform can; Windows always does."""
+    """Whether to ask pyserial for exclusive access: True on POSIX; None on Windows, where access always is."""
     return True if os.name == "posix" else None
 
 
 def describe_open_error(path: str, error: Exception) -> str:
-    """One line: what was seen and the cure."""
+    """One line with the error and the cure."""
     code = getattr(error, "errno", None)
     text = str(error).lower()
     if code == errno.ENOENT or "no such file" in text or "filenotfound" in text:
         return f"no port {path}; `biotac list` shows the ports of this machine"
-    # Windows says "access is denied" of a port that somebody has open; there it has no other meaning.
+    # Windows says "access is denied" for a port that a program has open; there it means nothing else.
     if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text or "access is denied" in text:
         return f"{path} is in use by {in_words(holders(path))}; close that program and try again"
     if code == errno.EACCES or "permission" in text:

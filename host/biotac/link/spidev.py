@@ -1,11 +1,11 @@
 """Sensors on this computer's own SPI bus: the board is a thread of this process.
 
-The firmware's own sampler, session and framing run here (host/binding/sbc.c); Python gives them the bus through
+The firmware's own sampler, session and framing run here (host/binding/sbc.c); Python provides the bus through
 ``spidev``, the time and the link. What differs from a microcontroller:
 
-- spidev talks to one sensor at a time, so the fingers of a slot sample one transfer after the other, not at once.
-  A slot's time is that of the first.
-- Linux and the interpreter keep no deadline. A slot that comes too late is left out and counted, as on a board
+- spidev talks to one sensor at a time, so the fingers of a slot are sampled one after the other, not simultaneously.
+  The slot's time is that of the first.
+- Linux and the interpreter guarantee no deadline. A slot that comes too late is left out and counted, as on a board
   (``Status.slots_late``), and its channel is missing from its frame. Electrodes and PAC alternate: a bus that is a
   little too slow for every slot loses one of the two kinds throughout.
 """
@@ -21,12 +21,12 @@ from typing import Any, Protocol
 from ..errors import DeviceLostError, PortError
 from ..wire import sensor_gen as sensor
 from ..wire.native import ffi, lib
-from .base import Played
+from .base import Link
 
-# As much as a board and the operating system would hold for a host that is slow; more is dropped in whole frames.
+# As much as a board and the operating system would buffer for a slow host; beyond that, whole frames are dropped.
 OUTBOX_BYTES = 262_144
-# Linux wakes a sleeper some 60 us late, even from sleep(0): the last of a wait is spent awake. Other threads get
-# the interpreter whenever the board's C code runs, several times a slot.
+# Linux wakes a sleeping thread some 60 us late, even from sleep(0), so the end of each wait is spent awake. Other
+# threads get the interpreter whenever the board's C code runs, several times per slot.
 AWAKE_NS = 100_000
 
 
@@ -34,28 +34,26 @@ class Clock(Protocol):
     """Device time."""
 
     def now_ns(self) -> int:
-        """Time since anything."""
+        """Time since some fixed moment."""
 
     def delay_ns(self, ns: int) -> None:
-        """Return not before ns have passed."""
+        """Wait for at least ns."""
 
     def wait_until(self, t_ns: int) -> bool:
-        """Wait for t_ns; false when it has not come but the host may want something."""
+        """Wait for t_ns; false when it returns before, because the host may want something."""
 
 
-class MonotonicClock:
-    """The computer's."""
+class MonotonicClock(Clock):
+    """The computer's monotonic clock."""
 
     def now_ns(self) -> int:
-        """See Clock.now_ns."""
         return time.monotonic_ns()
 
     def delay_ns(self, ns: int) -> None:
-        """See Clock.delay_ns."""
         self.wait_until(time.monotonic_ns() + ns)
 
     def wait_until(self, t_ns: int) -> bool:
-        """See Clock.wait_until; never false, for the next slot is never far."""
+        """See Clock.wait_until; never false, because the next slot is always near."""
         while (left_ns := t_ns - time.monotonic_ns()) > 0:
             if left_ns > AWAKE_NS:
                 time.sleep((left_ns - AWAKE_NS) / 1e9)
@@ -63,7 +61,7 @@ class MonotonicClock:
 
 
 def parse_spidev(port: str) -> list[tuple[int, int]]:
-    """Bus and device of each finger of ``spidev:0.0,0.1``; PortError for anything else."""
+    """Bus and device of each finger of ``spidev:0.0,0.1``. Raises PortError for any other form."""
     texts = port.removeprefix("spidev:").split(",")
     devices: list[tuple[int, int]] = []
     for text in texts:
@@ -81,7 +79,7 @@ def parse_spidev(port: str) -> list[tuple[int, int]]:
 
 
 def open_devices(port: str) -> list[Any]:
-    """A ``spidev.SpiDev`` for each finger of the port; PortError says what is in the way."""
+    """A ``spidev.SpiDev`` for each finger of the port. Raises PortError when one cannot be opened."""
     places = parse_spidev(port)
     try:
         import spidev
@@ -96,7 +94,7 @@ def open_devices(port: str) -> list[Any]:
                 opened.append(spi)
                 spi.mode = 0
                 spi.max_speed_hz = sensor.SPI_HZ
-                spi.bits_per_word = 8  # two to a word: the Raspberry Pi's bus knows no 16
+                spi.bits_per_word = 8  # two bytes per 16-bit word: the Raspberry Pi's bus cannot do 16 bits
             except OSError as error:
                 raise PortError(describe_open_error(f"/dev/spidev{bus}.{device}", error)) from error
     except BaseException:
@@ -107,7 +105,7 @@ def open_devices(port: str) -> list[Any]:
 
 
 def describe_open_error(path: str, error: OSError) -> str:
-    """One line: what was seen and the cure."""
+    """One line with the error and the cure."""
     if isinstance(error, FileNotFoundError):
         return f"no SPI device {path}; switch SPI on (raspi-config, Interface Options) and see ls /dev/spidev*"
     if isinstance(error, PermissionError):
@@ -117,18 +115,11 @@ def describe_open_error(path: str, error: OSError) -> str:
     )
 
 
-class SpidevLink:
+class SpidevLink(Link):
     """A Link to the gateway that runs in this process."""
 
     def __init__(self, port: str, *, clock: Clock | None = None) -> None:
         self.port = port
-        self.source: Played | None = None
-        self.patience = 1.0
-        self.keeps_time = True
-        self.bits_per_s: int | None = None
-        self.ended = False
-        self.fd: int | None = None
-        self.pace = 1.0
         self._devices = open_devices(port)
         self._clock: Clock = clock or MonotonicClock()
         self._start_ns = self._clock.now_ns()
@@ -148,7 +139,6 @@ class SpidevLink:
     # ---- the host's thread -----------------------------------------------------------------------
 
     def read(self, timeout_s: float) -> bytes:
-        """See Link.read."""
         with self._changed:
             self._changed.wait_for(lambda: self._outbox or self._failure or self._closing, timeout_s)
             data = bytes(self._outbox)
@@ -158,31 +148,15 @@ class SpidevLink:
         return data
 
     def write(self, data: bytes) -> None:
-        """See Link.write."""
         self._check()
         with self._changed:
             self._inbox += data
 
-    def release(self) -> None:
-        """A real bus's time always runs."""
-
-    def places(self) -> list[str]:
-        """None: the bus is this computer's own, and nobody unplugs it."""
-        return []
-
-    def reopen(self, place: str) -> None:
-        """Never asked for: there are no places."""
-        raise PortError(f"{self.port} cannot be opened again; make a new one")
-
-    def abandon(self) -> None:
-        """See Link.abandon. The thread that is the board was not forked."""
-
     def close(self) -> None:
-        """See Link.close."""
         self._closing = True
         self._thread.join()
         for spi in self._devices:
-            with suppress(OSError):  # one that is gone is closed
+            with suppress(OSError):  # a device that is gone needs no closing
                 spi.close()
         self._devices = []
 
@@ -195,7 +169,7 @@ class SpidevLink:
     # ---- the board's thread ----------------------------------------------------------------------
 
     def _run(self) -> None:
-        """firmware/app/main.c, with an end."""
+        """The main loop of firmware/app/main.c, but with an end."""
         lib.bt_sbc_start(self._board)
         while not self._closing and self._failure is None:
             lib.bt_sbc_poll(self._board)
@@ -203,7 +177,7 @@ class SpidevLink:
                 lib.bt_sbc_alarm(self._board)
 
     def _due_ns(self) -> int:
-        """The board's 32-bit us, unwrapped around now."""
+        """When the board is due next: its 32-bit time in us, unwrapped around now, as ns of the clock."""
         now_us = self._us()
         ahead_us: int = (lib.bt_sbc_due_us(self._board) - now_us + 2**31) % 2**32 - 2**31
         return self._start_ns + (now_us + ahead_us) * 1000
@@ -217,7 +191,7 @@ class SpidevLink:
             self._changed.notify_all()
 
     def _exchange(self, finger: int, data: Any) -> None:
-        # After a failure the rest of the slot has no bus: zeros, and the loop ends behind it.
+        # After a failure the rest of the slot reads as zeros; then the loop ends.
         data[:] = bytes(len(data)) if self._failure else bytes(self._devices[finger].xfer2(list(bytes(data))))
 
     def _send(self, data: bytes) -> bool:
@@ -237,18 +211,13 @@ class SpidevLink:
         return data
 
 
-def open_spidev(port: str, pace: float) -> SpidevLink:
-    """Open a spidev: port; its time is its own, whatever ``pace`` is."""
-    return SpidevLink(port)
-
-
 def _of(handle: Any) -> SpidevLink:
     link: SpidevLink = ffi.from_handle(handle)
     return link
 
 
 def _failed(kind: Any, error: Any, trace: Any) -> None:
-    """What a callback below raises must not be lost in C: it ends the board, and the host is told."""
+    """Keep what a callback below raised from being lost in C: it ends the board, and the host gets the error."""
     _of(trace.tb_frame.f_locals["handle"])._fail(error)
 
 

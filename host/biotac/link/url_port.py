@@ -9,26 +9,18 @@ from typing import Any
 import serial
 
 from ..errors import DeviceLostError, PortError
-from .base import Played
+from .base import Link
 from .serial_port import READ_BYTES, nowhere, went_away
 
-# rfc2217 tells its far end of every change, so that this stands; a read is made of several.
+# rfc2217 sends every change of the timeout to its far end, so it stays fixed; a read consists of several such waits.
 WAIT_S = 0.05
 
 
-class UrlLink:
-    """A byte pipe to what pyserial opens by URL. Several times slower than a port of this computer."""
-
-    patience = 1.0
-    keeps_time = True
-    bits_per_s: int | None = None
+class UrlLink(Link):
+    """A byte pipe to a port that pyserial opens by URL. Several times slower than a port of this computer."""
 
     def __init__(self, url: str) -> None:
         self.port = url
-        self.source: Played | None = None
-        self.ended = False
-        self.pace = 1.0
-        self.fd: int | None = None
         self._serial: Any = None
         self.reopen(url)
 
@@ -37,20 +29,18 @@ class UrlLink:
         return [self.port]
 
     def reopen(self, place: str) -> None:
-        """See Link.reopen."""
         self.close()
         try:
-            patience = {"write_timeout": 2} if place.startswith("socket:") else {}  # rfc2217 knows none
+            patience = {"write_timeout": 2} if place.startswith("socket:") else {}  # rfc2217 has no write timeout
             self._serial = serial.serial_for_url(place, 115200, timeout=WAIT_S, **patience)
         except (serial.SerialException, OSError, ValueError) as error:
             raise PortError(
                 f"{place} cannot be opened ({error}); check host and port, and that it is shared"
             ) from error
-        # A socket can be read in C like any port. rfc2217 speaks Telnet below, which pyserial takes apart.
+        # A socket can be read in C like any port. rfc2217 is Telnet underneath, which pyserial has to parse.
         self.fd = self._serial.fileno() if os.name == "posix" and place.startswith("socket:") else None
 
     def read(self, timeout_s: float) -> bytes:
-        """See Link.read."""
         deadline_s = time.monotonic() + timeout_s
         try:
             while True:
@@ -63,7 +53,6 @@ class UrlLink:
             raise went_away(self.port, error) from error
 
     def write(self, data: bytes) -> None:
-        """See Link.write."""
         try:
             self._serial.write(data)
         except (serial.SerialException, OSError) as error:
@@ -71,20 +60,10 @@ class UrlLink:
                 f"{self.port} takes no data ({error}); check the network and open it again"
             ) from error
 
-    def release(self) -> None:
-        """A real board's time always runs."""
-
     def abandon(self) -> None:
-        """See Link.abandon."""
         if self.fd is not None:
             nowhere(self.fd)
 
     def close(self) -> None:
-        """See Link.close."""
         if self._serial is not None:
             self._serial.close()
-
-
-def open_url(url: str, pace: float) -> UrlLink:
-    """Open a socket:// or rfc2217:// port; its time is its own, whatever ``pace`` is."""
-    return UrlLink(url)

@@ -1,9 +1,10 @@
-"""Recordings: MCAP files that hold the raw wire, so that nothing a board said is ever lost.
+"""Recordings: MCAP files that hold the raw wire bytes, so that nothing the board sent is lost.
 
-A block a second, taken apart by finger and field so that it can be put together again to the byte, each part in a
-chunk of its own: a killed recorder loses at most its last second. Beside it, thinned, JSON messages that Foxglove and
-PlotJuggler understand (plots.py). The metadata record ``biotac`` holds who sent them and with which settings; the
-schema record of the wire holds protocol/schema.json of the day. host/docs/recording.md describes it all.
+There is one block per second. It is split by finger and field, in a form that can be reassembled byte for byte, and
+each part is a chunk of its own: a killed recorder loses at most its last second. Thinned JSON and ROS 2 messages for
+Foxglove and PlotJuggler are stored beside it (plots.py). The metadata record ``biotac`` names the board, its sensors
+and the settings in force; the wire's schema record holds protocol/schema.json as it was at the time of recording.
+host/docs/recording.md describes the format.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How strongly dynamic pressure vibrated in a recording, as a board told it or would have."""
+"""Vibration energy of a recording's dynamic pressure: as the board sent it, or as it would have."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .stamps import unwrapped_us
 
 
 def recorded_bands(pac: StructArray, messages: list[Any], begin_us: int) -> StructArray:
-    """BANDS_DTYPE (n,): of each finger the BANDS among ``messages``, or without any those of its ``pac`` rows.
+    """BANDS_DTYPE (n,): each finger's BANDS among ``messages`` or, if it has none, computed from its ``pac`` rows.
 
-    Times of messages are unwrapped from ``begin_us`` on; a finger's rows lie together, in its order.
+    Times of messages are unwrapped from ``begin_us`` on. Rows are sorted by finger, and in order within a finger.
     """
     told = [message for message in messages if isinstance(message, wire.Bands)]
     parts = []

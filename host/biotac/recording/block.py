@@ -1,9 +1,9 @@
-"""A block of the wire, about a second, taken apart by finger and field, and put together again to the byte.
+"""A block of the wire, about one second, split by finger and field and reassembled byte for byte.
 
-A finger's part holds its FRAMEs, PACs and heartbeats, a column a field: the change from row to row (the first row's is
-from 0), zigzag so that small ones are small numbers, and byte planes, lowest first. That is what makes zstd good at
-them, and what lets one field be read without the others. ``seq`` and ``t_us`` are unwrapped. The rest of a block is
-which message came when, and the other messages as they came.
+A finger's part holds its FRAMEs, PACs and heartbeats, one column per field. A column holds the change from row to row
+(the first row's is from 0), zigzag-encoded so that small changes are small numbers, as byte planes, lowest first. zstd
+compresses this well, and a field can be read without the others. ``seq`` and ``t_us`` are unwrapped. The rest of a
+block is the order of the messages, and all other messages as they came.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ FRAME, PAC, IDLE = range(len(KINDS))
 _RAW = int(lib.BT_REBUILD_RAW)
 _FINGER_BITS = 3  # a code is a kind and a finger
 _ROWS = struct.Struct("<3I")
-_HEAD = struct.Struct("<qqI")  # first and last t_us of a FRAME or heartbeat, and how many codes follow
+_HEAD = struct.Struct("<qqI")  # first and last t_us of the FRAMEs and heartbeats, number of codes that follow
 _MOST_PER_MESSAGE = 256
-_MOST_MESSAGES = 1 << 16  # of a block; a second of five fingers is some 1100
+_MOST_MESSAGES = 1 << 16  # per block; one second of five fingers is about 1100
 
-#: Name, type of a value and values a row.
+#: Name, dtype of a value, values per row.
 Column = tuple[str, np.dtype[Any], int]
 
 
 def _columns(message_id: int) -> dict[str, np.dtype[Any]]:
-    """Of one kind: the message's fields but for the finger, seq and t_us unwrapped."""
+    """Columns of one kind: the message's fields without the finger, with seq and t_us unwrapped."""
     fields = {name: DTYPES[message_id][name] for name in DTYPES[message_id].names or () if name != "finger"}
     return fields | {"seq": np.dtype("<u4"), "t_us": np.dtype("<i8")}
 
@@ -47,7 +47,7 @@ COLUMNS = tuple(_columns(message_id) for message_id in KINDS)
 
 
 def schema() -> bytes:
-    """Which columns a finger's part has, as the recording says it of itself."""
+    """The columns of a finger's part as JSON; stored in the recording."""
     kinds = {
         wire.MESSAGES[message_id].__name__.upper(): [
             [name, dtype.base.str, int(np.prod(dtype.shape))] for name, dtype in columns.items()
@@ -59,7 +59,7 @@ def schema() -> bytes:
 
 @dataclass(frozen=True)
 class Rest:
-    """The order of a block's messages, as codes, and what is no row, as it came."""
+    """The order of a block's messages, as codes, and the messages that are not rows, as they came."""
 
     first_us: int
     last_us: int
@@ -72,44 +72,44 @@ class Rest:
 
     @classmethod
     def unpack(cls, data: bytes) -> Rest:
-        """ValueError or struct.error for what is none."""
+        """Inverse of ``pack``. Raises ValueError or struct.error for invalid data."""
         first_us, last_us, n = _HEAD.unpack_from(data)
         if n > _MOST_MESSAGES:
             raise ValueError(f"a block of {n} messages, expected at most {_MOST_MESSAGES}")
         return cls(first_us, last_us, np.frombuffer(data, np.uint8, n, _HEAD.size), data[_HEAD.size + n :])
 
     def fingers(self, kind: int) -> NDArray[np.uint8]:
-        """The finger of each message of ``kind``, in order."""
+        """The finger of each message of ``kind``, in order of arrival."""
         mine = self.codes[(self.codes != _RAW) & (self.codes >> _FINGER_BITS == kind)]
         fingers: NDArray[np.uint8] = mine & ((1 << _FINGER_BITS) - 1)
         return fingers
 
     def without(self, fingers: Collection[int]) -> Rest:
-        """The same without the rows of ``fingers``."""
+        """A copy without the rows of ``fingers``."""
         gone = np.isin(self.codes & ((1 << _FINGER_BITS) - 1), list(fingers)) & (self.codes != _RAW)
         return Rest(self.first_us, self.last_us, self.codes[~gone], self.raw)
 
     @property
     def all_fingers(self) -> set[int]:
-        """Those of which there is a row."""
+        """Fingers with at least one row."""
         there = np.bincount(self.codes, minlength=256)[:_RAW].nonzero()[0]
         return set((there & ((1 << _FINGER_BITS) - 1)).tolist())
 
 
 @dataclass(frozen=True)
 class Block:
-    """``parts`` by finger, encoded; see ``read_part``."""
+    """A block split up. ``parts`` by finger, encoded; ``read_part`` reads them."""
 
     parts: dict[int, bytes]
     rest: Rest
 
 
 def take_apart(data: bytes, batch: Batch) -> Block | None:
-    """``data``, whole messages, whose decoded rows are ``batch``; None when it could not be put together again."""
+    """Split up ``data``, whole messages whose decoded rows are ``batch``; None if it could not be reassembled."""
     if data.count(0) > _MOST_MESSAGES:
         return None
     pieces = data.split(b"\0")[:-1]
-    ids = np.array([piece[1] if len(piece) > 1 else 0 for piece in pieces], np.intp)  # the id, behind COBS's first
+    ids = np.array([piece[1] if len(piece) > 1 else 0 for piece in pieces], np.intp)  # the id follows COBS's first byte
     codes = np.full(len(pieces), _RAW, np.uint8)
     tables = _tables(batch)
     for kind, rows in enumerate(tables):
@@ -130,14 +130,14 @@ def take_apart(data: bytes, batch: Batch) -> Block | None:
 
 
 def _tables(batch: Batch) -> list[StructArray]:
-    """FRAMEs as sent, with unwrapped seq and t_us; PAC and heartbeats have theirs."""
+    """FRAMEs as sent, but with seq and t_us unwrapped; those of PAC and heartbeats already are."""
     frames = np.empty(len(batch.wire), table_dtype(FRAME))
     for name in frames.dtype.names or ():
         frames[name] = batch.seq if name == "seq" else batch.t_us if name == "t_us" else batch.wire[name]
     return [frames, batch.pac, batch.idle]
 
 
-#: Of a row of a table: finger, seq and t_us; messages begin with the same three.
+#: Bytes of finger, seq and t_us at the start of a table's row; messages start with the same three fields.
 _LEAD = 1 + 4 + 8
 
 
@@ -146,7 +146,7 @@ def table_dtype(kind: int) -> np.dtype[Any]:
 
 
 def as_sent(rows: StructArray, kind: int) -> StructArray:
-    """Messages of a kind, seq and t_us wrapped again; those that are as sent already, as they are."""
+    """Messages of one kind with seq and t_us wrapped again; ``rows`` itself if it already has that dtype."""
     sent = DTYPES[KINDS[kind]]
     if rows.dtype == sent:
         return rows
@@ -154,7 +154,7 @@ def as_sent(rows: StructArray, kind: int) -> StructArray:
     out["finger"] = rows["finger"]
     for name in ("seq", "t_us"):
         out[name] = rows[name] & np.iinfo(sent[name]).max
-    rest = rows.dtype.itemsize - _LEAD  # the same in both, so it is one move a row
+    rest = rows.dtype.itemsize - _LEAD  # the same in both, so one copy per row
     _bytes(out)[:, -rest:] = _bytes(rows)[:, -rest:]
     return out
 
@@ -164,7 +164,7 @@ def _bytes(rows: StructArray) -> NDArray[np.uint8]:
 
 
 def together(rest: Rest, sent: list[StructArray]) -> bytes:
-    """The wire's bytes of messages by kind, each in the order of arrival."""
+    """The wire bytes of ``sent``, the messages by kind, each kind in order of arrival."""
     n = 1 << _FINGER_BITS
     tables, sizes, ids = (ffi.new(f"{kind}[64]") for kind in ("uint8_t const *", "uint32_t", "uint8_t"))
     keep = []
@@ -204,7 +204,7 @@ def _planes(values: NDArray[Any]) -> bytes:
 
 
 class Reading:
-    """How the stored columns of one kind become rows: of the fields ``wanted``, or none at all (None)."""
+    """Turns the stored columns of one kind into rows of the fields ``wanted``; None: into no rows at all."""
 
     def __init__(self, kind: int, columns: list[Column], wanted: Collection[str] | None) -> None:
         full = table_dtype(kind)
@@ -225,7 +225,7 @@ class Reading:
         self.nothing = self.table(np.empty(0, np.uint8))
 
     def table(self, finger: NDArray[np.uint8]) -> StructArray:
-        """Rows of these fingers, to be read; a field that the recording's version did not have is invalid."""
+        """Rows of these fingers, for ``read`` to fill; fields that the recording's version did not have are invalid."""
         rows = np.empty(len(finger), self.dtype)
         rows["finger"] = finger
         for name in self._missing:
@@ -233,7 +233,7 @@ class Reading:
         return rows
 
     def read(self, planes: memoryview, rows: StructArray, at: NDArray[np.uint32]) -> None:
-        """A part's columns of this kind, ``len(at) * row_bytes`` bytes, into the rows ``at`` of a table."""
+        """Decode a part's columns of this kind, ``len(at) * row_bytes`` bytes, into the rows ``at`` of a table."""
         source, index, out = (
             ffi.from_buffer("uint8_t[]", planes),
             ffi.from_buffer("uint32_t[]", at),
@@ -243,7 +243,7 @@ class Reading:
 
 
 def read_part(data: bytes, readings: Sequence[Reading], tables: list[StructArray], finger: int) -> None:
-    """A finger's part into its rows of ``tables``, by kind. ValueError or struct.error for other sizes."""
+    """Decode a finger's part into its rows of ``tables``, by kind. Raises ValueError or struct.error for wrong size."""
     counts = _ROWS.unpack_from(data)
     expected = _ROWS.size + sum(n * reading.row_bytes for n, reading in zip(counts, readings, strict=True))
     if expected != len(data):
@@ -260,7 +260,7 @@ def read_part(data: bytes, readings: Sequence[Reading], tables: list[StructArray
 
 
 def layout_of(text: bytes) -> list[list[Column]]:
-    """What ``schema`` says. ValueError, KeyError or TypeError for what it never says."""
+    """The columns by kind that ``schema`` wrote. Raises ValueError, KeyError or TypeError for anything else."""
     kinds = json.loads(text)
     out = []
     for message_id in KINDS:

@@ -1,4 +1,4 @@
-"""The blocks of a recording, one by one: rows of the fields and fingers that are wanted, or the wire's bytes."""
+"""The blocks of a recording, one by one: rows of the wanted fields and fingers, or the wire bytes."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ ALL = {kind: table_dtype(kind).names or () for kind in range(len(KINDS))}
 
 @dataclass(frozen=True)
 class Piece:
-    """One block. ``rows`` by kind, in the order of arrival, of the fingers and fields that were wanted.
+    """One block. ``rows``: the wanted fingers and fields, by kind, in order of arrival.
 
-    Without ``rest`` it is ``raw``: bytes of the wire as they came. ``whole``: nothing of it is damaged.
+    If ``rest`` is None, the block is ``raw``: wire bytes as they came. ``whole``: none of it is damaged.
     """
 
     arrived_ns: int
@@ -36,14 +36,14 @@ class Piece:
     whole: bool = True
 
     def bytes(self) -> bytes:
-        """As they came, of a piece of all fields and fingers."""
+        """The wire bytes as they came; only for a piece with all fields and fingers."""
         if self.rest is None:
             return self.raw
         return together(self.rest, [as_sent(rows, kind) for kind, rows in enumerate(self.rows)])
 
 
 class Blocks:
-    """Iterating gives Pieces; ``metadata`` (None until seen), ``gaps`` and ``problems`` are known afterwards."""
+    """Iterates over Pieces; ``metadata`` (None until seen), ``gaps`` and ``scan.problems`` are complete afterwards."""
 
     def __init__(
         self,
@@ -104,7 +104,7 @@ class Blocks:
             self.gaps.append(facts)
 
     def _told_misplaced(self) -> None:
-        """Parts of a second that are missing, or are not with the rest of it; damage that explains it was told."""
+        """Report parts that are missing or misplaced, unless an earlier problem already explains it."""
         if not self.scan.problems:
             name = self.scan.path.name
             self.scan.problems.append(f"{name} is damaged: what it has is not in its order, and some of it left out")
@@ -130,19 +130,19 @@ class Blocks:
         return Piece(message.publish_time, message.log_time, message.sequence, rows, rest, whole=whole)
 
     def _tables(self, rest: Rest, readings: list[Reading]) -> list[StructArray]:
-        """Rows to be read, by kind, each with its finger."""
+        """Rows for ``read_part`` to fill, by kind, with their fingers set."""
         return [
             reading.table(self._mine(rest.fingers(kind))) if reading.wanted else reading.nothing
             for kind, reading in enumerate(readings)
         ]
 
     def _mine(self, fingers: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Those that are wanted."""
+        """The wanted ones of ``fingers``."""
         return fingers if self._chosen is None else fingers[self._chosen[fingers]]
 
 
 def is_lossless(frames: StructArray, pac: StructArray, idle: StructArray) -> bool:
-    """Every round of every finger is there once, as a FRAME or in a heartbeat, and every PAC block."""
+    """True if every finger's rounds are all there, each once, as a FRAME or in a heartbeat, and so is every PAC."""
     for finger in range(8):
         mine, waits = frames["seq"][frames["finger"] == finger], idle[idle["finger"] == finger]
         ends = np.concatenate([mine, waits["seq"]]).astype(np.int64)

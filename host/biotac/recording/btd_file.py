@@ -1,8 +1,8 @@
-"""SynTouch's .btd text: header lines, ``Begin File``, then one line a slot.
+"""SynTouch's .btd text files: header lines, ``Begin File``, then one line per slot.
 
-A line is ``t batch frame channel`` and a pair ``value parity`` for each sensor of the adapter, parity
-0 good and 1 bad; an absent sensor reads bad parity throughout (BioTac QuickStart Guide; biotac.md
-1.6). The logger leaves gaps between batches.
+A line is ``t batch frame channel`` followed by a pair ``value parity`` for each sensor of the adapter. Parity 0 is
+good, 1 is bad; an absent sensor reads bad parity throughout (BioTac QuickStart Guide; biotac.md 1.6). The logger
+leaves gaps between batches.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from ..wire.messages_gen import INVALID_COUNT
 _FIRST_PAIR = 4
 _BEGIN = b"Begin File"
 _MAX_BYTES = 1 << 30  # a day of three sensors is larger
-# Packed, real ones have a tenth of their bytes; in memory each becomes four.
+# Real files compress to a tenth of their size; in memory each byte becomes four.
 _PACKED_RATIO, _PACKED_FREE_BYTES = 30, 1 << 24
 
 
 @dataclass(frozen=True)
 class BtdFrames:
-    """Complete frames of the sensors that were there.
+    """Complete frames of the sensors that were present.
 
-    ``samples`` uint16 (frames, sensors, 44) in our SLOTS order, INVALID_COUNT where the parity was bad; ``t_s``
-    (frames,) the file's time of each; ``skipped`` counts incomplete frames.
+    ``samples`` uint16 (frames, sensors, 44) in our SLOTS order, INVALID_COUNT where the parity was bad. ``t_s``
+    (frames,) is the file's time of each frame in s. ``skipped`` counts incomplete frames.
     """
 
     samples: npt.NDArray[np.uint16]
@@ -41,7 +41,7 @@ class BtdFrames:
 
 
 def read_btd(path: Path) -> BtdFrames:
-    """Read a .btd or .btd.gz file. Raises RecordingError naming the line for anything malformed."""
+    """Read a .btd or .btd.gz file. Raises RecordingError, naming the line, for anything malformed."""
     data = _bytes(path)
     header, begin, body = data.partition(_BEGIN)
     if not begin:
@@ -73,7 +73,7 @@ def read_btd(path: Path) -> BtdFrames:
             "E1..E19, PDC, TAC and TDC once and PAC 22 times (a BioTac SP's 54-slot frames are not played)"
         )
     rows = starts[:, None] + np.arange(len(_sensor.SLOTS))
-    # sorting by channel, stably, lines up the k-th sample of a channel here with the k-th there
+    # a stable sort by channel aligns the k-th sample of a channel in the file with its k-th slot in SLOTS
     here = np.argsort(channel[rows], axis=1, kind="stable")
     there = np.argsort(_slot_channels(), kind="stable")
     samples = np.empty((len(starts), words.shape[1], len(_sensor.SLOTS)), dtype=np.uint16)
@@ -82,14 +82,14 @@ def read_btd(path: Path) -> BtdFrames:
 
 
 def _slot_channels() -> npt.NDArray[np.float64]:
-    """Channel numbers (44,) of our slots; a command is 1SSSSSSP, S the channel."""
+    """Channel numbers (44,) of our slots; a command byte is 1SSSSSSP, S the channel."""
     return np.array([(_sensor.CHANNEL_COMMAND[name] & 0x7E) >> 1 for name in _sensor.SLOTS], dtype=np.float64)
 
 
 def _complete_frames(
     batch: npt.NDArray[np.float64], frame: npt.NDArray[np.float64], channel: npt.NDArray[np.float64]
 ) -> tuple[npt.NDArray[np.int64], int]:
-    """First rows of complete frames, and how many frames are not."""
+    """First rows of the complete frames, and the number of incomplete ones."""
     change = np.flatnonzero((np.diff(batch) != 0) | (np.diff(frame) != 0)) + 1
     starts = np.concatenate([[0], change]).astype(np.int64)
     lengths = np.diff(np.append(starts, len(batch)))
@@ -112,7 +112,7 @@ def _bytes(path: Path) -> bytes:
             with path.open("rb") as plain:
                 data = plain.read(limit + 1)
     except (OSError, EOFError, zlib.error) as error:
-        seen = getattr(error, "strerror", None)  # of the system; what damage raises has none
+        seen = getattr(error, "strerror", None)  # only errors of the operating system have it, not damaged data
         cure = "check the path" if seen else "copy it again"
         raise RecordingError(f"{path}: cannot be read ({seen or error}): expected a .btd; {cure}") from None
     if len(data) > limit:
@@ -124,7 +124,7 @@ def _numbers(path: Path, body: bytes, first_line: int) -> npt.NDArray[np.float64
     """The lines after ``Begin File`` as float64 (lines, 4 + 2 * sensors)."""
     if not body.strip():
         raise RecordingError(f"{path}: nothing after 'Begin File': expected one line a slot; record again")
-    # the rest of the line of 'Begin File' goes, so that row 0 is the line after it
+    # drop the rest of the 'Begin File' line, so that row 0 is the line after it
     body = body.partition(b"\n")[2]
     try:
         table = np.loadtxt(io.BytesIO(body), dtype=np.float64, ndmin=2, comments=None, encoding="latin-1")
@@ -141,7 +141,7 @@ def _numbers(path: Path, body: bytes, first_line: int) -> npt.NDArray[np.float64
 
 
 def _first_fault(body: bytes, first_line: int) -> str:
-    """Says which line is the first that is wrong; slow, and only for the error."""
+    """Error text naming the first malformed line. Slow: only called when there is an error."""
     expected = "expected 't batch frame channel' and 'value parity' for each sensor; copy the file again"
     columns = 0
     for number, line in enumerate(body.split(b"\n"), first_line):

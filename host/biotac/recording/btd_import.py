@@ -1,4 +1,4 @@
-"""SynTouch .btd files as recordings: their counts through the board's own code, with the file's own times."""
+"""Importing SynTouch .btd files as recordings: the board's own code runs on their counts, with the file's own times."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ..wire import slots
 from ..wire.framing import encode
 from ..wire.identity import NO_IMAGE
 from .btd_file import read_btd
+from .facts import Facts
 from .file import RecordingFile
 from .rounds import Rounds, frames_and_tares
-from .writer import describe
 
 NO_BOARD = 0
 _BLOCK_US = 1_000_000
@@ -26,11 +26,11 @@ _FIRST_PAC_US = int(slots.PAC_SLOT[0]) * 1_000_000 // sensor.SLOT_HZ
 
 
 def import_btd(path: Path, out: Path, show: Callable[[float], None] = lambda share: None) -> dict[str, int]:
-    """Write ``path`` (.btd or .btd.gz) to ``out`` as a recording; return counts of what was done.
+    """Write ``path`` (.btd or .btd.gz) to ``out`` as a recording; return the numbers of fingers, frames and skipped.
 
-    Every sensor that was there becomes a finger, every complete frame a FRAME and a PAC at the file's own
-    time. Frames that are incomplete are left out; the gaps of the logger stay gaps in time, while sequence
-    numbers go on, as the tare machine counts rounds. Raises RecordingError naming the line.
+    Every sensor that was present becomes a finger, and every complete frame a FRAME and a PAC at the file's own
+    time. Incomplete frames are left out. The logger's gaps stay gaps in time, but sequence numbers go on without a
+    gap, because the tare machine counts rounds. Raises RecordingError naming the line.
     """
     read = read_btd(path)
     words = read.samples
@@ -69,7 +69,7 @@ def import_btd(path: Path, out: Path, show: Callable[[float], None] = lambda sha
 def _write(
     path: Path, out: Path, fingers: int, settings: dict[wire.Setting, int], messages: list[tuple[int, int, bytes]]
 ) -> None:
-    """A block a second. The file has no date: its first frame is at 0 of the host's clock."""
+    """Write one block per second. The file has no date: its first frame is at 0 on the host's clock."""
     major, minor, patch = (int(part) for part in __version__.split(".")[:3])
     hello = wire.Hello(
         req_id=0, nonce=0, wire_major=wire.WIRE_MAJOR, wire_minor=wire.WIRE_MINOR, schema_hash=wire.SCHEMA_HASH,
@@ -79,7 +79,7 @@ def _write(
     )  # fmt: skip
     unknown = wire.SensorInfo(0, 0, 1, (0,) * 2, (0,) * 4, (0,) * 16, 0, 0)
     sensors = [dataclasses.replace(unknown, finger=finger) for finger in range(fingers)]
-    metadata = describe(hello, settings, {}, sensors, f"btd:{path.name}")
+    metadata = Facts(hello, sensors, settings).metadata(f"btd:{path.name}")
     with out.open("xb") as stream:
         file = RecordingFile(stream, metadata)
         second, block = 0, b""

@@ -1,7 +1,7 @@
 """A chunk of an MCAP file, and the records in it.
 
-mcap's own reader calls a function for each field of each record, which was a third of the time of loading a recording.
-What it finds in a chunk is the same.
+This replaces mcap's own reader, which finds the same records but calls a function for each field of each record: that
+took a third of the time of loading a recording.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from mcap.stream_reader import get_chunk_data_stream
 
 _CHUNK = struct.Struct("<QQQII")  # first and last time, unpacked size, checksum, length of the compression's name
 _LENGTH = struct.Struct("<Q")
-HEAD = struct.Struct("<BQ")  # of every record: which kind, and how long
+HEAD = struct.Struct("<BQ")  # of every record: opcode, length
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-_MESSAGE_OPCODE = int(Opcode.MESSAGE)  # a member of an enum is looked up anew each time
+_MESSAGE_OPCODE = int(Opcode.MESSAGE)  # a plain int: accessing an enum member is slow
 
 
 def chunk_of(record: bytes) -> Chunk:
-    """A chunk, still packed. struct.error or UnicodeDecodeError for what is none."""
+    """The chunk in ``record``, still compressed. Raises struct.error or UnicodeDecodeError if it is not one."""
     first, last, size, crc, named = _CHUNK.unpack_from(record)
     at = _CHUNK.size + named
     (length,) = _LENGTH.unpack_from(record, at)
@@ -39,13 +39,13 @@ def chunk_of(record: bytes) -> Chunk:
 
 
 def unpack(chunk: Chunk) -> bytes:
-    """What is in it, its checksum compared. Raises what mcap and its decompressors raise."""
+    """The chunk's data, decompressed, with its checksum verified. Raises what mcap and its decompressors raise."""
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     return stream.read(length)
 
 
 def records_of(data: bytes) -> Iterator[Message | Channel | Schema]:
-    """The records of an unpacked chunk. struct.error or mcap's errors for damaged ones."""
+    """The records of a decompressed chunk. Raises struct.error or mcap's errors for damaged ones."""
     at = 0
     while at < len(data):
         opcode, length = HEAD.unpack_from(data, at)

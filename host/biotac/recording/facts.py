@@ -1,59 +1,89 @@
-"""What a recording's metadata say, as values."""
+"""Facts about a recording (its board, sensors, settings and calibrations), as values and as metadata."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from ..errors import InputError
 from ..keep import Calibration
-from ..keep.calibration_file import from_dict
+from ..keep.calibration_file import from_dict, to_dict
 from ..keep.map_blob import as_blob
 from ..keep.values import own_settings
+from ..version import __version__
 from ..wire import messages_gen as wire
-from ..wire.identity import NO_IMAGE
+from ..wire.identity import NO_IMAGE, version_text
 from . import layout
+
+Settings = Mapping[wire.Setting, int]
 
 
 @dataclass(frozen=True)
 class Facts:
-    """Board, sensors and what was in force when it began; ``calibrations`` and ``maps`` by finger, ``names`` fingers
-    by name.
+    """Board, sensors, and the settings, calibrations and maps in force when the recording began.
+
+    ``calibrations`` and ``maps`` are by finger; ``names`` are fingers by name.
     """
 
     info: wire.Hello
     sensors: list[wire.SensorInfo]
     settings: dict[wire.Setting, int]
-    calibrations: dict[int, Calibration]
-    maps: dict[int, bytes]
-    names: dict[str, int]
+    calibrations: dict[int, Calibration] = field(default_factory=dict)
+    maps: dict[int, bytes] = field(default_factory=dict)
+    names: dict[str, int] = field(default_factory=dict)
 
     @classmethod
     def read(cls, metadata: Mapping[str, str]) -> Facts:
-        """KeyError, TypeError, ValueError, AttributeError, RecursionError or OverflowError for damaged ones."""
+        """Facts from a recording's metadata.
+
+        Raises KeyError, TypeError, ValueError, AttributeError, RecursionError or OverflowError if it is damaged.
+        """
         hello: dict[str, Any] = {"image_crc32": NO_IMAGE} | json.loads(metadata["hello"])
         named = json.loads(metadata["settings"])
         own = json.loads(metadata.get("calibrations", "{}"))
         return cls(
             wire.Hello(**_tuples(hello)),
             [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))],
-            # A setting or a calibration that this recording's firmware did not have yet: what it did, and none.
+            # A setting that the recording's firmware did not have yet gets the value it acted by; a calibration, none.
             {s: int(named.get(s.name.lower(), wire.SETTINGS[s].before)) for s in wire.Setting},
             {int(finger): from_dict(its) for finger, its in own.items()},
             _maps(metadata.get("maps", "{}")),
             layout.names_of(metadata),
         )
 
+    def metadata(self, port: str) -> dict[str, str]:
+        """The metadata record: everything needed to read and interpret the wire later."""
+        return {
+            "format": layout.FORMAT_VERSION,
+            "software": __version__,
+            "port": port,
+            "wire": f"{wire.WIRE_MAJOR}.{wire.WIRE_MINOR}",
+            "firmware": version_text(self.info),
+            "hello": json.dumps(asdict(self.info)),
+            **in_force(self.settings, self.calibrations, self.maps),
+            layout.NAMES: json.dumps(self.names),
+            "sensors": json.dumps([asdict(s) for s in self.sensors]),
+        }
+
     @property
     def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
-        """All settings that a finger's results come from, for the fingers that had a calibration in force."""
+        """All settings that affect a finger's results, for the fingers that had a calibration in force."""
         return own_settings(self.settings, self.calibrations)
 
 
+def in_force(settings: Settings, calibrations: Mapping[int, Calibration], maps: Mapping[int, bytes]) -> dict[str, str]:
+    """Metadata entries for what a recording's results depend on."""
+    return {
+        "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
+        "calibrations": json.dumps({finger: to_dict(its) for finger, its in calibrations.items()}),
+        "maps": layout.maps_text(maps),
+    }
+
+
 def _maps(text: str) -> dict[int, bytes]:
-    """Maps as JSON had them; ValueError for what is none."""
+    """Maps by finger from their JSON text. Raises ValueError if one is invalid."""
     try:
         return {finger: as_blob(its) for finger, its in layout.maps_of(text).items()}
     except InputError as error:
@@ -61,5 +91,5 @@ def _maps(text: str) -> dict[int, bytes]:
 
 
 def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
-    """A message's fields as JSON had them."""
+    """A message's fields from JSON, with lists turned into tuples."""
     return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}

@@ -1,8 +1,9 @@
 """The MCAP file below every recording, live, recomputed or imported.
 
-A second is a chunk a finger, one with what else came and in which order, which nothing else can replace, and one for
-plotting. Each chunk is closed and handed to the operating system at once. A second that cannot be taken apart so that
-it could be put together again to the byte (it holds damaged messages, or another version's) is kept as it came.
+Each second is stored as one chunk per finger, one chunk with the other messages and the order of all, which cannot be
+recovered from elsewhere, and one chunk for plotting. Each chunk is closed and handed to the operating system at once.
+A second that cannot be split so that it could be reassembled byte for byte (it holds damaged messages, or another
+version's) is stored as it came.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from .block import schema as schema_of_parts
 from .block import take_apart
 from .plots import Plots
 
-# Chunks are closed by flush() alone; the library would do it by size.
+# Large enough that only flush() closes a chunk; the library would also close it by size.
 _CHUNK_BYTES = 1 << 40
 
 
 class RecordingFile:
-    """A recording being written to ``stream``, which is closed with it and also when it cannot be begun."""
+    """A recording being written to ``stream``. Closing it closes ``stream``, as does a failure to begin it."""
 
     def __init__(self, stream: BinaryIO, metadata: dict[str, str]) -> None:
         self._stream = stream
@@ -33,7 +34,7 @@ class RecordingFile:
         try:
             self._begin(metadata)
         except OSError:
-            with contextlib.suppress(OSError):  # the disk is as full as it was
+            with contextlib.suppress(OSError):  # the disk is still full
                 stream.close()
             raise
 
@@ -47,7 +48,7 @@ class RecordingFile:
         )
         self._writer.start(profile="", library=f"biotac-gateway {__version__}")
         self._last = (0, 0)
-        self._tail = b""  # of a message whose end has not come
+        self._tail = b""  # of a message whose end has not arrived yet
         self._decoder = StreamDecoder()
         self._decoder.accept_newer_minor()
         schema = resources.files("biotac").joinpath("schema.json").read_bytes()
@@ -60,10 +61,10 @@ class RecordingFile:
         self._writer.flush()  # type: ignore[no-untyped-call]
 
     def add(self, block: bytes, arrived_ns: int, all_here_ns: int | None = None) -> None:
-        """Append wire bytes; ``arrived_ns`` is when their first byte came, by the host's clock (Unix).
+        """Append wire bytes; ``arrived_ns`` is when their first byte arrived, in ns on the host's clock (Unix).
 
-        ``all_here_ns`` is when all of them had come; None where nobody knows. What follows the last delimiter waits for
-        the next block.
+        ``all_here_ns`` is when all of them had arrived; None if unknown. Bytes after the last delimiter wait for the
+        next block.
         """
         data = self._tail + block
         end = data.rfind(b"\0") + 1
@@ -85,7 +86,7 @@ class RecordingFile:
             self._writer.flush()  # type: ignore[no-untyped-call]
 
     def _put(self, topic: str, data: bytes, stamps: tuple[int, int]) -> None:
-        """A message in a chunk of its own, so that whoever wants no other opens no other."""
+        """Write a message as a chunk of its own, so that a reader need not open the others."""
         if topic not in self._channels:
             encoding, schema = (
                 (layout.MESSAGE_ENCODING, self._wire_schema)
@@ -104,11 +105,11 @@ class RecordingFile:
 
     @property
     def closed(self) -> bool:
-        """Nothing is written any more."""
+        """True when nothing more is written."""
         return self._stream.closed
 
     def fileno(self) -> int:
-        """Of the file."""
+        """File descriptor of the file."""
         return self._stream.fileno()
 
     def close(self) -> None:
@@ -118,8 +119,8 @@ class RecordingFile:
         try:
             if self._tail:
                 self._put(layout.TOPIC, self._tail, self._last)
-            self._writer.add_metadata(layout.METADATA_NAME, self._metadata)  # once more, for whom the first is damaged
-            self._writer.flush()  # type: ignore[no-untyped-call]  # what finish() writes is not in its checksum
+            self._writer.add_metadata(layout.METADATA_NAME, self._metadata)  # again, in case the first one gets damaged
+            self._writer.flush()  # type: ignore[no-untyped-call]  # finish() leaves what it flushes itself out of its checksum
             self._writer.finish()  # type: ignore[no-untyped-call]
         finally:
-            self._stream.close()  # also on a full disk, or the interpreter would try once more at its end
+            self._stream.close()  # also on a full disk, or the interpreter would try again at exit

@@ -6,12 +6,15 @@ import base64
 import json
 import zlib
 from collections.abc import Mapping
+from pathlib import Path
+
+from ..errors import RecordingError
 
 # Additions that an older reader may ignore (topics, metadata keys) do not change it.
 FORMAT_VERSION = "2"
 KNOWN_VERSIONS = ("1", "2")
-# 1: blocks of the wire. 2: blocks taken apart (block.py), a message a finger and one for the rest, which comes last and
-# has the same sequence number; those that cannot be are as in 1.
+# 1: blocks of the wire. 2: split blocks (block.py), one message per finger and one for the rest, which comes last and
+# has the same sequence number; blocks that cannot be split are stored as in 1.
 TOPIC = "/biotac/wire"
 PARTS = "/biotac/parts/finger"
 REST = "/biotac/parts/rest"
@@ -26,28 +29,37 @@ METADATA_NAME = "biotac"
 CONTINUES = "continues"  # metadata key: the file that ended when the board restarted
 
 
+def check_version(path: Path, metadata: Mapping[str, str]) -> None:
+    """Raise RecordingError for a recording that this version cannot read."""
+    if metadata.get("format") not in KNOWN_VERSIONS:
+        raise RecordingError(
+            f"{path} has recording format {metadata.get('format')}, this version reads "
+            f"{' and '.join(KNOWN_VERSIONS)}; install a newer biotac-gateway"
+        )
+
+
 def frame_id(finger: int) -> str:
     """The coordinate frame of a finger's results, in recordings and exports (SPEC.md, Frames of reference)."""
     return f"biotac_finger{finger}"
 
 
 def maps_text(maps: Mapping[int, bytes]) -> str:
-    """Maps by finger, as the metadata has them; ``maps_of`` reads it."""
+    """Maps by finger as text for the metadata; ``maps_of`` reads it."""
     return json.dumps({finger: base64.b64encode(blob).decode() for finger, blob in maps.items()})
 
 
 def maps_of(text: str) -> dict[int, bytes]:
-    """Inverse of maps_text; ValueError for what is none."""
+    """Inverse of maps_text. Raises ValueError for invalid text."""
     return {int(finger): base64.b64decode(its, validate=True) for finger, its in json.loads(text).items()}
 
 
 def names_of(metadata: Mapping[str, str]) -> dict[str, int]:
-    """Fingers by name; TypeError or ValueError for other than that."""
+    """Fingers by name. Raises TypeError or ValueError if the entry is damaged."""
     return {str(name): int(finger) for name, finger in json.loads(metadata.get(NAMES, "{}")).items()}
 
 
 def finger_of(finger: int | str, names: Mapping[str, int]) -> int:
-    """KeyError for a name that was not recorded."""
+    """The finger's number, given its number or its name. Raises KeyError for a name that was not recorded."""
     if isinstance(finger, str) and finger not in names:
         raise KeyError(f"no finger {finger!r}: expected one of {', '.join(names) or 'the numbers 0 to 4'}")
     return names[finger] if isinstance(finger, str) else int(finger)
@@ -59,7 +71,7 @@ def signed(facts: Mapping[str, str]) -> dict[str, str]:
 
 
 def unsigned(facts: Mapping[str, str]) -> dict[str, str]:
-    """Inverse of ``signed``; ValueError when the checksum is wrong. Format 1 had none, and is taken as it is."""
+    """Inverse of ``signed``. Raises ValueError when the checksum is wrong; format 1 had none and is accepted as is."""
     rest = {key: value for key, value in facts.items() if key != CHECKSUM}
     if facts.get(CHECKSUM, _checksum(rest)) != _checksum(rest):
         raise ValueError("wrong checksum")

@@ -1,4 +1,4 @@
-"""Trials as .npz files of arrays: read and checked, and turned into Lin's frame."""
+"""Reading and checking trials in .npz files, and rotating their vectors into Lin's frame."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import numpy.typing as npt
 from ..errors import RecordingError
 from ..wire import sensor_gen as _sensor
 
-# Of all wanted fields: an hour of every channel as float64 is 150 MB, and zip makes 1000 bytes of one.
+# Of all wanted fields: an hour of every channel as float64 is 150 MB; one zipped byte can unpack to 1000.
 MAX_BYTES = 192 << 20
 MAX_ROWS = 360_000  # an hour
 
 
 def read_npz(path: Path, wanted: Collection[str]) -> dict[str, npt.NDArray[Any]]:
-    """Those of the ``wanted`` arrays that the file has. Raises RecordingError for what is no .npz."""
+    """The ``wanted`` arrays that the file has. Raises RecordingError if it is not a valid .npz, or too large."""
     try:
-        # opened here because np.load leaves a file it cannot read open
+        # opened here because np.load does not close a file that it cannot read
         with path.open("rb") as file:
             archive = np.load(file, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
@@ -42,7 +42,7 @@ def read_npz(path: Path, wanted: Collection[str]) -> dict[str, npt.NDArray[Any]]
             return fields
     except RecordingError:
         raise
-    except Exception as error:  # a damaged header is taken for Python's text, and fails in many ways
+    except Exception as error:  # a damaged header is parsed as Python and can fail in many ways
         seen = str(error).partition("\n")[0]
         raise RecordingError(
             f"{path}: cannot be read ({seen}): expected an .npz of number arrays; save it again"
@@ -65,7 +65,7 @@ def counts_field(
     expected = f"expected whole counts 0..{_sensor.FULL_SCALE_COUNT}; save raw counts"
     if array.dtype.kind not in "iuf":
         raise RecordingError(f"{path}: field {name} holds {array.dtype}: {expected}")
-    # written so that NaN is wrong too
+    # written so that NaN fails too
     right = (array >= 0) & (array <= _sensor.FULL_SCALE_COUNT) & (array == np.floor(array))
     if not right.all():
         row = int(np.argwhere(~right)[0][0])
@@ -75,9 +75,9 @@ def counts_field(
 
 
 def to_lin_frame(vectors: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
-    """Recorded vectors (n, 3), X lateral, Y to the tip, Z out of the pad, in Lin's frame: x = Y, y = X, z = -Z.
+    """Recorded vectors (n, 3) (X lateral, Y to the tip, Z out of the pad) in Lin's frame: x = Y, y = X, z = -Z.
 
-    That is a rotation, so torques turn as forces do.
+    This is a rotation, so torques transform as forces do.
     """
     recorded = vectors.astype(np.float64)
     return np.column_stack([recorded[:, 1], recorded[:, 0], -recorded[:, 2]])

@@ -1,4 +1,4 @@
-"""A recording's frames, or a part of them, in memory that follows the part."""
+"""Loading a recording's frames, or only a part of them; memory use is in proportion to that part."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..wire.fields import FRAME_FIELDS, Field, dtype_of, values_of
 from ..wire.frames import StructArray
 from . import layout
 from .block import FRAME
-from .blocks import ALL, Blocks, Piece
+from .blocks import ALL, Blocks
 
 _BY_NAME = {field.name: field for field in FRAME_FIELDS}
 
@@ -30,13 +30,14 @@ def load(
     start_s: float = 0.0,
     stop_s: float | None = None,
 ) -> StructArray:
-    """Return a recording's frames, in order of arrival: FRAME_DTYPE (n,), or of it the ``fields`` named, in its order.
+    """Return a recording's frames in order of arrival: FRAME_DTYPE (n,), or only its ``fields`` named, in its order.
 
-    ``fingers`` are chip selects or names that were recorded; ``start_s`` and ``stop_s`` are device seconds since the
-    first row, from start on and before stop. What is left out takes no memory, and, in recordings of format 2, little
-    time. Raises RecordingError when the file is no recording, and InputError for an unknown field or finger. Of a
-    recording that was cut off or is damaged it gives what is whole, and warns (RecordingWarning); Recording.problems
-    say more.
+    ``fingers`` are chip selects or recorded names. ``start_s`` (inclusive) and ``stop_s`` (exclusive) are device
+    seconds since the first row. What is left out takes no memory and, in recordings of format 2, little time.
+
+    Raises RecordingError when the file is not a recording, InputError for an unknown field or finger. If the recording
+    was cut off or is damaged, returns the undamaged frames and warns (RecordingWarning); Recording.problems has the
+    details.
     """
     place = Path(path)
     chosen = _fields(fields)
@@ -50,11 +51,11 @@ def load(
             return _from_wire(place, chosen, numbers, start_s, stop_s)
         if begin_us is None and piece.rest.last_us:
             begin_us = piece.rest.first_us
-        if begin_us is None or not _overlaps(piece, begin_us, start_s, stop_s):
+        if begin_us is None:
             continue
         rows = piece.rows[FRAME]
-        if not _lies_within(piece, begin_us, start_s, stop_s):
-            rows = rows[_within(rows["t_us"], begin_us, start_s, stop_s)]
+        mine = _within(rows["t_us"], begin_us, start_s, stop_s)
+        rows = rows if mine.all() else rows[mine]
         out = np.empty(len(rows), dtype)
         for field in chosen:
             out[field.name] = values_of(field, rows[field.sent or field.name])
@@ -66,7 +67,7 @@ def load(
 def _from_wire(
     place: Path, chosen: list[Field], fingers: Collection[int] | None, start_s: float, stop_s: float | None
 ) -> StructArray:
-    """Of a recording that has its wire as it came: all of it is decoded, a block at a time."""
+    """Like ``load``, for a recording that stores the wire bytes as they came: decodes all of them, block by block."""
     pieces = Blocks(place, ALL, check=False)
     parts, begin_us = [], None
     for batch in _batches(pieces):
@@ -119,19 +120,6 @@ def _fingers(place: Path, fingers: Iterable[int | str]) -> set[int]:
         raise InputError(f"{place}: {error.args[0]}") from None
 
 
-def _overlaps(piece: Piece, begin_us: int, start_s: float, stop_s: float | None) -> bool:
-    assert piece.rest is not None
-    return piece.rest.last_us >= begin_us + start_s * 1e6 and (
-        stop_s is None or piece.rest.first_us < begin_us + stop_s * 1e6
-    )
-
-
-def _lies_within(piece: Piece, begin_us: int, start_s: float, stop_s: float | None) -> bool:
-    assert piece.rest is not None
-    ends_us = np.array([piece.rest.first_us, piece.rest.last_us])
-    return bool(_within(ends_us, begin_us, start_s, stop_s).all())
-
-
 def _within(t_us: NDArray[Any], begin_us: int, start_s: float, stop_s: float | None) -> NDArray[np.bool_]:
     inside: NDArray[np.bool_] = t_us >= begin_us + start_s * 1e6
     return inside if stop_s is None else inside & (t_us < begin_us + stop_s * 1e6)
@@ -140,11 +128,7 @@ def _within(t_us: NDArray[Any], begin_us: int, start_s: float, stop_s: float | N
 def _checked(pieces: Blocks, place: Path) -> None:
     if pieces.metadata is None:
         raise RecordingError(f"{place} holds no biotac recording that can be read; expected one by `biotac record`")
-    if pieces.metadata.get("format") not in layout.KNOWN_VERSIONS:
-        raise RecordingError(
-            f"{place} has recording format {pieces.metadata.get('format')}, this version reads "
-            f"{' and '.join(layout.KNOWN_VERSIONS)}; install a newer biotac-gateway"
-        )
+    layout.check_version(place, pieces.metadata)
     problems = pieces.scan.problems
     if problems:
         more = f", and {len(problems) - 1} more: see Recording(...).problems" if len(problems) > 1 else ""

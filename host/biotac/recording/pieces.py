@@ -10,7 +10,7 @@ from ..wire.framing import open_frame
 
 @dataclass(frozen=True)
 class Piece:
-    """Bytes up to and with a delimiter. ``message_id`` is None where they are no good message."""
+    """Bytes up to and including a delimiter. ``message_id`` is None where they are not a valid message."""
 
     block: int
     data: bytes
@@ -19,9 +19,9 @@ class Piece:
 
 
 def split(blocks: Iterable[bytes]) -> Iterator[Piece]:
-    """All pieces in order; one that goes on into the next block counts to that.
+    """All pieces in order; one that continues into the next block belongs to that block.
 
-    What follows the last delimiter is left out: it was cut off.
+    Bytes after the last delimiter are left out: they are part of a message that was cut off.
     """
     rest = b""
     for number, block in enumerate(blocks):

@@ -1,7 +1,7 @@
-"""JSON messages of a recording: what they hold, and the schemas that say so.
+"""JSON messages of a recording and their schemas.
 
-A value that is invalid is left out, and is null in a list: JSON has no NaN. The schemas name a list's type alone, as
-the programs that read them know no union types.
+An invalid value is left out, or null in a list: JSON has no NaN. The schemas do not declare that a list can hold null,
+because the programs that read them do not support union types.
 """
 
 from __future__ import annotations
@@ -10,10 +10,9 @@ import json
 from typing import Any
 
 from ..wire import messages_gen as wire
-from ..wire.events import INVALID_U32, event_age_s, kind_name
+from ..wire.events import event_age_s, kind_name
+from ..wire.fields import INVALID_U32
 from . import layout
-
-_NO_TARE = 0xFFFFFFFF
 
 
 def _number(what: str) -> dict[str, Any]:
@@ -91,7 +90,7 @@ SCHEMAS = {"results": RESULTS_SCHEMA, "counts": COUNTS_SCHEMA, "tare": TARE_SCHE
 
 
 def encoded(body: dict[str, Any], finger: int, seq: int, stamp_ns: int) -> bytes:
-    """A message of ``body`` behind its head."""
+    """A message: the head, then ``body``."""
     head = {
         "timestamp": {"sec": stamp_ns // 10**9, "nsec": stamp_ns % 10**9},
         "frame_id": layout.frame_id(finger),
@@ -101,7 +100,7 @@ def encoded(body: dict[str, Any], finger: int, seq: int, stamp_ns: int) -> bytes
 
 
 def results(row: Any) -> dict[str, Any]:
-    """What one FRAME message says of a contact, SI, invalid values left out."""
+    """A FRAME message's results in SI units, invalid values left out."""
     body: dict[str, Any] = {}
     for name, field, per_unit, invalid in (
         ("force_n", "force_100un", 10_000, wire.INVALID_I32),
@@ -122,27 +121,24 @@ def results(row: Any) -> dict[str, Any]:
 
 
 def counts(row: Any, pac: Any = None) -> dict[str, Any]:
-    """Raw counts of one frame, missing electrodes null, missing slow channels left out; and its PAC samples."""
+    """Raw counts of one frame and its PAC samples; missing values in lists are null, missing slow channels left out."""
     slow = {name: int(row[name]) for name in ("pdc", "tac", "tdc") if row[name] != wire.INVALID_COUNT}
     block = {} if pac is None else {"pac": _count_list(pac)}
     return {"electrodes": _count_list(row["counts"])} | slow | block
 
 
 def tare_change(tare: wire.Tare) -> dict[str, Any]:
-    """What a TARE message says, electrodes without a tare null."""
+    """A TARE message's contents, null for electrodes without a tare."""
     return {
         "reason": _name(wire.TareReason, tare.reason),
         "state": _name(wire.TareState, tare.tare_state),
-        "tare": [None if value == _NO_TARE else round(value / 65536, 4) for value in tare.tare_q16],
+        "tare": [None if value == INVALID_U32 else round(value / 65536, 4) for value in tare.tare_q16],
     }
 
 
 def event(told: wire.Event) -> dict[str, Any]:
-    """What an EVENT message says, what is invalid left out."""
-    body: dict[str, Any] = {
-        "kind": kind_name(told),
-        "age_s": event_age_s(told),
-    }
+    """An EVENT message's contents, invalid values left out."""
+    body: dict[str, Any] = {"kind": kind_name(told), "age_s": event_age_s(told)}
     if told.energy_count2 != INVALID_U32:
         body["energy"] = told.energy_count2
     if told.peak_count != wire.INVALID_COUNT:

@@ -1,7 +1,7 @@
-"""ROS 2 messages of a recording, for programs that draw well-known types by themselves: Foxglove, PlotJuggler, Rerun.
+"""ROS 2 messages of a recording, for programs that draw well-known types without setup: Foxglove, PlotJuggler, Rerun.
 
-Little-endian CDR, every field aligned to its own size behind the four bytes of encapsulation. Numbers are float64, as
-these programs want them, of float32's precision: the bytes that are zero make a recording smaller.
+Encoded as little-endian CDR, every field aligned to its own size after the four bytes of encapsulation. Numbers are
+float64, as these programs expect, rounded to float32: the zero bytes make a recording smaller.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ POSE = "geometry_msgs/msg/PoseStamped"
 _RULE = "=" * 80
 _CDR = b"\0\1\0\0"
 
-#: Schemas by the types' names, as ROS 2 has them.
+#: ROS 2 message definitions by type name.
 SCHEMAS = {
     ARRAY: f"""std_msgs/MultiArrayLayout layout
 float64[] data
@@ -83,12 +83,12 @@ def _numbers(values: Any) -> bytes:
 
 
 def _turned_to(force_n: Any) -> tuple[float, float, float, float]:
-    """The shortest turn from x to ``force_n``, as a quaternion x, y, z, w."""
+    """The shortest rotation from x to ``force_n``, as a quaternion x, y, z, w; none for a zero or invalid force."""
     x, y, z = (float(value) for value in force_n)
     size = math.sqrt(x * x + y * y + z * z)
     if not size > 0:  # none, or NaN
         return 0.0, 0.0, 0.0, 1.0
     w = math.sqrt((1 + x / size) / 2)
-    if w < 1e-6:  # straight back: half a turn about any axis
+    if w < 1e-6:  # opposite direction: half a turn about any axis normal to x
         return 0.0, 0.0, 1.0, 0.0
     return 0.0, -z / size / (2 * w), y / size / (2 * w), w

@@ -1,7 +1,7 @@
-"""Messages beside the wire, for other programs: SI units, a frame_id, fewer than the wire has.
+"""Messages stored beside the wire for other programs: in SI units, with a frame_id, fewer than on the wire.
 
-The wire is the truth; these are derived from it, thinned so that a long recording stays small, and no reader of ours
-looks at them. JSON (plot_json.py) says all in words; messages of ROS 2 types (plot_ros.py) are drawn without a word.
+They are derived from the wire, thinned so that a long recording stays small, and our own readers ignore them. JSON
+messages (plot_json.py) name every value; messages of ROS 2 types (plot_ros.py) are drawn without setup.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _ROS = {"force": plot_ros.ARRAY, "signals": plot_ros.ARRAY, "contact": plot_ros.
 
 @dataclass(frozen=True)
 class _Message:
-    """One to be written; ``encode`` makes it, told its stamp in ns."""
+    """A message to be written; ``encode`` builds its bytes, given its stamp in ns."""
 
     topic: str
     finger: int
@@ -50,9 +50,10 @@ class Plots:
         self._due_us: dict[tuple[str, int], int] = {}
 
     def add(self, batch: Batch, decoder: StreamDecoder, arrived_ns: int, all_here_ns: int | None) -> bool:
-        """Write what the next rows are good for; true if that was anything.
+        """Write the messages for the next rows; return True if there were any.
 
-        ``decoder`` is theirs; their first byte was here at ``arrived_ns``, all at ``all_here_ns`` if anybody knows.
+        ``decoder`` is the one that decoded them. Their first byte arrived at ``arrived_ns``, the last at
+        ``all_here_ns`` (None if unknown).
         """
         begin_us, end_us = batch.first_t_us(), batch.last_t_us()
         if self._stamps is None and begin_us is not None:
@@ -79,7 +80,7 @@ class Plots:
         return bool(messages)
 
     def _thinned(self, what: str, rows: StructArray) -> list[int]:
-        """Rows to show: of each finger the first of every period of device time."""
+        """Indices of the rows to show: each finger's first row in every period of device time."""
         period_us = _PERIOD_US[what]
         chosen: list[int] = []
         for finger in np.unique(rows["finger"]):

@@ -1,4 +1,4 @@
-"""Reading a recording, whole or cut off."""
+"""Reading a recording, complete or cut off."""
 
 from __future__ import annotations
 
@@ -33,17 +33,22 @@ from .tabular import to_pandas, to_xarray
 class Recording:
     """A recording in memory.
 
-    ``frames`` (FRAME_DTYPE) and ``pac`` (PAC_DTYPE) are arrays in the order of arrival, ``idle`` (IDLE_DTYPE)
-    heartbeats, ``wire`` the FRAME messages as sent, ``seq`` and ``t_us`` (int64, (n,)) their unwrapped numbers and
-    times, ``messages`` the rest (tare changes, status). ``settings`` are the board's, ``calibrations`` and ``maps``
-    (bytes, as the board holds them) those in force, by finger, when it began, ``names`` what fingers were called:
-    ``recording["index"]`` is that finger's frames.
+    ``frames`` (FRAME_DTYPE), ``pac`` (PAC_DTYPE) and the heartbeats ``idle`` (IDLE_DTYPE) are arrays in order of
+    arrival. ``wire`` holds the FRAME messages as sent, ``seq`` and ``t_us`` (int64, (n,)) their unwrapped sequence
+    numbers and times, ``messages`` everything else (tare changes, status).
+
+    ``settings`` are the board's when the recording began; ``calibrations`` and ``maps`` (bytes, as the board holds
+    them) are those in force then, by finger. ``names`` maps names to fingers: ``recording["index"]`` returns that
+    finger's frames.
+
     ``problems`` lists in words what is missing or damaged; the rest is good. ``cut_off``: the file ends without its
-    index; ``damaged_chunks``: seconds that were left out; ``wrong_checksums``: over the file's records and its index;
-    ``gaps``: times in which the board was away. ``blocks`` are the wire's bytes as they came, about one a second,
-    ``arrived_ns`` when each began, by the host's clock (Unix), ``all_here_ns`` when it was whole (None where nobody
-    knows).
-    Raises RecordingError when nothing can be read. ``show`` is told the share of the work that is done.
+    index. ``damaged_chunks``: number of seconds left out. ``wrong_checksums``: number of wrong checksums over the
+    file's records and its index. ``gaps``: times when the board was away.
+
+    ``blocks`` are the wire bytes as they came, about one block per second. ``arrived_ns`` is when each block began,
+    ``all_here_ns`` when it was complete (None where unknown), both in ns on the host's clock (Unix).
+
+    Raises RecordingError when nothing can be read. ``show`` is called with the share of the work done, 0 to 1.
     """
 
     def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] = lambda share: None) -> None:
@@ -53,7 +58,7 @@ class Recording:
         self._pieces = list(blocks)
         self._take_facts(blocks)
         self.arrived_ns: list[int] = [piece.arrived_ns for piece in self._pieces]
-        # Imported ones say of both times that they are the first.
+        # Imported recordings store the first time for both.
         self.all_here_ns: list[int | None] = [
             piece.all_here_ns if piece.all_here_ns != piece.arrived_ns else None for piece in self._pieces
         ]
@@ -61,7 +66,7 @@ class Recording:
         decoder.accept_newer_minor()
         batch = self._rows(decoder) or self._decoded(decoder, show)
         show(1.0)
-        self._batch = batch  # whose wire may have seq and t_us unwrapped
+        self._batch = batch  # seq and t_us of its wire may be unwrapped
         self.seq, self.t_us = batch.seq, batch.t_us
         self.pac: StructArray = batch.pac
         self.idle: StructArray = batch.idle
@@ -94,7 +99,7 @@ class Recording:
             )
 
     def _rows(self, decoder: StreamDecoder) -> Batch | None:
-        """What the pieces hold as rows; None when a decoder has to say what is missing."""
+        """The rows of all pieces; None when the wire must be decoded to find out what is missing."""
         pieces = self._pieces
         if not pieces or any(piece.rest is None or not piece.whole for piece in pieces):
             return None
@@ -119,32 +124,32 @@ class Recording:
         return join(parts)
 
     def _take_arrivals(self, last_us: list[int | None]) -> None:
-        """``last_us``: of each block's rows, None or 0 without any."""
+        """``last_us``: last device time of each block's rows, None or 0 for a block without rows."""
         ends = zip(last_us, self.all_here_ns, strict=True)
         self._arrivals = [(t_us, at_ns) for t_us, at_ns in ends if t_us and at_ns is not None]
 
     @property
     def frames(self) -> StructArray:
-        """The FRAMEs in user units, FRAME_DTYPE (n,), in the order of arrival."""
+        """The FRAMEs in user units, FRAME_DTYPE (n,), in order of arrival."""
         return self._batch.frames
 
     @cached_property
     def wire(self) -> StructArray:
-        """The FRAME messages as sent, with seq and t_us as they wrap."""
+        """The FRAME messages as sent, with seq and t_us wrapped."""
         return as_sent(self._batch.wire, FRAME)
 
     @cached_property
     def bands(self) -> StructArray:
-        """Energies of PAC in octaves, BANDS_DTYPE (n,), finger by finger: as recorded, or else computed of ``pac``."""
+        """Energy of PAC per octave, BANDS_DTYPE (n,), finger by finger: as recorded, or else computed from ``pac``."""
         return recorded_bands(self.pac, self.messages, self.begin_us)
 
     @cached_property
     def blocks(self) -> list[bytes]:
-        """The wire's bytes as they came, about a second each."""
+        """The wire bytes as they came, about one second per block."""
         return [piece.bytes() for piece in self._pieces]
 
     def to_pandas(self) -> Any:
-        """The frames as a pandas DataFrame (tabular.py), in the order of arrival. Needs the extra ``pandas``."""
+        """The frames as a pandas DataFrame (tabular.py), in order of arrival. Needs the extra ``pandas``."""
         return to_pandas(self.frames, self.stamp_ns(self.frames["t_us"]))
 
     def to_xarray(self) -> Any:
@@ -152,10 +157,11 @@ class Recording:
         return to_xarray(self.frames, self.stamp_ns(self.frames["t_us"]))
 
     def stamp_ns(self, t_us: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Device times (n,) in us on the host's clock, Unix ns (n,): ``begin_ns`` plus elapsed device time.
+        """Device times (n,) in us, converted to the host's clock: Unix ns (n,).
 
-        Elapsed by the host's clock, whose drift against the board's is measured from when each second had come; by the
-        board's own in recordings of less than ten seconds, and where a board did not keep pace with the host.
+        The result is ``begin_ns`` plus the time elapsed on the host's clock; the drift between the two clocks is
+        measured from the arrival times of the blocks. In recordings shorter than ten seconds, or when the board did
+        not keep pace with the host, it is ``begin_ns`` plus the time elapsed on the board's clock.
         """
         return self._stamps(t_us)
 
@@ -167,16 +173,16 @@ class Recording:
         return stamps
 
     def __getitem__(self, finger: int | str) -> StructArray:
-        """The frames of one finger, by its number or its name when it was recorded. KeyError for none."""
+        """The frames of one finger, by number or by its recorded name. Raises KeyError for an unknown name."""
         rows: StructArray = self.frames[self.frames["finger"] == finger_of(finger, self.names)]
         return rows
 
     def clock(self, promised_delay_s: float = 0.01) -> DeviceClock:
         """The board's clock against the recording computer's; its host_time_s is in seconds since 1970.
 
-        Each second was written when its last frame had come. A recording holds no round trips: the stated
-        uncertainty rests on ``promised_delay_s``, your word that in every 5 s one of these frames took no longer
-        from the board to the file.
+        Each block was written when its last frame had arrived. A recording holds no round trips, so the stated
+        uncertainty rests on ``promised_delay_s``: you promise that in every 5 s at least one of these frames took no
+        longer than this from the board to the file.
         """
         clock = DeviceClock(promised_delay_s=promised_delay_s, unix_offset_s=0.0)
         for t_us, at_ns in self._arrivals:
@@ -200,11 +206,7 @@ class Recording:
         return f"{self.path} is an MCAP file, but no biotac recording; expected one that `biotac record` wrote"
 
     def _take_metadata(self, metadata: dict[str, str]) -> None:
-        if metadata.get("format") not in layout.KNOWN_VERSIONS:
-            raise RecordingError(
-                f"{self.path} has recording format {metadata.get('format')}, this version reads "
-                f"{' and '.join(layout.KNOWN_VERSIONS)}; install a newer biotac-gateway"
-            )
+        layout.check_version(self.path, metadata)
         major = metadata["wire"].partition(".")[0]
         if int(major) != wire.WIRE_MAJOR:
             raise RecordingError(
@@ -218,29 +220,29 @@ class Recording:
 
     @property
     def finger_settings(self) -> dict[int, dict[Setting, int]]:
-        """All settings that a finger's results come from, for the fingers that had a calibration in force."""
+        """All settings that affect a finger's results, for the fingers that had a calibration in force."""
         return own_settings(self.settings, self.calibrations)
 
     @property
     def fingers(self) -> list[int]:
-        """Fingers of which there is a frame, a heartbeat, PAC, BANDS or an EVENT."""
+        """Fingers with at least one frame, heartbeat, PAC, BANDS or EVENT."""
         rows = (self._batch.wire, self.idle, self.pac)
         told = {m.finger for m in self.messages if isinstance(m, (wire.Bands, wire.Event))}
         return sorted(told | {int(finger) for table in rows for finger in np.unique(table["finger"])})
 
     @property
     def begin_us(self) -> int:
-        """Device time of the first frame or heartbeat; 0 without any."""
+        """Device time of the first frame or heartbeat, us; 0 if there is none."""
         return self._batch.first_t_us() or 0
 
     @property
     def end_us(self) -> int:
-        """Device time of the last frame or heartbeat; 0 without any."""
+        """Device time of the last frame or heartbeat, us; 0 if there is none."""
         return self._batch.last_t_us() or 0
 
     @property
     def begin_ns(self) -> int:
-        """``begin_us`` on the host's clock (Unix), as good as the link is prompt."""
+        """``begin_us`` on the host's clock (Unix), in ns; late by the delay of the link."""
         return self.arrived_ns[0] if self.arrived_ns else 0
 
     def _describe_losses(self, decoder: StreamDecoder) -> None:

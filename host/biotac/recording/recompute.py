@@ -1,4 +1,4 @@
-"""A recording's counts through the maths once more, with other settings: a new recording, the old untouched."""
+"""Recomputing a recording's results from its counts with other settings, into a new recording."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from ..core.compiled import on_board_q4, pressure_force_100un
 from ..core.map_versions import opened
 from ..errors import InputError
 from ..hand.subscription import RESULTS
-from ..keep.calibration_file import to_dict
 from ..keep.values import own_settings
 from ..version import __version__
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
+from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray
 from ..wire.framing import encode
+from .facts import in_force
 from .file import RecordingFile
-from .layout import maps_text
 from .pieces import split
 from .reader import Recording
 from .rounds import HostTare, Rounds, frames_and_tares, with_silence
@@ -32,7 +32,7 @@ from .rounds import HostTare, Rounds, frames_and_tares, with_silence
 Settings = dict[wire.Setting, int]
 Show = Callable[[float], None]
 
-#: What the maths after the tare uses; the others act on the tare machine and the stream.
+#: Settings used by the maths after the tare; all others act on the tare machine and the stream.
 RESULT_SETTINGS = frozenset(
     {
         wire.Setting.POC_WEIGHTS,
@@ -47,7 +47,6 @@ RESULT_SETTINGS = frozenset(
 )
 _KERNEL_FLAGS = wire.FrameFlags.POC_INVALID | wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE
 _HOST_REASONS = (wire.TareReason.HOST_NOW, wire.TareReason.HOST_SET)
-_UNKNOWN_Q16 = 0xFFFFFFFF
 _ACTIVE_COUNTS = 15
 _ACTIVE_FOR_TORSION = 4
 
@@ -61,12 +60,12 @@ def recompute(
     maps: Mapping[int, BoardMap | bytes] | None = None,
     show: Show = lambda share: None,
 ) -> list[str]:
-    """Write ``recording`` to ``out`` with results recomputed under its settings and ``changes``.
+    """Write ``recording`` to ``out``, with results recomputed under its settings as modified by ``changes``.
 
-    The tare machine runs again over all counts, with the tares the host gave; ``keep_tare`` keeps each
-    frame's recorded tare and state instead and recomputes what follows from them. ``maps`` are the wrench
-    maps in force, or their blobs, by finger; None: the recording's own. Returns notes in words. Raises InputError
-    when the recording cannot be run through the machine, or a setting is out of range.
+    The tare machine runs again over all counts, with the tares that the host set. With ``keep_tare``, each frame's
+    recorded tare and state are kept, and only what follows from them is recomputed. ``maps`` are the wrench maps in
+    force, or their blobs, by finger; None: the recording's own. Returns notes for the user, as text. Raises InputError
+    when the recording cannot be run through the tare machine, or a setting is out of range.
     """
     for setting, value in changes.items():
         spec = wire.SETTINGS[setting]
@@ -79,30 +78,25 @@ def recompute(
     settings = recording.settings | changes
     calibrations = {finger: its.changed(changes) for finger, its in recording.calibrations.items()}
     own = own_settings(settings, calibrations)
-    in_force = {f: opened(its) for f, its in (recording.maps if maps is None else maps).items()}
-    _check_maps(recording, in_force)
+    board_maps = {f: opened(its) for f, its in (recording.maps if maps is None else maps).items()}
+    _check_maps(recording, board_maps)
     notes: list[str] = []
     if keep_tare:
         idle = sorted(s.name.lower() for s in set(changes) - RESULT_SETTINGS)
         if idle:
             raise InputError(f"{idle[0]} has no effect on tares that are kept; leave --keep-tare away")
-        new, tares = _with_kept_tares(recording, settings, own, in_force), None
+        new, tares = _with_kept_tares(recording, settings, own, board_maps), None
         show(0.5)
     else:
-        new, tares = _through_the_machine(recording, settings, own, in_force, notes, lambda share: show(share / 2))
-    metadata = recording.metadata | {
-        "settings": json.dumps({s.name.lower(): value for s, value in settings.items()}),
-        "calibrations": json.dumps({finger: to_dict(its) for finger, its in calibrations.items()}),
-        "maps": maps_text({finger: its.blob for finger, its in in_force.items()}),
-        "recomputed": json.dumps(
-            {
-                "from": recording.path.name,
-                "software": __version__,
-                "keep_tare": keep_tare,
-                "changes": {s.name.lower(): value for s, value in changes.items()},
-            }
-        ),
+        new, tares = _through_the_machine(recording, settings, own, board_maps, notes, lambda share: show(share / 2))
+    made = {
+        "from": recording.path.name,
+        "software": __version__,
+        "keep_tare": keep_tare,
+        "changes": {s.name.lower(): value for s, value in changes.items()},
     }
+    blobs = {finger: its.blob for finger, its in board_maps.items()}
+    metadata = recording.metadata | in_force(settings, calibrations, blobs) | {"recomputed": json.dumps(made)}
     _write(recording, out, metadata, new, tares, lambda share: show(0.5 + share / 2))
     return notes
 
@@ -120,15 +114,15 @@ def _check_maps(recording: Recording, maps: Mapping[int, BoardMap]) -> None:
 def _with_kept_tares(
     recording: Recording, settings: Settings, own: Mapping[int, Settings], maps: Mapping[int, BoardMap]
 ) -> StructArray:
-    """FRAME messages as recorded, with what the kernels make of their counts and tares now."""
+    """FRAME messages as recorded, with results that the kernels recompute from their counts and tares."""
     new: StructArray = recording.wire.copy()
     for finger in np.unique(new["finger"]):
-        # Another sensor's, of which nothing was computed: the settings are not its own.
+        # Frames of another sensor have no results: the settings are not that sensor's.
         refused = wire.FrameFlags.SENSOR_OTHER | wire.FrameFlags.NOT_ASKED
         known = (new["flags"] & wire.FrameFlags.UNTARED == 0) & (new["flags"] & refused != refused)
         at = np.flatnonzero((new["finger"] == finger) & known)
         new[at] = _recomputed(new[at], own.get(int(finger), settings), maps.get(int(finger)))
-    # A standard deviation follows from the gains and the noise, which a frame does not hold.
+    # The standard deviations depend on the gains and on the noise, which a frame does not hold.
     for name in ("poc_sigma_um", "force_sigma_100un"):
         new[name] = wire.INVALID_COUNT
     return new
@@ -156,7 +150,7 @@ def _recomputed(frames: StructArray, settings: Settings, its: BoardMap | None) -
 
 
 def _torsion_ok(frames: StructArray, poc_um: NDArray[np.int16]) -> NDArray[np.bool_]:
-    """TORSION_OK of SPEC.md, as far as a frame tells: enough energy is known from the flags it had."""
+    """TORSION_OK of SPEC.md, as far as a frame can tell: whether the energy suffices is taken from its old flags."""
     down = (poc_um[:, 2] <= -sensor.CORE_RADIUS_UM // 2) & (poc_um[:, 2] != wire.INVALID_I16)
     missing = (frames["counts"] == wire.INVALID_COUNT) | (frames["tare_q4"] == wire.INVALID_COUNT)
     moved = np.abs(frames["counts"].astype(np.int32) * 16 - frames["tare_q4"]) >= 16 * _ACTIVE_COUNTS
@@ -175,7 +169,7 @@ def _through_the_machine(
     notes: list[str],
     show: Show,
 ) -> tuple[StructArray, dict[int, wire.Tare]]:
-    """FRAME messages in the order of arrival, and the TARE messages by the row they go before."""
+    """FRAME messages in order of arrival, and TARE messages by the row that each precedes."""
     if len(recording.idle) or recording.frames_lost or recording.disordered:
         seen = "heartbeats" if len(recording.idle) else "lost frames" if recording.frames_lost else "a restart"
         raise InputError(
@@ -203,7 +197,7 @@ def _through_the_machine(
         if len(frames) != len(at):
             raise InputError(f"{recording.path}: finger {finger} has frames without one good count; add --keep-tare")
         frames["seq"] = recording.wire["seq"][at]
-        frames["flags"] |= recording.wire["flags"][at] & np.uint32(wire.FrameFlags.SENSOR_UNSURE)  # counts do not tell
+        frames["flags"] |= recording.wire["flags"][at] & np.uint32(wire.FrameFlags.SENSOR_UNSURE)  # not in counts
         new[at] = frames
         for row, message in changes.items():
             tares[int(at[row])] = dataclasses.replace(message, seq=int(frames["seq"][row]))
@@ -218,7 +212,7 @@ def _rounds(recording: Recording, at: NDArray[np.int64], its: BoardMap | None, n
     for message in recording.messages:
         if isinstance(message, wire.Tare) and message.finger == finger and message.reason in _HOST_REASONS:
             q16 = np.array([*message.tare_q16, message.pdc_tare_q16])
-            counts = np.where(q16 == _UNKNOWN_Q16, np.nan, q16 / 65536)
+            counts = np.where(q16 == INVALID_U32, np.nan, q16 / 65536)
             _give(tares, row_of.get(message.seq), counts, message.reason == wire.TareReason.HOST_NOW)
     if 0 not in tares and not int(sent["flags"][0]) & wire.FrameFlags.UNTARED:
         q4 = np.append(sent["tare_q4"][0], sent["pdc_tare_q4"][0])
@@ -232,7 +226,7 @@ def _rounds(recording: Recording, at: NDArray[np.int64], its: BoardMap | None, n
 
 
 def _host_words(recording: Recording, sent: StructArray, row_of: Mapping[int, int]) -> dict[int, wire.TareReason]:
-    """What the host, or its silence, said of a finger, by row: from the flag HELD, and RELEASE from its message."""
+    """Hold, release and lapsed hold of a finger, by row: from the flag HELD, RELEASE from its TARE message."""
     held = (sent["flags"] & wire.FrameFlags.HELD) != 0
     edges = np.diff(held.astype(np.int8), prepend=np.int8(0))
     words = {
@@ -249,7 +243,7 @@ def _host_words(recording: Recording, sent: StructArray, row_of: Mapping[int, in
 
 
 def _give(tares: dict[int, HostTare], row: int | None, values: NDArray[np.float64], now: bool) -> None:
-    """Note a tare of 19 electrodes and pressure; one that was never whole cannot be given again."""
+    """Add a tare of 19 electrodes and pressure to ``tares``; one without all electrodes cannot be set again."""
     if row is not None and not np.isnan(values[:-1]).any():
         tares[row] = HostTare(values[:-1], None if np.isnan(values[-1]) else float(values[-1]), now)
 
@@ -262,7 +256,7 @@ def _write(
     tares: dict[int, wire.Tare] | None,
     show: Show,
 ) -> None:
-    """The wire as it was, FRAMEs replaced, and TAREs too unless they are kept (None)."""
+    """Write the wire as it was, with FRAMEs replaced, and TAREs too unless they are kept (``tares`` None)."""
     blocks = [bytearray() for _ in recording.blocks]
     row = 0
     for piece in split(recording.blocks):

@@ -1,4 +1,4 @@
-"""Recorded counts through the board's own code: a finger's rounds in, the messages a board would send out."""
+"""Running recorded counts through the board's own code: a finger's rounds in, the board's messages out."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ _ROWS = 2000  # between two calls of show
 
 @dataclass(frozen=True)
 class HostTare:
-    """What the host told the board: ``counts`` (19,) and ``pdc``, or with ``now`` to take its own latest means."""
+    """A tare that the host set: ``counts`` (19,) and ``pdc``; with ``now``, the host asked for the latest means."""
 
     counts: NDArray[np.float64]
     pdc: float | None
     now: bool = False
 
     def give(self, finger: Finger) -> None:
-        """Tell ``finger``; where it sees no means to take now, it gets those that the board took."""
+        """Set it on ``finger``; if that has no means to tare now, it gets those that the board took."""
         try:
             if self.now:
                 finger.tare_now()
@@ -48,8 +48,8 @@ class HostTare:
 class Rounds:
     """A finger's rounds: ``counts`` (n, 19), ``pdc``, ``tac``, ``tdc`` (n,), ``t_us`` (n,) device time.
 
-    ``tares``: by the round from which on each holds; ``words``: HOST_HOLD, HOST_RELEASE or HOLD_LAPSED, likewise.
-    ``wrench_map``: in force all along.
+    ``tares``: by the round from which each holds. ``words``: HOST_HOLD, HOST_RELEASE or HOLD_LAPSED, likewise.
+    ``wrench_map``: in force throughout.
     """
 
     finger: int
@@ -65,9 +65,9 @@ class Rounds:
 
 
 def with_silence(rounds: Rounds) -> Rounds:
-    """``rounds`` with one without words wherever time jumps: the sensor was silent there, or was asked who it is.
+    """``rounds`` with an empty round inserted wherever time jumps: the sensor did not answer, or was being identified.
 
-    The trigger and the pressure's filter forget in such a round; how many there were is told by ``t_us`` alone.
+    The trigger and the pressure filter reset in such a round. Only ``t_us`` tells how many of them there were.
     """
     late = np.flatnonzero(np.diff(rounds.t_us) > 3 * ROUND_US // 2) + 1
 
@@ -92,14 +92,14 @@ def with_silence(rounds: Rounds) -> Rounds:
 def frames_and_tares(
     rounds: Rounds, settings: dict[wire.Setting, int], show: Callable[[int], None] = lambda rows: None
 ) -> tuple[StructArray, dict[int, wire.Tare]]:
-    """FRAME messages (m,) of the rounds in which a sensor answered, and TARE messages by row of those.
+    """FRAME messages (m,) of the rounds in which a sensor answered, and TARE messages by row of these.
 
-    ``show`` is told how many rounds were run, of twice their number.
+    ``show`` is called with the number of rounds just run; at most twice their number are run in all.
     """
     finger = Finger(settings, index=rounds.finger, quantities=rounds.quantities, wrench_map=rounds.wrench_map)
     rows = np.concatenate(list(_run(rounds, finger, [], show)))
     changed = np.flatnonzero((rows["flags"] & wire.FrameFlags.TARE_CHANGED).astype(bool) & (rows["present"] != 0))
-    # The tare's own 1/65536 count is in no row: a second run stops at each change to look.
+    # Rows do not hold the tare in 1/65536 count: a second run stops at each change to read it.
     finger.reset()
     messages: dict[int, wire.Tare] = {}
     ends = [int(k) + 1 for k in changed]
@@ -117,7 +117,7 @@ def frames_and_tares(
 
 
 def _run(rounds: Rounds, finger: Finger, ends: list[int], show: Callable[[int], None]) -> Iterator[StructArray]:
-    """Rows in parts, which end at ``ends``, before tares from the host, and every _ROWS rounds."""
+    """Rows in parts that end at ``ends``, before each tare or word from the host, and every _ROWS rounds."""
     n = len(rounds.counts)
     cuts = sorted({0, n, *ends, *rounds.tares, *rounds.words, *range(0, n, _ROWS)})
     for begin, end in pairwise(cuts):

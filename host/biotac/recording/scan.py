@@ -1,7 +1,7 @@
-"""An MCAP file from its first byte to its last: what of it is whole, and only the chunks that are wanted.
+"""Scanning an MCAP file from first byte to last, yielding the undamaged parts of the wanted chunks.
 
-Every chunk has a checksum, the two halves of the file have one each, and its statistics say how many chunks, notes and
-messages there were: a flipped bit shows in one or the other.
+Every chunk has a checksum, and so have the file's records and its index. The statistics say how many chunks, metadata
+records and messages there were. A flipped bit shows in one or the other.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from mcap.writer import MCAP0_MAGIC
 from ..errors import RecordingError
 from .chunk import HEAD, chunk_of, records_of, unpack
 
-# A second of five fingers is 0.1 MB. Files have a quarter of what they unpack to; those of format 1, with fingers at
-# rest, a fiftieth. In memory it becomes ten times that.
+# A second of five fingers is 0.1 MB. Files are a quarter of the size they unpack to; those of format 1 with fingers at
+# rest, a fiftieth. In memory the data takes ten times its unpacked size.
 _CHUNK_MAX_BYTES = 1 << 23
 _RATIO_MAX = 100
 _FREE_BYTES = 1 << 24
 
-_START = struct.Struct("<BQH")  # and what a message index begins with: its channel
-# As plain numbers: a member of an enum is looked up anew for each of sixteen thousand records.
+_START = struct.Struct("<BQH")  # a record's head, and the channel that a message index begins with
+# As plain ints: accessing an enum member is slow, and there are sixteen thousand records.
 _CHUNK, _MESSAGE_INDEX = int(Opcode.CHUNK), int(Opcode.MESSAGE_INDEX)
 _DATA_END, _FOOTER = int(Opcode.DATA_END), int(Opcode.FOOTER)
-_FOOTER_BYTES = HEAD.size + 16  # that its checksum is over, too
+_FOOTER_BYTES = HEAD.size + 16  # the part of the footer that its checksum covers, too
 _READ: dict[int, Any] = {
     Opcode.METADATA: Metadata,
     Opcode.SCHEMA: Schema,
@@ -52,7 +52,7 @@ def _content(stream: BinaryIO, at: int, length: int) -> ReadDataStream:
 
 
 def _crc32(stream: BinaryIO, begin: int, end: int) -> int:
-    """Of the file's bytes from begin to end; the stream stays where it is."""
+    """CRC-32 of the file's bytes from begin to end; leaves the stream's position as it was."""
     here, crc = stream.tell(), 0
     stream.seek(begin)
     while begin < end and (data := stream.read(min(end - begin, 1 << 20))):
@@ -63,12 +63,12 @@ def _crc32(stream: BinaryIO, begin: int, end: int) -> int:
 
 
 class Scan:
-    """Iterating gives Metadata, and the messages of ``wanted`` topics as (topic, Message).
+    """Iterates over Metadata, and the messages of ``wanted`` topics as (topic, Message).
 
-    ``schemas`` by topic, as far as it has come. Afterwards ``problems`` in words, ``cut_off`` (the file ends without
-    its index), ``damaged_chunks`` and ``wrong_checksums`` (of the file's halves). Chunks that nobody wants, and the
-    halves, are checked only with ``check``. RecordingError for what is no MCAP file, or unpacks to far more than
-    recordings do.
+    ``schemas`` holds the schemas read so far, by topic. Complete afterwards: ``problems`` in words, ``cut_off`` (the
+    file ends without its index), ``damaged_chunks`` and ``wrong_checksums`` (over the file's records and its index).
+    Unwanted chunks, and those two checksums, are verified only with ``check``. Raises RecordingError if the file is
+    not an MCAP file, or unpacks to far more than a recording would.
     """
 
     def __init__(self, path: Path, wanted: Callable[[str], bool], *, check: bool = True) -> None:
@@ -86,7 +86,7 @@ class Scan:
         self._chunks = self._metadata = 0
         self._messages: Counter[int] = Counter()  # of wanted topics, by channel
         self._counted = False
-        self._data_end = 0  # where the first half ends
+        self._data_end = 0  # where the DataEnd record ends
 
     def __iter__(self) -> Iterator[Metadata | tuple[str, Message]]:
         try:
@@ -101,13 +101,13 @@ class Scan:
                     "`biotac record` wrote"
                 )
             good_until = len(MCAP0_MAGIC)
-            held: tuple[int, int] | None = None  # where a chunk is, until its indexes say which channels it has
+            held: tuple[int, int] | None = None  # position and length of a chunk whose message indexes are being read
             channels: set[int] = set()
             while True:
                 opcode, length, channel = _START.unpack(stream.read(_START.size).ljust(_START.size, b"\0"))
                 at = good_until + HEAD.size
                 whole = opcode != 0 and length <= self._size - at
-                if opcode == _MESSAGE_INDEX and whole:  # two of three records
+                if opcode == _MESSAGE_INDEX and whole:  # two out of three records
                     channels.add(channel)
                     good_until = at + length
                     stream.seek(good_until)
@@ -139,7 +139,7 @@ class Scan:
             self.problems.append(f"{self.path.name} is damaged: without its statistics nobody knows what is missing")
 
     def _prove(self, stream: BinaryIO, opcode: int, at: int, length: int) -> None:
-        """Hold the checksum that a DataEnd or Footer has against what it is over; 0 is none, as in format 1."""
+        """Verify the checksum in a DataEnd or Footer; 0 means that there is none, as in format 1."""
         record = self._read(opcode, _content(stream, at, length))
         if isinstance(record, DataEnd):
             self._data_end = at + length
@@ -157,7 +157,7 @@ class Scan:
             self.problems.append(f"{self.path.name} is damaged: the checksum over its {what} is wrong")
 
     def _read(self, opcode: int, content: ReadDataStream) -> Any:
-        """A record; None, and a problem, for a damaged one."""
+        """The record in ``content``; None if it is damaged, which is added to ``problems``."""
         try:
             return _READ[opcode].read(content)
         except (McapError, struct.error, ValueError, EOFError, MemoryError, OverflowError) as error:
@@ -199,7 +199,7 @@ class Scan:
                 yield topic, record
 
     def _compare(self, told: dict[int, int]) -> None:
-        """Messages of wanted topics, unless damage that explains it was named."""
+        """Compare the numbers of messages of wanted topics, unless damaged chunks already explain a difference."""
         wanted = {channel for channel in {*told, *self._messages} if self._wanted(self._topics.get(channel, ""))}
         if not self.damaged_chunks and any(told.get(channel, 0) != self._messages[channel] for channel in wanted):
             self.problems.append(
@@ -216,7 +216,7 @@ class Scan:
             records = [] if unwanted else list(records_of(data))
         except RecordingError:
             raise
-        except Exception as error:  # mcap, zstandard and struct each raise their own kinds
+        except Exception as error:  # mcap, zstandard and struct raise many types
             self.damaged_chunks += 1
             self.problems.append(f"one second of {self.path.name} is damaged and left out ({error})")
             return
@@ -228,7 +228,7 @@ class Scan:
             try:
                 told = zstandard.get_frame_parameters(chunk.data).content_size
             except zstandard.ZstdError:
-                return  # it will not be opened either
+                return  # unpacking it will fail too
             size = max(size, told if told != zstandard.CONTENTSIZE_UNKNOWN else 0)
         self._unpacked += size
         if size > _CHUNK_MAX_BYTES or self._unpacked > _FREE_BYTES + _RATIO_MAX * self._size:

@@ -1,4 +1,4 @@
-"""Device time on the recording computer's clock, for what is derived from a recording: by the drift that it shows."""
+"""Device time on the recording computer's clock, corrected by the drift that the recording shows."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..clock import LAST_SAMPLE_US, DeviceClock
 
-# In less the delays of single messages tell more than a crystal: 0.5 ms at 50 ppm.
+# In less time, the delays of single messages exceed the drift of a crystal: 0.5 ms at 50 ppm.
 _LEAST_S = 10.0
-# What came this much too early or late did not keep pace: a simulated board, whose time is no clock, or a long stall.
+# A block this much too early or late did not keep pace: from a simulated board without a real clock, or after a stall.
 _PACE_S = 0.5
 _MAX_DRIFT = 500e-6
 _SETTLED_US = 600e6  # of the clock's course at a time, before it forgets what it was made of
@@ -20,18 +20,18 @@ _REACH_US = 200e6
 
 
 def unwrapped_us(begin_us: int, told_us: npt.ArrayLike) -> NDArray[np.int64]:
-    """Device times of messages as sent, 32 bits, in order: unwrapped from ``begin_us`` on.
+    """Device times of messages in order, 32 bits as sent, unwrapped from ``begin_us`` on.
 
-    STATUS comes each second, so two neighbours are never half a wrap apart.
+    STATUS comes every second, so neighbours are never half a wrap apart.
     """
     return np.unwrap(np.append(begin_us, told_us).astype(np.int64), period=2**32)[1:].astype(np.int64)
 
 
 class Stamps:
-    """Unix ns of unwrapped device times: ``begin_ns`` at ``begin_us``, and on from there as the two clocks ran.
+    """Converts unwrapped device times to Unix ns: ``begin_ns`` at ``begin_us``, and from there as the two clocks ran.
 
-    By the plain difference of device times while the arrivals show no one course: in the first ten seconds, of a
-    board that does not keep pace with the host, and from when one of the clocks has stepped.
+    While the arrivals do not yet show a steady drift, plain differences of device times are used instead: in the first
+    ten seconds, for a board that does not keep pace with the host, and once one of the clocks has stepped.
     """
 
     def __init__(self, begin_us: int, begin_ns: int) -> None:
@@ -41,10 +41,10 @@ class Stamps:
         self._settled_us = float(begin_us)
         self._first: tuple[int, float] | None = None
         self._keeps_pace = False
-        self._begin_s = math.nan  # by the clock; once, so that its later views do not move everything
+        self._begin_s = math.nan  # by the clock; set once, so that later estimates do not shift all stamps
 
     def arrived(self, t_us: int, at_ns: int) -> None:
-        """All of a block was here at ``at_ns``, whose last row is of ``t_us``."""
+        """Tell that a block whose last row is from ``t_us`` had arrived completely at ``at_ns``."""
         at_s = (at_ns - self._begin_ns) / 1e9
         self._first = self._first or (t_us, at_s)
         device_s, host_s = (t_us - self._first[0]) / 1e6, at_s - self._first[1]
@@ -55,7 +55,7 @@ class Stamps:
             self._settled_us = t_us
 
     def __call__(self, t_us: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Stamps (n,) in ns of device times (n,)."""
+        """Stamps (n,) in ns for device times (n,) in us."""
         plain: NDArray[np.int64] = self._begin_ns + (t_us - self._begin_us) * 1000
         if not self._keeps_pace or self._clock.resets or not len(t_us):
             return plain

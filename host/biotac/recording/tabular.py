@@ -1,4 +1,4 @@
-"""Frames as a pandas DataFrame or an xarray Dataset; both libraries are imported when they are asked for."""
+"""Frames as a pandas DataFrame or an xarray Dataset; either library is imported only when needed."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ..wire.frames import StructArray
 
 
 def to_pandas(frames: StructArray, stamp_ns: Any) -> Any:
-    """A DataFrame with the flat names of host/docs/rows.md, a row a frame, indexed by ``stamp`` (UTC, n).
+    """A DataFrame with the flat names of host/docs/rows.md, one row per frame, indexed by ``stamp`` (UTC).
 
-    Integer fields that can be missing are nullable (UInt16), others of NumPy's types.
+    Integer fields that can be missing are nullable (UInt16); all others have NumPy types.
     """
     pandas = _imported("pandas")
     columns: dict[str, Any] = {}
@@ -29,9 +29,9 @@ def to_pandas(frames: StructArray, stamp_ns: Any) -> Any:
 
 
 def to_xarray(frames: StructArray, stamp_ns: Any) -> Any:
-    """A Dataset with dimensions ``row``, ``axis`` and ``electrode``, units as attributes.
+    """A Dataset with dimensions ``row``, ``axis`` and ``electrode``, and units as attributes.
 
-    Counts that are missing are NaN (float32 holds 0 to 4095 exactly).
+    Missing counts are NaN (float32 holds 0 to 4095 exactly).
     """
     xarray = _imported("xarray")
     data: dict[str, Any] = {}

@@ -1,7 +1,7 @@
 """The emulated board: a microcontroller's own flash image in an emulator, playing a Source.
 
-The emulator is a Node program in this project's repository (tools/emulator/); it is not part of the
-installed package. It speaks to this side as the posix simulator does, on a pty that is made here.
+The emulator is a Node program in this project's repository (tools/emulator/), not part of the installed package. It
+talks to this side as the posix simulator does, on a pty created here.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .source import Source
 
 @dataclass(frozen=True)
 class Tools:
-    """What an emulated board is made of."""
+    """Files that an emulated board needs."""
 
     node: str
     program: Path
@@ -35,12 +35,12 @@ class Tools:
 
 
 class EmulatedBoard(SimBoard):
-    """A running emulator; ``path`` is the pty that any serial program can open.
+    """A running emulator; ``path`` is a pty that any serial program can open.
 
-    With ``uart`` there is another one, ``uart_path``, on the pins of the board's UART.
+    With ``uart``, a second pty, ``uart_path``, is connected to the pins of the board's UART.
     """
 
-    _pass_fds: tuple[int, ...] = ()  # beside its own ptys'
+    _pass_fds: tuple[int, ...] = ()  # besides those of its own ptys
 
     def __init__(
         self, board: str, source: Source, *, pace: float, hold: bool, image: str | None = None, uart: bool = False
@@ -65,33 +65,33 @@ class EmulatedBoard(SimBoard):
             return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=fds)
 
     def plan(self, seconds: float, verb: str) -> None:
-        """Have something happen to the board once its sensors have lived for ``seconds``; see main.mjs."""
+        """Make something happen to the board when its sensors' time reaches ``seconds``; see main.mjs for verbs."""
         self.say(f"@{seconds:.9f} {verb}")
 
     def do(self, verb: str) -> None:
-        """Have something happen to the board before whatever is written to its link from now on; see main.mjs.
+        """Make something happen to the board before it gets anything written to its link from now on; see main.mjs.
 
-        Verbs and link are two pipes: without an answer on the one, the other may overtake it.
+        Verbs and the link are separate pipes: without waiting for an answer, the link could overtake the verb.
         """
         self.say(verb)
         self.counters()
 
     def counters(self) -> dict[str, Any]:
-        """What the emulator counted: time, resets, transfers, USB packets, breaches of the rules."""
+        """The emulator's counters: time, resets, latency, violations of its rules."""
         self.say("counters")
         facts: dict[str, Any] = self._counted()[1]
         return facts
 
     def arrivals(self) -> list[tuple[int, int, float]]:
-        """Of each FRAME its t_us, its finger, and the board's time in us when its last byte was with the host."""
+        """For each FRAME: its t_us, its finger, and the board's time in us when its last byte reached the host."""
         self.say("arrivals")
         return [tuple(one) for one in self._counted()[1]]
 
     def until(self, seconds: float, **counters: Any) -> dict[str, Any]:
-        """Wait until these counters are so, and return all of them then.
+        """Wait until these counters have these values; return all counters.
 
-        DeviceLostError when they are not within ``seconds`` of emulated time. Time that is held, or waits for
-        whoever has the link open to read, does not pass.
+        Raises DeviceLostError if they do not within ``seconds`` of emulated time. Emulated time stands still while it
+        is held, or waits for the program that has the link open to read.
         """
         self.say(f"until {seconds:.6f} {json.dumps(counters)}")
         word, told = self._counted()
@@ -110,8 +110,10 @@ class EmulatedBoard(SimBoard):
 
 @contextmanager
 def new_pty() -> Iterator[tuple[int, str]]:
-    """The master's descriptor, to be passed on, and the path of the other side; while nobody holds that, the master
-    cannot be read, which is the board's DTR."""
+    """A new pty: the master's descriptor, to be passed on, and the path of the other side.
+
+    The master cannot be read while nobody has the other side open; this serves as the board's DTR.
+    """
     master, slave = pty.openpty()
     try:
         tty.setraw(slave)  # from the start: an echoing terminal would send our own frames back to us
@@ -124,7 +126,7 @@ def new_pty() -> Iterator[tuple[int, str]]:
 
 
 def find_tools(board: str, image: str | None) -> Tools:
-    """Everything that is needed, or a PortError with the cure for what is missing."""
+    """The files that the emulator needs. Raises PortError, with a remedy, if one is missing."""
     if board != "pico":
         raise PortError(f"no emulated board is called {board!r}; there is one: emu:pico")
     if os.name != "posix":
@@ -146,7 +148,7 @@ def find_tools(board: str, image: str | None) -> Tools:
 
 
 def find_folder() -> Path:
-    """tools/emulator of the repository that this process runs in, or that its environment lies in."""
+    """tools/emulator of the repository that contains the working directory, this environment or this file."""
     override = os.environ.get("BIOTAC_EMULATOR")
     if override:
         places = [Path(override)]

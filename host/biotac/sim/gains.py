@@ -1,9 +1,9 @@
-"""Force and torque gains that fit one emulated finger: what its calibration would give.
+"""Force and torque gains fitted to emulated fingers, as a calibration would give.
 
-Lin Eq 3 and 4: F_d = S_d sum e n_d, M_d = T_d sum e (r x n)_d, with e = count - rest. Each gain is
-the least squares fit without offset of noise-free counts to the scenario's own truth, axis by axis.
-It is the best these five numbers can do on this scenario, so residuals show the method's error and
-not a missing calibration. M_x has no gain: the electrodes hardly see it (numerics.md 4).
+Lin Eq 3 and 4: F_d = S_d sum e n_d, M_d = T_d sum e (r x n)_d, with e = count - rest. Each gain is a least-squares fit
+without offset from noise-free counts to the scenario's truth, axis by axis. This is the best that these five numbers
+can do on the scenario, so residuals show the error of the method and not a lack of calibration. M_x has no gain: the
+electrodes hardly see it (numerics.md 4).
 """
 
 from __future__ import annotations
@@ -12,11 +12,9 @@ import numpy as np
 
 from ..core import geometry as surface
 from ..core.geometry import Floats
-from ..wire.messages_gen import SETTINGS
+from ..wire.messages_gen import SETTINGS, Setting
 
 _ARMS_MM: Floats = np.asarray(np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL), dtype=np.float64)
-
-_SPECS = {setting.name.lower(): spec for setting, spec in SETTINGS.items()}
 
 _AXES: tuple[tuple[str, Floats], ...] = (
     ("force_gain_x_nn", surface.ELECTRODE_NORMAL[:, 0]),
@@ -41,6 +39,6 @@ def fit_gains(signal: Floats, force_n: Floats, torque_nmm: Floats) -> dict[str, 
         if np.abs(truth).max(initial=0.0) < 1e-6 or energy == 0.0:
             continue
         nano_per_count = 1e9 * float(total @ truth) / energy
-        spec = _SPECS[name]
+        spec = SETTINGS[Setting[name.upper()]]
         gains[name] = round(min(max(nano_per_count, spec.low), spec.high))
     return gains

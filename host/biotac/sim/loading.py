@@ -1,4 +1,4 @@
-"""The one function that loads a source of any kind."""
+"""Loading a source of any kind."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ def bundled_scenarios() -> list[str]:
 def load_source(path: str | Path, *, fingers: int | None = None, seconds: float | None = None) -> Source:
     """Load a scenario (.toml) or a recording (.npz, .btd, .btd.gz), by its suffix.
 
-    A bare name such as ``press.toml`` that is no file is looked up among the bundled scenarios.
-    ``fingers`` (1..5) is how many fingers to play: a scenario's are cut or repeated, repeated ones
-    with a sensor seed of their own; a recording's are cut or copied; default: as many as it has.
-    ``seconds`` (0.01..3600) crops; a scenario that is shorter is repeated.
+    A bare name such as ``press.toml`` that is not a file is looked up among the bundled scenarios. ``fingers`` (1..5)
+    is the number of fingers to play, by default all: a scenario's are cut or repeated, each repeated one with its own
+    sensor seed; a recording's are cut or copied. ``seconds`` (0.01..3600) crops the source; a shorter scenario is
+    repeated.
 
-    Raises InputError (ScenarioError for the text of a scenario) naming what was seen and expected.
+    Raises InputError (ScenarioError for a scenario's text), naming what was seen and expected.
     """
     if fingers is not None and not (type(fingers) is int and 1 <= fingers <= _sensor.MAX_SENSORS):
         raise InputError(f"fingers is {fingers!r}: expected 1 to {_sensor.MAX_SENSORS}")

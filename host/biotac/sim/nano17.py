@@ -1,7 +1,7 @@
-"""An emulated ATI Nano17 under a finger: what a scenario applies, as the sensor's own counts.
+"""An emulated ATI Nano17 force sensor that measures what a scenario applies to a finger, in the sensor's own counts.
 
-It has the real one's resolution and range (SI-12-0.12: 1/320 N, 1/64 N mm; 12 and 17 N, 120 N mm), noise, a zero
-that is not zero, axes and an origin of its own, and a clock that neither starts with the board's nor keeps pace.
+It has the real sensor's resolution and range (SI-12-0.12: 1/320 N, 1/64 N mm; 12 and 17 N, 120 N mm), noise, a zero
+offset, axes and an origin of its own, and a clock that is offset from the board's and drifts against it.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ COUNTS_PER_NM = 1_000_000.0
 NOISE_STEPS = 0.7  # standard deviation, in steps of the resolution
 SENSOR = "emulated Nano17"
 
-#: The sensor carries the finger from above, turned: no axis of its is one of Lin's. Were it behind the finger, a
-#: firm press on the tip would be more than its 120 N mm.
+#: The sensor carries the finger from above, rotated so that none of its axes is one of Lin's. If it were behind the
+#: finger, a firm press on the tip would exceed its 120 N mm.
 MOUNTING = Mounting(np.array([[0.0, 0.0, 1.0], [0.6, 0.8, 0.0], [-0.8, 0.6, 0.0]]), np.array([-5.0, 1.5, 10.0]))
 
 
 @dataclass(frozen=True)
 class Nano17:
-    """``offset_s`` is its time when the board's is 0; it then gains ``drift_ppm``. ``zero`` (6,) N and N mm."""
+    """The sensor. ``offset_s``: its time when the board's is 0; it gains ``drift_ppm``. ``zero`` (6,): N and N mm."""
 
     mounting: Mounting = MOUNTING
     rate_hz: float = 500.0
@@ -43,11 +43,11 @@ class Nano17:
 
     @property
     def scale(self) -> Scale:
-        """As its box is configured."""
+        """Scale factors as configured in its box."""
         return Scale(COUNTS_PER_N, COUNTS_PER_NM / NMM_PER_NM, self.rate_hz)
 
     def records(self, source: Source, finger: int) -> tuple[Floats, npt.NDArray[np.void]]:
-        """Board times (m,) s and RDT records (m,) while ``source`` plays. Raises InputError without a truth."""
+        """Board times (m,) in s and RDT records (m,) while ``source`` plays. Raises InputError if it has no truth."""
         if source.truth is None:
             raise InputError(f"{source.name} says nothing of the forces: expected a scenario (.toml)")
         lin = np.column_stack([source.truth.force_n[:, finger], source.truth.torque_nmm[:, finger]])

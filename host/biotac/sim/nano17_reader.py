@@ -1,4 +1,4 @@
-"""A Reader of the emulated Nano17 whose time is the simulated board's: no socket, no wall clock."""
+"""A Reader of the emulated Nano17 that runs on the simulated board's time: no socket, no wall clock."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ _DATAGRAM_RECORDS = 20
 
 
 class Nano17Reader:
-    """What the sensor has measured of ``source`` can be read once the board has come as far."""
+    """Reads what the sensor measures of ``source``, up to the board's current time."""
+
+    sensor = SENSOR
 
     def __init__(self, source: Source, finger: int, nano17: Nano17 | None = None) -> None:
         self.nano17 = nano17 or Nano17()
@@ -20,23 +22,15 @@ class Nano17Reader:
         self._next = 0
 
     @property
-    def sensor(self) -> str:
-        """What it is."""
-        return SENSOR
-
-    @property
     def stats(self) -> ReaderStats:
-        """Nothing is lost on this way."""
+        """Counters of records lost, late and bad; nothing is lost here."""
         its = self._decoder
         return ReaderStats(its.lost, its.late, its.bad + its.refused)
 
     def read(self, board_s: float) -> Samples:
-        """What was measured since the last call."""
+        """Samples measured since the last call, up to board time ``board_s``."""
         end = int(self._at_s.searchsorted(board_s))
         for begin in range(self._next, end, _DATAGRAM_RECORDS):
             self._decoder.feed(self._records[begin : min(begin + _DATAGRAM_RECORDS, end)].tobytes())
         self._next = max(self._next, end)
         return self._decoder.take()
-
-    def close(self) -> None:
-        """Nothing to give back."""

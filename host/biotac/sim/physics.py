@@ -70,11 +70,11 @@ class States:
 
     @cached_property
     def deformation(self) -> tuple[Floats, Floats]:
-        """What deform() says of these, the same for every finger."""
+        """Result of deform() for these states, the same for every finger."""
         return deform(self)
 
     def of(self, rows: npt.NDArray[Any]) -> States:
-        """At some of the instants, as NumPy indexes them."""
+        """The states at the instants ``rows``, a NumPy index."""
         return States(
             self.contact_mm[rows], self.force_n[rows], self.shear_n[rows], self.torsion_nmm[rows],
             self.tip_radius_mm[rows], self.warm_c[rows], None if self.slip_mm_s is None else self.slip_mm_s[rows],
@@ -95,9 +95,9 @@ class States:
 
 @dataclass(frozen=True)
 class Footprints:
-    """What n contacts cover, where they are not round: half lengths (n,) in mm of a Gaussian's ellipse.
+    """Footprints of n contacts that are not round: half lengths (n,) in mm of an elliptic Gaussian's axes.
 
-    ``along`` (n, 3) is the long one's unit vector in the tangent plane. probes.py makes them.
+    ``along`` (n, 3) is the unit vector of the long axis, in the tangent plane. probes.py makes them.
     """
 
     short_mm: Floats
@@ -133,7 +133,7 @@ def _squeeze_and_bulge(state: Floats) -> tuple[Floats, Floats]:
     footprint, ellipse = state[:, 8:9], state[:, 9:13]
     if not ellipse.shape[1]:
         footprint = footprint + FOOTPRINT_GROWTH_MM * np.cbrt(force)[:, None]
-    # of one area with the round one, so that a footprint's shape alone takes no force away
+    # same area as a round footprint, so that the shape alone does not change the force
     size = footprint if not ellipse.shape[1] else np.sqrt(footprint * ellipse[:, :1])
     depth = (
         SQUEEZE_AT_REFERENCE * ((force / SQUEEZE_FORCE_N) ** SQUEEZE_EXPONENT)[:, None] * (SQUEEZE_FOOTPRINT_MM / size)
@@ -236,7 +236,7 @@ class Finger:
         return self.counts_of(*states.deformation, states.warm_c)
 
     def counts_of(self, compression: Floats, bulge: Floats, warm_c: Floats) -> Floats:
-        """counts() of what deform() says, each (n, 19), at ``warm_c`` (n,) above 30 C."""
+        """counts() from the results of deform(), each (n, 19), at ``warm_c`` (n,) in C above 30 C."""
         change = bulge * self.gap_gain
         # a bulge opens the gap in proportion; a negative one must not close it past zero
         opened = np.where(change >= 0.0, 1.0 + change, np.exp(np.minimum(change, 0.0)))

@@ -1,4 +1,4 @@
-"""A scenario played: states to counts, faults laid over them, and the truth beside them."""
+"""Playing a scenario: counts from its states, with faults laid over them, and the truth."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from .scenario import Fault, FingerSpec, Scenario, default_serial
 from .source import Rows, Source, Truth
 
 _IS_CHANNEL = {name: np.array(_sensor.SLOTS) == name for name in _sensor.SLOTS}
-_REPEAT_SEED_STEP = 100  # apart enough that repeated fingers do not meet the scenario's own seeds
+_REPEAT_SEED_STEP = 100  # large enough that repeated fingers do not get the scenario's own seeds
 
 
 def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | None = None) -> Source:
     """Play ``scenario`` on ``fingers`` fingers for ``seconds``; None: as the scenario says.
 
-    A longer time repeats the timeline, so end a scenario as it began or the start of a repetition
-    jumps; drift and noise go on. Finger k plays the script of finger k modulo the scenario's count.
+    A longer time repeats the timeline, so a scenario should end as it began, or each repetition starts with a jump;
+    drift and noise go on. Finger k plays the script of finger k modulo the scenario's number of fingers.
     """
     own = len(scenario.fingers)
     count = own if fingers is None else fingers
@@ -64,7 +64,7 @@ def play(scenario: Scenario, *, fingers: int | None = None, seconds: float | Non
 
 
 def _truth(middles: list[States], frame: Rows) -> Truth:
-    """What is applied to each finger, given its states at the middle of each frame of the timeline."""
+    """The truth for each finger, from its states at the middle of each frame of the timeline."""
     contact = np.stack([its.force_n > 0.0 for its in middles], axis=1)
     poc_mm = np.stack([its.contact_mm for its in middles], axis=1)
     wrenches = [its.wrench() for its in middles]
@@ -84,7 +84,7 @@ def _repeated(spec: FingerSpec, repetition: int) -> FingerSpec:
 
 
 def _codes(faults: list[Fault], period: int) -> sampling.Words | None:
-    """What they put in place of counts, (period, 44): a code in every slot that begins while one lasts, else 0."""
+    """Codes that faults put in place of counts, (period, 44): in every slot that begins during a fault; otherwise 0."""
     if not faults:
         return None
     codes = np.zeros((period, slots.SLOTS_PER_FRAME), np.uint16)
@@ -100,7 +100,7 @@ def _codes(faults: list[Fault], period: int) -> sampling.Words | None:
 
 
 def _fit(emulated: tuple[Finger, ...], middles: list[States]) -> dict[str, int]:
-    """Gains over one whole timeline, whatever part of it is played, and all fingers together."""
+    """Gains fitted over one whole timeline, even if only part of it is played, and over all fingers together."""
     signals = [
         finger.counts(its) - finger.rest_counts(its.warm_c) for finger, its in zip(emulated, middles, strict=True)
     ]

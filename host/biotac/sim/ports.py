@@ -17,7 +17,7 @@ from .two_picos import TwoPicos
 class SimPort:
     """A parsed ``sim:SOURCE?...`` or ``emu:BOARD?source=SOURCE&...``."""
 
-    board: str  # "posix", or what is emulated
+    board: str  # "posix", or the name of an emulated board
     source: str
     pace: float
     fingers: int | None
@@ -64,7 +64,7 @@ def open_sim(port: str, pace: float) -> SimLink:
 
 
 def start_board(board: str, source: Source, *, pace: float, image: str | None = None) -> SimBoard:
-    """Start a board that is a program, held until its release: ``posix`` or an emulated one.
+    """Start a simulated board, held until released: ``posix`` or an emulated one.
 
     Raises PortError naming what is missing and how to get it.
     """

@@ -1,4 +1,4 @@
-"""What seed 000 pressed with - tips of 1, 3.6 and 10 mm radius, a flat - and a bar: the footprint of each.
+"""Footprints of the probes used in seed 000 (tips of 1, 3.6 and 10 mm radius, a flat) and of a bar.
 
 Two bodies that touch are apart by h(u) = u.C u / 2 around the first point, C the sum of their curvatures in the tangent
 plane (Johnson, Contact Mechanics, 1985, 4.1). With c1 <= c2 its eigenvalues, Hertz's ellipse has, to 4 % up to a
@@ -25,15 +25,15 @@ from .physics import GAP_MM, Finger, Footprints, States, deform
 
 E_STAR_MPA = 1.3  # E / (1 - nu^2) of silicone with E = 1 MPa, nu = 0.5
 SKIN_RADIUS_MM = surface.RADIUS_MM + GAP_MM
-SKIN_MM = 0.6  # what a point becomes
+SKIN_MM = 0.6  # half length of a point's footprint
 FLATTEST_PER_MM = 1.0 / 60.0  # keeps slenderness finite: a flat along a cylinder ends at its edge, not at infinity
 
 
 @dataclass(frozen=True)
 class Probe:
-    """A thing to press with. ``radius_mm``: of curvature, inf for a flat; ``half_length_mm``: where it ends.
+    """A probe. ``radius_mm``: radius of curvature, inf for a flat. ``half_length_mm``: distance to its end.
 
-    A ``bar`` is a cylinder of that radius that lies on the skin; turned by an angle, see footprints().
+    A ``bar`` is a cylinder of that radius lying on the skin, rotated by an angle; see footprints().
     """
 
     name: str
@@ -53,7 +53,7 @@ BAR = Probe("bar", 1.0, 10.0, bar=True)
 
 
 def footprints(probe: Probe, contact_mm: Floats, force_n: Floats, turned_rad: Floats | None = None) -> Footprints:
-    """Of ``probe`` on core points (n, 3) under normal forces (n,) in N.
+    """Footprints of ``probe`` on core points (n, 3) under normal forces (n,) in N.
 
     ``turned_rad`` (n,) is a bar's direction in the tangent plane, 0 to the tip and pi/2 to E11's side.
     """
@@ -81,9 +81,9 @@ def footprints(probe: Probe, contact_mm: Floats, force_n: Floats, turned_rad: Fl
 
 
 def counts_of(finger: Finger, contacts: Sequence[tuple[States, Footprints | None]]) -> Floats:
-    """Counts (n, 19), not rounded, of contacts that are there at once: their squeezes and volumes add.
+    """Counts (n, 19), not rounded, of simultaneous contacts: their squeezes and volumes add.
 
-    All have n states; the temperature is the first one's.
+    Each contact has n states; the temperature is that of the first contact.
     """
     parts = [deform(states, its) for states, its in contacts]
     compression, bulge = (np.sum([part[k] for part in parts], axis=0) for k in (0, 1))

@@ -1,6 +1,6 @@
 """The simulated board: the firmware as a process on a pty, playing a Source.
 
-The board's time is its own. With pace 0 it runs as fast as this side reads and loses nothing; it
+The board has its own time. With pace 0 it runs as fast as this side reads, and loses nothing. A held board's time
 stands still until ``release``, so that frame 0 is the source's first row.
 """
 
@@ -29,12 +29,12 @@ def executable() -> Path:
 
 
 class SimBoard:
-    """A running simulator process; ``path`` is the pty that any serial program can open."""
+    """A running simulator process; ``path`` is a pty that any serial program can open."""
 
     def __init__(self, source: Source, *, pace: float, hold: bool) -> None:
         self.source = source
         self.pace = pace
-        self.over = False  # the tape is played, and everything of it handed over
+        self.over = False  # the tape has been played, and everything handed over
         self._heard = b""
         self._answers: list[str] = []
         self._folder = tempfile.TemporaryDirectory(prefix="biotac-sim-")
@@ -55,7 +55,7 @@ class SimBoard:
             self.close()
             raise PortError(f"the simulator did not start: {error or 'it said nothing'}")
         self.path = first[1]
-        # The board has read its tape by now; nothing is left behind however this process ends.
+        # The board has read its tape by now. Removed here, so that nothing is left behind however this process ends.
         self._folder.cleanup()
 
     def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
@@ -63,12 +63,12 @@ class SimBoard:
         return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
     def stdout_fd(self) -> int:
-        """Readable when the board has something to say, or is gone."""
+        """File descriptor of the board's stdout: readable when it has something to say, or is gone."""
         assert self._process.stdout is not None
         return self._process.stdout.fileno()
 
     def hear(self) -> None:
-        """Read what the board says; waits for it."""
+        """Wait for output of the board and read it. Raises DeviceLostError when the board has died."""
         text = os.read(self.stdout_fd(), 65536)
         if not text:
             raise DeviceLostError(f"the simulated board died: {self._last_words() or 'no message'}")
@@ -80,7 +80,7 @@ class SimBoard:
                 self._answers.append(line.decode())
 
     def say(self, line: str) -> None:
-        """Tell the process that is the board, beside the link."""
+        """Send a line to the board's process, separately from the link."""
         assert self._process.stdin is not None
         self._process.stdin.write(f"{line}\n".encode())
         self._process.stdin.flush()
@@ -90,18 +90,18 @@ class SimBoard:
         self.say("run")
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Wait until the tape is over or timeout_s have passed; true when it is over."""
+        """Wait at most timeout_s for output of the board; return True when the tape is over."""
         ready, _, _ = select.select([self.stdout_fd()], [], [], timeout_s)
         if ready:
             self.hear()
         return self.over
 
     def abandon(self) -> None:
-        """In a fork of the process that started it: nothing of it is ours."""
+        """Let go of the process and its pipes, in a fork of the process that started it."""
         for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
             if pipe is not None and not pipe.closed:
                 nowhere(pipe.fileno())
-        self._process.returncode = 0  # its parent is to wait for it
+        self._process.returncode = 0  # only its parent may wait for it
 
     def close(self) -> None:
         """End the process and remove its files. Safe to call twice."""
@@ -120,7 +120,7 @@ class SimBoard:
 
 
 class SimLink(SerialLink):
-    """A SerialLink to a simulated board of its own, which it closes."""
+    """A SerialLink to a simulated board, which it owns and closes."""
 
     patience = 60.0
 
@@ -142,12 +142,11 @@ class SimLink(SerialLink):
         return [self.board.path]
 
     def reopen(self, place: str) -> None:
-        """See Link.reopen."""
         super().reopen(place)
-        self.fd = None  # the process is to be listened to as well
+        self.fd = None  # the process must be watched as well
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for bytes, or for word that the source is over."""
+        """Wait for bytes, or for the end of the source; return True if there are bytes to read."""
         watched = [self._serial.fileno()] + ([] if self.board.over else [self.board.stdout_fd()])
         ready, _, _ = select.select(watched, [], [], timeout_s)
         if len(watched) > 1 and watched[1] in ready:
@@ -156,17 +155,14 @@ class SimLink(SerialLink):
         return self._serial.fileno() in ready
 
     def abandon(self) -> None:
-        """See Link.abandon."""
         super().abandon()
         self.board.abandon()
 
     def release(self) -> None:
-        """See Link.release."""
         if self._held:
             self._held = False
             self.board.release()
 
     def close(self) -> None:
-        """See Link.close."""
         super().close()
         self.board.close()

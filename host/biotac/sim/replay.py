@@ -1,7 +1,7 @@
 """Recorded counts as sources: .npz arrays and .btd text.
 
-A row is a frame and frames are played at 100 Hz whatever the recording's time stamps say: gaps and
-jitter of the logger are not replayed.
+Each row is a frame. Frames are played at 100 Hz whatever the recording's time stamps say: gaps and jitter of the logger
+are not replayed.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def load_npz(path: Path, *, fingers: int | None = None, seconds: float | None = 
     """One recorded finger from an .npz file.
 
     Fields, counts 0..4095 of any number type: ``E`` (n, 19), required; ``PDC``, ``TAC``, ``TDC``
-    (n,) and ``PAC`` (n, 22), whose absence the sensor answers as a channel it does not have; ``F``
+    (n,) and ``PAC`` (n, 22), if absent played as channels that the sensor does not have; ``F``
     (n, 3) N as data/README.md has it (X lateral, Y to the tip, Z out of the pad), turned into Lin's
     frame; ``E_base`` (m, 19), the same finger in free air, whose mean becomes the stored tare.
     Others are ignored. Raises RecordingError naming the field.
@@ -59,7 +59,7 @@ def load_npz(path: Path, *, fingers: int | None = None, seconds: float | None = 
 
 
 def load_btd(path: Path, *, fingers: int | None = None, seconds: float | None = None) -> Source:
-    """The sensors of a .btd or .btd.gz file that were there, incomplete frames left out and counted.
+    """The sensors present in a .btd or .btd.gz file; incomplete frames are left out and counted.
 
     Raises RecordingError naming the line.
     """

@@ -49,7 +49,7 @@ def tdc_counts(celsius: Floats) -> Floats:
 def sample(finger: Finger, states: States, rows: npt.NDArray[np.int64] | None = None) -> Words:
     """Read ``finger`` through n frames, given its states at their n + 1 boundaries.
 
-    ``rows`` (n + 1,) says which of ``states`` those are, where they repeat; without it all of them in order.
+    ``rows`` (n + 1,) are their indices in ``states``, which may repeat; by default all of them in order.
     Returns uint16 (n, 44) in SLOTS order, 0..4095. Each word is taken at its own slot's time, by
     linear interpolation between the boundaries. Deterministic: the same finger and states give the
     same words, and a longer run begins with the words of a shorter one.
@@ -63,18 +63,18 @@ def sample(finger: Finger, states: States, rows: npt.NDArray[np.int64] | None = 
 
 
 class _Reading:
-    """A finger that is read on and on: what its states make of it at once, and what the time before left in it."""
+    """A finger read block by block: precomputed effects of its states, and what carries over between blocks."""
 
     def __init__(self, finger: Finger, states: States) -> None:
         self._finger = finger
         self._exact = finger.counts(states)
         self._pressed = self._exact - finger.rest_counts(states.warm_c)
         self._force_n = states.force_n
-        self._load = _load(states)
+        self._load = spring_load(states)
         self._tdc = tdc_counts(REST_CELSIUS + states.warm_c)
         slips = states.slip_mm_s is not None and states.slip_mm_s.any()
         self._slip_mm_s = states.slip_mm_s if slips else None
-        # one stream a kind, filled frame by frame: that is what makes a shorter run a prefix
+        # one random stream per kind, drawn frame by frame, so that a shorter run is a prefix of a longer one
         rngs = [np.random.default_rng([finger.seed, kind]) for kind in (1, 2, 3, 4, 5)]
         self._electrode_rng, self._glitch_rng, self._pac_rng, self._slow_rng, slip_rng = rngs
         self._ringing = Ringing(slip_rng)
@@ -83,7 +83,7 @@ class _Reading:
         self._frame = 0
 
     def on(self, rows: npt.NDArray[np.int64]) -> Words:
-        """The next n frames, (n, 44), between these n + 1 states; the first of them is the last of the call before."""
+        """The next n frames, (n, 44), between these n + 1 states; the first is the last of the previous call."""
         finger, frames = self._finger, len(rows) - 1
         words = np.empty((frames, SLOTS_PER_FRAME))
 
@@ -127,15 +127,15 @@ def _between(boundary: Floats, share: Floats) -> Floats:
     return values
 
 
-def _load(states: States) -> Floats:
-    """What would be the static pressure above rest (n,), in counts, if skin were a spring: numerics.md 3.1."""
+def spring_load(states: States) -> Floats:
+    """Static pressure above rest (n,), in counts, as if skin were a spring: numerics.md 3.1."""
     load: Floats = PDC_PER_N * states.force_n * (1.0 + 0.15 * np.tanh(states.contact_mm[:, 0] / 8.0))
     return load
 
 
 def pressure(states: States) -> Floats:
-    """Static pressure above rest (n,), in counts, without noise, of a finger at rest before; see _Pressure."""
-    return _Pressure()(_load(states))
+    """Static pressure above rest (n,), in counts, without noise, of a finger that was at rest; see _Pressure."""
+    return _Pressure()(spring_load(states))
 
 
 class _Pressure:
@@ -156,7 +156,7 @@ class _Pressure:
 
 
 class Lag:
-    """First-order lag of (n + 1, k) from zero on; a call's first row is the last of the call before."""
+    """First-order lag of (n + 1, k), starting at zero; a call's first row is the last of the previous call."""
 
     def __init__(self, seconds: float) -> None:
         # y_i = a y_{i-1} + (1 - a) x_i, summed up: y_i = a^i (a y_{-1} + (1 - a) sum of x_j a^-j up to i)
@@ -186,7 +186,7 @@ class _HighPass:
         self._settled = np.zeros(1)
 
     def __call__(self, signal: Floats) -> Floats:
-        settled = np.diff(signal) / FRAME_S * self._seconds  # its answer to a ramp that never ends
+        settled = np.diff(signal) / FRAME_S * self._seconds  # response to an endless ramp
         start = self._lag(np.append(self._settled, settled)[:, None])[:-1]
         self._settled = settled[-1:]
         decay = np.exp(-PAC_SLOT / _sensor.SLOT_HZ / self._seconds)

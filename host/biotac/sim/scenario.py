@@ -43,11 +43,11 @@ SHEAR_MAX_N = 20.0
 TORSION_MAX_NMM = 100.0
 SLIP_MAX_MM_S = 200.0
 SEED_MAX = 2**31 - 1
-# Repeated for an hour on five fingers the worst takes some 8 s of a busy processor, half of which any hour takes, and
-# 350 MB. Half of each with gains = "fit", which computes all of it once more.
+# Repeated for an hour on five fingers, the worst scenario takes about 8 s on a busy processor (half of it for any hour)
+# and 350 MB. With gains = "fit", which computes everything once more, half of each limit is allowed.
 FINGER_SECONDS_MAX = 900.0  # all fingers together
 MOVING_MAX_S = 160.0  # likewise, with a load that changes: each frame of it costs 0.15 ms
-FAULTS_MAX_S = 10_000.0  # all together; what they take to play goes by it
+FAULTS_MAX_S = 10_000.0  # all together; the time to play them grows with it
 
 FAULT_CODES = {
     "bad_parity": tape.BAD_PARITY,
@@ -73,7 +73,7 @@ STEP_KEYS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class FingerSpec:
-    """Which sensor a finger has; ``serial`` is what it answers when asked, 16 characters."""
+    """A finger's sensor; ``serial`` is the serial number that it reports, 16 characters."""
 
     seed: int
     profile: Profile
@@ -93,7 +93,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A valid scenario: one track and one sensor a finger, all tracks equally long."""
+    """A valid scenario: one track and one sensor per finger, all tracks equally long."""
 
     name: str
     fit_gains: bool
@@ -260,7 +260,7 @@ def _fault(table: Table, fingers: int, scenario_s: float) -> Fault:
     at_s = table.number("at_s", 0.0, scenario_s - 0.01 if scenario_s > 0.01 else 0.0, "s")
     return Fault(
         at_s=at_s,
-        # a fault that ends after the scenario would say something the source does not do
+        # a fault may not end after the scenario: the source would not play that part
         seconds=table.number("seconds", 0.001, round(scenario_s - at_s, 9), "s"),
         finger=table.integer("finger", 0, fingers - 1),
         code=FAULT_CODES[table.choice("kind", tuple(FAULT_CODES))],

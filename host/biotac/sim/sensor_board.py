@@ -8,11 +8,13 @@ from __future__ import annotations
 import threading
 import time
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import DeviceLostError, InputError, PortError
+from ..errors import BiotacError, DeviceLostError, InputError, PortError
 from ..hand.board import Board
 from ..link import Link
 from ..wire import messages_gen as wire
@@ -22,14 +24,14 @@ from .source import Source
 
 SAMPLES_A_MESSAGE = 110
 SAMPLE_BYTES = 2 * SAMPLES_A_MESSAGE
-BURST = 16  # messages until the board is asked how far it got
-REST_S = 0.05  # while its room is full
+BURST = 16  # messages sent before the board is asked for its status
+REST_S = 0.05  # wait while the board has no room
 NOT_HELD = 0xFFFFFFFF
-KEEP_S = 20.0  # 39 sectors of flash that take their longest
+KEEP_S = 20.0  # 39 sectors of flash, each at its longest
 
 
 class SensorBoard:
-    """The sensor board on ``link``, which is closed when it does not answer as one (PortError)."""
+    """The sensor board on ``link``. If another board answers, closes ``link`` and raises PortError."""
 
     def __init__(self, link: Link) -> None:
         self._board = Board(link)
@@ -55,15 +57,15 @@ class SensorBoard:
             self._board.ask(wire.EmuPlug(0, finger, finger < fingers, padded), wire.EmuStatus)
 
     def status(self) -> wire.EmuStatus:
-        """How it gets on."""
+        """The board's status."""
         return self._board.ask(wire.EmuGetStatus(0), wire.EmuStatus)
 
     def fault(self, finger: int, fault: wire.EmuFault) -> wire.EmuStatus:
-        """Have a finger do this from now on, whatever its tape says; EmuFault.NONE ends it."""
+        """Give a finger this fault from now on, whatever its tape says; EmuFault.NONE ends it."""
         return self._board.ask(wire.EmuSetFault(0, finger, fault), wire.EmuStatus)
 
     def play(self, *, hold_slot: int | None = None, by_time: bool = False) -> wire.EmuStatus:
-        """How the tape is served, until the next plug().
+        """Set how the tape is served, until the next plug().
 
         Before ``hold_slot``, a round's first, it waits until another play() names a later one or none, and then goes on
         with all fingers in one round. That is for gateways: a reader that never asks its sensors who they are waits for
@@ -73,9 +75,9 @@ class SensorBoard:
         return self._board.ask(wire.EmuPlay(0, self.held_at, by_time), wire.EmuStatus)
 
     def keep(self) -> wire.EmuStatus:
-        """Have all that was plugged kept in the board's flash, to be played over and over from power-up on.
+        """Store the whole plugged source in the board's flash, to be played in a loop from power-up on.
 
-        It must fit the board at once, which is 3.5 s of five fingers. Raises InputError when it does not, and
+        It must fit the board's memory at once, 3.5 s of five fingers. Raises InputError when it does not, and
         CommandRefusedError when the board has lost some of it.
         """
         slots, fingers = self._samples.shape
@@ -94,13 +96,13 @@ class SensorBoard:
         return status
 
     def forget(self) -> wire.EmuStatus:
-        """Have nothing in flash to be played."""
+        """Erase the tape kept in flash."""
         return self._board.ask(wire.EmuKeep(0, 0, 0), wire.EmuStatus)
 
     def feed(self, until_full: bool = False, ended: threading.Event | None = None) -> wire.EmuStatus:
-        """Send what is left of the source as there is room for it; returns once all is there, or ``ended`` is set.
+        """Send the rest of the source as the board has room; return when all is sent, or ``ended`` is set.
 
-        ``until_full``: returns when the board's room is full as well.
+        ``until_full``: return also when the board has no more room.
         """
         ended = ended or threading.Event()
         slots, fingers = self._samples.shape
@@ -120,6 +122,27 @@ class SensorBoard:
                 self._board.send(self._part(first, count))
             status = self._board.ask(self._part(*parts[-1]), wire.EmuStatus)
         return status
+
+    @contextmanager
+    def feeding(self) -> Iterator[wire.EmuStatus]:
+        """Feed the board in a thread meanwhile; yields its status when its room was full for the first time.
+
+        If the board goes away, the next request to it raises the error.
+        """
+        ended = threading.Event()
+
+        def feed() -> None:
+            with suppress(BiotacError):
+                self.feed(ended=ended)
+
+        full = self.feed(until_full=True)
+        thread = threading.Thread(target=feed, name="biotac sensor board", daemon=True)
+        thread.start()
+        try:
+            yield full
+        finally:
+            ended.set()
+            thread.join()
 
     def _part(self, first: int, count: int) -> wire.EmuTape:
         data = self._samples[first : first + count].astype("<u2").tobytes()

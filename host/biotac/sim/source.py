@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,11 @@ from .physics import Finger
 Rows = npt.NDArray[np.int64]
 
 MAX_SECONDS = 3600.0  # 5 fingers for an hour are 160 MB of counts
+
+
+def _played(part: int) -> Any:
+    """An attribute of Truth: ``part`` of its timeline at each frame."""
+    return cached_property(lambda truth: truth._timeline[part][truth._rows])
 
 
 class Truth:
@@ -27,29 +33,14 @@ class Truth:
     def __init__(
         self, contact: npt.NDArray[np.bool_], poc_mm: Floats, force_n: Floats, torque_nmm: Floats, rows: Rows
     ) -> None:
-        """Of one timeline; ``rows`` (frames,) says which of its rows each frame is."""
+        """Truth from the arrays of one timeline; ``rows`` (frames,) is each frame's index in it."""
         self._timeline = contact, poc_mm, force_n, torque_nmm
         self._rows = rows
 
-    @cached_property
-    def contact(self) -> npt.NDArray[np.bool_]:
-        """See the class."""
-        return self._timeline[0][self._rows]
-
-    @cached_property
-    def poc_mm(self) -> Floats:
-        """See the class."""
-        return self._timeline[1][self._rows]
-
-    @cached_property
-    def force_n(self) -> Floats:
-        """See the class."""
-        return self._timeline[2][self._rows]
-
-    @cached_property
-    def torque_nmm(self) -> Floats:
-        """See the class."""
-        return self._timeline[3][self._rows]
+    contact: npt.NDArray[np.bool_] = _played(0)
+    poc_mm: Floats = _played(1)
+    force_n: Floats = _played(2)
+    torque_nmm: Floats = _played(3)
 
 
 @dataclass(frozen=True)

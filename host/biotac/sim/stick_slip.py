@@ -1,4 +1,4 @@
-"""What skin that slides does to the dynamic pressure: stick and slip.
+"""The effect of sliding skin on dynamic pressure: stick and slip.
 
 A surface that slides over skin at v sticks and lets go v / d times a second, at random, d being how far the skin is
 drawn along; as it begins to slide it lets go at once. Each time the skin rings as a damped oscillator:

@@ -18,7 +18,7 @@ from ..core.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from .physics import Finger, States, deform
 from .probes import BAR, PROBES, Probe, counts_of, footprints
-from .sampling import PDC_NOISE, PDC_PER_N
+from .sampling import PDC_NOISE, spring_load
 
 Integers = npt.NDArray[np.int64]
 
@@ -54,7 +54,7 @@ class Stimulations:
         return len(self.probe)
 
     def where(self, rows: npt.NDArray[np.bool_]) -> Stimulations:
-        """Those of ``rows`` (n,)."""
+        """The rows selected by ``rows`` (n,)."""
         return Stimulations(*(getattr(self, one.name)[rows] for one in fields(self)))
 
 
@@ -81,7 +81,7 @@ def stimulate(
     tilt = np.tan(np.radians(np.tile(TILTS_DEG, (n, 1)) + rng.normal(0.0, TILT_SD_DEG, (presses, 2))))
     to_tip, to_side = surface.tangents_at(surface.normals_at(contact_mm))
     shear = to_tip * tilt[:, :1] + to_side * tilt[:, 1:]
-    # up and down again, not to nothing: what does not touch has no place
+    # up and down again, but not to zero: without contact there is no point of contact
     rise = np.sin(np.pi * (np.arange(frames) + 0.5) / frames) ** 2
     peak = rng.uniform(*peak_n, presses)
     normal_n = (peak[:, None] * np.maximum(rise, LEAST_SHARE)).ravel()
@@ -101,7 +101,7 @@ def stimulate(
         compression[rows], bulge[rows] = deform(mine, its_print)
     exact = finger.counts_of(compression, bulge, zeros)
     noisy = np.rint(exact + rng.normal(0.0, finger.noise_counts, exact.shape))
-    pdc = PDC_PER_N * normal_n * (1.0 + 0.15 * np.tanh(states.contact_mm[:, 0] / 8.0))
+    pdc = spring_load(states)
     return Stimulations(
         counts=np.clip(noisy, 0.0, _sensor.FULL_SCALE_COUNT),
         tare=np.repeat(finger.rest_counts(np.zeros(1)), len(states), axis=0),

@@ -1,7 +1,7 @@
-"""Typed reads of TOML tables whose errors name the line and the key.
+"""Typed reading of TOML tables, with errors that name the line and the key.
 
-The standard parser keeps no line numbers, so Lines finds headers and keys again by scanning the
-text. A multi-line string that looks like a header or a key can mislead it, by a few lines.
+The standard parser keeps no line numbers, so Lines finds headers and keys again by scanning the text. A multi-line
+string that looks like a header or a key can make it wrong by a few lines.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Lines:
 
 
 def parse_toml(data: bytes, file: str) -> tuple[dict[str, Any], Lines]:
-    """Parse TOML. Raises ScenarioError with the parser's own line for what is no TOML."""
+    """Parse TOML. Raises ScenarioError, with the parser's line number, for invalid TOML."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -72,7 +72,7 @@ def parse_toml(data: bytes, file: str) -> tuple[dict[str, Any], Lines]:
 
 
 class Table:
-    """One table: reads keys with type and range, and refuses what it does not know.
+    """A TOML table: reads keys with type and range checks, and refuses unknown keys.
 
     Every method raises ScenarioError ``file:LINE: label: key 'k' seen: expected ...; cure``.
     """

@@ -1,4 +1,4 @@
-"""One finger's script: straight pieces between poses, evaluated at any time."""
+"""One finger's script: linear pieces between poses, evaluated at any time."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ class Track:
 
     pose: Pose = field(default_factory=Pose)
     seconds: float = 0.0
-    moving_s: float = 0.0  #: of them with a load that changes, each frame of which has to be computed
+    moving_s: float = 0.0  #: part of ``seconds`` with a changing load, of which each frame must be computed
     _starts_s: list[float] = field(default_factory=list)
     _lengths_s: list[float] = field(default_factory=list)
     _from: list[list[float]] = field(default_factory=list)
     _to: list[list[float]] = field(default_factory=list)
 
     def ramp(self, seconds: float, end: Pose, start: Pose | None = None) -> None:
-        """Go straight to ``end``; ``start`` jumps first (without load a jump has no effect)."""
+        """Go linearly to ``end``; with ``start``, jump there first (a jump without load has no effect)."""
         begin = start or self.pose
         if replace(begin, celsius=end.celsius, slip_mm_s=end.slip_mm_s) != end:
             self.moving_s += seconds

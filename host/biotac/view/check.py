@@ -1,13 +1,14 @@
-"""The page asked for by a program in place of a browser: is everything there, and does it tell the truth?"""
+"""Testing the page without a browser: whether all files are there, and whether its data are right."""
 
 from __future__ import annotations
 
-import http.client
 import json
 import time
 from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from html.parser import HTMLParser
+from http.client import HTTPConnection, HTTPResponse
 from itertools import pairwise
 from typing import Any
 
@@ -21,7 +22,7 @@ PATIENCE_S = 300.0
 
 @dataclass(frozen=True)
 class Checked:
-    """What was seen. ``problems``: in words, empty when all is well."""
+    """Result of the check. ``problems``: in words, empty if all is well."""
 
     files: int
     bytes: int
@@ -46,18 +47,20 @@ def check() -> Checked:
         return Checked(len(viewing.server.files), sum(sizes), len(seen), len(frames), problems)
 
 
+@contextmanager
+def asked(port: int, what: str, path: str, body: str | None = None, **headers: str) -> Iterator[HTTPResponse]:
+    """The response to a request."""
+    with closing(HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)) as connection:
+        connection.request(what, path, body, headers)
+        yield connection.getresponse()
+
+
 def get(port: int, path: str) -> bytes:
-    """Body of a page that must be there."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
-    try:
-        connection.request("GET", path)
-        answer = connection.getresponse()
-        body = answer.read()
+    """Body of a page. Raises ConnectionError if it is not there."""
+    with asked(port, "GET", path) as answer:
         if answer.status != 200:
             raise ConnectionError(f"{path} was answered with {answer.status}")
-        return body
-    finally:
-        connection.close()
+        return answer.read()
 
 
 class _Links(HTMLParser):
@@ -71,20 +74,20 @@ class _Links(HTMLParser):
 
 
 def linked(html: str) -> list[str]:
-    """What a page loads."""
+    """Files that a page loads."""
     parser = _Links()
     parser.feed(html)
     return parser.names
 
 
 def imported(files: dict[str, bytes]) -> set[str]:
-    """Modules that another module names in an import."""
+    """Modules that another module imports."""
     code = b"".join(body for name, body in files.items() if name.endswith(".js")).decode()
     return {name for name in files if f'"./{name}"' in code}
 
 
 def first_frames(port: int) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """What the stream says first, and ROUNDS frames of every finger."""
+    """The stream's first event, and about ROUNDS frames of every finger."""
     about: dict[str, Any] = {}
     rows: list[dict[str, Any]] = []
     deadline_s = time.monotonic() + PATIENCE_S
@@ -99,11 +102,8 @@ def first_frames(port: int) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 def events(port: int) -> Iterator[tuple[str, Any]]:
-    """Name and JSON of server-sent events, as they come."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
-    try:
-        connection.request("GET", "/events", headers={"Accept": "text/event-stream"})
-        answer = connection.getresponse()
+    """Name and JSON data of server-sent events, as they come."""
+    with asked(port, "GET", "/events", Accept="text/event-stream") as answer:
         name = "message"
         while line := answer.readline().decode().rstrip("\n"):
             if line.startswith("event: "):
@@ -114,12 +114,10 @@ def events(port: int) -> Iterator[tuple[str, Any]]:
                 answer.readline()
             elif line.startswith(":"):
                 answer.readline()
-    finally:
-        connection.close()
 
 
 def judge(about: dict[str, Any], frames: list[dict[str, Any]]) -> list[str]:
-    """What is wrong with the first frames."""
+    """Problems with the first frames, in words."""
     problems = []
     electrodes = len(about["electrodes"])
     for finger in range(about["fingers"]):
@@ -127,7 +125,7 @@ def judge(about: dict[str, Any], frames: list[dict[str, Any]]) -> list[str]:
         if not mine:
             problems.append(f"finger {finger} sent nothing")
         steps = {b["seq"] - a["seq"] for a, b in pairwise(mine)}
-        if min(steps, default=1) < 1:  # a busy computer loses frames, which the page counts
+        if min(steps, default=1) < 1:  # larger steps are fine: a busy computer loses frames, which the page counts
             problems.append(f"finger {finger}: sequence numbers step by {sorted(steps)}")
         if any(len(row["signal_q4"]) != electrodes for row in mine):
             problems.append(f"finger {finger}: a frame without its {electrodes} electrodes")
@@ -135,12 +133,12 @@ def judge(about: dict[str, Any], frames: list[dict[str, Any]]) -> list[str]:
 
 
 def judge_commands(port: int, token: str) -> list[str]:
-    """A stranger's command must be refused, our own answered."""
+    """Problems with commands, in words: a stranger's must be refused, our own answered."""
     problems = []
     for what, headers, wanted in (
         ("without the page's token", {}, {403}),
         ("from another origin", {TOKEN_HEADER: token, "Origin": "http://example.org"}, {403}),
-        # refused (409) while the finger moves, which is for the board to say
+        # the board refuses (409) while the finger moves
         ("of the page", {TOKEN_HEADER: token}, {200, 409}),
     ):
         status = post(port, {"do": "tare", "finger": 0}, headers)
@@ -150,12 +148,7 @@ def judge_commands(port: int, token: str) -> list[str]:
 
 
 def post(port: int, wish: dict[str, Any], headers: dict[str, str]) -> int:
-    """Status of a command."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
-    try:
-        connection.request("POST", "/command", json.dumps(wish), {"Content-Type": "application/json"} | headers)
-        answer = connection.getresponse()
-        answer.read()
+    """HTTP status of a command."""
+    headers = {"Content-Type": "application/json"} | headers
+    with asked(port, "POST", "/command", json.dumps(wish), **headers) as answer:
         return answer.status
-    finally:
-        connection.close()

@@ -14,11 +14,12 @@ from ..hand.recorded import Recorder
 from ..hand.subscription import RESULTS
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats
-from .player import Recorded
+from ..wire.identity import version_text
+from .player import Player, Recorded
 
 
-class LivePlayer:
-    """A Hand that is read without a pause. ``folder`` is where recordings go."""
+class LivePlayer(Player):
+    """Player of a board, which is read without pauses. ``folder`` is where recordings go."""
 
     live = True
     paused = False
@@ -28,11 +29,11 @@ class LivePlayer:
         self._recorder: Recorder | None = None
         self._recording_since_us: int | None = None
         self._last_us = 0
-        # A person watches: simulated boards run in real time.
+        # People watch, so simulated boards run in real time.
         self._hand = open_hand(port, pace=1.0)
         try:
-            # An earlier program may have left the board with another choice: the page shows all of it. Of a board that
-            # others share it shows what its writer chose.
+            # The page shows all results, but an earlier program may have left another subscription. For a shared board,
+            # it shows what the writer chose.
             with suppress(CommandRefusedError):
                 self._hand.subscribe(RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags.EVENTS)
         except BaseException:
@@ -41,23 +42,19 @@ class LivePlayer:
         self.board = describe(self._hand.info)
 
     def batches(self) -> Iterator[Batch]:
-        """See Player."""
         for batch in self._hand.batches():
             self._last_us = batch.last_t_us() or self._last_us
             yield batch
 
     def stats(self) -> LinkStats:
-        """See Player."""
         return self._hand.stats
 
     def recording(self) -> Recorded | None:
-        """See Player."""
         if self._recorder is None or self._recorder.closed or self._recording_since_us is None:
             return None
         return Recorded(str(self._recorder.path), (self._last_us - self._recording_since_us) / 1e6)
 
     def do(self, command: str, finger: int | None) -> str:
-        """See Player."""
         if command == "tare":
             return self._tare(self._hand.fingers if finger is None else [finger])
         if command == "record":
@@ -92,19 +89,17 @@ class LivePlayer:
         return f"recorded to {recorder.path}"
 
     def close(self) -> None:
-        """See Player. A recording is finished and kept."""
+        """Close the board; a recording in progress is finished and kept."""
         self._hand.close()
 
 
 def describe(hello: wire.Hello) -> str:
-    """Board and firmware, for a person."""
-    known = hello.board in list(wire.Board)
-    board = wire.BOARD_DOC[hello.board] if known else f"board {hello.board}"
-    return f"{board}, firmware {hello.firmware_major}.{hello.firmware_minor}.{hello.firmware_patch}"
+    """Board and firmware, as text for users."""
+    return f"{wire.BOARD_DOC.get(hello.board, f'board {hello.board}')}, firmware {version_text(hello)}"
 
 
 def writable(folder: Path) -> Path:
-    """``folder``; InputError when recordings cannot go there, before anybody relies on it."""
+    """``folder``. Raises InputError if recordings cannot be written there."""
     if not folder.is_dir() or not os.access(folder, os.W_OK):
         raise InputError(f"{folder} is no folder to write to; name another with --folder")
     return folder

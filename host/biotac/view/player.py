@@ -1,4 +1,4 @@
-"""What the page needs of whatever it shows: one playing, from its opening to its end or loss."""
+"""The interface that the page needs to whatever it shows, from opening it until it ends or is lost."""
 
 from __future__ import annotations
 
@@ -18,37 +18,37 @@ class Recorded:
 
 
 class Player(Protocol):
-    """Batches, and what can be done meanwhile. Used by one thread only."""
+    """Yields batches and takes commands meanwhile. Used by one thread only."""
 
-    #: Who sends, for a person: board, firmware, serial number.
+    #: The sender, as text for users: board and firmware.
     board: str
 
-    #: A board is there: it can be tared and recorded. Otherwise it can be paused.
+    #: True for a board, which can be tared and recorded; False for a recording, which can be paused.
     live: bool
 
-    #: Playing stands still until ``resume``.
+    #: True while paused, until ``resume``.
     paused: bool
 
     def batches(self) -> Iterator[Batch]:
-        """Yield batches as time goes on, empty ones at least every second; return when it is over."""
+        """Yield batches as time goes on, at least one per second, if need be an empty one; return at the end."""
 
     def stats(self) -> LinkStats:
         """Health of the link."""
 
     def recording(self) -> Recorded | None:
-        """What is being written now."""
+        """The recording being written now, if any."""
 
     def do(self, command: str, finger: int | None) -> str:
         """Carry out a command of ``COMMANDS``; return what was done, in words.
 
-        Raises InputError for one that makes no sense here, any BiotacError for one that failed.
+        Raises InputError for a command that this player does not support, any BiotacError for one that failed.
         """
 
     def close(self) -> None:
-        """Give everything back. Safe to call twice."""
+        """Release all resources. Safe to call twice."""
 
 
 Opener = Callable[[], Player]
 
-#: What the page may ask for. ``again`` plays from the start what is over; it never reaches a Player.
+#: Commands of the page. ``again`` replays from the start after the end; it never reaches a Player.
 COMMANDS = ("tare", "record", "stop", "pause", "resume", "again")

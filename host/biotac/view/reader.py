@@ -1,4 +1,4 @@
-"""The one thread that reads: opens, plays, obeys, and opens again what went away."""
+"""The only reading thread: opens the source, plays it, carries out commands, and reopens what went away."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ANSWER_S = 10.0
 
 @dataclass
 class Command:
-    """One wish of a browser; ``done`` gets what was done in words, or the error."""
+    """A command from a browser; ``done`` gets a description of what was done, or the error."""
 
     name: str
     finger: int | None
@@ -25,26 +25,26 @@ class Command:
 
 
 class Reader:
-    """Plays what ``opener`` opens into ``state``. ``again``: what is over starts anew."""
+    """Plays what ``opener`` opens into ``state``. ``again``: start over after the end."""
 
     def __init__(self, opener: Opener, state: State, *, again: bool) -> None:
         self._opener = opener
         self._state = state
         self._again = again
-        self._loss = ""  # how the board was lost, for as long as it is
+        self._loss = ""  # how the board was lost, while it is lost
         self._commands: queue.Queue[Command | None] = queue.Queue()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="biotac-view-reader", daemon=True)
-        #: Set before ``over`` when nothing can ever be played: a source that is malformed or missing.
+        #: Set before ``over`` when nothing can be played at all: the source is malformed or missing.
         self.failure: BaseException | None = None
         self.over = threading.Event()
 
     def start(self) -> None:
-        """Begin to play."""
+        """Start playing."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End, with what is open closed; waits for it."""
+        """Stop the thread and wait for it; it closes what is open."""
         self._stop.set()
         self._commands.put(None)
         self._thread.join()
@@ -52,8 +52,8 @@ class Reader:
     def ask(self, name: str, finger: int | None) -> str:
         """Have the thread carry out a command; return what was done, in words.
 
-        Raises InputError for an unknown command, when nothing plays, and when it was not begun in time: then it never
-        will be. Else what the Player raises.
+        Raises InputError for an unknown command, when nothing plays, and when the command was not done in time; if it
+        was not even begun, it is cancelled. Otherwise raises what the Player raises.
         """
         if name not in COMMANDS:
             raise InputError(f"no command is called {name!r}; expected one of {', '.join(COMMANDS)}")
@@ -83,7 +83,7 @@ class Reader:
         try:
             player = self._opener()
         except InputError:
-            raise  # no waiting mends a malformed source
+            raise  # waiting does not help with a malformed source
         except BiotacError as error:
             self._rest("lost", f"{self._loss}No board: {error}. Looking again every second.", RETRY_S)
             return
@@ -92,7 +92,7 @@ class Reader:
             self._state.begin(player)
             ended = self._play(player)
         except (BiotacError, OSError) as error:
-            # OSError: a recording met a full disk.
+            # OSError: the disk is full while recording.
             kept = player.recording()
             self._close(player)
             self._loss = f"Connection lost: {error}. "

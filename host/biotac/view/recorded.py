@@ -1,4 +1,4 @@
-"""A recording for the page: the same batches, at the pace they were made."""
+"""A recording for the page, played at the pace at which it was recorded."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ..wire.batches import Batch, LinkStats
 from ..wire.counters import nearest
 from ..wire.frames import StructArray
 from .live import describe
-from .player import Recorded
+from .player import Player, Recorded
 
 TICK_S = 1 / 60
 
 
-class RecordedPlayer:
+class RecordedPlayer(Player):
     """Plays ``recording`` once at ``pace`` recorded seconds per second; 0 plays all of it at once."""
 
     live = False
@@ -29,7 +29,7 @@ class RecordedPlayer:
     def __init__(self, recording: Recording, pace: float = 1.0) -> None:
         self._recording = recording
         self._pace = pace
-        self._tick = threading.Event()  # never set: its wait is a sleep that close() ends
+        self._tick = threading.Event()  # waiting for it is a sleep that close() ends
         self.paused = False
         self.board = f"{describe(recording.info)}, recorded on {recording.metadata['port']}"
         self._frames = 0
@@ -37,7 +37,7 @@ class RecordedPlayer:
         if not parts:
             raise InputError(f"{recording.path} holds no frames; record it again")
         self._begin_us = min(int(t.min()) for t in parts)
-        # Messages carry 32 bits of the clock that rows carry unwrapped.
+        # Messages carry 32-bit times; rows carry unwrapped ones.
         self._messages = sorted(
             ((nearest(m.t_us, self._begin_us), k, m) for k, m in enumerate(recording.messages) if hasattr(m, "t_us")),
             key=lambda item: item[:2],
@@ -45,7 +45,6 @@ class RecordedPlayer:
         self._end_us = max([int(t.max()) for t in parts] + [t_us for t_us, _, _ in self._messages]) + 1
 
     def batches(self) -> Iterator[Batch]:
-        """See Player."""
         orders = [np.argsort(rows["t_us"], kind="stable") for rows in self._rows()]
         done = [0] * len(orders)
         said = 0
@@ -79,7 +78,7 @@ class RecordedPlayer:
         return self._recording.frames, self._recording.pac, self._recording.idle
 
     def stats(self) -> LinkStats:
-        """See Player: what the whole recording says, with the frames shown so far."""
+        """Statistics of the whole recording, except ``frames``: the number shown so far."""
         recording = self._recording
         return LinkStats(
             bytes_received=recording.path.stat().st_size,
@@ -92,11 +91,9 @@ class RecordedPlayer:
         )
 
     def recording(self) -> Recorded | None:
-        """See Player."""
-        return None
+        return None  # nothing is written
 
     def do(self, command: str, finger: int | None) -> str:
-        """See Player."""
         if command in ("pause", "resume"):
             self.paused = command == "pause"
             return "paused" if self.paused else "playing on"
@@ -104,5 +101,4 @@ class RecordedPlayer:
         raise InputError(f"a recording cannot be {what}; open a board for that")
 
     def close(self) -> None:
-        """See Player."""
         self._tick.set()

@@ -1,6 +1,6 @@
-"""Frames as compact JSON, in the wire's own integers: nothing is rounded on its way to the page.
+"""Frames as compact JSON, in the wire's own integers, so that nothing is rounded on its way to the page.
 
-static/model.js reads these rows; ``FRAME_ROW`` names their columns and is sent to it first.
+static/model.js reads these rows. ``FRAME_ROW`` names their columns and is sent first.
 """
 
 from __future__ import annotations
@@ -15,12 +15,10 @@ from ..core.unroll import unroll
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch
-from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, StructArray
+from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, Q4_PER_COUNT, UM_PER_MM, StructArray
 
-TARE_Q4_PER_COUNT = 16
-
-#: ``signal_q4``: count - tare in 1/16 count (19), null where either is missing. ``map_um``: where the
-#: point of contact is on the unrolled skin, across and along; null where it is invalid.
+#: ``signal_q4``: count - tare in 1/16 count (19), null where either is missing. ``map_um``: the point of contact on the
+#: unrolled skin, across and along, in um; null where it is invalid.
 FRAME_ROW = (
     "finger",
     "seq",
@@ -39,7 +37,7 @@ FRAME_ROW = (
 PAC_ROW = ("finger", "seq", "t_us", "pac")
 
 SCALES = {
-    "signal_q4": TARE_Q4_PER_COUNT,
+    "signal_q4": Q4_PER_COUNT,
     "poc_um": UM_PER_MM,
     "force_100un": FORCE_LSB_PER_N,
     "torque_mnmm": MNMM_PER_NMM,
@@ -80,16 +78,16 @@ def pac_rows(batch: Batch) -> list[str]:
 
 
 def signal_q4(messages: StructArray) -> NDArray[np.int32]:
-    """e of FRAME messages in 1/16 count, (n, 19); INVALID_I32 where count or tare is missing."""
+    """Signals of FRAME messages in 1/16 count, (n, 19); INVALID_I32 where count or tare is missing."""
     counts, tare_q4 = messages["counts"], messages["tare_q4"]
     missing = (counts == wire.INVALID_COUNT) | (tare_q4 == wire.INVALID_COUNT)
-    signals: NDArray[np.int32] = counts.astype(np.int32) * TARE_Q4_PER_COUNT - tare_q4
+    signals: NDArray[np.int32] = counts.astype(np.int32) * Q4_PER_COUNT - tare_q4
     signals[missing] = wire.INVALID_I32
     return signals
 
 
 def map_um(frames: StructArray) -> list[list[int] | None]:
-    """The column of that name for FRAME_DTYPE rows."""
+    """The column ``map_um`` for FRAME_DTYPE rows."""
     across, along = unroll(frames["poc_mm"])
     places = np.stack([across, along], axis=1) * UM_PER_MM
     good = np.isfinite(across + along)
@@ -98,7 +96,7 @@ def map_um(frames: StructArray) -> list[list[int] | None]:
 
 
 def with_null(values: NDArray[Any], invalid: int) -> Any:
-    """Python lists of any depth, with None for ``invalid``; quick where nothing is."""
+    """``values`` as nested lists, with None for ``invalid``; fast if nothing is invalid."""
     if not np.any(values == invalid):
         return values.tolist()
     out = values.astype(object)
@@ -107,12 +105,12 @@ def with_null(values: NDArray[Any], invalid: int) -> Any:
 
 
 def compact(value: Any) -> str:
-    """JSON without spaces; NaN would be no JSON, and is a mistake."""
+    """JSON without spaces. Raises ValueError for NaN, which is not valid JSON."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False)
 
 
 def facts() -> dict[str, Any]:
-    """What the page has to know before its first row: geometry, scales, and the contract's words."""
+    """What the page needs before its first row: geometry, scales, and texts for flags and tare states."""
     electrodes = np.array(sensor.ELECTRODE_UM) / UM_PER_MM
     across, along = unroll(electrodes)
     return {
@@ -136,7 +134,7 @@ def facts() -> dict[str, Any]:
     }
 
 
-#: Flags that say how it is; every other one says that something is doubtful.
+#: Flags that are informational; every other one is a warning.
 CALM = (
     wire.FrameFlags.CONTACT
     | wire.FrameFlags.MX_DERIVED

@@ -1,9 +1,9 @@
 """HTTP on 127.0.0.1: static files, one stream of events, one address for commands.
 
-Any page that a browser shows can send requests here, and so can any program of this computer: commands need a secret
-that stands in the page's address alone, behind a #, which browsers keep to themselves. Requests under a foreign name
-are refused: a name that its owner points at 127.0.0.1 would make our page his. Connections are few: of those that have
-not asked yet, the oldest makes room.
+Any page in a browser and any program on this computer can send requests here. Commands therefore need a secret, which
+is only in the fragment (after #) of the page's URL; browsers do not send it. Requests with a foreign host name are
+refused, because the owner of a name that resolves to 127.0.0.1 could otherwise take over our page (DNS rebinding). The
+number of connections is limited; the oldest one that does not get events makes room for a new one.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from .state import State
 
 HOST = "127.0.0.1"
 TOKEN_HEADER = "X-Biotac-Token"
-EVENT_S = 1 / 60  # no browser draws more often
-QUIET_S = 1.0  # then a comment is sent, which is how a browser that left is noticed
-# Small, so that a slow browser is late by a fraction of a second and then misses rows, not by megabytes.
+EVENT_S = 1 / 60  # browsers do not draw more often
+QUIET_S = 1.0  # after so long without news a comment is sent, to notice a browser that left
+# Small, so that a slow browser lags by a fraction of a second and then misses rows, instead of lagging by megabytes.
 SEND_BUFFER_BYTES = 1 << 16
 SEND_TIMEOUT_S = 10.0
 MAX_BODY_BYTES = 1000
-MAX_CONNECTIONS = 32  # that ask or are answered; a browser has six
+MAX_CONNECTIONS = 32  # without those that get events; a browser opens six
 MAX_PAGES = 16
 TYPES = {
     ".html": "text/html; charset=utf-8",
@@ -61,8 +61,8 @@ class ViewServer(ThreadingHTTPServer):
         self.token = secrets.token_urlsafe(24)
         self.files = static_files()
         self._counting = threading.Lock()
-        self._asking: dict[Any, None] = {}  # connections, the oldest first
-        self._pages: set[Any] = set()  # those that get events
+        self._asking: dict[Any, None] = {}  # connections that do not get events, oldest first
+        self._pages: set[Any] = set()  # connections that get events
         try:
             super().__init__((HOST, port), Handler)
         except OSError as error:
@@ -71,7 +71,7 @@ class ViewServer(ThreadingHTTPServer):
 
     @property
     def url(self) -> str:
-        """Where the page is, for whoever only looks."""
+        """The page's URL without the secret, for viewing only."""
         return f"http://{HOST}:{self.server_port}/"
 
     def process_request(self, request: Any, client_address: Any) -> None:
@@ -81,12 +81,12 @@ class ViewServer(ThreadingHTTPServer):
                 oldest = next(iter(self._asking))
                 del self._asking[oldest]
                 with contextlib.suppress(OSError):
-                    oldest.shutdown(socket.SHUT_RDWR)  # its thread reads the end, and ends
+                    oldest.shutdown(socket.SHUT_RDWR)  # its thread then reads end of file and ends
             self._asking[request] = None
         super().process_request(request, client_address)
 
     def begin_page(self, request: Any) -> bool:
-        """The connection gets events from now on, unless too many do."""
+        """Count the connection as one that gets events; False if there are too many."""
         with self._counting:
             if len(self._pages) >= MAX_PAGES:
                 return False
@@ -102,7 +102,7 @@ class ViewServer(ThreadingHTTPServer):
         super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that goes away in the middle of an answer is nobody's error; anything else is ours."""
+        """Ignore a browser that leaves in the middle of a response; anything else is our error."""
         if not isinstance(sys.exc_info()[1], (ConnectionError, TimeoutError)):
             super().handle_error(request, client_address)
 
@@ -131,7 +131,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def do_POST(self) -> None:
         """Commands: ``{"do": "tare", "finger": 0}``, answered with ``{"words": ...}``."""
-        self.close_connection = True  # whatever of a refused body was not read ends with it
+        self.close_connection = True  # discards the unread body of a refused request
         if not self._known_name():
             return
         if not secrets.compare_digest(self.headers.get(TOKEN_HEADER, "").encode(), self.server.token.encode()):
@@ -197,11 +197,11 @@ class Handler(BaseHTTPRequestHandler):
         self.end_headers()
 
     def log_message(self, format: str, *args: Any) -> None:
-        """A library does not print."""
+        """Log nothing: a library does not print."""
 
 
 def parse_command(body: bytes) -> tuple[str, int | None]:
-    """Name and finger of a command's JSON; ValueError for anything else."""
+    """Name and finger from a command's JSON. Raises ValueError for anything else."""
     wish = parse_json(body)
     name = wish.get("do") if isinstance(wish, dict) else None
     finger = wish.get("finger") if isinstance(wish, dict) else None
@@ -211,6 +211,6 @@ def parse_command(body: bytes) -> tuple[str, int | None]:
 
 
 def static_files() -> dict[str, bytes]:
-    """Every file of the page by its name; nothing else can be asked for."""
+    """The page's files by name; no other files are served."""
     folder = resources.files("biotac.view").joinpath("static")
     return {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name.endswith(tuple(TYPES))}

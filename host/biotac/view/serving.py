@@ -1,10 +1,9 @@
-"""What is to be shown, and a server that shows it until it is closed."""
+"""Serving the page for a source until it is closed."""
 
 from __future__ import annotations
 
 import threading
 from pathlib import Path
-from types import TracebackType
 
 from ..errors import PortError
 from ..recording import Recording
@@ -16,7 +15,7 @@ from .recorded import RecordedPlayer
 from .server import ViewServer
 from .state import State
 
-# A scenario repeats for that long without a seam; making more of it would keep people waiting.
+# A scenario is repeated seamlessly for so long; generating more would keep people waiting.
 SCENARIO_S = 120
 RECORDING_SUFFIX = ".mcap"
 
@@ -24,11 +23,11 @@ RECORDING_SUFFIX = ".mcap"
 class Viewing:
     """A page being served; use as a context manager.
 
-    ``source`` is a PORT or a recording (.mcap). ``port``: of the page; None: the usual one, or any free one
-    when that is taken. ``folder``: where recordings go. ``again``: what is over starts anew.
+    ``source`` is a PORT or a recording (.mcap). ``port``: the page's TCP port; None: the default one, or any free one
+    if that is taken. ``folder``: where recordings go. ``again``: start over after the end.
 
-    Raises InputError or RecordingError for a source or folder that cannot be used, PortError when ``port``
-    is taken. A board that is not there is waited for: the page says so.
+    Raises InputError or RecordingError for a recording or folder that cannot be used, PortError when ``port`` is
+    taken. If the board is not there, the page says so and waits for it.
     """
 
     def __init__(self, source: str, *, port: int | None = None, folder: Path | None = None, again: bool = True) -> None:
@@ -42,12 +41,12 @@ class Viewing:
 
     @property
     def url(self) -> str:
-        """Where the page is; with what commands need, which only its own reader is to have."""
+        """The page's URL with the secret for commands; only for the user of this page."""
         return f"{self.server.url}#{self.server.token}"
 
     def wait(self) -> None:
-        """Wait for a failure, which is raised; there is no other end."""
-        while not self.reader.over.wait(1.0):  # without a time Ctrl-C is not heard on Windows
+        """Wait until the reader stops, and raise its failure if there is one."""
+        while not self.reader.over.wait(1.0):  # without a timeout, Ctrl-C does not work on Windows
             pass
         if self.reader.failure is not None:
             raise self.reader.failure
@@ -63,25 +62,23 @@ class Viewing:
     def __enter__(self) -> Viewing:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 
 def serve(state: State, reader: Reader, port: int | None) -> ViewServer:
-    """The server on ``port``, or on the usual or any other one."""
+    """The server on ``port``; None: on the default port, or any free one if that is taken."""
     if port is not None:
         return ViewServer(state, reader, port)
     try:
-        # The usual one, so that a page left open finds its way back when the program runs again.
+        # The default one, so that a page left open reconnects when the program runs again.
         return ViewServer(state, reader, DEFAULT_PORT)
     except PortError:
         return ViewServer(state, reader, 0)
 
 
 def opener_of(source: str, folder: Path) -> Opener:
-    """What opens ``source``; a recording is read now, once."""
+    """An opener for ``source``; a recording is read now, only once."""
     if source.endswith(RECORDING_SUFFIX):
         recording = Recording(source)
         return lambda: RecordedPlayer(recording)
@@ -90,7 +87,7 @@ def opener_of(source: str, folder: Path) -> Opener:
 
 
 def lasting(port: str) -> str:
-    """A simulated scenario that does not say how long, for a while longer than its own length."""
+    """``port``, with ``seconds=SCENARIO_S`` added for a simulated scenario that does not say how long it plays."""
     head, _, options = port.partition("?")
     scenario = head.startswith("sim:") and head.endswith(".toml")
     if not scenario or "seconds=" in options:

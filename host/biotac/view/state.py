@@ -1,7 +1,7 @@
-"""What the page shows, between the one thread that reads and the many that serve.
+"""The state that the page shows, shared by the one reading thread and the many serving threads.
 
-The reader never waits for a browser: rows go into rings, and whoever is too slow finds the oldest gone and
-is told how many.
+The reader never waits for a browser: rows go into ring buffers, and a browser that is too slow misses the oldest rows
+and is told how many.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from ..wire.events import kind_name
 from .player import Player
 from .rows import compact, frame_rows, pac_rows
 
-KEPT_ROWS = 300  # of each kind: 0.6 s of five fingers, more than a picture is ever late
+KEPT_ROWS = 300  # of each kind: 0.6 s of five fingers, longer than any picture takes
 HEALTH_S = 0.25
 RATE_S = 2.0
-MARKS = 60  # more than ten seconds of plots can show
+MARKS = 60  # more than can be shown in ten seconds of plots
 
 
 class Ring:
@@ -34,7 +34,7 @@ class Ring:
         self.end = 0
 
     def extend(self, texts: list[str]) -> None:
-        """Append; the oldest make room."""
+        """Append texts, dropping the oldest ones."""
         self._texts.extend(texts)
         self.end += len(texts)
 
@@ -44,18 +44,18 @@ class Ring:
 
     @property
     def begin(self) -> int:
-        """Number of the oldest that is still there."""
+        """Number of the oldest text still kept."""
         return self.end - len(self._texts)
 
     def since(self, begin: int) -> tuple[list[str], int]:
-        """What came from number ``begin`` on and is still there, and how many of it are gone."""
+        """The texts from number ``begin`` on that are still kept, and how many of them are gone."""
         held = min(self.end - begin, len(self._texts))
         return list(islice(self._texts, len(self._texts) - held, None)), self.end - begin - held
 
 
 @dataclass
 class Cursor:
-    """How far one browser has come."""
+    """How far one browser has read."""
 
     frames: int
     pac: int
@@ -65,14 +65,14 @@ class Cursor:
 
 @dataclass
 class Health:
-    """Everything but the rows. ``link``: opening, live, playing, paused, over or lost; ``words`` tells why."""
+    """Everything but the rows. ``link``: opening, live, playing, paused, over or lost; ``words`` explains it."""
 
     link: str = "opening"
     words: str = ""
     source: str = ""
     board: str = ""
     live: bool = True
-    epoch: int = 0  # of what plays: numbers and times start anew
+    epoch: int = 0  # counts openings of the source; sequence numbers and times start over with each
     frames_per_s: float = 0.0
     stats: dict[str, int] = field(default_factory=dict)
     status: dict[str, int] = field(default_factory=dict)
@@ -82,7 +82,7 @@ class Health:
 
 
 class State:
-    """Written by the reader, read by anybody."""
+    """Written by the reader, read by any thread."""
 
     def __init__(self, source: str) -> None:
         self._news = threading.Condition()
@@ -100,7 +100,7 @@ class State:
     # ---- the reader's side ---------------------------------------------------------------------
 
     def say(self, link: str, words: str) -> None:
-        """Change the link's state, and tell everybody at once."""
+        """Change the link's state and publish it at once."""
         with self._news:
             self._health.link, self._health.words = link, words
             if link in ("lost", "opening"):
@@ -110,7 +110,7 @@ class State:
             self._publish()
 
     def begin(self, player: Player) -> None:
-        """A new playing: counters and tares of the one before are nobody's."""
+        """Start a new epoch, and forget rows, status and tares of the previous one."""
         with self._news:
             self._health.epoch += 1
             self._frames.clear()
@@ -121,7 +121,7 @@ class State:
             self._arrived.clear()
 
     def take(self, batch: Batch, player: Player) -> None:
-        """Add what came."""
+        """Add a batch."""
         frames, pac = frame_rows(batch), pac_rows(batch)
         now_s = time.monotonic()
         with self._news:
@@ -147,15 +147,11 @@ class State:
         if isinstance(message, wire.Status):
             self._health.status = asdict(message)
         elif isinstance(message, wire.SensorStatus):
-            self._finger(message.finger).update(
-                asdict(message),
-                status_t_us=message.t_us,
-                t_us=message.t_us,
-            )
+            self._finger(message.finger).update(asdict(message), status_t_us=message.t_us, t_us=message.t_us)
         elif isinstance(message, wire.Event):
             t_us, name = nearest(message.t_us, now_us), kind_name(message).lower()
             self._health.events.append({"finger": message.finger, "t_us": t_us, "name": name})
-            self._health_due_s = 0.0  # told at once
+            self._health_due_s = 0.0  # publish at once
         elif isinstance(message, wire.Tare):
             self._finger(message.finger).update(
                 tare_state=message.tare_state, tare_reason=message.reason, tare_age_ms=0, status_t_us=message.t_us
@@ -165,7 +161,7 @@ class State:
         while len(self._arrived) > 1 and now_s - self._arrived[0][0] > RATE_S:
             self._arrived.popleft()
         span_s = now_s - self._arrived[0][0]
-        # The first batch only says when counting began.
+        # The first batch only marks the start of counting.
         rate = sum(count for _, count in islice(self._arrived, 1, None)) / span_s if span_s > 0 else 0.0
         self._health.frames_per_s = round(rate, 1)
         self._health.stats = asdict(stats)
@@ -180,7 +176,7 @@ class State:
         self._news.notify_all()
 
     def close(self) -> None:
-        """Let everybody who waits go."""
+        """Release all waiting threads."""
         with self._news:
             self._closed = True
             self._news.notify_all()
@@ -189,16 +185,16 @@ class State:
 
     @property
     def closed(self) -> bool:
-        """Nothing comes any more."""
+        """True when nothing more will come."""
         return self._closed
 
     def cursor(self) -> Cursor:
-        """Where a new browser starts: with the latest rows, so that it shows something even when nothing comes."""
+        """Cursor of a new browser: at the rows still kept, so that it shows something even if nothing new comes."""
         with self._news:
             return Cursor(self._frames.begin, self._pac.begin)
 
     def wait(self, cursor: Cursor, timeout_s: float) -> str:
-        """Wait for news; return them as one JSON text and move ``cursor``. Empty after timeout_s without any."""
+        """Wait for news; return them as one JSON text and advance ``cursor``. Empty after timeout_s without any."""
         with self._news:
             self._news.wait_for(lambda: self._closed or self._is_news(cursor), timeout_s)
             if not self._is_news(cursor):
@@ -217,10 +213,10 @@ class State:
 
 
 def tared(finger: int, facts: dict[str, Any]) -> dict[str, Any]:
-    """A finger's facts with the tare's age as of its latest frame; the board tells it only once a second."""
+    """A finger's facts, with the tare's age as of its latest frame; the board sends the age only once a second."""
     out = {"finger": finger} | {k: v for k, v in facts.items() if k not in ("t_us", "status_t_us", "req_id")}
     if "tare_age_ms" in facts:
         later_ms = (facts["t_us"] - facts["status_t_us"]) % 2**32 // 1000
-        # A frame older than the status makes the difference wrap: no age is that long.
+        # The difference wraps if the frame is older than the status; no real age is that long.
         out["tare_age_ms"] = facts["tare_age_ms"] + (later_ms if later_ms < 2**31 // 1000 else 0)
     return out

@@ -1,1 +1,1 @@
-"""The wire: generated messages, framing, the decoder, and batches of numbered frames."""
+"""The wire protocol: generated messages, framing, the decoder, and batches of numbered frames."""

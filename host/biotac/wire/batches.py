@@ -1,7 +1,7 @@
-"""From checked messages to arrays, with sequence numbers and device time unwrapped and losses counted.
+"""From bytes to arrays, with sequence numbers and device times unwrapped and losses counted.
 
-The live link, the recorder's reader and the tests all feed the same class. The work is C (host/binding/intake.c), and
-so is waiting for a port and reading it (host/binding/descriptor.c).
+The live link, the reader of recordings and the tests all feed the same class. The work is done in C
+(host/binding/decode/intake.c), as is waiting for a port and reading it (descriptor.c next to it).
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ _NO_PAC, _NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (PAC_DTYPE, IDLE_DTY
 
 @dataclass
 class Batch:
-    """What one chunk of bytes completed.
+    """The messages that one chunk of bytes completed.
 
-    ``wire`` holds the FRAME messages as sent (DTYPES), ``seq`` and ``t_us`` (int64) their unwrapped
-    numbers and device times, ``frames`` the same rows in user units, converted when first asked for;
-    ``pac`` is PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order. ``fingers`` is a bit mask:
-    others have no row in ``wire`` and ``idle``; -1 where it was not looked at.
+    ``wire`` holds the FRAME messages as sent (DTYPES); ``seq`` and ``t_us`` (int64) are their unwrapped sequence
+    numbers and device times in us. ``frames`` are the same rows in user units, converted on first use. ``pac`` is
+    PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order. ``fingers`` is the bit mask of the
+    fingers that may have rows in ``wire`` and ``idle``; -1 where this is unknown.
     """
 
     wire: StructArray
@@ -60,10 +60,10 @@ class Batch:
         """The FRAMEs in user units, FRAME_DTYPE (n,)."""
         return frames_from_wire(self.wire, self.seq, self.t_us)
 
-    if not TYPE_CHECKING:  # for which it would be any attribute
+    if not TYPE_CHECKING:  # to a type checker, __getattr__ would allow any attribute
 
         def __getattr__(self, name: str) -> NDArray[np.int64]:
-            # Two columns of what StreamDecoder makes, when first asked for: most live programs never do.
+            # Two columns of StreamDecoder's batches, made on first use: most live programs never use them.
             if name not in ("seq", "t_us") or "wire" not in self.__dict__:
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
             n = len(self.wire)
@@ -84,7 +84,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class LinkStats:
-    """Health of the link as this side sees it."""
+    """Counts that show the health of the link, as seen from this side."""
 
     bytes_received: int
     frames: int
@@ -93,42 +93,42 @@ class LinkStats:
     disordered: int  # sequence numbers that repeat or step back, as after a reboot
     crc_errors: int
     other_errors: int
-    batches_skipped: int = 0  # came, and were let go for a consumer that was too slow
+    batches_skipped: int = 0  # arrived, but dropped because a consumer was too slow
     frames_skipped: int = 0
-    gaps: int = 0  # times in which the board was away
+    gaps: int = 0  # how many times the board was away
 
 
 class StreamDecoder:
-    """Chunks of bytes in, batches of arrays out; what is lost is known by the sequence numbers."""
+    """Chunks of bytes in, batches of arrays out; losses are counted by the sequence numbers."""
 
     def __init__(self) -> None:
         self._state: Any = new("bt_intake *")
         lib.bt_intake_reset(self._state)
-        self._alone = threading.Lock()  # C works without Python's lock
+        self._alone = threading.Lock()  # needed because the C code runs without Python's lock
         # Views of the state; they do not keep it alive, self._state does.
         self._facts = ffi.buffer(self._state.facts)
         self._out = ffi.buffer(self._state.out)
         self._in = ffi.buffer(getattr(self._state, "in"))
         #: (finger, seq before the gap, frames lost) of every gap so far.
         self.lost_after: list[tuple[int, int, int]] = []
-        # Of the last call that gave a batch.
-        self.taken = 0  #: bytes
-        self.arrived_s = 0.0  #: when ``read`` had them, by time.monotonic()
+        # These are of the last call that returned a batch.
+        self.taken = 0  #: how many bytes it took
+        self.arrived_s = 0.0  #: when ``read`` got them, by time.monotonic()
         self.last_t_us: int | None = None  #: device time of the latest frame or heartbeat
 
     @property
     def lost(self) -> int:
-        """Frames that were made and never came."""
+        """How many frames were made but never arrived."""
         return int(self._state.rounds.lost)
 
     @property
     def lost_pac(self) -> int:
-        """PAC blocks that were made and never came."""
+        """How many PAC blocks were made but never arrived."""
         return int(self._state.pacs.lost)
 
     @property
     def disordered(self) -> int:
-        """Numbers that repeat or step back, as after a reboot."""
+        """How many sequence numbers repeated or stepped back, as after a reboot."""
         return int(self._state.rounds.disordered + self._state.pacs.disordered)
 
     @property
@@ -137,7 +137,7 @@ class StreamDecoder:
         return counts_of(self._state.decoder)
 
     def stats(self, bytes_received: int, frames: int) -> LinkStats:
-        """All counts, with what the caller has counted."""
+        """All counts, together with those of the caller."""
         counts = self.counts
         return LinkStats(
             bytes_received=bytes_received,
@@ -150,7 +150,7 @@ class StreamDecoder:
         )
 
     def accept_newer_minor(self) -> None:
-        """The peer's wire minor is newer: its messages may be longer than known here."""
+        """Accept messages that are longer than known here, from a peer with a newer wire minor."""
         self._state.decoder.allow_longer = True
 
     def unwrap_t_us(self, t_us: int) -> int:
@@ -160,7 +160,7 @@ class StreamDecoder:
     def feed(self, chunk: Buffer) -> Batch:
         """Take any number of bytes; return what they complete.
 
-        Raises RuntimeError when another thread is in here: bytes of two threads have no order.
+        Raises RuntimeError when another thread is in ``feed``: bytes from two threads have no order.
         """
         if not self._alone.acquire(blocking=False):
             raise RuntimeError("another thread feeds this decoder; give each thread a decoder of its own")
@@ -172,7 +172,7 @@ class StreamDecoder:
     def _feed(self, chunk: Buffer) -> Batch:
         size = len(chunk)
         if type(chunk) is bytes and size <= ONE_STEP_BYTES:
-            # cffi hands the bytes' address over, which is faster than to borrow a buffer.
+            # cffi passes the address of bytes, which is faster than borrowing a buffer.
             _feed(self._state, chunk, size)
             return self._batch()
         batches: list[Batch] = []
@@ -188,13 +188,13 @@ class StreamDecoder:
         return batch
 
     def read(self, fd: int, timeout_s: float) -> Batch | None:
-        """Wait for bytes of a port and return what they complete, like ``feed``: all in C, other threads run on.
+        """Wait for bytes from a port and return what they complete, like ``feed``, all in C; other threads run on.
 
-        None when nothing comes within timeout_s. OSError when the port is gone. POSIX only.
+        None when nothing comes within timeout_s. Raises OSError when the port is gone. POSIX only.
         """
         got = _read(self._state, fd, timeout_s)
         if got == _AGAIN:
-            # Python's own handler of a signal runs between these lines.
+            # Python's signal handlers run between these lines.
             deadline_s = time.monotonic() + timeout_s
             while got == _AGAIN:
                 got = _read(self._state, fd, deadline_s - time.monotonic())
@@ -205,11 +205,11 @@ class StreamDecoder:
         raise OSError("it hung up") if got == _HUNG_UP else OSError(-got, os.strerror(-got))
 
     def chunk(self) -> bytes:
-        """The bytes of the last ``read`` that gave something."""
+        """The bytes of the last ``read`` that returned a batch."""
         return bytes(self._in[: self.taken])
 
     def _batch(self) -> Batch:
-        # What the state has is copied out: the next call writes over it.
+        # Copy everything out of the state: the next call overwrites it.
         self.taken, arrived_ns, size, n, pacs, idles, others, gaps, last_us, fingers = _FACTS(self._facts)
         self.arrived_s = arrived_ns * 1e-9
         self.last_t_us = last_us if n or idles else None
@@ -245,12 +245,12 @@ class StreamDecoder:
 
 
 def known(others: list[tuple[int, bytes]]) -> list[Any]:
-    """Messages of known ids; the others are a newer peer's."""
+    """The messages with known ids; the others come from a newer peer and are left out."""
     return [wire.MESSAGES[message_id].unpack(payload) for message_id, payload in others if message_id in wire.MESSAGES]
 
 
 def split(batch: Batch, end_us: int) -> tuple[Batch, Batch]:
-    """Rows before device time ``end_us``, and the rest."""
+    """The rows before device time ``end_us``, with all messages, and the other rows."""
     now = batch.t_us < end_us
     pac_now = batch.pac["t_us"] < end_us
     idle_now = batch.idle["t_us"] < end_us

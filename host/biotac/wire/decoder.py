@@ -1,4 +1,4 @@
-"""The link's bytes to arrays of wire messages, a chunk at a time, in C (host/binding/decode.c). No I/O."""
+"""From the link's bytes to arrays of wire messages, a chunk at a time, in C (host/binding/decode/decode.c). No I/O."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from . import messages_gen as wire
 from .dtypes_gen import DTYPES
@@ -16,9 +15,9 @@ from .native import ffi, lib
 
 Buffer = bytes | bytearray | memoryview
 
-STREAMED = (wire.Frame.ID, wire.Pac.ID, wire.Idle.ID)  # what comes as rows; by enum bt_decoded
+STREAMED = (wire.Frame.ID, wire.Pac.ID, wire.Idle.ID)  # the messages that come as rows, in the order of enum bt_decoded
 
-# Looked up once: a chunk of few messages takes no longer than a few of these would.
+# Looked up once: a few of these look-ups would take as long as a chunk of few messages.
 _decode = lib.bt_decode
 _from_buffer = ffi.from_buffer
 _unpack = ffi.unpack
@@ -28,17 +27,17 @@ NO_FRAME, NO_PAC, NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (FRAME, PAC,
 _KINDS = int(lib.BT_DECODED_KINDS)
 ONE_STEP_BYTES = int(lib.bt_decode_bytes())
 
-# Not cleared, the reset sets what is read: most of it is room that a short connection never touches.
+# Not cleared, because the reset sets what is read: most of the memory is never touched by a short connection.
 new = ffi.new_allocator(should_clear_after_alloc=False)
 
 
 @dataclass(slots=True)
 class Decoded:
-    """What one chunk of bytes completed.
+    """The messages that one chunk of bytes completed.
 
-    ``frames``, ``pacs`` and ``idles`` are the FRAME, PAC and IDLE messages as sent (DTYPES), each in the
-    order of arrival and read-only. ``others`` are the rest as (message id, payload), with the ids that this
-    library does not know. ``ids`` has the id of every message, a byte each: it tells the order among all of them.
+    ``frames``, ``pacs`` and ``idles`` are the FRAME, PAC and IDLE messages as sent (DTYPES), each in order of arrival
+    and read-only. ``others`` are the rest as (message id, payload), including ids that this library does not know.
+    ``ids`` has the id of every message, one byte each, which gives the order among all of them.
     """
 
     frames: StructArray
@@ -47,12 +46,8 @@ class Decoded:
     others: list[tuple[int, bytes]]
     ids: bytes
 
-    def order(self, message_id: int) -> NDArray[np.intp]:
-        """Where among all messages those of ``message_id`` came, counted from 0."""
-        return np.flatnonzero(_frombuffer(self.ids, np.uint8) == message_id)
-
     def messages(self) -> list[tuple[int, bytes]]:
-        """All as (message id, payload), in the order of arrival. Slow: for few messages."""
+        """All messages as (message id, payload), in order of arrival. Slow: for few messages only."""
         rows = map(iter, (self.frames, self.pacs, self.idles))
         streams = dict(zip(STREAMED, rows, strict=True))
         others = iter(self.others)
@@ -65,8 +60,8 @@ class Decoded:
 class Decoder:
     """Splits a byte stream into checked messages; any chunking gives the same messages.
 
-    A frame that is damaged is counted and left out, and so is a known id with another length. What no
-    delimiter has ended yet waits for the next chunk.
+    A damaged frame is counted and left out, and so is a known id with a wrong length. Bytes that no delimiter has ended
+    yet wait for the next chunk.
     """
 
     def __init__(self) -> None:
@@ -81,8 +76,8 @@ class Decoder:
         """Take any number of bytes; return what they complete."""
         size = len(chunk)
         if type(chunk) is bytes and size <= ONE_STEP_BYTES:
-            # cffi hands the bytes' address over, which is faster than to borrow a buffer. All in one place: to
-            # call for the parts is a quarter of the time of a chunk of 4096 bytes.
+            # cffi passes the address of bytes, which is faster than borrowing a buffer. All in one place, because
+            # calling functions for the parts would cost a quarter of the time of a chunk of 4096 bytes.
             _decode(self._state, chunk, size)
             n_frames, n_pacs, n_idles, n_others, n_ids = _unpack(self._filled, _KINDS)
             return Decoded(
@@ -98,7 +93,7 @@ class Decoder:
             at = 0
             while at < size:
                 at += _decode(self._state, data + at, size - at)
-                # Copies: the next call writes over what this one completed.
+                # Copies, because the next call overwrites what this one completed.
                 steps.append(tuple(rows[:n] for rows, n in zip(self._data, _unpack(self._filled, _KINDS), strict=True)))
         frames, pacs, idles, others, ids = (b"".join(parts) for parts in zip(*steps, strict=True))
         return Decoded(_frombuffer(frames, FRAME), _frombuffer(pacs, PAC), _frombuffer(idles, IDLE), pairs(others), ids)
@@ -112,7 +107,7 @@ class Decoder:
     def allow_longer(self) -> bool:
         """Accept payloads longer than this library knows, for a peer whose wire minor is newer.
 
-        Fields are append-only, so the known ones are at the front; the rest is cut off.
+        Fields are only ever appended, so the known ones come first; the rest is cut off.
         """
         return bool(self._state.allow_longer)
 
@@ -122,13 +117,13 @@ class Decoder:
 
 
 def counts_of(decoder: Any) -> FramingCounts:
-    """What became of the bytes that a C struct bt_decoder was given."""
+    """What became of the bytes that were fed to a C struct bt_decoder."""
     _, *outcomes = decoder.outcomes
     return FramingCounts(*map(int, outcomes))
 
 
 def pairs(others: bytes) -> list[tuple[int, bytes]]:
-    """(message id, payload) of BT_DECODED_OTHER."""
+    """The (message id, payload) pairs in the bytes of BT_DECODED_OTHER."""
     out = []
     at = 0
     while at < len(others):

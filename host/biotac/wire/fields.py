@@ -1,7 +1,7 @@
-"""What a row is made of: the one table of names, units and marks for live rows, recordings, views and exports.
+"""The columns of rows: the one table of names, units and invalid marks for live rows, recordings, views and exports.
 
-``FRAME_DTYPE``, ``Frame``, JSON, every export's columns and the page host/docs/rows.md are made of it, or held to it
-by tests.
+``FRAME_DTYPE``, ``Frame``, JSON, the columns of every export and the page host/docs/rows.md are made from it, or
+checked against it by tests.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .messages_gen import INVALID_COUNT, INVALID_I16, INVALID_I32
 from .sensor_gen import ELECTRODE_NAMES
@@ -19,16 +20,18 @@ AXES = ("x", "y", "z")
 PAC_SAMPLES = tuple(str(k) for k in range(22))
 _ELECTRODES = tuple(ELECTRODE_NAMES)
 
-#: Marks of no value in the wire's integers, by type.
-WIRE_INVALID = {"u2": INVALID_COUNT, "u4": 0xFFFFFFFF, "i2": INVALID_I16, "i4": INVALID_I32}
+#: The marks for a missing value in the wire's integers, by type.
+INVALID_U32 = 0xFFFFFFFF
+WIRE_INVALID = {"u2": INVALID_COUNT, "u4": INVALID_U32, "i2": INVALID_I16, "i4": INVALID_I32}
 
 
 @dataclass(frozen=True)
 class Field:
-    """A column. ``dtype`` is NumPy's; ``parts`` name the components of a vector, in flat formats a column each.
+    """A column. ``dtype`` is NumPy's; ``parts`` name the components of a vector, which flat formats split into columns.
 
-    ``sent`` is the FRAME message's field that it is made of, ``per_unit`` of whose steps are one ``unit``, and None
-    where the value is sent as it is. ``invalid`` marks no value in an integer column; in a float column it is NaN.
+    ``sent`` is the field of the message that it is made from. ``per_unit`` of that field's steps make one ``unit``;
+    None means that the value is sent as it is. ``invalid`` marks a missing value in an integer column; in a float
+    column that is NaN.
     """
 
     name: str
@@ -42,11 +45,11 @@ class Field:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of one row's value."""
+        """Shape of one row's value."""
         return (len(self.parts),) if self.parts else ()
 
     def flat_names(self) -> tuple[str, ...]:
-        """Names in a flat table: ``force_x_n`` for force_n, x (the unit stays at the end), ``counts_E1``."""
+        """Names in a flat table: ``force_x_n`` for part x of force_n (the unit stays at the end), ``counts_E1``."""
         stem, _, unit = self.name.rpartition("_")
         named = stem and unit in _UNITS
         return tuple(f"{stem}_{part}_{unit}" if named else f"{self.name}_{part}" for part in self.parts) or (self.name,)
@@ -65,7 +68,7 @@ def _count(name: str, what: str, parts: tuple[str, ...] = ()) -> Field:
     return Field(name, "<u2", "count", f"{what}, 0 to 4095; 65535 where missing", parts, name, None, INVALID_COUNT)
 
 
-#: A row a finger and round of slots (10 ms).
+#: One row per finger and round of slots (10 ms).
 FRAME_FIELDS = (
     _FINGER,
     *_TIME,
@@ -121,10 +124,10 @@ FRAME_FIELDS = (
     Field("flags", "<u4", "1", "bits of flags frame in MESSAGES.md; they say why a result is invalid", (), "flags"),
 )
 
-#: A row a finger and round: 22 samples, the k-th k/2200 s after t_us.
+#: One row per finger and round: 22 samples, sample k (from 0) is k/2200 s after t_us.
 PAC_FIELDS = (_FINGER, *_TIME, _count("pac", "dynamic pressure", PAC_SAMPLES))
 
-#: A row a finger and round: how strongly PAC vibrated, by octaves (SPEC.md, Bands).
+#: One row per finger and round: how strongly PAC vibrated, by octave (SPEC.md, Bands).
 BANDS_FIELDS = (
     _FINGER,
     *_TIME,
@@ -140,7 +143,7 @@ BANDS_FIELDS = (
     ),
 )
 
-#: Heartbeats of untouched fingers: a row stands for ``frames`` rounds of which no FRAME was sent; ``seq`` is the last.
+#: Heartbeats of untouched fingers: a row stands for ``frames`` rounds without a FRAME, the last of which is ``seq``.
 IDLE_FIELDS = (
     _FINGER,
     *_TIME,
@@ -154,21 +157,26 @@ IDLE_FIELDS = (
 
 
 def dtype_of(fields: Sequence[Field]) -> np.dtype[np.void]:
-    """A structured dtype of rows of ``fields``."""
+    """The structured dtype of rows with these ``fields``."""
     return np.dtype([(field.name, field.dtype, field.shape) for field in fields])
 
 
 def values_of(field: Field, sent: Any) -> Any:
-    """The column of ``field`` made of what was sent, (n,) or (n, parts): in its unit and type, NaN where invalid."""
+    """The column of ``field``, (n,) or (n, parts), from what was sent: in its unit and type, NaN where invalid."""
     if field.per_unit is None:
         return sent.astype(field.dtype, copy=False)
-    out = np.divide(sent, field.per_unit, dtype=np.float64)
-    out[sent == WIRE_INVALID[sent.dtype.str[1:]]] = np.nan
-    return out.astype(field.dtype, copy=False)
+    return to_units(sent, field.per_unit).astype(field.dtype, copy=False)
+
+
+def to_units(raw: Any, per_unit: int) -> NDArray[np.float64]:
+    """Divide integers by ``per_unit``; invalid (the type's minimum, or 0xFFFF unsigned) becomes NaN."""
+    out: NDArray[np.float64] = np.divide(raw, per_unit, dtype=np.float64)
+    out[raw == WIRE_INVALID[raw.dtype.str[1:]]] = np.nan
+    return out
 
 
 def sent_of(field: Field, values: Any, dtype: np.dtype[Any]) -> Any:
-    """Inverse of values_of: integers of the message's ``dtype``, NaN as its mark of no value."""
+    """Inverse of values_of: integers of the message's ``dtype``, with its invalid mark for NaN."""
     if field.per_unit is None:
         return values.astype(dtype, copy=False)
     scaled = np.rint(values.astype(np.float64) * field.per_unit)
@@ -176,7 +184,7 @@ def sent_of(field: Field, values: Any, dtype: np.dtype[Any]) -> Any:
 
 
 def as_json(row: Any, fields: Sequence[Field] = FRAME_FIELDS) -> dict[str, Any]:
-    """One row, of a structured array or with the fields as attributes, of JSON types only: invalid is None."""
+    """One row, of a structured array or an object with the fields as attributes, as JSON types; None where invalid."""
     of = row.__getitem__ if isinstance(row, np.void) else lambda name: getattr(row, name)
     return {field.name: _json_value(np.asarray(of(field.name)), field) for field in fields}
 

@@ -1,4 +1,4 @@
-"""What a user sees of a frame: SI-like units, the same field names everywhere.
+"""Frames as users see them: in SI-like units, with the same field names everywhere.
 
 Wire integers become mm, N and N*mm here and nowhere else.
 """
@@ -14,17 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .dtypes_gen import DTYPES
-from .fields import (
-    BANDS_FIELDS,
-    FRAME_FIELDS,
-    IDLE_FIELDS,
-    PAC_FIELDS,
-    WIRE_INVALID,
-    Field,
-    dtype_of,
-    sent_of,
-    values_of,
-)
+from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field, dtype_of, sent_of, values_of
+from .fields import to_units as to_units
 from .messages_gen import INVALID_COUNT, FrameFlags, TareState
 from .messages_gen import Frame as _FrameMessage
 
@@ -35,17 +26,17 @@ Q4_PER_COUNT = 16
 
 StructArray = NDArray[np.void]
 
-#: One row per finger and round of slots; names, units and marks in fields.FRAME_FIELDS and host/docs/rows.md.
+#: One row per finger and round of slots; names, units and invalid marks are in host/docs/rows.md (fields.FRAME_FIELDS).
 FRAME_DTYPE = dtype_of(FRAME_FIELDS)
 
-#: Twenty-two dynamic pressure samples, 1/2200 s apart from ``t_us`` on; 0xFFFF where missing.
+#: 22 samples of dynamic pressure, 1/2200 s apart, the first at ``t_us``; 0xFFFF where missing.
 PAC_DTYPE = dtype_of(PAC_FIELDS)
 
 #: How strongly dynamic pressure vibrated in a round, in six octaves, the lowest first; ``t_us`` is that of PAC.
 BANDS_DTYPE = dtype_of(BANDS_FIELDS)
 
-#: Heartbeats of untouched fingers (Hand.subscribe): a row stands for ``frames`` rounds of which no FRAME
-#: was sent; ``seq`` is the last of them. ``energy_count2`` is the sum of squared signals.
+#: Heartbeats of untouched fingers (Hand.subscribe): a row stands for ``frames`` rounds for which no FRAME was sent;
+#: ``seq`` is that of the last one. ``energy_count2`` is the sum of the squared signals, in count^2.
 IDLE_DTYPE = dtype_of(IDLE_FIELDS)
 
 
@@ -59,11 +50,11 @@ def _no_sigma() -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One finger, one round of slots (10 ms). Equal to another when all values are, NaN to NaN.
+    """One round of slots (10 ms) of one finger. Two are equal when all values are equal, where NaN equals NaN.
 
-    Shapes: counts (19,) uint16; tare (19,) float32; poc_mm, force_n, torque_nmm, force_sigma_n (3,) float64; the rest
-    are numbers. Names, units and invalid marks as in FRAME_DTYPE. Force and torque act on the finger; x to the tip, y
-    to E11's side, z dorsal.
+    Shapes: counts (19,) uint16; tare (19,) float32; poc_mm, force_n, torque_nmm, force_sigma_n (3,) float64; the others
+    are numbers. Names, units and invalid marks are as in FRAME_DTYPE. Force and torque act on the finger; x points to
+    the tip, y to E11's side, z is dorsal.
     """
 
     finger: int
@@ -98,16 +89,9 @@ class Frame:
 
     @classmethod
     def from_row(cls, row: Any) -> Frame:
-        """Build from one row of a FRAME_DTYPE array."""
+        """Make a Frame from one row of a FRAME_DTYPE array."""
         values = {name: row[name].copy() if row[name].shape else row[name].item() for name in FRAME_DTYPE.names or ()}
         return cls(**values | {"flags": FrameFlags(values["flags"])})
-
-
-def to_units(raw: NDArray[Any], per_unit: int) -> NDArray[np.float64]:
-    """Divide integers by ``per_unit``; invalid (the type's minimum, or 0xFFFF unsigned) becomes NaN."""
-    out = raw / float(per_unit)
-    out[raw == WIRE_INVALID[raw.dtype.str[1:]]] = np.nan
-    return np.asarray(out, dtype=np.float64)
 
 
 def frames_from_wire(messages: StructArray, seq: NDArray[Any], t_us: NDArray[Any]) -> StructArray:
@@ -132,7 +116,7 @@ def _from_wire(
 
 
 def frames_to_wire(frames: StructArray) -> StructArray:
-    """Inverse of frames_from_wire: FRAME_DTYPE (n,) as the messages (n,) that it was made of, to the bit."""
+    """Inverse of frames_from_wire: the FRAME messages (n,) from which FRAME_DTYPE (n,) was made, to the bit."""
     out = np.zeros(len(frames), DTYPES[_FrameMessage.ID])
     out["finger"] = frames["finger"]
     out["seq"], out["t_us"] = frames["seq"] & 0xFFFF, frames["t_us"] & 0xFFFFFFFF
@@ -143,7 +127,7 @@ def frames_to_wire(frames: StructArray) -> StructArray:
 
 
 def tare_to_q4(tare_counts: NDArray[np.float64]) -> NDArray[np.uint16]:
-    """A tare in counts 0..4095 to the board's 1/16 count, halves up; any shape."""
+    """A tare in counts 0..4095, of any shape, in the board's unit of 1/16 count; halves are rounded up."""
     return np.floor(tare_counts * 16 + 0.5).astype(np.uint16)
 
 

@@ -1,6 +1,6 @@
-"""Messages to the link's bytes: COBS, CRC-32, 0x00 (protocol/SPEC.md). No I/O in here; decode.py is the way back.
+"""From messages to the link's bytes: COBS, CRC-32, 0x00 (protocol/SPEC.md). No I/O; decoder.py is the way back.
 
-The judge of both is protocol/vectors/, which the C tests read too.
+Both are tested against protocol/vectors/, which the C tests read too.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ class FramingCounts:
 
     @property
     def bad(self) -> int:
-        """All refused frames."""
+        """How many frames were refused."""
         return self.too_long + self.bad_cobs + self.bad_crc + self.bad_length
 
 
 def encode(message_id: int, payload: bytes) -> bytes:
-    """Return one whole frame with its delimiter. ValueError for a payload of over 249 bytes."""
+    """Return one whole frame with its delimiter. Raises ValueError for a payload of over 249 bytes."""
     if len(payload) > PAYLOAD_MAX_BYTES:
         raise ValueError(f"a payload of {len(payload)} bytes, expected at most {PAYLOAD_MAX_BYTES}")
     out = ffi.new("uint8_t[]", ENCODED_MAX_BYTES)
@@ -42,9 +42,9 @@ def encode(message_id: int, payload: bytes) -> bytes:
 
 
 def open_frame(data: bytes) -> tuple[int, bytes] | None:
-    """Message id and payload of what stands between two delimiters; None when it is no good frame.
+    """Message id and payload of the bytes between two delimiters; None when they are not a valid frame.
 
-    For looking at single frames, whatever their length; streams go through decode.py.
+    This is for looking at single frames, whatever their length; streams go through decoder.py.
     """
     out = ffi.new("uint8_t[]", max(1, len(data)))
     n = lib.bt_cobs_decode(data, len(data), out)

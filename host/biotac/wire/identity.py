@@ -1,4 +1,4 @@
-"""What boards and sensors say of themselves, as text."""
+"""What boards and sensors say about themselves, as text."""
 
 from __future__ import annotations
 
@@ -6,25 +6,31 @@ from collections.abc import Iterable
 
 from . import messages_gen as wire
 
-# What HELLO says where there is no image, or one from before it said so.
+# HELLO's image_crc32 where there is no image, or one from before that field.
 NO_IMAGE = 0xFFFFFFFF
 
-# A Pico's number has 8 bytes; HELLO leaves room for 12 and fills up with zeros.
+# A Pico's serial number has 8 bytes; HELLO has room for 12, padded with zeros.
 SERIAL_BYTES = 8
 
 
 def board_text(board: int) -> str:
-    """A board's name, or its number when it is newer than this library."""
+    """A board's name, or its number if this library does not know it."""
     return wire.Board(board).name if board in list(wire.Board) else f"board {board}"
 
 
+def command_name(message_id: int) -> str:
+    """A command's name, or its number if this library does not know it."""
+    known = wire.MESSAGES.get(message_id)
+    return known.__name__ if known is not None else f"command 0x{message_id:02X}"
+
+
 def version_text(hello: wire.Hello) -> str:
-    """Firmware release."""
+    """The firmware's release."""
     return f"{hello.firmware_major}.{hello.firmware_minor}.{hello.firmware_patch}"
 
 
 def serial_text(hello: wire.Hello) -> str:
-    """The board's unique number as USB tells it: as text where it is text, else in hex."""
+    """The board's serial number as USB reports it: as text if it is text, else in hex."""
     raw = bytes(hello.board_serial)
     text = raw.rstrip(b"\0")
     if text and all(0x20 <= b < 0x7F for b in text):
@@ -33,6 +39,6 @@ def serial_text(hello: wire.Hello) -> str:
 
 
 def ascii_text(values: Iterable[int]) -> str:
-    """A sensor's zero-padded ASCII, such as its serial number; what is none, or would move a terminal, as U+FFFD."""
+    """A sensor's zero-padded ASCII, such as its serial number; U+FFFD for what is not printable ASCII."""
     text = bytes(values).rstrip(b"\0").decode("ascii", errors="replace")
     return "".join(c if c.isprintable() else "\ufffd" for c in text)

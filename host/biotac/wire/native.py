@@ -1,4 +1,4 @@
-"""The compiled firmware core, of the same schema as this package."""
+"""The compiled firmware core, checked to have the same schema as this package. Raises ImportError otherwise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A round's 44 slots: its length, and where each channel stands in it."""
+"""The 44 slots of a round: how long it is, and which slots each channel has."""
 
 from __future__ import annotations
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.calibrate.reference import Mounting, Reference, Samples
+from biotac.calibrate.reference.mounting import Mounting
 from biotac.calibrate.reference.rdt import RdtDecoder
+from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.reference.timing import align
 from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
 from biotac.calibrate.wrench.provenance import check_serial
@@ -86,7 +87,7 @@ def test_the_truth_of_every_row(recorded: tuple[Recording, Source], board: Board
 
 
 def test_three_axes_are_enough_for_force(board: Board, reference: Reference) -> None:
-    samples = replace(reference.samples, torque_nmm=None)
+    samples = replace(reference.samples, wrench=reference.samples.force_n)
     its = join("board.mcap", board, replace(reference, samples=samples))
     assert its.run.truth.shape[1] == 3
     assert np.isnan(its.on_skin_share)
@@ -96,7 +97,7 @@ def test_a_reference_of_a_tenth_of_the_rate(
     recorded: tuple[Recording, Source], board: Board, reference: Reference
 ) -> None:
     its = reference.samples
-    thin = Samples(its.t_s[::10], its.force_n[::10], None)
+    thin = Samples(its.t_s[::10], its.force_n[::10])
     found = join("board.mcap", board, replace(reference, samples=thin)).run.truth
     truth = truth_of(recorded, board)[: len(found), :3]
     assert np.sqrt(((found - truth) ** 2).mean(axis=0)).max() < 0.1
@@ -106,13 +107,13 @@ def test_a_gap_of_the_reference_is_left_out_and_not_bridged(board: Board, refere
     whole = join("board.mcap", board, reference)
     its = reference.samples
     gone = (its.t_s > its.t_s[0] + 135.0) & (its.t_s < its.t_s[0] + 137.0)
-    found = join("board.mcap", board, replace(reference, samples=Samples(its.t_s[~gone], its.force_n[~gone], None)))
+    found = join("board.mcap", board, replace(reference, samples=Samples(its.t_s[~gone], its.force_n[~gone])))
     assert len(whole.run.truth) - len(found.run.truth) == pytest.approx(200, abs=10)
 
 
 def spoilt(reference: Reference, how: str) -> Reference:
     its = reference.samples
-    t_s, force, torque = its.t_s.copy(), its.force_n.copy(), np.array(its.torque_nmm)
+    t_s, force, torque = its.t_s.copy(), its.force_n.copy(), its.wrench[:, 3:].copy()
     mounting = reference.mounting
     if how == "another run":
         order = np.argsort((t_s // 1.7 * 0.61803) % 1.0, kind="stable")
@@ -133,7 +134,7 @@ def spoilt(reference: Reference, how: str) -> Reference:
         force = np.clip(force, None, Nano17().zero[0] + 1.0)
     elif how == "wandering zero":
         force = force + np.sin(t_s / 11.0)[:, None]
-    return replace(reference, samples=Samples(t_s, force, torque), mounting=mounting)
+    return replace(reference, samples=Samples(t_s, np.column_stack([force, torque])), mounting=mounting)
 
 
 @pytest.mark.parametrize(

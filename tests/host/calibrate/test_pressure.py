@@ -17,6 +17,9 @@ from biotac.calibrate.pressure.fit import Fit, fit, told_by, verify
 from biotac.calibrate.pressure.force_source import MAX_LAG_ROWS, Series, check_alignment, lag_rows
 from biotac.calibrate.pressure.presses import GIVE_UP_ROWS, HOLD_ROWS, Phase, Press, Presses, Procedure, Rest, Step
 from biotac.calibrate.pressure.rows import ROW_DTYPE
+from biotac.core.compiled import pressure_filtered_q4
+from biotac.wire import messages_gen as wire
+from biotac.wire.frames import Q4_PER_COUNT
 
 K = 0.0125  # N per count
 REST = 1300.0
@@ -31,7 +34,9 @@ def course(
     words = REST + force / k + np.random.default_rng(seed).normal(0.0, 1.0, len(force)) * noise
     rows = np.zeros(len(force), ROW_DTYPE)
     rows["finger"], rows["t_us"] = finger, np.arange(len(force)) * ROUND_US
-    rows["pressure"], rows["rest"] = formulas.filtered(words, alpha), REST
+    for k in range(1, len(words)):
+        words[k] = alpha * words[k] + (1.0 - alpha) * words[k - 1]
+    rows["pressure"], rows["rest"] = words, REST
     rows["told_n"], rows["force_n"] = np.nan, force
     rows["touched"] = force > 0.05
     return rows
@@ -62,10 +67,12 @@ def its_fit(rows: Any) -> Fit:
 
 
 def test_the_filter_is_the_papers_by_hand() -> None:
-    assert formulas.filtered([100, 200, 200, 0], 0.5).tolist() == [100, 150, 175, 87.5]
-    assert formulas.filtered([100, 200], 1.0).tolist() == [100, 200]
-    broken = formulas.filtered([100, np.nan, 300, 400], 0.5)
-    assert np.isnan(broken[1]) and broken[[0, 2, 3]].tolist() == [100, 300, 350]
+    def filtered(words: list[int], filter_milli: int) -> list[float]:
+        return (pressure_filtered_q4(np.array(words, np.uint16), filter_milli) / Q4_PER_COUNT).tolist()
+
+    assert filtered([100, 200, 200, 60], 500) == [100, 150, 175, 117.5]
+    assert filtered([100, 200], 1000) == [100, 200]
+    assert filtered([100, wire.INVALID_COUNT, 300, 400], 500) == [100, wire.INVALID_COUNT / Q4_PER_COUNT, 300, 350]
 
 
 def test_k_is_the_pseudo_inverse() -> None:

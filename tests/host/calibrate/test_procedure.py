@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.calibrate.reference import LIN, Samples
 from biotac.calibrate.reference.csv_file import read_csv
+from biotac.calibrate.reference.mounting import LIN
 from biotac.calibrate.reference.rdt import HOLD_RECORDS
-from biotac.calibrate.reference.samples import Reference
+from biotac.calibrate.reference.samples import Reference, Samples
 from biotac.calibrate.wrench.coverage import CELLS_PER_REGION, REGIONS, Coverage, cell_of
-from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Places, Plan, Procedure, Step, walk
+from biotac.calibrate.wrench.guided import MAX_WARM_UP_S, TARE_FRAMES, Places, Procedure, Step, walk
 from biotac.calibrate.wrench.sources import load
 from biotac.errors import DeviceLostError, InputError
 from biotac.recording import Recording
@@ -37,7 +37,7 @@ def frames(begin: int, count: int, counts_per_min: float = 0.0, *, finger: int =
 
 def still(seconds: float, begin_s: float = 0.0, force_n: float = 0.0) -> Samples:
     t_s = begin_s + np.arange(0.0, seconds, 0.002)
-    return Samples(t_s, np.full((len(t_s), 3), force_n), np.zeros((len(t_s), 3)))
+    return Samples(t_s, np.tile([force_n] * 3 + [0.0] * 3, (len(t_s), 1)))
 
 
 def press(point: tuple[float, float, float], wrench: np.ndarray | None = None, seconds: float = 1.0) -> Samples:
@@ -47,7 +47,7 @@ def press(point: tuple[float, float, float], wrench: np.ndarray | None = None, s
     force = -3.0 * normal
     one = np.concatenate([force, np.cross(at, force)]) + (0.0 if wrench is None else wrench)
     t_s = np.arange(0.0, seconds, 0.002)
-    return Samples(t_s, np.tile(one[:3], (len(t_s), 1)), np.tile(one[3:], (len(t_s), 1)))
+    return Samples(t_s, np.tile(one, (len(t_s), 1)))
 
 
 # ---- warm-up and tare --------------------------------------------------------------------------
@@ -63,14 +63,14 @@ def test_a_finger_is_warm_below_the_limit(counts_per_min: float, warm: bool) -> 
     its.frames(frames(5900, 600, counts_per_min))
     assert (its.step is Step.TARE) == warm
     assert its.drift_counts_per_min == pytest.approx(counts_per_min, abs=0.5)
-    words = [event.words for event in its.take_events()]
+    words = its.take_events()
     assert words[0] == "warming up: leave the finger alone"
     assert (words[1:] == [f"warm: {its.drift_counts_per_min:+.1f} counts/min over the last minute"]) == warm
     assert its.take_events() == []
 
 
 def test_the_drift_is_the_last_minutes() -> None:
-    its = Procedure(0, LIN, Plan(max_drift_counts_per_min=5.0))
+    its = Procedure(0, LIN, max_drift_counts_per_min=5.0)
     its.frames(frames(0, 12_000, 60.0))
     assert its.step is Step.WARM_UP
     rest = frames(12_000, 3_000)
@@ -133,16 +133,16 @@ def test_a_reference_that_moves_is_not_zeroed() -> None:
     its = Procedure(0, LIN)
     at = tare(its, 0)
     moving = still(1.0, 3.0)
-    its.samples(Samples(moving.t_s, moving.force_n + np.linspace(0.0, 1.0, 500)[:, None], moving.torque_nmm))
+    its.samples(Samples(moving.t_s, moving.wrench + np.linspace(0.0, 1.0, 500)[:, None]))
     its.tared(accepted=True)
     its.frames(frames(at, TARE_FRAMES))
     assert its.step is Step.TARE and its.zero is None
-    assert "the reference moves by 0." in its.take_events()[-1].words
+    assert "the reference moves by 0." in its.take_events()[-1]
     its.samples(still(3.0, 5.0))
     its.frames(frames(at, TARE_FRAMES))
     assert its.step is Step.LOADS
     with pytest.raises(InputError, match="no torque: expected six axes"):
-        its.samples(Samples(moving.t_s, moving.force_n, None))
+        its.samples(Samples(moving.t_s, moving.force_n))
 
 
 # ---- coverage ----------------------------------------------------------------------------------
@@ -161,7 +161,7 @@ def test_a_reference_that_moves_is_not_zeroed() -> None:
 )
 def test_regions(point: tuple[float, float, float], region: str) -> None:
     its = Coverage()
-    its.add(press(point).wrench(), 0.002)
+    its.add(press(point).wrench, 0.002)
     touched = [name for name, cells in zip(REGIONS, its.cells, strict=True) if cells]
     assert touched == [region]
     assert its.cells.sum() == 1
@@ -184,7 +184,7 @@ def test_ways_and_forces_by_hand() -> None:
     at = np.array([-8.0, 0.0, -R])
     shear, twist = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -4.0])
     extra = np.concatenate([shear, np.cross(at, shear) + twist])
-    its.add(press((-8.0, 0.0, -R), extra).wrench(), 0.002)
+    its.add(press((-8.0, 0.0, -R), extra).wrench, 0.002)
     (line,) = [line for line in its.missing() if line.startswith("pad")]
     # 3 N exactly is neither light nor firm
     assert line == (
@@ -196,11 +196,11 @@ def test_ways_and_forces_by_hand() -> None:
 
 def test_too_short_or_too_light_is_not_covered() -> None:
     its = Coverage()
-    its.add(press((-8.0, 0.0, -R), seconds=0.2).wrench(), 0.002)
-    its.add(0.3 * press((-8.0, 0.0, -R)).wrench(), 0.002)
+    its.add(press((-8.0, 0.0, -R), seconds=0.2).wrench, 0.002)
+    its.add(0.3 * press((-8.0, 0.0, -R)).wrench, 0.002)
     its.add(np.full((500, 6), np.nan), 0.002)
     assert its.cells.sum() == 0
-    its.add(press((-8.0, 0.0, -R), seconds=0.1).wrench(), 0.002)
+    its.add(press((-8.0, 0.0, -R), seconds=0.1).wrench, 0.002)
     assert its.cells.sum() == 1
 
 
@@ -231,7 +231,7 @@ def walked(
         reader = Interrupting(hand.link.source, 0)
         reader.at_s, reader.error = (1e9 if at_s is None else at_s), error
         procedure = Procedure(0, reader.nano17.mounting)
-        walk(hand, reader, procedure, places, show=lambda event: words.append(event.words))
+        walk(hand, reader, procedure, places, show=words.append)
         assert not hand.streaming
         hand.set_setting(biotac.Setting.POC_WEIGHTS, 0)  # refused while streaming
     return procedure, words, places, reader

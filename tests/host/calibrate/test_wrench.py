@@ -266,8 +266,7 @@ def test_the_final_map_is_saved_and_predicts_the_same(validation: Validation, tm
     window, lag = final.window_rows, final.lag_rows[0]
     around = rows[:, None] + lag + np.arange(window) - window // 2
     mean = again.predict(run.counts[around].mean(axis=1))
-    coefficients = np.column_stack([choice.coefficients for choice in final.best])
-    np.testing.assert_allclose(mean[:, 0], predict(run, final, [coefficients], rows)[0, :, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(mean[:, 0], predict(run, final, [final.best], rows)[0, :, 0, 0], atol=1e-9)
     assert np.isnan(again.predict(np.full((1, 19), np.nan))).all()
     facts = json.loads(place.read_text())
     for change in (

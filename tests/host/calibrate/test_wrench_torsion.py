@@ -196,7 +196,7 @@ def test_the_finger_in_air_is_trained_in_where_contact_does_not_pay_for_it(tmp_p
 
 
 def test_air_weighs_as_much_as_the_run_before_its_share(run: Run) -> None:
-    sums = moments.air_sums(run, 1, run.truth.shape[1])
+    sums = moments.air_sums(run, 1)
     assert sums is not None
     assert sums.rows == pytest.approx(FRAMES)
     assert not sums.cross.any()  # the truth is 0

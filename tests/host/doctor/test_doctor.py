@@ -285,7 +285,7 @@ def test_every_code_has_a_case_and_a_page() -> None:
         assert f"## {code}\n" in page
         assert entry.meaning in page
         assert entry.cure in page
-    checked = [sys.executable, str(ROOT / "tools/make_doctor_page.py"), "--check"]
+    checked = [sys.executable, str(ROOT / "tools/make/doctor_page.py"), "--check"]
     assert subprocess.run(checked, capture_output=True, text=True).stderr == ""
 
 

@@ -64,15 +64,22 @@ def test_modem_manager_is_in_the_way_unless_udev_says_otherwise(root: Path) -> N
     assert look(PORT, root=root, entries=[]).left_alone
 
 
-def test_permission_and_holders_are_those_of_the_only_board(root: Path, monkeypatch) -> None:
-    entry = ListPortInfo(PORT, skip_link_detection=True)
-    entry.vid, entry.pid, entry.serial_number = wire.USB_VENDOR, wire.USB_PRODUCT, "A"
+def board_at(device: str, serial: str) -> ListPortInfo:
+    entry = ListPortInfo(device, skip_link_detection=True)
+    entry.vid, entry.pid, entry.serial_number = wire.USB_VENDOR, wire.USB_PRODUCT, serial
+    return entry
+
+
+def test_permission_and_holders_are_those_of_the_only_board_or_of_the_one_named(root: Path, monkeypatch) -> None:
+    entry, other = board_at(PORT, "A"), board_at("/dev/ttyACM1", "B")
     (root / "proc/71/fd").mkdir(parents=True)
     write(root / "proc/71/comm", "minicom\n")
     (root / "proc/71/fd/3").symlink_to(PORT)
     facts = look(None, root=root, entries=[entry])
     assert facts.permitted
     assert facts.holders == [Holder(71, "minicom")]
+    assert look("serial:a", root=root, entries=[entry, other]).holders == facts.holders
+    assert not look("serial:B", root=root, entries=[entry]).holders
     # Root may open everything, so the refusal is made up.
     monkeypatch.setattr("biotac.doctor.system.os.access", lambda path, mode: False)
     (root / "dev/ttyACM0").chmod(0o660)

@@ -12,9 +12,9 @@ from fake_flash_board import NEW_SETTING, FakeBoard, make_drive, make_image, no_
 from biotac.cli.main import main
 from biotac.errors import BiotacError, FlashError, InputError, NotAGatewayError
 from biotac.flash import Backup, carried, flash, loader_drive, read_backup, read_image
-from biotac.flash.every import flash_every
 from biotac.flash.image import Image
 from biotac.flash.loader_drive import linux_folders
+from biotac.flash.procedure import flash_every
 from biotac.hand.hand import Hand
 from biotac.wire import messages_gen as wire
 

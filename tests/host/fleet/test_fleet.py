@@ -85,7 +85,8 @@ def test_it_is_a_port_like_any_other(shared, tmp_path, capsys) -> None:
         assert hand.settings() == shared.hand.settings()
         hand.record(path)
         until(hand, 100)
-        assert hand.stats.frames_lost == hand.link.batches_lost == hand.stats.crc_errors == 0
+        assert hand.link.batches_lost == hand.stats.crc_errors == 0
+        assert hand.stats.frames_lost <= shared.hand.stats.frames_lost
     recording = biotac.Recording(path)
     assert len(recording.frames) >= 100 and not recording.problems
     assert main(["check", str(path)]) == 0
@@ -108,7 +109,7 @@ def test_readers_have_the_same_frames_and_no_answers_of_others(shared) -> None:
                 break
         answers = [m for m in told if getattr(m, "req_id", 0)]
         assert all(isinstance(m, wire.Reply) and m.command == wire.Start.ID for m in answers)
-        assert reading.stats.frames_lost == 0
+        assert reading.stats.frames_lost <= shared.hand.stats.frames_lost
 
 
 def test_who_may_command_is_said_and_kept_to(shared, capsys) -> None:
@@ -215,7 +216,8 @@ def test_batches_that_are_not_the_boards_are_left_alone(shared) -> None:
             rows += len(batch.frames)
             if rows > 200:
                 break
-        assert hand.link.batches_lost == hand.stats.frames_lost == hand.stats.disordered == 0
+        assert hand.link.batches_lost == hand.stats.disordered == 0
+        assert hand.stats.frames_lost <= shared.hand.stats.frames_lost
 
 
 def test_who_says_nonsense_of_himself_is_not_listed(shared, capsys) -> None:
@@ -232,11 +234,12 @@ def test_who_says_nonsense_of_himself_is_not_listed(shared, capsys) -> None:
 
 
 def test_a_slow_reader_loses_whole_batches_counted_and_hurts_nobody(shared, monkeypatch) -> None:
-    monkeypatch.setattr(zenoh_link, "MAX_WAITING_BYTES", 20_000)
     with biotac.open(shared.port()) as slow, biotac.open(shared.port()) as quick:
+        monkeypatch.setattr(slow.link, "max_waiting_bytes", 20_000)
         until(slow, 20)
         until(quick, 300)
-        assert quick.stats.frames_lost == quick.link.batches_lost == 0
+        assert quick.link.batches_lost == 0
+        assert quick.stats.frames_lost <= shared.hand.stats.frames_lost  # before it was shared: a busy computer's
         until(slow, 100)
         assert slow.link.batches_lost > 0 and slow.stats.frames_lost > 0
         assert slow.stats.crc_errors == slow.stats.other_errors == 0  # whole ones

@@ -13,6 +13,7 @@ from pathlib import Path
 import fake_spidev
 import numpy as np
 import pytest
+from kept_board import boot, serial_of
 from live_board import Clock, point
 from maps import BIG, make_map
 from mcap.reader import make_reader
@@ -28,18 +29,14 @@ from biotac.keep.map_blob import PART_BYTES, for_any_sensor, made_s, serial
 from biotac.link import spidev as spidev_link
 from biotac.link.serial_port import SerialLink
 from biotac.recording import Recording
+from biotac.recording.facts import Facts
 from biotac.recording.recompute import recompute
 from biotac.sim.loading import load_source
 from biotac.sim.ports import start_board
-from biotac.sim.process import SimBoard, SimLink
+from biotac.sim.process import SimBoard
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
-
-
-def serial_of(hand: biotac.Hand, finger: int) -> str:
-    return bytes(hand.sensor_info(finger).serial).rstrip(b"\0").decode()
-
 
 # ---- the header ------------------------------------------------------------------------------------
 
@@ -205,22 +202,6 @@ def test_a_board_that_rebooted_gets_its_maps_again(tmp_path: Path) -> None:
 # ---- what keeps maps -------------------------------------------------------------------------------
 
 
-class FlashBoard(SimBoard):
-    """A simulated board that keeps its flash in a file."""
-
-    flash: Path
-
-    def _start(self, options: list[str]):
-        return super()._start([*options, "--flash", str(self.flash)])
-
-
-def boot(flash: Path, serials: list[str] | None = None) -> biotac.Hand:
-    source = load_source("press.toml", fingers=2, seconds=1)
-    FlashBoard.flash = flash
-    board = FlashBoard(replace(source, serials=serials) if serials else source, pace=0.0, hold=True)
-    return biotac.Hand(SimLink("sim:flash", board))
-
-
 def test_a_saved_map_holds_after_the_next_boot(tmp_path: Path) -> None:
     flash = tmp_path / "flash"
     with boot(flash) as hand:
@@ -307,14 +288,10 @@ def test_a_recording_made_of_one_has_them_too(recorded: Path, tmp_path: Path) ->
 
 
 def test_a_recording_of_before_there_were_any_and_a_damaged_one(tmp_path: Path, monkeypatch) -> None:
-    from biotac.recording import writer
-
-    now = writer.describe
+    now = Facts.metadata
     for name, text in (("old", None), ("short", base64.b64encode(bytes(5)).decode()), ("no", "!")):
         maps = {} if text is None else {"maps": json.dumps({"0": text})}
-        monkeypatch.setattr(
-            writer, "describe", lambda *a, m=maps: {k: v for k, v in now(*a).items() if k != "maps"} | m
-        )
+        monkeypatch.setattr(Facts, "metadata", lambda *a, m=maps: {k: v for k, v in now(*a).items() if k != "maps"} | m)
         path = tmp_path / f"{name}.mcap"
         assert main(["record", "sim:press.toml", str(path), "--seconds", "0.3"]) == 0
         if text is None:

@@ -10,9 +10,10 @@ import pytest
 from live_board import Clock, Firmware, frame, point
 
 import biotac
-import biotac.recording.writer
+import biotac.recording
 from biotac.hand.hand import Hand
 from biotac.link.serial_port import SerialLink
+from biotac.recording.facts import Facts
 from biotac.wire import messages_gen as wire
 
 WAIT_S = 600.0
@@ -176,7 +177,7 @@ def test_a_recording_goes_on_and_holds_the_gap(world, tmp_path) -> None:
 
     there = world.plug(boot_id=1)
     hand = world.opened()
-    recorder = biotac.recording.writer.Recorder(tmp_path / "a.mcap", hand.info, {}, {}, [], hand.port)
+    recorder = biotac.recording.Recorder(tmp_path / "a.mcap", Facts(hand.info, [], {}), hand.port)
     hand._recorded.to(recorder)
     hand.run()
     send(there, frame(10), frame(11), b"\x05half")

@@ -264,9 +264,9 @@ class OldHost(Old):
         os.close(self._fd)
 
     def ask(self, command: str, **values: Any) -> tuple[str, dict[str, Any]]:
-        """The first answer with the command's number, or a refusal without one."""
+        """The first answer with the command's number, or a refusal without one; what is streamed has none."""
         os.write(self._fd, self.frame(command, **{"req_id": 9, **values}))
-        return self.hear(lambda name, its: its.get("req_id", 9) in (0, 9) and name != "FRAME")
+        return self.hear(lambda name, its: its.get("req_id") in (0, 9))
 
     def stream(self, seconds: int = 0) -> list[dict[str, Any]]:
         """FRAMEs of a moment."""

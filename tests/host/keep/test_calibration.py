@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import struct
-import subprocess
 import zlib
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cobs import cobs
+from kept_board import boot, serial_of
 
 import biotac
 from biotac import Calibration, CalibrationState, PocWeights, Setting
@@ -21,8 +21,9 @@ from biotac.keep import calibration_file as file
 from biotac.keep import record
 from biotac.lab.crosscheck import CrossCheck
 from biotac.recording import Recording
+from biotac.recording.facts import Facts
 from biotac.sim.loading import load_source
-from biotac.sim.process import SimBoard, SimLink
+from biotac.sim.process import SimBoard
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
 
@@ -208,26 +209,6 @@ def test_no_byte_of_a_record_may_change(at: int) -> None:
 # ---- a board with flash --------------------------------------------------------------------------
 
 
-class FlashBoard(SimBoard):
-    """A simulated board whose flash is a file."""
-
-    flash: Path
-
-    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
-        return super()._start([*options, "--flash", str(self.flash)])
-
-
-def boot(flash: Path, serials: list[str] | None = None) -> biotac.Hand:
-    source = load_source("press.toml", fingers=2, seconds=1)
-    FlashBoard.flash = flash
-    board = FlashBoard(replace(source, serials=serials) if serials else source, pace=0.0, hold=True)
-    return biotac.Hand(SimLink("sim:flash", board))
-
-
-def serial_of(hand: biotac.Hand, finger: int) -> str:
-    return bytes(hand.sensor_info(finger).serial).rstrip(b"\0").decode()
-
-
 def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_path: Path) -> None:
     flash = tmp_path / "flash"
     with boot(flash) as hand:
@@ -350,10 +331,8 @@ def test_a_recording_knows_the_calibrations_and_is_checked_by_them(two_gains: Pa
 
 
 def test_a_recording_of_before_there_were_any_is_still_checked(monkeypatch, capsys, tmp_path: Path) -> None:
-    from biotac.recording import writer
-
-    now = writer.describe
-    monkeypatch.setattr(writer, "describe", lambda *a: {k: v for k, v in now(*a).items() if k != "calibrations"})
+    now = Facts.metadata
+    monkeypatch.setattr(Facts, "metadata", lambda *a: {k: v for k, v in now(*a).items() if k != "calibrations"})
     path = tmp_path / "old.mcap"
     assert main(["record", "sim:press.toml", str(path), "--seconds", "1"]) == 0
     assert Recording(path).calibrations == {}
@@ -361,10 +340,8 @@ def test_a_recording_of_before_there_were_any_is_still_checked(monkeypatch, caps
 
 
 def test_a_recording_with_a_broken_calibration_is_refused(monkeypatch, tmp_path: Path) -> None:
-    from biotac.recording import writer
-
-    now = writer.describe
-    monkeypatch.setattr(writer, "describe", lambda *a: now(*a) | {"calibrations": '{"0": {"format": "x"}}'})
+    now = Facts.metadata
+    monkeypatch.setattr(Facts, "metadata", lambda *a: now(*a) | {"calibrations": '{"0": {"format": "x"}}'})
     path = tmp_path / "broken.mcap"
     assert main(["record", "sim:press.toml", str(path), "--seconds", "1"]) == 0
     with pytest.raises(biotac.RecordingError, match="damaged metadata"):

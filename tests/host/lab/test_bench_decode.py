@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import zlib
+from functools import partial
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def test_a_contestant_that_decodes_another_value_is_named(field: str) -> None:
     sent[message_id] = sent[message_id].copy()
     sent[message_id][field].reshape(len(sent[message_id]), -1)[77, -1] ^= 1
     contestant = decode._Contestant(
-        "it", [data], decode._ours(decode.Decoder, {decode.FRAME: "frames", decode.PAC: "pacs"})
+        "it", [data], partial(decode._ours, decode.Decoder, {decode.FRAME: "frames", decode.PAC: "pacs"})
     )
     with pytest.raises(RuntimeError, match=f"it decoded another {field} of {decode.NAMES[message_id]}"):
         decode._check(contestant, sent)

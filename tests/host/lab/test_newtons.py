@@ -11,7 +11,6 @@ import pytest
 
 from biotac.cli.main import main
 from biotac.lab.bench import newtons
-from biotac.lab.bench.newtons_picture import draw
 
 PACKAGE = "biotac.lab.bench"
 
@@ -41,7 +40,7 @@ def test_every_point_has_cycles_on_every_core() -> None:
 
 
 def test_the_picture_is_drawn(tmp_path: Path) -> None:
-    draw(outcome(), tmp_path / "newtons.png")
+    newtons.draw(outcome(), tmp_path / "newtons.png")
     assert (tmp_path / "newtons.png").read_bytes().startswith(b"\x89PNG")
 
 

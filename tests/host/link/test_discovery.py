@@ -46,7 +46,7 @@ def plugged(monkeypatch):
 
 
 def test_the_firmware_and_the_host_have_their_ids_from_one_place() -> None:
-    source = (ROOT / "firmware/port/rp2040/usb_descriptors.c").read_text()
+    source = (ROOT / "firmware/port/rp2040/usb/descriptors.c").read_text()
     assert "LOW(BT_USB_VENDOR)" in source
     assert "LOW(BT_USB_PRODUCT)" in source
     assert "0x1209" not in source

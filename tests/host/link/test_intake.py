@@ -1,4 +1,4 @@
-"""From bytes to numbered rows in C (host/binding/intake.c, descriptor.c), by chunks and from a port.
+"""From bytes to numbered rows in C (host/binding/decode/intake.c, descriptor.c), by chunks and from a port.
 
 The truth is the reference deframer with a loop over one message at a time.
 """

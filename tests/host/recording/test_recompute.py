@@ -85,7 +85,8 @@ def test_what_the_host_said_of_a_hold_is_heard_again(folder, timeout_ms: int) ->
     assert main(["recompute", str(folder / "grasp.mcap"), str(folder / "grasp_again.mcap")]) == 0
     again = biotac.Recording(folder / "grasp_again.mcap")
     assert again.wire.tobytes() == was.wire.tobytes()
-    assert tares(again) == tares(was)
+    # A TARE goes before its FRAME, and the recording may end between them.
+    assert tares(again) == [m for m in tares(was) if m.seq <= was.wire["seq"][-1]]
 
 
 @pytest.mark.parametrize("options", [[], ["--keep-tare"]])

@@ -17,6 +17,7 @@ from record_all import record_all
 import biotac
 from biotac.hand.subscription import AT_FIRST
 from biotac.recording import writer
+from biotac.recording.facts import Facts
 from biotac.wire import messages_gen as wire
 from biotac.wire.framing import encode
 
@@ -134,9 +135,9 @@ def test_messages_hold_what_their_schemas_say_and_no_nan(recorded: Path) -> None
 def test_a_second_on_the_recorders_clock_closes_a_block(tmp_path: Path) -> None:
     now_s = [100.0]
     with biotac.open("sim:press.toml?seconds=1") as hand:
-        info, settings, sensors = hand.info, hand.settings(), [hand.sensor_info(0)]
+        facts = Facts(hand.info, [hand.sensor_info(0)], hand.settings())
     path = tmp_path / "clock.mcap"
-    recorder = writer.Recorder(path, info, settings, {}, sensors, "test", clock_s=lambda: now_s[0], unix_ns=lambda: 7)
+    recorder = writer.Recorder(path, facts, "test", clock_s=lambda: now_s[0], unix_ns=lambda: 7)
     ping = encode(wire.Reply.ID, wire.Reply(1, wire.Ping.ID, 0).pack())
     sizes = []
     for step in (0.0, 0.5, 0.3, 0.2, 0.4, 0.3):
@@ -184,7 +185,7 @@ def test_whatever_a_board_says_the_wire_is_kept(recorded: Path, tmp_path: Path) 
     known = biotac.Recording(recorded)
     rng = np.random.default_rng(7)
     path = tmp_path / "wild.mcap"
-    recorder = writer.Recorder(path, known.info, known.settings, {}, known.sensors, "test", clock_s=lambda: 0.0)
+    recorder = writer.Recorder(path, Facts(known.info, known.sensors, known.settings), "test", clock_s=lambda: 0.0)
     wild = b""
     for message_id in (wire.Frame.ID, wire.Pac.ID, wire.Tare.ID, wire.Idle.ID, wire.Status.ID) * 60:
         wild += encode(message_id, rng.bytes(wire.MESSAGES[message_id].STRUCT.size))

@@ -17,8 +17,8 @@ import biotac
 from biotac.cli.main import main
 from biotac.hand.hand import Hand
 from biotac.link.ports import open_link
-from biotac.recording.playback import Playback
-from biotac.recording.replay_link import ReplayLink, open_replay
+from biotac.recording.replay.link import ReplayLink, open_replay
+from biotac.recording.replay.playback import Playback
 from biotac.wire import messages_gen as wire
 
 SECONDS = 4

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from net_ft_box import NetFtBox, Network
 
 from biotac.calibrate.reference import rdt
 from biotac.calibrate.reference.net_ft import SILENCE_S, NetFtReader, parse_address
-from biotac.calibrate.reference.samples import Samples, join
+from biotac.calibrate.reference.samples import Samples
 from biotac.errors import DeviceLostError, PortError
 from biotac.sim.loading import load_source
 from biotac.sim.nano17 import Nano17
-from biotac.sim.net_ft_box import NetFtBox, Network
 from biotac.sim.source import Source
 
 STEP_S = 0.1  # 50 datagrams: they fit any socket's buffer
@@ -50,7 +50,7 @@ def read_all(box: NetFtBox, reader: NetFtReader, seconds: float = 6.0) -> Sample
     for k in range(round(seconds / STEP_S)):
         box.advance((k + 1) * STEP_S)
         parts.append(reader.read())
-    return join([part for part in parts if len(part)])
+    return Samples(np.concatenate([p.t_s for p in parts]), np.concatenate([p.wrench for p in parts]))
 
 
 def test_the_box_tells_its_scale_and_its_number(box: NetFtBox) -> None:

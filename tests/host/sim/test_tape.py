@@ -36,60 +36,27 @@ def test_codes_are_those_of_the_c_simulator() -> None:
     assert (*codes, tape.UNPLUGGED, tape.SWAPPED) == (0xFFFF, 0xFFFE, 0xFFFD, 0xFFFC, 0xFFFB, 0xFFFA, 0xFFF9)
 
 
-def test_what_is_written_is_read(tmp_path: Path) -> None:
+def test_what_is_written_are_the_samples(tmp_path: Path) -> None:
     path = tmp_path / "a.tape"
     tape.write_tape(path, small())
-    read = tape.read_tape(path)
-    assert read.dtype == np.uint16
-    np.testing.assert_array_equal(read, small().samples)
-
-
-def damaged(data: bytes, at: int, new: bytes) -> bytes:
-    return data[:at] + new + data[at + len(new) :]
+    np.testing.assert_array_equal(np.frombuffer(path.read_bytes(), "<u2", offset=24).reshape(3, 2, 44), small().samples)
 
 
 @pytest.mark.parametrize(
-    ("damage", "words"),
+    ("samples", "words"),
     [
-        (lambda d: b"", "expected a tape"),
-        (lambda d: damaged(d, 7, b"2"), "BTTAPE02"),
-        (lambda d: d[:-1], "551 bytes: expected 552"),
-        (lambda d: d + b"\0", "553 bytes: expected 552"),
-        (lambda d: damaged(d, 16, b"\x36"), "54 slots"),
-        (lambda d: damaged(d, 20, b"\x01"), "reserved 1"),
-        (lambda d: damaged(d, 12, b"\x00")[:24], "0 frames"),
-        (lambda d: damaged(d, 24 + 2 * 3, b"\x00\x10"), "frame 0, finger 0, slot 3 holds 4096"),
-        (lambda d: damaged(d, 24 + 2 * 47, b"\xf8\xff"), "frame 0, finger 1, slot 3 holds 65528"),
+        (np.zeros((3, 44), dtype=np.uint16), "expected uint16"),
+        (np.zeros((3, 1, 43), dtype=np.uint16), "expected uint16"),
+        (np.zeros((3, 1, 44), dtype=np.int16), "samples are int16"),
+        (np.zeros((0, 1, 44), dtype=np.uint16), "0 frames"),
+        (np.zeros((3, 6, 44), dtype=np.uint16), "of 6 fingers"),
+        (np.full((3, 1, 44), 4096, dtype=np.uint16), "frame 0, finger 0, slot 0 holds 4096"),
+        (np.full((3, 1, 44), 65528, dtype=np.uint16), "frame 0, finger 0, slot 0 holds 65528"),
     ],
 )
-def test_a_damaged_tape_is_refused(tmp_path: Path, damage: object, words: str) -> None:
+def test_what_is_no_tape_is_not_written(tmp_path: Path, samples: np.ndarray, words: str) -> None:
     path = tmp_path / "a.tape"
-    tape.write_tape(path, small())
-    path.write_bytes(damage(path.read_bytes()))  # type: ignore[operator]
-    with pytest.raises(InputError) as caught:
-        tape.read_tape(path)
-    assert words in str(caught.value) and "\n" not in str(caught.value)
-
-
-def test_a_missing_tape_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot read the tape"):
-        tape.read_tape(tmp_path / "none.tape")
-
-
-@pytest.mark.parametrize(
-    "samples",
-    [
-        np.zeros((3, 44), dtype=np.uint16),
-        np.zeros((3, 1, 43), dtype=np.uint16),
-        np.zeros((3, 1, 44), dtype=np.int16),
-        np.zeros((0, 1, 44), dtype=np.uint16),
-        np.zeros((3, 6, 44), dtype=np.uint16),
-        np.full((3, 1, 44), 4096, dtype=np.uint16),
-    ],
-)
-def test_what_is_no_tape_is_not_written(tmp_path: Path, samples: np.ndarray) -> None:
-    path = tmp_path / "a.tape"
-    with pytest.raises(InputError, match="expected"):
+    with pytest.raises(InputError, match=words):
         tape.write_tape(path, Source(name="wrong", samples=samples))
     assert not path.exists()
 

@@ -1,4 +1,4 @@
-"""Unwrapped numbers and counted gaps (host/binding/numbering.c), against a plain loop over one message at a time."""
+"""Unwrapped numbers and counted gaps (host/binding/decode/numbering.c), against a loop over one message at a time."""
 
 from __future__ import annotations
 

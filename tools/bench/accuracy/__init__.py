@@ -1,1 +1,1 @@
-"""What tools/bench/front puts side by side: each kernel's errors, its cycles, and the sensor's own step."""
+"""What tools/bench/front compares: each kernel's errors, its cycles, and the effect of the sensor's own ADC step."""

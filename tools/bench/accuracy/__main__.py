@@ -1,4 +1,4 @@
-"""What tools/bench/front runs: count on the emulated boards, look for errors, write the front."""
+"""Run by tools/bench/front: count on the emulated boards, measure errors, write the front."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import boards
 
-from . import front, measure, picture
+from . import front, measure
 
 
 def main() -> int:
@@ -38,7 +38,7 @@ def main() -> int:
     (args.out / "front.md").write_text(table, encoding="utf-8")
     (args.out / "front.json").write_text(text, encoding="utf-8")
     if cores:
-        picture.draw(facts, args.out / "front.png")
+        front.draw(facts, args.out / "front.png")
     if args.commit:
         shutil.copy(args.out / "front.png", boards.ROOT / "host" / "docs" / "front.png")
     print(text if args.json else table, end="")

@@ -1,14 +1,14 @@
-"""Every kernel variant (tools/bench/variants) against the exact result, and against the others' time.
+"""Every kernel variant (tools/bench/variants): its error against the exact result, and its time against the others'.
 
-Errors are distances to exact sums finished in extended precision (errors.c): over random frames of six
-classes, and the worst that hill climbing finds. Times are ratios to the shipped kernel
-within one run: interleaved rounds, warmed buffers, medians.
+Errors are distances to exact sums finished in extended precision (errors.c): over random frames of six classes, and
+the worst that hill climbing finds. Times are ratios to the shipped kernel within one run: interleaved rounds, warmed
+buffers, medians.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -23,19 +23,14 @@ from biotac.lab.bench.timing import Contestant, timed
 from biotac.wire.messages_gen import PocWeights
 
 from . import limit, signals
+from .limit import QUANTITIES, rms
 
 ffi = cffi.FFI()
 ffi.cdef(re.sub("^#.*", "", Path(__file__).with_name("errors.h").read_text(encoding="utf-8"), flags=re.MULTILINE))
 
-#: What is compared, in the order of BT_KERNEL_ERRORS, and its unit. N*um is the wire's mN*mm.
-QUANTITIES: dict[str, str] = {
-    "PoC": "um",
-    "force": "mN",
-    "torque y, z": "N*um",
-    "torque x": "N*um",
-}
 WEIGHT_NAMES: dict[PocWeights, str] = dict(zip(PocWeights, boards.WEIGHTS, strict=True))
 SHIPPED = "shipped"
+Facts = dict[str, Any]
 ROUNDS = 15
 TIMED_FRAMES = 2000
 SEED = 2013
@@ -43,65 +38,16 @@ SEED = 2013
 
 @dataclass(frozen=True)
 class Effort:
-    """How hard to look for errors: frames per class, and hill climbing."""
+    """How hard to search for errors: frames per class, and hill climbing."""
 
     frames: int = 50_000
     restarts: int = 8
     steps: int = 10_000
 
 
-@dataclass(frozen=True)
-class ClassError:
-    """Over one class of frames; 0 where no frame of it has such a result."""
-
-    rms: float
-    max: float
-
-
-@dataclass(frozen=True)
-class Error:
-    """One quantity of one variant. ``unanswered`` is the share of frames with a point that it denies.
-
-    ``at_1n`` is the RMS over the frames of limit.py, the only one that its budget is for.
-    """
-
-    at_1n: float
-    rms: float
-    max: float
-    max_in: str
-    adversarial: float
-    unanswered: float
-    classes: dict[str, ClassError]
-
-    @property
-    def worst(self) -> float:
-        return max(self.max, self.adversarial)
-
-
-@dataclass(frozen=True)
-class Measured:
-    """One variant with one kind of weights; ``errors`` by quantity."""
-
-    times_shipped: float
-    errors: dict[str, Error]
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """One run. ``variants`` by name and weights, ``limits`` by weights and quantity."""
-
-    effort: Effort
-    variants: dict[str, dict[str, Measured]]
-    limits: dict[str, dict[str, float]]
-
-    def budget(self, weights: str, quantity: str) -> float:
-        """What a kernel may add to one ADC step at 1 N."""
-        return self.limits[weights][quantity] * limit.BUDGET_SHARE
-
-
 @cache
 def compiled() -> Any:
-    """errors.c and the variants, built by this machine's compiler."""
+    """errors.c and the variants, compiled for this machine."""
     build = boards.BUILD / "accuracy"
     boards.command("cmake", "-S", boards.ROOT, "-B", build, "-DBIOTAC_BENCH=ON")
     boards.command("cmake", "--build", build, "--target", "biotac_errors")
@@ -110,14 +56,17 @@ def compiled() -> Any:
 
 @cache
 def names() -> list[str]:
-    """The variants, in the C table's order."""
+    """The variants, in the order of the C table."""
     lib = compiled()
     return [ffi.string(lib.bt_kernel_name(k)).decode() for k in range(lib.bt_kernel_variants())]
 
 
-def measure(effort: Effort) -> Outcome:
-    """Errors and ratios of every variant, with the default gains and each kind of weights."""
-    variants: dict[str, dict[str, Measured]] = {name: {} for name in names()}
+def measure(effort: Effort) -> Facts:
+    """Errors by quantity and time ratios of every variant, by name and weights, with the default gains; as JSON types.
+
+    ``one_adc_step_at_1n`` has limit.one_step() by weights; a kernel may add up to ``budget_share`` of it.
+    """
+    variants: Facts = {name: {} for name in names()}
     limits = {}
     for weights, label in WEIGHT_NAMES.items():
         case = _case(weights)
@@ -135,9 +84,15 @@ def measure(effort: Effort) -> Outcome:
                 )
                 for kind, quantity in enumerate(QUANTITIES)
             }
-            variants[name][label] = Measured(ratios[index], errors)
-        limits[label] = dict(zip(QUANTITIES, limit.one_step(weights).values(), strict=True))
-    return Outcome(effort, variants, limits)
+            variants[name][label] = {"host_times_shipped": ratios[index], "errors": errors}
+        limits[label] = limit.one_step(weights)
+    return {
+        "effort": asdict(effort),
+        "quantities": QUANTITIES,
+        "one_adc_step_at_1n": limits,
+        "budget_share": limit.BUDGET_SHARE,
+        "variants": variants,
+    }
 
 
 def _case(weights: PocWeights) -> Any:
@@ -164,25 +119,26 @@ def _errors(index: int, case: Any, e_q4: signals.Signals) -> NDArray[np.float64]
     return out
 
 
-def _error(pressed: NDArray[np.float64], found: dict[str, NDArray[np.float64]], adversarial: float) -> Error:
+def _error(pressed: NDArray[np.float64], found: dict[str, NDArray[np.float64]], adversarial: float) -> Facts:
+    """One quantity of one variant. ``unanswered`` is the share of frames with a point for which the variant gives none.
+
+    ``at_1n`` is the RMS over the frames of limit.py, the only ones that the budget applies to. ``classes`` have RMS and
+    maximum for each class of frames, 0 where no frame of it has such a result.
+    """
     answered = {scene: column[np.isfinite(column)] for scene, column in found.items()}
     denied = sum(int(np.isinf(column).sum()) for column in found.values())
     everything = np.concatenate(list(answered.values()))
-    classes = {scene: ClassError(_rms(column), float(column.max(initial=0.0))) for scene, column in answered.items()}
-    max_in = max(classes, key=lambda scene: classes[scene].max)
-    return Error(
-        at_1n=_rms(pressed[np.isfinite(pressed)]),
-        rms=_rms(everything),
-        max=classes[max_in].max,
-        max_in=max_in,
-        adversarial=adversarial,
-        unanswered=denied / max(denied + len(everything), 1),
-        classes=classes,
-    )
-
-
-def _rms(column: NDArray[np.float64]) -> float:
-    return float(np.sqrt((column**2).mean())) if len(column) else 0.0
+    classes = {scene: {"rms": rms(column), "max": float(column.max(initial=0.0))} for scene, column in answered.items()}
+    max_in = max(classes, key=lambda scene: classes[scene]["max"])
+    return {
+        "at_1n": rms(pressed[np.isfinite(pressed)]),
+        "rms": rms(everything),
+        "max": classes[max_in]["max"],
+        "max_in": max_in,
+        "adversarial": adversarial,
+        "unanswered": denied / max(denied + len(everything), 1),
+        "classes": classes,
+    }
 
 
 def _climb(index: int, case: Any, kind: int, effort: Effort) -> float:
@@ -190,7 +146,7 @@ def _climb(index: int, case: Any, kind: int, effort: Effort) -> float:
 
 
 def _ratios(case: Any, e_q4: signals.Signals) -> list[float]:
-    """Per variant, its median time over that of the shipped kernel."""
+    """For each variant, its median time over that of the shipped kernel."""
     taken = (case, len(e_q4), ffi.from_buffer("int32_t[]", e_q4))
     runs = [partial(compiled().bt_kernel_run, index, *taken) for index in range(len(names()))]
     rows = timed([Contestant(name, len(e_q4), run) for name, run in zip(names(), runs, strict=True)], ROUNDS)

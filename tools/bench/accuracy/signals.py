@@ -1,4 +1,4 @@
-"""Random frames for the kernels: six classes, each after what a kernel may get wrong.
+"""Random frames for the kernels: six classes, each aimed at something a kernel may get wrong.
 
 Signals (n, 19) int32 in 1/16 count, compression negative, within the range of the ADC.
 """
@@ -22,7 +22,7 @@ _X_UM = np.array(sensor.ELECTRODE_UM, dtype=np.float64)[:, 0]
 
 
 def bumps(random: np.random.Generator, n: int, weights: PocWeights) -> Signals:
-    """One contact each: a Gaussian dent of 1 to 3000 counts somewhere on the finger, and a bulge around it."""
+    """One contact each: a Gaussian dent of 1 to 3000 counts somewhere on the finger, with a bulge around it."""
     along = random.uniform(surface.PROXIMAL_END_MM, surface.RADIUS_MM, n)
     reach = np.sqrt(np.maximum(surface.RADIUS_MM**2 - np.maximum(along, 0.0) ** 2, 0.0))
     contact = surface.on_surface(np.column_stack([along, random.uniform(-1.0, 1.0, n) * reach]))
@@ -45,12 +45,12 @@ def dense(random: np.random.Generator, n: int, weights: PocWeights) -> Signals:
 
 
 def tiny(random: np.random.Generator, n: int, weights: PocWeights) -> Signals:
-    """The last bit only, -1, 0 or 1 in each electrode."""
+    """Only the last bit: -1, 0 or 1 in each electrode."""
     return random.integers(-1, 2, (n, ELECTRODES), dtype=np.int32)
 
 
 def corners(random: np.random.Generator, n: int, weights: PocWeights) -> Signals:
-    """Every electrode at one end of its range: where an accumulator overflows if any does."""
+    """Every electrode at one end of its range: if any accumulator overflows, it does here."""
     return _signals(random.choice([-E_MAX_Q4, E_MAX_Q4], (n, ELECTRODES)))
 
 

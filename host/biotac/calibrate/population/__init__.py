@@ -1,7 +1,10 @@
-"""Newtons for a finger that nobody has calibrated: a map learnt from other fingers.
+"""Force for a finger without its own calibration: a population map, fitted to other fingers.
 
-``training`` makes it of force-plate recordings; ``fewshot`` is what five presses on a scale, known ``weights`` or a
-minute on a plate add, and ``presses`` how they come from a board; ``worth`` says what each leaves on a finger that the
-map has not seen; ``keeping`` writes and reads its file, and holds the one that comes with the package. Recordings are
-never part of it, coefficients and where they come from are.
+- ``training``: fits the map to force-plate recordings
+- ``fewshot``: improves it with five presses on a scale, known ``weights`` or a minute on a plate
+- ``presses``: gets such presses from a board or a recording
+- ``worth``: the error that each leaves on a finger that the map has not seen
+- ``keeping``: writes and reads its file, and has the one that comes with the package
+
+A file holds coefficients and their provenance, never recordings.
 """

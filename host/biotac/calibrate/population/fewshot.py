@@ -1,4 +1,4 @@
-"""What little of a new finger adds to the population map: presses on a scale, weights, or a minute on a force plate."""
+"""The population map improved with a little data of a new finger: presses on a scale, weights, a minute on a plate."""
 
 from __future__ import annotations
 
@@ -10,39 +10,42 @@ from ...core.geometry import Floats
 from ...errors import InputError
 from .training import Population, Sums
 
-# How much fingers differ in the two numbers, and how far the map is off in one press: F1 and F2, each by the other's.
+# How much fingers differ in the two numbers, and the map's error in one press: from F1 and F2, each by the other's map.
 GAIN_SPREAD = 0.04
 BALANCE_SPREAD = 0.1
 PRESS_ERROR_N = (0.45, 0.35, 0.35)  # x, y, z
 
-# Weights tell all of the force: how far each axis may be mixed into each, and how many seconds one is worth.
+# Weights give the whole force vector: how far axes may mix into each other, and how many seconds a weight counts as.
 MIXING_SPREAD = 0.1
 WEIGHT_S = 3.0
-PULL = 1000.0  # seconds of recording that a spread of one column's standard deviation is worth: F1 and F2
+PULL = 1000.0  # weight of the population map against the finger's own data, in seconds of recording: from F1 and F2
 
 
 @dataclass(frozen=True)
 class Scale:
-    """``gain`` of F_z, and ``balance``: what of F_z is taken from F_x. Both say nothing of a finger at 1 and 0."""
+    """A finger's correction: ``gain`` of F_z, and ``balance``, the share of F_z subtracted from F_x.
+
+    The defaults change nothing.
+    """
 
     gain: float = 1.0
     balance: float = 0.0
 
     def applied(self, force: Floats) -> Floats:
-        """To the population's force (n, 3) in N."""
+        """The population map's force (n, 3) in N, corrected."""
         x = force[:, 0] - self.balance * force[:, 2]
         return np.column_stack([x, force[:, 1], self.gain * force[:, 2]])
 
     def on(self, its: Population) -> Population:
-        """The map with both in it."""
+        """The map with the correction in its coefficients."""
         return replace(its, coefficients=self.applied(its.coefficients))
 
 
 def scale_of(said: Floats, shown_n: Floats) -> Scale:
-    """From presses straight down: the map's force (k, 3) in each, N, and what the scale showed (k,), N.
+    """The correction from presses straight down, by the map's force ``said`` (k, 3) and the scale's (k,), both in N.
 
-    Each number is pulled to what it is on most fingers, by how far the map is off in one press. Raises InputError for
-    presses that say nothing.
+    Both numbers are pulled towards their defaults, the more the larger the map's error in one press is against their
+    spread over fingers. Raises InputError for a force that is not above 0.
     """
     z = said[:, 2]
     if not np.isfinite(z).all() or (shown_n <= 0.0).any() or (z <= 0.0).any():
@@ -58,14 +61,14 @@ def scale_of(said: Floats, shown_n: Floats) -> Scale:
 
 
 def scaled(its: Population, columns: Floats, force_n: Floats) -> Population:
-    """The map with scale_of() presses: ``columns`` (k, 323), means over each, and force (k, 3) in N, all of it z."""
+    """The map corrected by scale_of() presses: mean ``columns`` (k, 323) of each and its force (k, 3) in N, along z."""
     return scale_of(columns @ its.coefficients, force_n[:, 2]).on(its)
 
 
 def weighed(its: Population, columns: Floats, force_n: Floats) -> Population:
-    """The map moved to weights: ``columns`` (k, 323), a mean while each lay still, and its force (k, 3) in N.
+    """The map fitted to weights: mean ``columns`` (k, 323) while each lay still, and its force (k, 3) in N.
 
-    What they say first goes into a mixing of the axes, nine numbers; what that leaves then moves single columns.
+    A mixing of the axes, nine numbers, is fitted first; what it leaves then changes the columns' coefficients.
     """
     said = columns @ its.coefficients
     mixing = np.eye(len(PRESS_ERROR_N))
@@ -79,7 +82,7 @@ def weighed(its: Population, columns: Floats, force_n: Floats) -> Population:
 
 
 def pulled(its: Population, new: Sums, seconds: float) -> Population:
-    """The map moved to a finger's own ``seconds`` on a force plate, as far as they are worth it."""
+    """The map pulled towards a finger's own ``new`` sums, weighted as ``seconds`` of recording on a force plate."""
     pull = PULL * np.diag(its.variance)
     change = np.linalg.solve(seconds * new.gram + pull, seconds * (new.cross - new.gram @ its.coefficients))
     return replace(its, coefficients=its.coefficients + change)

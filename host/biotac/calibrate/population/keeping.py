@@ -1,6 +1,6 @@
-"""A population map as JSON, with where it comes from; and the one that comes with the package.
+"""A population map as JSON, with its provenance; and the one that comes with the package.
 
-Coefficients have seven digits, a thousandth of what the map is off by: short, and the same wherever it is made.
+Coefficients have seven digits: short, the same on every computer, and off by a thousandth of the map's error.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ NOTHING = 1e-9
 
 @dataclass(frozen=True)
 class Kept:
-    """A map, one sigma (3,) in N of a new finger's force by it, the same after five presses, and its provenance."""
+    """A map and its provenance, with one sigma (3,) in N of a new finger's force, as it is and after five presses."""
 
     its: Population
     sigma_n: Floats
@@ -43,28 +43,28 @@ class Kept:
 
 
 def provenance_of(files: Sequence[Path], source: str, *, symmetric: bool) -> dict[str, Any]:
-    """Names and SHA-256 of the recordings, and ``source``: where they are from and under which licence."""
+    """Names and SHA-256 of the recordings, and ``source``: where they come from and under which licence."""
     hashes = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
     return {"source": source, "files": hashes, "symmetric": symmetric, "software": f"biotac-gateway {__version__}"}
 
 
 def made_of(kept: Kept, files: Sequence[Path]) -> bool:
-    """Whether it was trained on one of ``files``: what it says of these is no forecast."""
+    """Whether the map was trained on one of ``files``: its error on these is no estimate for a new finger."""
     seen = provenance_of(files, "", symmetric=False)["files"]
     return bool(set(seen.values()) & set(kept.provenance.get("files", {}).values()))
 
 
 def others_than(kept: Kept, files: Sequence[Path]) -> tuple[Floats | None, str]:
-    """Coefficients (533, 3) of a wrench map to pull the finger of ``files`` to, and a note; None if it knows them."""
+    """Coefficients (533, 3) of a wrench map to pull the finger of ``files`` to, None if trained on them; and a note."""
     fingers = ", ".join(kept.provenance.get("files", {})) or "fingers that it does not name"
     if made_of(kept, files):
         return None, f"not pulled to the population map of {fingers}, which was made of this recording"
-    # columns of counts above the tare mean the same whatever that is
+    # any tare will do: the columns mean the same with every tare
     return kept.its.wrench_map(np.zeros(ELECTRODES)).coefficients, f"pulled to the population map of {fingers}"
 
 
 def dumps(kept: Kept) -> str:
-    """As JSON, a line a column."""
+    """The map as JSON, one line for each column."""
     head = {
         "format": FORMAT,
         "provenance": kept.provenance,
@@ -81,7 +81,7 @@ def dumps(kept: Kept) -> str:
 
 
 def loads(text: str, where: str) -> Kept:
-    """Inverse of dumps, but for the digits. Raises InputError naming what is wrong with it."""
+    """Inverse of dumps, up to rounding. Raises InputError that begins with ``where`` and says what is wrong."""
     try:
         facts = parse_json(text)
         if facts["format"] != FORMAT:
@@ -102,7 +102,7 @@ def loads(text: str, where: str) -> Kept:
 
 
 def load(path: Path | None) -> Kept:
-    """From a file, or the package's own where ``path`` is None. Raises InputError."""
+    """The map in a file, or the package's own if ``path`` is None. Raises InputError if it cannot be read or used."""
     if path is None:
         return loads(shipped(), SHIPPED)
     try:
@@ -113,12 +113,12 @@ def load(path: Path | None) -> Kept:
 
 
 def _short(values: Floats) -> list[float]:
-    # what cancels between mirror images is not quite 0, and another computer's is another
+    # what cancels between mirror images is not exactly 0, and differs between computers
     return [float(f"{value:.{DIGITS}g}") if abs(value) > NOTHING else 0.0 for value in values]
 
 
 def _board_map(its: Population) -> BoardMap:
-    """Of the digits that are kept, so that whoever reads them makes the same."""
+    """The board's map, made from the rounded coefficients, so that a reader of the file gets the same one."""
     named = [(Kind[kind], Gate[gate]) for kind, gate in _block_names()]
     return population.board_map(population.split(named, np.array([_short(row) for row in its.coefficients])))
 

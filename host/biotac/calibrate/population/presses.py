@@ -1,4 +1,4 @@
-"""Presses of known force, guided on a board or from a recording: what the map says to each, and held out."""
+"""Presses of known force, guided on a board or from a recording: the map fitted to them, and its held-out error."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from ...errors import InputError
 from ...hand.hand import Hand
 from ...recording import Recording
 from ...wire import messages_gen as wire
+from ...wire.batches import Batch, join
 from ...wire.frames import Q4_PER_COUNT, StructArray
-from ..pressure.force_source import Truth, Unknown
+from ..pressure.force_source import Truth
 from ..pressure.from_recording import recorded_rows
-from ..pressure.guided import Face, ask_forces
+from ..pressure.guided import Face, ask_forces, drive
 from ..pressure.presses import Press, Procedure, Step
-from ..pressure.rows import rows_of
 from ..wrench.run import Run
 from .training import Population, by_columns
 
 LEAST_PRESSES = 3
 FAR_SIGMAS = 3.0
 STRAIGHT = (0.0, 0.0, 1.0)
-ASKED_N = (2.0, 5.0, 3.0, 6.0, 4.0)  # light and firm in turn; of more presses, again from the first
+ASKED_N = (2.0, 5.0, 3.0, 6.0, 4.0)  # light and firm in turn; starts again after the last
 
 
-#: A map, columns (k, 323) and force (k, 3) in N of presses -> the map with what they say; as in fewshot.
+#: From a map, and columns (k, 323) and force (k, 3) in N of presses, to the map fitted to them; see fewshot.
 Fit = Callable[[Population, Floats, Floats], Population]
 
 
 @dataclass(frozen=True)
 class Held:
-    """Of k presses: frames' ``counts`` (n, 19) and ``tare`` (19,), which ``press`` (n,) they are of, 0 to k - 1.
+    """Frames of k presses: ``counts`` (n, 19), ``tare`` (19,), and the ``press`` (n,) of each frame, 0 to k - 1.
 
     ``force_n`` (k, 3) is what the finger was pressed with.
     """
@@ -47,12 +47,12 @@ class Held:
 
     @cached_property
     def columns(self) -> Floats:
-        """Of the map (k, 323), a mean over each press."""
+        """The map's columns (k, 323), a mean over each press."""
         every = by_columns(self.counts, self.tare, lambda z: z)
         return np.array([every[self.press == k].mean(axis=0) for k in range(len(self.force_n))])
 
     def run(self, name: str) -> Run:
-        """The frames as a run without a force, to compare fixed point with float on."""
+        """The frames as a run with a force of 0, for comparing fixed point with float."""
         rows = len(self.counts)
         nothing = np.zeros((rows, 3))
         return Run(name, self.counts, self.tare, nothing, None, np.ones(19), np.zeros(rows, np.bool_), ())
@@ -60,9 +60,9 @@ class Held:
 
 @dataclass(frozen=True)
 class Found:
-    """The finger's ``own`` map by all presses, and RMS errors (3,) over them in N.
+    """The finger's ``own`` map, fitted to all presses, and RMS errors (3,) in N over the presses.
 
-    ``held_out_n`` is of each press by the map of the others, ``before_n`` of the map as it was.
+    ``held_out_n`` is with each press predicted by a map fitted to the others, ``before_n`` that of the map as it was.
     """
 
     own: Population
@@ -70,13 +70,16 @@ class Found:
     held_out_n: Floats
 
     def worth_it(self, sigma_n: Floats) -> bool:
-        """Better than the map as it was, and a finger as the map knows them, whose one sigma (3,) is ``sigma_n``."""
+        """Whether the own map is better than the map as it was, and the finger is like those that the map knows.
+
+        It is if each axis's held-out error is below FAR_SIGMAS times the map's one sigma ``sigma_n`` (3,).
+        """
         better = (self.held_out_n**2).sum() < (self.before_n**2).sum()
         return bool(better and (self.held_out_n < FAR_SIGMAS * sigma_n).all())
 
 
 def found(its: Population, held: Held, fit: Fit) -> Found:
-    """The finger's own map by ``fit``, and what it is worth. Raises InputError for presses that say nothing."""
+    """The finger's own map by ``fit``, and its errors. Raises InputError for presses that ``fit`` cannot use."""
     columns, force_n = held.columns, held.force_n
     own = fit(its, columns, force_n)
     every = np.arange(len(force_n))
@@ -86,7 +89,7 @@ def found(its: Population, held: Held, fit: Fit) -> Found:
 
 
 def asked_n(presses: int) -> tuple[float, ...]:
-    """Newtons to ask for on a scale. Raises InputError for too few."""
+    """The forces in N to ask for on a scale. Raises InputError for fewer than LEAST_PRESSES."""
     _check_enough(presses)
     return tuple(ASKED_N[k % len(ASKED_N)] for k in range(presses))
 
@@ -100,42 +103,34 @@ def guided(
     truth: Truth | None = None,
     toward: Sequence[Sequence[float]] | None = None,
 ) -> Held:
-    """On a board: ``face`` says what to do, a press for each of ``forces_n`` (k,), and tells its size when it is held.
+    """Presses on a board, one for each of ``forces_n`` (k,): ``face`` says what to do, and gives the force of each.
 
-    ``truth`` tells it instead, of a scenario. ``toward`` (k, 3) are directions, straight down if not given. Raises
-    InputError when a press is waited for in vain.
+    With a scenario, ``truth`` gives the force instead. ``toward`` (k, 3) are directions, straight down if not given.
+    Raises InputError for too few presses, for one that does not come, or for one without a complete frame.
     """
     _check_enough(len(forces_n))
     procedure = Procedure([finger], forces_n, needs_force=truth is not None)
     told: dict[tuple[int, int], float] = {}
-    kept: list[tuple[StructArray, Any]] = []
-    shown: Step | None = procedure.step
-    face.show(shown)
-    for batch in hand.batches():
-        mine = batch.wire["finger"] == finger
-        kept.append((batch.wire[mine], batch.t_us[mine]))
-        reference = truth or Unknown()
-        procedure.feed(rows_of(batch.wire, batch.t_us, reference.at(batch.wire["finger"], batch.t_us)))
-        if procedure.step != shown:
-            shown = procedure.step
-            if truth is None:
-                ask_forces(procedure, told, face)
-            face.show(shown)
-        if procedure.done:
-            break
-    else:
-        procedure.finish()
+    heard: list[Batch] = []
+
+    def show(step: Step | None) -> None:
+        if truth is None:
+            ask_forces(procedure, told, face)
+        face.show(step)
+
+    drive(hand, procedure, truth, show, heard=heard.append)
     hand.stop()
-    frames, t_us = np.concatenate([one for one, _ in kept]), np.concatenate([at for _, at in kept])
+    batch = join(heard)
+    mine = batch.wire["finger"] == finger
     presses = procedure.presses[finger]
     sizes_n = [told.get((finger, press.number), float(np.mean(press.rows["force_n"]))) for press in presses]
-    return _held(frames, t_us, presses, sizes_n, toward)
+    return _held(batch.wire[mine], batch.t_us[mine], presses, sizes_n, toward)
 
 
 def recorded(
     recording: Recording, finger: int, forces_n: Sequence[float], toward: Sequence[Sequence[float]] | None = None
 ) -> Held:
-    """From a recording, a press for each of ``forces_n`` (k,). Raises InputError when there are not so many."""
+    """Presses in a recording, one for each of ``forces_n`` (k,). Raises InputError when it has fewer."""
     _check_enough(len(forces_n))
     rows = recorded_rows(recording, None)
     procedure = Procedure([finger], forces_n, needs_force=False)
@@ -169,7 +164,7 @@ def _held(
         tares.append(its["tare_q4"][whole] / Q4_PER_COUNT)
         numbers.append(np.full(int(whole.sum()), k))
     tare = tares[0].mean(axis=0)
-    # each press above its own tare: a board takes a new one in between
+    # counts above each press's own tare: the board takes a new one between presses
     level = [one - at + tare for one, at in zip(counts, tares, strict=True)]
     directions = np.array([STRAIGHT] * len(presses) if toward is None else toward)
     return Held(np.concatenate(level), tare, np.concatenate(numbers), np.array(sizes_n)[:, None] * directions)

@@ -1,9 +1,10 @@
-"""The population map: two families of columns, ridge, drift and mirrored fingers, their mean (field.md 9).
+"""The population map: the mean of two ridge fits, one for each family of columns, over drift and mirrored fingers.
 
-Columns have no offset and are 0 where counts are at their tare, so that rest is 0 N on any finger. A finger's mirror
-image (left and right electrodes exchanged, F_y turned) is another finger that could be, and is trained on as such; for
-F_y only when asked, as fingers of one rig share what is not symmetric. A plate is never quite parallel to the finger:
-what of F_x goes with F_z on the whole is that recording's mounting and habit, and is taken out before training.
+See field.md 9. Columns have no offset and are 0 where counts are at their tare, so that rest is 0 N on any finger. A
+finger's mirror image (left and right electrodes exchanged, F_y negated) is another possible finger, and the map is
+trained on it too; for F_y only when asked, as fingers of one rig share the same asymmetry. A plate is never quite
+parallel to the finger: the share of F_z in F_x over a whole recording comes from its mounting and from habit, and is
+removed before training.
 """
 
 from __future__ import annotations
@@ -34,13 +35,13 @@ _PARTS = tuple(np.split(np.arange(COLUMNS), np.cumsum([len(index) for index in I
 
 DRIFT_SIGMA_COUNTS = 100.0  # what a finger drifts by in about two minutes of warm-up (biotac.md finding 6)
 RIDGE = 2e-3  # of each column's variance
-VARIANCE_FLOOR = 0.3  # of the median: what hardly moves in training must not decide in use
+VARIANCE_FLOOR = 0.3  # of the median: a column that hardly varies in training must not dominate in use
 ROWS_AT_ONCE = 4096
 AXES = map_columns.AXES[:3]
 MODEL = "population"
 
 _MM = np.asarray(surface.ELECTRODE_MM)
-#: The electrode that lies where each one's mirror image does.
+#: For each electrode (19,), the index of its mirror image.
 MIRROR: npt.NDArray[np.intp] = (
     ((_MM[:, None] * [1.0, -1.0, 1.0] - _MM[None]) ** 2).sum(axis=2).argmin(axis=1).astype(np.intp)
 )
@@ -48,7 +49,7 @@ MIRROR: npt.NDArray[np.intp] = (
 
 @dataclass(frozen=True)
 class Sums:
-    """Means a row over drift: ``gram`` (323, 323), ``cross`` (323, 3) with force in N, ``mean`` (323,)."""
+    """Means over rows and drift: ``gram`` (323, 323), ``cross`` (323, 3) with force in N, ``mean`` (323,)."""
 
     gram: Floats
     cross: Floats
@@ -57,7 +58,7 @@ class Sums:
 
 @dataclass(frozen=True)
 class FingerSums:
-    """Of one finger, and of its mirror image."""
+    """Sums of one finger, and of its mirror image."""
 
     own: Sums
     mirrored: Sums
@@ -65,30 +66,32 @@ class FingerSums:
 
 @dataclass(frozen=True)
 class Population:
-    """``coefficients`` (323, 3) of columns(), N; ``variance`` (323,) of the columns in training, floored."""
+    """A population map: ``coefficients`` (323, 3) of columns(), in N.
+
+    ``variance`` (323,) is that of the columns in training, with a floor.
+    """
 
     coefficients: Floats
     variance: Floats
 
     def force(self, counts: Floats, tare: Floats) -> Floats:
-        """Force (n, 3) in N on the finger, of counts (n, 19) with ``tare`` (19,)."""
+        """Force (n, 3) in N on the finger, from counts (n, 19) and their ``tare`` (19,)."""
         return by_columns(counts, tare, lambda z: z @ self.coefficients)
 
     def wrench_map(self, tare: Floats) -> WrenchMap:
-        """The same as a calibrated finger's map, for ``tare`` (19,), with an offset of 0."""
+        """The same map in the form of a calibrated finger's, for ``tare`` (19,), with an offset of 0."""
         every = np.zeros((ALL_COLUMNS + 1, len(AXES)))
         every[_STACKED] = self.coefficients
         return WrenchMap(MODEL, AXES, np.asarray(tare, dtype=np.float64), 1, (0, 0, 0), every)
 
 
 def columns(e: Floats, tare: Floats) -> Floats:
-    """What the map is linear in (n, 323): e (n, 19) counts above ``tare`` (19,)."""
-    stacked: Floats = features.columns(Signals(e, tare))[:, _STACKED]
-    return stacked
+    """The columns (n, 323) that the map is linear in, from counts above the tare ``e`` (n, 19) and ``tare`` (19,)."""
+    return features.columns(Signals(e, tare))[:, _STACKED]
 
 
 def by_columns(counts: Floats, tare: Floats, of: Callable[[Floats], Floats]) -> Floats:
-    """``of`` the columns (n, 323) of counts (n, 19), so many rows at a time that they fit the cache."""
+    """``of`` applied to the columns (n, 323) of counts (n, 19), in chunks of rows that fit the cache."""
     rows = range(0, len(counts), ROWS_AT_ONCE)
     return np.concatenate([of(columns(counts[at : at + ROWS_AT_ONCE] - tare, tare)) for at in rows])
 
@@ -100,9 +103,9 @@ def mirrored(run: Run) -> Run:
 
 
 def aligned(run: Run) -> Run:
-    """The run with its truth at the counts' time: the lag is two loggers', and no finger's. Without PDC.
+    """The run without PDC, its truth shifted to the counts' time: the lag is between two loggers, not in the finger.
 
-    Raises RecordingError when force and counts do not follow each other.
+    Raises RecordingError when force and counts do not belong together.
     """
     lag, _ = (0, 0.0) if run.by_clocks else Lags(run, Blocks(run.rest, run.contact)).check()
     rows = np.arange(max(-lag, 0), len(run.truth) - max(lag, 0))
@@ -112,7 +115,7 @@ def aligned(run: Run) -> Run:
 
 
 def sums_of(run: Run) -> FingerSums:
-    """What training needs of a run that is aligned."""
+    """What training needs from an aligned run, without the share of F_z in F_x."""
     truth = run.truth.copy()
     truth[:, 0] -= truth[:, 0].sum() / truth[:, 2].sum() * truth[:, 2]
     level = replace(run, truth=truth)
@@ -120,7 +123,7 @@ def sums_of(run: Run) -> FingerSums:
 
 
 def sums(run: Run) -> Sums:
-    """Of counts and force row by row, at the three drifts of moments.py."""
+    """Sums over the run's counts and force, averaged over the three drifts of moments.py."""
     gram = np.zeros((COLUMNS, COLUMNS))
     cross = np.zeros((COLUMNS, len(AXES)))
     mean = np.zeros(COLUMNS)
@@ -137,9 +140,9 @@ def sums(run: Run) -> Sums:
 
 
 def train(fingers: Sequence[FingerSums], *, symmetric: bool = False, mirror: bool = True) -> Population:
-    """The map of several fingers, each weighing alike. ``symmetric``: F_y too is trained on mirror images.
+    """The map of several fingers, all with equal weight. With ``symmetric``, F_y too is trained on mirror images.
 
-    ``mirror`` False trains on the fingers as they are, which is for judging a map on their mirror images.
+    ``mirror`` False trains on the fingers alone, for judging a map on their mirror images.
     """
     own = [finger.own for finger in fingers]
     every = [*own, *[finger.mirrored for finger in fingers]] if mirror else own

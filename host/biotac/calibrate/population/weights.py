@@ -1,7 +1,7 @@
-"""Known weights on the finger's pad, the block that holds it tilted: forces that nobody has to measure.
+"""Known weights on the finger's pad, with the block that holds it level or tilted: forces that need no measurement.
 
-The finger lies with its pad up. A weight that does not slide presses it with all of its weight, straight down in the
-room; so the tilt of the block turns a known part of it into shear.
+The finger lies with its pad up. A weight that does not slide presses with its full force, vertically, so tilting the
+block turns a known part of it into shear.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from ..reference.scale import STANDARD_GRAVITY
 
 MASSES_G = (200.0, 500.0)
 TILTS_DEG = (15.0,)
-MASS_G = (50.0, 2000.0)  # what a finger feels, and what it bears
-MAX_TILT_DEG = 30.0  # a weight slides beyond what rubber holds
+MASS_G = (50.0, 2000.0)  # from what a finger feels to what it withstands
+MAX_TILT_DEG = 30.0  # beyond, a weight slides even on rubber
 LEVEL = "level"
-#: Which side of the tip is lower, and where that turns a weight to: x to the tip, y to E11's side (Lin's frame).
+#: The side that is lower, and the direction of the shear: x towards the tip, y towards E11's side (Lin's frame).
 DOWN = {"the tip": (1.0, 0.0), "the base": (-1.0, 0.0), "E11's side": (0.0, 1.0), "E1's side": (0.0, -1.0)}
 
 
 @dataclass(frozen=True)
 class Load:
-    """``mass_g`` on the pad, the block tilted by ``tilt_deg`` with the side ``down`` of DOWN lower, or LEVEL."""
+    """A mass on the pad; the block is tilted by ``tilt_deg`` with the side ``down``, a key of DOWN, lower, or LEVEL."""
 
     mass_g: float
     tilt_deg: float = 0.0
@@ -32,7 +32,7 @@ class Load:
 
     @property
     def size_n(self) -> float:
-        """Of the force."""
+        """Size of the force."""
         return self.mass_g * 1e-3 * STANDARD_GRAVITY
 
     @property
@@ -50,7 +50,7 @@ class Load:
 
 
 def plan(masses_g: Sequence[float], tilts_deg: Sequence[float]) -> tuple[Load, ...]:
-    """Every mass on the level block, then at every tilt to every side. Raises InputError."""
+    """Every mass on the level block, then at every tilt to every side. Raises InputError for values out of range."""
     low, high = MASS_G
     if not masses_g or not all(low <= mass <= high for mass in masses_g):
         raise InputError(f"masses of {_list(masses_g)} g: expected {low:g} to {high:g} g each; weigh them")

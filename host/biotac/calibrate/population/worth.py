@@ -1,4 +1,4 @@
-"""What the population map, and little of a new finger added to it, leave on a finger it has not seen."""
+"""The population map's error on a finger that it has not seen, as it is and with a little data of that finger."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from ..wrench.run import Run
 from .fewshot import Scale, pulled, scale_of
 from .training import FingerSums, Population, mirrored, sums, train
 
-ROWS_PER_S = 100  # of the recordings that have no time
+ROWS_PER_S = 100  # taken for all recordings: they need not have times
 PRESSES = 5
 DRAWS = 200
 PRESS_ROWS = 75
-STRAIGHT = 0.08  # of F_z, shear that a hand on a scale does not notice
+STRAIGHT = 0.08  # of F_z: shear that a person pressing on a scale does not notice
 FIRM_N = 1.5
 APART_ROWS = 100
 MINUTE_S = 60
-MINUTES = 4  # of the recording, spread over it; each is tried alone
+MINUTES = 4  # number tried, each alone, spread over the recording
 SIGMAS = (1.0, 2.0)
 
 
 @dataclass(frozen=True)
 class Worth:
-    """RMSE (3,) in N: of the map as it is, after five straight presses, after a minute on a plate; None: not found.
+    """RMSE (3,) in N of the map as it is, after five straight presses, and after a minute on a plate.
 
-    ``said_n`` and ``truth_n`` (n, 3) are what the map says as it is, and the plate; ``scales`` come of the draws.
+    It is None where the run has no such presses or is too short. ``said_n`` (n, 3) is the force by the map as it is,
+    ``truth_n`` (n, 3) the plate's; ``scales`` are from the draws of presses.
     """
 
     rmse_n: Floats
@@ -41,20 +42,19 @@ class Worth:
 
 
 def worth(its: Population, run: Run) -> Worth:
-    """Of a map on an aligned run whose finger is new to it."""
+    """The errors of a map on an aligned run whose finger is new to it."""
     truth = run.truth
     said = its.force(run.counts, run.tare)
-    draws = _scaled(said, truth)
-    each = [((scale.applied(said) - truth) ** 2).mean(axis=0) for scale in draws]
-    scale5 = np.sqrt(np.mean(each, axis=0)) if draws else None
-    return Worth(_rms(said - truth), scale5, _minute(its, run), said, truth, tuple(draws))
+    scales, scale5 = _scaled(said, truth)
+    return Worth(_rms(said - truth), scale5, _minute(its, run), said, truth, scales)
 
 
 def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: bool = False) -> tuple[Floats, Floats]:
-    """One sigma (3,) in N of a new finger's force, as the map is and after five presses; ``runs`` are aligned.
+    """One sigma (3,) in N of a new finger's force, by the map as it is and after five presses; ``runs`` are aligned.
 
-    Of several fingers, what the others' map leaves on each; of one, what its map leaves on its mirror image, the one
-    other finger there is; an image's F_x is off by what no press mends, but presses leave no finger less known.
+    With several fingers it is the error on each of the map of the others. With one it is the error of its map on its
+    own mirror image, the only other finger there is. Presses cannot correct a mirror image's F_x, but the second sigma
+    is never above the first: presses do not make a finger less known.
     """
     if len(fingers) == 1:
         alone = train(fingers, mirror=False)
@@ -69,21 +69,21 @@ def sigma_of(fingers: Sequence[FingerSums], runs: Sequence[Run], *, symmetric: b
 
 
 def worth_of_force(its: Population, run: Run) -> tuple[Floats, Floats]:
-    """RMSE (3,) in N as it is and after five presses; the former again where the run has none."""
+    """RMSE (3,) in N as the map is and after five presses; the former twice where the run has no such presses."""
     truth = run.truth
     said = its.force(run.counts, run.tare)
     raw = _rms(said - truth)
-    each = [((scale.applied(said) - truth) ** 2).mean(axis=0) for scale in _scaled(said, truth)]
-    return raw, np.sqrt(np.mean(each, axis=0)) if each else raw
+    _, scale5 = _scaled(said, truth)
+    return raw, raw if scale5 is None else scale5
 
 
 def coverage(error_n: Floats, sigma_n: Floats) -> list[float]:
-    """Share of errors (n, 3) within one and two sigma (3,), all axes together."""
+    """Shares of errors (n, 3) within one and two sigma (3,), all axes together."""
     return [float((np.abs(error_n) <= sigmas * sigma_n).mean()) for sigmas in SIGMAS]
 
 
 def facts(its: Worth, sigma: tuple[Floats, Floats]) -> dict[str, Any]:
-    """As JSON types."""
+    """The errors and coverages as JSON types."""
     result: dict[str, Any] = {
         "rmse_n": its.rmse_n.tolist(),
         "rmse_scale5_n": None if its.rmse_scale5_n is None else its.rmse_scale5_n.tolist(),
@@ -96,8 +96,8 @@ def facts(its: Worth, sigma: tuple[Floats, Floats]) -> dict[str, Any]:
     return result
 
 
-def _scaled(said: Floats, truth: Floats) -> list[Scale]:
-    """Scales from draws of five presses, each a stretch of the run that is firm and straight."""
+def _scaled(said: Floats, truth: Floats) -> tuple[tuple[Scale, ...], Floats | None]:
+    """Scales from draws of five presses, each a firm and straight stretch of the run, and the RMSE with them."""
     ends = np.arange(PRESS_ROWS, len(truth) + 1)
     total = np.concatenate([np.zeros((1, 6)), np.cumsum(np.column_stack([said, truth]), axis=0)])
     mean = (total[ends] - total[ends - PRESS_ROWS]) / PRESS_ROWS
@@ -114,12 +114,13 @@ def _scaled(said: Floats, truth: Floats) -> list[Scale]:
                 result.append(scale_of(mean[chosen, :3], mean[chosen, 5]))
                 break
         else:
-            return []  # no five presses are in it
-    return result
+            return (), None  # the run has no five presses
+    each = [((scale.applied(said) - truth) ** 2).mean(axis=0) for scale in result]
+    return tuple(result), np.sqrt(np.mean(each, axis=0))
 
 
 def _minute(its: Population, run: Run) -> Floats | None:
-    """After a minute of the run, judged on what is a second and more away from it."""
+    """RMSE (3,) in N after a minute of the run, over rows at least a second away from it; None for less than two."""
     rows, n = MINUTE_S * ROWS_PER_S, len(run.counts)
     if n < 2 * rows:
         return None

@@ -1,11 +1,11 @@
 """Force from static pressure: calibration and checks after Navarro et al. 2015.
 
 - ``formulas``: the paper's equations in float64
-- ``check``: the board's own numbers held to them, frame by frame
-- ``rows``: what a calibration looks at of a frame
-- ``presses``: what of a press was held, what of it is rest, and the guided sequence of presses
-- ``force_source``: where the force comes from that the fingers are calibrated to
-- ``fit``: K and the relative error of a finger; what is refused
-- ``guided``: all that with a board; ``from_recording``: with a recording
-- ``report``: what it came to
+- ``check``: checks the board's results against them, frame by frame
+- ``rows``: the part of a frame that a calibration uses
+- ``presses``: finds rest and held presses, and guides through a sequence of presses
+- ``force_source``: the force that fingers are calibrated to
+- ``fit``: K of a finger, its relative error, and what is refused
+- ``guided``: the whole procedure on a board; ``from_recording``: from a recording
+- ``report``: the results
 """

@@ -1,9 +1,9 @@
-"""The board's filtered pressure and the force from it against Eq 1 and 3 in float64, frame by frame.
+"""Checks the board's filtered pressure and the force from it against Eq 1 and 3 in float64, frame by frame.
 
-The force needs nothing but its own frame: filtered pressure and rest are both in it. The filter has a history, and the
-frame before tells all of it that matters, so no start has to be waited for: each frame is held to Eq 3 from what the
-frame before published. Where there is none (the first of a stream, after lost frames, after heartbeats) the filtered
-pressure is taken as told, and counted (``starts``); a wrong one there is found in the next frame.
+The force depends on its own frame alone, which holds filtered pressure and rest. The filter's state is all in the
+previous frame's output, so each frame is checked by Eq 3 from the previous frame's published value. Without a previous
+frame (at the start of a stream, after lost frames or heartbeats) the filtered pressure is accepted and counted in
+``starts``; a wrong one there shows up in the next frame.
 """
 
 from __future__ import annotations
@@ -21,49 +21,43 @@ from . import formulas
 
 ROUND_US = 10_000
 RAIL_COUNT: int = lib.bt_rail_count()
-#: Half a step of what is published, N.
+#: Half a step of the published force, N.
 FORCE_BOUND_N = 0.5 / FORCE_LSB_PER_N
-SLACK = 1e-9  # of float64 itself: a half that is hit exactly is no error
+SLACK = 1e-9  # for rounding in float64: an error of exactly half a step is allowed
 INNER_STEP = 1 / 256  # of the board's filter, counts
+
+Findings = list[tuple[int, str]]  # wrong rows, and what is wrong
 
 
 def filter_bound(alpha: float) -> float:
-    """In counts: half a step published now, what half a step published before becomes, half a step inside."""
+    """Largest rounding error, counts: half a published step, the filtered half step before it, half an inner step."""
     return 0.5 / Q4_PER_COUNT * (1.0 + (1.0 - alpha)) + 0.5 * INNER_STEP
 
 
 def usable(pdc: NDArray[np.uint16]) -> NDArray[np.bool_]:
-    """Neither missing nor railed, as the board judges it."""
+    """Mask of the values that are neither missing nor railed, by the board's rule."""
     return np.asarray((pdc > 0) & (pdc < RAIL_COUNT))
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A row that is wrong, and how."""
-
-    row: int
-    what: str
 
 
 @dataclass
 class PressureCheck:
-    """Outcome over any number of frames, given in the order of arrival. Maxima are over valid results."""
+    """Results over any number of frames, given in order of arrival. Maxima are over valid results."""
 
     force_n_max: float = 0.0
     filter_max: float = 0.0
-    filter_bound: float = 0.0  # the largest that any frame was held to, counts
-    starts: int = 0  # frames whose filter had no frame before it to be checked from
+    filter_bound: float = 0.0  # the largest bound applied to any frame, counts
+    starts: int = 0  # frames without a previous frame to check the filter from
     _last: dict[int, StructArray] = field(default_factory=dict)
 
-    def add(self, messages: StructArray, settings: Settings) -> list[Finding]:
-        """Check FRAME messages (n,) of fingers that share ``settings``; returns what is wrong, by row."""
+    def add(self, messages: StructArray, settings: Settings) -> Findings:
+        """Check FRAME messages (n,) of fingers that share ``settings``."""
         found = self._forces(messages, settings)
         for finger in np.unique(messages["finger"]).tolist():
             at = np.flatnonzero(messages["finger"] == finger)
             found += self._filters(finger, messages[at], at, settings)
         return found
 
-    def _forces(self, messages: StructArray, settings: Settings) -> list[Finding]:
+    def _forces(self, messages: StructArray, settings: Settings) -> Findings:
         gain_n = settings[wire.Setting.PRESSURE_GAIN_NN] / 1e9 or np.nan
         pressure = to_units(messages["pdc_filtered_q4"], Q4_PER_COUNT)
         rest = to_units(messages["pdc_tare_q4"], Q4_PER_COUNT)
@@ -73,13 +67,13 @@ class PressureCheck:
         self.force_n_max = max(self.force_n_max, float(np.nanmax(error, initial=0.0)))
         one_sided = np.isnan(told) != np.isnan(truth)
         return [
-            Finding(int(k), "pressure's force is valid on one side only")
+            (int(k), "pressure's force is valid on one side only")
             if one_sided[k]
-            else Finding(int(k), f"pressure's force off by {error[k] * 1e3:.4g} mN, bound {FORCE_BOUND_N * 1e3:.4g} mN")
+            else (int(k), f"pressure's force off by {error[k] * 1e3:.4g} mN, bound {FORCE_BOUND_N * 1e3:.4g} mN")
             for k in np.flatnonzero(one_sided | (error > FORCE_BOUND_N + SLACK))
         ]
 
-    def _filters(self, finger: int, rows: StructArray, at: NDArray[np.intp], settings: Settings) -> list[Finding]:
+    def _filters(self, finger: int, rows: StructArray, at: NDArray[np.intp], settings: Settings) -> Findings:
         alpha = settings[wire.Setting.PRESSURE_FILTER_MILLI] / 1000
         last = self._last.get(finger)
         self._last[finger] = rows[-1:]
@@ -101,8 +95,8 @@ class PressureCheck:
             self.filter_max = max(self.filter_max, float(error.max()))
             self.filter_bound = max(self.filter_bound, bound)
         return [
-            Finding(int(at[k]), "filtered pressure is valid on one side only")
+            (int(at[k]), "filtered pressure is valid on one side only")
             if one_sided[k]
-            else Finding(int(at[k]), f"filtered pressure off by {error[k]:.4g} counts, bound {bound:.4g} counts")
+            else (int(at[k]), f"filtered pressure off by {error[k]:.4g} counts, bound {bound:.4g} counts")
             for k in np.flatnonzero(one_sided | (error > bound + SLACK))
         ]

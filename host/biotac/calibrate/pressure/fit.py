@@ -1,4 +1,4 @@
-"""K of a finger from its presses (Eq 6), what it is worth on another press, and what is refused."""
+"""K of a finger from its presses (Eq 6), its error on another press, and what is refused."""
 
 from __future__ import annotations
 
@@ -12,24 +12,23 @@ from ...errors import InputError
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, to_units
 from . import formulas
-from .formulas import Floats
 from .presses import HOLD_ROWS, Press, Rest
 
 NN_PER_N = 1e9
 MIN_PRESSES = 3
-# A tenth of the least that the paper found (0.009 to 0.016 N per count), and what a board takes, six times the most:
-# beyond, something else is wrong.
+# The paper found 0.009 to 0.016 N per count. The limits are a tenth of the smallest, and what a board accepts, six
+# times the largest: beyond these something else is wrong.
 GAIN_MIN_N = 0.0009
 GAIN_MAX_N = wire.SETTINGS[wire.Setting.PRESSURE_GAIN_NN].high / NN_PER_N
-#: The gains of single presses may be this far apart, of their mean, before the fit is refused; a press at another
-#: place or with another alignment shows in it.
+#: The gains of single presses may be this far apart, as a share of K, before the fit is refused. A press at another
+#: place or with another alignment shows up here.
 SPREAD_MAX = 0.5
 SPREAD_NOTED = 0.1
 
 
 @dataclass(frozen=True)
 class Fit:
-    """``gain_n`` is K in N per count; ``rest`` what P0 was; ``press_gains_n`` K of each press alone."""
+    """One finger's fit: ``gain_n`` is K in N per count, ``rest`` has P0, ``press_gains_n`` is K of each press alone."""
 
     finger: int
     gain_n: float
@@ -43,14 +42,17 @@ class Fit:
 
     @property
     def gain_nn(self) -> int:
-        """As the board keeps it: whole nN per count."""
+        """K as the board keeps it, in whole nN per count."""
         return round(self.gain_n * NN_PER_N)
 
 
 @dataclass(frozen=True)
 class Verification:
-    """One more press. ``board_error`` is the relative error of what the board told, ``float_error`` that of Eq 1 in
-    float64 from the same frames, ``apart_n`` the largest difference between the two."""
+    """Errors on one more press.
+
+    ``board_error`` is the relative error of the board's force, ``float_error`` that of Eq 1 in float64 from the same
+    frames, ``apart_n`` the largest difference between the two forces in N.
+    """
 
     finger: int
     force_n: float
@@ -61,7 +63,7 @@ class Verification:
 
 
 def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
-    """K of one finger. Raises InputError, with the number that shows it, for presses that K cannot be had from."""
+    """K of one finger. Raises InputError, with the number that shows why, for presses that do not give K."""
     finger = presses[0].finger if presses else -1
     where = f"finger {finger}"
     if len(presses) < MIN_PRESSES:
@@ -105,9 +107,9 @@ def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
 
 
 def verify(its: Fit, press: Press) -> Verification:
-    """Hold the board's own force (``told_n``) of a press, and float64's, to the reference.
+    """Compare the board's own force in a press (``told_n``), and float64's, with the reference.
 
-    Raises InputError when the board told none, or the reference is unusable.
+    Raises InputError when the board gave none in some row, or the reference is unusable.
     """
     where = f"finger {its.finger}"
     _check(where, press)
@@ -130,15 +132,11 @@ def verify(its: Fit, press: Press) -> Verification:
 
 
 def told_by(press: Press, gain_nn: int) -> Press:
-    """The press as a board with this gain tells it, by the board's own code; for what was recorded without."""
+    """The press with ``told_n`` as a board with this gain gives it, by the board's own code; for recordings without."""
     rows = press.rows.copy()
-    rows["told_n"] = _told(rows["pressure"], rows["rest"], gain_nn)
+    filtered_q4, rest_q4 = (np.rint(rows[name] * Q4_PER_COUNT).astype(np.uint16) for name in ("pressure", "rest"))
+    rows["told_n"] = to_units(pressure_force_100un(filtered_q4, rest_q4, gain_nn), FORCE_LSB_PER_N)
     return Press(press.finger, press.number, rows)
-
-
-def _told(pressure: Floats, rest: Floats, gain_nn: int) -> Floats:
-    filtered_q4, rest_q4 = (np.rint(values * Q4_PER_COUNT).astype(np.uint16) for values in (pressure, rest))
-    return to_units(pressure_force_100un(filtered_q4, rest_q4, gain_nn), FORCE_LSB_PER_N)
 
 
 def _check(where: str, press: Press) -> None:

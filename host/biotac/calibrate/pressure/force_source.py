@@ -1,6 +1,6 @@
-"""Where the force comes from: a magnitude in N for every frame (Eq 2), from a scenario or from a file.
+"""The force to calibrate to: a magnitude in N for every frame (Eq 2), from a scenario or from a file.
 
-A force plate's own driver is not here; whatever gives newtons with device times can be a ``Reference``.
+There is no driver for a force plate here; anything that gives newtons at device times can be a ``Reference``.
 """
 
 from __future__ import annotations
@@ -19,30 +19,22 @@ from . import formulas
 from .formulas import Floats
 
 LAG_ROWS = 100
-MAX_LAG_ROWS = 20  # 0.2 s: more is no transport delay but another clock; a held contact of 0.5 s bears as much
+MAX_LAG_ROWS = 20  # 0.2 s: more is not a transport delay but another clock; a contact held for 0.5 s allows this much
 MIN_CORRELATION = 0.9
-MAX_FORCE_N = 200.0  # what no finger bears; millinewtons and grams are beyond
+MAX_FORCE_N = 200.0  # more than a finger withstands; values in millinewtons and grams exceed it
 
 
 class Reference(Protocol):
-    """The force on the finger that is pressed."""
+    """Source of the force on the finger that is pressed."""
 
     def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
         """Magnitude (n,) in N at device times (n,), NaN where it is not known."""
 
 
-class Unknown:
-    """No force: for presses whose force is typed in later."""
-
-    def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
-        """See Reference.at."""
-        return np.full(len(t_us), np.nan)
-
-
 class Truth:
-    """What a scenario applies, or a recording of counts carries (Source.known_force_n).
+    """The force that a scenario applies, or that a recording of counts holds (Played.known_force_n).
 
-    The first time it is asked for is that of the source's first row with any good word.
+    The earliest time in the first call of at() is taken as that of the source's first row with any valid word.
     """
 
     def __init__(self, source: Played) -> None:
@@ -55,11 +47,10 @@ class Truth:
 
     @property
     def first_us(self) -> int:
-        """Device time of the source's first row; 0 before anything was asked."""
+        """Device time of the source's first row with any valid word; 0 before at() was called."""
         return self._first_us or 0
 
     def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
-        """See Reference.at."""
         if not len(t_us):
             return np.empty(0)
         if self._first_us is None:
@@ -71,10 +62,10 @@ class Truth:
 
 
 class Series:
-    """Forces over device time, straight lines between; NaN before the first and after the last.
+    """Forces over device time, linearly interpolated; NaN before the first and after the last.
 
-    ``t_s`` (n,) seconds of the board's time and ``force_n`` (n,) newtons; ``name`` is for messages. Raises InputError
-    for times that do not rise, NaN, no change at all, and forces that no finger bears.
+    ``t_s`` (n,) is in seconds of the board's time, ``force_n`` (n,) in N; ``name`` is for messages. Raises InputError
+    for fewer than two rows, NaN, times that do not increase, and forces above MAX_FORCE_N.
     """
 
     def __init__(self, name: str, t_s: Floats, force_n: Floats) -> None:
@@ -93,12 +84,15 @@ class Series:
         self._t_s, self._force_n = t_s, force_n
 
     def at(self, finger: NDArray[np.uint8], t_us: NDArray[np.int64]) -> Floats:
-        """See Reference.at; one plate for all fingers."""
+        """See Reference.at; the force is the same for all fingers, as they share one plate."""
         return np.asarray(np.interp(t_us / 1e6, self._t_s, self._force_n, left=np.nan, right=np.nan), np.float64)
 
 
 def lag_rows(above_rest: Floats, force_n: Floats) -> tuple[int, float]:
-    """By how many rows pressure comes after the force, and the correlation there; both (n,), NaN left out."""
+    """The number of rows by which pressure lags the force, and the correlation there.
+
+    Both inputs are (n,); rows with NaN are left out.
+    """
     best = (0, -1.0)
     for lag in range(-LAG_ROWS, LAG_ROWS + 1):
         a = above_rest[max(lag, 0) : len(above_rest) + min(lag, 0)]
@@ -113,7 +107,7 @@ def lag_rows(above_rest: Floats, force_n: Floats) -> tuple[int, float]:
 
 
 def check_alignment(where: str, above_rest: Floats, force_n: Floats) -> int:
-    """Lag in rows of one finger's pressure after the force. Raises InputError when they do not belong together."""
+    """The number of rows by which one finger's pressure lags the force. Raises InputError when they do not match."""
     lag, correlation = lag_rows(above_rest, force_n)
     if correlation < MIN_CORRELATION or abs(lag) > MAX_LAG_ROWS:
         raise InputError(
@@ -125,10 +119,10 @@ def check_alignment(where: str, above_rest: Floats, force_n: Floats) -> int:
 
 
 def load_csv(path: Path) -> Series:
-    """A file with a head: ``t_s`` (seconds of the board's time) and ``force_n``, or the three axes of a force.
+    """The forces in a CSV file with a header: ``t_s`` (seconds of the board's time), and ``force_n`` or the three axes.
 
-    The axes may also be named as `calibrate wrench` has them, ``Fx_N`` or ``Fx [N]``; other columns are passed over.
-    Raises InputError naming what is wrong with it.
+    The axes are ``fx_n``, ``fy_n``, ``fz_n``, or named as for `calibrate wrench`, ``Fx_N`` or ``Fx [N]``. Other columns
+    are ignored. Raises InputError that says what is wrong with the file.
     """
     _, head, read = open_table(path)
     for axes in (["force_n"], ["fx_n", "fy_n", "fz_n"]):

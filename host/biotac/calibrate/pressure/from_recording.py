@@ -1,4 +1,4 @@
-"""The same from a recording: the last press of each finger verifies what the ones before it gave."""
+"""Pressure calibration from a recording: each finger's last press verifies the K from the presses before it."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ...wire.frames import StructArray
 from ...wire.identity import ascii_text
 from . import report
 from .fit import MIN_PRESSES, fit, told_by, verify
-from .force_source import Series, Unknown, check_alignment
+from .force_source import Series, check_alignment
 from .presses import CALIBRATION_FORCES_N, VERIFICATION_FORCES_N, Procedure
 from .report import Outcome
 from .rows import rows_of, with_filter
 
-AROUND_ROWS = 50  # of a touch, in which the plate is this finger's
+AROUND_ROWS = 50  # before and after a touch, in which the plate's force is taken as this finger's
 
 
 def calibrate(
@@ -33,11 +33,11 @@ def calibrate(
     forces_n: Sequence[float] = (),
     made_s: int = 0,
 ) -> Outcome:
-    """K of each of ``fingers`` (none: all that the recording has), from all of its presses but the last.
+    """K of each of ``fingers`` (none: all in the recording), from all of its presses but the last.
 
     ``reference`` has the force over the board's time; without it ``forces_n`` are what a scale showed at each press,
-    the last one's included. What the board would have told at the last press is computed by the board's own code.
-    Raises InputError for data that K cannot be had from.
+    including the last. The board's force at the last press is computed by the board's own code. Raises InputError for
+    data that does not give K.
     """
     if reference is None and not forces_n:
         raise InputError(
@@ -61,7 +61,7 @@ def calibrate(
         mine = rows[rows["finger"] == finger]
         if reference is not None:
             outcome.lag_rows[finger] = _lag(recording, mine, finger)
-        # One for each: in a recording they may be in any order.
+        # A procedure for each finger: a recording may have them in any order.
         procedure = Procedure([finger], asked, needs_force=reference is not None)
         procedure.feed(mine)
         procedure.finish()
@@ -72,9 +72,8 @@ def calibrate(
         outcome.fits[finger] = its
         outcome.verified[finger] = verify(its, told_by(held[-1], its.gain_nn))
         own = recording.calibrations.get(finger) or Calibration().changed(recording.settings)
-        outcome.calibrations[finger] = replace(
-            own, pressure_gain_nn=its.gain_nn, serial=_serial(recording, finger), made_s=made_s
-        )
+        serial = next((ascii_text(told.serial) for told in recording.sensors if told.finger == finger), "")
+        outcome.calibrations[finger] = replace(own, pressure_gain_nn=its.gain_nn, serial=serial, made_s=made_s)
         source = {
             "from": recording.path.name,
             "sha256": hashlib.sha256(recording.path.read_bytes()).hexdigest(),
@@ -85,15 +84,15 @@ def calibrate(
 
 
 def recorded_rows(recording: Recording, reference: Series | None) -> StructArray:
-    """ROW_DTYPE rows (n,) of a whole recording, in the order of arrival.
+    """ROW_DTYPE rows (n,) of a whole recording, in order of arrival.
 
-    InputError when the reference's times are not the recording's.
+    Raises InputError when the reference's times cover none of the recording.
     """
     messages = recording.wire
     if recording.info.wire_minor < PRESSURE_SINCE_MINOR:
         messages = with_filter(messages, recording.settings[wire.Setting.PRESSURE_FILTER_MILLI])
     t_us = recording.frames["t_us"]
-    rows = rows_of(messages, t_us, (reference or Unknown()).at(messages["finger"], t_us))
+    rows = rows_of(messages, t_us, reference)
     if reference is not None and len(rows) and np.isnan(rows["force_n"]).all():
         first_s, last_s = t_us.min() / 1e6, t_us.max() / 1e6
         raise InputError(
@@ -104,12 +103,7 @@ def recorded_rows(recording: Recording, reference: Series | None) -> StructArray
 
 
 def _lag(recording: Recording, mine: StructArray, finger: int) -> int:
-    # One plate for all fingers: it is this one's around its own touches alone.
+    # All fingers share one plate: its force is this finger's only around its own touches.
     near = np.convolve(mine["touched"], np.ones(2 * AROUND_ROWS + 1), "same") > 0
     above = np.where(near, mine["pressure"] - mine["rest"], np.nan)
     return check_alignment(f"{recording.path}, finger {finger}", above, mine["force_n"])
-
-
-def _serial(recording: Recording, finger: int) -> str:
-    told = next((s for s in recording.sensors if s.finger == finger), None)
-    return "" if told is None else ascii_text(told.serial)

@@ -1,12 +1,12 @@
-"""Rest and held contacts in a stream of pressure: rows in, presses out, with no look ahead.
+"""Rest and held contacts in a stream of pressure: rows in, presses out, without look-ahead.
 
-A gain fitted on ramps is wrong by what the filter and the sensor lag (+3 % in a test with the paper's filter), so only
-what is held counts. Held is a matter of the pressure alone: over the latest 0.4 s, means of 0.1 s differ by no more
-than 1 % of the load, or than the noise at rest explains. (Halves would not do: at the crest of a wave they are equal.)
-What passes changes by some 3 % a second, and lags by 0.03 % where the filter's lag is a row.
+A gain fitted to ramps is wrong by the lag of filter and sensor (+3 % in a test with the paper's filter), so only held
+presses count. Held is decided from the pressure alone: over the latest 0.4 s, means over 0.1 s differ by no more than
+1 % of the load, or than the noise at rest explains. (Two halves would not do: at the crest of a wave they are equal.)
+What passes this test changes by at most some 3 % a second, an error of 0.03 % where the filter lags by one row.
 
-The guided sequence is finger by finger, so many presses each. None of this prints, waits or reads a clock: whoever has
-rows feeds them, live or from a file, and shows ``step`` to whoever presses. Time is counted in the rows themselves.
+The guided sequence goes finger by finger, with a number of presses each. Nothing here prints, waits or reads a clock:
+the caller feeds rows, live or from a file, and shows ``step`` to the person who presses. Time is counted in rows.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from .rows import ROW_DTYPE
 HZ = 100
 WINDOW_ROWS = 40
 REST_ROWS = 50
-HOLD_ROWS = 50  # of one press: the paper's n
+HOLD_ROWS = 50  # for each press: the paper's n
 MOVING_SHARE = 0.01  # of the load
 NOISE_SIGMAS = 5.0
-SIGMA_FLOOR = 0.25  # counts: words are whole, a quiet sensor shows less noise than it has
-PRESS_COUNTS = 20.0  # above rest: some 0.2 N; the board's own contact takes 6
+SIGMA_FLOOR = 0.25  # counts: words are whole numbers, so a quiet sensor shows less noise than it has
+PRESS_COUNTS = 20.0  # above rest: some 0.2 N; the board's own contact needs 6
 LETTING_GO_COUNTS = PRESS_COUNTS / 2
 GIVE_UP_ROWS = 60 * HZ
 
 
 class Phase(Enum):
-    """What a finger waits for."""
+    """What the procedure waits for at a finger."""
 
     REST = "rest"
     PRESS = "press"
@@ -67,63 +67,58 @@ class Press:
         return self.rows["pressure"] - self.rows["rest"]
 
     def with_force(self, force_n: float) -> Press:
-        """The same under one force throughout, as a scale showed it."""
+        """The same press with one force in all rows, as a scale showed it."""
         rows = self.rows.copy()
         rows["force_n"] = force_n
         return Press(self.finger, self.number, rows)
 
 
 def motion(values: Any) -> float:
-    """The range of the means of the four quarters of ``values``."""
+    """Range of the means of the four quarters of ``values``."""
     return float(np.ptp(np.reshape(values, (4, -1)).mean(axis=1)))
 
 
 def noise(values: Any) -> float:
-    """Standard deviation of what differs from row to row, whatever the mean does meanwhile; 0 of fewer than three.
+    """Standard deviation of the differences between rows, which a moving mean hardly changes; 0 for fewer than three.
 
-    For noise through the filter with alpha = 0.5 it is that of the values themselves.
+    For noise through the filter with alpha = 0.5 it equals that of the values themselves.
     """
     return float(np.diff(values).std()) if len(values) > 2 else 0.0
 
 
 def motion_limit(level: float, sigma: float) -> float:
-    """What ``motion`` may be of a window that is held at ``level`` counts above rest, with ``sigma`` of noise."""
-    # Filtered noise is correlated; with alpha = 0.5 a mean scatters by sqrt(3) more than of independent rows.
+    """The largest ``motion`` of a window held at ``level`` counts above rest, with noise of ``sigma`` counts."""
+    # Filtered noise is correlated: with alpha = 0.5 a mean scatters sqrt(3) times more than for independent rows.
     scatter = max(sigma, SIGMA_FLOOR) * np.sqrt(3.0 * 2.0 / (WINDOW_ROWS / 4))
     return float(max(MOVING_SHARE * abs(level), NOISE_SIGMAS * scatter))
 
 
 class Presses:
-    """One finger through ``count`` presses. Feed it rows; it knows no clock but them, and asks nobody.
+    """Follows one finger through ``count`` presses. Feed it rows; they are its only clock.
 
-    ``needs_force``: rows without a reference are not held, whatever the pressure does.
+    With ``needs_force``, rows without a reference do not count as held, whatever the pressure does.
     """
+
+    phase: Phase
 
     def __init__(self, finger: int, count: int, *, needs_force: bool = True) -> None:
         self.finger = finger
-        self.phase = Phase.REST
         self.rest: Rest | None = None
         self.presses: list[Press] = []
         self._count = count
         self._needs_force = needs_force
         self._window: deque[float] = deque(maxlen=WINDOW_ROWS)
-        self._kept: list[Any] = []
-        self._waited = 0
-        self._railed = 0
-        self._forceless = 0
-        self._most_kept = 0
-        self._most_above = -np.inf
-        self._steadiest = (np.inf, 0.0)  # motion, limit
+        self._enter(Phase.REST)
 
     @property
     def done(self) -> bool:
-        """Every press was seen, and let go of."""
+        """Whether every press was seen and released (after finish(), the last need not be)."""
         return self.phase is Phase.DONE
 
     def feed(self, rows: StructArray) -> int:
         """Take rows (n,) of this finger, up to the one that ends its last press; returns how many were taken.
 
-        Raises InputError when it has waited for a minute in vain, with why.
+        Raises InputError that says why after a minute in one phase.
         """
         for k, row in enumerate(rows):
             if self.phase is Phase.DONE:
@@ -135,14 +130,14 @@ class Presses:
         return len(rows)
 
     def finish(self) -> None:
-        """No more rows come: InputError unless every press was seen."""
+        """End: no more rows come. Raises InputError unless every press was seen."""
         if self.phase is Phase.RELEASE and len(self.presses) == self._count:
             self.phase = Phase.DONE
         if self.phase is not Phase.DONE:
             raise InputError(self.why())
 
     def why(self) -> str:
-        """What is waited for and what was seen of it instead, in numbers."""
+        """What it is waiting for and what was seen instead, in numbers."""
         seen = f"finger {self.finger}, {self._waited} rows"
         if self.phase is Phase.REST:
             return (
@@ -178,11 +173,10 @@ class Presses:
 
     def _enter(self, phase: Phase) -> None:
         self.phase = phase
-        self._window.clear()
-        self._kept = []
+        self._begin_again()
         self._waited = self._railed = self._forceless = self._most_kept = 0
         self._most_above = -np.inf
-        self._steadiest = (np.inf, 0.0)
+        self._steadiest = (np.inf, 0.0)  # motion, limit
 
     def _take(self, row: Any) -> None:
         above = float(row["pressure"] - row["rest"])
@@ -200,7 +194,7 @@ class Presses:
 
     def _begin_again(self) -> None:
         self._window.clear()
-        self._kept = []
+        self._kept: list[Any] = []
 
     def _is_steady(self, pressure: float, level: float, sigma: float) -> bool:
         self._window.append(pressure)
@@ -244,14 +238,14 @@ class Presses:
             self._enter(Phase.RELEASE)
 
 
-#: Newtons that are asked for. The paper asks for joint angles of 18, 20 and 22 degrees, "with increasing pressure".
+#: Forces to ask for, N. The paper asks for joint angles of 18, 20 and 22 degrees, "with increasing pressure".
 CALIBRATION_FORCES_N = (2.0, 3.5, 5.0)
 VERIFICATION_FORCES_N = (4.0,)
 
 
 @dataclass(frozen=True)
 class Step:
-    """What is to be done now: ``phase`` of press ``press`` of ``presses``, to about ``force_n``."""
+    """What to do now: ``phase`` of press number ``press`` of ``presses``, with about ``force_n``."""
 
     finger: int
     phase: Phase
@@ -261,10 +255,10 @@ class Step:
 
 
 class Procedure:
-    """``fingers`` in turn, each through a press for every one of ``forces_n``.
+    """Takes ``fingers`` in turn through a press for each of ``forces_n``.
 
-    Only the finger whose turn it is is looked at, so the others may do as they like. Raises InputError for no fingers,
-    one that occurs twice, or forces that are not above 0.
+    Only the finger whose turn it is matters; the others may be touched or not. Raises InputError for no fingers, one
+    that occurs twice, no forces, or forces that are not above 0 and below 100 N.
     """
 
     def __init__(self, fingers: Sequence[int], forces_n: Sequence[float], *, needs_force: bool = True) -> None:
@@ -278,7 +272,7 @@ class Procedure:
 
     @property
     def step(self) -> Step | None:
-        """What is to be done now; None when all is."""
+        """What to do now; None when all is done."""
         machine = next((m for m in self._machines if m.phase is not Phase.DONE), None)
         if machine is None:
             return None
@@ -287,23 +281,23 @@ class Procedure:
 
     @property
     def done(self) -> bool:
-        """Every press of every finger was seen."""
+        """Whether every press of every finger was seen."""
         return self.step is None
 
     @property
     def rests(self) -> dict[int, Rest]:
-        """By finger, for those that were at rest."""
+        """Rest by finger, for those that have been at rest."""
         return {m.finger: m.rest for m in self._machines if m.rest is not None}
 
     @property
     def presses(self) -> dict[int, list[Press]]:
-        """By finger, what has been held so far."""
+        """Presses held so far, by finger."""
         return {m.finger: list(m.presses) for m in self._machines}
 
     def feed(self, rows: StructArray) -> None:
-        """Take rows (n,) of ROW_DTYPE of any fingers, in the order of time.
+        """Take rows (n,) of ROW_DTYPE of any fingers, in order of time.
 
-        Raises InputError when a finger has waited for a minute of rows in vain, with what was seen.
+        Raises InputError that says what was seen when a finger stays in one phase for a minute of rows.
         """
         for machine in self._machines:
             if machine.phase is Phase.DONE:
@@ -312,10 +306,10 @@ class Procedure:
             taken = machine.feed(mine)
             if not machine.done:
                 return
-            # The next one begins here, however many rows come at once.
+            # The next finger begins after this row, even if later rows came in the same call.
             rows = rows[rows["t_us"] > mine["t_us"][taken - 1]] if taken else rows
 
     def finish(self) -> None:
-        """No more rows come. InputError unless all is done."""
+        """End: no more rows come. Raises InputError unless every press was seen."""
         for machine in self._machines:
             machine.finish()

@@ -1,4 +1,4 @@
-"""What a pressure calibration came to: facts for files, lines for people."""
+"""Results of a pressure calibration: facts for files, lines for people."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ PAPER_ERROR = 0.0591  # relative error of the fore finger's verification press
 
 @dataclass(frozen=True)
 class Outcome:
-    """By finger: K, the calibration with it, where it comes from, and the verification press.
+    """Results by finger: K, the calibration with it, its provenance, and the verification press.
 
-    ``verified`` is empty when no verification was asked for; ``lag_rows`` is how late pressure came after a reference
-    with times of its own; ``not_saved`` is why the board did not keep what it was asked to keep.
+    ``lag_rows`` is how many rows pressure lags a reference that has its own times. ``not_saved`` is why the board did
+    not save the calibrations, None if it did or was not asked to.
     """
 
     fits: dict[int, Fit]
@@ -31,7 +31,7 @@ class Outcome:
 
 
 def provenance(its: Fit, **source: str) -> Provenance:
-    """How K came about, for a calibration's file: the ``source`` it is from, and the numbers of the fit."""
+    """How K was made, for a calibration's file: its ``source`` and the numbers of the fit."""
     made = {"software": f"biotac-gateway {__version__}", "method": "pressure, Navarro 2015"}
     return {**made, **source, **_numbers(its)}
 
@@ -50,18 +50,17 @@ def _numbers(its: Fit) -> Provenance:
 
 
 def facts(outcome: Outcome) -> list[dict[str, Any]]:
-    """One object a finger, JSON types only."""
+    """One object for each finger, in JSON types."""
     out = []
     for finger, its in outcome.fits.items():
+        digits = {"force_n": 4, "told_n": 4, "board_error": 5, "float_error": 5, "apart_n": 7}
+        seen = outcome.verified[finger]
         one = _numbers(its) | {
             "serial": outcome.calibrations[finger].serial,
             "pressure_gain_nn": its.gain_nn,
             "notes": list(its.notes),
+            "verification": {name: round(getattr(seen, name), places) for name, places in digits.items()},
         }
-        if finger in outcome.verified:
-            digits = {"force_n": 4, "told_n": 4, "board_error": 5, "float_error": 5, "apart_n": 7}
-            seen = outcome.verified[finger]
-            one["verification"] = {name: round(getattr(seen, name), places) for name, places in digits.items()}
         if finger in outcome.lag_rows:
             one["lag_rows"] = outcome.lag_rows[finger]
         out.append(one)
@@ -69,15 +68,14 @@ def facts(outcome: Outcome) -> list[dict[str, Any]]:
 
 
 def lines(outcome: Outcome) -> list[str]:
-    """The table of K and P0, with the verification press where there was one."""
+    """The table of K and P0, with the verification press."""
     head = f"{'finger':>6}  {'sensor':<16}  {'K N/count':>9}  {'P0 count':>8}  {'fit':>6}"
-    out = [head + (f"  {'force N':>7}  {'told N':>7}  {'error':>6}  {'float64':>7}" if outcome.verified else "")]
+    out = [head + f"  {'force N':>7}  {'told N':>7}  {'error':>6}  {'float64':>7}"]
     for finger, its in outcome.fits.items():
         serial = outcome.calibrations[finger].serial or "any"
         line = f"{finger:>6}  {serial:<16}  {its.gain_n:>9.6f}  {its.rest.counts:>8.1f}  {its.relative_error:>6.2%}"
-        if finger in outcome.verified:
-            seen = outcome.verified[finger]
-            line += f"  {seen.force_n:>7.3f}  {seen.told_n:>7.3f}  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
+        seen = outcome.verified[finger]
+        line += f"  {seen.force_n:>7.3f}  {seen.told_n:>7.3f}  {seen.board_error:>6.2%}  {seen.float_error:>7.2%}"
         out.append(line)
     notes = [note for its in outcome.fits.values() for note in its.notes]
     notes += [

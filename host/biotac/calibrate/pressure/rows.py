@@ -1,4 +1,4 @@
-"""What the calibration looks at, a row a finger and round: pressure, rest, what the board made of it, and the force."""
+"""The rows that the calibration uses, one per finger and round: pressure, rest, the board's force, the reference's."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from ...core.compiled import pressure_filtered_q4
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
 from .check import usable
-from .formulas import Floats
+from .force_source import Reference
 
-#: ``pressure`` is PDC through the board's filter and ``rest`` the tare of the same frame, counts, NaN where unknown.
-#: ``told_n`` is the board's own force from them, ``force_n`` the reference's, NaN without. ``railed``: the word was at
-#: an end of its range.
+#: ``pressure`` is PDC through the board's filter and ``rest`` the tare of the same frame, in counts, NaN where unknown.
+#: ``told_n`` is the board's own force from them, ``force_n`` the reference's, NaN where unknown. ``touched`` means
+#: contact or a fault, ``railed`` a PDC at an end of its range.
 ROW_DTYPE = np.dtype(
     [
         ("finger", "u1"),
@@ -28,21 +28,21 @@ ROW_DTYPE = np.dtype(
 )
 
 
-def rows_of(messages: StructArray, t_us: NDArray[np.int64], force_n: Floats | None = None) -> StructArray:
-    """Rows (n,) of FRAME messages (n,), their unwrapped times (n,) and the reference's force (n,) in N."""
+def rows_of(messages: StructArray, t_us: NDArray[np.int64], reference: Reference | None = None) -> StructArray:
+    """Rows (n,) from FRAME messages (n,) and their unwrapped times (n,), with the reference's force."""
     out = np.empty(len(messages), ROW_DTYPE)
     out["finger"], out["t_us"] = messages["finger"], t_us
     out["pressure"] = to_units(messages["pdc_filtered_q4"], Q4_PER_COUNT)
     out["rest"] = to_units(messages["pdc_tare_q4"], Q4_PER_COUNT)
     out["told_n"] = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
-    out["force_n"] = np.nan if force_n is None else force_n
+    out["force_n"] = np.nan if reference is None else reference.at(messages["finger"], t_us)
     out["touched"] = (messages["flags"] & (wire.FrameFlags.CONTACT | wire.FrameFlags.FAULT)) != 0
     out["railed"] = ~usable(messages["pdc"]) & (messages["pdc"] != wire.INVALID_COUNT)
     return out
 
 
 def with_filter(messages: StructArray, filter_milli: int) -> StructArray:
-    """FRAME messages (n,) with ``pdc_filtered_q4`` by the board's own code, for boards of before wire 1.4."""
+    """FRAME messages (n,) with ``pdc_filtered_q4`` by the board's own code, for boards before wire 1.4."""
     out: StructArray = messages.copy()
     for finger in np.unique(messages["finger"]):
         mine = messages["finger"] == finger

@@ -1,12 +1,5 @@
-"""Force/torque sensors that say what a finger is loaded with: their files, their live streams, their clocks.
+"""Reference sensors that measure the load on a finger: their files, live streams and clocks.
 
 A reference measures in its own axes about its own origin; a Mounting turns that into the force on the finger in
-Lin's frame. Nothing here knows of models or of boards.
+Lin's frame. Nothing here depends on models or boards.
 """
-
-from __future__ import annotations
-
-from .mounting import LIN, Mounting
-from .samples import Reference, Samples
-
-__all__ = ["LIN", "Mounting", "Reference", "Samples"]

@@ -1,11 +1,11 @@
-"""References as text: a header that names every column with its unit, and a row a sample.
+"""References as text: a header that names every column with its unit, then one row for each sample.
 
     # sensor: ATI Nano17 FT12345
     # mounting: {"rotation": ..., "offset_mm": ..., "reads": "force on finger"}
     t_s,Fx_N,Fy_N,Fz_N,Mx_Nmm,My_Nmm,Mz_Nmm
 
-Units may also stand in brackets: ``Fx [N]``, ``Tx (N m)``. Columns of other names are passed over. A column without
-a unit is refused: millimetres for metres is a factor that a calibration takes without a word.
+Units may also be in brackets: ``Fx [N]``, ``Tx (N m)``. Columns with other names are ignored. A column without a unit
+is refused: a calibration would not notice a factor such as millimetres for metres.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ import numpy as np
 
 from ...errors import InputError, RecordingError
 from .mounting import Mounting, from_json
-from .samples import Floats, Reference, Samples, check, from_wrench
+from .samples import Floats, Reference, Samples, check
 
 COLUMNS = ("t_s", "Fx_N", "Fy_N", "Fz_N", "Mx_Nmm", "My_Nmm", "Mz_Nmm")
-# in the order they are wanted; torque goes by M or T
+# in the order of the result; torque may be named M or T
 _NAMES = ("t", "fx", "fy", "fz", "mx", "my", "mz")
 _UNITS = {"t": {"s": 1.0}, "f": {"N": 1.0}, "m": {"Nmm": 1.0, "Nm": 1000.0}}
 _COLUMN = re.compile(r"^(t|time|[FMT][xyz])(?:\s*[\[(]([^\])]*)[\])]|_(.+))?$", re.IGNORECASE)
@@ -32,9 +32,9 @@ _WANTED = "t in s, forces in N, torques in N mm or N m"
 
 
 def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
-    """The reference in ``path``; ``mounting`` takes the place of the file's own.
+    """The reference in ``path``; ``mounting`` replaces the file's own.
 
-    Raises RecordingError for what cannot be read or believed, with its line.
+    Raises RecordingError for what cannot be read or is not plausible, InputError for a wrong mounting in the file.
     """
     own, head, read = open_table(path)
     its_mounting = mounting
@@ -47,16 +47,16 @@ def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
         )
     use, scale = columns(path, head)
     table = read(use)
-    wrench = table[:, 1:] * scale
-    samples = from_wrench(table[:, 0], wrench)
+    samples = Samples(table[:, 0], table[:, 1:] * scale)
     check(str(path), samples)
     return Reference(path.name, samples, its_mounting, own.get("sensor", ""))
 
 
 def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequence[int]], Floats]]:
-    """What '# key: value' lines say, the header's names, and a function from columns' places to their numbers (n, k).
+    """The values of '# key: value' lines, the header's names, and a function from column indices to numbers (n, k).
 
-    Columns are parted by comma, semicolon or tab. Raises RecordingError; so does the function, with the line.
+    Columns are separated by comma, semicolon or tab. Raises RecordingError for a file without text or header; the
+    function raises it for a cell that is not a number.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -82,7 +82,7 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequenc
 
 
 def _split(text: str) -> tuple[dict[str, str], str | None, str]:
-    """What '# key: value' lines say, the header, and the rest."""
+    """The values of '# key: value' lines, the header line, and the text after it."""
     own: dict[str, str] = {}
     for match in re.finditer(r"[^\n]*\n?", text):
         line = match[0].strip()
@@ -96,9 +96,10 @@ def _split(text: str) -> tuple[dict[str, str], str | None, str]:
 
 
 def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[int], Floats]:
-    """Which columns are t, F and, with ``torque``, M if there are any, and what the latter two are multiplied by.
+    """Indices of the columns t, F and, with ``torque`` and if there are any, M; and the factors for F and M.
 
-    Raises RecordingError.
+    The factors convert to N and N mm. Raises RecordingError for a column that is missing, doubled or without a known
+    unit.
     """
     found: dict[str, tuple[int, float]] = {}
     for place, cell in enumerate(names):
@@ -125,7 +126,7 @@ def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[
 
 
 class CsvWriter:
-    """A reference being written; every ``add`` is handed to the operating system, so that a kill loses nothing.
+    """Writes a reference; every ``add`` is flushed to the operating system, so that killing the process loses nothing.
 
     Raises InputError when ``path`` exists and may not be overwritten, or cannot be written.
     """
@@ -143,16 +144,12 @@ class CsvWriter:
         self._stream.flush()
 
     def add(self, samples: Samples) -> None:
-        """Append; six axes."""
+        """Append samples of six axes."""
         if len(samples):
-            np.savetxt(
-                self._stream,
-                np.column_stack([samples.t_s, samples.wrench()]),
-                fmt=["%.6f", *["%.6g"] * 6],
-                delimiter=",",
-            )
+            rows = np.column_stack([samples.t_s, samples.wrench])
+            np.savetxt(self._stream, rows, fmt=["%.6f", *["%.6g"] * 6], delimiter=",")
             self._stream.flush()
 
     def close(self) -> None:
-        """Safe to call twice."""
+        """Close the file. Safe to call twice."""
         self._stream.close()

@@ -12,9 +12,9 @@ from .samples import Reference
 
 
 def read_reference(text: str, mounting: Mounting | None = None) -> Reference:
-    """``FILE.csv``, or ``FILE.mcap`` with one wrench topic, or ``FILE.mcap:TOPIC``.
+    """The reference in ``FILE.csv``, in ``FILE.mcap`` with one wrench topic, or in ``FILE.mcap:TOPIC``.
 
-    ``mounting`` takes the place of what the file says. Raises InputError (RecordingError for the content).
+    ``mounting`` replaces the one in the file. Raises InputError (RecordingError for the content).
     """
     name, colon, topic = text.rpartition(":")
     if colon and name.lower().endswith(".mcap"):

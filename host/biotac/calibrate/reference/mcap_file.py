@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 from ...documents import parse_json
 from ...errors import BiotacError, InputError, RecordingError
 from .mounting import Mounting
-from .samples import Reference, check, from_wrench
+from .samples import Reference, Samples, check
 
 SCHEMAS = ("geometry_msgs/msg/WrenchStamped", "geometry_msgs/WrenchStamped")
 NMM_PER_NM = 1000.0
@@ -25,9 +25,10 @@ Row = tuple[float, list[float]]
 
 
 def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -> Reference:
-    """The wrench of ``topic``, or of the only such topic.
+    """The wrench of ``topic``, or of the only wrench topic.
 
-    Raises RecordingError for a file without one, InputError where CDR needs an extra that is not installed.
+    Raises RecordingError for a file without exactly one or without ``mounting``, InputError where CDR needs an extra
+    that is not installed.
     """
     if mounting is None:
         raise RecordingError(
@@ -48,21 +49,21 @@ def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -
                 rows.setdefault(channel.topic, []).append(_row(decoders[channel.topic](message.data)))
     except BiotacError:
         raise
-    except Exception as error:  # a damaged file fails in as many ways as the packages that read it
+    except Exception as error:  # the packages that read it raise many kinds of errors for a damaged file
         raise RecordingError(f"{path}: cannot be read ({error}): expected an MCAP file with {SCHEMAS[0]}") from None
     if len(rows) != 1:
         known = ", ".join(sorted(rows)) or ", ".join(sorted(seen)[:6]) or "no message"
         cure = "name one: --reference FILE:TOPIC" if rows else "record the sensor's topic too"
         raise RecordingError(f"{path}: holds {known}: expected one topic of {SCHEMAS[0]}; {cure}")
     ((name, its),) = rows.items()
-    its.sort(key=lambda row: row[0])  # a bag is in order of arrival, the stamps are the sensor's
-    samples = from_wrench(np.array([t for t, _ in its]), np.array([w for _, w in its]))
+    its.sort(key=lambda row: row[0])  # a bag is in order of arrival, not of the sensor's stamps
+    samples = Samples(np.array([t for t, _ in its]), np.array([w for _, w in its]))
     check(f"{path} {name}", samples)
     return Reference(path.name, samples, mounting, name)
 
 
 def _decoder(path: Path, encoding: str) -> Callable[[bytes], Any]:
-    """From a message's bytes to its fields as attributes."""
+    """A function from a message's bytes to an object with its fields as attributes."""
     if encoding == "json":
         return lambda data: parse_json(data, lambda fields: SimpleNamespace(**fields))
     if encoding != "cdr":
@@ -79,8 +80,8 @@ def _decoder(path: Path, encoding: str) -> Callable[[bytes], Any]:
 
 def _row(message: Any) -> Row:
     stamp, wrench = message.header.stamp, message.wrench
-    # ROS 2 and ROS 1 call the same things sec and nanosec, and secs and nsec
+    # ROS 2 has sec and nanosec, Foxglove's JSON sec and nsec, ROS 1 secs and nsecs.
     second = stamp.sec if hasattr(stamp, "sec") else stamp.secs
-    nanosec = stamp.nanosec if hasattr(stamp, "nanosec") else stamp.nsec
+    nanosec = next(getattr(stamp, name) for name in ("nanosec", "nsec", "nsecs") if hasattr(stamp, name))
     force, torque = ([float(getattr(of, axis)) for axis in "xyz"] for of in (wrench.force, wrench.torque))
     return float(second) + float(nanosec) * 1e-9, [*force, *[NMM_PER_NM * t for t in torque]]

@@ -1,7 +1,7 @@
-"""How a force/torque sensor is fixed to a finger: what turns its axes and its origin into Lin's.
+"""How a force/torque sensor is mounted on a finger: the transform from its axes and origin to Lin's.
 
-The sensor has to move with the finger (it carries the finger, or the finger's holder), so that one rotation and one
-offset hold for the whole run. A file says it in TOML:
+The sensor must move with the finger (it carries the finger, or the finger's holder), so that one rotation and one
+offset hold for the whole run. In a TOML file:
 
     rotation = [[0, 1, 0], [1, 0, 0], [0, 0, -1]]  # rows: Lin's x, y, z in the sensor's axes
     offset_mm = [-30.0, 0.0, 12.0]                 # the sensor's origin, seen from Lin's
@@ -24,15 +24,18 @@ from ...errors import InputError
 Floats = npt.NDArray[np.float64]
 
 READS = ("force on finger", "force on sensor")
-MAX_SKEW = 1e-3  # of R R' - 1: three decimals in a file are a rotation, a forgotten minus is not
+MAX_SKEW = 1e-3  # of R R' - 1: passes a rotation with three decimals, not one with a forgotten minus
 MAX_OFFSET_MM = 500.0
 KEYS = ("rotation", "offset_mm", "reads")
 
 
 @dataclass(frozen=True)
 class Mounting:
-    """``rotation`` (3, 3) takes vectors of the sensor's axes to Lin's; ``offset_mm`` (3,) is the sensor's origin
-    in Lin's frame; ``sign`` is -1 where it reads the force on itself. Raises InputError for what is no rotation.
+    """Transform from a sensor's readings to the wrench on the finger in Lin's frame.
+
+    ``rotation`` (3, 3) turns vectors from the sensor's axes to Lin's. ``offset_mm`` (3,) is the sensor's origin in
+    Lin's frame. ``sign`` is -1 if the sensor reads the force on itself. Raises InputError for a matrix that is not a
+    rotation, or an offset above MAX_OFFSET_MM.
     """
 
     rotation: Floats
@@ -59,7 +62,7 @@ class Mounting:
             raise InputError("rotation mirrors, its determinant is -1: expected +1; change the sign of one row")
 
     def to_finger(self, wrench: Floats) -> Floats:
-        """Force on the finger, and moment about Lin's origin, of readings (n, 3) or (n, 6)."""
+        """Force on the finger, and moment about Lin's origin, from readings (n, 3) in N or (n, 6) with N mm."""
         force: Floats = self.sign * wrench[:, :3] @ self.rotation.T
         if wrench.shape[1] == 3:
             return force
@@ -67,23 +70,23 @@ class Mounting:
         return np.column_stack([force, moment])
 
     def to_sensor(self, wrench: Floats) -> Floats:
-        """What the sensor reads of a wrench (n, 6) in Lin's frame: to_finger turned round."""
+        """What the sensor reads for a wrench (n, 6) in Lin's frame: the inverse of to_finger."""
         force = wrench[:, :3]
         moment = wrench[:, 3:] - np.cross(self.offset_mm, force)
         return self.sign * np.column_stack([force @ self.rotation, moment @ self.rotation])
 
     def facts(self) -> dict[str, Any]:
-        """As JSON types; of() takes them back."""
+        """The mounting as JSON types; of() reads them."""
         reads = READS[0] if self.sign > 0 else READS[1]
         return {"rotation": self.rotation.tolist(), "offset_mm": self.offset_mm.tolist(), "reads": reads}
 
 
-#: Axes and origin are Lin's already, and the force is that on the finger.
+#: For readings that are already the force on the finger in Lin's axes and about Lin's origin.
 LIN = Mounting(np.eye(3), np.zeros(3))
 
 
 def of(facts: Mapping[str, Any], where: str) -> Mounting:
-    """A mounting from its three values. Raises InputError that begins with ``where``."""
+    """The mounting from its three values. Raises InputError that begins with ``where``."""
     missing, unknown = [key for key in KEYS if key not in facts], sorted(set(facts) - set(KEYS))
     if missing or unknown:
         seen = f"{missing[0]} is missing" if missing else f"{unknown[0]!r} is no part of it"
@@ -102,7 +105,7 @@ def of(facts: Mapping[str, Any], where: str) -> Mounting:
 
 
 def read_mounting(text: str) -> Mounting:
-    """From a TOML file, or the word ``lin``. Raises InputError naming what is wrong in it."""
+    """The mounting in a TOML file, or LIN for the word ``lin``. Raises InputError that says what is wrong."""
     if text == "lin":
         return LIN
     path = Path(text)
@@ -115,7 +118,7 @@ def read_mounting(text: str) -> Mounting:
 
 
 def from_json(text: str, where: str) -> Mounting:
-    """From one line of JSON, as a recorded reference has it."""
+    """The mounting in one line of JSON, as in a recorded reference. Raises InputError that begins with ``where``."""
     try:
         facts = parse_json(text)
     except ValueError as error:

@@ -1,6 +1,6 @@
-"""A Reader of an ATI Net F/T box (or NETrs, Axia Ethernet) over UDP.
+"""A Reader for an ATI Net F/T box (or NETrs, Axia Ethernet) over UDP.
 
-Written from the published protocol and tested against an emulated box (sim/net_ft_box.py); it has not met hardware.
+Written from the published protocol and tested with an emulated box (tests/support), never with hardware.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from .samples import ReaderStats, Samples
 PREFIX = "netft:"
 SILENCE_S = 2.0
 HTTP_TIMEOUT_S = 3.0
-RECEIVE_BYTES = 1 << 22  # some seconds of 7 kHz, while this side draws or writes
+RECEIVE_BYTES = 1 << 22  # some seconds at 7 kHz, while this program draws or writes
 OPTIONS = ("cpf", "cpt", "rate", "http")
 _FORM = "netft:HOST[:PORT][?cpf=COUNTS_PER_N&cpt=COUNTS_PER_NM&rate=HZ]"
-# the box's words, without dots, stars and dashes
+# units as the box names them, without spaces, dots, stars and dashes
 _FORCE = {"N": 1.0, "KN": 1000.0}
 _TORQUE_NMM = {"NM": 1000.0, "NMM": 1.0, "KNM": 1e6}
 
 
 @dataclass(frozen=True)
 class Address:
-    """Where a box is, and its scale where the address says it."""
+    """Where a box is, and its scale if the address gives it."""
 
     host: str
     port: int
@@ -42,7 +42,7 @@ class Address:
 
 
 def parse_address(text: str) -> Address:
-    """From ``netft:HOST[:PORT][?cpf=...&cpt=...&rate=...]``. Raises InputError."""
+    """The address in ``netft:HOST[:PORT][?cpf=...&cpt=...&rate=...]``. Raises InputError for anything else."""
     place, _, query = text.removeprefix(PREFIX).partition("?")
     match = re.fullmatch(r"([^:\s]+)(?::(\d{1,5}))?", place)
     options = dict(parse_qsl(query, keep_blank_values=True))
@@ -64,7 +64,10 @@ def parse_address(text: str) -> Address:
 
 
 def read_configuration(xml: bytes, where: str) -> tuple[Scale, str]:
-    """Scale and calibration number from the box's netftapi2.xml. Raises InputError for units it cannot convert."""
+    """Scale and calibration number from the box's netftapi2.xml.
+
+    Raises InputError for units that it cannot convert, RDT switched off, or XML that is not such a box's.
+    """
     try:
         root = ElementTree.fromstring(xml)
     except ElementTree.ParseError as error:
@@ -97,9 +100,10 @@ def read_configuration(xml: bytes, where: str) -> tuple[Scale, str]:
 
 
 class NetFtReader:
-    """An open stream; ``steady_s`` is the clock by which silence is judged.
+    """An open stream from a box; ``sensor`` is its address and its calibration's number.
 
-    Raises PortError when the box cannot be reached, InputError for what it is configured to.
+    ``steady_s`` is the clock by which silence is judged. Raises PortError when the box cannot be reached, InputError
+    for a configuration that cannot be used.
     """
 
     def __init__(self, address: Address, *, steady_s: Callable[[], float] = time.monotonic) -> None:
@@ -116,7 +120,7 @@ class NetFtReader:
                     f"{url} does not answer ({error}): expected a Net F/T box; check the cable, or give {_FORM}"
                 ) from None
         self.scale = scale
-        self._sensor = f"Net F/T {where}" + (f", calibration {number}" if number else "")
+        self.sensor = f"Net F/T {where}" + (f", calibration {number}" if number else "")
         self._where = where
         self._decoder = RdtDecoder(scale)
         self._steady_s = steady_s
@@ -132,18 +136,13 @@ class NetFtReader:
         self._heard_s = steady_s()
 
     @property
-    def sensor(self) -> str:
-        """The box's address and its calibration's number."""
-        return self._sensor
-
-    @property
     def stats(self) -> ReaderStats:
-        """Counts so far; a datagram that is no record counts as bad."""
+        """Counts so far; a datagram that holds no records counts as bad."""
         its = self._decoder
         return ReaderStats(its.lost, its.late, its.bad + its.refused)
 
     def read(self, board_s: float = 0.0) -> Samples:
-        """What has come. Raises DeviceLostError after SILENCE_S without a datagram."""
+        """New samples that are in order. Raises DeviceLostError after SILENCE_S without a datagram."""
         heard = False
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -151,7 +150,7 @@ class NetFtReader:
                     self._decoder.feed(self._socket.recv(65536))
                     heard = True
                 except ConnectionRefusedError:
-                    break  # nobody there yet, or any more: silence decides
+                    break  # nothing listens there yet, or any more: SILENCE_S decides
         now_s = self._steady_s()
         if heard:
             self._heard_s = now_s

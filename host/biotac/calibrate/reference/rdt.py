@@ -1,8 +1,8 @@
-"""ATI's RDT messages (Net F/T and its kin): requests out, records in, in order. No socket, no clock.
+"""ATI's RDT messages (Net F/T and similar): encodes requests, decodes records in order. No socket, no clock.
 
-Facts: ATI manual 9620-05-NET FT, section 9. A request is eight bytes; a datagram holds one record of 36 bytes, or
-many in the buffered mode. UDP loses, doubles and reorders: a record's number in the stream says when it was taken,
-so time is the box's own and a gap stays a gap.
+Source: ATI manual 9620-05-NET FT, section 9. A request is eight bytes; a datagram holds one record of 36 bytes, or
+many in the buffered mode. UDP loses, duplicates and reorders datagrams. A record's number in the stream says when it
+was taken, so time is the box's own and a gap stays a gap.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ import numpy.typing as npt
 
 from ...errors import DeviceLostError, InputError
 from ...wire.counters import nearest
-from .samples import Samples, from_wrench
+from .samples import Samples
 
 PORT = 49152
 MAGIC = 0x1234
 STOP, START, START_BUFFERED = 0x0000, 0x0002, 0x0003
 ENDLESS = 0
-ERROR_BIT = 0x8000_0000  # of the status: the box vouches for nothing
+ERROR_BIT = 0x8000_0000  # of the status: the reading is not valid
 NMM_PER_NM = 1000.0
 
 REQUEST = struct.Struct(">HHI")
 RECORD_DTYPE = np.dtype([("rdt_sequence", ">u4"), ("ft_sequence", ">u4"), ("status", ">u4"), ("counts", ">i4", (6,))])
 
-# Records held back for those that were overtaken. Neighbours swap places on a network; more than this is a loss.
+# Records held back for late ones. Neighbours swap places on a network; a record that is later than this is lost.
 HOLD_RECORDS = 64
-RESTART_RECORDS = 500  # so far behind is no late datagram: the box counts from the start again
+RESTART_RECORDS = 500  # a record this far behind is not late: the box has restarted its numbers
 
 
 @dataclass(frozen=True)
 class Scale:
-    """Counts per N and per N mm, and records a second: what the box is configured to."""
+    """The box's configuration: counts per N and per N mm, and records per second."""
 
     counts_per_n: float
     counts_per_nmm: float
@@ -47,14 +47,15 @@ class Scale:
 
 
 def request(command: int, records: int = ENDLESS) -> bytes:
-    """A request; ``records`` 0: until STOP."""
+    """A request's bytes; with 0 ``records`` the box sends until STOP."""
     return REQUEST.pack(MAGIC, command, records)
 
 
 class RdtDecoder:
-    """Datagrams in, samples in order out. Counts what was ``lost``, came too ``late`` or twice, or was ``refused``.
+    """Decodes datagrams into samples in order.
 
-    ``bad``: readings with the error bit; they are NaN.
+    It counts records that were ``lost`` or came too ``late`` or twice, datagrams ``refused`` for their size, and
+    ``bad`` readings with the error bit, which are NaN.
     """
 
     def __init__(self, scale: Scale) -> None:
@@ -65,7 +66,7 @@ class RdtDecoder:
         self._released = -1
 
     def feed(self, datagram: bytes) -> None:
-        """Take one datagram. Raises DeviceLostError when the box has begun its numbers again."""
+        """Take one datagram. Raises DeviceLostError when the box has restarted its numbers."""
         size = RECORD_DTYPE.itemsize
         if not datagram or len(datagram) % size:
             self.refused += 1
@@ -84,9 +85,9 @@ class RdtDecoder:
         self._waiting.append((numbers, records))
 
     def take(self, *, all_of_them: bool = False) -> Samples:
-        """What is in order by now; with ``all_of_them`` also what was held back."""
+        """The samples that are in order by now; with ``all_of_them`` also those held back."""
         if not self._waiting:
-            return from_wrench(np.empty(0), np.empty((0, 6)))
+            return Samples(np.empty(0), np.empty((0, 6)))
         numbers = np.concatenate([n for n, _ in self._waiting])
         records = np.concatenate([r for _, r in self._waiting])
         order = np.argsort(numbers, kind="stable")
@@ -107,4 +108,4 @@ class RdtDecoder:
         wrong = (records["status"] & ERROR_BIT) != 0
         self.bad += int(wrong.sum())
         wrench[wrong] = np.nan
-        return from_wrench(numbers / self.scale.rate_hz, wrench)
+        return Samples(numbers / self.scale.rate_hz, wrench)

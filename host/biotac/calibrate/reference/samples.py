@@ -1,8 +1,7 @@
-"""What a force/torque sensor measured, checked at the door; from a file, or read while it measures."""
+"""What a force/torque sensor measured, from a file or read live, and checks of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,35 +13,35 @@ from .mounting import Mounting
 
 Floats = npt.NDArray[np.float64]
 
-RATE_HZ = (20.0, 20_000.0)  # slower than 20 Hz a press is a handful of points; ATI's fastest boxes give 7 to 8 kHz
-FORCE_N = (0.3, 200.0)  # of the 99th percentile: what a finger is calibrated with, and what would break it
+RATE_HZ = (20.0, 20_000.0)  # below 20 Hz a press has only a few points; ATI's fastest boxes give 7 to 8 kHz
+FORCE_N = (0.3, 200.0)  # of the 99th percentile: from the least useful for calibrating to what would break a finger
 
 
 @dataclass(frozen=True)
 class Samples:
-    """n instants in the sensor's own axes and by its own clock.
+    """n readings in the sensor's own axes and by its own clock.
 
-    ``t_s`` (n,) increasing; ``force_n`` (n, 3) N; ``torque_nmm`` (n, 3) N mm about the sensor's origin, or None
-    for a sensor of three axes. A reading that the sensor itself calls bad is NaN.
+    ``t_s`` (n,) is increasing. ``wrench`` (n, 6) is force in N and torque in N mm about the sensor's origin, or (n, 3)
+    for a sensor with three axes. A reading that the sensor itself marks as bad is NaN.
     """
 
     t_s: Floats
-    force_n: Floats
-    torque_nmm: Floats | None
+    wrench: Floats
 
     def __len__(self) -> int:
         return len(self.t_s)
 
-    def wrench(self) -> Floats:
-        """Force and, where there is one, torque: (n, 6) or (n, 3)."""
-        return self.force_n if self.torque_nmm is None else np.column_stack([self.force_n, self.torque_nmm])
+    @property
+    def force_n(self) -> Floats:
+        """Force (n, 3) in N."""
+        return self.wrench[:, :3]
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Samples with how their sensor was fixed to the finger; ``name`` says where they are from.
+    """Samples and how their sensor was mounted on the finger; ``name`` says where they come from.
 
-    ``sensor`` is its maker's name and number, "" where the file does not say.
+    ``sensor`` is the sensor's make and number, "" where the file does not say.
     """
 
     name: str
@@ -51,23 +50,8 @@ class Reference:
     sensor: str = ""
 
 
-def from_wrench(t_s: Floats, wrench: Floats) -> Samples:
-    """Samples of a wrench (n, 3) or (n, 6)."""
-    return Samples(t_s, wrench[:, :3], wrench[:, 3:] if wrench.shape[1] == 6 else None)
-
-
-def join(parts: Sequence[Samples]) -> Samples:
-    """One after the other; at least one part."""
-    torques = [part.torque_nmm for part in parts if part.torque_nmm is not None]
-    return Samples(
-        np.concatenate([part.t_s for part in parts]),
-        np.concatenate([part.force_n for part in parts]),
-        np.concatenate(torques) if len(torques) == len(parts) else None,
-    )
-
-
 def check(where: str, samples: Samples) -> None:
-    """Refuse what cannot be a finger's reference. Raises RecordingError with the number that shows it."""
+    """Refuse samples that cannot be a finger's reference. Raises RecordingError with the number that shows why."""
     if len(samples) < 2:
         raise RecordingError(f"{where}: {len(samples)} samples: expected a recording of some minutes; record it again")
     timeless = ~np.isfinite(samples.t_s)
@@ -86,9 +70,8 @@ def check(where: str, samples: Samples) -> None:
         raise RecordingError(
             f"{where}: {rate_hz:.4g} samples a second: expected {RATE_HZ[0]:g} to {RATE_HZ[1]:g}; {guess}"
         )
-    wrench = samples.wrench()
-    bad: npt.NDArray[np.bool_] = ~np.isfinite(wrench.sum(axis=1))
-    # single readings that the sensor calls bad are left out later; a tenth of all is another matter
+    bad: npt.NDArray[np.bool_] = ~np.isfinite(samples.wrench.sum(axis=1))
+    # a few readings that the sensor marks as bad are left out later; a tenth of all is too many
     if bad.mean() > 0.1:
         raise RecordingError(
             f"{where}: {bad.sum()} of {len(bad)} samples are not finite, first sample {int(np.argmax(bad))}: expected "
@@ -106,7 +89,7 @@ def check(where: str, samples: Samples) -> None:
 
 @dataclass(frozen=True)
 class ReaderStats:
-    """Samples that never came, came too late or twice, and that the sensor itself called bad."""
+    """How many samples never came, came too late or twice, or were marked as bad by the sensor."""
 
     lost: int
     late: int
@@ -114,21 +97,18 @@ class ReaderStats:
 
 
 class Reader(Protocol):
-    """``sensor`` is its name and number as far as it says them."""
+    """A force/torque sensor that is read live."""
 
     @property
     def sensor(self) -> str:
-        """For people and for provenance."""
+        """Its name and number as far as known, for people and for provenance."""
 
     @property
     def stats(self) -> ReaderStats:
         """Counts so far."""
 
     def read(self, board_s: float) -> Samples:
-        """Samples since the last call, six axes, in order. Raises DeviceLostError when the sensor has gone.
+        """Samples since the last call, six axes, in order. Raises DeviceLostError when the sensor is gone.
 
-        ``board_s`` is how long the board has streamed by its own clock: what an emulated sensor goes by.
+        ``board_s`` is how long the board has streamed by its own clock; it is the clock of an emulated sensor.
         """
-
-    def close(self) -> None:
-        """Safe to call twice."""

@@ -1,9 +1,9 @@
-"""A scale or balance on a serial port, by what it prints.
+"""A scale or balance on a serial port, read from the lines that it prints.
 
-Two families of lines, which many makers' scales speak: MT-SICS (``S S     123.4 g``, and ``S D`` while it moves) and
-A&D's (``ST,+00123.4  g``, ``US,`` while it moves, with ``GS,`` or ``NT,`` between in the indicators'). Both answer the
-command SI with a line; a scale that prints by itself may pass over it. Written from published formats and tested
-against a scale that was made up: it has met no hardware.
+It reads two formats that many makers' scales use: MT-SICS (``S S     123.4 g``, and ``S D`` while it moves) and A&D's
+(``ST,+00123.4  g``, ``US,`` while it moves; indicators add ``GS,`` or ``NT,`` after that). Both answer the command SI
+with a line; a scale that prints by itself may ignore it. Written from published formats and tested with an emulated
+scale, never with hardware.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator
-from types import TracebackType
 from urllib.parse import parse_qsl
 
 import serial
@@ -19,10 +18,10 @@ import serial
 from ...errors import InputError, PortError
 from ...link.serial_port import describe_open_error
 
-STANDARD_GRAVITY = 9.80665  # m/s2; the earth's differs by 0.3 %
+STANDARD_GRAVITY = 9.80665  # m/s2; the local value differs by up to 0.3 %
 UNITS_N = {"N": 1.0, "g": 1e-3 * STANDARD_GRAVITY, "kg": STANDARD_GRAVITY}
 ASK = b"SI\r\n"
-ASK_S = 0.25  # how often
+ASK_S = 0.25  # time between requests
 PATIENCE_S = 5.0  # a kitchen scale settles in one or two
 LEAST_N = 0.1  # less is an empty pan
 MAX_LINE_BYTES = 64
@@ -36,7 +35,10 @@ _BEYOND = re.compile(r"S[IR]*\s+[-+]|OL,.*")
 
 
 class Scale:
-    """The scale at ``port``, opened with ``?baud=`` and its like. Raises InputError and PortError."""
+    """The scale at ``port``, opened with its options (``?baud=`` etc.).
+
+    Raises InputError for wrong options, PortError when the port cannot be opened.
+    """
 
     def __init__(self, port: str, patience_s: float = PATIENCE_S) -> None:
         place, _, query = port.partition("?")
@@ -59,16 +61,17 @@ class Scale:
     def __enter__(self) -> Scale:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._serial.close()
 
     def force_n(self) -> float:
-        """What it shows now, in N, once it says that it has settled. Raises InputError and PortError."""
+        """The force in N that the scale shows, once it has settled.
+
+        Raises InputError when it does not settle, is silent, or shows no usable weight; PortError when it is gone.
+        """
         seen: list[str] = []
         try:
-            self._serial.read(self._serial.in_waiting)  # what it said before the press
+            self._serial.read(self._serial.in_waiting)  # discards lines from before the press
             for line in self._lines():
                 seen.append(line)
                 value_n = self._settled_n(line)
@@ -92,7 +95,7 @@ class Scale:
         )
 
     def _lines(self) -> Iterator[str]:
-        """Whole lines until the patience is over, asking for one now and then."""
+        """Whole lines for ``patience_s``; asks for one every ASK_S."""
         end = time.monotonic() + self._patience_s
         ask, data = 0.0, b""
         while (now := time.monotonic()) < end:

@@ -1,14 +1,14 @@
-"""One event seen by two clocks: when the finger was loaded, by its counts and by its reference.
+"""Aligns two clocks by the load on the finger, as seen in its counts and by its reference.
 
-Both streams become one number that grows with the load. How fast it changes is cross-correlated over every shift
-that leaves enough overlap; the peak, to a fraction of a step, is the offset between the clocks. Pieces of the run
-are then aligned each on its own, and a line through their offsets is the clocks' drift against each other. A peak
+Each stream is reduced to one number that grows with the load. Its rate of change is cross-correlated over every shift
+that leaves enough overlap; the peak, to a fraction of a step, is the offset between the clocks. Pieces of the run are
+then aligned on their own, and the slope of a line through their offsets is the clocks' drift against each other. A peak
 that does not stand out is refused: two files that do not belong together also have a best shift.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -21,24 +21,24 @@ STEP_S = 0.01  # a board's round
 MIN_OVERLAP_S = 10.0
 MIN_OVERLAP_SHARE = 0.3  # of the shorter stream
 MIN_PEAK = 0.4  # correlation; unrelated streams of two minutes have 0.2 to 0.3
-# Standard errors between the peak and the best beyond APART_S of it (Fisher's z): presses repeated like clockwork fit
-# almost as well a period off, and a minute of them is still enough to tell.
+# Standard errors between the peak and the best further than APART_S from it (Fisher's z). Presses repeated like
+# clockwork fit almost as well a period off, but a minute of them is enough to tell the shifts apart.
 MIN_CLEAR = 5.0
 APART_S = 0.4
 PIECE_S = 15.0
 PIECE_SEARCH_S = 0.3
 MIN_PIECES = 4  # for a drift
 MAX_DRIFT_PPM = 1000.0
-MAX_SCATTER_S = 0.02  # of the pieces about their line: more, and one of the clocks jumped
+MAX_SCATTER_S = 0.02  # of the pieces about their line; with more, one of the clocks jumped
 
 
 @dataclass(frozen=True)
 class Alignment:
     """``t_reference = t_board + offset_s + drift_ppm * 1e-6 * (t_board - middle_s)``.
 
-    ``peak`` correlation there, ``runner_up`` the best elsewhere and ``clear`` the standard errors between them;
-    ``width_s`` the peak's width at half its height;
-    ``scatter_s`` RMS of ``pieces`` offsets about the line; ``overlap_s`` seconds in both streams.
+    ``peak`` is the correlation there, ``runner_up`` the best elsewhere, and ``clear`` the standard errors between them.
+    ``width_s`` is the peak's width at half its height, ``scatter_s`` the RMS of ``pieces`` offsets about the line, and
+    ``overlap_s`` the seconds that are in both streams.
     """
 
     offset_s: float
@@ -53,19 +53,15 @@ class Alignment:
     overlap_s: float
 
     def to_reference_s(self, t_board_s: Floats) -> Floats:
-        """The reference's clock at the board's times."""
-        result: Floats = t_board_s + self.offset_s + 1e-6 * self.drift_ppm * (t_board_s - self.middle_s)
-        return result
-
-    def facts(self) -> dict[str, float | int]:
-        """As JSON types."""
-        return asdict(self)
+        """The reference's times (n,) at the board's times (n,), both in s."""
+        return t_board_s + self.offset_s + 1e-6 * self.drift_ppm * (t_board_s - self.middle_s)
 
 
 def align(where: str, board_s: Floats, board_load: Floats, reference_s: Floats, reference_load: Floats) -> Alignment:
-    """Align loads (n,) at ``board_s`` and (m,) at ``reference_s``; scales and zeros do not matter, NaN is no load.
+    """Align loads (n,) at ``board_s`` and (m,) at ``reference_s``; scale and offset do not matter, NaN is left out.
 
-    Raises RecordingError, beginning with ``where``, when the peak is not clear.
+    Raises RecordingError that begins with ``where`` for streams that are too short, a peak that is too low or not
+    clear, or too much drift or scatter.
     """
     a, a_start = _changes(board_s, board_load)
     b, b_start = _changes(reference_s, reference_load)
@@ -119,42 +115,36 @@ def align(where: str, board_s: Floats, board_load: Floats, reference_s: Floats, 
 def on_grid(t_s: Floats, values: Floats, edges_s: Floats) -> Floats:
     """Means (k, columns) of ``values`` (n, columns) between k + 1 ``edges_s``; NaN where there is no sample.
 
-    Means, and not the sample next to it: a sensor ten times as fast as the grid would alias its noise into it.
+    Means rather than the nearest sample: the noise of a sensor ten times as fast as the grid would be aliased.
     """
     cell = np.searchsorted(edges_s, t_s, side="right") - 1
     good = np.isfinite(values).all(axis=1) & (cell >= 0) & (cell < len(edges_s) - 1)
     count = np.bincount(cell[good], minlength=len(edges_s) - 1)
     with np.errstate(invalid="ignore"):
         columns = [np.bincount(cell[good], weights=v, minlength=len(edges_s) - 1) / count for v in values[good].T]
-    result: Floats = np.column_stack(columns)
-    return result
+    return np.column_stack(columns)
 
 
 def _changes(t_s: Floats, load: Floats) -> tuple[Floats, float]:
-    """How fast the load changes on an even grid, and when that begins. Gaps are bridged: nothing changes there."""
+    """Rate of change of the load on an even grid, and the grid's start in s. Gaps are interpolated linearly."""
     start = float(t_s[0])
-    # cells lie around their times: a board's one sample a cell is then where it was taken, and means are centred
+    # cells are centred on their times: a board's one sample per cell keeps its time, and means are centred
     edges = start + STEP_S * (np.arange(int((t_s[-1] - start) / STEP_S) + 2, dtype=np.float64) - 0.5)
     cells = on_grid(t_s, np.column_stack([load, t_s]), edges)
     known = np.isfinite(cells[:, 0])
     at = edges[:-1] + STEP_S / 2.0
-    # at the time that the mean is of: a cell's samples lie to one side of its middle as their phase has it
+    # uses the mean time of each cell's samples: depending on their phase they lie to one side of its middle
     even: Floats = np.interp(at, cells[known, 1], cells[known, 0]) if known.any() else np.zeros(len(cells))
-    change: Floats = np.gradient(_smooth(even, 5))
-    # a knock is one event: without a limit it alone would decide
+    smooth = np.convolve(np.pad(even, 2, mode="edge"), np.full(5, 0.2), mode="valid")
+    change: Floats = np.gradient(smooth)
+    # without a limit a single knock would decide alone
     size = float(np.sqrt((change**2).mean()))
     change = np.clip(change, -3.0 * size, 3.0 * size)
     return change - change.mean(), start
 
 
-def _smooth(values: Floats, width: int) -> Floats:
-    padded = np.pad(values, width // 2, mode="edge")
-    smooth: Floats = np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
-    return smooth
-
-
 def _correlate(a: Floats, b: Floats, least: int) -> tuple[npt.NDArray[np.int64], Floats, npt.NDArray[np.int64]]:
-    """Correlation of a[k] with b[k + lag] over what overlaps, for every lag that leaves ``least`` steps."""
+    """Lags, correlation of a[k] with b[k + lag], and overlap in steps, for every lag that leaves ``least`` steps."""
     n = 1 << (len(a) + len(b)).bit_length()
     spectrum = np.conj(np.fft.rfft(a, n)) * np.fft.rfft(b, n)
     product = np.fft.irfft(spectrum, n)
@@ -163,14 +153,14 @@ def _correlate(a: Floats, b: Floats, least: int) -> tuple[npt.NDArray[np.int64],
     energy_a, energy_b = (np.concatenate([[0.0], np.cumsum(v**2)]) for v in (a, b))
     ea = energy_a[end] - energy_a[begin]
     eb = energy_b[end + lags] - energy_b[begin + lags]
-    # an overlap in which nearly nothing happens correlates by chance
+    # an overlap in which almost nothing happens correlates by chance
     floor = 0.2 * min(energy_a[-1], energy_b[-1] * energy_a[-1] / max(energy_b[-1], 1e-300))
     norm = np.sqrt(np.maximum(ea, floor) * np.maximum(eb, 0.2 * energy_b[-1]))
     return lags, product[lags % n] / np.maximum(norm, 1e-300), end - begin
 
 
 def _peak(correlation: Floats, best: int) -> tuple[float, float]:
-    """Height and place of the peak, by a parabola through it and its neighbours."""
+    """Height of the peak and its offset from ``best`` in steps, by a parabola through it and its neighbours."""
     if not 0 < best < len(correlation) - 1:
         return float(correlation[best]), 0.0
     before, at, after = correlation[best - 1 : best + 2]
@@ -184,7 +174,7 @@ def _fisher(correlation: float) -> float:
 
 
 def _width(correlation: Floats, best: int) -> float:
-    """Seconds at half the peak's height."""
+    """Width in s at half the peak's height."""
     below = correlation < 0.5 * correlation[best]
     left = best - int(np.argmax(below[best::-1])) if below[: best + 1].any() else 0
     right = best + int(np.argmax(below[best:])) if below[best:].any() else len(correlation) - 1
@@ -194,7 +184,7 @@ def _width(correlation: Floats, best: int) -> float:
 def _drift(
     a: Floats, b: Floats, a_start: float, b_start: float, lag: int, offset_s: float
 ) -> tuple[float, float, float, float, int]:
-    """ppm, the board's middle time, offset there, scatter and pieces of a line through offsets of pieces."""
+    """A line through the offsets of pieces: ppm, the board's middle time, offset there, scatter, number of pieces."""
     size, reach = round(PIECE_S / STEP_S), round(PIECE_SEARCH_S / STEP_S)
     busy = 0.2 * float((a**2).mean())
     at: list[float] = []
@@ -220,7 +210,7 @@ def _drift(
         return 0.0, middle, offset_s, 0.0, len(at)
     slope, value, keep = 0.0, float(np.median(offsets)), np.ones(len(at), dtype=np.bool_)
     times, found = np.array(at) - middle, np.array(offsets)
-    for _ in range(3):  # a piece that locked onto another press is not to bend the line
+    for _ in range(3):  # a piece that locked onto another press must not bend the line
         slope, value = (float(v) for v in np.polyfit(times[keep], found[keep], 1))
         off = np.abs(found - value - slope * times)
         near = off <= max(3.0 * float(np.median(off)), 1e-3)

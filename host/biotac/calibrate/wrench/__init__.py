@@ -1,8 +1,14 @@
-"""A finger's wrench from its counts: models fitted to a force plate, and what they are worth held out.
+"""A finger's wrench from its counts: models fitted to a force plate, and their held-out errors.
 
-``run`` reads a recording with its truth and refuses what cannot be calibrated from, ``joined`` joins a board's with a
-reference's, ``guided`` makes both on a board; ``blocks`` cuts a run so that nothing leaks from test to training;
-``features`` and ``models`` say what is linear in what; ``lag`` says how late counts come; ``crossvalidation`` chooses
-and measures; ``report`` writes it down; ``contact`` is the force plate's own point of contact. Not to be mixed up
-with ``biotac.keep``, which keeps the gains a board uses today.
+- ``run``: reads a recording with its truth and refuses unusable ones
+- ``joined``: joins a board's recording with a reference's; ``sources``: gets a run from either kind of file
+- ``guided``: records both on a board; ``coverage``: what of the finger they cover
+- ``blocks``: cuts a run so that nothing leaks from test to training
+- ``features``, ``models``: the columns and the linear models of them; ``template``: another model, for comparison
+- ``lag``: how far counts lag the force; ``moments``: the sums that fits need
+- ``crossvalidation``: chooses and measures; ``figures``, ``report``: the results
+- ``fitted``, ``provenance``: the map and its file; ``board``, ``upload``: the map on a board
+- ``contact``: the point of contact from the force plate alone
+
+Not to be confused with ``biotac.keep``, which stores the gains and maps that boards use.
 """

@@ -1,8 +1,8 @@
 """Cutting a run so that nothing leaks from test to training.
 
-Neighbouring rows are the same instant of the same contact twice, so rows are never shuffled: the run
-is cut into contiguous blocks, and what lies within a guard of a held-out block is not trained on. A run
-that says which contact each row belongs to is cut by contacts instead, and needs no guard.
+Neighbouring rows are almost the same instant of the same contact, so rows are never shuffled: the run is cut into
+contiguous blocks, and rows within a guard of a held-out block are not trained on. A run that says which contact each
+row belongs to is cut by contacts instead, and needs no guard.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ GUARD_ROWS = 100
 
 
 def contacts(path: Path, given: npt.NDArray[Any], rows: int) -> npt.NDArray[np.int64]:
-    """Field ``contact`` (n,), a number a row. Raises RecordingError when there are too few for the blocks."""
+    """Field ``contact`` (n,), each row's contact. Raises RecordingError when there are too few for the blocks."""
     if given.shape != (rows,) or given.dtype.kind not in "iu":
         raise RecordingError(
             f"{path}: field contact is {given.dtype} {given.shape}: expected ({rows},) integers, a contact each"
@@ -37,11 +37,11 @@ def contacts(path: Path, given: npt.NDArray[Any], rows: int) -> npt.NDArray[np.i
 
 
 class Blocks:
-    """``BLOCKS`` blocks of the run's rows, each cut into head guard, middle and tail guard.
+    """``BLOCKS`` blocks of the run's rows, each cut into three strips: head guard, middle and tail guard.
 
-    Sums are kept per strip, so that any training set is a choice of strips. Blocks are contiguous; where
-    the run rests, an edge is moved to the middle of a rest nearby: then no contact is in two blocks. With
-    ``contact`` (n,), a number a row, each block is a twentieth of the contacts, and guards are empty.
+    ``strips`` are arrays of row indices. Sums are kept for each strip, so that any training set is a choice of strips.
+    Blocks are contiguous; an edge is moved to the middle of a rest nearby if there is one, so that no contact is in two
+    blocks. With ``contact`` (n,), each row's contact, each block is a twentieth of the contacts, and guards are empty.
     """
 
     def __init__(self, rest: npt.NDArray[np.bool_], contact: npt.NDArray[np.int64] | None = None) -> None:
@@ -51,17 +51,17 @@ class Blocks:
         if contact is not None:
             names, of = np.unique(contact, return_inverse=True)
             self.contacts = len(names)
-            # dealt out like cards: contacts numbered along the finger must not make a block a region
+            # shuffled: if contacts are numbered along the finger, a block must not be one region
             order = np.random.default_rng(0).permutation(len(names))
             block_of = (order % BLOCKS)[of.reshape(-1)]
-            self._strips = [
+            self.strips = [
                 np.flatnonzero(block_of == k // 3) if k % 3 == 1 else np.zeros(0, dtype=np.intp)
                 for k in range(3 * BLOCKS)
             ]
             return
         rows = len(rest)
         even = np.linspace(0, rows, BLOCKS + 1).round().astype(np.int64)
-        # half of what a block has beyond its guards: two neighbours that give way still hold them
+        # half of what a block has beyond its guards: a block that shrinks at both edges still holds its guards
         room = max((rows // BLOCKS - 2 * GUARD_ROWS) // 2, 0)
         middles = _rest_middles(rest)
         edges = even.copy()
@@ -72,26 +72,22 @@ class Blocks:
                 self.whole_contacts += 1
         strips = [(e, e + GUARD_ROWS, n - GUARD_ROWS) for e, n in pairwise(edges)]
         bounds = np.append(np.array(strips).ravel(), rows)
-        self._strips = [np.arange(a, b) for a, b in pairwise(bounds)]
-
-    @property
-    def strips(self) -> list[npt.NDArray[np.intp]]:
-        """Rows of each of the 3 * BLOCKS strips."""
-        return self._strips
+        self.strips = [np.arange(a, b) for a, b in pairwise(bounds)]
 
     def rows(self, block: int) -> npt.NDArray[np.intp]:
-        """Rows of a block."""
-        return np.concatenate(self._strips[3 * block : 3 * block + 3])
+        return np.concatenate(self.strips[3 * block : 3 * block + 3])
 
     def own(self, blocks: Iterable[int]) -> npt.NDArray[np.bool_]:
-        """Strips (3 * BLOCKS,) of the given blocks."""
+        """Mask (3 * BLOCKS,) of the given blocks' strips."""
         mask = np.zeros(3 * BLOCKS, dtype=np.bool_)
         for block in blocks:
             mask[3 * block : 3 * block + 3] = True
         return mask
 
     def kept_from(self, blocks: Iterable[int]) -> npt.NDArray[np.bool_]:
-        """Strips that may be trained on when the given blocks are held out: not theirs, nor their guards."""
+        """Mask (3 * BLOCKS,) of the strips to train on when the given blocks are held out: not theirs, nor the guards
+        of their neighbours next to them.
+        """
         mask = np.ones(3 * BLOCKS, dtype=np.bool_)
         for block in blocks:
             mask[max(3 * block - 1, 0) : 3 * block + 4] = False
@@ -100,5 +96,4 @@ class Blocks:
 
 def _rest_middles(rest: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
     change = np.flatnonzero(np.diff(np.concatenate([[False], rest, [False]]).astype(np.int8)))
-    middles: npt.NDArray[np.int64] = (change[::2] + change[1::2]) // 2
-    return middles
+    return (change[::2] + change[1::2]) // 2

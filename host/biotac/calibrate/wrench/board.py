@@ -1,13 +1,12 @@
-"""A fitted map in the board's fixed point (core.map_quantise), and compared with the fit.
+"""A fitted map in the board's fixed point (core.map_quantise), and its comparison with the fit.
 
-What rounding costs is computed frame by frame (``bound``), from protocol/SPEC.md, Wrench maps; nothing here is
-measured and then called a tolerance.
+The rounding error is bounded frame by frame (``bound``), from protocol/SPEC.md, Wrench maps; no tolerance here comes
+from a measurement.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,10 +28,10 @@ from .run import Run
 
 @dataclass(frozen=True)
 class Comparison:
-    """Differences of the board's results from the float model's over ``rows``, and what was proved of them.
+    """Differences between the board's results and the float model's over ``rows``, and their proven bounds.
 
-    RMS is the worst axis'. ``force_mn_bound`` and ``torque_nmm_bound`` are the largest over the rows. Torque is None
-    with three axes, and torsion counts as torque.
+    RMS is that of the worst axis. ``force_mn_bound`` and ``torque_nmm_bound`` are the largest over the rows. Torque is
+    None with three axes; torsion counts as torque.
     """
 
     rows: int
@@ -43,19 +42,17 @@ class Comparison:
     torque_nmm_rms: float | None
     torque_nmm_max: float | None
     torque_nmm_bound: float | None
-    outside: int  # rows and axes beyond their own bound: none, or the code is wrong
-
-    def as_dict(self) -> dict[str, float | int | None]:
-        """For JSON."""
-        return dataclasses.asdict(self)
+    outside: int  # values beyond their own bound; if there are any, the code is wrong
 
 
 # ---- from float to integers --------------------------------------------------------------------
 
 
 def quantise(its: WrenchMap, *, serial: str = "", made_s: int = 0) -> BoardMap:
-    """The map for a board. Raises InputError, naming the block, when a coefficient is beyond the board's formats, and
-    when there is no room for all of them.
+    """The map for a board.
+
+    Raises InputError when a coefficient is beyond the board's formats (it names the block), when all are 0, or when
+    there is no room for all of them.
     """
     axes = len(its.axes)
     found = _merged(its)
@@ -76,7 +73,7 @@ def quantise(its: WrenchMap, *, serial: str = "", made_s: int = 0) -> BoardMap:
 
 
 def _merged(its: WrenchMap) -> Unrounded:
-    """Coefficients by block, in the board's units of a result."""
+    """Coefficients by block, in the board's units for results."""
     unit = result_units(len(its.axes))
     found: Unrounded = {}
     at = 0
@@ -86,7 +83,7 @@ def _merged(its: WrenchMap) -> Unrounded:
         at += block.width
     found[Kind.OFFSET, Gate.ONE] = its.coefficients[at:] * unit
     for gate in Gate:
-        # e = min(e, 0) + max(e, 0): where both are there anyway, a block less to compute
+        # e = min(e, 0) + max(e, 0): where both are present anyway, this saves a block
         split = (Kind.COMPRESSION, gate), (Kind.BULGE, gate)
         if (Kind.SIGNAL, gate) in found and all(part in found and np.any(found[part] != 0.0) for part in split):
             signal = found.pop((Kind.SIGNAL, gate))
@@ -102,25 +99,24 @@ def bound(
     tare_q4: npt.NDArray[np.uint16],
     pdc_q4: npt.NDArray[np.int32],
 ) -> Floats:
-    """How far the board's result may be off (n, axes) in N and N mm: from ``model``, or without one from exact()."""
+    """Bound (n, axes) on the board's error in N and N mm: against ``model``, or without one against exact()."""
     wanted = _merged(model) if model is not None else None
     off = np.concatenate([bound_of(its, wanted, s) for s in tared_chunks(its, counts, tare_q4, pdc_q4)])
-    result: Floats = off / result_units(its.axes)
-    return result
+    return off / result_units(its.axes)
 
 
-# ---- both beside each other --------------------------------------------------------------------
+# ---- comparison --------------------------------------------------------------------------------
 
 
 def compare(model: WrenchMap, its: BoardMap, counts: Floats, pdc: Floats | None = None) -> Comparison:
-    """The board's results against ``model`` over recorded counts (n, 19); ``pdc`` (n,) counts above rest.
+    """The board's results against ``model`` over recorded counts (n, 19); ``pdc`` (n,) in counts above rest.
 
-    Both take what a FRAME holds: whole counts, tare and pressure in 1/16 count.
+    Both get what a FRAME holds: whole counts, and tare and pressure in 1/16 count.
     """
     raw = np.rint(counts).astype(np.uint16)
     tare_q4 = tare_to_q4(np.broadcast_to(model.tare, raw.shape))
     pdc_q4 = np.zeros(len(raw), np.int32) if pdc is None else np.rint(pdc * Q4_PER_COUNT).astype(np.int32)
-    on_frames = dataclasses.replace(model, tare=tare_q4[0] / Q4_PER_COUNT)
+    on_frames = replace(model, tare=tare_q4[0] / Q4_PER_COUNT)
     truth = on_frames.predict(raw.astype(np.float64), pdc_q4 / Q4_PER_COUNT if model.with_pdc else None)
     force, torque, torsion = its.results(raw, tare_q4, pdc_q4)
     got = np.column_stack([force, torque, torsion])[:, : its.axes] / result_units(its.axes)
@@ -141,15 +137,15 @@ def compare(model: WrenchMap, its: BoardMap, counts: Floats, pdc: Floats | None 
 
 
 def summary(model: WrenchMap, run: Run) -> dict[str, Any]:
-    """compare() over a run as JSON; {"refused": in words} for a map that no board can hold."""
+    """compare() over a run as JSON types; {"refused": reason} for a map that no board can hold."""
     try:
-        return compare(model, quantise(model), run.counts, run.pdc).as_dict()
+        return asdict(compare(model, quantise(model), run.counts, run.pdc))
     except InputError as error:
         return {"refused": str(error)}
 
 
 def words(facts: dict[str, Any]) -> str:
-    """summary() as a line."""
+    """summary() as a line of text."""
     if "refused" in facts:
         return f"on a board: {facts['refused']}"
     torque = f" and {facts['torque_nmm_rms']:.4f} N mm" if facts["torque_nmm_max"] is not None else ""

@@ -1,10 +1,9 @@
-"""Where a force plate says a finger is touched: a wrench and the core's shape give the point of contact.
+"""The point of contact from a force plate: it follows from a wrench and the core's shape.
 
-A point contact carries a force f and a torsion K about the surface's normal n, so the moment about
-the origin is m = c x f + K n with c on the half-cylinder (x <= 0) or the quarter-sphere. That is as
-many unknowns as equations, and numerics.md 5.1 solves it in closed form; the paper searches a 0.5 mm
-mesh instead (Eq 5 to 7), which by itself is off by a quarter of a millimetre. Pure functions; lengths
-in mm, forces in N on the finger, moments in N mm.
+A point contact carries a force f and a torsion K about the surface's normal n, so the moment about the origin is
+m = c x f + K n with c on the half-cylinder (x <= 0) or the quarter-sphere. There are as many unknowns as equations, and
+numerics.md 5.1 solves them in closed form. The paper searches a 0.5 mm mesh instead (Eq 5 to 7), which alone is off by
+a quarter of a millimetre. Pure functions; lengths in mm, forces in N on the finger, moments in N mm.
 """
 
 from __future__ import annotations
@@ -26,10 +25,10 @@ MESH_STEP_MM = 0.5
 class Contact:
     """n contacts; NaN where the wrench has none.
 
-    ``point_mm`` (n, 3) on the core, ``normal`` (n, 3) outward, ``normal_force_n`` (n,) >= 0 into the
-    finger, ``torsion_nmm`` (n,) about the outward normal. ``missed`` (n,): the line of
-    action passes beside the cylinder (noise at a grazing contact, or a second contact), so there is no
-    point. ``on_skin`` (n,): the point is on the ventral surface between its proximal end and the tip.
+    ``point_mm`` (n, 3) is on the core, ``normal`` (n, 3) points outward, ``normal_force_n`` (n,) >= 0 is into the
+    finger, ``torsion_nmm`` (n,) is about the outward normal. ``missed`` (n,) is true where the line of action passes
+    beside the cylinder (noise at a grazing contact, or a second contact), so that there is no point. ``on_skin`` (n,)
+    is true where the point is on the ventral surface between its proximal end and the tip.
     """
 
     point_mm: Floats
@@ -41,14 +40,13 @@ class Contact:
 
 
 def moment(point_mm: Floats, force_n: Floats, torsion_nmm: Floats) -> Floats:
-    """Moment (n, 3) about the origin of contacts at ``point_mm`` (n, 3): the forward computation."""
+    """Moment (n, 3) about the origin for contacts at ``point_mm`` (n, 3): the inverse of locate()."""
     normal = surface.normals_at(point_mm)
-    result: Floats = np.cross(point_mm, force_n) + torsion_nmm[:, None] * normal
-    return result
+    return np.cross(point_mm, force_n) + torsion_nmm[:, None] * normal
 
 
 def locate(force_n: Floats, moment_nmm: Floats) -> Contact:
-    """Contacts from forces (n, 3) and moments about the origin (n, 3). No force, or NaN, gives NaN."""
+    """Contacts from forces (n, 3) and moments about the origin (n, 3). A force of 0, or NaN, gives NaN."""
     force, torque = np.asarray(force_n, dtype=np.float64), np.asarray(moment_nmm, dtype=np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
         on_sphere, sphere_torsion = _sphere(force, torque)
@@ -70,14 +68,14 @@ def locate(force_n: Floats, moment_nmm: Floats) -> Contact:
 def _sphere(f: Floats, m: Floats) -> tuple[Floats, Floats]:
     """Outward normal (n, 3) and torsion (n,) as if the whole core were the sphere.
 
-    (K - a [f]x) n = m, split into the part along f and the part across: neither divides by K, so a
-    contact without torsion is no special case.
+    (K - a [f]x) n = m is split into the parts along f and across it. Neither divides by K, so a contact without
+    torsion is no special case.
     """
     a = surface.RADIUS_MM
     ff, mm, mf = (f * f).sum(axis=1), (m * m).sum(axis=1), (m * f).sum(axis=1)
     b = mm - a * a * ff
     root = np.hypot(b, 2.0 * a * mf)
-    # of the two ways to write K^2 and (f.n)^2, each time the one without cancellation
+    # K^2 and (f.n)^2 can each be written in two ways: this takes the one without cancellation
     large = (np.abs(b) + root) / 2.0
     small = np.where(large > 0.0, (a * mf) ** 2 / large, 0.0)
     k2 = np.where(b > 0.0, large, small)
@@ -90,7 +88,7 @@ def _sphere(f: Floats, m: Floats) -> tuple[Floats, Floats]:
 
 
 def _cylinder(f: Floats, m: Floats) -> tuple[Floats, Floats, Floats, npt.NDArray[np.bool_]]:
-    """Point, outward normal, torsion, and whether m_x is more than f can have there, on the endless cylinder."""
+    """Point, outward normal, torsion, and whether m_x is larger than f can cause, on the endless cylinder."""
     a = surface.RADIUS_MM
     across = np.hypot(f[:, 1], f[:, 2])
     sine = m[:, 0] / (a * across)
@@ -107,12 +105,12 @@ def _cylinder(f: Floats, m: Floats) -> tuple[Floats, Floats, Floats, npt.NDArray
     return point, np.column_stack([np.zeros_like(x), ny, nz]), k, missed
 
 
-def locate_on_mesh(force_n: Floats, moment_nmm: Floats, step_mm: float = MESH_STEP_MM) -> Floats:
-    """The paper's way: the mesh point (n, 3) where |n x (m - c x f)| is least among those the force presses on.
+def locate_on_mesh(force_n: Floats, moment_nmm: Floats) -> Floats:
+    """The paper's method: the mesh point (n, 3) with the least |n x (m - c x f)| of those that the force presses on.
 
     NaN where it presses on none.
     """
-    points, normals, _ = surface.ventral_mesh(step_mm)
+    points, normals, _ = surface.ventral_mesh(MESH_STEP_MM)
     result = np.full((len(force_n), 3), np.nan)
     for k, (f, m) in enumerate(zip(force_n, moment_nmm, strict=True)):
         left = np.linalg.norm(np.cross(normals, m - np.cross(points, f)), axis=1)
@@ -123,21 +121,21 @@ def locate_on_mesh(force_n: Floats, moment_nmm: Floats, step_mm: float = MESH_ST
     return result
 
 
-LIGHT_N = 0.5  # a lighter contact holds no torsion to speak of: friction times force times half its width
+LIGHT_N = 0.5  # a lighter contact has hardly any torsion: at most friction times force times half its width
 MAX_NOWHERE_SHARE = 0.01
-MAX_OFF_MM = 2.0  # how far beside the core a line of action may pass and still be a touch of the skin over it
+MAX_OFF_MM = 2.0  # a line of action may pass the core at this distance and still touch the skin over it
 
 
 def torsion_truth(
     where: object, given: npt.NDArray[Any] | None, force_n: Floats, moment_nmm: Floats
 ) -> tuple[Floats, tuple[str, ...]]:
-    """Torsion (n, 1) in N mm about the outward normal, or (n, 0) where there is none to be had, and notes.
+    """Torsion (n, 1) in N mm about the outward normal, or (n, 0) where it cannot be determined, and notes.
 
-    Truth for a row of the map of its own: torque about the origin is mostly the force's lever, and what is left after
-    taking c x F away again is the point of contact's error times the force (three times a good map's error).
+    It is an axis of the map of its own: torque about the origin is mostly the force's lever, and subtracting c x F from
+    it leaves the point of contact's error times the force (three times a good map's error).
 
-    ``given`` (n,) is the recording's own, else it follows from the wrench on a point contact. Raises
-    RecordingError when ``given`` is no number a row.
+    ``given`` (n,) is the recording's own torsion; without it, it is computed from the wrench as of a point contact.
+    Raises RecordingError when ``given`` is not one finite number for each row.
     """
     rows = len(force_n)
     if given is not None:
@@ -164,7 +162,7 @@ def torsion_truth(
 
 
 def _on_mesh(force_n: Floats, moment_nmm: Floats) -> Floats:
-    """Torsion (n,) at the mesh point that fits best; NaN where none explains the moment to MAX_OFF_MM."""
+    """Torsion (n,) at the mesh point that fits best; NaN where even that is off by more than MAX_OFF_MM."""
     point = locate_on_mesh(force_n, moment_nmm)
     normal = surface.normals_at(point)
     about = moment_nmm - np.cross(point, force_n)
@@ -172,15 +170,15 @@ def _on_mesh(force_n: Floats, moment_nmm: Floats) -> Floats:
     return np.where(off_mm <= MAX_OFF_MM, (about * normal).sum(axis=1), np.nan)
 
 
-# What is laid over the wrench, in N and N mm: nothing, a Nano17's resolution, and a lesser plate's noise.
+# Noise added to the wrench, in N and N mm: none, a Nano17's resolution, and that of a worse plate.
 NOISES = (("exact wrench", 0.0, 0.0), ("Nano17's resolution", 1 / 320, 1 / 64), ("20 mN, 0.2 N mm", 0.02, 0.2))
 
 
 @dataclass(frozen=True)
 class ContactError:
-    """Distances in mm between the contact found and the true one, over ``found`` of the contacts.
+    """Distances in mm between the contact found and the true one, over ``found`` contacts.
 
-    A contact that noise puts beside the finger has no place: it is not in ``found``.
+    A contact that noise puts beside the finger has no point and is not counted in ``found``.
     """
 
     noise: str
@@ -191,8 +189,8 @@ class ContactError:
     max_mm: float
 
 
-def compare(contacts: int, *, seed: int = 0, step_mm: float = MESH_STEP_MM) -> list[ContactError]:
-    """Both methods under every noise of NOISES, on ``contacts`` random contacts with shear and torsion."""
+def compare(contacts: int, *, seed: int = 0) -> list[ContactError]:
+    """Errors of both methods with every noise of NOISES, on ``contacts`` random contacts with shear and torsion."""
     rng = np.random.default_rng(seed)
     point, force, torsion = random_contacts(contacts, rng)
     torque = moment(point, force, torsion)
@@ -202,13 +200,13 @@ def compare(contacts: int, *, seed: int = 0, step_mm: float = MESH_STEP_MM) -> l
         read_m = torque + rng.normal(0.0, 1.0, torque.shape) * torque_nmm
         closed = locate(read_f, read_m)
         result.append(_error(name, "closed form", np.where(closed.missed[:, None], np.nan, closed.point_mm) - point))
-        on_mesh = locate_on_mesh(read_f, read_m, step_mm)
-        result.append(_error(name, f"mesh of {step_mm:g} mm", on_mesh - point))
+        on_mesh = locate_on_mesh(read_f, read_m)
+        result.append(_error(name, f"mesh of {MESH_STEP_MM:g} mm", on_mesh - point))
     return result
 
 
 def random_contacts(count: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
-    """Points (n, 3) all over the ventral surface, forces (n, 3) of 0.5 to 20 N into it, torsions (n,)."""
+    """Points (n, 3) all over the ventral surface, forces (n, 3) of 0.5 to 20 N into it plus shear, torsions (n,)."""
     x, angle = rng.uniform(surface.PROXIMAL_END_MM, 0.95 * surface.RADIUS_MM, count), rng.uniform(-1.5, 1.5, count)
     radius = np.sqrt(surface.RADIUS_MM**2 - np.maximum(x, 0.0) ** 2)
     point = np.column_stack([x, radius * np.sin(angle), -radius * np.cos(angle)])

@@ -1,8 +1,8 @@
-"""What a calibration of this run is worth on rows it has never seen.
+"""The error of a calibration of this run on rows that it has never seen.
 
-Nested: each of the blocks is held out once, and everything that is chosen for it - lags, smoothing,
-lambdas and the models' weights, per axis - is chosen by a second cross-validation inside the other blocks. What is
-reported is therefore the procedure's error and not the luckiest of many.
+Nested cross-validation: each block is held out once, and everything that is chosen for it (lags, smoothing, and for
+each axis lambdas and the models' weights) is chosen inside the other blocks. What is reported is therefore the
+procedure's error, not the luckiest of many.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from .template import Template
 
 INNER_FOLDS = 5
 FIRST_OF_POOL = len(MODELS) - len(POOL)
-WINDOWS_ROWS = (1, 5, 9)  # as recorded, or a mean: a third of the noise for 40 ms of delay at 100 Hz
-# What the frames in free air weigh against the run's. A finger that never rests leaves the map free to say half a
-# newton in air, or more; but where light presses are scarce, holding it at zero bends the map in contact. So: the most
-# that costs no force axis more than a twentieth of its error, and never nothing.
+WINDOWS_ROWS = (1, 5, 9)  # as recorded, or a mean: over 9, a third of the noise for 40 ms of delay at 100 Hz
+# Weight of the frames in free air against the run's. If a finger never rests, nothing keeps the map from giving half a
+# newton in air, or more; but where light presses are scarce, holding it at zero bends the map in contact. So this takes
+# the largest weight that costs no force axis more than a twentieth of its error, and never none.
 AIR_SHARES = (0.05, 0.01)
-AIR_COST = 1.1  # in squared error
+AIR_COST = 1.1  # factor on the squared error
 AIR_LAMBDA = 1e-4
-SHIFTS_COUNTS = (0.0, 100.0, -100.0)  # un-tared drift the result is tried with
-LESS = (0.25, 0.5)  # of the training blocks, for what more recording is worth
+SHIFTS_COUNTS = (0.0, 100.0, -100.0)  # un-tared drift that the result is tested with
+LESS = (0.25, 0.5)  # shares of the training blocks, to see what a longer recording would gain
 THREADS = 2
 
 Show = Callable[[str], None]
@@ -44,49 +44,36 @@ Strips = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Choice:
-    """What predicts one axis: ``coefficients`` (p + 1,) of features.columns, the offset last.
-
-    ``inner_mse`` is the mean squared error of the inner cross-validation, over drift, in the truth's
-    unit squared; NaN where nothing was chosen. ``lam`` is NaN for the pool, whose parts have their own.
-    """
-
-    model: str
-    lam: float
-    inner_mse: float
-    coefficients: Floats
-
-
-@dataclass(frozen=True)
 class Fit:
-    """One training: the choice per axis for every model by name, of which ``best`` is the pool.
+    """One training. ``by_model`` has each model's coefficients (p + 1, axes) of features.columns, the offset last.
 
-    ``lag_rows`` of each axis; ``weights`` (axes, m) of POOL's models, each with both LAMBDAS, and where others are
-    known again with both OTHERS_LAMBDAS; ``air_share`` is the weight of the frames in free air, of the run's, 0 without
-    any; ``less`` are coefficients (p + 1, axes) from LESS of its blocks.
+    ``lag_rows`` are for each axis. ``weights`` (axes, m) are those of POOL's models with both LAMBDAS, and, if a map of
+    other fingers is given, again with both OTHERS_LAMBDAS. ``air_share`` is the weight of the frames in free air as a
+    share of the run's, 0 without any. ``less`` are the pool's coefficients (p + 1, axes) from LESS of its blocks.
     """
 
     lag_rows: tuple[int, ...]
     window_rows: int
     air_share: float
-    by_model: dict[str, tuple[Choice, ...]]
+    by_model: dict[str, Floats]
     weights: Floats
     less: tuple[Floats, ...]
 
     @property
-    def best(self) -> tuple[Choice, ...]:
-        """The pool's, per axis."""
+    def best(self) -> Floats:
+        """The pool's coefficients (p + 1, axes)."""
         return self.by_model[POOLED]
 
 
 @dataclass(frozen=True)
 class Validation:
-    """Everything held out; ``axes`` columns throughout.
+    """Held-out results, and the final training.
 
-    ``predicted`` (3, n, axes) at SHIFTS_COUNTS by each row's own fold; ``by_model`` name -> RMSE (3, axes), each with
-    its own nested lambda, and TEMPLATE's; ``less`` (2, axes) the RMSE of LESS of the blocks; ``folds`` the 20
-    trainings; ``final`` the training on the whole run; ``lag_rows`` common to the axes, of the whole run before any
-    correction; ``affine_r2`` held-out R2 of the affine model there.
+    ``predicted`` (3, n, axes) is at SHIFTS_COUNTS, for each row by the fold that holds it out. ``by_model`` gives by
+    name the RMSE (3, axes) of each model with its own nested lambda, and TEMPLATE's. ``less`` (2, axes) is the RMSE
+    with LESS of the blocks. ``folds`` are the 20 trainings, ``final`` is the training on the whole run. ``lag_rows`` is
+    the lag common to all axes over the whole run, before any correction; ``affine_r2`` is the affine model's held-out
+    R2 at that lag.
     """
 
     run: Run
@@ -102,7 +89,7 @@ class Validation:
 
 @dataclass(frozen=True)
 class _Training:
-    """What is trained on: inner folds over the blocks ``of``, and what was found about time on ``strips`` alone."""
+    """What is trained on: inner folds over the blocks ``of``, and lags and window chosen on ``strips`` alone."""
 
     of: list[int]
     strips: Strips
@@ -118,14 +105,13 @@ def validate(
     others: Floats | None = None,
     show: Show | None = None,
 ) -> Validation:
-    """Hold every block out once, then train on all. ``align`` False takes rows as they stand, lag 0.
+    """Hold every block out once, then train on all. ``align`` False trains with lag 0.
 
-    ``others`` (q + 1, 3) are coefficients of a map of other fingers, to pull the force to.
+    ``others`` (q + 1, 3) are coefficients of a map of other fingers, to pull the force towards.
 
-    BLAS runs on one thread meanwhile, in the whole process. Raises RecordingError when force and counts do not follow
-    each other.
+    BLAS runs on one thread meanwhile, in the whole process. Raises RecordingError when force and counts do not match.
     """
-    # Thousands of small systems: OpenBLAS's threads wait for each other, and on a busy computer for much longer.
+    # Thousands of small systems: OpenBLAS's threads wait for each other, and much longer on a busy computer.
     threads = min(THREADS, os.cpu_count() or 1)
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(threads) as pool:
         return _validate(run, align, windows, others, show, pool)
@@ -164,24 +150,24 @@ def _validate(
         if show is not None:
             show(f"{run.name}: block {block + 1} of {BLOCKS} held out")
         rows = blocks.rows(block)
-        tried = [np.column_stack([choice.coefficients for choice in its]) for its in fit.by_model.values()]
-        # side by side: their columns cost more than their sums
-        said = predict(run, fit, [*tried, *fit.less], rows)
+        # all at once: computing the columns costs more than the products
+        said = predict(run, fit, [*fit.by_model.values(), *fit.less], rows)
         truth = run.truth[rows]
         predicted[:, rows] = said[:, :, list(fit.by_model).index(POOLED)]
         error = ((said - truth[:, None]) ** 2).sum(axis=1)
         for k, name in enumerate(fit.by_model):
             errors[name] = errors.get(name, 0.0) + error[:, k]
-        less += error[0, len(tried) :]
+        less += error[0, len(fit.by_model) :]
         trained = np.concatenate([blocks.strips[k] for k in np.flatnonzero(trainings[block].strips)])
         guess = template.held_out(fit.window_rows, fit.lag_rows, trained, rows, SHIFTS_COUNTS)
         errors[TEMPLATE] = errors.get(TEMPLATE, 0.0) + ((guess - truth) ** 2).sum(axis=1)
-    by_model, less = {name: _rms(total, run) for name, total in errors.items()}, _rms(less, run)
+    n = len(run.truth)
+    by_model, less = {name: np.sqrt(total / n) for name, total in errors.items()}, np.sqrt(less / n)
     return Validation(run, blocks, predicted, by_model, less, tuple(fits[:-1]), fits[-1], lag_rows, affine_r2)
 
 
 def predict(run: Run, fit: Fit, coefficients: Sequence[Floats], rows: Rows) -> Floats:
-    """What each of ``coefficients`` (p + 1, axes) makes of the run's ``rows`` at SHIFTS_COUNTS: (3, n, each, axes)."""
+    """Wrenches (3, n, m, axes) at SHIFTS_COUNTS for the run's ``rows`` (n,), by each of m ``coefficients``."""
     axes = len(fit.lag_rows)
     late = np.clip(rows[:, None] + np.array(fit.lag_rows), 0, len(run.counts) - 1)
     needed, place = np.unique(late, return_inverse=True)
@@ -196,13 +182,8 @@ def predict(run: Run, fit: Fit, coefficients: Sequence[Floats], rows: Rows) -> F
     return found
 
 
-def _rms(total: Floats, run: Run) -> Floats:
-    result: Floats = np.sqrt(total / len(run.truth))
-    return result
-
-
 def _folds(blocks: Blocks, of: list[int], strips: Strips) -> list[tuple[Strips, Strips]]:
-    """Per inner fold the strips that are trained on and those that are tested."""
+    """For each inner fold, the strips to train on and those to test on."""
     result = []
     for fold in range(INNER_FOLDS):
         out = of[fold::INNER_FOLDS]
@@ -211,15 +192,15 @@ def _folds(blocks: Blocks, of: list[int], strips: Strips) -> list[tuple[Strips, 
 
 
 class _Timing:
-    """How many rows to average, by the affine model, which costs little: noise is noise whatever is fitted to it."""
+    """Chooses how many rows to average, by the affine model, which is cheap: the noise is the same for any model."""
 
     def __init__(self, run: Run, blocks: Blocks, windows: tuple[int, ...]) -> None:
-        # rows that are not in time have no neighbours
+        # rows that are not in order of time have no neighbours to average with
         self._run, self._blocks, self._windows = run, blocks, windows if run.contact is None else windows[:1]
         self._sums: dict[tuple[int, tuple[int, ...]], Sums] = {}
 
     def window(self, lag_rows: tuple[int, ...], of: list[int], strips: Strips) -> int:
-        """In rows, for a training."""
+        """The window in rows with the least inner error for a training."""
         error = {}
         for window in self._windows if len(self._windows) > 1 else ():
             sums = self._of(window, lag_rows)
@@ -241,12 +222,12 @@ class _Timing:
 
 
 def _late(run: Run, which: Sequence[tuple[int, int]]) -> Floats:
-    """The truth's axes, each moved by its lag in rows."""
+    """Axes of the truth, each shifted by its lag in rows; ``which`` has (axis, lag)."""
     return np.column_stack([moved(run.truth[:, axis], lag) for axis, lag in which])
 
 
 class _Trainer:
-    """Trains on any choice of blocks; sums are made once for each window, for all axes at all lags in use."""
+    """Trains on any choice of blocks; sums are computed once for each window, for all axes at all lags in use."""
 
     def __init__(
         self,
@@ -268,10 +249,9 @@ class _Trainer:
                 return strip_sums(at(signals, rows), truth[rows], run.drift)
 
             self._sums[window] = stacked(pool.map(of, blocks.strips))
-            self._air[window] = air_sums(run, window, run.truth.shape[1])
+            self._air[window] = air_sums(run, window)
 
     def train(self, its: _Training) -> Fit:
-        """Fit all models."""
         every, air = self._sums[its.window_rows], self._air[its.window_rows]
         every = every.axes([self._late.index(late) for late in enumerate(its.lag_rows)])
         folds = _folds(self._blocks, its.of, its.strips)
@@ -280,39 +260,36 @@ class _Trainer:
         total = every.of(its.strips)
         share = 0.0
         if air is not None:
-            # another recording than the run: it is in every training and in no test
+            # it is a separate recording: part of every training and of no test
             share = self._air_share(kept, tested, air)
             total, kept = total.plus(air, share), [one.plus(air, share) for one in kept]
         rows = sum(one.rows for one in tested)
         inner = [np.array(one) for one in zip(*(self._pulled(one, MODELS) for one in kept), strict=True)]
         alone = self._pulled(total, MODELS)
-        choices = {
-            LIN: _choices(LIN, models.lin(total, offset=False)),
-            LIN_OFFSET: _choices(LIN_OFFSET, models.lin(total)),
-        }
+        by_model = {LIN: models.lin(total, offset=False), LIN_OFFSET: models.lin(total)}
         for model, fits, whole in zip(MODELS, inner, alone, strict=False):
             mse = np.sum([out.errors(fit) for fit, out in zip(fits, tested, strict=True)], axis=0) / rows
             # for comparison: one lambda for all axes
             best = int((mse / np.maximum(mse.min(axis=0), 1e-12)).mean(axis=1).argmin())
-            choices[model.name] = _choices(model.name, whole[best], LAMBDAS[best], mse[best])
-        weights, mse = _weights(np.concatenate(inner[FIRST_OF_POOL:], axis=1), tested, rows)
-        choices[POOLED] = _choices(POOLED, _mean(weights, alone[FIRST_OF_POOL:]), mse=mse)
+            by_model[model.name] = whole[best]
+        weights = _weights(np.concatenate(inner[FIRST_OF_POOL:], axis=1), tested, rows)
+        by_model[POOLED] = _mean(weights, alone[FIRST_OF_POOL:])
         less = []
         for part in LESS:
             sums = every.of(its.strips & self._blocks.own(its.of[:: round(1 / part)]))
             sums = sums if air is None else sums.plus(air, share)
             less.append(_mean(weights, self._pulled(sums, POOL)))
-        return Fit(its.lag_rows, its.window_rows, share, choices, weights, tuple(less))
+        return Fit(its.lag_rows, its.window_rows, share, by_model, weights, tuple(less))
 
     def _pulled(self, sums: Sums, of: Sequence[Model]) -> list[Floats]:
-        """Those pulled to Lin's scales, then those of POOL pulled to others."""
+        """Coefficients of the models ``of`` pulled to Lin's scales, then of POOL pulled to ``others`` if given."""
         found = models.pulled(sums, [model.family for model in of])
         if self._others is not None:
             found += models.pulled_to_others(sums, [model.family for model in POOL], self._others)
         return found
 
     def _air_share(self, kept: list[Sums], tested: list[Sums], air: Sums) -> float:
-        """By a model that bends as the pool will, and costs little."""
+        """The weight of the free-air frames, chosen with a cheap model that bends as the pool does."""
         index = features.GATED.index(len(air.gram) - 1)
         air = air.part(index)
 
@@ -327,21 +304,16 @@ class _Trainer:
         return next((share for share in AIR_SHARES if (error(share) <= AIR_COST * without).all()), AIR_SHARES[-1])
 
 
-def _choices(name: str, found: Floats, lam: float = float("nan"), mse: Floats | None = None) -> tuple[Choice, ...]:
-    errors = np.full(found.shape[1], np.nan) if mse is None else mse
-    return tuple(Choice(name, lam, float(error), its) for error, its in zip(errors, found.T, strict=True))
-
-
 def _mean(weights: Floats, members: Sequence[Floats]) -> Floats:
-    """Coefficients (p + 1, axes)."""
+    """Weighted mean of the members' coefficients (p + 1, axes)."""
     mean: Floats = np.einsum("am,mpa->pa", weights, np.concatenate(members))
     return mean
 
 
-def _weights(inner: Floats, tested: list[Sums], rows: float) -> tuple[Floats, Floats]:
-    """Of the members (axes, m) by the errors of their inner folds, and the mean squared error (axes,) with them.
+def _weights(inner: Floats, tested: list[Sums], rows: float) -> Floats:
+    """Weights of the members (axes, m) from their errors in the inner folds.
 
-    ``inner`` (folds, m, p + 1, axes) are their coefficients.
+    ``inner`` (folds, m, p + 1, axes) are their coefficients, ``tested`` the sums of each fold's test rows.
     """
     axes = inner.shape[3]
     product = np.zeros((axes, inner.shape[1], inner.shape[1]))
@@ -350,6 +322,4 @@ def _weights(inner: Floats, tested: list[Sums], rows: float) -> tuple[Floats, Fl
             its = of[:, :, axis]
             cross = its @ out.cross[:, axis]
             product[axis] += its @ out.gram @ its.T - cross[:, None] - cross + out.square[axis]
-    product /= rows
-    found = np.array([models.weights(its) for its in product])
-    return found, np.einsum("am,amn,an->a", found, product, found)
+    return np.array([models.weights(its) for its in product / rows])

@@ -1,10 +1,10 @@
-"""What the models are linear in: one row of features a frame, block by block.
+"""The features that the models are linear in: one row for each frame, block by block.
 
-A block is a kind of column times a gate, e.g. the compressions times how far along the finger the contact
-lies (protocol/map.toml). Every model is a choice of blocks, and a board's map is a list of them. Features are
-functions of one frame's tared counts alone (and of PDC where there is one), so a frame can be checked by itself
-and at any drift. Columns are scaled to be of the order of one; none is centred or standardised by the run
-itself, because a fitted map has to mean the same on the next run.
+A block is a kind of column times a gate, e.g. the compressions times the contact's position along the finger
+(protocol/map.toml). Every model is a choice of blocks, and a board's map is a list of them. Features are functions of
+one frame's tared counts alone (and of PDC where there is one), so a frame can be checked by itself and at any drift.
+Columns are scaled to be of the order of one. None is centred or standardised by the run itself, because a fitted map
+must mean the same on the next run.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ class Block:
 
     @property
     def width(self) -> int:
-        """Columns."""
         return _map.KINDS[self.kind].columns
 
 
@@ -48,17 +47,17 @@ _CONDUCTANCE_PAIRS = _blocks([Kind.CONDUCTANCE_PAIRS])
 _SPLIT = (Kind.COMPRESSION, Kind.BULGE)  # different physics (biotac.md finding 4)
 _PRESSURE = _blocks([Kind.PRESSURE], STRAIGHT)
 
-# PRESSURE last: a run without PDC has the columns before it
+# PRESSURE is last: a run without PDC has just the columns before it
 BLOCKS = (*_SIGNAL, *_SIGNAL_PAIRS, *_CONDUCTANCE, *_CONDUCTANCE_PAIRS, *_blocks(_SPLIT, STRAIGHT), *_PRESSURE)
 
 
 def blocks(*, with_pdc: bool) -> tuple[Block, ...]:
-    """The blocks of columns(), in their order."""
+    """The blocks of columns(), in order."""
     return BLOCKS if with_pdc else BLOCKS[: -len(_PRESSURE)]
 
 
 def width(*, with_pdc: bool) -> int:
-    """Columns of columns()."""
+    """Number of columns of columns()."""
     return sum(block.width for block in blocks(with_pdc=with_pdc))
 
 
@@ -69,7 +68,7 @@ class Family:
     blocks: tuple[Block, ...]
 
     def index(self, columns: int) -> npt.NDArray[np.intp]:
-        """Places of the family's columns among all ``columns`` of columns()."""
+        """Indices of the family's columns; ``columns`` is the number of all columns of columns()."""
         own = [block for block in blocks(with_pdc=columns == width(with_pdc=True)) if block in self.blocks]
         return np.concatenate([_place(block) for block in own])
 

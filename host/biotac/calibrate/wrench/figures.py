@@ -1,4 +1,4 @@
-"""What a validation is worth, in figures; everything here is of held-out rows."""
+"""A validation's figures: all errors are over held-out rows, rest_n() is of the final map."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from .features import columns
 from .models import LAMBDAS, LIN, POOL, POOLED
 from .moments import moved, with_one
 
-ROWS_PER_S = 100  # of a run that does not say
-ANGLE_MIN_N = 0.5  # a smaller force has a direction only on paper
+ROWS_PER_S = 100  # taken for all runs, which have no times
+ANGLE_MIN_N = 0.5  # the direction of a smaller force means nothing
 THIRDS = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
 
 
 def rmse(predicted: Floats, truth: Floats) -> Floats:
-    """Per axis (axes,), in the truth's unit."""
+    """RMS error of each axis (axes,), in the truth's unit."""
     result: Floats = np.sqrt(((predicted - truth) ** 2).mean(axis=0))
     return result
 
 
 def r2(predicted: Floats, truth: Floats) -> Floats:
-    """Per axis (axes,): 1 is perfect, 0 no better than the mean; NaN where the truth never changes."""
+    """R2 of each axis (axes,): 1 is perfect, 0 no better than the mean; NaN where the truth never changes."""
     variance = truth.var(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         result: Floats = np.where(variance > 0.0, 1.0 - ((predicted - truth) ** 2).mean(axis=0) / variance, np.nan)
@@ -35,22 +35,22 @@ def r2(predicted: Floats, truth: Floats) -> Floats:
 
 
 def median_angle_deg(predicted: Floats, truth: Floats) -> float:
-    """Between predicted and true force, over rows with at least ANGLE_MIN_N; NaN when there are none."""
+    """Median angle between predicted and true force, over rows with at least ANGLE_MIN_N; NaN if there are none."""
     size = np.linalg.norm(truth[:, :3], axis=1)
     firm = size >= ANGLE_MIN_N
     if not firm.any():
         return float("nan")
     a, b = predicted[firm, :3], truth[firm, :3]
-    # atan2 keeps small angles that acos rounds to nothing
+    # atan2 is exact for small angles, which acos rounds to 0
     angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
     return float(np.degrees(np.median(angle)))
 
 
 def confusion(predicted: Floats, truth: Floats) -> Floats:
-    """(axes, axes): how much of true axis j appears on predicted axis i; the identity is perfect.
+    """Matrix (axes, axes) of how much of true axis j appears on predicted axis i; the identity is perfect.
 
-    Least squares of the prediction on all true axes and an offset, so that axes which merely go
-    together in this run are not blamed.
+    It is a least-squares fit of the prediction to all true axes and an offset, so that axes which are merely correlated
+    in this run do not appear as confused.
     """
     basis = np.column_stack([truth, np.ones(len(truth))])
     found: Floats = np.linalg.lstsq(basis, predicted, rcond=None)[0][:-1].T
@@ -58,9 +58,10 @@ def confusion(predicted: Floats, truth: Floats) -> Floats:
 
 
 def regions(validation: Validation) -> list[dict[str, Any]]:
-    """RMS length of the error by where the compression's centroid lies, ``x_mm`` and ``y_mm``, the worst first.
+    """RMS length of the force error by the place of the compression's centroid, ``x_mm`` and ``y_mm``, worst first.
 
-    Thirds along times thirds across of the run's own contacts; those with hardly a row are left out.
+    Regions are thirds along times thirds across of the run's own contacts; those with under 1 % of the rows in contact
+    are left out.
     """
     run, final = validation.run, validation.final
     centre = centroid_mm(moved(run.counts, -int(np.median(final.lag_rows))) - run.tare)
@@ -80,7 +81,7 @@ def regions(validation: Validation) -> list[dict[str, Any]]:
 
 
 def minutes(validation: Validation) -> list[dict[str, Any]]:
-    """Error against what there was to train on: ``minutes`` at ROWS_PER_S, and ``rmse`` per axis held out."""
+    """Error against the amount of training: ``minutes`` at ROWS_PER_S, and the held-out ``rmse`` of each axis."""
     rows = len(validation.run.truth) * (BLOCKS - 1) / BLOCKS
     whole = rmse(validation.predicted[0], validation.run.truth)
     steps = [*zip(LESS, validation.less, strict=True), (1.0, whole)]
@@ -88,9 +89,10 @@ def minutes(validation: Validation) -> list[dict[str, Any]]:
 
 
 def next_minute(validation: Validation) -> dict[str, Any]:
-    """The region where a further minute pays most: the one of regions(), and ``gain_n`` off its error by it.
+    """The region where a further minute helps most: that of regions(), with ``gain_n``, what it takes off the error.
 
-    A region's error is taken to fall with its own rows as the whole run's does with all: an estimate, to choose by.
+    A region's error is assumed to fall with its own rows as the whole run's does with all rows. It is an estimate, good
+    enough to choose by.
     """
     full = np.linalg.norm(rmse(validation.predicted[0], validation.run.truth)[:3])
     before = np.linalg.norm(validation.less[-1][:3])
@@ -103,20 +105,20 @@ def next_minute(validation: Validation) -> dict[str, Any]:
 
 
 def weights(validation: Validation) -> list[dict[str, float]]:
-    """Per axis: model -> its weight in the pool, a mean over the folds; pulled to others or not."""
+    """For each axis, each model's weight in the pool, a mean over the folds; pulled to others or not."""
     mean = np.mean([fit.weights for fit in validation.folds], axis=0)
     of_models = mean.reshape(len(mean), -1, len(POOL), len(LAMBDAS)).sum(axis=(1, 3))
     return [{model.name: float(one) for model, one in zip(POOL, its, strict=True)} for its in of_models]
 
 
 def pulled_share(validation: Validation) -> list[float]:
-    """Per axis: the weight of what is pulled to other fingers, a mean over the folds; 0 where none were known."""
+    """For each axis, the weight of the members pulled to other fingers, a mean over the folds; 0 if there are none."""
     mean = np.mean([fit.weights for fit in validation.folds], axis=0)
     return [float(one) for one in mean[:, len(POOL) * len(LAMBDAS) :].sum(axis=1)]
 
 
 def summary(validation: Validation) -> dict[str, Any]:
-    """All figures as JSON types; forces in N, torques in N mm, axes as in ``axes``."""
+    """All figures as JSON types; forces in N, torques in N mm, in the order of ``axes``."""
     run, truth, predicted = validation.run, validation.run.truth, validation.predicted
     lin = validation.by_model[LIN][0]
     of = [rmse(p, truth) for p in predicted]
@@ -151,7 +153,7 @@ def summary(validation: Validation) -> dict[str, Any]:
     }
     if len(run.axes) > 3:
         result["rmse_nmm"] = _list(of[0][3:6])
-        # numerics.md 4: two electrodes at the tip see it, by a millimetre and a half of lever
+        # numerics.md 4: only two electrodes at the tip sense it, with a lever of a millimetre and a half
         result["notes"].append("Mx cannot be measured with this electrode layout: its figures are of what goes with it")
     if len(run.axes) > 6:
         result["torsion_rmse_nmm"] = float(of[0][6])
@@ -159,13 +161,12 @@ def summary(validation: Validation) -> dict[str, Any]:
 
 
 def rest_n(validation: Validation) -> list[float]:
-    """Length of the force in N that the final map says where nothing touches: e = 0, then at SHIFTS_COUNTS[1:]."""
+    """Size of the force in N that the final map gives where nothing touches: at e = 0, then at SHIFTS_COUNTS[1:]."""
     run, final = validation.run, validation.final
     still = np.zeros((1, len(run.tare)))
     pdc = None if run.pdc is None else np.zeros(1)
-    coefficients = np.column_stack([choice.coefficients for choice in final.best])
     said = [
-        with_one(columns(Signals(still + counts * run.drift, run.tare, pdc))) @ coefficients for counts in SHIFTS_COUNTS
+        with_one(columns(Signals(still + counts * run.drift, run.tare, pdc))) @ final.best for counts in SHIFTS_COUNTS
     ]
     return [float(np.linalg.norm(wrench[0, :3])) for wrench in said]
 

@@ -1,10 +1,11 @@
-"""The map a calibration ends with, and its file."""
+"""The map that a calibration results in, and its file."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,17 +17,17 @@ from . import features
 from .crossvalidation import Validation
 from .models import POOLED
 from .moments import with_one
+from .provenance import KEY, Provenance
 
 FORMAT = "biotac-wrench-map/3"
 
 
 @dataclass(frozen=True)
 class WrenchMap:
-    """One frame's counts to force on the finger; where calibrated, torque about Lin's origin and torsion.
+    """A map from one frame's counts to force on the finger, and where calibrated torque about Lin's origin and torsion.
 
-    ``coefficients`` (p + 1, axes) of features.columns, block by block, the offset last; ``tare`` (19,)
-    counts. It was trained for mean counts of ``window_rows`` frames, those coming ``lag_rows`` (axes,) later than
-    force.
+    ``coefficients`` (p + 1, axes) are for features.columns, block by block, the offset last; ``tare`` (19,) is in
+    counts. The map was trained on mean counts of ``window_rows`` frames, which lag the force by ``lag_rows`` (axes,).
     """
 
     model: str
@@ -38,31 +39,30 @@ class WrenchMap:
 
     @property
     def with_pdc(self) -> bool:
-        """Whether it was trained with PDC, and so needs it."""
+        """Whether the map was trained with PDC, and so needs it."""
         return len(self.coefficients) - 1 == features.width(with_pdc=True)
 
     def predict(self, counts: Floats, pdc: Floats | None = None) -> Floats:
-        """Wrench (n, axes) in N and N mm of each of ``counts`` (n, 19), NaN where a count is; the mean is the caller's.
+        """Wrench (n, axes) in N and N mm for each of ``counts`` (n, 19); NaN where a count is NaN.
 
-        ``pdc`` (n,) counts above rest. Raises InputError when it was trained with PDC and there is none.
+        The caller averages the counts over ``window_rows``. ``pdc`` (n,) is in counts above rest. Raises InputError
+        when the map was trained with PDC and there is none.
         """
         if self.with_pdc and pdc is None:
             raise InputError("this map was trained with PDC: expected pdc (n,) too; calibrate again without field PDC")
         signals = Signals(np.asarray(counts, dtype=np.float64) - self.tare, self.tare, pdc if self.with_pdc else None)
-        result: Floats = with_one(features.columns(signals)) @ self.coefficients
-        return result
+        return with_one(features.columns(signals)) @ self.coefficients
 
 
 def of(validation: Validation) -> WrenchMap:
     """The map trained on the whole run."""
     final, run = validation.final, validation.run
-    coefficients = np.column_stack([choice.coefficients for choice in final.best])
-    return WrenchMap(POOLED, run.axes, run.tare, final.window_rows, final.lag_rows, coefficients)
+    return WrenchMap(POOLED, run.axes, run.tare, final.window_rows, final.lag_rows, final.best)
 
 
-def dumps(its: WrenchMap) -> str:
-    """As JSON; loads() gives the same numbers to the bit."""
-    facts = {
+def dumps(its: WrenchMap, origin: Provenance | None = None) -> str:
+    """The map as JSON; load() gives exactly the same numbers, provenance.read() the ``origin``."""
+    facts: dict[str, Any] = {
         "format": FORMAT,
         "model": its.model,
         "axes": list(its.axes),
@@ -72,11 +72,13 @@ def dumps(its: WrenchMap) -> str:
         "blocks": _block_names(with_pdc=its.with_pdc),
         "coefficients": its.coefficients.tolist(),
     }
+    if origin is not None:
+        facts[KEY] = asdict(origin)
     return json.dumps(facts) + "\n"
 
 
 def load(path: Path) -> WrenchMap:
-    """A map from its file. Raises InputError naming what is wrong with it."""
+    """The map in a file. Raises InputError that says what is wrong with it."""
     try:
         facts = read_json(path)
         if facts["format"] != FORMAT:

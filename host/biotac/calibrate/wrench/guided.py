@@ -1,14 +1,16 @@
-"""A calibration walked through on a board: warm up, tare, load everywhere, done.
+"""A guided calibration on a board: warm up, tare, load everywhere, done.
 
 The procedure is fed with a board's frames and a reference's samples, each by its own clock; it keeps no time of its
-own, prints nothing and asks nobody. What somebody has to do or might like to know comes out as Events. walk() reads
-both and records them: the files are complete up to the last second, so whatever ends it, they can be fitted later.
+own, prints nothing and asks nobody. ``events`` has a line for whatever a person must do or may want to know. walk()
+reads both streams and records them. The files are complete up to the last second, so that whatever ends it, they can be
+fitted later.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -22,20 +24,21 @@ from ...hand.hand import Hand
 from ...wire import messages_gen as wire
 from ..reference.csv_file import CsvWriter
 from ..reference.mounting import Mounting
-from ..reference.samples import Reader, Samples, join
+from ..reference.samples import Reader, Samples
 from .coverage import Coverage
 
 Frames = npt.NDArray[np.void]
 
-MEAN_FRAMES = 50  # drift is slow: means of half a second have it without the noise
+MEAN_FRAMES = 50  # drift is slow: means over half a second show it without the noise
 TARE_FRAMES = 200
 TARE_SAMPLES_S = 1.0
 MAX_ZERO_SPREAD_N = 0.15  # 10 to 90 % of the reference while it is zeroed
 MAX_WARM_UP_S = 3600.0
+DRIFT_OVER_S = 60.0
 
 
 class Step(Enum):
-    """What is being done; the value is what a person is told."""
+    """Step of the procedure; the value is the text for the person."""
 
     WARM_UP = "warming up: leave the finger alone"
     TARE = "taring: leave the finger alone"
@@ -43,38 +46,23 @@ class Step(Enum):
     DONE = "done"
 
 
-@dataclass(frozen=True)
-class Plan:
-    """Limits. Drift is the mean over the electrodes, in counts a minute over the last ``drift_over_s``."""
-
-    max_drift_counts_per_min: float = 20.0
-    drift_over_s: float = 60.0
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something happened. ``step`` is the one in force now; ``words`` are one line."""
-
-    step: Step
-    words: str
-
-
 @dataclass
 class Procedure:
-    """Calibrates finger ``finger``. Feed ``frames`` and ``samples`` as they come; look at ``step`` and ``events``.
+    """Guides one finger's calibration. Feed ``frames`` and ``samples`` as they come; watch ``step`` and ``events``.
 
-    When ``wants_tare`` is true the board is to be told to tare, and ``tared`` called with whether it did.
+    When ``wants_tare`` is true, the caller tells the board to tare, and calls ``tared`` with whether it accepted. Drift
+    is that of the mean over the electrodes, over the last DRIFT_OVER_S.
     """
 
     finger: int
     mounting: Mounting
-    plan: Plan = field(default_factory=Plan)
+    max_drift_counts_per_min: float = 20.0
     coverage: Coverage = field(default_factory=Coverage)
     step: Step = Step.WARM_UP
-    events: list[Event] = field(default_factory=list)
+    events: list[str] = field(default_factory=list)
     zero: Floats | None = None
     drift_counts_per_min: float = float("nan")
-    last_step: Step = Step.WARM_UP  # before the one in force
+    last_step: Step = Step.WARM_UP  # the step before the current one
 
     def __post_init__(self) -> None:
         self._means: deque[tuple[float, float]] = deque()  # time in s, mean over the electrodes
@@ -86,7 +74,7 @@ class Procedure:
         self._recent: deque[Samples] = deque()
         self._last_words = ""
 
-    # ---- what comes in -------------------------------------------------------------------------
+    # ---- input ---------------------------------------------------------------------------------
 
     def frames(self, frames: Frames) -> None:
         """Take FRAME_DTYPE rows of any fingers, in order."""
@@ -94,33 +82,33 @@ class Procedure:
             self._frame(row)
 
     def samples(self, samples: Samples) -> None:
-        """Take what the reference has measured since. Raises InputError for one of three axes."""
+        """Take the reference's samples since the last call. Raises InputError for a reference of three axes."""
         if not len(samples):
             return
-        if samples.torque_nmm is None:
+        if samples.wrench.shape[1] < 6:
             raise InputError("the reference has no torque: expected six axes, places are found by them")
         if self.step in (Step.WARM_UP, Step.TARE):
             self._keep(samples)
         elif self.step is Step.LOADS and self.zero is not None:
             step_s = float(np.median(np.diff(samples.t_s))) if len(samples) > 1 else 0.0
-            self.coverage.add(self.mounting.to_finger(samples.wrench() - self.zero), step_s)
+            self.coverage.add(self.mounting.to_finger(samples.wrench - self.zero), step_s)
             self._tell_progress()
 
     def tared(self, *, accepted: bool) -> None:
-        """The board answered; one that refuses is asked again after a while of quiet."""
+        """Take the board's answer; if it refused, it is asked again after TARE_FRAMES untouched frames."""
         self._asked = accepted
         self._tared_frames = 0
         if not accepted:
             self._untouched = 0
-            self._tell("the board refused to tare, its signals move: leave the finger alone")
+            self.events.append("the board refused to tare, its signals move: leave the finger alone")
 
     def finish(self, why: str) -> None:
-        """Complete or not: on the user's word, or because nothing more comes."""
+        """End the procedure, complete or not: at the user's request, or because no more data comes."""
         if self.step is not Step.DONE:
             self._go(Step.DONE, why)
 
     def status(self) -> str:
-        """One line of where it is, for a display that is renewed."""
+        """One line of progress, for a display that is refreshed."""
         if self.step is Step.WARM_UP:
             return f"{Step.WARM_UP.value}: {self.drift_counts_per_min:+.0f} counts/min"
         if self.step is Step.LOADS:
@@ -128,14 +116,13 @@ class Procedure:
         words: str = self.step.value
         return words
 
-    def take_events(self) -> list[Event]:
-        """What has happened since this was asked last."""
+    def take_events(self) -> list[str]:
+        """The events since the last call."""
         events, self.events = self.events, []
         return events
 
     @property
     def wants_tare(self) -> bool:
-        """The board is to tare now."""
         return self.step is Step.TARE and not self._asked and self._untouched >= TARE_FRAMES
 
     # ---- warm-up and tare ----------------------------------------------------------------------
@@ -156,14 +143,14 @@ class Procedure:
     def _warm_up(self, at_s: float, row: np.void, disturbed: bool) -> None:
         if self._begin_s is None:
             self._begin_s = at_s
-            self._tell(Step.WARM_UP.value)
+            self.events.append(Step.WARM_UP.value)
         if at_s - self._begin_s > MAX_WARM_UP_S:
             raise InputError(
                 f"after {MAX_WARM_UP_S / 60:.0f} minutes the finger still drifts by {self.drift_counts_per_min:+.0f} "
-                f"counts/min: expected at most {self.plan.max_drift_counts_per_min:g}; is it alone, and is it on?"
+                f"counts/min: expected at most {self.max_drift_counts_per_min:g}; is it alone, and is it on?"
             )
         if disturbed and self._untouched == 0:
-            # a warming finger that moves fast enough is called touched by the board; both are the wait's business
+            # the board reports a touch for a finger that drifts fast enough, too: either way, keep waiting
             self._half.clear()
             return
         self._half.append((at_s, row["counts"].astype(np.float64)))
@@ -172,14 +159,14 @@ class Procedure:
         mean_s = float(np.mean([t for t, _ in self._half]))
         self._means.append((mean_s, float(np.mean([counts.mean() for _, counts in self._half]))))
         self._half.clear()
-        while mean_s - self._means[0][0] > self.plan.drift_over_s:
+        while mean_s - self._means[0][0] > DRIFT_OVER_S:
             self._means.popleft()
         times, counts = np.array(self._means).T
         if len(times) > 3:
             self.drift_counts_per_min = 60.0 * float(np.polyfit(times - times[0], counts, 1)[0])
-        long_enough = mean_s - self._begin_s >= self.plan.drift_over_s
-        enough = len(times) >= 0.8 * self.plan.drift_over_s * 100.0 / MEAN_FRAMES
-        if long_enough and enough and abs(self.drift_counts_per_min) <= self.plan.max_drift_counts_per_min:
+        long_enough = mean_s - self._begin_s >= DRIFT_OVER_S
+        enough = len(times) >= 0.8 * DRIFT_OVER_S * 100.0 / MEAN_FRAMES
+        if long_enough and enough and abs(self.drift_counts_per_min) <= self.max_drift_counts_per_min:
             self._go(Step.TARE, f"warm: {self.drift_counts_per_min:+.1f} counts/min over the last minute")
 
     def _keep(self, samples: Samples) -> None:
@@ -191,14 +178,14 @@ class Procedure:
     def _zero_reference(self) -> None:
         if not self._recent:
             return
-        wrench = join(list(self._recent)).wrench()
+        wrench = np.concatenate([samples.wrench for samples in self._recent])
         wrench = wrench[np.isfinite(wrench).all(axis=1)]
         if not len(wrench):
             return
         low, high = np.percentile(wrench[:, :3], (10, 90), axis=0)
         if float((high - low).max()) > MAX_ZERO_SPREAD_N:
             self._tared_frames = 0
-            self._tell(f"the reference moves by {float((high - low).max()):.2f} N: let go of everything")
+            self.events.append(f"the reference moves by {float((high - low).max()):.2f} N: let go of everything")
             return
         self.zero = np.median(wrench, axis=0)
         self._recent.clear()
@@ -213,22 +200,19 @@ class Procedure:
         words = self.status()
         if words != self._last_words:
             self._last_words = words
-            self._tell(words)
+            self.events.append(words)
 
     def _go(self, step: Step, words: str) -> None:
         self.last_step, self.step = self.step, step
-        self._tell(words)
-
-    def _tell(self, words: str) -> None:
-        self.events.append(Event(self.step, words))
+        self.events.append(words)
 
 
-Show = Callable[[Event], None]
+Show = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Places:
-    """Where the board's recording (.mcap) and the reference (.csv) go."""
+    """Paths for the board's recording (.mcap) and the reference (.csv)."""
 
     recording: Path
     reference: Path
@@ -242,42 +226,36 @@ def walk(
     *,
     overwrite: bool = False,
     show: Show = lambda event: None,
-    progress: Callable[[str], None] = lambda text: None,
+    progress: Show = lambda text: None,
 ) -> None:
-    """Until the procedure is done, the board's source ends, or a KeyboardInterrupt, which ends the procedure too.
+    """Run and record the procedure until it is done, the board's source ends, or a KeyboardInterrupt, which ends it.
 
-    The board streams no more afterwards. Raises InputError when a file exists or cannot be written, DeviceLostError
-    when the board or the reference goes away; what was recorded until then is kept.
+    The board does not stream afterwards. Raises InputError when a file exists or cannot be written, when the finger
+    keeps drifting or the reference has no torque, and DeviceLostError when the board or the reference is lost; what was
+    recorded until then is kept.
     """
-    writer = CsvWriter(places.reference, procedure.mounting, reader.sensor, overwrite=overwrite)
-    try:
-        recorder = hand.record(places.recording, overwrite=overwrite)
+    reference = CsvWriter(places.reference, procedure.mounting, reader.sensor, overwrite=overwrite)
+    with closing(reference) as writer, closing(hand.record(places.recording, overwrite=overwrite)):
         try:
             _loop(hand, reader, procedure, writer, show, progress)
             if procedure.step is not Step.DONE:
                 procedure.finish("the simulated finger's script is over")
         except KeyboardInterrupt:
             procedure.finish("ended on your word")
-        finally:
-            recorder.close()
-    finally:
-        writer.close()
     for event in procedure.take_events():
         show(event)
-    # also a board whose source has ended: it streams nothing, and still calls itself busy
+    # needed even if the board's source has ended: it sends nothing more, but still refuses as busy
     hand.stop()
 
 
-def _loop(
-    hand: Hand, reader: Reader, procedure: Procedure, writer: CsvWriter, show: Show, progress: Callable[[str], None]
-) -> None:
+def _loop(hand: Hand, reader: Reader, procedure: Procedure, writer: CsvWriter, show: Show, progress: Show) -> None:
     first_us: int | None = None
     for batch in hand.batches():
         last_us = batch.last_t_us()
         if last_us is not None:
             first_us = last_us if first_us is None else first_us
             samples = reader.read((last_us - first_us) / 1e6)
-            # kept before it is judged
+            # written before the procedure sees it, which may raise
             writer.add(samples)
             procedure.frames(batch.frames)
             procedure.samples(samples)

@@ -1,7 +1,7 @@
-"""A board's recording and a force/torque sensor's, each by its own clock, joined into a run.
+"""Joins a board's recording and a force/torque sensor's, each by its own clock, into a run.
 
-Counts, tare and contact are the board's own, frame by frame; the force is the mean of the reference over each
-frame's 10 ms. The reference's zero is taken where the board felt nothing, before its axes are turned into Lin's.
+Counts, tare and contact are the board's own, frame by frame. The force is the mean of the reference over each frame's
+10 ms. The reference's zero is taken where the board felt nothing, before its axes are turned into Lin's.
 """
 
 from __future__ import annotations
@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from ...core.board_map import pdc_above_rest_q4
 from ...core.geometry import Floats
 from ...errors import InputError, RecordingError
 from ...wire import messages_gen as wire
 from ...wire import sensor_gen as sensor
-from ...wire.frames import electrode_signals
+from ...wire.frames import Q4_PER_COUNT, electrode_signals, to_units
 from ..reference.samples import Reference
 from ..reference.timing import STEP_S, Alignment, align
 from . import contact
@@ -24,27 +25,29 @@ from .run import MIN_REST_ROWS, REST_N, Run, check_clipping, check_electrodes, c
 Mask = npt.NDArray[np.bool_]
 
 MAX_INCOMPLETE_SHARE = 0.05
-MAX_GAP_S = 0.05  # between two samples of the reference: longer, and the force in between is not known
+MAX_GAP_S = 0.05  # between two samples of the reference: in a longer gap the force is unknown
 SETTLE_ROWS = 30  # after a touch the skin creeps back, and a hand may still be near
 MAX_REST_FORCE_N = 0.5
 FIRM_N = 1.0
 MIN_ON_SKIN_SHARE = 0.7
 LEVER_MM = (0.1, 40.0)  # |M| / |F| about Lin's origin: contacts are within 17 mm of it, torsion adds some
-# After a frame's t_us: when its electrodes are read on average, and when its pressure is.
+# Times after a frame's t_us at which its electrodes, on average, and its pressure are read.
 ELECTRODES_S = float(np.mean([sensor.SLOTS.index(name) for name in sensor.ELECTRODE_NAMES])) / sensor.SLOT_HZ
 PDC_S = sensor.SLOTS.index("PDC") / sensor.SLOT_HZ
-IDLE_MEAN_ROWS = 50  # drift is slow: means have it without the noise
+IDLE_MEAN_ROWS = 50  # drift is slow: means show it without the noise
 
 
 @dataclass(frozen=True)
 class Joined:
-    """A run and how it came about. ``zero`` is the reference's, in its own axes: N, and N mm where it has torque.
+    """A run and how it was made. ``zero`` is the reference's, in its own axes: N, and N mm where it has torque.
 
-    ``on_skin_share`` of the firm rows have their line of action meet the finger's ventral surface; NaN without torque.
+    ``on_skin_share`` is the share of firm rows whose line of action meets the finger's ventral surface; NaN without
+    torque.
     """
 
     run: Run
     finger: int
+    reference: Reference
     alignment: Alignment
     zero: Floats
     on_skin_share: float
@@ -52,10 +55,11 @@ class Joined:
 
 @dataclass(frozen=True)
 class Board:
-    """What a board said of one finger: n frames in order.
+    """A board's data for one finger: n frames in order.
 
-    ``t_s`` (n,) device time; ``counts`` and ``e`` (n, 19), NaN where a word is missing or there was no tare yet;
-    ``pdc`` (n,) above its tare, NaN where unknown; ``quiet`` (n,): tared and not in contact, for a while.
+    ``t_s`` (n,) is device time. ``counts`` and ``e``, the counts above the tare, are (n, 19); they are NaN where a word
+    is missing, ``e`` also without a tare. ``pdc`` (n,) is above its tare, NaN where unknown. ``quiet`` (n,) is true
+    after more than SETTLE_ROWS frames that were tared and not in contact.
     """
 
     finger: int
@@ -67,17 +71,15 @@ class Board:
     quiet: Mask
 
     def only(self, rows: Mask) -> Board:
-        """Those frames."""
+        """The frames where ``rows`` is true."""
         arrays = {name: getattr(self, name)[rows] for name in ("t_s", "counts", "e", "pdc", "quiet")}
         return replace(self, **arrays)
 
 
 def board_of(frames: npt.NDArray[np.void], t_us: npt.NDArray[np.int64], finger: int, serial: str) -> Board:
-    """From FRAME messages (DTYPES) of one finger and their unwrapped times."""
-    missing = wire.INVALID_COUNT
-    counts = np.where(frames["counts"] == missing, np.nan, frames["counts"].astype(np.float64))
-    no_pdc = (frames["pdc"] == missing) | (frames["pdc_tare_q4"] == missing)
-    pdc = np.where(no_pdc, np.nan, frames["pdc"] - frames["pdc_tare_q4"] / 16.0)
+    """A Board from FRAME messages (DTYPES) of one finger and their unwrapped times."""
+    counts = to_units(frames["counts"], 1)
+    pdc = to_units(pdc_above_rest_q4(frames), Q4_PER_COUNT)
     untouched = (frames["flags"] & (wire.FrameFlags.CONTACT | wire.FrameFlags.UNTARED)) == 0
     since = np.arange(len(frames)) - np.maximum.accumulate(np.where(untouched, -1, np.arange(len(frames))))
     quiet = untouched & (since > SETTLE_ROWS)
@@ -85,7 +87,7 @@ def board_of(frames: npt.NDArray[np.void], t_us: npt.NDArray[np.int64], finger: 
 
 
 def join(where: str, board: Board, reference: Reference) -> Joined:
-    """Align, zero and turn. Raises RecordingError, beginning with ``where``, for what cannot be a calibration."""
+    """Align, zero and turn the reference. Raises RecordingError that begins with ``where`` for unusable data."""
     known: Mask = np.isfinite(board.e.sum(axis=1))
     if len(known) and (~known).mean() > MAX_INCOMPLETE_SHARE:
         raise RecordingError(
@@ -94,14 +96,12 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
         )
     check_rows(where, int(known.sum()))
     board = board.only(known)
-    wrench = reference.samples.wrench()
-    alignment = _align(where, board, reference.samples.t_s, wrench, _common_value(wrench))
-    rows = _means(reference.samples.t_s, wrench, alignment.to_reference_s(board.t_s + ELECTRODES_S))
-    zero = _zero(where, board, rows)
-    # once more with the zero that is now known: |F| grows with the load only about the right one
-    alignment = _align(where, board, reference.samples.t_s, wrench, zero)
-    rows = _means(reference.samples.t_s, wrench, alignment.to_reference_s(board.t_s + ELECTRODES_S))
-    zero = _zero(where, board, rows)
+    wrench = reference.samples.wrench
+    zero = _common_value(wrench)
+    for _ in range(2):  # twice, now with a better zero: |F| grows with the load only if the zero is right
+        alignment = _align(where, board, reference.samples.t_s, wrench, zero)
+        rows = _means(reference.samples.t_s, wrench, alignment.to_reference_s(board.t_s + ELECTRODES_S))
+        zero = _zero(where, board, rows)
     there: Mask = np.isfinite(rows.sum(axis=1))
     check_rows(f"{where}, where counts and force are both known", int(there.sum()))
     truth = reference.mounting.to_finger(rows[there] - zero)
@@ -144,7 +144,7 @@ def _run(
     )
     run = Run(
         name=where,
-        # with one tare for the whole run, and each frame's own e to the last bit
+        # one tare for the whole run, but each frame keeps its own e
         counts=e + tare,
         tare=tare,
         truth=truth,
@@ -155,33 +155,29 @@ def _run(
         serial=board.serial,
         by_clocks=True,
     )
-    return Joined(run, board.finger, alignment, zero, on_skin)
+    return Joined(run, board.finger, reference, alignment, zero, on_skin)
 
 
 def _align(where: str, board: Board, t_s: Floats, wrench: Floats, zero: Floats) -> Alignment:
     load = np.linalg.norm(wrench[:, :3] - zero[:3], axis=1)
     tries = [(ELECTRODES_S, np.sqrt((board.e**2).mean(axis=1)))]
     if np.isfinite(board.pdc).all() and np.ptp(board.pdc) > 0.0:
-        # the fluid's pressure follows the normal force closer than the counts do, where the channel works
+        # where the channel works, the fluid's pressure follows the normal force more closely than the counts do
         tries.append((PDC_S, board.pdc))
-    best: Alignment | None = None
-    refusal: RecordingError | None = None
+    found: list[Alignment] = []
+    refusals: list[RecordingError] = []
     for after_s, its in tries:
         try:
-            found = align(where, board.t_s + after_s, its, t_s, load)
+            found.append(align(where, board.t_s + after_s, its, t_s, load))
         except RecordingError as error:
-            refusal = refusal or error
-            continue
-        if best is None or found.peak > best.peak:
-            best = found
-    if best is None:
-        assert refusal is not None
-        raise refusal
-    return best
+            refusals.append(error)
+    if not found:
+        raise refusals[0]
+    return max(found, key=lambda its: its.peak)
 
 
 def _common_value(wrench: Floats) -> Floats:
-    """Where the readings are most often: the zero, of a run that lets go now and then."""
+    """The most frequent reading of each axis: the zero, if the run lets go now and then."""
     result = np.zeros(wrench.shape[1])
     for axis, column in enumerate(wrench.T):
         values = np.sort(column[np.isfinite(column)])
@@ -192,7 +188,7 @@ def _common_value(wrench: Floats) -> Floats:
 
 
 def _means(t_s: Floats, values: Floats, at_s: Floats) -> Floats:
-    """Means (k, columns) over one board's step about ``at_s``; between two slow samples a straight line.
+    """Means (k, columns) over a board's step around ``at_s`` (k,); linear interpolation where samples are sparser.
 
     NaN beyond the ends and in gaps.
     """
@@ -230,7 +226,10 @@ def _zero(where: str, board: Board, rows: Floats) -> Floats:
 
 
 def _on_skin(where: str, truth: Floats) -> float:
-    """Share of firm rows whose contact is on the finger: wrong torque units or a wrong mounting put it elsewhere."""
+    """Share of firm rows whose contact is on the finger: wrong torque units or a wrong mounting put it elsewhere.
+
+    Raises RecordingError when the share is too low, or torque and force do not fit each other.
+    """
     firm = truth[np.linalg.norm(truth[:, :3], axis=1) > FIRM_N]
     if not len(firm):
         raise RecordingError(f"{where}: no force above {FIRM_N:g} N: expected firm presses; press harder")
@@ -258,7 +257,7 @@ def _words(zero: Floats) -> str:
 
 
 def choose_finger(where: str, fingers: list[int], finger: int | None) -> int:
-    """The one that is asked for, or the only one. Raises InputError."""
+    """The finger asked for, or the only one. Raises InputError if it is not there, or if there is a choice."""
     seen = ", ".join(str(f) for f in fingers) or "none"
     if finger is None:
         if len(fingers) != 1:

@@ -1,7 +1,7 @@
-"""By how many rows the counts come later than the force, and whether they follow it at all.
+"""The number of rows by which counts lag the force, and whether they follow it at all.
 
-Two loggers, a ROS synchroniser or an F/T sensor's own filter shift one against the other by tens of
-milliseconds; a whole second off, or two files that do not belong together, still gives coefficients.
+Two loggers, a ROS synchroniser or an F/T sensor's own filter shift one against the other by tens of milliseconds. Data
+that is a whole second off, or from two files that do not belong together, still gives coefficients.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from ...core.map_columns import Signals
 from ...errors import RecordingError
 from .blocks import BLOCKS, Blocks
 from .models import solve
-from .moments import NO_DRIFT, Sums, at, linear_columns, moved, stacked, strip_sums
+from .moments import NO_DRIFT, at, linear_columns, moved, stacked, strip_sums
 from .run import Run
 
 SEARCH_ROWS = 50
-MAX_LAG_ROWS = 20  # 0.2 s at 100 Hz: more is no transport delay but another clock
-APART_ROWS = 5  # an axis' own lag from the common one: skin creeps longer under shear than under a press (F1 2/5/2)
+MAX_LAG_ROWS = 20  # 0.2 s at 100 Hz: more is not a transport delay but another clock
+APART_ROWS = 5  # an axis's lag against the common one: skin creeps longer under shear than under a press (F1 2/5/2)
 MIN_R2 = 0.3  # held out; the weakest real finger has 0.5 to 0.9 (biotac.md 5), unrelated files have less than 0
 LAGS: npt.NDArray[np.int64] = np.arange(-SEARCH_ROWS, SEARCH_ROWS + 1)
 LEAST_RIDGE = 1e-6
 
 
 class Lags:
-    """The affine model at every lag of a run."""
+    """Fits of the affine model to a run at every lag."""
 
     def __init__(self, run: Run, blocks: Blocks) -> None:
         self._run, self._blocks = run, blocks
@@ -37,23 +37,27 @@ class Lags:
         )
 
     def common(self, strips: npt.NDArray[np.bool_]) -> int:
-        """The lag in rows at which it explains most of the truth, on ``strips`` alone."""
+        """The lag in rows at which the model explains most of the truth, on ``strips`` alone."""
         return int(LAGS[np.argmin(self._unexplained(strips).mean(axis=1))])
 
     def of_axes(self, strips: npt.NDArray[np.bool_]) -> tuple[int, ...]:
-        """The same for each axis, near the common one."""
+        """Each axis's own best lag in rows, within APART_ROWS of the common one."""
         unexplained = self._unexplained(strips)
         apart = np.abs(LAGS - LAGS[np.argmin(unexplained.mean(axis=1))])
         unexplained[apart > APART_ROWS] = np.inf
         return tuple(int(lag) for lag in LAGS[unexplained.argmin(axis=0)])
 
     def check(self) -> tuple[int, float]:
-        """Common lag in rows and held-out R2 there, on the whole run. Raises RecordingError for what is no run."""
+        """Common lag in rows over the whole run, and the held-out R2 there.
+
+        Raises RecordingError when force and counts do not match or the lag is too large, unless the run is aligned by
+        clocks.
+        """
         lag = self.common(self._blocks.own(range(BLOCKS)))
         r2 = self._held_out_r2(lag)
         where = f"{self._run.name}: force and counts"
         if self._run.by_clocks:
-            # their correlation had a clear peak, and small tips in places held out leave an affine map nothing to say
+            # the clocks' correlation had a clear peak, and with small tips an affine map fails at held-out places
             return lag, r2
         if r2 < MIN_R2:
             raise RecordingError(
@@ -68,9 +72,9 @@ class Lags:
         return lag, r2
 
     def _unexplained(self, strips: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
-        """Share (lags, axes)."""
+        """Unexplained share of the truth's variance (lags, axes)."""
         sums = self._sums.of(strips)
-        share = sums.errors(_affine(sums)) / np.maximum(sums.rows * sums.variance(), 1e-12)
+        share = sums.errors(solve(sums, LEAST_RIDGE)) / np.maximum(sums.rows * sums.variance(), 1e-12)
         return share.reshape(len(LAGS), self._axes)
 
     def _held_out_r2(self, lag: int) -> float:
@@ -78,11 +82,7 @@ class Lags:
         force = self._sums.axes(range(place, place + 3))
         total = np.zeros(3)
         for block in range(BLOCKS):
-            fitted = _affine(force.of(self._blocks.kept_from([block])))
+            fitted = solve(force.of(self._blocks.kept_from([block])), LEAST_RIDGE)
             total += force.of(self._blocks.own([block])).errors(fitted)
         every = force.of(self._blocks.own(range(BLOCKS)))
         return float(1.0 - total.sum() / max(every.rows * every.variance().sum(), 1e-12))
-
-
-def _affine(sums: Sums) -> npt.NDArray[np.float64]:
-    return solve(sums, LEAST_RIDGE)

@@ -1,7 +1,7 @@
 """The models, all linear in their coefficients, solved from sums alone.
 
-Ridge shrinks toward what is known without the run and not toward zero: Lin's geometry, and in other members of the pool
-the map of other fingers. A coefficient the run says nothing about stays what that makes it.
+Ridge shrinks towards what is known without the run, not towards zero: Lin's geometry, and in other members of the pool
+the map of other fingers. A coefficient that the run does not determine keeps that prior value.
 """
 
 from __future__ import annotations
@@ -18,22 +18,23 @@ from . import features
 from .features import Family
 from .moments import Sums
 
-# Per row, in units of each column's own variance; every model is fitted with both.
+# Ridge per row, in units of each column's own variance; every model is fitted with both.
 LAMBDAS = (1e-5, 1e-3)
-# The same, toward the map of other fingers, which is worth more trust. Of F1 and F2, each with the other's, a third of
-# the recording is worth half of it without; on the whole it costs F1 a fiftieth and saves F2 a fifteenth.
+# The same towards the map of other fingers, which deserves more trust. For F1 and F2, each with the other's map, a
+# third of the recording is then as good as half of it without; with the whole recording it adds a fiftieth to F1's
+# error and takes a fifteenth off F2's.
 OTHERS_LAMBDAS = (1e-3, 1e-1)
-# A column that is constant in training has no variance to be measured in: without a floor it is free,
-# and a test row that moves it goes anywhere (the hinge model of biotac.md 5: R2 -34).
+# A column that is constant in training has no variance to scale by: without a floor its coefficient is unconstrained,
+# and a test row in which it varies can give anything (the hinge model of biotac.md 5: R2 -34).
 COLUMN_FLOOR = 0.01
-# How much of each member's own error is taken for chance: 0 trusts the inner folds, and follows their noise. In
-# proportion to the error: what is off by much in some folds (extrapolation) is what the next fold tells most apart.
+# How much of each member's own squared error is added as chance: 0 trusts the inner folds and follows their noise. It
+# is in proportion to the error: a member that is far off in some folds (extrapolation) varies most between folds.
 CHANCE = 0.5
 
 
 @dataclass(frozen=True)
 class Model:
-    """Every coefficient of a family, with ridge."""
+    """A ridge regression on the columns of a family."""
 
     name: str
     family: Family
@@ -49,8 +50,8 @@ JOINED = Model("joined", features.JOINED, "that, and gains by sign that follow t
 MODELS = (AFFINE, QUADRATIC, CONDUCTANCE, JOINED)
 
 LIN, LIN_OFFSET = "lin-scales", "lin-scales-offset"
-# Which model and lambda is best changes from axis to axis and from block to block: to choose one costs more (F2: x
-# .43 N for .35) than to weigh all of them.
+# The best model and lambda change from axis to axis and from block to block: choosing one is worse than a weighted mean
+# of all (F2, x: 0.43 N instead of 0.35 N).
 POOL = (QUADRATIC, CONDUCTANCE, JOINED)
 POOLED = "pooled"
 TEMPLATE = "template"
@@ -64,9 +65,9 @@ WORDS = {
 
 
 def lin_directions(axes: int) -> Floats:
-    """Lin's Eq 3 and 4: what a count on each electrode (19, axes) is in [1] and, beyond three, in mm.
+    """Lin's Eq 3 and 4: each electrode's contribution per count (19, axes), in [1] for force and in mm for torque.
 
-    The seventh is Eq 4 about the middle of the pad and its outward normal, -z: torsion as long as the contact is there.
+    The seventh axis is Eq 4 about the middle of the pad and its outward normal, -z: torsion if the contact is there.
     """
     arms = np.cross(surface.ELECTRODE_MM, surface.ELECTRODE_NORMAL)
     middle = surface.ELECTRODE_MM.mean(axis=0)
@@ -86,14 +87,14 @@ def lin(sums: Sums, *, offset: bool = True) -> Floats:
         if offset:
             basis[-1, 1] = 1.0
         gram = basis.T @ small.gram @ basis
-        # M_x is the difference of two electrodes: where nothing reaches them its sum is 0 / 0
+        # M_x is the difference of two electrodes: if nothing reaches them, it would be 0 / 0
         gram[0, 0] += 1e-9 * max(float(gram.max()), 1.0)
         result[np.append(index, -1), axis] = basis @ np.linalg.solve(gram, basis.T @ small.cross[:, axis])
     return result
 
 
 def solve(sums: Sums, lam: float) -> Floats:
-    """Coefficients (q, axes), the offset last."""
+    """Ridge coefficients (q, axes) with ``lam``, shrunk towards zero except for the offset, which is last."""
     mean, gram, cross, scale = _levelled(sums)
     gram.flat[:: len(gram) + 1] += lam
     found = np.linalg.solve(gram, cross) * scale[:, None]
@@ -101,12 +102,12 @@ def solve(sums: Sums, lam: float) -> Floats:
 
 
 def pulled(sums: Sums, families: Sequence[Family]) -> list[Floats]:
-    """Of each family, coefficients (2, p + 1, axes) of all columns, with each of LAMBDAS, pulled to Lin's scales."""
+    """For each family, coefficients (2, p + 1, axes) of all columns with each of LAMBDAS, pulled to Lin's scales."""
     return _pulled_to(lin(sums), sums, families, LAMBDAS)
 
 
 def pulled_to_others(sums: Sums, families: Sequence[Family], others: Floats) -> list[Floats]:
-    """The same with OTHERS_LAMBDAS, force pulled to ``others`` (q + 1, 3), which have no columns of PDC."""
+    """As pulled(), with OTHERS_LAMBDAS and the force pulled to ``others`` (q + 1, 3), which have no columns of PDC."""
     known = lin(sums)
     known[:, : others.shape[1]] = 0.0
     known[: len(others) - 1, : others.shape[1]] = others[:-1]
@@ -128,7 +129,7 @@ def _pulled_to(known: Floats, sums: Sums, families: Sequence[Family], lambdas: S
 
 
 def _levelled(sums: Sums) -> tuple[Floats, Floats, Floats, Floats]:
-    """Without the offset, which is free, and with columns of variance 1: mean, gram, cross, and their scale."""
+    """Mean, gram, cross and scale of columns that are centred, as the offset is free, and scaled to variance 1."""
     rows = sums.rows
     mean = sums.gram[-1, :-1] / rows
     gram = sums.gram[:-1, :-1] / rows - mean[:, None] * mean
@@ -139,9 +140,9 @@ def _levelled(sums: Sums) -> tuple[Floats, Floats, Floats, Floats]:
 
 
 def weights(error: Floats) -> Floats:
-    """Of members (m,), none below 0 and 1 together, for the least squared error of their mean, by CHANCE.
+    """Weights (m,) of members, not below 0 and with sum 1, for the least squared error of their mean; see CHANCE.
 
-    ``error`` (m, m) is the mean product of the errors of any two.
+    ``error`` (m, m) is the mean product of each two members' errors.
     """
     size = len(error)
     error = error + CHANCE * np.diag(np.diag(error))

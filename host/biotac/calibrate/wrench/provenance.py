@@ -1,16 +1,15 @@
-"""Where a calibration comes from: kept in the map's own file, so that it can be asked years later.
+"""Where a calibration comes from: kept in the map's own file, so that it is still known years later.
 
-The hash is of the recordings' bytes, in the order given: the same files give the same hash, and one changed count
-another.
+The hash is over the recordings' bytes, in the order given: the same files give the same hash, and a single changed
+count gives another.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +18,13 @@ from ...errors import InputError
 from ...version import __version__
 
 KEY = "provenance"
-_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """``serial`` is the sensor's, "" where nobody knows; ``made_s`` seconds since 1970.
+    """Origin of a map. ``serial`` is the sensor's, "" if unknown; ``made_s`` is in seconds since 1970 UTC.
 
-    ``alignment`` and ``mounting`` are None where force and counts came in one file.
+    ``alignment`` and ``mounting`` are None where force and counts came from one file.
     """
 
     serial: str
@@ -40,7 +38,7 @@ class Provenance:
 
     @property
     def made(self) -> str:
-        """The date in words, UTC."""
+        """Date and time as text, in UTC."""
         return time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime(self.made_s))
 
 
@@ -53,24 +51,17 @@ def of_files(
     mounting: dict[str, Any] | None = None,
     alignment: dict[str, Any] | None = None,
 ) -> Provenance:
-    """Of recordings that are there; ``made_s`` is the caller's, a library has no date."""
+    """The provenance of a map made from ``files``, which it reads; the caller gives ``made_s``."""
     digest = hashlib.sha256()
     for path in files:
-        with path.open("rb") as stream:
-            while part := stream.read(_BYTES):
-                digest.update(part)
+        digest.update(path.read_bytes())
     names = tuple(path.name for path in files)
     software = f"biotac-gateway {__version__}"
     return Provenance(serial, made_s, software, names, digest.hexdigest(), reference, mounting, alignment)
 
 
-def embed(map_text: str, provenance: Provenance) -> str:
-    """A map's JSON with its provenance; fitted.loads passes over it."""
-    return json.dumps(json.loads(map_text) | {KEY: asdict(provenance)}) + "\n"
-
-
 def read(path: Path) -> Provenance | None:
-    """A map file's provenance; None for one that has none. Raises InputError for a damaged one."""
+    """A map file's provenance, None if it has none. Raises InputError for a damaged one."""
     try:
         facts = read_json(path).get(KEY)
         if facts is None:
@@ -83,7 +74,7 @@ def read(path: Path) -> Provenance | None:
 def check_serial(where: str, made_for: str, serial: str, *, force: bool = False) -> None:
     """Refuse one sensor's data or calibration for another, unless forced. Raises InputError.
 
-    A side that does not know its number ("") is let through: there is nothing to compare.
+    If either serial number is unknown (""), nothing is refused.
     """
     if made_for and serial and made_for != serial and not force:
         raise InputError(

@@ -1,4 +1,4 @@
-"""A validation as a page of markdown and a picture; every figure in it is computed from the validation."""
+"""A validation as a page of Markdown and a picture; every number in it is computed from the validation."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .lag import MAX_LAG_ROWS
 from .models import POOLED, WORDS
 
 AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")
-MAX_DOTS = 4000  # an axis; more only make the picture larger
+MAX_DOTS = 4000  # per axis; more would only make the file larger
 
 
 def markdown(validation: Validation, picture: str) -> str:
-    """The page; ``picture`` is the file name it shows."""
+    """The page; ``picture`` is the file name of its picture."""
     facts = figures.summary(validation)
     run = validation.run
     lines = [
@@ -64,7 +64,7 @@ def markdown(validation: Validation, picture: str) -> str:
 
 
 def draw(validation: Validation, figure: Any) -> None:
-    """Prediction against truth per force axis, and the models' errors, in a matplotlib figure."""
+    """Draw prediction against truth for each force axis, and the models' errors, in a matplotlib figure."""
     figure.set_size_inches(16, 4.4)
     figure.suptitle(f"{validation.run.name}: {POOLED}, held out")
     axes = figure.subplots(1, 4)

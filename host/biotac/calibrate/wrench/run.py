@@ -1,7 +1,7 @@
-"""A recording that carries its own truth, checked at the door.
+"""A recording with its own truth, checked when it is loaded.
 
-A calibration from a bad recording looks like any other: every refusal here is a mistake that was
-easy to make in the laboratory and hard to see in the coefficients.
+A calibration from a bad recording looks like any other. Every refusal here is for a mistake that is easy to make in the
+laboratory and hard to see in the coefficients.
 """
 
 from __future__ import annotations
@@ -21,20 +21,21 @@ from ...wire import sensor_gen as _sensor
 from . import contact
 from .blocks import BLOCKS, GUARD_ROWS, contacts
 
-MIN_ROWS = BLOCKS * 2 * GUARD_ROWS  # a block shorter than its two guards would be all guard
-REST_N = 0.1  # a plate's reading below this is taken for "nothing touches"
+MIN_ROWS = BLOCKS * 2 * GUARD_ROWS  # a shorter block would be nothing but its two guards
+REST_N = 0.1  # a plate's reading below this means that nothing touches
 MIN_REST_ROWS = 50
 MAX_REST_SWING_COUNTS = 100.0  # 10 % to 90 %: warming up is 8 counts in 10 s (biotac.md finding 6), a press hundreds
 RAIL_LOW, RAIL_HIGH = 0, 4090  # numerics.md 1.3: beyond these an electrode is railed
 MAX_RAILED_SHARE = 0.01
-LEAST_SWING_COUNTS = 2  # a live electrode's noise alone has more in so many rows
+LEAST_SWING_COUNTS = 2  # over so many rows, the noise alone of a live electrode exceeds this
 MAX_CLIPPED_SHARE = 0.005
-# |F| per RMS count: the physics model presses a point and gives 0.06, a flat plate moves all electrodes and gives
-# 0.01 (median rows). Grams (x 102) and millinewtons (x 1000) fall outside however the finger is pressed.
+# |F| per RMS count: the physics model presses at a point and gives 0.06, a flat plate affects all electrodes and gives
+# 0.01 (medians over rows). Grams (x 102) and millinewtons (x 1000) are outside however the finger is pressed.
 NEWTON_PER_COUNT = (0.002, 0.5)
-MIN_DRIFT_SHARE = 0.5  # of the idle recording's variance: less is noise, and noise has no direction
-# Of the differences between two rests about their mean, which is drift: one finger's rests differ by its loadings'
-# spread (10 % of some hundred counts), two fingers' by how their electrodes are made (86 to 170 counts).
+MIN_DRIFT_SHARE = 0.5  # of the idle recording's variance: less is noise, which has no direction
+# RMS difference of the electrodes between two rests, about the mean, which is drift. Two rests of one finger differ by
+# how unevenly its electrodes drift (10 % of some hundred counts), rests of two fingers by the electrodes themselves (86
+# to 170 counts).
 MAX_OTHER_REST_COUNTS = 60.0
 
 FIELDS = ("E", "F", "M", "PDC", "E_base", "E_idle", "torsion", "contact", "serial")
@@ -44,13 +45,12 @@ FIELDS = ("E", "F", "M", "PDC", "E_base", "E_idle", "torsion", "contact", "seria
 class Run:
     """Counts with the force that made them; frame, signs and origin are Lin's (force on the finger).
 
-    ``counts`` (n, 19), ``tare`` (19,) counts; ``truth`` (n, 3) N, or (n, 7) with N mm about the origin and about
-    the outward normal at the contact;
-    ``pdc`` (n,) counts above rest, or None; ``drift`` (19,) what one count of mean drift does to each
-    electrode; ``rest`` bool (n,), rows without contact; ``notes`` say what was assumed; ``serial`` is the sensor's
-    number, "" where the recording does not say. ``by_clocks``: force and counts were aligned by their own times.
-    ``air`` (m, 19) are the counts of E_base, or None; ``contact`` (n,) is which contact each row belongs to, or
-    None: rows in time.
+    ``counts`` is (n, 19) and ``tare`` (19,), both in counts. ``truth`` is (n, 3) in N, (n, 6) with N mm about the
+    origin, or (n, 7) with N mm about the outward normal at the contact, too. ``pdc`` (n,) is in counts above rest, or
+    None. ``drift`` (19,) is each electrode's drift for one count of mean drift. ``rest`` (n,) is true for rows without
+    contact. ``notes`` say what was assumed. ``serial`` is the sensor's serial number, "" where the recording does not
+    say. ``by_clocks`` is true if force and counts were aligned by their own times. ``air`` (m, 19) are the counts of
+    E_base, or None. ``contact`` (n,) is the contact that each row belongs to, or None for rows in order of time.
     """
 
     name: str
@@ -73,21 +73,21 @@ class Run:
 
 
 def load_run(path: Path) -> Run:
-    """A run from an .npz file of one finger, rows at a steady rate.
+    """A run from an .npz file of one finger, with rows at a steady rate.
 
-    Fields: ``E`` (n, 19) raw counts and ``F`` (n, 3) N, required; ``M`` (n, 3) N mm about Lin's origin,
-    both in the recorded axes (X lateral, Y to the tip, Z out of the pad); ``PDC`` (n,) counts;
-    ``E_base`` (m, 19) the finger in free air, needed where the run itself never rests; ``E_idle``
-    (k, 19) an untouched finger, whose first principal component is the drift; ``torsion`` (n,) N mm about
-    the outward normal at the contact (with M; else it is computed); ``contact`` (n,) integers, which
-    contact a row belongs to, where rows are not in time; ``serial``, the sensor's number as text. Raises
+    Required fields are ``E`` (n, 19), raw counts, and ``F`` (n, 3) in N. Optional fields are ``M`` (n, 3) in N mm about
+    Lin's origin, with F and M in the recorded axes (X lateral, Y to the tip, Z out of the pad); ``PDC`` (n,) in counts;
+    ``E_base`` (m, 19), the finger in free air, needed where the run itself never rests; ``E_idle`` (k, 19), an
+    untouched finger, whose first principal component is the drift; ``torsion`` (n,) in N mm about the outward normal at
+    the contact, used only with M and otherwise computed; ``contact`` (n,), integers that say which contact a row
+    belongs to, where rows are not in order of time; and ``serial``, the sensor's serial number as text. Raises
     RecordingError with what was seen, in numbers.
     """
     return run_of(path, read_npz(path, FIELDS))
 
 
 def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
-    """The same from a file's fields; ``path`` is what errors name."""
+    """A run from a file's fields, as load_run(); ``path`` is for error messages."""
     missing = [name for name in ("E", "F") if name not in fields]
     if missing:
         seen = ", ".join(fields) or "none of the known fields"
@@ -109,13 +109,13 @@ def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
     rest: npt.NDArray[np.bool_] = np.linalg.norm(force, axis=1) < REST_N
     tare, notes = _tare(path, fields, counts, force, rest)
     check_units(path, counts - tare, force)
-    # only now: in other units a press is a rest
+    # only after the check of units: in others a press may look like a rest
     if "E_base" in fields and rest.sum() >= MIN_REST_ROWS:
         _check_same_finger(path, tare, np.median(counts[rest], axis=0))
     pdc = None
     if "PDC" in fields:
         raw = counts_field(path, "PDC", fields["PDC"], rows, None).astype(np.float64)
-        # without a rest in the run the lowest percent stands for it; an offset does no harm to a linear model
+        # without a rest in the run, the lowest percent stands in for it; an offset does not harm a linear model
         pdc = raw - (np.median(raw[rest]) if rest.sum() >= MIN_REST_ROWS else np.percentile(raw, 1))
     drift, note = np.ones(len(_sensor.ELECTRODE_NAMES)), "drift: no E_idle, all electrodes taken to drift alike"
     if "E_idle" in fields:
@@ -140,7 +140,7 @@ def _counts(path: Path, name: str, fields: dict[str, npt.NDArray[Any]]) -> Float
 
 
 def numbers(path: Path, name: str, array: npt.NDArray[Any], shape: tuple[int, ...], unit: str) -> Floats:
-    """Field ``name``, of ``shape`` and finite throughout. Raises RecordingError."""
+    """Field ``name`` as float64. Raises RecordingError unless it has ``shape`` and is finite."""
     if array.shape != shape or array.dtype.kind not in "iuf":
         raise RecordingError(
             f"{path}: field {name} is {array.dtype} {array.shape}: expected {shape} in {unit}, a row a frame"
@@ -155,7 +155,7 @@ def numbers(path: Path, name: str, array: npt.NDArray[Any], shape: tuple[int, ..
 
 
 def check_rows(where: object, rows: int) -> None:
-    """Refuse a run that is too short to be held out block by block."""
+    """Refuse a run that is too short to be held out block by block. Raises RecordingError."""
     if rows < MIN_ROWS:
         raise RecordingError(
             f"{where}: {rows} rows: expected at least {MIN_ROWS}, {BLOCKS} blocks of twice the guard of "
@@ -172,7 +172,7 @@ def _serial(path: Path, fields: dict[str, npt.NDArray[Any]]) -> str:
 
 
 def check_clipping(path: object, name: str, force: Floats) -> None:
-    """A plate at the end of its range repeats its last value; no measured force does."""
+    """Refuse forces at the end of a plate's range: only there are extremes exactly repeated. Raises RecordingError."""
     for axis in range(3):
         column = force[:, axis]
         for end in (column.min(), column.max()):
@@ -214,7 +214,7 @@ def _tare(
                 f"{path}: E_base is not at rest: {_sensor.ELECTRODE_NAMES[worst]} swings over "
                 f"{high[worst] - low[worst]:.0f} counts: expected at most {MAX_REST_SWING_COUNTS:.0f}; record it in air"
             )
-        # the median, because a brief touch in the recording must not become the rest
+        # the median, because a brief touch in the recording must not change it
         return median, (f"tare: median of {len(base)} rows of E_base",)
     if rest.sum() < MIN_REST_ROWS:
         raise RecordingError(
@@ -242,7 +242,7 @@ def check_units(path: object, signal: Floats, force: Floats) -> None:
 
 
 def _check_same_finger(path: Path, base: Floats, resting: Floats) -> None:
-    """Rests of one finger differ by its drift, all electrodes alike; another finger's has another pattern."""
+    """Refuse an E_base of another finger: one finger's rests differ by drift, about the same on all electrodes."""
     apart = resting - base
     spread = float(apart.std())
     if spread > MAX_OTHER_REST_COUNTS:
@@ -255,7 +255,7 @@ def _check_same_finger(path: Path, base: Floats, resting: Floats) -> None:
 
 
 def drift_of(name: str, idle: Floats) -> tuple[Floats, str]:
-    """What drift does to the electrodes (19,) for one count on average, from an untouched finger, and words for it."""
+    """The electrodes' drift (19,) for one count of mean drift, from an untouched finger's counts, and a note."""
     common: Floats = np.ones(len(_sensor.ELECTRODE_NAMES))
     variance, direction = (
         np.linalg.eigh(np.cov(idle, rowvar=False)) if len(idle) > 1 else (np.zeros(1), common[:, None])
@@ -263,7 +263,7 @@ def drift_of(name: str, idle: Floats) -> tuple[Floats, str]:
     share = float(variance[-1] / max(variance.sum(), 1e-12))
     first: Floats = direction[:, -1] * np.sign(direction[:, -1].sum())
     mean = float(first.mean())
-    # loadings of both signs are a touch or a broken electrode, and dividing by their mean would blow them up
+    # loadings of both signs mean a touch or a broken electrode, and dividing by their mean would inflate them
     if share < MIN_DRIFT_SHARE or mean < 0.5 * float(np.abs(first).mean()):
         return common, f"drift: {name}'s first component holds {share:.0%} of its variance, all electrodes taken alike"
     return first / mean, f"drift: first component of {name}, {share:.1%} of its variance"

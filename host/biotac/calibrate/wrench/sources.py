@@ -1,8 +1,8 @@
-"""Runs from files: an .npz that has everything, or a board's recording with a reference beside it."""
+"""Runs from files: an .npz that has everything, or a board's recording and a reference."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,29 +19,29 @@ from .run import Run, load_run
 
 @dataclass(frozen=True)
 class Loaded:
-    """A run, the files it came from, and what joining them found; None for an .npz."""
+    """A run, the files it came from, and how they were joined, None for an .npz."""
 
     run: Run
     files: tuple[Path, ...]
-    reference: Reference | None = None
     joined: Joined | None = None
 
     def provenance(self, made_s: int) -> Provenance:
-        """For the map that is made of it."""
-        its, joined = self.reference, self.joined
-        if its is None or joined is None:
+        """The provenance of a map made from this run."""
+        joined = self.joined
+        if joined is None:
             return of_files(self.run.serial, self.files, "in the same file", made_s=made_s)
+        its = joined.reference
         words = f"{its.name} {its.sensor}".strip()
-        mounting, alignment = its.mounting.facts(), joined.alignment.facts()
+        mounting, alignment = its.mounting.facts(), asdict(joined.alignment)
         return of_files(self.run.serial, self.files, words, made_s=made_s, mounting=mounting, alignment=alignment)
 
     def facts(self) -> dict[str, Any]:
-        """What joining found, as JSON types."""
+        """Results of joining, as JSON types; empty for an .npz."""
         if self.joined is None:
             return {}
         its = self.joined
         share = None if np.isnan(its.on_skin_share) else its.on_skin_share
-        return {"alignment": its.alignment.facts(), "reference_zero": its.zero.tolist(), "on_skin_share": share}
+        return {"alignment": asdict(its.alignment), "reference_zero": its.zero.tolist(), "on_skin_share": share}
 
 
 def load(
@@ -52,7 +52,7 @@ def load(
     serial: str = "",
     force: bool = False,
 ) -> Loaded:
-    """A checked run. ``serial`` is the sensor it is wanted for; another's is refused unless forced.
+    """A checked run from ``path``. ``serial`` is the sensor it is for; a run of another is refused unless forced.
 
     Raises InputError, RecordingError for the content of files.
     """
@@ -71,4 +71,4 @@ def load(
     rows = recording.wire["finger"] == chosen
     board = board_of(recording.wire[rows], recording.frames["t_us"][rows], chosen, number)
     joined = join(path.name, board, reference[1])
-    return Loaded(joined.run, (path, reference[0]), reference[1], joined)
+    return Loaded(joined.run, (path, reference[0]), joined)

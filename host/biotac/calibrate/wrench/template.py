@@ -1,10 +1,10 @@
-"""Joint template least squares: what a press, a bulge, two shears and a torsion look like, five numbers a frame.
+"""Joint template least squares: the shapes of a press, a bulge, two shears and a torsion, five numbers for each frame.
 
-Around the point of contact each of the five has a shape over the electrodes; their sizes come from one weighted
-5x5 solve, and a dozen coefficients an axis turn sizes into newtons (numerics.md 3.2). It knows little of the finger,
-so it tells how much of a calibrated map's accuracy is physics and how much is that finger's own. It runs on the
-host alone and is never chosen. Finding the point of contact again without what was explained as shear (numerics.md
-proposes it) gains a fiftieth of Fy's error on the emulated sensor and costs a tenth of the torsion's: not done.
+Around the point of contact each of the five has a shape over the electrodes. Their sizes come from one weighted 5x5
+solve, and a dozen coefficients for each axis turn sizes into newtons (numerics.md 3.2). The model knows little of the
+finger, so it shows how much of a calibrated map's accuracy is physics and how much is that finger's own. It runs on the
+host alone and is never chosen. Finding the point of contact again without the part explained as shear, as numerics.md
+proposes, is not done: on the emulated sensor it takes a fiftieth off Fy's error and adds a tenth to the torsion's.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from ...wire import map_gen as _map
 from .moments import Rows, smoothed
 from .run import Run
 
-FOOTPRINT_MM = 2.5  # between a probe's and a flat's
-HOLE = 1.5  # footprints around the contact that do not bulge
+FOOTPRINT_MM = 2.5  # between that of a probe and of a flat plate
+HOLE = 1.5  # radius around the contact that does not bulge, in footprints
 REACH_MM = 7.0  # of shear and torsion
-# A squeezed electrode follows nothing linearly: the further from rest, the less its row counts.
+# A squeezed electrode is not linear in anything: the further it is from rest, the lower its weight.
 SOFT = 0.5  # of log conductance
-STIFFNESS = 1e-3  # ridge of the solve, of its mean diagonal: sizes no electrode near the contact sees stay small
+STIFFNESS = 1e-3  # ridge, as a share of the mean diagonal: keeps sizes small that no electrode near the contact senses
 LEAST_CONDUCTANCE = 0.003  # of that at rest: 10 MOhm
 
-LEAST_RIDGE = 1e-9  # an axis that a size does not reach has columns of zeros
+LEAST_RIDGE = 1e-9  # for an axis with columns of zeros, because a size does not reach it
 
 SHAPES = 5
 PRESS, BULGE, ALONG, ACROSS, TURN = range(SHAPES)
@@ -37,7 +37,7 @@ PRESS, BULGE, ALONG, ACROSS, TURN = range(SHAPES)
 
 @dataclass(frozen=True)
 class Sizes:
-    """n frames: ``point_mm``, ``normal``, ``to_tip``, ``to_side`` (n, 3) at the contact; ``size`` (n, 5)."""
+    """Fits to n frames: ``point_mm``, ``normal``, ``to_tip``, ``to_side`` (n, 3) at the contact; ``size`` (n, 5)."""
 
     point_mm: Floats
     normal: Floats
@@ -47,7 +47,7 @@ class Sizes:
 
 
 def solve(signals: Signals) -> Sizes:
-    """The five sizes of every frame."""
+    """The five sizes of each frame, and the contact that they are about."""
     seen = np.log(np.maximum(conductance_change(signals.e, signals.tare) + 1.0, LEAST_CONDUCTANCE))
     weight = 1.0 / (1.0 + (seen / SOFT) ** 2)
     squeezed = np.maximum(-signals.e, 0.0) ** 2 + _map.FLOOR_COUNTS**2
@@ -63,7 +63,7 @@ def solve(signals: Signals) -> Sizes:
 
 
 def _shapes(point: Floats, normal: Floats, to_tip: Floats, to_side: Floats) -> Floats:
-    """What each of the five does to log conductance (n, 19, 5): a closed gap conducts less."""
+    """Effect of each of the five on log conductance (n, 19, 5): a closed gap conducts less."""
     arm = surface.ELECTRODE_MM[None] - point[:, None, :]
     far = (arm**2).sum(axis=2)
     facing = np.maximum(normal @ surface.ELECTRODE_NORMAL.T, 0.0)
@@ -76,10 +76,10 @@ def _shapes(point: Floats, normal: Floats, to_tip: Floats, to_side: Floats) -> F
 
 
 def columns(signals: Signals) -> Floats:
-    """What the coefficients multiply (n, 7, k), axis by axis: forces, c x F + torsion n, and the torsion.
+    """Columns (n, 7, k) that the coefficients multiply, axis by axis: forces, c x F + torsion n, and the torsion.
 
-    A press makes a force along the inward normal, shears make them along the skin, and the torque of each is its
-    lever's; every axis has its own coefficient for each, because no finger is the drawing of one.
+    A press makes a force along the inward normal, shears make forces along the skin, and the torque of each comes from
+    its lever. Every axis has its own coefficient for each, because no finger matches the model exactly.
     """
     its = solve(signals)
     size = its.size
@@ -104,23 +104,13 @@ def columns(signals: Signals) -> Floats:
 
 
 def fit(of: Floats, truth: Floats) -> Floats:
-    """Coefficients (axes, k), axis by axis, from columns (n, 7, k) and truth (n, axes)."""
-    found = []
-    for axis in range(truth.shape[1]):
-        x = of[:, axis]
-        gram = x.T @ x
-        found.append(np.linalg.solve(gram + LEAST_RIDGE * np.trace(gram) * np.eye(len(gram)), x.T @ truth[:, axis]))
-    return np.array(found)
-
-
-def predict(of: Floats, coefficients: Floats) -> Floats:
-    """Wrench (n, axes)."""
-    wrench: Floats = np.einsum("nak,ak->na", of[:, : len(coefficients)], coefficients)
-    return wrench
+    """Least-squares coefficients (k,) of one axis, from its columns (n, k) and truth (n,)."""
+    gram = of.T @ of
+    return np.linalg.solve(gram + LEAST_RIDGE * np.trace(gram) * np.eye(len(gram)), of.T @ truth)
 
 
 class Template:
-    """The model on a run, for any lags and window: columns are computed once for each window."""
+    """The model on a run, for any lags and window; columns are computed once for each window."""
 
     def __init__(self, run: Run) -> None:
         self.run = run
@@ -130,7 +120,7 @@ class Template:
     def held_out(
         self, window_rows: int, lag_rows: tuple[int, ...], trained: Rows, rows: Rows, shifts: Sequence[float]
     ) -> Floats:
-        """Wrench (shifts, n, axes) of ``rows`` at each drift, by coefficients from the rows ``trained``."""
+        """Wrench (shifts, n, axes) for ``rows`` (n,) at each drift, by coefficients from the rows ``trained``."""
         if window_rows not in self._columns:
             signals = smoothed(self.run, window_rows)
             self._columns[window_rows] = np.array(
@@ -140,8 +130,7 @@ class Template:
         last = len(self.run.truth) - 1
         result = np.empty((len(shifts), len(rows), self.axes))
         for axis, lag in enumerate(lag_rows):
-            late = of[:, :, axis : axis + 1]
-            coefficients = fit(late[0][np.clip(trained + lag, 0, last)], self.run.truth[trained, axis : axis + 1])
-            for shift, shifted in zip(result, late, strict=True):
-                shift[:, axis] = predict(shifted[np.clip(rows + lag, 0, last)], coefficients)[:, 0]
+            late = of[:, :, axis]
+            coefficients = fit(late[0, np.clip(trained + lag, 0, last)], self.run.truth[trained, axis])
+            result[:, :, axis] = np.einsum("snk,k->sn", late[:, np.clip(rows + lag, 0, last)], coefficients)
         return result

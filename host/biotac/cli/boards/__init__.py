@@ -1,1 +1,1 @@
-"""Verbs about boards: what is there, what ails it, what it keeps."""
+"""Verbs about boards: which are there, what is wrong with them, what they store."""

@@ -7,8 +7,7 @@ import json
 import platform
 import sys
 import textwrap
-import threading
-from contextlib import suppress
+from contextlib import closing
 from dataclasses import asdict, is_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,6 @@ from typing import Any
 from ...doctor import CATALOGUE, Facts, Finding, PairFacts, judge, udev
 from ...doctor.listening import examine
 from ...doctor.timing import slots_per_s
-from ...errors import BiotacError
 from ...link import open_link
 from ...partial_file import whole
 from ...sim.loading import load_source
@@ -33,17 +31,19 @@ Exit code 0: healthy; 1: there are findings. Their codes are fixed:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Port, time, and how many sensors there should be."""
+    """Add port, time and the expected number of sensors."""
     parser.description = f"{parser.description}{CODES}"
     values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, default=3.0, help="how long to listen (default 3)")
     parser.add_argument("--sensor-port", metavar="SENSOR", help="port of a sensor board that is wired to PORT")
-    parser.add_argument("--report", metavar="FILE", help="also write all of it as one JSON file, to send with a report")
-    parser.add_argument("--fingers", type=int, help="how many sensors there should be (default: those that answer)")
+    parser.add_argument(
+        "--report", metavar="FILE", help="also write everything to one JSON file, to attach to a bug report"
+    )
+    parser.add_argument("--fingers", type=int, help="how many sensors to expect (default: those that answer)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Examine, print the findings, return 1 if there are any."""
+    """Examine the board and print the findings; return 1 if there are any."""
     if args.sensor_port is None:
         facts = examine(args.port, seconds=args.seconds, expected_fingers=args.fingers)
     else:
@@ -60,37 +60,21 @@ def run(args: argparse.Namespace) -> int:
 
 
 def examine_pair(port: str | None, sensor_port: str, seconds: float) -> Facts:
-    """A gateway whose sensors are a board of ours, which plays to it meanwhile."""
-    sensors = SensorBoard(open_link(sensor_port))
-    ended = threading.Event()
-    try:
+    """Facts about a gateway whose sensors are a sensor board of ours, which plays to it meanwhile."""
+    with closing(SensorBoard(open_link(sensor_port))) as sensors:
         sensors.plug(load_source(PLAYED, fingers=MAX_SENSORS, seconds=PLAYED_S))
-        feeding = threading.Thread(target=feed, args=(sensors, ended), name="biotac doctor sensors")
-        before = sensors.feed(until_full=True)
-        feeding.start()
-        facts = examine(port, seconds=seconds, expected_fingers=MAX_SENSORS)
-        ended.set()
-        feeding.join()
-        pair = PairFacts(before, sensors.status(), sensors.serials)
-    finally:
-        ended.set()
-        sensors.close()
-    return replace(facts, pair=pair)
-
-
-def feed(sensors: SensorBoard, ended: threading.Event) -> None:
-    """Until ended; a board that goes away is told by what is asked of it afterwards."""
-    with suppress(BiotacError):
-        sensors.feed(ended=ended)
+        with sensors.feeding() as before:
+            facts = examine(port, seconds=seconds, expected_fingers=MAX_SENSORS)
+        return replace(facts, pair=PairFacts(before, sensors.status(), sensors.serials))
 
 
 def summary(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
-    """For machines."""
+    """The result as JSON types."""
     return {"port": facts.port, "measured": measured(facts), "findings": [as_facts(f) for f in findings]}
 
 
 def report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
-    """What to send back: the findings, and what they were judged by but for the frames."""
+    """The report to send in: the findings and the facts behind them, except the frames."""
     board = facts.board
     told = {} if board is None else {**vars(board), "frames": len(board.frames), "idle": len(board.idle)}
     return {
@@ -106,12 +90,12 @@ def report(facts: Facts, findings: list[Finding]) -> dict[str, Any]:
 
 
 def plain(value: object) -> object:
-    """A part of the facts as JSON has it."""
+    """A part of the facts as JSON types."""
     return asdict(value) if is_dataclass(value) and not isinstance(value, type) else str(value)
 
 
 def as_facts(finding: Finding) -> dict[str, str]:
-    """For machines."""
+    """A finding as JSON types."""
     entry = finding.entry
     return {
         "code": finding.code,
@@ -123,7 +107,7 @@ def as_facts(finding: Finding) -> dict[str, str]:
 
 
 def measured(facts: Facts) -> dict[str, Any]:
-    """What was measured, healthy or not; empty when nothing could be."""
+    """What was measured, healthy or not; empty if nothing could be measured."""
     board = facts.board
     if board is None:
         return {}
@@ -139,7 +123,7 @@ def measured(facts: Facts) -> dict[str, Any]:
 
 
 def print_words(facts: Facts, findings: list[Finding]) -> None:
-    """For a person."""
+    """Print the result for people."""
     for finding in findings:
         print(f"{finding.entry.severity.value} {finding.code}: {finding.seen}")
         for title, text in (("meaning", finding.entry.meaning), ("cure", finding.entry.cure)):

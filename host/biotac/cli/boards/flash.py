@@ -5,14 +5,15 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from ...errors import FlashError, InputError, PortError
 from ...flash import Backup, Image, Loader, Outcome, Restored, Target, flash, read_backup, read_image
 from ...flash.carried import find_image
-from ...flash.every import Result, flash_every
 from ...flash.image import note_text
+from ...flash.procedure import Result, flash_every
 from ...wire.identity import serial_text, version_text
 from ..progress import Progress
 
@@ -21,30 +22,28 @@ EMULATED = "emu:pico?source=press.toml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Port, image, and what happens to the settings."""
+    """Add port, image and what happens to the settings."""
     parser.add_argument(
         "port",
         metavar="PORT",
         nargs="?",
-        help="device path or emu:pico?source=SOURCE (default: the only board there is)",
+        help="device path or emu:pico?source=SOURCE (default: the only board on USB)",
     )
-    parser.add_argument(
-        "image", metavar="IMAGE", nargs="?", help=".uf2 file (default: the one that this package carries)"
-    )
-    parser.add_argument("--all", action="store_true", help="every board that is plugged in and runs something else")
+    parser.add_argument("image", metavar="IMAGE", nargs="?", help=".uf2 file (default: the one in this package)")
+    parser.add_argument("--all", action="store_true", help="every connected board that runs another version")
     parser.add_argument("--emulated", action="store_true", help=f"rehearse it on an emulated board: {EMULATED}")
     parser.add_argument(
         "--backup", type=Path, metavar="FILE", help="new file for the settings (default: one in this folder)"
     )
     parser.add_argument("--no-backup", action="store_true", help="flash even a board whose firmware does not answer")
-    parser.add_argument("--downgrade", action="store_true", help="flash an image older than the firmware that runs")
+    parser.add_argument("--downgrade", action="store_true", help="flash an image older than the running firmware")
     parser.add_argument(
-        "--restore", type=Path, metavar="FILE", help="settings from this backup in place of the board's own"
+        "--restore", type=Path, metavar="FILE", help="restore settings from this backup instead of the board's own"
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Flash, and say what the board says afterwards."""
+    """Flash a board and print what it reports afterwards."""
     if args.backup is not None and args.no_backup:
         raise InputError("--backup and --no-backup contradict each other; leave one out")
     port, path = sort_out(args.port, args.image, alone=args.emulated or args.all)
@@ -57,9 +56,8 @@ def run(args: argparse.Namespace) -> int:
     say(f"{image.path}: {note_text(image.note)}")
     if args.all:
         return run_all(image, args)
-    progress = Progress()
     target, loaders = find_board(EMULATED if args.emulated else port)
-    try:
+    with closing(target), Progress() as progress:
         outcome = flash(
             image,
             target,
@@ -71,20 +69,17 @@ def run(args: argparse.Namespace) -> int:
             say=say,
             show=lambda done, of: progress.show(f"{done} of {of} blocks"),
         )
-    finally:
-        progress.done()
-        target.close()
     print(json.dumps(facts(image, outcome)) if args.json else summary(outcome))
     return 0
 
 
 def say(text: str) -> None:
-    """A step, on stderr: stdout is for what came of it."""
+    """Print a step on stderr; stdout is for the result."""
     print(text, file=sys.stderr, flush=True)
 
 
 def run_all(image: Image, args: argparse.Namespace) -> int:
-    """Flash every board, say what became of each, and return 8 when one of them failed."""
+    """Flash every board and print the result of each; return 8 if one of them failed."""
     from ...flash.target_serial import SerialTarget, gateway_ports
 
     targets = [SerialTarget(port) for port in sorted(gateway_ports())]
@@ -116,13 +111,13 @@ def run_all(image: Image, args: argparse.Namespace) -> int:
 
 
 def its_facts(image: Image, result: Result) -> dict[str, Any]:
-    """One of several boards, for machines."""
+    """The result of one of several boards, as JSON types."""
     error = None if result.error is None else str(result.error)
     return {"port": result.port, "error": error} | (facts(image, result.outcome) if result.outcome else {})
 
 
 def sort_out(port: str | None, image: str | None, *, alone: bool) -> tuple[str | None, Path | None]:
-    """Both words are optional: a single one is the image when it ends in .uf2, or can be nothing else."""
+    """PORT and IMAGE, both optional: a single word is the image if it ends in .uf2 or if no PORT is allowed."""
     if image is None and port is not None and (alone or port.lower().endswith(".uf2")):
         port, image = None, port
     if alone and port is not None:
@@ -131,7 +126,7 @@ def sort_out(port: str | None, image: str | None, *, alone: bool) -> tuple[str |
 
 
 def find_board(port: str | None) -> tuple[Target, list[Loader]]:
-    """The board, and the ways to its loader."""
+    """The board, and the ways to reach its boot loader."""
     if port is not None and port.startswith(("emu:", "sim:")):
         from ...flash.loader_emulated import EmulatedLoader
         from ...flash.target_emulated import EmulatedTarget
@@ -149,7 +144,7 @@ def find_board(port: str | None) -> tuple[Target, list[Loader]]:
 
 
 def usb_loaders() -> list[Loader]:
-    """The ways to a board that is in its loader on USB."""
+    """The ways to reach a board that is in its boot loader on USB."""
     from ...flash.loader_drive import DriveLoader
     from ...flash.loader_picotool import PicotoolLoader
 
@@ -157,7 +152,7 @@ def usb_loaders() -> list[Loader]:
 
 
 def facts(image: Image, outcome: Outcome) -> dict[str, Any]:
-    """For machines."""
+    """The outcome as JSON types."""
     before, settings = outcome.before, outcome.settings
     return {
         "image": str(image.path),
@@ -175,14 +170,14 @@ def facts(image: Image, outcome: Outcome) -> dict[str, Any]:
 
 
 def known(backup: Backup, settings: Restored) -> str:
-    """How many of a backup's settings, calibrations and maps the firmware has."""
+    """How many of a backup's settings, calibrations and maps the firmware knows."""
     more = {"calibrations": len(backup.calibrations), "wrench maps": len(backup.maps)}
     count = len(backup.values) + sum(more.values()) - len(settings.unknown)
     return f"{count} {', '.join(['settings', *(name for name, its in more.items() if its)])}"
 
 
 def summary(outcome: Outcome) -> str:
-    """For people."""
+    """The outcome for people."""
     after, settings = outcome.after, outcome.settings
     lines = [
         f"{outcome.port} runs firmware {version_text(after)}, boot {after.boot_id:08x}, serial {serial_text(after)}"

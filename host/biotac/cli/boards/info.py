@@ -20,12 +20,12 @@ EXAMPLE = "biotac info /dev/ttyACM0"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The port."""
+    """Add the port."""
     values.add_port(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what the board says of itself."""
+    """Print what the board reports about itself."""
     with biotac.open(args.port) as hand:
         hello = hand.info
         sensors = [hand.sensor_info(f) for f in hand.fingers]

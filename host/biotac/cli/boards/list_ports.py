@@ -19,19 +19,19 @@ EXAMPLE = "biotac list"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """--all is not the default: bytes sent to an unknown device may mean something to it."""
+    """Add the options. --all is not the default: bytes sent to an unknown device may mean something to it."""
     parser.add_argument(
         "--zenoh",
         metavar="ENDPOINT",
         nargs="?",
         const="",
-        help="boards that other computers share, too; by way of ENDPOINT (tcp/HOST:7447), or looked for",
+        help="also list boards shared by other computers, through ENDPOINT (tcp/HOST:7447) or by searching the network",
     )
-    parser.add_argument("--all", action="store_true", help="ask every port; without it only those with our USB ids")
+    parser.add_argument("--all", action="store_true", help="query every port, not only those with our USB ids")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print ports and scenarios."""
+    """Print the ports and scenarios."""
     ports = [describe(port, ask=port.is_board or args.all) for port in serial_ports()]
     scenarios = [f"sim:{name}" for name in bundled_scenarios()]
     remote = _shared(args.zenoh or None) if args.zenoh is not None else []
@@ -53,15 +53,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _shared(endpoint: str | None) -> list[dict[str, Any]]:
-    """What computers on the network say of the boards that they share."""
-    from ...fleet import network  # here, for most lists are of this computer
+    """What other computers on the network report about the boards they share."""
+    from ...fleet import network  # here, because most calls list this computer only
 
     with closing(network.open_session("biotac list", connect=endpoint)) as session:
-        return [{"port": network.found(facts), **facts} for facts in network.shared(session)]
+        return [{"port": f"zenoh:{facts['name']}", **facts} for facts in network.shared(session)]
 
 
 def describe(port: SerialPort, *, ask: bool) -> dict[str, Any]:
-    """What the operating system says of a port, and what the port says when asked."""
+    """What the operating system knows about a port and, if ``ask``, what the port answers."""
     facts: dict[str, Any] = {
         "port": port.device,
         "is_board": port.is_board,
@@ -78,7 +78,7 @@ def describe(port: SerialPort, *, ask: bool) -> dict[str, Any]:
 
 
 def as_facts(hello: wire.Hello, fingers: list[int]) -> dict[str, Any]:
-    """Of a port that answered."""
+    """A port that answered, as JSON types."""
     return {
         "is_board": True,
         "serial_number": serial_text(hello),
@@ -89,7 +89,7 @@ def as_facts(hello: wire.Hello, fingers: list[int]) -> dict[str, Any]:
 
 
 def as_line(facts: dict[str, Any]) -> str:
-    """For a person."""
+    """A port as one line for people."""
     if "problem" in facts:
         return f"{facts['port']}  {facts['problem']}"
     if "firmware" not in facts:

@@ -11,7 +11,7 @@ EXAMPLE = "sudo biotac udev-setup"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """--print, for whoever installs it in another way."""
+    """Add --print, for those who install the rule in another way."""
     parser.add_argument("--print", action="store_true", help="print the rule and install nothing")
 
 

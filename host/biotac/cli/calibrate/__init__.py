@@ -4,29 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from . import contact as calibrate_contact
-from . import normal as calibrate_normal
-from . import population as calibrate_population
-from . import pressure as calibrate_pressure
-from . import scale as calibrate_scale
-from . import weights as calibrate_weights
-from . import wrench as calibrate_wrench
+from . import contact, normal, population, pressure, scale, weights, wrench
 
-EXAMPLE = calibrate_wrench.EXAMPLE
+EXAMPLE = wrench.EXAMPLE
 
-WHATS = (
-    calibrate_wrench,
-    calibrate_population,
-    calibrate_scale,
-    calibrate_weights,
-    calibrate_pressure,
-    calibrate_normal,
-    calibrate_contact,
-)
+WHATS = (wrench, population, scale, weights, pressure, normal, contact)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to calibrate; each has its own arguments."""
+    """Add what to calibrate; each has its own arguments."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     for module in WHATS:
         one = what.add_parser(
@@ -36,12 +22,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             epilog=f"example: {module.EXAMPLE}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        # of the verb already; here for those who write it last
+        # The verb has --json already; here it is for those who write it last.
         one.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print JSON for machines")
         module.add_arguments(one)
         one.set_defaults(calibrate=module.run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do what was named."""
+    """Run the named calibration."""
     return int(args.calibrate(args))

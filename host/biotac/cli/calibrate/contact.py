@@ -15,7 +15,7 @@ MOST = 100_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """How many contacts."""
+    """Add the number of contacts."""
     parser.add_argument("--contacts", type=_count, default=4000, metavar="N", help="random ones (default %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of the random contacts (default %(default)s)")
 
@@ -28,7 +28,7 @@ def _count(text: str) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print a line a method and noise."""
+    """Print one line per method and noise."""
     found = compare(args.contacts, seed=args.seed)
     if args.json:
         print(json.dumps({"contacts": args.contacts, "errors": [asdict(error) for error in found]}))

@@ -12,7 +12,7 @@ import biotac
 from ...calibrate.reference.mounting import Mounting, read_mounting
 from ...calibrate.reference.net_ft import PREFIX, NetFtReader, parse_address
 from ...calibrate.reference.samples import Reader
-from ...calibrate.wrench.guided import Event, Places, Procedure, walk
+from ...calibrate.wrench.guided import Places, Procedure, walk
 from ...calibrate.wrench.provenance import check_serial
 from ...errors import BiotacError, InputError
 from ...sim.nano17 import Nano17
@@ -26,9 +26,9 @@ EMULATED = "nano17"
 
 
 def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Places, list[str]]:
-    """Walk through; the files, and what is missing in words.
+    """Guide through the procedure; return the files, and what is missing in words.
 
-    Raises KeyboardInterrupt, in words, when it was ended before there was anything to fit.
+    Raises KeyboardInterrupt, with a message, if it was ended before there was anything to fit.
     """
     serial = ascii_text(hand.sensor_info(finger).serial)
     check_serial(f"finger {finger}", serial, args.serial, force=args.force)
@@ -36,9 +36,9 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
     places = Places(args.out / f"{name}.mcap", args.out / f"{name}.csv")
     progress = Progress()
 
-    def show(event: Event) -> None:
+    def show(event: str) -> None:
         progress.done()
-        print(f"biotac: {event.words}", file=sys.stderr)
+        print(f"biotac: {event}", file=sys.stderr)
 
     with _reader(args, hand, finger) as (reader, mounting):
         outputs.make_folder(args.out)
@@ -63,7 +63,7 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
 
 
 def open_board(args: argparse.Namespace) -> biotac.Hand:
-    """The board; a simulated one beside an emulated reference runs as fast as this side reads."""
+    """Open the board; a simulated one beside an emulated reference runs as fast as the host reads."""
     return biotac.open(args.live, pace=0.0 if args.reference == [EMULATED] else 1.0)
 
 
@@ -83,8 +83,5 @@ def _reader(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> Iterato
     if args.mounting is None:
         raise InputError(f"{text} does not say how it is fixed to the finger: expected --mounting FILE.toml")
     mounting = read_mounting(args.mounting)
-    reader = NetFtReader(parse_address(text))
-    try:
+    with contextlib.closing(NetFtReader(parse_address(text))) as reader:
         yield reader, mounting
-    finally:
-        reader.close()

@@ -19,18 +19,16 @@ EXAMPLE = "biotac calibrate normal trial.npz --out index.normal.json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which recording, and where the correction goes."""
+    """Add the recording, and where the correction goes."""
     parser.add_argument("file", metavar="FILE", type=Path, help="an .npz with E, PDC and z_dir (experiments.md)")
     parser.add_argument("--out", metavar="FILE", type=Path, help="the correction goes here (.normal.json)")
-    parser.add_argument("--force", action="store_true", help="overwrite what is there")
+    parser.add_argument("--force", action="store_true", help="overwrite existing files")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Say what it is worth on contacts held out, then fit all."""
+    """Print the error on held-out contacts, then fit all contacts."""
     outputs.check_file(args.out, overwrite=args.force)
-    theirs = laboratory.load(args.file, needs=("PDC", "z_dir"))
-    assert theirs.plate_normal is not None
-    looks = plate_normal.looks(theirs.trial, theirs.plate_normal)
+    looks = plate_normal.looks(laboratory.load(args.file, needs=("PDC", "z_dir")))
     its = normal.fit(looks)
     before = plate_normal.angles_deg(looks.points_mm, looks.normals)
     after = normal.angles_deg(normal.held_out(looks), looks.normals)

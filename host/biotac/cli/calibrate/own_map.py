@@ -1,4 +1,4 @@
-"""What `calibrate scale` and `calibrate weights` share: a few presses make the population map the finger's own."""
+"""What `calibrate scale` and `calibrate weights` share: a few presses fit the population map to one finger."""
 
 from __future__ import annotations
 
@@ -31,19 +31,21 @@ WHY = "no better than the population map, or a finger unlike those; tare, and lo
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which finger, and where the map goes."""
+    """Add the finger, and where the map goes."""
     parser.add_argument("where", metavar="PORT|REC", help="a board, or a recording (.mcap) of such presses")
     parser.add_argument("--finger", metavar="NAME", type=values.finger, required=True, help="name or chip select")
     parser.add_argument("--population", metavar="FILE", type=Path, help="another map than the package's own")
     parser.add_argument("--out", metavar="FILE", type=Path, help="the finger's map goes here (.wrench.json)")
     parser.add_argument("--no-upload", action="store_true", help="leave the board as it is")
-    parser.add_argument("--save", action="store_true", help="have the board keep the map over a restart")
-    parser.add_argument("--force", action="store_true", help="overwrite what is there; upload what is not worth it")
+    parser.add_argument("--save", action="store_true", help="save the map on the board, so that it survives a restart")
+    parser.add_argument(
+        "--force", action="store_true", help="overwrite existing files; upload even if it does not help"
+    )
 
 
 @dataclass(frozen=True)
 class Pressed:
-    """``held`` of sensor ``serial``; ``hand`` is the board, or None for a recording."""
+    """The presses ``held`` of sensor ``serial``; ``hand`` is the board, or None for a recording."""
 
     held: Held
     serial: str
@@ -54,7 +56,7 @@ class Pressed:
 def pressed(
     args: argparse.Namespace, guide: Callable[[Hand], Held], recorded: Callable[[Recording], Held]
 ) -> Iterator[Pressed]:
-    """On a board by ``guide``, or ``recorded``. Raises InputError."""
+    """The presses, from a board by ``guide`` or from a recording by ``recorded``. Raises InputError."""
     outputs.check_file(args.out, overwrite=args.force)
     if Path(args.where).is_file() or args.where.endswith(".mcap"):
         if args.save:
@@ -71,29 +73,27 @@ def pressed(
 
 
 class Guide:
-    """What to do, on stderr, so that stdout is the result's alone; ``press`` says it in words."""
+    """A guided.Face that prints instructions on stderr, leaving stdout to the result; ``press`` words a press."""
 
     def __init__(self, press: Callable[[Step], str], force_n: Callable[[Step], float], held: str) -> None:
         self._press, self._force_n, self._held = press, force_n, held
 
     def show(self, step: Step | None) -> None:
-        """See guided.Face."""
         if step is not None:
             words = {Phase.REST: "let go, and leave it alone", Phase.RELEASE: self._held}
             said = self._press(step) if step.phase is Phase.PRESS else words[step.phase]
             print(f"biotac: {said}", file=sys.stderr)
 
     def force_n(self, step: Step) -> float:
-        """See guided.Face."""
         return self._force_n(step)
 
 
 def tell(
     args: argparse.Namespace, its: Pressed, fit: Fit, how: str, more: Callable[[keeping.Kept], dict[str, Any]]
 ) -> dict[str, Any]:
-    """Fit, say what it is worth; then, and only if it is worth it, onto the board. What was found as JSON types.
+    """Fit the map, and upload it only if it helps or --force is given; return the findings as JSON types.
 
-    ``how`` says where the force is from, ``more`` what else was found.
+    ``how`` says where the force is from; ``more`` gives further findings.
     """
     kept = keeping.load(args.population)
     result = found(kept.its, its.held, fit)
@@ -116,17 +116,17 @@ def tell(
             f"{len(its.held.force_n)} {how}; population map of {', '.join(kept.provenance.get('files', {}))}",
         )  # fmt: skip
         with whole(args.out, overwrite=args.force) as place:
-            place.write_text(provenance.embed(fitted.dumps(own), origin), encoding="utf-8")
+            place.write_text(fitted.dumps(own, origin), encoding="utf-8")
         facts["written"] = str(args.out)
     if its.hand is not None and not args.no_upload and (facts["worth_it"] or args.force):
-        facts["board"] = upload(its.hand, args.finger, own, run, serial=its.serial, made_s=made_s).facts()
+        facts["board"] = upload(its.hand, args.finger, own, run, serial=its.serial, made_s=made_s)
         if args.save:
             its.hand.save_settings()
     return facts
 
 
 def show(args: argparse.Namespace, facts: dict[str, Any], title: str) -> None:
-    """On stdout, as JSON or in lines."""
+    """Print the findings on stdout, as JSON or as lines."""
 
     def numbers(of: Sequence[float]) -> str:
         return "  ".join(f"{value:5.2f}" for value in of)

@@ -17,28 +17,28 @@ from ...partial_file import whole
 from .. import outputs
 
 NAME = "population"
-HELP = "A force map for fingers that nobody has calibrated, learnt from other fingers on a force plate."
+HELP = "A force map for uncalibrated fingers, trained on other fingers on a force plate."
 EXAMPLE = "biotac calibrate population F1.npz F2.npz --out population.json"
-# The whole fit is a few products of large matrices; more threads than cores in use wait for each other.
+# The fit is a few products of large matrices; threads beyond the free cores only wait for each other.
 THREADS = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """From which recordings, judged on which, and where it goes."""
+    """Add the training recordings, the test recording, and where the map goes."""
     parser.add_argument("files", metavar="REC", nargs="+", type=Path, help="a finger each, as for calibrate wrench")
-    parser.add_argument("--test", metavar="REC", type=Path, help="a finger that is not trained on, to judge the map by")
+    parser.add_argument("--test", metavar="REC", type=Path, help="a finger to test the map on; not used for training")
     parser.add_argument(
         "--symmetric", action="store_true", help="F_y too from mirrored fingers: for use on another rig than theirs"
     )
     parser.add_argument("--out", metavar="FILE", type=Path, help="the map goes here (.json)")
     parser.add_argument(
-        "--source", metavar="TEXT", default="not said", help="where they come from and their licence, for its file"
+        "--source", metavar="TEXT", default="not said", help="origin and licence of the data, stored in the map"
     )
-    parser.add_argument("--force", action="store_true", help="overwrite what is there")
+    parser.add_argument("--force", action="store_true", help="overwrite existing files")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Train, judge, write."""
+    """Train the map, judge it, write it."""
     if args.test is not None and args.test.resolve() in [path.resolve() for path in args.files]:
         raise InputError(f"{args.test} is trained on and judged by: expected another finger's; leave it out of one")
     outputs.check_file(args.out, overwrite=args.force)

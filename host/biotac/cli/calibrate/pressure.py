@@ -29,7 +29,7 @@ WORDS = {Phase.REST: "let go of finger {f}", Phase.RELEASE: "held; let go of fin
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """On what, to which force, and where the result goes."""
+    """Add the board or recordings, the target force, and where the result goes."""
     parser.add_argument("where", metavar="PORT|REC", nargs="+", help="a board, or recordings (.mcap)")
     parser.add_argument(
         "--reference",
@@ -52,12 +52,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--verify", metavar="N", type=_force, default=VERIFICATION_FORCES_N[0], help="newtons of the verification press"
     )
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="a calibration file a finger goes here")
-    parser.add_argument("--force", action="store_true", help="overwrite what is there")
-    parser.add_argument("--save", action="store_true", help="keep it on the board over reboots")
+    parser.add_argument("--force", action="store_true", help="overwrite existing files")
+    parser.add_argument("--save", action="store_true", help="save it on the board, so that it survives a restart")
 
 
 def run(args: argparse.Namespace) -> int:
-    """A board, or every recording."""
+    """Calibrate on a board, or from every recording."""
     recordings = [place for place in args.where if Path(place).is_file() or place.endswith(".mcap")]
     if recordings and len(recordings) < len(args.where):
         raise InputError(f"{' '.join(args.where)}: expected one board, or recordings, and not both")
@@ -106,10 +106,9 @@ def _on_board(args: argparse.Namespace) -> report.Outcome:
 
 
 class _Terminal:
-    """The guide on stderr, so that stdout is the result's alone."""
+    """A guided.Face on stderr, leaving stdout to the result."""
 
     def show(self, step: Step | None) -> None:
-        """See guided.Face."""
         if step is None:
             print("done", file=sys.stderr)
         elif step.phase is Phase.PRESS:
@@ -119,7 +118,6 @@ class _Terminal:
             print(WORDS[step.phase].format(f=step.finger), file=sys.stderr)
 
     def force_n(self, step: Step) -> float:
-        """See guided.Face."""
         return reading_n(f"finger {step.finger}, press {step.press}")
 
 

@@ -25,7 +25,7 @@ HELD = "held: let go"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which finger, how many presses, what the scale shows, and where the map goes."""
+    """Add the finger, the number of presses, the scale's unit, and where the map goes."""
     own_map.add_arguments(parser)
     parser.add_argument(
         "--presses", metavar="N", type=int, default=5, help="how many (default %(default)s; 20 are better)"
@@ -34,13 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scale", metavar="PORT", help="read the scale from a serial port: MT-SICS or A&D, ?baud=9600&parity=N&bits=8"
     )
     parser.add_argument(
-        "--readings", metavar="X,X,X", type=values.numbers, help="what the scale showed at each, of a recording"
+        "--readings", metavar="X,X,X", type=values.numbers, help="the scale's reading at each press, for a recording"
     )
     parser.add_argument("--unit", choices=list(UNITS_N), default="N", help="of the readings (default %(default)s)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Press, fit, say what it is worth; then, and only if it is worth it, onto the board."""
+    """Guide the presses, fit the map, print its error; upload it only if it helps."""
     newtons = UNITS_N[args.unit]
 
     def press(step: Step) -> str:
@@ -74,16 +74,9 @@ def run(args: argparse.Namespace) -> int:
 
         def more(kept: keeping.Kept) -> dict[str, Any]:
             scale = fewshot.scale_of(its.held.columns @ kept.its.coefficients, its.held.force_n[:, 2])
-            return {
-                "shown_n": its.held.force_n[:, 2].tolist(),
-                "gain": scale.gain,
-                "balance": scale.balance,
-            }
+            return {"shown_n": its.held.force_n[:, 2].tolist(), "gain": scale.gain, "balance": scale.balance}
 
         facts = own_map.tell(args, its, fewshot.scaled, "presses on a scale", more)
-        own_map.show(
-            args,
-            facts,
-            f"{facts['presses']} presses: gain of z {facts['gain']:.3f}, balance {facts['balance']:+.3f} N/N",
-        )
+        words = f"{facts['presses']} presses: gain of z {facts['gain']:.3f}, balance {facts['balance']:+.3f} N/N"
+        own_map.show(args, facts, words)
     return 0

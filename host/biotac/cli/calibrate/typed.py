@@ -1,4 +1,4 @@
-"""What a scale shows, typed in by whoever presses."""
+"""Readings of a scale, typed in by whoever presses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ MAX_N = 100.0  # no finger bears more
 
 
 def reading_n(which: str, unit: str = "N", newtons: float = 1.0) -> float:
-    """Ask on stderr until a force above 0 comes, in ``unit`` of ``newtons`` each; InputError at the input's end."""
+    """Ask on stderr until a force between 0 and MAX_N is typed in, in ``unit`` of ``newtons`` each; return it in N.
+
+    Raises InputError at the end of the input.
+    """
     while True:
         print(f"{which}: the scale shows [{unit}] ", end="", file=sys.stderr, flush=True)
         try:

@@ -12,12 +12,12 @@ from .. import values
 from . import own_map
 
 NAME = "weights"
-HELP = "A finger's own force from known weights on its pad, its block tilted: the population map, all axes mended."
+HELP = "A finger's own force from known weights on its pad, level and tilted: corrects all axes of the population map."
 EXAMPLE = "biotac calibrate weights sim:weights.toml --finger index"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which finger, which weights and tilts, and where the map goes."""
+    """Add the finger, the weights and tilts, and where the map goes."""
     own_map.add_arguments(parser)
     for name, default, metavar, what in (
         ("--masses", weights.MASSES_G, "G,G", "grams"),
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Load, fit, say what it is worth; then, and only if it is worth it, onto the board."""
+    """Guide the loading, fit the map, print its error; upload it only if it helps."""
     loads = weights.plan(args.masses, args.tilts)
     sizes_n, toward = [load.size_n for load in loads], [load.toward for load in loads]
 

@@ -7,9 +7,7 @@ import contextlib
 import json
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +30,6 @@ from .. import outputs, values
 from ..progress import Progress
 from . import live as calibrate_live
 
-Put = Callable[[Validation, provenance.Provenance], dict[str, Any]]
-
 NAME = "wrench"
 HELP = (
     "Counts to force: from a board's recordings with a force/torque sensor's file beside each, or from .npz with E, "
@@ -43,7 +39,7 @@ EXAMPLE = "biotac calibrate wrench thumb.mcap --reference thumb.csv --finger thu
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to fit, and from which files."""
+    """Add what to fit, and from which files."""
     parser.add_argument("files", metavar="FILE", nargs="*", type=Path, help="one finger each, fitted on its own")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="report (.md, .png) and map (.wrench.json) go here")
     parser.add_argument(
@@ -61,20 +57,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="pull to this map of other fingers, or to none (the package's)",
     )
-    parser.add_argument("--serial", metavar="BT...", default="", help="refuse data of another sensor than this")
-    parser.add_argument("--force", action="store_true", help="overwrite what is there; take another sensor's data")
+    parser.add_argument("--serial", metavar="BT...", default="", help="refuse data from any other sensor")
+    parser.add_argument("--force", action="store_true", help="overwrite existing files; accept another sensor's data")
     live = parser.add_argument_group("guided, on a board")
-    live.add_argument("--live", metavar="PORT", help="warm up, tare, load everywhere, fit, upload; Ctrl-C ends loading")
-    live.add_argument("--upload", metavar="PORT", help="give the map fitted from FILE to this board's finger")
+    live.add_argument(
+        "--live", metavar="PORT", help="guided: warm up, tare, load everywhere, fit, upload; Ctrl-C ends the loading"
+    )
+    live.add_argument("--upload", metavar="PORT", help="upload the map fitted from FILE to this board's finger")
     live.add_argument("--no-upload", action="store_true", help="with --live: leave the board as it is")
-    live.add_argument("--save", action="store_true", help="have the board keep the map over a restart")
+    live.add_argument("--save", action="store_true", help="save the map on the board, so that it survives a restart")
     parser.add_argument(
         "--as-recorded", action="store_true", help="do not correct the lag of counts after force, do not smooth counts"
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Calibrate every file, or the finger of a board."""
+    """Calibrate from every file, or the finger of a board."""
     if (args.live is None) != bool(args.files):
         raise InputError("expected FILE..., or --live PORT and no FILE")
     if args.live is not None:
@@ -87,10 +85,13 @@ def run(args: argparse.Namespace) -> int:
     mounting = None if args.mounting is None else read_mounting(args.mounting)
     finger = args.finger
     for path in args.files:
-        its = references.get(path)
-        beside = None if its is None else (Path(its), read_reference(its, mounting))
+        reference = references.get(path)
+        beside = None if reference is None else (Path(reference), read_reference(reference, mounting))
         loaded = load(path, beside, finger=finger, serial=args.serial, force=args.force)
-        fit(args, loaded, partial(_upload_to, args, finger, loaded))
+        validation, its, facts = _fit(args, loaded)
+        if args.upload is not None:
+            facts["board"] = _upload(args, finger, loaded, validation, its)
+        _tell(args, facts)
     return 0
 
 
@@ -109,30 +110,23 @@ def _live(args: argparse.Namespace) -> int:
         if not args.force:
             _check_out(args.out, [places.recording], overwrite=False)
         loaded = load(places.recording, (places.reference, read_reference(str(places.reference))), finger=finger)
-
-        def put(validation: Validation, its: provenance.Provenance) -> dict[str, Any]:
-            if args.no_upload:
-                return {}
-            return {"board": _put(args, hand, finger, loaded, validation, its)}
-
-        fit(args, loaded, put, {"not_covered": missing})
+        validation, its, facts = _fit(args, loaded)
+        if not args.no_upload:
+            facts["board"] = _put(args, hand, finger, loaded, validation, its)
+        _tell(args, facts | {"not_covered": missing})
     return 0
 
 
-def _upload_to(
+def _upload(
     args: argparse.Namespace, finger: int | None, loaded: Loaded, validation: Validation, its: provenance.Provenance
 ) -> dict[str, Any]:
-    if args.upload is None:
-        return {}
     with biotac.open(args.upload) as hand:
-        where = finger
-        if where is None:
-            where = (
-                loaded.joined.finger if loaded.joined is not None else choose_finger(args.upload, hand.fingers, None)
-            )
-        serial = ascii_text(hand.sensor_info(where).serial)
+        if finger is None:
+            known = loaded.joined
+            finger = known.finger if known is not None else choose_finger(args.upload, hand.fingers, None)
+        serial = ascii_text(hand.sensor_info(finger).serial)
         provenance.check_serial(f"{loaded.run.name}", its.serial, serial, force=args.force)
-        return {"board": _put(args, hand, where, loaded, validation, its)}
+        return _put(args, hand, finger, loaded, validation, its)
 
 
 def _put(
@@ -148,7 +142,7 @@ def _put(
     )
     if args.save:
         hand.save_settings()
-    return found.facts() | {"saved": args.save}
+    return found | {"saved": args.save}
 
 
 def _references(files: list[Path], references: list[str]) -> dict[Path, str]:
@@ -160,12 +154,12 @@ def _references(files: list[Path], references: list[str]) -> dict[Path, str]:
     return dict(zip(recordings, references, strict=False))
 
 
-def fit(args: argparse.Namespace, loaded: Loaded, put: Put, more: dict[str, Any] | None = None) -> None:
-    """Fit, write what was asked for, ``put`` it on a board, and tell all that, and ``more``."""
+def _fit(args: argparse.Namespace, loaded: Loaded) -> tuple[Validation, provenance.Provenance, dict[str, Any]]:
+    """Fit, and write the files first: they are safe whatever happens on the board afterwards."""
     progress = Progress()
     try:
         windows = (1,) if args.as_recorded else WINDOWS_ROWS
-        # clocks that were aligned by themselves leave no lag to look for
+        # data aligned by their own times leave no lag to search for
         its_own_lag = not args.as_recorded and not loaded.run.by_clocks
         run, others = loaded.run, None
         if args.population != "none":
@@ -181,8 +175,10 @@ def fit(args: argparse.Namespace, loaded: Loaded, put: Put, more: dict[str, Any]
     if args.out is not None:
         places = _write(validation, its, loaded.files[0], args.out, overwrite=args.force)
         facts["written"] = [str(place) for place in places]
-    # the files are safe by now, whatever the board says
-    facts |= put(validation, its) | (more or {})
+    return validation, its, facts
+
+
+def _tell(args: argparse.Namespace, facts: dict[str, Any]) -> None:
     print(json.dumps(facts) if args.json else "\n".join(_lines(facts)))
 
 
@@ -205,7 +201,7 @@ def _write(
         parts[0].write_text(report.markdown(validation, picture.name) + _origin(its), encoding="utf-8")
         with drawn(parts[1]) as figure:
             report.draw(validation, figure)
-        parts[2].write_text(provenance.embed(fitted.dumps(fitted.of(validation)), its), encoding="utf-8")
+        parts[2].write_text(fitted.dumps(fitted.of(validation), its), encoding="utf-8")
     return places
 
 

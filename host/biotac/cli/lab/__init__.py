@@ -1,1 +1,1 @@
-"""Verbs of the laboratory: demo, benchmarks, experiments."""
+"""Verbs of the lab: demo, benchmarks, experiments."""

@@ -18,12 +18,12 @@ from ..progress import Progress
 EXAMPLE = "biotac bench batch"
 BATCH_FRAMES = 200_000
 DECODE_FRAMES = 30_000  # a minute of five fingers
-# Memory bounds all.
+# Upper limits are bounds on memory.
 FRAMES = {"batch": (batch.SINGLE_FRAMES, 10_000_000), "decode": (500, 1_000_000)}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What, and how much of it."""
+    """Add what to measure, and how much of it."""
     parser.add_argument(
         "what",
         metavar="WHAT",
@@ -58,7 +58,7 @@ def _count(text: str) -> int:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print and return 0, whatever the numbers are: they are for people to judge."""
+    """Print the figures and return 0 whatever they are: judging them is up to people."""
     if args.what in FRAMES and args.frames is not None:
         low, high = FRAMES[args.what]
         if not low <= args.frames <= high:
@@ -102,7 +102,7 @@ def _live(outcome: live.Outcome) -> None:
         )
     print(f"{outcome.rounds} rounds of {outcome.seconds:g} s in turns, a board with a ring of 16 KiB on a pty")
     for asked in live.asked(outcome):
-        print(f"{asked.what}: {asked.seen} (asked {asked.wanted}: {'met' if asked.met else 'NOT met'})")
+        print(f"{asked.what}: {asked.seen}{_met(asked.met, asked.wanted)}")
 
 
 def _batch(outcome: batch.Outcome) -> None:
@@ -134,15 +134,19 @@ def _rows(title: str, rows: list[timing.Row]) -> None:
 
 def _ratios(ratios: list[timing.Ratio]) -> None:
     for ratio in ratios:
-        print(f"{ratio.ratio:5.1f}x  {ratio.faster} against {ratio.slower}{_verdict(ratio)}")
+        verdict = "" if ratio.asked is None else _met(ratio.ratio >= ratio.asked, f"{ratio.asked:.0f}x")
+        print(f"{ratio.ratio:5.1f}x  {ratio.faster} against {ratio.slower}{verdict}")
 
 
 def _recording(outcome: recording.Outcome) -> None:
     parts = ", ".join(f"{name} {size / recording.MB:.1f}" for name, size in outcome.mcap_parts.items())
     print(f"{outcome.source}, {outcome.fingers} finger(s), {outcome.seconds:.1f} s, {outcome.frames} frames and PAC")
     print(f"MB: wire {outcome.wire_bytes / recording.MB:.1f}")
+    # the limit applies to ten minutes of five fingers
+    whole = (outcome.fingers, round(outcome.seconds)) == (5, 600)
+    asked = _met(outcome.mcap_bytes <= recording.ASKED_MCAP_MB * recording.MB, "<= 40 MB") if whole else ""
     print(
-        f"    MCAP {outcome.mcap_bytes / recording.MB:.1f} ({parts}){_asked_mb(outcome)}\n"
+        f"    MCAP {outcome.mcap_bytes / recording.MB:.1f} ({parts}){asked}\n"
         f"    MCAP with protobuf messages {outcome.protobuf_bytes / recording.MB:.1f}\n"
         f"    entropy floor of the columns {outcome.floor_bytes / recording.MB:.2f}"
     )
@@ -151,21 +155,8 @@ def _recording(outcome: recording.Outcome) -> None:
     print(f"{outcome.part:.2f}x  one finger's force against all frames")
 
 
-def _asked_mb(outcome: recording.Outcome) -> str:
-    """The figure asked is for ten minutes of five fingers."""
-    if (outcome.fingers, round(outcome.seconds)) != (5, 600):
-        return ""
-    return _met(outcome.mcap_bytes <= recording.ASKED_MCAP_MB * recording.MB, "<= 40 MB")
-
-
 def _met(met: bool, asked: str) -> str:
     return f" (asked {asked}: {'met' if met else 'NOT met'})"
-
-
-def _verdict(ratio: timing.Ratio) -> str:
-    if ratio.asked is None:
-        return ""
-    return f" (asked {ratio.asked:.0f}x: {'met' if ratio.ratio >= ratio.asked else 'NOT met'})"
 
 
 def _record(args: argparse.Namespace) -> recording.Outcome:
@@ -186,9 +177,7 @@ def _newtons(args: argparse.Namespace) -> dict[str, Any]:
         progress.done()
     facts = newtons.facts(outcome)
     if args.picture is not None:
-        from ...lab.bench.newtons_picture import draw
-
-        draw(outcome, args.picture)
+        newtons.draw(outcome, args.picture)
         facts["picture"] = str(args.picture)
     return facts
 
@@ -214,7 +203,7 @@ def _three(rmse: dict[str, list[float]], files: list[str]) -> str:
     return "".join(f"{cell:>20}" for cell in cells)
 
 
-# What is measured, how it is printed, and what of its properties JSON has besides its fields.
+# How to measure, how to print, and which properties JSON has besides the fields.
 WHAT: dict[str, tuple[Callable[[argparse.Namespace], Any], Callable[[Any], None], tuple[str, ...]]] = {
     "batch": (lambda args: batch.measure(args.frames or BATCH_FRAMES), _batch, ()),
     "decode": (lambda args: decode.measure(args.frames or DECODE_FRAMES), _decode, ()),

@@ -14,17 +14,17 @@ EXAMPLE = "biotac demo press.toml --out my-demo"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Source, length and folder."""
+    """Add source, length and folder."""
     parser.add_argument(
         "source", metavar="SOURCE", nargs="?", default="press.toml", help="scenario or recorded counts (press.toml)"
     )
     parser.add_argument("--seconds", type=values.seconds, help="device time (default: the source's length)")
     parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
-    parser.add_argument("--out", type=Path, default=Path("biotac-demo"), help="folder for what it leaves")
+    parser.add_argument("--out", type=Path, default=Path("biotac-demo"), help="folder for its output")
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 when everything arrived and every result is within its bound, else 1."""
+    """Return 0 if everything arrived and every result is within its bound, else 1."""
     progress = Progress()
     demo = run_demo(
         args.source.removeprefix("sim:"), args.out, fingers=args.fingers, seconds=args.seconds, show=progress.show

@@ -22,7 +22,7 @@ SEED_MAX = 2**31 - 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which experiment, on what, and where its results go."""
+    """Add the experiment, its input, and where its results go."""
     parser.add_argument(
         "name",
         metavar="NAME",
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         action="append",
         default=[],
-        help="a .wrench.json to try beside the paper's model; more than once if you like",
+        help="also try this .wrench.json beside the paper's model; may be repeated",
     )
     parser.add_argument(
         "--real",
@@ -54,16 +54,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         action="append",
         default=[],
-        help="seed000: an .npz with its force to try nets on, too; more than once if you like",
+        help="seed000: also try nets on this .npz with its force; may be repeated",
     )
-    parser.add_argument("--quick", action="store_true", help="seed000: a small run of the same, with worse figures")
+    parser.add_argument("--quick", action="store_true", help="seed000: a short run, with worse figures")
     parser.add_argument("--out", metavar="FOLDER", type=Path, help="NAME.md, NAME.png and NAME.json go here")
-    parser.add_argument("--force", action="store_true", help="overwrite what is there")
-    parser.add_argument("--check", action="store_true", help="exit 1 when a figure misses what is asked of it")
+    parser.add_argument("--force", action="store_true", help="overwrite existing files")
+    parser.add_argument("--check", action="store_true", help="exit 1 when a figure misses its target")
 
 
 def run(args: argparse.Namespace) -> int:
-    """0, or 1 when --check finds something missed."""
+    """Return 0, or 1 if --check finds a limit missed."""
     experiment = catalogue.load(args.name)
     _check_arguments(args, experiment)
     progress = Progress()
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_arguments(args: argparse.Namespace, experiment: Experiment) -> None:
-    """Before seconds of work and not after them."""
+    """Check before seconds of work, not after."""
     if args.recording is not None and not experiment.RECORDING:
         raise InputError(f"{args.name} is for the emulated sensor only, seen {args.recording}: leave it out")
     if args.recording is not None and args.seed is not None:

@@ -1,4 +1,4 @@
-"""A board on a pty for as long as the command runs: told, linked, and gone with Ctrl-C."""
+"""A board on a pty for as long as the command runs: announced, linked, and removed on Ctrl-C."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...errors import PortError
 
 
 class Board(Protocol):
-    """What is on the pty."""
+    """The board on the pty."""
 
     path: str
 
@@ -24,7 +24,7 @@ class Board(Protocol):
 
 @contextmanager
 def until_ctrl_c(board: Board, link: Path | None) -> Iterator[None]:
-    """Ctrl-C is the usual way to stop it; then the board and the link to it are gone, as after an error."""
+    """Run until Ctrl-C, the usual way to stop; then, as after an error, close the board and remove the link to it."""
     try:
         yield
     except KeyboardInterrupt:
@@ -36,7 +36,7 @@ def until_ctrl_c(board: Board, link: Path | None) -> Iterator[None]:
 
 
 def tell(board: Board, link: Path | None, plays: str, facts: dict[str, Any], *, as_json: bool) -> None:
-    """Make the link, and print where the board is and what it plays; ``facts`` are those of --json besides the port."""
+    """Make the link; print where the board is and what it plays. ``facts`` go to --json besides the port."""
     if link is not None:
         make_link(link, board.path)
     print(json.dumps({"port": board.path, **facts}) if as_json else f"{board.path} plays {plays}; Ctrl-C stops")
@@ -44,12 +44,12 @@ def tell(board: Board, link: Path | None, plays: str, facts: dict[str, Any], *, 
 
 
 def tell_over(plays: str) -> None:
-    """A board does not vanish when nothing more happens to its fingers: it goes on answering."""
+    """Say that the source is over: the board goes on answering."""
     print(f"{plays} is over; the board stays until Ctrl-C", file=sys.stderr)
 
 
 def make_link(link: Path, target: str) -> None:
-    """Replace a link left over from before; never anything else."""
+    """Make the link; replaces a link left over from before, never anything else."""
     if link.is_symlink():
         link.unlink()
     try:

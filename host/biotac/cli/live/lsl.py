@@ -15,14 +15,14 @@ EXAMPLE = "biotac lsl 'sim:press.toml?fingers=2'"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Port and time."""
+    """Add port and time."""
     values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, help="device time (default: until Ctrl-C)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Publish until the time is over, the source ends or Ctrl-C."""
-    from ...bridges.lsl import Outlet  # here, for the other verbs need no liblsl
+    from ...bridges.lsl import Outlet  # here, because other verbs need no liblsl
 
     with biotac.open(args.port, pace=1.0) as hand, Outlet(hand) as outlet:
         hand.subscribe(AT_FIRST | biotac.QuantityFlags.EVENTS)

@@ -17,7 +17,7 @@ EXAMPLE = "biotac record /dev/ttyACM0 grasp.mcap --seconds 30"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Port, file and time."""
+    """Add port, file and time."""
     parser.add_argument(
         "port", metavar="PORT", help="device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE"
     )
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Record until the time is over, the source ends or Ctrl-C; what came until then is kept."""
+    """Record until the time is over, the source ends or Ctrl-C, and keep what has arrived."""
     progress = Progress(enabled=not is_possible())
     first_us: int | None = None
     last_us = 0
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def faults_told(hand: biotac.Hand) -> list[str]:
-    """What the board's latched faults are, a line each; none for firmware that keeps none."""
+    """The board's latched faults, a line each; none for firmware that latches none."""
     with suppress(biotac.WireVersionError):
         return str(hand.faults()).splitlines()
     return []

@@ -22,7 +22,7 @@ LOOK_S = 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Port, source, faults."""
+    """Add port, source and faults."""
     parser.add_argument(
         "port", metavar="PORT", help="device path or serial:NUMBER of the sensor board, not the gateway"
     )
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "source",
         metavar="SOURCE",
         nargs="?",
-        help="scenario (.toml) or recorded counts (.npz, .btd); without one the board goes on with what it has",
+        help="scenario (.toml) or recorded counts (.npz, .btd); without one the board goes on with its present tape",
     )
     parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
     parser.add_argument(
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="keep SOURCE in the board's flash, up to 3.5 s of five fingers: it plays from power-up on, over and over",
     )
-    kept.add_argument("--forget", action="store_true", help="keep nothing there")
+    kept.add_argument("--forget", action="store_true", help="erase what --keep has stored")
     kinds = ", ".join(fault.name.lower() for fault in wire.EmuFault)
     parser.add_argument(
         "--fault",
@@ -61,14 +61,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Plug the sensors in, feed them until their tape is over, or Ctrl-C, and say how the board got on."""
+    """Plug the sensors in, feed them until their tape ends or Ctrl-C, and print how the board did."""
     faults = [fault_of(text) for text in args.fault]
     if args.source is None and (args.keep or args.by_time):
         raise InputError(f"{'--keep' if args.keep else '--by-time'} wants a SOURCE, such as press.toml")
     board = SensorBoard(open_link(args.port))
     try:
         if args.source is not None:
-            repeats = args.source.endswith(".toml") and not args.keep  # a loop repeats by itself
+            repeats = args.source.endswith(".toml") and not args.keep  # a loop repeats on its own
             seconds = args.seconds or (SCENARIO_S if repeats else None)
             board.plug(load_source(args.source, fingers=args.fingers, seconds=seconds))
             board.play(by_time=args.by_time)
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def play(board: SensorBoard) -> wire.EmuStatus:
-    """Until the bus has come past the last slot, or Ctrl-C."""
+    """Feed until the gateway has read past the last slot, or Ctrl-C."""
     try:
         status = board.feed()
         while status.slots_served < status.slots_taken:
@@ -97,7 +97,7 @@ def play(board: SensorBoard) -> wire.EmuStatus:
 
 
 def fault_of(text: str) -> tuple[int, wire.EmuFault]:
-    """``2=stuck_low``: a finger and what it does."""
+    """Finger and fault of a text such as ``2=stuck_low``."""
     finger, _, kind = text.partition("=")
     if not finger.isdigit() or kind.upper() not in wire.EmuFault.__members__:
         kinds = ", ".join(fault.name.lower() for fault in wire.EmuFault)
@@ -106,7 +106,7 @@ def fault_of(text: str) -> tuple[int, wire.EmuFault]:
 
 
 def summary(status: wire.EmuStatus) -> str:
-    """For people. Where the gateway lost no slot, the tape's time less this board's is the two clocks' drift."""
+    """The status for people. If the gateway lost no slot, the tape's time less this board's is the clocks' drift."""
     lines = [
         f"{status.slots_served} of {status.slots_taken} slots served in {status.elapsed_us / 1e6:.3f} s by its clock; "
         f"{status.words} words read, {status.words_late} late, {status.samples_starved} asked for in vain",

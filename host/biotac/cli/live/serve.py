@@ -21,7 +21,7 @@ _LOOK_S = 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What, as whom, and where Zenoh is."""
+    """Add the port, the name to share it under, and where Zenoh is."""
     values.add_port(parser)
     parser.add_argument("--name", required=True, help="others open it as zenoh:NAME")
     parser.add_argument("--listen", metavar="ENDPOINT", help="such as tcp/0.0.0.0:7447 (default: Zenoh's own way)")
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Share it until Ctrl-C. A board that goes away is looked for; its readers are told."""
+    """Share the board until Ctrl-C. If it goes away, look for it again and tell its readers."""
     if args.port is not None and args.port.startswith("zenoh:"):
         raise InputError(f"{args.port} is shared already; open it as it is, from anywhere")
     name = network.checked_name(args.name)
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.flush()
         try:
             while True:
-                hand.check()  # it reads and publishes by itself
+                hand.check()  # the bridge reads and publishes on its own
                 time.sleep(_LOOK_S)
         except KeyboardInterrupt:
             pass  # the usual way to stop it

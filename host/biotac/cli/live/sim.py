@@ -20,7 +20,7 @@ SCENARIO_S = 600.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Source and pace."""
+    """Add source and pace."""
     parser.add_argument("source", metavar="SOURCE", help="scenario (.toml) or recorded counts (.npz, .btd)")
     parser.add_argument("--fingers", type=int, help="how many fingers play it, 1 to 5")
     parser.add_argument(
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def prepare(board: SimBoard) -> None:
-    """Give the board its source's settings and tare, as biotac.open does, and let its time run."""
+    """Give the board its source's settings and tare, as biotac.open does, and start its time."""
     link = SerialLink(board.path)
     link.source = board.source
     shake_hands(link).close()

@@ -9,7 +9,8 @@ import sys
 import biotac
 
 from ...hand.subscription import AT_FIRST, RESULTS
-from ...wire.events import INVALID_U32, event_age_s, kind_name
+from ...wire.events import event_age_s, kind_name
+from ...wire.fields import INVALID_U32
 from ...wire.fields import as_json as row_as_json
 from ...wire.frames import Frame
 from ...wire.messages_gen import INVALID_COUNT, Event, FrameFlags, QuantityFlags
@@ -20,25 +21,21 @@ EXAMPLE = "biotac stream sim:press.toml --rate 5"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Port, time and rate."""
+    """Add port, time and rate."""
     values.add_port(parser)
     parser.add_argument("--seconds", type=values.seconds, help="stop after this much device time")
     parser.add_argument(
         "--rate", type=values.rate, default=10.0, help="lines per second and finger (default 10; 0: all)"
     )
+    parser.add_argument("--events", action="store_true", help="also print a line for each touch, lift, jolt and slip")
     parser.add_argument(
-        "--events",
-        action="store_true",
-        help="a line for each touch, lift, jolt and slip, too; no table",
-    )
-    parser.add_argument(
-        "--touched", action="store_true", help="only fingers that are touched; untouched ones send heartbeats"
+        "--touched", action="store_true", help="only fingers that are touched; the others send heartbeats"
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Print until the time is over, the source ends or Ctrl-C."""
-    # A person wants to see it happen: simulated boards run in real time here.
+    # For people watching, simulated boards run in real time here.
     with biotac.open(args.port, pace=1.0) as hand:
         for warning in hand.warnings:
             print(f"biotac: {warning.text}", file=sys.stderr)
@@ -56,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def watch(hand: biotac.Hand, *, seconds: float | None) -> None:
-    """A table that stands still."""
+    """Show a table, updated in place."""
     first_us: int | None = None
     words = ""
     with LiveTable(hand, hand.port) as table:
@@ -74,7 +71,7 @@ def watch(hand: biotac.Hand, *, seconds: float | None) -> None:
 
 
 def show(hand: biotac.Hand, *, rate: float, seconds: float | None = None, as_json: bool = False) -> None:
-    """Print ``rate`` frames a second and finger."""
+    """Print ``rate`` frames per second and finger."""
     due_us: dict[int, int] = {}
     step_us = int(1e6 / rate) if rate > 0 else 0
     end_us: int | None = None
@@ -95,7 +92,7 @@ def show(hand: biotac.Hand, *, rate: float, seconds: float | None = None, as_jso
 
 
 def event_as_json(event: Event) -> dict[str, object]:
-    """Name and numbers of an event; what is invalid is null."""
+    """Name and numbers of an event as JSON types; invalid numbers are null."""
     return {
         "event": kind_name(event).lower(),
         "finger": event.finger,
@@ -107,7 +104,7 @@ def event_as_json(event: Event) -> dict[str, object]:
 
 
 def event_as_line(event: Event) -> str:
-    """One line for a person."""
+    """One line for people."""
     line = f"{event.t_us / 1e6:9.3f} s finger {event.finger}  {kind_name(event).lower()}"
     if event.peak_count != INVALID_COUNT:
         line += f", peak {event.peak_count} counts"
@@ -116,7 +113,7 @@ def event_as_line(event: Event) -> str:
 
 
 def as_line(frame: Frame) -> str:
-    """Columns for a person."""
+    """Columns for people."""
     poc = " ".join(f"{v:7.2f}" for v in frame.poc_mm)
     force = " ".join(f"{v:7.3f}" for v in frame.force_n)
     torque = " ".join(f"{v:8.2f}" for v in frame.torque_nmm)

@@ -1,10 +1,9 @@
-"""All fingers as a table that stands still, on a terminal with ``rich`` (the extra ``terminal``)."""
+"""All fingers as a table updated in place, on a terminal with ``rich`` (the extra ``terminal``)."""
 
 from __future__ import annotations
 
 import sys
 import time
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import biotac
@@ -29,12 +28,12 @@ COLUMNS = (
     "tdc",
     "what to know",
 )
-#: What makes a result doubtful; that a finger is at rest or was not asked something is no news.
+#: Flags that are not shown, as they say only that a finger is at rest or a result was not asked for.
 DULL = FrameFlags.CONTACT | FrameFlags.NOT_ASKED | FrameFlags.POC_INVALID
 
 
 class LiveTable:
-    """Call ``show`` as often as you like; use as a context manager. ``console`` is rich's, by default stdout's."""
+    """Call ``show`` as often as you like; use as a context manager. ``console`` is rich's; default stdout."""
 
     def __init__(self, hand: biotac.Hand, title: str, console: Any = None) -> None:
         from rich.live import Live
@@ -48,13 +47,11 @@ class LiveTable:
         self._live.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._live.stop()
 
     def show(self, words: str, *, now: bool = False) -> None:
-        """The latest of each finger, and ``words`` below; drawn ten times a second at most, unless ``now``."""
+        """Draw the latest of each finger with ``words`` below, at most ten times a second unless ``now``."""
         now_s = time.monotonic()
         if now or now_s >= self._due_s:
             self._due_s = now_s + REDRAW_S
@@ -71,7 +68,7 @@ class LiveTable:
         table = Table(box=SIMPLE_HEAD, title=self._title, caption=f"{words}; {health}", caption_justify="left")
         for name in COLUMNS:
             left = name in (COLUMNS[0], COLUMNS[-1])
-            # Of one width whatever stands in it, so that nothing moves.
+            # Fixed widths, so that nothing moves.
             width = 30 if name == COLUMNS[-1] else 8 if left or "N" in name or "mm" in name else 7
             table.add_column(name, justify="left" if left else "right", width=width, no_wrap=True)
         for name in self._hand:
@@ -81,7 +78,7 @@ class LiveTable:
 
 
 def cells(finger: biotac.FingerView) -> list[str]:
-    """A finger's values as text, a dash where invalid."""
+    """A finger's values as text; an invalid one is a dash."""
     frame = finger.frame
     force_n, poc_mm = (v.tolist() for v in (frame.force_n, frame.poc_mm))
     strength_n = sum(v * v for v in force_n) ** 0.5
@@ -95,12 +92,12 @@ def cells(finger: biotac.FingerView) -> list[str]:
 
 
 def number(value: float, digits: int) -> str:
-    """With so many digits; NaN is a dash."""
+    """``value`` with that many digits; a dash for NaN."""
     return "-" if value != value else f"{value:.{digits}f}"
 
 
 def is_possible() -> bool:
-    """Somebody looks at a terminal, and rich is installed."""
+    """Whether stdout is a terminal and rich is installed."""
     if not sys.stdout.isatty():
         return False
     try:

@@ -18,18 +18,20 @@ EXAMPLE = "biotac view 'sim:press.toml?fingers=5'"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to show, and where."""
+    """Add what to show, and where."""
     parser.add_argument(
         "source",
         metavar="PORT|RECORDING",
         nargs="?",
-        help="as in other verbs, or a .mcap; default: the only board on USB",
+        help="as for the other verbs, or a .mcap (default: the only board on USB)",
     )
     parser.add_argument("--port", type=int, help=f"of the page (default {DEFAULT_PORT}, or a free one; 0: a free one)")
     parser.add_argument("--folder", type=Path, default=Path(), help="where recordings go (default: here)")
     parser.add_argument("--no-browser", action="store_true", help="only print the page's address")
-    parser.add_argument("--once", action="store_true", help="do not start anew what has played to its end")
-    parser.add_argument("--check", action="store_true", help="fetch the page and its first events, judge them, and end")
+    parser.add_argument("--once", action="store_true", help="stop at the end instead of playing again")
+    parser.add_argument(
+        "--check", action="store_true", help="fetch the page and its first events, check them, and exit"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -39,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     if args.port is not None and not 0 <= args.port <= 65535:
         raise InputError(f"--port is {args.port}, expected 0 to 65535")
     source = args.source or choose()
-    from ...view.serving import Viewing  # here, for the other verbs need no HTTP server
+    from ...view.serving import Viewing  # here, because other verbs need no HTTP server
 
     with Viewing(source, port=args.port, folder=args.folder, again=not args.once) as viewing:
         print(json.dumps({"url": viewing.url, "source": source}) if args.json else f"{viewing.url} shows {source}")

@@ -14,14 +14,14 @@ EXAMPLE = "biotac check grasp.mcap"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The recording."""
+    """Add the recording."""
     parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record")
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: what is there is right. 1: a wrong result, damaged data or no frame. 2 (raised): unreadable.
+    """Return 0 if the recording is good, 1 for a wrong result, damaged data or no frame. Raises if unreadable (code 2).
 
-    A recording that was merely cut off, as by a kill, is right as far as it goes; stderr says so.
+    A recording that was merely cut off, as by a kill, is good as far as it goes; stderr says so.
     """
     recording = load(args.recording, quiet=True)
     outcome = CrossCheck(wire_minor=recording.info.wire_minor)

@@ -16,17 +16,17 @@ EXAMPLE = "biotac export grasp.mcap grasp.parquet, or biotac export trials/*.mca
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Recordings, where to, and whether to overwrite."""
+    """Add the recordings, the output, and whether to overwrite."""
     parser.add_argument("recordings", metavar="REC", nargs="+", type=Path, help="file written by biotac record")
     formats = "; ".join(f"{suffix} {its.what}" for suffix, its in FORMATS.items())
-    # The last of the words is OUT where there is no lake; argparse shows it, and run() takes it from the others.
+    # Without --lake the last word is OUT. It is here for argparse's help; run() takes it from the recordings.
     parser.add_argument("out", metavar="OUT", nargs="?", type=Path, help=f"file to write: {formats}")
-    parser.add_argument("--force", action="store_true", help="overwrite OUT, or what the lake has of the recordings")
+    parser.add_argument("--force", action="store_true", help="overwrite OUT, or the recordings' files in the lake")
     lake.add_export_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write OUT, or leave nothing behind; what the recording lacks is said on stderr."""
+    """Write OUT, or leave nothing behind; stderr says what the recording lacks."""
     places = [*args.recordings, *([args.out] if args.out else [])]
     if args.lake is not None:
         return lake.run_export(args, places)
@@ -34,16 +34,13 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{len(places)} files are named, expected REC OUT; many recordings go to --lake DIR")
     source, out = places
     recording = load(source)
-    progress = Progress()
-    try:
+    with Progress() as progress:
         written = export(
             recording,
             out,
             overwrite=args.force,
             show=lambda share: progress.show(f"{out}: {share:.0%}, Ctrl-C stops and leaves nothing behind"),
         )
-    finally:
-        progress.done()
     names = [str(path) for path in written]
     facts = {"written": names, "frames": len(recording.frames), "pac": len(recording.pac)}
     print(json.dumps(facts) if args.json else f"{len(recording.frames)} frames to {', '.join(names)}")

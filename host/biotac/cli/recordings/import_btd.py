@@ -14,7 +14,7 @@ EXAMPLE = "biotac import trial.btd trial.mcap"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What and where to."""
+    """Add input and output."""
     parser.add_argument("file", metavar="FILE", type=Path, help=".btd or .btd.gz")
     parser.add_argument("out", metavar="OUT", type=Path, help="recording to write, .mcap")
     parser.add_argument("--force", action="store_true", help="overwrite OUT")
@@ -22,12 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write OUT, or leave nothing behind."""
-    progress = Progress()
-    try:
-        with whole(args.out, overwrite=args.force) as place:
-            done = import_btd(args.file, place, lambda share: progress.show(f"{args.out}: {share:.0%}"))
-    finally:
-        progress.done()
+    with Progress() as progress, whole(args.out, overwrite=args.force) as place:
+        done = import_btd(args.file, place, lambda share: progress.show(f"{args.out}: {share:.0%}"))
     if args.json:
         print(json.dumps({"recording": str(args.out)} | done))
         return 0

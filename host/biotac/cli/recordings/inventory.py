@@ -8,25 +8,20 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ...errors import InputError
+from .lake import room
 
 EXAMPLE = "biotac inventory trials.lake"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The lake."""
+    """Add the lake."""
     parser.add_argument("folder", metavar="DIR", type=Path, help="a lake, as `biotac export --lake` makes it")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print it and keep it in the lake; return 1 when a sensor is not as it used to be."""
-    try:
-        from ...lake import inventory, layout
-    except ImportError as error:
-        raise InputError(
-            f"a lake needs {error.name}, which is not installed; pip install 'biotac-gateway[lake]'"
-        ) from error
-    lake = layout.opened(args.folder)
+    """Print the inventory and keep it in the lake; return 1 if a sensor is not as it used to be."""
+    inventory = room("inventory")
+    lake = room("layout").opened(args.folder)
     its = inventory.take(lake)
     path = inventory.keep(lake, its)
     if args.json:
@@ -44,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def as_line(its: Any, day: Any) -> str:
-    """A sensor for people."""
+    """A sensor as one line for people."""
     name = its.sensor or "without a number"
     calibration = "not calibrated"
     if its.calibration is not None:

@@ -21,22 +21,22 @@ EXAMPLE = 'biotac lake sql "SELECT board, count(*) FROM frames GROUP BY board" t
 
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which lake, and who does it."""
-    parser.add_argument("--lake", metavar="DIR", type=Path, help="a folder of Parquet files that all REC are put into")
+    """Add the lake, and the number of workers."""
+    parser.add_argument("--lake", metavar="DIR", type=Path, help="a folder of Parquet files to add every REC to")
     _add_workers(parser)
 
 
 def _add_workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-j", dest="jobs", metavar="N", type=values.workers, default=1, help="processes")
-    parser.add_argument("--dask", metavar="ADDRESS", help="a Dask scheduler, whose workers see the same files")
+    parser.add_argument("--dask", metavar="ADDRESS", help="a Dask scheduler whose workers see the same files")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The verbs of a lake."""
+    """Add the subverbs of a lake."""
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     words = {
         "check": "Check all files against their seals, and every on-board result against the float64 reference.",
-        "sql": "Ask DuckDB; each topic is a table. Prints CSV, or with --json an object a line.",
+        "sql": "Query with DuckDB; each topic is a table. Prints CSV, or with --json one object per line.",
     }
     its = {name: what.add_parser(name, help=text, description=text) for name, text in words.items()}
     for name, one in its.items():
@@ -52,13 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do what was asked for."""
+    """Run the subverb."""
     return int(args.action(args))
 
 
 def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
-    """0: all are in the lake. 2: some are not; each is named, the others are there."""
-    layout, writing = _room("layout"), _room("writing")
+    """Return 0 if all are in the lake, 2 if some are not: those are named, the others are in."""
+    layout, writing = room("layout"), room("writing")
     lake = layout.opened(args.lake, create=True)
     with layout.sole_writer(args.lake):
         work = functools.partial(writing.put, str(args.lake.absolute()), lake.partition, args.force)
@@ -83,9 +83,9 @@ def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
 
 
 def run_check(args: argparse.Namespace) -> int:
-    """0: all of it is right. 1: something is not, and is named. 2 (raised): no lake, or files that are none of it."""
-    lake = _room("layout").opened(args.folder)
-    work = functools.partial(_room("checking").check, str(args.folder.absolute()), lake.topics, lake.partition)
+    """Return 0 if all is right, 1 if something is wrong, which is named. Raises (code 2): no lake, or foreign files."""
+    lake = room("layout").opened(args.folder)
+    work = functools.partial(room("checking").check, str(args.folder.absolute()), lake.topics, lake.partition)
     done, failed = _all(work, sorted(lake.partition), args, "checked")
     wrong = [text for its in done for text in its.wrong]
     for text in wrong if not args.json else ():
@@ -96,13 +96,13 @@ def run_check(args: argparse.Namespace) -> int:
         "good": good,
         "recordings": len(lake.partition),
         "unfinished": lake.unfinished,
-        "frames": sum(its.frames for its in done),
-        "violations": sum(its.violations for its in done),
+        "frames": sum(its.outcome.frames for its in done),
+        "violations": sum(its.outcome.violations for its in done),
         "wrong": wrong,
         "failed": failed,
     }
     largest = {
-        name: max((getattr(its, name) for its in done), default=0.0)
+        name: max((getattr(its.outcome, name) for its in done), default=0.0)
         for name in ("poc_um_max", "force_mn_max", "torque_nmm_max")
     }
     facts |= largest
@@ -120,10 +120,10 @@ def run_check(args: argparse.Namespace) -> int:
 
 
 def run_sql(args: argparse.Namespace) -> int:
-    """Print what the query gives."""
-    lake = _room("layout").opened(args.folder)
+    """Print the query's result."""
+    lake = room("layout").opened(args.folder)
     _warn_of_unfinished(lake)
-    names, rows = _room("sql").query(lake, args.query)
+    names, rows = room("sql").query(lake, args.query)
     if args.json:
         for row in rows:
             print(json.dumps(dict(zip(names, row, strict=True)), default=str))
@@ -145,11 +145,11 @@ def _warn_of_unfinished(lake: Any) -> None:
 def _all(
     work: Callable[[str], Any], items: list[str], args: argparse.Namespace, did: str
 ) -> tuple[list[Any], list[str]]:
-    """What ``work`` gave, and what is said of those that failed, in the order of ``items``."""
+    """The results of ``work``, and the messages about items that failed, both in the order of ``items``."""
     progress = Progress()
     results: dict[str, Any] = {}
     try:
-        for item, result in _room("workers").each(work, items, args.jobs, args.dask):
+        for item, result in room("workers").each(work, items, args.jobs, args.dask):
             results[item] = result
             progress.show(f"{len(results)} of {len(items)} {did}; Ctrl-C stops, the same command goes on from there")
     except KeyboardInterrupt:
@@ -164,8 +164,8 @@ def _all(
     return [its for item in items if not isinstance(its := results[item], BiotacError)], failed
 
 
-def _room(name: str) -> ModuleType:
-    """A module of the lake. InputError for the extra that it needs."""
+def room(name: str) -> ModuleType:
+    """A module of the lake. Raises InputError naming the extra that it needs."""
     try:
         return import_module(f"biotac.lake.{name}")
     except ImportError as error:

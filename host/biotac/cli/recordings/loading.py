@@ -1,4 +1,4 @@
-"""Reading a recording as several verbs do: with a progress line, and with what it lacks on stderr."""
+"""Loading a recording as several verbs do: with a progress line, and with what it lacks on stderr."""
 
 from __future__ import annotations
 
@@ -11,11 +11,8 @@ from ..progress import Progress
 
 def load(path: Path, *, quiet: bool = False) -> Recording:
     """The recording at ``path``; ``quiet`` leaves its problems to the caller."""
-    progress = Progress()
-    try:
+    with Progress() as progress:
         recording = Recording(path, lambda share: progress.show(f"reading {path}: {share:.0%}"))
-    finally:
-        progress.done()
     if not quiet:
         for problem in recording.problems:
             print(f"biotac: {problem}", file=sys.stderr)

@@ -23,11 +23,11 @@ EXAMPLE = "biotac recompute grasp.mcap again.mcap --poc-weights compress_n2"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Recording, file, and what shall be different."""
+    """Add the recording, the output, and what to change."""
     parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record; it is not changed")
     parser.add_argument("out", metavar="OUT", type=Path, help=".mcap, or any format of biotac export")
     names = [weights.name.lower() for weights in wire.PocWeights]
-    parser.add_argument("--poc-weights", choices=names, help="how electrodes weigh in the point of contact")
+    parser.add_argument("--poc-weights", choices=names, help="weights of the electrodes in the point of contact")
     parser.add_argument(
         "--settings", metavar="FILE", type=Path, help="JSON object of settings by name, as biotac info --json prints"
     )
@@ -73,7 +73,7 @@ def read_settings(path: Path) -> dict[wire.Setting, int]:
         named = read_json(path)
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read as JSON ({error}); expected an object of settings") from error
-    # What `biotac info --json` prints has them under "settings".
+    # `biotac info --json` prints them under "settings".
     named = named.get("settings", named) if isinstance(named, dict) else named
     known = {setting.name.lower(): setting for setting in wire.Setting}
     if not isinstance(named, dict) or not all(type(value) is int for value in named.values()):

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from ...errors import InputError
-from ...recording.playback import Playback
+from ...recording.replay.playback import Playback
 from .. import values
 from ..live import stream
 from ..live.board_on_pty import tell, tell_over, until_ctrl_c
@@ -17,7 +17,7 @@ EXAMPLE = "biotac replay grasp.mcap --from 12.5 --pace 2"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Recording, which part of it, how fast and where to."""
+    """Add the recording, which part of it, how fast and where to."""
     parser.add_argument("recording", metavar="REC", type=Path, help="file written by biotac record")
     parser.add_argument("--from", dest="from_s", type=moment, default=0.0, help="seconds since its first frame")
     parser.add_argument("--to", dest="to_s", type=moment, help="seconds since its first frame")
@@ -29,17 +29,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def moment(text: str) -> float:
     """Seconds, 0 or more."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = values.number(text)
     if not 0 <= value < math.inf:
         raise argparse.ArgumentTypeError(f"{text!r} is no time; expected seconds from 0 on")
     return value
 
 
 def run(args: argparse.Namespace) -> int:
-    """Play to the end or Ctrl-C; what the recording lacks is said on stderr."""
+    """Play to the end or Ctrl-C; stderr says what the recording lacks."""
     if args.link is not None and not args.pty:
         raise InputError("--link is for a pty; add --pty")
     recording = load(args.recording)
@@ -50,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 def on_stdout(args: argparse.Namespace, playback: Playback) -> int:
     """Print frames as biotac stream does."""
     from ...hand.opening import shake_hands
-    from ...recording.replay_link import ReplayLink
+    from ...recording.replay.link import ReplayLink
 
     with shake_hands(ReplayLink(f"replay:{args.recording}", playback, pace=args.pace)) as hand:
         stream.show(hand, rate=args.rate, as_json=args.json)
@@ -58,8 +55,8 @@ def on_stdout(args: argparse.Namespace, playback: Playback) -> int:
 
 
 def on_pty(args: argparse.Namespace, playback: Playback) -> int:
-    """Be a board until Ctrl-C; it plays when somebody starts its stream."""
-    from ...recording.replay_pty import ReplayPty
+    """Act as a board until Ctrl-C; playing begins when somebody starts its stream."""
+    from ...recording.replay.pty import ReplayPty
 
     board = ReplayPty(playback, args.pace)
     name = str(args.recording)

@@ -1,1 +1,1 @@
-"""What `biotac bench` measures, with the contestants beside it."""
+"""The benchmarks of `biotac bench`, and the code they are compared with."""

@@ -1,8 +1,8 @@
-"""biotac.compute against NumPy, in one run: interleaved rounds, warmed buffers, medians.
+"""biotac.compute against NumPy in one run: interleaved rounds, warmed buffers, medians.
 
-Ratios are of wall time: OpenBLAS may use every core, compute() uses one (and OpenBLAS's threads spin on
-after their work, so that CPU time would be charged to whoever runs next). Absolute times say something
-about this machine only.
+Ratios are of wall time: compute() uses one core, OpenBLAS may use all. CPU time would be unfair, because OpenBLAS's
+threads keep spinning after their work, at the expense of whoever runs next. Absolute times hold for this machine
+only.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ WHOLE, BEST = "NumPy, whole-array matrix products", "NumPy, blocked, buffers reu
 ONE_PREPARED, ONE_WARM = "per_frame, one frame per call", "compute, out= reused, one frame per call"
 ONE_WHOLE, ONE_OWN = "NumPy, whole-array code, one frame per call", "NumPy, written for one frame, one frame per call"
 
-#: (faster, slower, at least so many times), None where nothing was asked.
+#: (faster, slower, smallest ratio); None where there is no requirement.
 ASKED: tuple[tuple[str, str, float | None], ...] = (
     (WARM, WHOLE, 6.0),
     (WARM, BEST, 2.0),
@@ -43,7 +43,7 @@ ASKED: tuple[tuple[str, str, float | None], ...] = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """One run."""
+    """The figures of one run."""
 
     frames: int
     block: int
@@ -61,7 +61,7 @@ def recording(frames: int) -> tuple[NDArray[np.uint16], NDArray[np.float64]]:
 
 
 def measure(frames: int, rounds: int = ROUNDS) -> Outcome:
-    """Check that all contestants agree on ``frames`` frames, then time them. RuntimeError if they do not."""
+    """Check that all contestants agree on ``frames`` frames, then time them. Raises RuntimeError if they do not."""
     counts, tare = recording(frames)
     out = np.zeros(frames, RESULT_DTYPE)
     arrays = (np.zeros((frames, 3)), np.zeros((frames, 3)), np.zeros((frames, 3)))
@@ -73,7 +73,7 @@ def measure(frames: int, rounds: int = ROUNDS) -> Outcome:
         Contestant(WHOLE, frames, lambda: whole_array(counts, tare)),
         Contestant(BEST, frames, lambda: best(counts, tare, arrays)),
     ]
-    singles = list(counts[:SINGLE_FRAMES])  # taking a row out of the array is nobody's time
+    singles = list(counts[:SINGLE_FRAMES])  # taking a row out of the array must not be timed
     one_out = np.zeros((), RESULT_DTYPE)
     prepared = per_frame(tare, LIN)
     ones: list[tuple[str, Callable[[NDArray[np.uint16]], Any]]] = [
@@ -101,13 +101,13 @@ def _looped(run: Callable[[NDArray[np.uint16]], Any], rows: list[NDArray[np.uint
 
 
 def _best_block(counts: NDArray[np.uint16], tare: NDArray[np.float64], arrays: Any) -> int:
-    """NumPy's best block size here; it depends on the cache."""
+    """NumPy's best block size on this machine; it depends on the cache."""
     trials = [Contestant(str(size), len(counts), partial(Blocked(size), counts, tare, arrays)) for size in BLOCK_SIZES]
     return int(min(timed(trials, 5), key=lambda row: row.median_ns).name)
 
 
 def _check(results: list[Any], what: str) -> None:
-    """All of them against the first, which is compute()'s."""
+    """Compare all results with the first, which is compute()'s. Raises RuntimeError if one differs."""
     for other in results[1:]:
         for k, name in enumerate(RESULT_DTYPE.names or ()):
             values = other[k] if isinstance(other, tuple) else other[name]

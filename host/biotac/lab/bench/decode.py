@@ -1,8 +1,8 @@
-"""The link's decoder against MAVLink's and against what one writes in Python, in one run.
+"""The link's decoder against MAVLink's and against decoders written in Python, in one run.
 
-Five simulated fingers' FRAMEs and PACs, in memory, in chunks; what a chunk gives is let go before the next one,
-as by a live reader. Interleaved rounds, each contestant once untimed before it is timed, medians of CPU time.
-Absolute times say something about this machine only.
+The input is FRAMEs and PACs of five simulated fingers, in memory, in chunks. As in a live reader, the result of one
+chunk is released before the next. Rounds are interleaved, each contestant runs once untimed first, and times are
+medians of CPU time. Absolute times hold for this machine only.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ FINGERS = 5
 FRAMES_PER_S = 100 * FINGERS
 SOURCE = "sim:press.toml"
 ROUNDS = 7
-CHUNK_BYTES = (4096, 65536)  # what a serial port's read gives at most, and a recording's reader
+CHUNK_BYTES = (4096, 65536)  # the most that one read of a serial port, and of the recording reader, gives
 CRC_BYTES = 4
 CRC_RESIDUE = zlib.crc32(zlib.crc32(b"any").to_bytes(CRC_BYTES, "little"), zlib.crc32(b"any"))
 FRAME, PAC, UNITS_OF_FRAME = wire.Frame.ID, wire.Pac.ID, -1
@@ -44,7 +44,7 @@ EXTRA = "biotac bench decode runs against pymavlink and cobs; install them: pip 
 OURS, LIVE, UNITS = "biotac Decoder", "biotac StreamDecoder", "biotac StreamDecoder, units"
 MAVLINK, STRUCT, NUMPY = "pymavlink", "C-cobs + zlib + struct", "C-cobs + zlib + NumPy frombuffer"
 
-#: (faster, slower, at least so many times), None where nothing was asked.
+#: (faster, slower, smallest ratio); None where there is no requirement.
 ASKED: tuple[tuple[str, str, float | None], ...] = (
     (OURS, MAVLINK, 150.0),
     (OURS, STRUCT, 15.0),
@@ -59,9 +59,9 @@ Feed = Callable[[bytes], Columns]
 
 @dataclass(frozen=True)
 class Result:
-    """One chunk size. Rows are ns per message, of which a FRAME and a PAC are one each.
+    """One chunk size. Rows are ns per message; a FRAME and a PAC count as one each.
 
-    Ratios are against the slower one's best median of all chunk sizes.
+    Ratios use the slower contestant's best median of all chunk sizes.
     """
 
     chunk_bytes: int
@@ -71,7 +71,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One run over ``seconds`` of stream; bytes of one message on the wire are means."""
+    """One run over ``seconds`` of stream; bytes per message on the wire are means."""
 
     seconds: float
     messages: int
@@ -84,7 +84,7 @@ class Outcome:
 class _Contestant:
     name: str
     chunks: Chunks
-    start: Callable[[], Feed]  # a fresh decoder, as the function that takes its chunks
+    start: Callable[[], Feed]  # makes a fresh decoder; the function takes its chunks
 
 
 def recording(frames: int) -> dict[int, StructArray]:
@@ -101,28 +101,29 @@ def recording(frames: int) -> dict[int, StructArray]:
 def measure(frames: int, rounds: int = ROUNDS) -> Outcome:
     """Check that all contestants decode the same fields, then time them.
 
-    InputError without the extra `bench`, RuntimeError if two contestants differ.
+    Raises InputError without the extra `bench`, RuntimeError if two contestants differ.
     """
     cobs_decode, dialect = _extra()
     sent = recording(frames)
     messages = _as_sent(sent)
     ours = b"".join(encode(m.ID, m.pack()) for m in messages)
     theirs = b"".join(map(mavlink.encoder(dialect), messages))
+    live = {FRAME: "wire", PAC: "pac"}
     tables: list[list[Row]] = []
     for chunk_bytes in CHUNK_BYTES:
         chunks, mavlink_chunks = _chunks(ours, chunk_bytes), _chunks(theirs, chunk_bytes)
         contestants = [
-            _Contestant(OURS, chunks, _ours(Decoder, {FRAME: "frames", PAC: "pacs"})),
-            _Contestant(LIVE, chunks, _ours(StreamDecoder, {FRAME: "wire", PAC: "pac"})),
-            _Contestant(UNITS, chunks, _ours(StreamDecoder, {FRAME: "wire", PAC: "pac", UNITS_OF_FRAME: "frames"})),
-            _Contestant(MAVLINK, mavlink_chunks, _mavlink(dialect)),
-            _Contestant(STRUCT, chunks, _struct(cobs_decode)),
-            _Contestant(NUMPY, chunks, _numpy(cobs_decode)),
+            _Contestant(OURS, chunks, partial(_ours, Decoder, {FRAME: "frames", PAC: "pacs"})),
+            _Contestant(LIVE, chunks, partial(_ours, StreamDecoder, live)),
+            _Contestant(UNITS, chunks, partial(_ours, StreamDecoder, live | {UNITS_OF_FRAME: "frames"})),
+            _Contestant(MAVLINK, mavlink_chunks, partial(_mavlink, dialect)),
+            _Contestant(STRUCT, chunks, partial(_struct, cobs_decode)),
+            _Contestant(NUMPY, chunks, partial(_numpy, cobs_decode)),
         ]
         for contestant in contestants:
             _check(contestant, sent)
         tables.append(_timed(contestants, rounds, len(messages)))
-    # Who makes an object of every value is slower with long chunks (fresh memory): each is taken at its best.
+    # Decoders that make an object per value are slower with long chunks (fresh memory): take each at its best.
     best = {row.name: min(row.median_ns, other.median_ns) for row, other in zip(*tables, strict=True)}
     results = []
     for chunk_bytes, rows in zip(CHUNK_BYTES, tables, strict=True):
@@ -143,7 +144,7 @@ def _extra() -> tuple[Callable[[bytes], bytes], ModuleType]:
 
 
 def _as_sent(sent: dict[int, StructArray]) -> list[Any]:
-    """In the board's order: of every round all FRAMEs, then all PACs."""
+    """All messages in the board's order: in each round all FRAMEs, then all PACs."""
     messages = [(wire.MESSAGES[i].unpack(row.tobytes()), k) for i, rows in sent.items() for k, row in enumerate(rows)]
     return [m for m, k in sorted(messages, key=lambda message: (message[1] // FINGERS, message[0].ID))]
 
@@ -152,101 +153,85 @@ def _chunks(data: bytes, size: int) -> Chunks:
     return [data[at : at + size] for at in range(0, len(data), size)]
 
 
-# ---- contestants: all check what they take and count what they refuse ---------------------------
+# ---- contestants: all check what they accept and count what they reject --------------------------
 
 
-def _ours(make: Callable[[], Any], columns: dict[int, str]) -> Callable[[], Feed]:
-    """A decoder of this package; ``columns`` names what of its batches is read, by message id."""
+def _ours(make: Callable[[], Any], columns: dict[int, str]) -> Feed:
+    """A decoder of this package; ``columns`` names the part of its batches to read, by message id."""
+    decoder = make()
 
-    def start() -> Feed:
-        decoder = make()
+    def feed(chunk: bytes) -> Columns:
+        batch = decoder.feed(chunk)
+        return {message_id: getattr(batch, name) for message_id, name in columns.items()}
 
-        def feed(chunk: bytes) -> Columns:
-            batch = decoder.feed(chunk)
-            return {message_id: getattr(batch, name) for message_id, name in columns.items()}
-
-        return feed
-
-    return start
+    return feed
 
 
-def _mavlink(dialect: ModuleType) -> Callable[[], Feed]:
+def _mavlink(dialect: ModuleType) -> Feed:
+    parser = dialect.MAVLink(None)
     frame_id = mavlink.FIRST_ID + FRAME
 
-    def start() -> Feed:
-        parser = dialect.MAVLink(None)
+    def feed(chunk: bytes) -> Columns:
+        frames: list[Any] = []
+        pacs: list[Any] = []
+        for message in parser.parse_buffer(chunk) or ():
+            (frames if message.id == frame_id else pacs).append(message)
+        return {FRAME: frames, PAC: pacs}
 
-        def feed(chunk: bytes) -> Columns:
-            frames: list[Any] = []
-            pacs: list[Any] = []
-            for message in parser.parse_buffer(chunk) or ():
-                (frames if message.id == frame_id else pacs).append(message)
-            return {FRAME: frames, PAC: pacs}
-
-        return feed
-
-    return start
+    return feed
 
 
-def _struct(cobs_decode: Callable[[bytes], bytes]) -> Callable[[], Feed]:
+def _struct(cobs_decode: Callable[[bytes], bytes]) -> Feed:
     unpackers = {i: wire.MESSAGES[i].STRUCT.unpack for i in NAMES}
+    crc32 = zlib.crc32
+    rest, bad = b"", 0
 
-    def start() -> Feed:
-        crc32 = zlib.crc32
-        rest, bad = b"", 0
-
-        def feed(chunk: bytes) -> Columns:
-            nonlocal rest, bad
-            *pieces, rest = (rest + chunk).split(b"\0")
-            columns: dict[int, list[Any]] = {FRAME: [], PAC: []}
-            for piece in pieces:
-                try:
-                    plain = cobs_decode(piece)
-                    if crc32(plain) != CRC_RESIDUE:
-                        bad += 1
-                        continue
-                    message_id = plain[0]
-                    columns[message_id].append(unpackers[message_id](plain[1:-CRC_BYTES]))
-                except Exception:
+    def feed(chunk: bytes) -> Columns:
+        nonlocal rest, bad
+        *pieces, rest = (rest + chunk).split(b"\0")
+        columns: dict[int, list[Any]] = {FRAME: [], PAC: []}
+        for piece in pieces:
+            try:
+                plain = cobs_decode(piece)
+                if crc32(plain) != CRC_RESIDUE:
                     bad += 1
-            return columns
+                    continue
+                message_id = plain[0]
+                columns[message_id].append(unpackers[message_id](plain[1:-CRC_BYTES]))
+            except Exception:
+                bad += 1
+        return columns
 
-        return feed
-
-    return start
+    return feed
 
 
-def _numpy(cobs_decode: Callable[[bytes], bytes]) -> Callable[[], Feed]:
-    # With id and CRC in the row no message is cut up; a view leaves them out afterwards.
+def _numpy(cobs_decode: Callable[[bytes], bytes]) -> Feed:
+    # With id and CRC in the row no message needs slicing; a view drops them afterwards.
     dtypes = {i: np.dtype([("id", "u1"), ("payload", DTYPES[i]), ("crc", "<u4")]) for i in NAMES}
     sizes = {i: dtype.itemsize for i, dtype in dtypes.items()}
+    crc32 = zlib.crc32
+    rest, bad = b"", 0
 
-    def start() -> Feed:
-        crc32 = zlib.crc32
-        rest, bad = b"", 0
-
-        def feed(chunk: bytes) -> Columns:
-            nonlocal rest, bad
-            *pieces, rest = (rest + chunk).split(b"\0")
-            plains: dict[int, list[bytes]] = {FRAME: [], PAC: []}
-            for piece in pieces:
-                try:
-                    plain = cobs_decode(piece)
-                    message_id = plain[0]
-                    if crc32(plain) == CRC_RESIDUE and len(plain) == sizes[message_id]:
-                        plains[message_id].append(plain)
-                    else:
-                        bad += 1
-                except Exception:
+    def feed(chunk: bytes) -> Columns:
+        nonlocal rest, bad
+        *pieces, rest = (rest + chunk).split(b"\0")
+        plains: dict[int, list[bytes]] = {FRAME: [], PAC: []}
+        for piece in pieces:
+            try:
+                plain = cobs_decode(piece)
+                message_id = plain[0]
+                if crc32(plain) == CRC_RESIDUE and len(plain) == sizes[message_id]:
+                    plains[message_id].append(plain)
+                else:
                     bad += 1
-            return {i: np.frombuffer(b"".join(rows), dtypes[i])["payload"] for i, rows in plains.items()}
+            except Exception:
+                bad += 1
+        return {i: np.frombuffer(b"".join(rows), dtypes[i])["payload"] for i, rows in plains.items()}
 
-        return feed
-
-    return start
+    return feed
 
 
-# ---- the same content, and the clock ------------------------------------------------------------
+# ---- checks and timing --------------------------------------------------------------------------
 
 
 def _check(contestant: _Contestant, sent: dict[int, StructArray]) -> None:
@@ -262,7 +247,7 @@ def _check(contestant: _Contestant, sent: dict[int, StructArray]) -> None:
 
 
 def _array(messages: list[Any], dtype: np.dtype[Any]) -> StructArray:
-    """Tuples in the order of the fields, arrays flattened as struct gives them, or objects with the fields."""
+    """Messages as an array; each is an object with the fields, or a tuple in their order, flattened as by struct."""
     out = np.empty(len(messages), dtype)
     at = 0
     for field in dtype.names or ():
@@ -278,8 +263,8 @@ def _array(messages: list[Any], dtype: np.dtype[Any]) -> StructArray:
 
 
 def _timed(contestants: list[_Contestant], rounds: int, messages: int) -> list[Row]:
-    # The garbage collector stays on and is part of who makes many objects, but this benchmark's own are not
-    # theirs to walk.
+    # The garbage collector stays on, as a cost of making many objects. The benchmark's own objects are frozen, so that
+    # no contestant pays for walking them.
     gc.collect()
     gc.freeze()
     try:

@@ -1,16 +1,15 @@
-"""A board in a process of its own that floods a pty with FRAMEs: the producer of `biotac bench live`.
+"""A board that floods a pty with FRAMEs, in its own process: the producer of `biotac bench live`.
 
     python -m biotac.lab.bench.flood MASTER_FD RATE FRAMES TIMES_FILE
 
-It answers commands; START lets it send FRAMES frames of five fingers, RATE a second, through a ring of 16 KiB that
-drops whole frames when full, as boards have it. When each burst was put into the ring goes to TIMES_FILE (int64 ns,
-CLOCK_MONOTONIC); afterwards it writes a line of JSON to stdout. Python, because the simulator's executable is the
-firmware, which is not to grow a flood; frames are made beforehand, so that sending is a slice and a system call.
+It answers commands. START makes it send FRAMES frames of five fingers, RATE a second, through a ring of 16 KiB that
+drops whole frames when full, as on real boards. TIMES_FILE gets the time at which each burst entered the ring (int64
+ns, CLOCK_MONOTONIC); afterwards a line goes to stdout. It is Python because the simulator's executable is the
+firmware, which should not grow a flood mode. Frames are made beforehand: sending is a slice and a system call.
 """
 
 from __future__ import annotations
 
-import json
 import mmap
 import os
 import select
@@ -29,12 +28,12 @@ from ...wire.identity import NO_IMAGE
 
 FINGERS = 5
 RING_BYTES = 16_384
-MOST_BURSTS_HZ = 5_000  # USB would not deliver oftener
-SPIN_NS = 150_000  # a sleeper is woken so much too late
+MOST_BURSTS_HZ = 5_000  # USB would not deliver more often
+SPIN_NS = 150_000  # a sleeper wakes up to this much late
 
 
 def burst_frames(rate: int) -> int:
-    """Frames that go out together."""
+    """Frames per burst."""
     return max(1, rate // MOST_BURSTS_HZ)
 
 
@@ -54,7 +53,7 @@ def frames(count: int) -> list[bytes]:
 
 
 class Board:
-    """The far end of the pty."""
+    """The board's end of the pty."""
 
     def __init__(self, master: int) -> None:
         self._master = master
@@ -62,9 +61,9 @@ class Board:
         os.set_blocking(master, False)
 
     def serve(self, ring: bytearray) -> bool:
-        """Put answers to what has come in the ring; true when START was among it.
+        """Put the answers to commands received into the ring; return true if START was among them.
 
-        Written beside the ring they would end up amid a frame, or, when the pty is full, end the flood.
+        Written past the ring, an answer could land inside a frame, or end the flood when the pty is full.
         """
         try:
             heard = self._decoder.feed(os.read(self._master, 4096))
@@ -78,17 +77,17 @@ class Board:
         return started
 
     def send(self, ring: bytearray) -> None:
-        """As much of the ring as the pty takes."""
+        """Write as much of the ring as the pty takes."""
         with suppress(BlockingIOError):
             del ring[: os.write(self._master, ring)]
 
     def wait(self) -> None:
-        """Until something comes."""
+        """Block until something arrives."""
         select.select([self._master], [], [])
 
 
 def answer(message: Any) -> bytes:
-    """HELLO or yes."""
+    """The encoded answer: HELLO, or a Reply of success."""
     if isinstance(message, wire.HelloRequest):
         versions = (wire.WIRE_MAJOR, wire.WIRE_MINOR, wire.SCHEMA_HASH, 0, 0, 0)
         hello = wire.Hello(
@@ -98,34 +97,28 @@ def answer(message: Any) -> bytes:
     return encode(wire.Reply.ID, wire.Reply(message.req_id, message.ID, 0).pack())
 
 
-def flood(board: Board, packets: list[bytes], rate: int, times: Any, ring: bytearray) -> dict[str, int]:
-    """Send them all in time, or drop them."""
+def flood(board: Board, packets: list[bytes], rate: int, times: Any, ring: bytearray) -> None:
+    """Send all packets on time; drop those that find the ring full."""
     burst = burst_frames(rate)
-    dropped = 0
-    worst_ns = 0
     begin_ns = time.monotonic_ns() + 10_000_000
     for number, first in enumerate(range(0, len(packets), burst)):
         due_ns = begin_ns + first * 1_000_000_000 // rate
         while (left_ns := due_ns - time.monotonic_ns()) > 0:
             if left_ns > SPIN_NS:
                 time.sleep((left_ns - SPIN_NS) / 1e9)
-        worst_ns = max(worst_ns, -left_ns)
         times[number] = time.monotonic_ns()
         for packet in packets[first : first + burst]:
-            if len(ring) + len(packet) > RING_BYTES:
-                dropped += 1
-            else:
+            if len(ring) + len(packet) <= RING_BYTES:
                 ring += packet
         board.send(ring)
         if number % 512 == 0:
             board.serve(ring)
     while ring:
         board.send(ring)
-    return {"offered": len(packets), "dropped": dropped, "late_us": worst_ns // 1000}
 
 
 def main() -> None:
-    """See the head of this file."""
+    """Run the board; see the module's docstring."""
     master, rate, count, path = int(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
     packets = frames(count)
     bursts = -(-count // burst_frames(rate))
@@ -141,8 +134,9 @@ def main() -> None:
             started = board.serve(ring)
             board.send(ring)
             if started:
-                print(json.dumps(flood(board, packets, rate, times, ring)), flush=True)
-        except OSError:  # nobody has the port open for a while: between two rounds
+                flood(board, packets, rate, times, ring)
+                print("sent", flush=True)
+        except OSError:  # nobody has the port open for a while, between two rounds
             ring.clear()
             time.sleep(0.001)
 

@@ -1,7 +1,7 @@
-"""What an untouched finger costs on the link: frames against heartbeats, in one simulated scenario.
+"""What an untouched finger costs on the link: frames against heartbeats in one simulated scenario.
 
-Bytes are those of the FRAME, TARE and IDLE messages as they cross the wire. Device time and the simulated
-board's own counters are all that is used: the figures are the same on every machine.
+Bytes are those of the FRAME, TARE and IDLE messages on the wire. Only device time and the simulated board's own
+counters are used, so that the figures are the same on every machine.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from ...wire.slots import FRAME_S
 
 @dataclass(frozen=True)
 class Share:
-    """One finger state's part of the stream."""
+    """The part of the stream in which the finger is touched, or is not."""
 
-    seconds: float  # of finger time
+    seconds: float  # finger time
     frames: int
     heartbeats: int
-    bytes_per_s: float  # and finger
+    bytes_per_s: float  # per finger
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """``saved_percent``: bytes per second at rest with heartbeats against those in contact."""
+    """``saved_percent`` compares bytes per second at rest with heartbeats with those in contact."""
 
     source: str
     rest_with_frames: Share
@@ -44,7 +44,7 @@ class Outcome:
 
 
 def measure(source: str) -> Outcome:
-    """Play ``source`` (of biotac.open, without ``sim:``) twice, with frames and with heartbeats at rest."""
+    """Play ``source`` (as for biotac.open, without ``sim:``) with frames at rest, then with heartbeats at rest."""
     eager, _ = _play(source, RESULTS | wire.QuantityFlags.REST_FRAMES)
     lazy, status = _play(source, RESULTS)
     rest, contact = _share(lazy, touched=False), _share(lazy, touched=True)
@@ -65,7 +65,7 @@ def _play(source: str, quantities: wire.QuantityFlags) -> tuple[Batch, wire.Stat
 
 
 def _share(batch: Batch, *, touched: bool) -> Share:
-    """Split by the tare state that a message carries."""
+    """Split by the tare state in each message."""
 
     def mine(states: Any) -> Any:
         return (states == wire.TareState.CONTACT) == touched

@@ -1,4 +1,4 @@
-"""What starting costs: CPU time of processes that import and do nothing, interleaved, medians, in one run."""
+"""What startup costs: CPU time of processes that only import, interleaved, medians, in one run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STARTS = {
 
 
 def measure(rounds: int) -> dict[str, float]:
-    """Median CPU seconds of each start, user and system."""
+    """Median CPU seconds (user and system) of each startup."""
     taken: dict[str, list[float]] = {name: [] for name in STARTS}
     for _ in range(rounds):
         for name, words in STARTS.items():

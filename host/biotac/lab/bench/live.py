@@ -1,11 +1,10 @@
 """The live path against a plain pyserial reader thread: loss, delay from write to callback, CPU. `biotac bench live`.
 
-Both read the same board (flood.py, another process) through the same pty in rounds that take turns. A pty is not USB.
+Both read the same board (flood.py, another process) through the same pty, in alternate rounds. A pty is not USB.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import pty
 import statistics
@@ -39,24 +38,23 @@ ASKED_LOSS = {5_000: 0.0, 50_000: 0.001}
 ASKED_LATENCY_US = 100.0
 ASKED_CPU = {50_000: 0.6}
 
-#: (finger (n,), seq (n,), when in ns)
+#: (finger (n,), seq (n,), arrival in ns)
 Arrival = tuple[NDArray[Any], NDArray[Any], int]
 
 
 @dataclass(frozen=True)
 class Round:
-    """One reader, once."""
+    """One reader in one round."""
 
     loss: float
     median_us: float
     p99_us: float
     cpu_percent: float
-    producer_late_us: int
 
 
 @dataclass(frozen=True)
 class Row:
-    """One reader at one rate; medians over the rounds, ``loss`` and ``worst_loss`` in parts of what was offered."""
+    """One reader at one rate: medians over the rounds, but mean and worst loss, as shares of the frames offered."""
 
     rate: int
     name: str
@@ -69,7 +67,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Outcome:
-    """All rows, and ours to pyserial's CPU time by rate: the median of the rounds' ratios."""
+    """All rows, and by rate our CPU time over pyserial's: the median of the rounds' ratios."""
 
     rows: list[Row]
     cpu_ratio: dict[int, float]
@@ -79,7 +77,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Asked:
-    """A figure, and whether it is what was asked for."""
+    """A figure, and whether it meets its requirement."""
 
     what: str
     seen: str
@@ -88,35 +86,30 @@ class Asked:
 
 
 class Producer:
-    """flood.py in a process, and the pty between us."""
+    """flood.py in a process, and the pty to it."""
 
     def __init__(self, rate: int, seconds: float, folder: Path) -> None:
         self.rate = rate
         self.seconds = seconds
+        self.frames = int(rate * seconds)
         self._times = folder / f"times{rate}"
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         self.path = os.ttyname(self._slave)
-        words = [sys.executable, "-m", "biotac.lab.bench.flood", str(self._master), str(rate), str(int(rate * seconds))]
+        words = [str(word) for word in (self._master, rate, self.frames, self._times)]
         self._process = subprocess.Popen(
-            [*words, str(self._times)], stdout=subprocess.PIPE, pass_fds=[self._master], text=True
+            [sys.executable, "-m", "biotac.lab.bench.flood", *words], stdout=subprocess.PIPE, pass_fds=[self._master]
         )
-        self._line()
+        self.wait()
 
-    def _line(self) -> str:
+    def wait(self) -> None:
+        """Wait for its next line: it writes one when ready, and one each time all frames are sent."""
         assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
+        if not self._process.stdout.readline():
             raise RuntimeError("the producer of `biotac bench live` died")
-        return line
-
-    def outcome(self) -> dict[str, int]:
-        """Waits until all is sent."""
-        facts: dict[str, int] = json.loads(self._line())
-        return facts
 
     def delays_us(self, arrivals: list[Arrival]) -> NDArray[np.float64]:
-        """Of every frame that came, from the ring to the callback."""
+        """Delay of every frame that arrived, from the ring to the callback."""
         put_ns = np.fromfile(self._times, np.int64)
         delays = [
             (when - put_ns[(seq.astype(np.int64) * flood.FINGERS + finger) // flood.burst_frames(self.rate)]) / 1e3
@@ -135,7 +128,7 @@ class Producer:
 
 
 def ours(path: str, arrivals: list[Arrival], until: Callable[[], None]) -> None:
-    """The package, as a user runs it."""
+    """Read with the package, as a user runs it."""
     now_ns = time.monotonic_ns
 
     def arrived(batch: Batch) -> None:
@@ -149,7 +142,7 @@ def ours(path: str, arrivals: list[Arrival], until: Callable[[], None]) -> None:
 
 
 def pyserial_thread(path: str, arrivals: list[Arrival], until: Callable[[], None]) -> None:
-    """What one writes without this package: pyserial, C cobs and CRC a packet, a function called with it."""
+    """Read as one would without this package: pyserial, and per packet C cobs, CRC and a callback."""
     import serial
     from cobs import cobs
 
@@ -182,32 +175,26 @@ def pyserial_thread(path: str, arrivals: list[Arrival], until: Callable[[], None
 
 
 def one_round(producer: Producer, contestant: Callable[..., None]) -> Round:
-    """Let one read everything once."""
+    """Let one reader read everything once."""
     arrivals: list[Arrival] = []
-    facts: dict[str, int] = {}
-    cpu_s: list[float] = []
-    begin = time.process_time()
+    cpu_s, begin = 0.0, time.process_time()
 
     def until() -> None:
-        facts.update(producer.outcome())
-        time.sleep(0.05)  # the rest is on its way
-        cpu_s.append(time.process_time() - begin)
+        nonlocal cpu_s
+        producer.wait()
+        time.sleep(0.05)  # the rest is still on its way
+        cpu_s = time.process_time() - begin
 
     contestant(producer.path, arrivals, until)
     delays = producer.delays_us(arrivals)
     if not len(delays):
-        return Round(1.0, float("nan"), float("nan"), 0.0, facts["late_us"])
-    return Round(
-        1 - len(delays) / facts["offered"],
-        float(np.median(delays)),
-        float(np.percentile(delays, 99)),
-        100 * cpu_s[0] / producer.seconds,
-        facts["late_us"],
-    )
+        return Round(1.0, float("nan"), float("nan"), 0.0)
+    median_us, p99_us = np.percentile(delays, (50, 99)).tolist()
+    return Round(1 - len(delays) / producer.frames, median_us, p99_us, 100 * cpu_s / producer.seconds)
 
 
 def measure(*, rates: tuple[int, ...] = RATES, rounds: int = 5, seconds: float = 2.0) -> Outcome:
-    """Both readers at each rate, taking turns, each once untimed before. Raises InputError where that cannot be."""
+    """Time both readers at each rate in alternate rounds after an untimed one. Raises InputError if it cannot run."""
     if os.name != "posix":
         raise InputError("bench live needs a pty, which this system lacks; use Linux or macOS")
     try:
@@ -235,14 +222,14 @@ def measure(*, rates: tuple[int, ...] = RATES, rounds: int = 5, seconds: float =
 
 
 def row_of(rate: int, name: str, taken: list[Round]) -> Row:
-    """Medians; loss is the sum over all rounds."""
+    """Medians over the rounds; the loss is their mean."""
     middle = {k: statistics.median(getattr(r, k) for r in taken) for k in ("median_us", "p99_us", "cpu_percent")}
     losses = [r.loss for r in taken]
     return Row(rate, name, statistics.fmean(losses), max(losses), **middle)
 
 
 def asked(outcome: Outcome) -> list[Asked]:
-    """What is asked of this package's reader."""
+    """The requirements on this package's reader, and what it did."""
     out = []
     for row in (row for row in outcome.rows if row.name == OURS):
         at = f"at {row.rate}/s"

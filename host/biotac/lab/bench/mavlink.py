@@ -15,7 +15,7 @@ import numpy as np
 
 from ...wire.dtypes_gen import DTYPES
 
-FIRST_ID = 100  # of the dialect's messages; the link's own id is added
+FIRST_ID = 100  # of the dialect's messages, plus the link's own id
 TYPES = {"u1": "uint8_t", "u2": "uint16_t", "u4": "uint32_t", "i2": "int16_t", "i4": "int32_t"}
 
 
@@ -51,7 +51,7 @@ def _dialect(names: dict[int, str]) -> str:
 
 
 def encoder(dialect: ModuleType) -> Any:
-    """A function from a message of _wire to its bytes."""
+    """A function from a _wire message to its bytes."""
     sender = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
 
     def encode(message: Any) -> bytes:

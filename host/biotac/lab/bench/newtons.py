@@ -1,15 +1,15 @@
-"""The front that matters: cycles of a force on the board against its error on real fingers, in newtons.
+"""The trade-off that matters: a force's cycles on the board against its error on real fingers in newtons.
 
-Every error is of what was not seen: a finger's own map is judged block by block as `biotac calibrate wrench` does, and
-a map of other fingers on a finger that it was not made of. Cycles are those that `tools/bench/run --keep` counted on
-emulated cores.
+Every error is on data held out. A finger's own map is judged block by block, as in `biotac calibrate wrench`; a map of
+other fingers is judged on a finger that was not in its training. Cycles are those that `tools/bench/run --keep` counted
+on emulated cores.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -27,22 +27,31 @@ from ...calibrate.wrench.sources import load
 from ...core.compute import compute
 from ...core.geometry import Floats
 from ...errors import InputError
+from ...picture import picture
 from ...wire import messages_gen as wire
 
 CYCLES = "cycles.json"
 LIN = {wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}
 OWN = "its own force plate"
-#: A finger's own models, what the board runs for each, and what they are called.
+#: Model of a finger's own map, what the board runs for it, and its label.
 OWN_MODELS = (
     (models.LIN, "Lin's scales", "Lin's scales"),
     (models.LIN_OFFSET, "signals and offset, 3 axes", "Lin's scales and offsets"),
     (models.AFFINE.name, "signals and offset, 3 axes", "affine"),
     (models.CONDUCTANCE.name, "quadratic in conductance, 3 axes", "small map"),
-    (models.JOINED.name, "population and a scale, 3 axes", "joined map"),  # of the same blocks
+    (models.JOINED.name, "population and a scale, 3 axes", "joined map"),  # on the same blocks
     (models.POOLED, "pooled, 3 axes", "large map"),
 )
-NEAREST = 0.05  # of the rows, those whose counts came back closest, stand for "the same pattern"
-EVERY_ROW = 4  # looked at for that
+PANELS = (("Cortex-M0+", "m0plus_divider", "with the RP2040's divider"), ("Cortex-M4F", "m4f", ""))
+#: By what is known about the finger.
+COLORS = {"nothing": "#c2410c", OWN: "#1d4ed8"}
+LITTLE = "#15803d"
+# Labels stand to the right of their points and above, except these.
+LEFT = ("affine", "small map", "population map")
+BELOW = ("Lin's scales, the firmware's", "small map", "joined map", "population map, pulled")
+FLOORS = (("repeatability_n", "the plate again, same pattern", "--"), ("noise_n", "electrode noise, a frame", ":"))
+NEAREST = 0.05  # share of the rows, those with the most similar counts, that stand for "the same pattern"
+EVERY_ROW = 4  # one row in this many is looked at for that
 GUARD_ROWS = 1000
 
 Show = Callable[[str], None]
@@ -50,7 +59,7 @@ Show = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Point:
-    """A way to a force: ``knows`` of the finger; ``cycles`` by core; ``rmse_n`` by recording, x y z."""
+    """One way to compute force: ``knows`` about the finger; ``cycles`` by core; ``rmse_n`` by recording, for x y z."""
 
     name: str
     knows: str
@@ -59,15 +68,17 @@ class Point:
 
     @property
     def error_n(self) -> float:
-        """RMS length of the force's error, the geometric mean over the recordings."""
-        return float(np.exp(np.mean([np.log(np.linalg.norm(rmse)) for rmse in self.rmse_n.values()])))
+        """Error over all recordings and axes."""
+        return _pooled(self.rmse_n)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """``noise_n``: what the electrodes' noise is through the large map, in a frame; ``repeatability_n``: how far the
-    plate differs from itself, less what the large map tells, when the counts come back. Both by recording, x y z.
-    ``cores``: title and where cycles are from.
+    """All points, and two limits of the data, by recording for x y z.
+
+    ``noise_n`` is the effect of one frame's electrode noise through the large map. ``repeatability_n`` is how much the
+    plate's force differs when the same counts recur, less what the large map explains. ``cores`` has titles and sources
+    of the cycles.
     """
 
     points: list[Point]
@@ -78,7 +89,7 @@ class Outcome:
 
 
 def measure(files: Sequence[Path], show: Show = lambda text: None) -> Outcome:
-    """All points on recordings as for `biotac calibrate wrench`. Raises InputError and RecordingError."""
+    """All points, on recordings as for `biotac calibrate wrench`. Raises InputError and RecordingError."""
     if not files:
         raise InputError("no recording was named: expected one or more with force beside counts, such as F1.npz")
     names = [path.name for path in files]
@@ -96,7 +107,7 @@ def measure(files: Sequence[Path], show: Show = lambda text: None) -> Outcome:
             for key, rmse in _untrained(others[name], run).items():
                 found.setdefault(key, {})[name] = rmse
         by_lin = compute(run.counts.astype(np.uint16), run.tare, LIN)["force_n"]
-        found.setdefault(LINS, {})[name] = _rmse(by_lin, run.truth[:, :3])
+        found.setdefault(LINS, {})[name] = figures.rmse(by_lin, run.truth[:, :3]).tolist()
         its = validate(run, show=show)
         for model, _, _ in OWN_MODELS:
             found.setdefault(model, {})[name] = its.by_model[model][0][:3].tolist()
@@ -121,7 +132,7 @@ UNTRAINED = (
 
 
 def _of_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Population], list[str]]:
-    """By recording the map of the others; of a single one the package's, if it was not made of it."""
+    """For each recording the map of the others; for a single one the package's map, if not trained on it."""
     if len(runs) > 1:
         fingers = [training.sums_of(training.aligned(run)) for run in runs]
         return {
@@ -142,7 +153,7 @@ def _untrained(its: Population, run: Run) -> dict[str, list[float]]:
 
 
 def _noise(its: Validation) -> list[float]:
-    """Electrode noise, from second differences, which slow loads leave, through the map of the whole run."""
+    """RMS effect, N, of electrode noise through the map of the whole run. Second differences leave out slow loads."""
     run, rng = its.run, np.random.default_rng(0)
     curve = np.diff(run.counts, n=2, axis=0)
     sigma = np.median(np.abs(curve), axis=0) / 0.6745 / np.sqrt(6.0)
@@ -152,21 +163,23 @@ def _noise(its: Validation) -> list[float]:
     counts = run.counts[rows]
     noisy = counts + rng.normal(size=counts.shape) * sigma
     there, here = (map_of_all.predict(its, pdc)[:, :3] for its in (noisy, counts))
-    return _rmse(there, here)
+    noise_n: list[float] = figures.rmse(there, here).tolist()
+    return noise_n
 
 
 def _repeatability(its: Validation) -> list[float]:
-    """Held-out errors of rows whose counts are nearest each other and seconds apart: what differs is no map's fault."""
+    """Differences of held-out errors between rows of nearly equal counts seconds apart, which no map could explain."""
     run = its.run
     error = its.predicted[0][:, :3] - run.truth[:, :3]
     rows = np.arange(0, len(run.counts), EVERY_ROW)
     near, distance = _nearest(run.counts - run.tare, rows)
     same = distance <= np.quantile(distance, NEAREST)
-    return [value / float(np.sqrt(2.0)) for value in _rmse(error[rows[same]], error[near[same]])]
+    apart_n: list[float] = (figures.rmse(error[rows[same]], error[near[same]]) / np.sqrt(2.0)).tolist()
+    return apart_n
 
 
 def _nearest(e: Floats, rows: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
-    """Of each of ``rows`` the row nearest in counts that is GUARD_ROWS or more away, and how near."""
+    """For each of ``rows`` the row nearest in counts that is at least GUARD_ROWS away, and its squared distance."""
     size, every = (e**2).sum(axis=1), np.arange(len(e))
     near, distance = np.zeros(len(rows), np.intp), np.zeros(len(rows))
     for start in range(0, len(rows), 500):
@@ -177,20 +190,60 @@ def _nearest(e: Floats, rows: NDArray[np.intp]) -> tuple[NDArray[np.intp], Float
     return near, distance
 
 
-def _rmse(one: Floats, other: Floats) -> list[float]:
-    return [float(value) for value in figures.rmse(one, other)]
+def _pooled(rmse_n: dict[str, list[float]]) -> float:
+    """RMS length over x y z, then the geometric mean over the recordings."""
+    return float(np.exp(np.mean([np.log(np.linalg.norm(three)) for three in rmse_n.values()])))
 
 
 def facts(its: Outcome) -> dict[str, Any]:
-    """As JSON types."""
-    points = [
-        {"name": p.name, "knows": p.knows, "cycles": p.cycles, "rmse_n": p.rmse_n, "error_n": p.error_n}
-        for p in its.points
-    ]
-    return {
-        "points": points,
-        "noise_n": its.noise_n,
-        "repeatability_n": its.repeatability_n,
-        "cores": its.cores,
-        "notes": its.notes,
-    }
+    """The outcome as JSON types."""
+    return asdict(its) | {"points": [asdict(point) | {"error_n": point.error_n} for point in its.points]}
+
+
+def draw(its: Outcome, path: Path) -> None:
+    """Write a PNG."""
+    with picture(path) as figure:
+        figure.set_size_inches(13, 6)
+        files = ", ".join(its.noise_n)
+        figure.suptitle(f"Force on a real finger: cycles against error that was not trained on ({files})")
+        axes = figure.subplots(1, 2, sharey=True)
+        for panel, (title, core, words) in zip(axes, PANELS, strict=True):
+            _panel(panel, its, core)
+            panel.set(title=title, xlabel=f"cycles for one force{', ' if words else ''}{words}")
+        axes[0].set_ylabel("RMS length of the force's error [N]")
+        figure.legend(*axes[0].get_legend_handles_labels(), fontsize=9, loc="outside lower center", ncols=3)
+
+
+def _panel(axes: Any, its: Outcome, core: str) -> None:
+    for field, words, style in FLOORS:
+        level = _pooled(getattr(its, field))
+        axes.axhline(level, color="#334155", linestyle=style, linewidth=1, label=f"{words}: {level:.2f} N")
+    seen = set()
+    for point in its.points:
+        color = COLORS.get(point.knows, LITTLE)
+        words = point.knows if point.knows in COLORS else "a little"
+        label = None if words in seen else f"known of the finger: {words}"
+        seen.add(words)
+        x = point.cycles[core]
+        axes.plot(x, point.error_n, "o", color=color, markersize=9, label=label)
+        for rmse in point.rmse_n.values():
+            axes.plot(x, np.linalg.norm(rmse), "_", color=color, markersize=9, alpha=0.6)
+        _name(axes, point, x, color)
+    axes.set(xscale="log", yscale="log")
+    cycles = [point.cycles[core] for point in its.points]
+    axes.set_xlim(min(cycles) / 1.6, max(cycles) * 14)
+    axes.grid(alpha=0.25, which="both")
+
+
+def _name(axes: Any, point: Point, x: int, color: str) -> None:
+    below, left = point.name in BELOW, point.name in LEFT
+    axes.annotate(
+        f"{point.name}: {x:,}, {point.error_n:.2f} N",
+        (x, point.error_n),
+        xytext=(-8 if left else 8, -12 if below else 4),
+        textcoords="offset points",
+        fontsize=8,
+        color=color,
+        ha="right" if left else "left",
+        va="top" if below else "bottom",
+    )

@@ -1,7 +1,7 @@
-"""compute() as one writes it in NumPy, three ways: what biotac.compute is measured against.
+"""compute() written in NumPy in three ways, for comparison with biotac.compute.
 
-All take counts (uint16, 0xFFFF where missing) and a tare (19,) float64 in counts that is a multiple of
-1/16, use the default settings, and check nothing. Results in mm, N, N*mm.
+All take counts (uint16, 0xFFFF where missing) and a tare (19,) float64 in counts, a multiple of 1/16. They use the
+default settings and check nothing. Results are in mm, N, N*mm.
 """
 
 from __future__ import annotations
@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import FORCE_GAINS, NN_PER_N, TORQUE_GAINS, default_settings
+from ...core.geometry import ELECTRODE_MM as R_MM
+from ...core.geometry import ELECTRODE_NORMAL as NORMAL
+from ...core.geometry import RADIUS_MM
+from ...core.geometry import Floats as Array
 from ...wire import messages_gen as wire
-from ...wire import sensor_gen as sensor
 
-Array = NDArray[np.float64]
 Three = tuple[Array, Array, Array]
 
-RADIUS_MM = sensor.CORE_RADIUS_UM / 1000
-R_MM = np.array(sensor.ELECTRODE_UM) / 1000
-NORMAL = np.array(sensor.ELECTRODE_NORMAL_MILLI) / 1000
 ARM_MM = np.cross(R_MM, NORMAL)
 _DEFAULTS = default_settings()
 FORCE_GAIN = np.array([_DEFAULTS[s] for s in FORCE_GAINS]) / NN_PER_N
@@ -26,7 +25,7 @@ TORQUE_GAIN = np.array([_DEFAULTS[s] for s in TORQUE_GAINS]) / NN_PER_N
 
 
 def whole_array(counts: NDArray[np.uint16], tare: Array) -> Three:
-    """Matrix products over the whole recording, as the formulas read: counts (n, 19), results (n, 3)."""
+    """Matrix products over the whole recording, as in the formulas: counts (n, 19), results (n, 3)."""
     e = counts - tare
     e[counts == wire.INVALID_COUNT] = 0
     w = np.maximum(-e, 0)
@@ -44,7 +43,7 @@ def whole_array(counts: NDArray[np.uint16], tare: Array) -> Three:
 
 
 def one_frame(counts: NDArray[np.uint16], tare: Array) -> Three:
-    """The same written for a single frame: counts (19,), results (3,)."""
+    """The same for a single frame: counts (19,), results (3,)."""
     e = counts - tare
     e[counts == wire.INVALID_COUNT] = 0
     w = np.maximum(-e, 0)
@@ -65,10 +64,10 @@ def one_frame(counts: NDArray[np.uint16], tare: Array) -> Three:
 
 
 class Blocked:
-    """The fastest NumPy float64 that was found: blocks that stay in the cache, every buffer reused.
+    """The fastest NumPy float64 version found: blocks that stay in the cache, every buffer reused.
 
-    One matrix product per operand, frames as columns, so that the rest runs over adjoining numbers;
-    weights stay negated; missing electrodes are looked for only in blocks that have any.
+    One matrix product per operand, with frames as columns, so that the rest runs over adjacent numbers. Weights stay
+    negated. Missing electrodes are looked for only in blocks that have any.
     """
 
     def __init__(self, block: int) -> None:
@@ -82,7 +81,7 @@ class Blocked:
         self._tip = np.empty(block, bool)
 
     def __call__(self, counts: NDArray[np.uint16], tare: Array, out: Three) -> Three:
-        """counts (n, 19) into ``out``, three arrays (n, 3)."""
+        """Compute counts (n, 19) into ``out``, three arrays (n, 3)."""
         column = tare[:, None]
         for first in range(0, len(counts), self.block):
             some = counts[first : first + self.block]

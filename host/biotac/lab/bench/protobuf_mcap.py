@@ -1,4 +1,4 @@
-"""The contestant: the same content as one protobuf message a frame, in MCAP with the library's own settings."""
+"""A contestant: the same content as one protobuf message per frame, in MCAP with the library's default settings."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from ...wire import messages_gen as wire
 from ...wire.dtypes_gen import DTYPES
-from .columns import KINDS, Columns, Fields
+from .columns import Columns
 
 _OF_KIND = {"frames": wire.Frame.ID, "pac": wire.Pac.ID, "idle": wire.Idle.ID}
 _FIELD = descriptor_pb2.FieldDescriptorProto
 
 
 def _messages() -> dict[str, Any]:
-    """Message classes by kind, fields as the wire's: unsigned as varint, signed as zigzag, arrays packed."""
+    """Message classes by kind, with the wire's fields: unsigned as varint, signed as zigzag, arrays packed."""
     file = descriptor_pb2.FileDescriptorProto(name="biotac_bench.proto", package="biotac_bench", syntax="proto3")
     for kind, message_id in _OF_KIND.items():
         message = file.message_type.add(name=kind.capitalize())
@@ -43,43 +43,39 @@ MESSAGES = _messages()
 
 
 def write(path: Path, content: Columns) -> None:
-    """One message a frame, PAC block and heartbeat."""
+    """Write one message per frame, PAC block and heartbeat."""
     with path.open("wb") as stream, Writer(stream) as out:
-        for kind in KINDS:
-            for finger, fields in getattr(content, kind).items():
-                names = list(fields)
-                for row in zip(*(values.tolist() for values in fields.values()), strict=True):
-                    message = MESSAGES[kind](finger=finger, **dict(zip(names, row, strict=True)))
-                    stamp_ns = message.t_us * 1000
-                    out.write_message(f"/{kind}", message, stamp_ns, stamp_ns)
+        for (kind, finger), fields in content.items():
+            for row in zip(*(values.tolist() for values in fields.values()), strict=True):
+                message = MESSAGES[kind](finger=finger, **dict(zip(fields, row, strict=True)))
+                stamp_ns = message.t_us * 1000
+                out.write_message(f"/{kind}", message, stamp_ns, stamp_ns)
 
 
 def load(path: Path) -> Columns:
-    """All messages to arrays by finger, through one flat list a field."""
-    columns: dict[str, dict[int, dict[str, list[Any]]]] = {kind: {} for kind in KINDS}
-    plans = {kind: _plan(kind) for kind in KINDS}
+    """All messages as arrays by finger, through one flat list per field."""
+    columns: dict[tuple[str, int], dict[str, list[Any]]] = {}
+    plans = {kind: _plan(kind) for kind in _OF_KIND}
     with path.open("rb") as stream:
         for _, channel, record in make_reader(stream).iter_messages(log_time_order=False):
             kind = channel.topic[1:]
             message = MESSAGES[kind].FromString(record.data)
             single, repeated = plans[kind]
-            lists = columns[kind].get(message.finger)
+            lists = columns.get((kind, message.finger))
             if lists is None:
-                lists = columns[kind][message.finger] = {name: [] for name in (*single, *repeated)}
+                lists = columns[kind, message.finger] = {name: [] for name in (*single, *repeated)}
             for name in single:
                 lists[name].append(getattr(message, name))
             for name in repeated:
                 lists[name].extend(getattr(message, name))
-    out = Columns()
-    for kind in KINDS:
-        for finger, lists in columns[kind].items():
-            fields: Fields = {name: _array(kind, name, values) for name, values in lists.items()}
-            getattr(out, kind)[finger] = fields
-    return out
+    return {
+        (kind, finger): {name: _array(kind, name, values) for name, values in lists.items()}
+        for (kind, finger), lists in columns.items()
+    }
 
 
 def _plan(kind: str) -> tuple[list[str], list[str]]:
-    """Fields with one value and with many, but for the finger's number."""
+    """Fields with one value and those with several, without the finger's number."""
     dtype = DTYPES[_OF_KIND[kind]]
     names = [name for name in dtype.names or () if name != "finger"]
     return [n for n in names if not dtype[n].shape], [n for n in names if dtype[n].shape]

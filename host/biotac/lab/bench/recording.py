@@ -1,9 +1,8 @@
-"""Recordings: how large, how far from their entropy, how quick to load, all in one run.
+"""Recordings in one run: their size, its distance from their entropy, and load time.
 
-The entropy floor is of order 0: for each column of each finger the smaller of the entropies of its values
-and of the differences of neighbours, without any model's own cost; PAC is one signal of 2200 Hz. Loading is
-from a file in the page cache to NumPy arrays of the same content, which is checked; CPU times, interleaved
-rounds, medians.
+The entropy floor is of order 0: for each column of each finger the smaller entropy of its values and of the
+differences between neighbours, without the cost of any model; PAC is one signal of 2200 Hz. Loading is from a file in
+the page cache to NumPy arrays, whose content is checked; times are medians of CPU time over interleaved rounds.
 """
 
 from __future__ import annotations
@@ -56,7 +55,7 @@ class Outcome:
 
 
 def measure(source: str, *, fingers: int, seconds: float, show: Callable[[str], None] = lambda text: None) -> Outcome:
-    """Record ``source`` on ``fingers`` simulated fingers, PAC included, and measure what comes of it.
+    """Record ``source`` on ``fingers`` simulated fingers, PAC included, and measure the recording.
 
     Raises InputError without the extra ``bench``.
     """
@@ -100,7 +99,7 @@ def measure(source: str, *, fingers: int, seconds: float, show: Callable[[str], 
 
 
 def time_all(loaders: dict[str, Callable[[], Any]], show: Callable[[str], None]) -> dict[str, float]:
-    """Median CPU seconds of each; every one has been run before."""
+    """Median CPU seconds of each; each has run before."""
     taken: dict[str, list[float]] = {name: [] for name in loaders}
     for k in range(ROUNDS):
         for name, load in loaders.items():
@@ -112,7 +111,7 @@ def time_all(loaders: dict[str, Callable[[], Any]], show: Callable[[str], None])
 
 
 def mcap_parts(path: Path) -> dict[str, int]:
-    """Bytes of the wire's chunks, of those for plotting, and of the rest."""
+    """Bytes of the chunks with wire messages, of those for plotting, and of the rest."""
     from mcap.records import Channel, Chunk, Message
     from mcap.stream_reader import StreamReader, breakup_chunk
 

@@ -1,4 +1,4 @@
-"""Contestants timed against each other in one run: interleaved rounds, warmed buffers, medians."""
+"""Times contestants against each other in one run: interleaved rounds, warmed buffers, medians."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Contestant:
-    """What is run, and how many frames or messages that is."""
+    """What to run, and how many frames or messages one run handles."""
 
     name: str
     count: int
@@ -30,7 +30,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Ratio:
-    """Median time of ``slower`` over that of ``faster``, and what was asked of it."""
+    """Median time of ``slower`` over that of ``faster``, and the smallest ratio required."""
 
     faster: str
     slower: str
@@ -39,7 +39,7 @@ class Ratio:
 
 
 def timed(contestants: list[Contestant], rounds: int, clock_ns: Callable[[], int] = time.perf_counter_ns) -> list[Row]:
-    """Each once untimed before it is timed, so that it has its own pages and caches, not its neighbour's."""
+    """Time each contestant right after an untimed run of it, which brings in its own pages and caches."""
     times: dict[str, list[float]] = {c.name: [] for c in contestants}
     for _ in range(rounds):
         for contestant in contestants:

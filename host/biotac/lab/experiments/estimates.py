@@ -1,9 +1,9 @@
-"""Force and torque of a trial by the paper's scales, on the board, and by fitted wrench maps.
+"""Force and torque of a trial by the paper's scales on the board, and by fitted wrench maps.
 
-Lin 2013 has one scale an axis, found "through direct experimentation": here least squares without offset
-of the board's own signals to the truth, written into the board's settings, so that what is compared is
-what that board then publishes. Mx has no scale on the board (the electrodes hardly see it, numerics.md 4):
-it publishes the lever of the force there.
+Lin 2013 has one scale per axis, found "through direct experimentation". Here it is a least-squares fit without offset
+of the board's own signals to the truth. It is written into the board's settings, so that the comparison uses what that
+board publishes. Mx has no scale on the board, as the electrodes hardly see it (numerics.md 4): there the board
+publishes the lever of the force.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ PAPER = "paper"
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a model makes of a trial: ``force_n`` (n, 3), ``torque_nmm`` (n, 3) about the origin or None.
+    """A model's estimate of a trial: ``force_n`` (n, 3), ``torque_nmm`` (n, 3) about the origin or None.
 
-    ``own_torsion_nmm`` (n,) is that of a map that was fitted to torsion itself.
+    ``own_torsion_nmm`` (n,) is from a map that was fitted to torsion itself.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Estimate:
     own_torsion_nmm: Floats | None = None
 
     def torsion_nmm(self, at_mm: Floats) -> Floats | None:
-        """Torque (n,) about the outward normal at contacts (n, 3), NaN without one: its own or (M - c x F) . n."""
+        """Torque (n,) about the outward normal at contacts (n, 3), its own or (M - c x F) . n; NaN without contact."""
         if self.own_torsion_nmm is not None:
             return np.where(np.isfinite(at_mm).all(axis=1), self.own_torsion_nmm, np.nan)
         if self.torque_nmm is None:
@@ -57,7 +57,7 @@ def torsion(force_n: Floats, torque_nmm: Floats, at_mm: Floats) -> Floats:
 
 
 def paper_scales(trials: Sequence[Trial]) -> Settings:
-    """The paper's scales as board settings, least squares over all frames of ``trials`` that have a tare."""
+    """The paper's scales as board settings: least squares over all frames of ``trials`` with a tare."""
     parts: list[tuple[Floats, Floats, Floats]] = []
     for trial in trials:
         assert trial.force_n is not None
@@ -68,11 +68,10 @@ def paper_scales(trials: Sequence[Trial]) -> Settings:
     return {wire.Setting[name.upper()]: value for name, value in fit_gains(signal, force, torque).items()}
 
 
-def by_paper(trial: Trial, settings: Settings, name: str = PAPER) -> tuple[Trial, Estimate]:
-    """The trial on a board with these scales, and what it published."""
-    scaled = trial.again(settings)
-    frames = scaled.frames
-    return scaled, Estimate(name, frames["force_n"], frames["torque_nmm"])
+def by_paper(trial: Trial, settings: Settings, name: str = PAPER) -> Estimate:
+    """What a board with these scales publishes."""
+    frames = trial.again(settings).frames
+    return Estimate(name, frames["force_n"], frames["torque_nmm"])
 
 
 def by_map(trial: Trial, its: WrenchMap, name: str) -> Estimate:
@@ -94,7 +93,7 @@ def by_map(trial: Trial, its: WrenchMap, name: str) -> Estimate:
 
 
 def load_maps(paths: Sequence[Path]) -> dict[str, tuple[Path, WrenchMap]]:
-    """Maps and where they are from, by the name of their file, its endings left out. Raises InputError."""
+    """Maps and their paths, by file name without endings. Raises InputError."""
     maps: dict[str, tuple[Path, WrenchMap]] = {}
     for path in paths:
         name = path.name.removesuffix(".json").removesuffix(".wrench")
@@ -105,7 +104,7 @@ def load_maps(paths: Sequence[Path]) -> dict[str, tuple[Path, WrenchMap]]:
 
 
 def rmse(estimate: Floats | None, truth: Floats | None, rows: Bools) -> Floats:
-    """Root of the mean squared error per column over ``rows`` where both are known; NaN where nothing is."""
+    """RMS error per column over ``rows`` where both are known; NaN if there are none."""
     if estimate is None or truth is None:
         return np.full(3, np.nan)
     a, b = np.atleast_2d(estimate.T)[:, rows], np.atleast_2d(truth.T)[:, rows]

@@ -1,8 +1,8 @@
-"""Light holds against what presses leave in the skin: does the board keep the one and tare the other?
+"""Light holds against the residue of presses: does the board keep the former and tare the latter?
 
-A recording of presses in which nobody holds anything has only residues. Holds are made of it: the last row of an
-unloading whose pressure is still at least a share of the press's peak is repeated for two seconds. It is a real
-finger's, but as still as no hand is: what the board tares of it, it would tare of a hold. Without a recording the
+In a recording of presses nobody holds anything: it has only residues. Holds are made from it: the last row of an
+unloading whose pressure is at least a given share of the press's peak is repeated for two seconds. The row is from a
+real finger but stiller than any hand. Whatever the board tares of it, it would tare of a hold. Without a recording the
 same is done to an emulated finger, new and worn, whose pressure creeps and undershoots (sim/sampling.py).
 """
 
@@ -17,11 +17,11 @@ from ...core.finger import Finger
 from ...core.geometry import Floats
 from ...errors import RecordingError
 from ...markdown import table
-from ...sim.physics import Profile
+from ...sim.physics import PROFILES
 from ...wire import messages_gen as wire
 from ...wire.frames import StructArray
 from . import laboratory
-from .outcome import Facts, Options, check, claim, number, text
+from .outcome import Facts, Options, check, claim, numbers, text
 from .plate_normal import emulated
 from .trial import Words
 
@@ -29,18 +29,19 @@ RECORDING = "E and PDC of presses"
 MAPS = False
 
 SHARES = (0.5, 0.3, 0.2, 0.1, 0.05, 0.04, 0.03)
-SAFE_SHARE = 0.1  # holds of this and more are never tared
-LIGHT_LIMIT = 0.1  # share of the lighter ones that may be
+SAFE_SHARE = 0.1  # holds of this share of the peak and more are never tared
+LIGHT_LIMIT = 0.1  # the largest share of lighter holds that may be tared
 HOLD_ROWS = 200  # 2 s of rounds
-PRESSED_COUNTS, PRESSED_ROWS = 60, 8  # what counts as a press: above rest, for so long
-REST_ROWS = (25, 8)  # before a press, whose median is its rest
+PRESSED_COUNTS, PRESSED_ROWS = 60, 8  # a press is this far above rest for this long
+REST_ROWS = (25, 8)  # rows before a press whose median is its rest
 
+OUTCOMES = {"tared": "#b91c1c", "doubt": "#c2410c", "contact": "#1d4ed8"}  # with their colours
 RELEASES = (wire.TareReason.RELEASE, wire.TareReason.RESIDUE, wire.TareReason.SHIFT)
 
 
 @dataclass(frozen=True)
 class Press:
-    """Rows of a press: its first, its peak, where the next begins; PDC at rest before it and at its peak."""
+    """Rows of a press: its first, its peak, where the next press begins; PDC at rest before it and at its peak."""
 
     first: int
     peak: int
@@ -51,17 +52,17 @@ class Press:
 
 @dataclass(frozen=True)
 class Hold:
-    """What became of one spliced hold; ``above`` is its PDC over the tare then in force, counts."""
+    """The outcome of one spliced hold; ``above`` is its PDC above the tare then in force, counts."""
 
     press: int
     share: float
     above: float
-    outcome: str  # "tared", "doubt" or "contact"
+    outcome: str  # a key of OUTCOMES
 
 
 @dataclass(frozen=True)
 class Case:
-    """One finger: its rows as they were, re-zeros among them, and the holds spliced in."""
+    """One finger: its original rows with the re-zeros among them, and the holds spliced in."""
 
     name: str
     pdc: Words
@@ -71,25 +72,25 @@ class Case:
 
     @property
     def rezeros(self) -> list[int]:
-        """Rows at which a contact ended in a tare."""
+        """Rows where a contact ended in a new tare."""
         changed = (self.rows["flags"] & wire.FrameFlags.TARE_CHANGED) != 0
         return [int(k) for k in np.flatnonzero(changed & np.isin(self.rows["tare_reason"], RELEASES))]
 
     def above(self, row: int) -> float:
-        """PDC over what it is at rest around ``row``, whatever the board thinks: the 5th percentile of 20 s."""
+        """PDC above its rest around ``row``, whatever the board's tare is; the rest is the 5th percentile of 20 s."""
         near = self.pdc[max(row - 1000, 0) : row + 1000].astype(float)
         return float(self.pdc[row] - np.percentile(near, 5))
 
     @property
     def seen(self) -> list[bool]:
-        """Which presses had the board in contact all along from their fourth row on to their peak."""
+        """For each press, whether the board was in contact from its fourth row to its peak."""
         state = self.rows["tare_state"]
         return [bool((state[p.first + 3 : p.peak + 1] == wire.TareState.CONTACT).all()) for p in self.presses]
 
 
 @dataclass(frozen=True)
 class Result:
-    """A case a sensor."""
+    """One case per sensor."""
 
     source: str
     cases: list[Case]
@@ -97,7 +98,7 @@ class Result:
 
 
 def presses_of(pdc: Words) -> list[Press]:
-    """Where PDC is PRESSED_COUNTS over what it rests at around there, for PRESSED_ROWS and more."""
+    """Where PDC exceeds its rest around there by PRESSED_COUNTS for at least PRESSED_ROWS."""
     known = np.where(pdc == wire.INVALID_COUNT, np.nan, pdc.astype(float))
     rest = np.array([np.nanpercentile(known[max(k - 1000, 0) : k + 1000], 5) for k in range(0, len(pdc), 50)])
     over = known - np.repeat(rest, 50)[: len(pdc)] > PRESSED_COUNTS
@@ -113,8 +114,8 @@ def presses_of(pdc: Words) -> list[Press]:
     return out
 
 
-def spliced(counts: Words, pdc: Words, press: Press, share: float) -> int | None:
-    """The last row of the unloading with at least this share of the press's peak; None where it never falls below."""
+def spliced(pdc: Words, press: Press, share: float) -> int | None:
+    """The last row of the unloading with at least this share of the press's peak; None if it never falls below."""
     above = pdc[press.peak : press.end].astype(float) - press.rest
     low = np.flatnonzero(above < share * (press.top - press.rest))
     return press.peak + int(low[0]) - 1 if len(low) and low[0] > 0 else None
@@ -132,12 +133,12 @@ def _hold(counts: Words, pdc: Words, row: int) -> tuple[str, float]:
 
 
 def judge(name: str, counts: Words, pdc: Words) -> Case:
-    """Run the rows as they are, and once more with every hold that can be made of them."""
+    """Run the rows as they are, and once more with each hold that can be made from them."""
     presses = presses_of(pdc)
     holds = []
     for k, press in enumerate(presses):
         for share in SHARES:
-            row = spliced(counts, pdc, press, share)
+            row = spliced(pdc, press, share)
             if row is not None:
                 outcome, above = _hold(counts, pdc, row)
                 holds.append(Hold(k, share, above, outcome))
@@ -145,34 +146,30 @@ def judge(name: str, counts: Words, pdc: Words) -> Case:
 
 
 def run(options: Options) -> Result:
-    """On a recording; or on an emulated finger, new and worn."""
+    """Run on a recording, or on an emulated finger, new and worn."""
     if options.recording is not None:
-        theirs = laboratory.load(options.recording, options.finger, needs=("PDC",))
-        case = judge("recorded", theirs.trial.counts, theirs.trial.pdc)
+        trial = laboratory.load(options.recording, options.finger, needs=("PDC",))
+        case = judge("recorded", trial.counts, trial.pdc)
         if not case.presses:
             raise RecordingError(
                 f"{options.recording}: PDC is never {PRESSED_COUNTS} counts above rest for {PRESSED_ROWS} rows: "
                 "expected presses; is it counts?"
             )
-        return Result(str(options.recording), [case], list(theirs.notes))
-    profiles: tuple[Profile, ...] = ("new", "worn")
+        return Result(str(options.recording), [case], list(trial.notes))
     cases = []
-    for profile in profiles:
+    for profile in PROFILES:
         options.show(f"presses on the {profile} sensor")
         trial = emulated(options.seed, profile)
         cases.append(judge(profile, trial.counts, trial.pdc))
-    return Result(
-        f"emulated finger, seed {options.seed}", cases, ["emulated: the model's pressure creeps and undershoots"]
-    )
+    notes = ["emulated: the model's pressure creeps and undershoots"]
+    return Result(f"emulated finger, seed {options.seed}", cases, notes)
 
 
 def _shares(case: Case) -> list[Facts]:
     out = []
     for share in SHARES:
         its = [hold.outcome for hold in case.holds if hold.share == share]
-        out.append(
-            {"share": share, "holds": len(its), **{name: its.count(name) for name in ("tared", "doubt", "contact")}}
-        )
+        out.append({"share": share, "holds": len(its)} | {name: its.count(name) for name in OUTCOMES})
     return out
 
 
@@ -184,6 +181,7 @@ def facts(result: Result) -> Facts:
         safe = [hold for hold in case.holds if hold.share >= SAFE_SHARE]
         light = [hold for hold in case.holds if hold.share < SAFE_SHARE]
         tared = sum(hold.outcome == "tared" for hold in light)
+        before_n = case.rows["force_100un"][np.array(case.rezeros, np.intp) - 1] / 1e4
         cases.append(
             {
                 "sensor": case.name,
@@ -191,7 +189,7 @@ def facts(result: Result) -> Facts:
                 "seen": sum(case.seen),
                 "rezeros": len(case.rezeros),
                 "rezero_rows": case.rezeros,
-                "rezero_force_n": [number(_force_n(case.rows, row - 1)) for row in case.rezeros],
+                "rezero_force_n": numbers(np.linalg.norm(before_n, axis=1)),
                 "shares": _shares(case),
             }
         )
@@ -208,12 +206,8 @@ def facts(result: Result) -> Facts:
         *result.notes]}  # fmt: skip
 
 
-def _force_n(rows: StructArray, row: int) -> float:
-    return float(np.linalg.norm(rows["force_100un"][row].astype(float)) / 1e4)
-
-
 def page(facts: Facts) -> list[str]:
-    """What became of the holds, then the re-zeros."""
+    """The outcomes of the holds, then the re-zeros."""
     lines = []
     for case in facts["cases"]:
         forces = [f for f in case["rezero_force_n"] if f is not None]
@@ -222,19 +216,17 @@ def page(facts: Facts) -> list[str]:
             f"with at most {text(max(forces, default=float('nan')), 2)} N before.",
             "",
             *table(["hold", "holds", "tared", "in doubt", "contact"],
-                   [[f"{its['share']:.0%}", *[str(its[k]) for k in ("holds", "tared", "doubt", "contact")]]
+                   [[f"{its['share']:.0%}", *[str(its[k]) for k in ("holds", *OUTCOMES)]]
                     for its in case["shares"]]),
         ]  # fmt: skip
     return lines
 
 
 def draw(result: Result, figure: Any) -> None:
-    """Pressure with the board's states and re-zeros; holds by their share and what became of them."""
-
+    """Pressure with the board's states and re-zeros; outcomes of holds by share."""
     figure.set_size_inches(13, 4.2 * len(result.cases))
     axes = figure.subplots(len(result.cases), 2, squeeze=False)
     figure.suptitle(f"Hold or residue: {result.source}")
-    colors = {"tared": "#b91c1c", "doubt": "#c2410c", "contact": "#1d4ed8"}
     for (left, right), case in zip(axes, result.cases, strict=True):
         time_s: Floats = np.arange(len(case.pdc)) / 100.0
         left.plot(time_s, case.pdc, color="#111111", linewidth=0.6, label="PDC")
@@ -247,7 +239,7 @@ def draw(result: Result, figure: Any) -> None:
             xlabel="rounds of 10 ms [s]", ylabel="PDC [counts]", title=case.name, ylim=(known.min() - 20, known.max())
         )
         left.legend(fontsize=8)
-        for outcome, color in colors.items():
+        for outcome, color in OUTCOMES.items():
             its = [hold for hold in case.holds if hold.outcome == outcome]
             right.plot([hold.share for hold in its], [max(hold.above, 0.5) for hold in its], "o", color=color,
                        markersize=4, label=f"{outcome}: {len(its)}")  # fmt: skip

@@ -1,8 +1,7 @@
-"""A laboratory's own trial, through the board's code as an emulated one."""
+"""Loads a laboratory's own trial, run through the board's code like an emulated one."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,32 +15,23 @@ from ...recording import Recording
 from ...recording.npz_file import counts_field, read_npz, to_lin_frame
 from ...wire import messages_gen as wire
 from ...wire import sensor_gen as _sensor
-from .trial import Trial, Words, on_board
+from .trial import Trial, on_board
 
 FIELDS = ("E", "PDC", "F", "M", "E_base", "t", "z_dir")
 ROW_S = 0.01
-TOUCHED_N = 0.1  # a plate's reading below this is taken for "nothing touches"
+TOUCHED_N = 0.1  # a plate's reading below this counts as "nothing touches"
 _ELECTRODES = len(_sensor.ELECTRODE_NAMES)
 
 
-@dataclass(frozen=True)
-class Recorded:
-    """A trial, and ``plate_normal`` (n, 3), the plate's unit normal in Lin's frame, where it was recorded."""
+def load(path: Path, finger: int = 0, needs: tuple[str, ...] = (), *, own_force: bool = False) -> Trial:
+    """The trial in an .npz of one finger, or of ``finger`` in a recording of `biotac record`.
 
-    trial: Trial
-    plate_normal: Floats | None
-    notes: tuple[str, ...]
-
-
-def load(path: Path, finger: int = 0, needs: tuple[str, ...] = (), *, own_force: bool = False) -> Recorded:
-    """An .npz of one finger, or a recording of `biotac record`, of which ``finger`` is taken.
-
-    The latter has no truth; ``own_force`` takes the force that its board published, by its own scales, for F.
+    The latter has no truth; ``own_force`` takes the force that its board published with its own scales as F.
 
     Fields of an .npz: ``E`` (n, 19) counts; optionally ``PDC`` (n,) counts, ``F`` (n, 3) N and ``M`` (n, 3)
     N mm about Lin's origin in the recorded axes (X lateral, Y to the tip, Z out of the pad), ``t`` (n,) s,
     ``E_base`` (m, 19), whose median is given to the board as its tare, and ``z_dir`` (n, 3), a plate's unit
-    normal in the axes of data/README.md. ``needs`` names the fields an experiment cannot do without. Raises
+    normal in the axes of data/README.md. ``needs`` names the fields that an experiment requires. Raises
     RecordingError naming the field.
     """
     if path.suffix.lower() != ".npz":
@@ -71,10 +61,19 @@ def load(path: Path, finger: int = 0, needs: tuple[str, ...] = (), *, own_force:
         for name, unit in (("F", "N"), ("M", "N mm"))
     )
     normal = _plate_normal(path, fields["z_dir"], n) if "z_dir" in fields else None
-    return Recorded(_trial(path, time_s, counts, pdc, force, torque, base), normal, tuple(notes))
+    torsion = at_mm = None
+    if force is not None and torque is not None:
+        plate = contact.locate(force, torque)
+        # below that the plate's point of contact is noise divided by noise
+        known = (np.linalg.norm(force, axis=1) > TOUCHED_N) & plate.on_skin
+        torsion = np.where(known, plate.torsion_nmm, np.nan)
+        at_mm = np.where(known[:, None], plate.point_mm, np.nan)
+    rows = on_board(counts, pdc, given=base)
+    return Trial(path.name, time_s, (), counts, pdc, rows, force, torque, torsion, at_mm, normal, given=base,
+                 notes=tuple(notes))  # fmt: skip
 
 
-def _of_recording(path: Path, finger: int, needs: tuple[str, ...], own_force: bool) -> Recorded:
+def _of_recording(path: Path, finger: int, needs: tuple[str, ...], own_force: bool) -> Trial:
     recording = Recording(path)
     _require(path, needs, ("E", "PDC", "F") if own_force else ("E", "PDC"))
     mine = recording.frames[recording.frames["finger"] == finger]
@@ -86,23 +85,8 @@ def _of_recording(path: Path, finger: int, needs: tuple[str, ...], own_force: bo
         notes.append("force: what the board published, by its own scales; no plate was there")
     force = np.nan_to_num(mine["force_n"]) if own_force else None
     time_s = (mine["t_us"] - mine["t_us"][0]) / 1e6
-    trial = _trial(path, time_s, mine["counts"].copy(), mine["pdc"].copy(), force, None, None)
-    return Recorded(trial, None, tuple(notes))
-
-
-def _trial(
-    path: Path, time_s: Floats, counts: Words, pdc: Words, force: Floats | None, torque: Floats | None,
-    base: Floats | None,
-) -> Trial:  # fmt: skip
-    rows, tare, pdc_rest = on_board(counts, pdc, given=base)
-    torsion = at_mm = None
-    if force is not None and torque is not None:
-        plate = contact.locate(force, torque)
-        # below that a plate's point of contact is noise over noise
-        known = (np.linalg.norm(force, axis=1) > TOUCHED_N) & plate.on_skin
-        torsion = np.where(known, plate.torsion_nmm, np.nan)
-        at_mm = np.where(known[:, None], plate.point_mm, np.nan)
-    return Trial(path.name, time_s, (), counts, pdc, rows, tare, pdc_rest, force, torque, torsion, at_mm, given=base)
+    counts, pdc = mine["counts"].copy(), mine["pdc"].copy()
+    return Trial(path.name, time_s, (), counts, pdc, on_board(counts, pdc), force, None, notes=tuple(notes))
 
 
 def _require(path: Path, needs: tuple[str, ...], seen: tuple[str, ...]) -> None:

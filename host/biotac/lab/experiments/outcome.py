@@ -1,4 +1,4 @@
-"""What every experiment gives: options in, figures that JSON can hold, a page of markdown, checks against limits."""
+"""What every experiment takes and gives: options, figures as JSON types, a Markdown page, checks against limits."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Show = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Options:
-    """What an experiment is told.
+    """Options of an experiment.
 
-    ``seed`` chooses the emulated finger; with ``recording`` there is none, and ``finger`` is which of the
-    recording's is meant. ``maps`` are files of fitted wrench maps to try beside the paper's model; ``show`` is
-    told what is going on. ``real`` are recordings with their force to try beside the emulated finger; ``quick`` asks
-    for a smaller run of the same, whose figures are worse.
+    ``seed`` chooses the emulated finger; with ``recording`` there is none, and ``finger`` chooses one of the
+    recording's. ``maps`` are files of fitted wrench maps to try beside the paper's model; ``show`` is called with
+    progress. ``real`` are recordings with their force to try beside the emulated finger; ``quick`` asks for a smaller
+    run, with worse figures.
     """
 
     seed: int = 1
@@ -34,10 +34,10 @@ class Options:
 class Experiment(Protocol):
     """The module of an experiment, host/biotac/lab/experiments/NAME.py.
 
-    ``RECORDING`` says in words what a recording must hold, empty where none makes sense; ``MAPS`` whether
-    wrench maps can be tried; ``REAL``, where there is one, whether Options.real and quick are for it. ``facts`` are
-    JSON types only; ``page`` is built from nothing else, so that table and JSON cannot differ. Facts hold
-    ``experiment``, ``source``, ``checks`` (of check()) and ``notes``.
+    ``RECORDING`` says in words what a recording must hold, empty where none makes sense; ``MAPS`` whether wrench maps
+    can be tried; ``REAL``, where it exists, whether Options.real and quick apply. ``facts`` are JSON types only;
+    ``page`` is built from nothing else, so that table and JSON cannot differ. Facts hold ``experiment``, ``source``,
+    ``checks`` (from check() and claim()) and ``notes``.
     """
 
     @property
@@ -56,12 +56,12 @@ class Experiment(Protocol):
 
 
 def check(what: str, seen: float, limit: float, unit: str) -> Facts:
-    """That ``seen`` is at most ``limit``; NaN never is."""
+    """A check that ``seen`` is at most ``limit``; NaN fails."""
     return {"what": what, "seen": number(seen), "limit": limit, "unit": unit, "met": bool(seen <= limit)}
 
 
 def claim(what: str, holds: bool) -> Facts:
-    """That something the paper says, or the issue asks, is so."""
+    """A check that something the paper says, or the issue asks for, holds."""
     return {"what": what, "met": bool(holds)}
 
 
@@ -76,7 +76,7 @@ def verdicts(facts: Facts) -> list[str]:
 
 
 def number(value: float) -> float | None:
-    """For JSON, which has no NaN; four digits after the point, as many as a page shows."""
+    """``value`` for JSON: None for NaN, rounded to four decimals, as many as a page shows."""
     return round(float(value), 4) if math.isfinite(value) else None
 
 
@@ -86,12 +86,12 @@ def numbers(values: Iterable[float]) -> list[float | None]:
 
 
 def text(value: float | None, digits: int = 3) -> str:
-    """For a table."""
+    """``value`` for a table."""
     return "-" if value is None else f"{value:.{digits}f}"
 
 
 def markdown(title: str, body: list[str], facts: Facts, picture: str) -> str:
-    """The whole page; ``picture`` is the file name it shows."""
+    """The whole page; ``picture`` is the name of the image file in it."""
     lines = [f"# {title}", "", f"Source: {facts['source']}.", "", *body]
     if facts["checks"]:
         lines += ["## Checks", "", *[f"* {line}" for line in verdicts(facts)], ""]

@@ -1,16 +1,16 @@
-"""The normal at the point of contact against that of a flat plate: the board's default weights, nothing fitted.
+"""The normal at the point of contact against that of a flat plate, with the board's default weights and nothing fitted.
 
-A flat plate that touches a convex finger does so where the finger's outward normal is the plate's. On a
-recording the plate's normal was measured (motion capture, trial_15330 of Robotic-Finger); protocol of
-reference/biotac.md, section 5: every frame in contact counts. In contact is where the board says so and PDC
-is more than CONTACT_COUNTS above the rest the board has for it, which on that sensor is more than 2000
-count^2 of signal; figures for other thresholds stand beside it. What a correction of the normal by other contacts of
-the same recording leaves stands there, too: whether the error is the formula's or the sensor's.
+A flat plate touches a convex finger where the finger's outward normal is the plate's. In the recording the plate's
+normal was measured (motion capture, trial_15330 of Robotic-Finger). The protocol is that of reference/biotac.md,
+section 5: every frame in contact counts. A frame is in contact if the board says so and PDC is more than
+CONTACT_COUNTS above the board's rest, which on that sensor is more than 2000 count^2 of signal; figures for other
+thresholds are given, too. To tell the formula's error from the sensor's, the figures also give the error left after
+correcting the normal by other contacts of the same recording.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,13 +21,13 @@ from ...core.geometry import Floats
 from ...errors import InputError, RecordingError
 from ...markdown import table
 from ...sim.physics import PROFILES, Profile
+from ...sim.scenario import FLAT_MM
 from ...sim.timeline import Pose
 from ...wire import messages_gen as wire
 from . import laboratory
 from .outcome import Facts, Options, check, number, text
 from .poke import COLORS, SHIPPED, WEIGHTS, WORDS, words
 from .trial import Bools, Script, Trial, play
-from .weight import FLAT_MM
 
 RECORDING = "E, PDC and z_dir, a plate's unit normal"
 MAPS = False
@@ -42,12 +42,12 @@ KNOWN_DEG = {
     wire.PocWeights.COMPRESS_N2: (11.0, 19.4),
 }
 EMULATED_CONTACTS = 40
-APART_ROWS = 15  # frames without contact between two contacts
+APART_ROWS = 15  # frames without contact that separate two contacts
 
 
 @dataclass(frozen=True)
 class Angles:
-    """Degrees between the point's normal and the plate's in every frame of one kind of weights, NaN without a point."""
+    """Degrees between the point's normal and the plate's for one kind of weights, by frame; NaN without a point."""
 
     profile: str
     weights: wire.PocWeights
@@ -56,15 +56,15 @@ class Angles:
     pressure: Floats
 
     def over(self, threshold_counts: float) -> Floats:
-        """Of the frames in contact with more pressure than that; a frame without a point counts as 180 deg."""
+        """Angles of the frames in contact with more pressure than that; a frame without a point counts as 180 deg."""
         rows = self.touched & (self.pressure > threshold_counts)
-        # leaving them out would reward weights that give up
+        # leaving such frames out would reward weights that often give no point
         return np.nan_to_num(self.angle_deg[rows], nan=180.0)
 
 
 @dataclass(frozen=True)
 class Result:
-    """A case a sensor and kind of weights; ``corrected_deg`` by sensor, each contact by a correction of the others."""
+    """A case per sensor and kind of weights; ``corrected_deg`` by sensor, each contact corrected by the others."""
 
     source: str
     cases: list[Angles]
@@ -74,14 +74,14 @@ class Result:
 
 
 def angles_deg(points_mm: Floats, normals: Floats) -> Floats:
-    """Between the core's outward normals at points (n, 3) and unit normals (n, 3); NaN without a point."""
+    """Angles between the core's outward normals at points (n, 3) and unit normals (n, 3); NaN without a point."""
     known = np.asarray(np.isfinite(points_mm).all(axis=1))
     mine = surface.normals_at(np.where(known[:, None], points_mm, [0.0, 0.0, -1.0]))
     return np.where(known, normal.angles_deg(mine, normals), np.nan)
 
 
 def emulated(seed: int, profile: Profile) -> Trial:
-    """A flat plate pressed from EMULATED_CONTACTS directions, 1 to 6 N, released in between."""
+    """A trial of a flat plate pressed from EMULATED_CONTACTS directions with 1 to 6 N, released in between."""
     rng = np.random.default_rng([seed, 15330])
     script = Script()
     for k in range(EMULATED_CONTACTS):
@@ -91,24 +91,26 @@ def emulated(seed: int, profile: Profile) -> Trial:
         script.phase("rest", 0.1, 1.4, rest, rest)
         script.phase(f"press {k + 1}", 0.5, 1.0, Pose(rest.x_mm, rest.y_mm, force_n, tip_mm=FLAT_MM))
         script.phase("release", 0.3, 0.2, rest)
-    return play("plate-normal", script, seed=seed, profile=profile)
+    trial = play("plate-normal", script, seed=seed, profile=profile)
+    assert trial.at_mm is not None
+    contact = np.where(np.isfinite(trial.at_mm), trial.at_mm, [0.0, 0.0, -surface.RADIUS_MM])
+    return replace(trial, plate_normal=surface.normals_at(contact))
 
 
 def run(options: Options) -> Result:
-    """On an emulated finger, new and worn; or on a recording."""
+    """Run on an emulated finger, new and worn, or on a recording."""
     if options.recording is not None:
-        theirs = laboratory.load(options.recording, options.finger, needs=("PDC", "z_dir"))
-        assert theirs.plate_normal is not None
-        cases = [_case("recorded", weights, theirs.trial, theirs.plate_normal) for weights in WEIGHTS]
+        trial = laboratory.load(options.recording, options.finger, needs=("PDC", "z_dir"))
+        cases = [_case("recorded", weights, trial) for weights in WEIGHTS]
         for case in cases:
             if not len(case.over(CONTACT_COUNTS)):
                 raise RecordingError(
                     f"{options.recording}: PDC is never {CONTACT_COUNTS:g} counts above rest in contact: expected "
                     f"presses; is it counts?"
                 )
-        notes, corrected = list(theirs.notes), {}
+        notes, corrected = list(trial.notes), {}
         try:
-            corrected["recorded"] = _corrected(theirs.trial, theirs.plate_normal)
+            corrected["recorded"] = _corrected(trial)
         except InputError as error:
             notes.append(f"no correction: {error}")
         return Result(str(options.recording), cases, corrected, notes, True)
@@ -116,11 +118,8 @@ def run(options: Options) -> Result:
     for profile in PROFILES:
         options.show(f"a plate on the {profile} sensor")
         trial = emulated(options.seed, profile)
-        assert trial.at_mm is not None
-        contact = np.where(np.isfinite(trial.at_mm), trial.at_mm, [0.0, 0.0, -surface.RADIUS_MM])
-        normals = surface.normals_at(contact)
-        cases += [_case(profile, weights, trial, normals) for weights in WEIGHTS]
-        corrected[profile] = _corrected(trial, normals)
+        cases += [_case(profile, weights, trial) for weights in WEIGHTS]
+        corrected[profile] = _corrected(trial)
     notes = [
         f"emulated sensor, seed {options.seed}: {EMULATED_CONTACTS} presses of a {FLAT_MM:g} mm flat, 1 to 6 N, x -12 "
         "to 3.5 mm, up to 57 deg of roll, no shear; a real plate also rubs: these angles are kinder than a laboratory's"
@@ -128,23 +127,25 @@ def run(options: Options) -> Result:
     return Result(f"emulated finger, seed {options.seed}", cases, corrected, notes, False)
 
 
-def looks(trial: Trial, normals: Floats) -> normal.Looks:
-    """Its frames in contact with a point, by CONTACT_COUNTS and the default weights; ``normals`` (n, 3) the plate's."""
+def looks(trial: Trial) -> normal.Looks:
+    """Its frames in contact with a point, by CONTACT_COUNTS and the default weights, and the plate's normals there."""
+    assert trial.plate_normal is not None
     points = trial.again({wire.Setting.POC_WEIGHTS: int(SHIPPED)}).frames["poc_mm"]
     known = np.isfinite(points).all(axis=1) & np.isfinite(trial.signal).all(axis=1)
     rows = np.flatnonzero(trial.touched & (trial.pressure > CONTACT_COUNTS) & known)
     contact = np.concatenate([[0], np.cumsum(np.diff(rows) > APART_ROWS)])[: len(rows)]
-    return normal.Looks(points[rows], trial.signal[rows], normals[rows], contact)
+    return normal.Looks(points[rows], trial.signal[rows], trial.plate_normal[rows], contact)
 
 
-def _corrected(trial: Trial, normals: Floats) -> Floats:
-    its = looks(trial, normals)
+def _corrected(trial: Trial) -> Floats:
+    its = looks(trial)
     return normal.angles_deg(normal.held_out(its), its.normals)
 
 
-def _case(profile: str, weights: wire.PocWeights, trial: Trial, normals: Floats) -> Angles:
+def _case(profile: str, weights: wire.PocWeights, trial: Trial) -> Angles:
+    assert trial.plate_normal is not None
     points = trial.again({wire.Setting.POC_WEIGHTS: int(weights)}).frames["poc_mm"]
-    return Angles(profile, weights, angles_deg(points, normals), trial.touched, trial.pressure)
+    return Angles(profile, weights, angles_deg(points, trial.plate_normal), trial.touched, trial.pressure)
 
 
 def facts(result: Result) -> Facts:
@@ -214,7 +215,7 @@ def page(facts: Facts) -> list[str]:
 
 
 def draw(result: Result, figure: Any) -> None:
-    """Shares of frames below an angle, and angles against pressure for the default weights."""
+    """Cumulative shares of frames by angle, and angles against pressure for the default weights."""
     figure.set_size_inches(13, 5.4)
     axes = figure.subplots(1, 2)
     figure.suptitle(f"Normal at the point of contact against a flat plate's: {result.source}")
@@ -231,16 +232,12 @@ def draw(result: Result, figure: Any) -> None:
     axes[0].legend(fontsize=8, loc="lower right")
     for case in result.cases:
         if case.weights in (SHIPPED, wire.PocWeights.ABS_N2) and case.profile == result.cases[0].profile:
-            _draw_pressure(axes[1], case, COLORS[case.weights])
+            rows = case.touched & (case.pressure > 0.0)
+            axes[1].plot(case.pressure[rows], case.angle_deg[rows], ".", color=COLORS[case.weights], markersize=2,
+                         alpha=0.35, label=WORDS[case.weights])  # fmt: skip
     axes[1].axvline(CONTACT_COUNTS, color="#111111", linewidth=1, linestyle=":")
     axes[1].set(xlabel="PDC above rest [counts]", ylabel="angle [deg]", xscale="log", xlim=(5, None), ylim=(0, 90))
     axes[1].set_title(f"{result.cases[0].profile}, frames in contact", fontsize=10)
     axes[1].legend(fontsize=8, markerscale=4)
     for axis in axes:
         axis.grid(alpha=0.25)
-
-
-def _draw_pressure(axes: Any, case: Angles, color: str) -> None:
-    rows = case.touched & (case.pressure > 0.0)
-    axes.plot(case.pressure[rows], case.angle_deg[rows], ".", color=color, markersize=2, alpha=0.35,
-              label=WORDS[case.weights])  # fmt: skip

@@ -1,11 +1,10 @@
 """Electrode poking: Lin, Fishel and Loeb 2013, figures 5 and 7 and table 2.
 
-A flat-tipped probe of 2 mm over each electrode in turn, released in between so that the board tares anew.
-The paper gives one standard deviation of the point of contact an electrode and trial, and calls the point
-reliable above 1 N. It does not say how three coordinates became one number, nor which frames: here it is
-the length, sqrt(var x + var y + var z), of the board's published points over every frame of the contact in
-which the true force is above 1 N, ramps included, without any filter. That is the largest of the readings
-(one coordinate alone gives less).
+A flat-tipped probe of 2 mm presses over each electrode in turn, released in between so that the board tares anew. The
+paper gives one standard deviation of the point of contact per electrode and trial, and calls the point reliable above
+1 N. It does not say how three coordinates became one number, nor which frames it used. Here it is the length,
+sqrt(var x + var y + var z), of the board's published points over every frame of the contact in which the true force is
+above 1 N, ramps included, unfiltered. That is the strictest reading of the paper; one coordinate alone gives less.
 """
 
 from __future__ import annotations
@@ -35,12 +34,12 @@ MAPS = False
 
 PROBE_MM = 2.0
 FLOOR_N = 1.0
-PEAK_N = 2.5  # as the bundled scenario poke.toml, which is older than this measurement
+PEAK_N = 2.5  # as in the bundled scenario poke.toml, which is older than this measurement
 SLOW_PEAK_N = 5.0
 BANDS_N = ((1.0, 1.5), (1.5, 2.0), (2.0, 3.0), (3.0, 5.0))
-MIN_FRAMES = 5  # fewer have no standard deviation worth the name
-GAP_S = 0.1  # a force that dips for less is still the same contact
-LIMIT_MM = 0.23  # issue 6; the average of the paper's first trial is 0.2269
+MIN_FRAMES = 5  # fewer give no meaningful standard deviation
+GAP_S = 0.1  # a shorter dip of the force does not end the contact
+LIMIT_MM = 0.23  # issue 6; the paper's average for its first trial is 0.2269
 SHIPPED = wire.PocWeights(wire.SETTINGS[wire.Setting.POC_WEIGHTS].default)
 WEIGHTS = (SHIPPED, *(weights for weights in wire.PocWeights if weights != SHIPPED))
 WORDS = {
@@ -67,7 +66,9 @@ _TRUE_MM = surface.project(surface.ELECTRODE_MM)  # where the probe stands: over
 
 @dataclass(frozen=True)
 class Spread:
-    """Points of contact of 19 pokes, NaN where there were fewer than MIN_FRAMES.
+    """Statistics of the points of contact of 19 pokes.
+
+    NaN for a poke with fewer than MIN_FRAMES; the mean of all is then NaN, too, as one over the rest would flatter.
 
     ``std_mm`` (19,) length of the standard deviation; ``axis_std_mm`` (19,) root mean square over x, y and z;
     ``bias_mm`` (19,) from the electrode to the mean point; ``frames`` (19,).
@@ -81,7 +82,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class Case:
-    """One sensor and one kind of weights: ``trials``, and a slow one by ``bands``; ``points_mm`` of trial 1."""
+    """One sensor and kind of weights: ``trials``, and a slow one by ``bands``; ``points_mm`` are of trial 1."""
 
     profile: str
     weights: wire.PocWeights
@@ -92,7 +93,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Result:
-    """``plate`` is the force plate's own point, in closed form and on the paper's mesh, for emulated trials."""
+    """``plate`` is the force plate's own point for emulated trials, in closed form and on the paper's mesh."""
 
     source: str
     cases: list[Case]
@@ -102,7 +103,7 @@ class Result:
 
 
 def spread(points_mm: Floats, contacts: Sequence[Bools]) -> Spread:
-    """Of points (n, 3), NaN where there is none, over each electrode's frames (n,)."""
+    """The spread of points (n, 3), NaN where there is none, over each electrode's frames (n,)."""
     std, axis, bias, frames = np.full((4, len(contacts)), np.nan)
     for k, rows in enumerate(contacts):
         mine = points_mm[rows]
@@ -116,7 +117,7 @@ def spread(points_mm: Floats, contacts: Sequence[Bools]) -> Spread:
 
 
 def emulated(seed: int, profile: Profile, *, take: int = 0, slow: bool = False, noiseless: bool = False) -> Trial:
-    """19 pokes; ``slow`` goes up to SLOW_PEAK_N in four seconds instead of up to PEAK_N in 0.3."""
+    """A trial of 19 pokes; ``slow`` rises to SLOW_PEAK_N in four seconds instead of to PEAK_N in 0.3."""
     script = Script()
     for name, (x_mm, y_mm, _) in zip(_sensor.ELECTRODE_NAMES, _TRUE_MM.tolist(), strict=True):
         rest = Pose(x_mm, y_mm, tip_mm=PROBE_MM)
@@ -151,23 +152,18 @@ def contacts(trial: Trial, low_n: float = FLOOR_N, high_n: float = np.inf) -> li
 
 
 def run(options: Options) -> Result:
-    """On an emulated finger, new and worn, twice each; or on a recording."""
+    """Run on an emulated finger, new and worn, twice each; or on a recording."""
     if options.recording is not None:
-        theirs = laboratory.load(options.recording, options.finger, needs=("F",), own_force=True)
-        firm = contacts(theirs.trial)
-        banded = [contacts(theirs.trial, *band) for band in BANDS_N]
-        cases = [_case("recorded", weights, [theirs.trial], theirs.trial, [firm], banded) for weights in WEIGHTS]
-        return Result(str(options.recording), cases, {}, [*theirs.notes], True)
-    cases = []
+        trial = laboratory.load(options.recording, options.finger, needs=("F",), own_force=True)
+        return Result(str(options.recording), _cases("recorded", [trial], trial), {}, [*trial.notes], True)
+    cases: list[Case] = []
     plate: dict[str, Spread] = {}
     for profile in PROFILES:
         options.show(f"poking the {profile} sensor")
         trials = [emulated(options.seed, profile, take=take) for take in (0, 1)]
         slow = emulated(options.seed, profile, take=2, slow=True)
-        firm_of = [contacts(trial) for trial in trials]
-        banded = [contacts(slow, *band) for band in BANDS_N]
-        cases += [_case(profile, weights, trials, slow, firm_of, banded) for weights in WEIGHTS]
-        plate = plate or _plate(trials[0], firm_of[0])
+        cases += _cases(profile, trials, slow)
+        plate = plate or _plate(trials[0])
     notes = [
         f"emulated sensor, seed {options.seed}: the probe presses with up to {PEAK_N:g} N for half a second; by force: "
         f"it goes up to {SLOW_PEAK_N:g} N in four seconds, 25 frames a 0.3 N",
@@ -177,27 +173,27 @@ def run(options: Options) -> Result:
     return Result(f"emulated finger, seed {options.seed}", cases, plate, notes, False)
 
 
-def _case(
-    profile: str, weights: wire.PocWeights, trials: list[Trial], slow: Trial, firm: list[list[Bools]],
-    banded: list[list[Bools]],
-) -> Case:  # fmt: skip
-    settings = {wire.Setting.POC_WEIGHTS: int(weights)}
-    points = [trial.again(settings).frames["poc_mm"] for trial in trials]
-    slow_points = slow.again(settings).frames["poc_mm"]
-    return Case(
-        profile,
-        weights,
-        [spread(p, rows) for p, rows in zip(points, firm, strict=True)],
-        [spread(slow_points, rows) for rows in banded],
-        points[0][np.any(firm[0], axis=0)],
-    )
+def _cases(profile: str, trials: list[Trial], slow: Trial) -> list[Case]:
+    """One case for each kind of weights."""
+    firm = [contacts(trial) for trial in trials]
+    banded = [contacts(slow, *band) for band in BANDS_N]
+    cases = []
+    for weights in WEIGHTS:
+        settings = {wire.Setting.POC_WEIGHTS: int(weights)}
+        points = [trial.again(settings).frames["poc_mm"] for trial in trials]
+        slow_points = slow.again(settings).frames["poc_mm"]
+        spreads = [spread(p, rows) for p, rows in zip(points, firm, strict=True)]
+        bands = [spread(slow_points, rows) for rows in banded]
+        cases.append(Case(profile, weights, spreads, bands, points[0][np.any(firm[0], axis=0)]))
+    return cases
 
 
-def _plate(trial: Trial, firm: list[Bools]) -> dict[str, Spread]:
-    """The points of a force plate with the Nano17's resolution and no other error."""
+def _plate(trial: Trial) -> dict[str, Spread]:
+    """Points from a force plate with the Nano17's resolution and no other error."""
     assert trial.force_n is not None and trial.torque_nmm is not None
     force = np.rint(trial.force_n / PLATE_STEP_N) * PLATE_STEP_N
     torque = np.rint(trial.torque_nmm / PLATE_STEP_NMM) * PLATE_STEP_NMM
+    firm = contacts(trial)
     rows = np.any(firm, axis=0)
     on_mesh = np.full((len(trial), 3), np.nan)
     on_mesh[rows] = contact.locate_on_mesh(force[rows], torque[rows])
@@ -205,11 +201,6 @@ def _plate(trial: Trial, firm: list[Bools]) -> dict[str, Spread]:
         "closed form": spread(contact.locate(force, torque).point_mm, firm),
         "0.5 mm mesh (paper)": spread(on_mesh, firm),
     }
-
-
-def _mean(values: Floats) -> float:
-    """NaN when an electrode is missing: a mean over the others would flatter."""
-    return float(values.mean())
 
 
 def facts(result: Result) -> Facts:
@@ -227,11 +218,11 @@ def facts(result: Result) -> Facts:
         "cases": [_case_facts(case) for case in result.cases],
         "bands_n": [list(band) for band in BANDS_N],
         "plate": {
-            name: {"mean_std_mm": number(_mean(its.std_mm)), "mean_bias_mm": number(_mean(its.bias_mm))}
+            name: {"mean_std_mm": number(its.std_mm.mean()), "mean_bias_mm": number(its.bias_mm.mean())}
             for name, its in result.plate.items()
         },
         "checks": [
-            check(f"{what}, trial {k}", _mean(trial.std_mm), LIMIT_MM, "mm")
+            check(f"{what}, trial {k}", trial.std_mm.mean(), LIMIT_MM, "mm")
             for k, trial in enumerate(shipped.trials, start=1)
         ],
         "notes": result.notes,
@@ -244,18 +235,18 @@ def _case_facts(case: Case) -> Facts:
         "weights": case.weights.name,
         "words": WORDS[case.weights],
         "std_mm": [numbers(trial.std_mm) for trial in case.trials],
-        "mean_std_mm": [number(_mean(trial.std_mm)) for trial in case.trials],
-        "mean_axis_std_mm": [number(_mean(trial.axis_std_mm)) for trial in case.trials],
+        "mean_std_mm": [number(trial.std_mm.mean()) for trial in case.trials],
+        "mean_axis_std_mm": [number(trial.axis_std_mm.mean()) for trial in case.trials],
         "bias_mm": [numbers(trial.bias_mm) for trial in case.trials],
-        "mean_bias_mm": [number(_mean(trial.bias_mm)) for trial in case.trials],
+        "mean_bias_mm": [number(trial.bias_mm.mean()) for trial in case.trials],
         "frames": [trial.frames for trial in case.trials],
-        "band_std_mm": [number(_mean(band.std_mm)) for band in case.bands],
-        "band_bias_mm": [number(_mean(band.bias_mm)) for band in case.bands],
+        "band_std_mm": [number(band.std_mm.mean()) for band in case.bands],
+        "band_bias_mm": [number(band.bias_mm.mean()) for band in case.bands],
     }
 
 
 def page(facts: Facts) -> list[str]:
-    """Means first, then by force, then table 2 itself."""
+    """The means, then by force, then table 2."""
     paper = facts["paper_mean_mm"]
     rows = []
     for case in facts["cases"]:
@@ -295,12 +286,12 @@ def page(facts: Facts) -> list[str]:
 
 
 def words(case: Facts, facts: Facts) -> str:
-    """The weights in words."""
+    """The weights, in words."""
     return str(case["words"]) + (" (default)" if case["weights"] == facts["shipped"] else "")
 
 
 def draw(result: Result, figure: Any) -> None:
-    """Figure 7 laid flat for the default and the paper's weights, table 2 as bars, and by force."""
+    """Figure 7 unrolled for the default and the paper's weights, table 2 as bars, and by force."""
     figure.set_size_inches(15, 9.5)
     grid = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
     first = result.cases[0].profile
@@ -329,7 +320,7 @@ def _draw_points(axes: Any, case: Case) -> None:
 def _draw_bands(axes: Any, result: Result) -> None:
     styles = dict(zip(dict.fromkeys(case.profile for case in result.cases), ("-", "--"), strict=False))
     for case in result.cases:
-        axes.plot(range(len(BANDS_N)), [_mean(band.std_mm) for band in case.bands], styles[case.profile], marker="o",
+        axes.plot(range(len(BANDS_N)), [band.std_mm.mean() for band in case.bands], styles[case.profile], marker="o",
                   markersize=4, color=COLORS[case.weights], label=f"{case.profile}: {WORDS[case.weights]}")  # fmt: skip
     axes.axhline(LIMIT_MM, color="#111111", linewidth=1, linestyle=":")
     axes.annotate(f"{LIMIT_MM} mm", (0, LIMIT_MM), xycoords=("axes fraction", "data"), xytext=(3, 3),
@@ -343,9 +334,12 @@ def _draw_bands(axes: Any, result: Result) -> None:
 
 def _draw_electrodes(axes: Any, result: Result) -> None:
     shipped = [case for case in result.cases if case.weights == SHIPPED]
-    series = [(f"{case.profile}, trial {k + 1}", trial.std_mm, color) for case, colors in
-              zip(shipped, (("#1d4ed8", "#60a5fa"), ("#15803d", "#86efac")), strict=False)
-              for k, (trial, color) in enumerate(zip(case.trials, colors, strict=False))]  # fmt: skip
+    colors = iter(("#1d4ed8", "#60a5fa", "#15803d", "#86efac"))
+    series = [
+        (f"{case.profile}, trial {k}", trial.std_mm, next(colors))
+        for case in shipped
+        for k, trial in enumerate(case.trials, start=1)
+    ]
     series += [(f"paper, trial {k + 1}", np.array(PAPER_MM[k]), color) for k, color in ((0, "#57534e"), (1, "#a8a29e"))]
     place, width = np.arange(len(_sensor.ELECTRODE_NAMES)), 0.84 / len(series)
     for k, (label, std, color) in enumerate(series):

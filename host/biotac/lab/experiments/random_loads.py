@@ -1,7 +1,7 @@
 """Random loads on an emulated finger, and the calibration recording that a force plate would make of them.
 
-One frame a load: the contact's place, normal force, shear, torsion and footprint are all drawn anew, so nothing is
-learnt from how a load moves. What may be held out together is the cell of the pad that a contact lies in.
+One frame per load: the contact's place, normal force, shear, torsion and footprint are all drawn anew, so that a model
+can learn nothing from how a load moves. What may be held out together is the cell of the pad with the contact.
 """
 
 from __future__ import annotations
@@ -13,23 +13,24 @@ import numpy.typing as npt
 
 from ...core import geometry as surface
 from ...core.geometry import Floats
+from ...recording.npz_file import to_lin_frame
 from ...sim import sampling
 from ...sim.physics import Finger, States
 from ...wire import sensor_gen as _sensor
 
 CELL_MM, CELL_DEG = 1.5, 15.0  # numerics.md 3.2: what counts as one contact location
-X_MM = (-13.0, 3.5)  # the pad, with the tip's electrodes and without the seal
+X_MM = (-13.0, 3.5)  # the pad, including the tip's electrodes but not the seal
 ROLL_DEG = 55.0
 FORCE_N = (1.0, 12.0)  # log-uniform: the paper's point of contact is good from 1 N
 FRICTION = 0.6
-TORSION_PER_N, TORSION_MAX_NMM = 2.0, 12.0  # N mm a newton: friction times two thirds of a flat's radius, and more
+TORSION_PER_N, TORSION_MAX_NMM = 2.0, 12.0  # N mm per newton: over friction times two thirds of a flat's radius
 FOOTPRINTS_MM = (0.6, 1.0, 1.8, 3.5)  # numerics.md 3.1
 SHARES = {"both": 0.6, "torsion": 0.2, "shear": 0.1, "press": 0.1}  # of the frames
 REST_FRAMES, IDLE_FRAMES, IDLE_DRIFT_COUNTS = 500, 1000, 200.0
 
 
 def states(frames: int, seed: int) -> tuple[States, npt.NDArray[np.int64]]:
-    """Random loads (frames,) of one contact each, and the number of the cell that each contact lies in."""
+    """Random loads (frames,) of one contact each, and the number of the cell that holds each contact."""
     rng = np.random.default_rng([seed, 31])
     x = rng.uniform(*X_MM, frames)
     roll = rng.uniform(-ROLL_DEG, ROLL_DEG, frames)
@@ -49,7 +50,7 @@ def states(frames: int, seed: int) -> tuple[States, npt.NDArray[np.int64]]:
 
 
 def recording(finger: Finger, loads: States, cell: npt.NDArray[np.int64], seed: int) -> dict[str, Any]:
-    """The arrays of a calibration's .npz: what ``finger`` reads under ``loads``, with noise, and the plate's truth."""
+    """The arrays of a calibration's .npz: the noisy counts of ``finger`` under ``loads``, and the plate's truth."""
     rng = np.random.default_rng([seed, 32])
 
     def read(counts: Floats, sigma: float) -> npt.NDArray[np.uint16]:
@@ -63,15 +64,11 @@ def recording(finger: Finger, loads: States, cell: npt.NDArray[np.int64], seed: 
     pressure = sampling.PDC_PER_N * loads.force_n * (1.0 + 0.15 * np.tanh(loads.contact_mm[:, 0] / 8.0))
     return {
         "E": read(finger.counts(loads), finger.noise_counts),
-        "F": _recorded(force),
-        "M": _recorded(torque),
+        "F": to_lin_frame(force),  # the same turn leads back to a recording's axes
+        "M": to_lin_frame(torque),
         "torsion": loads.torsion_nmm,
         "PDC": read(sampling.PDC_REST + pressure, sampling.PDC_NOISE),
         "E_base": read(np.repeat(at_rest, REST_FRAMES, axis=0), finger.noise_counts),
         "E_idle": read(at_rest + warming * loading, finger.noise_counts),
         "contact": cell,
     }
-
-
-def _recorded(lin: Floats) -> Floats:
-    return np.column_stack([lin[:, 1], lin[:, 0], -lin[:, 2]])

@@ -1,8 +1,8 @@
 """Every table and figure of seed 000 (Wettels and Loeb 2011), on an emulated finger and on recordings with their force.
 
-The paper's probes, places and presses are drawn by sim/stimulations.py. What is learnt is judged on contacts that
-training has not seen; beside it stands the paper's own split, rows at random, of which neighbours in time land on
-either side: what it gains over contacts held out is a leak and not a finding.
+The paper's probes, places and presses are drawn by sim/stimulations.py. Models are judged on contacts that were not in
+training. Beside that stands the paper's own split, rows at random, which puts neighbours in time on both sides: what it
+gains over held-out contacts is leakage, not a finding.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ...errors import InputError
 from ...sim.physics import Finger
 from ...sim.probes import PROBES
 from .outcome import Facts, Options, check, claim, text
-from .seed000_page import PAPER_PLACES, details, overview
+from .seed000_page import EQUATION, PAPER_PLACES, details, overview, paf_row
 
 RECORDING = ""
 MAPS = False
@@ -30,7 +30,7 @@ ROC_ASKED, D_ASKED_MM, R_ASKED_MM, BAR_ASKED_DEG = 0.947, 2.3, 2.2, 5.0
 
 @dataclass(frozen=True)
 class Size:
-    """How much is drawn and learnt: contacts a probe, rows and steps of a net."""
+    """The size of a run: contacts per probe, rows, and training steps of a net."""
 
     places: tuple[int, ...] = (400, 400, 400, 400)
     paf_places: tuple[int, ...] = PAPER_PLACES
@@ -49,7 +49,7 @@ QUICK = Size((8, 8, 8, 8), (3, 3, 3, 3), 300, 2, (6, 6, 6, 6), 2, (6, 6, 6, 6), 
 
 @dataclass(frozen=True)
 class Result:
-    """``paf`` is what figure 8 draws: truth, raw and smoothed (n, 2); ``force`` truth and estimate (n, 3)."""
+    """``paf`` is what figure 8 draws: truth, raw and smoothed (n, 2); ``force`` is truth and estimate (n, 3)."""
 
     source: str
     parts: Facts
@@ -59,7 +59,7 @@ class Result:
 
 
 def run(options: Options) -> Result:
-    """Minutes; see host/docs/features.md. Raises InputError without scikit-learn, scipy and statsmodels."""
+    """Run it, for minutes; see host/docs/features.md. Raises InputError without scikit-learn, scipy and statsmodels."""
     try:
         import sklearn  # noqa: F401
         import statsmodels  # noqa: F401
@@ -68,7 +68,7 @@ def run(options: Options) -> Result:
     from threadpoolctl import threadpool_limits
 
     size = QUICK if options.quick else Size()
-    # nets are many small systems: BLAS's own threads would wait for each other
+    # the nets are many small systems, on which BLAS's own threads would only wait for each other
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(min(2, os.cpu_count() or 1)) as pool:
         return _run(options, size, pool)
 
@@ -121,9 +121,9 @@ def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
 
 
 def facts(result: Result) -> Facts:
-    """All figures, and what the issue asks of them."""
+    """All figures, and the checks that the issue asks for."""
     its = result.parts
-    paf = _paf(its, "30 to 40 N, as the paper", "rest offset removed", "force threshold")
+    paf = paf_row(its, EQUATION, "force threshold")
     best = max(its["roc"][1:], key=lambda one: one["correct"])
     one, four = its["force"][0]["pooled_n"], its["force"][1]["pooled_n"]
     return {
@@ -141,12 +141,6 @@ def facts(result: Result) -> Facts:
         ],
         "notes": result.notes,
     }
-
-
-def _paf(its: Facts, load: str, equation: str, technique: str) -> Facts:
-    wanted = (load, equation, technique)
-    found: Facts = next(row for row in its["paf"] if (row["load"], row["equation"], row["technique"]) == wanted)
-    return found
 
 
 def page(facts: Facts) -> list[str]:

@@ -22,39 +22,35 @@ from ...sim.physics import Finger
 from ...sim.stimulations import Stimulations, stimulate
 from .outcome import Facts, number
 
-FRAMES, UP = 5, 3  # a press's way up
+FRAMES, UP = 5, 3  # of a press; its way up
 FOLDS = 5
 LEAST_N = 1.0  # Eq 6 divides by the force
 AXES = ("Fx", "Fy", "Fz")
 ONE, A_PRIORI, CASCADE = "one net", "four nets, classes known", "four nets, rear or forward by PAF"
-REDUCTIONS: dict[str, inputs.Reduce] = {
-    "none": inputs.every,
-    "PCA, > 0.1 % variance": inputs.principal,
-    "FastICA": inputs.independent,
+REDUCTIONS: dict[str, dict[str, Any]] = {
+    "none": {"reduce": inputs.every},
+    "PCA, > 0.1 % variance": {"reduce": inputs.principal},
+    "FastICA": {"reduce": inputs.independent},
+    "Spearman > 0.1": {"by_spearman": True},
 }
-SPEARMAN = "Spearman > 0.1"
 REAL_EVERY, REAL_BLOCKS, GUARD_ROWS = 8, 20, 100
 
 
 def load(finger: Finger, places: tuple[int, ...], seed: int) -> Stimulations:
-    """Presses of all probes, their way up."""
+    """Frames of the way up of presses with all probes."""
     its = stimulate(finger, places, seed=seed, frames=FRAMES)
     return its.where(np.arange(len(its)) % FRAMES < UP)
 
 
 def networks(its: Stimulations, steps: int, seed: int) -> dict[str, Floats]:
-    """Held-out force (n, 3) of ONE, A_PRIORI and CASCADE: five folds by contact."""
+    """Held-out force (n, 3) of ONE, A_PRIORI and CASCADE in five folds by contact."""
     above = its.counts - its.tare
     large = its.probe >= 2
     known = force.classes(skin(its.contact_mm)[:, 0], large)
     d = paf(above, threshold_n=0.0)["dr_mm"][:, 0]
-    # the paper passes the probe on as known, too; without a PAF there is no class: the true one would flatter
+    # The paper passes the probe on as known, too. Without a PAF the class is taken at 0 mm: the true one would flatter.
     guessed = force.classes(np.where(np.isnan(d), 0.0, d), large)
     cascade = np.full((len(its), 3), np.nan)
-
-    def single(training: Any, test: Any) -> Floats:
-        net = force.train(above[training], its.force_n[training], its.contact[training], steps=steps, seed=seed)
-        return net(above[test])
 
     def four(training: Any, test: Any) -> Floats:
         nets = force.train(
@@ -64,31 +60,32 @@ def networks(its: Stimulations, steps: int, seed: int) -> dict[str, Floats]:
         return nets(above[test], known[test])
 
     return {
-        ONE: force.cross_validated(above, its.contact, FOLDS, single),
+        ONE: _held_out(above, its.force_n, its.contact, steps=steps, seed=seed),
         A_PRIORI: force.cross_validated(above, its.contact, FOLDS, four),
         CASCADE: cascade,
     }
 
 
 def reductions(its: Stimulations, steps: int, seed: int) -> list[Facts]:
-    """Figure 10: one net behind each way to choose its inputs, held out by contact."""
-    above = its.counts - its.tare
+    """Figure 10: one net for each way to choose its inputs, held out by contact."""
+    rows = []
+    for name, how in REDUCTIONS.items():
+        said = _held_out(its.counts - its.tare, its.force_n, its.contact, steps=steps, seed=seed, **how)
+        rows.append({"how": name} | scores(said, its.force_n))
+    return rows
 
-    def held_out(**how: Any) -> Floats:
-        def predict(training: Any, test: Any) -> Floats:
-            net = force.train(
-                above[training], its.force_n[training], its.contact[training], steps=steps, seed=seed, **how
-            )
-            return net(above[test])
 
-        return force.cross_validated(above, its.contact, FOLDS, predict)
+def _held_out(above: Floats, force_n: Floats, groups: force.Integers, **how: Any) -> Floats:
+    """Force (n, 3) by one net per fold, trained by force.train with the options ``how``."""
 
-    rows = [{"how": name} | scores(held_out(reduce=how), its.force_n) for name, how in REDUCTIONS.items()]
-    return [*rows, {"how": SPEARMAN} | scores(held_out(by_spearman=True), its.force_n)]
+    def predict(training: Any, test: Any) -> Floats:
+        return force.train(above[training], force_n[training], groups[training], **how)(above[test])
+
+    return force.cross_validated(above, groups, FOLDS, predict)
 
 
 def scores(said: Floats, truth: Floats) -> Facts:
-    """Table 4's, each axis, and the RMSE over all three."""
+    """Table 4's scores for each axis, and the RMSE over all three."""
     good = np.isfinite(said).all(axis=1)
     pooled = float(np.sqrt(((said - truth)[good] ** 2).mean())) if good.any() else np.nan
     each = [asdict(score(said[:, k], truth[:, k], least=LEAST_N)) for k in range(3)]
@@ -99,7 +96,7 @@ def scores(said: Floats, truth: Floats) -> Facts:
 
 
 def by_class(said: Floats, its: Stimulations) -> list[Facts]:
-    """Table 4 for each class, of one prediction."""
+    """Table 4 of one prediction, for each class."""
     kind = force.classes(skin(its.contact_mm)[:, 0], its.probe >= 2)
     return [
         {"class": name} | scores(said[kind == c], its.force_n[kind == c])
@@ -119,13 +116,8 @@ def recorded(path: Path, steps: int, seed: int, show: Callable[[str], None]) -> 
     near = np.min(np.abs(np.arange(n)[:, None] - edge[None]), axis=1) < GUARD_ROWS // 2
     rows = np.flatnonzero(~near)[::REAL_EVERY]
     x, truth = above[rows], run.truth[rows, :3]
-
-    def predict(training: Any, test: Any) -> Floats:
-        net = force.train(x[training], truth[training], block[rows][training], steps=steps, seed=seed)
-        return net(x[test])
-
     show(f"{path.name}: a net")
-    net = force.cross_validated(x, block[rows], FOLDS, predict)
+    net = _held_out(x, truth, block[rows], steps=steps, seed=seed)
     show(f"{path.name}: the calibrated map")
     mapped = crossvalidation.validate(run).predicted[0][rows, :3]
     everybody = population.alone(Signals(x, np.broadcast_to(run.tare, x.shape)))

@@ -20,7 +20,7 @@ TEST_SHARE = 0.15
 
 
 def bars(finger: Finger, presses: int, seed: int, steps: int) -> Facts:
-    """Of presses the net has not seen, in degrees."""
+    """Error in degrees of an edge's direction, for presses that were not in training."""
     counts, tare, angle = press_bars(finger, presses, seed=seed)
     seen = edge.columns(counts - tare, tare)
     known = round((1.0 - TEST_SHARE) * presses)
@@ -31,7 +31,7 @@ def bars(finger: Finger, presses: int, seed: int, steps: int) -> Facts:
 
 
 def pairs(finger: Finger, each: int, seed: int) -> list[Facts]:
-    """A row a distance, the first for one contact: how often the number was right, and where it was, the errors."""
+    """One row per distance, 0 for one contact: how often the number was right, and then errors of place and share."""
     rng = np.random.default_rng([seed, 36])
     tare = finger.rest_counts(np.zeros(1))[0]
     rows = []
@@ -59,7 +59,7 @@ def pairs(finger: Finger, each: int, seed: int) -> list[Facts]:
 
 
 def _pair(apart: float, rng: np.random.Generator) -> Floats:
-    """Two places (2, 3) on the pad, ``apart`` mm along the skin laid flat."""
+    """Two places (2, 3) on the pad, ``apart`` mm from each other along the unrolled skin."""
     while True:
         first = np.array([rng.uniform(*PAD_D_MM), rng.uniform(-PAD_R_MM, PAD_R_MM)])
         way = rng.uniform(0.0, 2.0 * np.pi)

@@ -1,4 +1,4 @@
-"""Seed 000's table 3 and figures 4, 6, 8 and 9 on an emulated finger: PAF by each technique, and who follows what."""
+"""Seed 000's table 3 and figures 4, 6, 8 and 9 on an emulated finger: PAF by each technique, and correlations."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ...features.paf import THRESHOLD_N, paf
 from ...features.scores import score
 from ...features.signals import skin
 from ...features.smooth import causal, lowess
-from ...sim.physics import Finger
-from ...sim.probes import PROBES, footprints
+from ...sim.physics import Finger, States
+from ...sim.probes import PROBES, counts_of, footprints
 from ...sim.stimulations import Stimulations, stimulate
 from .outcome import Facts, number
 
@@ -26,7 +26,7 @@ FRAMES = 20
 
 
 def run(finger: Finger, places: tuple[int, ...], seed: int) -> tuple[list[Facts], Any]:
-    """A row a load, equation and technique; and what is drawn: true and estimated places of the first."""
+    """A row per load, equation and technique; and for the drawing, true and estimated places of the first load."""
     rows: list[Facts] = []
     drawn: Any = None
     for load, peak_n in LOADS_N.items():
@@ -37,20 +37,19 @@ def run(finger: Finger, places: tuple[int, ...], seed: int) -> tuple[list[Facts]
             said = paf(its.counts - its.tare, as_printed=as_printed, threshold_n=0.0)["dr_mm"]
             for technique in TECHNIQUES:
                 found = _by(technique, said, firm, its)
-                scores = [score(found[:, k], truth[:, k]) for k in (0, 1)]
-                held = np.isfinite(found).all(axis=1)
-                rows.append({
-                    "load": load, "equation": equation, "technique": technique, "share": number(float(held.mean())),
-                    "d": {name: number(value) for name, value in asdict(scores[0]).items()},
-                    "r": {name: number(value) for name, value in asdict(scores[1]).items()},
-                })  # fmt: skip
+                row: Facts = {"load": load, "equation": equation, "technique": technique}
+                row["share"] = number(np.isfinite(found).all(axis=1).mean())
+                for k, name in enumerate("dr"):
+                    scores = asdict(score(found[:, k], truth[:, k]))
+                    row[name] = {which: number(value) for which, value in scores.items()}
+                rows.append(row)
                 if drawn is None and technique == "both" and not as_printed:
                     drawn = truth, said, found
     return rows, drawn
 
 
 def _by(technique: str, said: Floats, firm: Any, its: Stimulations) -> Floats:
-    """The paper merged its files; a contact is smoothed by itself here, as nothing lies between two of them."""
+    """The estimate ``said`` by one technique; each contact is smoothed alone, as nothing lies between two of them."""
     found = said if technique in TECHNIQUES[:2] else np.where(firm[:, None], said, np.nan)
     if technique in ("none", "force threshold"):
         return found
@@ -71,9 +70,6 @@ def correlations(finger: Finger, places: tuple[int, ...], seed: int) -> list[lis
 
 def impedance(finger: Finger) -> list[Facts]:
     """Figure 4: resistance of E18 over its rest when a 1 mm tip presses with 10 N at these distances along d."""
-    from ...sim.physics import States
-    from ...sim.probes import counts_of
-
     at = np.array([0.0, 1.0, 2.0, 4.0, 6.0])
     over = surface.ELECTRODE_MM[17]
     contact = surface.project(np.column_stack([over[0] + at, np.repeat(over[1], 5), np.repeat(over[2], 5)]))

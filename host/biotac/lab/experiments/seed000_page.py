@@ -11,20 +11,19 @@ PAPER_TABLE3 = {
     "force threshold": ((2.37, 0.183, 0.839), (2.90, 0.198, 0.813)),
     "both": ((2.36, 0.182, 0.839), (2.89, 0.197, 0.813)),
 }
-PAPER_TABLE4 = {"Fz": (0.729, 31.4), "Fy": (0.931, 13.9), "Fx": (0.870, 37.9)}  # R2, percent error of rear, large
+PAPER_TABLE4 = {"Fz": (0.729, 31.4), "Fy": (0.931, 13.9), "Fx": (0.870, 37.9)}  # R2, percent error; class "rear, large"
 
 LOAD, EQUATION = "30 to 40 N, as the paper", "rest offset removed"
 
 
 def overview(facts: Facts) -> list[str]:
-    """Paper, ours emulated, ours on recordings, why they differ."""
+    """For each result: the paper's, ours emulated, ours on recordings, and why they differ."""
     by_row, by_contact, press, contact, press_machine, contact_machine = facts["roc"]
     one, four, cascade = facts["force"]
     plain, pca, ica, spearman = (row["pooled_n"] for row in facts["reductions"])
     rear = next((row for row in facts["classes"] if row["class"] == "rear, large"), None)
     kept = [sum((row[axis] or 0.0) > 0.1 for row in facts["correlations"]) for axis in range(3)]
     ratio = {row["mm"]: row["ratio"] for row in facts["impedance"]}
-    raw = {row["equation"]: row for row in facts["paf"] if row["load"] == LOAD and row["technique"] == "none"}
     real = "; ".join(_real(one) for one in facts["real"]) or "none given (--real)"
     none = "no recording has it"
     rows = [
@@ -49,10 +48,11 @@ def overview(facts: Facts) -> list[str]:
          "a random split puts neighbours of a row into training: the paper's figure has that leak; a frame of a new "
          "place does not tell width from distance to the next electrode, a growing press does"],
         ["Fig 8", "noisy, jumps at low force",
-         f"d/r {_dr(raw['as printed'])} as printed, {_dr(raw[EQUATION])} mm without the rest offset", none,
+         f"d/r {_dr(facts, 'as printed', 'none')} as printed, "
+         f"{_dr(facts, EQUATION, 'none')} mm without the rest offset", none,
          "as printed 3.08 N stand for no touch at all and pull the mean to the middle; nothing divides by zero"],
         ["Fig 9, Table 3", f"both: d/r {PAPER_TABLE3['both'][0][0]} / {PAPER_TABLE3['both'][1][0]} mm",
-         f"both: {_dr(_row(facts, EQUATION, 'both'))} mm; printed {_dr(_row(facts, 'as printed', 'both'))} mm", none,
+         f"both: {_dr(facts, EQUATION, 'both')} mm; printed {_dr(facts, 'as printed', 'both')} mm", none,
          "no error of marking places by hand is in ours; the threshold goes by the true force"],
         ["Fig 10", "PCA some, Spearman Fy and Fz, ICA poor (bars, no numbers)",
          f"pooled RMSE {text(plain, 2)} N; PCA {text(pca, 2)}, FastICA {text(ica, 2)}, Spearman {text(spearman, 2)}",
@@ -74,7 +74,7 @@ def overview(facts: Facts) -> list[str]:
 
 
 def details(facts: Facts) -> list[str]:
-    """The tables themselves."""
+    """The tables behind the overview."""
     lines = ["## Table 3, PAF", "", "RMSE mm, SMSE, R2; share of rows with a value.", ""]
     rows = [
         [row["load"], row["equation"], row["technique"], _three(row["d"]), _three(row["r"]), text(row["share"], 2)]
@@ -122,13 +122,15 @@ def details(facts: Facts) -> list[str]:
     return lines
 
 
-def _row(facts: Facts, equation: str, technique: str) -> Facts:
+def paf_row(facts: Facts, equation: str, technique: str) -> Facts:
+    """The row of the paper's loads."""
     wanted = (LOAD, equation, technique)
     found: Facts = next(row for row in facts["paf"] if (row["load"], row["equation"], row["technique"]) == wanted)
     return found
 
 
-def _dr(row: Facts) -> str:
+def _dr(facts: Facts, equation: str, technique: str) -> str:
+    row = paf_row(facts, equation, technique)
     return f"{text(row['d']['rmse'], 2)} / {text(row['r']['rmse'], 2)}"
 
 

@@ -1,35 +1,34 @@
-"""Seed 000's figure 7 on an emulated finger: which of four probes, by frames and by trajectories, by two splits."""
+"""Seed 000's figure 7 on an emulated finger: which of four probes, by frames and trajectories, with two splits."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...core.geometry import Floats
 from ...features import roc
 from ...sim.physics import Finger
 from ...sim.probes import PROBES
 from ...sim.stimulations import LEAST_SHARE, stimulate
 from .outcome import Facts, number
 
-FRAMES = 5  # the way up at 10, 65 and 100 % of the peak
+FRAMES = 5  # a press; its way up is at 10, 65 and 100 % of the peak
 LEAST_N = 1.0
-PAPER = 0.947
 BY_CONTACT, BY_ROW = "held out by contact", "rows at random, as the paper"
 
 
 def frames(finger: Finger, places: tuple[int, ...], by_contact: bool, seed: int, steps: int, most: int) -> Facts:
-    """The paper's own: 19 electrodes of a frame into 38 units. ``most`` rows are taken at most."""
+    """The paper's own classifier: a frame's 19 electrodes into 38 units. It uses at most ``most`` rows."""
     its = stimulate(finger, places, seed=seed, frames=FRAMES)
     rng = np.random.default_rng([seed, 35])
     firm = np.flatnonzero(its.normal_n > max(LEAST_N, LEAST_SHARE))
     rows = np.sort(rng.permutation(firm)[:most])
-    columns = (its.counts - its.tare)[rows]
-    kind, groups = its.probe[rows], its.contact[rows] if by_contact else rows
-    return _case("frame", BY_CONTACT if by_contact else BY_ROW, columns, kind, groups, None, seed, steps, places)
+    columns, kind = (its.counts - its.tare)[rows], its.probe[rows]
+    training, stopping, test = roc.split(its.contact[rows] if by_contact else rows, seed)
+    net = roc.train(columns, kind, training, stopping, seed=seed, steps=steps)
+    return _facts("frame", BY_CONTACT if by_contact else BY_ROW, net(columns[test]), kind[test], net, places)
 
 
 def trajectories(finger: Finger, places: tuple[int, ...], seed: int, steps: int) -> list[Facts]:
-    """How a press grows, alone and all five of a contact together, by the paper's net and by support vectors."""
+    """Classify how a press grows, one press or all five of a contact, by the paper's net and by support vectors."""
     its = stimulate(finger, places, seed=seed, frames=FRAMES)
     columns, press = roc.trajectories(its.counts - its.tare, its.tare, its.stimulation)
     first = np.searchsorted(its.stimulation, press)
@@ -51,19 +50,10 @@ def trajectories(finger: Finger, places: tuple[int, ...], seed: int, steps: int)
     return found
 
 
-def _case(
-    what: str, split: str, columns: Floats, kind: roc.Integers, groups: roc.Integers,
-    together: roc.Integers | None, seed: int, steps: int, places: tuple[int, ...],
-) -> Facts:  # fmt: skip
-    training, stopping, test = roc.split(groups, seed)
-    net = roc.train(columns, kind, training, stopping, seed=seed, steps=steps)
-    return _facts(what, split, net(columns[test], together), kind[test], net, places)
-
-
 def _facts(
     what: str, split: str, said: roc.Integers, truth: roc.Integers, net: roc.Classifier | None, places: tuple[int, ...]
 ) -> Facts:
-    """Without a ``net`` nothing is said of its weights."""
+    """The figures of one classifier; without a ``net`` the entries about its weights are None."""
     its = net.net if net else None
     return {
         "what": what, "split": split, "places": list(places), "correct": number(float((said == truth).mean())),

@@ -1,7 +1,7 @@
 """The shear trial: Lin, Fishel and Loeb 2013, figure 3, phases A to G.
 
-A 500 g weight with a flat surface lies on the pad and is pushed by hand to E11's side, then to E1's, about
-3 N each. The paper shows electrodes and says in words what they do; those words are the checks.
+A 500 g weight with a flat surface lies on the pad and is pushed by hand towards E11, then towards E1, with about 3 N
+each. The paper plots the electrodes and describes in words what they do; those words are the checks.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ emulated = partial(weight.emulated, "figure 3", STEPS, HOLD_S)
 
 
 def run(options: Options) -> Result:
-    """On an emulated finger or a recording."""
+    """Run on an emulated finger or a recording."""
     return weight.run(options, emulated, f"pushed with {SHEAR_N:g} N", torque=False)
 
 
 def facts(result: Result) -> Facts:
-    """Errors, phases, and what the paper's caption says."""
+    """Errors, phases, and the claims of the paper's caption."""
     its = weight.facts_of(result, "shear")
-    if not result.is_recorded:
+    if not result.trial.is_recorded:
         its["checks"] = _claims({phase["name"]: phase["counts"] for phase in its["phases"]})
     return its
 
 
 def _claims(counts: dict[str, dict[str, float]]) -> list[Facts]:
-    """Figure 3's caption, from mean counts above tare by phase and electrode."""
+    """Figure 3's caption as checks, from mean counts above tare by phase and electrode."""
     towards, away = (
         {name: counts[after][name] - counts[before][name] for name in LATERAL} for before, after in ("BC", "DE")
     )
@@ -70,6 +70,6 @@ def page(facts: Facts) -> list[str]:
 
 def draw(result: Result, figure: Any) -> None:
     """Figure 3, and the forces below it."""
-    axes = ("Fx", "Fy", "Fz") if result.is_recorded else ("Fy", "Fz")
+    axes = ("Fx", "Fy", "Fz") if result.trial.is_recorded else ("Fy", "Fz")
     title = f"Shear trial (Lin 2013, figure 3): {result.source}"
     traces.draw(result.trial, result.estimates, axes, title, figure, MARKED)

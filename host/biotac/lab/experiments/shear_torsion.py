@@ -1,8 +1,8 @@
-"""Shear and torsion at once: what a calibrated map makes of it, and what the paper's formulas do.
+"""Shear and torsion at once: how well a calibrated map and the paper's formulas estimate them.
 
 Lin, Fishel and Loeb 2013 call the two "substantially convolved" (figure 10). Here an emulated finger is pressed,
-sheared and twisted at random over its pad, calibrated by ``biotac calibrate wrench``'s own machinery with contact
-locations held out, warmed and cooled, and put through figure 10's trial, which was not trained on.
+sheared and twisted at random over its pad, and calibrated with the code of ``biotac calibrate wrench``, with contact
+locations held out. Then it is warmed and cooled, and put through figure 10's trial, which was not in training.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ MAPS = False
 FRAMES = 9000
 FY, TORSION = 1, 6
 PAPER, CALIBRATED = "paper", "calibrated"
-FY_LIMIT, TORSION_LIMIT = 0.4, 0.6  # of the paper's RMSE: issue 6
+FY_LIMIT, TORSION_LIMIT = 0.4, 0.6  # of the paper's RMSE, from issue 6
 WARM_C = 8.0  # numerics.md 3.3
 
 
 @dataclass(frozen=True)
 class Result:
-    """A calibration and what it was tried with.
+    """A calibration and its trials.
 
-    ``validation`` is of the random loads, ``both`` (n,) those with shear and torsion at once; ``paper`` (n, 7) is
-    Lin's Eq 3 and 4 there, its six scales fitted without the row's own block. ``warm`` maps what was done about
-    temperature to RMSE (7,) over ``both``. ``replayed`` is figure 10's trial by the paper's model and by the map.
+    ``validation`` is of the random loads; ``both`` (n,) marks those with shear and torsion at once. ``paper`` (n, 7) is
+    Lin's Eq 3 and 4 on them, its six scales fitted without the row's own block. ``warm`` maps each way to handle
+    temperature to its RMSE (7,) over ``both``. ``replayed`` is figure 10's trial by the paper's model and by the map.
     """
 
     seed: int
@@ -60,7 +60,7 @@ class Result:
 
 
 def run(options: Options) -> Result:
-    """On the emulated finger of the options' seed."""
+    """Run on the emulated finger of the options' seed."""
     finger = Finger(options.seed)
     loads, cell = random_loads.states(FRAMES, options.seed)
     with tempfile.TemporaryDirectory() as folder:
@@ -76,7 +76,7 @@ def run(options: Options) -> Result:
 
 
 def _paper(validation: Validation) -> Floats:
-    """Eq 1 to 4 (n, 7): six scales by least squares without offset, torsion about the paper's own point of contact."""
+    """Eq 1 to 4 (n, 7): six scales by least squares without offset; torsion about the paper's own point of contact."""
     run, blocks = validation.run, validation.blocks
     e = run.counts - run.tare
     sums = e @ lin_directions(6)
@@ -93,10 +93,10 @@ def _paper(validation: Validation) -> Floats:
 
 
 def _warm(finger: Finger, loads: States, both: Bools, validation: Validation, seed: int) -> dict[str, Floats]:
-    """RMSE (7,) at up to WARM_C off the temperature of calibration, held out, by what the tare does about it."""
+    """RMSE (7,), held out, at up to WARM_C off the calibration temperature, for each way the tare may follow it."""
     celsius = np.random.default_rng([seed, 33]).uniform(-WARM_C, WARM_C, len(loads))
     cold = validation.run.counts
-    # the very same noise on top of what warmth does
+    # the same noise as before, plus the effect of temperature
     counts = cold + finger.counts(replace(loads, warm_c=celsius)) - finger.counts(loads)
     tdc = sampling.tdc_counts(REST_CELSIUS + celsius) - float(sampling.tdc_counts(np.array([REST_CELSIUS]))[0])
     gained = finger.rest_counts(celsius) - finger.rest_counts(np.zeros(1))
@@ -117,19 +117,18 @@ def _warm(finger: Finger, loads: States, both: Bools, validation: Validation, se
 
 
 def _held_out(validation: Validation, counts: Floats, tare: Floats) -> Floats:
-    """What each row's own fold makes (n, 7) of other ``counts`` (n, 19) with ``tare`` (n, 19), frame by frame."""
+    """Prediction (n, 7) of each row's own fold for other ``counts`` (n, 19) and ``tare`` (n, 19), frame by frame."""
     result = np.empty_like(validation.run.truth)
     for block, fit in enumerate(validation.folds):
         rows = validation.blocks.rows(block)
-        coefficients = np.column_stack([choice.coefficients for choice in fit.best])
         pdc = validation.run.pdc
         signals = Signals(counts[rows] - tare[rows], tare[rows], None if pdc is None else pdc[rows])
-        result[rows] = with_one(features.columns(signals)) @ coefficients
+        result[rows] = with_one(features.columns(signals)) @ fit.best
     return result
 
 
 def facts(result: Result) -> Facts:
-    """Errors of both models, what temperature does, figure 10's signs and leakage."""
+    """Errors of both models, the effect of temperature, figure 10's signs and leakage."""
     validation, both = result.validation, result.both
     truth = validation.run.truth
     errors = {
@@ -210,21 +209,20 @@ def page(facts: Facts) -> list[str]:
 
 
 def draw(result: Result, figure: Any) -> None:
-    """Fy and torsion against the truth, the paper's and the map's."""
+    """Fy and torsion against the truth, for the paper's model and the map."""
     truth, both = result.validation.run.truth, result.both
     figure.set_size_inches(11, 5)
     panels = figure.subplots(1, 2)
     figure.suptitle(f"Shear and torsion at once, held-out locations: emulated finger, seed {result.seed}")
     for panel, axis, unit in zip(panels, (FY, TORSION), ("N", "N mm"), strict=True):
-        _dots(panel, truth[both, axis], result.paper[both, axis], f"{PAPER} (Eq 3 and 4)", "#9ca3af")
-        _dots(panel, truth[both, axis], result.validation.predicted[0][both, axis], CALIBRATED, report.AXIS_COLORS[1])
+        for guess, label, color in (
+            (result.paper, f"{PAPER} (Eq 3 and 4)", "#9ca3af"),
+            (result.validation.predicted[0], CALIBRATED, report.AXIS_COLORS[1]),
+        ):
+            panel.plot(truth[both, axis], guess[both, axis], ".", color=color, markersize=2, alpha=0.6, label=label)
         ends = [float(truth[both, axis].min()), float(truth[both, axis].max())]
         panel.plot(ends, ends, color="#111111", linewidth=1)
         panel.set(xlabel=f"true {AXES[axis]} [{unit}]", ylabel=f"estimated {AXES[axis]} [{unit}]")
         panel.set_ylim(2.0 * ends[0], 2.0 * ends[1])
         panel.grid(alpha=0.3)
         panel.legend(markerscale=5)
-
-
-def _dots(panel: Any, truth: Floats, guess: Floats, label: str, color: str) -> None:
-    panel.plot(truth, guess, ".", color=color, markersize=2, alpha=0.6, label=label)

@@ -1,8 +1,8 @@
 """The torsion trial: Lin, Fishel and Loeb 2013, figure 9, phases A to G.
 
-A 500 g weight with a flat surface lies on the pad and is turned clockwise, then counter-clockwise, five
-seconds each. The paper draws Fz and the torque about z against the force plate and gives no numbers; it
-claims that pure torques are extracted, so the checks are the torques' signs.
+A 500 g weight with a flat surface lies on the pad and is turned clockwise, then counter-clockwise, for five seconds
+each. The paper plots Fz and the torque about z against the force plate without numbers. It claims to extract pure
+torques, so the checks are the torques' signs.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from .weight import WEIGHT_N, Result
 RECORDING = "E, F and M"
 MAPS = True
 
-TORSION_NMM = 6.0  # the paper gives none: as much as such a flat under 5 N holds at moderate friction
+TORSION_NMM = 6.0  # the paper gives none: this is what such a flat holds under 5 N at moderate friction
 HOLD_S = 4.5
 MARKED = ("E2", "E3", "E12", "E13", "E17")
-# The finger lies pad up and is turned as seen from above, looking along the inward normal, so clockwise is negative
-# about the outward one.
+# The finger lies pad up. The turn is named as seen from above, along the inward normal, so clockwise is negative about
+# the outward normal.
 TURNS_NMM = {"B": 0.0, "C": -TORSION_NMM, "D": 0.0, "E": TORSION_NMM, "F": 0.0}
 STEPS = (*[(name, WEIGHT_N, 0.0, turn_nmm) for name, turn_nmm in TURNS_NMM.items()], ("G", 0.0, 0.0, 0.0))
 
@@ -31,7 +31,7 @@ emulated = partial(weight.emulated, "figure 9", STEPS, HOLD_S)
 
 
 def run(options: Options) -> Result:
-    """On an emulated finger or a recording."""
+    """Run on an emulated finger or a recording."""
     how = (
         f"turned by {TORSION_NMM:g} N mm clockwise in C and counter-clockwise in E; the normal there is -z, so Mz is "
         "minus the torsion"
@@ -42,7 +42,7 @@ def run(options: Options) -> Result:
 def facts(result: Result) -> Facts:
     """Errors, phases, and the signs."""
     its = weight.facts_of(result, "torsion")
-    if not result.is_recorded:
+    if not result.trial.is_recorded:
         means = {phase["name"]: phase for phase in its["phases"]}
         its["checks"] = [
             claim(f"the torsion's sign is right in C and E: {name}",

@@ -1,31 +1,31 @@
 """Torsion with shear: Lin, Fishel and Loeb 2013, figure 10.
 
-Region II is the torsion trial of figure 9; regions I and III are the same torsions while the weight is also
-pushed to E11's side (+y) and to E1's (-y). The paper gives no numbers and calls its estimates of the two
-"substantially convolved". What is counted here: whether the torsion's sign is right in each region, and how
-much of a pure torsion (region II) shows up as lateral force.
+Region II is the torsion trial of figure 9; in regions I and III the same torsions act while the weight is also pushed
+towards E11 (+y) and E1 (-y). The paper gives no numbers and calls its estimates of the two "substantially convolved".
+The figures here are whether the torsion's sign is right in each region, and how much of a pure torsion (region II)
+shows up as lateral force.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...core.geometry import Floats
 from ...markdown import table
-from ...sim.physics import Profile
 from . import shear, torsion, traces, weight
 from .estimates import PAPER, Estimate, rmse
 from .outcome import Facts, Options, claim, number, text
 from .torsion import TORSION_NMM
 from .trial import Bools, Trial
-from .weight import E17_MM, FLAT_MM, WEIGHT_N, Result
+from .weight import E17_MM, WEIGHT_N, Result
 
 RECORDING = "E, F and M"
 MAPS = True
 
-SHEAR_N = 1.5  # the paper gives none; numerics.md 3.4 replays the figure with this
+SHEAR_N = 1.5  # the paper gives none; numerics.md 3.4 uses this for the figure
 REGIONS = {"I": 1.0, "II": 0.0, "III": -1.0}  # push along +y
 HOLD_S = 2.5
 # clockwise is negative about the outward normal, see torsion.py
@@ -36,20 +36,16 @@ def replay(
     at_mm: tuple[float, float] = E17_MM,
     *,
     seed: int = 1,
-    profile: Profile = "new",
     force_n: float = WEIGHT_N,
     shear_n: float = SHEAR_N,
     torsion_nmm: float = TORSION_NMM,
-    tip_mm: float = FLAT_MM,
-    take: int = 0,
-    noiseless: bool = False,
-    mirrored: bool = False,
+    **more: Any,
 ) -> Trial:
     """Figure 10 on an emulated finger: states, counts, the truth and the board's results.
 
-    ``at_mm`` places the weight; ``force_n`` > 0 is its normal force, ``shear_n`` the push to +y in region I and
-    to -y in III, ``torsion_nmm`` the torque's size. Phases are called "I clockwise", "II counter", ... after
-    REGIONS and TURNS. The rest is as of weight.emulated.
+    ``at_mm`` places the weight; ``force_n`` > 0 is its normal force, ``shear_n`` the push towards +y in region I and
+    -y in III, ``torsion_nmm`` the torque's size. Phases are called "I clockwise", "II counter", ... after REGIONS and
+    TURNS. ``more`` goes to weight.emulated.
     """
     turned = [
         (f"{region} {turn}", force_n, push * shear_n, sign * torsion_nmm)
@@ -57,14 +53,11 @@ def replay(
         for turn, sign in TURNS
     ]
     steps = [("B", force_n, 0.0, 0.0), *turned, ("G", 0.0, 0.0, 0.0)]
-    return weight.emulated(
-        "figure 10", steps, HOLD_S, seed, at_mm=at_mm, tip_mm=tip_mm, profile=profile, take=take, noiseless=noiseless,
-        mirrored=mirrored,
-    )  # fmt: skip
+    return weight.emulated("figure 10", steps, HOLD_S, seed, at_mm=at_mm, **more)
 
 
 def signs(trial: Trial, its: Estimate, at_mm: Floats) -> dict[str, bool]:
-    """Per region whether the mean torsion at contacts (n, 3) has its true sign in both turns; {} without torque."""
+    """By region, whether the mean torsion at contacts (n, 3) has the true sign in both turns; {} without torque."""
     assert trial.torsion_nmm is not None
     turned = its.torsion_nmm(at_mm)
     if turned is None:
@@ -77,7 +70,7 @@ def signs(trial: Trial, its: Estimate, at_mm: Floats) -> dict[str, bool]:
 
 
 def leakage(trial: Trial, its: Estimate) -> float:
-    """N of Fy for a N mm of pure torsion, in size: between the two turns of region II, where Fy is 0."""
+    """Size of Fy in N per N mm of pure torsion, between the two turns of region II, where the true Fy is 0."""
     assert trial.torsion_nmm is not None
     one, other = (_rows(trial, f"II {turn}") for turn in ("clockwise", "counter"))
     lateral, torsion_nmm = its.force_n[:, 1], trial.torsion_nmm
@@ -86,7 +79,7 @@ def leakage(trial: Trial, its: Estimate) -> float:
 
 
 def together(trial: Trial, its: Estimate) -> dict[str, float | None]:
-    """RMSE of Fy and of the torsion at the true contact while shear and torsion are both there, all ramps included."""
+    """RMSE of Fy and of the torsion at the true contact while both shear and torsion act, all ramps included."""
     assert trial.states is not None and trial.at_mm is not None
     pushed = np.linalg.norm(trial.states.shear_n, axis=1) > 0.0
     rows = np.asarray(pushed & (trial.states.torsion_nmm != 0.0))
@@ -100,25 +93,22 @@ def _rows(trial: Trial, name: str) -> Bools:
 
 
 def run(options: Options) -> Result:
-    """On an emulated finger or a recording."""
+    """Run on an emulated finger or a recording."""
     how = f"turned by {TORSION_NMM:g} N mm; pushed with {SHEAR_N:g} N to +y in region I, not in II, to -y in III"
-
-    def before(seed: int) -> list[Trial]:
-        return [shear.emulated(seed, take=1), torsion.emulated(seed, take=2)]
-
+    before = (partial(shear.emulated, take=1), partial(torsion.emulated, take=2))
     return weight.run(options, lambda seed: replay(seed=seed), how, torque=True, before=before)
 
 
 def facts(result: Result) -> Facts:
-    """Errors, phases, signs and leakage; checks only for maps, the paper's model has failed already."""
+    """Errors, phases, signs and leakage. Only maps are checked: the paper's model is known to fail."""
     its = weight.facts_of(result, "torsion-shear")
-    if result.is_recorded:
+    if result.trial.is_recorded:
         return its
     for estimate in result.estimates:
         one = its["models"][estimate.name]
         assert result.trial.at_mm is not None
         one["sign_right"] = signs(result.trial, estimate, result.trial.at_mm)
-        one["sign_right_at_poc"] = signs(result.trial, estimate, weight.poc_mm(result.trial))
+        one["sign_right_at_poc"] = signs(result.trial, estimate, result.trial.frames["poc_mm"])
         one["together"] = together(result.trial, estimate)
         one["leak_n_per_nmm"] = number(leakage(result.trial, estimate))
     paper = its["models"][PAPER]

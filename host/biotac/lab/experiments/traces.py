@@ -1,4 +1,4 @@
-"""Traces of a trial over time: electrodes on top, what was applied against what models say below."""
+"""Traces of a trial over time: electrodes on top; below, the applied load against the models' estimates."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from .trial import Trial
 MAP_COLORS = ("#1d4ed8", "#15803d", "#7c3aed", "#be185d")
 PAPER_COLOR = "#c2410c"
 OTHER_PAPER_COLOR = "#fb923c"
-MAX_POINTS = 20_000  # a line; more only make the picture larger
+MAX_POINTS = 20_000  # per line; more would only make the picture larger
 
 
 def draw(
     trial: Trial, estimates: Sequence[Estimate], axes: Sequence[str], title: str, figure: Any, marked: Sequence[str]
 ) -> None:
-    """``axes`` are of Fx, Fy, Fz, Mz and "torsion" (about the contact's normal, at the true contact).
+    """``axes`` are some of Fx, Fy, Fz, Mz and "torsion" (about the contact's normal, at the true contact).
 
-    Electrodes in ``marked`` are in colour, the others grey.
+    Electrodes in ``marked`` are drawn in colour, the others in grey.
     """
     ratios = [1.6] + [1.0] * len(axes)
     figure.set_size_inches(13, 2.4 * sum(ratios) / 1.15)
@@ -66,7 +66,7 @@ def _quantity(panel: Any, trial: Trial, estimates: Sequence[Estimate], axis: str
             continue
         of_paper = its.name.startswith(PAPER)
         color = next(papers, PAPER_COLOR) if of_paper else next(colors, MAP_COLORS[-1])
-        # a map follows every count's noise: drawn last, its line would hide the others
+        # a map's line follows the noise of every count: drawn last, it would hide the others
         panel.plot(trial.time_s[::step], line[::step], color=color, linewidth=1.0, label=its.name, zorder=3 + of_paper)
     panel.axhline(0.0, color="#111111", linewidth=0.6)
     panel.set_ylabel(f"{axis} [{'N' if axis.startswith('F') else 'N mm'}]")

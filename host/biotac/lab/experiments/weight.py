@@ -1,13 +1,15 @@
-"""What figures 3, 9 and 10 of Lin 2013 share: a 500 g weight with a flat surface on the pad, and its models.
+"""What figures 3, 9 and 10 of Lin 2013 share: a 500 g weight with a flat surface on the pad, and the models.
 
-The trial is emulated or a laboratory's own with a force plate; its estimates are the paper's scales and any
-fitted maps; its figures are errors over the loaded frames and means over the phases in which the load rests.
+The trial is emulated or a laboratory's own with a force plate. Estimates are by the paper's scales and by any fitted
+maps. Figures are errors over the loaded frames, and means over the phases in which the load is at rest.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...errors import RecordingError
 from ...markdown import table
-from ...sim.physics import Profile
+from ...sim.scenario import FLAT_MM
 from ...sim.timeline import Pose
 from ...wire import sensor_gen as _sensor
 from . import laboratory
@@ -24,25 +26,23 @@ from .outcome import Facts, Options, number, numbers, text
 from .trial import Bools, Script, Trial, play
 
 WEIGHT_N = 4.905  # 500 g
-FLAT_MM = 7.0  # numerics.md 3.1: a flat surface leaves a footprint of 3.5 mm radius
 LOADED_N = 0.5
 RAMP_S = 0.5
 _E17 = surface.ELECTRODE_MM[_sensor.ELECTRODE_NAMES.index("E17")]
-E17_MM = (float(_E17[0]), float(_E17[1]))  # the paper does not say where the weight lies; figure 3 has it over E17
+E17_MM = (float(_E17[0]), float(_E17[1]))  # the paper does not say where the weight lies; in figure 3 it is over E17
 Step = tuple[str, float, float, float]  # phase, weight N, push to +y N, torsion about the outward normal N mm
 FORCES, TORQUES = ("Fx", "Fy", "Fz"), ("Mx", "My", "Mz")
 
 
 @dataclass(frozen=True)
 class Result:
-    """A trial and what models make of it; the first of ``estimates`` is the paper's on this very trial."""
+    """A trial and the models' estimates; the first of ``estimates`` is by the paper's scales fitted to this trial."""
 
     source: str
     trial: Trial
     estimates: list[Estimate]
     scales: dict[str, dict[str, int]]
     notes: list[str]
-    is_recorded: bool
 
 
 def emulated(
@@ -53,14 +53,12 @@ def emulated(
     *,
     at_mm: tuple[float, float] = E17_MM,
     tip_mm: float = FLAT_MM,
-    profile: Profile = "new",
-    take: int = 0,
-    noiseless: bool = False,
     mirrored: bool = False,
+    **finger: Any,
 ) -> Trial:
     """Two seconds at rest (A), then each step's load at ``at_mm``, reached in RAMP_S and held for ``hold_s``.
 
-    ``mirrored`` is the same trial as its mirror image sees it; ``profile``, ``take`` and ``noiseless`` as of play().
+    ``mirrored`` is the same trial seen in a mirror; ``finger`` has profile, take and noiseless as for play().
     """
     side = -1.0 if mirrored else 1.0
     bare = Pose(at_mm[0], side * at_mm[1], tip_mm=tip_mm)
@@ -69,7 +67,7 @@ def emulated(
     for name, force_n, push_n, torsion_nmm in steps:
         end = replace(bare, force_n=force_n, shear_y_n=side * push_n, torsion_nmm=side * torsion_nmm)
         script.phase(name, RAMP_S, hold_s, end)
-    return play(figure, script, seed=seed, profile=profile, take=take, noiseless=noiseless, mirrored=mirrored)
+    return play(figure, script, seed=seed, mirrored=mirrored, **finger)
 
 
 def run(
@@ -78,61 +76,56 @@ def run(
     how: str,
     *,
     torque: bool,
-    before: Callable[[int], Sequence[Trial]] = lambda seed: (),
+    before: Sequence[Callable[[int], Trial]] = (),
 ) -> Result:
-    """On an emulated finger by its seed, loaded ``how``; or on a recording with F, and M for ``torque``."""
-    if options.recording is not None:
-        return _of_recording(options, torque=torque)
-    seed = options.seed
-    notes = [f"emulated sensor, new, seed {seed}: {WEIGHT_N:.1f} N over E17, {how}"]
-    return _estimated(f"emulated finger, seed {seed}", emulate(seed), options, notes, before(seed), is_recorded=False)
+    """Run on an emulated finger by its seed, loaded as ``how`` says, after the trials ``before``, or on a recording.
 
-
-def _of_recording(options: Options, *, torque: bool) -> Result:
-    assert options.recording is not None
-    theirs = laboratory.load(options.recording, options.finger, needs=("F", "M") if torque else ("F",))
-    assert theirs.trial.force_n is not None
-    if not np.isfinite(theirs.trial.tare).any():
-        raise RecordingError(
-            f"{options.recording}: the board never finds a tare in it: expected the finger still and untouched at the "
-            f"start; add E_base"
-        )
-    if not loaded(theirs.trial).any():
-        most = np.linalg.norm(theirs.trial.force_n, axis=1).max()
-        raise RecordingError(
-            f"{options.recording}: never loaded, the most is {most:.2f} N: expected over {LOADED_N:g} N; is F in N?"
-        )
-    notes = [*theirs.notes, "phases are not looked for in a recording: its errors are over all loaded frames"]
-    return _estimated(str(options.recording), theirs.trial, options, notes, is_recorded=True)
-
-
-def _estimated(
-    source: str, trial: Trial, options: Options, notes: list[str], before: Sequence[Trial] = (), *, is_recorded: bool
-) -> Result:
-    """The paper's scales fitted on the trial itself, on the trials ``before`` it, and the maps of the options."""
+    A recording needs F and, for ``torque``, M. The estimates are by the paper's scales, fitted on the trial itself and,
+    separately, on those before, and by the options' maps.
+    """
     maps = load_maps(options.maps)
-    on_this = paper_scales([trial])
-    scaled, own = by_paper(trial, on_this, PAPER)
-    scales = {PAPER: on_this}
-    estimates = [own]
-    notes = [
-        *notes,
+    earlier: list[Trial] = []
+    if options.recording is not None:
+        source, trial = str(options.recording), _recorded(options.recording, options.finger, torque)
+        notes = [*trial.notes, "phases are not looked for in a recording: its errors are over all loaded frames"]
+    else:
+        seed = options.seed
+        source, trial, earlier = f"emulated finger, seed {seed}", emulate(seed), [its(seed) for its in before]
+        notes = [f"emulated sensor, new, seed {seed}: {WEIGHT_N:.1f} N over E17, {how}"]
+    scales = {PAPER: paper_scales([trial])}
+    notes.append(
         f"{PAPER}: one scale an axis, least squares on this very trial, which is the best they can do; an axis without "
-        "load keeps the board's default",
-    ]
+        "load keeps the board's default"
+    )
     if trial.torque_nmm is not None:
         notes.append("the board has no scale for Mx, which the electrodes hardly see: it publishes the force's lever")
-    if before:
+    if earlier:
         name = f"{PAPER}, scaled before"
-        scales[name] = paper_scales(before)
-        estimates.append(by_paper(trial, scales[name], name)[1])
-        notes.append(f"{name}: the same fitted on {' and '.join(t.name for t in before)} of the same finger instead")
+        scales[name] = paper_scales(earlier)
+        notes.append(f"{name}: the same fitted on {' and '.join(t.name for t in earlier)} of the same finger instead")
+    estimates = [by_paper(trial, its, name) for name, its in scales.items()]
     for name, (path, its) in maps.items():
-        estimates.append(by_map(scaled, its, name))
+        estimates.append(by_map(trial, its, name))
         more = "; torsion is an axis of its own" if "torsion" in its.axes else ""
         notes.append(f"{name}: {its.model}, {path}{more}")
     named = {name: {setting.name.lower(): value for setting, value in these.items()} for name, these in scales.items()}
-    return Result(source, scaled, estimates, named, notes, is_recorded)
+    return Result(source, trial, estimates, named, notes)
+
+
+def _recorded(path: Path, finger: int, torque: bool) -> Trial:
+    trial = laboratory.load(path, finger, needs=("F", "M") if torque else ("F",))
+    assert trial.force_n is not None
+    if not np.isfinite(trial.tare).any():
+        raise RecordingError(
+            f"{path}: the board never finds a tare in it: expected the finger still and untouched at the start; "
+            "add E_base"
+        )
+    if not loaded(trial).any():
+        most = np.linalg.norm(trial.force_n, axis=1).max()
+        raise RecordingError(
+            f"{path}: never loaded, the most is {most:.2f} N: expected over {LOADED_N:g} N; is F in N?"
+        )
+    return trial
 
 
 def loaded(trial: Trial) -> Bools:
@@ -142,14 +135,8 @@ def loaded(trial: Trial) -> Bools:
     return np.asarray((np.linalg.norm(trial.force_n, axis=1) > LOADED_N) & tared)
 
 
-def poc_mm(trial: Trial) -> Floats:
-    """The board's own points of contact (n, 3)."""
-    points: Floats = trial.frames["poc_mm"]
-    return points
-
-
 def facts_of(result: Result, name: str) -> Facts:
-    """What the figures of all three have in common."""
+    """The figures that all three experiments share."""
     trial, rows = result.trial, loaded(result.trial)
     models: Facts = {}
     for its in result.estimates:
@@ -157,7 +144,7 @@ def facts_of(result: Result, name: str) -> Facts:
         if trial.torque_nmm is not None and its.torque_nmm is not None:
             one["rmse_nmm"] = numbers(rmse(its.torque_nmm, trial.torque_nmm, rows))
             assert trial.at_mm is not None
-            for what, at_mm in (("torsion", trial.at_mm), ("torsion_at_poc", poc_mm(trial))):
+            for what, at_mm in (("torsion", trial.at_mm), ("torsion_at_poc", trial.frames["poc_mm"])):
                 error = rmse(its.torsion_nmm(at_mm), trial.torsion_nmm, rows)
                 one[f"{what}_rmse_nmm"] = number(float(error[0]))
         models[its.name] = one
@@ -203,7 +190,7 @@ def _means(force: Floats, torque: Floats | None, torsion: Floats | None) -> Fact
 
 
 def errors_table(facts: Facts) -> list[str]:
-    """Errors over the loaded frames, a model a row."""
+    """Errors over the loaded frames, one row per model."""
     torque = any("rmse_nmm" in its for its in facts["models"].values())
     head = ["model", *[f"{axis} [N]" for axis in FORCES]]
     head += [*[f"{axis} [N mm]" for axis in TORQUES], "torsion [N mm]", "at the board's point"] if torque else []
@@ -227,7 +214,7 @@ def errors_table(facts: Facts) -> list[str]:
 
 
 def phases_table(facts: Facts, axes: Sequence[str]) -> list[str]:
-    """Means over each phase, what was applied beside every model."""
+    """Means over each phase: the applied load beside every model."""
     if not facts["phases"]:
         return []
     names = ["applied", *facts["models"]]

@@ -75,11 +75,7 @@ export class Fingertip {
     const c = this.context;
     const radius = this.large ? 0.82 : 0.75;
     c.lineWidth = (this.large ? 1.4 : 1) / scale * devicePixelRatio;
-    this.electrodes.forEach(({ across_mm: a, along_mm: b, name }, k) => {
-      const value = signal ? signal[k] : NaN;
-      const at = 4 * shade(Number.isNaN(value) ? 0 : value / limit);
-      const colour = theme.shades.bytes.subarray(at, at + 3);
-      const dead = signal && Number.isNaN(value);
+    for (const { a, b, dead, colour } of this.shown(signal, theme, limit)) {
       disc(c, a, b, radius);
       c.fillStyle = dead ? theme.card : `rgb(${colour.join(",")})`;
       c.fill();
@@ -87,17 +83,22 @@ export class Fingertip {
       c.setLineDash(dead ? [0.3, 0.3] : []);
       c.stroke();
       c.setLineDash([]);
-    });
+    }
   }
 
   drawNumbers(signal, theme, limit) {
-    this.electrodes.forEach(({ across_mm: a, along_mm: b, name }, k) => {
-      const value = signal ? signal[k] : NaN;
-      const dead = signal && Number.isNaN(value);
-      const at = 4 * shade(Number.isNaN(value) ? 0 : value / limit);
-      const [red, green, blue] = theme.shades.bytes.subarray(at, at + 3);
+    for (const { a, b, name, dead, colour: [red, green, blue] } of this.shown(signal, theme, limit)) {
       const bright = red * 0.299 + green * 0.587 + blue * 0.114 > 140;
       label(this.context, dead ? "×" : name.slice(1), a, b, 0.92, dead ? theme.quiet : bright ? "#171b22" : "#ffffff");
+    }
+  }
+
+  // Each electrode: its place, its colour, and whether it is missing from a frame.
+  shown(signal, theme, limit) {
+    return this.electrodes.map(({ across_mm: a, along_mm: b, name }, k) => {
+      const value = signal ? signal[k] : NaN;
+      const at = 4 * shade(Number.isNaN(value) ? 0 : value / limit);
+      return { a, b, name, dead: signal && Number.isNaN(value), colour: theme.shades.bytes.subarray(at, at + 3) };
     });
   }
 

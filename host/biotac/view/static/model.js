@@ -19,20 +19,15 @@ export class Model {
     this.dropped = 0;
   }
 
-  // Forget what was: another playing has begun.
-  clear() {
-    this.fingers.clear();
-  }
-
   finger(index) {
-    if (!this.fingers.has(index)) this.fingers.set(index, new Finger(index));
+    if (!this.fingers.has(index)) this.fingers.set(index, new Finger());
     return this.fingers.get(index);
   }
 
   take(news) {
     const health = news.health;
     if (health) {
-      if (this.health && this.health.epoch !== health.epoch) this.clear();
+      if (this.health && this.health.epoch !== health.epoch) this.fingers.clear(); // another playing has begun
       this.health = health;
     }
     for (const row of news.frames) {
@@ -56,7 +51,6 @@ export class Model {
       seq: row[column.seq],
       tUs: row[column.t_us],
       flags: row[column.flags],
-      tareState: row[column.tare_state],
       signal: scaled("signal_q4"),
       pdc: plain("pdc"),
       tac: plain("tac"),
@@ -70,8 +64,7 @@ export class Model {
 }
 
 export class Finger {
-  constructor(index) {
-    this.index = index;
+  constructor() {
     this.latest = null;
     this.history = { t: ring(HISTORY_ROWS), x: ring(HISTORY_ROWS), y: ring(HISTORY_ROWS), z: ring(HISTORY_ROWS), pdc: ring(HISTORY_ROWS) };
     this.rows = 0; // ever added

@@ -14,9 +14,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import numpy as np
 
-from ..calibrate.reference import rdt
-from .nano17 import COUNTS_PER_N, COUNTS_PER_NM, Nano17
-from .source import Source
+from biotac.calibrate.reference import rdt
+from biotac.sim.nano17 import COUNTS_PER_N, COUNTS_PER_NM, Nano17
+from biotac.sim.source import Source
 
 BUFFERED_RECORDS = 40
 

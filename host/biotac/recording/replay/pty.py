@@ -1,4 +1,4 @@
-"""A recording as a board on a pty, for any serial program."""
+"""A recording played back as a board on a pty, for any serial program."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import pty
 import select
 import tty
 
-from ..clock.host_clock import HostClock, SystemClock
-from ..errors import PortError
+from ...clock.host_clock import HostClock, SystemClock
+from ...errors import PortError
+from .link import CHUNK_BYTES, Pacer
 from .playback import Playback
-from .replay_link import CHUNK_BYTES, Pacer
 
 
 class ReplayPty:
-    """A pty on which any serial program meets the recorded board; ``path`` names it."""
+    """A pty on which any serial program finds the recorded board, at ``path``."""
 
     def __init__(self, playback: Playback, pace: float, *, clock: HostClock | None = None) -> None:
         self._pacer = Pacer(playback, pace, clock or SystemClock())
@@ -23,18 +23,18 @@ class ReplayPty:
             self._master, self._slave = pty.openpty()
         except OSError as error:
             raise PortError(f"no pty for the recording ({error.strerror}); use replay: in this process") from error
-        # Kept open: the pty outlives whoever opens and closes it. Raw, or it would echo our own bytes.
+        # Kept open, so that the pty outlives the programs that open and close it. Raw, or it would echo our own bytes.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
 
     @property
     def over(self) -> bool:
-        """Everything was handed over."""
+        """True when everything has been handed over."""
         return self._pacer.playback.over and not self._out
 
     def turn(self, timeout_s: float) -> None:
-        """Answer and play for one turn; waits at most ``timeout_s`` for something to do."""
+        """Answer commands and play what is due, once; waits at most ``timeout_s`` for something to do."""
         wait_s = self._pacer.wait_s()
         if not self._out and wait_s is not None:
             timeout_s = min(timeout_s, wait_s)
@@ -56,11 +56,11 @@ class ReplayPty:
         try:
             sent = os.write(self._master, self._out)
         except BlockingIOError:
-            sent = 0  # the reader is behind; nothing is dropped, time waits for it
+            sent = 0  # the reader is behind; nothing is dropped, playback waits
         self._out = self._out[sent:]
 
     def close(self) -> None:
-        """Take the pty away. Safe to call twice."""
+        """Close the pty. Safe to call twice."""
         for fd in (self._master, self._slave):
             if fd >= 0:
                 os.close(fd)

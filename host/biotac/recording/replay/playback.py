@@ -1,7 +1,7 @@
-"""A recording that answers as the board did: commands in, its stream out. No I/O, no clock.
+"""A recording that answers as the board did: commands in, stream out. No I/O, no clock.
 
-It says HELLO, settings and sensors as they were recorded, and plays the wire byte for byte as far as START
-asks for it. What would change the board is refused: it has happened already.
+It answers with the recorded HELLO, settings and sensors, and plays those parts of the wire that START asks for, byte
+for byte. Commands that would change the board are refused: the recording cannot change any more.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import struct
 from collections.abc import Iterator
 from typing import Any
 
-from ..errors import InputError
-from ..keep import map_blob as maps
-from ..wire import messages_gen as wire
-from ..wire.counters import nearest
-from ..wire.decoder import Decoder
-from ..wire.framing import encode
-from .pieces import Piece, split
-from .reader import Recording
+from ...errors import InputError
+from ...keep import map_blob as maps
+from ...wire import messages_gen as wire
+from ...wire.counters import nearest
+from ...wire.decoder import Decoder
+from ...wire.framing import encode
+from ..pieces import Piece, split
+from ..reader import Recording
 
 _STREAM_OF = {
     wire.Frame.ID: wire.StreamFlags.FRAMES,
@@ -32,18 +32,18 @@ _STREAM_OF = {
     wire.SensorStatus.ID: wire.StreamFlags.STATUS,
 }
 _TIME = struct.Struct("<I")
-_TIME_AT = 2  # seq, then t_us: all stream messages begin so
+_TIME_AT = 2  # after seq; all stream messages begin with seq and t_us
 _FINGER_AT = 6
-_FINGER_AT_IN_STATUS = 7  # behind req_id
+_FINGER_AT_IN_STATUS = 7  # after req_id
 _REQ_ID_AT = 6
-# Of these alone the order in time is that of arrival: a PAC begins after the FRAME that it precedes.
+# Only these arrive in order of their times: a PAC can begin later than the FRAME that it precedes.
 _CLOCKS = (wire.Frame.ID, wire.Idle.ID)
 
 
 class Playback:
     """The part of ``recording`` from ``from_s`` to ``to_s``, in device seconds since its first frame.
 
-    Raises InputError when nothing of it lies in there.
+    Raises InputError when ``from_s`` is outside the recording, or ``to_s`` is not after it.
     """
 
     def __init__(self, recording: Recording, *, from_s: float = 0.0, to_s: float | None = None) -> None:
@@ -62,7 +62,7 @@ class Playback:
         self._asked: wire.Start | None = None
         self.playing = False
         self.over = False
-        # What GET_STATUS is answered with: the latest that was played, at first the earliest there is.
+        # The answer to GET_STATUS: the last one played; before that, the first of the recording.
         statuses = [m for m in recording.messages if isinstance(m, wire.Status)]
         self._status: wire.Status | None = statuses[0] if statuses else None
         sensors = [m for m in reversed(recording.messages) if isinstance(m, wire.SensorStatus)]
@@ -71,7 +71,7 @@ class Playback:
     # ---- what it plays -------------------------------------------------------------------------
 
     def next_us(self) -> int | None:
-        """Device time since ``from_s`` at which the next bytes are due; None when it is over."""
+        """Device time in us since ``from_s`` at which the next bytes are due; None when the playback is over."""
         while self._next is None and not self.over:
             t_us, piece = next(self._stream, (0, None))
             self.over = piece is None
@@ -80,14 +80,14 @@ class Playback:
         return None if self._next is None else self._next[0]
 
     def take(self) -> bytes:
-        """The next bytes; none when it is over."""
+        """The next bytes; empty when the playback is over."""
         self.next_us()
         data = b"" if self._next is None else self._next[1]
         self._next = None
         return data
 
     def _timed(self) -> Iterator[tuple[int, Piece]]:
-        """Pieces between from and to, with the device time at which each came."""
+        """Pieces in the range played, each with the device time at which it came."""
         now_us = self.recording.begin_us
         for piece in split(self.recording.blocks):
             if piece.message_id in _CLOCKS:
@@ -99,15 +99,15 @@ class Playback:
                 yield now_us, piece
 
     def _wanted(self, piece: Piece) -> bytes | None:
-        """Its bytes as this session shall see them; None if it shall not."""
+        """The piece's bytes as sent to this session; None if they are not sent."""
         message_id, payload = piece.message_id, piece.payload
         if message_id is None:
-            return piece.data  # damaged as it was, for the host to count
+            return piece.data  # damaged then, and passed on for the host to count
         if self._asked is None:
             return None
         if message_id == wire.Reply.ID:
-            # A START in the middle: its reply tells a decoder that the gap before it is no loss. Request 0
-            # is nobody's.
+            # A START in mid-recording: its reply tells a decoder that the gap before it is not a loss. No request has
+            # the id 0.
             reply = wire.Reply.unpack(payload[: wire.Reply.STRUCT.size])
             again = reply.command == wire.Start.ID and reply.error == wire.Error.OK
             return encode(wire.Reply.ID, dataclasses.replace(reply, req_id=0).pack()) if again else None
@@ -115,7 +115,7 @@ class Playback:
         if stream is None or not self._asked.streams & stream:
             return None
         if stream == wire.StreamFlags.STATUS and payload[_REQ_ID_AT]:
-            return None  # somebody had asked for it then
+            return None  # it answered a request at the time
         if message_id == wire.Status.ID:
             self._status = wire.Status.unpack(payload[: wire.Status.STRUCT.size])
             return piece.data
@@ -128,11 +128,11 @@ class Playback:
     # ---- what it answers -----------------------------------------------------------------------
 
     def requests(self, data: bytes) -> list[tuple[int, bytes]]:
-        """The commands that these bytes of the host complete."""
+        """The commands completed by these bytes from the host."""
         return [request for request in self._decoder.feed(data).others if request[1]]
 
     def answer(self, message_id: int, payload: bytes) -> bytes | None:
-        """Reply to one command; None if it makes no sense here (``refusal``)."""
+        """The reply to one command; None if a recording cannot execute it (see ``refusal``)."""
         req_id = payload[0]
         known = wire.MESSAGES.get(message_id)
         if message_id in (wire.Ping.ID, wire.Stop.ID):
@@ -163,7 +163,7 @@ class Playback:
         return None
 
     def refusal(self, message_id: int, payload: bytes) -> bytes:
-        """The reply to a command that has no answer."""
+        """The reply to a command for which ``answer`` returned None."""
         return _reply(payload[0], message_id, wire.Error.NOT_HERE)
 
     def _setting(self, asked: wire.GetSetting) -> bytes:

@@ -1,0 +1,1 @@
+"""A recording played back as a board: its stream, and answers to commands."""

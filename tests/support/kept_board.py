@@ -1,0 +1,35 @@
+"""A simulated board that outlives its process: settings, calibrations and maps are in a file."""
+
+from __future__ import annotations
+
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import biotac
+from biotac.sim.loading import load_source
+from biotac.sim.process import SimBoard, SimLink
+from biotac.sim.source import Source
+
+
+class KeptBoard(SimBoard):
+    """A simulated board whose flash is a file, and outlives it."""
+
+    def __init__(self, source: Source, flash: Path) -> None:
+        self._flash = flash
+        super().__init__(source, pace=0.0, hold=True)
+
+    def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
+        return super()._start([*options, "--flash", str(self._flash)])
+
+
+def boot(flash: Path, serials: list[str] | None = None) -> biotac.Hand:
+    """Two fingers, of these serial numbers, on a board with this flash."""
+    source = load_source("press.toml", fingers=2, seconds=1)
+    board = KeptBoard(replace(source, serials=serials) if serials else source, flash)
+    return biotac.Hand(SimLink("sim:flash", board))
+
+
+def serial_of(hand: biotac.Hand, finger: int) -> str:
+    """What its sensor says that it is."""
+    return bytes(hand.sensor_info(finger).serial).rstrip(b"\0").decode()
