@@ -9,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
-from prover.report import Report
+from prover import Report
 
 
 @pytest.fixture

@@ -24,7 +24,7 @@ from pathlib import Path
 
 import pytest
 
-from prover.report import Report
+from prover import Report
 from prover.source import CORE, changed, run_c, text_of
 from prover.table import constants, doubles, table
 

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 import z3
 
+from prover import Report
 from prover.cnumbers import INT, INT64, UINT
 from prover.integers import IntegerDomain
 from prover.prove import Input, Refuted, prove
-from prover.report import Report
 from prover.source import CORE, changed, parse, text_of
 from prover.table import constants, table
 

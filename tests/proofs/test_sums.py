@@ -14,10 +14,9 @@ from functools import cache
 import pytest
 from pycparser import c_ast
 
-from prover import sums
+from prover import Report, sums
 from prover.cnumbers import UINT, Undefined, Unsupported
 from prover.linear import Form, LinearDomain, Overflow, inputs
-from prover.report import Report
 from prover.source import CORE, parse, text_of
 from prover.table import constants, table
 

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 import z3
 
+from prover import Report
 from prover.cnumbers import INT
 from prover.integers import IntegerDomain
 from prover.prove import Refuted, prove
-from prover.report import Report
 from prover.source import CORE, changed, parse, text_of
 from prover.table import constants
 

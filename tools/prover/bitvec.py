@@ -6,25 +6,17 @@ from typing import Any
 
 import z3
 
-from .cnumbers import UINT, CType
-from .integers import Obligation
+from .cnumbers import COMPARE, COMPUTE, UINT, CType
+from .integers import Questions
 
 
 def vector(x: Any, bits: int) -> Any:
     return z3.BitVecVal(x, bits) if isinstance(x, int) else x
 
 
-class BitVectorDomain:
-    def __init__(self) -> None:
-        self.facts: list[Any] = []
-        self.obligations: list[Obligation] = []
-        self.inputs: dict[str, Any] = {}
-
+class BitVectorDomain(Questions):
     def input(self, name: str, kind: CType) -> Any:
         return self.inputs.setdefault(name, z3.BitVec(name, kind.bits))
-
-    def require(self, what: str, condition: Any, guard: Any) -> None:
-        self.obligations.append(Obligation(what, guard, condition, len(self.facts)))
 
     def binary(self, op: str, kind: CType, a: Any, b: Any, guard: Any) -> Any:
         x = vector(a, kind.bits)
@@ -45,8 +37,7 @@ class BitVectorDomain:
             if kind.signed:
                 return x / y if op == "/" else z3.SRem(x, y)
             return z3.UDiv(x, y) if op == "/" else z3.URem(x, y)
-        results = {"+": x + y, "-": x - y, "*": x * y, "&": x & y, "|": x | y, "^": x ^ y}
-        return results[op]
+        return COMPUTE[op](x, y)
 
     def require_no_overflow(self, op: str, x: Any, y: Any, guard: Any) -> None:
         if op == "+":
@@ -63,25 +54,14 @@ class BitVectorDomain:
 
     def compare(self, op: str, kind: CType, a: Any, b: Any) -> Any:
         x, y = vector(a, kind.bits), vector(b, kind.bits)
-        if op in ("==", "!="):
-            return x == y if op == "==" else x != y
-        if kind.signed:
-            signed = {"<": x < y, "<=": x <= y, ">": x > y, ">=": x >= y}
-            return signed[op]
-        unsigned = {"<": z3.ULT(x, y), "<=": z3.ULE(x, y), ">": z3.UGT(x, y), ">=": z3.UGE(x, y)}
-        return unsigned[op]
+        unsigned = {} if kind.signed else {"<": z3.ULT, "<=": z3.ULE, ">": z3.UGT, ">=": z3.UGE}
+        return unsigned.get(op, COMPARE[op])(x, y)
 
     def convert(self, x: Any, source: CType, target: CType, guard: Any) -> Any:
         return resized(x, target.bits, signed=source.signed)
 
     def choose(self, condition: Any, kind: CType, a: Any, b: Any) -> Any:
         return z3.If(condition, vector(a, kind.bits), vector(b, kind.bits))
-
-    def both(self, a: Any, b: Any) -> Any:
-        return z3.And(a, b)
-
-    def inverse(self, a: Any) -> Any:
-        return z3.Not(a)
 
     def clz(self, x: Any, guard: Any) -> Any:
         self.require("clz of 0", x != 0, guard)

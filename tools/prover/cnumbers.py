@@ -1,8 +1,9 @@
-"""C's numbers: types of a width, promotions, and arithmetic on numbers that are known."""
+"""C's numbers: types with a width, promotions, and arithmetic on known numbers."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import operator
+from typing import Any, NamedTuple
 
 
 class Unsupported(Exception):
@@ -10,7 +11,7 @@ class Unsupported(Exception):
 
 
 class Undefined(Exception):
-    """Known numbers that run into undefined behaviour."""
+    """Known numbers that lead to undefined behaviour."""
 
 
 class CType(NamedTuple):
@@ -46,7 +47,25 @@ NAMES = {
     "long long": INT64,
     "unsigned long long": CType(False, 64),
 }
-COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+# These work on z3's terms, too.
+COMPARE: dict[str, Any] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+}
+COMPUTE: dict[str, Any] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "<<": operator.lshift,
+    ">>": operator.rshift,
+    "&": operator.and_,
+    "|": operator.or_,
+    "^": operator.xor,
+}
 
 
 def promoted(kind: CType) -> CType:
@@ -72,23 +91,11 @@ def known_binary(op: str, kind: CType, a: int, b: int) -> int:
         raise Undefined(f"shift by {b}")
     if op == "<<" and kind.signed and a < 0:
         raise Undefined("a negative number shifted to the left")
-    quotient = (abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)) if op in ("/", "%") else 0
-    value = {
-        "+": lambda: a + b,
-        "-": lambda: a - b,
-        "*": lambda: a * b,
-        "/": lambda: quotient,
-        "%": lambda: a - quotient * b,
-        "<<": lambda: a << b,
-        ">>": lambda: a >> b,
-        "&": lambda: a & b,
-        "|": lambda: a | b,
-        "^": lambda: a ^ b,
-    }[op]()
+    if op in ("/", "%"):
+        quotient = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
+        value = quotient if op == "/" else a - quotient * b
+    else:
+        value = COMPUTE[op](a, b)
     if kind.signed and not kind.holds(value):
         raise Undefined(f"{a} {op} {b} overflows")
     return wrapped(kind, value)
-
-
-def known_compare(op: str, a: int, b: int) -> bool:
-    return {"<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b, "==": a == b, "!=": a != b}[op]

@@ -1,8 +1,8 @@
 """C's arithmetic as z3 integers: exact numbers, with every place where C would wrap made explicit.
 
-Shifts, masks and divisions become fresh integers with the equations that define them, so that what is
-left is linear or nearly so; bit-vectors of 64 bits would leave z3 to rediscover how division works. A
-fact that rests on an earlier obligation holds only where that obligation was asked, hence the guards.
+Shifts, masks and divisions become fresh integers with the equations that define them, so that the rest is linear or
+nearly so; with 64-bit bit-vectors z3 would have to rediscover how division works. A fact that rests on an earlier
+obligation holds only where that obligation was asked for, hence the guards.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 
 import z3
 
-from .cnumbers import CType, Unsupported
+from .cnumbers import COMPARE, CType, Unsupported
 
 
 @dataclass(frozen=True)
@@ -30,18 +30,34 @@ class Obligation:
     facts: int  # how many facts existed when it arose; only those may be used for it
 
 
-def number(x: Any) -> Number:
-    return x if isinstance(x, Number) else Number(z3.IntVal(x), x, x)
+class Questions:
+    """The questions for z3: for these inputs, given the facts, whether each obligation holds."""
 
-
-class IntegerDomain:
     def __init__(self) -> None:
         self.facts: list[Any] = []
         self.obligations: list[Obligation] = []
         self.inputs: dict[str, Any] = {}
+
+    def require(self, what: str, condition: Any, guard: Any) -> None:
+        self.obligations.append(Obligation(what, guard, condition, len(self.facts)))
+
+    def both(self, a: Any, b: Any) -> Any:
+        return z3.And(a, b)
+
+    def inverse(self, a: Any) -> Any:
+        return z3.Not(a)
+
+
+def number(x: Any) -> Number:
+    return x if isinstance(x, Number) else Number(z3.IntVal(x), x, x)
+
+
+class IntegerDomain(Questions):
+    def __init__(self) -> None:
+        super().__init__()
         self.parts: dict[tuple[int, int, int], tuple[Number, Number]] = {}
-        self.kept: list[Any] = []  # keeps terms alive whose ids are keys
-        self.made = 0  # fresh numbers; counted here, so that a question is the same text whatever was asked before
+        self.kept: list[Any] = []  # keeps alive the terms whose ids are keys
+        self.made = 0  # fresh numbers; counted here, so that a question's text does not depend on earlier questions
 
     def input(self, name: str, kind: CType) -> Number:
         term = self.inputs.setdefault(name, z3.Int(name))
@@ -57,11 +73,8 @@ class IntegerDomain:
     def fact(self, condition: Any, guard: Any) -> None:
         self.facts.append(condition if guard is True else z3.Implies(guard, condition))
 
-    def require(self, what: str, condition: Any, guard: Any) -> None:
-        self.obligations.append(Obligation(what, guard, condition, len(self.facts)))
-
     def fitted(self, term: Any, low: int, high: int, kind: CType, what: str, guard: Any) -> Number:
-        """A result in its type: required of signed types, wrapped in unsigned ones."""
+        """A result in its type: signed types require that it fits, unsigned types wrap it."""
         if kind.holds(low) and kind.holds(high):
             return Number(term, low, high)
         if kind.signed:
@@ -70,7 +83,7 @@ class IntegerDomain:
         return self.modulo(Number(term, low, high), kind.bits, guard)[1]
 
     def modulo(self, x: Number, bits: int, guard: Any) -> tuple[Number, Number]:
-        """floor(x / 2^bits) and what is left: also what an arithmetic shift and a mask give below 0."""
+        """floor(x / 2^bits) and the remainder, as an arithmetic shift and a mask give, also below 0."""
         key = (x.term.get_id(), 0, bits)
         if key not in self.parts:
             quotient = self.fresh("high", x.low >> bits, x.high >> bits, True)
@@ -110,10 +123,10 @@ class IntegerDomain:
         if op == "&" and isinstance(b, int) and b & (b + 1) == 0:
             return self.modulo(x, b.bit_length(), guard)[1]
         if op == "&" and kind.signed and self.parts.get((x.term.get_id(), 0, kind.bits - 1), (None,))[0] is b:
-            # The sign, copied into every bit, keeps all of a negative number and nothing of others.
+            # The sign, copied into every bit, keeps all bits of a negative number and none of others.
             return Number(z3.If(x.term < 0, x.term, 0), min(x.low, 0), min(x.high, 0))
         if op == "^" and kind.signed and (y.low >= -1 and y.high <= 0):
-            # With 0, or with -1, which turns every bit over: -x - 1.
+            # With 0, or with -1, which inverts every bit: -x - 1.
             turned = Number(-x.term - 1, -x.high - 1, -x.low - 1)
             if y.low == y.high:
                 return turned if y.low else x
@@ -138,9 +151,7 @@ class IntegerDomain:
         raise Unsupported(f"operator {op} on integers")
 
     def compare(self, op: str, kind: CType, a: Any, b: Any) -> Any:
-        x, y = number(a).term, number(b).term
-        results = {"<": x < y, "<=": x <= y, ">": x > y, ">=": x >= y, "==": x == y, "!=": x != y}
-        return results[op]
+        return COMPARE[op](number(a).term, number(b).term)
 
     def convert(self, x: Any, source: CType, target: CType, guard: Any) -> Any:
         if target.holds(x.low) and target.holds(x.high):
@@ -154,12 +165,6 @@ class IntegerDomain:
     def choose(self, condition: Any, kind: CType, a: Any, b: Any) -> Any:
         x, y = number(a), number(b)
         return Number(z3.If(condition, x.term, y.term), min(x.low, y.low), max(x.high, y.high))
-
-    def both(self, a: Any, b: Any) -> Any:
-        return z3.And(a, b)
-
-    def inverse(self, a: Any) -> Any:
-        return z3.Not(a)
 
     def clz(self, x: Any, guard: Any) -> Any:
         raise Unsupported("clz of an integer: use bit-vectors")

@@ -1,10 +1,9 @@
-"""Exact integer linear forms: what a sum over the electrodes is, and how large it and its parts can be.
+"""Exact integer linear forms: the value of a sum over the electrodes, and the extremes of it and its parts.
 
-A form is a sum of known multiples of atoms. An atom is an input, the compressed part min(e, 0) of one,
-the high or the low part of a form that was split by a shift or a mask, or what a division left over.
-Expanding the low parts (low = form - 2^bits high) decides equality of two sums exactly, as polynomials;
-the extreme values of a form over the box of its atoms are sums of |coefficient| times range, an L1 norm,
-and are reached when the atoms are inputs.
+A form is a sum of known multiples of atoms. An atom is an input, the compressed part min(e, 0) of one, the high or the
+low part of a form that was split by a shift or a mask, or the remainder of a division. Expanding the low parts
+(low = form - 2^bits high) decides exactly, as for polynomials, whether two sums are equal. The extremes of a form over
+the box of its atoms are sums of |coefficient| times range, an L1 norm; they are reached if the atoms are inputs.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from .cnumbers import CType, Unsupported
 
 
 class Overflow(Exception):
-    """A signed result that leaves its type, with an input that makes it do so."""
+    """A signed result that leaves its type, with an input for which it does."""
 
     def __init__(self, message: str, witness: dict[str, int]) -> None:
         super().__init__(f"{message}; reached at {witness}")
@@ -30,14 +29,14 @@ class Atom:
     name: str
     low: int
     high: int
-    # A split's high part knows what it is part of; so does a low part, and that it is one.
+    # The form that a high or low part was split from, and whether it is the low part.
     of: Form | None = None
     bits: int = 0
     is_low: bool = False
     is_rest: bool = False
 
 
-Rational = int | Fraction  # divisions leave fractions; every form's value still is a whole number
+Rational = int | Fraction  # divisions leave fractions, but every form's value is a whole number
 
 
 class Form:
@@ -71,7 +70,7 @@ class Form:
         return f"{text} + {self.constant}"
 
     def extreme(self, sign: int) -> tuple[int, dict[str, int]]:
-        """The largest (sign 1) or smallest (-1) value over the box, and where it is taken."""
+        """The largest (sign 1) or smallest (-1) value over the box, and an input where it is taken."""
         at = {atom.name: atom.high if c * sign > 0 else atom.low for atom, c in self.terms.items()}
         value = self.constant + sum(c * at[atom.name] for atom, c in self.terms.items())
         return math.floor(value) if sign > 0 else math.ceil(value), at
@@ -89,21 +88,23 @@ class Form:
         return max(abs(self.low), abs(self.high))
 
     def expanded(self) -> Form:
-        """The same without low parts: low = form - 2^bits * high. High parts that do not cancel stay."""
+        """The same form without low parts: low = form - 2^bits * high. High parts that do not cancel stay."""
         out = Form({}, self.constant)
         for atom, c in self.terms.items():
             if atom.of is None:
                 out = out + Form({atom: c})
                 continue
             whole = atom.of.expanded()
-            # The same number may have been split in two ways of writing it: name parts by what they are of.
+            # The same number may have been split in two notations: name parts by the form that they are part of.
             high = Atom(f"high{atom.bits}({sorted_text(whole)})", 0, 0)
             out = out + (whole * c - Form({high: c * (1 << atom.bits)}) if atom.is_low else Form({high: c}))
         return out
 
     def coefficients(self, names: list[str], *, cut: Rational = 0) -> list[Rational]:
-        """Of the expanded form, in that order. What divisions left over may add up to less than ``cut``;
-        anything else besides the names is refused."""
+        """Coefficients of the expanded form, in the order of ``names``.
+
+        Raises ValueError if remainders of divisions may add up to ``cut`` or more, or if anything else is left.
+        """
         expanded = self.expanded()
         rests = [(atom, c) for atom, c in expanded.terms.items() if atom.is_rest]
         by_name = {atom.name: c for atom, c in expanded.terms.items() if not atom.is_rest}
@@ -125,10 +126,10 @@ def inputs(count: int, low: int, high: int) -> list[Form]:
 
 
 class LinearDomain:
-    """Refuses what is not linear, and any signed result that can leave its type.
+    """Refuses whatever is not linear, and any signed result that can leave its type.
 
-    Unsigned forms may wrap: they are kept as what they are congruent to, and a conversion to a signed
-    type, a shift, a mask or a comparison asks that the form itself fits, which then is what C computes.
+    Unsigned forms may wrap: they are kept as a congruent form. A conversion to a signed type, a shift, a mask or a
+    comparison requires that the form itself fits, and then it is what C computes.
     """
 
     def __init__(self) -> None:
@@ -158,14 +159,14 @@ class LinearDomain:
         if op == "*" and (isinstance(a, int) or isinstance(b, int)):
             form, factor = (b, a) if isinstance(a, int) else (a, b)
             if not kind.signed and factor >> (kind.bits - 1):
-                factor -= 1 << kind.bits  # congruent, and what a negative coefficient turns into
+                factor -= 1 << kind.bits  # congruent; a negative coefficient had become the unsigned factor
             return self.signed(form * factor, kind, "a product")
         if op in ("<<", ">>", "&") and isinstance(b, int) and isinstance(a, Form):
             return self.split(op, kind, a, b)
         if op == "/" and isinstance(b, int) and b > 0:
             return self.divide(kind, a, b)
         if op == "&" and kind.signed and b == self.split(">>", kind, a, kind.bits - 1):
-            # The sign, copied into every bit, keeps all of a negative number and nothing of others.
+            # The sign, copied into every bit, keeps all bits of a negative number and none of others.
             return Form({Atom(f"min({sorted_text(a)},0)", min(a.low, 0), min(a.high, 0)): 1})
         raise Unsupported(f"{op} of signals is not linear")
 
@@ -185,28 +186,18 @@ class LinearDomain:
         return Form({Atom(f"low{bits}({a})", 0, b, a, bits, True): 1})
 
     def divide(self, kind: CType, a: Form, b: int) -> Form:
-        """Towards 0: a = b q + rest, where the rest has the sign of a."""
+        """Division towards 0: a = b q + rest, where the rest has the sign of a."""
         self.checked(a, kind, "what is divided")
         rest = Atom(f"rest{b}({a})", -(b - 1) if a.low < 0 else 0, b - 1 if a.high > 0 else 0, is_rest=True)
         return (a - Form({rest: 1})) * Fraction(1, b)
 
     def convert(self, x: Any, source: CType, target: CType, guard: Any) -> Any:
         if target.signed or target.bits > source.bits:
-            # Narrowing keeps the value modulo 2^bits, so a form that fits is what comes out.
+            # Narrowing keeps the value modulo 2^bits, so a form that fits comes out unchanged.
             self.checked(x, target if target.signed else source, "a conversion")
         return x
 
-    def compare(self, op: str, kind: CType, a: Any, b: Any) -> Any:
-        raise Unsupported("a condition on a signal inside a sum")
+    def refuse(self, *operands: Any) -> Any:
+        raise Unsupported("a condition on a signal, a choice by it or its clz inside a sum")
 
-    def choose(self, condition: Any, kind: CType, a: Any, b: Any) -> Any:
-        raise Unsupported("a choice by a signal inside a sum")
-
-    def both(self, a: Any, b: Any) -> Any:
-        raise Unsupported("a condition on a signal inside a sum")
-
-    def inverse(self, a: Any) -> Any:
-        raise Unsupported("a condition on a signal inside a sum")
-
-    def clz(self, x: Any, guard: Any) -> Any:
-        raise Unsupported("clz inside a sum")
+    compare = choose = both = inverse = clz = refuse

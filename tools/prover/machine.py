@@ -1,10 +1,10 @@
-"""An interpreter for the C of the core, in which a number may be a symbol of some domain.
+"""An interpreter for the core's C in which a number may be a symbol of some domain.
 
-Known numbers are computed here, with C's types and promotions. Unknown ones go to the domain. Both
-sides of an `if` on an unknown condition run, each store under its condition; a loop must end by a
-known condition. Whatever C leaves undefined is an obligation, which the domain has to discharge:
-overflow of a signed type, a shift by too much or of a negative number to the left, division by 0.
-Anything else that is not understood raises Unsupported: a proof never skips what it cannot read.
+Known numbers are computed here, with C's types and promotions. Unknown ones go to the domain. Both sides of an `if` on
+an unknown condition run, each store under its condition; a loop must end by a known condition. Whatever C leaves
+undefined is an obligation that the domain must discharge: overflow of a signed type, a shift by too much or of a
+negative number to the left, division by 0. Anything else that is not understood raises Unsupported: a proof never
+skips what it cannot read.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pycparser import c_ast
 
 from .cnumbers import (
     BOOL,
-    COMPARISONS,
+    COMPARE,
     INT,
     UINT,
     CType,
@@ -23,7 +23,6 @@ from .cnumbers import (
     Unsupported,
     common,
     known_binary,
-    known_compare,
     promoted,
     wrapped,
 )
@@ -87,7 +86,7 @@ class Machine(Storage):
         return not a if isinstance(a, bool) else self.domain.inverse(a)
 
     def here(self) -> Any:
-        """The condition under which this statement runs, once its function was called."""
+        """The condition under which this statement runs, given that its function was called."""
         return self.both(self.frame.guard, self.frame.live)
 
     def now(self) -> Any:
@@ -135,8 +134,8 @@ class Machine(Storage):
         x = self.converted(a, kind)
         y = self.converted(b, promoted(b.kind) if op in ("<<", ">>") else kind)
         known = isinstance(x, int) and isinstance(y, int)
-        if op in COMPARISONS:
-            return self.from_condition(known_compare(op, x, y) if known else self.domain.compare(op, kind, x, y))
+        if op in COMPARE:
+            return self.from_condition(COMPARE[op](x, y) if known else self.domain.compare(op, kind, x, y))
         if known:
             return Value(kind, known_binary(op, kind, x, y))
         return Value(kind, self.domain.binary(op, kind, x, y, self.now()))
@@ -309,8 +308,7 @@ class Machine(Storage):
             self.run(item)
         self.frame.names = outer
 
-    def run_Decl(self, node: Any) -> None:
-        self.declare(node)
+    run_Decl = Storage.declare
 
     def run_DeclList(self, node: Any) -> None:
         for decl in node.decls:
@@ -319,8 +317,7 @@ class Machine(Storage):
     def run_EmptyStatement(self, node: Any) -> None:
         pass
 
-    def run_StaticAssert(self, node: Any) -> None:
-        pass
+    run_StaticAssert = run_EmptyStatement
 
     def run_Return(self, node: Any) -> None:
         if node.expr is not None:

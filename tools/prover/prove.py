@@ -1,7 +1,7 @@
-"""Asking z3: a claim about a C function, together with everything C leaves undefined in it.
+"""Asks z3 about a claim on a C function, together with everything that C leaves undefined in it.
 
-Every question goes to a z3 process of its own, as text, with a limit in z3's own units of work. What z3 finds and
-what it costs then depend on the question alone: not on what was asked before, and not on what else the computer does.
+Every question goes to a z3 process of its own, as text, with a limit in z3's own units of work. So z3's answer and its
+cost depend on the question alone, not on earlier questions or on what else the computer does.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Input = tuple[str, CType] | int  # a symbol, or a known number
 
 
 class Refuted(Exception):
-    """The claim is wrong; the witness is an input for which it is."""
+    """The claim is wrong; the witness is an input for which it fails."""
 
     def __init__(self, claim: str, witness: dict[str, int]) -> None:
         super().__init__(f"{claim}: wrong for {witness}")
@@ -36,17 +36,17 @@ class Refuted(Exception):
 
 
 class Undecided(Exception):
-    """z3 gave up; never taken for a proof."""
+    """z3 gave up, which never counts as a proof."""
 
 
-# Of z3's own units. The hardest question of the night takes 35 million (45 s), of the day 17 million.
+# In z3's own units. The hardest nightly question takes 35 million (45 s), the hardest of the daily ones 17 million.
 LIMIT = 400_000_000
 
 VALUE = re.compile(r"\((\w+) (?:(\d+)|\(- (\d+)\)|#x([0-9a-f]+)|#b([01]+))\)")
 
 
 def program() -> str:
-    """z3 as a program: z3-solver's wheel brings it, Debian has it."""
+    """Path of the z3 program, from z3-solver's wheel or from Debian."""
     found = shutil.which("z3", path=os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", "")]))
     if found is None:
         raise FileNotFoundError("no program z3; pip install z3-solver, or Debian's z3")
@@ -54,7 +54,7 @@ def program() -> str:
 
 
 def ask(claim: str, conditions: Sequence[Any], inputs: dict[str, Any], signed: dict[str, bool]) -> None:
-    """Return when the conditions contradict each other, i.e. no counterexample exists."""
+    """Return if the conditions contradict each other, i.e. no counterexample exists. Raises Refuted or Undecided."""
     solver = z3.Solver()
     solver.add(*conditions)
     text = solver.to_smt2()
@@ -67,7 +67,7 @@ def ask(claim: str, conditions: Sequence[Any], inputs: dict[str, Any], signed: d
         return
     if answer != "sat":
         raise Undecided(f"{claim}: z3 says {answer or done.stderr.strip()!r} within {LIMIT} units of work")
-    witness = dict.fromkeys(inputs, 0)  # whatever the conditions do not speak of
+    witness = dict.fromkeys(inputs, 0)  # 0 for whatever the conditions do not mention
     for name, plus, minus, hexadecimal, binary in VALUE.findall(values):
         witness[name] = int(plus or 0) - int(minus or 0) + int(hexadecimal or "0", 16) + int(binary or "0", 2)
         bits = 4 * len(hexadecimal) or len(binary)
@@ -87,7 +87,7 @@ def prove(
 ) -> int:
     """Prove ``claim(result, **inputs)`` and that nothing undefined happens, where ``assume(**inputs)`` holds.
 
-    Inputs reach both as z3 terms. Returns how many queries were answered.
+    Inputs reach both as z3 terms. Returns the number of queries answered.
     """
     machine = Machine(unit, domain)
     values = []

@@ -14,8 +14,8 @@ from pycparser import c_ast, c_parser
 ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "firmware" / "core"
 
-# Only what the core's arithmetic includes. The widths are those of every target we build for; a core
-# that asked for more of libc would fail to parse, which is the wish.
+# Only what the core's arithmetic includes. The widths are those of every target we build for. A core that needed more
+# of libc would fail to parse, on purpose.
 HEADERS = {
     "stdint.h": """
 typedef signed char int8_t; typedef unsigned char uint8_t;
@@ -40,7 +40,7 @@ typedef long long int64_t; typedef unsigned long long uint64_t;
 
 
 def preprocess(text: str, folders: Sequence[Path] = (CORE,)) -> str:
-    """What is left of ``text`` when every #include and macro is gone."""
+    """``text`` after preprocessing: no #include and no macro is left."""
     with tempfile.TemporaryDirectory() as folder:
         for name, content in HEADERS.items():
             Path(folder, name).write_text(content, encoding="utf-8")
@@ -54,29 +54,29 @@ def preprocess(text: str, folders: Sequence[Path] = (CORE,)) -> str:
 
 @cache
 def parse(text: str, folders: tuple[Path, ...] = (CORE,)) -> c_ast.FileAST:
-    """The same tree for the same text: who changes it changes a copy."""
+    """The syntax tree, the same object for the same text: to change it, change a copy."""
     return c_parser.CParser().parse(preprocess(text, folders))
 
 
 @cache
 def text_of(path: Path) -> str:
-    """A C file's text; tests change it before parsing to see a proof fail."""
+    """A C file's text, which tests change before parsing, to see a proof fail."""
     return path.read_text(encoding="utf-8")
 
 
 def changed(text: str, old: str, new: str) -> str:
-    """``text`` with one place made wrong on purpose; the place must be there, and only once."""
+    """``text`` with one place made wrong on purpose. The place must occur exactly once."""
     if text.count(old) != 1:
         raise ValueError(f"{old!r} occurs {text.count(old)} times, so what to break is not clear")
     return text.replace(old, new)
 
 
-# The warnings are those of every other build; a proof that does not compile cleanly proves nothing.
+# The warnings are those of every other build: a proof of C that does not compile cleanly proves nothing.
 FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Werror")
 
 
 def run_c(text: str, folders: Sequence[Path], *arguments: str, sources: Sequence[Path] = ()) -> str:
-    """Compile a program and run it; what it prints. Raises ValueError with that when it fails."""
+    """Compile a program, run it and return its output. Raises ValueError with the output if it fails."""
     with tempfile.TemporaryDirectory() as folder:
         main, program = Path(folder, "main.c"), Path(folder, "program")
         main.write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""C's objects: numbers, arrays, structs and pointers, and how declarations make and fill them."""
+"""C's objects: numbers, arrays, structs and pointers, and how declarations create and fill them."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ class Struct:
 
 @dataclass
 class Frame:
-    """One call: its names, and under which condition it was made and has not returned yet."""
+    """One call: its names, and the conditions under which it was made and has not returned yet."""
 
     names: dict[str, list[Any]]
     entry: Any = True
-    guard: Any = True  # the ifs around the statement that runs
+    guard: Any = True  # the ifs around the running statement
     live: Any = True
     result: Any = None
 
 
 class Storage(ABC):
-    """Names and what they hold; the expressions in declarations are the machine's business."""
+    """Names and their objects; the expressions in declarations are left to Machine."""
 
     types: dict[str, Any]
     globals: dict[str, list[Any]]
@@ -64,7 +64,7 @@ class Storage(ABC):
         """See the machine."""
 
     def scalar(self, node: Any) -> CType | None:
-        """The number type a declaration or type name stands for; None when it is no number."""
+        """The number type of a declaration or type name; None if it is no number."""
         while isinstance(node, c_ast.Typename | c_ast.TypeDecl):
             node = node.type
         if isinstance(node, c_ast.Enum):
@@ -75,7 +75,7 @@ class Storage(ABC):
         return None
 
     def build(self, node: Any) -> Any:
-        """An object of a declared type, its numbers not stored yet."""
+        """An object of a declared type, with its numbers not yet stored."""
         while isinstance(node, c_ast.TypeDecl | c_ast.Typename):
             node = node.type
         kind = self.scalar(node)
@@ -143,7 +143,7 @@ class Storage(ABC):
             index += 1
 
     def clear(self, room: list[Any], at: int) -> None:
-        """What C does to members that an initialiser leaves out."""
+        """Zero the members that an initialiser leaves out, as C does."""
         target = room[at]
         if isinstance(target, Value):
             room[at] = Value(target.kind, 0)

@@ -17,7 +17,7 @@ from .storage import Pointer, Struct, Value
 @dataclass(frozen=True)
 class Sums:
     out: dict[str, Form]  # by field of the result, arrays as name[index]
-    peak: int  # largest magnitude of any signed intermediate result, as the C orders them
+    peak: int  # largest magnitude of any signed intermediate result, in the order of the C
     steps: int
 
     def __getitem__(self, name: str) -> Form:
@@ -38,13 +38,13 @@ def flat(value: Any, name: str) -> dict[str, Value]:
 
 
 def call(machine: Machine, function: str, values: Sequence[Any], *options: int) -> dict[str, Value]:
-    """Run ``function(v, options..., out)``; what it writes, by field."""
+    """Run ``function(v, options..., out)``; return what it writes, by field."""
     parameters = machine.functions[function].decl.type.args.params
     kind = machine.scalar(parameters[0].type.type)
     assert kind is not None
     signals = Pointer([Value(kind, value) for value in values], 0)
     pointed = parameters[-1].type
-    # An array parameter is all there is to say how long what it points to is.
+    # Only an array parameter tells how long its array is.
     room = [machine.build(pointed)] if isinstance(pointed, c_ast.ArrayDecl) else [machine.build(pointed.type)]
     target = Pointer(room[0], 0) if isinstance(room[0], list) else Pointer(room, 0)
     machine.call(function, signals, *(Value(INT, option) for option in options), target)
@@ -55,14 +55,14 @@ def exact(name: str, value: Value, domain: LinearDomain) -> Form:
     if value.x is None:
         raise Undefined(f"{name} is never stored")
     form = value.x if isinstance(value.x, Form) else Form({}, value.x)
-    # An unsigned result so far is only congruent to its form; what fits its type is equal to it.
+    # So far an unsigned result is only congruent to its form; if the form fits the type, they are equal.
     return domain.checked(form, value.kind, name)
 
 
 def forms(
     unit: c_ast.FileAST, function: str, count: int, low: int, high: int, *options: int, wraps: Sequence[str] = ()
 ) -> Sums:
-    """The sums for inputs anywhere in low..high; raises where the C would not compute them exactly.
+    """The sums for inputs anywhere in low..high. Raises where the C would not compute them exactly.
 
     Results in ``wraps`` may leave their unsigned type: they are meant modulo 2^bits.
     """
@@ -73,13 +73,13 @@ def forms(
 
 
 class Known:
-    """For runs in which every number is known: nothing may reach the domain."""
+    """A domain for runs in which every number is known: nothing may reach it."""
 
     def __getattr__(self, name: str) -> object:
         raise AssertionError(f"{name} of an unknown number")
 
 
 def evaluate(unit: c_ast.FileAST, function: str, values: list[int], *options: int) -> dict[str, int]:
-    """The same C on known numbers; raises Undefined where C leaves the result open."""
+    """Results of the same C on known numbers. Raises Undefined where C leaves the result open."""
     domain: Domain = Known()  # type: ignore[assignment]
     return {name: value.x for name, value in call(Machine(unit, domain), function, values, *options).items()}

@@ -1,4 +1,4 @@
-"""What the proofs compare with: Table 1 from protocol/sensor.toml, and the constants the C asserts."""
+"""What the proofs compare with: Table 1 from protocol/sensor.toml, and the constants that the C asserts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Table:
 
     @property
     def arm_nm(self) -> list[tuple[int, int, int]]:
-        """r x n; um times 1/1000 is nm."""
+        """r x n in nm: um times 1/1000."""
         pairs = zip(self.um, self.milli, strict=True)
         return [(y * c - z * b, z * a - x * c, x * b - y * a) for (x, y, z), (a, b, c) in pairs]
 
@@ -48,7 +48,7 @@ def table() -> Table:
 
 
 def constants(include: str, *names: str) -> list[int]:
-    """What macros and constant expressions stand for in the C."""
+    """The values of macros and constant expressions in the C."""
     text = "".join(f"const long long proof_{k} = (long long)({name});\n" for k, name in enumerate(names))
     machine = Machine(parse(f'#include "{include}"\n{text}'), None)  # type: ignore[arg-type]
     values = [machine.globals[f"proof_{k}"][0] for k in range(len(names))]
@@ -58,7 +58,7 @@ def constants(include: str, *names: str) -> list[int]:
 
 
 def doubles(include: str, *names: str) -> list[float]:
-    """What expressions of a header are worth as doubles: asked of a compiled program."""
+    """The values of a header's expressions as doubles, from a compiled program."""
     prints = "".join(f'    printf("%.17g\\n", (double)({name}));\n' for name in names)
     text = f'#include <stdio.h>\n#include "{include}"\nint main(void)\n{{\n{prints}    return 0;\n}}\n'
     return [float(line) for line in run_c(text, (ROOT / "firmware/reference",)).split()]
