@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import re
 import subprocess
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +20,8 @@ PAGE = ROOT / "host/docs/architecture.md"
 PYTHON = "host/biotac"
 C = ("firmware", "host/binding")
 BY_NAME = re.compile(r"biotac(\.\w+)+(:\w+)?")
+NOT_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"', re.S)
+FUNCTION = re.compile(r"^[A-Za-z_][\w *]*?\b(\w+)\([^;{]*\)\s*\{", re.M)
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,24 @@ def c_arrows(root: Path, files: Iterable[str]) -> Iterator[Arrow]:
             yield from (Arrow(file, number, header) for header in found)
 
 
+def c_calls(root: Path, files: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Which C file names a function of which other: a header that several share does not tell.
+
+    A function that several files define is one image's or the other's, as port.h's are, and leads nowhere.
+    """
+    c = [file for file in files if file.startswith(C) and file.endswith((".c", ".h"))]
+    code = {file: NOT_CODE.sub("", (root / file).read_text(encoding="utf-8")) for file in c}
+    declared = {name for file in c if file.endswith(".h") for name in re.findall(r"(\w+)\(", code[file])}
+    named = {file: set(re.findall(r"(?<![.>\w])\w+\b", text)) for file, text in code.items() if file.endswith(".c")}
+    homes: dict[str, list[str]] = defaultdict(list)
+    for file in named:
+        for name in declared.intersection(FUNCTION.findall(code[file])):
+            homes[name].append(file)
+    for name, home in homes.items():
+        if len(home) == 1:
+            yield from ((file, home[0]) for file, names in named.items() if name in names)
+
+
 def wrong(arrows: Iterable[Arrow], table: Table) -> list[str]:
     """What points the wrong way, each with file and line."""
     found = []
@@ -179,7 +199,8 @@ def judge(root: Path, table: Table) -> list[str]:
     found = wrong([*python, *c], table)
     for circle in circles((a.source, a.target) for a in python if not hooked(a, table)):
         found.append(f"{circle[0]}: in a circle with {', '.join(circle[1:])}")
-    for circle in circles((stem(a.source), stem(a.target)) for a in c if stem(a.source) != stem(a.target)):
+    ties = [*((a.source, a.target) for a in c), *c_calls(root, files)]
+    for circle in circles((stem(source), stem(target)) for source, target in ties if stem(source) != stem(target)):
         found.append(f"{circle[0]}.c: in a circle with {', '.join(circle[1:])}")
     return found
 
@@ -196,6 +217,19 @@ def test_the_page_is_about_what_there_is_and_runs_one_way() -> None:
     assert circles((room, other) for room, may in table.rooms.items() for other in may) == []
     used = {(a.source, a.target) for a in python_arrows(ROOT, tracked(ROOT))}
     assert table.hooks - used == set(), "a hook that nothing needs"
+
+
+def crowded(files: Iterable[str]) -> list[str]:
+    """Folders of code in which nobody finds his file."""
+    lie_in = Counter(
+        str(Path(file).parent) for file in files if file.startswith(("firmware/", "host/", "tests/", "tools/"))
+    )
+    return [f"{folder}: {count} files" for folder, count in lie_in.items() if count > 25 and folder != "host/docs"]
+
+
+def test_no_folder_holds_more_than_one_can_overlook() -> None:
+    assert crowded(tracked(ROOT)) == []
+    assert crowded(f"tools/{k}.py" for k in range(26)) == ["tools: 26 files"]
 
 
 # ---- that it can fail ----------------------------------------------------------------------------
@@ -237,6 +271,14 @@ MADE_UP = """
                 "firmware/high/d.c": '#include "high/d.h"\n#include "high/c.h"\n',
             },
             "firmware/high/c.c: in a circle with firmware/high/d",
+        ),
+        (
+            {
+                "firmware/high/all.h": "void one(void);\nvoid other(void);\n",
+                "firmware/high/e.c": '#include "high/all.h"\nvoid one(void)\n{\n    other();\n}\n',
+                "firmware/high/f.c": '#include "high/all.h"\nvoid other(void)\n{\n    start(&one);\n}\n',
+            },
+            "firmware/high/e.c: in a circle with firmware/high/f",
         ),
     ],
 )
