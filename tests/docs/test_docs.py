@@ -38,9 +38,9 @@ COMMANDS = [
 
 
 def tool(name: str, monkeypatch) -> ModuleType:
-    """A script of tools/ as a module."""
-    monkeypatch.syspath_prepend(str(ROOT / "tools"))
-    spec = importlib.util.spec_from_file_location(name, ROOT / f"tools/{name}.py")
+    """A script of tools/make/ as a module."""
+    monkeypatch.syspath_prepend(str(ROOT / "tools/make"))
+    spec = importlib.util.spec_from_file_location(name, ROOT / f"tools/make/{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -83,14 +83,14 @@ def test_a_pages_command_is_one(page: str, command: str) -> None:
     parser().parse_args(shlex.split(command))  # leaves with SystemExit when it is none
 
 
-@pytest.mark.parametrize("name", ["make_cli_page", "make_frames_drawing"])
+@pytest.mark.parametrize("name", ["cli_page", "frames_drawing"])
 def test_generated_pages_are_up_to_date(name: str) -> None:
-    done = subprocess.run([sys.executable, ROOT / f"tools/{name}.py", "--check"], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, ROOT / f"tools/make/{name}.py", "--check"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
 
 def test_the_command_lines_page_has_every_option(monkeypatch, capsys) -> None:
-    text = tool("make_cli_page", monkeypatch).page()
+    text = tool("cli_page", monkeypatch).page()
     for verb in parser()._subparsers._group_actions[0].choices:
         with pytest.raises(SystemExit):
             main([verb, "--help"])
@@ -130,7 +130,7 @@ def test_the_controllers_page_has_every_flag() -> None:
 
 
 def test_the_drawings_signs_are_what_a_board_measures(tmp_path: Path, monkeypatch) -> None:
-    drawing = tool("make_frames_drawing", monkeypatch)
+    drawing = tool("frames_drawing", monkeypatch)
     checked = 0
     for name in drawing.PRESSED:
         (tmp_path / "press.toml").write_text(SCENARIO.format(at=name))
@@ -146,7 +146,7 @@ def test_the_drawings_signs_are_what_a_board_measures(tmp_path: Path, monkeypatc
 
 
 def test_the_drawing_has_every_electrode_and_both_palmar_sides(monkeypatch) -> None:
-    drawing = tool("make_frames_drawing", monkeypatch)
+    drawing = tool("frames_drawing", monkeypatch)
     palmar = "".join(drawing.electrodes(drawing.PALMAR))
     assert [int(n) for n in re.findall(r">(\d+)</text>", palmar)] == list(range(1, 20))
     # Seen from below with the tip up, E11's side is on the right, and the tip's electrode on top.
