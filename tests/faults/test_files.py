@@ -31,7 +31,7 @@ from biotac.errors import BiotacError
 from biotac.flash import read_backup
 from biotac.flash.backup import FORMAT as BACKUP
 from biotac.keep import calibration_file, map_file
-from biotac.keep.values import Calibration
+from biotac.keep.calibration import Calibration
 from biotac.sim import physics
 from biotac.sim.loading import load_source
 from biotac.wire import messages_gen as wire

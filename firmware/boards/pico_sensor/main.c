@@ -1,5 +1,5 @@
 #include "answers.h"
-#include "link.h"
+#include "commands.h"
 #include "loop.h"
 #include "port.h"
 #include "system.h"
@@ -14,9 +14,9 @@ void bus_start(void)
 int main(int argc, char **argv)
 {
     port_init(argc, argv);
-    link_start(&stream);
+    commands_start(&stream);
     for (;;) {
-        link_poll();
+        commands_poll();
         loop_poll();
         port_idle();
     }

@@ -1,6 +1,6 @@
 """From real coefficients to a board's: 16 bits, with exponents at which no sum on a board can overflow.
 
-The bounds are those of firmware/core/map/judge.c, which decides: a block gets the largest exponent that passes them.
+The bounds are those of firmware/core/map/open.c, which decides: a block gets the largest exponent that passes them.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.board_map import BoardMap
 from ..errors import CommandRefusedError, DeviceLostError, WireVersionError
 from ..keep import map_blob as maps
-from ..keep.values import Calibration, own_settings
+from ..keep.calibration import Calibration, own_settings
 from ..wire import messages_gen as wire
 from ..wire.frames import tare_to_q4
 from ..wire.sensor_gen import MAX_SENSORS

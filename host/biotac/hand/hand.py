@@ -26,7 +26,7 @@ from .compatibility import HandWarning
 from .keepalive import SILENCE_S
 from .pull import take
 from .reconnect import Reconnection
-from .recorded import Recorded, Recorder
+from .record import Recorded, Recorder
 from .streams import Streams
 from .views import FingerView, Latest, checked_names, finger_index
 

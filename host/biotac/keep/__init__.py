@@ -9,6 +9,6 @@
 
 from __future__ import annotations
 
-from .values import Calibration
+from .calibration import Calibration
 
 __all__ = ["Calibration"]

@@ -10,7 +10,7 @@ from typing import Any
 from ..documents import JSON_BYTES, parse_json, read_text
 from ..errors import InputError
 from ..wire import messages_gen as wire
-from .values import Calibration
+from .calibration import Calibration
 
 FORMAT = "biotac-calibration"
 VERSION = 2  # version 1 had no pressure_gain_nn

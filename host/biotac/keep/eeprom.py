@@ -13,9 +13,9 @@ import zlib
 from typing import NamedTuple
 
 from ..errors import InputError, PortError
-from . import record
+from . import flash_record
+from .calibration import Calibration
 from .chip import Chip
-from .values import Calibration
 
 PLACE_BYTES = 128
 PLACES = 2
@@ -41,7 +41,7 @@ def load(chip: Chip) -> Calibration:
         raise InputError(
             f"{chip.place} holds no calibration: neither place's CRC is right; check --chip, or store it again"
         )
-    return record.unpack(newest.record, chip.place)
+    return flash_record.unpack(newest.record, chip.place)
 
 
 def store(chip: Chip, calibration: Calibration) -> bool:
@@ -50,7 +50,7 @@ def store(chip: Chip, calibration: Calibration) -> bool:
     Raises PortError when it is not stored.
     """
     newest = _newest([_read(chip, place) for place in range(PLACES)])
-    body = record.pack(calibration).ljust(PLACE_BYTES - CRC.size - GENERATION.size, b"\xff")
+    body = flash_record.pack(calibration).ljust(PLACE_BYTES - CRC.size - GENERATION.size, b"\xff")
     if newest is not None and newest.record == body:
         return False
     place = 0 if newest is None else 1 - newest.place

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from ..errors import PortError
 from . import eeprom
+from .calibration import Calibration
 from .chip import KINDS, Chip, parse_place
-from .values import Calibration
 
 FORM = "spidev:0.0,0.1?calibration=1:0x50:24c02,1:0x51:24c02"
 

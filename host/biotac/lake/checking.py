@@ -18,7 +18,7 @@ from ..lab.crosscheck import CrossCheck
 from ..recording.facts import Facts
 from ..wire.fields import FRAME_FIELDS
 from ..wire.frames import FRAME_DTYPE, StructArray, frames_to_wire
-from .layout import RECORDINGS, place
+from .folder import RECORDINGS, place
 from .writing import DIGEST, digest_of
 
 

@@ -19,7 +19,7 @@ from ..recording.facts import Facts
 from ..wire import messages_gen as wire
 from ..wire.identity import version_text
 from ..wire.sensor_gen import ELECTRODE_NAMES
-from .layout import INVENTORY, Lake
+from .folder import INVENTORY, Lake
 from .sql import query
 
 ENOUGH = 3  # earlier recordings needed to know what is usual

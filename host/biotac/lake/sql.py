@@ -8,7 +8,7 @@ from typing import Any
 import duckdb
 
 from ..errors import InputError
-from .layout import Lake
+from .folder import Lake
 
 # Stated explicitly, or a serial number of digits alone would be read as a number and lose its leading zeros.
 _TYPES = "hive_types = {'board': VARCHAR, 'date': DATE}"

@@ -18,8 +18,8 @@ from ..export.messages import message_tables
 from ..export.parquet import Label, frame_ids, write_labelled
 from ..recording import Recording
 from ..recording.layout import CHECKSUM
-from . import identity
-from .layout import PARTIAL, RECORDINGS, place
+from . import ids
+from .folder import PARTIAL, RECORDINGS, place
 
 SIZE = b"biotac.size_bytes"  # of the source: a recording that has grown is exported again
 DIGEST = b"biotac.sha256"  # of the seal itself; those of the other files are in the seal
@@ -69,12 +69,12 @@ def put(lake: str, known: dict[str, str], force: bool, source: str) -> Written:
     RecordingError or InputError if ``source`` cannot be read or ``lake`` not written; the recording is then not sealed.
     """
     folder, path = Path(lake), Path(source)
-    name = identity.recording_id(path)
+    name = ids.recording_id(path)
     size = path.stat().st_size
     if name in known and not force and _sealed(folder, known[name], name) >= size:
         return Written(name, False, {})
     recording = Recording(path)
-    partition = identity.partition(recording)
+    partition = ids.partition(recording)
     if name not in known and _sealed(folder, partition, name) >= size:  # written meanwhile from a copy of it
         return Written(name, True, {})
     topics: dict[str, list[Table]] = {}
@@ -109,7 +109,7 @@ def _sealed(folder: Path, partition: str, name: str) -> int:
 
 
 def _write(stage: Path, topic: str, made: list[Table], recording: Recording, name: str) -> dict[str, Any]:
-    sensors, calibrations = identity.sensors(recording), identity.calibrations(recording)
+    sensors, calibrations = ids.sensors(recording), ids.calibrations(recording)
     fingers = [table.finger for table in made if table.finger is not None]
     labels = [Label("recording", "id of the recording", (name,) * len(made))]
     if len(fingers) == len(made):
@@ -136,8 +136,8 @@ def _seal(place: Path, recording: Recording, name: str, size: int, files: list[d
         "frames_lost": recording.frames_lost,
         "pac_lost": recording.pac_lost,
         "problems": [text.replace(str(recording.path), recording.path.name) for text in recording.problems],
-        "sensors": list(identity.sensors(recording).items()),
-        "calibrations": list(identity.calibrations(recording).items()),
+        "sensors": list(ids.sensors(recording).items()),
+        "calibrations": list(ids.calibrations(recording).items()),
         "metadata": sorted((key, its) for key, its in recording.metadata.items() if key != CHECKSUM),
         "files": files,
     }

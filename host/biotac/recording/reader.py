@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..clock import LAST_SAMPLE_US, DeviceClock
 from ..errors import RecordingError
 from ..hand.gap import Gap
-from ..keep.values import own_settings
+from ..keep.calibration import own_settings
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, StreamDecoder, join
 from ..wire.frames import StructArray

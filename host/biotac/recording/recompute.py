@@ -16,7 +16,7 @@ from ..core.compiled import on_board_q4, pressure_force_100un
 from ..core.map_versions import opened
 from ..errors import InputError
 from ..hand.subscription import RESULTS
-from ..keep.values import own_settings
+from ..keep.calibration import own_settings
 from ..version import __version__
 from ..wire import messages_gen as wire
 from ..wire import sensor_gen as sensor

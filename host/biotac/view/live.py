@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..errors import CommandRefusedError, InputError
 from ..hand.opening import open as open_hand
-from ..hand.recorded import Recorder
+from ..hand.record import Recorder
 from ..hand.subscription import RESULTS
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, LinkStats

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import biotac
+from biotac.calibrate.reference.alignment import align
 from biotac.calibrate.reference.mounting import Mounting
 from biotac.calibrate.reference.rdt import RdtDecoder
 from biotac.calibrate.reference.samples import Reference, Samples
-from biotac.calibrate.reference.timing import align
 from biotac.calibrate.wrench.joined import Board, board_of, choose_finger, join
 from biotac.calibrate.wrench.provenance import check_serial
 from biotac.core import geometry as surface

@@ -12,9 +12,9 @@ import pytest
 import wrench_run
 
 from biotac.calibrate.wrench import features, figures, fitted, models, moments
-from biotac.calibrate.wrench.blocks import BLOCKS, GUARD_ROWS, Blocks
 from biotac.calibrate.wrench.crossvalidation import SHIFTS_COUNTS, Validation, predict, validate
 from biotac.calibrate.wrench.run import MIN_ROWS, Run, load_run
+from biotac.calibrate.wrench.splits import BLOCKS, GUARD_ROWS, Blocks
 from biotac.cli.main import main
 from biotac.core import geometry as surface
 from biotac.core.map_columns import SIGNAL_COUNTS, Signals

@@ -12,9 +12,9 @@ import pytest
 import wrench_run
 
 from biotac.calibrate.wrench import contact, features, figures, models, moments, template
-from biotac.calibrate.wrench.blocks import BLOCKS, Blocks
 from biotac.calibrate.wrench.crossvalidation import AIR_SHARES, validate
 from biotac.calibrate.wrench.run import Run, load_run
+from biotac.calibrate.wrench.splits import BLOCKS, Blocks
 from biotac.core import geometry as surface
 from biotac.core.map_columns import Signals
 from biotac.errors import RecordingError

@@ -18,7 +18,7 @@ import biotac
 from biotac import Calibration, CalibrationState, PocWeights, Setting
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
-from biotac.keep import record
+from biotac.keep import flash_record
 from biotac.lab.crosscheck import CrossCheck
 from biotac.recording import Recording
 from biotac.recording.facts import Facts
@@ -159,9 +159,9 @@ def test_a_record_is_that_of_the_specification() -> None:
     data = SERIAL.encode() + struct.pack("<I8i", 1_763_731_310, 0, 1, -2, 3, -4, 5, -600, 9_500_000)
     header = struct.pack("<IHHI", 0x52544F42, 2, 2, 52)
     crc = zlib.crc32((header + b"\xff" * 4 + data).ljust(256, b"\xff"))
-    assert record.pack(ODD) == header + struct.pack("<I", crc) + data
-    assert record.unpack(record.pack(ODD), "it") == ODD
-    assert record.unpack(record.pack(ODD).ljust(256, b"\xff"), "it") == ODD
+    assert flash_record.pack(ODD) == header + struct.pack("<I", crc) + data
+    assert flash_record.unpack(flash_record.pack(ODD), "it") == ODD
+    assert flash_record.unpack(flash_record.pack(ODD).ljust(256, b"\xff"), "it") == ODD
 
 
 def sealed(record_id: int, version: int, data: bytes) -> bytes:
@@ -170,15 +170,15 @@ def sealed(record_id: int, version: int, data: bytes) -> bytes:
     return header + struct.pack("<I", crc) + data
 
 
-GOOD = record.pack(ODD)[16:]
+GOOD = flash_record.pack(ODD)[16:]
 
 
 @pytest.mark.parametrize(
     ("data", "words"),
     [
         (b"", "no whole record"),
-        (record.pack(ODD)[:-3], "no whole record: its CRC is wrong"),
-        (record.pack(ODD) + b"\0", "no whole record"),
+        (flash_record.pack(ODD)[:-3], "no whole record: its CRC is wrong"),
+        (flash_record.pack(ODD) + b"\0", "no whole record"),
         (sealed(1, 1, GOOD), "something else than a calibration"),
         (sealed(7, 1, GOOD), "something else than a calibration"),
         (sealed(2, 3, GOOD), "newer version"),
@@ -190,20 +190,20 @@ GOOD = record.pack(ODD)[16:]
 )
 def test_a_record_that_is_none_says_why(data: bytes, words: str) -> None:
     with pytest.raises(biotac.InputError, match=words):
-        record.unpack(data, "it")
+        flash_record.unpack(data, "it")
 
 
 def test_a_record_from_before_pressure_keeps_all_that_it_has() -> None:
     old = sealed(2, 1, GOOD[:-4])
-    assert record.unpack(old, "it") == replace(ODD, pressure_gain_nn=0)
+    assert flash_record.unpack(old, "it") == replace(ODD, pressure_gain_nn=0)
 
 
 @pytest.mark.parametrize("at", range(68))
 def test_no_byte_of_a_record_may_change(at: int) -> None:
-    data = bytearray(record.pack(ODD))
+    data = bytearray(flash_record.pack(ODD))
     data[at] ^= 0x20
     with pytest.raises(biotac.InputError):
-        record.unpack(bytes(data), "it")
+        flash_record.unpack(bytes(data), "it")
 
 
 # ---- a board with flash --------------------------------------------------------------------------
@@ -217,7 +217,7 @@ def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_pat
         hand.set_calibration(1, replace(ODD, serial=""))
         hand.save_settings()
         hand.clear_calibration(1)  # not saved
-    assert record.pack(mine) in flash.read_bytes()
+    assert flash_record.pack(mine) in flash.read_bytes()
     with boot(flash) as hand:
         assert hand.calibrations() == {0: mine, 1: replace(ODD, serial="")}
         hand.clear_calibration(1)

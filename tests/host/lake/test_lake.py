@@ -29,7 +29,8 @@ import biotac
 from biotac.cli.main import main
 from biotac.errors import InputError
 from biotac.export.messages import message_tables
-from biotac.lake import checking, identity, layout
+from biotac.lake import checking, ids
+from biotac.lake import folder as lake_folder
 from biotac.recording.file import RecordingFile
 from biotac.wire import messages_gen as wire
 from biotac.wire.frames import frames_from_wire, frames_to_wire
@@ -85,7 +86,7 @@ def test_frames_become_the_wire_again_to_the_bit(sources) -> None:
 
 
 def test_every_row_of_every_topic_is_there_with_its_ids(sources, lake, capsys) -> None:
-    by_id = {identity.recording_id(path): biotac.Recording(path) for path in sources}
+    by_id = {ids.recording_id(path): biotac.Recording(path) for path in sources}
     assert len(by_id) == len(sources)
     assert {row["recording"] for row in sql(capsys, lake, "SELECT recording FROM recordings")} == set(by_id)
     for topic, rows_of in {
@@ -102,8 +103,8 @@ def test_every_row_of_every_topic_is_there_with_its_ids(sources, lake, capsys) -
         }
     name, own = next((name, rec) for name, rec in by_id.items() if rec.calibrations)
     told = sql(capsys, lake, f"SELECT DISTINCT finger, sensor, calibration FROM frames WHERE recording = '{name}'")
-    assert {row["finger"]: row["sensor"] for row in told} == identity.sensors(own)
-    assert {row["finger"]: row["calibration"] for row in told} == identity.calibrations(own)
+    assert {row["finger"]: row["sensor"] for row in told} == ids.sensors(own)
+    assert {row["finger"]: row["calibration"] for row in told} == ids.calibrations(own)
     assert len({row["calibration"] for row in told}) == 2  # and without one it is null
     assert sql(capsys, lake, "SELECT count(*) AS n FROM frames WHERE calibration IS NULL")[0]["n"] == sum(
         len(rec.frames) for rec in by_id.values() if rec is not own
@@ -112,7 +113,7 @@ def test_every_row_of_every_topic_is_there_with_its_ids(sources, lake, capsys) -
 
 def test_columns_are_those_of_the_parquet_export(sources, lake, tmp_path) -> None:
     assert main(["export", str(sources[0]), str(tmp_path / "a.parquet")]) == 0
-    place = layout.opened(lake).path("frames", identity.recording_id(sources[0]))
+    place = lake_folder.opened(lake).path("frames", ids.recording_id(sources[0]))
     alone, mine = (pq.read_table(path, partitioning=None) for path in (tmp_path / "a.parquet", place))
     assert set(mine.column_names) - set(alone.column_names) == {"recording", "sensor", "calibration"}
     assert mine.select(alone.column_names).equals(alone)  # nulls, stamps and all
@@ -152,7 +153,7 @@ def test_again_does_nothing_and_grown_files_replace(sources, tmp_path, capsys) -
             file.add(block, told.begin_ns + k)
         file.close()
     whole = biotac.Recording(grown)
-    assert identity.recording_id(cut) == identity.recording_id(grown) != identity.recording_id(sources[1])
+    assert ids.recording_id(cut) == ids.recording_id(grown) != ids.recording_id(sources[1])
     assert export([cut], folder) == 0
     some = sql(capsys, folder, "SELECT count(*) AS n FROM pac")[0]["n"]
     assert 0 < some < len(whole.pac)
@@ -205,15 +206,15 @@ def test_killed_at_any_rename_nothing_is_twice_or_missing(
     with pytest.raises(SystemExit):
         export(sources, folder)
     monkeypatch.undo()
-    (folder / layout.PARTIAL / "left").mkdir(parents=True)
-    whole = layout.opened(folder)
-    assert identity.recording_id(sources[1]) in whole.partition and whole.unfinished == at % 7
+    (folder / lake_folder.PARTIAL / "left").mkdir(parents=True)
+    whole = lake_folder.opened(folder)
+    assert ids.recording_id(sources[1]) in whole.partition and whole.unfinished == at % 7
     assert sql(capsys, folder, "SELECT count(*) AS n FROM frames")[0]["n"] in {
         sum(len(biotac.Recording(path).frames) for path in some) for some in (sources[1:2], sources[:2])
     }
     assert export(sources, folder) == 0
     assert hashes(folder) == hashes(lake)
-    assert not (folder / layout.PARTIAL).exists() and not layout.opened(folder).unfinished
+    assert not (folder / lake_folder.PARTIAL).exists() and not lake_folder.opened(folder).unfinished
 
 
 def test_a_file_that_fails_is_named_and_the_rest_is_done(sources, lake, tmp_path, capsys) -> None:
@@ -241,7 +242,7 @@ def test_check_runs_the_crosscheck_over_all_of_it(sources, lake, capsys) -> None
 def test_check_finds_what_is_wrong(sources, lake, tmp_path, capsys) -> None:
     folder = tmp_path / "lake"
     shutil.copytree(lake, folder)
-    its = layout.opened(folder)
+    its = lake_folder.opened(folder)
     first, second, *_ = sorted(its.topics["frames"])
     flipped = bytearray(its.path("frames", first).read_bytes())
     flipped[len(flipped) // 2] ^= 1
@@ -259,9 +260,9 @@ def test_check_finds_what_is_wrong(sources, lake, tmp_path, capsys) -> None:
 def test_a_seal_that_says_something_else_is_found(lake, tmp_path, capsys) -> None:
     folder = tmp_path / "lake"
     shutil.copytree(lake, folder)
-    its = layout.opened(folder)
+    its = lake_folder.opened(folder)
     first, second, *_ = sorted(its.partition)
-    seal = its.path(layout.RECORDINGS, first)
+    seal = its.path(lake_folder.RECORDINGS, first)
     good = seal.read_bytes()
     draw = random.Random(1)
     for _ in range(200):
@@ -270,7 +271,7 @@ def test_a_seal_that_says_something_else_is_found(lake, tmp_path, capsys) -> Non
         seal.write_bytes(flipped)
         with pytest.raises(InputError, match="is damaged"):
             checking.check(str(folder), {}, its.partition, first)
-    seal.write_bytes(its.path(layout.RECORDINGS, second).read_bytes())
+    seal.write_bytes(its.path(lake_folder.RECORDINGS, second).read_bytes())
     assert main(["lake", "check", str(folder)]) == 1
     assert f"it is of {second}" in capsys.readouterr().err
     assert main(["inventory", str(folder)]) == 2
@@ -307,7 +308,11 @@ def test_a_foreign_file_is_one_line_and_2(sources, lake, tmp_path, capsys, verb:
 
 
 def test_two_exports_at_once_are_refused_in_words(sources, lake) -> None:
-    with layout.sole_writer(lake), pytest.raises(InputError, match="another export writes"), layout.sole_writer(lake):
+    with (
+        lake_folder.sole_writer(lake),
+        pytest.raises(InputError, match="another export writes"),
+        lake_folder.sole_writer(lake),
+    ):
         pass
 
 
@@ -327,7 +332,7 @@ def test_five_hundred_killed_half_way(sources, tmp_path) -> None:
     words = [sys.executable, "-m", "biotac", "export", *map(str, made), "--lake", str(tmp_path / "lake"), "-j", "2"]
 
     def sealed() -> int:
-        return len(list((tmp_path / "lake" / layout.RECORDINGS).rglob("*.parquet")))
+        return len(list((tmp_path / "lake" / lake_folder.RECORDINGS).rglob("*.parquet")))
 
     killed = 0
     for _ in range(10):
@@ -343,5 +348,5 @@ def test_five_hundred_killed_half_way(sources, tmp_path) -> None:
     assert subprocess.run(words, stdout=subprocess.DEVNULL, check=False).returncode == 0
     assert export(made, tmp_path / "once") == 0
     assert hashes(tmp_path / "lake") == hashes(tmp_path / "once")
-    its = layout.opened(tmp_path / "lake")
+    its = lake_folder.opened(tmp_path / "lake")
     assert len(its.partition) == 500 and not its.unfinished

@@ -7,7 +7,7 @@
     ensures \result == 0 || \result == 1; */
 static bool coefficients_bounded(const bt_map *map);
 
-#include "map/judge.c"
+#include "map/open.c"
 
 static uint8_t blob[BT_MAP_MAX_BYTES] __attribute__((aligned(4)));
 

@@ -20,11 +20,11 @@ from ...core import map_columns
 from ...core.geometry import Floats
 from ...core.map_columns import Signals
 from ..wrench import features
-from ..wrench.blocks import Blocks
 from ..wrench.fitted import WrenchMap
 from ..wrench.lag import Lags
 from ..wrench.moments import DRIFT_NODES
 from ..wrench.run import Run
+from ..wrench.splits import Blocks
 
 FAMILIES = (features.GATED, features.CONDUCTANCE_QUADRATIC)
 ALL_COLUMNS = features.width(with_pdc=False)

@@ -19,11 +19,11 @@ from threadpoolctl import threadpool_limits
 from ...core.geometry import Floats
 from ...core.map_columns import Signals
 from . import features, models
-from .blocks import BLOCKS, Blocks
 from .lag import Lags
 from .models import LAMBDAS, LIN, LIN_OFFSET, MODELS, POOL, POOLED, TEMPLATE, Model
 from .moments import Rows, Sums, air_sums, at, linear_columns, moved, smoothed, stacked, strip_sums, with_one
 from .run import Run
+from .splits import BLOCKS, Blocks
 from .template import Template
 
 INNER_FOLDS = 5

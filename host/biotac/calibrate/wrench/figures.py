@@ -9,11 +9,11 @@ import numpy as np
 
 from ...core.geometry import Floats
 from ...core.map_columns import Signals, centroid_mm
-from .blocks import BLOCKS
 from .crossvalidation import LESS, SHIFTS_COUNTS, Validation
 from .features import columns
 from .models import LAMBDAS, LIN, POOL, POOLED
 from .moments import moved, with_one
+from .splits import BLOCKS
 
 ROWS_PER_S = 100  # taken for all runs, which have no times
 ANGLE_MIN_N = 0.5  # the direction of a smaller force means nothing

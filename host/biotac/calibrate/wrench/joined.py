@@ -17,8 +17,8 @@ from ...errors import InputError, RecordingError
 from ...wire import messages_gen as wire
 from ...wire import sensor_gen as sensor
 from ...wire.frames import Q4_PER_COUNT, electrode_signals, to_units
+from ..reference.alignment import STEP_S, Alignment, align
 from ..reference.samples import Reference
-from ..reference.timing import STEP_S, Alignment, align
 from . import contact
 from .run import MIN_REST_ROWS, REST_N, Run, check_clipping, check_electrodes, check_rows, check_units, drift_of
 

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from ...core.map_columns import Signals
 from ...errors import RecordingError
-from .blocks import BLOCKS, Blocks
 from .models import solve
 from .moments import NO_DRIFT, at, linear_columns, moved, stacked, strip_sums
 from .run import Run
+from .splits import BLOCKS, Blocks
 
 SEARCH_ROWS = 50
 MAX_LAG_ROWS = 20  # 0.2 s at 100 Hz: more is not a transport delay but another clock

@@ -9,10 +9,10 @@ import numpy as np
 from ...core.geometry import Floats
 from ...markdown import table
 from . import figures
-from .blocks import BLOCKS, GUARD_ROWS
 from .crossvalidation import INNER_FOLDS, SHIFTS_COUNTS, Validation
 from .lag import MAX_LAG_ROWS
 from .models import POOLED, WORDS
+from .splits import BLOCKS, GUARD_ROWS
 
 AXIS_COLORS = ("#c2410c", "#15803d", "#1d4ed8")
 MAX_DOTS = 4000  # per axis; more would only make the file larger

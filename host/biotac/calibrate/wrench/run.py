@@ -19,7 +19,7 @@ from ...errors import RecordingError
 from ...recording.npz_file import counts_field, read_npz, to_lin_frame
 from ...wire import sensor_gen as _sensor
 from . import contact
-from .blocks import BLOCKS, GUARD_ROWS, contacts
+from .splits import BLOCKS, GUARD_ROWS, contacts
 
 MIN_ROWS = BLOCKS * 2 * GUARD_ROWS  # a shorter block would be nothing but its two guards
 REST_N = 0.1  # a plate's reading below this means that nothing touches

@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the inventory and keep it in the lake; return 1 if a sensor is not as it used to be."""
     inventory = room("inventory")
-    lake = room("layout").opened(args.folder)
+    lake = room("folder").opened(args.folder)
     its = inventory.take(lake)
     path = inventory.keep(lake, its)
     if args.json:

@@ -58,9 +58,9 @@ def run(args: argparse.Namespace) -> int:
 
 def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
     """Return 0 if all are in the lake, 2 if some are not: those are named, the others are in."""
-    layout, writing = room("layout"), room("writing")
-    lake = layout.opened(args.lake, create=True)
-    with layout.sole_writer(args.lake):
+    lake_folder, writing = room("folder"), room("writing")
+    lake = lake_folder.opened(args.lake, create=True)
+    with lake_folder.sole_writer(args.lake):
         work = functools.partial(writing.put, str(args.lake.absolute()), lake.partition, args.force)
         done, failed = _all(work, [str(path.absolute()) for path in dict.fromkeys(sources)], args, "exported")
     new = {its.recording for its in done if its.new}
@@ -84,7 +84,7 @@ def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
 
 def run_check(args: argparse.Namespace) -> int:
     """Return 0 if all is right, 1 if something is wrong, which is named. Raises (code 2): no lake, or foreign files."""
-    lake = room("layout").opened(args.folder)
+    lake = room("folder").opened(args.folder)
     work = functools.partial(room("checking").check, str(args.folder.absolute()), lake.topics, lake.partition)
     done, failed = _all(work, sorted(lake.partition), args, "checked")
     wrong = [text for its in done for text in its.wrong]
@@ -121,7 +121,7 @@ def run_check(args: argparse.Namespace) -> int:
 
 def run_sql(args: argparse.Namespace) -> int:
     """Print the query's result."""
-    lake = room("layout").opened(args.folder)
+    lake = room("folder").opened(args.folder)
     _warn_of_unfinished(lake)
     names, rows = room("sql").query(lake, args.query)
     if args.json:

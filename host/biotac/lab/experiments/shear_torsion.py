@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from ...calibrate.wrench import features, figures, fitted, report
-from ...calibrate.wrench.blocks import BLOCKS
 from ...calibrate.wrench.crossvalidation import Validation, validate
 from ...calibrate.wrench.models import lin_directions
 from ...calibrate.wrench.moments import with_one
 from ...calibrate.wrench.run import load_run
+from ...calibrate.wrench.splits import BLOCKS
 from ...core import geometry as surface
 from ...core.geometry import Floats
 from ...core.map_columns import AXES, Signals

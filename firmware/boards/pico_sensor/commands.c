@@ -1,4 +1,4 @@
-#include "link.h"
+#include "commands.h"
 
 #include "answers.h"
 #include "loop.h"
@@ -12,7 +12,7 @@ static bt_emu_stream *stream;
 static bt_deframer deframer;
 static uint8_t plugged;
 
-void link_start(bt_emu_stream *its)
+void commands_start(bt_emu_stream *its)
 {
     stream = its;
     plugged = (1u << BT_MAX_FINGERS) - 1;
@@ -182,7 +182,7 @@ static void obey(uint8_t id, const uint8_t *payload)
     }
 }
 
-void link_poll(void)
+void commands_poll(void)
 {
     uint8_t bytes[64];
     size_t n;

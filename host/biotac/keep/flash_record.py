@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ..errors import InputError
 from ..wire.native import ffi, lib
-from .values import Calibration
+from .calibration import Calibration
 
 MAX_BYTES = 256
 

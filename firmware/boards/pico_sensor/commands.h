@@ -1,12 +1,12 @@
 // What the host says to the board, and what it is told: protocol/link.toml, from 0x40 and 0xC0 on.
-#ifndef BIOTAC_PICO_SENSOR_LINK_H
-#define BIOTAC_PICO_SENSOR_LINK_H
+#ifndef BIOTAC_PICO_SENSOR_COMMANDS_H
+#define BIOTAC_PICO_SENSOR_COMMANDS_H
 
 #include "stream.h"
 
-void link_start(bt_emu_stream *stream);
+void commands_start(bt_emu_stream *stream);
 
 // Main loop: what came from the host.
-void link_poll(void);
+void commands_poll(void);
 
 #endif
