@@ -88,7 +88,9 @@ def put(lake: str, known: dict[str, str], force: bool, source: str) -> Written:
         with tempfile.TemporaryDirectory(prefix=f"{name}.", dir=partial) as stage:
             files = [_write(Path(stage), topic, made, recording, name) for topic, made in sorted(topics.items())]
             _seal(Path(stage) / RECORDINGS, recording, name, size, files)
-            for topic in [*sorted(topics), RECORDINGS]:  # the seal comes last: what is sealed is complete
+            # An old seal goes first and the new one comes last: what is sealed is complete, and of one export.
+            place(folder, RECORDINGS, partition, name).unlink(missing_ok=True)
+            for topic in [*sorted(topics), RECORDINGS]:
                 target = place(folder, topic, partition, name)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 os.replace(Path(stage) / topic, target)

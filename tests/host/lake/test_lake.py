@@ -217,6 +217,29 @@ def test_killed_at_any_rename_nothing_is_twice_or_missing(
     assert not (folder / lake_folder.PARTIAL).exists() and not lake_folder.opened(folder).unfinished
 
 
+def test_a_recording_killed_while_it_is_replaced_is_in_no_answer(sources, tmp_path, capsys, monkeypatch) -> None:
+    """New files under the old seal would be rows that the seal does not describe."""
+    real, done = os.replace, []
+
+    def killed(source: Any, target: Any) -> None:
+        if len(done) == 2:
+            raise SystemExit
+        done.append(target)
+        real(source, target)
+
+    folder = tmp_path / "lake"
+    assert export(sources[:2], folder) == 0
+    whole = hashes(folder)
+    monkeypatch.setattr("biotac.lake.writing.os.replace", killed)
+    with pytest.raises(SystemExit):
+        export(sources[1:2], folder, "--force")
+    monkeypatch.undo()
+    assert set(lake_folder.opened(folder).partition) == {ids.recording_id(sources[0])}
+    rows = sql(capsys, folder, "SELECT count(*) AS n FROM frames")[0]["n"]
+    assert rows == len(biotac.Recording(sources[0]).frames)
+    assert export(sources[1:2], folder) == 0 and hashes(folder) == whole
+
+
 def test_a_file_that_fails_is_named_and_the_rest_is_done(sources, lake, tmp_path, capsys) -> None:
     bad = tmp_path / "bad.mcap"
     bad.write_bytes(b"no recording")
