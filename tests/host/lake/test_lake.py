@@ -274,7 +274,7 @@ def test_a_seal_that_says_something_else_is_found(lake, tmp_path, capsys) -> Non
     assert main(["lake", "check", str(folder)]) == 1
     assert f"it belongs to {second}" in capsys.readouterr().err
     assert main(["inventory", str(folder)]) == 2
-    assert "names them" in capsys.readouterr().err
+    assert "names and contents of files disagree" in capsys.readouterr().err
 
 
 def test_a_wrong_result_is_found(sources, tmp_path, capsys) -> None:
@@ -312,7 +312,7 @@ def test_a_foreign_file_is_one_line_and_2(sources, lake, tmp_path, capsys, verb:
 
 
 def test_two_exports_at_once_are_refused_in_words(sources, lake) -> None:
-    with layout.sole_writer(lake), pytest.raises(InputError, match="another export writes"), layout.sole_writer(lake):
+    with layout.sole_writer(lake), pytest.raises(InputError, match="another export is writing"), layout.sole_writer(lake):
         pass
 
 
