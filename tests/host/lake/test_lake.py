@@ -312,7 +312,11 @@ def test_a_foreign_file_is_one_line_and_2(sources, lake, tmp_path, capsys, verb:
 
 
 def test_two_exports_at_once_are_refused_in_words(sources, lake) -> None:
-    with layout.sole_writer(lake), pytest.raises(InputError, match="another export is writing"), layout.sole_writer(lake):
+    with (
+        layout.sole_writer(lake),
+        pytest.raises(InputError, match="another export is writing"),
+        layout.sole_writer(lake),
+    ):
         pass
 
 
