@@ -193,7 +193,7 @@ class Scan:
                 if seen != told:
                     self.problems.append(
                         f"{self.path.name} has {seen[0]} chunks and {seen[1]} metadata records, but its statistics say "
-                        f"{told[0]} and {told[1]}: some are too damaged to find"
+                        f"{told[0]} and {told[1]}: the file is damaged"
                     )
                 self._compare(record.channel_message_counts)
             elif isinstance(record, Message) and self._wanted(topic := self._topics.get(record.channel_id, "")):
@@ -206,7 +206,7 @@ class Scan:
         if not self.damaged_chunks and any(told.get(channel, 0) != self._messages[channel] for channel in wanted):
             self.problems.append(
                 f"{self.path.name} has {sum(self._messages.values())} blocks, but its statistics say "
-                f"{sum(told.get(channel, 0) for channel in wanted)}: some are too damaged to find"
+                f"{sum(told.get(channel, 0) for channel in wanted)}: the file is damaged"
             )
 
     def _open(self, stream: BinaryIO, at: int, length: int, *, unwanted: bool) -> Iterator[tuple[str, Message]]:
