@@ -22,7 +22,7 @@ int main(int argc, char **argv)
     fd = argc == 3 ? open(argv[1], O_RDWR | O_NOCTTY) : -1;
     struct termios raw;
     if (fd < 0 || tcgetattr(fd, &raw) != 0) {
-        fprintf(stderr, "expected a board's port and how many frames\n");
+        fprintf(stderr, "usage: example PORT FRAMES; PORT must be a board's port that can be opened\n");
         return 2;
     }
     cfmakeraw(&raw);
@@ -37,8 +37,8 @@ int main(int argc, char **argv)
         bt_msg_frame frame;
         if (id == BT_HELLO_ID && bt_client_read(&board, BT_HELLO_ID, &hello) && hello.nonce == 7) {
             if (hello.wire_major != BT_WIRE_MAJOR) {
-                fprintf(stderr, "the board speaks wire %u, this program %u\n", hello.wire_major,
-                        (unsigned)BT_WIRE_MAJOR);
+                fprintf(stderr, "the board uses wire version %u, this program %u; build it for the board's\n",
+                        hello.wire_major, (unsigned)BT_WIRE_MAJOR);
                 return 2;
             }
             board.accept_longer = hello.wire_minor > BT_WIRE_MINOR;

@@ -4,7 +4,7 @@
 
 _Static_assert(BT_REPLAY_BYTES == BT_FRAME_BYTES + 3 + 3 * 4,
                "a row is a frame, three bytes and three words");
-_Static_assert(BT_REPLAY_NO_TOUCH >= BT_SLOTS, "no touch must be no slot");
+_Static_assert(BT_REPLAY_NO_TOUCH >= BT_SLOTS, "BT_REPLAY_NO_TOUCH must not be a slot");
 
 static void mark_absent(const bt_finger *finger, bt_msg_frame *msg)
 {

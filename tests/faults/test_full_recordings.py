@@ -48,7 +48,7 @@ def test_a_recording_whose_folder_is_removed_is_told_once_and_the_reading_goes_o
         recorder = hand.record(folder / "a.mcap")
         assert len(hand.read(0.5)) == 50
         shutil.rmtree(folder)
-        with pytest.raises(FileNotFoundError, match="deleted while it was recorded"):
+        with pytest.raises(FileNotFoundError, match="was deleted during recording"):
             hand.read(30)
         assert recorder.closed
         assert len(hand.read(0.5)) == 50

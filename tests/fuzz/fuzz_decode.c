@@ -132,7 +132,7 @@ static void check_rows(void)
         at += want.filled[kind];
     }
     if (at - (const uint8_t *)intake.out != intake.facts[BT_INTAKE_OUT_BYTES]) {
-        FAIL("%d bytes are handed out", (int)intake.facts[BT_INTAKE_OUT_BYTES]);
+        FAIL("%d bytes handed out", (int)intake.facts[BT_INTAKE_OUT_BYTES]);
     }
 }
 
@@ -143,23 +143,25 @@ static void check_chunk(const uint8_t *bytes, size_t count)
     for (size_t at = 0; at < count;) {
         size_t taken = bt_decode(&decoder, chunk + at, count - at);
         if (taken == 0 || taken > count - at) {
-            FAIL("of %zu bytes %zu are taken", count - at, taken);
+            FAIL("of %zu bytes, %zu were taken", count - at, taken);
         }
         expect(chunk + at, taken);
         if (bt_intake_feed(&intake, chunk + at, taken) != taken) {
-            FAIL("of %zu bytes not all are numbered", taken);
+            FAIL("not all of %zu bytes were numbered", taken);
         }
         check_rows();
         at += taken;
         for (int kind = 0; kind < BT_DECODED_KINDS; kind++) {
             if (decoder.filled[kind] != want.filled[kind]
                 || memcmp(decoder.data[kind], want.data[kind], want.filled[kind]) != 0) {
-                FAIL("%u bytes of kind %d differ from %u", decoder.filled[kind], kind, want.filled[kind]);
+                FAIL("%u bytes of kind %d differ from the expected %u", decoder.filled[kind], kind,
+                     want.filled[kind]);
             }
         }
         for (int k = BT_DEFRAMED_GOOD; k < BT_DECODE_OUTCOMES; k++) {
             if (decoder.outcomes[k] != want.outcomes[k]) {
-                FAIL("outcome %d: %d times, not %d", k, (int)decoder.outcomes[k], (int)want.outcomes[k]);
+                FAIL("outcome %d: counted %d times, expected %d", k, (int)decoder.outcomes[k],
+                     (int)want.outcomes[k]);
             }
         }
     }

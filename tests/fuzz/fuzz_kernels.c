@@ -69,7 +69,7 @@ static void check_wanted(const frame_input *in, const int16_t poc_um[3], const i
             if (poc[d] != (wanted & BT_WANT_POC ? poc_um[d] : BT_INVALID_I16)
                 || force[d] != (wanted & BT_WANT_FORCE ? force_100un[d] : BT_INVALID_I32)
                 || torque[d] != (wanted & BT_WANT_TORQUE ? torque_mnmm[d] : BT_INVALID_I32)) {
-                FAIL("wanted %u gives another result on axis %d", wanted, d);
+                FAIL("with wanted = %u, the result differs on axis %d", wanted, d);
             }
         }
     }
@@ -148,21 +148,22 @@ static void check(const variant *v, const answer *got, const lin2013_result *wan
     for (int d = 0; d < 3; d++) {
         double off = got->force_mn[d] - want->force_n[d] * 1000;
         if (!(fabs(off) <= allowed->force_mn)) {
-            FAIL("%s: force %d is off by %.9g mN of %.9g", v->name, d, off, allowed->force_mn);
+            FAIL("%s: force %d is off by %.9g mN, allowed %.9g", v->name, d, off, allowed->force_mn);
         }
         double poc_off = got->poc_um[d] - want->poc_mm[d] * 1000;
         square += poc_off * poc_off;
     }
     if (got->has_poc == isnan(want->poc_mm[0])) {
-        FAIL("%s: a PoC where there is none, or none where there is one", v->name);
+        FAIL("%s: a PoC where the reference has none, or none where it has one", v->name);
     }
     if (got->has_poc && !(sqrt(square) <= allowed->poc_um)) {
-        FAIL("%s: PoC is off by %.9g um of %.9g", v->name, sqrt(square), allowed->poc_um);
+        FAIL("%s: PoC is off by %.9g um, allowed %.9g", v->name, sqrt(square), allowed->poc_um);
     }
     for (int d = got->has_poc ? 0 : 1; d < 3; d++) {
         double off = got->torque_mnmm[d] - want->torque_nmm[d] * 1000;
         if (!(fabs(off) <= allowed->torque_mnmm[d])) {
-            FAIL("%s: torque %d is off by %.9g mN*mm of %.9g", v->name, d, off, allowed->torque_mnmm[d]);
+            FAIL("%s: torque %d is off by %.9g mN*mm, allowed %.9g", v->name, d, off,
+                 allowed->torque_mnmm[d]);
         }
     }
 }

@@ -121,7 +121,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     for (int a = 0; a < map.axes; a++) {
         if (result[a] > BT_MAP_RESULT_MAX || result[a] < -BT_MAP_RESULT_MAX) {
-            fail("a result beyond its limit");
+            fail("a result exceeds its limit");
         }
         int64_t total = 0;
         const int16_t *its = (const int16_t *)(const void *)map.coefficients;
@@ -137,7 +137,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
                 : total < -BT_MAP_RESULT_MAX ? -BT_MAP_RESULT_MAX
                                              : total;
         if (plain && result[a] != total) {
-            fail("a result that is not the specification's");
+            fail("a result differs from the specification");
         }
     }
     return 0;

@@ -27,7 +27,7 @@ static int erases;
 static bool erase(uint32_t offset)
 {
     if (offset % BT_FLASH_SECTOR_BYTES != 0 || offset >= BT_MAPS_BYTES) {
-        FAIL("erases at %u", offset);
+        FAIL("bad erase at %u", offset);
     }
     erases++;
     memset(slots + offset, 0xFF, BT_FLASH_SECTOR_BYTES);
@@ -37,7 +37,7 @@ static bool erase(uint32_t offset)
 static bool program(uint32_t offset, const uint8_t *page)
 {
     if (offset % BT_FLASH_PAGE_BYTES != 0 || offset >= BT_MAPS_BYTES) {
-        FAIL("programs at %u", offset);
+        FAIL("bad program at %u", offset);
     }
     for (int k = 0; k < BT_FLASH_PAGE_BYTES; k++) {
         slots[offset + (uint32_t)k] &= page[k];
@@ -201,12 +201,12 @@ static void check_calibrations(const bt_session *session)
         const bt_calibration *its = &session->calibration[f];
         if (session->calibration_state[f] == BT_CALIBRATION_STATE_IN_FORCE
             && (!its->present || bt_calibration_apply(its, &own) != BT_ERROR_OK)) {
-            FAIL("finger %d works by a calibration that cannot be", f);
+            FAIL("finger %d uses an invalid calibration", f);
         }
         if (session->kernel[f].poc_weights != bt_settings_get(&own, BT_SETTING_POC_WEIGHTS)
             || session->tare[f].contact_energy_count2
                    != (uint32_t)bt_settings_get(&own, BT_SETTING_CONTACT_ENERGY_COUNT2)) {
-            FAIL("finger %d works by other values than are told", f);
+            FAIL("finger %d uses other values than it reports", f);
         }
     }
 }
@@ -219,11 +219,11 @@ static void check_maps(const bt_session *session)
         bt_map map;
         if (its->place.bytes == 0) {
             if (session->map_state[f] != BT_CALIBRATION_STATE_NONE) {
-                FAIL("finger %d is said to have a map", f);
+                FAIL("finger %d is reported to have a map it does not have", f);
             }
         } else if (bt_crc32(blob, its->place.bytes) != its->place.crc32
                    || bt_map_open(&map, blob, its->place.bytes) != BT_ERROR_OK) {
-            FAIL("finger %d has a map that cannot be", f);
+            FAIL("finger %d has an invalid map", f);
         }
     }
 }

@@ -22,7 +22,7 @@ static uint32_t bytes_left; // until power fails
 static bool erase(uint32_t offset)
 {
     if (offset % BT_FLASH_SECTOR_BYTES != 0 || offset >= BT_STORAGE_BYTES) {
-        FAIL("an erase at %u", (unsigned)offset);
+        FAIL("bad erase at %u", (unsigned)offset);
     }
     for (uint32_t k = 0; k < BT_FLASH_SECTOR_BYTES && bytes_left > 0; k++, bytes_left--) {
         flash_bytes[offset + k] = 0xFF;
@@ -33,7 +33,7 @@ static bool erase(uint32_t offset)
 static bool program(uint32_t offset, const uint8_t *page)
 {
     if (offset % BT_FLASH_PAGE_BYTES != 0 || offset >= BT_STORAGE_BYTES) {
-        FAIL("a page at %u", (unsigned)offset);
+        FAIL("bad page program at %u", (unsigned)offset);
     }
     for (uint32_t k = 0; k < BT_FLASH_PAGE_BYTES && bytes_left > 0; k++, bytes_left--) {
         flash_bytes[offset + k] &= page[k];
@@ -44,7 +44,7 @@ static bool program(uint32_t offset, const uint8_t *page)
 static void read_flash(uint32_t offset, uint8_t *data, size_t bytes)
 {
     if (offset + bytes > BT_STORAGE_BYTES) {
-        FAIL("a read of %zu bytes at %u", bytes, (unsigned)offset);
+        FAIL("bad read of %zu bytes at %u", bytes, (unsigned)offset);
     }
     memcpy(data, flash_bytes + offset, bytes);
 }
@@ -76,7 +76,7 @@ static record read_one(uint16_t id)
             return its;
         }
     }
-    FAIL("record %u was read and is on no page", (unsigned)id);
+    FAIL("record %u was read but is on no page", (unsigned)id);
 }
 
 static bool same(const record *a, const record *b)
@@ -121,8 +121,8 @@ static void write_one(fuzz_input *in)
         record now = read_one(other);
         bool is_new = other == id && same(&now, &fresh);
         if (!is_new && ((other == id && kept) || !same(&now, &old[other]))) {
-            FAIL("record %u after a write of %u that %s", (unsigned)other, (unsigned)id,
-                 kept ? "was kept" : "failed");
+            FAIL("record %u is wrong after a write of %u that %s", (unsigned)other, (unsigned)id,
+                 kept ? "succeeded" : "failed");
         }
     }
 }

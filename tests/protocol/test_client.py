@@ -69,4 +69,4 @@ def test_what_is_on_no_port_is_said_in_words(tmp_path: Path) -> None:
         ["cc", "-std=gnu11", str(CLIENT / "example.c"), str(CLIENT / "biotac_client.c"), "-o", str(program)], check=True
     )
     done = subprocess.run([str(program), "/dev/null", "1"], capture_output=True, text=True, check=False)
-    assert done.returncode == 2 and "expected a board's port" in done.stderr
+    assert done.returncode == 2 and "usage: example PORT FRAMES" in done.stderr

@@ -28,11 +28,11 @@ const char *flash_open(const char *path)
     }
     // One of settings alone is of a release that had no maps.
     if (s.st_size != 0 && s.st_size != BT_STORAGE_BYTES && s.st_size != BT_KEPT_BYTES) {
-        return "is no flash file: its size is not that of the simulated board's flash";
+        return "not a flash file: its size is not that of the simulated board's flash; choose another file";
     }
     size_t missing = BT_KEPT_BYTES - (size_t)s.st_size;
     if (pwrite(fd, memory, missing, s.st_size) != (ssize_t)missing) {
-        return "cannot be filled; is the disk full?";
+        return "cannot be extended to its full size; is the disk full?";
     }
     void *bytes = mmap(NULL, BT_KEPT_BYTES, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
     (void)close(fd);

@@ -55,7 +55,7 @@ static void load_tape(const char *path)
     struct stat s;
     int fd = open(path, O_RDONLY);
     if (fd < 0 || fstat(fd, &s) != 0 || s.st_size == 0) {
-        die(path, fd < 0 ? strerror(errno) : "empty");
+        die(path, fd < 0 ? strerror(errno) : "empty; expected a tape");
     }
     void *bytes = mmap(NULL, (size_t)s.st_size, PROT_READ, MAP_PRIVATE, fd, 0);
     if (bytes == MAP_FAILED) {
@@ -95,7 +95,7 @@ void port_init(int argc, char **argv)
         }
     }
     if (tape_path == NULL) {
-        die("--tape", "missing; biotac sim makes one and passes it");
+        die("--tape", "missing; expected a tape, which `biotac sim` makes and passes");
     }
     load_tape(tape_path);
     const char *wrong = flash_open(flash_path);
@@ -108,7 +108,7 @@ void port_init(int argc, char **argv)
     clock_init(pace);
     const char *path = pty_open(!paced);
     if (path == NULL) {
-        die("no pty", strerror(errno));
+        die("cannot open a pty", strerror(errno));
     }
     printf("pty %s\n", path);
     (void)fflush(stdout);

@@ -4,11 +4,12 @@
 
 #include <string.h>
 
-_Static_assert(BT_FRAME_MAX_BYTES <= BT_COBS_BLOCK_BYTES, "undo_cobs() knows one block");
-_Static_assert(BT_DEFRAMED_BAD_LENGTH + 1 == BT_DECODE_OUTCOMES, "every outcome is counted");
+_Static_assert(BT_FRAME_MAX_BYTES <= BT_COBS_BLOCK_BYTES, "undo_cobs() handles only one block");
+_Static_assert(BT_DEFRAMED_BAD_LENGTH + 1 == BT_DECODE_OUTCOMES, "every outcome needs a counter");
 // A message takes its payload, id, CRC, COBS byte and delimiter from the input, more than it takes of any
 // row but one that is filled up.
-_Static_assert(BT_DECODE_ROOM >= BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1, "the rest may complete too");
+_Static_assert(BT_DECODE_ROOM >= BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1,
+               "BT_DECODE_ROOM must also hold the completed rest");
 
 #define COBS_MAX_BYTES (BT_FRAME_MAX_BYTES + 1)
 
@@ -37,16 +38,16 @@ static const struct {
 };
 _Static_assert(BT_FRAME_BYTES == FRAME_1_0_BYTES + 20 && BT_STATUS_BYTES == STATUS_1_0_BYTES + 54
                    && BT_CALIBRATION_BYTES == 51 + 4 && BT_HELLO_BYTES == 35 + 4,
-               "who appends more says so above");
+               "list appended fields in the table above");
 // A FRAME or a STATUS filled up is longer than what came.
 _Static_assert((int64_t)(BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1) * BT_FRAME_BYTES
                    <= (int64_t)BT_DECODE_ROOM * (FRAME_1_0_BYTES + AROUND),
-               "rows filled up must fit");
+               "padded rows must fit");
 _Static_assert((int64_t)(BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1) * (2 + BT_STATUS_BYTES)
                    <= (int64_t)BT_DECODE_ROOM * (STATUS_1_0_BYTES + AROUND),
-               "and these with id and length");
+               "padded STATUS messages must fit with id and length");
 _Static_assert(2 + BT_CALIBRATION_BYTES <= 51 + AROUND && 2 + BT_HELLO_BYTES <= 35 + AROUND,
-               "and nothing else may be longer than what came");
+               "no other padded message may exceed its input");
 
 void bt_decoder_reset(bt_decoder *decoder)
 {

@@ -8,7 +8,7 @@
 
 // Rows take their bytes and 16 more; a row took at least its bytes from the input.
 _Static_assert(BT_PAC_BYTES >= 16 && BT_IDLE_BYTES >= 16 && BT_FRAME_BYTES >= 16,
-               "two of their own size suffice");
+               "twice a row's own size must suffice");
 _Static_assert(BT_IDLE_BYTES > 16 && BT_FRAME_BYTES > 16, "each row may have a gap before it");
 _Static_assert(BT_DECODED_FRAME == 0 && BT_DECODED_PAC == 1 && BT_DECODED_IDLE == 2, "rows come first");
 

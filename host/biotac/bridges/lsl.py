@@ -149,7 +149,7 @@ def describe(hand: Hand, finger: int) -> dict[str, str]:
         "board_serial": serial_text(hand.info),
         "port": hand.port,
         "axes": "x to the tip, y to E11's side, z dorsal; origin at the centre of the tip sphere",
-        "stamp": f"begin of the round; its electrodes were sampled {late_ms:.2f} ms later on average",
+        "stamp": f"start of the round; its electrodes were sampled {late_ms:.2f} ms later on average",
         "core_radius_m": f"{sensor.CORE_RADIUS_UM / 1e6:g}",
     }
 

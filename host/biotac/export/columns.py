@@ -16,7 +16,9 @@ from ..wire.frames import StructArray
 #: Called with the share of the work done, 0 to 1.
 Show = Callable[[float], None]
 
-STAMP = Field("stamp_ns", "<i8", "ns", "device time on the host's clock (Unix), by the drift that the recording shows")
+STAMP = Field(
+    "stamp_ns", "<i8", "ns", "device time on the host's clock (Unix), corrected for the drift seen in the recording"
+)
 
 
 def _stamped(fields: Sequence[Field]) -> tuple[Field, ...]:

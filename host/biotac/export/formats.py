@@ -27,9 +27,9 @@ class Format:
 
 
 FORMATS = {
-    ".csv": Format("biotac.export.csv_text", "text, one line a finger and round; PAC, bands in files of their own"),
-    ".parquet": Format("biotac.export.parquet", "columns for pandas and Arrow; files likewise", "parquet"),
-    ".h5": Format("biotac.export.hdf5", "HDF5, a group a finger, a dataset a column", "hdf5"),
+    ".csv": Format("biotac.export.csv_text", "text, one line per finger and round; PAC and bands in separate files"),
+    ".parquet": Format("biotac.export.parquet", "columns for pandas and Arrow; the same files", "parquet"),
+    ".h5": Format("biotac.export.hdf5", "HDF5, one group per finger, one dataset per column", "hdf5"),
     ".npz": Format("biotac.export.npz", "NumPy arrays named finger0/force_n"),
     ".ros2": Format("biotac.export.ros2", "a ROS 2 bag, a folder: WrenchStamped, PointStamped, counts, PAC", "ros2"),
 }
@@ -43,7 +43,7 @@ def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Sh
     """
     kind = FORMATS.get(out.suffix.lower())
     if kind is None:
-        raise InputError(f"{out}: no format has the suffix {out.suffix!r}; expected {', '.join(FORMATS)}")
+        raise InputError(f"{out}: unknown suffix {out.suffix!r}; expected {', '.join(FORMATS)}")
     try:
         module = import_module(kind.module)
     except ImportError as error:
@@ -52,7 +52,7 @@ def export(recording: Recording, out: Path, *, overwrite: bool = False, show: Sh
         ) from error
     made = tables(recording)
     if not any(len(table) for table in made):
-        raise InputError(f"{recording.path} holds no frame and no PAC; there is nothing to export")
+        raise InputError(f"{recording.path} holds no frames and no PAC; there is nothing to export")
     written: list[Path] = []
     write: Write = module.write
     with ExitStack() as together:  # no file is put in place before all are complete

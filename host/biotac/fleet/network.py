@@ -34,7 +34,10 @@ def key(name: str, what: str) -> str:
 def checked_name(name: str) -> str:
     """``name``. Raises InputError if it is not a valid name for a board."""
     if not NAME.fullmatch(name):
-        raise InputError(f"{name!r} is no name for a board; expected up to 64 letters, digits, '_', '-' and '.'")
+        raise InputError(
+            f"{name!r} cannot name a board; expected up to 64 letters, digits, '_', '-' and '.', the first a letter "
+            "or digit"
+        )
     return name
 
 
@@ -64,13 +67,15 @@ def open_session(
             facts.insert_json5("mode", '"client"')
     except zenoh.ZError as error:
         file = Path(config or os.environ.get("ZENOH_CONFIG", "")).name
-        raise InputError(f"{file} is no configuration of Zenoh ({_short(error)}); see zenoh.io/docs") from error
+        raise InputError(
+            f"Zenoh rejects its endpoint or configuration file {file} ({_short(error)}); see zenoh.io/docs"
+        ) from error
     try:
         return zenoh.open(facts)
     except zenoh.ZError as error:
         raise PortError(
-            f"{where}: Zenoh cannot be reached ({_short(error)}); check the endpoint, that `biotac serve` runs, and, "
-            "where it asks for a password or a certificate, your configuration of Zenoh"
+            f"{where}: cannot reach Zenoh ({_short(error)}); check the endpoint, that `biotac serve` is running, and, "
+            "if it asks for a password or a certificate, your Zenoh configuration"
         ) from error
 
 

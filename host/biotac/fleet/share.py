@@ -43,7 +43,7 @@ class Share:
         self._pauses = 0
         self._tail = b""
         if network.alive(session, name):
-            raise PortError(f"somebody shares a board as {name} already; choose another --name, or end that one")
+            raise PortError(f"a board is already shared as {name}; choose another --name, or stop that one")
         self._declared = [
             session.declare_queryable(network.key(name, what), answer)
             for what, answer in (("info", self._tell), ("claim", self._claim), ("command", self._command))

@@ -67,8 +67,8 @@ class ZenohLink(Link):
             epochs = network.alive(session, self._name)
             if not epochs:
                 raise PortError(
-                    f"nobody shares a board as {self._name}; see `biotac list --zenoh`, start `biotac serve PORT "
-                    f"--name {self._name}`, or name its computer: {FORM}"
+                    f"no board is shared as {self._name}; see `biotac list --zenoh`, start `biotac serve PORT "
+                    f"--name {self._name}`, or give the address of its computer: {FORM}"
                 )
             if len(epochs) > 1:
                 raise PortError(f"{len(epochs)} boards are shared as {self._name}; give them different names")
@@ -108,9 +108,10 @@ class ZenohLink(Link):
         )
         answer = next((reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None), None)
         if answer != b"":
-            holder = "nobody who answers" if answer is None else answer.decode(errors="replace")
+            holder = "unknown, as nobody answers" if answer is None else answer.decode(errors="replace")
             raise PortError(
-                f"{self.port}: {holder} commands this board, and one may; read it without write=yes, or end that one"
+                f"{self.port}: only one program may write at a time (now {holder}); open without write=yes, or "
+                "stop that one"
             )
 
     def _take(self, sample: Any) -> None:
@@ -146,9 +147,7 @@ class ZenohLink(Link):
             self._batches.clear()
             self._waiting = 0
             if not data and time.monotonic() - self._gone_s >= GONE_S:
-                raise DeviceLostError(
-                    f"{self.port} is not shared any more; see to `biotac serve` there, and open it again"
-                )
+                raise DeviceLostError(f"{self.port} is no longer shared; check `biotac serve` there and open it again")
             return data
 
     def write(self, data: bytes) -> None:
@@ -170,8 +169,8 @@ class ZenohLink(Link):
             return
         if rights.needs_writer(message_id) and not self._write:
             raise CommandRefusedError(
-                f"{self.port} is for reading: {command_name(message_id)} changes the board; open it with "
-                f"{'&' if '?' in self.port else '?'}write=yes, which one program may at a time",
+                f"{self.port} is read-only, and {command_name(message_id)} changes the board; open it with "
+                f"{'&' if '?' in self.port else '?'}write=yes (one program at a time)",
                 wire.Error.NOT_HERE,
             )
         replies = session.get(

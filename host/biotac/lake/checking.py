@@ -41,10 +41,10 @@ def check(lake: str, topics: dict[str, set[str]], partition: dict[str, str], rec
         data = seal.read_bytes()
         digest = pq.read_metadata(io.BytesIO(data)).metadata[DIGEST]
         if digest != digest_of(data, digest):
-            raise ValueError("its digest is another")
+            raise ValueError("its digest does not match")
         row: dict[str, Any] = pq.read_table(io.BytesIO(data)).to_pylist()[0]
         if row["recording"] != recording:
-            raise ValueError(f"it is of {row['recording']}")
+            raise ValueError(f"it belongs to {row['recording']}")
         facts = Facts.read(dict(row["metadata"]))
         files = {its["topic"]: its for its in row["files"]}
     except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError) as error:
@@ -55,7 +55,7 @@ def check(lake: str, topics: dict[str, set[str]], partition: dict[str, str], rec
         path = place(folder, topic, partition[recording], recording)
         told = files.get(topic)
         if told is None:
-            wrong.append(f"{path} is not named by its seal; move it elsewhere")
+            wrong.append(f"{path} is not listed in its seal; move it elsewhere")
             continue
         try:
             data = path.read_bytes()
@@ -63,7 +63,7 @@ def check(lake: str, topics: dict[str, set[str]], partition: dict[str, str], rec
             wrong.append(f"{path} cannot be read ({error.strerror}); export {row['source']} again with --force")
             continue
         if hashlib.sha256(data).hexdigest() != told["sha256"]:
-            wrong.append(f"{path} is not what was exported; export {row['source']} again with --force")
+            wrong.append(f"{path} differs from what was exported; export {row['source']} again with --force")
         elif topic == "frames":
             rows = frames_of(pq.read_table(io.BytesIO(data)))
             outcome.add(frames_to_wire(rows), facts.settings, facts.finger_settings, facts.maps)

@@ -51,7 +51,7 @@ def opened(folder: Path, *, create: bool = False) -> Lake:
         with contextlib.suppress(FileExistsError):
             folder.mkdir(parents=True)
     if not folder.is_dir() or not (create or (folder / RECORDINGS).is_dir()):
-        raise InputError(f"{folder} is no lake; `biotac export RECS... --lake {folder}` makes one")
+        raise InputError(f"{folder} is not a lake; create one with `biotac export RECS... --lake {folder}`")
     lake = Lake(folder)
     found: list[tuple[str, str, str]] = []
     foreign: list[str] = []
@@ -64,15 +64,15 @@ def opened(folder: Path, *, create: bool = False) -> Lake:
     if foreign:
         more = f" and {len(foreign) - 1} more" if foreign[1:] else ""
         raise InputError(
-            f"{folder / min(foreign)}{more} is no part of a lake; expected TOPIC/board=.../date=.../ID.parquet: "
-            "move it elsewhere"
+            f"no part of the lake: {folder / min(foreign)}{more}; expected only TOPIC/board=.../date=.../ID.parquet: "
+            "move the rest elsewhere"
         )
     for topic, partition, recording in found:
         if topic == RECORDINGS:
             if recording in lake.partition:
                 raise InputError(
                     f"{folder} holds recording {recording} in {lake.partition[recording]} and in {partition}; "
-                    "one is a copy: remove it"
+                    "expected one: remove the copy"
                 )
             lake.partition[recording] = partition
     for topic, partition, recording in found:
@@ -108,7 +108,7 @@ def sole_writer(folder: Path) -> Iterator[None]:
             if fcntl is not None:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            raise InputError(f"another export writes to {folder}; wait for its end") from error
+            raise InputError(f"another export is writing to {folder}; wait until it ends") from error
         shutil.rmtree(folder / PARTIAL, ignore_errors=True)
         try:
             yield

@@ -29,7 +29,7 @@ def recording_id(path: Path) -> str:
     first = next(iter(blocks), None)
     if first is None or blocks.metadata is None:
         Recording(path)  # raises an error that says what is wrong
-        raise RecordingError(f"{path} holds no second of data; there is nothing to export")
+        raise RecordingError(f"{path} holds no data; there is nothing to export")
     begin = json.dumps([blocks.metadata, first.arrived_ns], sort_keys=True).encode()
     return hashlib.sha256(begin + first.bytes()).hexdigest()[:_LETTERS]
 

@@ -124,8 +124,8 @@ def _facts(seal: dict[str, Any]) -> Facts:
 
 def _misplaced(lake: Lake, recording: str) -> InputError:
     return InputError(
-        f"files do not hold the recording that they are named after, {recording}; `biotac lake check {lake.folder}` "
-        "names them"
+        f"names and contents of files disagree about recording {recording}; list them with "
+        f"`biotac lake check {lake.folder}`"
     )
 
 
@@ -184,7 +184,7 @@ def _sensor(mine: list[_Round], facts: dict[str, Facts]) -> SensorFacts:
     findings = [f"{name} is dead" for name in last.dead]
     findings += _unusual("noise", "counts", [its.noise_count for its in mine])
     findings += _unusual("drift", "counts", drifts)
-    findings += _unusual("residue", "an hour", residues)
+    findings += _unusual("residue", "per hour", residues)
     return SensorFacts(
         last.sensor,
         last.board,

@@ -30,7 +30,7 @@ def query(lake: Lake, text: str) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
         result = connection.execute(text)
     except duckdb.Error as error:
         known = ", ".join(sorted(lake.topics))
-        raise InputError(f"DuckDB refuses it: {_first_line(error)}; topics are {known}") from error
+        raise InputError(f"DuckDB rejects the query: {_first_line(error)}; topics are {known}") from error
     names = [column[0] for column in result.description or ()]
     return names, _rows(result)
 
@@ -40,7 +40,9 @@ def _rows(result: Any) -> Iterator[tuple[Any, ...]]:
         while rows := result.fetchmany(10_000):
             yield from rows
     except duckdb.Error as error:
-        raise InputError(f"DuckDB stops: {_first_line(error)}; `biotac lake check` finds damaged files") from error
+        raise InputError(
+            f"DuckDB stopped: {_first_line(error)}; look for damaged files with `biotac lake check`"
+        ) from error
 
 
 def _first_line(error: Exception) -> str:

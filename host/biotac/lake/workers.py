@@ -11,7 +11,7 @@ from ..errors import BiotacError, InputError
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 _work: Callable[[Any], Any] | None = None  # in a worker
-_ENDED = "its worker ended before it was done (memory?); run it again with fewer workers"
+_ENDED = "its worker died before finishing (out of memory?); run again with fewer workers"
 
 
 def each(
@@ -90,7 +90,7 @@ def _on_dask(
         client = connect(address, timeout="10s", set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(
-            f"no Dask scheduler answers at {address} ({error}); start one with `dask scheduler`, expected tcp://HOST:PORT"
+            f"no Dask scheduler answers at {address} ({error}); expected one at tcp://HOST:PORT: start `dask scheduler`"
         ) from error
     with client:
         futures = client.map(_tried, [work] * len(items), items, pure=False)

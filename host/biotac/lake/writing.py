@@ -28,17 +28,19 @@ NO_DIGEST = b"0" * 64
 _SEAL = pa.schema(
     [
         pa.field("recording", pa.string(), metadata={"what": "id, the name of its files"}),
-        pa.field("source", pa.string(), metadata={"what": "name of the file that it was exported from"}),
-        pa.field("begin_ns", pa.int64(), metadata={"unit": "ns", "what": "stamp of its begin, Unix"}),
+        pa.field("source", pa.string(), metadata={"what": "name of the file it was exported from"}),
+        pa.field("begin_ns", pa.int64(), metadata={"unit": "ns", "what": "when it began, Unix time"}),
         pa.field("duration_s", pa.float64(), metadata={"unit": "s", "what": "by the board's clock"}),
         pa.field("size_bytes", pa.int64(), metadata={"unit": "B", "what": "of the source"}),
         pa.field("frames_lost", pa.int64(), metadata={"unit": "1", "what": "by the sequence numbers"}),
         pa.field("pac_lost", pa.int64(), metadata={"unit": "1", "what": "by the sequence numbers"}),
-        pa.field("problems", pa.list_(pa.string()), metadata={"what": "what of the source is missing or damaged"}),
+        pa.field(
+            "problems", pa.list_(pa.string()), metadata={"what": "what is missing from the source or damaged in it"}
+        ),
         pa.field("sensors", pa.map_(pa.uint8(), pa.string()), metadata={"what": "serial numbers by finger"}),
         pa.field("calibrations", pa.map_(pa.uint8(), pa.string()), metadata={"what": "ids by finger"}),
         pa.field(
-            "metadata", pa.map_(pa.string(), pa.string()), metadata={"what": "as host/docs/recording.md has them"}
+            "metadata", pa.map_(pa.string(), pa.string()), metadata={"what": "as described in host/docs/recording.md"}
         ),
         pa.field(
             "files",
@@ -81,7 +83,7 @@ def put(lake: str, known: dict[str, str], force: bool, source: str) -> Written:
     for table in [*tables(recording, {**EXPORTED, **HEARTBEATS}), *message_tables(recording)]:
         topics.setdefault(table.kind, []).append(table)
     if not topics:
-        raise InputError(f"{path} holds no frame, no PAC and no message; there is nothing to export")
+        raise InputError(f"{path} holds no frames, PAC or other messages; there is nothing to export")
     try:
         partial = folder / PARTIAL
         partial.mkdir(exist_ok=True)
@@ -96,7 +98,7 @@ def put(lake: str, known: dict[str, str], force: bool, source: str) -> Written:
                 os.replace(Path(stage) / topic, target)
     except OSError as error:
         raise InputError(
-            f"{folder} cannot be written ({error.strerror or error}); see to it and run it again"
+            f"{folder} cannot be written ({error.strerror or error}); fix that and run the export again"
         ) from error
     return Written(name, True, {its["topic"]: its["rows"] for its in files})
 
@@ -117,9 +119,11 @@ def _write(stage: Path, topic: str, made: list[Table], recording: Recording, nam
     if len(fingers) == len(made):
         labels += [
             frame_ids(made),
-            Label("sensor", "serial number, null where none is told", tuple(map(sensors.get, fingers))),
+            Label("sensor", "serial number, null where unknown", tuple(map(sensors.get, fingers))),
             Label(
-                "calibration", "id of calibration and map in force, null without", tuple(map(calibrations.get, fingers))
+                "calibration",
+                "id of the calibration and map in force, null if none",
+                tuple(map(calibrations.get, fingers)),
             ),
         ]
     write_labelled(stage / topic, made, labels, {"biotac.recording": name})

@@ -266,6 +266,6 @@ def layout_of(text: bytes) -> list[list[Column]]:
     for message_id in KINDS:
         columns = [(str(n), np.dtype(d), int(p)) for n, d, p in kinds[wire.MESSAGES[message_id].__name__.upper()]]
         if any(dtype.kind not in "iu" or not 0 < parts <= 64 for _, dtype, parts in columns):
-            raise ValueError("columns that are no integers")
+            raise ValueError("a column is not of integers, or not 1 to 64 wide")
         out.append(columns)
     return out

@@ -96,7 +96,7 @@ class Blocks:
             facts = layout.unsigned(record.metadata)
         except ValueError:
             self.damaged_metadata += 1
-            self.scan.problems.append(f"{record.name!r} of {self.scan.path.name} is damaged and left out")
+            self.scan.problems.append(f"{record.name!r} of {self.scan.path.name} is damaged and was skipped")
             return
         if record.name == layout.METADATA_NAME and self.metadata is None:
             self.metadata = facts
@@ -107,7 +107,7 @@ class Blocks:
         """Report parts that are missing or misplaced, unless an earlier problem already explains it."""
         if not self.scan.problems:
             name = self.scan.path.name
-            self.scan.problems.append(f"{name} is damaged: what it has is not in its order, and some of it left out")
+            self.scan.problems.append(f"{name} is damaged: parts of it are missing or out of order, and were skipped")
 
     def _piece(self, message: Message, parts: dict[int, bytes]) -> Piece | None:
         try:
@@ -125,7 +125,7 @@ class Blocks:
                 read_part(data, self._readings, rows, finger)
         except (KeyError, TypeError, ValueError, struct.error, IndexError, RecursionError) as error:
             self.scan.damaged_chunks += 1
-            self.scan.problems.append(f"one second of {self.scan.path.name} is damaged and left out ({error})")
+            self.scan.problems.append(f"one second of {self.scan.path.name} is damaged and was skipped ({error})")
             return None
         return Piece(message.publish_time, message.log_time, message.sequence, rows, rest, whole=whole)
 

@@ -53,24 +53,28 @@ def read_btd(path: Path) -> BtdFrames:
 
     present = (parity == 0).any(axis=0)
     if not present.any():
-        raise RecordingError(f"{path}: no sensor has a word of good parity: expected at least one sensor")
+        raise RecordingError(
+            f"{path}: no value has good parity: expected at least one sensor; record again with one connected"
+        )
     if int(present.sum()) > _sensor.MAX_SENSORS:
-        raise RecordingError(f"{path}: {present.sum()} sensors: expected at most {_sensor.MAX_SENSORS}")
+        raise RecordingError(
+            f"{path}: {present.sum()} sensors: expected at most {_sensor.MAX_SENSORS}; remove the columns of the others"
+        )
     values, good = values[:, present], parity[:, present] == 0
     wrong = good & ((values < 0) | (values > _sensor.FULL_SCALE_COUNT) | (values != np.floor(values)))
     if wrong.any():
         row, sensor = (int(k) for k in np.argwhere(wrong)[0])
         raise RecordingError(
             f"{path}: line {first_line + row} holds {values[row, sensor]:g} with good parity: "
-            f"expected a whole count 0..{_sensor.FULL_SCALE_COUNT}"
+            f"expected a whole count 0..{_sensor.FULL_SCALE_COUNT}; copy the file again"
         )
     words = np.where(good, values, INVALID_COUNT).astype(np.uint16)
 
     starts, skipped = _complete_frames(table[:, 1], table[:, 2], channel)
     if len(starts) == 0:
         raise RecordingError(
-            f"{path}: none of {skipped} frames is complete: expected {len(_sensor.SLOTS)} lines a frame with "
-            "E1..E19, PDC, TAC and TDC once and PAC 22 times (a BioTac SP's 54-slot frames are not played)"
+            f"{path}: no complete frame among {skipped}: expected {len(_sensor.SLOTS)} lines per frame with "
+            "E1..E19, PDC, TAC and TDC once and PAC 22 times (the 54-slot frames of a BioTac SP are not supported)"
         )
     rows = starts[:, None] + np.arange(len(_sensor.SLOTS))
     # a stable sort by channel aligns the k-th sample of a channel in the file with its k-th slot in SLOTS
@@ -116,14 +120,14 @@ def _bytes(path: Path) -> bytes:
         cure = "check the path" if seen else "copy it again"
         raise RecordingError(f"{path}: cannot be read ({seen or error}): expected a .btd; {cure}") from None
     if len(data) > limit:
-        raise RecordingError(f"{path}: more than {limit >> 20} MB of text: expected less; split it")
+        raise RecordingError(f"{path}: holds more than {limit >> 20} MiB of text: expected at most that; split it")
     return data
 
 
 def _numbers(path: Path, body: bytes, first_line: int) -> npt.NDArray[np.float64]:
     """The lines after ``Begin File`` as float64 (lines, 4 + 2 * sensors)."""
     if not body.strip():
-        raise RecordingError(f"{path}: nothing after 'Begin File': expected one line a slot; record again")
+        raise RecordingError(f"{path}: nothing after 'Begin File': expected one line per slot; record again")
     # drop the rest of the 'Begin File' line, so that row 0 is the line after it
     body = body.partition(b"\n")[2]
     try:

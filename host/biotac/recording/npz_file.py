@@ -24,13 +24,15 @@ def read_npz(path: Path, wanted: Collection[str]) -> dict[str, npt.NDArray[Any]]
         with path.open("rb") as file:
             archive = np.load(file, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise RecordingError(f"{path}: one bare array: expected an .npz with field E; use numpy.savez")
+                raise RecordingError(
+                    f"{path}: holds a single array: expected an .npz with field E; save it with numpy.savez"
+                )
             names = [name for name in archive.files if name in wanted]
             assert archive.zip is not None  # until it is closed
             size = sum(archive.zip.getinfo(f"{name}.npy").file_size for name in names)
             if size > MAX_BYTES:
                 raise RecordingError(
-                    f"{path}: its fields have {size >> 20} MiB: expected at most {MAX_BYTES >> 20}; split it"
+                    f"{path}: its fields take {size >> 20} MiB: expected at most {MAX_BYTES >> 20}; split it"
                 )
             fields = {}
             for name in names:
@@ -45,7 +47,7 @@ def read_npz(path: Path, wanted: Collection[str]) -> dict[str, npt.NDArray[Any]]
     except Exception as error:  # a damaged header is parsed as Python and can fail in many ways
         seen = str(error).partition("\n")[0]
         raise RecordingError(
-            f"{path}: cannot be read ({seen}): expected an .npz of number arrays; save it again"
+            f"{path}: cannot be read ({seen}): expected an .npz of numeric arrays; save it again"
         ) from None
 
 
@@ -61,7 +63,7 @@ def counts_field(
     good = len(shape) == (1 if columns is None else 2) and shape[0] > 0
     good = good and (rows is None or shape[0] == rows) and (columns is None or shape[1] == columns)
     if not good:
-        raise RecordingError(f"{path}: field {name} has shape {shape}: expected {wanted}, one row a frame")
+        raise RecordingError(f"{path}: field {name} has shape {shape}: expected {wanted}, one row per frame")
     expected = f"expected whole counts 0..{_sensor.FULL_SCALE_COUNT}; save raw counts"
     if array.dtype.kind not in "iuf":
         raise RecordingError(f"{path}: field {name} holds {array.dtype}: {expected}")

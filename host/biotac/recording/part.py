@@ -99,7 +99,7 @@ def _fields(names: Iterable[str] | None) -> list[Field]:
     chosen = list(_BY_NAME) if names is None else [names] if isinstance(names, str) else list(names)
     unknown = [name for name in chosen if name not in _BY_NAME]
     if unknown:
-        raise InputError(f"no field {unknown[0]!r}: expected some of {', '.join(_BY_NAME)}")
+        raise InputError(f"unknown field {unknown[0]!r}: expected one or more of {', '.join(_BY_NAME)}")
     return [field for field in FRAME_FIELDS if field.name in chosen]
 
 
@@ -127,7 +127,7 @@ def _within(t_us: NDArray[Any], begin_us: int, start_s: float, stop_s: float | N
 
 def _checked(pieces: Blocks, place: Path) -> None:
     if pieces.metadata is None:
-        raise RecordingError(f"{place} holds no biotac recording that can be read; expected one by `biotac record`")
+        raise RecordingError(f"{place} holds no readable biotac recording; expected a file written by `biotac record`")
     layout.check_version(place, pieces.metadata)
     problems = pieces.scan.problems
     if problems:

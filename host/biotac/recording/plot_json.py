@@ -41,9 +41,9 @@ RESULTS_SCHEMA = {
         "force_n": _vector("N"),
         "torque_nm": _vector("N*m, about the origin; x is derived"),
         "poc_m": _vector("m, point of contact"),
-        "pressure_force_n": _number("magnitude of the force from static pressure, N; left out unless calibrated"),
+        "pressure_force_n": _number("magnitude of the force from static pressure, N; absent unless calibrated"),
         "torsion_nm": _number(
-            "torque about the outward normal at the contact, N*m; left out unless a wrench map has it"
+            "torque about the outward normal at the contact, N*m; absent unless a wrench map gives it"
         ),
         "contact": {"type": "boolean"},
         "flags": {"type": "integer", "description": "flags frame in MESSAGES.md"},
@@ -83,7 +83,7 @@ EVENT_SCHEMA = {
         "kind": {"type": "string", "description": "enum event_kind in MESSAGES.md"},
         "age_s": _number("how long ago it began, s"),
         "energy": _number("of a touch or lift: sum of squares of the signals, count^2"),
-        "peak": _number("of a jolt or slip: the most that dynamic pressure changed by within 3.6 ms, count"),
+        "peak": _number("of a jolt or slip: largest change of dynamic pressure within 3.6 ms, count"),
     },
 }
 SCHEMAS = {"results": RESULTS_SCHEMA, "counts": COUNTS_SCHEMA, "tare": TARE_SCHEMA, "events": EVENT_SCHEMA}

@@ -75,7 +75,7 @@ class Recording:
         self.pac_lost = decoder.lost_pac
         self.disordered = decoder.disordered
         if self.cut_off and not len(self.seq):
-            raise RecordingError(f"{self.path} was cut off before its first second was whole; record it again")
+            raise RecordingError(f"{self.path} was cut off before its first second was complete; record it again")
         self._describe_losses(decoder)
 
     def _take_facts(self, blocks: Blocks) -> None:
@@ -90,12 +90,14 @@ class Recording:
         try:
             self._take_metadata(blocks.metadata)
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
-            raise RecordingError(f"{self.path} has damaged metadata ({error}); its frames cannot be judged") from error
+            raise RecordingError(
+                f"{self.path} has damaged metadata ({error}) and cannot be used; try another copy"
+            ) from error
         numbers = {piece.number for piece in self._pieces}
         missing = max(numbers, default=-1) + 1 - len(numbers) - self.damaged_chunks
         if self.metadata["format"] != "1" and missing > 0:
             self.problems.append(
-                f"{missing} second(s) of {self.path.name} are missing: it is damaged beyond recognition"
+                f"{missing} second(s) of {self.path.name} are missing: the file is too damaged to find them"
             )
 
     def _rows(self, decoder: StreamDecoder) -> Batch | None:
@@ -193,25 +195,27 @@ class Recording:
         try:
             gap = Gap.from_text(text)
         except (KeyError, ValueError) as error:
-            self.problems.append(f"a gap is marked in {self.path.name}, in words that are damaged ({error})")
+            self.problems.append(f"a gap is marked in {self.path.name}, but its record is damaged ({error})")
             return
         self.gaps.append(gap)
         self.problems.append(gap.words())
 
     def _without_metadata(self, damaged: bool) -> str:
         if damaged:
-            return f"{self.path} has damaged metadata (wrong checksum); its frames cannot be judged"
+            return f"{self.path} has damaged metadata (wrong checksum) and cannot be used; try another copy"
         if self.problems:
-            return f"{self.path} was cut off before its first record; nothing can be read: record it again"
-        return f"{self.path} is an MCAP file, but no biotac recording; expected one that `biotac record` wrote"
+            return (
+                f"{self.path} is cut off or damaged and has no readable metadata; try another copy or record it again"
+            )
+        return f"{self.path} is an MCAP file but not a biotac recording; expected a file written by `biotac record`"
 
     def _take_metadata(self, metadata: dict[str, str]) -> None:
         layout.check_version(self.path, metadata)
         major = metadata["wire"].partition(".")[0]
         if int(major) != wire.WIRE_MAJOR:
             raise RecordingError(
-                f"{self.path} holds wire {metadata['wire']}, this version reads {wire.WIRE_MAJOR}.x; "
-                "install the biotac-gateway it was recorded with"
+                f"{self.path} uses wire version {metadata['wire']}, this biotac-gateway reads {wire.WIRE_MAJOR}.x; "
+                "install the version it was recorded with"
             )
         self.metadata = metadata
         facts = Facts.read(metadata)
@@ -253,6 +257,6 @@ class Recording:
         counts = decoder.counts
         if counts.bad:
             self.problems.append(
-                f"{counts.bad} wire frame(s) refused: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
+                f"{counts.bad} packet(s) rejected: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "
                 f"{counts.bad_length} wrong length, {counts.too_long} too long"
             )

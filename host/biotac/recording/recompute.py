@@ -74,7 +74,7 @@ def recompute(
                 f"{setting.name.lower()} is {value}, expected {spec.low} to {spec.high} {spec.unit}; choose another"
             )
     if not len(recording.wire):
-        raise InputError(f"{recording.path} holds no frame; there is nothing to recompute")
+        raise InputError(f"{recording.path} holds no frames; there is nothing to recompute")
     settings = recording.settings | changes
     calibrations = {finger: its.changed(changes) for finger, its in recording.calibrations.items()}
     own = own_settings(settings, calibrations)
@@ -84,7 +84,7 @@ def recompute(
     if keep_tare:
         idle = sorted(s.name.lower() for s in set(changes) - RESULT_SETTINGS)
         if idle:
-            raise InputError(f"{idle[0]} has no effect on tares that are kept; leave --keep-tare away")
+            raise InputError(f"{idle[0]} has no effect when tares are kept; omit --keep-tare")
         new, tares = _with_kept_tares(recording, settings, own, board_maps), None
         show(0.5)
     else:
@@ -106,8 +106,8 @@ def _check_maps(recording: Recording, maps: Mapping[int, BoardMap]) -> None:
     missing = [int(finger) for finger in mapped if int(finger) not in maps]
     if missing:
         raise InputError(
-            f"finger {missing[0]} of {recording.path} published by a wrench map that is not known: expected its map; "
-            "record it with the board that has it"
+            f"finger {missing[0]} of {recording.path} used a wrench map that is not available; expected that "
+            "map: record again with the board that has it"
         )
 
 
@@ -173,13 +173,13 @@ def _through_the_machine(
     if len(recording.idle) or recording.frames_lost or recording.disordered:
         seen = "heartbeats" if len(recording.idle) else "lost frames" if recording.frames_lost else "a restart"
         raise InputError(
-            f"{recording.path} has {seen}, and the tare machine needs the counts of every round; add --keep-tare to "
-            "recompute from the tares it recorded"
+            f"{recording.path} has {seen}, but the tare machine needs the counts of every round; add --keep-tare to "
+            "use the recorded tares"
         )
     if np.any(recording.wire["flags"] & wire.FrameFlags.SENSOR_OTHER):
         raise InputError(
-            f"{recording.path} has a sensor that was plugged in while recording, whose tare began anew; add "
-            "--keep-tare to recompute from the tares it recorded"
+            f"{recording.path} has a sensor that was plugged in during the recording and tared afresh; add "
+            "--keep-tare to use the recorded tares"
         )
     new = np.empty_like(recording.wire)
     tares: dict[int, wire.Tare] = {}
@@ -195,7 +195,10 @@ def _through_the_machine(
         rounds = with_silence(_rounds(recording, at, maps.get(int(finger)), notes))
         frames, changes = frames_and_tares(rounds, own.get(int(finger), settings), ran_rows)
         if len(frames) != len(at):
-            raise InputError(f"{recording.path}: finger {finger} has frames without one good count; add --keep-tare")
+            raise InputError(
+                f"{recording.path}: finger {finger} has frames without a single valid count; add --keep-tare to use "
+                "the recorded tares"
+            )
         frames["seq"] = recording.wire["seq"][at]
         frames["flags"] |= recording.wire["flags"][at] & np.uint32(wire.FrameFlags.SENSOR_UNSURE)  # not in counts
         new[at] = frames
@@ -217,7 +220,9 @@ def _rounds(recording: Recording, at: NDArray[np.int64], its: BoardMap | None, n
     if 0 not in tares and not int(sent["flags"][0]) & wire.FrameFlags.UNTARED:
         q4 = np.append(sent["tare_q4"][0], sent["pdc_tare_q4"][0])
         _give(tares, 0, np.where(q4 == wire.INVALID_COUNT, np.nan, q4 / 16), False)
-        notes.append(f"finger {finger} was tared before the recording began; it starts with its first frame's tare")
+        notes.append(
+            f"finger {finger} was tared before the recording began; its first frame's tare is used at the start"
+        )
     words = _host_words(recording, sent, row_of)
     sigma = (sent["poc_sigma_um"] != wire.INVALID_COUNT).any()
     quantities = RESULTS | wire.QuantityFlags.REST_FRAMES | wire.QuantityFlags(wire.QuantityFlags.SIGMA if sigma else 0)

@@ -97,8 +97,8 @@ class Scan:
         with stream:
             if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
                 raise RecordingError(
-                    f"{self.path} is no MCAP file ({self._size} bytes, wrong first bytes); expected a file that "
-                    "`biotac record` wrote"
+                    f"{self.path} is not an MCAP file ({self._size} bytes, wrong first bytes); expected a file "
+                    "written by `biotac record`"
                 )
             good_until = len(MCAP0_MAGIC)
             held: tuple[int, int] | None = None  # position and length of a chunk whose message indexes are being read
@@ -133,10 +133,12 @@ class Scan:
         if self.cut_off:
             self.problems.append(
                 f"{self.path.name} ends without its index, as after a kill or a full disk: its last "
-                f"{self._size - good_until} bytes are missing or unreadable, what came before them is read"
+                f"{self._size - good_until} bytes are incomplete or unreadable; everything before them was read"
             )
         elif not self._counted or not self._data_end:
-            self.problems.append(f"{self.path.name} is damaged: without its statistics nobody knows what is missing")
+            self.problems.append(
+                f"{self.path.name} is damaged: it lacks its statistics or end record, so losses may go unnoticed"
+            )
 
     def _prove(self, stream: BinaryIO, opcode: int, at: int, length: int) -> None:
         """Verify the checksum in a DataEnd or Footer; 0 means that there is none, as in format 1."""
@@ -147,21 +149,21 @@ class Scan:
         elif isinstance(record, Footer):
             begin, end, told = record.summary_start, at - HEAD.size + _FOOTER_BYTES, record.summary_crc
             if begin != self._data_end:
-                self.problems.append(f"{self.path.name} is damaged: its index is not where its end says")
+                self.problems.append(f"{self.path.name} is damaged: its index is not where its footer says")
                 return
         else:
             return
         if self._check and told and _crc32(stream, begin, end) != told:
             self.wrong_checksums += 1
             what = "records" if opcode == Opcode.DATA_END else "index"
-            self.problems.append(f"{self.path.name} is damaged: the checksum over its {what} is wrong")
+            self.problems.append(f"{self.path.name} is damaged: the checksum of its {what} is wrong")
 
     def _read(self, opcode: int, content: ReadDataStream) -> Any:
         """The record in ``content``; None if it is damaged, which is added to ``problems``."""
         try:
             return _READ[opcode].read(content)
         except (McapError, struct.error, ValueError, EOFError, MemoryError, OverflowError) as error:
-            self.problems.append(f"a record of {self.path.name} is damaged and left out ({error})")
+            self.problems.append(f"a record of {self.path.name} is damaged and was skipped ({error})")
             return None
 
     def _one(self, opcode: int, content: ReadDataStream) -> Iterator[Metadata | tuple[str, Message]]:
@@ -190,8 +192,8 @@ class Scan:
                 seen, told = (self._chunks, self._metadata), (record.chunk_count, record.metadata_count)
                 if seen != told:
                     self.problems.append(
-                        f"{self.path.name} has {seen[0]} chunks and {seen[1]} notes, and its statistics say {told[0]} "
-                        f"and {told[1]}: some of it is damaged beyond recognition"
+                        f"{self.path.name} has {seen[0]} chunks and {seen[1]} metadata records, but its statistics say "
+                        f"{told[0]} and {told[1]}: the file is damaged"
                     )
                 self._compare(record.channel_message_counts)
             elif isinstance(record, Message) and self._wanted(topic := self._topics.get(record.channel_id, "")):
@@ -203,8 +205,8 @@ class Scan:
         wanted = {channel for channel in {*told, *self._messages} if self._wanted(self._topics.get(channel, ""))}
         if not self.damaged_chunks and any(told.get(channel, 0) != self._messages[channel] for channel in wanted):
             self.problems.append(
-                f"{self.path.name} has {sum(self._messages.values())} blocks, and its statistics say "
-                f"{sum(told.get(channel, 0) for channel in wanted)}: some of it is damaged beyond recognition"
+                f"{self.path.name} has {sum(self._messages.values())} blocks, but its statistics say "
+                f"{sum(told.get(channel, 0) for channel in wanted)}: the file is damaged"
             )
 
     def _open(self, stream: BinaryIO, at: int, length: int, *, unwanted: bool) -> Iterator[tuple[str, Message]]:
@@ -218,7 +220,7 @@ class Scan:
             raise
         except Exception as error:  # mcap, zstandard and struct raise many types
             self.damaged_chunks += 1
-            self.problems.append(f"one second of {self.path.name} is damaged and left out ({error})")
+            self.problems.append(f"one second of {self.path.name} is damaged and was skipped ({error})")
             return
         yield from self._take(records)
 
@@ -233,7 +235,7 @@ class Scan:
         self._unpacked += size
         if size > _CHUNK_MAX_BYTES or self._unpacked > _FREE_BYTES + _RATIO_MAX * self._size:
             raise RecordingError(
-                f"{self.path} unpacks to {self._unpacked / 1e6:.0f} MB and more, from {self._size / 1e6:.1f} MB; "
-                f"expected {_CHUNK_MAX_BYTES >> 20} MB a chunk and {_RATIO_MAX} times its size at most: it is no "
-                "recording of a board"
+                f"{self.path} unpacks to {self._unpacked / 1e6:.0f} MB or more from {self._size / 1e6:.1f} MB; "
+                f"expected at most {_CHUNK_MAX_BYTES >> 20} MiB per chunk and {_RATIO_MAX} times the file's size: it "
+                "is not a recording of a board"
             )

@@ -111,7 +111,7 @@ class Recorder:
         """
         if os.fstat(self.fileno()).st_nlink == 0:
             self._file.close()  # so that this is reported only once
-            raise FileNotFoundError(errno.ENOENT, "was deleted while it was recorded", str(self.path))
+            raise FileNotFoundError(errno.ENOENT, "was deleted during recording", str(self.path))
         self._file.add(bytes(self._pending), self._arrived_ns, self._unix_ns())
         self._pending.clear()
 
@@ -141,6 +141,6 @@ def create(path: Path, *, overwrite: bool) -> BinaryIO:
     try:
         return path.open("wb" if overwrite else "xb")
     except FileExistsError as error:
-        raise InputError(f"{path} exists and would be overwritten; choose another name or say --force") from error
+        raise InputError(f"{path} exists and would be overwritten; choose another name or add --force") from error
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error

@@ -59,7 +59,7 @@ def get(port: int, path: str) -> bytes:
     """Body of a page. Raises ConnectionError if it is not there."""
     with asked(port, "GET", path) as answer:
         if answer.status != 200:
-            raise ConnectionError(f"{path} was answered with {answer.status}")
+            raise ConnectionError(f"{path} returned HTTP status {answer.status}")
         return answer.read()
 
 
@@ -126,9 +126,9 @@ def judge(about: dict[str, Any], frames: list[dict[str, Any]]) -> list[str]:
             problems.append(f"finger {finger} sent nothing")
         steps = {b["seq"] - a["seq"] for a, b in pairwise(mine)}
         if min(steps, default=1) < 1:  # larger steps are fine: a busy computer loses frames, which the page counts
-            problems.append(f"finger {finger}: sequence numbers step by {sorted(steps)}")
+            problems.append(f"finger {finger}: sequence numbers step by {sorted(steps)}, expected 1 or more")
         if any(len(row["signal_q4"]) != electrodes for row in mine):
-            problems.append(f"finger {finger}: a frame without its {electrodes} electrodes")
+            problems.append(f"finger {finger}: a frame does not have {electrodes} electrodes")
     return problems
 
 
@@ -139,11 +139,11 @@ def judge_commands(port: int, token: str) -> list[str]:
         ("without the page's token", {}, {403}),
         ("from another origin", {TOKEN_HEADER: token, "Origin": "http://example.org"}, {403}),
         # the board refuses (409) while the finger moves
-        ("of the page", {TOKEN_HEADER: token}, {200, 409}),
+        ("from the page", {TOKEN_HEADER: token}, {200, 409}),
     ):
         status = post(port, {"do": "tare", "finger": 0}, headers)
         if status not in wanted:
-            problems.append(f"a command {what} was answered with {status}")
+            problems.append(f"a command {what} returned HTTP status {status}")
     return problems
 
 

@@ -101,5 +101,5 @@ def describe(hello: wire.Hello) -> str:
 def writable(folder: Path) -> Path:
     """``folder``. Raises InputError if recordings cannot be written there."""
     if not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise InputError(f"{folder} is no folder to write to; name another with --folder")
+        raise InputError(f"{folder} is not a writable folder; name another with --folder")
     return folder

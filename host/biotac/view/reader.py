@@ -56,7 +56,7 @@ class Reader:
         was not even begun, it is cancelled. Otherwise raises what the Player raises.
         """
         if name not in COMMANDS:
-            raise InputError(f"no command is called {name!r}; expected one of {', '.join(COMMANDS)}")
+            raise InputError(f"unknown command {name!r}; expected one of {', '.join(COMMANDS)}")
         command = Command(name, finger)
         self._commands.put(command)
         try:
@@ -64,9 +64,9 @@ class Reader:
         except TimeoutError:
             if not command.done.cancel():
                 raise InputError(
-                    f"{name} was begun and has taken over {ANSWER_S:.0f} s; look what came of it"
+                    f"{name} has been running for over {ANSWER_S:.0f} s; check whether it took effect"
                 ) from None
-            raise InputError(f"{name} was not begun within {ANSWER_S:.0f} s, and will not be; try again") from None
+            raise InputError(f"{name} did not start within {ANSWER_S:.0f} s and was cancelled; try again") from None
 
     # ---- the thread ----------------------------------------------------------------------------
 
@@ -85,7 +85,7 @@ class Reader:
         except InputError:
             raise  # waiting does not help with a malformed source
         except BiotacError as error:
-            self._rest("lost", f"{self._loss}No board: {error}. Looking again every second.", RETRY_S)
+            self._rest("lost", f"{self._loss}No board: {error}. Retrying every second.", RETRY_S)
             return
         self._loss = ""
         try:
@@ -97,12 +97,12 @@ class Reader:
             self._close(player)
             self._loss = f"Connection lost: {error}. "
             if kept:
-                self._loss += f"The recording {kept.path} is kept up to there. "
-            self._rest("lost", f"{self._loss}Looking again every second.", RETRY_S)
+                self._loss += f"The recording {kept.path} is kept up to that point. "
+            self._rest("lost", f"{self._loss}Retrying every second.", RETRY_S)
             return
         self._close(player)
         if ended and not self._again:
-            self._rest("over", "It has played to its end.", None)
+            self._rest("over", "Playback finished.", None)
 
     def _play(self, player: Player) -> bool:
         self._say_playing(player)
@@ -127,7 +127,7 @@ class Reader:
     def _obey(self, player: Player, command: Command) -> None:
         try:
             if command.name == "again":
-                raise InputError("it is playing already")
+                raise InputError("it is already playing")
             words = player.do(command.name, command.finger)
         except (BiotacError, OSError) as error:
             command.done.set_exception(error)

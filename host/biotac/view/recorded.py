@@ -31,7 +31,7 @@ class RecordedPlayer(Player):
         self._pace = pace
         self._tick = threading.Event()  # waiting for it is a sleep that close() ends
         self.paused = False
-        self.board = f"{describe(recording.info)}, recorded on {recording.metadata['port']}"
+        self.board = f"{describe(recording.info)}, recorded from {recording.metadata['port']}"
         self._frames = 0
         parts = [rows["t_us"] for rows in (recording.frames, recording.pac, recording.idle) if len(rows)]
         if not parts:
@@ -96,7 +96,7 @@ class RecordedPlayer(Player):
     def do(self, command: str, finger: int | None) -> str:
         if command in ("pause", "resume"):
             self.paused = command == "pause"
-            return "paused" if self.paused else "playing on"
+            return "paused" if self.paused else "playing"
         what = {"tare": "tared", "record": "recorded again", "stop": "stopped"}.get(command, command)
         raise InputError(f"a recording cannot be {what}; open a board for that")
 

@@ -66,7 +66,9 @@ class ViewServer(ThreadingHTTPServer):
         try:
             super().__init__((HOST, port), Handler)
         except OSError as error:
-            raise PortError(f"{HOST}:{port} cannot be served ({error.strerror}); --port 0 takes a free one") from error
+            raise PortError(
+                f"cannot serve on {HOST}:{port} ({error.strerror}); use --port 0 for any free port"
+            ) from error
         self.names = {f"{name}:{self.server_port}" for name in (HOST, "localhost")}
 
     @property
@@ -127,7 +129,7 @@ class Handler(BaseHTTPRequestHandler):
         elif name in self.server.files:
             self._answer(200, TYPES[name[name.rindex(".") :]], self.server.files[name])
         else:
-            self._words(404, f"nothing is at {path}")
+            self._words(404, f"nothing at {path}")
 
     def do_POST(self) -> None:
         """Commands: ``{"do": "tare", "finger": 0}``, answered with ``{"words": ...}``."""
@@ -135,10 +137,10 @@ class Handler(BaseHTTPRequestHandler):
         if not self._known_name():
             return
         if not secrets.compare_digest(self.headers.get(TOKEN_HEADER, "").encode(), self.server.token.encode()):
-            self._words(403, "this page only shows; for commands open the address that `biotac view` printed")
+            self._words(403, "this page is view-only; to send commands, open the address that `biotac view` printed")
             return
         if self.path != "/command":
-            self._words(404, f"nothing is at {self.path}")
+            self._words(404, f"nothing at {self.path}")
             return
         try:
             name, finger = parse_command(self._body())
@@ -160,12 +162,12 @@ class Handler(BaseHTTPRequestHandler):
         if here and (origin is None or origin.removeprefix("http://") in self.server.names):
             return True
         self.close_connection = True
-        self._words(403, f"this page is only at {self.server.url}")
+        self._words(403, f"this page is served only at {self.server.url}")
         return False
 
     def _events(self) -> None:
         if not self.server.begin_page(self.connection):
-            self._words(503, f"{MAX_PAGES} pages are open already; close one")
+            self._words(503, f"{MAX_PAGES} pages are already open; close one")
             return
         self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
         self.close_connection = True

@@ -10,7 +10,7 @@ most_n = 0.0
 
 
 def touched(touch) -> None:
-    print(f"finger {touch.finger} may be touched, {touch.t_us / 1e6:.4f} s")
+    print(f"finger {touch.finger}: possible touch at {touch.t_us / 1e6:.4f} s")
 
 
 def arrived(batch) -> None:

@@ -26,5 +26,5 @@ folds = StratifiedKFold(5, shuffle=True, random_state=0)
 for samples in (220, 1100, 2200, None):
     rows = texture.describe_all(its[:samples] for its in pac)
     found = cross_val_predict(texture.classifier(), rows, materials, cv=folds)
-    what = "all of each slide" if samples is None else f"its first {samples / 2200:g} s"
-    print(f"{what}: {np.mean(found == np.array(materials)):.0%} of {len(pac)} slides")
+    what = "whole slides" if samples is None else f"the first {samples / 2200:g} s"
+    print(f"{what}: {np.mean(found == np.array(materials)):.0%} of {len(pac)} slides recognised")

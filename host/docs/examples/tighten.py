@@ -124,7 +124,7 @@ def learn(seeds: range) -> grip.Trained:
 
 if __name__ == "__main__":
     trained = learn(range(4))
-    for name, its in (("held as it was", None), ("tightened", trained)):
+    for name, its in (("grip not changed", None), ("tightened", trained)):
         thing = Thing(mass_kg=0.25, lift_s=2.0)
         grasp(thing, 100, its)
         lost = "lost" if thing.slid_mm >= LOST_MM else "kept"

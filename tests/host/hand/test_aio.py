@@ -25,7 +25,7 @@ EXAMPLES = Path(__file__).resolve().parents[3] / "host" / "docs" / "examples"
 SAYS = {
     "pull.py": "300 frames",
     "latest.py": "FrameFlags.CONTACT",
-    "callbacks.py": "finger 0 may be touched",
+    "callbacks.py": "finger 0: possible touch at ",
     "loop.py": ", 0 lost",
     "subscription.py": "the thumb was at rest",
 }

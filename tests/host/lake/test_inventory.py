@@ -91,4 +91,4 @@ def test_two_recordings_are_no_history(first, tmp_path, capsys) -> None:
 
 def test_no_lake_is_one_line(tmp_path, capsys) -> None:
     assert main(["inventory", str(tmp_path)]) == 2
-    assert "is no lake" in capsys.readouterr().err
+    assert "is not a lake" in capsys.readouterr().err

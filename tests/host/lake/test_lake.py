@@ -274,7 +274,7 @@ def test_check_finds_what_is_wrong(sources, lake, tmp_path, capsys) -> None:
     assert main(["lake", "check", str(folder)]) == 1
     said = capsys.readouterr().out.splitlines()
     assert len(said) == 3
-    assert any("is not what was exported" in line and first in line for line in said)
+    assert any("differs from what was exported" in line and first in line for line in said)
     assert any("cannot be read" in line and second in line for line in said)
     assert export(sources, folder, "--force") == 0
     assert hashes(folder) == hashes(lake)
@@ -296,9 +296,9 @@ def test_a_seal_that_says_something_else_is_found(lake, tmp_path, capsys) -> Non
             checking.check(str(folder), {}, its.partition, first)
     seal.write_bytes(its.path(lake_folder.RECORDINGS, second).read_bytes())
     assert main(["lake", "check", str(folder)]) == 1
-    assert f"it is of {second}" in capsys.readouterr().err
+    assert f"it belongs to {second}" in capsys.readouterr().err
     assert main(["inventory", str(folder)]) == 2
-    assert "names them" in capsys.readouterr().err
+    assert "names and contents of files disagree" in capsys.readouterr().err
 
 
 def test_a_wrong_result_is_found(sources, tmp_path, capsys) -> None:
@@ -327,13 +327,18 @@ def test_a_foreign_file_is_one_line_and_2(sources, lake, tmp_path, capsys, verb:
     }[verb]
     assert main(words) == 2
     said = capsys.readouterr().err.splitlines()
-    assert len(said) == 1 and "mine.parquet is no part of a lake" in said[0] and "move it elsewhere" in said[0]
+    assert (
+        len(said) == 1
+        and "no part of the lake: " in said[0]
+        and "mine.parquet; expected" in said[0]
+        and "move the rest elsewhere" in said[0]
+    )
 
 
 def test_two_exports_at_once_are_refused_in_words(sources, lake) -> None:
     with (
         lake_folder.sole_writer(lake),
-        pytest.raises(InputError, match="another export writes"),
+        pytest.raises(InputError, match="another export is writing"),
         lake_folder.sole_writer(lake),
     ):
         pass

@@ -81,7 +81,7 @@ def test_one_fingers_force_takes_little_memory(recorded: Path) -> None:
 
 
 def test_what_is_not_there_is_named(recorded: Path, tmp_path: Path) -> None:
-    with pytest.raises(biotac.InputError, match="no field 'forces_n': expected some of finger, seq"):
+    with pytest.raises(biotac.InputError, match="unknown field 'forces_n': expected one or more of finger, seq"):
         biotac.load(recorded, fields=["forces_n"])
     with pytest.raises(biotac.InputError, match="no finger 'nose'"):
         biotac.load(recorded, fingers=["nose"])

@@ -233,8 +233,8 @@ def edited(row: int, column: int, value: float) -> list[list[float]]:
         ([*btd_lines(), [1.0, 2, 3]], "line 138 is '1.000000 2 3'"),
         ([line[:9] for line in btd_lines()], "line 6 is"),
         ([line[:4] for line in btd_lines()], "line 6 is"),
-        ([[*line[:4], 0, 1, 0, 1, 0, 1] for line in btd_lines()], "no sensor has a word of good parity"),
-        (btd_lines(1)[:40], "none of 1 frames is complete"),
+        ([[*line[:4], 0, 1, 0, 1, 0, 1] for line in btd_lines()], "no value has good parity"),
+        (btd_lines(1)[:40], "no complete frame among 1"),
     ],
 )
 def test_malformed_btd_is_refused(tmp_path: Path, lines: list[list[float]], words: str) -> None:

@@ -100,7 +100,7 @@ def test_a_recording_plays_on_the_same_page(view, open_page, tmp_path) -> None:
     page.keyboard.press("p")
     link_is(page, "playing")
     link_is(page, "over")
-    assert page.text_content("#link-words") == "It has played to its end."
+    assert page.text_content("#link-words") == "Playback finished."
     # Its last picture comes after the word.
     until(page, "n => numbers.dataset.seq === n", str(recording.frames["seq"].max()))
     page.keyboard.press("g")
@@ -173,7 +173,7 @@ def test_pause_freezes_the_picture_and_nothing_else(view, open_page) -> None:
     until(page, "() => numbers.dataset.seq > 0")
     page.keyboard.press("p")
     page.wait_for_selector("#pause[aria-pressed=true]")
-    assert "the board and a recording go on" in page.text_content("#link-words")
+    assert "the board and any recording keep running" in page.text_content("#link-words")
     before = page.evaluate(SNAPSHOT)["seq"]
     cursor = viewing.state.cursor()
     viewing.state.wait(cursor, 0)

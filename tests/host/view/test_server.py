@@ -204,7 +204,7 @@ def test_a_command_that_was_told_to_have_failed_is_not_carried_out(make_player, 
     monkeypatch.setattr(State, "take", stuck)
     viewing = view_of(lambda: player)
     monkeypatch.setattr("biotac.view.reader.ANSWER_S", 0.05)
-    with pytest.raises(biotac.InputError, match=r"tare was not begun within 0 s, and will not be"):
+    with pytest.raises(biotac.InputError, match=r"tare did not start within 0 s and was cancelled"):
         viewing.reader.ask("tare", 3)
     monkeypatch.setattr("biotac.view.reader.ANSWER_S", 300)
     held.set()
@@ -371,7 +371,7 @@ def test_check_finds_what_is_wrong(monkeypatch, capsys) -> None:
     [
         (["nowhere.mcap"], 2, "nowhere.mcap cannot be read"),
         (["sim:nowhere.toml"], 2, "no such file"),
-        (["sim:press.toml", "--folder", "/nowhere"], 2, "no folder to write to"),
+        (["sim:press.toml", "--folder", "/nowhere"], 2, "is not a writable folder"),
         (["sim:press.toml", "--port", "99999"], 2, "expected 0 to 65535"),
     ],
 )
@@ -384,7 +384,7 @@ def test_what_can_never_be_shown_ends_the_command(capsys, words: list[str], code
 def test_a_taken_port_is_told(make_player, view_of, capsys) -> None:
     taken = view_of(lambda: make_player()).server.server_port
     assert main(["view", "sim:press.toml", "--no-browser", "--port", str(taken)]) == 3
-    assert "--port 0 takes a free one" in capsys.readouterr().err
+    assert "use --port 0 for any free port" in capsys.readouterr().err
 
 
 def test_closing_leaves_no_thread_behind(view) -> None:

@@ -23,7 +23,7 @@ def open_replay(port: str, pace: float = 0.0, *, clock: HostClock | None = None)
     """
     path, options = options_of(port, ("pace", "from", "to"), FORM)
     if not path:
-        raise PortError(f"{port}: no recording; expected {FORM}")
+        raise PortError(f"{port}: no recording named; expected {FORM}")
     try:
         pace = parse_pace(options["pace"]) if "pace" in options else pace
         from_s = float(options.get("from", 0.0))
@@ -104,8 +104,8 @@ class ReplayLink(Link):
             answer = playback.answer(message_id, payload)
             if answer is None:
                 raise CommandRefusedError(
-                    f"{self.port} is a recording: {command_name(message_id)} asks for what a board alone can do; "
-                    "`biotac recompute` runs its counts with other settings"
+                    f"{self.port} is a recording: {command_name(message_id)} needs a board; "
+                    "to try other settings on its counts, use `biotac recompute`"
                 )
             with self._answering:
                 self._answers += answer

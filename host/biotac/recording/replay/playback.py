@@ -51,8 +51,8 @@ class Playback:
         length_s = (recording.end_us - recording.begin_us) / 1e6
         if not 0 <= from_s <= length_s or (to_s is not None and not from_s < to_s):
             raise InputError(
-                f"{recording.path} has {length_s:.2f} s; expected 0 <= from < to within them, "
-                f"not from {from_s:g}{'' if to_s is None else f' to {to_s:g}'}"
+                f"{recording.path} cannot be played from {from_s:g}{'' if to_s is None else f' to {to_s:g}'}; "
+                f"expected 0 <= from < to, and from within its {length_s:.2f} s"
             )
         self._from_us = recording.begin_us + round(from_s * 1e6)
         self._to_us = None if to_s is None else recording.begin_us + round(to_s * 1e6)

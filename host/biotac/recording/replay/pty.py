@@ -22,7 +22,9 @@ class ReplayPty:
         try:
             self._master, self._slave = pty.openpty()
         except OSError as error:
-            raise PortError(f"no pty for the recording ({error.strerror}); use replay: in this process") from error
+            raise PortError(
+                f"cannot open a pty for the recording ({error.strerror}); use replay:REC as the port instead"
+            ) from error
         # Kept open, so that the pty outlives the programs that open and close it. Raw, or it would echo our own bytes.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)

@@ -1,16 +1,16 @@
 // Buttons and keys. A key does what its button does, and is refused when that is.
 
 const KEYS = [
-  ["T", "tare the finger that is shown"],
+  ["T", "tare the finger shown"],
   ["A", "tare all fingers"],
   ["R", "start or stop a recording"],
-  ["P", "pause or go on"],
-  ["G", "play again, when it is over"],
+  ["P", "pause or resume"],
+  ["G", "play again, after the end"],
   ["0 … 4", "show that finger"],
-  ["← →", "show its neighbour"],
+  ["← →", "show the previous or next finger"],
   ["D", "theme: system, light, dark"],
   ["?", "this list"],
-  ["Tab, Enter", "go to a button, press it"],
+  ["Tab, Enter", "move to a button, press it"],
 ];
 const BUTTONS = { t: "tare", a: "tare-all", r: "record", p: "pause", g: "again", d: "theme", "?": "help" };
 

@@ -56,7 +56,7 @@ class Page {
   // ---- the stream --------------------------------------------------------------------------
 
   meet(about) {
-    if (this.model) tell("Connected to the viewer program again.");
+    if (this.model) tell("Reconnected to the viewer program.");
     this.model = new Model(about);
     this.tip = new Fingertip(byId("fingertip-canvas"), about.electrodes, { large: true });
     this.hand = new HandRow(byId("fingers"), about, (index) => this.pick(index));
@@ -82,7 +82,7 @@ class Page {
   }
 
   lose() {
-    showLink("gone", "The viewer program does not answer. Trying again; is it still running?");
+    showLink("gone", "The viewer program does not answer. Retrying; is it still running?");
     if (this.model) this.model.health = null;
     this.showButtons();
   }
@@ -121,7 +121,7 @@ class Page {
   showState() {
     const { health } = this.model;
     if (!health) return;
-    if (this.frozen && health.link === "live") showLink("paused", "Paused: the picture stands still, the board and a recording go on.");
+    if (this.frozen && health.link === "live") showLink("paused", "Paused: the picture is frozen; the board and any recording keep running.");
     else showLink(health.link, health.words);
     this.showButtons();
   }
@@ -139,7 +139,7 @@ class Page {
     byId("record").title = recording ? recording.path : "";
     byId("record-words").textContent = recording ? `Stop, ${Math.floor(recording.seconds)} s` : "Record";
     byId("pause").setAttribute("aria-pressed", String(paused));
-    byId("pause-words").textContent = paused ? "Go on" : "Pause";
+    byId("pause-words").textContent = paused ? "Resume" : "Pause";
   }
 
   loop(nowMs) {

@@ -117,7 +117,7 @@ export function showTare(about, facts) {
   const chip = byId("tare-state");
   write(chip, state?.name ?? "unknown");
   chip.dataset.kind = !state || ["INIT", "FAULT"].includes(state.name) ? "warn" : "calm";
-  write(byId("tare-words"), state?.words ?? "the board has not said yet");
+  write(byId("tare-words"), state?.words ?? "not reported by the board yet");
   const known = facts && "tare_age_ms" in facts && facts.tare_reason !== undefined;
   const tared = known && facts.tare_reason !== 0;
   byId("tare-age").dataset.value = tared ? facts.tare_age_ms : "";
@@ -130,10 +130,10 @@ const HEALTH = [
   { key: "lost", name: "Frames lost", digits: 0, warns: true },
   { key: "crc", name: "CRC errors", digits: 0, warns: true },
   { key: "other", name: "Other wire errors", digits: 0, warns: true },
-  { key: "late", name: "Slots late on the board", digits: 0, warns: true },
+  { key: "late", name: "Late slots on the board", digits: 0, warns: true },
   { key: "boardDropped", name: "Messages dropped by the board", digits: 0, warns: true },
-  { key: "dropped", name: "Frames this page was too slow for", digits: 0, warns: true },
-  { key: "draws", name: "Pictures per second", digits: 0 },
+  { key: "dropped", name: "Frames dropped by this page", digits: 0, warns: true },
+  { key: "draws", name: "Redraws per second", digits: 0 },
 ];
 
 export class Link {

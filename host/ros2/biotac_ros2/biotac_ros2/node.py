@@ -66,7 +66,7 @@ class Fingers(Node):
             its = batch.frames["finger"] == finger
             stamps_s[its] = self._stamps.of(batch.frames["t_us"][its].astype(np.float64), finger)
         if first and self._stamps.by_arrival:
-            self.get_logger().warning("the board's clock is not known (yet): frames are stamped by their arrival")
+            self.get_logger().warning("the board's clock is not known yet: frames are stamped on arrival")
         for row, stamp_s in zip(batch.frames, stamps_s.tolist(), strict=True):
             self._publish(row, round(stamp_s * 1e9))
 
