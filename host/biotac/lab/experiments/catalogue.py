@@ -16,7 +16,7 @@ NAMES = {
     "shear-torsion": "shear and torsion at once on held-out places, calibrated against the paper's model",
     "hold": "light holds spliced into presses, against the residue that presses leave",
     "navarro": "pressure calibration and its verification press (Navarro et al.)",
-    "seed000": "point, curvature and force by learning: every table and figure (Wettels and Loeb)",
+    "seed000": "every table and figure on learning point of contact, curvature and force (Wettels and Loeb)",
 }
 
 

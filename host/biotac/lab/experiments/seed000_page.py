@@ -35,7 +35,8 @@ def overview(facts: Facts) -> list[str]:
         ["Fig 3", "(d, r) on the fingerprints", "d from x = -16 mm, r around the axis", "-",
          "the paper gives no numbers; the origin is that of numerics.md 5.2"],
         ["Fig 4", "impedance falls off around an electrode",
-         f"E18, 10 N over rest: {text(ratio[0.0], 1)}, {text(ratio[2.0], 1)} at 2 mm, {text(ratio[4.0], 1)} at 4 mm",
+         f"E18's resistance at 10 N over that at rest: {text(ratio[0.0], 1)}, {text(ratio[2.0], 1)} at 2 mm, "
+         f"{text(ratio[4.0], 1)} at 4 mm",
          none, "the paper pressed 4.5 mm deep with a 2 mm tip and plots a surface without numbers"],
         ["Fig 5", "shear squeezes one side and bulges the other", "true by construction", "F1, F2: both signs",
          "a schematic"],
