@@ -39,7 +39,7 @@ def broken(folder: Path) -> Iterator[str]:
             name = path.relative_to(folder.resolve())
             if url.scheme or url.netloc:
                 if url.scheme != "https":
-                    yield f"{name}: {link} is neither a page of these nor https"
+                    yield f"{name}: {link} is neither one of these pages nor https"
                 continue
             target = (path.parent / unquote(url.path)).resolve() if url.path else path
             if not target.is_file():

@@ -38,15 +38,15 @@ def run(elf: Path, seconds: float = SECONDS) -> tuple[int, str]:
         raise Failed("qemu-system-arm is missing; install it: apt-get install qemu-system-arm") from None
     except subprocess.TimeoutExpired as late:
         said = (late.stdout or b"").decode(errors="replace").splitlines()
-        last = f"it said {len(said)} lines, the last: {said[-1]}" if said else "it said nothing"
-        raise Failed(f"{elf.name} has not ended within {seconds:g} s; {last}") from None
+        last = f"it printed {len(said)} lines, the last: {said[-1]}" if said else "it printed nothing"
+        raise Failed(f"{elf.name} did not end within {seconds:g} s; {last}") from None
     return done.returncode, done.stdout.decode(errors="replace")
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="end it after so long (default %(default)g)")
-    parser.add_argument("image", type=Path, help="an .elf of firmware/boards/m4f")
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="kill it after this long (default %(default)g)")
+    parser.add_argument("image", type=Path, help="an .elf built from firmware/boards/m4f")
     args = parser.parse_args()
     code, said = run(args.image, args.seconds)
     sys.stdout.write(said)

@@ -8,7 +8,7 @@ need() { # need COMMAND-THAT-MUST-WORK PACKAGE...
         return
     fi
     if ! command -v apt-get >/dev/null; then
-        echo "missing: $*; install the like of these Debian packages and run this again" >&2
+        echo "missing: $* (Debian packages); install their equivalents and run this again" >&2
         exit 1
     fi
     local root=""

@@ -158,10 +158,10 @@ def test_the_port_waits_only_with_a_bound() -> None:
 @pytest.mark.parametrize(
     ("code", "why"),
     [
-        ("void f(void)\n{\n    while (!(SPI0_SSPSR & SSPSR_RNE)) {\n    }\n}\n", "x.c:3: a while loop"),
-        ("void f(void)\n{\n    do {\n    } while (TIMER_TIMERAWL != 3);\n}\n", "x.c:4: a while loop"),
-        ("void f(void)\n{\n    for (; PLL_CS(b) == 0;) {\n    }\n}\n", "x.c:3: a for loop that waits for PLL_CS"),
-        ("void f(void)\n{\n    for (;;) {\n    }\n}\n", "x.c:3: a for loop without an end"),
+        ("void f(void)\n{\n    while (!(SPI0_SSPSR & SSPSR_RNE)) {\n    }\n}\n", "x.c:3: while loop"),
+        ("void f(void)\n{\n    do {\n    } while (TIMER_TIMERAWL != 3);\n}\n", "x.c:4: while loop"),
+        ("void f(void)\n{\n    for (; PLL_CS(b) == 0;) {\n    }\n}\n", "x.c:3: for loop waits for PLL_CS"),
+        ("void f(void)\n{\n    for (;;) {\n    }\n}\n", "x.c:3: endless for loop"),
         ("void f(void)\n{\n    for (int k = 0; k < 9; k++) {\n    } // while (SPI0_SSPSR)\n}\n", None),
     ],
 )

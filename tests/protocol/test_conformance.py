@@ -86,7 +86,7 @@ def not_all(line: str) -> bool:
 def test_what_cannot_be_asked_is_said() -> None:
     for command in (["false"], ["/nowhere/to/be/found"]):
         done = verdict(*command)
-        assert done.returncode == 2 and "cannot be held against the vectors" in done.stderr
+        assert done.returncode == 2 and "cannot be checked against the vectors" in done.stderr
     assert verdict().returncode == 2
     assert "it offers nothing" in verdict("sed", "s/.*/no/").stdout
 

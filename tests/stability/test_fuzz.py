@@ -90,7 +90,7 @@ def lose_a_number(rows: np.ndarray) -> None:
         (forget_contacts, "the finger is at rest"),
         (never_release, "in contact for more than"),
         (doubt_for_ever, "not tared within"),
-        (no_such_state, "the state is none"),
+        (no_such_state, "a tare state is unknown"),
         (tare_a_load, "was tared away"),
         (touch_at_rest, "contact without load"),
         (wrong_force, "force y off by"),

@@ -141,7 +141,7 @@ def qemu_says(elf: Path) -> list[str]:
     """The lines that the image printed."""
     code, said = qemu.run(elf)
     if code:
-        raise Failed(f"{elf.name} ended with {code} in QEMU: {said.strip()[-200:]}")
+        raise Failed(f"{elf.name} exited with code {code} in QEMU: {said.strip()[-200:]}")
     return said.splitlines()
 
 
@@ -158,7 +158,9 @@ def run_m4f(elf: Path) -> list[Row]:
     except UnknownInstruction as unknown:
         raise Failed(str(unknown)) from None
     if len(rows) != len(names):
-        raise Failed(f"QEMU's log has {len(rows)} runs of {len(names)}; it must log blocks (qemu-system-arm 7 does)")
+        raise Failed(
+            f"QEMU's log has {len(rows)} of {len(names)} runs; use a QEMU that logs blocks, such as qemu-system-arm 7"
+        )
     return rows
 
 

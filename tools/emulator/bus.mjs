@@ -159,7 +159,7 @@ export class UsbBus {
 
   #enabled(endpoint, out) {
     const control = this.#endpoint(endpoint, out)
-    if (control & DOUBLE_BUFFER) throw new Error(`endpoint ${endpoint} is double-buffered, which this emulator lacks`)
+    if (control & DOUBLE_BUFFER) throw new Error(`endpoint ${endpoint} is double-buffered, which this emulator does not support`)
     return !!(control & ENDPOINT_ENABLE)
   }
 

@@ -100,7 +100,7 @@ let base = null // [wall ms, world ms] that pacing counts from
 function boot() {
   while (options.hold && !rig.still) {
     if (rig.machine.nanos > BOOT_NS) {
-      die(options.image, `does not sample within ${BOOT_NS / 1e9} s of its time; is it the gateway's image?`)
+      die(options.image, `does not sample within ${BOOT_NS / 1e9} s of its time: expected the gateway's image`)
     }
     rig.run(STRETCH_NS)
   }

@@ -60,7 +60,7 @@ export class SensorBoard {
   /** Have the gateway's lead of this name end where another one should, or nowhere (null); both are names of LEADS. */
   connect(name, end) {
     if (!(name in LEADS) || (end !== null && !(end in LEADS))) {
-      throw new Error(`no lead ${name} to ${end}: expected of ${Object.keys(LEADS).join(', ')}`)
+      throw new Error(`no lead ${name} to ${end}: expected names from ${Object.keys(LEADS).join(', ')}`)
     }
     const left = this.ends.get(LEADS[name])
     if (left !== null && left !== MISO) this.pio.input(left, SELECTS.includes(left)) // what is pulled there
@@ -90,7 +90,7 @@ export class SensorBoard {
       spi.completeTransmit(this.word)
     })
     spi.onTransmit = (mosi) => {
-      if (!WIDTHS.includes(spi.dataBits) || spi.spiMode !== 0) throw new Error('the gateway speaks another SPI')
+      if (!WIDTHS.includes(spi.dataBits) || spi.spiMode !== 0) throw new Error('wrong SPI mode or word width of the gateway: expected mode 0 and one of WIDTHS')
       this.commands += spi.dataBits === SPI_BLOCK_BITS && mosi >> 8 >= SAMPLE_COMMAND ? 1 : 0
       done.schedule(this.clockOut(mcu.clock.nanos, mosi, spi.dataBits, 1e9 / spi.clockFrequency))
     }

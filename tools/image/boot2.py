@@ -25,7 +25,7 @@ def crc32_mpeg2(data: bytes) -> int:
 def block(code: bytes) -> bytes:
     """The code padded with zeros, and its CRC. Raises ValueError if it is too long."""
     if len(code) > CODE_BYTES:
-        raise ValueError(f"second-stage boot has {len(code)} bytes; there is room for {CODE_BYTES}")
+        raise ValueError(f"second-stage boot has {len(code)} bytes: expected at most {CODE_BYTES}")
     padded = code.ljust(CODE_BYTES, b"\0")
     return padded + crc32_mpeg2(padded).to_bytes(4, "little")
 

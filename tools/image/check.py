@@ -78,9 +78,10 @@ def misplaced(program: stack.Program) -> list[str]:
     """Functions that would run from the slow flash, or from SRAM before they are copied there."""
     early = program.reached("clocks_start") | {"image_reset"}
     late = program.reached("main").union(*(program.reached(name) for name in interrupts(program))) - {ROM}
-    wrong = [f"{name} in flash" for name in late if program.functions[name].address < SRAM]
+    wrong = [f"{name} runs from flash" for name in late if program.functions[name].address < SRAM]
     return sorted(
-        wrong + [f"{name} in SRAM before it is copied" for name in early if program.functions[name].address >= SRAM]
+        wrong
+        + [f"{name} runs from SRAM before it is copied" for name in early if program.functions[name].address >= SRAM]
     )
 
 
@@ -97,12 +98,12 @@ def check(elf: Path, objdump: str) -> list[str]:
     parts = ", ".join(f"{name} {size[section]}" for name, section in RAM_PARTS)
     print(f"RAM   {ram} of {RAM_BUDGET} bytes: {parts}")
     print(f"stack {depth} of {size['.stack']} bytes: {chains}")
-    wrong = [f"{flash} bytes of flash"] if flash > FLASH_BUDGET else []
-    wrong += [f"{ram} bytes of RAM"] if ram > RAM_BUDGET else []
-    wrong += [f"a stack of {depth} bytes"] if depth > size[".stack"] else []
+    wrong = [f"{flash} bytes of flash, over budget"] if flash > FLASH_BUDGET else []
+    wrong += [f"{ram} bytes of RAM, over budget"] if ram > RAM_BUDGET else []
+    wrong += [f"a stack of {depth} bytes, more than .stack has"] if depth > size[".stack"] else []
     for name in sorted(symbols(elf, objdump)):
         if FLOAT_SYMBOL.match(name) or LIBRARY_SYMBOL.match(name):
-            wrong.append(f"{name} in the image")
+            wrong.append(f"{name} must not be in the image")
     return wrong + misplaced(program) + waits.unbounded(PORT)
 
 

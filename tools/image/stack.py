@@ -90,7 +90,7 @@ def read_usage(folder: Path) -> dict[str, int]:
         for line in path.read_text(encoding="utf-8").splitlines():
             where, size, kind = line.split("\t")
             if kind != "static" and "bounded" not in kind:
-                raise Unknown(f"{where}: the frame's size is {kind}")
+                raise Unknown(f"{where}: stack frame is {kind}: expected static or bounded")
             name = CLONE.sub("", where.rsplit(":", 1)[1])
             frames[name] = max(frames.get(name, 0), int(size))
     return frames
@@ -106,7 +106,7 @@ class Program:
         """The function's name in the image, where the compiler may have renamed it as a variant."""
         found = [key for key in self.functions if CLONE.sub("", key) == name]
         if len(found) != 1:
-            raise Unknown(f"{len(found)} functions in the image are called {name}; there must be one")
+            raise Unknown(f"{len(found)} functions in the image are called {name}: expected one")
         return found[0]
 
     def frame(self, name: str) -> int:
@@ -119,11 +119,11 @@ class Program:
     def through_pointer(self, name: str, where: str) -> tuple[str, ...]:
         line = source_line(where)
         if line is None:
-            raise Unknown(f"{name} calls through a pointer at '{where}', no line of source that can be read here")
+            raise Unknown(f"{name} calls through a pointer at '{where}', no line of source found there")
         for call, targets in self.pointers.items():
             if call in line:
                 return targets
-        raise Unknown(f"{name} calls through a pointer at {where}: {line}; tools/image/check.py must list what that is")
+        raise Unknown(f"{name} calls through a pointer at {where}: {line}; add to POINTERS in tools/image/check.py")
 
     def deepest(self, name: str, above: tuple[str, ...] = ()) -> tuple[int, tuple[str, ...]]:
         """The most bytes it needs, and the chain of calls that needs them."""

@@ -34,13 +34,13 @@ def loops(text: str, registers: set[str]) -> list[tuple[int, str]]:
     for match in LOOP.finditer(text):
         line = text.count("\n", 0, match.start()) + 1
         if match.group(1) != "for":
-            found.append((line, f"a while loop; waits go through {HELPERS}"))
+            found.append((line, f"while loop: waits must go through {HELPERS}"))
             continue
         condition = parenthesis(text, match.end() - 1).split(";")[1]
         if not condition.strip() and f"void {AFTER_RESET}(void)" not in text[: match.start()].rsplit("\n}", 1)[-1]:
-            found.append((line, "a for loop without an end"))
+            found.append((line, "endless for loop"))
         elif used := registers & set(re.findall(r"\w+", condition)):
-            found.append((line, f"a for loop that waits for {min(used)}; waits go through {HELPERS}"))
+            found.append((line, f"for loop waits for {min(used)}: waits must go through {HELPERS}"))
     return found
 
 

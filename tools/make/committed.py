@@ -18,7 +18,7 @@ def write_or_check(outputs: dict[Path, str], source: str) -> int:
     ``source``, and returns 1 if there are any.
     """
     parser = argparse.ArgumentParser(description=(__main__.__doc__ or "").splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="compare, do not write")
+    parser.add_argument("--check", action="store_true", help="only compare")
     check = parser.parse_args().check
     drifted = [path for path, text in outputs.items() if not path.exists() or path.read_text(encoding="utf-8") != text]
     if check and drifted:

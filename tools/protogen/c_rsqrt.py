@@ -70,7 +70,7 @@ def source(contract: Contract) -> str:
     um, _ = factors(radius)
     values = [entry(k, radius, um) - base(contract) for k in range(FIRST, LAST + 1)]
     if max(values) >= 1 << 16:
-        raise ValueError("sensor.toml: the table of roots does not fit 16 bits")
+        raise ValueError("sensor.toml: the table of roots does not fit in 16 bits")
     rows = [", ".join(map(str, values[k : k + 12])) for k in range(0, len(values), 12)]
     head = [f"// {GENERATED}", '#include "solve/rsqrt_gen.h"', "", f"const uint16_t bt_root_table[{len(values)}] = {{"]
     return "\n".join([*head, *(f"    {row}," for row in rows), "};", ""])

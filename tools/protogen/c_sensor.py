@@ -23,7 +23,7 @@ def mirror_image(table: list[Any], i: int) -> int | None:
     image = ((r[0], -r[1], r[2]), (n[0], -n[1], n[2]))
     twins = [j for j, (_, q, m) in enumerate(table) if (q, m) == image]
     if len(twins) != 1:
-        raise ValueError(f"sensor.toml: {name} has no mirror image; the sums go over pairs")
+        raise ValueError(f"sensor.toml: {name} must have exactly one mirror image, as sums go over pairs")
     return twins[0]
 
 
@@ -41,7 +41,7 @@ def frame_ms(contract: Contract) -> int:
     """Length of a round in ms. Raises ValueError if it is no whole number: times are given as frame counts."""
     slots, hz = len(contract.sensor["frame"]["slots"]), contract.sensor["bus"]["slot_hz"]
     if slots * 1000 % hz:
-        raise ValueError(f"sensor.toml: {slots} slots at {hz} Hz are no whole number of ms")
+        raise ValueError(f"sensor.toml: {slots} slots at {hz} Hz are not a whole number of ms")
     return int(slots * 1000 // hz)
 
 

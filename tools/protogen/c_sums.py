@@ -50,7 +50,7 @@ class MirroredLines:
             if r[1] > 0:
                 continue
             if r[1] == 0 and n[1]:
-                raise ValueError(f"sensor.toml: {name} is on the midline and faces sideways")
+                raise ValueError(f"sensor.toml: {name} is on the midline but faces sideways")
             key = (-r[1], r[2], (n[0], -n[1], n[2]))
             groups.setdefault(key, []).append((i, mirror_image(table, i), r[0]))
         self.lines = [Line(y, z, n, members) for (y, z, n), members in groups.items()]
@@ -58,7 +58,7 @@ class MirroredLines:
         behind = [-x for line in self.lines for _, _, x in line.members if x < 0]
         self.x_unit = reduce(gcd, behind)
         if any(line.z >= 0 for line in self.lines):
-            raise ValueError("sensor.toml: an electrode is not below the axis; the sums of z have one sign")
+            raise ValueError("sensor.toml: an electrode is not below the axis (z < 0), which the sums of z need")
 
     def summed(self, bits: int) -> dict[str, int]:
         """For each sum, the sum over the electrodes of the lower ``bits`` of |coordinate|."""
@@ -137,7 +137,7 @@ def moments(finger: MirroredLines, *, split: bool) -> list[str]:
         out += add("total", 1 if split else -1, "even")
     if split:
         if not moved or used > UINT32_MAX >> WEIGHT_BITS:
-            raise ValueError("sensor.toml: x behind the seam does not fit two sums")
+            raise ValueError("sensor.toml: x behind the seam does not fit in two sums")
         out += ["    sums->behind[1] = behind;"]
         names.remove("behind")
     signed = ("y", "y_hi", "y_lo")

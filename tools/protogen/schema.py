@@ -113,7 +113,7 @@ def check_sensor(sensor: dict[str, Any]) -> None:
             raise ValueError(f"sensor.toml: command of {channel['name']} breaks the parity rule")
     for slot in sensor["frame"]["slots"]:
         if slot not in names:
-            raise ValueError(f"sensor.toml: slot {slot} is no channel")
+            raise ValueError(f"sensor.toml: slot {slot} is not a channel")
     for name, *position in sensor["geometry"]["electrodes"]:
         # What keeps the PoC away from 0/0 rests on z < 0 (SPEC.md, Degenerate input).
         if position[2] >= 0:
@@ -152,17 +152,17 @@ def check_link(link: dict[str, Any], messages: tuple[Message, ...]) -> None:
         if not low <= setting["default"] <= high:
             raise ValueError(f"link.toml: default of {name} is outside its range")
         if not low <= before(setting) <= high:
-            raise ValueError(f"link.toml: what was before {name} is outside its range")
+            raise ValueError(f"link.toml: `before` of {name} is outside its range")
     for message in messages:
         for field in message.fields:
             values = len(per_finger(link))
             if field.unit == PER_FINGER_UNIT and field.count != values:
-                raise ValueError(f"link.toml: {message.name} has {field.count} values of {values} per-finger settings")
+                raise ValueError(f"link.toml: {message.name} has {field.count} values for {values} per-finger settings")
         # id + payload + CRC-32 must fit, so that COBS adds exactly one byte.
         if 1 + message.payload_bytes + 4 > link["wire"]["max_frame_bytes"]:
             raise ValueError(f"link.toml: {message.name} is too long for one frame")
         if message.reply is not None and message.reply not in names:
-            raise ValueError(f"link.toml: {message.name} is answered by unknown {message.reply}")
+            raise ValueError(f"link.toml: {message.name} is answered by unknown message {message.reply}")
         if message.stream and [f.name for f in message.fields[:2]] != ["seq", "t_us"]:
             raise ValueError(f"link.toml: stream message {message.name} must start with seq, t_us")
 
@@ -171,17 +171,19 @@ def check_map(wrench_map: dict[str, Any]) -> None:
     for table in ("kind", "gate"):
         values = [entry["value"] for entry in wrench_map[table].values()]
         if values != list(range(len(values))):
-            raise ValueError(f"map.toml: values of [{table}] must be 0, 1, 2 ... in their order, they index tables")
+            raise ValueError(f"map.toml: values of [{table}] must be 0, 1, 2 ... in order, as they index tables")
     for name, kind in wrench_map["kind"].items():
         if kind["columns"] not in ("one", "electrodes", "pairs"):
-            raise ValueError(f"map.toml: {name} has unknown columns {kind['columns']}")
+            raise ValueError(
+                f"map.toml: {name} has unknown columns {kind['columns']}: expected one, electrodes or pairs"
+            )
 
 
 def check_map_sizes(messages: tuple[Message, ...], wrench_map: dict[str, Any]) -> None:
     for message in messages:
         for field in message.fields:
             if field.name == "size_bytes" and (field.range or (0, 0))[1] != wrench_map["blob"]["max_bytes"]:
-                raise ValueError(f"link.toml: {message.name} has another largest map than map.toml")
+                raise ValueError(f"link.toml: {message.name}'s largest size_bytes differs from max_bytes in map.toml")
 
 
 def canonical(contract: Contract, *, with_docs: bool) -> str:

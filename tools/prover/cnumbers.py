@@ -90,7 +90,7 @@ def known_binary(op: str, kind: CType, a: int, b: int) -> int:
     if op in ("<<", ">>") and not 0 <= b < kind.bits:
         raise Undefined(f"shift by {b}")
     if op == "<<" and kind.signed and a < 0:
-        raise Undefined("a negative number shifted to the left")
+        raise Undefined("left shift of a negative number")
     if op in ("/", "%"):
         quotient = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
         value = quotient if op == "/" else a - quotient * b

@@ -136,7 +136,7 @@ class IntegerDomain(Questions):
             return self.divide(kind, x, y, guard)[op == "%"]
         if op == "<<":
             if kind.signed and x.low < 0:
-                self.require("a negative number shifted to the left", x.term >= 0, guard)
+                self.require("left shift of a negative number", x.term >= 0, guard)
             op, y = "*", number(1 << b)
         if op == "+":
             return self.fitted(x.term + y.term, x.low + y.low, x.high + y.high, kind, "a sum", guard)

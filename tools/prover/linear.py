@@ -176,7 +176,7 @@ class LinearDomain:
             return a
         if op == "<<":
             if kind.signed and a.low < 0:
-                raise Overflow("a negative number shifted to the left", a.extreme(-1)[1])
+                raise Overflow("left shift of a negative number", a.extreme(-1)[1])
             return self.signed(a * (1 << b), kind, "a shift")
         if op == ">>":
             return Form({Atom(f"high{b}({a})", a.low >> b, a.high >> b, a, b): 1})

@@ -59,11 +59,11 @@ class Machine(Storage):
 
     def store(self, room: list[Any], at: int, value: Any) -> None:
         if not 0 <= at < len(room):
-            raise Undefined(f"a store to element {at} of {len(room)}")
+            raise Undefined(f"write of element {at} of {len(room)}")
         old = room[at]
         if not isinstance(old, Value):
             if self.now() is not True:
-                raise Unsupported("a store of no number under a condition")
+                raise Unsupported("a conditional store of something that is not a number")
             room[at] = value
             return
         x = self.converted(value, old.kind)
@@ -96,7 +96,7 @@ class Machine(Storage):
         if isinstance(value, bool):
             return value
         if not isinstance(value, Value):
-            raise Unsupported("a condition that is no number")
+            raise Unsupported("a condition that is not a number")
         if isinstance(value.x, int):
             return value.x != 0
         return self.domain.compare("!=", value.kind, value.x, 0)
@@ -106,13 +106,13 @@ class Machine(Storage):
     def constant(self, node: Any) -> int:
         value = self.number(node)
         if not isinstance(value.x, int):
-            raise Unsupported(f"{node.coord}: a number that must be known is not")
+            raise Unsupported(f"{node.coord}: a number that must be known depends on the input")
         return value.x
 
     def number(self, node: Any) -> Value:
         value = self.expression(node)
         if not isinstance(value, Value):
-            raise Unsupported(f"{type(node).__name__} is no number")
+            raise Unsupported(f"{type(node).__name__} is not a number")
         return value
 
     def converted(self, value: Value, kind: CType) -> Any:
@@ -142,7 +142,7 @@ class Machine(Storage):
 
     def load(self, room: list[Any], at: int) -> Any:
         if not 0 <= at < len(room):
-            raise Undefined(f"element {at} of {len(room)}")
+            raise Undefined(f"read of element {at} of {len(room)}")
         found = room[at]
         if isinstance(found, Value) and found.x is None:
             raise Undefined("a number read before it is stored")
@@ -165,7 +165,7 @@ class Machine(Storage):
         if isinstance(node, c_ast.UnaryOp) and node.op == "*":
             base = self.expression(node.expr)
             return base.room, base.at
-        raise Unsupported(f"{type(node).__name__} as a place")
+        raise Unsupported(f"{type(node).__name__} as an lvalue")
 
     def expression(self, node: Any) -> Any:
         method = getattr(self, f"on_{type(node).__name__}", None)
@@ -192,7 +192,7 @@ class Machine(Storage):
     def on_Cast(self, node: Any) -> Value:
         kind = self.scalar(node.to_type)
         if kind is None:
-            raise Unsupported("a cast to no number")
+            raise Unsupported("a cast to something that is not a number")
         value = self.number(node.expr)
         return Value(kind, self.converted(value, kind))
 

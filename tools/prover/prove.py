@@ -30,7 +30,7 @@ class Refuted(Exception):
     """The claim is wrong; the witness is an input for which it fails."""
 
     def __init__(self, claim: str, witness: dict[str, int]) -> None:
-        super().__init__(f"{claim}: wrong for {witness}")
+        super().__init__(f"{claim}: fails for {witness}")
         self.claim = claim
         self.witness = witness
 
@@ -49,7 +49,7 @@ def program() -> str:
     """Path of the z3 program, from z3-solver's wheel or from Debian."""
     found = shutil.which("z3", path=os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", "")]))
     if found is None:
-        raise FileNotFoundError("no program z3; pip install z3-solver, or Debian's z3")
+        raise FileNotFoundError("z3 is missing; install it: pip install z3-solver, or apt-get install z3")
     return found
 
 

@@ -67,7 +67,7 @@ def text_of(path: Path) -> str:
 def changed(text: str, old: str, new: str) -> str:
     """``text`` with one place made wrong on purpose. The place must occur exactly once."""
     if text.count(old) != 1:
-        raise ValueError(f"{old!r} occurs {text.count(old)} times, so what to break is not clear")
+        raise ValueError(f"{old!r} occurs {text.count(old)} times: expected once")
     return text.replace(old, new)
 
 

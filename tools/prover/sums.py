@@ -53,7 +53,7 @@ def call(machine: Machine, function: str, values: Sequence[Any], *options: int) 
 
 def exact(name: str, value: Value, domain: LinearDomain) -> Form:
     if value.x is None:
-        raise Undefined(f"{name} is never stored")
+        raise Undefined(f"{name} is never written")
     form = value.x if isinstance(value.x, Form) else Form({}, value.x)
     # So far an unsigned result is only congruent to its form; if the form fits the type, they are equal.
     return domain.checked(form, value.kind, name)

@@ -176,9 +176,9 @@ def _judge_ranges(rows: StructArray, settings: dict[Setting, int], outcome: Outc
         (bool((known <= 65520).all()), "a tare is out of range"),
         # 19 electrodes of 4095 counts; and three times the noise, which is capped at the setting
         (bool((rows["energy_count2"] <= 19 * 4095**2).all()), "an energy wrapped"),
-        (bool((rows["threshold_count2"] <= 3 * limit).all()), "the threshold passed three times the setting"),
+        (bool((rows["threshold_count2"] <= 3 * limit).all()), "the threshold is over three times the setting"),
         (bool((np.diff(rows["seq"].astype(np.int64)) == rows["present"][1:]).all()), "the sequence has a gap"),
-        (bool(np.isin(rows["tare_state"], list(TareState)).all()), "the state is none"),
+        (bool(np.isin(rows["tare_state"], list(TareState)).all()), "a tare state is unknown"),
     ):
         if not held:
             outcome.broken.append(what)
@@ -213,7 +213,7 @@ def _judge_loads(course: Course, rows: StructArray, outcome: Outcome) -> None:
         lasting[back:] &= held[:-back]
         lasting[:back] = False
     for k in np.flatnonzero(lasting & (rows["tare_state"] == TareState.REST))[:1].tolist():
-        outcome.broken.append(f"frame {k}: {course.force_n[k]:.2f} N for {LATE} frames, and the finger is at rest")
+        outcome.broken.append(f"frame {k}: {course.force_n[k]:.2f} N for {LATE} frames, but the finger is at rest")
     _judge_releases(course, rows, outcome)
 
 
@@ -230,7 +230,7 @@ def _judge_releases(course: Course, rows: StructArray, outcome: Outcome) -> None
         free = np.flatnonzero(np.isin(state, (TareState.REST, TareState.DOUBT)))
         outcome.let_go_frames = max(outcome.let_go_frames, int(free[0]) if len(free) else len(state))
         if not len(free) or free[0] > LET_GO_WITHIN:
-            outcome.broken.append(f"frame {k}: released, and in contact for more than {LET_GO_WITHIN} frames")
+            outcome.broken.append(f"frame {k}: released, but in contact for more than {LET_GO_WITHIN} frames")
         at_rest = np.flatnonzero(state == TareState.REST)
         over = np.flatnonzero(~touch[k:end])
         if not len(over) or (not len(at_rest) and over[0] + TARED_WITHIN > len(state)):
@@ -238,7 +238,7 @@ def _judge_releases(course: Course, rows: StructArray, outcome: Outcome) -> None
         waited = int(at_rest[0] - over[0]) if len(at_rest) else len(state)
         outcome.tared_frames = max(outcome.tared_frames, waited)
         if waited > TARED_WITHIN:
-            outcome.broken.append(f"frame {k}: released, and not tared within {TARED_WITHIN} frames of no touch")
+            outcome.broken.append(f"frame {k}: released, but not tared within {TARED_WITHIN} frames of no touch")
 
 
 def _is_touch(course: Course, rows: StructArray) -> np.ndarray:

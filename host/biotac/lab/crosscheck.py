@@ -114,7 +114,7 @@ class CrossCheck:
             its = messages[mapped & (messages["finger"] == finger)]
             if finger not in maps:
                 for k in range(len(its)):
-                    self._find(its, k, "MAPPED, by a wrench map that is not known here")
+                    self._find(its, k, "MAPPED is set, but this finger's wrench map is unknown")
                 continue
             self._add(its, own.get(finger, settings), opened(maps[finger]))
         shared = ~mapped

@@ -65,7 +65,7 @@ def run_demo(
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder} cannot be made a folder ({error.strerror}); choose another --out") from error
+        raise InputError(f"{folder}: cannot create the folder ({error.strerror}); choose another --out") from error
     recording_path = folder / "demo.mcap"
     wall = time.monotonic()
     # The board's counts are ready; from here on this process is a host with a board, and its cost is measured.
@@ -195,21 +195,21 @@ def report_text(facts: dict[str, Any]) -> str:
                 ["host CPU", f"{facts['host_cpu_percent']} % of one core", ""],
             ],
         ),
-        "The errors are those of the board's fixed point against the same formulas in float64, not those of the",
-        "formulas against a real force.",
+        "These errors compare the board's fixed-point arithmetic with the same formulas in float64. They do not show",
+        "how well the formulas match a real force.",
     ]
     if facts["force_rmse_n"] is not None:
-        lines += ["", "Against the source's own force, in contact, N RMS in x / y / z:", ""]
+        lines += ["", "RMS error against the source's own force, in contact, in N, x / y / z:", ""]
         for words, name in (
-            ("the board, by Lin's scales of its settings", "force_rmse_n"),
-            ("the firmware's own scales", "lin_rmse_n"),
+            ("the board, with Lin's scales from its settings", "force_rmse_n"),
+            ("the firmware's default scales", "lin_rmse_n"),
             (facts["calibrated_by"], "calibrated_rmse_n"),
         ):
             x, y, z = facts[name]
             lines.append(f"* {words}: {x:.2f} / {y:.2f} / {z:.2f}")
     if facts["tare_changes"]:
         changes = [[str(t["finger"]), str(t["seq"]), t["reason"]] for t in facts["tare_changes"][:50]]
-        lines += ["", *table(["finger", "frame", "tare changed because"], changes)[:-1]]
+        lines += ["", *table(["finger", "frame", "reason for the new tare"], changes)[:-1]]
     return "\n".join(lines) + "\n"
 
 
@@ -245,9 +245,9 @@ def draw_fingertip(figure: Any, axes: Any, frames: Any, messages: Any) -> None:
     axes.plot(poc_across, poc_along, ".", color="#7c3aed", markersize=3, alpha=0.5, label="point of contact")
     if len(frames) and contact.any():
         a, b = unroll(frames["poc_mm"][strongest : strongest + 1])
-        axes.plot(a, b, "x", color="#7c3aed", markersize=13, markeredgewidth=3, label="at the strongest moment")
+        axes.plot(a, b, "x", color="#7c3aed", markersize=13, markeredgewidth=3, label="at peak signal")
         axes.set_title(f"electrodes at {frames['t_us'][strongest] / 1e6:.2f} s", fontsize=10)
-    axes.set(xlabel="around the finger [mm], + is E11's side", ylabel="along the finger [mm], tip up")
+    axes.set(xlabel="around the finger [mm], + towards E11", ylabel="along the finger [mm], tip up")
     axes.set_aspect("equal")
     axes.margins(0.15)
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.06), fontsize=8, ncols=2, frameon=False)
@@ -270,6 +270,6 @@ def draw_force(axes: Any, source: Source, frames: Any, rows: NDArray[np.int64], 
     )
     axes.set(xlabel="device time [s]", ylabel="force on the finger [N]")
     words = f"force: calibrated (thin: {answers.calibrated_by}), Lin's scales as shipped (dotted)"
-    axes.set_title(f"{words}, truth (broad)" if truth_n is not None else words, fontsize=10)
+    axes.set_title(f"{words}, truth (thick)" if truth_n is not None else words, fontsize=10)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, ncols=5, loc="upper center", bbox_to_anchor=(0.5, -0.12), frameon=False)

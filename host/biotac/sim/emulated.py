@@ -98,7 +98,9 @@ class EmulatedBoard(SimBoard):
         facts: dict[str, Any] = told
         if word == "never":
             seen = {name: facts.get(name) for name in counters}
-            raise DeviceLostError(f"within {seconds:g} s of its time the emulated board came to {seen}, not {counters}")
+            raise DeviceLostError(
+                f"the emulated board came to {seen} within {seconds:g} s of its time: expected {counters}"
+            )
         return facts
 
     def _counted(self) -> tuple[str, Any]:
@@ -128,14 +130,14 @@ def new_pty() -> Iterator[tuple[int, str]]:
 def find_tools(board: str, image: str | None) -> Tools:
     """The files that the emulator needs. Raises PortError, with a remedy, if one is missing."""
     if board != "pico":
-        raise PortError(f"no emulated board is called {board!r}; there is one: emu:pico")
+        raise PortError(f"no emulated board {board!r}: expected emu:pico")
     if os.name != "posix":
         raise PortError("emulated boards need a pty, which this system lacks; use Linux or macOS")
     folder = find_folder()
     root = folder.parent.parent
     node = shutil.which("node")
     if node is None:
-        raise PortError("node is missing, which runs the emulator; install it (Debian: apt-get install nodejs npm)")
+        raise PortError("node, which runs the emulator, is missing; install it (Debian: apt-get install nodejs npm)")
     sensors = root / "build" / "emulator" / "sensors.wasm"
     if not sensors.is_file() or not (root / "tools" / "node_modules" / "rp2040js").is_dir():
         raise PortError(f"the emulator is not ready; run {folder / 'prepare'} once")

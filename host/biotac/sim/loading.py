@@ -33,7 +33,7 @@ def load_source(path: str | Path, *, fingers: int | None = None, seconds: float 
     if fingers is not None and not (type(fingers) is int and 1 <= fingers <= _sensor.MAX_SENSORS):
         raise InputError(f"fingers is {fingers!r}: expected 1 to {_sensor.MAX_SENSORS}")
     if seconds is not None and not (math.isfinite(seconds) and 0.01 <= seconds <= MAX_SECONDS):
-        raise InputError(f"seconds is {seconds!r}: expected 0.01 to {MAX_SECONDS:.0f}")
+        raise InputError(f"seconds is {seconds!r}: expected 0.01 to {MAX_SECONDS:.0f} s")
     place = Path(path)
     lower = place.name.lower()
     if lower.endswith(".toml"):
@@ -55,16 +55,18 @@ def _scenario_bytes(place: Path) -> bytes:
         return place.read_bytes()
     except FileNotFoundError:
         raise InputError(
-            f"{place}: no such file, and no bundled scenario: expected a scenario's path or one of "
+            f"{place}: no such file or bundled scenario: expected a scenario's path or one of "
             f"{', '.join(bundled_scenarios())}"
         ) from None
     except OSError as error:
-        raise InputError(f"{place}: cannot be read ({error.strerror}): expected a scenario file") from error
+        raise InputError(
+            f"{place}: cannot be read ({error.strerror}): expected a scenario file; check the path"
+        ) from error
 
 
 def _existing(place: Path) -> Path:
     if not place.is_file():
-        seen = "is no file" if place.exists() else "no such file"
+        seen = "not a file" if place.exists() else "no such file"
         raise InputError(f"{place}: {seen}: expected a recording; check the path")
     if place.stat().st_size == 0:
         raise InputError(f"{place}: the file is empty: expected a recording; copy it again")

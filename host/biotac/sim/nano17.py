@@ -49,7 +49,7 @@ class Nano17:
     def records(self, source: Source, finger: int) -> tuple[Floats, npt.NDArray[np.void]]:
         """Board times (m,) in s and RDT records (m,) while ``source`` plays. Raises InputError if it has no truth."""
         if source.truth is None:
-            raise InputError(f"{source.name} says nothing of the forces: expected a scenario (.toml)")
+            raise InputError(f"{source.name} has no true forces: expected a scenario (.toml)")
         lin = np.column_stack([source.truth.force_n[:, finger], source.truth.torque_nmm[:, finger]])
         at_s = (np.arange(len(lin)) + 0.5) * FRAME_S
         first = int(np.ceil(self.offset_s * self.rate_hz))

@@ -42,7 +42,7 @@ def parse_sim(port: str, pace: float) -> SimPort:
     head, options = options_of(port, _OPTIONS[scheme], FORMS[scheme])
     board, source = ("posix", head) if scheme == "sim" else (head, options.get("source", ""))
     if not source:
-        raise PortError(f"{port}: no source; expected {FORMS[scheme]}")
+        raise PortError(f"{port}: no source: expected {FORMS[scheme]}")
     try:
         return SimPort(
             board,

@@ -24,7 +24,7 @@ def executable() -> Path:
     override = os.environ.get("BIOTAC_SIM")
     path = Path(override) if override else Path(str(resources.files("biotac"))) / "bin" / "biotac-sim"
     if not path.is_file():
-        raise PortError(f"no simulator at {path}; install the package again: pip install .")
+        raise PortError(f"no simulator at {path}; reinstall the package (pip install .), or correct BIOTAC_SIM if set")
     return path
 
 
@@ -53,7 +53,7 @@ class SimBoard:
         if len(first) != 2 or first[0] != "pty":
             error = self._last_words()
             self.close()
-            raise PortError(f"the simulator did not start: {error or 'it said nothing'}")
+            raise PortError(f"the simulator did not start: {error or 'no message'}")
         self.path = first[1]
         # The board has read its tape by now. Removed here, so that nothing is left behind however this process ends.
         self._folder.cleanup()

@@ -72,7 +72,8 @@ def _force(path: Path, array: npt.NDArray[Any], rows: int) -> npt.NDArray[np.flo
     """F (n, 3) as recorded -> force on the finger in Lin's frame: x = Fy, y = Fx, z = -Fz."""
     if array.shape != (rows, 3) or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
         raise RecordingError(
-            f"{path}: field F is {array.dtype} {array.shape}: expected finite numbers ({rows}, 3) in N"
+            f"{path}: field F is {array.dtype} {array.shape}: expected ({rows}, 3) numbers in N without NaN or inf; "
+            "correct F"
         )
     return to_lin_frame(array)
 

@@ -107,7 +107,7 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
     """Read a scenario. Raises ScenarioError naming ``file``, the line, the table and the key."""
     values, lines = parse_toml(data, file)
     if not values:
-        raise ScenarioError(f"{file}:1: the file is empty: expected a name and [[step]] tables")
+        raise ScenarioError(f"{file}:1: the file is empty: expected a name and [[step]] tables; add them")
     top = Table(values, file, "", lines, 0)
     top.only(("name", "seed", "fingers", "gains", "finger", "step", "fault"))
     name = top.text("name", r"[^\x00-\x1f]{1,64}", "1 to 64 printable characters")
@@ -124,7 +124,7 @@ def parse_scenario(data: bytes, *, file: str) -> Scenario:
         _add_step(step, tracks, share)
     faults = tuple(_fault(table, len(specs), tracks[0].seconds) for table in top.tables("fault"))
     if sum(fault.seconds for fault in faults) > FAULTS_MAX_S:
-        raise top.error("fault", "lasts too long", f"{FAULTS_MAX_S:g} s in all at most", "leave some out")
+        raise top.error("fault", "lasts too long", f"at most {FAULTS_MAX_S:g} s in total", "remove some")
     return Scenario(
         name=name,
         fit_gains="gains" in top,
@@ -147,7 +147,7 @@ def _fingers(top: Table, seed: int) -> tuple[FingerSpec, ...]:
         stated = top.integer("fingers", 1, _sensor.MAX_SENSORS)
         if tables and stated != count:
             raise top.error(
-                "fingers", f"is {stated}, with {count} [[finger]] tables", "as many as tables", "remove one"
+                "fingers", f"is {stated}, with {count} [[finger]] tables", "the same number", "correct one of them"
             )
         count = stated
     if count > _sensor.MAX_SENSORS:
@@ -169,12 +169,12 @@ def _fingers(top: Table, seed: int) -> tuple[FingerSpec, ...]:
 
 def _add_step(step: Table, tracks: tuple[Track, ...], share: float) -> None:
     do = step.choice("do", tuple(STEP_KEYS))
-    step.only(("do", "seconds", "fingers", *STEP_KEYS[do]), f" to {do}")
+    step.only(("do", "seconds", "fingers", *STEP_KEYS[do]), f" for {do}")
     seconds = step.number("seconds", 0.01, MAX_SECONDS, "s")
     most_s = share * FINGER_SECONDS_MAX / len(tracks)
     if tracks[0].seconds + seconds > most_s:
-        expected = f"at most {most_s:g} s in all with {len(tracks)} finger(s)"
-        raise step.error("seconds", "makes the scenario too long", expected, "shorten it; ?seconds= repeats it")
+        expected = f"at most {most_s:g} s in total with {len(tracks)} finger(s)"
+        raise step.error("seconds", "makes the scenario too long", expected, "shorten it, and repeat it with ?seconds=")
     acting = step.indices("fingers", len(tracks)) if "fingers" in step else tuple(range(len(tracks)))
     for index, track in enumerate(tracks):
         if index not in acting or do == "hold":
@@ -191,8 +191,8 @@ def _add_step(step: Table, tracks: tuple[Track, ...], share: float) -> None:
         else:
             _move(step, do, track, seconds, index)
     if sum(track.moving_s for track in tracks) > share * MOVING_MAX_S:
-        expected = f"at most {share * MOVING_MAX_S:g} s of changing load in all, fingers added up"
-        raise step.error("seconds", "makes the load change too long", expected, "hold, or shorten it")
+        expected = f"at most {share * MOVING_MAX_S:g} s of changing load, summed over the fingers"
+        raise step.error("seconds", "makes the load change for too long", expected, "shorten it, or hold")
 
 
 def _press(step: Table, track: Track, seconds: float) -> None:
@@ -201,14 +201,14 @@ def _press(step: Table, track: Track, seconds: float) -> None:
         for key in ("at", "at_mm", "tip_mm"):
             if key in step:
                 raise step.error(
-                    key, "is given while something touches", "a place only where a contact starts",
-                    "remove it, or slide or rest first",
+                    key, "is given during a contact", "it only where a contact starts",
+                    "remove it, rest first, or use slide",
                 )  # fmt: skip
         end = replace(track.pose, force_n=force_n) if force_n > 0.0 else track.pose.released()
         track.ramp(seconds, end)
         return
     if force_n == 0.0:
-        raise step.error("force_n", "is 0 and nothing touches", "more than 0 N to start a contact")
+        raise step.error("force_n", "is 0 but nothing touches", "more than 0 N to start a contact")
     x_mm, y_mm = _place(step, "at", "at_mm")
     tip_mm = step.number("tip_mm", 0.5, 10.0, "mm") if "tip_mm" in step else FLAT_MM
     start = Pose(x_mm=x_mm, y_mm=y_mm, tip_mm=tip_mm, celsius=track.pose.celsius)
@@ -248,7 +248,7 @@ def _place(step: Table, name_key: str, pair_key: str) -> tuple[float, float]:
     if not surface.is_on_surface(x_mm, y_mm):
         raise step.error(
             pair_key, f"is [{x_mm:g}, {y_mm:g}]",
-            f"a point of the ventral surface: x from {surface.PROXIMAL_END_MM:g}, |y| up to "
+            f"a point on the ventral surface: x from {surface.PROXIMAL_END_MM:g}, |y| up to "
             f"{surface.RADIUS_MM:g}, and x^2 + y^2 up to {surface.RADIUS_MM:g}^2 where x > 0",
         )  # fmt: skip
     return x_mm, y_mm

@@ -39,7 +39,7 @@ class SensorBoard:
         if self.info.board != wire.Board.PICO_SENSOR:
             seen = board_text(self.info.board)
             self._board.close()
-            raise PortError(f"{link.port} is {seen}, no sensor board; name the other port, or `biotac flash` it")
+            raise PortError(f"{link.port} is {seen}, not a sensor board; name the other port, or `biotac flash` it")
         self.serials: tuple[str, ...] = ()  #: of the sensors that are plugged in
         self.held_at = NOT_HELD  #: the slot before which its tape waits
         self._samples: npt.NDArray[np.uint16] = np.zeros((0, 1), np.uint16)
@@ -84,13 +84,17 @@ class SensorBoard:
         taken = self.feed(until_full=True).slots_taken
         if taken < slots:
             tape_s, room_s = slots / sensor.SLOT_HZ, taken / sensor.SLOT_HZ
-            raise InputError(f"{tape_s:g} s of {fingers} fingers do not fit the board, {room_s:g} s do")
+            raise InputError(
+                f"{tape_s:g} s of {fingers} fingers do not fit the board: expected up to {room_s:g} s; shorten it"
+            )
         digest = zlib.crc32(self._samples.astype("<u2").tobytes())
         status = self._board.ask(wire.EmuKeep(0, slots, digest), wire.EmuStatus)
         until_s = time.monotonic() + KEEP_S * self._board.link.patience
         while status.loop_slots != slots:
             if time.monotonic() > until_s:
-                raise DeviceLostError(f"{self._board.link.port}: the tape was not written within {KEEP_S:g} s")
+                raise DeviceLostError(
+                    f"{self._board.link.port}: the tape was not written within {KEEP_S:g} s; try again"
+                )
             time.sleep(REST_S)
             status = self.status()
         return status

@@ -56,7 +56,7 @@ def parse_toml(data: bytes, file: str) -> tuple[dict[str, Any], Lines]:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
-        raise ScenarioError(f"{file}:{line}: not UTF-8 text: expected a TOML scenario") from None
+        raise ScenarioError(f"{file}:{line}: not UTF-8 text: expected a TOML scenario; save it as UTF-8") from None
     try:
         return documents.parse_toml(text), Lines(text)
     except documents.TOMLDecodeError as error:
@@ -66,9 +66,11 @@ def parse_toml(data: bytes, file: str) -> tuple[dict[str, Any], Lines]:
         if place is not None:
             line = int(place.group(1) or line)
             seen = seen[: place.start()]
-        raise ScenarioError(f"{file}:{line}: no TOML: {seen}: expected `key = value`; correct it") from None
+        raise ScenarioError(f"{file}:{line}: not valid TOML: {seen}: expected `key = value`; correct it") from None
     except ValueError as error:
-        raise ScenarioError(f"{file}:1: this TOML cannot be read: {error}: expected a TOML scenario") from None
+        raise ScenarioError(
+            f"{file}:1: this TOML cannot be read: {error}: expected a TOML scenario; correct it"
+        ) from None
 
 
 class Table:
@@ -150,7 +152,7 @@ class Table:
 
     def indices(self, key: str, count: int) -> tuple[int, ...]:
         """A list of distinct indices below ``count``."""
-        expected = f"a list of different finger indices 0 to {count - 1}"
+        expected = f"a list of distinct finger indices 0 to {count - 1}"
         value = self._value(key, expected)
         good = isinstance(value, list) and len(value) > 0
         if not good or not all(type(part) is int and 0 <= part < count for part in value):

@@ -184,7 +184,7 @@ def test_folders_that_cannot_be_made_exit_2(capsys, tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("")
     for out in (file, file / "sub", Path("/dev/null"), Path("/proc/nowhere")):
-        assert "cannot be made a folder" in fails(capsys, 2, "demo", "press.toml", "--seconds", "1", "--out", str(out))
+        assert "cannot create the folder" in fails(capsys, 2, "demo", "press.toml", "--seconds", "1", "--out", str(out))
     assert "is a folder" in fails(capsys, 2, "record", "sim:press.toml", str(tmp_path))
 
 

@@ -91,7 +91,7 @@ CASES: list[tuple[int, str, str]] = [
     (3, "plug one in", "info serial:FFFF"),
     (3, "expected a device path", "info telnet:1"),
     (3, "expected BUS.DEVICE", "info spidev:zero"),
-    (3, "there is one: emu:pico", "info emu:teensy?source=press.toml"),
+    (3, "expected emu:pico", "info emu:teensy?source=press.toml"),
     (3, "expected sim:SOURCE?pace=X&fingers=N", "info sim:press.toml?finger=2"),
     (3, "an example is replay:", "info replay:@rec.mcap?pace=quick"),
     (2, "expected a scenario's path or one of", "info sim:nowhere.toml"),
@@ -118,10 +118,10 @@ CASES: list[tuple[int, str, str]] = [
     (2, "expected 0 to 2147483647", "experiment poke --seed -1"),
     (2, "expected an .npz of numeric arrays", "experiment poke +no.npz"),
     (2, "save z_dir too", "experiment plate-normal @rec.mcap"),
-    (2, "name another with --finger", "experiment poke @rec.mcap --finger thumb"),
+    (2, "choose one with --finger", "experiment poke @rec.mcap --finger thumb"),
     (2, "0 contacts above 1 N: expected 19", "experiment poke @rest.npz --out +out"),
     (2, "save M too", "experiment torsion @rest.npz"),
-    (2, "never loaded, the most is 0.00 N", "experiment shear @rest.npz"),
+    (2, "force never exceeds 0.00 N", "experiment shear @rest.npz"),
     (2, "add E_base", "experiment shear @brief.npz"),
     (2, "leave one out", "experiment shear @rest.npz --seed 2"),
     (2, "leave --map out", "experiment poke --map +no.wrench.json"),
@@ -398,7 +398,7 @@ def test_a_recording_on_a_pty_needs_ptys(capsys, files, monkeypatch) -> None:
 
 def test_a_package_without_its_simulator(capsys, monkeypatch, tmp_path) -> None:
     monkeypatch.setenv("BIOTAC_SIM", str(tmp_path / "none"))
-    assert "install the package again" in line_of(capsys, 3, ["info", "sim:press.toml"])
+    assert "reinstall the package" in line_of(capsys, 3, ["info", "sim:press.toml"])
 
 
 def test_a_simulator_that_does_not_start(capsys, monkeypatch, tmp_path) -> None:

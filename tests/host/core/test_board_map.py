@@ -396,7 +396,7 @@ def test_the_check_finds_a_wrong_force_another_map_and_no_map() -> None:
     none = CrossCheck()
     none.add(frames, default_settings(), maps={2: its})
     assert none.violations == (frames["flags"] & wire.FrameFlags.MAPPED).astype(bool).sum()
-    assert "not known here" in none.findings[0]
+    assert "map is unknown" in none.findings[0]
 
 
 def test_the_check_finds_a_wrong_torsion_and_one_that_no_map_gives() -> None:

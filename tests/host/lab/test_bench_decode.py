@@ -52,7 +52,7 @@ def test_a_contestant_that_decodes_another_value_is_named(field: str) -> None:
     contestant = decode._Contestant(
         "it", [data], partial(decode._ours, decode.Decoder, {decode.FRAME: "frames", decode.PAC: "pacs"})
     )
-    with pytest.raises(RuntimeError, match=f"it decoded another {field} of {decode.NAMES[message_id]}"):
+    with pytest.raises(RuntimeError, match=f"it decoded a wrong {field} of {decode.NAMES[message_id]}"):
         decode._check(contestant, sent)
 
 

@@ -254,7 +254,7 @@ def test_a_map_is_given_the_board_s_tare_and_pressure(figure10: Trial) -> None:
     turned = replace(its, axes=("torsion", *axes[:5]))
     assert estimates.by_map(figure10, turned, "any").own_torsion_nmm[known] == pytest.approx(expected[known, 0])
     without_pressure = replace(figure10, pdc=np.full_like(figure10.pdc, wire.INVALID_COUNT))
-    with pytest.raises(InputError, match="trained with PDC"):
+    with pytest.raises(InputError, match="needs PDC"):
         estimates.by_map(without_pressure, its, "any")
 
 

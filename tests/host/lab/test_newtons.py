@@ -60,7 +60,7 @@ def test_the_nearest_row_is_none_of_the_same_press() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["newtons"], "no recording was named"),
+        (["newtons"], "no recording given"),
         (["batch", "F1.npz"], "takes no recording"),
         (["newtons", "/nonexistent/F1.npz"], "F1.npz"),
     ],

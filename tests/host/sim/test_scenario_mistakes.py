@@ -22,7 +22,7 @@ BAD: list[tuple[str, str, int, str, str]] = [
         'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nat = "E1"\nforcen = 2\n',
         6,
         "step 1",
-        "'forcen' is unknown to press: expected one of do, seconds, fingers, force_n",
+        "'forcen' is unknown for press: expected one of do, seconds, fingers, force_n",
     ),
     (
         "near miss",
@@ -36,7 +36,7 @@ BAD: list[tuple[str, str, int, str, str]] = [
         step('[[step]]\ndo = "hold"\nseconds = 1\ncelsius = 30\n'),
         11,
         "step 2",
-        "'celsius' is unknown to hold",
+        "'celsius' is unknown for hold",
     ),
     ("unknown do", step('[[step]]\nseconds = 1\ndo = "pres"\n'), 10, "step 2", "did you mean 'press'?"),
     ("missing do", step("[[step]]\nseconds = 1\n"), 8, "step 2", "'do' is missing"),
@@ -78,7 +78,7 @@ BAD: list[tuple[str, str, int, str, str]] = [
         'name = "t"\nfingers = 5\n[[step]]\ndo = "rest"\nseconds = 181\n',
         5,
         "step 1",
-        "expected at most 180 s in all with 5 finger(s)",
+        "expected at most 180 s in total with 5 finger(s)",
     ),
     (
         "too long a change",
@@ -101,7 +101,7 @@ BAD: list[tuple[str, str, int, str, str]] = [
         'name = "t"\n' + PRESS.replace('at = "E17"', "at_mm = [4.0, 4.0]"),
         5,
         "step 1",
-        "'at_mm' is [4, 4]: expected a point of the ventral surface",
+        "'at_mm' is [4, 4]: expected a point on the ventral surface",
     ),
     (
         "three coordinates",
@@ -115,21 +115,21 @@ BAD: list[tuple[str, str, int, str, str]] = [
         step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = 2\nat = "E1"\n'),
         12,
         "step 2",
-        "'at' is given while something touches",
+        "'at' is given during a contact",
     ),
     (
         "tip while touching",
         step('[[step]]\ndo = "press"\nseconds = 1\nforce_n = 2\ntip_mm = 2\n'),
         12,
         "step 2",
-        "'tip_mm' is given while something touches",
+        "'tip_mm' is given during a contact",
     ),
     (
         "release of nothing",
         'name = "t"\n[[step]]\ndo = "press"\nseconds = 1\nforce_n = 0\n',
         5,
         "step 1",
-        "'force_n' is 0 and nothing touches",
+        "'force_n' is 0 but nothing touches",
     ),
     (
         "shear of nothing",
@@ -172,7 +172,7 @@ BAD: list[tuple[str, str, int, str, str]] = [
         step('[[step]]\ndo = "hold"\nseconds = 1\nfingers = [0, 0]\n'),
         11,
         "step 2",
-        "different",
+        "distinct",
     ),
     (
         "no fingers at all",
@@ -265,9 +265,9 @@ BAD: list[tuple[str, str, int, str, str]] = [
         "fault 1",
         "'channel' is 'E20'",
     ),
-    ("no toml", 'name = "t"\n[[step]]\ndo = \n', 3, "", "no TOML"),
-    ("unfinished toml", 'name = "t"\nx = [1,\n', 2, "", "no TOML"),
-    ("key twice", 'name = "t"\nseed = 1\nseed = 2\n' + REST, 3, "", "no TOML"),
+    ("no toml", 'name = "t"\n[[step]]\ndo = \n', 3, "", "not valid TOML"),
+    ("unfinished toml", 'name = "t"\nx = [1,\n', 2, "", "not valid TOML"),
+    ("key twice", 'name = "t"\nseed = 1\nseed = 2\n' + REST, 3, "", "not valid TOML"),
     ("empty", "# nothing\n", 1, "", "the file is empty"),
 ]
 

@@ -120,7 +120,7 @@ def test_a_gateway_is_no_sensor_board_nor_the_other_way_round(scripted_board, he
     with pytest.raises(NotAGatewayError, match="biotac sensor"):
         open_hand(path)
     fake.board = int(wire.Board.PICO)
-    with pytest.raises(PortError, match="is PICO, no sensor board"):
+    with pytest.raises(PortError, match="is PICO, not a sensor board"):
         SensorBoard(SerialLink(path))
 
 
@@ -159,7 +159,7 @@ def test_a_tape_is_kept_and_forgotten(scripted_board, hello, capsys) -> None:
     assert fake.kept == 880
     run("--forget")
     assert fake.keeping == 0
-    with pytest.raises(InputError, match=r"0.3 s of 2 fingers do not fit the board, 0.2.* s do"):
+    with pytest.raises(InputError, match=r"0.3 s of 2 fingers do not fit the board: expected up to 0.2.* s"):
         run("press.toml", "--fingers", "2", "--seconds", "0.3", "--keep")
     with pytest.raises(InputError, match="--keep wants a SOURCE"):
         run("--keep")

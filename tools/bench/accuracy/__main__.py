@@ -19,15 +19,17 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=boards.BUILD / "front", help="default build/bench/front")
     parser.add_argument("--commit", action="store_true", help="refresh host/docs/front.png, which README.md shows")
     parser.add_argument("--errors", action="store_true", help="errors and host times only, no boards and no picture")
-    parser.add_argument("--json", action="store_true", help="print front.json in place of front.md")
-    parser.add_argument("--frames", type=int, default=effort.frames, help="per class (default %(default)s)")
-    parser.add_argument("--restarts", type=int, default=effort.restarts, help="of the climbing (default %(default)s)")
-    parser.add_argument("--steps", type=int, default=effort.steps, help="of each restart (default %(default)s)")
+    parser.add_argument("--json", action="store_true", help="print front.json instead of front.md")
+    parser.add_argument("--frames", type=int, default=effort.frames, help="frames per class (default %(default)s)")
+    parser.add_argument(
+        "--restarts", type=int, default=effort.restarts, help="restarts of the hill climbing (default %(default)s)"
+    )
+    parser.add_argument("--steps", type=int, default=effort.steps, help="steps of each restart (default %(default)s)")
     args = parser.parse_args()
     if args.frames < 1 or args.restarts < 1 or args.steps < 1:
         parser.error("--frames, --restarts and --steps must be 1 or more")
     if args.commit and args.errors:
-        parser.error("--commit needs what --errors leaves out: the picture")
+        parser.error("--commit needs the picture, which --errors leaves out; drop one of them")
     args.out.mkdir(parents=True, exist_ok=True)
     cores = {}
     if not args.errors:

@@ -81,10 +81,10 @@ def page(all_facts: Facts) -> str:
         "# Kernels: cost against accuracy",
         "",
         f"RMS and max over {effort['frames']} random frames of each of six classes; adv. is the worst that hill "
-        f"climbing found, {effort['restarts']} restarts of {effort['steps']} steps. Host: times the shipped kernel's "
-        "time, within this run. Cycles: everything wanted, the median of the counted frames (up to half of the ADC's "
-        "range) and the longest of the same frames doubled. The point's error is a distance, that of force and of "
-        "torque y, z is of the axis that is furthest off.",
+        f"climbing found, {effort['restarts']} restarts of {effort['steps']} steps. Host: a multiple of the shipped "
+        "kernel's time, in this run. Cycles: with everything computed, the median of the counted frames (up to half of "
+        "the ADC's range) and the longest of the same frames doubled. The point's error is a distance; that of force "
+        "and of torque y, z is of the worst axis.",
     ]
     for weights in WEIGHT_NAMES.values():
         lines += ["", f"## Weights: {weights}", "", *_one_table(all_facts, weights)]
@@ -159,7 +159,7 @@ def _panel(axes: Any, all_facts: Facts, title: str, keys: tuple[str, ...]) -> No
             axes.plot(cycles, error_um, "o", markerfacecolor="white", color=HIGHLIGHT[name], markersize=9)
             _label(axes, f"with the RP2040's divider: {cycles:,}", (cycles, error_um), HIGHLIGHT[name], "divider")
     cycles_of = [cycles for _, cycles, _ in points]
-    axes.set(xscale="log", yscale="log", xlabel="cycles per frame, everything wanted", title=title)
+    axes.set(xscale="log", yscale="log", xlabel="cycles per frame, everything computed", title=title)
     axes.set_xlim(min(cycles_of) / 1.6, max(cycles_of) * 2.5)
     axes.set_ylim(FLOOR_UM / 4, max(error_um for *_, error_um in points) * 6)
     axes.grid(alpha=0.25, which="major")

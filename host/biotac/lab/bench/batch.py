@@ -112,4 +112,4 @@ def _check(results: list[Any], what: str) -> None:
         for k, name in enumerate(RESULT_DTYPE.names or ()):
             values = other[k] if isinstance(other, tuple) else other[name]
             if not np.allclose(np.squeeze(values), results[0][name], rtol=0, atol=EQUAL, equal_nan=True):
-                raise RuntimeError(f"{what}: two contestants differ in {name}; their times say nothing")
+                raise RuntimeError(f"{what}: two contestants differ in {name}; do not compare their times")

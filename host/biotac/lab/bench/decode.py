@@ -39,7 +39,7 @@ CRC_BYTES = 4
 CRC_RESIDUE = zlib.crc32(zlib.crc32(b"any").to_bytes(CRC_BYTES, "little"), zlib.crc32(b"any"))
 FRAME, PAC, UNITS_OF_FRAME = wire.Frame.ID, wire.Pac.ID, -1
 NAMES = {FRAME: "FRAME", PAC: "PAC"}
-EXTRA = "biotac bench decode runs against pymavlink and cobs; install them: pip install 'biotac-gateway[bench]'"
+EXTRA = "bench decode needs pymavlink and cobs; pip install 'biotac-gateway[bench]'"
 
 OURS, LIVE, UNITS = "biotac Decoder", "biotac StreamDecoder", "biotac StreamDecoder, units"
 MAVLINK, STRUCT, NUMPY = "pymavlink", "C-cobs + zlib + struct", "C-cobs + zlib + NumPy frombuffer"
@@ -243,7 +243,7 @@ def _check(contestant: _Contestant, sent: dict[int, StructArray]) -> None:
         whole = np.concatenate(got) if arrays else _array([m for part in got for m in part], rows.dtype)
         for field in rows.dtype.names or ():
             if len(whole) != len(rows) or not np.array_equal(whole[field].astype(rows[field].dtype), rows[field]):
-                raise RuntimeError(f"{name} decoded another {field} of {NAMES[message_id]}; its times say nothing")
+                raise RuntimeError(f"{name} decoded a wrong {field} of {NAMES[message_id]}; do not compare its times")
 
 
 def _array(messages: list[Any], dtype: np.dtype[Any]) -> StructArray:

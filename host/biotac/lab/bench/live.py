@@ -106,7 +106,7 @@ class Producer:
         """Wait for its next line: it writes one when ready, and one each time all frames are sent."""
         assert self._process.stdout is not None
         if not self._process.stdout.readline():
-            raise RuntimeError("the producer of `biotac bench live` died")
+            raise RuntimeError("the producer of `biotac bench live` ended early; its own error is on stderr")
 
     def delays_us(self, arrivals: list[Arrival]) -> NDArray[np.float64]:
         """Delay of every frame that arrived, from the ring to the callback."""
@@ -200,7 +200,7 @@ def measure(*, rates: tuple[int, ...] = RATES, rounds: int = 5, seconds: float =
     try:
         import cobs  # noqa: F401
     except ImportError:
-        raise InputError("bench live needs cobs, for pyserial's side; pip install 'biotac-gateway[bench]'") from None
+        raise InputError("bench live needs cobs for the pyserial reader; pip install 'biotac-gateway[bench]'") from None
     contestants = {OURS: ours, PYSERIAL: pyserial_thread}
     rows, ratios = [], {}
     with tempfile.TemporaryDirectory(prefix="biotac-bench-") as folder:
@@ -242,5 +242,5 @@ def asked(outcome: Outcome) -> list[Asked]:
         )
         if row.rate in ASKED_CPU:
             ratio, most = outcome.cpu_ratio[row.rate], ASKED_CPU[row.rate]
-            out.append(Asked(f"CPU of pyserial's {at}", f"{ratio:.2f}x", f"<= {most}x", ratio <= most))
+            out.append(Asked(f"CPU time over pyserial's {at}", f"{ratio:.2f}x", f"<= {most}x", ratio <= most))
     return out

@@ -49,7 +49,7 @@ LITTLE = "#15803d"
 # Labels stand to the right of their points and above, except these.
 LEFT = ("affine", "small map", "population map")
 BELOW = ("Lin's scales, the firmware's", "small map", "joined map", "population map, pulled")
-FLOORS = (("repeatability_n", "the plate again, same pattern", "--"), ("noise_n", "electrode noise, a frame", ":"))
+FLOORS = (("repeatability_n", "the plate, same pattern again", "--"), ("noise_n", "electrode noise, one frame", ":"))
 NEAREST = 0.05  # share of the rows, those with the most similar counts, that stand for "the same pattern"
 EVERY_ROW = 4  # one row in this many is looked at for that
 GUARD_ROWS = 1000
@@ -91,10 +91,10 @@ class Outcome:
 def measure(files: Sequence[Path], show: Show = lambda text: None) -> Outcome:
     """All points, on recordings as for `biotac calibrate wrench`. Raises InputError and RecordingError."""
     if not files:
-        raise InputError("no recording was named: expected one or more with force beside counts, such as F1.npz")
+        raise InputError("no recording given: name one or more with counts and force, such as F1.npz")
     names = [path.name for path in files]
     if len(set(names)) < len(names):
-        raise InputError(f"{', '.join(names)}: two have one name; rename one")
+        raise InputError(f"{', '.join(names)}: two have the same name; rename one")
     kept = json.loads(resources.files(__package__).joinpath(CYCLES).read_text(encoding="utf-8"))
     runs = {path.name: load(path).run for path in files}
     with threadpool_limits(limits=1, user_api="blas"):
@@ -102,7 +102,7 @@ def measure(files: Sequence[Path], show: Show = lambda text: None) -> Outcome:
     found: dict[str, dict[str, list[float]]] = {}
     noise, repeats = {}, {}
     for name, run in runs.items():
-        show(f"{name}: what others know of it")
+        show(f"{name}: maps from other fingers")
         if name in others:
             for key, rmse in _untrained(others[name], run).items():
                 found.setdefault(key, {})[name] = rmse
@@ -138,11 +138,11 @@ def _of_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Popula
         return {
             path.name: training.train([its for j, its in enumerate(fingers) if j != k], symmetric=True)
             for k, path in enumerate(files)
-        }, ["population maps are of the other recordings, symmetric as the package's"]
+        }, ["population maps are trained on the other recordings, symmetric like the package's"]
     kept = keeping.load(None)
     path = files[0]
     if keeping.made_of(kept, [path]):
-        return {}, [f"the package's population map was made of {path.name}: name another finger's recording too"]
+        return {}, [f"the package's population map was made from {path.name}: name another finger's recording too"]
     return {path.name: kept.its}, ["the population map is the package's"]
 
 
@@ -205,12 +205,12 @@ def draw(its: Outcome, path: Path) -> None:
     with picture(path) as figure:
         figure.set_size_inches(13, 6)
         files = ", ".join(its.noise_n)
-        figure.suptitle(f"Force on a real finger: cycles against error that was not trained on ({files})")
+        figure.suptitle(f"Force on real fingers: cycles against held-out error ({files})")
         axes = figure.subplots(1, 2, sharey=True)
         for panel, (title, core, words) in zip(axes, PANELS, strict=True):
             _panel(panel, its, core)
-            panel.set(title=title, xlabel=f"cycles for one force{', ' if words else ''}{words}")
-        axes[0].set_ylabel("RMS length of the force's error [N]")
+            panel.set(title=title, xlabel=f"cycles per force{', ' if words else ''}{words}")
+        axes[0].set_ylabel("RMS length of the force error [N]")
         figure.legend(*axes[0].get_legend_handles_labels(), fontsize=9, loc="outside lower center", ncols=3)
 
 
@@ -222,7 +222,7 @@ def _panel(axes: Any, its: Outcome, core: str) -> None:
     for point in its.points:
         color = COLORS.get(point.knows, LITTLE)
         words = point.knows if point.knows in COLORS else "a little"
-        label = None if words in seen else f"known of the finger: {words}"
+        label = None if words in seen else f"known about the finger: {words}"
         seen.add(words)
         x = point.cycles[core]
         axes.plot(x, point.error_n, "o", color=color, markersize=9, label=label)

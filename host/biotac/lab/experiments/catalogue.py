@@ -14,9 +14,9 @@ NAMES = {
     "torsion": "a weight turned both ways (Lin 2013, figure 9)",
     "torsion-shear": "a weight turned while it is pushed (Lin 2013, figure 10)",
     "shear-torsion": "shear and torsion at once on held-out places, calibrated against the paper's model",
-    "hold": "light holds spliced into presses, against what presses leave in the skin",
+    "hold": "light holds spliced into presses, against the residue that presses leave",
     "navarro": "pressure calibration and its verification press (Navarro et al.)",
-    "seed000": "every table and figure of point, curvature and force by learning (Wettels and Loeb)",
+    "seed000": "every table and figure on learning point of contact, curvature and force (Wettels and Loeb)",
 }
 
 

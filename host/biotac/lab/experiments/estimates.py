@@ -80,9 +80,7 @@ def by_map(trial: Trial, its: WrenchMap, name: str) -> Estimate:
     Raises InputError when the map needs PDC and the trial has none.
     """
     if its.with_pdc and not np.isfinite(trial.pressure).any():
-        raise InputError(
-            f"map {name} was trained with PDC, and {trial.name} has none: expected PDC; choose another map"
-        )
+        raise InputError(f"map {name} needs PDC, but {trial.name} has none; choose a map trained without PDC")
     counts = np.where(trial.counts == wire.INVALID_COUNT, np.nan, trial.counts)
     wrench = replace(its, tare=trial.tare).predict(counts, trial.pressure)
     columns = {axis: k for k, axis in enumerate(its.axes)}
@@ -98,7 +96,9 @@ def load_maps(paths: Sequence[Path]) -> dict[str, tuple[Path, WrenchMap]]:
     for path in paths:
         name = path.name.removesuffix(".json").removesuffix(".wrench")
         if name in maps or name.startswith(PAPER):
-            raise InputError(f"{path}: another model is called {name} too: expected names that differ; rename the file")
+            raise InputError(
+                f"{path}: map name {name} is taken, or begins with 'paper' like the built-in models; rename the file"
+            )
         maps[name] = path, fitted.load(path)
     return maps
 

@@ -153,7 +153,7 @@ def run(options: Options) -> Result:
         if not case.presses:
             raise RecordingError(
                 f"{options.recording}: PDC is never {PRESSED_COUNTS} counts above rest for {PRESSED_ROWS} rows: "
-                "expected presses; is it counts?"
+                "expected presses; check that PDC is in counts"
             )
         return Result(str(options.recording), [case], list(trial.notes))
     cases = []
@@ -195,14 +195,14 @@ def facts(result: Result) -> Facts:
         )
         checks += [
             claim(f"{case.name}: every press is seen", all(case.seen)),
-            check(f"{case.name}: re-zeros with PDC more than {PRESSED_COUNTS} over rest", len(pressed), 0, ""),
-            check(f"{case.name}: holds of {SAFE_SHARE:.0%} and more that are tared",
+            check(f"{case.name}: re-zeros with PDC more than {PRESSED_COUNTS} counts above rest", len(pressed), 0, ""),
+            check(f"{case.name}: holds of {SAFE_SHARE:.0%} or more that are tared",
                   sum(hold.outcome == "tared" for hold in safe), 0, f"of {len(safe)}"),
-            check(f"{case.name}: share of the lighter holds that is tared",
+            check(f"{case.name}: share of the lighter holds that are tared",
                   tared / len(light) if light else float("nan"), LIGHT_LIMIT, f"of {len(light)}"),
         ]  # fmt: skip
     return {"experiment": "hold", "source": result.source, "cases": cases, "checks": checks, "notes": [
-        f"a hold is one row repeated for {HOLD_ROWS / 100:g} s, and shares are of a press's peak of PDC over its rest",
+        f"a hold is one row repeated for {HOLD_ROWS / 100:g} s; shares are of a press's peak PDC above its rest",
         *result.notes]}  # fmt: skip
 
 
@@ -213,9 +213,9 @@ def page(facts: Facts) -> list[str]:
         forces = [f for f in case["rezero_force_n"] if f is not None]
         lines += [
             f"{case['sensor']}: {case['presses']} presses, {case['seen']} seen; {case['rezeros']} re-zeros, "
-            f"with at most {text(max(forces, default=float('nan')), 2)} N before.",
+            f"with at most {text(max(forces, default=float('nan')), 2)} N just before.",
             "",
-            *table(["hold", "holds", "tared", "in doubt", "contact"],
+            *table(["share of peak", "holds", "tared", "in doubt", "contact"],
                    [[f"{its['share']:.0%}", *[str(its[k]) for k in ("holds", *OUTCOMES)]]
                     for its in case["shares"]]),
         ]  # fmt: skip
@@ -236,7 +236,7 @@ def draw(result: Result, figure: Any) -> None:
         left.plot(time_s[case.rezeros], case.pdc[case.rezeros], "v", color="#15803d", markersize=5, label="re-zero")
         known = case.pdc[case.pdc != wire.INVALID_COUNT]
         left.set(
-            xlabel="rounds of 10 ms [s]", ylabel="PDC [counts]", title=case.name, ylim=(known.min() - 20, known.max())
+            xlabel="time in rounds [s]", ylabel="PDC [counts]", title=case.name, ylim=(known.min() - 20, known.max())
         )
         left.legend(fontsize=8)
         for outcome, color in OUTCOMES.items():
@@ -244,7 +244,7 @@ def draw(result: Result, figure: Any) -> None:
             right.plot([hold.share for hold in its], [max(hold.above, 0.5) for hold in its], "o", color=color,
                        markersize=4, label=f"{outcome}: {len(its)}")  # fmt: skip
         right.set(
-            xlabel="share of the press's peak", ylabel="PDC over the last tare [counts]", xscale="log", yscale="log"
+            xlabel="share of the press's peak", ylabel="PDC above the last tare [counts]", xscale="log", yscale="log"
         )
         right.legend(fontsize=8)
         for axis in (left, right):

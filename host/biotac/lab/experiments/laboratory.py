@@ -79,10 +79,12 @@ def _of_recording(path: Path, finger: int, needs: tuple[str, ...], own_force: bo
     mine = recording.frames[recording.frames["finger"] == finger]
     if not len(mine):
         there = ", ".join(str(k) for k in np.unique(recording.frames["finger"])) or "none"
-        raise RecordingError(f"{path}: finger {finger} sent no frames: expected {there}; name another with --finger")
+        raise RecordingError(
+            f"{path}: no frames from finger {finger}; fingers with frames: {there}; choose one with --finger"
+        )
     notes = ["tare: the board's own, from the recorded counts", *recording.problems]
     if own_force:
-        notes.append("force: what the board published, by its own scales; no plate was there")
+        notes.append("force: as the board published it, with its own scales; there was no force plate")
     force = np.nan_to_num(mine["force_n"]) if own_force else None
     time_s = (mine["t_us"] - mine["t_us"][0]) / 1e6
     counts, pdc = mine["counts"].copy(), mine["pdc"].copy()

@@ -105,14 +105,14 @@ def calibrate(
     verify_s = len(fingers) * len(CALIBRATION_FORCES_N) * PRESS_S
 
     first = Procedure(fingers, CALIBRATION_FORCES_N)
-    show(f"{profile}: three presses a finger")
+    show(f"{profile}: three presses per finger")
     with _open(source, board) as hand:
         guided.drive(hand, first, Truth(source))
     fits = {f: fit(first.rests[f], presses) for f, presses in first.presses.items()}
 
     second = Procedure(fingers, VERIFICATION_FORCES_N)
     outcome, truth = CrossCheck(), Truth(source)
-    show(f"{profile}: a verification press a finger")
+    show(f"{profile}: one verification press per finger")
     with _open(source, board) as hand:
         for its in fits.values():
             guided.put(hand, its.finger, guided.with_gain(hand, its, int(time.time())))
@@ -230,13 +230,13 @@ def facts(result: Result) -> Facts:
         "notes": [
             f"presses of {', '.join(f'{f:g}' for f in CALIBRATION_FORCES_N)} N, then "
             f"{VERIFICATION_FORCES_N[0]:g} N, with a 7 mm flat at {PLACE}; the force is the scenario's, without error",
-            "the emulated sensor's pressure is the same law in every finger, with a factor that depends on the "
-            "place along the finger: real fingers differ more in K",
-            "a worn emulated sensor differs in its electrodes alone: for pressure it is five fingers more",
-            "relative error: |told - F| / |F|, Euclidean norms over the held rows; the paper gives no formula",
-            "P0 is the tare in each frame; the one in the table is the mean at rest before the first press",
-            "tare off: the most that the tare of a held row differs from that mean; a tare that is taken right after a "
-            "release still holds some of it",
+            "pressure follows the same law in every emulated finger, with a factor that depends on the place along "
+            "the finger; real fingers differ more in K",
+            "a worn emulated sensor differs only in its electrodes: for pressure, these are just five more fingers",
+            "relative error: |estimate - F| / |F|, Euclidean norms over the held rows; the paper gives no formula",
+            "P0 is each frame's tare; the table has the mean at rest before the first press",
+            "tare off: the largest difference between a held row's tare and that mean; a tare taken right after a "
+            "release still contains some residue of the press",
         ],
     }
 
@@ -281,14 +281,14 @@ def page(facts: Facts) -> list[str]:
         for name, x, gain, errors in zip(where["names"], where["x_mm"], where["gain_n"], where["errors"], strict=True)
     ]
     lines += [
-        f"The paper's verification press of the fore finger: {facts['paper']['error']:.2f} %.",
+        f"The paper's verification press, fore finger: {facts['paper']['error']:.2f} %.",
         "",
-        "## The place of the press",
+        "## Place of the press",
         "",
-        "K from one place (row), and the relative error in % that it gives at another (column). A K holds where it was "
-        "found.",
+        "K fitted at one place (row), and its relative error in % at each place (column). K is valid only where it was "
+        "fitted.",
         "",
-        *table(["K of (x)", "K [mN/count]", *where["names"]], rows),
+        *table(["K from (x)", "K [mN/count]", *where["names"]], rows),
     ]
     return lines
 

@@ -95,5 +95,5 @@ def markdown(title: str, body: list[str], facts: Facts, picture: str) -> str:
     lines = [f"# {title}", "", f"Source: {facts['source']}.", "", *body]
     if facts["checks"]:
         lines += ["## Checks", "", *[f"* {line}" for line in verdicts(facts)], ""]
-    lines += ["## Taken for granted", "", *[f"* {note}" for note in facts["notes"]], ""]
+    lines += ["## Notes", "", *[f"* {note}" for note in facts["notes"]], ""]
     return "\n".join([*lines, f"![{title}]({picture})", ""])

@@ -106,7 +106,7 @@ def run(options: Options) -> Result:
             if not len(case.over(CONTACT_COUNTS)):
                 raise RecordingError(
                     f"{options.recording}: PDC is never {CONTACT_COUNTS:g} counts above rest in contact: expected "
-                    f"presses; is it counts?"
+                    f"presses; check that PDC is in counts"
                 )
         notes, corrected = list(trial.notes), {}
         try:
@@ -116,13 +116,13 @@ def run(options: Options) -> Result:
         return Result(str(options.recording), cases, corrected, notes, True)
     cases, corrected = [], {}
     for profile in PROFILES:
-        options.show(f"a plate on the {profile} sensor")
+        options.show(f"pressing a plate on the {profile} sensor")
         trial = emulated(options.seed, profile)
         cases += [_case(profile, weights, trial) for weights in WEIGHTS]
         corrected[profile] = _corrected(trial)
     notes = [
         f"emulated sensor, seed {options.seed}: {EMULATED_CONTACTS} presses of a {FLAT_MM:g} mm flat, 1 to 6 N, x -12 "
-        "to 3.5 mm, up to 57 deg of roll, no shear; a real plate also rubs: these angles are kinder than a laboratory's"
+        "to 3.5 mm, up to 57 deg of roll, no shear; a real plate also rubs, so a laboratory's angles are larger"
     ]
     return Result(f"emulated finger, seed {options.seed}", cases, corrected, notes, False)
 
@@ -226,8 +226,8 @@ def draw(result: Result, figure: Any) -> None:
         axes[0].plot(angles, (np.arange(len(angles)) + 0.5) / len(angles), styles[case.profile],
                      color=COLORS[case.weights], label=label)  # fmt: skip
     for share, limit in ((0.5, LIMIT_MEDIAN_DEG), (0.9, LIMIT_P90_DEG)):
-        axes[0].plot(limit, share, "k>", markersize=8, label=f"asked: {share:.0%} within {limit} deg")
-    axes[0].set(xlabel="angle [deg]", ylabel="share of frames within it", xlim=(0, 60), ylim=(0, 1))
+        axes[0].plot(limit, share, "k>", markersize=8, label=f"required: {share:.0%} within {limit} deg")
+    axes[0].set(xlabel="angle [deg]", ylabel="share of frames within this angle", xlim=(0, 60), ylim=(0, 1))
     axes[0].set_title(f"frames with PDC > rest + {CONTACT_COUNTS:g} counts; median / 90th percentile", fontsize=10)
     axes[0].legend(fontsize=8, loc="lower right")
     for case in result.cases:

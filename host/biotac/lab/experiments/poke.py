@@ -141,7 +141,7 @@ def contacts(trial: Trial, low_n: float = FLOOR_N, high_n: float = np.inf) -> li
     if len(groups) != len(_sensor.ELECTRODE_NAMES):
         raise RecordingError(
             f"{trial.name}: {len(groups)} contacts above {FLOOR_N:g} N: expected {len(_sensor.ELECTRODE_NAMES)}, "
-            f"a poke an electrode in their order, released in between; record that"
+            f"one poke per electrode, in order, released in between; record it again"
         )
     result = []
     for group in groups:
@@ -166,9 +166,9 @@ def run(options: Options) -> Result:
         plate = plate or _plate(trials[0])
     notes = [
         f"emulated sensor, seed {options.seed}: the probe presses with up to {PEAK_N:g} N for half a second; by force: "
-        f"it goes up to {SLOW_PEAK_N:g} N in four seconds, 25 frames a 0.3 N",
-        "probe placed exactly: by hand it is not, which adds to the paper's bias and not to its deviation",
-        "new: noise 1.5 counts, 3 to 5 kOhm, as the paper; worn: noise 5 counts, glitches, as public recordings",
+        f"it ramps up to {SLOW_PEAK_N:g} N in four seconds, 24 frames per 0.3 N",
+        "probe placed exactly; by hand it is not, which adds to the paper's bias but not to its deviation",
+        "new: noise 1.5 counts, 3 to 5 kOhm, as in the paper; worn: noise 5 counts, glitches, as in public recordings",
     ]
     return Result(f"emulated finger, seed {options.seed}", cases, plate, notes, False)
 
@@ -263,10 +263,10 @@ def page(facts: Facts) -> list[str]:
         "Standard deviation of the point of contact, sqrt(var x + var y + var z), over every frame with a force",
         f"above {FLOOR_N:g} N, mean over the 19 electrodes. Bias: from the electrode to the mean point.",
         "",
-        *table(["sensor", "weights", "trial", "std [mm]", "one coordinate [mm]", "bias [mm]"], rows),
+        *table(["sensor", "weights", "trial", "std [mm]", "per coordinate [mm]", "bias [mm]"], rows),
         "## By force",
         "",
-        "Mean over the electrodes of the standard deviation within a band of force, and of the bias, in mm.",
+        "Standard deviation within each band of force, and bias in parentheses: means over the electrodes, in mm.",
         "",
     ]
     bands = [f"{low:g} to {high:g} N" for low, high in facts["bands_n"]]
@@ -282,7 +282,7 @@ def page(facts: Facts) -> list[str]:
     rows = [[name, *[text(column[k], 4) for column in columns]] for k, name in enumerate(_sensor.ELECTRODE_NAMES)]
     means = [mean for case in shipped for mean in case["mean_std_mm"]] + paper
     rows.append(["**average**", *[text(mean, 4) for mean in means]])
-    return [*lines, "## Table 2, with the board's default weights", "", "mm.", "", *table(head, rows)]
+    return [*lines, "## Table 2, with the board's default weights", "", "In mm.", "", *table(head, rows)]
 
 
 def words(case: Facts, facts: Facts) -> str:
@@ -310,7 +310,7 @@ def _draw_points(axes: Any, case: Case) -> None:
     axes.plot(across, along, "o", markersize=13, markerfacecolor="none", color="#111111", label="electrode")
     for name, a, b in zip(_sensor.ELECTRODE_NAMES, across, along, strict=True):
         axes.annotate(name, (a, b), xytext=(0, 9), textcoords="offset points", ha="center", fontsize=7.5)
-    axes.set(xlabel="around the finger [mm], + is E11's side", ylabel="along the finger [mm], tip up", aspect="equal")
+    axes.set(xlabel="around the finger [mm], + towards E11", ylabel="along the finger [mm], tip up", aspect="equal")
     axes.set_title(f"{case.profile}: {WORDS[case.weights]}", fontsize=10)
     axes.margins(0.08)
     axes.grid(alpha=0.25)

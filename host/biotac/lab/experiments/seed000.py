@@ -83,7 +83,7 @@ def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
     its = force.load(finger, size.force_places, seed)
     less = force.load(finger, size.reduced_places, seed)
     steps = size.force_steps
-    options.show("drawing presses and training nets")
+    options.show("simulating presses and training nets")
     nets = pool.submit(force.networks, its, steps, seed)
     by_contact = pool.submit(roc.frames, finger, size.places, True, seed, size.steps, size.frames)
     by_row = pool.submit(roc.frames, finger, PAPER_PLACES, False, seed, size.steps, size.frames)
@@ -108,12 +108,12 @@ def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
         "real": [one.result() for one in real],
     }
     notes = [
-        f"emulated finger, seed {seed}: Hertz's footprints on numerics.md 3.1, like a BioTac and not a given one",
-        f"contacts of five presses, 30 to 40 N: the paper's {PAPER_PLACES} for PAF, {size.places} for curvature, "
-        f"{size.force_places} for force, {size.reduced_places} for figure 10",
+        f"emulated finger, seed {seed}: Hertzian footprints on numerics.md 3.1, like a BioTac but no particular one",
+        f"contacts of five presses per probe, 30 to 40 N: the paper's {PAPER_PLACES} for PAF, "
+        f"{size.places} for curvature, {size.force_places} for force, {size.reduced_places} for figure 10",
         "no filter: the paper's 3-pole 5 Hz low-pass lags by about 0.1 s; R2 is the squared correlation, as its "
         "table 3 needs; Eq 6 only where the force is above 1 N",
-        "rear and forward by the true place, the probe known, as the paper has it; a row says what PAF's own d does",
+        "rear or forward by the true place, the probe known, as in the paper; one row uses PAF's own d instead",
     ]
     if options.quick:
         notes.append("--quick: far too few rows for the figures to mean anything")
@@ -133,9 +133,7 @@ def facts(result: Result) -> Facts:
         "checks": [
             check("PAF d above 1 N, the paper's loads", paf["d"]["rmse"], D_ASKED_MM, "mm"),
             check("PAF r above 1 N, the paper's loads", paf["r"]["rmse"], R_ASKED_MM, "mm"),
-            check(
-                f"probes taken for others, held out, by {best['what']}", 1 - best["correct"], 1 - ROC_ASKED, "of all"
-            ),
+            check(f"probes misclassified, held out, by {best['what']}", 1 - best["correct"], 1 - ROC_ASKED, "of all"),
             claim(f"nets by class beat one net, pooled RMSE {text(four)} against {text(one)} N", four < one),
             check("direction of a bar, RMSE", its["bars"]["rmse_deg"], BAR_ASKED_DEG, "deg"),
         ],
@@ -172,7 +170,7 @@ def draw(result: Result, figure: Any) -> None:
     for (row, column), value in np.ndenumerate(confusion):
         axes.text(column, row, str(value), ha="center", va="center", fontsize=8)
     names = [probe.name for probe in PROBES]
-    axes.set(xticks=range(4), yticks=range(4), xticklabels=names, yticklabels=names, xlabel="is", ylabel="taken for")
+    axes.set(xticks=range(4), yticks=range(4), xticklabels=names, yticklabels=names, xlabel="true", ylabel="found")
     axes.set_title(f"figure 7: by {result.parts['roc'][-1]['what']}, held out")
     inner = grid[2, :].subgridspec(1, 3)
     true, said = result.force

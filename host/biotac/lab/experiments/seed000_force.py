@@ -116,9 +116,9 @@ def recorded(path: Path, steps: int, seed: int, show: Callable[[str], None]) -> 
     near = np.min(np.abs(np.arange(n)[:, None] - edge[None]), axis=1) < GUARD_ROWS // 2
     rows = np.flatnonzero(~near)[::REAL_EVERY]
     x, truth = above[rows], run.truth[rows, :3]
-    show(f"{path.name}: a net")
+    show(f"{path.name}: training a net")
     net = _held_out(x, truth, block[rows], steps=steps, seed=seed)
-    show(f"{path.name}: the calibrated map")
+    show(f"{path.name}: fitting the calibrated map")
     mapped = crossvalidation.validate(run).predicted[0][rows, :3]
     everybody = population.alone(Signals(x, np.broadcast_to(run.tare, x.shape)))
     return {

@@ -25,51 +25,52 @@ def overview(facts: Facts) -> list[str]:
     kept = [sum((row[axis] or 0.0) > 0.1 for row in facts["correlations"]) for axis in range(3)]
     ratio = {row["mm"]: row["ratio"] for row in facts["impedance"]}
     real = "; ".join(_real(one) for one in facts["real"]) or "none given (--real)"
-    none = "no recording has it"
+    none = "in no recording"
     rows = [
-        ["Table 1", "range 0.01 to 50 N, PAC 0 to 2 kPa, 0 to 1 C/s", "presses of 0.3 to 40 N are drawn", none,
-         "a maker's data, not a result; electrodes over which 30 N stand read 10 MOhm, the converter's last counts"],
-        ["Table 2", "why each feature is wanted", "-", "-", "words"],
-        ["Fig 1, 2", "vice, force plate, four probes by hand", "four probes by Hertz's footprints", none,
-         "no plate's drift, no slips; places and tilts scatter by 0.3 mm and 4 degrees in place of a hand"],
+        ["Table 1", "range 0.01 to 50 N, PAC 0 to 2 kPa, 0 to 1 C/s", "random presses of 0.3 to 40 N", none,
+         "the manufacturer's data, not a result; electrodes under 30 N read 10 MOhm, the converter's last counts"],
+        ["Table 2", "why each feature is wanted", "-", "-", "text only"],
+        ["Fig 1, 2", "vice, force plate, four hand-held probes", "four probes with Hertzian footprints", none,
+         "no plate drift, no slips; places scatter by 0.3 mm and tilts by 4 degrees, like a hand's"],
         ["Fig 3", "(d, r) on the fingerprints", "d from x = -16 mm, r around the axis", "-",
-         "the paper prints no numbers; numerics.md 5.2 has this origin"],
+         "the paper gives no numbers; the origin is that of numerics.md 5.2"],
         ["Fig 4", "impedance falls off around an electrode",
-         f"E18 at 10 N over rest: {text(ratio[0.0], 1)}, {text(ratio[2.0], 1)} at 2 mm, {text(ratio[4.0], 1)} at 4 mm",
-         none, "the paper moved 4.5 mm deep with a 2 mm tip and prints a surface without numbers"],
-        ["Fig 5", "shear squeezes one side and bulges the other", "so by construction", "F1, F2: both signs",
+         f"E18's resistance at 10 N over that at rest: {text(ratio[0.0], 1)}, {text(ratio[2.0], 1)} at 2 mm, "
+         f"{text(ratio[4.0], 1)} at 4 mm",
+         none, "the paper pressed 4.5 mm deep with a 2 mm tip and plots a surface without numbers"],
+        ["Fig 5", "shear squeezes one side and bulges the other", "true by construction", "F1, F2: both signs",
          "a schematic"],
-        ["Fig 6", "Spearman > 0.1 kept, no numbers", f"{kept[0]}/{kept[1]}/{kept[2]} electrodes for Fx/Fy/Fz", "-",
-         "the paper prints bars; numerics.md 5.3 had 8/14/11 with lighter loads"],
-        ["Fig 7", "94.7 % of rows",
-         f"rows at random {_percent(by_row)} ({sum(by_row['places'])} contacts), rows of new contacts "
+        ["Fig 6", "keeps Spearman > 0.1, no numbers", f"{kept[0]}/{kept[1]}/{kept[2]} electrodes for Fx/Fy/Fz", "-",
+         "the paper plots bars; numerics.md 5.3 has 8/14/11 with lighter loads"],
+        ["Fig 7", "94.7 % of rows correct",
+         f"random rows {_percent(by_row)} ({sum(by_row['places'])} contacts), rows of new contacts "
          f"{_percent(by_contact)}, presses {_percent(press)}, contacts of five presses {_percent(contact)}; "
-         f"by support vectors {_percent(press_machine)} and {_percent(contact_machine)}", none,
-         "a random split puts neighbours of a row into training: the paper's figure has that leak; a frame of a new "
-         "place does not tell width from distance to the next electrode, a growing press does"],
+         f"with support vectors {_percent(press_machine)} and {_percent(contact_machine)}", none,
+         "a random split puts a row's neighbours into training: the paper's figure has that leak; at a new place one "
+         "frame cannot tell width from distance to the next electrode, but a growing press can"],
         ["Fig 8", "noisy, jumps at low force",
          f"d/r {_dr(facts, 'as printed', 'none')} as printed, "
          f"{_dr(facts, EQUATION, 'none')} mm without the rest offset", none,
-         "as printed 3.08 N stand for no touch at all and pull the mean to the middle; nothing divides by zero"],
+         "as printed, Eq 4 gives 3.08 N without a touch, which pulls the mean to the middle; nothing divides by zero"],
         ["Fig 9, Table 3", f"both: d/r {PAPER_TABLE3['both'][0][0]} / {PAPER_TABLE3['both'][1][0]} mm",
-         f"both: {_dr(facts, EQUATION, 'both')} mm; printed {_dr(facts, 'as printed', 'both')} mm", none,
-         "no error of marking places by hand is in ours; the threshold goes by the true force"],
+         f"both: {_dr(facts, EQUATION, 'both')} mm; as printed {_dr(facts, 'as printed', 'both')} mm", none,
+         "ours has no error from marking places by hand; the threshold uses the true force"],
         ["Fig 10", "PCA some, Spearman Fy and Fz, ICA poor (bars, no numbers)",
          f"pooled RMSE {text(plain, 2)} N; PCA {text(pca, 2)}, FastICA {text(ica, 2)}, Spearman {text(spearman, 2)}",
          "-",
-         "PCA and ICA span the same here, so a net can undo either, and electrodes without rank correlation still "
-         "say how the others are meant; fewer contacts than figure 11"],
+         "PCA and ICA span the same space here, so a net can undo either, and electrodes without rank correlation "
+         "still help to read the others; fewer contacts than for figure 11"],
         ["Fig 11", "segregation improves RMSE and R2 (bars)",
          f"one net {text(one['pooled_n'], 2)}, by class {text(four['pooled_n'], 2)}, by PAF's own d "
          f"{text(cascade['pooled_n'], 2)} N", real,
-         "held out by contact, not by row; a wrong class at d = 14 mm costs what the classes gain, or some of it"],
+         "held out by contact, not by row; a wrong class at d = 14 mm costs some or all of what the classes gain"],
         ["Table 4, Fig 12", "; ".join(f"{axis} R2 {r2}, {error} %" for axis, (r2, error) in PAPER_TABLE4.items()),
-         _class(rear), real, "places are new to the net, the paper's were not; F1 and F2 are one flat plate"],
+         _class(rear), real, "our places are new to the net, the paper's were not; F1 and F2 are from one flat plate"],
         ["Fig 13", "classifier and look-up feed the nets", f"PAF feeds them: {text(cascade['pooled_n'], 2)} N pooled",
-         "-", "the probe is taken as known, as the paper does"],
-        ["Eq 7", "particle filter, proposed", "-", "-", "the paper has no figure; built as biotac.features.grip"],
+         "-", "the probe is assumed to be known, as in the paper"],
+        ["Eq 7", "particle filter, proposed", "-", "-", "the paper gives no figure; built as biotac.features.grip"],
     ]  # fmt: skip
-    head = ["paper", "there", "emulated finger", "recordings", "why they differ"]
+    head = ["paper", "its result", "emulated finger", "recordings", "why they differ"]
     return ["## Every table and figure", "", *table(head, rows)]
 
 
@@ -91,13 +92,13 @@ def details(facts: Facts) -> list[str]:
          text(one["weights"], 0), text(one["steps"], 0)]
         for one in facts["roc"]
     ]  # fmt: skip
-    lines += table(["decided by", "split", "contacts a probe", "correct", "weights determined", "of", "steps"], rows)
+    lines += table(["decided by", "split", "contacts per probe", "correct", "weights determined", "of", "steps"], rows)
     names = ["1 mm", "3.6 mm", "10 mm", "flat"]
     for one in facts["roc"]:
-        lines += [f"{one['what']}, {one['split']}: columns are true, rows are said.", ""]
+        lines += [f"{one['what']}, {one['split']}: columns: the true probe; rows: the classifier's answer.", ""]
         said = zip(names, one["confusion"], strict=True)
         lines += table(["", *names], [[name, *map(str, row)] for name, row in said])
-    lines += ["## Force", "", f"Contacts {facts['force_places']} of {PAPER_PLACES} in the paper, five folds.", ""]
+    lines += ["## Force", "", f"Contacts per probe: {facts['force_places']}; paper: {PAPER_PLACES}. Five folds.", ""]
     named = [(row.get("how") or row["class"], row) for row in [*facts["force"], *facts["classes"]]]
     named += [(f"figure 10: {row['how']}", row) for row in facts["reductions"]]
     for one in facts["real"]:
@@ -105,7 +106,7 @@ def details(facts: Facts) -> list[str]:
     rows = [[name, text(row["pooled_n"]), *[_four(row["axes"][axis]) for axis in row["axes"]]] for name, row in named]
     lines += table(["", "pooled RMSE [N]", *[f"{a}: RMSE N, SMSE, R2, %" for a in ("Fx", "Fy", "Fz")]], rows)
     if facts["real"]:
-        lines += ["The population map was trained on these recordings, and is not held out.", ""]
+        lines += ["The population map was trained on these recordings, so it is not held out.", ""]
     lines += ["## Two contacts, 3.6 mm tips, 3 to 8 N each", ""]
     rows = [
         [f"{row['apart_mm']:g}" if row["apart_mm"] else "one contact", text(row["right"], 2),
@@ -114,7 +115,7 @@ def details(facts: Facts) -> list[str]:
     ]  # fmt: skip
     lines += table(["apart [mm]", "number right", "PoC RMSE [mm]", "share RMSE"], rows)
     bars = facts["bars"]
-    lines += ["## Direction of a bar on the middle of the pad", ""]
+    lines += ["## Direction of a bar in the middle of the pad", ""]
     lines += [
         f"RMSE {text(bars['rmse_deg'], 2)}, median {text(bars['median_deg'], 2)} degrees ({bars['test']} new presses).",
         "",

@@ -51,10 +51,10 @@ def _claims(counts: dict[str, dict[str, float]]) -> list[Facts]:
     return [
         claim("E1, E4, E11 and E14 rise in B, as liquid is displaced towards them",
               all(counts["B"][name] > 0 for name in LATERAL)),
-        claim("E17, under the weight, is reduced from B to F", all(counts[phase]["E17"] < 0 for phase in "BCDEF")),
-        claim("E1 and E4 change one way in C and the other in E",
+        claim("E17, under the weight, is below tare from B to F", all(counts[phase]["E17"] < 0 for phase in "BCDEF")),
+        claim("E1 and E4 change in opposite directions in C and E",
               all((towards[name] > 0) != (away[name] > 0) for name in ("E1", "E4"))),
-        claim("E11 and E14, on the opposite side, change reciprocally", opposed),
+        claim("E11 and E14, on the other side, change the opposite way", opposed),
     ]  # fmt: skip
 
 
@@ -64,7 +64,7 @@ def page(facts: Facts) -> list[str]:
     if not facts["phases"]:
         return lines
     rows = [[phase["name"], *[text(phase["counts"][name], 1) for name in MARKED]] for phase in facts["phases"]]
-    lines += ["## Electrodes of figure 3", "", "Mean counts above the tare.", "", *table(["phase", *MARKED], rows)]
+    lines += ["## Electrodes of figure 3", "", "Mean counts above tare.", "", *table(["phase", *MARKED], rows)]
     return [*lines, "## Forces", "", *weight.phases_table(facts, ("Fy", "Fz"))]
 
 

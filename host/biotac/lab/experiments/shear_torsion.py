@@ -158,17 +158,17 @@ def facts(result: Result) -> Facts:
             name: {key: one[key] for key in ("sign_right", "leak_n_per_nmm")} for name, one in tried.items()
         },
         "checks": [
-            check("Fy under shear and torsion, of the paper's RMSE", share[FY], FY_LIMIT, "times"),
-            check("torsion under shear and torsion, of the paper's RMSE", share[TORSION], TORSION_LIMIT, "times"),
-            check("the same, of predicting no torsion at all", errors[CALIBRATED][TORSION] / spread[TORSION],
+            check("Fy under shear and torsion, RMSE relative to the paper's", share[FY], FY_LIMIT, "times"),
+            check("torsion under both, RMSE relative to the paper's", share[TORSION], TORSION_LIMIT, "times"),
+            check("the same, relative to predicting no torsion", errors[CALIBRATED][TORSION] / spread[TORSION],
                   TORSION_LIMIT, "times"),
             *[one for one in replayed["checks"] if one["what"].startswith(CALIBRATED)],
         ],
         "notes": [
             f"{FRAMES} frames of one contact each, with noise; {validation.blocks.contacts} locations "
             f"({random_loads.CELL_MM:g} mm by {random_loads.CELL_DEG:g} deg), a twentieth held out at a time",
-            f"{PAPER}: Eq 3 and 4, six scales fitted on the same frames, torsion = (M - c x F) . n at the c of Eq 1",
-            f"{CALIBRATED}: what `biotac calibrate wrench` chose; its torsion is a row of its own",
+            f"{PAPER}: Eq 3 and 4, six scales, the same frames held out, torsion = (M - c x F) . n at the c of Eq 1",
+            f"{CALIBRATED}: what `biotac calibrate wrench` chose; torsion is an axis of its own",
             *result.replayed.notes[:1],
         ],
     }  # fmt: skip
@@ -183,7 +183,7 @@ def page(facts: Facts) -> list[str]:
         return [name, *[text(value, 2) for value in values]]
 
     rows = [row(name, values) for name, values in facts["rmse"].items()]
-    rows += [row("share", facts["share_of_paper"]), row("spread of the truth", facts["spread"])]
+    rows += [row("calibrated / paper", facts["share_of_paper"]), row("spread of the truth", facts["spread"])]
     words = {True: "right", False: "WRONG"}
     replayed = [
         [name, *[words[right] for right in one["sign_right"].values()], text(one["leak_n_per_nmm"])]
@@ -196,14 +196,14 @@ def page(facts: Facts) -> list[str]:
         f"Each model, over all {facts['frames']} frames; chosen: {facts['model']}.",
         "",
         *table(["model", *head], [row(name, values) for name, values in facts["by_model"].items()]),
-        f"At up to {WARM_C:g} C off the temperature of calibration; frames with both:",
+        f"Up to {WARM_C:g} C away from the calibration temperature, over frames with both:",
         "",
         *table(["", *head], [row(name, values) for name, values in facts["warm"].items()]),
         "Figure 10's trial, not trained on: sign of the torsion in both turns of each region, and how much of region",
         "II's pure torsion appears as Fy.",
         "",
         *table(["model", "sign in I", "in II", "in III", "leak [N per N mm]"], replayed),
-        f"Where nothing touches the map says {text(facts['rest_n'][0])} N.",
+        f"With nothing touching, the map gives {text(facts['rest_n'][0])} N.",
         "",
     ]
 

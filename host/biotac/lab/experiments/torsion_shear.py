@@ -136,9 +136,9 @@ def page(facts: Facts) -> list[str]:
     head = ["model", *[f"sign in {region}" for region in REGIONS], *[f"{region}, board's point" for region in REGIONS]]
     return [
         "Sign of the torsion in both turns of each region, at the true contact and at the point of contact the board",
-        "publishes; how much of region II's pure torsion appears as Fy; RMSE while there is shear and torsion at once.",
+        "publishes; how much of region II's pure torsion appears as Fy; RMSE with both shear and torsion.",
         "",
-        *table([*head, "leak [N per N mm]", "Fy at once [N]", "torsion at once [N mm]"], rows),
+        *table([*head, "leak [N per N mm]", "Fy with both [N]", "torsion with both [N mm]"], rows),
         *weight.errors_table(facts),
         *weight.phases_table(facts, ("Fy", "torsion")),
     ]

@@ -48,7 +48,7 @@ def _electrodes(axes: Any, trial: Trial, marked: Sequence[str]) -> None:
     for name in marked:
         line = trial.signal[:, _sensor.ELECTRODE_NAMES.index(name)]
         axes.plot(trial.time_s[::step], line[::step], color=next(colors), linewidth=1.1, label=name)
-    axes.set_ylabel("count above tare")
+    axes.set_ylabel("counts above tare")
     _legend(axes)
 
 

@@ -87,22 +87,25 @@ def run(
     earlier: list[Trial] = []
     if options.recording is not None:
         source, trial = str(options.recording), _recorded(options.recording, options.finger, torque)
-        notes = [*trial.notes, "phases are not looked for in a recording: its errors are over all loaded frames"]
+        notes = [*trial.notes, "a recording is not split into phases: its errors are over all loaded frames"]
     else:
         seed = options.seed
         source, trial, earlier = f"emulated finger, seed {seed}", emulate(seed), [its(seed) for its in before]
         notes = [f"emulated sensor, new, seed {seed}: {WEIGHT_N:.1f} N over E17, {how}"]
     scales = {PAPER: paper_scales([trial])}
     notes.append(
-        f"{PAPER}: one scale an axis, least squares on this very trial, which is the best they can do; an axis without "
+        f"{PAPER}: one scale per axis, least squares on this same trial, so this is its best case; an axis without "
         "load keeps the board's default"
     )
     if trial.torque_nmm is not None:
-        notes.append("the board has no scale for Mx, which the electrodes hardly see: it publishes the force's lever")
+        notes.append(
+            "the board has no scale for Mx, which the electrodes hardly sense: it computes Mx from force and point of "
+            "contact"
+        )
     if earlier:
         name = f"{PAPER}, scaled before"
         scales[name] = paper_scales(earlier)
-        notes.append(f"{name}: the same fitted on {' and '.join(t.name for t in earlier)} of the same finger instead")
+        notes.append(f"{name}: the same, but fitted on {' and '.join(t.name for t in earlier)} of the same finger")
     estimates = [by_paper(trial, its, name) for name, its in scales.items()]
     for name, (path, its) in maps.items():
         estimates.append(by_map(trial, its, name))
@@ -117,13 +120,12 @@ def _recorded(path: Path, finger: int, torque: bool) -> Trial:
     assert trial.force_n is not None
     if not np.isfinite(trial.tare).any():
         raise RecordingError(
-            f"{path}: the board never finds a tare in it: expected the finger still and untouched at the start; "
-            "add E_base"
+            f"{path}: the board finds no tare in it: expected a still, untouched finger at the start; add E_base"
         )
     if not loaded(trial).any():
         most = np.linalg.norm(trial.force_n, axis=1).max()
         raise RecordingError(
-            f"{path}: never loaded, the most is {most:.2f} N: expected over {LOADED_N:g} N; is F in N?"
+            f"{path}: force never exceeds {most:.2f} N: expected over {LOADED_N:g} N; check that F is in N"
         )
     return trial
 
@@ -202,7 +204,7 @@ def errors_table(facts: Facts) -> list[str]:
             row += [text(value, 2) for value in values]
         rows.append(row)
     lines = [
-        "The paper draws this trial and gives no numbers, so what stands against it is its model on the same counts.",
+        "The paper plots this trial without numbers, so the comparison is with its model on the same counts.",
         f"RMSE over {facts['loaded_frames']} loaded frames (true force above {LOADED_N:g} N).",
     ]
     if torque:
@@ -224,4 +226,4 @@ def phases_table(facts: Facts, axes: Sequence[str]) -> list[str]:
         rows.append([phase["name"], *[text(both[name].get(axis), 2) for axis in axes for name in names]])
     units = {axis: "N" if axis in FORCES else "N mm" for axis in axes}
     head = ["phase", *[f"{axis} {name} [{units[axis]}]" for axis in axes for name in names]]
-    return ["Means over the part of each phase in which the load rests.", "", *table(head, rows)]
+    return ["Means over the part of each phase in which the load is held.", "", *table(head, rows)]
