@@ -28,7 +28,7 @@ const char *bt_tape_open(bt_tape *tape, const uint8_t *bytes, size_t size)
         return "made for another slot sequence";
     }
     if (tape->fingers < 1 || tape->fingers > BT_MAX_FINGERS || tape->frames < 1) {
-        return "wants 1 to 5 fingers and at least one frame";
+        return "not of 1 to 5 fingers and at least one frame";
     }
     if (size - HEADER_BYTES != (size_t)tape->frames * tape->fingers * BT_SLOTS * 2) {
         return "its length does not fit its header";

@@ -61,7 +61,7 @@ def check(what: str, seen: float, limit: float, unit: str) -> Facts:
 
 
 def claim(what: str, holds: bool) -> Facts:
-    """A check that something the paper says, or the issue asks for, holds."""
+    """A check that something that the paper says, or that was asked for, holds."""
     return {"what": what, "met": bool(holds)}
 
 
@@ -70,8 +70,11 @@ def verdicts(facts: Facts) -> list[str]:
     lines = []
     for one in facts["checks"]:
         word = "met" if one["met"] else "NOT met"
-        asked = f": {text(one['seen'])} {one['unit']}, at most {one['limit']:g}" if "limit" in one else ""
-        lines.append(f"{word}: {one['what']}{asked}")
+        if "limit" not in one:
+            lines.append(f"{word}: {one['what']}")
+            continue
+        seen = f"{text(one['seen'])} {one['unit']}".rstrip()  # a count has no unit
+        lines.append(f"{word}: {one['what']}: {seen}, at most {one['limit']:g}")
     return lines
 
 

@@ -109,7 +109,7 @@ def _run(options: Options, size: Size, pool: ThreadPoolExecutor) -> Result:
     }
     notes = [
         f"emulated finger, seed {seed}: Hertzian footprints on numerics.md 3.1, like a BioTac but no particular one",
-        f"contacts of five presses per probe, 30 to 40 N: the paper's {PAPER_PLACES} for PAF, "
+        f"contacts of five presses per probe, 30 to 40 N (paper: {PAPER_PLACES}): {size.paf_places} for PAF, "
         f"{size.places} for curvature, {size.force_places} for force, {size.reduced_places} for figure 10",
         "no filter: the paper's 3-pole 5 Hz low-pass lags by about 0.1 s; R2 is the squared correlation, as its "
         "table 3 needs; Eq 6 only where the force is above 1 N",
