@@ -376,7 +376,7 @@ def test_a_refusal_is_7(capsys, scripted_board, hello, files, tmp_path, monkeypa
 
 @pytest.mark.parametrize(
     ("numbers", "cure"),
-    [({}, "try `biotac demo`"), ({"/dev/ttyACM0": "A", "/dev/ttyACM1": "B"}, "name the one you mean")],
+    [({}, "try `biotac demo`"), ({"/dev/ttyACM0": "A", "/dev/ttyACM1": "B"}, "name one of them")],
 )
 def test_view_without_a_port_needs_exactly_one_board(capsys, monkeypatch, numbers: dict[str, str], cure: str) -> None:
     plug_in(monkeypatch).update(numbers)  # beside a serial port that is none of ours
