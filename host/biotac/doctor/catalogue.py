@@ -82,7 +82,7 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "modem_manager": Entry(
         W,
-        "ModemManager takes a new serial port for a modem and sends it commands for some seconds after it was plugged "
+        "ModemManager takes a new serial port for a modem and sends it commands for some seconds after it is plugged "
         "in: opening fails with busy, or the first frames are lost.",
         "`sudo biotac udev-setup` tells it to leave our boards alone; then plug the board in again.",
     ),

@@ -195,7 +195,7 @@ class Streams:
             if self._pulling and there is not here and there is not None and there.is_alive():
                 raise InputError(
                     f"thread {there.name!r} is reading this hand, and {here.name!r} would take part of its data; "
-                    "read in one thread, or use on_batch in each"
+                    "read in one thread, or give each an on_batch callback"
                 )
             self._pulling = 1 if there is not here else self._pulling + 1
             self._puller = here

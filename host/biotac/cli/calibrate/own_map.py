@@ -28,7 +28,8 @@ from .. import outputs, values
 from ..recordings.loading import load
 
 WHY = (
-    "no better than the population map, or a finger unlike those in it; tare, load the pad flat and firmly, hold still"
+    "no better than the population map, or a finger unlike those it was trained on; tare, and load the pad flat, "
+    "firmly and steadily"
 )
 
 
