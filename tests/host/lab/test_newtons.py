@@ -61,7 +61,7 @@ def test_the_nearest_row_is_none_of_the_same_press() -> None:
     ("words", "said"),
     [
         (["newtons"], "no recording was named"),
-        (["batch", "F1.npz"], "takes no REC"),
+        (["batch", "F1.npz"], "takes no recording"),
         (["newtons", "/nonexistent/F1.npz"], "F1.npz"),
     ],
 )

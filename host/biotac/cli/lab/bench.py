@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         if not low <= args.frames <= high:
             raise InputError(f"--frames is {args.frames}, expected {low} to {high} for bench {args.what}")
     if args.what != "newtons" and (args.files or args.picture):
-        raise InputError(f"bench {args.what} takes no REC and no --picture; drop them")
+        raise InputError(f"bench {args.what} takes no recording and no --picture; drop them")
     measure, show, more = WHAT[args.what]
     outcome = measure(args)
     if args.json:
