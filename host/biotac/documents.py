@@ -47,7 +47,7 @@ def read_text(path: Path, limit_bytes: int) -> str:
     with path.open("rb") as file:
         data = file.read(limit_bytes + 1)
     if len(data) > limit_bytes:
-        raise ValueError(f"it has over {limit_bytes >> 20} MiB")
+        raise ValueError(f"it is larger than {limit_bytes >> 20} MiB")
     return data.decode("utf-8")
 
 
@@ -62,7 +62,7 @@ def parse_json(text: str | bytes, object_hook: Callable[[dict[str, Any]], Any] |
 def parse_toml(text: str) -> dict[str, Any]:
     """The table of TOML text. Raises ValueError, or its subclass TOMLDecodeError."""
     if len(text) > TOML_BYTES:
-        raise ValueError(f"it has over {TOML_BYTES >> 20} MiB")
+        raise ValueError(f"it is larger than {TOML_BYTES >> 20} MiB")
     if any(_is_deep(match["dots"] or "") for match in _TOKEN.finditer(text)):
         raise ValueError("a key has too many dots")
     try:
@@ -83,9 +83,9 @@ def _is_deep(dots: str) -> bool:
 def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
-        raise ValueError(f"{text[:20]} is no number that can be used")
+        raise ValueError(f"{text[:20]} is not a finite number")
     return value
 
 
 def _no_constant(text: str) -> float:
-    raise ValueError(f"{text} is no number that can be used")
+    raise ValueError(f"{text} is not a finite number")

@@ -22,9 +22,9 @@ def whole(path: Path, *, overwrite: bool) -> Iterator[Path]:
     words that say so. Raises InputError when ``path`` exists and may not be overwritten.
     """
     if path.exists() and not overwrite:
-        raise InputError(f"{path} exists and would be overwritten; choose another name or say --force")
+        raise InputError(f"{path} exists and would be overwritten; choose another name or add --force")
     if path.is_dir() and not (path / ROS2_METADATA).is_file():
-        raise InputError(f"{path} is a folder, and no ROS 2 bag that could be written anew; choose another name")
+        raise InputError(f"{path} is a folder, but not a ROS 2 bag that could be replaced; choose another name")
     try:
         # In a folder of its own it has its right name already: a bag's files are called after it.
         folder = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent))
@@ -35,7 +35,7 @@ def whole(path: Path, *, overwrite: bool) -> Iterator[Path]:
         finally:
             shutil.rmtree(folder, ignore_errors=True)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"{path} was not written, what there was of it is removed") from None
+        raise KeyboardInterrupt(f"{path} was not written; the partial file was removed") from None
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror or error}); choose another place") from error
 

@@ -224,7 +224,7 @@ def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path:
     total = -(-blocks * PAGE // SECTOR) * SECTOR + blocks * PAGE
     bench.set(Setting.IDLE_PERIOD_MS, 250, save=True)
     bench.target.board.do(f"cut power after {cut if cut >= 0 else total + cut} flash bytes")
-    with pytest.raises(FlashError, match=r"emulated board came to .*backup1.json, for --restore"):
+    with pytest.raises(FlashError, match=r"emulated board came to .*backup1.json: restore them with --restore"):
         bench.flash(image)
     facts = bench.counters()
     assert facts["loader"] == {"blocks": 0, "of": 0, "waiting": 0, "ignored": 0}
@@ -238,7 +238,7 @@ def test_after_a_power_cut_it_is_flashed_from_the_loader(bench: Bench, tmp_path:
 @pytest.mark.long
 def test_a_power_cut_before_the_first_byte_leaves_the_old_firmware(bench: Bench, next_release: Image) -> None:
     bench.target.board.do("cut power after 0 flash bytes")
-    with pytest.raises(FlashError, match="the settings are in"):
+    with pytest.raises(FlashError, match="the settings are saved in"):
         bench.flash(next_release)
     outcome = bench.flash(next_release)
     assert outcome.before is not None

@@ -138,7 +138,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        print(f"biotac: {one_line(error)}; check the path and the space left", file=sys.stderr)
+        print(f"biotac: {one_line(error)}; check the path and the free disk space", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return InputError.exit_code
 

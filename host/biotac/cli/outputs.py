@@ -11,18 +11,21 @@ from ..errors import InputError
 def check_file(place: Path | None, *, overwrite: bool) -> None:
     """Raises InputError if the file, where one is named, exists and may not be overwritten."""
     if place is not None and place.exists() and not overwrite:
-        raise InputError(f"{place} exists and would be overwritten; choose another name or say --force")
+        raise InputError(f"{place} exists and would be overwritten; choose another name or add --force")
 
 
 def check(folder: Path, places: Sequence[Path], *, overwrite: bool) -> None:
     """Raises InputError if a place in ``folder`` is named twice, or exists and may not be overwritten."""
     for place in places:
         if places.count(place) > 1:
-            raise InputError(f"{place} would be written twice; give files of the same name a folder each")
+            raise InputError(
+                f"{place} would be written twice; name each finger once, and calibrate files of the same name with "
+                "separate --out folders"
+            )
         if place.exists() and not overwrite:
-            raise InputError(f"{place} exists and would be overwritten; choose another folder or say --force")
+            raise InputError(f"{place} exists and would be overwritten; choose another folder or add --force")
     if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder} is no folder; choose another name")
+        raise InputError(f"{folder} is not a folder; choose another name")
 
 
 def make_folder(folder: Path) -> None:
@@ -30,4 +33,4 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder} is no folder ({error.strerror}); choose another name") from error
+        raise InputError(f"{folder} cannot be created ({error.strerror}); choose another folder") from error

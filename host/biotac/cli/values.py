@@ -18,7 +18,7 @@ def seconds(text: str) -> float:
     """A time above 0."""
     value = number(text)
     if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is no time; expected seconds above 0")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a time; expected seconds above 0")
     return value
 
 
@@ -26,7 +26,9 @@ def rate(text: str) -> float:
     """Lines per second: 0 for all, or at least one a day."""
     value = number(text)
     if not (value == 0 or 1 / 86400 <= value < math.inf):
-        raise argparse.ArgumentTypeError(f"{text!r} is no rate; expected lines per second, or 0 for all")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a rate; expected lines per second, at least 1/86400, or 0 for all"
+        )
     return value
 
 
@@ -43,7 +45,7 @@ def pace(text: str) -> float:
 def workers(text: str) -> int:
     """A number of processes."""
     if not (text.isascii() and text.isdigit() and 1 <= int(text[:9]) <= 1024):
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; expected 1 to 1024")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of processes; expected 1 to 1024")
     return int(text)
 
 

@@ -8,7 +8,7 @@ from ..wire import sensor_gen as sensor
 from .catalogue import Finding
 from .facts import Facts
 
-KINDS = {"words_stuck": "of 0x0000 or 0xFFFF", "words_parity": "with bad parity", "words_error": "that are error words"}
+KINDS = {"words_stuck": "are 0x0000 or 0xFFFF", "words_parity": "have bad parity", "words_error": "are error words"}
 
 
 def check(facts: Facts) -> Iterator[Finding]:

@@ -82,7 +82,7 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "modem_manager": Entry(
         W,
-        "ModemManager takes a new serial port for a modem and sends it commands for some seconds after it was plugged "
+        "ModemManager takes a new serial port for a modem and sends it commands for some seconds after it is plugged "
         "in: opening fails with busy, or the first frames are lost.",
         "`sudo biotac udev-setup` tells it to leave our boards alone; then plug the board in again.",
     ),
@@ -115,7 +115,7 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "firmware_older": Entry(
         W,
-        "The board runs an older release than this package, without what has been mended or added since.",
+        "The board runs an older release than this package, and lacks what has been fixed or added since.",
         "`biotac flash`, which keeps the board's settings, calibrations and maps.",
     ),
     # ---- leads to a sensor board, with --sensor-port
@@ -168,7 +168,7 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "sensor_unsure": Entry(
         W,
-        "A sensor was away while the board streamed, and has not said its serial number since: tare, calibration and "
+        "A sensor was away while the board streamed, and has not given its serial number since: tare, calibration and "
         "map may be another sensor's. Results go on as before, with the flag SENSOR_UNSURE.",
         "Reseat the flex connector, and take the strain off its cable. If its serial number never comes, see "
         "words_error and words_parity, and plug it in again.",
@@ -225,11 +225,11 @@ CATALOGUE: dict[str, Entry] = {
         E,
         "The board missed sampling times: those channels are missing from their frames.",
         "On a Pico, report it with the output of `biotac info --json`. On a Linux computer's own bus, use fewer "
-        "fingers, a faster bus, or run less else.",
+        "fingers or a faster bus, or stop other programs.",
     ),
     "messages_dropped": Entry(
         W,
-        "The board had messages for which the link had no room: the computer read too slowly, or stood still.",
+        "The board had messages for which the link had no room: the computer read too slowly, or stalled.",
         "Close other programs that use the port or the processor; avoid hubs; read in a thread of its own.",
     ),
     "frames_lost": Entry(
@@ -251,18 +251,18 @@ CATALOGUE: dict[str, Entry] = {
     "clock_drift": Entry(
         W,
         "The board's clock runs fast or slow against this computer's by more than a crystal should.",
-        "This computer's clock may just be being set: run the doctor again in a few minutes. If it stays, the board's "
+        "This computer's clock may just be adjusting: run the doctor again in a few minutes. If it stays, the board's "
         "crystal is off; `Hand.clock` corrects for that while it is steady.",
     ),
     "clock_jumped": Entry(
         W,
-        "The board's time and this computer's drifted apart at once: one of the clocks was set, or stood still.",
+        "The board's time and this computer's jumped apart: one of the clocks was set, or stood still.",
         "See board_restarted; otherwise keep this computer from sleeping while it records.",
     ),
     # ---- tare
     "no_tare": Entry(
         W,
-        "The finger has no tare, so it gives no point of contact, force or torque: its signals never stood still.",
+        "The finger has no tare, so it gives no point of contact, force or torque: its signals were never steady.",
         "Let go of the finger for two seconds. If that does not help, look for vibration, or words_parity.",
     ),
     "tare_fault": Entry(
@@ -280,7 +280,7 @@ CATALOGUE: dict[str, Entry] = {
         E,
         "Electrodes at the end of their range, 0 or at least 4090 counts, in most frames: they carry no signal. The "
         "skin is dry, torn or empty, presses on the core, or a trace is broken.",
-        "Look at the skin and the fluid (the manual's inflation check); let go of the finger and ask again.",
+        "Look at the skin and the fluid (the manual's inflation check); let go of the finger and run the doctor again.",
     ),
     "channel_missing": Entry(
         E,

@@ -19,7 +19,7 @@ def check(facts: Facts) -> Iterator[Finding]:
         yield from _nothing_to_open(facts)
         return
     if not system.permitted:
-        yield Finding("no_permission", f"{facts.port} may not be opened by you; it is {system.owner}")
+        yield Finding("no_permission", f"no permission to open {facts.port}; it is owned by {system.owner}")
     elif isinstance(error, PortError) and ("in use" in str(error) or system.holders):
         yield Finding("port_busy", f"{facts.port} is in use by {in_words(system.holders)}")
     elif isinstance(error, PortError):
@@ -40,6 +40,6 @@ def _nothing_to_open(facts: Facts) -> Iterator[Finding]:
         there = ", ".join(f"serial:{port.serial_number} on {port.device}" for port in system.boards)
         yield Finding("several_boards", f"{len(system.boards)} boards: {there}")
     elif system.usb_boards:
-        yield Finding("no_serial_port", "the board's USB ids are there, but no serial port with them")
+        yield Finding("no_serial_port", "a device with our USB ids is plugged in, but it has no serial port")
     elif not system.loaders:
         yield Finding("no_board", "no serial port has our USB ids")

@@ -20,12 +20,12 @@ def check(facts: Facts) -> Iterator[Finding]:
     if good:
         yield from _selects(board, pair, good)
     elif not pair.more("words"):
-        yield Finding("lead_clock", "the sensor board was not once clocked with one of its selects low")
+        yield Finding("lead_clock", "the sensor board saw no clock while any of its selects was low")
     elif sum(board.more(finger, "words_error") for finger in range(MAX_SENSORS)):
-        seen = f"{pair.more('words')} words were read, and the sensors understood no command"
+        seen = f"{pair.more('words')} words were read, but the sensors understood no command"
         yield Finding("lead_mosi", seen)
     else:
-        yield Finding("lead_miso", f"the sensors gave {pair.more('words')} words, and none came to the gateway")
+        yield Finding("lead_miso", f"the sensors sent {pair.more('words')} words, but none reached the gateway")
 
 
 def _well(board: BoardFacts, finger: int) -> bool:
@@ -36,7 +36,10 @@ def _well(board: BoardFacts, finger: int) -> bool:
 def _selects(board: BoardFacts, pair: PairFacts, good: list[int]) -> Iterator[Finding]:
     for finger in range(MAX_SENSORS):
         if finger not in good:
-            yield Finding("lead_select", f"finger {finger} gives no word, fingers {', '.join(map(str, good))} do")
+            yield Finding(
+                "lead_select",
+                f"finger {finger} gives few good words or none, unlike fingers {', '.join(map(str, good))}",
+            )
     for sensor in board.sensors:
         serial = ascii_text(sensor.serial)
         if serial in pair.serials and serial != pair.serials[sensor.finger]:

@@ -20,7 +20,9 @@ def examine(port: str | None, *, seconds: float = 3.0, expected_fingers: int | N
     device = device_of(port, system.boards)
     if device is None and port is not None and system.boards:
         there = ", ".join(f"{SERIAL_PREFIX}{b.serial_number}" for b in system.boards)
-        error = PortError(f"no board has serial number {port.removeprefix(SERIAL_PREFIX).upper()}; there is {there}")
+        error = PortError(
+            f"no board has serial number {port.removeprefix(SERIAL_PREFIX).upper()}; expected one of {there}"
+        )
         return Facts(port, system, error, None, expected_fingers)
     if device is None:
         return Facts(None, system, None, None, expected_fingers)

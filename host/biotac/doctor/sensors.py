@@ -19,7 +19,9 @@ def check(facts: Facts) -> Iterator[Finding]:
         return
     for sensor in board.sensors:
         if not sensor.present and (serial := ascii_text(sensor.serial)):
-            yield Finding("wrong_sensor", f"finger {sensor.finger} is {serial}, which is no BioTac of 19 electrodes")
+            yield Finding(
+                "wrong_sensor", f"finger {sensor.finger} is {serial}, which is not a BioTac with 19 electrodes"
+            )
     if not board.present:
         yield Finding("no_sensor", "no sensor answers on any of the five chip selects")
         return
@@ -49,9 +51,9 @@ def _changed(board: BoardFacts) -> Iterator[Finding]:
         unsure = flags & wire.FrameFlags.SENSOR_UNSURE != 0
         other = flags & wire.FrameFlags.SENSOR_OTHER != 0
         if other.any():
-            yield Finding("sensor_other", f"finger {finger}: another sensor answers than when the stream began")
+            yield Finding("sensor_other", f"finger {finger}: a different sensor answers than when the stream began")
         elif unsure[-1:].any():  # one that has identified itself since is reported by its lost words instead
-            seen = f"finger {finger} was away and has not said who it is since"
+            seen = f"finger {finger} was away and has not identified itself since"
             yield Finding("sensor_unsure", f"{seen}: {unsure.sum()} of {len(flags)} messages are unsure")
 
 
@@ -64,7 +66,7 @@ def _serials(board: BoardFacts) -> Iterator[Finding]:
         kinds.setdefault(kind, []).append(sensor.finger)
     for serial, fingers in by_serial.items():
         if len(fingers) > 1:
-            yield Finding("same_serial", f"fingers {', '.join(map(str, fingers))} all call themselves {serial}")
+            yield Finding("same_serial", f"fingers {', '.join(map(str, fingers))} all report serial number {serial}")
     if len(kinds) > 1:
         words = [f"finger {', '.join(map(str, f))}: flex {flex}, software {sw}" for (flex, sw), f in kinds.items()]
         yield Finding("mixed_sensors", "; ".join(words))

@@ -72,8 +72,8 @@ def owner(path: Path) -> str:
 
         facts = path.stat()
         user, group = pwd.getpwuid(facts.st_uid).pw_name, grp.getgrgid(facts.st_gid).gr_name
-        return f"{user}'s and group {group}'s, mode {facts.st_mode & 0o777:o}"
-    return "somebody else's"
+        return f"{user}, group {group}, mode {facts.st_mode & 0o777:o}"
+    return "another user"
 
 
 def modem_manager_runs(root: Path) -> bool:

@@ -43,4 +43,4 @@ def _tare(board: BoardFacts, finger: int) -> Iterator[Finding]:
     last = [rows["flags"][rows["finger"] == finger][-1:] for rows in (board.frames, board.idle)]
     if any((flags & wire.FrameFlags.BASE_OLD).any() for flags in last):
         age_s = state.tare_age_ms / 1000
-        yield Finding("base_old", f"finger {finger} is touched for over a minute; its tare is {age_s:.0f} s old")
+        yield Finding("base_old", f"finger {finger} has been touched for over a minute; its tare is {age_s:.0f} s old")

@@ -33,7 +33,7 @@ def check(facts: Facts) -> Iterator[Finding]:
         earlier = replace(earlier, finger_faults=(0,) * sensor.MAX_SENSORS)
     if faults := faults_of(earlier, DEFAULT_NAMES):
         yield Finding("faults_latched", str(faults).replace("\n", "; "))
-    for counter, what in (("slots_late", "slots came too late"), ("messages_dropped", "messages found no room")):
+    for counter, what in (("slots_late", "slots were too late"), ("messages_dropped", "messages did not fit the link")):
         more = grown(board.before, board.after, counter)
         if more:
             yield Finding(counter, f"{more} {what}")
@@ -47,7 +47,7 @@ def check(facts: Facts) -> Iterator[Finding]:
     for finger in board.present:
         rate = slots_per_s(board, finger)
         if rate is not None and abs(rate / board.hello.slot_hz - 1) > RATE_SHARE:
-            yield Finding("rate_wrong", f"finger {finger}: {rate:.0f} slots a second, expected {board.hello.slot_hz}")
+            yield Finding("rate_wrong", f"finger {finger}: {rate:.0f} slots per second, expected {board.hello.slot_hz}")
     yield from _clock(board)
 
 
@@ -70,9 +70,9 @@ def _clock(board: BoardFacts) -> Iterator[Finding]:
     if board.clock is None:
         return
     if board.clock_resets:
-        yield Finding("clock_jumped", f"{board.clock_resets} times")
+        yield Finding("clock_jumped", f"{board.clock_resets} jump(s)")
     drift_ppm, bound_ppm = board.clock.drift_ppm, board.clock.drift_uncertainty_ppm
     if board.clock.known and abs(drift_ppm) - bound_ppm > CRYSTAL_PPM:
         yield Finding(
-            "clock_drift", f"{drift_ppm:+.0f} ppm, sure to {bound_ppm:.0f} ppm; up to {CRYSTAL_PPM:.0f} is usual"
+            "clock_drift", f"{drift_ppm:+.0f} ppm, +/- {bound_ppm:.0f} ppm; up to {CRYSTAL_PPM:.0f} ppm is normal"
         )

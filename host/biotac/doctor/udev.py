@@ -32,8 +32,8 @@ def rule() -> str:
 def install(path: Path = RULES) -> None:
     """Write the rule. Raises PortError without the permission to, InputError where there is no udev."""
     if not path.parent.is_dir():
-        raise InputError(f"no folder {path.parent}: this system has no udev; rules are for Linux")
+        raise InputError(f"no folder {path.parent}: this system has no udev; udev rules are for Linux")
     try:
         path.write_text(rule())
     except PermissionError as error:
-        raise PortError(f"no permission to write {path}; it takes root: sudo biotac udev-setup") from error
+        raise PortError(f"no permission to write {path}; run it as root: sudo biotac udev-setup") from error

@@ -137,7 +137,7 @@ def restore(hand: Hand, wanted: Backup) -> Restored:
     for finger in given:
         hand.set_calibration(finger, calibrations[finger])
         if hand.calibration(finger) != calibrations[finger]:
-            raise InputError(f"{calibration_name(finger)} reads otherwise after it was restored; set it by hand")
+            raise InputError(f"{calibration_name(finger)} reads back differently after it was restored; set it by hand")
     maps = wanted.maps if knows_maps else {}
     uploaded = [finger for finger, blob in maps.items() if hand.get_map(finger) != blob]
     for finger in uploaded:

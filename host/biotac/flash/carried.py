@@ -21,6 +21,6 @@ def find_image() -> Path:
         if (folder / BUILT).is_file():
             return folder / BUILT
     raise InputError(
-        f"this biotac-gateway was built without the board's image, and no {BUILT} is here or above; install a released "
-        "wheel, or name the IMAGE, a .uf2 file (building one: firmware/boards/pico)"
+        f"this biotac-gateway was built without a board image, and no {BUILT} is in this folder or above; install a "
+        "released wheel, or name an IMAGE, a .uf2 file (to build one, see firmware/boards/pico)"
     )

@@ -60,13 +60,15 @@ def read_image(path: Path) -> Image:
         check_boot2(payload)
         return Image(path, blocks, note.find(payload))
     except ValueError as error:
-        raise InputError(f"{path} is not flashed: {error}") from error
+        raise InputError(f"{path} cannot be flashed: {error}") from error
 
 
 def split(data: bytes) -> tuple[bytes, ...]:
     """The blocks of a UF2 file. Raises ValueError for a wrong size."""
     if not data or len(data) % BLOCK_BYTES:
-        raise ValueError(f"{len(data)} bytes are no UF2, which has blocks of {BLOCK_BYTES}; take the build's .uf2 file")
+        raise ValueError(
+            f"{len(data)} bytes are not a UF2 file, which has blocks of {BLOCK_BYTES}; use the build's .uf2"
+        )
     return tuple(data[at : at + BLOCK_BYTES] for at in range(0, len(data), BLOCK_BYTES))
 
 
@@ -77,28 +79,36 @@ def join_payloads(blocks: tuple[bytes, ...]) -> bytes:
     for k, block in enumerate(blocks):
         first, second, flags, address, size, number, count, family = HEAD.unpack_from(block)
         if (first, second, *struct.unpack_from("<I", block, BLOCK_BYTES - 4)) != MAGIC:
-            raise ValueError(f"block {k} has not the marks of UF2; take the build's .uf2 file")
+            raise ValueError(f"block {k} lacks UF2's magic numbers; use the build's .uf2 file")
         if flags != FLAG_FAMILY or family != FAMILY_RP2040:
-            seen = f"of family 0x{family:08X}, flags 0x{flags:X}" if flags & FLAG_FAMILY else "of no family"
+            seen = f"family 0x{family:08X}, flags 0x{flags:X}" if flags & FLAG_FAMILY else "no family"
             raise ValueError(
-                f"block {k} is {seen}; expected family "
-                f"0x{FAMILY_RP2040:08X}, the RP2040's flash, flags 0x{FLAG_FAMILY:X}"
+                f"block {k} has {seen}; expected family "
+                f"0x{FAMILY_RP2040:08X}, the RP2040's flash, flags 0x{FLAG_FAMILY:X}: use a Pico's .uf2 file"
             )
         if size != PAGE_BYTES:
-            raise ValueError(f"block {k} carries {size} bytes; the RP2040 takes {PAGE_BYTES}")
+            raise ValueError(
+                f"block {k} carries {size} bytes, expected {PAGE_BYTES} for the RP2040; use the build's .uf2 file"
+            )
         if (number, count) != (k, len(blocks)):
-            raise ValueError(f"block {k} of {len(blocks)} says it is {number} of {count}: the file is cut or mixed up")
+            raise ValueError(
+                f"block {k} of {len(blocks)} says it is {number} of {count}: the file is truncated or mixed up, "
+                "get it again"
+            )
         if not FLASH_AT <= address <= FLASH_AT + FLASH_BYTES - PAGE_BYTES:
-            raise ValueError(f"block {k} goes to 0x{address:08X}, which is no flash of this board")
+            raise ValueError(f"block {k} goes to 0x{address:08X}, outside this board's flash; use a Pico's .uf2 file")
         if address + PAGE_BYTES > end:
-            raise ValueError(f"block {k} goes to 0x{address:08X}, where maps and settings are (from 0x{end:08X})")
+            raise ValueError(
+                f"block {k} goes to 0x{address:08X}, but maps and settings begin at 0x{end:08X}; use a smaller image"
+            )
         if address != FLASH_AT + k * PAGE_BYTES:
             # A gap would be legal UF2, but RP2040-E14 makes the boot ROM erase sectors wrongly around it.
-            raise ValueError(f"block {k} goes to 0x{address:08X}; expected 0x{FLASH_AT + k * PAGE_BYTES:08X}, no gaps")
-        if any(block[HEAD.size + PAGE_BYTES : -4]):
             raise ValueError(
-                f"block {k} has something behind its {PAGE_BYTES} bytes: the file is damaged, take it again"
+                f"block {k} goes to 0x{address:08X}; expected 0x{FLASH_AT + k * PAGE_BYTES:08X}, without gaps: use the "
+                "build's .uf2 file"
             )
+        if any(block[HEAD.size + PAGE_BYTES : -4]):
+            raise ValueError(f"block {k} has data after its {PAGE_BYTES} bytes: the file is damaged, get it again")
         pages.append(block[HEAD.size : HEAD.size + PAGE_BYTES])
     return b"".join(pages)
 
@@ -115,7 +125,9 @@ def check_boot2(payload: bytes) -> None:
             crc = (crc << 1 ^ (0x04C11DB7 if crc & 0x80000000 else 0)) & 0xFFFFFFFF
     stored = int.from_bytes(payload[BOOT2_BYTES : BOOT2_BYTES + 4], "little")
     if crc != stored:
-        raise ValueError(f"its second-stage boot has CRC 0x{stored:08X}; the chip would want 0x{crc:08X}")
+        raise ValueError(
+            f"its second-stage boot has CRC 0x{stored:08X}; the chip expects 0x{crc:08X}: use the build's .uf2"
+        )
 
 
 def note_text(its: Note) -> str:

@@ -45,8 +45,10 @@ class DriveLoader(Loader):
 
     def cure(self) -> str:
         if not self._attached():
-            return f"no drive {LABEL} is there: plug the board in with BOOTSEL held, or look at the cable"
-        return f"the drive {LABEL} is there but not mounted: `udisksctl mount -b {disk_by_label()}`, or open it by hand"
+            return f"no drive {LABEL} found: plug the board in with BOOTSEL held, or check the cable"
+        return (
+            f"the drive {LABEL} is there but not mounted: `udisksctl mount -b {disk_by_label()}`, or mount it by hand"
+        )
 
     def write(self, image: Image, show: Show) -> None:
         path = self.drives()[0] / FILE

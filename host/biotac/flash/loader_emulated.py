@@ -24,7 +24,7 @@ class EmulatedLoader(Loader):
         return self._board.counters()["loader"] is not None
 
     def cure(self) -> str:
-        return "the emulated program did not leave for its loader: is that image this gateway's?"
+        return "the emulated board did not enter its loader: check that its image is this gateway's"
 
     def write(self, image: Image, show: Show) -> None:
         show(0, len(image.blocks))

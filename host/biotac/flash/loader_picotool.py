@@ -45,5 +45,5 @@ class PicotoolLoader(Loader):
         except (OSError, subprocess.TimeoutExpired) as error:
             self._heard = str(error)
             return False
-        self._heard = " ".join((done.stderr or done.stdout).split()) or f"nothing, exit code {done.returncode}"
+        self._heard = " ".join((done.stderr or done.stdout).split()) or f"no output, exit code {done.returncode}"
         return done.returncode == 0

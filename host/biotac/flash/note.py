@@ -41,13 +41,13 @@ def find(image: bytes) -> Note:
     at = _place(image)
     _, layout, board, *numbers = FIELDS.unpack_from(image, at)
     if layout != LAYOUT:
-        raise ValueError(f"its note has layout {layout}, this library knows {LAYOUT}: take the image of this release")
+        raise ValueError(f"its note has layout {layout}, this library knows {LAYOUT}: use the image of this release")
     size, crc32 = PROOF.unpack_from(image, at + FIELDS.size)
     if not at + CRC_AT + CRC_BYTES <= size <= len(image) or any(image[size:]):
-        raise ValueError(f"its note says {size} bytes, it has {len(image)}: the file is damaged, take it again")
+        raise ValueError(f"its note says {size} bytes, it has {len(image)}: the file is damaged, get it again")
     seen = _crc32(image[:size], at)
     if seen != crc32:
-        raise ValueError(f"its bytes have CRC-32 {seen:08x}, its note says {crc32:08x}: take the file again")
+        raise ValueError(f"its bytes have CRC-32 {seen:08x}, its note says {crc32:08x}: get the file again")
     return Note(board, (numbers[0], numbers[1], numbers[2]), (numbers[3], numbers[4]), crc32)
 
 
@@ -64,7 +64,7 @@ def _place(image: bytes) -> int:
     places = range(0, len(image) - FIELDS.size - PROOF.size + 1, ALIGNMENT)
     notes = [at for at in places if image.startswith(MAGIC, at)]
     if len(notes) != 1:
-        raise ValueError(f"it says {len(notes)} times which board it is for; expected once: is it this gateway's?")
+        raise ValueError(f"it says {len(notes)} times which board it is for, expected once; use this gateway's image")
     return notes[0]
 
 

@@ -61,11 +61,11 @@ def flash(
     """
     if image.note.wire[0] != wire.WIRE_MAJOR:
         raise InputError(
-            f"{image.path} speaks wire {image.note.wire[0]}, this library {wire.WIRE_MAJOR}: it could not tell whether "
-            "flashing worked; install the biotac-gateway of the image's release"
+            f"{image.path} speaks wire {image.note.wire[0]}, this library {wire.WIRE_MAJOR}: it could not verify "
+            "the result; install the biotac-gateway of the image's release"
         )
     if restore_from is not None and image.note.board == wire.Board.PICO_SENSOR:
-        raise InputError(f"{image.path} is for a sensor board, which keeps no settings; leave --restore out")
+        raise InputError(f"{image.path} is for a sensor board, which keeps no settings; drop --restore")
     loader = first_ready(loaders)
     before: wire.Hello | None = None
     written: Backup | None = None
@@ -73,7 +73,7 @@ def flash(
         before, written = leave(image, target, backup_path=backup_path, keep=keep, downgrade=downgrade, say=say)
     elif target.there():
         raise InputError(
-            f"{target.port} is there, and another board is in its loader ({loader.name}); unplug one of them"
+            f"{target.port} is plugged in, and another board is in its loader ({loader.name}); unplug one of them"
         )
     backup = restore_from or written
     with step(written or restore_from):
@@ -81,7 +81,7 @@ def flash(
             loader = wait_for(lambda: first_ready(loaders), LOADER_S)
             if loader is None:
                 cures = "; ".join(one.cure() for one in loaders)
-                raise FlashError(f"no board in its loader was found within {LOADER_S:.0f} s: {cures}; flash again then")
+                raise FlashError(f"no board in its loader was found within {LOADER_S:.0f} s: {cures}; then flash again")
         say(f"writing {len(image.blocks)} blocks to the {loader.name}")
         loader.write(image, show)
         say("waiting for the board to come back")
@@ -105,25 +105,25 @@ def leave(
     except (NotAGatewayError, WireVersionError) as error:
         if keep:
             raise type(error)(f"{error}, or flash it without a backup of its settings: --no-backup") from error
-        say(f"{error}; trying the touch at 1200 baud")
+        say(f"{error}; trying the 1200 baud touch")
         target.touch()
         return None, None
     with hand:
         if hand.info.board != image.note.board:
             raise InputError(
                 f"{image.path} is for {board_text(image.note.board)}, but {board_text(hand.info.board)} answers on "
-                f"{target.port}; take that board's image"
+                f"{target.port}; use that board's image"
             )
         if not downgrade and image.note.firmware < firmware(hand.info):
             raise InputError(
-                f"{image.path} has firmware {image.note.version}, {target.port} runs {version_text(hand.info)}: an "
-                "older one may not know what newer settings mean; --downgrade if you mean it"
+                f"{image.path} has firmware {image.note.version}, {target.port} runs {version_text(hand.info)}: older "
+                "firmware may not understand newer settings; use --downgrade if you mean it"
             )
         say(f"{target.port} runs firmware {version_text(hand.info)}, serial {serial_text(hand.info)}")
         # A sensor board has no settings to save.
         backup = save(hand, backup_path) if keep and hand.info.board != wire.Board.PICO_SENSOR else None
         if backup is not None:
-            say(f"{len(backup.values)} settings are in {backup.path}")
+            say(f"saved {len(backup.values)} settings to {backup.path}")
         with step(backup):
             knows = command_loader(hand)
     if not knows:
@@ -157,12 +157,12 @@ def check(image: Image, before: wire.Hello | None, after: wire.Hello) -> None:
     if (after.board, firmware(after)) != (image.note.board, image.note.firmware):
         raise FlashError(
             f"the board that came back is {board_text(after.board)}, firmware {version_text(after)}; expected "
-            f"{note_text(image.note)}: the image was not taken, flash again"
+            f"{note_text(image.note)}: the image is not running; flash again"
         )
     if after.image_crc32 != image.note.crc32:
         raise FlashError(
             f"the board's flash has CRC-32 {after.image_crc32:08x}, the image {image.note.crc32:08x}: it was not "
-            "written whole, flash again"
+            "written completely; flash again"
         )
     if before is not None and after.boot_id == before.boot_id:
         raise FlashError(f"the board still has boot id {after.boot_id:08x}: it has not restarted; plug it in again")
@@ -174,7 +174,7 @@ def step(backup: Backup | None) -> Iterator[None]:
     try:
         yield
     except BiotacError as error:
-        where = "" if backup is None else f"; the settings are in {backup.path}, for --restore"
+        where = "" if backup is None else f"; the settings are saved in {backup.path}: restore them with --restore"
         raise FlashError(f"{error}{where}") from error
 
 

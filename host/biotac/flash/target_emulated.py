@@ -21,7 +21,7 @@ class EmulatedTarget(Target):
         self.port = port
         sim = parse_sim(port, 0.0)
         if sim.board == "posix":
-            raise InputError(f"{port} has no image to be flashed; expected a device path or emu:pico?source=SOURCE")
+            raise InputError(f"{port} has no image to flash; expected a device path or emu:pico?source=SOURCE")
         source = load_source(sim.source, fingers=sim.fingers, seconds=sim.seconds or WORLD_S)
         self.board = EmulatedBoard(sim.board, source, pace=sim.pace, hold=True, image=sim.image)
         self.board.release()

@@ -31,7 +31,7 @@ class SerialTarget(Target):
 
     def open(self) -> Hand:
         if self._device is None:
-            raise PortError("no port is known of a board in its loader")
+            raise PortError("a board in its loader has no port to open; plug it in again without BOOTSEL")
         return Hand(SerialLink(self._device))
 
     def touch(self) -> None:
@@ -46,8 +46,8 @@ class SerialTarget(Target):
         hand = wait_for(self._try, BACK_S)
         if hand is None:
             raise DeviceLostError(
-                f"the board did not come back within {BACK_S:.0f} s ({self._failed}); plug it in again, "
-                "`biotac list --probe` then tells what it runs"
+                f"the board did not come back within {BACK_S:.0f} s ({self._failed}); plug it in again; "
+                "`biotac list` then shows what it runs"
             )
         return hand
 

@@ -54,7 +54,7 @@ class AsyncHand:
         return self
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError(f"{self!r} is of this process and cannot be sent to another; open the board there")
+        raise TypeError(f"{self!r} belongs to this process and cannot be sent to another; open the board there")
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -38,8 +38,8 @@ def check(port: str, line_bits_per_s: int, streams: int, fingers: int) -> None:
     lean = wire.StreamFlags.FRAMES | wire.StreamFlags.STATUS
     asked = " and ".join(message.__name__.upper() for stream, message in _OF_A_ROUND.items() if streams & stream)
     raise InputError(
-        f"{port} carries {line_bits_per_s} bit/s, and {asked} of {fingers} fingers take {needed}; it fits "
-        f"{most_fingers(streams, line_bits_per_s)} fingers, or {most_fingers(lean, line_bits_per_s)} with FRAME alone"
+        f"{port} carries {line_bits_per_s} bit/s, but {asked} of {fingers} fingers take {needed}; stream at most "
+        f"{most_fingers(streams, line_bits_per_s)} finger(s), or {most_fingers(lean, line_bits_per_s)} with FRAME alone"
     )
 
 

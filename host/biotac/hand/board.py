@@ -281,7 +281,7 @@ class Board:
             try:
                 for _ in range(REPLY_TRIES):
                     if not self.connected and not self.is_read_here():
-                        raise DeviceLostError(f"{self.link.port} is away and looked for; wait for its return")
+                        raise DeviceLostError(f"{self.link.port} is away and being looked for; wait until it returns")
                     deadline_s = time.monotonic() + self._patience_s()
                     self._write(request)
                     answer = self.next_message(answers, deadline_s)

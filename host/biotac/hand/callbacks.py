@@ -94,4 +94,4 @@ class Callbacks:
             error, culprit, more = self._error, self._culprit, self._more
             self._error, self._more = None, 0
         again = f", and {more} more error(s) since" if more else ""
-        raise CallbackError(f"callback {culprit} raised {type(error).__name__}: {error}{again}; correct it") from error
+        raise CallbackError(f"callback {culprit} raised {type(error).__name__}: {error}{again}; fix it") from error

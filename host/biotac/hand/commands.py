@@ -102,7 +102,9 @@ class Commands:
         """
         tare = np.asarray(tare_counts, dtype=np.float64)
         if tare.shape != (19,) or not np.all((tare >= 0) & (tare <= 4095)):
-            raise ValueError(f"tare_counts has shape {tare.shape}; expected 19 values of 0..4095 counts")
+            raise ValueError(
+                f"tare_counts has shape {tare.shape} or values out of range; expected 19 values of 0..4095 counts"
+            )
         tare_q4 = tuple(int(v) for v in tare_to_q4(tare))
         pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
         self._board.tell(wire.TareSet(0, self._index(finger), tare_q4, pdc_q4))
@@ -259,6 +261,6 @@ def _known(told: wire.Calibration) -> Calibration:
         return Calibration.from_wire(told.serial, told.made_s, told.value)
     except ValueError as error:
         raise WireVersionError(
-            f"the board's calibration of finger {told.finger} is none that this library knows ({error}); install the "
+            f"this library does not know the board's calibration of finger {told.finger} ({error}); install the "
             "biotac-gateway of the firmware's release"
         ) from error

@@ -33,7 +33,7 @@ def warnings(hello: wire.Hello, port: str) -> list[HandWarning]:
     if hello.schema_hash == wire.SCHEMA_HASH:
         return []
     text = f"the firmware on {port} has schema {hello.schema_hash:08x}, this library {wire.SCHEMA_HASH:08x}"
-    return [HandWarning("schema_differs", f"{text}; what only one side knows is left out: {cure(hello)}")]
+    return [HandWarning("schema_differs", f"{text}; what only one side knows is ignored; {cure(hello)}")]
 
 
 def describe_mismatch(hello: wire.Hello) -> str:
@@ -46,7 +46,7 @@ def need(hello: wire.Hello, since_minor: int, what: str) -> None:
     """Raise WireVersionError for a board whose wire minor is older than the one that introduced ``what``."""
     if hello.wire_minor < since_minor:
         seen = f"the board speaks wire {hello.wire_major}.{hello.wire_minor}"
-        raise WireVersionError(f"{seen}, expected 1.{since_minor}, which has {what}; {cure(hello)}")
+        raise WireVersionError(f"{seen}, expected at least 1.{since_minor}, which has {what}; {cure(hello)}")
 
 
 def cut(message_id: int, payload: bytes, minor: int) -> bytes:

@@ -157,7 +157,7 @@ class Hand:
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
-            f"{self!r} is of this process and cannot be sent to another; open the board there, or send arrays"
+            f"{self!r} belongs to this process and cannot be sent to another; open the board there, or send arrays"
         )
 
     def close(self) -> None:

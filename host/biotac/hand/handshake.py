@@ -46,9 +46,9 @@ def handshake(link: Link, send: Callable[[Any], None], *, timeout_s: float) -> w
     if seen == 0:
         words = "nothing answers"
     elif decoder.counts.good:
-        words = f"{decoder.counts.good} frames of this protocol came, but no HELLO"
+        words = f"{decoder.counts.good} frames of this protocol arrived, but no HELLO"
     else:
-        words = f"{seen} bytes came that are no frames of this protocol"
+        words = f"{seen} bytes arrived that are not frames of this protocol"
     raise NotAGatewayError(
         f"no gateway on {link.port}: {words}; expected a HELLO within {timeout_s * TRIES:.0f} s; check that this is "
         "the board's port and that it runs our firmware"

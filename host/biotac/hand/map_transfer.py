@@ -26,7 +26,9 @@ def write(board: Board, finger: int, blob: bytes) -> None:
             if refused.error not in (wire.Error.NOT_BEGUN, wire.Error.NOT_WHOLE) or not left:
                 raise
     if read(board, finger) != blob:
-        raise PortError(f"finger {finger} reads back another map than was written; is somebody else on this board?")
+        raise PortError(
+            f"finger {finger} reads back a different map than was written; close other programs and try again"
+        )
 
 
 def _write(board: Board, finger: int, blob: bytes) -> None:
@@ -65,4 +67,6 @@ def read(board: Board, finger: int) -> bytes | None:
         blob = b"".join(parts)[: told.size_bytes]
         if zlib.crc32(blob) == told.crc32:
             return blob
-    raise PortError(f"the map of finger {finger} does not come whole, {TRIES} times over; is it being changed?")
+    raise PortError(
+        f"the map of finger {finger} did not arrive intact in {TRIES} tries; close other programs and try again"
+    )

@@ -67,8 +67,8 @@ def shake_hands(
     try:
         if hand.info.board == wire.Board.PICO_SENSOR:
             raise NotAGatewayError(
-                f"{link.port} is a sensor board, no gateway: feed it with `biotac sensor {link.port} SOURCE`, and open "
-                "the port of the gateway that it is wired to"
+                f"{link.port} is a sensor board, not a gateway: feed it with `biotac sensor {link.port} SOURCE`, and "
+                "open the port of the gateway it is wired to"
             )
         for finger, calibration in (calibrations or {}).items():
             hand.set_calibration(finger, calibration)

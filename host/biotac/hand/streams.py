@@ -194,8 +194,8 @@ class Streams:
             here, there = threading.current_thread(), self._puller
             if self._pulling and there is not here and there is not None and there.is_alive():
                 raise InputError(
-                    f"thread {there.name!r} is reading this hand, and {here.name!r} would get the other half; read in "
-                    "one thread, or have each called by on_batch"
+                    f"thread {there.name!r} is reading this hand, and {here.name!r} would take part of its data; "
+                    "read in one thread, or give each an on_batch callback"
                 )
             self._pulling = 1 if there is not here else self._pulling + 1
             self._puller = here

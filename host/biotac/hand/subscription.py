@@ -49,11 +49,11 @@ class Wants:
         """The flags for ``names``. Raises InputError for an unknown name, no name, or a rate out of range."""
         for name in names:
             if name not in NAMES:
-                raise InputError(f"nothing is called {name!r}; expected some of {', '.join(NAMES)}")
+                raise InputError(f"unknown name {name!r}; expected some of {', '.join(NAMES)}")
         if not names:
-            raise InputError(f"nothing is wanted; expected some of {', '.join(NAMES)}")
+            raise InputError(f"no name was given; expected some of {', '.join(NAMES)}")
         if rate_hz is not None and not 0 < rate_hz <= FRAME_HZ:
-            raise InputError(f"rate_hz is {rate_hz}, expected above 0 and at most {FRAME_HZ:g}, the board's own")
+            raise InputError(f"rate_hz is {rate_hz}, expected above 0 and at most {FRAME_HZ:g}, the board's rate")
         quantities = QuantityFlags(0)
         for name in names:
             quantities |= QUANTITIES.get(name, QuantityFlags(0))

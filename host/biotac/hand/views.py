@@ -227,7 +227,7 @@ class FingerView:
         self._keeps = keeps  # the Hand, which would be closed with its last reference
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError(f"{self!r} is of this process and cannot be sent to another; open the board there")
+        raise TypeError(f"{self!r} belongs to this process and cannot be sent to another; open the board there")
 
     def __repr__(self) -> str:
         return f"<biotac finger {self.name!r}, chip select {self.finger}, {self.age_s:.3f} s old>"

@@ -81,7 +81,7 @@ class Link(Protocol):
 
     def reopen(self, place: str) -> None:
         """Open one of ``places`` in place of the lost port. Raises PortError."""
-        raise PortError(f"{self.port} cannot be opened again; make a new one")
+        raise PortError(f"{self.port} cannot be reopened; open a new link")
 
     def abandon(self) -> None:
         """In a forked child, let go of what the parent process goes on using, without sending anything."""

@@ -61,8 +61,8 @@ def choose(serial_number: str | None = None, entries: Iterable[Any] | None = Non
         wanted = "no board" if serial_number is None else f"no board with serial number {serial_number}"
         raise PortError(f"{wanted} on any USB port; plug one in and run `biotac doctor`, or try `biotac demo`")
     if not fitting:
-        raise PortError(f"no board has serial number {serial_number}; there is {there}")
-    raise PortError(f"{len(fitting)} boards: {there}; name the one you mean as PORT")
+        raise PortError(f"no board has serial number {serial_number}; expected one of {there}")
+    raise PortError(f"found {len(fitting)} boards: {there}; name one of them as PORT")
 
 
 def open_serial(port: str) -> SerialLink:

@@ -15,7 +15,7 @@ def options_of(port: str, known: Collection[str], form: str) -> tuple[str, dict[
     options = dict(parse_qsl(query))
     unknown = sorted(set(options) - set(known))
     if unknown:
-        raise PortError(f"{port}: option {unknown[0]!r}; expected {form}")
+        raise PortError(f"{port}: unknown option {unknown[0]!r}; expected {form}")
     return what, options
 
 

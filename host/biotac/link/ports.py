@@ -36,7 +36,7 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
     known = colon and scheme in OPENERS
     if not known and colon and os.sep not in port and not port.upper().startswith("COM") and len(scheme) > 1:
         raise PortError(
-            f"no kind of port is called {scheme!r}; expected a device path, serial:NUMBER, "
+            f"unknown kind of port {scheme!r}; expected a device path, serial:NUMBER, "
             "uart:DEVICE?baud=N, spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, sim:SOURCE, emu:pico, "
             "replay:REC or zenoh:NAME"
         )

@@ -94,7 +94,7 @@ class SerialLink(Link):
             self._serial.write(data)
         except (serial.SerialException, OSError) as error:
             raise DeviceLostError(
-                f"{self.port} takes no data ({error}); plug the board in and open it again"
+                f"cannot write to {self.port} ({error}); plug the board in and open it again"
             ) from error
 
     def abandon(self) -> None:

@@ -67,14 +67,14 @@ def parse_spidev(port: str) -> list[tuple[int, int]]:
     for text in texts:
         bus, dot, device = text.partition(".")
         if not (dot and bus.isdecimal() and device.isdecimal() and text.isascii()):
-            raise PortError(f"{port}: {text!r} is no SPI device; expected BUS.DEVICE for each finger: spidev:0.0,0.1")
+            raise PortError(f"{port}: {text!r} is not an SPI device; expected BUS.DEVICE per finger: spidev:0.0,0.1")
         devices.append((int(bus), int(device)))
     if len(devices) > sensor.MAX_SENSORS:
-        raise PortError(f"{port}: {len(devices)} devices; expected at most {sensor.MAX_SENSORS}, leave some out")
+        raise PortError(f"{port}: {len(devices)} devices; expected at most {sensor.MAX_SENSORS}")
     for bus_device in devices:
         if devices.count(bus_device) > 1:
             name = "{}.{}".format(*bus_device)
-            raise PortError(f"{port}: {name} stands there twice; each finger needs a chip select of its own")
+            raise PortError(f"{port}: {name} is listed twice; each finger needs its own chip select")
     return devices
 
 
@@ -84,7 +84,7 @@ def open_devices(port: str) -> list[Any]:
     try:
         import spidev
     except ImportError as error:
-        raise PortError(f"{port} needs spidev ({error}); pip install 'biotac-gateway[spi]', on Linux") from error
+        raise PortError(f"{port} needs spidev ({error}); on Linux: pip install 'biotac-gateway[spi]'") from error
     opened: list[Any] = []
     try:
         for bus, device in places:
@@ -107,7 +107,7 @@ def open_devices(port: str) -> list[Any]:
 def describe_open_error(path: str, error: OSError) -> str:
     """One line with the error and the cure."""
     if isinstance(error, FileNotFoundError):
-        return f"no SPI device {path}; switch SPI on (raspi-config, Interface Options) and see ls /dev/spidev*"
+        return f"no SPI device {path}; enable SPI (raspi-config, Interface Options) and check ls /dev/spidev*"
     if isinstance(error, PermissionError):
         return f"no permission to open {path}; sudo usermod -aG spi $USER, and log in again"
     return (

@@ -57,7 +57,7 @@ class UrlLink(Link):
             self._serial.write(data)
         except (serial.SerialException, OSError) as error:
             raise DeviceLostError(
-                f"{self.port} takes no data ({error}); check the network and open it again"
+                f"cannot write to {self.port} ({error}); check the network and open it again"
             ) from error
 
     def abandon(self) -> None:

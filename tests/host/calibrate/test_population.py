@@ -150,7 +150,7 @@ def test_the_command_trains_judges_and_keeps(
     assert main([*arguments, "--out", str(out)]) != 0
     assert "exists" in capsys.readouterr().err
     assert main(["calibrate", "population", str(files[0]), "--test", str(files[0])]) != 0
-    assert "judged by" in capsys.readouterr().err
+    assert "both a training file and --test" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("damage", [("biotac-population-map/1", "/2"), ("[[", "["), ("COMPRESSION", "BULGE")])

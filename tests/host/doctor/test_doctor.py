@@ -141,10 +141,13 @@ def pair(words: int, *, error: int = 0, good: tuple[int, ...] = (), serials: tup
 ALL = tuple(range(5))
 LEADS: list[tuple[Facts, list[tuple[str, str]]]] = [
     (pair(500, good=ALL, serials=tuple(f"BTEMU{k}" for k in ALL)), []),
-    (pair(0), [("lead_clock", "not once clocked")]),
+    (pair(0), [("lead_clock", "saw no clock")]),
     (pair(500, error=9), [("lead_mosi", "understood no command")]),
-    (pair(500), [("lead_miso", "500 words, and none came")]),
-    (pair(500, good=(0, 1, 3, 4)), [("lead_select", "finger 2 gives no word, fingers 0, 1, 3, 4 do")]),
+    (pair(500), [("lead_miso", "500 words, but none reached")]),
+    (
+        pair(500, good=(0, 1, 3, 4)),
+        [("lead_select", "finger 2 gives few good words or none, unlike fingers 0, 1")],
+    ),
     (
         pair(500, good=(1, 0, 2, 3, 4), serials=tuple(f"BTEMU{k}" for k in ALL)),
         [("lead_crossed", "finger 1 ends at the sensor of finger 0"), ("lead_crossed", "finger 0 ends at")],
@@ -222,22 +225,22 @@ CASES: list[tuple[str, Facts, str]] = [
     (
         "sensor_unsure",
         frames(lambda rows: mark("flags", int(wire.FrameFlags.SENSOR_UNSURE))(rows[60:])),
-        "finger 1 was away and has not said who it is since: 40 of 100",
+        "finger 1 was away and has not identified itself since: 40 of 100",
     ),
     (
         "sensor_other",
         frames(lambda rows: mark("flags", int(wire.FrameFlags.SENSOR_OTHER | wire.FrameFlags.SENSOR_UNSURE))(rows[9:])),
-        "finger 1: another sensor answers",
+        "finger 1: a different sensor answers",
     ),
     (
         "same_serial",
         board(sensors=[info(0, "BT00001"), info(1, "BT00001")]),
-        "fingers 0, 1 all call themselves BT00001",
+        "fingers 0, 1 all report serial number BT00001",
     ),
     ("mixed_sensors", board(sensors=[info(0, "BT1"), info(1, "BT2", flex="21")]), "finger 1: flex 21, software 0210"),
     ("mixed_sensors", board(sensors=[info(0, "BT1"), info(1, "BT2", software="0300")]), "software 0300"),
-    ("words_stuck", grown(1, words_stuck=44), "finger 1: 44 of 4444 words of 0x0000 or 0xFFFF"),
-    ("words_parity", grown(0, words_parity=1), "finger 0: 1 of 4401 words with bad parity"),
+    ("words_stuck", grown(1, words_stuck=44), "finger 1: 44 of 4444 words are 0x0000 or 0xFFFF"),
+    ("words_parity", grown(0, words_parity=1), "finger 0: 1 of 4401 words have bad parity"),
     ("words_error", grown(0, words_error=5), "5 of 4405 words"),
     ("board_restarted", board(after=message(wire.Status, **AFTER | {"uptime_s": 0})), "up for 0 s"),
     ("board_restarted", board(stats=dataclasses.replace(STATS, disordered=2)), "up for"),
@@ -253,12 +256,12 @@ CASES: list[tuple[str, Facts, str]] = [
     ("frames_lost", board(stats=dataclasses.replace(STATS, pac_lost=6)), "6 PAC"),
     ("bytes_damaged", board(stats=dataclasses.replace(STATS, crc_errors=7)), "7 frames with a bad CRC"),
     ("bytes_damaged", board(stats=dataclasses.replace(STATS, other_errors=8)), "8 otherwise"),
-    ("rate_wrong", board(frames=rounds((0, 1), step_us=10_200)), "finger 0: 4314 slots a second, expected 4400"),
-    ("clock_drift", board(clock=Fit(0.0, 1.0, 0.001, -180.0, 30.0)), "-180 ppm, sure to 30 ppm"),
-    ("clock_jumped", board(clock_resets=2), "2 times"),
+    ("rate_wrong", board(frames=rounds((0, 1), step_us=10_200)), "finger 0: 4314 slots per second, expected 4400"),
+    ("clock_drift", board(clock=Fit(0.0, 1.0, 0.001, -180.0, 30.0)), "-180 ppm, +/- 30 ppm"),
+    ("clock_jumped", board(clock_resets=2), "2 jump(s)"),
     ("no_tare", state(tare_state=wire.TareState.INIT), "finger 1"),
     ("tare_fault", state(tare_state=wire.TareState.FAULT, tare_age_ms=90_000), "90 s old"),
-    ("base_old", frames(mark("flags", int(wire.FrameFlags.BASE_OLD))), "finger 1 is touched for over a minute"),
+    ("base_old", frames(mark("flags", int(wire.FrameFlags.BASE_OLD))), "finger 1 has been touched for over a minute"),
     ("electrodes_railed", frames(mark("counts", 4090, 4)), "finger 1: E5"),
     ("electrodes_railed", frames(mark("counts", 0, 18)), "finger 1: E19"),
     ("channel_missing", frames(mark("counts", wire.INVALID_COUNT, 0)), "finger 1: E1"),
@@ -410,7 +413,7 @@ def test_a_serial_number_that_nobody_has_names_those_there(capsys, monkeypatch) 
     assert main(["doctor", "serial:0", "--json"]) == 1
     (finding,) = json.loads(capsys.readouterr().out)["findings"]
     assert finding["code"] == "port_failed"
-    assert "there is serial:E6605838831F5B2C" in finding["seen"]
+    assert "expected one of serial:E6605838831F5B2C" in finding["seen"]
 
 
 def test_the_doctor_leaves_the_stream_stopped() -> None:

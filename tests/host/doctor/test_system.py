@@ -111,5 +111,5 @@ def test_udev_setup_prints_or_says_that_it_takes_root(tmp_path: Path, capsys, mo
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr("biotac.doctor.udev.RULES.__class__.write_text", forbidden)
-    with pytest.raises(PortError, match="it takes root: sudo biotac udev-setup"):
+    with pytest.raises(PortError, match="run it as root: sudo biotac udev-setup"):
         udev.install(tmp_path / "70-biotac.rules")

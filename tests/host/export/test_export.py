@@ -237,7 +237,7 @@ def test_an_interrupted_export_leaves_nothing_and_says_so(
     monkeypatch.setattr("biotac.cli.progress.Progress.show", interrupt)
     assert export(recorded, tmp_path / f"a{suffix}") == 130
     error = capsys.readouterr().err
-    assert "interrupted" in error and "was not written, what there was of it is removed" in error
+    assert "interrupted" in error and "was not written; the partial file was removed" in error
     left = sorted(path.name for path in tmp_path.iterdir())
     # A flat format's first file may be whole when the second, with PAC, is not.
     assert left in ([], [f"a{suffix}"]) and not (step == 1 and left)

@@ -23,7 +23,7 @@ def test_nothing_answers_is_no_gateway(scripted_board, brief_silence) -> None:
 
 def test_another_kind_of_device_is_no_gateway(scripted_board, time_passes) -> None:
     board = scripted_board(lambda message_id, payload: b"$GPGGA,123519,4807.038,N*47\r\n" + time_passes())
-    with pytest.raises(biotac.NotAGatewayError, match="bytes came that are no frames"):
+    with pytest.raises(biotac.NotAGatewayError, match="bytes arrived that are not frames"):
         biotac.open(board.path)
 
 
@@ -136,7 +136,7 @@ def test_a_port_is_opened_once(scripted_board, hello) -> None:
     [
         ("/dev/ttyNOWHERE7", r"no port /dev/ttyNOWHERE7; `biotac list`"),
         (os.devnull, "cannot be opened as a serial port"),
-        ("modbus:1", "no kind of port is called 'modbus'"),
+        ("modbus:1", "unknown kind of port 'modbus'"),
         ("sim:", "no source"),
         ("sim:press.toml?speed=2", "option 'speed'"),
         ("sim:press.toml?pace=quick", "pace is 'quick', expected real, fast or"),

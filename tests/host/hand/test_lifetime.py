@@ -170,7 +170,7 @@ def test_a_fork_is_told_and_the_parent_reads_on(leave: str, tmp_path: Path) -> N
 def test_a_hand_cannot_be_sent_to_another_process() -> None:
     with biotac.open("sim:press.toml?seconds=1") as hand:
         for thing in (hand, hand["index"], biotac.aio.open("sim:press.toml")):
-            with pytest.raises(TypeError, match="is of this process and cannot be sent to another; open the board"):
+            with pytest.raises(TypeError, match="belongs to this process and cannot be sent to another; open"):
                 pickle.dumps(thing)
 
 
@@ -197,7 +197,7 @@ if __name__ == "__main__":
         try:
             refused.start()
         except TypeError as error:
-            print("is of this process" in str(error))
+            print("belongs to this process" in str(error))
 """
 
 

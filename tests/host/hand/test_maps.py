@@ -165,7 +165,7 @@ def test_a_board_that_restarts_in_the_middle_is_told_all_of_it_again(board: tupl
 def test_a_map_that_comes_back_otherwise_is_an_error(board: tuple[Upload, biotac.Hand]) -> None:
     upload, hand = board
     upload.reads_wrong = True
-    with pytest.raises(biotac.PortError, match="does not come whole"):
+    with pytest.raises(biotac.PortError, match="did not arrive intact in 3 tries"):
         hand.set_map(0, make_map(1, blocks=2))
 
 
@@ -343,13 +343,13 @@ def test_the_verb_puts_shows_gets_and_clears(port: str, tmp_path: Path, capsys) 
     assert "finger 1: in force, saved; force and torque, 3 block(s), 564 bytes, for any sensor" in said
     assert main(["map", "show", port]) == 0
     shown = capsys.readouterr().out.splitlines()
-    assert shown[0] == "finger 0: none, the settings hold"
+    assert shown[0] == "finger 0: none, the board's settings apply"
     assert shown[1].startswith("finger 1: in force; force and torque") and "made 2025-11-21" in shown[1]
     assert main(["map", "get", port, str(back), "--finger", "1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["crc32"] == f"{zlib.crc32(blob):08x}"
     assert map_file.load(back) == blob
     assert main(["map", "clear", port, "--finger", "1"]) == 0
-    assert "the settings hold, until the next reboot" in capsys.readouterr().out
+    assert "the board's settings apply, until the next reboot" in capsys.readouterr().out
     assert main(["map", "show", port, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["1"] == {"state": "NONE"}
 

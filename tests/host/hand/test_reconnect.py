@@ -156,7 +156,7 @@ def test_while_it_is_away_commands_say_so(world) -> None:
             import threading
 
             def command() -> None:
-                with pytest.raises(biotac.DeviceLostError, match="is away and looked for"):
+                with pytest.raises(biotac.DeviceLostError, match="is away and being looked for"):
                     hand.ping()
                 refusals.append(True)
 

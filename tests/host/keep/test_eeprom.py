@@ -276,7 +276,7 @@ def test_the_command_line_stores_shows_and_loads(monkeypatch, capsys, tmp_path: 
     assert main([*verb, "store", "--i2c", "2:0x50", "--chip", "24c02", str(path)]) == 3
     assert "no I2C bus 2" in capsys.readouterr().err
     assert main([*verb, "show", "--i2c", "1:0x50"]) == 2
-    assert "wants --chip" in capsys.readouterr().err
+    assert "needs --chip" in capsys.readouterr().err
     assert main([*verb, "show"]) == 2
 
 

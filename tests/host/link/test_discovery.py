@@ -80,8 +80,8 @@ def test_a_board_is_chosen_by_its_serial_number(number: str) -> None:
     [
         ([], None, r"no board on any USB port; plug one in"),
         ([ONE[1]], "A5XK3RJT", r"no board with serial number A5XK3RJT on any USB port"),
-        (ONE, "0", r"no board has serial number 0; there is serial:E6605838831F5B2C on /dev/ttyACM0"),
-        (TWO, None, r"2 boards: serial:E660583883200000 on COM3, serial:E6605838831F5B2C on COM10; name the one"),
+        (ONE, "0", r"no board has serial number 0; expected one of serial:E6605838831F5B2C on /dev/ttyACM0"),
+        (TWO, None, r"found 2 boards: serial:E660583883200000 on COM3, serial:E6605838831F5B2C on COM10; name one"),
     ],
 )
 def test_what_cannot_be_chosen_is_said_with_what_is_there(entries, number, words: str) -> None:

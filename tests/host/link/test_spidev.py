@@ -180,13 +180,13 @@ def test_closing_gives_the_devices_back_and_ends_the_thread(board: Board) -> Non
 @pytest.mark.parametrize(
     ("port", "words"),
     [
-        ("spidev:", r"'' is no SPI device; expected BUS\.DEVICE"),
-        ("spidev:0", "'0' is no SPI device"),
-        ("spidev:0.0,", "'' is no SPI device"),
-        ("spidev:0.x", r"'0\.x' is no SPI device"),
-        ("spidev:0.-1", r"'0\.-1' is no SPI device"),
-        ("spidev:0.0,0.0", r"0\.0 stands there twice; each finger needs"),
-        ("spidev:0.0,0.00", r"0\.0 stands there twice"),
+        ("spidev:", r"'' is not an SPI device; expected BUS\.DEVICE"),
+        ("spidev:0", "'0' is not an SPI device"),
+        ("spidev:0.0,", "'' is not an SPI device"),
+        ("spidev:0.x", r"'0\.x' is not an SPI device"),
+        ("spidev:0.-1", r"'0\.-1' is not an SPI device"),
+        ("spidev:0.0,0.0", r"0\.0 is listed twice; each finger needs"),
+        ("spidev:0.0,0.00", r"0\.0 is listed twice"),
         ("spidev:0.0,0.1,0.2,1.0,1.1,1.2", "6 devices; expected at most 5"),
     ],
 )
@@ -204,7 +204,7 @@ def test_without_spidev_it_names_the_extra(monkeypatch) -> None:
 @pytest.mark.parametrize(
     ("error", "words"),
     [
-        (FileNotFoundError(2, "No such file or directory"), r"no SPI device /dev/spidev0\.1; switch SPI on"),
+        (FileNotFoundError(2, "No such file or directory"), r"no SPI device /dev/spidev0\.1; enable SPI"),
         (PermissionError(13, "Permission denied"), r"no permission to open /dev/spidev0\.1; sudo usermod -aG spi"),
         (OSError(16, "Device or resource busy"), r"/dev/spidev0\.1 cannot be used .*busy"),
     ],

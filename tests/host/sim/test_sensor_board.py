@@ -155,13 +155,13 @@ def test_a_tape_is_kept_and_forgotten(scripted_board, hello, capsys) -> None:
         assert sensor.run(argparse.Namespace(**vars(parser.parse_args([port, *words])), json=False)) == 0
         return capsys.readouterr().out
 
-    assert "0.20 s are kept in its flash" in run("press.toml", "--fingers", "2", "--seconds", "0.2", "--keep")
+    assert "0.20 s stored in its flash" in run("press.toml", "--fingers", "2", "--seconds", "0.2", "--keep")
     assert fake.kept == 880
     run("--forget")
     assert fake.keeping == 0
     with pytest.raises(InputError, match=r"0.3 s of 2 fingers do not fit the board: expected up to 0.2.* s"):
         run("press.toml", "--fingers", "2", "--seconds", "0.3", "--keep")
-    with pytest.raises(InputError, match="--keep wants a SOURCE"):
+    with pytest.raises(InputError, match="--keep needs a SOURCE"):
         run("--keep")
 
 

@@ -87,10 +87,10 @@ def _load(args: argparse.Namespace) -> None:
 
 def _show(args: argparse.Namespace) -> None:
     if (args.where is None) == (args.i2c is None):
-        raise InputError("show wants one of PORT, FILE and --i2c; `biotac calibration show --help` has an example")
+        raise InputError("expected exactly one of PORT, FILE and --i2c; see `biotac calibration show --help`")
     if args.i2c is not None:
         if args.chip is None:
-            raise InputError(f"--i2c {args.i2c} wants --chip; expected one of {', '.join(KINDS)}")
+            raise InputError(f"--i2c {args.i2c} needs --chip; expected one of {', '.join(KINDS)}")
         with Chip(args.i2c, args.chip) as chip:
             its = eeprom.load(chip)
         CALIBRATION.say(args, f"EEPROM {args.i2c}", its, whole=True)

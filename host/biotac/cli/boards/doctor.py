@@ -132,10 +132,10 @@ def print_words(facts: Facts, findings: list[Finding]) -> None:
             print(textwrap.indent(udev.rule(), "    "), end="")
     seen = measured(facts)
     if seen:
-        rates = ", ".join(f"finger {f}: {r:.0f} slots a second" for f, r in seen["slots_per_s"].items() if r)
+        rates = ", ".join(f"finger {f}: {r:.0f} slots per second" for f, r in seen["slots_per_s"].items() if r)
         drift = ""
         if "drift_ppm" in seen:
-            drift = f", clock {seen['drift_ppm']:+.0f} ppm, sure to {seen['drift_uncertainty_ppm']:.0f}"
+            drift = f", clock {seen['drift_ppm']:+.0f} ppm, +/- {seen['drift_uncertainty_ppm']:.0f}"
         print(f"measured: {seen['frames']} frames, {rates or 'no rates'}{drift}")
     name = facts.port or "no port"
     print(f"{name}: {len(findings)} finding(s)" if findings else f"{name}: healthy")

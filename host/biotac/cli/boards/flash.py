@@ -45,12 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Flash a board and print what it reports afterwards."""
     if args.backup is not None and args.no_backup:
-        raise InputError("--backup and --no-backup contradict each other; leave one out")
+        raise InputError("--backup and --no-backup contradict each other; use only one")
     port, path = sort_out(args.port, args.image, alone=args.emulated or args.all)
     if args.all:
         for flag in ("emulated", "backup", "restore"):
             if getattr(args, flag):
-                raise InputError(f"--all is for every board that is plugged in, --{flag} for one; leave one out")
+                raise InputError(f"--all flashes every board, --{flag} is for one; use only one of them")
     image = read_image(path or find_image())
     kept = None if args.restore is None else read_backup(args.restore)
     say(f"{image.path}: {note_text(image.note)}")
@@ -101,7 +101,7 @@ def run_all(image: Image, args: argparse.Namespace) -> int:
         if result.error is not None:
             say(f"{result.port}: {result.error}")
         elif not args.json:
-            print(summary(result.outcome) if result.outcome else f"{result.port} runs this image already")
+            print(summary(result.outcome) if result.outcome else f"{result.port} already runs this image")
     if args.json:
         print(json.dumps([its_facts(image, result) for result in results]))
     failed = [result.port for result in results if result.error is not None]
@@ -121,7 +121,7 @@ def sort_out(port: str | None, image: str | None, *, alone: bool) -> tuple[str |
     if image is None and port is not None and (alone or port.lower().endswith(".uf2")):
         port, image = None, port
     if alone and port is not None:
-        raise InputError(f"--emulated and --all say which board, and {port} is another PORT; leave one out")
+        raise InputError(f"--emulated and --all choose the board, but PORT {port} is given; drop one of them")
     return port, None if image is None else Path(image)
 
 
@@ -139,7 +139,7 @@ def find_board(port: str | None) -> tuple[Target, list[Loader]]:
     port = port or only_port()
     if port is None and not any(loader.ready() for loader in loaders):
         cures = "; ".join(loader.cure() for loader in loaders)
-        raise PortError(f"no board is there, neither running nor in its loader: {cures}; or name its PORT")
+        raise PortError(f"no board found, running or in its loader: {cures}; or name its PORT")
     return SerialTarget(port), loaders
 
 
@@ -183,11 +183,11 @@ def summary(outcome: Outcome) -> str:
         f"{outcome.port} runs firmware {version_text(after)}, boot {after.boot_id:08x}, serial {serial_text(after)}"
     ]
     if settings is None or outcome.backup is None:
-        lines.append("its settings are those in its flash; none were read before, none were restored")
+        lines.append("no settings were backed up or restored; the board uses those in its flash")
     else:
         changed = ", ".join(settings.changed)
-        lines.append(f"all {known(outcome.backup, settings)} are as in {outcome.backup.path}")
-        lines[-1] += f"; restored and saved: {changed}" if changed else ", none had to be restored"
+        lines.append(f"all {known(outcome.backup, settings)} match {outcome.backup.path}")
+        lines[-1] += f"; restored and saved: {changed}" if changed else ", nothing had to be restored"
         if settings.unknown:
             lines.append(f"this firmware does not know {', '.join(settings.unknown)}; see {outcome.backup.path}")
     return "\n".join(lines)

@@ -39,11 +39,11 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({"ports": ports, "scenarios": scenarios, "zenoh": remote}))
         return 0
     if not any(port["is_board"] for port in ports):
-        print("no board on USB; plug one in, ask `biotac doctor`, or try a simulated one:")
+        print("no board on USB; plug one in, run `biotac doctor`, or try a simulated one:")
     for port in ports:
         print(as_line(port))
     for facts in remote:
-        commander = f"commanded by {facts['writer']}" if facts.get("writer") else "commanded by nobody"
+        commander = f"commanded by {facts['writer']}" if facts.get("writer") else "not commanded by anyone"
         print(f"{as_line(facts)}  {commander}")
     if args.zenoh is not None and not remote:
         print("no board is shared on the network; `biotac serve PORT --name NAME` shares one")

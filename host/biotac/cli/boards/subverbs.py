@@ -90,7 +90,7 @@ class Kept:
         with biotac.open(args.port) as hand:
             its = self.read(hand, args.finger)
             if its is None:
-                raise InputError(f"finger {args.finger} on {args.port} has no {self.name}; `put` gives it one")
+                raise InputError(f"finger {args.finger} on {args.port} has no {self.name}; upload one with `put`")
             board = {"from": args.port, "board_serial": serial_text(hand.info), "finger": args.finger}
         self.save(args, its, board)
 
@@ -121,7 +121,11 @@ class Kept:
             if args.save:
                 hand.save_settings()
         kept = "saved" if args.save else "until the next reboot (--save keeps it so)"
-        print(json.dumps({"finger": args.finger}) if args.json else f"finger {args.finger}: the settings hold, {kept}")
+        print(
+            json.dumps({"finger": args.finger})
+            if args.json
+            else f"finger {args.finger}: the board's settings apply, {kept}"
+        )
 
     def show_board(self, args: argparse.Namespace, port: str) -> None:
         """Print what each finger of a board has."""
@@ -135,10 +139,10 @@ class Kept:
         for finger, (state, its) in fingers.items():
             if its is not None:
                 in_force = state == biotac.CalibrationState.IN_FORCE
-                words = "in force" if in_force else "not in force, another sensor is there"
+                words = "in force" if in_force else "not in force, a different sensor is connected"
                 print("\n".join([f"finger {finger}: {words}; {self.title(its)}", *self.lines(its)]))
             elif finger in present:
-                print(f"finger {finger}: none, the settings hold")
+                print(f"finger {finger}: none, the board's settings apply")
 
     def say(self, args: argparse.Namespace, where: str, its: Any, *, more: str = "", whole: bool = False) -> None:
         """Print what is at ``where``; ``whole`` adds its content."""

@@ -24,5 +24,5 @@ def run(args: argparse.Namespace) -> int:
     elif args.print:
         print(udev.rule(), end="")
     else:
-        print(f"{udev.RULES} written; now: sudo udevadm control --reload, and plug the board in again")
+        print(f"wrote {udev.RULES}; now run sudo udevadm control --reload, and plug the board in again")
     return 0

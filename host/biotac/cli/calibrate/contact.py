@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _count(text: str) -> int:
     count = int(text)
     if not 1 <= count <= MOST:
-        raise argparse.ArgumentTypeError(f"{count}, expected 1 to {MOST}")
+        raise argparse.ArgumentTypeError(f"{count} is out of range; expected 1 to {MOST}")
     return count
 
 

@@ -47,7 +47,7 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
             walk(hand, reader, procedure, places, overwrite=args.force, show=show, progress=progress.show)
         except BiotacError:
             if places.recording.exists():
-                print(f"biotac: what was recorded is in {places.recording} and {places.reference}", file=sys.stderr)
+                print(f"biotac: the recorded data is in {places.recording} and {places.reference}", file=sys.stderr)
             raise
         finally:
             progress.done()
@@ -56,7 +56,7 @@ def record(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> tuple[Pl
         print(f"biotac: reference: {lost.lost} samples lost, {lost.late} late, {lost.bad} bad", file=sys.stderr)
     if procedure.zero is None:
         raise KeyboardInterrupt(
-            f"it ended while {procedure.last_step.value.partition(':')[0]}; what was recorded is in {places.recording} "
+            f"ended while {procedure.last_step.value.partition(':')[0]}; the recorded data is in {places.recording} "
             f"and {places.reference}"
         )
     return places, procedure.coverage.missing()
@@ -74,14 +74,16 @@ def _reader(args: argparse.Namespace, hand: biotac.Hand, finger: int) -> Iterato
     (text,) = args.reference
     if text == EMULATED:
         if not isinstance(hand.link.source, Source):
-            raise InputError(f"{EMULATED} is emulated and feels a simulated finger only: expected --live sim:SCENARIO")
+            raise InputError(
+                f"{EMULATED} is emulated and works only with a simulated finger: expected --live sim:SCENARIO"
+            )
         nano17 = Nano17() if args.mounting is None else Nano17(read_mounting(args.mounting))
         yield Nano17Reader(hand.link.source, finger, nano17), nano17.mounting
         return
     if not text.startswith(PREFIX):
-        raise InputError(f"{text}: expected {PREFIX}HOST, a Net F/T box, or {EMULATED}, the emulated one")
+        raise InputError(f"{text}: expected {PREFIX}HOST (a Net F/T box) or {EMULATED} (emulated)")
     if args.mounting is None:
-        raise InputError(f"{text} does not say how it is fixed to the finger: expected --mounting FILE.toml")
+        raise InputError(f"the mounting of {text} on the finger is unknown: expected --mounting FILE.toml")
     mounting = read_mounting(args.mounting)
     with contextlib.closing(NetFtReader(parse_address(text))) as reader:
         yield reader, mounting

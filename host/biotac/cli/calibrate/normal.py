@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     lines = [
         f"{facts['file']}: {facts['frames']} frames of {facts['contacts']} contacts; median and 90th percentile",
         "  the formula's normal:           " + "  ".join(f"{angle:5.2f}" for angle in facts["before_deg"]) + " deg",
-        "  each contact by the others:     " + "  ".join(f"{angle:5.2f}" for angle in facts["held_out_deg"]) + " deg",
+        "  each contact held out:          " + "  ".join(f"{angle:5.2f}" for angle in facts["held_out_deg"]) + " deg",
         *([f"  written: {facts['written']}"] if "written" in facts else []),
     ]
     print(json.dumps(facts) if args.json else "\n".join(lines))

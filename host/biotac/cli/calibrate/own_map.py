@@ -27,7 +27,10 @@ from ...wire.identity import ascii_text
 from .. import outputs, values
 from ..recordings.loading import load
 
-WHY = "no better than the population map, or a finger unlike those; tare, and load its pad flat, firm and still"
+WHY = (
+    "no better than the population map, or a finger unlike those it was trained on; tare, and load the pad flat, "
+    "firmly and steadily"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,14 +63,14 @@ def pressed(
     outputs.check_file(args.out, overwrite=args.force)
     if Path(args.where).is_file() or args.where.endswith(".mcap"):
         if args.save:
-            raise InputError("a recording goes to no board: expected no --save; that is for boards")
+            raise InputError("--save needs a board, not a recording: drop --save, or name a PORT")
         recording = load(Path(args.where))
         serial = next((ascii_text(its.serial) for its in recording.sensors if its.finger == args.finger), "")
         yield Pressed(recorded(recording), serial, None)
         return
     with biotac.open(args.where) as hand:
         if args.finger not in hand.fingers:
-            raise InputError(f"finger {args.finger} does not answer: expected one of {hand.fingers}; see to its cable")
+            raise InputError(f"finger {args.finger} does not answer: expected one of {hand.fingers}; check its cable")
         held = guide(hand)
         yield Pressed(held, ascii_text(hand.sensor_info(args.finger).serial), hand)
 
@@ -80,7 +83,7 @@ class Guide:
 
     def show(self, step: Step | None) -> None:
         if step is not None:
-            words = {Phase.REST: "let go, and leave it alone", Phase.RELEASE: self._held}
+            words = {Phase.REST: "let go, and do not touch it", Phase.RELEASE: self._held}
             said = self._press(step) if step.phase is Phase.PRESS else words[step.phase]
             print(f"biotac: {said}", file=sys.stderr)
 
@@ -113,7 +116,7 @@ def tell(
     if args.out is not None:
         origin = provenance.Provenance(
             its.serial, made_s, kept.provenance.get("software", ""), (args.where,), "",
-            f"{len(its.held.force_n)} {how}; population map of {', '.join(kept.provenance.get('files', {}))}",
+            f"{len(its.held.force_n)} {how}; population map from {', '.join(kept.provenance.get('files', {}))}",
         )  # fmt: skip
         with whole(args.out, overwrite=args.force) as place:
             place.write_text(fitted.dumps(own, origin), encoding="utf-8")
@@ -134,10 +137,10 @@ def show(args: argparse.Namespace, facts: dict[str, Any], title: str) -> None:
     lines = [
         f"finger {facts['finger']}, {title}",
         f"  error along x, y, z before:   {numbers(facts['before_n'])} N",
-        f"  of each press by the others:  {numbers(facts['held_out_n'])} N",
+        f"  each press held out:          {numbers(facts['held_out_n'])} N",
         f"  one sigma after five presses: {numbers(facts['sigma_n'])} N, with shear",
-        *([] if facts["worth_it"] else [f"  not worth having: {WHY}"]),
+        *([] if facts["worth_it"] else [f"  not worth using: {WHY}"]),
         *([f"  written: {facts['written']}"] if "written" in facts else []),
-        "  on the board until it restarts (--save keeps it)" if "board" in facts else "  the board is as it was",
+        "  on the board; without --save, only until it restarts" if "board" in facts else "  no board was changed",
     ]
     print(json.dumps(facts) if args.json else "\n".join(lines))

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", metavar="FILE", type=Path, help="the map goes here (.json)")
     parser.add_argument(
-        "--source", metavar="TEXT", default="not said", help="origin and licence of the data, stored in the map"
+        "--source", metavar="TEXT", default="not stated", help="origin and licence of the data, stored in the map"
     )
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
 
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Train the map, judge it, write it."""
     if args.test is not None and args.test.resolve() in [path.resolve() for path in args.files]:
-        raise InputError(f"{args.test} is trained on and judged by: expected another finger's; leave it out of one")
+        raise InputError(f"{args.test} is both a training file and --test: expected another finger; drop it from one")
     outputs.check_file(args.out, overwrite=args.force)
     with threadpool_limits(limits=THREADS, user_api="blas"):
         runs = [training.aligned(load(path).run) for path in args.files]
@@ -77,14 +77,14 @@ def _lines(facts: dict[str, Any]) -> list[str]:
         return "    -" if values is None else "  ".join(f"{value:5.3f}" for value in values)
 
     lines = [
-        f"{', '.join(facts['files'])}: {facts['columns']} columns an axis",
+        f"{', '.join(facts['files'])}: {facts['columns']} columns per axis",
         f"  a new finger, one sigma, x y z:   {numbers(facts['sigma_n'])} N",
         f"  after five presses on a scale:    {numbers(facts['sigma_scale5_n'])} N",
     ]
     if "test" in facts:
         within = ", ".join(f"{share:.0%}" for share in facts["coverage"])
         lines += [
-            f"{facts['test']}, RMSE as it is:          {numbers(facts['rmse_n'])} N",
+            f"{facts['test']}, RMSE uncorrected:       {numbers(facts['rmse_n'])} N",
             f"  five straight presses on a scale: {numbers(facts['rmse_scale5_n'])} N",
             f"  a minute on a force plate:        {numbers(facts['rmse_60s_n'])} N",
             f"  within one and two sigma:         {within}",

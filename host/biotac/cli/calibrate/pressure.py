@@ -60,18 +60,18 @@ def run(args: argparse.Namespace) -> int:
     """Calibrate on a board, or from every recording."""
     recordings = [place for place in args.where if Path(place).is_file() or place.endswith(".mcap")]
     if recordings and len(recordings) < len(args.where):
-        raise InputError(f"{' '.join(args.where)}: expected one board, or recordings, and not both")
+        raise InputError(f"{' '.join(args.where)}: expected one board or only recordings, not both")
     if not recordings and len(args.where) > 1:
-        raise InputError(f"{len(args.where)} boards are named; expected one")
+        raise InputError(f"{len(args.where)} boards given; expected one")
     if recordings and args.save:
-        raise InputError("--save is for boards; `biotac calibration put --save` brings a file to one")
+        raise InputError("--save needs a board; `biotac calibration put --save` uploads a file to one")
     if args.out is not None:
         _check_out(args, recordings)
     if not recordings:
         if args.reference is not None:
             raise InputError(
-                "--reference is for recordings; a board's presses are typed in, as a scale shows them: leave it out, "
-                "or record them together with the plate"
+                "--reference needs a recording; on a board, type in what a scale shows: drop --reference, or record "
+                "the presses together with the plate"
             )
         outcome = _on_board(args)
         _tell(args, outcome, None)
@@ -99,7 +99,7 @@ def _on_board(args: argparse.Namespace) -> report.Outcome:
         hand = biotac.open(port)
         if hand.link.source is None and not sys.stdin.isatty():
             hand.close()
-            raise InputError(f"{port} tells no force, and nobody is at the keyboard to type it; run it in a terminal")
+            raise InputError(f"{port} gives no force, and stdin is not a terminal to type it in; run it in a terminal")
         return hand
 
     return guided.calibrate(opened, plan, _Terminal(), made_s=int(time.time()), save=args.save)

@@ -45,8 +45,8 @@ def run(args: argparse.Namespace) -> int:
 
     def press(step: Step) -> str:
         return (
-            f"press {step.press} of {step.presses}: the pad straight down on the scale, about "
-            f"{step.force_n / newtons:.0f} {args.unit}, another place each time; hold still until told"
+            f"press {step.press} of {step.presses}: push the pad straight down on the scale with "
+            f"about {step.force_n / newtons:.0f} {args.unit}, in a new place each time; hold still until told"
         )
 
     def guide(hand: Hand) -> presses.Held:
@@ -58,8 +58,8 @@ def run(args: argparse.Namespace) -> int:
             else:
                 if source is None and not sys.stdin.isatty():
                     raise InputError(
-                        f"{args.where} tells no force, and nobody is at the keyboard to type it; use a terminal, or "
-                        "--scale"
+                        f"{args.where} gives no force, and stdin is not a terminal to type it in; use a terminal, or "
+                        "--scale PORT"
                     )
                 face = own_map.Guide(press, lambda step: reading_n(f"press {step.press}", args.unit, newtons), HELD)
             truth = None if source is None or args.scale is not None else Truth(source)
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
     def recorded(recording: Recording) -> presses.Held:
         if args.readings is None:
-            raise InputError("a recording does not hold what the scale showed: expected --readings, one a press")
+            raise InputError("a recording does not hold what the scale showed: expected --readings, one per press")
         return presses.recorded(recording, args.finger, [value * newtons for value in args.readings])
 
     with own_map.pressed(args, guide, recorded) as its:
@@ -77,6 +77,6 @@ def run(args: argparse.Namespace) -> int:
             return {"shown_n": its.held.force_n[:, 2].tolist(), "gain": scale.gain, "balance": scale.balance}
 
         facts = own_map.tell(args, its, fewshot.scaled, "presses on a scale", more)
-        words = f"{facts['presses']} presses: gain of z {facts['gain']:.3f}, balance {facts['balance']:+.3f} N/N"
+        words = f"{facts['presses']} presses: z gain {facts['gain']:.3f}, balance {facts['balance']:+.3f} N/N"
         own_map.show(args, facts, words)
     return 0

@@ -21,6 +21,6 @@ def reading_n(which: str, unit: str = "N", newtons: float = 1.0) -> float:
         except ValueError:
             continue
         except EOFError as error:
-            raise InputError(f"no reading was typed in; expected {unit}") from error
+            raise InputError(f"no reading was typed in; expected a number in {unit}") from error
         if 0 < value_n < MAX_N:
             return value_n

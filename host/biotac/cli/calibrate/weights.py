@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     sizes_n, toward = [load.size_n for load in loads], [load.toward for load in loads]
 
     def press(step: Step) -> str:
-        return f"weight {step.press} of {step.presses}: {loads[step.press - 1]}; leave it alone"
+        return f"weight {step.press} of {step.presses}: {loads[step.press - 1]}; do not touch it"
 
     def guide(hand: Hand) -> presses.Held:
         face = own_map.Guide(press, lambda step: sizes_n[step.press - 1], "held: take the weight off")

@@ -74,11 +74,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Calibrate from every file, or the finger of a board."""
     if (args.live is None) != bool(args.files):
-        raise InputError("expected FILE..., or --live PORT and no FILE")
+        raise InputError("expected either FILE... or --live PORT")
     if args.live is not None:
         return _live(args)
     if args.upload is not None and len(args.files) != 1:
-        raise InputError(f"--upload with {len(args.files)} files: expected one, which is the finger's")
+        raise InputError(f"--upload with {len(args.files)} files: expected one, the finger's")
     if args.out is not None:
         _check_out(args.out, args.files, overwrite=args.force)
     references = _references(args.files, args.reference)
@@ -99,11 +99,11 @@ def _live(args: argparse.Namespace) -> int:
     if args.finger is None:
         raise InputError("--live calibrates one finger: expected --finger NAME")
     if args.out is None:
-        raise InputError("--live keeps what it records: expected --out FOLDER")
+        raise InputError("--live saves its recording: expected --out FOLDER")
     finger = args.finger
     with calibrate_live.open_board(args) as hand:
         if finger not in hand.fingers:
-            raise InputError(f"finger {finger} does not answer: expected one of {hand.fingers}; see to its cable")
+            raise InputError(f"finger {finger} does not answer: expected one of {hand.fingers}; check its cable")
         places, missing = calibrate_live.record(args, hand, finger)
         for line in missing:
             print(f"biotac: not covered: {line}", file=sys.stderr)
@@ -207,7 +207,7 @@ def _write(
 
 def _origin(its: provenance.Provenance) -> str:
     rows = [
-        ("sensor", its.serial or "not said by the recording"),
+        ("sensor", its.serial or "not stated in the recording"),
         ("made", f"{its.made}, {its.software}"),
         ("data", f"{', '.join(its.files)}, SHA-256 {its.data_sha256}"),
         ("reference", its.reference),
@@ -233,9 +233,9 @@ def _lines(facts: dict[str, Any]) -> list[str]:
             else []
         ),
         f"  Lin's three scales:     RMSE {numbers(facts['models']['lin-scales'][:3])} N",
-        f"  counts {facts['lag_rows']} rows after the force, {facts['lag_corrected_rows']} corrected; "
+        f"  counts lag the force by {facts['lag_rows']} rows, {facts['lag_corrected_rows']} corrected; "
         f"mean of {facts['window_rows']} rows",
-        f"  where nothing touches:  {numbers(facts['rest_n'][:1])} N",
+        f"  untouched:              {numbers(facts['rest_n'][:1])} N",
         f"  {board.words(facts['fixed_point'])}",
         *[f"  {note}" for note in facts["notes"]],
         *[f"  written: {place}" for place in facts.get("written", [])],
@@ -245,12 +245,12 @@ def _lines(facts: dict[str, Any]) -> list[str]:
 
 def _board_lines(its: dict[str, Any]) -> list[str]:
     torque = "" if its["torque_nmm_max"] is None else f", {its['torque_nmm_max']:.4f} N mm"
-    kept = "kept over a restart" if its["saved"] else "until it restarts; --save keeps it"
-    sent = f"{its['frames_bit_for_bit']} frames it then sent are bit for bit what its map says"
+    kept = "survives a restart" if its["saved"] else "until it restarts; --save keeps it"
+    sent = f"all {its['frames_bit_for_bit']} frames it then sent match its map bit for bit"
     if not its["frames_bit_for_bit"]:
-        sent = "it sent no frame to compare, its simulated finger's script was over"
+        sent = "it sent no frame to compare: the simulated finger's script had ended"
     return [
-        f"  on the board, {kept}: {its['bytes']} bytes, read back alike",
+        f"  on the board, {kept}: {its['bytes']} bytes, read back identical",
         f"  its code on {its['rows']} recorded rows: within {its['force_mn_max']:.3f} mN{torque} of the float model",
         f"  {sent}",
     ]

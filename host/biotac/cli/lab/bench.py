@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _count(text: str) -> int:
     count = int(text)
     if not 1 <= count <= 1_000_000:
-        raise argparse.ArgumentTypeError(f"{count}, expected 1 to 1000000")
+        raise argparse.ArgumentTypeError(f"{count} is out of range; expected 1 to 1000000")
     return count
 
 
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         if not low <= args.frames <= high:
             raise InputError(f"--frames is {args.frames}, expected {low} to {high} for bench {args.what}")
     if args.what != "newtons" and (args.files or args.picture):
-        raise InputError(f"bench {args.what} takes no recording and draws no picture; leave them away")
+        raise InputError(f"bench {args.what} takes no recording and no --picture; drop them")
     measure, show, more = WHAT[args.what]
     outcome = measure(args)
     if args.json:
@@ -100,7 +100,7 @@ def _live(outcome: live.Outcome) -> None:
             f"{row.rate:8} {row.name:{width}} {row.loss:8.4%} {row.worst_loss:8.4%} {row.median_us:10.1f} "
             f"{row.p99_us:8.0f} {row.cpu_percent:7.1f}"
         )
-    print(f"{outcome.rounds} rounds of {outcome.seconds:g} s in turns, a board with a ring of 16 KiB on a pty")
+    print(f"{outcome.rounds} rounds of {outcome.seconds:g} s in turn, a board with a 16 KiB ring buffer on a pty")
     for asked in live.asked(outcome):
         print(f"{asked.what}: {asked.seen}{_met(asked.met, asked.wanted)}")
 
@@ -116,7 +116,7 @@ def _batch(outcome: batch.Outcome) -> None:
 def _decode(outcome: decode.Outcome) -> None:
     print(
         f"{outcome.seconds:g} s of {decode.FINGERS} fingers, {outcome.messages} FRAMEs and PACs of "
-        f"{outcome.bytes_per_message:.0f} bytes each, pymavlink's {outcome.mavlink_bytes_per_message:.0f}; CPU time, "
+        f"{outcome.bytes_per_message:.0f} bytes each (pymavlink: {outcome.mavlink_bytes_per_message:.0f}); CPU time, "
         f"{decode.ROUNDS} interleaved rounds;\nratios are against the other's better chunk size"
     )
     for result in outcome.results:
@@ -156,7 +156,7 @@ def _recording(outcome: recording.Outcome) -> None:
 
 
 def _met(met: bool, asked: str) -> str:
-    return f" (asked {asked}: {'met' if met else 'NOT met'})"
+    return f" (target {asked}: {'met' if met else 'NOT met'})"
 
 
 def _record(args: argparse.Namespace) -> recording.Outcome:
@@ -189,9 +189,9 @@ def _newtons_table(facts: dict[str, Any]) -> None:
     for point in facts["points"]:
         cycles = "".join(f"{point['cycles'][core]:15,}" for core in cores)
         print(f"{point['name']:28}{point['knows']:26}{cycles}" + _three(point["rmse_n"], files))
-    for words, name in (("electrode noise, a frame", "noise_n"), ("same pattern again", "repeatability_n")):
+    for words, name in (("electrode noise, per frame", "noise_n"), ("same pattern again", "repeatability_n")):
         print(f"{words:{54 + 15 * len(cores)}}" + _three(facts[name], files))
-    print("N, RMSE in x/y/z, held out; cycles of one force:")
+    print("RMSE in x/y/z in N, held out; cycles per force:")
     for core, about in cores.items():
         print(f"  {core}: {about['title']}, {about['cycles_by']}")
     for note in facts["notes"]:

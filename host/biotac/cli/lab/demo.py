@@ -44,6 +44,6 @@ def run(args: argparse.Namespace) -> int:
     )
     print(f"recording {facts['recording']}, report {facts['report']}")
     if facts["rows_skipped"]:
-        print(f"{facts['rows_skipped']} incomplete row(s) of the recording were left out")
+        print(f"{facts['rows_skipped']} incomplete row(s) of the recording skipped")
     print(f"picture {facts['picture']}")
     return 0 if demo.good else 1

@@ -77,8 +77,8 @@ def run(args: argparse.Namespace) -> int:
     finally:
         progress.done()
     if args.check and not facts["checks"]:
-        cure = "give --map FILE" if experiment.MAPS and args.recording is None else "leave --check out"
-        raise InputError(f"--check: nothing is asked of {args.name} on {facts['source']}: expected a figure; {cure}")
+        cure = "give --map FILE" if experiment.MAPS and args.recording is None else "drop --check"
+        raise InputError(f"--check: {args.name} on {facts['source']} has no figure with a target; {cure}")
     page = experiment.page(facts)
     if args.out is not None:
         facts["written"] = [str(place) for place in _write(args, experiment, result, facts, page)]
@@ -89,15 +89,15 @@ def run(args: argparse.Namespace) -> int:
 def _check_arguments(args: argparse.Namespace, experiment: Experiment) -> None:
     """Check before seconds of work, not after."""
     if args.recording is not None and not experiment.RECORDING:
-        raise InputError(f"{args.name} is for the emulated sensor only, seen {args.recording}: leave it out")
+        raise InputError(f"{args.name} runs only on the emulated sensor, but got {args.recording}: drop it")
     if args.recording is not None and args.seed is not None:
-        raise InputError("--seed chooses an emulated finger, and there is a recording: leave one out")
+        raise InputError("--seed chooses an emulated finger, but a recording is given: drop one of them")
     if args.seed is not None and not 0 <= args.seed <= SEED_MAX:
         raise InputError(f"--seed is {args.seed}: expected 0 to {SEED_MAX}")
     if args.map and not experiment.MAPS:
-        raise InputError(f"{args.name} has no use for a wrench map: leave --map out")
+        raise InputError(f"{args.name} does not use a wrench map: drop --map")
     if (args.real or args.quick) and not getattr(experiment, "REAL", False):
-        raise InputError(f"{args.name} has no use for --real or --quick: leave them out")
+        raise InputError(f"{args.name} does not use --real or --quick: drop them")
     if args.out is not None:
         check_drawable()
         outputs.check(args.out, _places(args.out, args.name), overwrite=args.force)

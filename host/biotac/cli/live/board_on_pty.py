@@ -45,7 +45,7 @@ def tell(board: Board, link: Path | None, plays: str, facts: dict[str, Any], *, 
 
 def tell_over(plays: str) -> None:
     """Say that the source is over: the board goes on answering."""
-    print(f"{plays} is over; the board stays until Ctrl-C", file=sys.stderr)
+    print(f"{plays} has ended; the board keeps answering until Ctrl-C", file=sys.stderr)
 
 
 def make_link(link: Path, target: str) -> None:
@@ -55,4 +55,4 @@ def make_link(link: Path, target: str) -> None:
     try:
         os.symlink(target, link)
     except OSError as error:
-        raise PortError(f"{link} cannot be made a link ({error.strerror}); choose another path") from error
+        raise PortError(f"link {link} cannot be created ({error.strerror}); choose another path") from error

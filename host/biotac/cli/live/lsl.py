@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
         if args.json:
             print(json.dumps({"streams": streams}))
         else:
-            print("\n".join(f"{stream['name']}, {stream['rate_hz']:g} samples a second" for stream in streams))
+            print("\n".join(f"{stream['name']}, {stream['rate_hz']:g} samples per second" for stream in streams))
             print("Ctrl-C stops", file=sys.stderr)
         sys.stdout.flush()
         end_us: float | None = None
@@ -46,7 +46,9 @@ def run(args: argparse.Namespace) -> int:
         except KeyboardInterrupt:
             pass  # the usual way to stop it
         if outlet.by_arrival:
-            print(f"biotac: {outlet.by_arrival} sample(s) were stamped by arrival: no clock to go by", file=sys.stderr)
+            print(
+                f"biotac: {outlet.by_arrival} sample(s) stamped by arrival time: board clock unknown", file=sys.stderr
+            )
         if hand.stats.frames_lost:
             print(f"biotac: {hand.stats.frames_lost} frame(s) lost; close other programs", file=sys.stderr)
     return 0

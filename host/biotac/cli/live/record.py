@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(f"{args.out}: {stats.frames} frames, {stats.frames_lost} lost; `biotac check {args.out}` verifies them")
         for fault in faults:
-            print(f"while it was recorded, {fault}")
+            print(f"fault during the recording: {fault}")
     return 0
 
 

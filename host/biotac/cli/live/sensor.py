@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     """Plug the sensors in, feed them until their tape ends or Ctrl-C, and print how the board did."""
     faults = [fault_of(text) for text in args.fault]
     if args.source is None and (args.keep or args.by_time):
-        raise InputError(f"{'--keep' if args.keep else '--by-time'} wants a SOURCE, such as press.toml")
+        raise InputError(f"{'--keep' if args.keep else '--by-time'} needs a SOURCE, such as press.toml")
     board = SensorBoard(open_link(args.port))
     try:
         if args.source is not None:
@@ -91,7 +91,7 @@ def play(board: SensorBoard) -> wire.EmuStatus:
             time.sleep(LOOK_S)
             status = board.status()
     except KeyboardInterrupt:
-        print("stopped; the board goes on with what it has", file=sys.stderr)
+        print("stopped; the board keeps playing what it has", file=sys.stderr)
         status = board.status()
     return status
 
@@ -109,16 +109,18 @@ def summary(status: wire.EmuStatus) -> str:
     """The status for people. If the gateway lost no slot, the tape's time less this board's is the clocks' drift."""
     lines = [
         f"{status.slots_served} of {status.slots_taken} slots served in {status.elapsed_us / 1e6:.3f} s by its clock; "
-        f"{status.words} words read, {status.words_late} late, {status.samples_starved} asked for in vain",
+        f"{status.words} words read, {status.words_late} late, {status.samples_starved} requested but missing",
         f"the slowest answer was ready {status.slowest_us} us after its select rose",
     ]
     if status.slots_served > 1 and status.elapsed_us:
         tape_us = (status.slots_served - 1 - status.rounds_moved * len(SLOTS)) * 1e6 / SLOT_HZ
-        lines.append(f"the gateway's clock is {(status.elapsed_us / tape_us - 1) * 1e6:+.0f} ppm slow by this board's")
+        lines.append(
+            f"the gateway's clock is {(status.elapsed_us / tape_us - 1) * 1e6:+.0f} ppm slow against this board's"
+        )
     if status.rounds_moved:
-        what = "left out" if status.rounds_moved > 0 else "played again"
-        lines.append(f"{abs(status.rounds_moved)} rounds of 10 ms were {what}, so that the tape kept to its clock")
+        what = "skipped" if status.rounds_moved > 0 else "repeated"
+        lines.append(f"{abs(status.rounds_moved)} rounds of 10 ms were {what} to keep the tape on its clock")
     if status.loop_slots:
-        now = "is being played" if status.looping else "plays from its next power-up on"
-        lines.append(f"{status.loop_slots / SLOT_HZ:.2f} s are kept in its flash, which {now}")
+        now = "playing now" if status.looping else "played from the next power-up"
+        lines.append(f"{status.loop_slots / SLOT_HZ:.2f} s stored in its flash, {now}")
     return "\n".join(lines)

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Share the board until Ctrl-C. If it goes away, look for it again and tell its readers."""
     if args.port is not None and args.port.startswith("zenoh:"):
-        raise InputError(f"{args.port} is shared already; open it as it is, from anywhere")
+        raise InputError(f"{args.port} is already shared; open it directly")
     name = network.checked_name(args.name)
     with (
         closing(network.open_session(name, connect=args.connect, listen=args.listen, config=args.config)) as session,

@@ -42,9 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the pty's path, then run until Ctrl-C."""
     if args.pace == 0:
-        raise InputError("a board on a pty needs a pace above 0; unpaced boards are for biotac.open and biotac demo")
+        raise InputError(
+            "--pace is 0, expected above 0 for a board on a pty; only biotac.open and biotac demo run unpaced"
+        )
     if args.image is not None and args.board == "posix":
-        raise InputError("--image is for boards that have one; add --board pico")
+        raise InputError("--image needs a board that has a flash image; add --board pico")
     name = args.source.removeprefix("sim:")
     seconds = args.seconds or (SCENARIO_S if name.endswith(".toml") else None)
     source = load_source(name, fingers=args.fingers, seconds=seconds)

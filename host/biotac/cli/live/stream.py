@@ -109,7 +109,7 @@ def event_as_line(event: Event) -> str:
     if event.peak_count != INVALID_COUNT:
         line += f", peak {event.peak_count} counts"
     age_s = event_age_s(event)
-    return f"{line}, began {age_s * 1000:.1f} ms before" if age_s else line
+    return f"{line}, began {age_s * 1000:.1f} ms earlier" if age_s else line
 
 
 def as_line(frame: Frame) -> str:

@@ -26,7 +26,7 @@ COLUMNS = (
     "pressure",
     "tac",
     "tdc",
-    "what to know",
+    "notes",
 )
 #: Flags that are not shown, as they say only that a finger is at rest or a result was not asked for.
 DULL = FrameFlags.CONTACT | FrameFlags.NOT_ASKED | FrameFlags.POC_INVALID

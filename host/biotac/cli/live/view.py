@@ -65,6 +65,6 @@ def _check(*, as_json: bool) -> int:
         verdict = "; ".join(checked.problems) or "good"
         print(
             f"page of {checked.files} files, {checked.bytes} bytes; {checked.fingers} fingers, "
-            f"{checked.frames} frames; commands guarded: {verdict}"
+            f"{checked.frames} frames; checks: {verdict}"
         )
     return 1 if checked.problems else 0

@@ -52,5 +52,5 @@ def run(args: argparse.Namespace) -> int:
         f"torque {outcome.torque_nmm_max:.5f} N*mm, pressure {outcome.pressure.force_n_max * 1e3:.4f} mN"
     )
     if outcome.pressure.starts:
-        print(f"  of {outcome.pressure.starts} frames, with none before them, the pressure's filter is taken as told")
+        print(f"  pressure filter not checked in {outcome.pressure.starts} frames that have no frame before them")
     return 0 if good else 1

@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     if args.lake is not None:
         return lake.run_export(args, places)
     if len(places) != 2:
-        raise InputError(f"{len(places)} files are named, expected REC OUT; many recordings go to --lake DIR")
+        raise InputError(f"{len(places)} files given, expected REC OUT; to export many recordings, use --lake DIR")
     source, out = places
     recording = load(source)
     with Progress() as progress:

@@ -29,6 +29,6 @@ def run(args: argparse.Namespace) -> int:
         return 0
     print(
         f"{args.out}: {done['frames']} frames of {done['fingers']} finger(s); "
-        f"{done['skipped']} incomplete frame(s) of {args.file} left out"
+        f"{done['skipped']} incomplete frame(s) of {args.file} skipped"
     )
     return 0

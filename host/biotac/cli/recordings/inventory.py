@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
 
 def as_line(its: Any, day: Any) -> str:
     """A sensor as one line for people."""
-    name = its.sensor or "without a number"
+    name = its.sensor or "without a serial number"
     calibration = "not calibrated"
     if its.calibration is not None:
         made = f" of {day(its.calibration_made_ns)}" if its.calibration_made_ns is not None else ""

@@ -76,8 +76,8 @@ def run_export(args: argparse.Namespace, sources: list[Path]) -> int:
         print(json.dumps(facts))
     else:
         print(
-            f"{args.lake}: {facts['exported']} exported, {facts['rows']} rows; {facts['already_there']} there before, "
-            f"{facts['same_as_another']} the same as another, {len(failed)} failed"
+            f"{args.lake}: {facts['exported']} exported, {facts['rows']} rows; {facts['already_there']} already there, "
+            f"{facts['same_as_another']} duplicates, {len(failed)} failed"
         )
     return InputError.exit_code if failed else 0
 
@@ -110,7 +110,7 @@ def run_check(args: argparse.Namespace) -> int:
         print(json.dumps(facts))
     else:
         _warn_of_unfinished(lake)
-        verdict = "good" if good else f"{len(wrong) + len(failed)} wrong" if lake.partition else "nothing in it"
+        verdict = "good" if good else f"{len(wrong) + len(failed)} problem(s)" if lake.partition else "empty"
         poc_um, force_mn, torque_nmm = largest.values()
         print(
             f"{args.folder}: {facts['recordings']} recordings, {facts['frames']} frames, {verdict}; largest error "
@@ -137,7 +137,7 @@ def run_sql(args: argparse.Namespace) -> int:
 def _warn_of_unfinished(lake: Any) -> None:
     if lake.unfinished:
         print(
-            f"biotac: {lake.unfinished} file(s) of exports that did not come to their end are left out; export again",
+            f"biotac: {lake.unfinished} file(s) of unfinished exports are ignored; export again",
             file=sys.stderr,
         )
 
@@ -151,11 +151,9 @@ def _all(
     try:
         for item, result in room("workers").each(work, items, args.jobs, args.dask):
             results[item] = result
-            progress.show(f"{len(results)} of {len(items)} {did}; Ctrl-C stops, the same command goes on from there")
+            progress.show(f"{len(results)} of {len(items)} {did}; Ctrl-C stops, run it again to finish")
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(
-            f"{len(results)} of {len(items)} are {did}; the same command goes on from there"
-        ) from None
+        raise KeyboardInterrupt(f"{len(results)} of {len(items)} {did}; run the same command again to finish") from None
     finally:
         progress.done()
     failed = [str(results[item]) for item in items if isinstance(results[item], BiotacError)]

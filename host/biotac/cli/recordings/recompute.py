@@ -77,8 +77,8 @@ def read_settings(path: Path) -> dict[wire.Setting, int]:
     named = named.get("settings", named) if isinstance(named, dict) else named
     known = {setting.name.lower(): setting for setting in wire.Setting}
     if not isinstance(named, dict) or not all(type(value) is int for value in named.values()):
-        raise InputError(f'{path} is no JSON object of whole numbers; expected one such as {{"poc_weights": 2}}')
+        raise InputError(f'{path} is not a JSON object of integers; expected one such as {{"poc_weights": 2}}')
     unknown = sorted(set(named) - set(known))
     if unknown:
-        raise InputError(f"{path}: no setting is called {unknown[0]!r}; expected {', '.join(known)}")
+        raise InputError(f"{path}: unknown setting {unknown[0]!r}; expected one of {', '.join(known)}")
     return {known[name]: value for name, value in named.items()}

@@ -31,7 +31,7 @@ def moment(text: str) -> float:
     """Seconds, 0 or more."""
     value = values.number(text)
     if not 0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is no time; expected seconds from 0 on")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a time; expected seconds, 0 or more")
     return value
 
 
