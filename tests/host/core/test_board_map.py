@@ -219,7 +219,7 @@ def test_a_map_without_room_on_a_board_is_refused_in_words(monkeypatch: pytest.M
     its = random_map(5, 7)
     size = len(board.quantise(its).blob)
     monkeypatch.setattr(_map, "MAX_BYTES", size - 1)
-    with pytest.raises(InputError, match=f"takes {size} bytes: expected at most {size - 1}, a board's room"):
+    with pytest.raises(InputError, match=f"takes {size} bytes: expected at most {size - 1}, which fit a board"):
         board.quantise(its)
 
 
