@@ -52,8 +52,8 @@ SETTINGS = default_settings() | {GAIN: 12_345_678, FILTER: 500}
 @pytest.mark.parametrize(
     ("field", "value", "words"),
     [
-        ("pressure_force_100un", 1, "pressure's force off by 0.0"),
-        ("pressure_force_100un", -1, "pressure's force off by"),
+        ("pressure_force_100un", 1, "force from pressure off by 0.0"),
+        ("pressure_force_100un", -1, "force from pressure off by"),
         ("pdc_filtered_q4", 3, "filtered pressure off by"),
         ("pdc_filtered_q4", -3, "filtered pressure off by"),
     ],
@@ -70,8 +70,8 @@ def test_one_wrong_digit_is_found(field: str, value: int, words: str) -> None:
 @pytest.mark.parametrize(
     ("field", "row", "value", "words"),
     [
-        ("pressure_force_100un", 280, wire.INVALID_I32, "pressure's force is valid on one side only"),
-        ("pressure_force_100un", 305, 0, "pressure's force is valid on one side only"),  # a word is missing there
+        ("pressure_force_100un", 280, wire.INVALID_I32, "force from pressure is valid on one side only"),
+        ("pressure_force_100un", 305, 0, "force from pressure is valid on one side only"),  # a word is missing there
         ("pdc_filtered_q4", 280, wire.INVALID_COUNT, "filtered pressure is valid on one side only"),
         ("pdc_filtered_q4", 305, 16 * 1326, "filtered pressure is valid on one side only"),
         ("pdc_filtered_q4", 320, 0, "filtered pressure is valid on one side only"),  # railed

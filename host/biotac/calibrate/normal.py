@@ -103,7 +103,7 @@ def load(path: Path) -> Normal:
             raise ValueError(f"coefficients {its.shape}")
     except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
         seen = str(error) or type(error).__name__
-        raise InputError(f"{path}: {seen}: expected a {FORMAT} as `biotac calibrate normal --out` writes it") from None
+        raise InputError(f"{path}: {seen}: expected a {FORMAT} written by `biotac calibrate normal --out`") from None
     return Normal(its)
 
 
@@ -114,7 +114,7 @@ class _Fitting:
         names, of = np.unique(looks.contact, return_inverse=True)
         if len(names) < LEAST_CONTACTS:
             raise InputError(
-                f"{len(names)} contacts of the plate: expected {LEAST_CONTACTS} or more; press it from many sides"
+                f"{len(names)} contacts with the plate: expected {LEAST_CONTACTS} or more; press it from many sides"
             )
         self.rows = [np.flatnonzero(of == k) for k in range(len(names))]
         self._normals = looks.normals

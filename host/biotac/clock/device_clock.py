@@ -33,7 +33,7 @@ class DeviceClock:
 
     def __init__(self, *, promised_delay_s: float | None = None, unix_offset_s: float | None = None) -> None:
         if promised_delay_s is not None and not 0 <= promised_delay_s < math.inf:
-            raise ValueError(f"promised_delay_s is {promised_delay_s}, expected seconds of 0 or more")
+            raise ValueError(f"promised_delay_s is {promised_delay_s}, expected a finite number of seconds, 0 or more")
         self.unix_offset_s = unix_offset_s
         self.segments: list[Segment] = []  #: the latest last; at most SEGMENTS_KEPT
         self.resets = 0  #: how many segments began after the first
@@ -52,7 +52,7 @@ class DeviceClock:
         with self._lock:
             self._segment(t_us, -math.inf, host_s).arrive(t_us, host_s)
             if self.segments[-1].contradicted:
-                self._begin(t_us, host_s, "no course of the clocks agrees with what was observed")
+                self._begin(t_us, host_s, "no drift that the clocks can have fits the observations")
                 self.segments[-1].arrive(t_us, host_s)
 
     def round_trip(self, sent_s: float, t_us: int, received_s: float) -> None:
@@ -61,7 +61,7 @@ class DeviceClock:
         Raises ValueError when ``received_s`` is before ``sent_s``.
         """
         if not sent_s <= received_s:
-            raise ValueError(f"received_s is {received_s}, before sent_s {sent_s}; both are of one steady clock")
+            raise ValueError(f"received_s is {received_s}, before sent_s {sent_s}; take both from one monotonic clock")
         with self._lock:
             self._segment(t_us, sent_s, received_s).send(t_us, sent_s)
             self.quickest_round_trip_s = min(self.quickest_round_trip_s, received_s - sent_s)
@@ -111,7 +111,7 @@ class DeviceClock:
     def unix_time_s(self, t_us: ArrayLike, *, segment: int = -1) -> NDArray[np.float64]:
         """Like host_time_s, in seconds since 1970. Raises ValueError without a ``unix_offset_s``."""
         if self.unix_offset_s is None:
-            raise ValueError("unix_offset_s is not set; it is time.time() - time.monotonic()")
+            raise ValueError("unix_offset_s is not set; set it to time.time() - time.monotonic()")
         return self.host_time_s(t_us, segment=segment) + self.unix_offset_s
 
     def estimate_s(self, t_us: float) -> float:

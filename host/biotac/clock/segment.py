@@ -122,7 +122,7 @@ class Segment:
         if self._latest.known:
             host_s, bound_s = (float(v) for v in self._latest.extended(np.float64(t_us)))
             if arrived_s < host_s - bound_s - TICK_S:
-                return "a message arrived before it can have been sent"
+                return "a message arrived before it could have been sent"
             if sent_s > host_s + bound_s + TICK_S:
                 return "an answer is older than its question"
         return ""

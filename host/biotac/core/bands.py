@@ -25,7 +25,7 @@ def bands_of(pac: StructArray) -> StructArray:
     The filters restart where rounds are missing. Raises ValueError for rows of several fingers.
     """
     if len(np.unique(pac["finger"])) > 1:
-        raise ValueError(f"rows of fingers {np.unique(pac['finger']).tolist()}, expected those of one")
+        raise ValueError(f"rows are of fingers {np.unique(pac['finger']).tolist()}, expected one; select its rows")
     begins = np.flatnonzero(np.diff(pac["seq"].astype(np.int64)) != 1) + 1
     sent = np.zeros(len(pac), _WIRE)
     sent["finger"] = pac["finger"]
@@ -53,7 +53,7 @@ def pac_words(pac: Any) -> NDArray[np.uint16]:
     """``pac`` as C takes it. Raises ValueError unless it is (n, 22) integers 0..4095, or 0xFFFF."""
     words = np.asarray(pac)
     if words.ndim != 2 or words.shape[1] != SAMPLES or words.dtype.kind not in "iu":
-        raise ValueError(f"pac is {words.dtype} of shape {words.shape}, expected integers of (n, {SAMPLES})")
+        raise ValueError(f"pac is {words.dtype} of shape {words.shape}, expected integers of shape (n, {SAMPLES})")
     if not np.all(((words >= 0) & (words <= sensor.FULL_SCALE_COUNT)) | (words == wire.INVALID_COUNT)):
         raise ValueError(
             f"pac holds {words.min()} to {words.max()}, expected 0 to {sensor.FULL_SCALE_COUNT}, or 0xFFFF"

@@ -79,7 +79,7 @@ class BoardMap:
     def _packed(self) -> bytes:
         serial = self.serial.encode("ascii")
         if len(serial) > _map.SERIAL_BYTES:
-            raise ValueError(f"the serial {self.serial!r} has over {_map.SERIAL_BYTES} characters")
+            raise ValueError(f"the serial number {self.serial!r} has more than {_map.SERIAL_BYTES} characters")
         head = HEADER.pack(_map.VERSION, self.axes, len(self.blocks), 0, serial, self.made_s)
         blocks, coefficients = b"", b""
         for block in self.blocks:
@@ -204,7 +204,7 @@ def _judged(blob: bytes) -> tuple[Any, Any]:
     error = lib.bt_map_open(handle, ffi.cast("uint8_t *", room), len(blob))
     if error != wire.Error.OK:
         raise InputError(
-            f"a wrench map of {len(blob)} bytes is refused as {wire.Error(error).name}: expected at most "
-            f"{_map.MAX_BYTES} bytes as protocol/SPEC.md lays them out, of version {_map.VERSION}; make the map again"
+            f"the board would refuse this wrench map of {len(blob)} bytes ({wire.Error(error).name}): expected at most "
+            f"{_map.MAX_BYTES} bytes, version {_map.VERSION}, laid out as in protocol/SPEC.md; make the map again"
         )
     return handle, room

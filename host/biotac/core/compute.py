@@ -142,7 +142,7 @@ def per_frame(
             seen = (
                 f"{counts.dtype} of shape {counts.shape}" if isinstance(counts, np.ndarray) else type(counts).__name__
             )
-            raise ValueError(f"counts are {seen}, expected uint16 of (19,)")
+            raise ValueError(f"counts are {seen}, expected uint16 of shape (19,)")
         if not one_frame(plan, counts.tobytes(), base_bytes, result):
             raise ValueError(_explain(0, counts, base))
         return out
@@ -169,7 +169,7 @@ def _plan_of(items: tuple[tuple[Any, Any], ...]) -> Any:
     settings = dict(items)
     for key in settings:
         if key not in _DEFAULTS:
-            raise ValueError(f"settings have {key!r}, expected members of biotac.Setting, such as FORCE_GAIN_Z_NN")
+            raise ValueError(f"settings contain {key!r}, expected members of biotac.Setting, such as FORCE_GAIN_Z_NN")
     chosen = {key: int(settings.get(key, _DEFAULTS[key])) for key in _PLAN_SETTINGS}
     for key, value in chosen.items():
         spec = wire.SETTINGS[key]
@@ -177,7 +177,7 @@ def _plan_of(items: tuple[tuple[Any, Any], ...]) -> Any:
             raise ValueError(f"{key.name} is {value}, expected {spec.low} to {spec.high} {spec.unit}")
     plan = ffi.new("bt_block_plan *")
     if not lib.bt_block_plan_init(plan, formula_settings(chosen), _population(chosen)):
-        raise RuntimeError("host/binding/blocks.c mirrors another geometry than the one that was generated")
+        raise RuntimeError("host/binding/blocks.c mirrors a different geometry from the generated one")
     return plan
 
 
@@ -194,7 +194,7 @@ def _checked_counts(counts: Any) -> NDArray[np.uint16]:
         raise ValueError(f"counts have shape {raw.shape}, expected (n, 19) or (19,)")
     if raw.dtype != _COUNT:
         if raw.dtype.kind not in "iu":
-            raise ValueError(f"counts are {raw.dtype}, expected integers, best uint16")
+            raise ValueError(f"counts are {raw.dtype}, expected integers, preferably uint16")
         bad = np.argwhere(~_countlike(raw))
         if len(bad):
             raise ValueError(_explain(int(bad[0, 0]) if raw.ndim == 2 else 0, raw, np.zeros(_ONE)))
@@ -206,9 +206,9 @@ def _checked_tare(tare: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """float64 (19,) or ``shape`` with adjacent columns. The range is checked in C."""
     base = np.asarray(tare)
     if base.shape not in (_ONE, shape):
-        raise ValueError(f"the tare has shape {base.shape}, expected (19,) or {shape} as the counts")
+        raise ValueError(f"the tare has shape {base.shape}, expected (19,) or {shape}, like the counts")
     if base.dtype.kind not in "iuf":
-        raise ValueError(f"the tare is {base.dtype}, expected numbers, best float64")
+        raise ValueError(f"the tare is {base.dtype}, expected numbers, preferably float64")
     base = base.astype(_TARE, copy=False)
     return base if base.strides[-1] == _TARE.itemsize else np.ascontiguousarray(base)
 
@@ -220,7 +220,7 @@ def _checked_out(out: StructArray, shape: tuple[int, ...], dtype: np.dtype[np.vo
         raise ValueError(f"out is {seen}, expected a contiguous, writeable {name} of shape {shape}")
     # The dtype has no alignment of its own, and C stores doubles.
     if out.size and out.ctypes.data % 8:
-        raise ValueError("out begins at an odd address, expected one that float64 can be stored at")
+        raise ValueError("out is not aligned to 8 bytes, as float64 needs; make it with numpy.empty")
     return out
 
 

@@ -49,7 +49,7 @@ FINGER_DTYPE = np.dtype(
 _ELECTRODES = len(sensor.ELECTRODE_NAMES)
 if FINGER_DTYPE.itemsize != lib.bt_replay_row_bytes():
     raise ImportError(
-        "the compiled core has other rows than this Python code; install the package again: pip install ."
+        "the compiled core's rows differ in size from this Python code's; reinstall the package: pip install ."
     )
 
 
@@ -145,7 +145,7 @@ class Finger:
     def _times(self, t_us: Any, n: int) -> NDArray[np.uint32]:
         times = self._next_us + ROUND_US * np.arange(n, dtype=np.int64) if t_us is None else np.asarray(t_us)
         if times.shape != (n,) or times.dtype.kind not in "iu":
-            raise ValueError(f"t_us is {times.dtype} of shape {times.shape}, expected integers of ({n},)")
+            raise ValueError(f"t_us is {times.dtype} of shape {times.shape}, expected integers of shape ({n},)")
         if n:
             self._next_us = int(times[-1]) + ROUND_US
         return (times.astype(np.int64) % 2**32).astype(np.uint32)
@@ -178,7 +178,7 @@ class Finger:
         values = tare if pdc is None else np.append(tare, pdc)
         if tare.shape != (_ELECTRODES,) or not np.all((values >= 0) & (values <= sensor.FULL_SCALE_COUNT)):
             raise ValueError(
-                f"a tare of shape {tare.shape}: expected ({_ELECTRODES},) and 0..{sensor.FULL_SCALE_COUNT}"
+                f"the tare has shape {tare.shape}, expected ({_ELECTRODES},) and values 0..{sensor.FULL_SCALE_COUNT}"
             )
         q16 = (tare_to_q4(values).astype(np.uint32) << 12).tolist()
         base = ffi.new("bt_baseline *")

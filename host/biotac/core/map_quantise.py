@@ -55,7 +55,7 @@ def block(kind: Kind, gate: Gate, values: Floats, names: tuple[str, ...]) -> Boa
         else:
             raise InputError(
                 f"coefficients of {kind.name} x {gate.name} for {name} add up to {float(np.abs(scaled).sum()):.3g} "
-                "units: a board's sums of 32 bits cannot hold them at full scale; fit with more rows or a larger lambda"
+                "units: too large for a board's 16-bit values or 32-bit sums; fit with more rows or a larger lambda"
             )
         exponents.append(exponent)
         whole.append(scaled.astype(np.int64))

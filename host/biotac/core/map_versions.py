@@ -28,8 +28,8 @@ def current(blob: bytes) -> bytes:
         return _read(blob).blob
     except (ValueError, ArithmeticError) as error:
         raise InputError(
-            f"a wrench map of version {VERSION} and {len(blob)} bytes cannot be read ({error}): expected one as "
-            f"`biotac map get` wrote it; calibrate the finger again"
+            f"a wrench map of version {VERSION} and {len(blob)} bytes cannot be read ({error}): expected one "
+            f"written by `biotac map get`; calibrate the finger again"
         ) from error
 
 
@@ -40,11 +40,11 @@ def opened(its: BoardMap | bytes) -> BoardMap:
 
 def _read(blob: bytes) -> BoardMap:
     if len(blob) < _map.HEADER_BYTES:
-        raise ValueError("its head is cut off")
+        raise ValueError("its header is cut off")
     _, axes, count, _, serial, made_s = HEADER.unpack_from(blob)
     at = _map.HEADER_BYTES + count * _map.BLOCK_BYTES
     if axes not in (_map.AXES_FORCE, _map.AXES_TORQUE, _map.AXES_TORSION) or len(blob) < at:
-        raise ValueError(f"{axes} axes, {count} blocks")
+        raise ValueError(f"its header claims {axes} axes and {count} blocks")
     blocks = []
     for k in range(count):
         kind_value, gate_value, *exponent = BLOCK.unpack_from(blob, _map.HEADER_BYTES + k * _map.BLOCK_BYTES)
@@ -58,5 +58,5 @@ def _read(blob: bytes) -> BoardMap:
         blocks.append(map_quantise.block(kind, gate, real, AXES[:axes]))
         at += 4 * spec.columns * axes
     if at != len(blob):
-        raise ValueError(f"{len(blob)} bytes, {at} by its head")
+        raise ValueError(f"it has {len(blob)} bytes, its header says {at}")
     return BoardMap(axes, tuple(blocks), serial.rstrip(b"\0").decode("ascii", "replace"), made_s)

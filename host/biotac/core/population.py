@@ -116,7 +116,7 @@ def compiled_coefficients() -> Any:
     its = blocks()
     if [(kind, gate) for kind, gate, _ in its] != _COMPILED:
         raise ValueError(
-            f"{SHIPPED} has other blocks than host/binding/population_float64.c; train it with this version"
+            f"{SHIPPED} has different blocks from host/binding/population_float64.c; retrain it with this version"
         )
     per_count = [c / SIGNAL_COUNTS if kind in (Kind.COMPRESSION, Kind.BULGE) else c for kind, _, c in its]
     return ffi.new("double[]", np.concatenate(per_count).ravel().tolist())

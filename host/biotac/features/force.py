@@ -39,7 +39,7 @@ class ForceNets:
         of = np.zeros(len(above), np.int64) if kind is None else np.asarray(kind)
         unknown = sorted(set(of.tolist()) - set(self.nets))
         if unknown:
-            raise InputError(f"class {unknown[0]} has no net: expected one of {sorted(self.nets)}; train with it")
+            raise InputError(f"class {unknown[0]} has no net: expected one of {sorted(self.nets)}; train one for it")
         result = np.empty((len(above), 3))
         for c, nets in self.nets.items():
             rows = of == c

@@ -59,7 +59,7 @@ def observations(rows: npt.NDArray[Any], pac: npt.ArrayLike) -> Floats:
     """
     counts = np.asarray(pac)
     if counts.ndim != 2 or len(counts) != len(rows) or counts.shape[1] <= LAG:
-        raise InputError(f"pac is {counts.shape} for {len(rows)} frames: expected its 22 samples for each of them")
+        raise InputError(f"pac has shape {counts.shape} for {len(rows)} frames: expected 22 samples per frame")
     level = np.where(counts == INVALID_COUNT, np.nan, counts.astype(np.float64))
     flat = np.concatenate([np.full(LAG, np.nan), level.ravel()])
     change2 = ((flat[LAG:] - flat[:-LAG]) ** 2).reshape(counts.shape)
@@ -109,11 +109,11 @@ def train(observed: npt.ArrayLike, states: npt.ArrayLike) -> Trained:
     """
     values, labels = _rounds(observed), np.asarray(states)
     if labels.shape != (len(values),) or labels.dtype.kind not in "iu" or not np.isin(labels, list(GripState)).all():
-        raise InputError(f"states are {labels.dtype} {labels.shape}: expected {len(values)} of GripState, one a round")
+        raise InputError(f"states are {labels.dtype} {labels.shape}: expected {len(values)} GripStates, one per round")
     seen = np.bincount(labels, minlength=STATES)
     if not seen.all():
         counted = ", ".join(f"{n} {GripState(k).name.lower()}" for k, n in enumerate(seen))
-        raise InputError(f"training has {counted} rounds: expected some of each; record a grip that gives")
+        raise InputError(f"training has {counted} rounds: expected some of each; record a grip that holds, then slips")
     at = np.arange(1, EDGES + 1) / (EDGES + 1)
     # Quantiles of each state's own values: slips are rare, and edges must lie among their values to tell them apart.
     of_states = np.array([np.nanquantile(values[labels == state], at, axis=0) for state in GripState])
@@ -145,7 +145,7 @@ class GripFilter:
         """Share of each GripState (n, 3) after each round of ``observed`` (n, k). Raises InputError for another k."""
         values = _rounds(observed)
         if values.shape[1] != len(self._trained.edges):
-            raise InputError(f"{values.shape[1]} values a round: expected the {len(self._trained.edges)} of training")
+            raise InputError(f"{values.shape[1]} values per round: expected {len(self._trained.edges)}, as in training")
         return np.array([self._step(weight) for weight in self._trained.weigh(values)]).reshape(-1, STATES)
 
     def _step(self, of_state: Floats) -> Floats:
@@ -164,5 +164,5 @@ class GripFilter:
 def _rounds(observed: npt.ArrayLike) -> Floats:
     values = np.asarray(observed, dtype=np.float64)
     if values.ndim != 2:
-        raise InputError(f"observed is of shape {values.shape}: expected (n, k), a row a round")
+        raise InputError(f"observed has shape {values.shape}: expected (n, k), one row per round")
     return values

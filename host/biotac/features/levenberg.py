@@ -95,9 +95,9 @@ def train(
 def _pair(inputs: npt.ArrayLike, targets: npt.ArrayLike) -> tuple[Floats, Floats]:
     x, t = np.asarray(inputs, dtype=np.float64), np.asarray(targets, dtype=np.float64)
     if x.ndim != 2 or t.ndim != 2 or len(x) != len(t) or len(x) < 2:
-        raise InputError(f"inputs {x.shape} and targets {t.shape}: expected (n, d) and (n, k), n at least 2")
+        raise InputError(f"inputs {x.shape} and targets {t.shape}: expected (n, d) and (n, k) with n at least 2")
     if not (np.isfinite(x).all() and np.isfinite(t).all()):
-        raise InputError("inputs or targets hold NaN or infinity: expected numbers; leave invalid rows out")
+        raise InputError("inputs or targets contain NaN or infinity: expected finite numbers; drop those rows")
     return x, t
 
 

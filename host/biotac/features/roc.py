@@ -77,7 +77,7 @@ def trajectories(above: Floats, tare: Floats, press: Integers) -> tuple[Floats, 
     size = np.exp(rows[:, 2])
     starts = np.flatnonzero(np.r_[True, press[1:] != press[:-1]])
     if len(np.unique(press)) != len(starts):
-        raise InputError("rows of a press do not stand together: expected them in order; sort by press and time")
+        raise InputError("rows of a press are not consecutive: expected them in time order; sort by press, then time")
     found = []
     for start, end in zip(starts, [*starts[1:], len(press)], strict=True):
         grown = np.maximum.accumulate(size[start:end])

@@ -28,7 +28,7 @@ def signals(rows: npt.NDArray[Any]) -> Floats:
     if rows.dtype.names is None:
         if rows.ndim != 2 or rows.shape[1] != ELECTRODES or rows.dtype.kind not in "fi":
             raise InputError(
-                f"rows are {rows.dtype} {rows.shape}: expected frames of biotac.load, or counts above the tare "
+                f"rows are {rows.dtype} {rows.shape}: expected frames from biotac.load, or counts above the tare "
                 f"(n, {ELECTRODES})"
             )
         return rows.astype(np.float64)

@@ -28,7 +28,7 @@ def lowess(values: npt.ArrayLike, taps: int = TAPS) -> Floats:
     for k, column in enumerate(flat.T):
         at = np.flatnonzero(np.isfinite(column))
         if len(at) < taps:
-            raise InputError(f"{len(at)} rows with a value: expected at least {taps}; smooth more of them together")
+            raise InputError(f"{len(at)} rows have a value: expected at least {taps}; smooth a longer stretch")
         result[at, k] = theirs(column[at], at, frac=taps / len(at), it=ROBUST_STEPS, return_sorted=False)
     return result.reshape(columns.shape)
 

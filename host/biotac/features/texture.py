@@ -38,9 +38,9 @@ def energies(pac: npt.ArrayLike) -> Floats:
     """
     samples = np.asarray(pac, dtype=np.float64)
     if samples.ndim != 1 or len(samples) < SAMPLES:
-        raise InputError(f"pac is of shape {samples.shape}: expected (n,) samples, at least {SAMPLES}; flatten rounds")
+        raise InputError(f"pac has shape {samples.shape}: expected (n,), at least {SAMPLES} samples; flatten rounds")
     if not np.isfinite(samples).all():
-        raise InputError(f"{(~np.isfinite(samples)).sum()} samples are not finite: leave out, or fill, what is missing")
+        raise InputError(f"{(~np.isfinite(samples)).sum()} samples are not finite: drop or fill the missing ones")
     rounds = samples[: len(samples) // SAMPLES * SAMPLES]
     words = np.clip(np.rint(rounds - np.median(rounds)) + _MIDDLE, 0, FULL_SCALE_COUNT).astype(np.uint16)
     return pac_bands(words.reshape(-1, SAMPLES))
@@ -53,10 +53,10 @@ def describe(energy_count2: npt.ArrayLike) -> Floats:
     """
     energy = np.asarray(energy_count2, dtype=np.float64)
     if energy.ndim != 2 or energy.shape[1] != len(BANDS_HZ):
-        raise InputError(f"energies are of shape {energy.shape}: expected (n, {len(BANDS_HZ)})")
+        raise InputError(f"energies have shape {energy.shape}: expected (n, {len(BANDS_HZ)})")
     known = energy[np.isfinite(energy).all(axis=1)]
     if not len(known):
-        raise InputError(f"none of {len(energy)} rounds has all its energies: expected one at least")
+        raise InputError(f"none of {len(energy)} rounds has all its energies: expected at least one; use more rounds")
     level = np.log10(known / SAMPLES + FLOOR_COUNT2)
     return np.quantile(level, QUANTILES, axis=0).ravel()
 

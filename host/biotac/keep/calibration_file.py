@@ -55,10 +55,10 @@ def from_dict(tree: Any) -> Calibration:
         if key not in tree and key != "provenance":
             raise ValueError(f"key {key!r} is missing")
     if not isinstance(tree.get("provenance", {}), dict):
-        raise ValueError("provenance is no object; put its facts under keys of their own")
+        raise ValueError("provenance is not an object; give each fact its own key")
     weights = [w.name for w in wire.PocWeights]
     if tree["poc_weights"] not in weights:
-        raise ValueError(f"poc_weights is {tree['poc_weights']!r}, expected {', '.join(weights)}")
+        raise ValueError(f"poc_weights is {tree['poc_weights']!r}, expected one of {', '.join(weights)}")
     x, y, z = _axes(tree, "force_gain_nn", "xyz")
     torque_y, torque_z = _axes(tree, "torque_gain_nn", "yz")
     return Calibration(
@@ -89,7 +89,7 @@ def loads(text: str, where: str) -> Calibration:
         return from_dict(parse_json(text))
     except ValueError as error:
         raise InputError(
-            f"{where} is no calibration that can be used: {error}; `biotac calibration get` writes one"
+            f"{where} is not a usable calibration: {error}; `biotac calibration get` writes one"
         ) from error
 
 
@@ -100,9 +100,9 @@ def load(path: Path) -> Calibration:
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} is no text; expected JSON that `biotac calibration get` wrote") from error
+        raise InputError(f"{path} is not text; expected JSON written by `biotac calibration get`") from error
     except ValueError as error:
-        raise InputError(f"{path} is no calibration: {error}; `biotac calibration get` writes one") from error
+        raise InputError(f"{path} is not a calibration: {error}; `biotac calibration get` writes one") from error
     return loads(text, str(path))
 
 
@@ -119,7 +119,7 @@ def write(path: Path, text: str, *, overwrite: bool) -> None:
         with path.open("w" if overwrite else "x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        raise InputError(f"{path} exists and would be overwritten; choose another name or say --force") from error
+        raise InputError(f"{path} already exists; choose another name, or add --force to overwrite it") from error
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
 

@@ -47,7 +47,7 @@ def parse_place(text: str) -> tuple[int, int]:
     """Bus and address from text such as ``1:0x50``. Raises PortError for anything else."""
     match = re.fullmatch(r"(\d{1,3}):(0[xX][0-9a-fA-F]{1,2}|\d{1,3})", text, re.ASCII)
     if match is None:
-        raise PortError(f"{text!r} is no place on an I2C bus; expected BUS:ADDRESS, such as 1:0x50 (see i2cdetect -l)")
+        raise PortError(f"{text!r} is not an I2C address; expected BUS:ADDRESS, such as 1:0x50 (see i2cdetect -l)")
     address = int(match[2], 0) if match[2][:2].lower() == "0x" else int(match[2])
     if not FIRST_ADDRESS <= address <= LAST_ADDRESS:
         raise PortError(f"{text}: a 24Cxx is at 0x{FIRST_ADDRESS:x} to 0x{LAST_ADDRESS:x}; check its address pins")
@@ -72,7 +72,7 @@ class Chip:
             import smbus2
         except ImportError as error:
             raise PortError(
-                f"{self.place} needs smbus2 ({error}); pip install 'biotac-gateway[i2c]', on Linux"
+                f"{self.place} needs smbus2 ({error}); on Linux, pip install 'biotac-gateway[i2c]'"
             ) from error
         self._message: Any = smbus2.i2c_msg
         try:
@@ -110,8 +110,8 @@ class Chip:
         except OSError as error:
             if error.errno in NOT_ACKNOWLEDGED:
                 raise PortError(
-                    f"{self.place}: nothing acknowledges ({error.strerror}); check power, SDA, SCL and the address "
-                    "(i2cdetect shows it)"
+                    f"{self.place}: no acknowledge ({error.strerror}); check power, SDA, SCL and the address "
+                    "(see i2cdetect)"
                 ) from error
             raise PortError(f"{self.place}: the bus failed ({error}); check its wires and try again") from error
 
@@ -126,14 +126,14 @@ class Chip:
             else:
                 return
         raise PortError(
-            f"{self.place} was given a page and has not acknowledged {QUESTIONS} questions since; check its power and "
-            "store again: the calibration before still stands"
+            f"{self.place} did not acknowledge any of {QUESTIONS} polls after a page write; check its power and "
+            "store again; the previous calibration is intact"
         )
 
 
 def _describe_open_error(bus: int, error: OSError) -> str:
     if isinstance(error, FileNotFoundError):
-        return f"no I2C bus {bus}; switch I2C on (raspi-config, Interface Options) and see ls /dev/i2c-*"
+        return f"no I2C bus {bus}; enable I2C (raspi-config, Interface Options), then see ls /dev/i2c-*"
     if isinstance(error, PermissionError):
         return f"no permission to open /dev/i2c-{bus}; sudo usermod -aG i2c $USER, and log in again"
     return f"/dev/i2c-{bus} cannot be opened ({error}); see ls /dev/i2c-*"

@@ -39,7 +39,7 @@ def load(chip: Chip) -> Calibration:
         if all(set(data) == {0xFF} for data in raw):
             raise InputError(f"{chip.place} is blank; `biotac calibration store` writes to it")
         raise InputError(
-            f"{chip.place} holds no calibration: neither place's CRC is right; check --chip, or store it again"
+            f"{chip.place} holds no calibration: the CRCs of both copies are wrong; check --chip, or store it again"
         )
     return flash_record.unpack(newest.record, chip.place)
 
@@ -60,7 +60,7 @@ def store(chip: Chip, calibration: Calibration) -> bool:
     chip.write(place * PLACE_BYTES, whole)
     if _read(chip, place) != whole:
         raise PortError(
-            f"{chip.place} reads back other bytes than were written; check --chip and the chip's write protection (WP)"
+            f"{chip.place} does not read back the bytes written; check --chip and the chip's write protection (WP)"
         )
     return True
 

@@ -12,11 +12,11 @@ from .calibration import Calibration
 MAX_BYTES = 256
 
 _WHY = {
-    lib.BT_RECORD_DAMAGED: "holds no whole record: its CRC is wrong",
-    lib.BT_RECORD_OF_SOMETHING: "holds a record of something else than a calibration",
-    lib.BT_RECORD_OTHER_VERSION: "holds a calibration of a newer version; install a newer biotac-gateway",
-    lib.BT_RECORD_CLEARED: "holds a calibration that was cleared",
-    lib.BT_RECORD_OUT_OF_RANGE: "holds a calibration with a value out of its range",
+    lib.BT_RECORD_DAMAGED: "holds no intact record: its CRC is wrong; store the calibration again",
+    lib.BT_RECORD_OF_SOMETHING: "holds a record other than a calibration; store the calibration again",
+    lib.BT_RECORD_OTHER_VERSION: "holds a calibration in a newer format; install a newer biotac-gateway",
+    lib.BT_RECORD_CLEARED: "holds a cleared calibration; store one again",
+    lib.BT_RECORD_OUT_OF_RANGE: "holds a calibration with a value out of range; store a valid one",
 }
 
 
@@ -43,4 +43,4 @@ def unpack(data: bytes, where: str) -> Calibration:
     try:
         return Calibration.from_wire(list(its.serial), its.made_s, list(its.value))
     except ValueError as error:
-        raise InputError(f"{where} holds a calibration that cannot be ({error})") from error
+        raise InputError(f"{where} holds an invalid calibration ({error}); store a valid one") from error

@@ -28,12 +28,12 @@ def parse(port: str) -> tuple[str, dict[int, tuple[str, str]]]:
             continue
         place, _, kind = text.rpartition(":")
         if kind not in KINDS:
-            raise PortError(f"{port}: {text!r} names no kind of EEPROM ({', '.join(KINDS)}); expected {FORM}")
+            raise PortError(f"{port}: {text!r} names no known EEPROM ({', '.join(KINDS)}); expected {FORM}")
         parse_place(place)
         places[finger] = (place, kind)
     fingers = bare.count(",") + 1
     if places and max(places) >= fingers:
-        raise PortError(f"{port}: {max(places) + 1} EEPROMs for {fingers} finger(s); expected one for each at most")
+        raise PortError(f"{port}: {max(places) + 1} EEPROMs for {fingers} finger(s); expected at most one per finger")
     return bare, places
 
 

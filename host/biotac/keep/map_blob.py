@@ -23,7 +23,7 @@ def as_blob(its: bytes | BoardMap) -> bytes:
     blob = its.blob if isinstance(its, BoardMap) else current(bytes(its))
     if not _map.HEADER_BYTES <= len(blob) <= _map.MAX_BYTES:
         raise InputError(
-            f"the map has {len(blob)} bytes, expected {_map.HEADER_BYTES} to {_map.MAX_BYTES}; is it a map's file?"
+            f"the map has {len(blob)} bytes, expected {_map.HEADER_BYTES} to {_map.MAX_BYTES}; is it a wrench map?"
         )
     return blob
 

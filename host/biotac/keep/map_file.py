@@ -48,10 +48,10 @@ def from_dict(tree: Any) -> bytes:
     try:
         blob = base64.b64decode(tree.get("map", ""), validate=True)
     except (TypeError, binascii.Error) as error:
-        raise ValueError(f"its map is no base64 ({error})") from error
+        raise ValueError(f"its map is not base64 ({error})") from error
     for key, value in to_dict(blob).items():
         if key != "provenance" and tree.get(key) != value:
-            raise ValueError(f"{key} is {tree.get(key)!r}, but its map's is {value!r}: it was changed or cut")
+            raise ValueError(f"{key} is {tree.get(key)!r}, but the map says {value!r}: the file was edited or cut off")
     return opened(blob).blob
 
 
@@ -62,9 +62,7 @@ def load(path: Path) -> bytes:
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from error
     except (ValueError, InputError) as error:
-        raise InputError(
-            f"{path} is no wrench map that can be used: {error}; `biotac map get` writes one that can"
-        ) from error
+        raise InputError(f"{path} is not a usable wrench map: {error}; `biotac map get` writes one") from error
 
 
 def save(path: Path, blob: bytes, provenance: Provenance | None = None, *, overwrite: bool = False) -> None:

@@ -163,7 +163,7 @@ class StreamDecoder:
         Raises RuntimeError when another thread is in ``feed``: bytes from two threads have no order.
         """
         if not self._alone.acquire(blocking=False):
-            raise RuntimeError("another thread feeds this decoder; give each thread a decoder of its own")
+            raise RuntimeError("another thread is feeding this decoder; give each thread its own")
         try:
             return self._feed(chunk)
         finally:

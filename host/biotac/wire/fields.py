@@ -59,7 +59,7 @@ _UNITS = ("n", "nmm", "mm")
 
 _FINGER = Field("finger", "u1", "1", "chip select, 0 to 4")
 _TIME = (
-    Field("seq", "<u4", "1", "number of the round, counted by the board, unwrapped"),
+    Field("seq", "<u4", "1", "round number, counted by the board, unwrapped"),
     Field("t_us", "<i8", "us", "device time, unwrapped from the first value seen"),
 )
 
@@ -76,8 +76,8 @@ FRAME_FIELDS = (
     _count("pdc", "static pressure"),
     _count("tac", "thermal flux"),
     _count("tdc", "temperature"),
-    Field("tare", "<f4", "count", "what of counts is rest, in 1/16; NaN where unknown", _ELECTRODES, "tare_q4", 16),
-    Field("pdc_tare", "<f8", "count", "pressure at rest, in 1/16; NaN where unknown", (), "pdc_tare_q4", 16),
+    Field("tare", "<f4", "count", "counts at rest, in steps of 1/16; NaN where unknown", _ELECTRODES, "tare_q4", 16),
+    Field("pdc_tare", "<f8", "count", "pressure at rest, in steps of 1/16; NaN where unknown", (), "pdc_tare_q4", 16),
     Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state"),
     Field("poc_mm", "<f8", "mm", "point of contact on the core's surface; NaN where invalid", AXES, "poc_um", 1_000),
     Field("force_n", "<f8", "N", "force on the finger; NaN where invalid", AXES, "force_100un", 10_000),
@@ -90,8 +90,8 @@ FRAME_FIELDS = (
         "torque_mnmm",
         1_000,
     ),
-    Field("poc_sigma_mm", "<f8", "mm", "one standard deviation; NaN unless wanted", (), "poc_sigma_um", 1_000),
-    Field("force_sigma_n", "<f8", "N", "one standard deviation; NaN unless wanted", AXES, "force_sigma_100un", 10_000),
+    Field("poc_sigma_mm", "<f8", "mm", "one standard deviation; NaN unless enabled", (), "poc_sigma_um", 1_000),
+    Field("force_sigma_n", "<f8", "N", "one standard deviation; NaN unless enabled", AXES, "force_sigma_100un", 10_000),
     Field(
         "pdc_filtered", "<f8", "count", "pressure, filtered by the board; NaN where missing", (), "pdc_filtered_q4", 16
     ),
@@ -108,7 +108,7 @@ FRAME_FIELDS = (
         "torsion_nmm",
         "<f8",
         "N*mm",
-        "torque about the outward normal at the contact; NaN unless a wrench map has it",
+        "torque about the outward normal at the contact; NaN unless a wrench map gives it",
         (),
         "torsion_mnmm",
         1_000,
@@ -117,7 +117,7 @@ FRAME_FIELDS = (
         "wrench_age_ms",
         "<u2",
         "ms",
-        "by which force, torque, torsion are older; 0 unless REPEATED",
+        "how much older force, torque and torsion are than the row; 0 unless REPEATED",
         (),
         "wrench_age_ms",
     ),
@@ -131,12 +131,12 @@ PAC_FIELDS = (_FINGER, *_TIME, _count("pac", "dynamic pressure", PAC_SAMPLES))
 BANDS_FIELDS = (
     _FINGER,
     *_TIME,
-    Field("good", "u1", "1", "samples of which a good word came", (), "good"),
+    Field("good", "u1", "1", "samples that came as a good word", (), "good"),
     Field(
         "energy_count2",
         "<f8",
         "count^2",
-        "sum of squares over 22 samples of what is in the band; NaN without a good word",
+        "sum of squares of the signal in the band, over 22 samples; NaN without a good word",
         ("18hz", "36hz", "72hz", "147hz", "309hz", "over527hz"),
         "energy_q4",
         16,
@@ -147,7 +147,7 @@ BANDS_FIELDS = (
 IDLE_FIELDS = (
     _FINGER,
     *_TIME,
-    Field("frames", "<u2", "1", "rounds that it stands for", (), "frames"),
+    Field("frames", "<u2", "1", "rounds that the row stands for", (), "frames"),
     Field("energy_count2", "<u4", "count^2", "sum of squared signals", (), "energy_count2"),
     _count("pdc", "static pressure"),
     _count("tdc", "temperature"),

@@ -36,7 +36,7 @@ class FramingCounts:
 def encode(message_id: int, payload: bytes) -> bytes:
     """Return one whole frame with its delimiter. Raises ValueError for a payload of over 249 bytes."""
     if len(payload) > PAYLOAD_MAX_BYTES:
-        raise ValueError(f"a payload of {len(payload)} bytes, expected at most {PAYLOAD_MAX_BYTES}")
+        raise ValueError(f"the payload has {len(payload)} bytes, expected at most {PAYLOAD_MAX_BYTES}")
     out = ffi.new("uint8_t[]", ENCODED_MAX_BYTES)
     return bytes(ffi.buffer(out, lib.bt_frame_encode(message_id, payload, len(payload), out)))
 

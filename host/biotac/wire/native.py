@@ -8,10 +8,10 @@ try:
     from .._core import ffi as ffi
     from .._core import lib as lib
 except ImportError as error:  # an editable tree without a build, or a wheel for another platform
-    raise ImportError(f"the compiled core is missing ({error}); install the package: pip install .") from error
+    raise ImportError(f"the compiled core cannot be loaded ({error}); install the package: pip install .") from error
 
 if lib.bt_binding_schema_hash() != SCHEMA_HASH:
     raise ImportError(
         f"the compiled core was built for schema {lib.bt_binding_schema_hash():08x}, this Python code for "
-        f"{SCHEMA_HASH:08x}; install the package again: pip install ."
+        f"{SCHEMA_HASH:08x}; reinstall the package: pip install ."
     )

@@ -67,7 +67,7 @@ def test_the_map_is_on_the_board_and_does_there_what_was_fitted(
 
 def test_another_fingers_board_is_refused(calibrated: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(fit_again(calibrated, "--upload", "sim:press.toml")) == 2
-    assert f"is of sensor {SERIAL}, and this is BTSIM00000000001: expected the same" in capsys.readouterr().err
+    assert f"is of sensor {SERIAL}, but this is BTSIM00000000001: expected the same" in capsys.readouterr().err
 
 
 def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -88,5 +88,5 @@ def test_a_board_that_computes_otherwise_is_found_out(calibrated: Path, monkeypa
             return type(held)(held.axes, held.blocks, held.serial, held.made_s).blob
 
         monkeypatch.setattr(hand, "get_map", spoilt)
-        with pytest.raises(PortError, match=r"the board took the map of \d+ bytes and has another one of \d+ bytes"):
+        with pytest.raises(PortError, match=r"the board accepted the map of \d+ bytes, but has another of \d+ bytes"):
             upload.upload(hand, 0, its, loaded.run, serial=SERIAL, made_s=1)

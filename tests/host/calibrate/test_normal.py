@@ -60,7 +60,7 @@ def test_a_frame_without_a_point_has_no_normal() -> None:
 
 
 def test_few_contacts_are_refused() -> None:
-    with pytest.raises(InputError, match="7 contacts of the plate: expected 8"):
+    with pytest.raises(InputError, match="7 contacts with the plate: expected 8"):
         normal.fit(looks(7))
 
 

@@ -172,12 +172,14 @@ def test_a_finger_is_pulled_to_others_and_not_to_itself(
 ) -> None:
     kept = keeping.Kept(its, np.ones(3), np.ones(3), keeping.provenance_of(files[:2], "", symmetric=False))
     others, note = keeping.others_than(kept, [files[2]])
-    assert others is not None and note == "pulled to the population map of 1.npz, 2.npz"
+    assert others is not None and note == "regularized towards the population map of 1.npz, 2.npz"
     e = runs[2].counts[:50] - runs[2].tare
     z = moments.with_one(features.columns(Signals(e, runs[2].tare)))
     assert z @ others == pytest.approx(its.force(runs[2].counts[:50], runs[2].tare), abs=1e-9)
     others, note = keeping.others_than(kept, [files[0]])
-    assert others is None and note.startswith("not pulled to the population map of 1.npz, 2.npz, which was made of")
+    assert others is None and note.startswith(
+        "not regularized towards the population map of 1.npz, 2.npz, which was made"
+    )
 
 
 @pytest.mark.nightly

@@ -172,7 +172,7 @@ def test_files_that_are_there_are_seen_before_anybody_presses(tmp_path: Path, ca
 
 
 def test_a_sensor_that_is_not_there_is_said_at_once() -> None:
-    with pytest.raises(biotac.InputError, match="no sensor answers as finger 3: there are 0, 1"):
+    with pytest.raises(biotac.InputError, match=r"no sensor on finger 3 \(0, 1 are there\)"):
         guided.calibrate(lambda: biotac.open("sim:fingers.toml?fingers=2"), guided.Plan((0, 3)), Silent(), made_s=0)
 
 
@@ -260,13 +260,13 @@ def changed_csv(pressed: Path, tmp_path: Path, change: str) -> Path:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("mN", "forces up to 5000, expected newtons, 200 at most"),
+        ("mN", "forces up to 5000, expected newtons, at most 200"),
         ("grams", "N/count, expected 0.0009 to 0.1; is the reference in newtons?"),
         ("late", "they agree best with pressure -59 rows after the force"),
         ("elsewhere", "covers none of"),
         ("nan", "1 of 3110 rows with NaN"),
         ("noise", "correlation 0."),
-        ("short", "has no reference: in "),
+        ("short", "has no reference: it gave no force in "),
         ("columns", "has columns t_ms, fx_n, fy_n, fz_n; expected t_s and force_n"),
     ],
 )

@@ -271,16 +271,16 @@ def test_what_was_walked_can_be_fitted_from_its_files(everywhere: tuple[Procedur
     assert origin.reference == "walk.csv emulated Nano17"
     assert origin.mounting is not None and origin.mounting["offset_mm"] == [-5.0, 1.5, 10.0]
     assert origin.alignment is not None and origin.alignment["peak"] > 0.9
-    with pytest.raises(InputError, match="is of sensor BTSIM00000000006, and this is BT0000000000000A"):
+    with pytest.raises(InputError, match="is of sensor BTSIM00000000006, but this is BT0000000000000A"):
         load(places.recording, (places.reference, reference), serial="BT0000000000000A")
     assert load(places.recording, (places.reference, reference), serial="BT0000000000000A", force=True).run.serial
-    with pytest.raises(InputError, match="without a force: expected --reference"):
+    with pytest.raises(InputError, match="which has no force: add --reference"):
         load(places.recording)
 
 
 def test_what_was_left_out_is_said_in_words(tmp_path: Path) -> None:
     procedure, words, *_ = walked(tmp_path, "calibrate_gaps.toml")
-    assert words[-1] == "the simulated finger's script is over"
+    assert words[-1] == "the simulated source has ended"
     assert procedure.coverage.missing() == [
         "side of E11: 0 of 8 cells",
         "tip: no shear to the tip",
@@ -293,7 +293,7 @@ def test_what_was_left_out_is_said_in_words(tmp_path: Path) -> None:
 @pytest.mark.parametrize("at_s", [20.0, 150.0])
 def test_ctrl_c_ends_it_and_keeps_everything(at_s: float, tmp_path: Path) -> None:
     procedure, words, places, reader = walked(tmp_path, "calibrate.toml", at_s)
-    assert procedure.step is Step.DONE and words[-1] == "ended on your word"
+    assert procedure.step is Step.DONE and words[-1] == "stopped by Ctrl-C"
     assert (procedure.zero is None) == (at_s < 100.0)
     recording = Recording(places.recording)
     assert not recording.problems
@@ -311,5 +311,5 @@ def test_a_reference_that_goes_away_leaves_the_files(tmp_path: Path) -> None:
     its = Reference("again", read_csv(tmp_path / "walk.csv").samples, LIN)
     assert len(its.samples) > 140 * 500
     assert not Recording(tmp_path / "walk.mcap").problems
-    with pytest.raises(InputError, match="would be overwritten"):
+    with pytest.raises(InputError, match="already exists; choose another name"):
         walked(tmp_path, "calibrate.toml")

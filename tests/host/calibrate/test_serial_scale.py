@@ -76,16 +76,16 @@ def test_it_waits_until_the_scale_has_settled() -> None:
 @pytest.mark.parametrize(
     ("printed", "words"),
     [
-        (b"", "is silent for 0.6 s"),
-        (b"\x83\xfe\x11\r\n", "is no weight"),
-        (b"hello\r\n", "'hello' is no weight"),
+        (b"", "no data from the scale in 0.6 s"),
+        (b"\x83\xfe\x11\r\n", "is not a weight"),
+        (b"hello\r\n", "'hello' is not a weight"),
         (b"S D     100.00 g\r\n", "did not settle"),
         (b"US,+00123.4  g\r\n", "did not settle"),
-        (b"S +\r\n", "beyond its range"),
-        (b"OL,+9999999  g\r\n", "beyond its range"),
-        (b"S S     10.00 oz\r\n", "expected N, g, kg"),
-        (b"ST,+00000.0  g\r\n", "while a finger presses"),
-        (b"ST,-00120.0  g\r\n", "while a finger presses"),
+        (b"S +\r\n", "the scale is out of range"),
+        (b"OL,+9999999  g\r\n", "the scale is out of range"),
+        (b"S S     10.00 oz\r\n", "expected a unit of N, g, kg"),
+        (b"ST,+00000.0  g\r\n", "while a finger should press"),
+        (b"ST,-00120.0  g\r\n", "while a finger should press"),
     ],
 )
 def test_what_is_no_reading_is_one_line(printed: bytes, words: str) -> None:
@@ -108,7 +108,7 @@ def test_a_port_that_is_not_there_is_named() -> None:
 def test_a_scale_that_is_unplugged_is_told() -> None:
     with printing([b"S S 1 g\r\n"]) as port:
         scale = Scale(port)
-    with scale, pytest.raises(PortError, match="went away"):
+    with scale, pytest.raises(PortError, match="lost the connection to the scale"):
         scale.force_n()
 
 

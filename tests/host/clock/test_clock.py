@@ -145,7 +145,7 @@ def test_a_device_time_that_runs_ahead_of_its_arrival_is_another_clock() -> None
     # A reboot seen through unwrapping: a small number becomes one behind the wrap.
     feed(clock, from_us=2**32 + 5_000, host_s=130.0)
     assert clock.resets == 1
-    assert clock.segments[-1].because == "a message arrived before it can have been sent"
+    assert clock.segments[-1].because == "a message arrived before it could have been sent"
     assert float(clock.host_time_s(2**32 + 1_005_000)) == pytest.approx(131.0, abs=0.001)
 
 

@@ -113,7 +113,7 @@ def test_pairs_go_round_a_ring() -> None:
 def test_what_a_board_would_refuse_is_refused_in_words() -> None:
     blob = board.quantise(random_map(2)).blob
     for bad in (b"", blob[:-1], blob + b"\0", b"\3" + blob[1:], blob[:24] + b"\xff" + blob[25:]):
-        with pytest.raises(InputError, match=rf"a wrench map of {len(bad)} bytes is refused as .* make the map again"):
+        with pytest.raises(InputError, match=rf"refuse this wrench map of {len(bad)} bytes .* make the map again"):
             from_blob(bad)
     with pytest.raises(InputError, match="OUT_OF_RANGE"):
         biotac.Finger(wrench_map=b"\3" + blob[1:])
@@ -219,7 +219,7 @@ def test_a_map_without_room_on_a_board_is_refused_in_words(monkeypatch: pytest.M
     its = random_map(5, 7)
     size = len(board.quantise(its).blob)
     monkeypatch.setattr(_map, "MAX_BYTES", size - 1)
-    with pytest.raises(InputError, match=f"takes {size} bytes: expected at most {size - 1}, a board's room"):
+    with pytest.raises(InputError, match=f"takes {size} bytes: expected at most {size - 1}, which fit a board"):
         board.quantise(its)
 
 

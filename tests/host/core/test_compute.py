@@ -278,7 +278,7 @@ def test_one_frame_per_call() -> None:
         assert results(row).tobytes() == expected.tobytes()
     assert results(counts[0]) is results(counts[1])
     for wrong in (counts[:1], counts[0].astype(int), counts[0, :18], counts[0].tolist()):
-        with pytest.raises(ValueError, match=r"expected uint16 of \(19,\)"):
+        with pytest.raises(ValueError, match=r"expected uint16 of shape \(19,\)"):
             results(wrong)
     counts[0, 0] = 4096
     with pytest.raises(ValueError, match="E1 = 4096"):

@@ -76,7 +76,7 @@ def test_training_stops_by_the_rows_kept_aside_and_refuses_nonsense() -> None:
     with pytest.raises(InputError, match=r"inputs \(40, 5\) and targets \(39, 1\): expected"):
         train(x, t[:-1])
     x[3, 2] = np.nan
-    with pytest.raises(InputError, match="hold NaN or infinity: expected numbers"):
+    with pytest.raises(InputError, match="contain NaN or infinity: expected finite numbers"):
         train(x, t)
     assert np.isnan(net(x)).any(axis=1).nonzero()[0].tolist() == [3]
     with pytest.raises(InputError, match=r"expected \(n, 5\), as in training"):
@@ -119,7 +119,7 @@ def test_a_trajectory_is_read_at_shares_of_its_own_largest_signal() -> None:
     rows = roc.shape(above, its.tare)
     assert any((found[4, -17:] == row).all() for row in rows[its.stimulation == 4]), "the last is a row of the press"
     np.testing.assert_allclose(found[:, 34 + 2], [rows[its.stimulation == k, 2].max() for k in range(30)])
-    with pytest.raises(InputError, match="do not stand together"):
+    with pytest.raises(InputError, match="rows of a press are not consecutive"):
         roc.trajectories(above, its.tare, np.arange(len(its)) % 7)
 
 

@@ -105,7 +105,7 @@ def test_lowess_keeps_a_line_and_drops_an_outlier() -> None:
     assert np.isnan(both[10, 1])
     moved = np.abs(both[:, 1] - lowess(noisy))
     assert np.nanmax(moved) < 0.1, "30 sigma off moves the line by less than one"
-    with pytest.raises(InputError, match="5 rows with a value: expected at least 11"):
+    with pytest.raises(InputError, match="5 rows have a value: expected at least 11"):
         lowess(np.arange(5.0))
 
 

@@ -313,16 +313,16 @@ def test_a_file_is_read_back_and_one_that_was_changed_is_refused(tmp_path: Path)
     assert (tree["serial"], tree["made_s"], tree["provenance"]) == ("BT7", 7, {"rmse_n": 0.2})
     worse = bytes([9]) + blob[1:]
     wrong = {
-        "serial is 'BT8', but its map's is 'BT7'": tree | {"serial": "BT8"},
-        "was changed or cut": tree | {"map": base64.b64encode(blob[:-3]).decode()},
-        "is refused as OUT_OF_RANGE": map_file.to_dict(worse),
-        "no base64": tree | {"map": "?"},
+        "serial is 'BT8', but the map says 'BT7'": tree | {"serial": "BT8"},
+        "the file was edited or cut off": tree | {"map": base64.b64encode(blob[:-3]).decode()},
+        r"would refuse this wrench map of \d+ bytes \(OUT_OF_RANGE\)": map_file.to_dict(worse),
+        "its map is not base64": tree | {"map": "?"},
         "its version is 2": tree | {"version": 2},
         'no "format"': [],
     }
     for words, changed in wrong.items():
         path.write_text(json.dumps(changed))
-        with pytest.raises(biotac.InputError, match=f"is no wrench map that can be used: .*{words}.*map get"):
+        with pytest.raises(biotac.InputError, match=f"is not a usable wrench map: .*{words}.*map get"):
             map_file.load(path)
 
 

@@ -92,7 +92,7 @@ def test_a_file_is_read_back_and_tells_where_it_comes_from(tmp_path: Path) -> No
     tree = json.loads(path.read_text())
     assert (tree["poc_weights"], tree["force_gain_nn"]) == ("ABS_N2", {"x": 1, "y": -2, "z": 3})
     assert tree["provenance"] == {"by": "hand"}
-    with pytest.raises(biotac.InputError, match="exists and would be overwritten"):
+    with pytest.raises(biotac.InputError, match="already exists; choose another name"):
         file.save(path, ODD, {})
 
 
@@ -103,7 +103,7 @@ def test_a_file_is_read_back_and_tells_where_it_comes_from(tmp_path: Path) -> No
         ({"version": 3}, "its version is 3, expected 1 to 2; a newer biotac-gateway"),
         ({"gain": 1}, "key 'gain' is unknown; expected"),
         ({"made_s": None}, "made_s is None, expected a whole number"),
-        ({"poc_weights": 1}, "poc_weights is 1, expected ABS_N2, COMPRESS_N1, COMPRESS_N2"),
+        ({"poc_weights": 1}, "poc_weights is 1, expected one of ABS_N2, COMPRESS_N1, COMPRESS_N2"),
         ({"poc_weights": ["ABS_N2"]}, "poc_weights is"),
         ({"force_gain_nn": {"x": 1, "y": 2}}, "expected an object with x, y, z"),
         ({"torque_gain_nn": [1, 2]}, "expected an object with y, z"),
@@ -111,7 +111,7 @@ def test_a_file_is_read_back_and_tells_where_it_comes_from(tmp_path: Path) -> No
         ({"thermal_gain_milli": 0.5}, "thermal_gain_milli is 0.5, expected a whole"),
         ({"pressure_gain_nn": -1}, "pressure_gain_nn is -1, expected 0 to 100000000"),
         ({"version": True}, "its version is True"),
-        ({"provenance": "hand"}, "provenance is no object"),
+        ({"provenance": "hand"}, "provenance is not an object"),
     ],
 )
 def test_a_file_that_cannot_be_used_says_why(tmp_path: Path, change: dict[str, object], words: str) -> None:
@@ -119,7 +119,7 @@ def test_a_file_that_cannot_be_used_says_why(tmp_path: Path, change: dict[str, o
     path.write_text(json.dumps(file.to_dict(ODD) | change))
     with pytest.raises(biotac.InputError, match=words) as refusal:
         file.load(path)
-    assert str(refusal.value).startswith(f"{path} is no calibration")
+    assert str(refusal.value).startswith(f"{path} is not a usable calibration")
 
 
 def test_a_file_from_before_pressure_is_read_as_not_calibrated_by_it(tmp_path: Path) -> None:
@@ -138,7 +138,7 @@ def test_every_key_but_provenance_must_be_there(key: str) -> None:
 
 @pytest.mark.parametrize("text", ["", "[]", "5", "{", '{"format": NaN}', "[" * 100_000, "\x00"])
 def test_what_is_no_file_at_all(text: str) -> None:
-    with pytest.raises(biotac.InputError, match="it is no calibration that can be used"):
+    with pytest.raises(biotac.InputError, match="it is not a usable calibration"):
         file.loads(text, "it")
 
 
@@ -148,7 +148,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     with pytest.raises(biotac.InputError, match="cannot be written"):
         file.save(tmp_path / "no" / "such.json", ODD, {})
     (tmp_path / "latin.json").write_bytes(b'{"by": "M\xfcller"}')
-    with pytest.raises(biotac.InputError, match="is no text"):
+    with pytest.raises(biotac.InputError, match="is not text"):
         file.load(tmp_path / "latin.json")
 
 
@@ -176,16 +176,16 @@ GOOD = flash_record.pack(ODD)[16:]
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"", "no whole record"),
-        (flash_record.pack(ODD)[:-3], "no whole record: its CRC is wrong"),
-        (flash_record.pack(ODD) + b"\0", "no whole record"),
-        (sealed(1, 1, GOOD), "something else than a calibration"),
-        (sealed(7, 1, GOOD), "something else than a calibration"),
-        (sealed(2, 3, GOOD), "newer version"),
-        (sealed(2, 1, GOOD), "out of its range"),
-        (sealed(2, 2, b""), "was cleared"),
-        (sealed(2, 2, GOOD[:20] + b"\7" + GOOD[21:]), "out of its range"),
-        (sealed(2, 2, b"B\xe4" + GOOD[2:]), "cannot be"),
+        (b"", "no intact record"),
+        (flash_record.pack(ODD)[:-3], "no intact record: its CRC is wrong"),
+        (flash_record.pack(ODD) + b"\0", "no intact record"),
+        (sealed(1, 1, GOOD), "a record other than a calibration"),
+        (sealed(7, 1, GOOD), "a record other than a calibration"),
+        (sealed(2, 3, GOOD), "a newer format"),
+        (sealed(2, 1, GOOD), "a value out of range"),
+        (sealed(2, 2, b""), "a cleared calibration"),
+        (sealed(2, 2, GOOD[:20] + b"\7" + GOOD[21:]), "a value out of range"),
+        (sealed(2, 2, b"B\xe4" + GOOD[2:]), "an invalid calibration"),
     ],
 )
 def test_a_record_that_is_none_says_why(data: bytes, words: str) -> None:

@@ -129,7 +129,7 @@ def test_silence_is_a_lost_device(box: NetFtBox) -> None:
     clock.now_s = 2 * SILENCE_S + 1.0
     reader.read()
     clock.now_s = 2 * SILENCE_S + 1.1
-    with pytest.raises(DeviceLostError, match=r"is silent for 2\.1 s: expected 500 records a second"):
+    with pytest.raises(DeviceLostError, match=r"for 2\.1 s: expected 500 records per second"):
         reader.read()
     reader.close()
     reader.close()

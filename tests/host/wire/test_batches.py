@@ -256,4 +256,4 @@ def test_threads_cannot_share_a_decoder() -> None:
     for thread in threads:
         thread.join()
     assert len(fed) + len(refused) == 160 and fed and refused
-    assert set(refused) == {"another thread feeds this decoder; give each thread a decoder of its own"}
+    assert set(refused) == {"another thread is feeding this decoder; give each thread its own"}

@@ -56,11 +56,13 @@ def made_of(kept: Kept, files: Sequence[Path]) -> bool:
 
 def others_than(kept: Kept, files: Sequence[Path]) -> tuple[Floats | None, str]:
     """Coefficients (533, 3) of a wrench map to pull the finger of ``files`` to, None if trained on them; and a note."""
-    fingers = ", ".join(kept.provenance.get("files", {})) or "fingers that it does not name"
+    fingers = ", ".join(kept.provenance.get("files", {})) or "unnamed fingers"
     if made_of(kept, files):
-        return None, f"not pulled to the population map of {fingers}, which was made of this recording"
+        return None, f"not regularized towards the population map of {fingers}, which was made from this recording"
     # any tare will do: the columns mean the same with every tare
-    return kept.its.wrench_map(np.zeros(ELECTRODES)).coefficients, f"pulled to the population map of {fingers}"
+    return kept.its.wrench_map(
+        np.zeros(ELECTRODES)
+    ).coefficients, f"regularized towards the population map of {fingers}"
 
 
 def dumps(kept: Kept) -> str:
@@ -93,11 +95,11 @@ def loads(text: str, where: str) -> Kept:
         if rows.shape != (COLUMNS, len(AXES) + 1) or any(one.shape != (len(AXES),) for one in sigmas):
             raise ValueError(f"coefficients {rows.shape}")
         if not all(np.isfinite(one).all() for one in (rows, *sigmas)) or (rows[:, -1] <= 0.0).any():
-            raise ValueError("a coefficient that is no number, or a variance that is not above 0")
+            raise ValueError("a coefficient is not finite, or a variance is not above 0")
         return Kept(Population(rows[:, :-1], rows[:, -1]), sigmas[0], sigmas[1], dict(facts["provenance"]))
     except (ValueError, KeyError, TypeError, OverflowError) as error:
         seen = str(error) or type(error).__name__
-        cure = "expected a " + FORMAT + " as `biotac calibrate population --out` writes it"
+        cure = "expected a " + FORMAT + " written by `biotac calibrate population --out`"
         raise InputError(f"{where}: {seen}: {cure}") from None
 
 

@@ -142,7 +142,7 @@ def recorded(
 
 def _check_enough(presses: int) -> None:
     if presses < LEAST_PRESSES:
-        raise InputError(f"{presses} presses of known force: expected {LEAST_PRESSES} or more; five are worth having")
+        raise InputError(f"{presses} presses of known force: expected {LEAST_PRESSES} or more; five work better")
 
 
 def _held(
@@ -158,7 +158,7 @@ def _held(
         whole = (its["counts"] != wire.INVALID_COUNT).all(axis=1) & (its["tare_q4"] != wire.INVALID_COUNT).all(axis=1)
         if not whole.any():
             raise InputError(
-                f"press {k + 1} has no frame with all electrodes and a tare: expected one; see to the sensor"
+                f"press {k + 1} has no frame with all electrodes and a tare: expected one; check the sensor"
             )
         counts.append(its["counts"][whole].astype(np.float64))
         tares.append(its["tare_q4"][whole] / Q4_PER_COUNT)

@@ -56,8 +56,8 @@ def plan(masses_g: Sequence[float], tilts_deg: Sequence[float]) -> tuple[Load, .
         raise InputError(f"masses of {_list(masses_g)} g: expected {low:g} to {high:g} g each; weigh them")
     if not all(0.0 < tilt <= MAX_TILT_DEG for tilt in tilts_deg):
         raise InputError(
-            f"tilts of {_list(tilts_deg)} deg: expected above 0 and at most {MAX_TILT_DEG:g}, where a weight lies "
-            "still; level needs no mention"
+            f"tilts of {_list(tilts_deg)} deg: expected above 0 and at most {MAX_TILT_DEG:g}, where a weight stays "
+            "put; the level block is always included"
         )
     blocks = [(0.0, LEVEL), *((tilt, down) for tilt in tilts_deg for down in DOWN)]
     return tuple(Load(mass, tilt, down) for tilt, down in blocks for mass in masses_g)

@@ -67,9 +67,9 @@ class PressureCheck:
         self.force_n_max = max(self.force_n_max, float(np.nanmax(error, initial=0.0)))
         one_sided = np.isnan(told) != np.isnan(truth)
         return [
-            (int(k), "pressure's force is valid on one side only")
+            (int(k), "force from pressure is valid on one side only")
             if one_sided[k]
-            else (int(k), f"pressure's force off by {error[k] * 1e3:.4g} mN, bound {FORCE_BOUND_N * 1e3:.4g} mN")
+            else (int(k), f"force from pressure off by {error[k] * 1e3:.4g} mN, bound {FORCE_BOUND_N * 1e3:.4g} mN")
             for k in np.flatnonzero(one_sided | (error > FORCE_BOUND_N + SLACK))
         ]
 

@@ -67,7 +67,7 @@ def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
     finger = presses[0].finger if presses else -1
     where = f"finger {finger}"
     if len(presses) < MIN_PRESSES:
-        raise InputError(f"{where}: {len(presses)} presses, expected {MIN_PRESSES}; press again")
+        raise InputError(f"{where}: {len(presses)} presses, expected at least {MIN_PRESSES}; press again")
     for press in presses:
         _check(where, press)
     above = np.concatenate([press.above_rest for press in presses])
@@ -75,8 +75,8 @@ def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
     gain_n = formulas.gain(above, force)
     if gain_n <= 0:
         raise InputError(
-            f"{where}: K is {gain_n:.3g} N/count: force falls while pressure rises; expected both to rise; the "
-            "reference is another press's, or has another sign"
+            f"{where}: K is {gain_n:.3g} N/count: force falls while pressure rises; expected both to rise; is the "
+            "reference from another press, or its sign wrong?"
         )
     if not GAIN_MIN_N <= gain_n <= GAIN_MAX_N:
         raise InputError(
@@ -87,12 +87,12 @@ def fit(rest: Rest, presses: Sequence[Press]) -> Fit:
     spread = (max(gains) - min(gains)) / gain_n
     if spread > SPREAD_MAX:
         raise InputError(
-            f"{where}: K of single presses is {min(gains):.4g} to {max(gains):.4g} N/count, {spread:.0%} apart, "
-            f"expected {SPREAD_MAX:.0%} at most; does the reference belong to this finger, and each press to one place?"
+            f"{where}: K of single presses is {min(gains):.4g} to {max(gains):.4g} N/count, a spread of {spread:.0%}, "
+            f"expected at most {SPREAD_MAX:.0%}; is the reference for this finger, and were all presses at one place?"
         )
     notes = []
     if spread > SPREAD_NOTED:
-        notes.append(f"{where}: K of single presses is {spread:.0%} apart: it depends on the force or the place")
+        notes.append(f"{where}: K of single presses spreads by {spread:.0%}: it depends on the force or the place")
     return Fit(
         finger=finger,
         gain_n=gain_n,
@@ -116,8 +116,8 @@ def verify(its: Fit, press: Press) -> Verification:
     told = press.rows["told_n"]
     if np.isnan(told).any():
         raise InputError(
-            f"{where}: the board told no force from pressure in {int(np.isnan(told).sum())} of {len(told)} held rows; "
-            "expected its calibration in force"
+            f"{where}: the board gave no force from pressure in {int(np.isnan(told).sum())} of {len(told)} held rows; "
+            "expected its calibration to be in force; see `biotac calibration show`"
         )
     truth = formulas.force(press.rows["pressure"], press.rows["rest"], its.gain_nn / NN_PER_N)
     force = press.rows["force_n"]
@@ -143,12 +143,14 @@ def _check(where: str, press: Press) -> None:
     force = press.rows["force_n"]
     which = f"{where}, press {press.number}"
     if len(force) < HOLD_ROWS:
-        raise InputError(f"{which}: {len(force)} held rows, expected {HOLD_ROWS}; hold longer")
+        raise InputError(f"{which}: {len(force)} held rows, expected at least {HOLD_ROWS}; hold longer")
     if not np.isfinite(force).all():
         bad = int((~np.isfinite(force)).sum())
-        raise InputError(f"{which}: the reference is NaN in {bad} of {len(force)} rows, expected a force in each")
+        raise InputError(
+            f"{which}: the reference is NaN in {bad} of {len(force)} rows, expected a force in each; record it longer"
+        )
     if not (force > 0).all():
         raise InputError(
             f"{which}: the reference is {float(force.min()):.3g} N while pressure is {press.above_rest.mean():.0f} "
-            "counts above rest, expected a magnitude above 0; zero it at rest, and check that it is this press's"
+            "counts above rest, expected a magnitude above 0; zero it at rest, and check that it belongs to this press"
         )

@@ -40,7 +40,7 @@ class Truth:
     def __init__(self, source: Played) -> None:
         known = source.known_force_n
         if known is None:
-            raise InputError(f"{source.name} knows no force; expected a scenario or a recording with one")
+            raise InputError(f"{source.name} has no force; expected a scenario or a recording with one")
         self._force_n = formulas.magnitude(known)
         self._first_row = int(np.argmax(np.any(source.samples <= 4095, axis=(1, 2))))
         self._first_us: int | None = None
@@ -72,12 +72,14 @@ class Series:
         bad = ~np.isfinite(t_s) | ~np.isfinite(force_n)
         if len(t_s) < 2 or bad.any():
             seen = f"{len(t_s)} rows" if len(t_s) < 2 else f"{int(bad.sum())} of {len(t_s)} rows with NaN"
-            raise InputError(f"{name} has {seen}; expected two rows or more, and a number in each")
+            raise InputError(f"{name} has {seen}; expected at least two rows, and a number in each")
         if (np.diff(t_s) <= 0).any():
-            raise InputError(f"{name}: time steps back or stands in row {int(np.argmax(np.diff(t_s) <= 0)) + 2}")
+            raise InputError(
+                f"{name}: time does not increase in row {int(np.argmax(np.diff(t_s) <= 0)) + 2}; sort the rows"
+            )
         if np.abs(force_n).max() > MAX_FORCE_N:
             raise InputError(
-                f"{name} has forces up to {np.abs(force_n).max():.4g}, expected newtons, {MAX_FORCE_N:g} at most; "
+                f"{name} has forces up to {np.abs(force_n).max():.4g}, expected newtons, at most {MAX_FORCE_N:g}; "
                 "convert them"
             )
         self.name = name
@@ -112,8 +114,8 @@ def check_alignment(where: str, above_rest: Floats, force_n: Floats) -> int:
     if correlation < MIN_CORRELATION or abs(lag) > MAX_LAG_ROWS:
         raise InputError(
             f"{where}: force and pressure are not aligned: they agree best with pressure {lag} rows after the force, "
-            f"correlation {correlation:.2f}; expected at most {MAX_LAG_ROWS} rows and {MIN_CORRELATION:g}; is it this "
-            "recording's force, in the board's own time (t_us of `biotac export`)?"
+            f"correlation {correlation:.2f}; expected at most {MAX_LAG_ROWS} rows, at least {MIN_CORRELATION:g}; is it "
+            "this recording's force, in the board's own time (t_us of `biotac export`)?"
         )
     return lag
 

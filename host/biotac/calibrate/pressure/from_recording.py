@@ -41,19 +41,19 @@ def calibrate(
     """
     if reference is None and not forces_n:
         raise InputError(
-            f"{recording.path}: no force to calibrate to; expected a reference file, or the force of each press"
+            f"{recording.path}: no force to calibrate against; expected a reference file, or the force of each press"
         )
     asked = tuple(forces_n) or (*CALIBRATION_FORCES_N, *VERIFICATION_FORCES_N)
     if len(asked) < MIN_PRESSES + 1:
         raise InputError(
-            f"{len(asked)} forces are named, expected {MIN_PRESSES + 1} or more: one a press, the last for verification"
+            f"{len(asked)} forces given, expected {MIN_PRESSES + 1} or more: one per press, the last for verification"
         )
     rows = recorded_rows(recording, reference)
     there = [int(f) for f in np.unique(rows["finger"])]
     absent = sorted(set(fingers) - set(there))
     if absent or not there:
         raise InputError(
-            f"{recording.path} has no frames of finger {absent[0] if absent else 0}; it has "
+            f"{recording.path} has no frames from finger {absent[0] if absent else 0}; fingers in it: "
             f"{', '.join(map(str, there)) or 'none at all'}"
         )
     outcome = Outcome({}, {}, {}, {}, {})
@@ -96,8 +96,8 @@ def recorded_rows(recording: Recording, reference: Series | None) -> StructArray
     if reference is not None and len(rows) and np.isnan(rows["force_n"]).all():
         first_s, last_s = t_us.min() / 1e6, t_us.max() / 1e6
         raise InputError(
-            f"{reference.name} covers none of {len(rows)} frames, which are from {first_s:.2f} to {last_s:.2f} s of "
-            "the board's time; expected t_s in that time (its t_us / 1e6)"
+            f"{reference.name} covers none of {len(rows)} frames, which span {first_s:.2f} to {last_s:.2f} s of "
+            "the board's time; expected t_s within it (t_us / 1e6)"
         )
     return rows
 

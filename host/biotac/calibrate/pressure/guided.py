@@ -114,8 +114,8 @@ def _on_board(
         now = _serial(hand, finger)
         if now != serials[finger]:
             raise InputError(
-                f"finger {finger} is sensor {now!r} and was {serials[finger]!r} when it was pressed; expected one and "
-                "the same: begin again"
+                f"finger {finger} is now sensor {now!r}, but was {serials[finger]!r} during the presses; expected "
+                "the same; start again"
             )
         calibrations[finger] = with_gain(hand, its, made_s)
         provenance[finger] = report.provenance(its, **{"from": hand.port, "board_serial": serial_text(hand.info)})
@@ -137,8 +137,10 @@ def _fingers(hand: Hand, plan: Plan) -> Sequence[int]:
     absent = sorted(set(plan.fingers) - set(hand.fingers))
     if absent or not hand.fingers:
         there = ", ".join(map(str, hand.fingers)) or "none"
-        which = absent[0] if absent else "any"
-        raise InputError(f"no sensor answers as finger {which}: there {'is' if not hand.fingers else 'are'} {there}")
+        which = absent[0] if absent else "0 to 4"
+        raise InputError(
+            f"no sensor on finger {which} ({there} {'is' if not hand.fingers else 'are'} there); check its cable"
+        )
     return plan.fingers or tuple(hand.fingers)
 
 
@@ -194,6 +196,6 @@ def put(hand: Hand, finger: int, calibration: Calibration) -> None:
     back = hand.calibration(finger)
     if back != calibration or hand.calibration_state(finger) != wire.CalibrationState.IN_FORCE:
         raise InputError(
-            f"finger {finger}: the board says {back}, expected what it was given, in force; read it with "
+            f"finger {finger}: the board returns {back}, expected the calibration it was given, in force; check with "
             "`biotac calibration show`"
         )

@@ -141,11 +141,11 @@ class Presses:
         seen = f"finger {self.finger}, {self._waited} rows"
         if self.phase is Phase.REST:
             return (
-                f"{seen}: never at rest: {self._most_kept} untouched rows in a row at most, "
-                f"{self._moved()}; expected {REST_ROWS}; let go of it and wait for its tare"
+                f"{seen}: never at rest: at most {self._most_kept} untouched rows in a row, "
+                f"{self._moved()}; expected {REST_ROWS}; let go and wait for the tare"
             )
         if self.phase is Phase.RELEASE:
-            return f"{seen}: press {len(self.presses)} was not let go of; expected pressure back at rest"
+            return f"{seen}: press {len(self.presses)} was not released; expected pressure back at rest; let go"
         which = f"press {len(self.presses) + 1} of {self._count}"
         if self._railed:
             return (
@@ -154,22 +154,24 @@ class Presses:
             )
         if self._forceless and self._forceless >= self._most_kept:
             return (
-                f"{seen}: {which} has no reference: in {self._forceless} held rows it told no force; expected one "
-                "in each; check that it runs, its place and its times"
+                f"{seen}: {which} has no reference: it gave no force in {self._forceless} held rows; expected one "
+                "in each; check that it is running, its place and its times"
             )
         if self._most_above < PRESS_COUNTS:
             return (
-                f"{seen}: {which} never came: pressure rose by {self._most_above:.1f} counts at most, expected "
-                f"{PRESS_COUNTS:g}; press harder, or this finger is not on the plate"
+                f"{seen}: {which} never came: pressure rose by at most {self._most_above:.1f} counts, expected "
+                f"{PRESS_COUNTS:g}; press harder, and check that this finger is on the plate"
             )
         return (
-            f"{seen}: {which} has no plateau: {self._most_kept} held rows in a row at most, {self._moved()}; expected "
+            f"{seen}: {which} has no plateau: at most {self._most_kept} held rows in a row, {self._moved()}; expected "
             f"{HOLD_ROWS}; hold still for a second"
         )
 
     def _moved(self) -> str:
         moved, limit = self._steadiest
-        return f"the steadiest moved by {moved:.2f} counts (limit {limit:.2f})" if np.isfinite(moved) else "none still"
+        return (
+            f"the steadiest moved by {moved:.2f} counts (limit {limit:.2f})" if np.isfinite(moved) else "none was still"
+        )
 
     def _enter(self, phase: Phase) -> None:
         self.phase = phase

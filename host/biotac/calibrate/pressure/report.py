@@ -70,7 +70,7 @@ def facts(outcome: Outcome) -> list[dict[str, Any]]:
 def lines(outcome: Outcome) -> list[str]:
     """The table of K and P0, with the verification press."""
     head = f"{'finger':>6}  {'sensor':<16}  {'K N/count':>9}  {'P0 count':>8}  {'fit':>6}"
-    out = [head + f"  {'force N':>7}  {'told N':>7}  {'error':>6}  {'float64':>7}"]
+    out = [head + f"  {'force N':>7}  {'board N':>7}  {'error':>6}  {'float64':>7}"]
     for finger, its in outcome.fits.items():
         serial = outcome.calibrations[finger].serial or "any"
         line = f"{finger:>6}  {serial:<16}  {its.gain_n:>9.6f}  {its.rest.counts:>8.1f}  {its.relative_error:>6.2%}"
@@ -79,10 +79,10 @@ def lines(outcome: Outcome) -> list[str]:
         out.append(line)
     notes = [note for its in outcome.fits.values() for note in its.notes]
     notes += [
-        f"finger {f}: verified {seen.board_error:.1%} off, the paper's finger was {PAPER_ERROR:.2%}: another place or "
-        "another way of pressing than before?"
+        f"finger {f}: {seen.board_error:.1%} off on the verification press (the paper's: {PAPER_ERROR:.2%}): was it at "
+        "another place, or pressed in another way?"
         for f, seen in outcome.verified.items()
         if seen.board_error > PAPER_ERROR
     ]
-    lags = [f"finger {f}: pressure comes {lag} rows after the force" for f, lag in outcome.lag_rows.items() if lag]
+    lags = [f"finger {f}: pressure lags the force by {lag} rows" for f, lag in outcome.lag_rows.items() if lag]
     return [*out, *(f"  {note}" for note in (*notes, *lags))]

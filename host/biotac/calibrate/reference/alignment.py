@@ -69,7 +69,7 @@ def align(where: str, board_s: Floats, board_load: Floats, reference_s: Floats, 
     if min(len(a), len(b)) < least:
         raise RecordingError(
             f"{where}: {min(len(a), len(b)) * STEP_S:.1f} s of force or counts: expected at least {MIN_OVERLAP_S:g} s "
-            "to align them by; record longer"
+            "to align them; record longer"
         )
     lags, correlation, overlap = _correlate(a, b, least)
     best = int(np.argmax(correlation))
@@ -80,21 +80,21 @@ def align(where: str, board_s: Floats, board_load: Floats, reference_s: Floats, 
     not_aligned = f"{where}: force and counts are not aligned"
     if peak < MIN_PEAK:
         raise RecordingError(
-            f"{not_aligned}: they agree best with the force {offset:+.2f} s off the counts' clock, and there their "
-            f"changes correlate with {peak:.2f}: expected at least {MIN_PEAK:g}; are both of the same run?"
+            f"{not_aligned}: they agree best with the force {offset:+.2f} s off the counts' clock, where their "
+            f"changes correlate with {peak:.2f}: expected at least {MIN_PEAK:g}; are both from the same run?"
         )
     width_s = _width(correlation, best)
     overlap_s = float(overlap[best] * STEP_S)
     clear = float((_fisher(peak) - _fisher(runner_up)) * np.sqrt(overlap_s / max(width_s, STEP_S)))
     if clear < MIN_CLEAR:
         raise RecordingError(
-            f"{not_aligned}: their best agreement ({peak:.2f}) is not clear, another shift has {runner_up:.2f}, "
-            f"{clear:.1f} standard errors less: expected {MIN_CLEAR:g}; press less regularly, or record longer"
+            f"{not_aligned}: their best agreement ({peak:.2f}) is not clear: another shift has {runner_up:.2f}, "
+            f"{clear:.1f} standard errors lower, expected {MIN_CLEAR:g}; press less regularly, or record longer"
         )
     drift_ppm, middle_s, offset, scatter, pieces = _drift(a, b, a_start, b_start, int(lags[best]), offset)
     if abs(drift_ppm) > MAX_DRIFT_PPM or scatter > MAX_SCATTER_S:
         raise RecordingError(
-            f"{not_aligned}: over the run the clocks drift by {drift_ppm:.0f} ppm, and pieces of it lie "
+            f"{not_aligned}: the clocks drift by {drift_ppm:.0f} ppm over the run, and parts of it lie "
             f"{scatter * 1e3:.0f} ms off that: expected at most {MAX_DRIFT_PPM:g} ppm and {MAX_SCATTER_S * 1e3:g} ms; "
             "did a clock jump?"
         )

@@ -42,8 +42,8 @@ def read_csv(path: Path, mounting: Mounting | None = None) -> Reference:
         its_mounting = from_json(own["mounting"], f"{path}: line '# mounting:'")
     if its_mounting is None:
         raise RecordingError(
-            f"{path}: says nothing of how the sensor is fixed to the finger: expected --mounting FILE.toml, or "
-            "--mounting lin where axes and origin are Lin's already"
+            f"{path}: does not say how the sensor is mounted on the finger: expected --mounting FILE.toml, or "
+            "--mounting lin if axes and origin are already Lin's"
         )
     use, scale = columns(path, head)
     table = read(use)
@@ -61,7 +61,7 @@ def open_table(path: Path) -> tuple[dict[str, str], list[str], Callable[[Sequenc
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        seen = error.strerror if isinstance(error, OSError) else "it is no text"
+        seen = error.strerror if isinstance(error, OSError) else "it is not text"
         raise RecordingError(f"{path}: cannot be read ({seen}): expected a CSV file of a force/torque sensor") from None
     own, head, body = _split(text)
     if head is None:
@@ -115,13 +115,15 @@ def columns(path: Path, names: list[str], *, torque: bool = True) -> tuple[list[
         if factor is None:
             raise RecordingError(f"{path}: column {cell!r} is in {unit!r}: expected {_WANTED}; convert it")
         if name in found:
-            raise RecordingError(f"{path}: column {cell!r} is there twice: expected it once; remove one")
+            raise RecordingError(f"{path}: column {cell!r} is there twice: expected once; remove one")
         found[name] = (place, factor)
     torques = torque and [name for name in _NAMES[4:] if name in found]
     wanted = _NAMES if torques else _NAMES[:4]
     missing = [COLUMNS[_NAMES.index(name)] for name in wanted if name not in found]
     if missing:
-        raise RecordingError(f"{path}: no column {missing[0]}: expected {','.join(COLUMNS)}, or those without torque")
+        raise RecordingError(
+            f"{path}: no column {missing[0]}: expected {','.join(COLUMNS)}, or the same without torque"
+        )
     return [found[name][0] for name in wanted], np.array([found[name][1] for name in wanted[1:]])
 
 
@@ -136,9 +138,9 @@ class CsvWriter:
         try:
             self._stream: TextIO = path.open("w" if overwrite else "x", encoding="utf-8", newline="\n")
         except FileExistsError:
-            raise InputError(f"{path} exists and would be overwritten; choose another name or say --force") from None
+            raise InputError(f"{path} already exists; choose another name, or add --force to overwrite it") from None
         except OSError as error:
-            raise InputError(f"{path} cannot be written ({error.strerror}); choose another place") from None
+            raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from None
         self._stream.write(f"# sensor: {' '.join(sensor.split())}\n# mounting: {json.dumps(mounting.facts())}\n")
         self._stream.write(",".join(COLUMNS) + "\n")
         self._stream.flush()

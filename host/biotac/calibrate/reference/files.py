@@ -25,4 +25,4 @@ def read_reference(text: str, mounting: Mounting | None = None) -> Reference:
         return read_mcap(path, mounting)
     if suffix in (".csv", ".tsv", ".txt"):
         return read_csv(path, mounting)
-    raise InputError(f"{text}: unknown kind of reference: expected .csv, or .mcap with geometry_msgs WrenchStamped")
+    raise InputError(f"{text}: unknown file type: expected .csv, .tsv, .txt, or .mcap with geometry_msgs WrenchStamped")

@@ -32,8 +32,8 @@ def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -
     """
     if mounting is None:
         raise RecordingError(
-            f"{path}: a WrenchStamped says nothing of how the sensor is fixed to the finger: expected --mounting "
-            "FILE.toml, or --mounting lin where axes and origin are Lin's already"
+            f"{path}: a WrenchStamped does not say how the sensor is mounted on the finger: expected --mounting "
+            "FILE.toml, or --mounting lin if axes and origin are already Lin's"
         )
     rows: dict[str, list[Row]] = {}
     decoders: dict[str, Callable[[bytes], Any]] = {}
@@ -52,7 +52,7 @@ def read_mcap(path: Path, mounting: Mounting | None, topic: str | None = None) -
     except Exception as error:  # the packages that read it raise many kinds of errors for a damaged file
         raise RecordingError(f"{path}: cannot be read ({error}): expected an MCAP file with {SCHEMAS[0]}") from None
     if len(rows) != 1:
-        known = ", ".join(sorted(rows)) or ", ".join(sorted(seen)[:6]) or "no message"
+        known = ", ".join(sorted(rows)) or ", ".join(sorted(seen)[:6]) or "no messages"
         cure = "name one: --reference FILE:TOPIC" if rows else "record the sensor's topic too"
         raise RecordingError(f"{path}: holds {known}: expected one topic of {SCHEMAS[0]}; {cure}")
     ((name, its),) = rows.items()

@@ -45,21 +45,21 @@ class Mounting:
     def __post_init__(self) -> None:
         rotation, offset = self.rotation, self.offset_mm
         if rotation.shape != (3, 3) or not np.isfinite(rotation).all():
-            raise InputError(f"rotation has shape {rotation.shape}: expected 3 rows of 3 numbers")
+            raise InputError(f"rotation has shape {rotation.shape}: expected 3 rows of 3 finite numbers")
         if offset.shape != (3,) or not np.isfinite(offset).all() or np.abs(offset).max() > MAX_OFFSET_MM:
             raise InputError(f"offset_mm is {offset.tolist()}: expected 3 numbers of up to {MAX_OFFSET_MM:g} mm")
         if not np.abs(rotation).max() <= 1.0 + MAX_SKEW:
             raise InputError(
-                f"rotation holds {np.abs(rotation).max():.3g}: expected at most 1; its rows are unit vectors"
+                f"rotation contains {np.abs(rotation).max():.3g}: expected at most 1; its rows must be unit vectors"
             )
         skew = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
         if skew > MAX_SKEW:
             raise InputError(
-                f"rotation is not orthonormal, R R' is off by {skew:.3g}: expected at most {MAX_SKEW:g}; its rows are "
+                f"rotation is not orthonormal, R R' is off by {skew:.3g}: expected at most {MAX_SKEW:g}; rows must be "
                 "unit vectors at right angles"
             )
         if np.linalg.det(rotation) < 0.0:
-            raise InputError("rotation mirrors, its determinant is -1: expected +1; change the sign of one row")
+            raise InputError("rotation mirrors (its determinant is -1): expected +1; change the sign of one row")
 
     def to_finger(self, wrench: Floats) -> Floats:
         """Force on the finger, and moment about Lin's origin, from readings (n, 3) in N or (n, 6) with N mm."""
@@ -89,7 +89,7 @@ def of(facts: Mapping[str, Any], where: str) -> Mounting:
     """The mounting from its three values. Raises InputError that begins with ``where``."""
     missing, unknown = [key for key in KEYS if key not in facts], sorted(set(facts) - set(KEYS))
     if missing or unknown:
-        seen = f"{missing[0]} is missing" if missing else f"{unknown[0]!r} is no part of it"
+        seen = f"{missing[0]} is missing" if missing else f"key {unknown[0]!r} is unknown"
         raise InputError(f"{where}: {seen}: expected {', '.join(KEYS)}")
     if facts["reads"] not in READS:
         raise InputError(f"{where}: reads is {facts['reads']!r}: expected {READS[0]!r} or {READS[1]!r}")
@@ -97,7 +97,7 @@ def of(facts: Mapping[str, Any], where: str) -> Mounting:
         rotation = np.array(facts["rotation"], dtype=np.float64)
         offset = np.array(facts["offset_mm"], dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{where}: rotation or offset_mm holds no numbers: expected 3 by 3 and 3 of them") from None
+        raise InputError(f"{where}: rotation or offset_mm is not numeric: expected 3 by 3 numbers and 3") from None
     try:
         return Mounting(rotation, offset, 1.0 if facts["reads"] == READS[0] else -1.0)
     except InputError as error:
@@ -113,7 +113,7 @@ def read_mounting(text: str) -> Mounting:
         facts = parse_toml(read_text(path, TOML_BYTES))
     except (OSError, ValueError) as error:
         seen = error.strerror if isinstance(error, OSError) else str(error)
-        raise InputError(f"{path}: {seen}: expected a mounting in TOML, with {', '.join(KEYS)}, or lin") from None
+        raise InputError(f"{path}: {seen}: expected TOML with {', '.join(KEYS)}, or the word lin") from None
     return of(facts, str(path))
 
 
@@ -122,7 +122,7 @@ def from_json(text: str, where: str) -> Mounting:
     try:
         facts = parse_json(text)
     except ValueError as error:
-        raise InputError(f"{where}: {error}: expected a mounting as JSON") from None
+        raise InputError(f"{where}: {error}: expected a mounting in JSON") from None
     if not isinstance(facts, dict):
         raise InputError(f"{where}: {text[:40]!r}: expected an object with {', '.join(KEYS)}")
     return of(facts, where)

@@ -49,15 +49,15 @@ def parse_address(text: str) -> Address:
     unknown = sorted(set(options) - set(OPTIONS))
     if match is None or unknown:
         seen = f"option {unknown[0]!r}" if unknown else repr(place)
-        raise InputError(f"{text}: {seen} is unknown: expected {_FORM}")
+        raise InputError(f"{text}: {seen} is not valid: expected {_FORM}")
     try:
         numbers = {key: float(value) for key, value in options.items()}
     except ValueError:
-        raise InputError(f"{text}: an option is no number: expected {_FORM}") from None
+        raise InputError(f"{text}: an option is not a number: expected {_FORM}") from None
     scale = None
     given = [key for key in ("cpf", "cpt", "rate") if key in numbers]
     if given and len(given) < 3:
-        raise InputError(f"{text}: {' and '.join(given)} alone: expected cpf, cpt and rate together, or none of them")
+        raise InputError(f"{text}: only {' and '.join(given)} given: expected cpf, cpt and rate, or none of them")
     if given:
         scale = Scale(numbers["cpf"], numbers["cpt"] / rdt.NMM_PER_NM, numbers["rate"])
     return Address(match[1], int(match[2] or rdt.PORT), int(numbers.get("http", 80)), scale)
@@ -71,23 +71,23 @@ def read_configuration(xml: bytes, where: str) -> tuple[Scale, str]:
     try:
         root = ElementTree.fromstring(xml)
     except ElementTree.ParseError as error:
-        raise InputError(f"{where}: {error}: expected the XML of a Net F/T box; is it one?") from None
+        raise InputError(f"{where}: {error}: expected the XML of a Net F/T box; check the address") from None
 
     def text(name: str) -> str:
         found = root.findtext(f".//{name}")
         if found is None:
-            raise InputError(f"{where}: no <{name}>: expected the configuration of a Net F/T box; give {_FORM}")
+            raise InputError(f"{where}: no <{name}>: expected a Net F/T box; check the address, or give {_FORM}")
         return found.strip()
 
     def unit(name: str, known: dict[str, float]) -> float:
         word = text(name)
         factor = known.get(re.sub(r"[\s.*·-]", "", word).upper())
         if factor is None:
-            raise InputError(f"{where}: the box counts in {word!r}: expected N, and N m or N mm; set it on its page")
+            raise InputError(f"{where}: the box's unit is {word!r}: expected N, and N m or N mm; set it on its page")
         return factor
 
     if text("comrdte").lower() not in ("enabled", "1"):
-        raise InputError(f"{where}: RDT is {text('comrdte')}: expected Enabled; switch it on on the box's page")
+        raise InputError(f"{where}: RDT is {text('comrdte')}: expected Enabled; enable it on the box's page")
     try:
         scale = Scale(
             float(text("cfgcpf")) / unit("scfgfu", _FORCE),
@@ -95,7 +95,7 @@ def read_configuration(xml: bytes, where: str) -> tuple[Scale, str]:
             float(text("comrdtrate")),
         )
     except ValueError as error:
-        raise InputError(f"{where}: {error}: expected numbers for cfgcpf, cfgcpt and comrdtrate") from None
+        raise InputError(f"{where}: {error}: expected numbers for cfgcpf, cfgcpt, comrdtrate; see its page") from None
     return scale, (root.findtext(".//cfgcalsn") or "").strip()
 
 
@@ -156,8 +156,8 @@ class NetFtReader:
             self._heard_s = now_s
         elif now_s - self._heard_s > SILENCE_S:
             raise DeviceLostError(
-                f"the force sensor at {self._where} is silent for {now_s - self._heard_s:.1f} s: expected "
-                f"{self.scale.rate_hz:g} records a second; check its cable, and that no other program reads it"
+                f"no data from the force sensor at {self._where} for {now_s - self._heard_s:.1f} s: expected "
+                f"{self.scale.rate_hz:g} records per second; check its cable, and that no other program reads it"
             )
         return self._decoder.take()
 

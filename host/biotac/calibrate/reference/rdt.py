@@ -78,8 +78,8 @@ class RdtDecoder:
             numbers[k] = nearest(raw, newest, 32)
             if numbers[k] < newest - RESTART_RECORDS:
                 raise DeviceLostError(
-                    f"the force sensor's records went from {newest} to {raw}: expected the next; it was restarted, or "
-                    "another program started it again: close that and begin anew"
+                    f"the force sensor's record number went from {newest} to {raw}: expected the next; it restarted or "
+                    "another program restarted its stream: close that program and start again"
                 )
             self._newest = max(newest, int(numbers[k]))
         self._waiting.append((numbers, records))

@@ -53,29 +53,31 @@ class Reference:
 def check(where: str, samples: Samples) -> None:
     """Refuse samples that cannot be a finger's reference. Raises RecordingError with the number that shows why."""
     if len(samples) < 2:
-        raise RecordingError(f"{where}: {len(samples)} samples: expected a recording of some minutes; record it again")
+        raise RecordingError(f"{where}: {len(samples)} samples: expected a recording of several minutes; record again")
     timeless = ~np.isfinite(samples.t_s)
     if timeless.any():
-        raise RecordingError(f"{where}: sample {int(np.argmax(timeless))} has no time (NaN): expected seconds")
+        raise RecordingError(
+            f"{where}: sample {int(np.argmax(timeless))} has no time (NaN): expected seconds; remove it"
+        )
     step = np.diff(samples.t_s)
     if (step <= 0.0).any():
         k = int(np.argmax(step <= 0.0))
         raise RecordingError(
             f"{where}: time goes from {samples.t_s[k]:.6f} to {samples.t_s[k + 1]:.6f} s after sample {k}: expected "
-            "increasing times; sort the samples, or take one run at a time"
+            "increasing times; sort the samples, or use one run at a time"
         )
     rate_hz = 1.0 / float(np.median(step))
     if not RATE_HZ[0] <= rate_hz <= RATE_HZ[1]:
         guess = "is t in ms or us?" if rate_hz < RATE_HZ[0] else "is t in s?"
         raise RecordingError(
-            f"{where}: {rate_hz:.4g} samples a second: expected {RATE_HZ[0]:g} to {RATE_HZ[1]:g}; {guess}"
+            f"{where}: {rate_hz:.4g} samples per second: expected {RATE_HZ[0]:g} to {RATE_HZ[1]:g}; {guess}"
         )
     bad: npt.NDArray[np.bool_] = ~np.isfinite(samples.wrench.sum(axis=1))
     # a few readings that the sensor marks as bad are left out later; a tenth of all is too many
     if bad.mean() > 0.1:
         raise RecordingError(
             f"{where}: {bad.sum()} of {len(bad)} samples are not finite, first sample {int(np.argmax(bad))}: expected "
-            "numbers; was the sensor in error?"
+            "numbers; did the sensor report an error?"
         )
     force = samples.force_n[~bad]
     size_n = float(np.percentile(np.linalg.norm(force - np.median(force, axis=0), axis=1), 99))

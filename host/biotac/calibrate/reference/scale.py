@@ -46,13 +46,13 @@ class Scale:
         self._port, self._patience_s = place, patience_s
         try:
             if set(options) != set(_OPTIONS):
-                raise ValueError(f"option {', '.join(set(options) - set(_OPTIONS))}")
+                raise ValueError(f"unknown option {', '.join(set(options) - set(_OPTIONS))}")
             baud, bits, stop = (int(options[key]) for key in ("baud", "bits", "stop"))
             self._serial = serial.serial_for_url(place, do_not_open=True, timeout=0.05, write_timeout=1.0)
             self._serial.baudrate, self._serial.bytesize, self._serial.stopbits = baud, bits, stop
             self._serial.parity = options["parity"].upper()
         except ValueError as error:
-            raise InputError(f"{port}: {error}: expected {_FORM}, as the scale's menu says") from None
+            raise InputError(f"{port}: {error}: expected {_FORM}, with the values from the scale's menu") from None
         try:
             self._serial.open()
         except (serial.SerialException, OSError) as error:
@@ -78,20 +78,20 @@ class Scale:
                 if value_n is not None:
                     return value_n
         except (serial.SerialException, OSError) as error:
-            raise PortError(f"{self._port}: the scale went away ({error}); see to its cable") from error
+            raise PortError(f"{self._port}: lost the connection to the scale ({error}); check its cable") from error
         if not seen:
             raise InputError(
-                f"{self._port}: the scale is silent for {self._patience_s:g} s; switch its output on, and give its "
+                f"{self._port}: no data from the scale in {self._patience_s:g} s; turn on its output, and give its "
                 f"baud rate: {_FORM}"
             )
         if any(_WEIGHT.fullmatch(line) for line in seen):
             raise InputError(
-                f"{self._port}: the scale did not settle in {self._patience_s:g} s, its last word was {seen[-1]!r}; "
-                "hold still, and begin again"
+                f"{self._port}: the scale did not settle in {self._patience_s:g} s, its last line was {seen[-1]!r}; "
+                "hold still, and start again"
             )
         raise InputError(
-            f"{self._port}: {seen[-1]!r} is no weight: expected lines as 'S S  123.4 g' or 'ST,+0123.4  g'; choose "
-            f"that format on the scale, or its baud rate: {_FORM}"
+            f"{self._port}: {seen[-1]!r} is not a weight: expected lines like 'S S  123.4 g' or 'ST,+0123.4  g'; set "
+            f"that format on the scale, or give its baud rate: {_FORM}"
         )
 
     def _lines(self) -> Iterator[str]:
@@ -109,14 +109,18 @@ class Scale:
 
     def _settled_n(self, line: str) -> float | None:
         if _BEYOND.fullmatch(line):
-            raise InputError(f"{self._port}: {line!r}: the scale is beyond its range; press less, or take another")
+            raise InputError(f"{self._port}: {line!r}: the scale is out of range; press less, or check its pan")
         found = _WEIGHT.fullmatch(line)
         if found is None or found["moving"] == "D" or found["settled"] == "US":
             return None
         unit = found["unit"]
         if unit not in UNITS_N:
-            raise InputError(f"{self._port}: {line!r}: expected {', '.join(UNITS_N)}; choose one on the scale")
+            raise InputError(
+                f"{self._port}: {line!r}: expected a unit of {', '.join(UNITS_N)}; choose one on the scale"
+            )
         value_n = float(found["number"].replace(" ", "")) * UNITS_N[unit]
         if value_n < LEAST_N:
-            raise InputError(f"{self._port}: {line!r} while a finger presses: expected more; hold on until told")
+            raise InputError(
+                f"{self._port}: {line!r} while a finger should press: expected more; keep pressing until told"
+            )
         return value_n

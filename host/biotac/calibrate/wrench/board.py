@@ -67,7 +67,7 @@ def quantise(its: WrenchMap, *, serial: str = "", made_s: int = 0) -> BoardMap:
     size = _map.HEADER_BYTES + sum(_map.BLOCK_BYTES + 2 * axes * _map.KINDS[b.kind].halves for b in blocks)
     if size > _map.MAX_BYTES:
         raise InputError(
-            f"the map takes {size} bytes: expected at most {_map.MAX_BYTES}, a board's room; choose a smaller model"
+            f"the map takes {size} bytes: expected at most {_map.MAX_BYTES}, which fit a board; choose a smaller model"
         )
     return result
 

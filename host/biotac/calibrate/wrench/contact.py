@@ -142,7 +142,7 @@ def torsion_truth(
         if given.shape != (rows,) or given.dtype.kind not in "iuf" or not np.isfinite(given).all():
             raise RecordingError(
                 f"{where}: field torsion is {given.dtype} {given.shape}: expected ({rows},) finite numbers in N mm "
-                f"about the outward normal, a row a frame; leave it out to have it computed from F and M"
+                f"about the outward normal, one per frame; omit it to have it computed from F and M"
             )
         return given.astype(np.float64)[:, None], ()
     size = np.linalg.norm(force_n, axis=1)
@@ -156,7 +156,7 @@ def torsion_truth(
     nowhere = ~np.isfinite(torsion)
     note = f"torsion: from F and M of point contacts; the line of action misses the finger in {missed.sum()} rows"
     if nowhere.sum() > MAX_NOWHERE_SHARE * rows:
-        return np.zeros((rows, 0)), (f"{note}, {nowhere.sum()} press on no place of it: torsion is left out",)
+        return np.zeros((rows, 0)), (f"{note}, in {nowhere.sum()} of which no contact fits: torsion is left out",)
     torsion[nowhere] = 0.0
     return torsion[:, None], (note,)
 

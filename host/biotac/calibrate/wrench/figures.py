@@ -154,7 +154,9 @@ def summary(validation: Validation) -> dict[str, Any]:
     if len(run.axes) > 3:
         result["rmse_nmm"] = _list(of[0][3:6])
         # numerics.md 4: only two electrodes at the tip sense it, with a lever of a millimetre and a half
-        result["notes"].append("Mx cannot be measured with this electrode layout: its figures are of what goes with it")
+        result["notes"].append(
+            "Mx cannot be measured with this electrode layout: its figures come from what correlates with it"
+        )
     if len(run.axes) > 6:
         result["torsion_rmse_nmm"] = float(of[0][6])
     return result

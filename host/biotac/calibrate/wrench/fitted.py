@@ -49,7 +49,9 @@ class WrenchMap:
         when the map was trained with PDC and there is none.
         """
         if self.with_pdc and pdc is None:
-            raise InputError("this map was trained with PDC: expected pdc (n,) too; calibrate again without field PDC")
+            raise InputError(
+                "this map was trained with PDC: expected pdc (n,) too; pass it, or calibrate without field PDC"
+            )
         signals = Signals(np.asarray(counts, dtype=np.float64) - self.tare, self.tare, pdc if self.with_pdc else None)
         return with_one(features.columns(signals)) @ self.coefficients
 
@@ -99,10 +101,10 @@ def load(path: Path) -> WrenchMap:
         if facts["blocks"] != _block_names(with_pdc=its.with_pdc):
             raise ValueError(f"blocks {facts['blocks']}")
         if not np.isfinite(its.coefficients).all() or not np.isfinite(its.tare).all():
-            raise ValueError("a coefficient that is no number")
+            raise ValueError("a coefficient or tare is not finite")
     except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
         seen = str(error) or type(error).__name__
-        raise InputError(f"{path}: {seen}: expected a {FORMAT} as `biotac calibrate wrench --out` writes it") from None
+        raise InputError(f"{path}: {seen}: expected a {FORMAT} written by `biotac calibrate wrench --out`") from None
     return its
 
 

@@ -42,7 +42,7 @@ class Step(Enum):
 
     WARM_UP = "warming up: leave the finger alone"
     TARE = "taring: leave the finger alone"
-    LOADS = "press, shear and twist: everywhere on the finger, and let go in between"
+    LOADS = "press, shear and twist all over the finger, and let go in between"
     DONE = "done"
 
 
@@ -86,7 +86,9 @@ class Procedure:
         if not len(samples):
             return
         if samples.wrench.shape[1] < 6:
-            raise InputError("the reference has no torque: expected six axes, places are found by them")
+            raise InputError(
+                "the reference has no torque: expected six axes, to locate contacts; use a six-axis sensor"
+            )
         if self.step in (Step.WARM_UP, Step.TARE):
             self._keep(samples)
         elif self.step is Step.LOADS and self.zero is not None:
@@ -100,7 +102,7 @@ class Procedure:
         self._tared_frames = 0
         if not accepted:
             self._untouched = 0
-            self.events.append("the board refused to tare, its signals move: leave the finger alone")
+            self.events.append("the board refused to tare, as its signals are moving: leave the finger alone")
 
     def finish(self, why: str) -> None:
         """End the procedure, complete or not: at the user's request, or because no more data comes."""
@@ -147,7 +149,7 @@ class Procedure:
         if at_s - self._begin_s > MAX_WARM_UP_S:
             raise InputError(
                 f"after {MAX_WARM_UP_S / 60:.0f} minutes the finger still drifts by {self.drift_counts_per_min:+.0f} "
-                f"counts/min: expected at most {self.max_drift_counts_per_min:g}; is it alone, and is it on?"
+                f"counts/min: expected at most {self.max_drift_counts_per_min:g}; is it untouched, and powered on?"
             )
         if disturbed and self._untouched == 0:
             # the board reports a touch for a finger that drifts fast enough, too: either way, keep waiting
@@ -239,9 +241,9 @@ def walk(
         try:
             _loop(hand, reader, procedure, writer, show, progress)
             if procedure.step is not Step.DONE:
-                procedure.finish("the simulated finger's script is over")
+                procedure.finish("the simulated source has ended")
         except KeyboardInterrupt:
-            procedure.finish("ended on your word")
+            procedure.finish("stopped by Ctrl-C")
     for event in procedure.take_events():
         show(event)
     # needed even if the board's source has ended: it sends nothing more, but still refuses as busy

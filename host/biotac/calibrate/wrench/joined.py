@@ -91,8 +91,8 @@ def join(where: str, board: Board, reference: Reference) -> Joined:
     known: Mask = np.isfinite(board.e.sum(axis=1))
     if len(known) and (~known).mean() > MAX_INCOMPLETE_SHARE:
         raise RecordingError(
-            f"{where}: {(~known).sum()} of {len(known)} frames have no tare or miss an electrode: expected at most "
-            f"{MAX_INCOMPLETE_SHARE:.0%}; tare before you record, and see to the wiring"
+            f"{where}: {(~known).sum()} of {len(known)} frames have no tare or lack an electrode: expected at most "
+            f"{MAX_INCOMPLETE_SHARE:.0%}; tare before you record, and check the wiring"
         )
     check_rows(where, int(known.sum()))
     board = board.only(known)
@@ -132,12 +132,12 @@ def _run(
     notes = (
         f"tare: the board's own, which moved by up to {moved:.0f} counts",
         f"reference: {reference.name}" + (f", {reference.sensor}" if reference.sensor else ""),
-        f"reference's zero: {_words(zero)}, from {int(board.quiet.sum())} rows in which the board felt nothing",
+        f"reference's zero: {_words(zero)}, from {int(board.quiet.sum())} rows in which the board saw no contact",
         f"clocks: offset {alignment.offset_s:+.4f} s, {alignment.drift_ppm:+.0f} ppm; "
         f"correlation {alignment.peak:.2f}, next best {alignment.runner_up:.2f}, "
         f"{alignment.width_s * 1e3:.0f} ms wide at half height; "
         f"{alignment.pieces} pieces scatter by {alignment.scatter_s * 1e3:.1f} ms",
-        f"{int((~there).sum())} of {len(there)} frames left out, for want of the reference",
+        f"{int((~there).sum())} of {len(there)} frames left out, as the reference does not cover them",
         *on_skin_note,
         drift_note,
         *about_torsion,
@@ -212,15 +212,15 @@ def _zero(where: str, board: Board, rows: Floats) -> Floats:
     quiet = board.quiet & np.isfinite(rows).all(axis=1)
     if quiet.sum() < MIN_REST_ROWS:
         raise RecordingError(
-            f"{where}: never at rest: in {int(quiet.sum())} frames the board felt nothing: expected {MIN_REST_ROWS}; "
-            "let go in between, the reference's zero is taken there"
+            f"{where}: never at rest: the board saw no contact in {int(quiet.sum())} frames: expected {MIN_REST_ROWS}; "
+            "let go in between, where the reference is zeroed"
         )
     zero: Floats = np.median(rows[quiet], axis=0)
     left = float(np.percentile(np.linalg.norm(rows[quiet, :3] - zero[:3], axis=1), 90))
     if left > MAX_REST_FORCE_N:
         raise RecordingError(
-            f"{where}: where the board felt nothing the reference says up to {left:.2f} N (90th percentile): expected "
-            f"at most {MAX_REST_FORCE_N:g} N; are they of the same run, and is the reference warm?"
+            f"{where}: where the board saw no contact the reference is up to {left:.2f} N (90th percentile): expected "
+            f"at most {MAX_REST_FORCE_N:g} N; are both from the same run, and is the reference warm?"
         )
     return zero
 
@@ -235,7 +235,7 @@ def _on_skin(where: str, truth: Floats) -> float:
         raise RecordingError(f"{where}: no force above {FIRM_N:g} N: expected firm presses; press harder")
     lever = float(np.median(np.linalg.norm(firm[:, 3:], axis=1) / np.linalg.norm(firm[:, :3], axis=1)))
     if not LEVER_MM[0] <= lever <= LEVER_MM[1]:
-        guess = "is it in N m?" if lever < LEVER_MM[0] else "is it in N um, or the mounting's offset wrong?"
+        guess = "is it in N m?" if lever < LEVER_MM[0] else "is it in N um, or is the mounting's offset wrong?"
         raise RecordingError(
             f"{where}: torque over force is {lever:.3g} mm about the fingertip's centre: expected {LEVER_MM[0]:g} to "
             f"{LEVER_MM[1]:g} mm; {guess}"
@@ -244,7 +244,7 @@ def _on_skin(where: str, truth: Floats) -> float:
     share = float(np.mean(its.on_skin & ~its.missed))
     if share < MIN_ON_SKIN_SHARE:
         raise RecordingError(
-            f"{where}: in {share:.0%} of the rows above {FIRM_N:g} N the force's line meets the finger's skin: "
+            f"{where}: in {share:.0%} of the rows above {FIRM_N:g} N the line of force meets the finger's skin: "
             f"expected at least {MIN_ON_SKIN_SHARE:.0%}; check the mounting's rotation, offset and sign, and "
             "the torque's unit"
         )
@@ -261,8 +261,8 @@ def choose_finger(where: str, fingers: list[int], finger: int | None) -> int:
     seen = ", ".join(str(f) for f in fingers) or "none"
     if finger is None:
         if len(fingers) != 1:
-            raise InputError(f"{where}: holds fingers {seen}: expected one; say which with --finger")
+            raise InputError(f"{where}: holds fingers {seen}: expected one; choose it with --finger")
         return fingers[0]
     if finger not in fingers:
-        raise InputError(f"{where}: holds fingers {seen}, not {finger}; say another with --finger")
+        raise InputError(f"{where}: holds fingers {seen}, not {finger}; choose another with --finger")
     return finger

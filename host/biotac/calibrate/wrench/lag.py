@@ -61,13 +61,13 @@ class Lags:
             return lag, r2
         if r2 < MIN_R2:
             raise RecordingError(
-                f"{where} are not aligned: they agree best at a lag of {lag} rows, and there an affine map explains "
-                f"R2 {r2:.2f} held out: expected at least {MIN_R2:g}; are both of the same run and finger, row by row?"
+                f"{where} are not aligned: they agree best at a lag of {lag} rows, where an affine map has a held-out "
+                f"R2 of {r2:.2f}: expected at least {MIN_R2:g}; are both from the same run and finger, row by row?"
             )
         if abs(lag) > MAX_LAG_ROWS:
             raise RecordingError(
-                f"{where} are not aligned: counts come {lag} rows after the force (R2 {r2:.2f}): expected at most "
-                f"{MAX_LAG_ROWS}, which would be corrected; shift one of them"
+                f"{where} are not aligned: counts lag the force by {lag} rows (R2 {r2:.2f}): expected at most "
+                f"{MAX_LAG_ROWS}, which is corrected automatically; shift one of them"
             )
         return lag, r2
 

@@ -46,7 +46,7 @@ QUADRATIC = Model("quadratic", features.QUADRATIC, "all products of two electrod
 CONDUCTANCE = Model(
     "conductance-quadratic", features.CONDUCTANCE_QUADRATIC, "all products of two conductances, PDC where recorded"
 )
-JOINED = Model("joined", features.JOINED, "that, and gains by sign that follow the contact")
+JOINED = Model("joined", features.JOINED, "the same, plus gains by sign that follow the contact")
 MODELS = (AFFINE, QUADRATIC, CONDUCTANCE, JOINED)
 
 LIN, LIN_OFFSET = "lin-scales", "lin-scales-offset"
@@ -56,11 +56,11 @@ POOL = (QUADRATIC, CONDUCTANCE, JOINED)
 POOLED = "pooled"
 TEMPLATE = "template"
 WORDS = {
-    LIN: "Lin's sums, one scale an axis",
-    LIN_OFFSET: "the same, with an offset an axis",
+    LIN: "Lin's sums, one scale per axis",
+    LIN_OFFSET: "the same, with an offset per axis",
     **{model.name: model.words for model in MODELS},
     POOLED: "weighted mean of " + ", ".join(model.name for model in POOL),
-    TEMPLATE: "five shapes around the contact, a 5x5 solve a frame; host only, for comparison",
+    TEMPLATE: "five shapes around the contact, one 5x5 solve per frame; host only, for comparison",
 }
 
 

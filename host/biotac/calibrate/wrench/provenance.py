@@ -68,7 +68,7 @@ def read(path: Path) -> Provenance | None:
             return None
         return Provenance(**{**facts, "files": tuple(facts["files"])})
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: {error}: expected a map as `biotac calibrate wrench --out` writes it") from None
+        raise InputError(f"{path}: {error}: expected a map written by `biotac calibrate wrench --out`") from None
 
 
 def check_serial(where: str, made_for: str, serial: str, *, force: bool = False) -> None:
@@ -78,6 +78,6 @@ def check_serial(where: str, made_for: str, serial: str, *, force: bool = False)
     """
     if made_for and serial and made_for != serial and not force:
         raise InputError(
-            f"{where} is of sensor {made_for}, and this is {serial}: expected the same; take that sensor's own, or say "
+            f"{where} is of sensor {made_for}, but this is {serial}: expected the same; use this sensor's own, or add "
             "--force"
         )

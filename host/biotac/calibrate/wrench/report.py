@@ -25,7 +25,7 @@ def markdown(validation: Validation, picture: str) -> str:
     lines = [
         f"# Wrench calibration of {run.name}",
         "",
-        f"{facts['rows']} rows, {_cut(validation)}; lags, smoothing and the models' weights are chosen inside the "
+        f"{facts['rows']} rows, {_cut(validation)}; lags, smoothing and the models' weights are chosen within the "
         f"other blocks ({INNER_FOLDS} folds of whole blocks). "
         "Frame: x to the tip, y to E11's side, z dorsal; force on the finger.",
         "",
@@ -34,9 +34,9 @@ def markdown(validation: Validation, picture: str) -> str:
         *_axes(validation),
         "## Models",
         "",
-        "RMSE held out; in brackets the worse of "
+        "Held-out RMSE; in brackets, the worse of "
         + " and ".join(f"{c:+.0f}" for c in SHIFTS_COUNTS[1:])
-        + " counts of drift that nobody tared away.",
+        + " counts of untared drift.",
         "",
         *_models(validation),
         "## Weak places",
@@ -45,19 +45,19 @@ def markdown(validation: Validation, picture: str) -> str:
         "",
         "## Confusion of axes",
         "",
-        "How much of each true axis appears on each predicted one; 1 on the diagonal and 0 beside it would be perfect.",
+        "How much of each true axis appears on each predicted one; 1 on the diagonal and 0 elsewhere is perfect.",
         "",
         *_confusion(validation),
-        "## Taken for granted",
+        "## Assumptions",
         "",
-        f"* force and counts: counts come {facts['lag_rows']} rows later (at most {MAX_LAG_ROWS} may be), corrected by "
-        f"axis: {_lags(validation)}; an affine map explains R2 {facts['affine_r2']:.2f} held out",
-        f"* forces are what the map says to the mean counts of {facts['window_rows']} frames",
+        f"* force and counts: counts lag by {facts['lag_rows']} rows (at most {MAX_LAG_ROWS} allowed), corrected per "
+        f"axis: {_lags(validation)}; an affine map reaches a held-out R2 of {facts['affine_r2']:.2f}",
+        f"* the map is evaluated on counts averaged over {facts['window_rows']} frames",
         *_rest(validation, facts),
         *[f"* {note}" for note in facts["notes"]],
         *_contacts(validation),
         "",
-        f"![truth against prediction, held out]({picture})",
+        f"![prediction against truth, held out]({picture})",
         "",
     ]
     return "\n".join(lines)
@@ -75,27 +75,27 @@ def draw(validation: Validation, figure: Any) -> None:
 
 def _cut(validation: Validation) -> str:
     if validation.blocks.by_contact:
-        return f"{validation.blocks.contacts} contacts dealt out to {BLOCKS} blocks, each held out once"
-    return f"{BLOCKS} contiguous blocks, each held out once with {GUARD_ROWS} rows of guard on both sides"
+        return f"{validation.blocks.contacts} contacts split into {BLOCKS} blocks, each held out once"
+    return f"{BLOCKS} contiguous blocks, each held out once with {GUARD_ROWS} guard rows on both sides"
 
 
 def _contacts(validation: Validation) -> list[str]:
     if validation.blocks.by_contact:
         return []
     if not validation.run.rest.any():
-        return ["* the run never rests: blocks are cut anywhere, a long contact may lie in two neighbours"]
+        return ["* the run never rests: blocks are cut anywhere, so a long contact may span two"]
     whole = validation.blocks.whole_contacts
-    return [f"* block edges that lie in a rest, so that no contact is in two blocks: {whole}"]
+    return [f"* block edges at rest, so that no contact spans two blocks: {whole}"]
 
 
 def _rest(validation: Validation, facts: dict[str, Any]) -> list[str]:
     still, *drifted = (f"{newton:.3f} N" for newton in facts["rest_n"])
-    line = f"* where nothing touches the map says {still}, and {' and '.join(drifted)} at " + " and ".join(
+    line = f"* without contact the map gives {still}, and {' and '.join(drifted)} at " + " and ".join(
         f"{counts:+.0f}" for counts in SHIFTS_COUNTS[1:]
     )
     if validation.run.air is None:
-        return [line + " counts of drift; there is no E_base, so nothing but the run itself says what no contact is"]
-    return [line + f" counts of drift; E_base is trained in with force 0, {facts['air_share']:.1%} of the run's weight"]
+        return [line + " counts of drift; there is no E_base, so only the run itself shows what no contact is"]
+    return [line + f" counts of drift; E_base is trained on with force 0, {facts['air_share']:.1%} of the run's weight"]
 
 
 def _lags(validation: Validation) -> str:
@@ -111,7 +111,7 @@ def _axes(validation: Validation) -> list[str]:
     errors = [figures.rmse(predicted, truth) for predicted in validation.predicted]
     explained = figures.r2(validation.predicted[0], truth)
     drifts = [f"at {c:+.0f} counts" for c in SHIFTS_COUNTS[1:]]
-    head = ["axis", "RMSE", *drifts, "R2", "spread of the truth", "weights of the models"]
+    head = ["axis", "RMSE", *drifts, "R2", "standard deviation of the truth", "model weights"]
     rows = []
     for k, (name, weights) in enumerate(zip(validation.run.axes, figures.weights(validation), strict=True)):
         chosen = ", ".join(f"{model} {weight:.2f}" for model, weight in weights.items())
@@ -137,9 +137,9 @@ def _weak(validation: Validation, facts: dict[str, Any]) -> list[str]:
     lines = [
         f"* weakest axis: {validation.run.axes[axis]}" + ("" if r2[axis] is None else f", R2 {r2[axis]:.3f}"),
         f"* worst region: compression centred at x {worst['x_mm'][0]:.1f} to {worst['x_mm'][1]:.1f} mm, "
-        f"y {worst['y_mm'][0]:.1f} to {worst['y_mm'][1]:.1f} mm ({worst['rows']} rows): RMS length of the error "
+        f"y {worst['y_mm'][0]:.1f} to {worst['y_mm'][1]:.1f} mm ({worst['rows']} rows): RMS error "
         f"{worst['rmse_n']:.3f} N; best region {best['rmse_n']:.3f} N",
-        f"* times better than Lin's three scales: {gain}",
+        f"* factor by which it is better than Lin's three scales: {gain}",
         *_more(facts),
     ]
     blocks = [validation.blocks.rows(k) for k in range(BLOCKS)]
@@ -157,9 +157,9 @@ def _more(facts: dict[str, Any]) -> list[str]:
     )
     (x, y), gain = (facts["next_minute"][name] for name in ("x_mm", "y_mm")), facts["next_minute"]["gain_n"]
     return [
-        f"* error along x/y/z in N by minutes trained on (100 rows a second): {curve}",
-        f"* a further minute pays most where the compression is centred at x {x[0]:.1f} to {x[1]:.1f} mm, "
-        f"y {y[0]:.1f} to {y[1]:.1f} mm: about {gain:.2f} N off its error",
+        f"* error along x/y/z in N by minutes of training data (100 rows per second): {curve}",
+        f"* another minute helps most where the compression is centred at x {x[0]:.1f} to {x[1]:.1f} mm, "
+        f"y {y[0]:.1f} to {y[1]:.1f} mm: it would cut the error by about {gain:.2f} N",
     ]
 
 
@@ -200,7 +200,7 @@ def _draw_models(axes: Any, validation: Validation) -> None:
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set(xlabel="RMSE held out [N]")
+    axes.set(xlabel="held-out RMSE [N]")
     axes.invert_yaxis()
     axes.grid(alpha=0.3, axis="x")
     axes.legend(fontsize=8)

@@ -92,7 +92,7 @@ def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
     if missing:
         seen = ", ".join(fields) or "none of the known fields"
         raise RecordingError(
-            f"{path}: holds {seen}: expected E (n, 19) counts and F (n, 3) N; save {' and '.join(missing)} too"
+            f"{path}: holds {seen}: expected E (n, 19) in counts and F (n, 3) in N; save {' and '.join(missing)} too"
         )
     counts = _counts(path, "E", fields)
     rows = len(counts)
@@ -117,7 +117,7 @@ def run_of(path: Path, fields: dict[str, npt.NDArray[Any]]) -> Run:
         raw = counts_field(path, "PDC", fields["PDC"], rows, None).astype(np.float64)
         # without a rest in the run, the lowest percent stands in for it; an offset does not harm a linear model
         pdc = raw - (np.median(raw[rest]) if rest.sum() >= MIN_REST_ROWS else np.percentile(raw, 1))
-    drift, note = np.ones(len(_sensor.ELECTRODE_NAMES)), "drift: no E_idle, all electrodes taken to drift alike"
+    drift, note = np.ones(len(_sensor.ELECTRODE_NAMES)), "drift: no E_idle, all electrodes assumed to drift alike"
     if "E_idle" in fields:
         drift, note = drift_of("E_idle", _counts(path, "E_idle", fields))
     return Run(
@@ -143,13 +143,13 @@ def numbers(path: Path, name: str, array: npt.NDArray[Any], shape: tuple[int, ..
     """Field ``name`` as float64. Raises RecordingError unless it has ``shape`` and is finite."""
     if array.shape != shape or array.dtype.kind not in "iuf":
         raise RecordingError(
-            f"{path}: field {name} is {array.dtype} {array.shape}: expected {shape} in {unit}, a row a frame"
+            f"{path}: field {name} is {array.dtype} {array.shape}: expected {shape} in {unit}, one row per frame"
         )
     bad = ~np.isfinite(array.reshape(len(array), -1)).all(axis=1)
     if bad.any():
         raise RecordingError(
             f"{path}: field {name} is not finite in {bad.sum()} of {len(bad)} rows, first in row {np.argmax(bad)}: "
-            f"expected {unit} in every row; leave those rows out of all fields"
+            f"expected {unit} in every row; drop those rows from all fields"
         )
     return array.astype(np.float64)
 
@@ -158,7 +158,7 @@ def check_rows(where: object, rows: int) -> None:
     """Refuse a run that is too short to be held out block by block. Raises RecordingError."""
     if rows < MIN_ROWS:
         raise RecordingError(
-            f"{where}: {rows} rows: expected at least {MIN_ROWS}, {BLOCKS} blocks of twice the guard of "
+            f"{where}: {rows} rows: expected at least {MIN_ROWS}, for {BLOCKS} blocks of twice the guard of "
             f"{GUARD_ROWS} rows; record longer"
         )
 
@@ -167,7 +167,7 @@ def _serial(path: Path, fields: dict[str, npt.NDArray[Any]]) -> str:
     if "serial" not in fields:
         return ""
     if fields["serial"].dtype.kind != "U" or fields["serial"].size != 1:
-        raise RecordingError(f"{path}: field serial is {fields['serial'].dtype}: expected one text; save it as str")
+        raise RecordingError(f"{path}: field serial is {fields['serial'].dtype}: expected one string; save it as str")
     return str(fields["serial"].reshape(()))
 
 
@@ -179,8 +179,8 @@ def check_clipping(path: object, name: str, force: Floats) -> None:
             share = float((column == end).mean())
             if abs(end) > REST_N and share > MAX_CLIPPED_SHARE:
                 raise RecordingError(
-                    f"{path}: {share:.1%} of the rows of {name} read exactly {end:.4g} N along {'xyz'[axis]}, the most "
-                    f"of all: expected at most {MAX_CLIPPED_SHARE:.1%}; the force sensor is saturated, press less"
+                    f"{path}: {share:.1%} of the rows of {name} read exactly {end:.4g} N along {'xyz'[axis]}, the "
+                    f"extreme: expected at most {MAX_CLIPPED_SHARE:.1%}; the force sensor is saturated, press less"
                 )
 
 
@@ -190,14 +190,14 @@ def check_electrodes(path: object, counts: Floats) -> None:
     if share[worst] > MAX_RAILED_SHARE:
         raise RecordingError(
             f"{path}: {_sensor.ELECTRODE_NAMES[worst]} is saturated (count {RAIL_LOW}, or {RAIL_HIGH} and above) in "
-            f"{share[worst]:.1%} of the rows: expected at most {MAX_RAILED_SHARE:.0%}; press less or see to it"
+            f"{share[worst]:.1%} of the rows: expected at most {MAX_RAILED_SHARE:.0%}; press less, or check it"
         )
     swing = np.ptp(counts, axis=0)
     least = int(np.argmin(swing))
     if swing[least] <= LEAST_SWING_COUNTS:
         raise RecordingError(
-            f"{path}: {_sensor.ELECTRODE_NAMES[least]} swings over {swing[least]:.0f} count in {len(counts)} rows: "
-            f"expected more than {LEAST_SWING_COUNTS}; it is stuck, and a map without it is another finger's"
+            f"{path}: {_sensor.ELECTRODE_NAMES[least]} varies by {swing[least]:.0f} count(s) in {len(counts)} rows: "
+            f"expected more than {LEAST_SWING_COUNTS}; it is stuck; check its wiring and record again"
         )
 
 
@@ -211,14 +211,14 @@ def _tare(
         worst = int(np.argmax(high - low))
         if high[worst] - low[worst] > MAX_REST_SWING_COUNTS:
             raise RecordingError(
-                f"{path}: E_base is not at rest: {_sensor.ELECTRODE_NAMES[worst]} swings over "
+                f"{path}: E_base is not at rest: {_sensor.ELECTRODE_NAMES[worst]} varies by "
                 f"{high[worst] - low[worst]:.0f} counts: expected at most {MAX_REST_SWING_COUNTS:.0f}; record it in air"
             )
         # the median, because a brief touch in the recording must not change it
         return median, (f"tare: median of {len(base)} rows of E_base",)
     if rest.sum() < MIN_REST_ROWS:
         raise RecordingError(
-            f"{path}: never at rest: {rest.sum()} rows below {REST_N} N, the least force is "
+            f"{path}: never at rest: {rest.sum()} rows below {REST_N} N, the lowest force is "
             f"{np.linalg.norm(force, axis=1).min():.2f} N, and there is no E_base: expected {MIN_REST_ROWS} rows "
             f"without contact; let go in between, or add E_base"
         )
@@ -237,7 +237,7 @@ def check_units(path: object, signal: Floats, force: Floats) -> None:
         guess = "is F in gf or mN, or are counts missing?" if per_count > high else "is F in kN or kgf?"
         raise RecordingError(
             f"{path}: {per_count:.3g} units of F per RMS count (median |F| {np.median(size[touched]):.4g}): expected "
-            f"{low:g} to {high:g}, as newtons give on a BioTac; {guess}"
+            f"{low:g} to {high:g}, as in newtons on a BioTac; {guess}"
         )
 
 
@@ -248,9 +248,9 @@ def _check_same_finger(path: Path, base: Floats, resting: Floats) -> None:
     if spread > MAX_OTHER_REST_COUNTS:
         worst = int(np.argmax(np.abs(apart - apart.mean())))
         raise RecordingError(
-            f"{path}: E at rest and E_base do not belong together: beside a common {apart.mean():+.0f} counts they "
+            f"{path}: E at rest and E_base do not match: apart from a common {apart.mean():+.0f} counts they "
             f"differ by {spread:.0f} RMS ({_sensor.ELECTRODE_NAMES[worst]} by {apart[worst]:+.0f}): expected at most "
-            f"{MAX_OTHER_REST_COUNTS:.0f}; is E_base another finger's?"
+            f"{MAX_OTHER_REST_COUNTS:.0f}; is E_base from another finger?"
         )
 
 
@@ -265,5 +265,8 @@ def drift_of(name: str, idle: Floats) -> tuple[Floats, str]:
     mean = float(first.mean())
     # loadings of both signs mean a touch or a broken electrode, and dividing by their mean would inflate them
     if share < MIN_DRIFT_SHARE or mean < 0.5 * float(np.abs(first).mean()):
-        return common, f"drift: {name}'s first component holds {share:.0%} of its variance, all electrodes taken alike"
+        return (
+            common,
+            f"drift: {name} ({share:.0%} in its first component) shows no common drift; electrodes assumed alike",
+        )
     return first / mean, f"drift: first component of {name}, {share:.1%} of its variance"

@@ -58,12 +58,12 @@ def load(
     """
     if path.suffix.lower() != ".mcap":
         if reference is not None:
-            raise InputError(f"{path} has its force inside: expected no --reference; that is for .mcap recordings")
+            raise InputError(f"{path} contains its force: expected no --reference; that is for .mcap recordings")
         run = load_run(path)
         check_serial(str(path), run.serial, serial, force=force)
         return Loaded(run, (path,))
     if reference is None:
-        raise InputError(f"{path} is a board's recording, without a force: expected --reference FILE beside it")
+        raise InputError(f"{path} is a board's recording, which has no force: add --reference FILE")
     recording = Recording(path)
     chosen = choose_finger(str(path), recording.fingers, finger)
     number = next((ascii_text(its.serial) for its in recording.sensors if its.finger == chosen), "")

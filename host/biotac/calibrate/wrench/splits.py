@@ -25,13 +25,13 @@ def contacts(path: Path, given: npt.NDArray[Any], rows: int) -> npt.NDArray[np.i
     """Field ``contact`` (n,), each row's contact. Raises RecordingError when there are too few for the blocks."""
     if given.shape != (rows,) or given.dtype.kind not in "iu":
         raise RecordingError(
-            f"{path}: field contact is {given.dtype} {given.shape}: expected ({rows},) integers, a contact each"
+            f"{path}: field contact is {given.dtype} {given.shape}: expected ({rows},) integers, one contact per row"
         )
     several = len(np.unique(given))
     if several < BLOCKS:
         raise RecordingError(
-            f"{path}: field contact names {several} contacts: expected at least {BLOCKS}, one a block; "
-            "touch more places, or leave it out to have blocks cut by time"
+            f"{path}: field contact names {several} contacts: expected at least {BLOCKS}, one per block; "
+            "touch more places, or omit it to have blocks cut by time"
         )
     return given.astype(np.int64)
 

@@ -45,24 +45,24 @@ def upload(
     blob = hand.get_map(finger)
     # only the header may differ: a forced map has no serial number in it
     if blob is None or blob[HEADER_BYTES:] != sent[HEADER_BYTES:]:
-        seen = "none" if blob is None else f"another one of {len(blob)} bytes"
+        seen = "none" if blob is None else f"another of {len(blob)} bytes"
         raise PortError(
-            f"the board took the map of {len(sent)} bytes and has {seen}: expected it back; upload it again"
+            f"the board accepted the map of {len(sent)} bytes, but has {seen}: expected the same; upload it again"
         )
     on_board = from_blob(blob)
     comparison = board.compare(its, on_board, np.rint(run.counts), run.pdc if its.with_pdc else None)
     if comparison.outside:
         raise PortError(
-            f"on {comparison.outside} recorded values the board's code is further from the float model than it can be: "
-            f"expected at most {comparison.force_mn_bound:.3f} mN; do not use it, and report this"
+            f"{comparison.outside} recorded values differ from the float model by more than rounding allows: "
+            f"expected at most {comparison.force_mn_bound:.3f} mN; do not use this map, and report this"
         )
     frames = _mapped_frames(hand, finger)
     force_100un, _, torsion_mnmm = on_board.results(frames["counts"], frames["tare_q4"], pdc_above_rest_q4(frames))
     differs = (force_100un != frames["force_100un"]).any(axis=1) | (torsion_mnmm != frames["torsion_mnmm"])
     wrong = int(differs.sum())
     if wrong or not (len(frames) or hand.ended):
-        seen = f"{wrong} of {len(frames)} frames are not what its map says" if len(frames) else "no frame uses the map"
-        raise PortError(f"the board has the map, and {seen}: expected all; restart the board and upload again")
+        seen = f"{wrong} of {len(frames)} frames do not match it" if len(frames) else "no frame uses it"
+        raise PortError(f"the board has the map, but {seen}: expected all to match; restart the board and upload again")
     return {"frames_bit_for_bit": len(frames), **asdict(comparison)}
 
 
