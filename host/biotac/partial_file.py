@@ -22,7 +22,7 @@ def whole(path: Path, *, overwrite: bool) -> Iterator[Path]:
     words that say so. Raises InputError when ``path`` exists and may not be overwritten.
     """
     if path.exists() and not overwrite:
-        raise InputError(f"{path} exists and would be overwritten; choose another name or add --force")
+        raise InputError(f"{path} already exists; choose another name, or add --force to overwrite it")
     if path.is_dir() and not (path / ROS2_METADATA).is_file():
         raise InputError(f"{path} is a folder, but not a ROS 2 bag that could be replaced; choose another name")
     try:

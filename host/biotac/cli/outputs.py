@@ -11,7 +11,7 @@ from ..errors import InputError
 def check_file(place: Path | None, *, overwrite: bool) -> None:
     """Raises InputError if the file, where one is named, exists and may not be overwritten."""
     if place is not None and place.exists() and not overwrite:
-        raise InputError(f"{place} exists and would be overwritten; choose another name or add --force")
+        raise InputError(f"{place} already exists; choose another name, or add --force to overwrite it")
 
 
 def check(folder: Path, places: Sequence[Path], *, overwrite: bool) -> None:
@@ -23,7 +23,7 @@ def check(folder: Path, places: Sequence[Path], *, overwrite: bool) -> None:
                 "separate --out folders"
             )
         if place.exists() and not overwrite:
-            raise InputError(f"{place} exists and would be overwritten; choose another folder or add --force")
+            raise InputError(f"{place} already exists; choose another folder, or add --force to overwrite it")
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is not a folder; choose another name")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 
 
 def number(text: str) -> float:
@@ -42,11 +43,15 @@ def pace(text: str) -> float:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-def workers(text: str) -> int:
-    """A number of processes."""
-    if not (text.isascii() and text.isdigit() and 1 <= int(text[:9]) <= 1024):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of processes; expected 1 to 1024")
-    return int(text)
+def count(most: int) -> Callable[[str], int]:
+    """The type of a whole number from 1 to ``most``."""
+
+    def parse(text: str) -> int:
+        if not (text.isascii() and text.isdigit() and 1 <= int(text[:9]) <= most):
+            raise argparse.ArgumentTypeError(f"seen {text!r}; expected a whole number, 1 to {most}")
+        return int(text[:9])
+
+    return parse
 
 
 def finger(text: str) -> int:
@@ -76,5 +81,8 @@ def add_port(parser: argparse.ArgumentParser) -> None:
 
 
 def numbers(text: str) -> tuple[float, ...]:
-    """Several numbers, separated by commas; empty for an empty text."""
-    return tuple(float(part) for part in text.split(",")) if text else ()
+    """Several finite numbers, separated by commas; empty for an empty text."""
+    found = tuple(number(part) for part in text.split(",")) if text else ()
+    if not all(map(math.isfinite, found)):
+        raise argparse.ArgumentTypeError(f"seen {text!r}; expected numbers, separated by commas")
+    return found

@@ -141,6 +141,6 @@ def create(path: Path, *, overwrite: bool) -> BinaryIO:
     try:
         return path.open("wb" if overwrite else "xb")
     except FileExistsError as error:
-        raise InputError(f"{path} exists and would be overwritten; choose another name or add --force") from error
+        raise InputError(f"{path} already exists; choose another name, or add --force to overwrite it") from error
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error

@@ -167,7 +167,7 @@ def test_what_was_pressed_is_not_lost_when_the_board_cannot_keep_it(tmp_path: Pa
 def test_files_that_are_there_are_seen_before_anybody_presses(tmp_path: Path, capsys) -> None:
     (tmp_path / "finger3.json").write_text("mine")
     assert main(["calibrate", "pressure", "sim:fingers.toml", "--out", str(tmp_path)]) == 2
-    assert "finger3.json exists and would be overwritten" in capsys.readouterr().err
+    assert "finger3.json already exists" in capsys.readouterr().err
     assert (tmp_path / "finger3.json").read_text() == "mine" and len(list(tmp_path.iterdir())) == 1
 
 

@@ -476,7 +476,7 @@ def test_calibrate_writes_report_picture_and_map(
     assert fitted.load(out / "finger.wrench.json").model == facts["model"]
     # a second time it would overwrite, and says so before it works
     assert main(words) == 2
-    assert "would be overwritten" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
     assert main(["calibrate", "wrench", str(finger), str(finger), "--out", str(tmp_path / "two")]) == 2
     assert "would be written twice" in capsys.readouterr().err
 

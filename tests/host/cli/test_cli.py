@@ -256,3 +256,23 @@ def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> 
     told = capsys.readouterr().err
     assert refused.value.code == 2
     assert "expected one of 'index', 'middle', 'ring', 'little', 'thumb', or 0 to 4" in told
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("calibrate contact --contacts many", "--contacts: seen 'many'; expected a whole number, 1 to 100000"),
+        ("calibrate contact --contacts 100001", "--contacts: seen '100001'; expected a whole number, 1 to 100000"),
+        ("bench live --rounds 0", "--rounds: seen '0'; expected a whole number, 1 to 1000000"),
+        ("export rec.mcap --lake lake -j 1.5", "-j: seen '1.5'; expected a whole number, 1 to 1024"),
+        ("calibrate scale PORT --readings 1,x", "--readings: seen '1,x'; expected numbers, separated by commas"),
+        ("calibrate scale PORT --readings 1,nan", "--readings: seen '1,nan'; expected numbers, separated by commas"),
+        ("calibrate pressure PORT --verify hard", "--verify: seen 'hard'; expected newtons above 0 and below 100"),
+        ("calibrate pressure PORT --forces 2,,3", "--forces: seen ''; expected newtons above 0 and below 100"),
+    ],
+)
+def test_a_number_that_is_none_is_told_with_what_was_expected(command: str, words: str, capsys) -> None:
+    with pytest.raises(SystemExit) as refused:
+        main(command.split())
+    assert refused.value.code == 2
+    assert words in capsys.readouterr().err

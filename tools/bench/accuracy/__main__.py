@@ -17,7 +17,7 @@ def main() -> int:
     effort = measure.Effort()
     parser = argparse.ArgumentParser(prog="tools/bench/front", description="Every kernel's cost and accuracy.")
     parser.add_argument("--out", type=Path, default=boards.BUILD / "front", help="default build/bench/front")
-    parser.add_argument("--commit", action="store_true", help="refresh host/docs/front.png, which README.md shows")
+    parser.add_argument("--commit", action="store_true", help="refresh host/docs/front.png")
     parser.add_argument("--errors", action="store_true", help="errors and host times only, no boards and no picture")
     parser.add_argument("--json", action="store_true", help="print front.json instead of front.md")
     parser.add_argument("--frames", type=int, default=effort.frames, help="frames per class (default %(default)s)")

@@ -54,11 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     CALIBRATION.add(add, "Back to the board's settings.")
 
     store = add("store", _store, "Into an EEPROM.", "store --i2c 1:0x50 --chip 24c32 thumb.json")
-    store.add_argument("file", metavar="FILE", nargs="?", type=Path, help="left out: standard input")
+    store.add_argument("file", metavar="FILE", nargs="?", type=Path, help="default: standard input")
     _add_eeprom(store, required=True)
 
     load = add("load", _load, "From an EEPROM.", "load --i2c 1:0x50 --chip 24c32 thumb.json")
-    load.add_argument("file", metavar="FILE", nargs="?", type=Path, help="left out: standard output")
+    load.add_argument("file", metavar="FILE", nargs="?", type=Path, help="default: standard output")
     load.add_argument("--force", action="store_true", help="overwrite FILE")
     _add_eeprom(load, required=True)
 

@@ -31,7 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     show = add("show", _show, "What a board, a recording or a file holds.", "show /dev/ttyACM0")
     show.add_argument("where", metavar="PORT|FILE")
 
-    MAP.add(add, "Back to what the settings say.", get_port_help="replay:REC gets what a recording was made with")
+    MAP.add(
+        add, "Back to what the settings say.", get_port_help="with replay:REC, the map that the recording was made with"
+    )
 
 
 def _show(args: argparse.Namespace) -> None:

@@ -7,6 +7,7 @@ import json
 from dataclasses import asdict
 
 from ...calibrate.wrench.contact import compare
+from .. import values
 
 NAME = "contact"
 HELP = "How well a wrench says where a finger is touched: closed form against the paper's 0.5 mm mesh."
@@ -16,15 +17,10 @@ MOST = 100_000
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the number of contacts."""
-    parser.add_argument("--contacts", type=_count, default=4000, metavar="N", help="random ones (default %(default)s)")
+    parser.add_argument(
+        "--contacts", type=values.count(MOST), default=4000, metavar="N", help="random ones (default %(default)s)"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the random contacts (default %(default)s)")
-
-
-def _count(text: str) -> int:
-    count = int(text)
-    if not 1 <= count <= MOST:
-        raise argparse.ArgumentTypeError(f"{count} is out of range; expected 1 to {MOST}")
-    return count
 
 
 def run(args: argparse.Namespace) -> int:

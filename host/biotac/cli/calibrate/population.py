@@ -25,7 +25,9 @@ THREADS = 2
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the training recordings, the test recording, and where the map goes."""
-    parser.add_argument("files", metavar="REC", nargs="+", type=Path, help="a finger each, as for calibrate wrench")
+    parser.add_argument(
+        "files", metavar="REC", nargs="+", type=Path, help="one finger per file, as for calibrate wrench"
+    )
     parser.add_argument("--test", metavar="REC", type=Path, help="a finger to test the map on; not used for training")
     parser.add_argument(
         "--symmetric", action="store_true", help="F_y too from mirrored fingers: for use on another rig than theirs"

@@ -22,7 +22,7 @@ from ..recordings.loading import load
 from .typed import reading_n
 
 NAME = "pressure"
-HELP = "Pressure to force, one gain a finger: press a plate or scale, guided; or from recordings of that."
+HELP = "Pressure to force, one gain per finger: press a plate or scale, guided; or from recordings of that."
 EXAMPLE = "biotac calibrate pressure sim:fingers.toml --out calibrated/"
 
 WORDS = {Phase.REST: "let go of finger {f}", Phase.RELEASE: "held; let go of finger {f}"}
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--verify", metavar="N", type=_force, default=VERIFICATION_FORCES_N[0], help="newtons of the verification press"
     )
-    parser.add_argument("--out", metavar="FOLDER", type=Path, help="a calibration file a finger goes here")
+    parser.add_argument("--out", metavar="FOLDER", type=Path, help="one calibration file per finger goes here")
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
     parser.add_argument("--save", action="store_true", help="save it on the board, so that it survives a restart")
 
@@ -153,9 +153,9 @@ def _write(args: argparse.Namespace, outcome: report.Outcome, name: str | None) 
 
 
 def _force(text: str) -> float:
-    force = float(text)
+    force = values.number(text)
     if not 0 < force < 100:
-        raise argparse.ArgumentTypeError(f"{text} N is out of range; expected above 0 and below 100")
+        raise argparse.ArgumentTypeError(f"seen {text!r}; expected newtons above 0 and below 100")
     return force
 
 

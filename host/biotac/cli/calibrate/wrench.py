@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--population",
         metavar="FILE",
         default=None,
-        help="pull to this map of other fingers, or to none (the package's)",
+        help="regularize towards this map of other fingers, or none (default: the package's)",
     )
     parser.add_argument("--serial", metavar="BT...", default="", help="refuse data from any other sensor")
     parser.add_argument("--force", action="store_true", help="overwrite existing files; accept another sensor's data")

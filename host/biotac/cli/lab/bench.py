@@ -47,14 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--source", default="press.toml", help="idle, recording: what to play (default %(default)s)")
     parser.add_argument("--fingers", type=int, default=5, help="recording: how many (default %(default)s)")
     parser.add_argument("--seconds", type=values.seconds, default=600.0, help="recording: device time (default 600)")
-    parser.add_argument("--rounds", type=_count, default=5, metavar="N", help="imports, live: of each (default 5)")
-
-
-def _count(text: str) -> int:
-    count = int(text)
-    if not 1 <= count <= 1_000_000:
-        raise argparse.ArgumentTypeError(f"{count} is out of range; expected 1 to 1000000")
-    return count
+    parser.add_argument(
+        "--rounds", type=values.count(1_000_000), default=5, metavar="N", help="imports, live: of each (default 5)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--by-time",
         action="store_true",
-        help="keep the tape to the board's clock: rounds are left out or played again where the gateway's differs",
+        help="keep the tape to the board's clock: where the gateway's differs, rounds are skipped or repeated",
     )
     kept = parser.add_mutually_exclusive_group()
     kept.add_argument(

@@ -27,7 +27,7 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_workers(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("-j", dest="jobs", metavar="N", type=values.workers, default=1, help="processes")
+    parser.add_argument("-j", dest="jobs", metavar="N", type=values.count(1024), default=1, help="processes")
     parser.add_argument("--dask", metavar="ADDRESS", help="a Dask scheduler whose workers see the same files")
 
 
