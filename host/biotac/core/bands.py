@@ -12,6 +12,7 @@ from ..wire import sensor_gen as sensor
 from ..wire.dtypes_gen import DTYPES
 from ..wire.frames import StructArray, bands_from_wire
 from ..wire.native import ffi, lib
+from .compiled import check_words
 
 #: The frequencies between which each band has at least half its power, Hz.
 BANDS_HZ = ((11, 26), (22, 53), (45, 106), (91, 214), (190, 454), (527, 1100))
@@ -54,11 +55,7 @@ def pac_words(pac: Any) -> NDArray[np.uint16]:
     words = np.asarray(pac)
     if words.ndim != 2 or words.shape[1] != SAMPLES or words.dtype.kind not in "iu":
         raise ValueError(f"pac is {words.dtype} of shape {words.shape}, expected integers of shape (n, {SAMPLES})")
-    if not np.all(((words >= 0) & (words <= sensor.FULL_SCALE_COUNT)) | (words == wire.INVALID_COUNT)):
-        raise ValueError(
-            f"pac holds {words.min()} to {words.max()}, expected 0 to {sensor.FULL_SCALE_COUNT}, or 0xFFFF"
-        )
-    return np.ascontiguousarray(words, np.uint16)
+    return np.ascontiguousarray(check_words("pac", words), np.uint16)
 
 
 def _energies(words: NDArray[np.uint16]) -> tuple[NDArray[np.uint8], NDArray[np.uint32]]:

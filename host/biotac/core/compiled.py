@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, tare_to_q4, to_units
 from ..wire.native import ffi, lib
-from ..wire.sensor_gen import ELECTRODE_NAMES
+from ..wire.sensor_gen import ELECTRODE_NAMES, FULL_SCALE_COUNT
 
 NN_PER_N = 1e9
 ELECTRODES = len(ELECTRODE_NAMES)
@@ -174,9 +174,31 @@ def integers(name: str, values: Any, dtype: Any, *shape: int | None) -> NDArray[
         raise ValueError(f"{name} have shape {array.shape}, expected ({wanted})")
     if array.dtype != dtype:
         limits = np.iinfo(dtype)
-        if array.dtype.kind not in "iu" or (array.size and not limits.min <= array.min() <= array.max() <= limits.max):
+        if array.dtype.kind not in "iu":
             raise ValueError(f"{name} are {array.dtype}, expected integers {limits.min} to {limits.max}")
+        bad = (array < limits.min) | (array > limits.max)
+        if bad.any():
+            raise ValueError(f"{name} hold {array[bad][0]}, expected integers {limits.min} to {limits.max}")
     return np.ascontiguousarray(array, dtype)
+
+
+def check_words(name: str, words: NDArray[Any]) -> NDArray[Any]:
+    """``words`` as they are. Raises ValueError, naming the first bad row, unless all are 0..4095 or 0xFFFF."""
+    bad = (words != wire.INVALID_COUNT) & ~((words >= 0) & (words <= FULL_SCALE_COUNT))
+    if bad.any():
+        raise ValueError(
+            f"{name} row {np.argwhere(bad)[0][0]} holds {words[bad][0]}, expected 0..{FULL_SCALE_COUNT}, or 0xFFFF "
+            "where missing"
+        )
+    return words
+
+
+def check_tare(tare: NDArray[np.float64]) -> NDArray[np.float64]:
+    """``tare`` as it is, in counts. Raises ValueError unless all of it is 0..4095."""
+    bad = ~((tare >= 0) & (tare <= FULL_SCALE_COUNT))
+    if bad.any():
+        raise ValueError(f"the tare holds {tare[bad][0]:g}, expected 0..{FULL_SCALE_COUNT} counts")
+    return tare
 
 
 def checked(counts: Any, tare: Any) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
@@ -185,9 +207,6 @@ def checked(counts: Any, tare: Any) -> tuple[NDArray[np.uint16], NDArray[np.uint
     base = np.broadcast_to(np.asarray(tare, dtype=np.float64), raw.shape)
     if raw.ndim != 2 or raw.shape[1] != 19:
         raise ValueError(f"counts have shape {raw.shape}, expected (n, 19)")
-    if not np.all(((raw >= 0) & (raw <= 4095)) | (raw == wire.INVALID_COUNT)):
-        raise ValueError("counts must be 0..4095, or 0xFFFF for a missing electrode")
-    if not np.all((base >= 0) & (base <= 4095)):
-        raise ValueError("a tare must be 0..4095 counts")
-    tare_q4 = tare_to_q4(base)
+    check_words("counts", raw)
+    tare_q4 = tare_to_q4(check_tare(base))
     return np.ascontiguousarray(raw, dtype=np.uint16), np.ascontiguousarray(tare_q4)

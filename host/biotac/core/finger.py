@@ -21,7 +21,7 @@ from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
 from ..wire.native import ffi, lib
 from .board_map import BoardMap
-from .compiled import Settings, board_settings, default_settings
+from .compiled import Settings, board_settings, check_tare, check_words, default_settings
 from .events import EVENT_DTYPE
 from .map_versions import opened
 
@@ -176,11 +176,9 @@ class Finger:
         """
         tare = np.asarray(counts, dtype=np.float64)
         values = tare if pdc is None else np.append(tare, pdc)
-        if tare.shape != (_ELECTRODES,) or not np.all((values >= 0) & (values <= sensor.FULL_SCALE_COUNT)):
-            raise ValueError(
-                f"the tare has shape {tare.shape}, expected ({_ELECTRODES},) and values 0..{sensor.FULL_SCALE_COUNT}"
-            )
-        q16 = (tare_to_q4(values).astype(np.uint32) << 12).tolist()
+        if tare.shape != (_ELECTRODES,):
+            raise ValueError(f"the tare has shape {tare.shape}, expected ({_ELECTRODES},)")
+        q16 = (tare_to_q4(check_tare(values)).astype(np.uint32) << 12).tolist()
         base = ffi.new("bt_baseline *")
         base.electrode_q16 = q16[:_ELECTRODES]
         base.pdc_q16 = INVALID_U32 if pdc is None else q16[_ELECTRODES]
@@ -236,13 +234,7 @@ def _words(name: str, values: Any, rows: int | None, columns: int | None) -> NDA
         raise ValueError(f"{name} have shape {array.shape}, expected {wanted}")
     if array.dtype.kind not in "iu":
         raise ValueError(f"{name} are {array.dtype}, expected integers")
-    bad = (array != wire.INVALID_COUNT) & ((array < 0) | (array > sensor.FULL_SCALE_COUNT))
-    if bad.any():
-        row = int(np.argwhere(bad)[0][0])
-        raise ValueError(
-            f"{name} row {row} holds {array[bad][0]}, expected 0..{sensor.FULL_SCALE_COUNT}, or 0xFFFF where missing"
-        )
-    return array.astype(np.uint16)
+    return check_words(name, array).astype(np.uint16)
 
 
 def _accept(command: str, error: int) -> None:

@@ -122,8 +122,8 @@ def test_what_a_board_would_refuse_is_refused_in_words() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"coefficients": [[2**15] * 3]}, "coefficients of OFFSET are int64, expected integers -32768 to 32767"),
-        ({"coefficients": [[-(2**31) - 40_000] * 3]}, "coefficients of OFFSET are int64"),
+        ({"coefficients": [[2**15] * 3]}, "coefficients of OFFSET hold 32768, expected integers -32768 to 32767"),
+        ({"coefficients": [[-(2**31) - 40_000] * 3]}, "coefficients of OFFSET hold -2147523648"),
         ({"coefficients": [[1.5] * 3]}, "coefficients of OFFSET are float64, expected integers"),
         ({"coefficients": [[1] * 4]}, r"coefficients of OFFSET have shape \(1, 4\), expected \(1, 3\)"),
         ({"exponent": (300, 0, 0)}, "cannot be stored"),

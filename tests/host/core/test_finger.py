@@ -156,11 +156,9 @@ def test_settings_and_times() -> None:
         (lambda: Finger().feed(np.zeros((1, 19), int), t_us=[0.5]), "t_us is float64"),
         (lambda: Finger(index=5), "index is 5"),
         (lambda: Finger({Setting.POC_WEIGHTS: 3}), "POC_WEIGHTS is 3"),
-        (
-            lambda: Finger().set_tare(np.full(19, 4096)),
-            r"the tare has shape \(19,\), expected \(19,\) and values 0\.\.4095",
-        ),
-        (lambda: Finger().set_tare(np.full(18, 100)), r"the tare has shape \(18,\)"),
+        (lambda: Finger().set_tare(np.full(19, 4096)), r"the tare holds 4096, expected 0\.\.4095 counts"),
+        (lambda: Finger().set_tare(np.full(19, 7), -1.5), r"the tare holds -1\.5, expected 0\.\.4095 counts"),
+        (lambda: Finger().set_tare(np.full(18, 100)), r"the tare has shape \(18,\), expected \(19,\)"),
     ],
 )
 def test_bad_input_is_refused_at_the_door(call, words) -> None:
