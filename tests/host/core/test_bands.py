@@ -62,7 +62,14 @@ def test_rounds_without_a_word_have_no_energy() -> None:
     assert np.flatnonzero(np.isnan(pac_bands(pac)).any(axis=1)).tolist() == [7]
 
 
-@pytest.mark.parametrize("pac", [np.zeros((3, 21), int), np.zeros((3, 22)), np.full((3, 22), 5000)])
-def test_what_is_no_pac_is_refused(pac: Any) -> None:
-    with pytest.raises(ValueError, match="expected"):
+@pytest.mark.parametrize(
+    ("pac", "words"),
+    [
+        (np.zeros((3, 21), int), r"int64 of shape \(3, 21\), expected integers of shape \(n, 22\)"),
+        (np.zeros((3, 22)), r"float64 of shape \(3, 22\), expected integers"),
+        (np.full((3, 22), 5000), "pac row 0 holds 5000, expected 0..4095"),
+    ],
+)
+def test_what_is_no_pac_is_refused(pac: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
         pac_bands(pac)
