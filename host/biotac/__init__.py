@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .errors import FlashError as FlashError
     from .errors import InputError as InputError
     from .errors import NotAGatewayError as NotAGatewayError
+    from .errors import PortBusyError as PortBusyError
     from .errors import PortError as PortError
     from .errors import RecordingError as RecordingError
     from .errors import RecordingWarning as RecordingWarning
@@ -68,7 +69,7 @@ _HOMES = {
     ".core.compute": "MAPPED_RESULT_DTYPE RESULT_DTYPE compute per_frame",
     ".core.finger": "FINGER_DTYPE Finger",
     ".errors": "BiotacError CallbackError CommandRefusedError DeviceLostError FlashError InputError "
-    "NotAGatewayError PortError RecordingError RecordingWarning ScenarioError WireVersionError",
+    "NotAGatewayError PortBusyError PortError RecordingError RecordingWarning ScenarioError WireVersionError",
     ".hand.aio": "aio",
     ".hand.compatibility": "HandWarning",
     ".hand.faults": "Faults",

@@ -42,6 +42,10 @@ class PortError(BiotacError):
     exit_code = 3
 
 
+class PortBusyError(PortError):
+    """Another program has the port open."""
+
+
 class NotAGatewayError(BiotacError):
     """Something is on the port, but it does not speak this protocol."""
 

@@ -27,8 +27,8 @@ void bt_intake_reset(bt_intake *intake)
     intake->unheard = 0;
 }
 
-// The three kinds of rows begin alike: u16 seq, u32 t_us, u8 finger (test_stream.py holds it against the
-// schema).
+// The three kinds of rows begin alike: u16 seq, u32 t_us, u8 finger (tests/host/wire/test_batches.py
+// holds it against the schema).
 static uint16_t seq_of(const uint8_t *row)
 {
     return bt_get_u16(row);

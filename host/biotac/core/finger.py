@@ -21,7 +21,7 @@ from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray, frames_from_wire, tare_to_q4
 from ..wire.native import ffi, lib
 from .board_map import BoardMap
-from .compiled import Settings, board_settings, check_tare, check_words, default_settings
+from .compiled import Settings, board_settings, check_words, default_settings
 from .events import EVENT_DTYPE
 from .map_versions import opened
 
@@ -178,7 +178,7 @@ class Finger:
         values = tare if pdc is None else np.append(tare, pdc)
         if tare.shape != (_ELECTRODES,):
             raise ValueError(f"the tare has shape {tare.shape}, expected ({_ELECTRODES},)")
-        q16 = (tare_to_q4(check_tare(values)).astype(np.uint32) << 12).tolist()
+        q16 = (tare_to_q4(values).astype(np.uint32) << 12).tolist()
         base = ffi.new("bt_baseline *")
         base.electrode_q16 = q16[:_ELECTRODES]
         base.pdc_q16 = INVALID_U32 if pdc is None else q16[_ELECTRODES]

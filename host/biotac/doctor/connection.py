@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..errors import DeviceLostError, NotAGatewayError, PortError
+from ..errors import DeviceLostError, NotAGatewayError, PortBusyError, PortError
 from ..link.holders import in_words
 from .catalogue import Finding
 from .facts import Facts
@@ -20,7 +20,7 @@ def check(facts: Facts) -> Iterator[Finding]:
         return
     if not system.permitted:
         yield Finding("no_permission", f"no permission to open {facts.port}; it is owned by {system.owner}")
-    elif isinstance(error, PortError) and ("in use" in str(error) or system.holders):
+    elif isinstance(error, PortBusyError) or (isinstance(error, PortError) and system.holders):
         yield Finding("port_busy", f"{facts.port} is in use by {in_words(system.holders)}")
     elif isinstance(error, PortError):
         yield Finding("port_failed", str(error))

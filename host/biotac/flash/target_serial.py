@@ -9,7 +9,7 @@ import serial
 from ..errors import BiotacError, DeviceLostError, PortError
 from ..hand.hand import Hand
 from ..link.discovery import boards
-from ..link.serial_port import SerialLink, describe_open_error
+from ..link.serial_port import SerialLink, open_error
 from .target import Target
 from .waiting import wait_for
 
@@ -39,7 +39,7 @@ class SerialTarget(Target):
         try:
             serial.Serial(self._device, TOUCH_BAUD).close()
         except (serial.SerialException, OSError, ValueError) as error:
-            raise PortError(describe_open_error(self._device, error)) from error
+            raise open_error(self._device, error) from error
 
     def reopen(self) -> Hand:
         self._failed = f"no port with serial number {self._serial_number}" if self._serial_number else "no new port"

@@ -87,7 +87,8 @@ class Commands:
     def point(self, finger: Finger) -> wire.Point:
         """Where ``finger`` is touched right now (``poc_um``), without waiting for the end of a round.
 
-        All INVALID_I16 without a touch or a tare. Raises CommandRefusedError when no sensor answers there.
+        Noise gives an untouched finger a point too: whether it is touched is in its frames. All INVALID_I16 without a
+        tare, or while no electrode has a weight. Raises CommandRefusedError when no sensor answers there.
         """
         return self._board.ask(wire.GetPoint(0, self._index(finger)), wire.Point)
 
@@ -98,15 +99,13 @@ class Commands:
     def set_tare(self, finger: Finger, tare_counts: Any, pdc_counts: float | None = None) -> None:
         """Use a stored tare: ``tare_counts`` (19,) in counts 0..4095, rounded to 1/16 count; ``pdc_counts`` likewise.
 
-        Raises ValueError when ``tare_counts`` has another shape or range.
+        Raises ValueError for another shape or range.
         """
         tare = np.asarray(tare_counts, dtype=np.float64)
-        if tare.shape != (19,) or not np.all((tare >= 0) & (tare <= 4095)):
-            raise ValueError(
-                f"tare_counts has shape {tare.shape} or values out of range; expected 19 values of 0..4095 counts"
-            )
-        tare_q4 = tuple(int(v) for v in tare_to_q4(tare))
-        pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else round(pdc_counts * 16)
+        if tare.shape != (19,):
+            raise ValueError(f"tare_counts has shape {tare.shape}, expected (19,)")
+        tare_q4 = tuple(tare_to_q4(tare).tolist())
+        pdc_q4 = wire.INVALID_COUNT if pdc_counts is None else int(tare_to_q4(np.float64(pdc_counts)))
         self._board.tell(wire.TareSet(0, self._index(finger), tare_q4, pdc_q4))
 
     def hold(self, *fingers: Finger) -> None:

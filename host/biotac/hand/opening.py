@@ -10,6 +10,7 @@ from ..keep import Calibration, harness
 from ..link import Link, open_link
 from ..link.discovery import SERIAL_PREFIX, choose
 from ..wire import messages_gen as wire
+from ..wire.frames import Q4_PER_COUNT
 from .hand import Hand
 
 
@@ -29,8 +30,9 @@ def open(
     ``sim:SOURCE`` for a simulated board, where SOURCE is a scenario (``press.toml``) or a recording of counts
     (``.npz``, ``.btd``); or ``emu:pico?source=SOURCE`` for the board's own flash image in an emulator, playing the
     same. ``replay:press.mcap?from=12.5&to=20`` plays a recording, or that part of it: the board's stream again, while
-    commands that would change a board raise CommandRefusedError. ``uart:DEVICE?baud=N`` is a board's UART, and
-    ``zenoh:NAME`` a board that another computer shares. ``pace`` is for simulated and emulated boards and recordings:
+    commands that would change a board raise CommandRefusedError. ``uart:DEVICE?baud=N`` is a board's UART,
+    ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT`` a serial port on the network, and ``zenoh:NAME`` a board that
+    another computer shares. ``pace`` is for simulated and emulated boards and recordings:
     device seconds per second, or 0 for as fast as this side reads.
 
     With ``reconnect``, a board that went away is looked for, by its serial number, until it is back. Then what this
@@ -76,7 +78,7 @@ def shake_hands(
             hand.set_setting(wire.Setting[name.upper()], value)
         if source and source.tare_q4 is not None:
             for finger, tare_q4 in enumerate(source.tare_q4):
-                hand.set_tare(finger, tare_q4 / 16.0)
+                hand.set_tare(finger, tare_q4 / Q4_PER_COUNT)
     except BaseException:
         hand.close()
         raise

@@ -59,7 +59,7 @@ class Wants:
             quantities |= QUANTITIES.get(name, QuantityFlags(0))
         if rest:
             quantities |= QuantityFlags.REST_FRAMES
-        # The link's sign of life, 36 bytes a second: without it, a hand without sensors would look dead.
+        # The link's sign of life: without it, a hand without sensors would look dead.
         streams = StreamFlags.STATUS
         if any(name in QUANTITIES or name in IN_EVERY_FRAME for name in names):
             streams |= StreamFlags.FRAMES

@@ -57,7 +57,7 @@ _SEAL = pa.schema(
 
 @dataclass(frozen=True)
 class Written:
-    """Result of ``put``. ``rows`` by topic; ``new`` is False if the recording was already in the lake."""
+    """Result of ``put``. ``rows`` by topic; ``new`` is False if it was in the lake before this export."""
 
     recording: str
     new: bool

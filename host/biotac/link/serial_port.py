@@ -11,7 +11,7 @@ from typing import Any
 import serial
 from serial.tools.list_ports import comports
 
-from ..errors import DeviceLostError, PortError
+from ..errors import DeviceLostError, PortBusyError, PortError
 from .base import Link
 from .holders import holders, in_words
 from .port_text import options_of
@@ -46,7 +46,7 @@ class SerialLink(Link):
             rate = self.bits_per_s or USB_BITS_PER_S
             self._serial = serial.Serial(place, rate, timeout=0, write_timeout=2, exclusive=exclusive())
         except (serial.SerialException, OSError, ValueError) as error:
-            raise PortError(describe_open_error(place, error)) from error
+            raise open_error(place, error) from error
         if os.name == "posix":
             self.fd = self._serial.fileno()
         if hasattr(select, "poll"):
@@ -141,15 +141,17 @@ def exclusive() -> bool | None:
     return True if os.name == "posix" else None
 
 
-def describe_open_error(path: str, error: Exception) -> str:
-    """One line with the error and the cure."""
+def open_error(path: str, error: Exception) -> PortError:
+    """What to raise when ``path`` could not be opened: the error in one line, with its cure."""
     code = getattr(error, "errno", None)
     text = str(error).lower()
     if code == errno.ENOENT or "no such file" in text or "filenotfound" in text:
-        return f"no port {path}; `biotac list` shows the ports of this machine"
+        return PortError(f"no port {path}; `biotac list` shows the ports of this machine")
     # Windows says "access is denied" for a port that a program has open; there it means nothing else.
     if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text or "access is denied" in text:
-        return f"{path} is in use by {in_words(holders(path))}; close that program and try again"
+        return PortBusyError(f"{path} is in use by {in_words(holders(path))}; close that program and try again")
     if code == errno.EACCES or "permission" in text:
-        return f"no permission to open {path}; `biotac doctor` tells how to get it"
-    return f"{path} cannot be opened as a serial port ({error}); `biotac list` shows the ports of this machine"
+        return PortError(f"no permission to open {path}; `biotac doctor` tells how to get it")
+    return PortError(
+        f"{path} cannot be opened as a serial port ({error}); `biotac list` shows the ports of this machine"
+    )

@@ -20,6 +20,12 @@ AXES = ("x", "y", "z")
 PAC_SAMPLES = tuple(str(k) for k in range(22))
 _ELECTRODES = tuple(ELECTRODE_NAMES)
 
+#: Steps of the wire's integers per unit of a column.
+UM_PER_MM = 1_000
+FORCE_LSB_PER_N = 10_000  # force_100un
+MNMM_PER_NMM = 1_000
+Q4_PER_COUNT = 16
+
 #: The marks for a missing value in the wire's integers, by type.
 INVALID_U32 = 0xFFFFFFFF
 WIRE_INVALID = {"u2": INVALID_COUNT, "u4": INVALID_U32, "i2": INVALID_I16, "i4": INVALID_I32}
@@ -76,11 +82,29 @@ FRAME_FIELDS = (
     _count("pdc", "static pressure"),
     _count("tac", "thermal flux"),
     _count("tdc", "temperature"),
-    Field("tare", "<f4", "count", "counts at rest, in steps of 1/16; NaN where unknown", _ELECTRODES, "tare_q4", 16),
-    Field("pdc_tare", "<f8", "count", "pressure at rest, in steps of 1/16; NaN where unknown", (), "pdc_tare_q4", 16),
+    Field(
+        "tare",
+        "<f4",
+        "count",
+        "counts at rest, in steps of 1/16; NaN where unknown",
+        _ELECTRODES,
+        "tare_q4",
+        Q4_PER_COUNT,
+    ),
+    Field(
+        "pdc_tare",
+        "<f8",
+        "count",
+        "pressure at rest, in steps of 1/16; NaN where unknown",
+        (),
+        "pdc_tare_q4",
+        Q4_PER_COUNT,
+    ),
     Field("tare_state", "u1", "1", "enum tare_state in MESSAGES.md", (), "tare_state"),
-    Field("poc_mm", "<f8", "mm", "point of contact on the core's surface; NaN where invalid", AXES, "poc_um", 1_000),
-    Field("force_n", "<f8", "N", "force on the finger; NaN where invalid", AXES, "force_100un", 10_000),
+    Field(
+        "poc_mm", "<f8", "mm", "point of contact on the core's surface; NaN where invalid", AXES, "poc_um", UM_PER_MM
+    ),
+    Field("force_n", "<f8", "N", "force on the finger; NaN where invalid", AXES, "force_100un", FORCE_LSB_PER_N),
     Field(
         "torque_nmm",
         "<f8",
@@ -88,12 +112,26 @@ FRAME_FIELDS = (
         "torque on the finger about the origin; NaN where invalid",
         AXES,
         "torque_mnmm",
-        1_000,
+        MNMM_PER_NMM,
     ),
-    Field("poc_sigma_mm", "<f8", "mm", "one standard deviation; NaN unless enabled", (), "poc_sigma_um", 1_000),
-    Field("force_sigma_n", "<f8", "N", "one standard deviation; NaN unless enabled", AXES, "force_sigma_100un", 10_000),
+    Field("poc_sigma_mm", "<f8", "mm", "one standard deviation; NaN unless enabled", (), "poc_sigma_um", UM_PER_MM),
     Field(
-        "pdc_filtered", "<f8", "count", "pressure, filtered by the board; NaN where missing", (), "pdc_filtered_q4", 16
+        "force_sigma_n",
+        "<f8",
+        "N",
+        "one standard deviation; NaN unless enabled",
+        AXES,
+        "force_sigma_100un",
+        FORCE_LSB_PER_N,
+    ),
+    Field(
+        "pdc_filtered",
+        "<f8",
+        "count",
+        "pressure, filtered by the board; NaN where missing",
+        (),
+        "pdc_filtered_q4",
+        Q4_PER_COUNT,
     ),
     Field(
         "pressure_force_n",
@@ -102,7 +140,7 @@ FRAME_FIELDS = (
         "magnitude of the force from static pressure, negative below rest; NaN unless calibrated",
         (),
         "pressure_force_100un",
-        10_000,
+        FORCE_LSB_PER_N,
     ),
     Field(
         "torsion_nmm",
@@ -111,7 +149,7 @@ FRAME_FIELDS = (
         "torque about the outward normal at the contact; NaN unless a wrench map gives it",
         (),
         "torsion_mnmm",
-        1_000,
+        MNMM_PER_NMM,
     ),
     Field(
         "wrench_age_ms",
@@ -139,7 +177,7 @@ BANDS_FIELDS = (
         "sum of squares of the signal in the band, over 22 samples; NaN without a good word",
         ("18hz", "36hz", "72hz", "147hz", "309hz", "over527hz"),
         "energy_q4",
-        16,
+        Q4_PER_COUNT,
     ),
 )
 

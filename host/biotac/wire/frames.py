@@ -1,6 +1,6 @@
 """Frames as users see them: in SI-like units, with the same field names everywhere.
 
-Wire integers become mm, N and N*mm here and nowhere else.
+The unit of each column is that of its row in fields.py, which divides.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .dtypes_gen import DTYPES
 from .fields import BANDS_FIELDS, FRAME_FIELDS, IDLE_FIELDS, PAC_FIELDS, Field, dtype_of, sent_of, values_of
+from .fields import FORCE_LSB_PER_N as FORCE_LSB_PER_N
+from .fields import MNMM_PER_NMM as MNMM_PER_NMM
+from .fields import Q4_PER_COUNT as Q4_PER_COUNT
+from .fields import UM_PER_MM as UM_PER_MM
 from .fields import to_units as to_units
 from .messages_gen import INVALID_COUNT, FrameFlags, TareState
 from .messages_gen import Frame as _FrameMessage
-
-UM_PER_MM = 1_000
-FORCE_LSB_PER_N = 10_000  # force_100un
-MNMM_PER_NMM = 1_000
-Q4_PER_COUNT = 16
+from .sensor_gen import FULL_SCALE_COUNT
 
 StructArray = NDArray[np.void]
 
@@ -126,13 +126,20 @@ def frames_to_wire(frames: StructArray) -> StructArray:
     return out
 
 
-def tare_to_q4(tare_counts: NDArray[np.float64]) -> NDArray[np.uint16]:
-    """A tare in counts 0..4095, of any shape, in the board's unit of 1/16 count; halves are rounded up."""
-    return np.floor(tare_counts * 16 + 0.5).astype(np.uint16)
+def tare_to_q4(tare_counts: ArrayLike) -> NDArray[np.uint16]:
+    """A tare in counts, of any shape, in the board's unit of 1/16 count; halves are rounded up.
+
+    Raises ValueError unless all of it is 0..4095 counts.
+    """
+    tare = np.asarray(tare_counts, dtype=np.float64)
+    bad = ~((tare >= 0) & (tare <= FULL_SCALE_COUNT))
+    if bad.any():
+        raise ValueError(f"the tare holds {tare[bad].flat[0]:g}, expected 0..{FULL_SCALE_COUNT} counts")
+    return np.floor(tare * Q4_PER_COUNT + 0.5).astype(np.uint16)
 
 
 def electrode_signals(messages: StructArray) -> NDArray[np.float64]:
     """e = count - tare of FRAME messages, in counts, shape (n, 19); NaN where either is missing."""
     counts, tare_q4 = messages["counts"], messages["tare_q4"]
     missing = (counts == INVALID_COUNT) | (tare_q4 == INVALID_COUNT)
-    return np.where(missing, np.nan, counts - tare_q4 / 16.0)
+    return np.where(missing, np.nan, counts - tare_q4 / Q4_PER_COUNT)

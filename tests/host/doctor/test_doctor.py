@@ -20,7 +20,7 @@ from biotac.cli.main import main
 from biotac.clock import Fit
 from biotac.doctor import CATALOGUE, BoardFacts, Facts, PairFacts, SystemFacts, judge, leads, udev
 from biotac.doctor.version import release
-from biotac.errors import DeviceLostError, NotAGatewayError, PortError, WireVersionError
+from biotac.errors import DeviceLostError, NotAGatewayError, PortBusyError, PortError, WireVersionError
 from biotac.link.discovery import SerialPort
 from biotac.link.holders import Holder
 from biotac.version import __version__
@@ -198,7 +198,7 @@ CASES: list[tuple[str, Facts, str]] = [
     ),
     (
         "port_busy",
-        Facts(PORT, SystemFacts(holders=[NOBODY]), PortError(f"{PORT} is in use by minicom")),
+        Facts(PORT, SystemFacts(holders=[NOBODY]), PortBusyError(f"{PORT} is in use by minicom")),
         "minicom (process 7)",
     ),
     ("port_shared", Facts(PORT, SystemFacts(holders=[NOBODY]), board=healthy()), "minicom (process 7)"),

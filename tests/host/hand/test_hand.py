@@ -94,10 +94,10 @@ def test_the_same_source_gives_the_same_bytes(tmp_path) -> None:
 
 def test_a_tare_command_changes_the_tare_of_the_next_frame() -> None:
     with biotac.open("sim:drift.toml?seconds=1") as hand:
-        hand.set_tare(0, np.full(19, 3000.0))
+        hand.set_tare(0, np.full(19, 3000.0), 1500 + 0.5 / 16)  # a half of 1/16 count, rounded up like the electrodes'
         batch = hand.read_batch(0.1)
     events = [m for m in batch.messages if isinstance(m, wire.Tare)]
-    assert batch.wire["tare_q4"][0].tolist() == [48000] * 19
+    assert batch.wire["tare_q4"][0].tolist() == [48000] * 19 and batch.wire["pdc_tare_q4"][0] == 24001
     assert (events[0].seq, events[0].reason) == (0, wire.TareReason.HOST_SET)
 
 
@@ -192,9 +192,13 @@ def test_nothing_works_after_close_and_it_says_so() -> None:
 
 def test_values_that_no_message_can_hold_are_refused() -> None:
     with biotac.open("sim:drift.toml?seconds=1") as hand:
-        for bad in (np.full(18, 3000.0), np.full(19, -1.0), np.full(19, 5000.0), np.full(19, np.nan)):
-            with pytest.raises(ValueError, match="expected 19 values"):
-                hand.set_tare(0, bad)
+        with pytest.raises(ValueError, match=r"tare_counts has shape \(18,\), expected \(19,\)"):
+            hand.set_tare(0, np.full(18, 3000.0))
+        for bad in (-1.0, 5000.0, np.nan):
+            with pytest.raises(ValueError, match=rf"the tare holds {bad:g}, expected 0\.\.4095 counts"):
+                hand.set_tare(0, np.full(19, bad))
+            with pytest.raises(ValueError, match=rf"the tare holds {bad:g}, expected 0\.\.4095 counts"):
+                hand.set_tare(0, np.full(19, 3000.0), bad)
         with pytest.raises(biotac.InputError, match="SetSetting cannot hold"):
             hand.set_setting(biotac.Setting.POC_WEIGHTS, 10**12)
         for seconds in (0, -1, float("nan"), float("inf")):

@@ -136,7 +136,7 @@ def test_while_a_board_is_looked_for_its_last_force_is_not_given() -> None:
 def test_settings_that_there_are_not_are_refused(key) -> None:
     counts, tare = np.full(19, 2000, np.uint16), np.full(19, 2100.0)
     for compute in (biotac.compute, lambda _, tare, settings: biotac.per_frame(tare, settings)):
-        with pytest.raises(ValueError, match=rf"settings have '?{key}'?, expected members of biotac.Setting"):
+        with pytest.raises(ValueError, match=rf"settings contain '?{key}'?, expected members of biotac.Setting"):
             compute(counts, tare, {key: 1})
 
 

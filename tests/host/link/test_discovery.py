@@ -15,7 +15,7 @@ import biotac
 from biotac.cli.main import main
 from biotac.link.discovery import boards, choose, serial_ports
 from biotac.link.holders import Holder, holders
-from biotac.link.serial_port import describe_open_error
+from biotac.link.serial_port import open_error
 from biotac.wire import messages_gen as wire
 from biotac.wire.identity import ascii_text, serial_text
 
@@ -170,10 +170,12 @@ def test_a_busy_port_names_the_program(proc: Proc, monkeypatch) -> None:
     monkeypatch.setattr("biotac.link.holders.PROC", proc.root)
     monkeypatch.setattr("biotac.link.serial_port.holders", lambda path: holders(path, proc.root))
     for error in (OSError(errno.EBUSY, "busy"), Exception("Could not exclusively lock port")):
-        text = describe_open_error("/dev/ttyACM0", error)
-        assert text == "/dev/ttyACM0 is in use by minicom (process 4242); close that program and try again"
-    assert "in use by another program" in describe_open_error("COM3", PermissionError(13, "Access is denied."))
-    assert "no permission" in describe_open_error("/dev/ttyACM0", PermissionError(13, "Permission denied"))
+        busy = open_error("/dev/ttyACM0", error)
+        assert isinstance(busy, biotac.PortBusyError)
+        assert str(busy) == "/dev/ttyACM0 is in use by minicom (process 4242); close that program and try again"
+    assert "in use by another program" in str(open_error("COM3", PermissionError(13, "Access is denied.")))
+    forbidden = open_error("/dev/ttyACM0", PermissionError(13, "Permission denied"))
+    assert "no permission" in str(forbidden) and not isinstance(forbidden, biotac.PortBusyError)
 
 
 def test_two_programs_that_want_one_port_are_told_apart(scripted_board, hello) -> None:

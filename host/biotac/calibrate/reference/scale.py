@@ -16,7 +16,7 @@ from urllib.parse import parse_qsl
 import serial
 
 from ...errors import InputError, PortError
-from ...link.serial_port import describe_open_error
+from ...link.serial_port import open_error
 
 STANDARD_GRAVITY = 9.80665  # m/s2; the local value differs by up to 0.3 %
 UNITS_N = {"N": 1.0, "g": 1e-3 * STANDARD_GRAVITY, "kg": STANDARD_GRAVITY}
@@ -56,7 +56,7 @@ class Scale:
         try:
             self._serial.open()
         except (serial.SerialException, OSError) as error:
-            raise PortError(describe_open_error(place, error)) from error
+            raise open_error(place, error) from error
 
     def __enter__(self) -> Scale:
         return self
