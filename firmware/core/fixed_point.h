@@ -1,7 +1,7 @@
 // Division, shifting and rounding in the core. Published values round half away from zero (protocol/SPEC.md).
 // Nothing here saturates: every caller's range is bounded at compile time.
-#ifndef BIOTAC_FIX_H
-#define BIOTAC_FIX_H
+#ifndef BIOTAC_FIXED_POINT_H
+#define BIOTAC_FIXED_POINT_H
 
 #include <stdint.h>
 

@@ -1,7 +1,7 @@
 // A map's coefficients as stored in the blob: 16 bits each, column by column, those of a group of axes side
 // by side. Sums read them two at a time.
-#ifndef BIOTAC_MAP_WORD_H
-#define BIOTAC_MAP_WORD_H
+#ifndef BIOTAC_MAP_WORDS_H
+#define BIOTAC_MAP_WORDS_H
 
 #include "fixed_point.h"
 #include "map/map.h"
