@@ -10,6 +10,9 @@
 #define BT_TARE_UNKNOWN 0xFFFFFFFFu // of a channel that was never read
 #define BT_SNAPSHOTS    8
 
+// Per sweep; 0.5 count/s: drift is followed no faster, so that no load is.
+#define BT_SLEW_Q16 (8 * 328)
+
 typedef struct {
     uint32_t electrode_q16[BT_ELECTRODES];
     uint32_t pdc_q16;

@@ -156,7 +156,7 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
 // Means are up to two sweeps old, so the present signals must agree with them.
 static bool present_is_still(const bt_tare *tare)
 {
-    bool still = tare->sweep.still_sweeps >= BT_STILL_SWEEPS;
+    bool still = tare->sweep.still_sweeps >= BT_TARE_STILL_SWEEPS;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         int change_q3 = 8 * tare->trigger.smooth.lane[i] - tare->sweep.mean_q3.lane[i];
         still = still && change_q3 <= NOW_SPAN_Q3 && change_q3 >= -NOW_SPAN_Q3;
