@@ -17,6 +17,9 @@ _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS <= BT_RECORD_MAP
                    && BT_RECORD_MAP + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS,
                "every finger's map must have a record of its own");
 
+_Static_assert(PORT_SERIAL_BYTES == BT_BOARD_SERIAL_BYTES,
+               "the board's serial number goes to the host whole");
+
 #define ALL_FINGERS ((1u << BT_MAX_FINGERS) - 1)
 
 // The gap after the last property read, plus the time a slow board takes from here to setting its alarm. If

@@ -10,10 +10,12 @@
 #include "map/upload.h"
 #include "wire/framing.h"
 
+#define BT_BOARD_SERIAL_BYTES sizeof(((bt_msg_hello *)NULL)->board_serial)
+
 typedef struct {
     uint16_t board; // enum bt_board
     uint8_t firmware_version[3];
-    uint8_t board_serial[12];
+    uint8_t board_serial[BT_BOARD_SERIAL_BYTES];
     uint32_t boot_id;
     uint32_t image_crc32; // 0xFFFFFFFF: unknown
 } bt_identity;
