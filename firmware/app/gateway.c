@@ -190,7 +190,7 @@ static void close_round(bt_gateway *gateway)
 {
     bt_session *session = &gateway->session;
     uint8_t serial[BT_SERIAL_BYTES];
-    bt_session_round(session);
+    bt_session_end_round(session);
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
         if (session->asked >> f & 1) {
             bool told = bt_serial_query_answer(&gateway->sampler.query[f], serial);

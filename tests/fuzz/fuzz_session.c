@@ -179,7 +179,7 @@ static void give_round(bt_session *session, fuzz_input *in, uint32_t now_us)
             bt_session_slot(session, slot, counts, now_us);
         }
     }
-    bt_session_round(session);
+    bt_session_end_round(session);
 }
 
 static void check_settings(const bt_session *session)
@@ -203,7 +203,7 @@ static void check_calibrations(const bt_session *session)
             && (!its->present || bt_calibration_apply(its, &own) != BT_ERROR_OK)) {
             FAIL("finger %d uses an invalid calibration", f);
         }
-        if (session->kernel[f].poc_weights != bt_settings_get(&own, BT_SETTING_POC_WEIGHTS)
+        if (session->solve[f].poc_weights != bt_settings_get(&own, BT_SETTING_POC_WEIGHTS)
             || session->tare[f].contact_energy_count2
                    != (uint32_t)bt_settings_get(&own, BT_SETTING_CONTACT_ENERGY_COUNT2)) {
             FAIL("finger %d uses other values than it reports", f);

@@ -132,7 +132,7 @@ static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
     }
     of->one = 1 << BT_MAP_ONE_Q;
     of->pressure =
-        bt_shift_down(bt_limited(pdc_above_rest_q4, -BT_E_MAX_Q4, BT_E_MAX_Q4), 4 - BT_MAP_PRESSURE_Q);
+        bt_shift_down(bt_clamp(pdc_above_rest_q4, -BT_E_MAX_Q4, BT_E_MAX_Q4), 4 - BT_MAP_PRESSURE_Q);
 }
 
 // ---- sums ----------------------------------------------------------------------------------------------
@@ -278,7 +278,7 @@ void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
         word += map->axes * words;
     }
     for (int a = 0; a < axes; a++) {
-        result[a] = bt_limited(total[a], -BT_MAP_RESULT_MAX, BT_MAP_RESULT_MAX);
+        result[a] = bt_clamp(total[a], -BT_MAP_RESULT_MAX, BT_MAP_RESULT_MAX);
     }
 }
 

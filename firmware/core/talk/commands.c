@@ -148,7 +148,7 @@ static void point(bt_session *session, uint8_t req_id, uint8_t finger)
 {
     uint8_t payload[BT_POINT_BYTES];
     bt_msg_point msg = {.req_id = req_id};
-    bt_finger_point(&session->finger[finger], &session->kernel[finger], &msg);
+    bt_finger_point(&session->finger[finger], &session->solve[finger], &msg);
     bt_msg_point_pack(&msg, payload);
     bt_session_send(session, BT_POINT_ID, payload);
 }

@@ -47,7 +47,7 @@ static bool is_residue(const bt_release *release, const bt_release_sweep *sweep)
     uint32_t left = witness ? release->energy_peak / RESIDUE_SHARE : 0;
     uint32_t forgiven = witness || !sweep->pressure ? sweep->forgiven_count2 : 0;
     left = (left > CALM_COUNT2 ? left : CALM_COUNT2) + forgiven;
-    int32_t rest = bt_limited(release->pdc_peak / REST_PDC_SHARE, QUIET_PDC_COUNT, REST_PDC_COUNT_MAX);
+    int32_t rest = bt_clamp(release->pdc_peak / REST_PDC_SHARE, QUIET_PDC_COUNT, REST_PDC_COUNT_MAX);
     bool back = witness ? sweep->above < rest : release->quiet_sweeps >= QUIET_SWEEPS;
     bool gone = sweep->energy_count2 < left || sweep->uneven_count2 < EVEN_COUNT2 + forgiven;
     return back && gone && sweep->still_sweeps >= ENDED_STILL_SWEEPS;
