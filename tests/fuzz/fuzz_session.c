@@ -111,7 +111,7 @@ static void give(bt_session *session, uint8_t id, const uint8_t *payload, uint32
 // The input may spoil a byte of its own map too.
 static void give_upload(bt_session *session, fuzz_input *in, uint32_t now_us)
 {
-    static const uint8_t halves[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
+    static const uint8_t coefficients[BT_MAP_KINDS] = BT_MAP_KIND_COEFFICIENTS;
     static uint8_t blob[BT_MAP_MAX_BYTES];
     uint8_t payload[BT_FRAME_MAX_BYTES];
     uint8_t finger = (uint8_t)(take_u8(in) % (BT_MAX_FINGERS + 1));
@@ -127,7 +127,7 @@ static void give_upload(bt_session *session, fuzz_input *in, uint32_t now_us)
         for (size_t a = 0; a < blob[1]; a++) {
             blob[at + 2 + a] = (uint8_t)(1 + take_u8(in) % BT_MAP_EXPONENT_MAX);
         }
-        count += (size_t)halves[blob[at]] * blob[1];
+        count += (size_t)coefficients[blob[at]] * blob[1];
     }
     for (size_t k = 0; k < count && at + 2 <= sizeof blob; k++, at += 2) {
         blob[at] = take_u8(in);
