@@ -8,6 +8,7 @@
 #include "port.h"
 
 #include "dma.h"
+#include "pins.h"
 #include "selects.h"
 #include "system.h"
 #include "wait.h"
