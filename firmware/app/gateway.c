@@ -17,6 +17,9 @@ _Static_assert(BT_RECORD_CALIBRATION + BT_MAX_FINGERS <= BT_RECORD_MAP
                    && BT_RECORD_MAP + BT_MAX_FINGERS - 1 <= BT_STORAGE_IDS,
                "every finger's map must have a record of its own");
 
+_Static_assert(PORT_SERIAL_BYTES == BT_BOARD_SERIAL_BYTES,
+               "the board's serial number goes to the host whole");
+
 #define ALL_FINGERS ((1u << BT_MAX_FINGERS) - 1)
 
 // The gap after the last property read, plus the time a slow board takes from here to setting its alarm. If
@@ -187,7 +190,7 @@ static void close_round(bt_gateway *gateway)
 {
     bt_session *session = &gateway->session;
     uint8_t serial[BT_SERIAL_BYTES];
-    bt_session_round(session);
+    bt_session_end_round(session);
     for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
         if (session->asked >> f & 1) {
             bool told = bt_serial_query_answer(&gateway->sampler.query[f], serial);

@@ -1,7 +1,7 @@
 // Division, shifting and rounding in the core. Published values round half away from zero (protocol/SPEC.md).
 // Nothing here saturates: every caller's range is bounded at compile time.
-#ifndef BIOTAC_FIX_H
-#define BIOTAC_FIX_H
+#ifndef BIOTAC_FIXED_POINT_H
+#define BIOTAC_FIXED_POINT_H
 
 #include <stdint.h>
 
@@ -66,7 +66,7 @@ static inline int64_t bt_shift_round(int64_t value, int bits)
     return value < 0 ? -(int64_t)magnitude : (int64_t)magnitude;
 }
 
-static inline int32_t bt_limited(int32_t value, int32_t low, int32_t high)
+static inline int32_t bt_clamp(int32_t value, int32_t low, int32_t high)
 {
     return value < low ? low : value > high ? high : value;
 }

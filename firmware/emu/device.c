@@ -303,9 +303,3 @@ uint8_t bt_emu_transfer8(bt_emu_device *device, uint8_t mosi, uint64_t t_ns)
     device->position++;
     return miso;
 }
-
-uint16_t bt_emu_transfer16(bt_emu_device *device, uint16_t mosi, uint64_t t_ns)
-{
-    uint8_t high = bt_emu_transfer8(device, (uint8_t)(mosi >> 8), t_ns);
-    return (uint16_t)(high << 8 | bt_emu_transfer8(device, (uint8_t)mosi, t_ns));
-}

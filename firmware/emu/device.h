@@ -74,7 +74,6 @@ void bt_emu_select(bt_emu_device *device, bool low, uint64_t t_ns);
 
 // Returns what this device drives on MISO. Call for selected devices only. A word is two bytes, MSB first.
 uint8_t bt_emu_transfer8(bt_emu_device *device, uint8_t mosi, uint64_t t_ns);
-uint16_t bt_emu_transfer16(bt_emu_device *device, uint16_t mosi, uint64_t t_ns);
 
 // The two bytes that the device would send if it were selected now, whatever the master sends. settled: its
 // 50 us are over. bytes: how much further on in a property.

@@ -1,5 +1,5 @@
 // Counts for the emulated sensors, prepared by the host (host/biotac/sim/tape.py): one uint16 per
-// frame, finger and slot, little-endian, after a 24-byte header. Values above 4095 are
+// round, finger and slot, little-endian, after a 24-byte header. Values above 4095 are
 // faults: enum bt_emu_fault of the wire.
 #ifndef BIOTAC_EMU_TAPE_H
 #define BIOTAC_EMU_TAPE_H
@@ -10,9 +10,9 @@
 
 typedef struct {
     uint32_t fingers;
-    uint32_t frames;
+    uint32_t rounds;
     const uint8_t *samples;
-    uint64_t start_ns; // of frame 0's first slot
+    uint64_t start_ns; // of round 0's first slot
     bool started;
 } bt_tape;
 
@@ -22,7 +22,7 @@ const char *bt_tape_open(bt_tape *tape, const uint8_t *bytes, size_t size);
 // A bt_emu_source; context is the tape. The first sample command starts the tape.
 uint16_t bt_tape_count(void *context, uint8_t finger, uint8_t channel, uint64_t t_ns);
 
-// True if the last frame's last slot is over by t_ns.
+// True if the last round's last slot is over by t_ns.
 bool bt_tape_over(const bt_tape *tape, uint64_t t_ns);
 
 #endif

@@ -74,8 +74,9 @@ const uint8_t *port_flash_maps(void);
 bool port_reboot_bootloader(void);
 
 // ---- identity -------------------------------------------------------------------------------
+#define PORT_SERIAL_BYTES 12
 uint16_t port_board(void); // enum bt_board
-void port_board_serial(uint8_t serial[12]);
+void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES]);
 uint32_t port_boot_id(void);    // random at each boot
 uint16_t port_started_by(void); // BT_FAULT_FLAG_STARTED, HUNG or CRASHED
 // CRC-32 of the image that runs, read where it is stored; 0xFFFFFFFF where there is no image.

@@ -19,7 +19,7 @@
 #define BT_SLOT_RING 128 // a power of two; 128 slots are 29 ms of main loop delay
 
 typedef struct {
-    uint32_t round; // frame number since start
+    uint32_t round; // its number since start
     uint32_t t_us;  // when the sample command was sent
     uint8_t slot;
     uint8_t asked; // bit mask of fingers asked for their serial number in this round, not sampled

@@ -189,9 +189,9 @@ uint16_t port_board(void)
     return BT_BOARD_LINUX_SBC;
 }
 
-void port_board_serial(uint8_t serial[12])
+void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES])
 {
-    memcpy(serial, "linux-spidev", 12);
+    memcpy(serial, "linux-spidev", PORT_SERIAL_BYTES);
 }
 
 uint32_t port_boot_id(void)

@@ -146,7 +146,7 @@ static inline void run_course(uint8_t quantities, uint64_t seed, course_log *log
             }
             bt_session_slot(&session, slot, count, slot_t_us(k, slot));
         }
-        bt_session_round(&session);
+        bt_session_end_round(&session);
     }
     assert_false(host.broken);
     host.room = SIZE_MAX;

@@ -117,7 +117,7 @@ static inline void host_round(bt_session *session, uint8_t mask, uint16_t count)
     for (uint8_t slot = 0; slot < BT_SLOTS; slot++) {
         bt_session_slot(session, slot, counts, 0);
     }
-    bt_session_round(session);
+    bt_session_end_round(session);
 }
 
 // ---- the session under test ---------------------------------------------------------------------

@@ -14,7 +14,7 @@ static inline size_t put_map(uint8_t *blob, uint32_t number, uint8_t axes, const
                              int count)
 {
     static const uint8_t columns[BT_MAP_KINDS] = BT_MAP_KIND_COLUMNS,
-                         halves[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
+                         coefficients[BT_MAP_KINDS] = BT_MAP_KIND_COEFFICIENTS;
     size_t at = BT_MAP_HEADER_BYTES;
     uint32_t step = 0;
     memset(blob, 0, BT_MAP_MAX_BYTES);
@@ -28,7 +28,7 @@ static inline size_t put_map(uint8_t *blob, uint32_t number, uint8_t axes, const
     }
     for (int k = 0; k < count; k++) {
         for (int group = 0; group < axes; group += 3) { // of 3 axes, or 6
-            for (int c = 0; c < 3 * halves[blocks[k][0]]; c++, at += 2, step++) {
+            for (int c = 0; c < 3 * coefficients[blocks[k][0]]; c++, at += 2, step++) {
                 uint32_t value = c < 3 * columns[blocks[k][0]] ? number * 2654435761u + step * 40503u : 0;
                 blob[at] = (uint8_t)(value >> 8);
                 blob[at + 1] = (uint8_t)(value >> 16 & 7);

@@ -6,7 +6,7 @@
 #include "support.h"
 
 static const uint32_t columns_of[BT_MAP_KINDS] = BT_MAP_KIND_COLUMNS;
-static const uint32_t halves_of[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
+static const uint32_t coefficients_of[BT_MAP_KINDS] = BT_MAP_KIND_COEFFICIENTS;
 static const uint32_t axes_of[] = {3, 6, 7};
 
 #define SOME_AXES (sizeof axes_of / sizeof *axes_of)
@@ -49,14 +49,14 @@ static inline half_word *half(blob *its, uint32_t first, uint32_t kind, uint32_t
 {
     half_word *halves = (half_word *)its->word + first;
     return axis < 3 ? halves + 3 * column + axis
-                    : halves + 3 * halves_of[kind] + (its->axes - 3) * column + axis - 3;
+                    : halves + 3 * coefficients_of[kind] + (its->axes - 3) * column + axis - 3;
 }
 
 // Coefficients of a block, all one and the same; where they begin.
 static inline uint32_t fill(blob *its, uint32_t kind, int16_t value)
 {
     uint32_t first = 2 * its->words;
-    its->words += halves_of[kind] * its->axes / 2;
+    its->words += coefficients_of[kind] * its->axes / 2;
     for (uint32_t column = 0; column < columns_of[kind]; column++) {
         for (uint32_t axis = 0; axis < its->axes; axis++) {
             *half(its, first, kind, column, axis) = value;

@@ -96,7 +96,7 @@ static void magnitudes_hold_at_the_ends(void **state)
         }
     }
     for (int32_t value = -9; value <= 9; value++) {
-        assert_int_equal(bt_limited(value, -5, 7), value < -5 ? -5 : value > 7 ? 7 : value);
+        assert_int_equal(bt_clamp(value, -5, 7), value < -5 ? -5 : value > 7 ? 7 : value);
         assert_int_equal(bt_abs32(value), abs(value));
         assert_int_equal(bt_with_sign(9, value), value < 0 ? -9 : 9);
     }

@@ -11,7 +11,6 @@
 fake_port fake;
 bool (*fake_host_takes)(const uint8_t *data, size_t bytes);
 
-static uint8_t selected;
 static uint64_t released_ns;
 static bool released;
 static bool armed;
@@ -27,14 +26,11 @@ void fake_reset(bt_emu_source source, uint64_t start_ns)
     fake.now_ns = start_ns;
     fake.shortest_gap_ns = UINT64_MAX;
     fake.link_up = true;
-    selected = 0;
     released = false;
     armed = false;
     incoming_bytes = 0;
     seed = 1;
-    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_emu_init(&fake.sensor[f], f, true, "", source, NULL);
-    }
+    bt_emu_bus_init(&fake.bus, BT_MAX_FINGERS, "", source, NULL);
 }
 
 bool fake_next_interrupt(void)
@@ -91,6 +87,7 @@ void port_alarm_at(uint32_t at_us)
 
 void port_spi_select(uint8_t mask)
 {
+    uint8_t selected = fake.bus.selected;
     if (selected == 0 && mask != 0 && released && fake.now_ns - released_ns < fake.shortest_gap_ns) {
         fake.shortest_gap_ns = fake.now_ns - released_ns;
     }
@@ -98,15 +95,12 @@ void port_spi_select(uint8_t mask)
         released_ns = fake.now_ns;
         released = true;
     }
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_emu_select(&fake.sensor[f], mask >> f & 1, fake.now_ns);
-    }
-    selected = mask;
+    bt_emu_bus_select(&fake.bus, mask, fake.now_ns);
 }
 
 uint16_t port_spi_transfer16(uint16_t mosi)
 {
-    uint16_t miso = 0;
+    uint8_t selected = fake.bus.selected;
     if (mosi & 0x8000) {
         sent_command command = {.t_ns = fake.now_ns, .mosi = mosi, .mask = selected};
         if (fake.on_command != NULL) {
@@ -115,23 +109,14 @@ uint16_t port_spi_transfer16(uint16_t mosi)
     } else if (selected == 0 || (selected & (selected - 1)) != 0) {
         fake.selected_reads++;
     }
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        if (selected >> f & 1) {
-            miso |= bt_emu_transfer16(&fake.sensor[f], mosi, fake.now_ns);
-        }
-    }
+    uint16_t miso = bt_emu_bus_transfer16(&fake.bus, mosi, fake.now_ns);
     fake.now_ns += TRANSFER_NS;
     return miso;
 }
 
 uint8_t port_spi_transfer8(uint8_t mosi)
 {
-    uint8_t miso = 0;
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        if (selected >> f & 1) {
-            miso |= bt_emu_transfer8(&fake.sensor[f], mosi, fake.now_ns);
-        }
-    }
+    uint8_t miso = bt_emu_bus_transfer8(&fake.bus, mosi, fake.now_ns);
     fake.now_ns += TRANSFER_NS / 2;
     fake.bytes++;
     return miso;
@@ -198,9 +183,9 @@ uint16_t port_board(void)
     return BT_BOARD_POSIX_SIM;
 }
 
-void port_board_serial(uint8_t serial[12])
+void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES])
 {
-    memcpy(serial, "fake-board-1", 12);
+    memcpy(serial, "fake-board-1", PORT_SERIAL_BYTES);
 }
 
 uint32_t port_boot_id(void)

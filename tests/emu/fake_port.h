@@ -5,7 +5,7 @@
 
 #include "failing_flash.h"
 
-#include "device.h"
+#include "bus.h"
 #include "map/store.h"
 #include "port.h"
 #include "wire/sensor_gen.h"
@@ -23,7 +23,7 @@ typedef struct {
 
 typedef struct {
     uint64_t now_ns;
-    bt_emu_device sensor[BT_MAX_FINGERS];
+    bt_emu_bus bus;
     uint64_t latency_ns;  // from the alarm's time to its interrupt: at most this, at random
     uint64_t held_off_ns; // the next interrupt comes this much later, once
 

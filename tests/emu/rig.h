@@ -92,7 +92,7 @@ static inline void boot(uint64_t start_ns)
     first_command_ns = 0;
     fake_reset(source, start_ns);
     fake_host_takes = take;
-    fake.sensor[trouble.finger].present = !trouble.absent;
+    fake.bus.sensor[trouble.finger].present = !trouble.absent;
     bt_gateway_init(&gateway);
     t0_ns = (uint64_t)gateway.sampler.slot_start_us * 1000;
     bt_msg_start_pack(&msg, payload);

@@ -63,7 +63,7 @@ static void the_slot_rate_is_exact_over_a_minute(void **state)
     assert_int_equal(last_slot, 60 * BT_SLOT_HZ + 1); // the last began when the minute was over
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         assert_in_range(host.frames[f], 5999, 6000);
-        assert_int_equal(fake.sensor[f].early_reads, 0);
+        assert_int_equal(fake.bus.sensor[f].early_reads, 0);
         for (int k = 0; k < host.frames[f]; k++) {
             assert_int_equal(host.frame[f][k].t_us, t0_ns / 1000 + 10000 * (unsigned)k);
             assert_int_equal(host.frame[f][k].seq, k);
@@ -87,7 +87,7 @@ static void interrupt_latency_neither_drifts_nor_breaks_the_settling_time(void *
     assert_int_equal(gateway.session.slots_late, 0);
     assert_true(fake.shortest_gap_ns >= 5000);
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        assert_int_equal(fake.sensor[f].early_reads, 0);
+        assert_int_equal(fake.bus.sensor[f].early_reads, 0);
     }
 }
 

@@ -4,7 +4,7 @@
 //
 //   test_interrupt            exit 0: no data race
 //   test_interrupt --defect   the main loop looks at what is the interrupt's alone, which must be told
-#include "device.h"
+#include "bus.h"
 #include "gateway.h"
 #include "map/store.h"
 #include "port.h"
@@ -26,8 +26,7 @@
 #define AWAY_TO      300
 
 static bt_gateway gateway;
-static bt_emu_device sensor[BT_MAX_FINGERS];
-static uint8_t selected;
+static bt_emu_bus bus;
 static _Alignas(4) uint8_t flash[BT_KEPT_BYTES];
 
 // Relaxed, all of them: they must not lend their order to what is watched.
@@ -96,9 +95,7 @@ int main(int argc, char **argv)
     bool defect = argc > 1 && strcmp(argv[1], "--defect") == 0;
     uint32_t looked = 0;
     memset(flash, 0xFF, sizeof flash);
-    for (uint8_t f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_emu_init(&sensor[f], f, true, "BTEMU00000000001", count, NULL);
-    }
+    bt_emu_bus_init(&bus, BT_MAX_FINGERS, "", count, NULL);
     bt_gateway_init(&gateway);
     start_stream();
     pthread_t thread;
@@ -136,28 +133,19 @@ void port_alarm_at(uint32_t at_us)
 
 void port_spi_select(uint8_t mask)
 {
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_emu_select(&sensor[f], mask >> f & 1, now());
-    }
-    selected = mask;
+    bt_emu_bus_select(&bus, mask, now());
 }
 
 uint16_t port_spi_transfer16(uint16_t mosi)
 {
-    uint16_t miso = 0;
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        miso |= selected >> f & 1 ? bt_emu_transfer16(&sensor[f], mosi, now()) : 0;
-    }
+    uint16_t miso = bt_emu_bus_transfer16(&bus, mosi, now());
     pass(TRANSFER_NS);
     return miso;
 }
 
 uint8_t port_spi_transfer8(uint8_t mosi)
 {
-    uint8_t miso = 0;
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        miso |= selected >> f & 1 ? bt_emu_transfer8(&sensor[f], mosi, now()) : 0;
-    }
+    uint8_t miso = bt_emu_bus_transfer8(&bus, mosi, now());
     asked = asked || now() > AWAY_FROM * ROUND_NS;
     pass(TRANSFER_NS / 2);
     return miso;
@@ -222,9 +210,9 @@ uint16_t port_board(void)
     return BT_BOARD_POSIX_SIM;
 }
 
-void port_board_serial(uint8_t serial[12])
+void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES])
 {
-    memset(serial, 0, 12);
+    memset(serial, 0, PORT_SERIAL_BYTES);
 }
 
 uint32_t port_boot_id(void)

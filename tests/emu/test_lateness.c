@@ -100,7 +100,7 @@ static void a_held_off_interrupt_loses_slots_and_never_the_time_base(void **stat
     uint32_t last = host.frame[1][host.frames[1] - 1].t_us;
     assert_int_equal((last - (uint32_t)(t0_ns / 1000)) % 10000, 0);
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        assert_int_equal(fake.sensor[f].early_reads, 0);
+        assert_int_equal(fake.bus.sensor[f].early_reads, 0);
     }
 }
 
@@ -128,7 +128,7 @@ static void sensors_are_known_by_name_and_absent_ones_stay_blank(void **state)
         }
     }
     run_rounds(3);
-    fake.sensor[2].present = true; // plugged in later
+    fake.bus.sensor[2].present = true; // plugged in later
     run_rounds(3);
     assert_true(gateway.session.finger[2].present);
     assert_true(fake.shortest_gap_ns >= 5000);

@@ -214,11 +214,11 @@ static void saved_maps_hold_for_their_own_sensors_alone(void **state)
     power_on();
     assert_int_equal(session->map_state[3], BT_CALIBRATION_STATE_IN_FORCE);
     assert_int_equal(session->map_state[4], BT_CALIBRATION_STATE_IN_FORCE);
-    fake.sensor[3].serial[15] ^= 3;
+    fake.bus.sensor[3].serial[15] ^= 3;
     power_on();
     assert_int_equal(session->map_state[3], BT_CALIBRATION_STATE_OTHER_SENSOR);
     assert_int_equal(session->map[3].map.made_s, 5); // kept
-    fake.sensor[3].serial[15] ^= 3;
+    fake.bus.sensor[3].serial[15] ^= 3;
     power_on();
     assert_int_equal(session->map_state[3], BT_CALIBRATION_STATE_IN_FORCE);
 }

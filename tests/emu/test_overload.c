@@ -74,7 +74,7 @@ static void start(void)
         bt_session *session = &gateway.session;
         size_t bytes = make_map(gateway.map_ram[f], f + 1u, 2, "");
         assert_int_equal(bt_map_open(&session->map[f].map, gateway.map_ram[f], bytes), BT_ERROR_OK);
-        session->kernel[f].map = &session->map[f].map;
+        session->solve[f].map = &session->map[f].map;
         session->finger[f].quantities = 0xFF;
         assert_int_not_equal(session->finger[f].tare.reason, BT_TARE_REASON_NONE);
     }
@@ -108,7 +108,7 @@ static void what_there_is_time_for_is_all_done(void **state)
     sigma_ns = 120000;
     frame_ns = 200000;
     run_ms(3000);
-    const bt_sheds none = {0, 0, 0};
+    const bt_shed_counts none = {0, 0, 0};
     assert_memory_equal(&gateway.session.sheds, &none, sizeof none);
     slots_and_commands_are_kept();
 }
@@ -173,7 +173,7 @@ static void whole_frames_go_last(void **state)
     frame_ns = 3000000; // 150 % for packing alone
     map_ns = 500000;
     run_ms(3000);
-    const bt_sheds *sheds = &gateway.session.sheds;
+    const bt_shed_counts *sheds = &gateway.session.sheds;
     assert_true(sheds->frames > 100 && sheds->wrench > 0 && sheds->sigma > 0);
     for (int f = 0; f < FINGERS; f++) {
         for (int k = 1; k < host.frames[f]; k++) {

@@ -40,7 +40,7 @@ static void all_are_read_with_gaps_between_the_bytes(void **state)
     // Once for nothing, and each of them twice.
     assert_int_equal(fake.bytes, 4 + 2 * (16 + 4 + 2 + 2 + 2));
     assert_true(fake.shortest_gap_ns >= 10000);
-    assert_int_equal(fake.sensor[0].early_reads, 0);
+    assert_int_equal(fake.bus.sensor[0].early_reads, 0);
 }
 
 static uint64_t flipped;
@@ -88,7 +88,7 @@ static void a_line_that_is_stuck_is_nobody(void **state)
 {
     (void)state;
     bt_msg_sensor_info info;
-    fake.sensor[0].present = false;
+    fake.bus.sensor[0].present = false;
     bt_properties_read(0, &info);
     static const uint8_t none[16];
     assert_int_equal(info.present, 0);
@@ -102,7 +102,7 @@ static void a_sensor_of_another_type_is_named_and_never_sure(void **state)
     static const char *const serial[] = {"BTSP050400018017", "BTTB050400018017"};
     for (int k = 0; k < 2; k++) {
         bt_msg_sensor_info info;
-        memcpy(fake.sensor[k].serial, serial[k], 16);
+        memcpy(fake.bus.sensor[k].serial, serial[k], 16);
         bt_properties_read((uint8_t)k, &info);
         assert_int_equal(info.present, 0);
         assert_memory_equal(info.serial, serial[k], 16);
@@ -111,7 +111,7 @@ static void a_sensor_of_another_type_is_named_and_never_sure(void **state)
     trouble.one_in = 1;
     trouble.fault = BT_EMU_FAULT_BAD_PARITY;
     boot(START_NS);
-    memcpy(fake.sensor[2].serial, serial[0], 16); // plugged in while sampling goes on
+    memcpy(fake.bus.sensor[2].serial, serial[0], 16); // plugged in while sampling goes on
     trouble.one_in = 0;
     run_rounds(300);
     assert_int_equal(gateway.session.info[2].present, 0);
@@ -125,10 +125,10 @@ static void a_mute_sensor_finds_its_voice(void **state)
 {
     (void)state;
     bt_msg_sensor_info info;
-    fake.sensor[0].mute = true;
+    fake.bus.sensor[0].mute = true;
     bt_properties_read(0, &info);
     assert_int_equal(info.present, 1);
-    assert_false(fake.sensor[0].mute);
+    assert_false(fake.bus.sensor[0].mute);
 }
 
 // At start the whole serial number is garbled; it is asked for again while sampling goes on.

@@ -95,8 +95,8 @@ static void saved_calibrations_hold_for_their_own_sensors_alone(void **state)
     assert_memory_equal(session->calibration_state, same, sizeof same);
     assert_int_equal(session->calibration[4].value[1], 30);
     // Fingers 0 and 1 change places: only what is forced may follow the place.
-    fake.sensor[0].serial[15] ^= 3;
-    fake.sensor[1].serial[15] ^= 3;
+    fake.bus.sensor[0].serial[15] ^= 3;
+    fake.bus.sensor[1].serial[15] ^= 3;
     power_cycle();
     static const uint8_t swapped[BT_MAX_FINGERS] = {BT_CALIBRATION_STATE_OTHER_SENSOR,
                                                     BT_CALIBRATION_STATE_IN_FORCE, 0, 0,
@@ -104,7 +104,7 @@ static void saved_calibrations_hold_for_their_own_sensors_alone(void **state)
     assert_memory_equal(session->calibration_state, swapped, sizeof swapped);
     assert_int_equal(session->calibration[0].value[1], 10); // kept
     // Absent, as another.
-    fake.sensor[4].present = false;
+    fake.bus.sensor[4].present = false;
     power_cycle();
     assert_int_equal(session->calibration_state[4], BT_CALIBRATION_STATE_OTHER_SENSOR);
 }

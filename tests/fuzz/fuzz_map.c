@@ -9,7 +9,7 @@
 #include <string.h>
 
 static const uint32_t columns_of[BT_MAP_KINDS] = BT_MAP_KIND_COLUMNS;
-static const uint32_t halves_of[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
+static const uint32_t coefficients_of[BT_MAP_KINDS] = BT_MAP_KIND_COEFFICIENTS;
 static uint32_t blob[BT_MAP_MAX_BYTES / 4 + 64];
 
 #define BLOCKS_MAX 4
@@ -79,7 +79,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         uint32_t coefficient = take_u32(&in), step = take_u32(&in);
         for (int group = 0; group < axes; group += group == 0 ? 3 : 4) {
             uint32_t width = group == 0 ? 3 : (uint32_t)axes - 3;
-            for (uint32_t k = 0; k < halves_of[head[0]] * width; k += 2) {
+            for (uint32_t k = 0; k < coefficients_of[head[0]] * width; k += 2) {
                 uint32_t both = 0;
                 for (uint32_t h = 0; h < 2; h++) {
                     int32_t value = (int16_t)(coefficient >> 16) / (1 + (int32_t)(step & 31));
@@ -128,10 +128,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         for (int b = 0; plain && b < map.block_count; b++) {
             const uint8_t *head = map.blocks + b * BT_MAP_BLOCK_BYTES;
             int width = a < 3 ? 3 : map.axes - 3;
-            const int16_t *c = its + (a < 3 ? a : 3 * (int)halves_of[head[0]] + a - 3);
+            const int16_t *c = its + (a < 3 ? a : 3 * (int)coefficients_of[head[0]] + a - 3);
             int64_t pressure = pdc_q4 < 0 ? -((1 - pdc_q4) / 2) : pdc_q4 / 2; // floor
             total += rounded(block_of(head[0], e, pressure, c, width), head[2 + a]);
-            its += halves_of[head[0]] * (uint32_t)map.axes;
+            its += coefficients_of[head[0]] * (uint32_t)map.axes;
         }
         total = total > BT_MAP_RESULT_MAX    ? BT_MAP_RESULT_MAX
                 : total < -BT_MAP_RESULT_MAX ? -BT_MAP_RESULT_MAX

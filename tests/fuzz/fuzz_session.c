@@ -111,7 +111,7 @@ static void give(bt_session *session, uint8_t id, const uint8_t *payload, uint32
 // The input may spoil a byte of its own map too.
 static void give_upload(bt_session *session, fuzz_input *in, uint32_t now_us)
 {
-    static const uint8_t halves[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
+    static const uint8_t coefficients[BT_MAP_KINDS] = BT_MAP_KIND_COEFFICIENTS;
     static uint8_t blob[BT_MAP_MAX_BYTES];
     uint8_t payload[BT_FRAME_MAX_BYTES];
     uint8_t finger = (uint8_t)(take_u8(in) % (BT_MAX_FINGERS + 1));
@@ -127,7 +127,7 @@ static void give_upload(bt_session *session, fuzz_input *in, uint32_t now_us)
         for (size_t a = 0; a < blob[1]; a++) {
             blob[at + 2 + a] = (uint8_t)(1 + take_u8(in) % BT_MAP_EXPONENT_MAX);
         }
-        count += (size_t)halves[blob[at]] * blob[1];
+        count += (size_t)coefficients[blob[at]] * blob[1];
     }
     for (size_t k = 0; k < count && at + 2 <= sizeof blob; k++, at += 2) {
         blob[at] = take_u8(in);
@@ -179,7 +179,7 @@ static void give_round(bt_session *session, fuzz_input *in, uint32_t now_us)
             bt_session_slot(session, slot, counts, now_us);
         }
     }
-    bt_session_round(session);
+    bt_session_end_round(session);
 }
 
 static void check_settings(const bt_session *session)
@@ -203,7 +203,7 @@ static void check_calibrations(const bt_session *session)
             && (!its->present || bt_calibration_apply(its, &own) != BT_ERROR_OK)) {
             FAIL("finger %d uses an invalid calibration", f);
         }
-        if (session->kernel[f].poc_weights != bt_settings_get(&own, BT_SETTING_POC_WEIGHTS)
+        if (session->solve[f].poc_weights != bt_settings_get(&own, BT_SETTING_POC_WEIGHTS)
             || session->tare[f].contact_energy_count2
                    != (uint32_t)bt_settings_get(&own, BT_SETTING_CONTACT_ENERGY_COUNT2)) {
             FAIL("finger %d uses other values than it reports", f);

@@ -34,7 +34,7 @@ static inline uint32_t bench_step(uint32_t *seed)
 // False when the core refuses it: then nothing that follows means anything.
 static inline bool bench_map_make(bench_map *out, const uint8_t (*blocks)[2], uint32_t count, uint32_t axes)
 {
-    static const uint32_t halves[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
+    static const uint32_t coefficients[BT_MAP_KINDS] = BT_MAP_KIND_COEFFICIENTS;
     uint32_t seed = 3;
     uint32_t words = BT_MAP_HEADER_BYTES / 4;
     for (uint32_t k = 0; k < words; k++) {
@@ -48,10 +48,10 @@ static inline bool bench_map_make(bench_map *out, const uint8_t (*blocks)[2], ui
         out->blob[words++] = axes == 7 ? exponents & 0xFF : 0;
     }
     for (uint32_t b = 0; b < count; b++) {
-        bool pairs = halves[blocks[b][0]] == 190;
+        bool pairs = coefficients[blocks[b][0]] == 190;
         for (uint32_t axis = 0; axis < axes; axis += axis == 0 ? 3 : axes) {
             uint32_t width = axis == 0 ? 3 : axes - 3; // of the group
-            uint32_t its = halves[blocks[b][0]] * width;
+            uint32_t its = coefficients[blocks[b][0]] * width;
             for (uint32_t k = 0; k < its; k += 2) {
                 uint32_t first = bench_step(&seed) % 2001 - 1000; // a row of ten stays in bounds
                 uint32_t second = bench_step(&seed) % 2001 - 1000;

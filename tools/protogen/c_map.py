@@ -81,7 +81,7 @@ def header(contract: Contract) -> str:
         "// Columns of each kind, in this order.",
         f"#define BT_MAP_KIND_COLUMNS {{{', '.join(str(columns(contract, k)) for k in its['kind'].values())}}}",
         "// Coefficients of each as they lie in the blob, of an axis.",
-        f"#define BT_MAP_KIND_HALVES {{{', '.join(str(halves(contract, k)) for k in its['kind'].values())}}}",
+        f"#define BT_MAP_KIND_COEFFICIENTS {{{', '.join(str(halves(contract, k)) for k in its['kind'].values())}}}",
         "",
         "enum bt_map_gate {",
         *(f"    BT_MAP_GATE_{name} = {g['value']}, // {g['doc']}" for name, g in its["gate"].items()),

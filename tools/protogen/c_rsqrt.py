@@ -57,7 +57,7 @@ def header(contract: Contract) -> str:
         "BT_ROOT_SHARE * 2^32 / sqrt(q) for q from 2^30 on, at steps of 2^BT_ROOT_STEP_BITS, less",
         "BT_ROOT_BASE. The share is the radius / (2 * BT_ROOT_UM_FACTOR).",
     ]
-    return c_header("ROOT", about, lines)
+    return c_header("RSQRT", about, lines)
 
 
 def base(contract: Contract) -> int:

@@ -122,7 +122,7 @@ def header(contract: Contract) -> str:
         "Messages of the USB link: structs, sizes, pack and unpack. Little-endian, packed.",
         "Units and Q formats stand beside each field; see protocol/MESSAGES.md.",
     ]
-    return c_header("WIRE", about, [*out, *field_lists(contract), "#endif"])
+    return c_header("MESSAGES", about, [*out, *field_lists(contract), "#endif"])
 
 
 def source(contract: Contract) -> str:

@@ -74,6 +74,7 @@ static void send_hello(const bt_msg_hello_request *request)
         .fingers_present = plugged,
         .image_crc32 = port_image_crc32(),
     };
+    _Static_assert(sizeof hello.board_serial == PORT_SERIAL_BYTES, "the board's serial number is sent whole");
     port_board_serial(hello.board_serial);
     uint8_t payload[BT_HELLO_BYTES];
     bt_msg_hello_pack(&hello, payload);

@@ -18,8 +18,8 @@ _Static_assert(BT_E_MAX_Q4 >> (4 - BT_MAP_SIGNAL_Q) == BT_MAP_SIGNAL_MAX, "a sig
 
 typedef struct {
     int32_t signal[RING];
-    int32_t compression[BT_MAP_LINE_HALVES]; // the last one is 0
-    int32_t bulge[BT_MAP_LINE_HALVES];
+    int32_t compression[BT_MAP_LINE_COEFFICIENTS]; // the last one is 0
+    int32_t bulge[BT_MAP_LINE_COEFFICIENTS];
     int32_t conductance[RING];
     int32_t one, pressure;
     int32_t gate[BT_MAP_GATES];
@@ -132,7 +132,7 @@ static void prepare(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
     }
     of->one = 1 << BT_MAP_ONE_Q;
     of->pressure =
-        bt_shift_down(bt_limited(pdc_above_rest_q4, -BT_E_MAX_Q4, BT_E_MAX_Q4), 4 - BT_MAP_PRESSURE_Q);
+        bt_shift_down(bt_clamp(pdc_above_rest_q4, -BT_E_MAX_Q4, BT_E_MAX_Q4), 4 - BT_MAP_PRESSURE_Q);
 }
 
 // ---- sums ----------------------------------------------------------------------------------------------
@@ -161,7 +161,7 @@ static inline void add_row(const int32_t f[BT_MAP_ROW], const bt_map_word *word,
 }
 
 // Sums are kept in a local array: the compiler must assume that a write through `sum` changes a word.
-static inline void line(const int32_t f[BT_MAP_LINE_HALVES], const bt_map_word *word, int width,
+static inline void line(const int32_t f[BT_MAP_LINE_COEFFICIENTS], const bt_map_word *word, int width,
                         int32_t sum[])
 {
     int32_t its[BT_MAP_GROUP_MAX] = {0, 0, 0, 0};
@@ -221,7 +221,7 @@ static BT_NOINLINE void pairs_of_4(const int32_t *f, const bt_map_word *word, in
 // For a kind with a single column.
 static void single(int32_t factor, const bt_map_word *word, int width, int32_t sum[])
 {
-    const bt_map_half *its = (const bt_map_half *)word;
+    const bt_map_coefficient *its = (const bt_map_coefficient *)word;
     for (int a = 0; a < width; a++) {
         sum[a] = factor * its[a];
     }
@@ -233,11 +233,11 @@ static inline void add_block(const uint8_t *head, const features *of, const bt_m
 {
     int32_t sum[BT_MAP_GROUP_MAX];
     const int32_t *f = (const int32_t *)(const void *)((const char *)of + factors_at[head[0]]);
-    switch (bt_map_halves[head[0]]) {
-    case BT_MAP_PAIR_HALVES:
+    switch (bt_map_coefficients[head[0]]) {
+    case BT_MAP_PAIR_COEFFICIENTS:
         (width == 3 ? pairs_of_3 : pairs_of_4)(f, word, sum);
         break;
-    case BT_MAP_LINE_HALVES:
+    case BT_MAP_LINE_COEFFICIENTS:
         (width == 3 ? line_of_3 : line_of_4)(f, word, sum);
         break;
     default:
@@ -268,7 +268,7 @@ void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
     prepare(map, e_q4, counts, tare_q4, pdc_above_rest_q4, &of);
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;
-        int words = bt_map_halves[head[0]] / 2; // per axis
+        int words = bt_map_coefficients[head[0]] / 2; // per axis
         add_block(head, &of, word, 0, 3, total);
         if (axes == BT_MAP_AXES_TORSION) {
             add_block(head, &of, word + 3 * words, 3, 4, total);
@@ -278,7 +278,7 @@ void bt_map_results(const bt_map *map, const int32_t e_q4[BT_ELECTRODES],
         word += map->axes * words;
     }
     for (int a = 0; a < axes; a++) {
-        result[a] = bt_limited(total[a], -BT_MAP_RESULT_MAX, BT_MAP_RESULT_MAX);
+        result[a] = bt_clamp(total[a], -BT_MAP_RESULT_MAX, BT_MAP_RESULT_MAX);
     }
 }
 

@@ -30,7 +30,7 @@ enum bt_map_kind {
 // Columns of each kind, in this order.
 #define BT_MAP_KIND_COLUMNS {1, 19, 19, 19, 190, 19, 190, 1}
 // Coefficients of each as they lie in the blob, of an axis.
-#define BT_MAP_KIND_HALVES {2, 20, 20, 20, 190, 20, 190, 2}
+#define BT_MAP_KIND_COEFFICIENTS {2, 20, 20, 20, 190, 20, 190, 2}
 
 enum bt_map_gate {
     BT_MAP_GATE_ONE = 0, // the constant 1

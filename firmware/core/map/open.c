@@ -20,7 +20,7 @@ void bt_map_close(bt_map *map)
 // Bytes of all coefficients, or 0 when the list of blocks breaks a rule.
 static size_t judge_blocks(bt_map *map)
 {
-    size_t halves = 0;
+    size_t coefficients = 0;
     uint8_t seen[BT_MAP_KINDS] = {0}; // gates that each kind has had so far
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *block = map->blocks + b * BT_MAP_BLOCK_BYTES;
@@ -38,14 +38,14 @@ static size_t judge_blocks(bt_map *map)
                 return 0;
             }
         }
-        halves += bt_map_halves[kind];
+        coefficients += bt_map_coefficients[kind];
     }
-    return 2 * halves * map->axes;
+    return 2 * coefficients * map->axes;
 }
 
 // The largest magnitude of an axis's sum over `columns` columns, with factors up to `most`. its: the axis's
 // first coefficient, one of `width` side by side.
-static uint64_t largest(const bt_map_half *its, int columns, int width, uint32_t most)
+static uint64_t largest(const bt_map_coefficient *its, int columns, int width, uint32_t most)
 {
     uint32_t sum = 0;
     for (int k = 0; k < columns; k++) {
@@ -63,13 +63,13 @@ static uint64_t left(uint64_t sum, int cut)
 #define REFUSED UINT64_MAX
 
 // The largest magnitude that a block adds to an axis, or REFUSED where a sum on the way might not fit.
-static uint64_t block_largest(const uint8_t *head, const bt_map_half *its, int width, int exponent)
+static uint64_t block_largest(const uint8_t *head, const bt_map_coefficient *its, int width, int exponent)
 {
     static const uint16_t factor_max[BT_MAP_KINDS] = BT_MAP_FACTOR_MAX;
-    int halves = bt_map_halves[head[0]];
+    int coefficients = bt_map_coefficients[head[0]];
     uint32_t most = factor_max[head[0]];
     uint64_t sum = 0;
-    if (halves == BT_MAP_PAIR_HALVES) {
+    if (coefficients == BT_MAP_PAIR_COEFFICIENTS) {
         for (int i = 0; i < BT_ELECTRODES; i++) {
             uint64_t row = largest(its + i * BT_MAP_ROW * width, BT_MAP_ROW, width, most);
             if (row > INT32_MAX) {
@@ -78,7 +78,7 @@ static uint64_t block_largest(const uint8_t *head, const bt_map_half *its, int w
             sum += left(row, BT_MAP_ROW_CUT) * most;
         }
     } else {
-        sum = largest(its, halves, width, most);
+        sum = largest(its, coefficients, width, most);
     }
     if (sum > INT32_MAX - (1 << BT_MAP_GATE_CUT)) {
         return REFUSED;
@@ -90,11 +90,11 @@ static uint64_t block_largest(const uint8_t *head, const bt_map_half *its, int w
 }
 
 // The number of columns is even: 19 electrodes, or a single column, have one more behind them, which is 0.
-static bool last_is_zero(uint8_t kind, const bt_map_half *its, int width)
+static bool last_is_zero(uint8_t kind, const bt_map_coefficient *its, int width)
 {
-    int halves = bt_map_halves[kind];
-    for (int a = 0; a < width && halves != BT_MAP_PAIR_HALVES; a++) {
-        if (its[width * (halves - 1) + a] != 0) {
+    int coefficients = bt_map_coefficients[kind];
+    for (int a = 0; a < width && coefficients != BT_MAP_PAIR_COEFFICIENTS; a++) {
+        if (its[width * (coefficients - 1) + a] != 0) {
             return false;
         }
     }
@@ -103,7 +103,7 @@ static bool last_is_zero(uint8_t kind, const bt_map_half *its, int width)
 
 static bool coefficients_bounded(const bt_map *map)
 {
-    const bt_map_half *its = (const bt_map_half *)bt_map_words(map);
+    const bt_map_coefficient *its = (const bt_map_coefficient *)bt_map_words(map);
     uint64_t total[BT_MAP_AXES_MAX] = {0};
     for (int b = 0; b < map->block_count; b++) {
         const uint8_t *head = map->blocks + b * BT_MAP_BLOCK_BYTES;
@@ -119,7 +119,7 @@ static bool coefficients_bounded(const bt_map *map)
                 }
                 total[axis + a] += most;
             }
-            its += width * bt_map_halves[head[0]];
+            its += width * bt_map_coefficients[head[0]];
         }
     }
     return true;

@@ -7,7 +7,7 @@ const uint16_t bt_population_sigma_100un[3] = BT_POPULATION_SIGMA_100UN;
 
 // As bt_map_open would fill it in (tests/core/map/test_population.c): the map is checked when it is built.
 #define BLOCKS_AT ((const uint8_t *)bt_population_blob + BT_MAP_HEADER_BYTES)
-static const bt_map population = {
+const bt_map bt_population = {
     .axes = BT_MAP_AXES_FORCE,
     .block_count = BT_POPULATION_BLOCKS,
     .kinds = BT_POPULATION_KINDS,
@@ -17,16 +17,10 @@ static const bt_map population = {
     .coefficients = BLOCKS_AT + BT_POPULATION_BLOCKS * BT_MAP_BLOCK_BYTES,
 };
 
-const bt_map *bt_population_map(size_t *bytes)
-{
-    *bytes = sizeof bt_population_blob;
-    return &population;
-}
-
 void bt_population_force(const int32_t e_q4[BT_ELECTRODES], const uint16_t counts[BT_ELECTRODES],
                          const uint16_t tare_q4[BT_ELECTRODES], int32_t force_100un[3])
 {
-    bt_map_results(&population, e_q4, counts, tare_q4, 0, BT_MAP_AXES_FORCE, force_100un);
+    bt_map_results(&bt_population, e_q4, counts, tare_q4, 0, BT_MAP_AXES_FORCE, force_100un);
 }
 
 // ---- is the frame like those that the map was trained on ------------------------------------------------

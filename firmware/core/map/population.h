@@ -9,8 +9,8 @@
 
 #include "map/map.h"
 
-// The map; *bytes is the size of its blob, which begins 4 bytes before `serial`.
-const bt_map *bt_population_map(size_t *bytes);
+// The map. Its blob begins 4 bytes before `serial`.
+extern const bt_map bt_population;
 
 // Force on the finger in 100 uN. e_q4: from bt_signals_q4; counts: 0..4095 or BT_INVALID_COUNT; an electrode
 // without a count or a tare has signal 0. No input overflows.

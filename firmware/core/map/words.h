@@ -1,7 +1,7 @@
 // A map's coefficients as stored in the blob: 16 bits each, column by column, those of a group of axes side
 // by side. Sums read them two at a time.
-#ifndef BIOTAC_MAP_WORD_H
-#define BIOTAC_MAP_WORD_H
+#ifndef BIOTAC_MAP_WORDS_H
+#define BIOTAC_MAP_WORDS_H
 
 #include "fixed_point.h"
 #include "map/map.h"
@@ -9,19 +9,20 @@
 // These words are read directly from the bytes of the blob, which requires a little-endian core.
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "a map is read in place");
 typedef uint32_t __attribute__((may_alias)) bt_map_word;
-typedef int16_t __attribute__((may_alias)) bt_map_half;
+typedef int16_t __attribute__((may_alias)) bt_map_coefficient;
 
 #define BT_MAP_ROW       10 // columns summed at a time: a row of pairs, or half of 19 + 1 electrodes
 #define BT_MAP_ROW_WORDS (BT_MAP_ROW / 2) // per axis
 #define BT_MAP_GROUP_MAX 4
 
-static const uint8_t bt_map_halves[BT_MAP_KINDS] = BT_MAP_KIND_HALVES;
+static const uint8_t bt_map_coefficients[BT_MAP_KINDS] = BT_MAP_KIND_COEFFICIENTS;
 
 // Coefficients per axis of a block of pairs, which has a row for each electrode, and of a block with a column
 // for each electrode.
-#define BT_MAP_PAIR_HALVES (BT_ELECTRODES * BT_MAP_ROW)
-#define BT_MAP_LINE_HALVES (2 * BT_MAP_ROW)
-_Static_assert(BT_MAP_LINE_HALVES == BT_ELECTRODES + 1 && BT_MAP_PAIR_HALVES == BT_ELECTRODES * 20 / 2,
+#define BT_MAP_PAIR_COEFFICIENTS (BT_ELECTRODES * BT_MAP_ROW)
+#define BT_MAP_LINE_COEFFICIENTS (2 * BT_MAP_ROW)
+_Static_assert(BT_MAP_LINE_COEFFICIENTS == BT_ELECTRODES + 1
+                   && BT_MAP_PAIR_COEFFICIENTS == BT_ELECTRODES * 20 / 2,
                "two rows must hold all electrodes, and a ring of ten columns every pair once");
 
 static inline const bt_map_word *bt_map_words(const bt_map *map)

@@ -1,8 +1,8 @@
 // A round: the words of one finger in its 44 slots, with validity per channel.
 // A channel that got no good word in its own slot is BT_INVALID_COUNT, never an older value.
 // Units: counts 0..4095; t_us is device time, wraps at 2^32.
-#ifndef BIOTAC_ASSEMBLY_H
-#define BIOTAC_ASSEMBLY_H
+#ifndef BIOTAC_ROUND_H
+#define BIOTAC_ROUND_H
 
 #include "wire/messages_gen.h"
 #include "wire/sensor_gen.h"

@@ -14,7 +14,7 @@ void bt_sweep_restart(bt_sweep *sweep)
     memset(sweep, 0, sizeof *sweep);
 }
 
-void bt_sweep_meet(bt_sweep *sweep, unsigned lane, uint16_t smooth)
+void bt_sweep_fill(bt_sweep *sweep, unsigned lane, uint16_t smooth)
 {
     // Sum as many rounds as have passed since the lane's last turn, as if the word had been there all along.
     // The lane's turn comes in round lane / BT_SWEEP_LANES, which adds the word once more.
@@ -29,7 +29,7 @@ static BT_NOINLINE void begin(bt_sweep *sweep, const bt_lanes *smooth)
 {
     sweep->begun = true;
     for (unsigned i = 0; i < BT_LANES; i++) {
-        bt_sweep_meet(sweep, i, smooth->lane[i]);
+        bt_sweep_fill(sweep, i, smooth->lane[i]);
     }
 }
 

@@ -35,7 +35,7 @@ void bt_sweep_restart(bt_sweep *sweep);
 void bt_sweep_add(bt_sweep *sweep, const bt_lanes *smooth);
 
 // Fill the window of a lane whose first word came in the middle of a sweep with that word.
-void bt_sweep_meet(bt_sweep *sweep, unsigned lane, uint16_t smooth);
+void bt_sweep_fill(bt_sweep *sweep, unsigned lane, uint16_t smooth);
 
 // The lanes whose turn it is in this round: first <= lane < end.
 #ifndef BT_CDEF

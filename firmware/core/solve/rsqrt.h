@@ -1,6 +1,6 @@
 // Reciprocal square root, by table and linear interpolation.
-#ifndef BIOTAC_ROOT_H
-#define BIOTAC_ROOT_H
+#ifndef BIOTAC_RSQRT_H
+#define BIOTAC_RSQRT_H
 
 #include "solve/rsqrt_gen.h"
 

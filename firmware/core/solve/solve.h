@@ -1,8 +1,8 @@
 // From signals, counts and tare to point of contact, force and torque.
 // Output units are those of the FRAME message: um, 100 uN, mN*mm, rounded half away from zero; a result that
 // cannot be given is the type's minimum, never 0 and never an older one.
-#ifndef BIOTAC_KERNEL_H
-#define BIOTAC_KERNEL_H
+#ifndef BIOTAC_SOLVE_H
+#define BIOTAC_SOLVE_H
 
 #include "keep/settings.h"
 #include "map/map.h"

@@ -10,8 +10,8 @@
 // n is c / r for the published point c. Force is linear in the signals: its sigma is S_d s |n_d|.
 //
 // Units: um and 100 uN, rounded to nearest; saturates at 65534. 0xFFFF: unknown.
-#ifndef BIOTAC_SIGMA_H
-#define BIOTAC_SIGMA_H
+#ifndef BIOTAC_UNCERTAINTY_H
+#define BIOTAC_UNCERTAINTY_H
 
 #include "solve/solve.h"
 

@@ -36,9 +36,7 @@ static void hello(bt_session *session, const uint8_t *payload)
         .fingers_present = bt_session_present(session),
         .image_crc32 = identity->image_crc32,
     };
-    for (int k = 0; k < 12; k++) {
-        msg.board_serial[k] = identity->board_serial[k];
-    }
+    memcpy(msg.board_serial, identity->board_serial, sizeof msg.board_serial);
     bt_msg_hello_pack(&msg, out);
     bt_session_send(session, BT_HELLO_ID, out);
 }
@@ -150,7 +148,7 @@ static void point(bt_session *session, uint8_t req_id, uint8_t finger)
 {
     uint8_t payload[BT_POINT_BYTES];
     bt_msg_point msg = {.req_id = req_id};
-    bt_finger_point(&session->finger[finger], &session->kernel[finger], &msg);
+    bt_finger_point(&session->finger[finger], &session->solve[finger], &msg);
     bt_msg_point_pack(&msg, payload);
     bt_session_send(session, BT_POINT_ID, payload);
 }
@@ -277,15 +275,13 @@ static uint8_t reboot_bootloader(const bt_session *session, const uint8_t *paylo
     return session->board.reboot_bootloader == NULL ? BT_ERROR_NOT_HERE : session->board.reboot_bootloader();
 }
 
-// payload is NULL if its length does not match the id. Then nothing in it can be trusted, not even where
-// req_id is.
 void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_t now_us)
 {
     if (id < 0x80) {
         return; // one of our own messages, echoed by a terminal driver
     }
     session->heard_us = now_us;
-    if (payload == NULL) {
+    if (payload == NULL) { // of a payload of another length nothing can be trusted, not even where req_id is
         reply(session, 0, id, bt_wire_payload_bytes(id) < 0 ? BT_ERROR_UNKNOWN_COMMAND : BT_ERROR_BAD_LENGTH);
         return;
     }

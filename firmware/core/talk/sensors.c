@@ -12,38 +12,38 @@ void bt_sensors_doubt(bt_session *session, unsigned f)
 {
     if (!(session->unsure >> f & 1)) {
         session->unsure |= (uint8_t)(1u << f);
-        session->who[f] = (bt_who){.to_wait = 0};
+        session->query[f] = (bt_sensor_query){.to_wait = 0};
     }
 }
 
 void bt_sensors_word(bt_session *session, unsigned f, bool good)
 {
-    bt_who *who = &session->who[f];
+    bt_sensor_query *query = &session->query[f];
     if (session->asked >> f & 1) {
         return;
     }
     if (good) {
-        who->bad_words = 0;
-    } else if (who->bad_words < BT_AWAY_WORDS && ++who->bad_words == BT_AWAY_WORDS) {
+        query->bad_words = 0;
+    } else if (query->bad_words < BT_AWAY_WORDS && ++query->bad_words == BT_AWAY_WORDS) {
         bt_sensors_doubt(session, f);
-        who->bad_words = BT_AWAY_WORDS;
+        query->bad_words = BT_AWAY_WORDS;
     }
 }
 
 static bool wants(bt_session *session, unsigned f)
 {
-    bt_who *who = &session->who[f];
+    bt_sensor_query *query = &session->query[f];
     bool answers = session->finger[f].present;
-    bool back = answers && !who->answered;
-    who->answered = answers;
-    if (back || who->to_wait == 0) {
-        if (who->times < LATE_AFTER) {
-            who->times++;
+    bool back = answers && !query->answered;
+    query->answered = answers;
+    if (back || query->to_wait == 0) {
+        if (query->times < LATE_AFTER) {
+            query->times++;
         }
-        who->to_wait = who->times < LATE_AFTER ? ASK_PERIOD : ASK_PERIOD_LATE;
+        query->to_wait = query->times < LATE_AFTER ? ASK_PERIOD : ASK_PERIOD_LATE;
         return true;
     }
-    who->to_wait--;
+    query->to_wait--;
     return false;
 }
 
@@ -66,7 +66,7 @@ void bt_sensors_answer(bt_session *session, unsigned f, const uint8_t serial[BT_
         return;
     }
     session->unsure &= (uint8_t)~(1u << f);
-    session->who[f].bad_words = 0;
+    session->query[f].bad_words = 0;
     if (info->present && memcmp(info->serial, serial, BT_SERIAL_BYTES) == 0) {
         return;
     }

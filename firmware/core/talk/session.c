@@ -55,8 +55,8 @@ static void use_finger_settings(bt_session *session, int f)
     if (session->calibration_state[f] == BT_CALIBRATION_STATE_IN_FORCE) {
         (void)bt_calibration_apply(calibration, &own); // its ranges were checked when it came
     }
-    session->kernel[f] = bt_solve_settings_from(&own);
-    session->kernel[f].map = session->map_state[f] == BT_CALIBRATION_STATE_IN_FORCE ? &map->map : NULL;
+    session->solve[f] = bt_solve_settings_from(&own);
+    session->solve[f].map = session->map_state[f] == BT_CALIBRATION_STATE_IN_FORCE ? &map->map : NULL;
     session->tare[f] = bt_tare_settings_from(&own);
     bt_pressure_use(&session->finger[f].pressure, &own);
 }

@@ -10,10 +10,12 @@
 #include "map/upload.h"
 #include "wire/framing.h"
 
+#define BT_BOARD_SERIAL_BYTES sizeof(((bt_msg_hello *)NULL)->board_serial)
+
 typedef struct {
     uint16_t board; // enum bt_board
     uint8_t firmware_version[3];
-    uint8_t board_serial[12];
+    uint8_t board_serial[BT_BOARD_SERIAL_BYTES];
     uint32_t boot_id;
     uint32_t image_crc32; // 0xFFFFFFFF: unknown
 } bt_identity;
@@ -39,7 +41,7 @@ typedef struct {
     uint32_t sigma;
     uint32_t wrench; // repeated
     uint32_t frames;
-} bt_sheds;
+} bt_shed_counts;
 
 // Finger-rounds of FRAME streams in which something was skipped because nobody needed it; wrap at 2^32.
 typedef struct {
@@ -48,7 +50,7 @@ typedef struct {
     uint32_t force;
     uint32_t torque;
     uint32_t sigma;
-} bt_skips;
+} bt_skip_counts;
 
 // What sensors.c knows about which sensor is there.
 typedef struct {
@@ -56,12 +58,12 @@ typedef struct {
     uint8_t to_wait;   // rounds until it is asked again
     uint8_t times;     // it was asked, up to a limit
     bool answered;     // in the last round
-} bt_who;
+} bt_sensor_query;
 
 typedef struct {
     bt_finger finger[BT_MAX_FINGERS];
     bt_sensor_info info[BT_MAX_FINGERS];
-    bt_who who[BT_MAX_FINGERS];
+    bt_sensor_query query[BT_MAX_FINGERS];
     uint8_t asked;   // bit masks of fingers: asked for their serial number in this round, not sampled
     uint8_t unsure;  // may be another sensor than info says
     uint8_t other;   // is another one than at START
@@ -72,7 +74,7 @@ typedef struct {
     bt_finger_map map[BT_MAX_FINGERS];
     uint8_t map_state[BT_MAX_FINGERS]; // likewise
     bt_upload upload;
-    bt_solve_settings kernel[BT_MAX_FINGERS];
+    bt_solve_settings solve[BT_MAX_FINGERS];
     bt_tare_settings tare[BT_MAX_FINGERS];
     uint32_t status_period_us;
     uint32_t hold_timeout_us; // 0: HOLD never lapses
@@ -84,7 +86,7 @@ typedef struct {
 
     uint8_t streams;              // BT_STREAM_FLAG_*
     uint8_t fingers;              // bit mask of the fingers that START named
-    uint8_t eventful;             // bit mask of the fingers that send EVENTs in this round
+    uint8_t event_fingers;        // bit mask of the fingers that send EVENTs in this round
     uint8_t events_due[BT_SLOTS]; // and of those for which each slot may show one
     uint16_t keepalive_ms;
     uint32_t heard_us; // when the host last said anything
@@ -96,8 +98,8 @@ typedef struct {
 
     uint32_t messages_sent;
     uint32_t messages_dropped;
-    bt_skips skips;
-    bt_sheds sheds;
+    bt_skip_counts skips;
+    bt_shed_counts sheds;
     uint8_t sigma_pause; // rounds left in which no finger gets a sigma
     uint8_t first;       // first finger of the next round: 0, or the first that something was left out for
     uint8_t first_next;  // the same, as found in this round; BT_MAX_FINGERS: none so far

@@ -21,7 +21,7 @@ static bool streams(const bt_session *session, const bt_finger *finger, uint8_t 
 static void begin_events(bt_session *session)
 {
     static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
-    const uint8_t before = session->eventful;
+    const uint8_t before = session->event_fingers;
     uint8_t now = 0;
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         const bool asked = session->finger[f].quantities & BT_QUANTITY_FLAG_EVENTS;
@@ -32,7 +32,7 @@ static void begin_events(bt_session *session)
     if (now == before) {
         return;
     }
-    session->eventful = now;
+    session->event_fingers = now;
     memset(session->events_due, 0, sizeof session->events_due);
     for (size_t k = 0; k < sizeof pac_slot; k++) {
         session->events_due[pac_slot[k]] = now;
@@ -122,7 +122,7 @@ void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_
             send_touch(session, &session->finger[f], slot, t_us);
         }
     }
-    uint32_t due = session->events_due[slot] | (touched & session->eventful);
+    uint32_t due = session->events_due[slot] | (touched & session->event_fingers);
     if (due) {
         send_events(session, slot, due, touched, t_us);
     }
@@ -148,7 +148,7 @@ static void send_idle(bt_session *session, bt_finger *finger, bool frame_follows
     finger->unsent = 0;
 }
 
-static void count_skips(bt_skips *skips, uint32_t quantities)
+static void count_skips(bt_skip_counts *skips, uint32_t quantities)
 {
     // Torque x needs a point and a force: they are computed for it, though not sent.
     bool torque = quantities & BT_QUANTITY_FLAG_TORQUE;
@@ -170,7 +170,7 @@ static int32_t late_us(const bt_session *session, const bt_finger *finger)
 
 static uint32_t to_shed(bt_session *session, const bt_finger *finger, int32_t late)
 {
-    uint32_t age = bt_finger_wrench_age(finger, &session->kernel[finger->index]);
+    uint32_t age = bt_finger_wrench_age(finger, &session->solve[finger->index]);
     if (late > SIGMA_LATE_US) {
         session->sigma_pause = SIGMA_PAUSE_ROUNDS;
     }
@@ -208,7 +208,7 @@ static void send_frame(bt_session *session, bt_finger *finger)
     }
     uint8_t quantities = finger->quantities;
     finger->quantities = bt_sensors_refused(session, finger->index) ? 0 : quantities;
-    bt_finger_frame(finger, &session->kernel[finger->index], shed, &msg);
+    bt_finger_frame(finger, &session->solve[finger->index], shed, &msg);
     finger->quantities = quantities;
     msg.flags |= bt_sensors_flags(session, finger->index);
     bt_faults_of_round(session, finger->index, msg.flags);
@@ -259,7 +259,7 @@ static void send_bands(bt_session *session, bt_finger *finger)
     bt_session_send(session, BT_BANDS_ID, payload);
 }
 
-void bt_session_round(bt_session *session)
+void bt_session_end_round(bt_session *session)
 {
     uint32_t answering = 0; // bit mask
     const int first = session->first;

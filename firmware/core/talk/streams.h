@@ -9,6 +9,6 @@
 // order; skipped ones count as missing. The end computes and sends what is subscribed to.
 void bt_session_begin(bt_session *session, uint32_t t_us);
 void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_MAX_FINGERS], uint32_t t_us);
-void bt_session_round(bt_session *session);
+void bt_session_end_round(bt_session *session);
 
 #endif

@@ -127,30 +127,30 @@ void bt_adopt_contact(bt_tare *tare)
 
 // A channel whose first word comes only now begins at rest, or it would look like a contact. Not if the host
 // has set its tare.
-static void meet_lane(bt_tare *tare, unsigned lane)
+static void take_first_word(bt_tare *tare, unsigned lane)
 {
     uint32_t first_q16 = (uint32_t)tare->trigger.smooth.lane[lane] << 16;
-    bt_sweep_meet(&tare->sweep, lane, tare->trigger.smooth.lane[lane]);
+    bt_sweep_fill(&tare->sweep, lane, tare->trigger.smooth.lane[lane]);
     if (lane < BT_ELECTRODES) {
         if (tare->tared && tare->base.electrode_q16[lane] == BT_TARE_UNKNOWN) {
             tare->base.electrode_q16[lane] = first_q16;
-            bt_rollback_meet(&tare->rollback, lane, first_q16);
+            bt_rollback_fill(&tare->rollback, lane, first_q16);
         }
         bt_adopt_electrode(tare, lane);
         return;
     }
     if (tare->state == BT_TARE_STATE_REST && tare->base.pdc_q16 == BT_TARE_UNKNOWN) {
         tare->base.pdc_q16 = first_q16;
-        bt_rollback_meet(&tare->rollback, lane, first_q16);
+        bt_rollback_fill(&tare->rollback, lane, first_q16);
     }
     bt_adopt_aim_pressure(tare);
 }
 
-BT_NOINLINE void bt_adopt_met(bt_tare *tare)
+BT_NOINLINE void bt_adopt_first_words(bt_tare *tare)
 {
     for (unsigned lane = 0; tare->trigger.met >> lane != 0; lane++) {
         if (tare->trigger.met >> lane & 1) {
-            meet_lane(tare, lane);
+            take_first_word(tare, lane);
         }
     }
     tare->trigger.met = 0;

@@ -58,6 +58,6 @@ void bt_adopt_contact(bt_tare *tare);
 void bt_adopt_none(bt_tare *tare);
 
 // Take note of channels whose first word has come.
-void bt_adopt_met(bt_tare *tare);
+void bt_adopt_first_words(bt_tare *tare);
 
 #endif

@@ -30,7 +30,7 @@ void bt_rollback_keep(bt_rollback *rollback, const bt_baseline *base)
     }
 }
 
-void bt_rollback_meet(bt_rollback *rollback, unsigned lane, uint32_t first_q16)
+void bt_rollback_fill(bt_rollback *rollback, unsigned lane, uint32_t first_q16)
 {
     for (int k = 0; k < BT_SNAPSHOTS; k++) {
         if (lane == BT_LANE_PDC) {

@@ -10,6 +10,9 @@
 #define BT_TARE_UNKNOWN 0xFFFFFFFFu // of a channel that was never read
 #define BT_SNAPSHOTS    8
 
+// Per sweep; 0.5 count/s: drift is followed no faster, so that no load is.
+#define BT_SLEW_Q16 (8 * 328)
+
 typedef struct {
     uint32_t electrode_q16[BT_ELECTRODES];
     uint32_t pdc_q16;
@@ -29,7 +32,7 @@ void bt_rollback_start(bt_rollback *rollback, const bt_baseline *base);
 void bt_rollback_keep(bt_rollback *rollback, const bt_baseline *base);
 
 // Put a lane's first value into all snapshots.
-void bt_rollback_meet(bt_rollback *rollback, unsigned lane, uint32_t first_q16);
+void bt_rollback_fill(bt_rollback *rollback, unsigned lane, uint32_t first_q16);
 
 // The baseline of at least a second ago, or the oldest there is.
 const bt_baseline *bt_rollback_before(const bt_rollback *rollback);
@@ -43,7 +46,7 @@ uint32_t bt_rollback_sweeps(const bt_rollback *rollback);
 // The value, moved towards its target by at most step_q16.
 static inline uint32_t bt_baseline_follow(uint32_t base_q16, uint32_t target_q16, int32_t step_q16)
 {
-    return base_q16 + (uint32_t)bt_limited((int32_t)(target_q16 - base_q16), -step_q16, step_q16);
+    return base_q16 + (uint32_t)bt_clamp((int32_t)(target_q16 - base_q16), -step_q16, step_q16);
 }
 
 // The value, moved by step_q16. It stays within 0..full scale, and an unknown one stays unknown.
@@ -52,7 +55,7 @@ static inline uint32_t bt_baseline_moved(uint32_t base_q16, int32_t step_q16)
     if (base_q16 == BT_TARE_UNKNOWN) {
         return base_q16;
     }
-    return (uint32_t)bt_limited((int32_t)base_q16 + step_q16, 0, BT_FULL_SCALE_COUNT << 16);
+    return (uint32_t)bt_clamp((int32_t)base_q16 + step_q16, 0, BT_FULL_SCALE_COUNT << 16);
 }
 
 // A known value in whole counts.

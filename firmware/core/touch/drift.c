@@ -31,7 +31,7 @@ void bt_drift_learn(bt_drift *drift)
     }
     int32_t change_q20 = drift->moved_q16 / BT_ELECTRODES * 16 - drift->rate_q20;
     int32_t rate_q20 = drift->rate_q20 + change_q20 / mean_sweeps(drift);
-    drift->rate_q20 = bt_limited(rate_q20, -16 * RATE_Q16, 16 * RATE_Q16);
+    drift->rate_q20 = bt_clamp(rate_q20, -16 * RATE_Q16, 16 * RATE_Q16);
     if (++drift->since_commit >= COMMIT_SWEEPS) {
         drift->since_commit = 0;
         drift->sure_q20 = drift->waiting_q20;
@@ -46,12 +46,12 @@ void bt_drift_revert(bt_drift *drift)
     drift->since_commit = 0;
 }
 
-void bt_drift_cool(bt_drift *drift, int32_t warming_q16)
+void bt_drift_remove_warming(bt_drift *drift, int32_t warming_q16)
 {
     int32_t rate_q16 = (int32_t)bt_shift_round(drift->rate_q20, 4);
     int32_t least = rate_q16 < 0 ? rate_q16 : 0;
     int32_t most = rate_q16 > 0 ? rate_q16 : 0;
-    drift->rate_q20 -= 16 * bt_limited(warming_q16, least, most);
+    drift->rate_q20 -= 16 * bt_clamp(warming_q16, least, most);
     drift->waiting_q20 = drift->rate_q20;
     drift->sure_q20 = drift->rate_q20;
 }
@@ -86,5 +86,5 @@ int32_t bt_drift_unseen(bt_drift *drift, uint32_t sweeps)
 int32_t bt_drift_step_q16(const bt_drift *drift, int32_t away_q16)
 {
     int32_t step_q16 = (int32_t)bt_shift_round(drift->rate_q20, 4) + bt_shift_down(away_q16, NEAR_SHIFT);
-    return bt_limited(step_q16, -RATE_Q16, RATE_Q16);
+    return bt_clamp(step_q16, -RATE_Q16, RATE_Q16);
 }

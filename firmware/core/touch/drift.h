@@ -23,7 +23,7 @@ typedef struct {
 void bt_drift_learn(bt_drift *drift);
 
 // From now on temperature is followed separately, by warming_q16 a sweep: take that out of the drift.
-void bt_drift_cool(bt_drift *drift, int32_t warming_q16);
+void bt_drift_remove_warming(bt_drift *drift, int32_t warming_q16);
 
 // A load is seen: forget what was learned from it.
 void bt_drift_revert(bt_drift *drift);

@@ -4,8 +4,7 @@
 
 #include "fixed_point.h"
 
-#define SLEW_Q16     (8 * 328)  // per sweep; 0.5 count/s: drift is followed no faster, so that no load is
-#define PDC_SLEW_Q16 (8 * 131)  // 0.2 count/s
+#define PDC_SLEW_Q16 (8 * 131)  // per sweep; 0.2 count/s
 #define PDC_SINK_Q16 (8 * 655)  // 1 count/s: no load takes pressure away
 #define PDC_BACK_Q16 (8 * 2621) // 4 counts/s: an undershoot comes back within seconds
 #define BACK_ROUNDS  400        // and is over after these
@@ -98,7 +97,7 @@ static void serve_electrode(bt_tare *tare, unsigned i)
     bt_watch_side(&tare->watch, mean_q16, *base_q16);
     uint32_t before_q16 = *base_q16;
     if (tracks(tare)) {
-        *base_q16 = bt_baseline_follow(*base_q16, mean_q16, SLEW_Q16);
+        *base_q16 = bt_baseline_follow(*base_q16, mean_q16, BT_SLEW_Q16);
     }
     if (rests(tare)) {
         int32_t drift_q16 = tare->drift_q16;

@@ -11,6 +11,7 @@
 #define DRIFT_LIMIT            60000
 
 _Static_assert((uint64_t)DRIFT_LIMIT *DRIFT_LIMIT <= UINT32_MAX, "the forgiven drift must fit 32 bits");
+_Static_assert(BT_ELECTRODES == 19, "220753 / 2^22 is 1/19");
 
 BT_NOINLINE void bt_judge_inverted(bt_tare *tare)
 {
@@ -128,7 +129,7 @@ BT_NOINLINE void bt_judge_sweep(bt_tare *tare, const bt_tare_settings *settings)
     bt_watch_end(&tare->watch, tare->pressure_seen ? &tare->sweep.mean_q3.lane[BT_LANE_PDC] : NULL);
     judge_drift(tare);
     if (tare->state == BT_TARE_STATE_INIT) {
-        if (tare->sweep.still_sweeps >= BT_STILL_SWEEPS && !tare->held) {
+        if (tare->sweep.still_sweeps >= BT_TARE_STILL_SWEEPS && !tare->held) {
             // Measured before there is a threshold: a worn sensor's noise must not look like a touch.
             bt_noise_add(&tare->noise, tare->deviation_q6, settings->contact_energy_count2);
             bt_adopt_present(tare, BT_TARE_REASON_START);

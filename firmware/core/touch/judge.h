@@ -5,7 +5,7 @@
 
 #include "touch/machine.h"
 
-#define BT_STILL_SWEEPS 2 // needed for a tare; the first may hold what came before it
+#define BT_TARE_STILL_SWEEPS 2 // needed for a tare; the first may hold what came before it
 
 // A round with pressure below the tare: a tare taken of a hold shows when the hold ends.
 void bt_judge_inverted(bt_tare *tare);

@@ -11,7 +11,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define BT_PDC_HIT 6 // pressure above rest that is a contact
+#define BT_PDC_HIT     6                // pressure above rest that is a contact
+#define BT_PDC_PRESSED (4 * BT_PDC_HIT) // and that makes a press
 
 typedef enum {
     BT_RELEASE_NO,      // the contact goes on

@@ -46,7 +46,7 @@ static BT_NOINLINE void count_hit(bt_tare *tare, const bt_tare_settings *setting
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         before.electrode_q16[i] = bt_baseline_moved(before.electrode_q16[i], since_q16);
     }
-    bt_drift_cool(&tare->drift, bt_thermal_rate_q16(&tare->thermal, settings->thermal_gain_q16));
+    bt_drift_remove_warming(&tare->drift, bt_thermal_rate_q16(&tare->thermal, settings->thermal_gain_q16));
     bt_adopt(tare, &before, BT_TARE_STATE_CONTACT, BT_TARE_REASON_ROLL_BACK);
 }
 
@@ -119,7 +119,7 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
         return;
     }
     if (tare->trigger.met != 0) {
-        bt_adopt_met(tare);
+        bt_adopt_first_words(tare);
     }
     if (tare->state == BT_TARE_STATE_FAULT) {
         // A tare from before the fault still holds. Whether something touches now, the trigger sees from the
@@ -156,7 +156,7 @@ void bt_tare_end(bt_tare *tare, uint32_t t_us, const bt_tare_settings *settings)
 // Means are up to two sweeps old, so the present signals must agree with them.
 static bool present_is_still(const bt_tare *tare)
 {
-    bool still = tare->sweep.still_sweeps >= BT_STILL_SWEEPS;
+    bool still = tare->sweep.still_sweeps >= BT_TARE_STILL_SWEEPS;
     for (unsigned i = 0; i < BT_ELECTRODES; i++) {
         int change_q3 = 8 * tare->trigger.smooth.lane[i] - tare->sweep.mean_q3.lane[i];
         still = still && change_q3 <= NOW_SPAN_Q3 && change_q3 >= -NOW_SPAN_Q3;

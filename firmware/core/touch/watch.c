@@ -10,13 +10,12 @@
 #define ONE_WAY_Q2   26             // 13 electrodes one way and 6 the other: three sigmas of noise
 #define CREEP_Q3     (5 * LEVEL_Q3) // at most in a silence: 13 s of skin creep at the limit of level
 #define CREEP_SWEEPS 250            // 20 s, two of its time constants
-#define SLEW_Q16     (8 * 328)      // per sweep; 0.5 count/s, as at rest
-#define MISSED_Q16   (SLEW_Q16 / 2) // 15 counts/min, the worst drift measured, as so few rounds are noisy
+#define MISSED_Q16   (BT_SLEW_Q16 / 2) // 15 counts/min, the worst drift measured, as so few rounds are noisy
 #define EACH_Q16     (8192 / BT_ELECTRODES) // the mean in q16, from a sum over all electrodes in 1/8 count
 
 _Static_assert((int64_t)BT_ELECTRODES * BT_SWEEP_UNREAD_Q3 * EACH_Q16 <= INT32_MAX,
                "a sum of distances must fit its type");
-_Static_assert((int64_t)UINT16_MAX *SLEW_Q16 <= INT32_MAX,
+_Static_assert((int64_t)UINT16_MAX *BT_SLEW_Q16 <= INT32_MAX,
                "what is due of the longest silence must fit its type");
 
 bool bt_watch_creeps(const bt_watch *watch)
@@ -51,7 +50,7 @@ void bt_watch_begin(bt_watch *watch)
 
 int32_t bt_watch_drifts_q16(const bt_watch *watch)
 {
-    return watch->one_way ? bt_limited(watch->shared_q16, -SLEW_Q16, SLEW_Q16) : 0;
+    return watch->one_way ? bt_clamp(watch->shared_q16, -BT_SLEW_Q16, BT_SLEW_Q16) : 0;
 }
 
 void bt_watch_take(bt_watch *watch, const bt_sweep *sweep, uint32_t unknown)
@@ -115,17 +114,17 @@ static bool resume_level(bt_watch *watch, const bt_silence *silence, int32_t *du
     int32_t pressure_q3 = silence->sum.lane[BT_LANE_PDC] * 8 / BT_SILENCE_ROUNDS;
     int32_t sweeps = watch->level_sweeps + silence->sweeps;
     int32_t change_q3 = pressure_q3 - watch->level_q3;
-    int32_t creep_q3 = bt_limited(sweeps * LEVEL_Q3 / LEVEL_SWEEPS, LEVEL_Q3, CREEP_Q3);
+    int32_t creep_q3 = bt_clamp(sweeps * LEVEL_Q3 / LEVEL_SWEEPS, LEVEL_Q3, CREEP_Q3);
     if (change_q3 > creep_q3 || change_q3 < -creep_q3) {
         return false;
     }
-    *due = bt_watch_level(watch) ? silence->sweeps : bt_limited(sweeps - LEVEL_SWEEPS, 0, silence->sweeps);
+    *due = bt_watch_level(watch) ? silence->sweeps : bt_clamp(sweeps - LEVEL_SWEEPS, 0, silence->sweeps);
     if (change_q3 > LEVEL_Q3 || change_q3 < -LEVEL_Q3) {
         watch->slow = true;
         watch->level_q3 = (uint16_t)pressure_q3;
         sweeps = 0;
     }
-    watch->level_sweeps = (uint8_t)bt_limited(sweeps, 0, UINT8_MAX);
+    watch->level_sweeps = (uint8_t)bt_clamp(sweeps, 0, UINT8_MAX);
     return true;
 }
 
@@ -156,5 +155,5 @@ int32_t bt_watch_resume(bt_watch *watch, const bt_silence *silence, int span_q3)
     watch->side = 0;
     watch->away_q3 = 0;
     watch->shared_q16 = 0;
-    return even ? bt_limited(sum_q3 * EACH_Q16, -due * MISSED_Q16, due * MISSED_Q16) : 0;
+    return even ? bt_clamp(sum_q3 * EACH_Q16, -due * MISSED_Q16, due * MISSED_Q16) : 0;
 }

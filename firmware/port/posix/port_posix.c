@@ -271,9 +271,9 @@ uint16_t port_board(void)
     return BT_BOARD_POSIX_SIM;
 }
 
-void port_board_serial(uint8_t serial[12])
+void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES])
 {
-    memset(serial, 0, 12);
+    memset(serial, 0, PORT_SERIAL_BYTES);
     memcpy(serial, "posix-sim", 9);
 }
 

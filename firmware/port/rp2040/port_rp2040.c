@@ -124,9 +124,9 @@ uint16_t port_board(void)
     return IMAGE_BOARD;
 }
 
-void port_board_serial(uint8_t serial[12])
+void port_board_serial(uint8_t serial[PORT_SERIAL_BYTES])
 {
-    memset(serial, 0, 12);
+    memset(serial, 0, PORT_SERIAL_BYTES);
     if (has_id) {
         memcpy(serial, unique_id, FLASH_ID_BYTES);
     } else {

@@ -9,6 +9,7 @@
 
 #include "dma.h"
 #include "pins.h"
+#include "selects.h"
 #include "system.h"
 #include "wait.h"
 #include "wire/sensor_gen.h"
@@ -39,8 +40,6 @@ typedef struct {
 } step;
 
 static step steps[STEPS];
-static const uint8_t select_pin[BT_MAX_FINGERS] = {PIN_SELECT_0, PIN_SELECT_1, PIN_SELECT_2, PIN_SELECT_3,
-                                                   PIN_SELECT_4};
 static volatile uint32_t command, listen, low, high, nowhere;
 static volatile uint32_t got[BT_MAX_FINGERS];
 static uint8_t read_mask;

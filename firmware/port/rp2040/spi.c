@@ -2,6 +2,7 @@
 #include "port.h"
 
 #include "pins.h"
+#include "selects.h"
 #include "system.h"
 #include "wait.h"
 #include "wire/sensor_gen.h"
@@ -17,7 +18,6 @@ _Static_assert(CLK_PERI_HZ / (CPSDVSR * (1 + SCR)) < BT_SPI_HZ + BT_SPI_HZ / 50
 
 #define SELECT(n)   (1u << PIN_SELECT_##n)
 #define ALL_SELECTS (SELECT(0) | SELECT(1) | SELECT(2) | SELECT(3) | SELECT(4))
-_Static_assert(BT_MAX_FINGERS == 5, "as many chip selects as fingers");
 
 static void output(uint32_t pin, uint32_t function)
 {
@@ -40,8 +40,6 @@ void spi_reset(void)
 
 void spi_start(void)
 {
-    static const uint8_t selects[BT_MAX_FINGERS] = {PIN_SELECT_0, PIN_SELECT_1, PIN_SELECT_2, PIN_SELECT_3,
-                                                    PIN_SELECT_4};
 #ifdef PIN_SMPS_PWM
     SIO_GPIO_OUT_SET = 1u << PIN_SMPS_PWM; // the sensors' supply: less than 20 mV of ripple
     SIO_GPIO_OE_SET = 1u << PIN_SMPS_PWM;
@@ -51,7 +49,7 @@ void spi_start(void)
     SIO_GPIO_OUT_SET = ALL_SELECTS;
     SIO_GPIO_OE_SET = ALL_SELECTS;
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        output(selects[f], GPIO_FUNC_SIO);
+        output(select_pin[f], GPIO_FUNC_SIO);
     }
     configure();
     output(PIN_SCK, GPIO_FUNC_SPI);
@@ -63,9 +61,11 @@ void spi_start(void)
 
 void spi_select_at_once(uint8_t mask)
 {
-    uint32_t low = (uint32_t)(mask & 1) << PIN_SELECT_0 | (uint32_t)(mask >> 1 & 1) << PIN_SELECT_1
-                   | (uint32_t)(mask >> 2 & 1) << PIN_SELECT_2 | (uint32_t)(mask >> 3 & 1) << PIN_SELECT_3
-                   | (uint32_t)(mask >> 4 & 1) << PIN_SELECT_4;
+    uint32_t low = 0;
+#pragma GCC unroll 5 // no loop: this is in every slot
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        low |= (uint32_t)(mask >> f & 1) << select_pin[f];
+    }
     SIO_GPIO_OUT_SET = ALL_SELECTS & ~low;
     SIO_GPIO_OUT_CLR = low;
 }

@@ -1,7 +1,7 @@
 """The tape: counts for the C simulator's sensors, one uint16 a slot.
 
-Little-endian: 8 bytes ``BTTAPE01``; u32 fingers, u32 frames, u32 slots (44), u32 reserved (0); then
-uint16 samples [frame][finger][slot]. 0..4095 are counts; CODES say what else the sensor puts on the
+Little-endian: 8 bytes ``BTTAPE01``; u32 fingers, u32 rounds, u32 slots (44), u32 reserved (0); then
+uint16 samples [round][finger][slot]. 0..4095 are counts; CODES say what else the sensor puts on the
 bus. Nothing in between is legal.
 """
 

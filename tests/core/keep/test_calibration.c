@@ -64,8 +64,8 @@ static void assert_works_by(uint8_t finger, const int32_t *value)
 {
     int32_t force_nn[3] = {value[1], value[2], value[3]}, torque_nn[2] = {value[4], value[5]};
     bt_gains gains = bt_gains_from(force_nn, torque_nn);
-    assert_int_equal(session.kernel[finger].poc_weights, value[0]);
-    assert_memory_equal(&session.kernel[finger].gains, &gains, sizeof gains);
+    assert_int_equal(session.solve[finger].poc_weights, value[0]);
+    assert_memory_equal(&session.solve[finger].gains, &gains, sizeof gains);
     assert_int_equal(session.tare[finger].thermal_gain_q16, bt_thermal_gain_q16(value[6]));
 }
 

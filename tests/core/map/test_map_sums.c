@@ -202,10 +202,10 @@ static void no_count_overflows_a_map_at_its_bounds(void **state)
         size_t bytes = BT_MAP_HEADER_BYTES;
         for (uint32_t k = 0; k < BT_MAP_KINDS * BT_MAP_GATES; k++) {
             uint32_t kind = (k + (uint32_t)round) % BT_MAP_KINDS;
-            if (bytes + BT_MAP_BLOCK_BYTES + 2 * axes * halves_of[kind] > BT_MAP_MAX_BYTES) {
+            if (bytes + BT_MAP_BLOCK_BYTES + 2 * axes * coefficients_of[kind] > BT_MAP_MAX_BYTES) {
                 continue;
             }
-            bytes += BT_MAP_BLOCK_BYTES + 2 * axes * halves_of[kind];
+            bytes += BT_MAP_BLOCK_BYTES + 2 * axes * coefficients_of[kind];
             kinds[blocks++] = kind;
             block(&its, kind, (k / BT_MAP_KINDS + (uint32_t)round) % BT_MAP_GATES, 6);
         }

@@ -77,7 +77,7 @@ static void a_lane_met_at_any_phase_has_its_first_word_for_what_was_before(void 
                 random_lanes(&seed, &smooth);
                 smooth.lane[lane] = round < at ? BT_TRIGGER_UNREAD : smooth.lane[lane];
                 if (round == at) {
-                    bt_sweep_meet(&sweep, lane, smooth.lane[lane]);
+                    bt_sweep_fill(&sweep, lane, smooth.lane[lane]);
                     assert_int_equal(sweep.mean_q3.lane[lane], 8 * smooth.lane[lane]);
                 }
                 sweep_add(&sweep, &smooth);

@@ -31,7 +31,7 @@ static void one_round_without_an_electrode(void)
         }
         bt_session_slot(&session, slot, counts, 0);
     }
-    bt_session_round(&session);
+    bt_session_end_round(&session);
 }
 
 static void rounds(int n)

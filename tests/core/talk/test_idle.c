@@ -25,7 +25,7 @@ static void play(const uint16_t electrode[BT_ELECTRODES])
         count[0] = channel < BT_ELECTRODES ? electrode[channel] : PDC_REST;
         bt_session_slot(&session, slot, count, t_us + slot);
     }
-    bt_session_round(&session);
+    bt_session_end_round(&session);
 }
 
 static void play_level(int rounds, uint16_t level)

@@ -86,7 +86,7 @@ static void who_is_silent_for_half_a_round_is_in_doubt(void **state)
         bt_sensors_word(&session, 2, k % 22 == 21);
     }
     assert_int_equal(session.unsure >> 2 & 1, 0);
-    session.who[2].bad_words = 0;
+    session.query[2].bad_words = 0;
     for (int k = 1; k <= 22; k++) {
         bt_sensors_word(&session, 2, false);
         assert_int_equal(session.unsure >> 2 & 1, k == 22);

@@ -230,7 +230,7 @@ static void a_new_setting_is_what_the_kernels_use(void **state)
     assert_true(value.req_id == 77 && value.value == -12345);
     assert_int_equal(bt_settings_get(&session.settings, BT_SETTING_FORCE_GAIN_Z_NN), -12345);
     assert_int_equal(set_error(BT_SETTING_POC_WEIGHTS, BT_POC_WEIGHTS_ABS_N2), BT_ERROR_OK);
-    assert_int_equal(session.kernel[0].poc_weights, BT_POC_WEIGHTS_ABS_N2);
+    assert_int_equal(session.solve[0].poc_weights, BT_POC_WEIGHTS_ABS_N2);
     assert_int_equal(set_error(BT_SETTING_CONTACT_ENERGY_COUNT2, 500), BT_ERROR_OK);
     assert_int_equal(session.tare[0].contact_energy_count2, 500);
 }

@@ -27,7 +27,7 @@ static uint8_t played(uint16_t count)
         bt_session_slot(&session, slot, words, t_us + slot * 1000000u / BT_SLOT_HZ);
         told = told == BT_SLOTS && host_count(BT_EVENT_ID) > before ? slot : told;
     }
-    bt_session_round(&session);
+    bt_session_end_round(&session);
     t_us += BT_FRAME_MS * 1000;
     return told;
 }

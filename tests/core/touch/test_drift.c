@@ -364,7 +364,7 @@ static void a_rate_that_temperature_makes_is_none_of_drift(void **state)
         static const int warming[][2] = {{0, 160}, {3, 112}, {10, 0}, {11, 0}, {-1, 160}};
         for (int k = 0; k < 5; k++) {
             bt_drift drift = {.rate_q20 = sign * 160, .waiting_q20 = 1, .sure_q20 = 2};
-            bt_drift_cool(&drift, sign * warming[k][0]);
+            bt_drift_remove_warming(&drift, sign * warming[k][0]);
             assert_int_equal(drift.rate_q20, sign * warming[k][1]);
             assert_int_equal(drift.waiting_q20, drift.rate_q20);
             assert_int_equal(drift.sure_q20, drift.rate_q20);

@@ -94,7 +94,7 @@ static void a_touch_goes_back_to_what_was_a_second_ago(void **state)
         assert_int_equal(bt_rollback_sweeps(&rollback), sweep - oldest);
     }
     for (unsigned lane = 0; lane < BT_LANES; lane++) {
-        bt_rollback_meet(&rollback, lane, 50 + lane);
+        bt_rollback_fill(&rollback, lane, 50 + lane);
     }
     for (int k = 0; k < BT_SNAPSHOTS; k++) {
         assert_int_equal(rollback.snapshot[k].pdc_q16, 50 + BT_LANE_PDC);
