@@ -25,9 +25,9 @@ from ..wire.frames import StructArray
 from ..wire.framing import encode
 from .facts import in_force
 from .file import RecordingFile
-from .pieces import split
 from .reader import Recording
 from .rounds import HostTare, Rounds, frames_and_tares, with_silence
+from .wire_messages import split
 
 Settings = dict[wire.Setting, int]
 Show = Callable[[float], None]

@@ -17,8 +17,8 @@ from ...wire import messages_gen as wire
 from ...wire.counters import nearest
 from ...wire.decoder import Decoder
 from ...wire.framing import encode
-from ..pieces import Piece, split
 from ..reader import Recording
+from ..wire_messages import Piece, split
 
 _STREAM_OF = {
     wire.Frame.ID: wire.StreamFlags.FRAMES,
