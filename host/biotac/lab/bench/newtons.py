@@ -28,10 +28,9 @@ from ...core.compute import compute
 from ...core.geometry import Floats
 from ...errors import InputError
 from ...picture import picture
-from ...wire import messages_gen as wire
+from .batch import LIN
 
 CYCLES = "cycles.json"
-LIN = {wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}
 OWN = "its own force plate"
 #: Model of a finger's own map, what the board runs for it, and its label.
 OWN_MODELS = (
