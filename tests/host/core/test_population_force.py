@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from core_in_units import on_board
 
 import biotac
 from biotac.calibrate.population import map_file
 from biotac.core import population
-from biotac.core.compiled import on_board, on_board_q4
+from biotac.core.compiled import on_board_q4
 from biotac.core.finger import Finger
 from biotac.core.map_columns import tared
 from biotac.lab.crosscheck import CrossCheck
