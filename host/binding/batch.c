@@ -2,6 +2,7 @@
 
 #include "signal/round.h"
 #include "signal/signals.h"
+#include "solve/results.h"
 
 void bt_kernel_frames(int64_t n, const uint16_t *counts, const uint16_t *tare_q4,
                       const bt_solve_settings *settings, int16_t *poc_um, int32_t *force_100un,
@@ -65,6 +66,16 @@ void bt_pressure_filter(int64_t n, const uint16_t *pdc, int32_t filter_milli, ui
 int bt_rail_count(void)
 {
     return BT_RAIL_COUNT;
+}
+
+int bt_active_q4(void)
+{
+    return BT_ACTIVE_Q4;
+}
+
+int bt_active_for_torsion(void)
+{
+    return BT_ACTIVE_FOR_TORSION;
 }
 
 uint32_t bt_binding_schema_hash(void)

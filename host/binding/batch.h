@@ -31,7 +31,9 @@ void bt_pressure_forces(int64_t n, const uint16_t *filtered_q4, const uint16_t *
 // The words of n rounds through the filter, from its beginning. pdc, filtered_q4: (n,).
 void bt_pressure_filter(int64_t n, const uint16_t *pdc, int32_t filter_milli, uint16_t *filtered_q4);
 
-int bt_rail_count(void); // BT_RAIL_COUNT
+int bt_rail_count(void);         // BT_RAIL_COUNT
+int bt_active_q4(void);          // BT_ACTIVE_Q4
+int bt_active_for_torsion(void); // BT_ACTIVE_FOR_TORSION
 
 // Compared with host/biotac/wire/messages_gen.py when the module is imported.
 uint32_t bt_binding_schema_hash(void);

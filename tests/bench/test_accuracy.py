@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from core_in_units import on_board, reference
 
 from accuracy import front, limit, measure, signals
-from biotac.core.compiled import default_settings, on_board, reference
+from biotac.core.compiled import default_settings
 from biotac.wire.messages_gen import PocWeights
 
 COUNTED = ("cycles", "cycles_max", "instructions")

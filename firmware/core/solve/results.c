@@ -6,10 +6,8 @@
 
 #include <stddef.h>
 
-#define ACTIVE_Q4          (15 * 16) // an electrode that moved this far takes part in the contact
-#define ACTIVE_FOR_TORSION 4
-#define POC_LOW            4                     // times the contact threshold
-#define BASE_OLD_FRAMES    (60000 / BT_FRAME_MS) // one minute
+#define POC_LOW         4                     // times the contact threshold
+#define BASE_OLD_FRAMES (60000 / BT_FRAME_MS) // one minute
 
 // Energies of a round's signals, truncated to 1/2 count.
 typedef struct {
@@ -105,10 +103,10 @@ static bool faces_down(const int16_t poc_um[3])
 
 static bool enough_active(const int32_t e_q4[BT_ELECTRODES])
 {
-    int wanted = ACTIVE_FOR_TORSION;
+    int wanted = BT_ACTIVE_FOR_TORSION;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         // One comparison for both signs: what is in between stays below.
-        if ((uint32_t)(e_q4[i] + ACTIVE_Q4 - 1) > 2 * (ACTIVE_Q4 - 1) && --wanted == 0) {
+        if ((uint32_t)(e_q4[i] + BT_ACTIVE_Q4 - 1) > 2 * (BT_ACTIVE_Q4 - 1) && --wanted == 0) {
             return true;
         }
     }

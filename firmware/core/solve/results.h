@@ -8,6 +8,9 @@
 #include "solve/solve.h"
 #include "touch/tare.h"
 
+#define BT_ACTIVE_Q4          (15 * 16) // an electrode that moved this far takes part in the contact
+#define BT_ACTIVE_FOR_TORSION 4         // electrodes: with fewer there is no torsion
+
 // Fill in flags, poc_um, force_100un, torque_mnmm, torsion_mnmm and sigmas of msg. quantities is a mask of
 // BT_QUANTITY_FLAG_*; the others are not computed, and marked invalid.
 void bt_results(const bt_round *round, const bt_tare *tare, const bt_solve_settings *settings,

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..wire import messages_gen as wire
-from ..wire.frames import FORCE_LSB_PER_N, MNMM_PER_NMM, UM_PER_MM, tare_to_q4, to_units
 from ..wire.native import ffi, lib
 from ..wire.sensor_gen import ELECTRODE_NAMES, FULL_SCALE_COUNT
 
@@ -35,25 +34,13 @@ def default_settings() -> Settings:
     return {setting: spec.default for setting, spec in wire.SETTINGS.items()}
 
 
-def on_board(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
-    """Run the on-board integer kernels: counts (n, 19) 0..4095 or 0xFFFF for missing, tare in counts.
-
-    ``tare`` is (19,) or (n, 19), rounded to 1/16 count as the board does. Raises ValueError for other
-    shapes or ranges.
-    """
-    raw, tare_q4 = checked(counts, tare)
-    poc_um, force_100un, torque_mnmm, _ = on_board_q4(raw, tare_q4, settings or default_settings())
-    return Results(
-        to_units(poc_um, UM_PER_MM), to_units(force_100un, FORCE_LSB_PER_N), to_units(torque_mnmm, MNMM_PER_NMM)
-    )
-
-
 def on_board_q4(
     counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settings: Settings
 ) -> tuple[NDArray[np.int16], NDArray[np.int32], NDArray[np.int32], NDArray[np.uint32]]:
-    """on_board() on the integers of FRAME messages, both (n, 19), giving such integers and the kernel's flags.
+    """Run the on-board integer kernels on the integers of FRAME messages, both (n, 19).
 
-    Returns poc_um, force_100un, torque_mnmm, each (n, 3), and flags (n,). Raises ValueError for other shapes or ranges.
+    Returns poc_um, force_100un, torque_mnmm, each (n, 3), and the kernel's flags (n,).
+    Raises ValueError for other shapes or ranges.
     """
     raw = integers("counts", counts, np.uint16, None, ELECTRODES)
     tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
@@ -125,14 +112,11 @@ def board_settings(settings: Settings) -> Any:
     return board
 
 
-def reference(counts: Any, tare: Any, settings: Settings | None = None) -> Results:
-    """The results of firmware/reference: Lin 2013 Eq 1-4 in float64. Arguments as on_board()."""
-    raw, tare_q4 = checked(counts, tare)
-    return reference_q4(raw, tare_q4, settings or default_settings())
-
-
 def reference_q4(counts: NDArray[np.uint16], tare_q4: NDArray[np.uint16], settings: Settings) -> Results:
-    """reference() on the integers of FRAME messages, both (n, 19). Raises ValueError for other shapes or ranges."""
+    """The results of firmware/reference, Lin 2013 Eq 1-4 in float64, from the integers of FRAME messages, both (n, 19).
+
+    Raises ValueError for other shapes or ranges.
+    """
     raw = integers("counts", counts, np.uint16, None, ELECTRODES)
     tare_q4 = integers("tare_q4", tare_q4, np.uint16, len(raw), ELECTRODES)
     gains = formula_settings(settings)
@@ -191,14 +175,3 @@ def check_words(name: str, words: NDArray[Any]) -> NDArray[Any]:
             "where missing"
         )
     return words
-
-
-def checked(counts: Any, tare: Any) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
-    """Contiguous uint16 counts and tare_q4 of the same shape (n, 19). Raises ValueError for other shapes or ranges."""
-    raw = np.atleast_2d(np.asarray(counts))
-    base = np.broadcast_to(np.asarray(tare, dtype=np.float64), raw.shape)
-    if raw.ndim != 2 or raw.shape[1] != 19:
-        raise ValueError(f"counts have shape {raw.shape}, expected (n, 19)")
-    check_words("counts", raw)
-    tare_q4 = tare_to_q4(base)
-    return np.ascontiguousarray(raw, dtype=np.uint16), np.ascontiguousarray(tare_q4)

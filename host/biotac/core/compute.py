@@ -1,6 +1,6 @@
 """Point of contact, force and torque of whole recordings, in float64.
 
-The formulas are those of core.compiled.reference and core.population, in C: host/binding/blocks.c,
+The formulas are those of core.compiled.reference_q4 and core.population, in C: host/binding/blocks.c,
 population_float64.c.
 """
 

@@ -49,7 +49,7 @@ def in_force(settings: Mapping[wire.Setting, int]) -> bool:
 
 
 def shipped() -> str:
-    """The package's population map as JSON text (biotac.calibrate.population.keeping)."""
+    """The package's population map as JSON text (biotac.calibrate.population.map_file)."""
     return resources.files(__package__).joinpath(SHIPPED).read_text(encoding="utf-8")
 
 

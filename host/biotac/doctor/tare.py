@@ -7,11 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..wire import messages_gen as wire
+from ..wire.native import lib
 from .catalogue import Finding
 from .facts import BoardFacts, Facts
 
 #: The limits of FrameFlags.RAIL.
-RAIL_LOW, RAIL_HIGH = 0, 4090
+RAIL_LOW, RAIL_HIGH = 0, lib.bt_rail_count()
 
 
 def check(facts: Facts) -> Iterator[Finding]:

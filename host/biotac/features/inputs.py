@@ -49,15 +49,18 @@ def principal(columns: Floats, least: float = LEAST_VARIANCE, most: int | None =
     return Reduction(plain.mean, plain.scale, kept.T)
 
 
-def independent(columns: Floats, least: float = LEAST_VARIANCE, seed: int = 0) -> Reduction:
-    """FastICA's components, as many as principal() keeps; where it does not converge, those of its last iteration."""
+def independent(columns: Floats, least: float = LEAST_VARIANCE) -> Reduction:
+    """FastICA's components, as many as principal() keeps with ``least``.
+
+    Where it does not converge, they are those of its last iteration.
+    """
     import warnings
 
     plain = principal(columns, least)
     whitened = plain(columns)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "did not converge": the paper, too, finds that ICA does badly here
-        found = FastICA(whiten="unit-variance", random_state=seed, max_iter=200).fit(whitened)
+        found = FastICA(whiten="unit-variance", random_state=0, max_iter=200).fit(whitened)
     return Reduction(plain.mean, plain.scale, plain.matrix @ found.components_.T)
 
 

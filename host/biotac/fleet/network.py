@@ -79,10 +79,10 @@ def open_session(
         ) from error
 
 
-def shared(session: Any, name: str = "*") -> list[dict[str, Any]]:
-    """Descriptions of the boards shared under that name (by default all), sorted by name."""
+def shared(session: Any) -> list[dict[str, Any]]:
+    """Descriptions of all boards shared, sorted by name."""
     told = []
-    for reply in session.get(key(name, "info"), target=_zenoh().QueryTarget.ALL, timeout=FIND_S):
+    for reply in session.get(key("*", "info"), target=_zenoh().QueryTarget.ALL, timeout=FIND_S):
         if reply.ok is not None:
             facts = _facts(reply.ok.payload.to_bytes())
             if facts is not None:

@@ -109,7 +109,7 @@ class Board:
         self.check()
         return not (self.connected or self.closed)
 
-    def is_closed(self) -> NoReturn:
+    def raise_closed(self) -> NoReturn:
         """Raise the failure, or else DeviceLostError saying that the hand was closed."""
         self.check()
         raise DeviceLostError(f"this Hand on {self.link.port} was closed; open the port again")
@@ -141,7 +141,7 @@ class Board:
         """Read once; false when nothing came within timeout_s. Raises what ``lost`` raises."""
         with self._reading:
             if self.closed:
-                self.is_closed()
+                self.raise_closed()
             try:
                 came = self.incoming.read(timeout_s)
             except DeviceLostError as error:
@@ -230,7 +230,7 @@ class Board:
             payload = compatibility.cut(message.ID, payload, self.info.wire_minor)
         with self._writing:
             if self.closed:
-                self.is_closed()
+                self.raise_closed()
             self.link.write(encode(message.ID, payload))
 
     def next_message(self, wanted: Callable[[Any], bool], deadline_s: float) -> Any:

@@ -183,7 +183,7 @@ class Streams:
                 if self.ended:
                     return
                 if self._board.closing.is_set():
-                    self._board.is_closed()
+                    self._board.raise_closed()
                 if not self.streaming:
                     return
                 self._await_batch(queue)
@@ -248,7 +248,7 @@ class Streams:
         self.check()
         board = self._board
         if board.closed:
-            board.is_closed()
+            board.raise_closed()
         if self._reader is not None:
             return
         if not (pulled or self._has_pulled):

@@ -18,7 +18,7 @@ from ..calibrate.pressure.check import FORCE_BOUND_N, PressureCheck
 from ..calibrate.wrench import board
 from ..core import population
 from ..core.board_map import BoardMap, pdc_above_rest_q4
-from ..core.compiled import TORQUE_GAINS, Results, Settings, reference_q4
+from ..core.compiled import NN_PER_N, TORQUE_GAINS, Results, Settings, reference_q4
 from ..core.map_bound import bound_of
 from ..core.map_columns import Signals, tared
 from ..core.map_float64 import exact, replace_gains
@@ -46,7 +46,7 @@ def torque_bound_nmm(messages: StructArray, truth: Results, settings: Settings) 
     firmware/reference/kernel_bounds.h has the formulas.
     """
     size = np.nansum(np.abs(electrode_signals(messages)), axis=1)
-    gains = np.array([abs(settings[s]) / 1e9 for s in TORQUE_GAINS])
+    gains = np.array([abs(settings[s]) / NN_PER_N for s in TORQUE_GAINS])
     with np.errstate(divide="ignore", invalid="ignore"):
         sums = np.nan_to_num(np.abs(truth.torque_nmm[:, 1:]) * 1000 / gains, posinf=0.0)
     force = np.abs(truth.force_n[:, 1:]).sum(axis=1)

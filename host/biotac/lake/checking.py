@@ -14,6 +14,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..errors import InputError
+from ..keep.calibration import own_settings
 from ..lab.crosscheck import CrossCheck
 from ..recording.facts import Facts
 from ..wire.fields import FRAME_FIELDS
@@ -66,7 +67,8 @@ def check(lake: str, topics: dict[str, set[str]], partition: dict[str, str], rec
             wrong.append(f"{path} differs from what was exported; export {row['source']} again with --force")
         elif topic == "frames":
             rows = frames_of(pq.read_table(io.BytesIO(data)))
-            outcome.add(frames_to_wire(rows), facts.settings, facts.finger_settings, facts.maps)
+            own = own_settings(facts.settings, facts.calibrations)
+            outcome.add(frames_to_wire(rows), facts.settings, own, facts.maps)
     wrong += [f"{recording} ({row['source']}): {finding}" for finding in outcome.findings]
     return Checked(outcome, wrong)
 

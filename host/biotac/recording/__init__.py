@@ -9,8 +9,8 @@ host/docs/recording.md describes the format.
 
 from __future__ import annotations
 
-from .part import load
 from .reader import Recording
+from .selection import load
 from .writer import Recorder
 
 __all__ = ["Recorder", "Recording", "load"]

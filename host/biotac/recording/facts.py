@@ -9,7 +9,6 @@ from typing import Any
 
 from ..errors import InputError
 from ..keep import Calibration
-from ..keep.calibration import own_settings
 from ..keep.calibration_file import from_dict, to_dict
 from ..keep.map_blob import as_blob
 from ..version import __version__
@@ -66,11 +65,6 @@ class Facts:
             layout.NAMES: json.dumps(self.names),
             "sensors": json.dumps([asdict(s) for s in self.sensors]),
         }
-
-    @property
-    def finger_settings(self) -> dict[int, dict[wire.Setting, int]]:
-        """All settings that affect a finger's results, for the fingers that had a calibration in force."""
-        return own_settings(self.settings, self.calibrations)
 
 
 def in_force(settings: Settings, calibrations: Mapping[int, Calibration], maps: Mapping[int, bytes]) -> dict[str, str]:

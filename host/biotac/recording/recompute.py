@@ -23,11 +23,12 @@ from ..wire import sensor_gen as sensor
 from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray
 from ..wire.framing import encode
+from ..wire.native import lib
 from .facts import in_force
 from .file import RecordingFile
-from .pieces import split
 from .reader import Recording
 from .rounds import HostTare, Rounds, frames_and_tares, with_silence
+from .wire_messages import split
 
 Settings = dict[wire.Setting, int]
 Show = Callable[[float], None]
@@ -47,8 +48,8 @@ RESULT_SETTINGS = frozenset(
 )
 _KERNEL_FLAGS = wire.FrameFlags.POC_INVALID | wire.FrameFlags.POPULATION | wire.FrameFlags.OUTSIDE
 _HOST_REASONS = (wire.TareReason.HOST_NOW, wire.TareReason.HOST_SET)
-_ACTIVE_COUNTS = 15
-_ACTIVE_FOR_TORSION = 4
+_ACTIVE_Q4: int = lib.bt_active_q4()
+_ACTIVE_FOR_TORSION: int = lib.bt_active_for_torsion()
 
 
 def recompute(
@@ -153,7 +154,7 @@ def _torsion_ok(frames: StructArray, poc_um: NDArray[np.int16]) -> NDArray[np.bo
     """TORSION_OK of SPEC.md, as far as a frame can tell: whether the energy suffices is taken from its old flags."""
     down = (poc_um[:, 2] <= -sensor.CORE_RADIUS_UM // 2) & (poc_um[:, 2] != wire.INVALID_I16)
     missing = (frames["counts"] == wire.INVALID_COUNT) | (frames["tare_q4"] == wire.INVALID_COUNT)
-    moved = np.abs(frames["counts"].astype(np.int32) * 16 - frames["tare_q4"]) >= 16 * _ACTIVE_COUNTS
+    moved = np.abs(frames["counts"].astype(np.int32) * 16 - frames["tare_q4"]) >= _ACTIVE_Q4
     active = (moved & ~missing).sum(axis=1) >= _ACTIVE_FOR_TORSION
     trouble = (frames["flags"] & (wire.FrameFlags.ELECTRODE_MISSING | wire.FrameFlags.RAIL)) != 0
     had = (frames["flags"] & wire.FrameFlags.TORSION_OK) != 0

@@ -9,12 +9,12 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from ..clock import LAST_SAMPLE_US, DeviceClock
+from ..clock.segment import MAX_DRIFT
 
 # In less time, the delays of single messages exceed the drift of a crystal: 0.5 ms at 50 ppm.
 _LEAST_S = 10.0
 # A block this much too early or late did not keep pace: from a simulated board without a real clock, or after a stall.
 _PACE_S = 0.5
-_MAX_DRIFT = 500e-6
 _SETTLED_US = 600e6  # of the clock's course at a time, before it forgets what it was made of
 _REACH_US = 200e6
 
@@ -48,7 +48,7 @@ class Stamps:
         at_s = (at_ns - self._begin_ns) / 1e9
         self._first = self._first or (t_us, at_s)
         device_s, host_s = (t_us - self._first[0]) / 1e6, at_s - self._first[1]
-        self._keeps_pace = device_s >= _LEAST_S and abs(host_s - device_s) <= _PACE_S + device_s * _MAX_DRIFT
+        self._keeps_pace = device_s >= _LEAST_S and abs(host_s - device_s) <= _PACE_S + device_s * MAX_DRIFT
         self._clock.arrived(t_us + LAST_SAMPLE_US, at_s)
         if t_us - self._settled_us > _SETTLED_US:
             self._clock.host_time_s(np.array([self._settled_us - _REACH_US, t_us]))

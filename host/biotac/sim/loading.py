@@ -9,7 +9,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..wire import sensor_gen as _sensor
 from .play import play
-from .replay import load_btd, load_npz
+from .recorded_counts import load_btd, load_npz
 from .scenario import parse_scenario
 from .source import MAX_SECONDS, Source
 

@@ -17,7 +17,7 @@ from ..core import geometry as surface
 from ..core.geometry import Floats
 from ..wire import sensor_gen as _sensor
 from .physics import Finger, States, deform
-from .probes import BAR, PROBES, Probe, counts_of, footprints
+from .probes import BAR, PROBES, counts_of, footprints
 from .sampling import PDC_NOISE, spring_load
 
 Integers = npt.NDArray[np.int64]
@@ -63,13 +63,12 @@ def stimulate(
     places: Sequence[int],
     *,
     seed: int,
-    probes: Sequence[Probe] = PROBES,
     frames: int = 16,
     peak_n: tuple[float, float] = PEAK_N,
 ) -> Stimulations:
-    """``places`` says how many contacts each of ``probes`` makes, of five stimulations of ``frames`` rows."""
+    """``places`` says how many contacts each of PROBES makes, of five stimulations of ``frames`` rows."""
     rng = np.random.default_rng([seed, 33])
-    probe = np.repeat(np.arange(len(probes)), places)
+    probe = np.repeat(np.arange(len(PROBES)), places)
     n, tilts = len(probe), len(TILTS_DEG)
     x, roll = _places(places, rng)
     presses = n * tilts
@@ -94,7 +93,7 @@ def stimulate(
     states = States(each(contact_mm), normal_n, each(shear) * normal_n[:, None], zeros, zeros, zeros)
     of_row = each(np.repeat(probe, tilts)).astype(np.int64)
     compression, bulge = np.empty((len(states), 19)), np.empty((len(states), 19))
-    for k, one in enumerate(probes):
+    for k, one in enumerate(PROBES):
         rows = of_row == k
         mine = states.of(rows)
         its_print = footprints(one, mine.contact_mm, mine.force_n)
@@ -121,7 +120,7 @@ BAR_LEVELS = (0.25, 0.5, 1.0)  # of the peak
 BAR_FRICTION = 0.2
 
 
-def press_bars(finger: Finger, presses: int, *, seed: int, bar: Probe = BAR) -> tuple[Floats, Floats, Floats]:
+def press_bars(finger: Finger, presses: int, *, seed: int) -> tuple[Floats, Floats, Floats]:
     """A bar across the pad in any direction, each press read at BAR_LEVELS of its peak.
 
     Counts (presses, 3, 19), the tare (19,) and the bar's direction (presses,) in rad, 0 to pi from the tip's to E11's
@@ -141,7 +140,7 @@ def press_bars(finger: Finger, presses: int, *, seed: int, bar: Probe = BAR) -> 
     for k, level in enumerate(BAR_LEVELS):
         force = level * peak
         states = States(contact_mm, force, shear * force[:, None], none, none, none)
-        counts[:, k] = counts_of(finger, [(states, footprints(bar, contact_mm, force, turned))])
+        counts[:, k] = counts_of(finger, [(states, footprints(BAR, contact_mm, force, turned))])
     noisy = np.rint(counts + rng.normal(0.0, finger.noise_counts, counts.shape))
     return np.clip(noisy, 0.0, _sensor.FULL_SCALE_COUNT), finger.rest_counts(np.zeros(1))[0], turned
 

@@ -221,10 +221,10 @@ def sent_of(field: Field, values: Any, dtype: np.dtype[Any]) -> Any:
     return np.where(np.isnan(scaled), WIRE_INVALID[dtype.str[1:]], scaled).astype(dtype)
 
 
-def as_json(row: Any, fields: Sequence[Field] = FRAME_FIELDS) -> dict[str, Any]:
-    """One row, of a structured array or an object with the fields as attributes, as JSON types; None where invalid."""
+def as_json(row: Any) -> dict[str, Any]:
+    """One row, FRAME_DTYPE or an object with its fields as attributes, as JSON types; None where invalid."""
     of = row.__getitem__ if isinstance(row, np.void) else lambda name: getattr(row, name)
-    return {field.name: _json_value(np.asarray(of(field.name)), field) for field in fields}
+    return {field.name: _json_value(np.asarray(of(field.name)), field) for field in FRAME_FIELDS}
 
 
 def _json_value(value: Any, field: Field) -> Any:

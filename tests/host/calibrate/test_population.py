@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import wrench_run
 
-from biotac.calibrate.population import keeping, training, worth
+from biotac.calibrate.population import held_out_error, map_file, training
 from biotac.calibrate.population.fewshot import Scale, pulled, scale_of
 from biotac.calibrate.wrench import board, features, moments
 from biotac.calibrate.wrench.run import Run, load_run
@@ -75,7 +75,7 @@ def test_a_new_finger_is_told_better_than_by_lins_scales_of_the_others(
     scales = (said * truth).sum(axis=0) / (said**2).sum(axis=0)
     new = runs[2]
     lins = np.sqrt(((lin(new) * scales - new.truth) ** 2).mean(axis=0))
-    found = worth.worth(its, new)
+    found = held_out_error.worth(its, new)
     assert (found.rmse_n < 0.75 * lins).all()
 
 
@@ -143,10 +143,10 @@ def test_the_command_trains_judges_and_keeps(
         assert len(facts[field]) == 3
     assert facts["rmse_60s_n"] is None  # a recording of 50 s has no minute and something to judge it by
     assert 0.0 < facts["coverage"][0] < facts["coverage"][1] <= 1.0
-    kept = keeping.load(out)
+    kept = map_file.load(out)
     assert kept.provenance["source"] == "made up"
     assert list(kept.provenance["files"]) == ["1.npz", "2.npz"]
-    assert keeping.dumps(keeping.loads(keeping.dumps(kept), "again")) == out.read_text(encoding="utf-8")
+    assert map_file.dumps(map_file.loads(map_file.dumps(kept), "again")) == out.read_text(encoding="utf-8")
     assert main([*arguments, "--out", str(out)]) != 0
     assert "exists" in capsys.readouterr().err
     assert main(["calibrate", "population", str(files[0]), "--test", str(files[0])]) != 0
@@ -155,13 +155,13 @@ def test_the_command_trains_judges_and_keeps(
 
 @pytest.mark.parametrize("damage", [("biotac-population-map/1", "/2"), ("[[", "["), ("COMPRESSION", "BULGE")])
 def test_a_damaged_file_is_refused_in_words(its: training.Population, damage: tuple[str, str]) -> None:
-    text = keeping.dumps(keeping.Kept(its, np.ones(3), np.ones(3), {}))
+    text = map_file.dumps(map_file.Kept(its, np.ones(3), np.ones(3), {}))
     with pytest.raises(InputError, match="biotac calibrate population --out"):
-        keeping.loads(text.replace(*damage), "x.json")
+        map_file.loads(text.replace(*damage), "x.json")
 
 
 def test_the_packages_own_names_what_it_is_made_of() -> None:
-    kept = keeping.load(None)
+    kept = map_file.load(None)
     for word in ("MiaoLi/syntouchcontact", "d58862d13f1325d8e0e70921b449a1df9649d483", "no licence stated"):
         assert word in kept.provenance["source"]
     assert all(len(sha256) == 64 for sha256 in kept.provenance["files"].values())
@@ -170,13 +170,13 @@ def test_the_packages_own_names_what_it_is_made_of() -> None:
 def test_a_finger_is_pulled_to_others_and_not_to_itself(
     its: training.Population, runs: list[Run], files: list[Path]
 ) -> None:
-    kept = keeping.Kept(its, np.ones(3), np.ones(3), keeping.provenance_of(files[:2], "", symmetric=False))
-    others, note = keeping.others_than(kept, [files[2]])
+    kept = map_file.Kept(its, np.ones(3), np.ones(3), map_file.provenance_of(files[:2], "", symmetric=False))
+    others, note = map_file.others_than(kept, [files[2]])
     assert others is not None and note == "regularized towards the population map of 1.npz, 2.npz"
     e = runs[2].counts[:50] - runs[2].tare
     z = moments.with_one(features.columns(Signals(e, runs[2].tare)))
     assert z @ others == pytest.approx(its.force(runs[2].counts[:50], runs[2].tare), abs=1e-9)
-    others, note = keeping.others_than(kept, [files[0]])
+    others, note = map_file.others_than(kept, [files[0]])
     assert others is None and note.startswith(
         "not regularized towards the population map of 1.npz, 2.npz, which was made"
     )
@@ -191,8 +191,8 @@ def test_real_fingers_each_by_the_other() -> None:
     fingers = [training.sums_of(run) for run in runs]
     within, after_presses = [], []
     for k, new in ((0, runs[1]), (1, runs[0])):
-        sigma = worth.sigma_of([fingers[k]], [runs[k]])
-        facts = worth.facts(worth.worth(training.train([fingers[k]]), new), sigma)
+        sigma = held_out_error.sigma_of([fingers[k]], [runs[k]])
+        facts = held_out_error.facts(held_out_error.worth(training.train([fingers[k]]), new), sigma)
         within.append(facts["coverage"])
         after_presses.append(facts["coverage_scale5"])
         assert (np.array(facts["rmse_n"]) <= [0.62, 0.39, 0.46]).all()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biotac.calibrate.population import keeping
+from biotac.calibrate.population import map_file
 from biotac.calibrate.population.fewshot import scaled
 from biotac.calibrate.population.presses import Held, found
 from biotac.calibrate.population.training import Population
@@ -33,7 +33,7 @@ def held(its: Population, gain: float, balance: float) -> tuple[Held, Population
 @pytest.fixture
 def firm() -> Population:
     """A map that says 10 to 100 N to such patterns, so that a press says more than what is known of fingers."""
-    its = keeping.load(None).its
+    its = map_file.load(None).its
     coefficients = np.zeros_like(its.coefficients)
     coefficients[:38, 2] = -5.0  # compressions and bulges
     return Population(coefficients, its.variance)
@@ -101,4 +101,4 @@ def test_too_few_presses_are_refused(capsys: pytest.CaptureFixture[str]) -> None
     assert main(["calibrate", "scale", "sim:fingers.toml", "--finger", "0", "--presses", "2"]) != 0
     assert "expected 3 or more" in capsys.readouterr().err
     with pytest.raises(InputError):
-        keeping.load(Path("nowhere.json"))
+        map_file.load(Path("nowhere.json"))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import wrench_run
 
-from biotac.calibrate.population import fewshot, keeping, training, weights
+from biotac.calibrate.population import fewshot, map_file, training, weights
 from biotac.calibrate.population.presses import Held, found
 from biotac.calibrate.wrench import fitted
 from biotac.calibrate.wrench.run import load_run
@@ -31,7 +31,7 @@ def others(tmp_path_factory: pytest.TempPathFactory) -> Path:
     some = [replace(run, counts=run.counts[::4], truth=run.truth[::4]) for run in runs]
     its = training.train([training.sums_of(run) for run in some])
     place = folder / "population.json"
-    place.write_text(keeping.dumps(keeping.Kept(its, np.full(3, 0.5), np.full(3, 0.5), {})), encoding="utf-8")
+    place.write_text(map_file.dumps(map_file.Kept(its, np.full(3, 0.5), np.full(3, 0.5), {})), encoding="utf-8")
     return place
 
 
@@ -92,7 +92,7 @@ def test_weights_mend_the_map_of_other_fingers(
     assert facts["presses"] == 10 and facts["worth_it"]
     assert facts["board"]["frames_bit_for_bit"] > 0 and facts["board"]["outside"] == 0
     counts, rest, truth = between()
-    before = rms(keeping.load(others).its.force(counts, rest) - truth)
+    before = rms(map_file.load(others).its.force(counts, rest) - truth)
     own = fitted.load(out)
     after = rms(own.predict(counts - rest + own.tare) - truth)
     assert np.linalg.norm(after) < 0.9 * np.linalg.norm(before)
@@ -133,7 +133,7 @@ def test_a_recording_says_the_same_and_goes_to_no_board(
 
 def test_axes_that_are_mixed_are_told_apart() -> None:
     """What nine numbers can say: a finger that answers with its axes turned and stretched."""
-    its = keeping.load(None).its
+    its = map_file.load(None).its
     firm = training.Population(100.0 * its.coefficients, its.variance)  # so that the prior says little
     rng = np.random.default_rng(7)
     counts = 2800.0 - np.abs(rng.normal(200.0, 80.0, (12, 19)))

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from core_in_units import on_board, reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -13,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 import biotac
 from biotac import FRAME_DTYPE, RESULT_DTYPE, PocWeights, Setting
 from biotac.cli import main
-from biotac.core.compiled import default_settings, on_board, reference
+from biotac.core.compiled import default_settings
 from biotac.core.compute import per_frame
 from biotac.lab.bench import batch as bench
 from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from core_in_units import on_board
 
 import biotac
-from biotac.calibrate.population import keeping
+from biotac.calibrate.population import map_file
 from biotac.core import population
-from biotac.core.compiled import on_board, on_board_q4
+from biotac.core.compiled import on_board_q4
 from biotac.core.finger import Finger
 from biotac.core.map_columns import tared
 from biotac.lab.crosscheck import CrossCheck
@@ -43,7 +44,7 @@ def test_on_plates_it_is_the_trained_map_to_what_16_bits_leave() -> None:
     inside = population.share(its) == population.ALL
     assert 500 < inside.sum() < 3900
     got = biotac.compute(counts, TARE, POPULATION)["force_n"][inside]
-    wanted = keeping.load(None).its.force(counts[inside], TARE)
+    wanted = map_file.load(None).its.force(counts[inside], TARE)
     np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-9)
 
 
@@ -99,7 +100,7 @@ def test_sigma_is_what_a_new_finger_leaves() -> None:
     rows = rows_of(POPULATION, pressed(500, 6))
     inside = rows["flags"] & wire.FrameFlags.OUTSIDE == 0
     assert inside.any()
-    told, wanted = rows["force_sigma_100un"][inside] / 1e4, keeping.load(None).sigma_n
+    told, wanted = rows["force_sigma_100un"][inside] / 1e4, map_file.load(None).sigma_n
     np.testing.assert_allclose(told, np.broadcast_to(wanted, told.shape), rtol=0, atol=5.1e-5)
 
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.compiled import Settings
+from ...core.compiled import NN_PER_N, Settings
+from ...core.finger import ROUND_US
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
 from ...wire.native import lib
 from . import formulas
 
-ROUND_US = 10_000
 RAIL_COUNT: int = lib.bt_rail_count()
 #: Half a step of the published force, N.
 FORCE_BOUND_N = 0.5 / FORCE_LSB_PER_N
@@ -58,7 +58,7 @@ class PressureCheck:
         return found
 
     def _forces(self, messages: StructArray, settings: Settings) -> Findings:
-        gain_n = settings[wire.Setting.PRESSURE_GAIN_NN] / 1e9 or np.nan
+        gain_n = settings[wire.Setting.PRESSURE_GAIN_NN] / NN_PER_N or np.nan
         pressure = to_units(messages["pdc_filtered_q4"], Q4_PER_COUNT)
         rest = to_units(messages["pdc_tare_q4"], Q4_PER_COUNT)
         truth = formulas.force(pressure, rest, gain_n)

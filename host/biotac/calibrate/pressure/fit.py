@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...core.compiled import pressure_force_100un
+from ...core.compiled import NN_PER_N, pressure_force_100un
 from ...errors import InputError
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, to_units
 from . import formulas
 from .presses import HOLD_ROWS, Press, Rest
 
-NN_PER_N = 1e9
 MIN_PRESSES = 3
 # The paper found 0.009 to 0.016 N per count. The limits are a tenth of the smallest, and what a board accepts, six
 # times the largest: beyond these something else is wrong.

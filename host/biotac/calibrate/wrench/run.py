@@ -18,6 +18,7 @@ from ...core.map_columns import AXES
 from ...errors import RecordingError
 from ...recording.npz_file import counts_field, read_npz, to_lin_frame
 from ...wire import sensor_gen as _sensor
+from ...wire.native import lib
 from . import contact
 from .splits import BLOCKS, GUARD_ROWS, contacts
 
@@ -25,7 +26,7 @@ MIN_ROWS = BLOCKS * 2 * GUARD_ROWS  # a shorter block would be nothing but its t
 REST_N = 0.1  # a plate's reading below this means that nothing touches
 MIN_REST_ROWS = 50
 MAX_REST_SWING_COUNTS = 100.0  # 10 % to 90 %: warming up is 8 counts in 10 s (biotac.md finding 6), a press hundreds
-RAIL_LOW, RAIL_HIGH = 0, 4090  # numerics.md 1.3: beyond these an electrode is railed
+RAIL_LOW, RAIL_HIGH = 0, lib.bt_rail_count()  # numerics.md 1.3: beyond these an electrode is railed
 MAX_RAILED_SHARE = 0.01
 LEAST_SWING_COUNTS = 2  # over so many rows, the noise alone of a live electrode exceeds this
 MAX_CLIPPED_SHARE = 0.005

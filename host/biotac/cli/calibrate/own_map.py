@@ -14,7 +14,7 @@ from typing import Any
 
 import biotac
 
-from ...calibrate.population import keeping
+from ...calibrate.population import map_file
 from ...calibrate.population.presses import Fit, Held, found
 from ...calibrate.pressure.presses import Phase, Step
 from ...calibrate.wrench import board, fitted, provenance
@@ -92,13 +92,13 @@ class Guide:
 
 
 def tell(
-    args: argparse.Namespace, its: Pressed, fit: Fit, how: str, more: Callable[[keeping.Kept], dict[str, Any]]
+    args: argparse.Namespace, its: Pressed, fit: Fit, how: str, more: Callable[[map_file.Kept], dict[str, Any]]
 ) -> dict[str, Any]:
     """Fit the map, and upload it only if it helps or --force is given; return the findings as JSON types.
 
     ``how`` says where the force is from; ``more`` gives further findings.
     """
-    kept = keeping.load(args.population)
+    kept = map_file.load(args.population)
     result = found(kept.its, its.held, fit)
     own = result.own.wrench_map(its.held.tare)
     run, made_s = its.held.run(args.where), int(time.time())

@@ -19,7 +19,7 @@ from ...keep import calibration_file as file
 from ...wire.sensor_gen import MAX_SENSORS
 from .. import outputs, values
 from ..recordings.loading import load
-from .typed import reading_n
+from .typed_readings import reading_n
 
 NAME = "pressure"
 HELP = "Pressure to force, one gain per finger: press a plate or scale, guided; or from recordings of that."

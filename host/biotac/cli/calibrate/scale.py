@@ -7,7 +7,7 @@ import sys
 from contextlib import ExitStack
 from typing import Any
 
-from ...calibrate.population import fewshot, keeping, presses
+from ...calibrate.population import fewshot, map_file, presses
 from ...calibrate.pressure.force_source import Truth
 from ...calibrate.pressure.presses import Step
 from ...calibrate.reference.scale import UNITS_N, Scale
@@ -16,7 +16,7 @@ from ...hand.hand import Hand
 from ...recording import Recording
 from .. import values
 from . import own_map
-from .typed import reading_n
+from .typed_readings import reading_n
 
 NAME = "scale"
 HELP = "A finger's own force from presses on a kitchen scale: the population map with its gain and balance."
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
     with own_map.pressed(args, guide, recorded) as its:
 
-        def more(kept: keeping.Kept) -> dict[str, Any]:
+        def more(kept: map_file.Kept) -> dict[str, Any]:
             scale = fewshot.scale_of(its.held.columns @ kept.its.coefficients, its.held.force_n[:, 2])
             return {"shown_n": its.held.force_n[:, 2].tolist(), "gain": scale.gain, "balance": scale.balance}
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import biotac
 
-from ...calibrate.population import keeping
+from ...calibrate.population import map_file
 from ...calibrate.reference.files import read_reference
 from ...calibrate.reference.mounting import read_mounting
 from ...calibrate.wrench import board, figures, fitted, provenance, report
@@ -163,8 +163,8 @@ def _fit(args: argparse.Namespace, loaded: Loaded) -> tuple[Validation, provenan
         its_own_lag = not args.as_recorded and not loaded.run.by_clocks
         run, others = loaded.run, None
         if args.population != "none":
-            kept = keeping.load(None if args.population is None else Path(args.population))
-            others, note = keeping.others_than(kept, loaded.files)
+            kept = map_file.load(None if args.population is None else Path(args.population))
+            others, note = map_file.others_than(kept, loaded.files)
             run = replace(run, notes=(*run.notes, note))
         validation = validate(run, align=its_own_lag, windows=windows, others=others, show=progress.show)
     finally:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from ...calibrate.population import keeping, training, worth
+from ...calibrate.population import held_out_error, map_file, training
 from ...calibrate.population.training import Population
 from ...calibrate.wrench import figures, fitted, models
 from ...calibrate.wrench.crossvalidation import Validation, validate
@@ -28,10 +28,9 @@ from ...core.compute import compute
 from ...core.geometry import Floats
 from ...errors import InputError
 from ...picture import picture
-from ...wire import messages_gen as wire
+from .batch import LIN
 
 CYCLES = "cycles.json"
-LIN = {wire.Setting.FORCE_MODEL: wire.ForceModel.LIN}
 OWN = "its own force plate"
 #: Model of a finger's own map, what the board runs for it, and its label.
 OWN_MODELS = (
@@ -139,15 +138,15 @@ def _of_others(files: Sequence[Path], runs: list[Run]) -> tuple[dict[str, Popula
             path.name: training.train([its for j, its in enumerate(fingers) if j != k], symmetric=True)
             for k, path in enumerate(files)
         }, ["population maps are trained on the other recordings, symmetric like the package's"]
-    kept = keeping.load(None)
+    kept = map_file.load(None)
     path = files[0]
-    if keeping.made_of(kept, [path]):
+    if map_file.made_of(kept, [path]):
         return {}, [f"the package's population map was made from {path.name}: name another finger's recording too"]
     return {path.name: kept.its}, ["the population map is the package's"]
 
 
 def _untrained(its: Population, run: Run) -> dict[str, list[float]]:
-    found = worth.worth(its, training.aligned(run))
+    found = held_out_error.worth(its, training.aligned(run))
     all_three = {POPULATION: found.rmse_n, PRESSES: found.rmse_scale5_n, MINUTE: found.rmse_60s_n}
     return {key: rmse.tolist() for key, rmse in all_three.items() if rmse is not None}
 

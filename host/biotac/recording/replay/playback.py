@@ -16,9 +16,18 @@ from ...keep import map_blob as maps
 from ...wire import messages_gen as wire
 from ...wire.counters import nearest
 from ...wire.decoder import Decoder
+from ...wire.dtypes_gen import DTYPES
 from ...wire.framing import encode
-from ..pieces import Piece, split
 from ..reader import Recording
+from ..wire_messages import Piece, split
+
+
+def _offset(message: type[Any], name: str) -> int:
+    """Where a field begins in a message's payload."""
+    fields = DTYPES[message.ID].fields
+    assert fields is not None
+    return int(fields[name][1])
+
 
 _STREAM_OF = {
     wire.Frame.ID: wire.StreamFlags.FRAMES,
@@ -32,10 +41,10 @@ _STREAM_OF = {
     wire.SensorStatus.ID: wire.StreamFlags.STATUS,
 }
 _TIME = struct.Struct("<I")
-_TIME_AT = 2  # after seq; all stream messages begin with seq and t_us
-_FINGER_AT = 6
-_FINGER_AT_IN_STATUS = 7  # after req_id
-_REQ_ID_AT = 6
+_TIME_AT = _offset(wire.Frame, "t_us")  # in all stream messages
+_FINGER_AT = _offset(wire.Frame, "finger")  # in all of one finger except SENSOR_STATUS, which has its req_id there
+_FINGER_AT_IN_STATUS = _offset(wire.SensorStatus, "finger")
+_REQ_ID_AT = _offset(wire.Status, "req_id")  # in SENSOR_STATUS, too
 # Only these arrive in order of their times: a PAC can begin later than the FRAME that it precedes.
 _CLOCKS = (wire.Frame.ID, wire.Idle.ID)
 
