@@ -202,7 +202,7 @@ def test_nothing_is_overwritten_unasked(folder, recorded, capsys) -> None:
     [
         ("{", "JSON"),
         ('{"nonsense": 1}', "nonsense"),
-        ('{"poc_weights": 1.5}', "whole"),
+        ('{"poc_weights": 1.5}', "integers"),
         ('{"poc_weights": 7}', "0 to 2"),
     ],
 )

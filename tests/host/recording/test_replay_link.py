@@ -199,7 +199,7 @@ def test_on_a_pty_it_is_a_board_for_any_serial_program(recorded, tmp_path) -> No
                 frames.append(batch.frames)
                 if sum(map(len, frames)) == len(recording.frames):
                     break
-        assert "is over" in process.stderr.readline()  # it says so once the last frame is written
+        assert "has ended" in process.stderr.readline()  # it says so once the last frame is written
         process.terminate()
         assert process.wait() == 0
     assert np.concatenate(frames).tobytes() == recording.frames.tobytes()
