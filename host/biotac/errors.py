@@ -24,6 +24,11 @@ class InputError(BiotacError):
     exit_code = 2
 
 
+def taken(path: object) -> InputError:
+    """What to raise when ``path`` exists and may not be overwritten."""
+    return InputError(f"{path} already exists; choose another name, or overwrite it (--force, overwrite=True)")
+
+
 class ScenarioError(InputError):
     """A scenario file is malformed; the message names file, line and key."""
 

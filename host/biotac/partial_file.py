@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from .errors import InputError
+from .errors import InputError, taken
 
 ROS2_METADATA = "metadata.yaml"
 
@@ -22,7 +22,7 @@ def whole(path: Path, *, overwrite: bool) -> Iterator[Path]:
     words that say so. Raises InputError when ``path`` exists and may not be overwritten.
     """
     if path.exists() and not overwrite:
-        raise InputError(f"{path} already exists; choose another name, or add --force to overwrite it")
+        raise taken(path)
     if path.is_dir() and not (path / ROS2_METADATA).is_file():
         raise InputError(f"{path} is a folder, but not a ROS 2 bag that could be replaced; choose another name")
     try:

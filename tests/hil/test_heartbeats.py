@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from core_in_units import on_board
 
 from biotac import QuantityFlags
-from biotac.core.compiled import on_board
 from biotac.wire import messages_gen as wire
 from biotac.wire.sensor_gen import SLOTS
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..errors import InputError
+from ..errors import InputError, taken
 
 
 def check_file(place: Path | None, *, overwrite: bool) -> None:
     """Raises InputError if the file, where one is named, exists and may not be overwritten."""
     if place is not None and place.exists() and not overwrite:
-        raise InputError(f"{place} already exists; choose another name, or add --force to overwrite it")
+        raise taken(place)
 
 
 def check(folder: Path, places: Sequence[Path], *, overwrite: bool) -> None:
@@ -23,7 +23,7 @@ def check(folder: Path, places: Sequence[Path], *, overwrite: bool) -> None:
                 "separate --out folders"
             )
         if place.exists() and not overwrite:
-            raise InputError(f"{place} already exists; choose another folder, or add --force to overwrite it")
+            raise taken(place)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is not a folder; choose another name")
 

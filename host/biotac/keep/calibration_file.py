@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..documents import JSON_BYTES, parse_json, read_text
-from ..errors import InputError
+from ..errors import InputError, taken
 from ..wire import messages_gen as wire
 from .calibration import Calibration
 
@@ -119,7 +119,7 @@ def write(path: Path, text: str, *, overwrite: bool) -> None:
         with path.open("w" if overwrite else "x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        raise InputError(f"{path} already exists; choose another name, or add --force to overwrite it") from error
+        raise taken(path) from error
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
 

@@ -40,7 +40,9 @@ def from_dict(tree: Any) -> bytes:
     Raises ValueError that says what is wrong with the file, InputError for a map that a board would refuse.
     """
     if not isinstance(tree, dict) or tree.get("format") != FORMAT:
-        raise ValueError(f'it has no "format": "{FORMAT}"')
+        raise ValueError(
+            f'it has no "format": "{FORMAT}"; to upload a .wrench.json, use `biotac calibrate wrench REC --upload PORT`'
+        )
     if tree.get("version") != VERSION:
         raise ValueError(
             f"its version is {tree.get('version')!r}, expected {VERSION}; a newer biotac-gateway may read it"
@@ -62,7 +64,7 @@ def load(path: Path) -> bytes:
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from error
     except (ValueError, InputError) as error:
-        raise InputError(f"{path} is not a usable wrench map: {error}; `biotac map get` writes one") from error
+        raise InputError(f"{path} is not a board's wrench map, as `biotac map get` writes it: {error}") from error
 
 
 def save(path: Path, blob: bytes, provenance: Provenance | None = None, *, overwrite: bool = False) -> None:

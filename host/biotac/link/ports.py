@@ -40,6 +40,9 @@ def open_link(port: str, *, pace: float = 0.0) -> Link:
             "uart:DEVICE?baud=N, spidev:BUS.DEVICE, socket://HOST:PORT, rfc2217://HOST:PORT, sim:SOURCE, emu:pico, "
             "replay:REC or zenoh:NAME"
         )
+    cure = {".mcap": "replay", ".toml": "sim", ".npz": "sim", ".btd": "sim"}.get(os.path.splitext(port)[1].lower())
+    if cure and not known:
+        raise PortError(f"{port} is a file, not a port; play it with {cure}:{port}")
     module, _, function = (OPENERS[scheme] if known else PATH).partition(":")
     opener: Callable[..., Link] = getattr(importlib.import_module(module), function)
     return opener(port, pace) if scheme in PACED else opener(port)

@@ -44,6 +44,8 @@ def read_npz(path: Path, wanted: Collection[str]) -> dict[str, npt.NDArray[Any]]
             return fields
     except RecordingError:
         raise
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the path") from None
     except Exception as error:  # a damaged header is parsed as Python and can fail in many ways
         seen = str(error).partition("\n")[0]
         raise RecordingError(

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
-from ..errors import InputError
+from ..errors import InputError, taken
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.framing import OVERHEAD_BYTES
@@ -138,9 +138,13 @@ def create(path: Path, *, overwrite: bool) -> BinaryIO:
     """Open ``path`` for writing. Raises InputError when it is a folder, exists, or cannot be written."""
     if path.is_dir():
         raise InputError(f"{path} is a folder; name a file in it")
+    if path.suffix not in ("", ".mcap"):
+        raise InputError(
+            f"{path}: a recording is an .mcap file; record to {path.with_suffix('.mcap')}, then use `biotac export`"
+        )
     try:
         return path.open("wb" if overwrite else "xb")
     except FileExistsError as error:
-        raise InputError(f"{path} already exists; choose another name, or add --force to overwrite it") from error
+        raise taken(path) from error
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from error

@@ -46,14 +46,14 @@ def test_presses_are_judged_each_by_the_others(firm: Population) -> None:
     assert z == pytest.approx(np.full(38, 1.3 * -5.0), rel=0.02)
     assert x == pytest.approx(np.zeros(38), abs=0.005 * 5.0)
     assert (its.held_out_n[[0, 2]] < 0.1 * its.before_n[[0, 2]]).all()
-    assert its.worth_it(np.full(3, 100.0))
-    assert not its.worth_it(np.full(3, 1e-3))  # a finger unlike those that the map is of
+    assert its.why_not(np.full(3, 100.0)) == ""
+    assert "unlike those of the population map" in its.why_not(np.full(3, 1e-3))
 
 
 def test_a_reading_that_is_wrong_shows_held_out(firm: Population) -> None:
     presses, tilted = held(firm, 1.0, 0.0)
     presses.force_n[2] *= 5.0
-    assert not found(tilted, presses, scaled).worth_it(np.full(3, 100.0))
+    assert "no better than" in found(tilted, presses, scaled).why_not(np.full(3, 100.0))
 
 
 def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -69,12 +69,12 @@ def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFi
         "3",
         "--json",
     ]
-    assert main([*words, "--out", str(out)]) == 0
+    assert main([*words, "--out", str(out)]) == 1  # nothing was uploaded
     facts = json.loads(capsys.readouterr().out)
     assert facts["shown_n"] == [2.0, 3.5, 5.0]
     assert fitted.load(out).axes == ("Fx", "Fy", "Fz")
     # the emulated finger is poked by a point and no flat: nothing for a map of flat plates
-    assert not facts["worth_it"] and "board" not in facts
+    assert facts["why_not"] and "board" not in facts
     assert main([*words, "--force"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["board"]["frames_bit_for_bit"] > 0 and facts["board"]["outside"] == 0

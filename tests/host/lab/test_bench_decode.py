@@ -70,7 +70,7 @@ def test_the_verb_prints_tables_and_json(outcome, monkeypatch, capsys) -> None:
     monkeypatch.setattr(decode, "measure", lambda frames: outcome)
     assert main(["bench", "decode", "--frames", "500"]) == 0
     text = capsys.readouterr().out
-    assert text.count("(asked 150x: ") == text.count("(asked 5x: ") == len(decode.CHUNK_BYTES)
+    assert text.count("(target 150x: ") == text.count("(target 5x: ") == len(decode.CHUNK_BYTES)
     assert main(["bench", "decode", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["messages"] == 1000 and len(facts["results"]) == len(decode.CHUNK_BYTES)

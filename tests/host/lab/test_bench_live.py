@@ -44,7 +44,7 @@ def test_the_command_prints_a_verdict_for_each_figure(monkeypatch, capsys) -> No
     monkeypatch.setattr(live, "measure", lambda rounds: live.Outcome(rows, {5_000: 1.0}, rounds, 2.0))
     assert main(["bench", "live", "--rounds", "2"]) == 0
     text = capsys.readouterr().out
-    assert text.count("(asked") == text.count("met)") == 2
+    assert text.count("(target") == text.count("met)") == 2
     assert main(["bench", "live", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["rounds"] == 5
 

@@ -69,13 +69,22 @@ class Found:
     before_n: Floats
     held_out_n: Floats
 
-    def worth_it(self, sigma_n: Floats) -> bool:
-        """Whether the own map is better than the map as it was, and the finger is like those that the map knows.
+    def why_not(self, sigma_n: Floats) -> str:
+        """Why the own map should not be used; empty if it should.
 
-        It is if each axis's held-out error is below FAR_SIGMAS times the map's one sigma ``sigma_n`` (3,).
+        It should if it is better than the map as it was, and the finger is like those that the map knows: each axis's
+        held-out error is below FAR_SIGMAS times the map's one sigma ``sigma_n`` (3,).
         """
-        better = (self.held_out_n**2).sum() < (self.before_n**2).sum()
-        return bool(better and (self.held_out_n < FAR_SIGMAS * sigma_n).all())
+        before, held_out = np.linalg.norm(self.before_n), np.linalg.norm(self.held_out_n)
+        if not held_out < before:
+            return f"held out, it is off by {held_out:.2f} N, no better than the {before:.2f} N of the population map"
+        for axis, error_n, limit_n in zip("xyz", self.held_out_n, FAR_SIGMAS * sigma_n, strict=True):
+            if not error_n < limit_n:
+                return (
+                    f"held out, {axis} is off by {error_n:.2f} N, not below {FAR_SIGMAS:g} sigma ({limit_n:.2f} N): "
+                    "the finger is unlike those of the population map"
+                )
+        return ""
 
 
 def found(its: Population, held: Held, fit: Fit) -> Found:

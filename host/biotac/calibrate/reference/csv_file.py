@@ -19,7 +19,7 @@ from typing import TextIO
 
 import numpy as np
 
-from ...errors import InputError, RecordingError
+from ...errors import InputError, RecordingError, taken
 from .mounting import Mounting, from_json
 from .samples import Floats, Reference, Samples, check
 
@@ -138,7 +138,7 @@ class CsvWriter:
         try:
             self._stream: TextIO = path.open("w" if overwrite else "x", encoding="utf-8", newline="\n")
         except FileExistsError:
-            raise InputError(f"{path} already exists; choose another name, or add --force to overwrite it") from None
+            raise taken(path) from None
         except OSError as error:
             raise InputError(f"{path} cannot be written ({error.strerror}); choose another folder") from None
         self._stream.write(f"# sensor: {' '.join(sensor.split())}\n# mounting: {json.dumps(mounting.facts())}\n")

@@ -27,10 +27,7 @@ from ...wire.identity import ascii_text
 from .. import outputs, values
 from ..recordings.loading import load
 
-WHY = (
-    "no better than the population map, or a finger unlike those it was trained on; tare, and load the pad flat, "
-    "firmly and steadily"
-)
+CURE = "tare, and load the pad flat, firmly and steadily, or upload it anyway with --force"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -109,7 +106,7 @@ def tell(
         **more(kept),
         "before_n": result.before_n.tolist(),
         "held_out_n": result.held_out_n.tolist(),
-        "worth_it": result.worth_it(kept.sigma_scale5_n),
+        "why_not": result.why_not(kept.sigma_scale5_n),
         "sigma_n": kept.sigma_scale5_n.tolist(),
         "fixed_point": board.summary(own, run),
     }
@@ -121,15 +118,17 @@ def tell(
         with whole(args.out, overwrite=args.force) as place:
             place.write_text(fitted.dumps(own, origin), encoding="utf-8")
         facts["written"] = str(args.out)
-    if its.hand is not None and not args.no_upload and (facts["worth_it"] or args.force):
+    wanted = its.hand is not None and not args.no_upload
+    facts["refused"] = wanted and bool(facts["why_not"]) and not args.force
+    if its.hand is not None and wanted and not facts["refused"]:
         facts["board"] = upload(its.hand, args.finger, own, run, serial=its.serial, made_s=made_s)
         if args.save:
             its.hand.save_settings()
     return facts
 
 
-def show(args: argparse.Namespace, facts: dict[str, Any], title: str) -> None:
-    """Print the findings on stdout, as JSON or as lines."""
+def show(args: argparse.Namespace, facts: dict[str, Any], title: str) -> int:
+    """Print the findings on stdout, as JSON or as lines. Return 1 if a map was to go to a board and did not."""
 
     def numbers(of: Sequence[float]) -> str:
         return "  ".join(f"{value:5.2f}" for value in of)
@@ -139,8 +138,9 @@ def show(args: argparse.Namespace, facts: dict[str, Any], title: str) -> None:
         f"  error along x, y, z before:   {numbers(facts['before_n'])} N",
         f"  each press held out:          {numbers(facts['held_out_n'])} N",
         f"  one sigma after five presses: {numbers(facts['sigma_n'])} N, with shear",
-        *([] if facts["worth_it"] else [f"  not worth using: {WHY}"]),
+        *([f"  not worth using: {facts['why_not']}; {CURE}"] if facts["why_not"] else []),
         *([f"  written: {facts['written']}"] if "written" in facts else []),
         "  on the board; without --save, only until it restarts" if "board" in facts else "  no board was changed",
     ]
     print(json.dumps(facts) if args.json else "\n".join(lines))
+    return int(facts["refused"])

@@ -78,5 +78,4 @@ def run(args: argparse.Namespace) -> int:
 
         facts = own_map.tell(args, its, fewshot.scaled, "presses on a scale", more)
         words = f"{facts['presses']} presses: z gain {facts['gain']:.3f}, balance {facts['balance']:+.3f} N/N"
-        own_map.show(args, facts, words)
-    return 0
+        return own_map.show(args, facts, words)

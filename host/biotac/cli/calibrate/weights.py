@@ -46,5 +46,4 @@ def run(args: argparse.Namespace) -> int:
         facts = own_map.tell(
             args, its, fewshot.weighed, "weights on tilted blocks", lambda kept: {"force_n": its.held.force_n.tolist()}
         )
-        own_map.show(args, facts, f"{facts['presses']} weights")
-    return 0
+        return own_map.show(args, facts, f"{facts['presses']} weights")

@@ -29,14 +29,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--folder", type=Path, default=Path(), help="where recordings go (default: here)")
     parser.add_argument("--no-browser", action="store_true", help="only print the page's address")
     parser.add_argument("--once", action="store_true", help="stop at the end instead of playing again")
-    parser.add_argument(
-        "--check", action="store_true", help="fetch the page and its first events, check them, and exit"
-    )
+    parser.add_argument("--check", action="store_true", help="test the page with a simulated hand, and exit")
 
 
 def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     if args.check:
+        if args.source:
+            raise InputError(f"--check uses a simulated hand of its own, but {args.source} is given; drop one of them")
         return _check(as_json=args.json)
     if args.port is not None and not 0 <= args.port <= 65535:
         raise InputError(f"--port is {args.port}, expected 0 to 65535")
