@@ -1,4 +1,4 @@
-"""What boards and sensors say about themselves, as text."""
+"""What boards and sensors say about themselves, and their settings, as text."""
 
 from __future__ import annotations
 
@@ -22,6 +22,15 @@ def command_name(message_id: int) -> str:
     """A command's name, or its number if this library does not know it."""
     known = wire.MESSAGES.get(message_id)
     return known.__name__ if known is not None else f"command 0x{message_id:02X}"
+
+
+def setting_text(setting: wire.Setting, value: int) -> str:
+    """A setting and its value with the unit, or with the name of an enum's value if this library knows it."""
+    name, unit = setting.name.lower(), wire.SETTINGS[setting].unit
+    if not unit.startswith("enum "):
+        return f"{name} = {value} {unit}"
+    names = {one.value: one.name for one in getattr(wire, unit[5:].title().replace("_", ""))}
+    return f"{name} = {value} ({names.get(value, 'unknown')})"
 
 
 def version_text(hello: wire.Hello) -> str:

@@ -258,6 +258,13 @@ def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> 
     assert "expected one of 'index', 'middle', 'ring', 'little', 'thumb', or 0 to 4" in told
 
 
+@pytest.mark.parametrize("command", ["record PORT out.mcap --f", "calibration get PORT out.json --finger 0 --forc"])
+def test_options_are_written_out(command: str, capsys) -> None:
+    with pytest.raises(SystemExit):
+        main(command.split())
+    assert "unrecognized arguments: --f" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("command", "words"),
     [
@@ -276,3 +283,9 @@ def test_a_number_that_is_none_is_told_with_what_was_expected(command: str, word
         main(command.split())
     assert refused.value.code == 2
     assert words in capsys.readouterr().err
+
+
+def test_settings_are_told_by_name_and_unit(capsys) -> None:
+    assert main(["info", "sim:press.toml"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert "poc_weights = 1 (COMPRESS_N1)" in told and "hold_timeout_ms = 2000 ms" in told
