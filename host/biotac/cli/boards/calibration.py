@@ -18,7 +18,7 @@ from ...version import __version__
 from ...wire import messages_gen as wire
 from . import subverbs
 
-EXAMPLE = "biotac calibration put /dev/ttyACM0 thumb.json --finger 0 --save"
+EXAMPLE = "biotac calibration put /dev/ttyACM0 index.json --finger index --save"
 
 run = subverbs.run
 
@@ -47,17 +47,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
     add = partial(subverbs.add, what, "calibration")
 
-    show = add("show", _show, "What a board, a file or an EEPROM holds.", "show thumb.json")
+    show = add("show", _show, "What a board, a file or an EEPROM holds.", "show index.json")
     show.add_argument("where", metavar="PORT|FILE", nargs="?", help="left out with --i2c")
     _add_eeprom(show, required=False)
 
     CALIBRATION.add(add, "Back to the board's settings.")
 
-    store = add("store", _store, "Into an EEPROM.", "store --i2c 1:0x50 --chip 24c32 thumb.json")
+    store = add("store", _store, "Into an EEPROM.", "store --i2c 1:0x50 --chip 24c32 index.json")
     store.add_argument("file", metavar="FILE", nargs="?", type=Path, help="default: standard input")
     _add_eeprom(store, required=True)
 
-    load = add("load", _load, "From an EEPROM.", "load --i2c 1:0x50 --chip 24c32 thumb.json")
+    load = add("load", _load, "From an EEPROM.", "load --i2c 1:0x50 --chip 24c32 index.json")
     load.add_argument("file", metavar="FILE", nargs="?", type=Path, help="default: standard output")
     load.add_argument("--force", action="store_true", help="overwrite FILE")
     _add_eeprom(load, required=True)

@@ -67,20 +67,20 @@ class Kept:
 
     def add(self, add: Any, cleared: str, get_port_help: str | None = None) -> None:
         """Add get, put and clear; ``cleared`` is the help text of clear."""
-        parser = add("get", self.get, "From a board into a file.", "get /dev/ttyACM0 --finger 0 thumb.json")
+        parser = add("get", self.get, "From a board into a file.", "get /dev/ttyACM0 --finger index index.json")
         parser.add_argument("port", metavar="PORT", help=get_port_help)
         parser.add_argument("file", metavar="FILE", type=Path)
         parser.add_argument("--force", action="store_true", help="overwrite FILE")
         add_finger(parser)
 
-        parser = add("put", self.put, "From a file to a board.", "put /dev/ttyACM0 thumb.json --finger 0 --save")
+        parser = add("put", self.put, "From a file to a board.", "put /dev/ttyACM0 index.json --finger index --save")
         parser.add_argument("port", metavar="PORT")
         parser.add_argument("file", metavar="FILE", type=Path)
         parser.add_argument("--force", action="store_true", help="accept a sensor other than the file's")
         add_finger(parser)
         add_save(parser)
 
-        parser = add("clear", self.clear, cleared, "clear /dev/ttyACM0 --finger 0 --save")
+        parser = add("clear", self.clear, cleared, "clear /dev/ttyACM0 --finger index --save")
         parser.add_argument("port", metavar="PORT")
         add_finger(parser)
         add_save(parser)

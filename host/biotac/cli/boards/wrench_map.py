@@ -11,7 +11,7 @@ from biotac import Hand
 from ...keep import map_file as file
 from . import subverbs
 
-EXAMPLE = "biotac map put /dev/ttyACM0 thumb.json --finger 0 --save"
+EXAMPLE = "biotac map put /dev/ttyACM0 index.json --finger index --save"
 
 run = subverbs.run
 

@@ -22,7 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "port", metavar="PORT", help="device path, spidev:BUS.DEVICE, sim:SOURCE or emu:pico?source=SOURCE"
     )
     parser.add_argument("out", metavar="OUT", type=Path, help="file to write, .mcap")
-    parser.add_argument("--seconds", type=values.seconds, help="device time to record (default: until Ctrl-C)")
+    parser.add_argument(
+        "--seconds", type=values.seconds, help="record at least this much device time (default: until Ctrl-C)"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite OUT")
 
 

@@ -28,7 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=int, help=f"of the page (default {DEFAULT_PORT}, or a free one; 0: a free one)")
     parser.add_argument("--folder", type=Path, default=Path(), help="where recordings go (default: here)")
     parser.add_argument("--no-browser", action="store_true", help="only print the page's address")
-    parser.add_argument("--once", action="store_true", help="stop at the end instead of playing again")
+    parser.add_argument(
+        "--once", action="store_true", help="play a recording or scenario once; the page stays until Ctrl-C"
+    )
     parser.add_argument(
         "--check", action="store_true", help="fetch the page and its first events, check them, and exit"
     )
