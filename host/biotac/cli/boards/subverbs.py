@@ -80,7 +80,7 @@ class Kept:
         add_finger(parser)
         add_save(parser)
 
-        parser = add("clear", self.clear, cleared, "clear /dev/ttyACM0 --finger 0 --save")
+        parser = add("clear", self.clear, cleared, "clear /dev/ttyACM0 --finger index --save")
         parser.add_argument("port", metavar="PORT")
         add_finger(parser)
         add_save(parser)
