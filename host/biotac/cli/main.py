@@ -9,6 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Collection, Sequence
+from typing import Any
 
 from ..errors import BiotacError, InputError
 
@@ -95,9 +96,16 @@ class OneLineEach(argparse.RawDescriptionHelpFormatter):
         self._action_max_length = 16
 
 
+class Parser(argparse.ArgumentParser):
+    """Options are written out, in subparsers too, which argparse makes of their parser's class."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options, allow_abbrev=False)
+
+
 def parser(called: Collection[str] = tuple(VERBS)) -> argparse.ArgumentParser:
     """The command line, with the arguments of the verbs that are ``called``."""
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog="biotac",
         description="BioTac fingertips over USB: forces, points of contact, torques.",
         epilog=EPILOG,

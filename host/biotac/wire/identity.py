@@ -1,8 +1,9 @@
-"""What boards and sensors say about themselves, as text."""
+"""What boards and sensors say about themselves, and their settings, as text."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from . import messages_gen as wire
 
@@ -22,6 +23,17 @@ def command_name(message_id: int) -> str:
     """A command's name, or its number if this library does not know it."""
     known = wire.MESSAGES.get(message_id)
     return known.__name__ if known is not None else f"command 0x{message_id:02X}"
+
+
+def setting_text(setting: wire.Setting, value: int) -> str:
+    """A setting as "name = value unit", or "name = NAME (number)" if its values have names."""
+    unit = wire.SETTINGS[setting].unit
+    kind, _, name = unit.partition(" ")
+    words = f"{value} {unit}"
+    if kind == "enum":
+        names: Any = getattr(wire, name.title().replace("_", ""))
+        words = f"{names(value).name} ({value})" if value in list(names) else str(value)
+    return f"{setting.name.lower()} = {words}"
 
 
 def version_text(hello: wire.Hello) -> str:

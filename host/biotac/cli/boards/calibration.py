@@ -15,7 +15,7 @@ from ...keep import calibration_file as file
 from ...keep import eeprom
 from ...keep.chip import KINDS, Chip
 from ...version import __version__
-from ...wire import messages_gen as wire
+from ...wire.identity import setting_text
 from . import subverbs
 
 EXAMPLE = "biotac calibration put /dev/ttyACM0 thumb.json --finger 0 --save"
@@ -32,9 +32,7 @@ def _title(its: Calibration) -> str:
 
 
 def _lines(its: Calibration) -> list[str]:
-    return [
-        f"  {setting.name.lower()} = {value} {wire.SETTINGS[setting].unit}" for setting, value in its.settings().items()
-    ]
+    return [f"  {setting_text(setting, value)}" for setting, value in its.settings().items()]
 
 
 CALIBRATION = subverbs.Kept(

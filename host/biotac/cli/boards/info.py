@@ -13,7 +13,7 @@ from ...keep import map_file
 from ...keep.calibration_file import to_dict, when
 from ...keep.map_blob import made_s
 from ...wire import messages_gen as wire
-from ...wire.identity import ascii_text, board_text, serial_text, version_text
+from ...wire.identity import ascii_text, board_text, serial_text, setting_text, version_text
 from .. import values
 
 EXAMPLE = "biotac info /dev/ttyACM0"
@@ -64,5 +64,5 @@ def run(args: argparse.Namespace) -> int:
         own += f", wrench map {when(made_s(maps[s.finger]))}" if s.finger in maps else ""
         print(f"finger {s.finger}: BioTac {ascii_text(s.serial)}, software {ascii_text(s.software_version)}{own}")
     for setting, value in settings.items():
-        print(f"{setting.name.lower()} = {value} {wire.SETTINGS[setting].unit}")
+        print(setting_text(setting, value))
     return 0

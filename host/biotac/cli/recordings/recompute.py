@@ -16,6 +16,7 @@ from ...partial_file import whole
 from ...recording import Recording
 from ...recording.recompute import recompute
 from ...wire import messages_gen as wire
+from ...wire.identity import setting_text
 from ..progress import Progress
 from .loading import load
 
@@ -62,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     for note in notes:
         print(f"biotac: {note}", file=sys.stderr)
     facts = {"recording": str(args.out), "frames": len(recording.frames), "notes": notes}
-    changed = ", ".join(f"{s.name.lower()} = {value}" for s, value in changes.items()) or "no setting changed"
+    changed = ", ".join(setting_text(setting, value) for setting, value in changes.items()) or "no setting changed"
     print(json.dumps(facts) if args.json else f"{args.out}: {len(recording.frames)} frames, {changed}")
     return 0
 
