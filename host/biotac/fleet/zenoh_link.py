@@ -68,7 +68,8 @@ class ZenohLink(Link):
             if not epochs:
                 raise PortError(
                     f"no board is shared as {self._name}; see `biotac list --zenoh`, start `biotac serve PORT "
-                    f"--name {self._name}`, or give the address of its computer: {FORM}"
+                    f"--name {self._name}`, or give the address of its computer: "
+                    f"zenoh:{self._name}?connect=tcp/HOST:7447"
                 )
             if len(epochs) > 1:
                 raise PortError(f"{len(epochs)} boards are shared as {self._name}; give them different names")

@@ -30,7 +30,9 @@ def query(lake: Lake, text: str) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
         result = connection.execute(text)
     except duckdb.Error as error:
         known = ", ".join(sorted(lake.topics))
-        raise InputError(f"DuckDB rejects the query: {_first_line(error)}; topics are {known}") from error
+        raise InputError(
+            f"DuckDB rejects the query: {_reason(error)}; topics are {known}; the query 'DESCRIBE TOPIC' lists columns"
+        ) from error
     names = [column[0] for column in result.description or ()]
     return names, _rows(result)
 
@@ -43,6 +45,12 @@ def _rows(result: Any) -> Iterator[tuple[Any, ...]]:
         raise InputError(
             f"DuckDB stopped: {_first_line(error)}; look for damaged files with `biotac lake check`"
         ) from error
+
+
+def _reason(error: Exception) -> str:
+    """DuckDB's sentences, such as the columns that there are, without the query that follows them."""
+    said, *_ = str(error).partition("\nLINE ")
+    return "; ".join(line.rstrip("!") for line in said.splitlines() if line).replace(": :", ":")
 
 
 def _first_line(error: Exception) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from . import messages_gen as wire
 
@@ -25,12 +26,14 @@ def command_name(message_id: int) -> str:
 
 
 def setting_text(setting: wire.Setting, value: int) -> str:
-    """A setting and its value with the unit, or with the name of an enum's value if this library knows it."""
-    name, unit = setting.name.lower(), wire.SETTINGS[setting].unit
-    if not unit.startswith("enum "):
-        return f"{name} = {value} {unit}"
-    names = {one.value: one.name for one in getattr(wire, unit[5:].title().replace("_", ""))}
-    return f"{name} = {value} ({names.get(value, 'unknown')})"
+    """A setting as "name = value unit", or "name = NAME (number)" if its values have names."""
+    unit = wire.SETTINGS[setting].unit
+    kind, _, name = unit.partition(" ")
+    words = f"{value} {unit}"
+    if kind == "enum":
+        names: Any = getattr(wire, name.title().replace("_", ""))
+        words = f"{names(value).name} ({value})" if value in list(names) else str(value)
+    return f"{setting.name.lower()} = {words}"
 
 
 def version_text(hello: wire.Hello) -> str:

@@ -143,6 +143,14 @@ def test_the_verb_ends_with_its_source_and_says_how_it_stamped(capsys) -> None:
     assert "stamped by arrival" in said.err
 
 
+def test_the_verb_tells_rates(capsys) -> None:
+    assert main(["lsl", "sim:press.toml?seconds=0.3&pace=fast", "--seconds", "0.1"]) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines()[0] == "BioTac finger0, 100 samples per second"
+    assert "BioTac finger0 events, irregular" in said.out.splitlines()
+    assert "Ctrl-C" not in said.err  # it ends by itself
+
+
 def test_without_pylsl_the_extra_is_named(capsys, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "pylsl", None)
     assert main(["lsl", "sim:press.toml"]) == biotac.InputError.exit_code

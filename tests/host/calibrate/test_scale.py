@@ -70,7 +70,9 @@ def test_the_guide_on_the_emulated_hand(tmp_path: Path, capsys: pytest.CaptureFi
         "--json",
     ]
     assert main([*words, "--out", str(out)]) == 1  # nothing was uploaded
-    facts = json.loads(capsys.readouterr().out)
+    said = capsys.readouterr()
+    assert "press 1 of 3: push the pad" in said.err and "biotac: " not in said.err  # prompts are no errors
+    facts = json.loads(said.out)
     assert facts["shown_n"] == [2.0, 3.5, 5.0]
     assert fitted.load(out).axes == ("Fx", "Fy", "Fz")
     # the emulated finger is poked by a point and no flat: nothing for a map of flat plates

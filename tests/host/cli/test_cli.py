@@ -13,6 +13,8 @@ import pytest
 import biotac
 import biotac.core.compiled
 from biotac.cli.main import VERBS, main, parser
+from biotac.wire import messages_gen as wire
+from biotac.wire.identity import setting_text
 
 
 def run(*words: str) -> subprocess.CompletedProcess[str]:
@@ -57,6 +59,13 @@ def test_info_tells_board_sensors_and_settings(capsys) -> None:
     assert all(s["serial"].startswith("BT") for s in facts["sensors"])
     assert facts["settings"]["contact_energy_count2"] == 1000
     assert facts["schema_matches"] is True
+
+
+def test_settings_with_names_are_shown_by_name(capsys) -> None:
+    assert main(["info", "sim:press.toml?fingers=1"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert {"force_model = POPULATION (1)", "poc_weights = COMPRESS_N1 (1)", "status_period_ms = 1000 ms"} < set(lines)
+    assert setting_text(wire.Setting.UART_PINS, 9) == "uart_pins = 9"  # of a newer board
 
 
 def test_stream_prints_one_json_object_a_frame(capsys) -> None:
@@ -162,6 +171,26 @@ def test_too_many_fingers_exit_2(capsys, tmp_path: Path) -> None:
     assert "expected 1 to 5" in fails(capsys, 2, "demo", "press.toml", "--fingers", "6", "--out", str(tmp_path))
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        "record sim:press.toml OUT --f",
+        "record sim:press.toml OUT --forc",
+        "calibration get sim:press.toml OUT --finger 0 --forc",
+        "calibrate scale sim:press.toml --finger 0 --forc",
+        "lake check OUT --js",
+    ],
+)
+def test_options_are_written_out(capsys, tmp_path: Path, command: str) -> None:
+    out = tmp_path / "a.mcap"
+    out.write_bytes(b"precious")
+    with pytest.raises(SystemExit) as refused:
+        main(command.replace("OUT", str(out)).split())
+    assert refused.value.code == 2
+    assert "unrecognized arguments: --" in capsys.readouterr().err
+    assert out.read_bytes() == b"precious"
+
+
 def test_usage_errors_exit_2() -> None:
     assert run("fly").returncode == 2
     assert run().returncode == 2
@@ -258,13 +287,6 @@ def test_a_finger_that_there_is_not_is_refused_by_name(command: str, capsys) -> 
     assert "expected one of 'index', 'middle', 'ring', 'little', 'thumb', or 0 to 4" in told
 
 
-@pytest.mark.parametrize("command", ["record PORT out.mcap --f", "calibration get PORT out.json --finger 0 --forc"])
-def test_options_are_written_out(command: str, capsys) -> None:
-    with pytest.raises(SystemExit):
-        main(command.split())
-    assert "unrecognized arguments: --f" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("command", "words"),
     [
@@ -283,9 +305,3 @@ def test_a_number_that_is_none_is_told_with_what_was_expected(command: str, word
         main(command.split())
     assert refused.value.code == 2
     assert words in capsys.readouterr().err
-
-
-def test_settings_are_told_by_name_and_unit(capsys) -> None:
-    assert main(["info", "sim:press.toml"]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert "poc_weights = 1 (COMPRESS_N1)" in told and "hold_timeout_ms = 2000 ms" in told

@@ -195,6 +195,7 @@ CASES: list[tuple[int, str, str]] = [
     (2, "to export many recordings, use --lake", "export @rec.mcap"),
     (2, "`biotac export RECS... --lake", "lake check +no"),
     (2, "`biotac export RECS... --lake", "lake sql SELECT +no"),
+    (2, "name the lake's folder", "lake sql SELECT"),
     (2, "`biotac export RECS... --lake", "inventory +no"),
     (3, "`biotac list` shows the ports", "sensor /dev/ttyNOWHERE7"),
     (2, "check the path", "import +no.btd +out.mcap"),
@@ -214,6 +215,8 @@ CASES: list[tuple[int, str, str]] = [
     (2, "use a 24c02", "calibration load --i2c 1:0x50 --chip 24c01 +out.json"),
     (2, "check the path", "map show +no.json"),
     (2, "as `biotac map get` writes it", "map show @list.json"),
+    (2, "no wrench map; the recording has none", "map get replay:@rec.mcap +out.json --finger thumb"),
+    (2, "no calibration; the recording has none", "calibration get replay:@rec.mcap +out.json --finger thumb"),
     (2, "upload one with `put`", "map get sim:drift.toml +out.json --finger index"),
     (2, "check the path", "map put sim:press.toml +no.json --finger 0"),
     (7, "or send no serial number to force it", "map put sim:press.toml @map.json --finger 0"),
@@ -418,6 +421,19 @@ def test_bench_recording_without_its_extra(capsys, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "biotac.lab.bench.protobuf_mcap", None)
     monkeypatch.delattr("biotac.lab.bench.protobuf_mcap", raising=False)
     assert "pip install 'biotac-gateway[bench]'" in line_of(capsys, 2, ["bench", "recording"])
+
+
+def test_bench_recording_names_a_package_as_pip_does(capsys, monkeypatch) -> None:
+    monkeypatch.delitem(sys.modules, "biotac.lab.bench.protobuf_mcap", raising=False)
+    monkeypatch.delattr("biotac.lab.bench.protobuf_mcap", raising=False)
+    monkeypatch.setitem(sys.modules, "google", None)
+    monkeypatch.setitem(sys.modules, "google.protobuf", None)
+    assert "biotac: protobuf is not installed" in line_of(capsys, 2, ["bench", "recording"])
+
+
+def test_an_inventory_of_no_lake_does_not_ask_for_duckdb(capsys, monkeypatch, tmp_path) -> None:
+    monkeypatch.setitem(sys.modules, "biotac.lake.inventory", None)
+    assert "is not a lake" in line_of(capsys, 2, ["inventory", str(tmp_path / "no")])
 
 
 def test_a_btd_without_end(capsys, monkeypatch, tmp_path) -> None:

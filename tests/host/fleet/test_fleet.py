@@ -270,13 +270,14 @@ def test_two_of_a_name_and_other_bad_ports_are_one_line(shared, capsys) -> None:
         Share(shared.hand, session, "left")
     for port, code, cure in (
         (shared.port().replace("left", "right"), 3, "biotac serve PORT --name right"),
+        (shared.port().replace("left", "right"), 3, ": zenoh:right?connect=tcp/HOST:7447\n"),
         ("zenoh:left?connect=tcp/127.0.0.1:1", 3, "that `biotac serve` is running, and"),
         ("zenoh:?write=yes", 3, "`biotac list --zenoh` lists names"),
         ("zenoh:left?write=maybe", 3, "expected zenoh:NAME"),
         (shared.port("&config=/no/such.json5"), 2, "Zenoh rejects its endpoint or configuration file such.json5"),
     ):
         assert main(["info", port]) == code
-        said = capsys.readouterr().err.splitlines()
+        said = capsys.readouterr().err.splitlines(keepends=True)
         assert len(said) == 1 and cure in said[0]
 
 

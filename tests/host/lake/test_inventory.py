@@ -70,7 +70,8 @@ def test_what_is_as_usual_has_no_finding(first, tmp_path, capsys) -> None:
     assert sensor["findings"] == sensor["dead"] == []
     assert main(["lake", "check", str(lake)]) in (0, 1)  # what is kept is no foreign file
     assert main(["inventory", str(lake)]) == 0
-    assert "sensor BTSIM00000000001 on posix-sim, finger 0: 4 recordings" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "sensor BTSIM00000000001 on posix-sim, finger 0: 4 recordings" in said and ": as usual\n" in said
 
 
 def test_what_is_worse_than_it_ever_was_is_found(first, tmp_path, capsys) -> None:
@@ -85,8 +86,11 @@ def test_what_is_worse_than_it_ever_was_is_found(first, tmp_path, capsys) -> Non
 
 
 def test_two_recordings_are_no_history(first, tmp_path, capsys) -> None:
-    (sensor,) = inventory(days(first, tmp_path / "a", [2.0, 2.5, 9.0], [10, 18, 90]), capsys)["sensors"]
+    lake = days(first, tmp_path / "a", [2.0, 2.5, 9.0], [10, 18, 90])
+    (sensor,) = inventory(lake, capsys)["sensors"]
     assert sensor["findings"] == []
+    assert main(["inventory", str(lake)]) == 0
+    assert ": no history yet\n" in capsys.readouterr().out
 
 
 def test_no_lake_is_one_line(tmp_path, capsys) -> None:

@@ -131,6 +131,15 @@ def test_list_asks_boards_and_nobody_else(scripted_board, hello, plugged, capsys
     assert capsys.readouterr().out.splitlines()[0].endswith("fingers 0, 2")
 
 
+def test_list_ends_with_what_can_be_simulated_if_there_is_no_board(plugged, capsys) -> None:
+    plugged([entry("/dev/ttyS0", ours=False, description="n/a")])
+    assert main(["list"]) == 0
+    first, second, third, *_ = capsys.readouterr().out.splitlines()
+    assert first == "/dev/ttyS0  not our USB id"
+    assert second.endswith("or try a simulated one:")
+    assert third.startswith("sim:")
+
+
 # ---- who has it ----------------------------------------------------------------------------------
 
 

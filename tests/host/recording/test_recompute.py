@@ -91,11 +91,12 @@ def test_what_the_host_said_of_a_hold_is_heard_again(folder, timeout_ms: int) ->
 
 @pytest.mark.parametrize("options", [[], ["--keep-tare"]])
 @pytest.mark.parametrize("weights", list(wire.PocWeights))
-def test_other_weights_give_what_a_board_with_them_sends(folder, recorded, weights, options: list[str]) -> None:
+def test_other_weights_give_what_a_board_with_them_sends(folder, recorded, capsys, weights, options: list[str]) -> None:
     """The truth is another simulated board, which had the setting while it measured."""
     expected = record(folder / "truth.mcap", "sim:press.toml?fingers=2", poc_weights=weights)
     words = ["recompute", str(recorded.path), str(folder / "new.mcap"), "--force"]
     assert main([*words, "--poc-weights", weights.name.lower(), *options]) == 0
+    assert f"poc_weights = {weights.name} ({int(weights)})" in capsys.readouterr().out
     (folder / "truth.mcap").unlink()
     new = biotac.Recording(folder / "new.mcap")
     assert np.array_equal(new.wire["poc_um"], expected.wire["poc_um"])

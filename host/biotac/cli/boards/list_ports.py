@@ -16,6 +16,7 @@ from ...wire import messages_gen as wire
 from ...wire.identity import board_text, serial_text, version_text
 
 EXAMPLE = "biotac list"
+NO_DESCRIPTION = "n/a"  # of pyserial
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,8 +39,6 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({"ports": ports, "scenarios": scenarios, "zenoh": remote}))
         return 0
-    if not any(port["is_board"] for port in ports):
-        print("no board on USB; plug one in, run `biotac doctor`, or try a simulated one:")
     for port in ports:
         print(as_line(port))
     for facts in remote:
@@ -47,6 +46,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"{as_line(facts)}  {commander}")
     if args.zenoh is not None and not remote:
         print("no board is shared on the network; `biotac serve PORT --name NAME` shares one")
+    if not any(port["is_board"] for port in ports):
+        print("no board on USB; plug one in, run `biotac doctor`, or try a simulated one:")
     for name in scenarios:
         print(name)
     return 0
@@ -93,7 +94,8 @@ def as_line(facts: dict[str, Any]) -> str:
     if "problem" in facts:
         return f"{facts['port']}  {facts['problem']}"
     if "firmware" not in facts:
-        return "  ".join(str(facts[key]) for key in ("port", "description", "serial_number") if facts[key])
+        known = [str(facts[key]) for key in ("port", "description", "serial_number") if facts[key]]
+        return "  ".join("not our USB id" if text == NO_DESCRIPTION else text for text in known)
     fingers = ", ".join(map(str, facts["fingers"])) or "none"
     words = (f"serial:{facts['serial_number']}", facts["board"], f"firmware {facts['firmware']}", f"fingers {fingers}")
     return "  ".join([facts["port"], *words])

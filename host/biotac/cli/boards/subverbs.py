@@ -90,7 +90,8 @@ class Kept:
         with biotac.open(args.port) as hand:
             its = self.read(hand, args.finger)
             if its is None:
-                raise InputError(f"finger {args.finger} on {args.port} has no {self.name}; upload one with `put`")
+                cure = "the recording has none" if args.port.startswith("replay:") else "upload one with `put`"
+                raise InputError(f"finger {args.finger} on {args.port} has no {self.name}; {cure}")
             board = {"from": args.port, "board_serial": serial_text(hand.info), "finger": args.finger}
         self.save(args, its, board)
 

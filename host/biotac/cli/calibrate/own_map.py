@@ -82,7 +82,7 @@ class Guide:
         if step is not None:
             words = {Phase.REST: "let go, and do not touch it", Phase.RELEASE: self._held}
             said = self._press(step) if step.phase is Phase.PRESS else words[step.phase]
-            print(f"biotac: {said}", file=sys.stderr)
+            print(said, file=sys.stderr)
 
     def force_n(self, step: Step) -> float:
         return self._force_n(step)

@@ -30,8 +30,11 @@ def run(args: argparse.Namespace) -> int:
         if args.json:
             print(json.dumps({"streams": streams}))
         else:
-            print("\n".join(f"{stream['name']}, {stream['rate_hz']:g} samples per second" for stream in streams))
-            print("Ctrl-C stops", file=sys.stderr)
+            for stream in streams:
+                rate = f"{stream['rate_hz']:g} samples per second" if stream["rate_hz"] else "irregular"
+                print(f"{stream['name']}, {rate}")
+            if args.seconds is None:
+                print("Ctrl-C stops", file=sys.stderr)
         sys.stdout.flush()
         end_us: float | None = None
         try:

@@ -20,8 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the inventory and keep it in the lake; return 1 if a sensor is not as it used to be."""
-    inventory = room("inventory")
     lake = room("folder").opened(args.folder)
+    inventory = room("inventory")
     its = inventory.take(lake)
     path = inventory.keep(lake, its)
     if args.json:
@@ -33,20 +33,25 @@ def run(args: argparse.Namespace) -> int:
                 f"{inventory.day(board.first_ns)} to {inventory.day(board.last_ns)}, {board.frames_lost} frames lost"
             )
         for sensor in its.sensors:
-            print(as_line(sensor, inventory.day))
+            print(as_line(sensor, inventory))
         print(f"kept in {path}")
     return 1 if any(sensor.findings for sensor in its.sensors) else 0
 
 
-def as_line(its: Any, day: Any) -> str:
+def as_line(its: Any, inventory: Any) -> str:
     """A sensor as one line for people."""
     name = its.sensor or "without a serial number"
     calibration = "not calibrated"
     if its.calibration is not None:
-        made = f" of {day(its.calibration_made_ns)}" if its.calibration_made_ns is not None else ""
+        made = f" of {inventory.day(its.calibration_made_ns)}" if its.calibration_made_ns is not None else ""
         calibration = f"calibration {its.calibration}{made}"
     known = {"noise": its.noise_count, "drift": its.drift_count}
     measured = [f"{what} {value:.1f} counts" for what, value in known.items() if value is not None]
-    health = "; ".join(its.findings) or "as usual"
-    words = [f"{its.recordings} recordings", f"{its.hours:.2f} h, last {day(its.last_ns)}", calibration, *measured]
+    health = "; ".join(its.findings) or ("as usual" if its.recordings > inventory.ENOUGH else "no history yet")
+    words = [
+        f"{its.recordings} recordings",
+        f"{its.hours:.2f} h, last {inventory.day(its.last_ns)}",
+        calibration,
+        *measured,
+    ]
     return f"sensor {name} on {its.board}, finger {its.finger}: {', '.join(words)}: {health}"

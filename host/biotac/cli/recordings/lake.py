@@ -43,9 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         one.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print JSON for machines")
         if name == "sql":
             one.add_argument("query", metavar="QUERY", help='such as "SELECT max(force_z_n) FROM frames"')
-        one.add_argument(
-            "folder", metavar="DIR", nargs="?" if name == "sql" else None, type=Path, default=Path(), help="the lake"
-        )
+        one.add_argument("folder", metavar="DIR", nargs="?" if name == "sql" else None, type=Path, help="the lake")
     _add_workers(its["check"])
     its["check"].set_defaults(action=run_check)
     its["sql"].set_defaults(action=run_sql)
@@ -121,7 +119,10 @@ def run_check(args: argparse.Namespace) -> int:
 
 def run_sql(args: argparse.Namespace) -> int:
     """Print the query's result."""
-    lake = room("folder").opened(args.folder)
+    here = Path()
+    if args.folder is None and not (here / room("folder").RECORDINGS).is_dir():
+        raise InputError("this folder is not a lake; name the lake's folder: biotac lake sql QUERY DIR")
+    lake = room("folder").opened(args.folder or here)
     _warn_of_unfinished(lake)
     names, rows = room("sql").query(lake, args.query)
     if args.json:

@@ -62,7 +62,8 @@ def measure(source: str, *, fingers: int, seconds: float, show: Callable[[str], 
     try:
         from . import protobuf_mcap
     except ImportError as error:
-        raise InputError(f"{error.name} is not installed; pip install 'biotac-gateway[bench]'") from error
+        name = "protobuf" if (error.name or "").partition(".")[0] == "google" else error.name  # as pip calls it
+        raise InputError(f"{name} is not installed; pip install 'biotac-gateway[bench]'") from error
     with tempfile.TemporaryDirectory(prefix="biotac-bench-") as folder:
         mcap, protobuf = (Path(folder) / name for name in ("a.mcap", "protobuf.mcap"))
         show("recording")
