@@ -322,7 +322,9 @@ def test_a_file_is_read_back_and_one_that_was_changed_is_refused(tmp_path: Path)
     }
     for words, changed in wrong.items():
         path.write_text(json.dumps(changed))
-        with pytest.raises(biotac.InputError, match=f"is not a usable wrench map: .*{words}.*map get"):
+        with pytest.raises(
+            biotac.InputError, match=f"is not a board's wrench map, as `biotac map get` writes it: .*{words}"
+        ):
             map_file.load(path)
 
 
