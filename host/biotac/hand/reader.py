@@ -16,8 +16,9 @@ from typing import Protocol
 from .board import POLL_S
 from .callbacks import Callbacks
 
-# A callback that runs for two of these is relieved: the Pico's ring holds 40 ms of five fingers' frames.
-RELIEF_S = 0.015
+# A callback that runs for two of these is relieved. The Pico's ring holds 40 ms of five fingers' frames; what comes
+# until then has to fit in the computer's own buffers.
+RELIEF_S = 0.04
 # At the end, what waits is passed to callbacks for this long; the rest is skipped.
 BACKLOG_S = 1.0
 
