@@ -247,28 +247,6 @@ static void what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch(void **stat
     assert_true(fabs(shared_error(&finger)) < 0.5); // 4 counts, twice
 }
 
-// Pressure that changes makes what the electrodes came to rest at worth nothing, until four sweeps say it
-// anew.
-static void a_hold_is_watched_again_once_its_means_are_new(void **state)
-{
-    (void)state;
-    emulated_finger finger = touched_finger(400, 100);
-    run_seconds(&finger, 3);
-    assert_int_equal(finger.tare.watch.wait_sweeps, 0);
-    finger.pdc_load = 108; // more than two counts; by twelve the finger would not be still
-    for (int k = 0; k < 4 * BT_SWEEP_ROUNDS && finger.tare.watch.wait_sweeps == 0; k++) {
-        step(&finger);
-    }
-    assert_int_equal(finger.tare.watch.wait_sweeps, 4); // five, less the sweep that has seen it
-    while (finger.tare.watch.wait_sweeps == 4 && finger.tare.watch.level_sweeps == 0) {
-        step(&finger);
-    }
-    run_frames(&finger, 2 * BT_SWEEP_ROUNDS - 1);
-    assert_int_not_equal(finger.tare.watch.wait_sweeps, 0);
-    step(&finger);
-    assert_int_equal(finger.tare.watch.wait_sweeps, 0);
-}
-
 static void what_was_learned_of_a_load_is_forgotten(void **state)
 {
     (void)state;
@@ -277,105 +255,6 @@ static void what_was_learned_of_a_load_is_forgotten(void **state)
     assert_int_equal(drift.rate_q20, 300);
     assert_int_equal(drift.waiting_q20, 300); // or it would be sure in some seconds
     assert_int_equal(drift.since_commit, 0);
-}
-
-// ---- by hand ---------------------------------------------------------------------------------------
-
-#define WORST_Q16 1312 // 15 counts a minute, in a sweep of 80 ms
-
-// The mean is of sixteen sweeps at least and of 128 at most; sixteen in which the tare settles say nothing.
-static void a_rate_is_learned_as_a_mean_that_grows(void **state)
-{
-    (void)state;
-    bt_drift drift = {0};
-    int32_t want_q20 = 0, sure = 0, waiting = 0;
-    for (int n = 1; n <= 300; n++) {
-        drift.moved_q16 = 19 * (n < 200 ? 500 : -300);
-        bt_drift_learn(&drift);
-        const int learned = n - 16;
-        if (learned <= 0) {
-            assert_int_equal(drift.settled, n);
-            assert_int_equal(drift.sweeps, 0);
-            continue;
-        }
-        const int over = learned < 16 ? 16 : learned > 128 ? 128 : learned;
-        want_q20 += (16 * drift.moved_q16 / 19 - want_q20) / over;
-        assert_int_equal(drift.rate_q20, want_q20);
-        assert_int_equal(drift.sweeps, learned < 128 ? learned : 128);
-        assert_int_equal(bt_drift_known(&drift), learned >= 32);
-        if (learned % 32 == 0) { // what was seen two and a half seconds ago is sure
-            sure = waiting;
-            waiting = want_q20;
-        }
-        assert_int_equal(drift.sure_q20, sure);
-        assert_int_equal(drift.waiting_q20, waiting);
-    }
-    for (int sign = -1; sign <= 1; sign += 2) {
-        for (int n = 0; n < 2000; n++) {
-            drift.moved_q16 = sign * 19 * 3000;
-            bt_drift_learn(&drift);
-        }
-        assert_int_equal(drift.rate_q20, sign * 16 * WORST_Q16);
-    }
-    drift.since_commit = 31;
-    bt_drift_revert(&drift);
-    assert_int_equal(drift.since_commit, 0);
-    bt_drift_learn(&drift);
-    assert_int_equal(drift.since_commit, 1);
-}
-
-// For eight times as long as it was seen; what is left of it fades by as much as was used.
-static void a_rate_that_is_not_seen_lasts_for_a_while(void **state)
-{
-    (void)state;
-    static const struct {
-        uint8_t sweeps;
-        int last;
-    } cases[] = {{0, 128}, {16, 128}, {17, 136}, {128, 1024}};
-    for (int k = 0; k < 4; k++) {
-        const int last = cases[k].last;
-        bt_drift drift = {.sweeps = cases[k].sweeps};
-        for (int sign = -1; sign <= 1; sign += 2) {
-            drift.rate_q20 = sign * 1600;
-            assert_int_equal(bt_drift_over(&drift, 1), sign * 100);
-            assert_int_equal(bt_drift_over(&drift, (uint32_t)last), sign * 100 * last);
-            assert_int_equal(bt_drift_over(&drift, (uint32_t)last - 1), sign * 100 * (last - 1));
-            assert_int_equal(bt_drift_over(&drift, (uint32_t)last + 1), sign * 100 * last);
-            assert_int_equal(bt_drift_over(&drift, UINT32_MAX), sign * 100 * last);
-            drift.rate_q20 = sign * 1024 * 8;
-            drift.waiting_q20 = sign * 1024 * 4;
-            drift.sure_q20 = sign * 1024 * 2;
-            bt_drift half = drift;
-            assert_int_equal(bt_drift_unseen(&half, (uint32_t)last / 2), sign * 512 * last / 2);
-            assert_int_equal(half.rate_q20, sign * 1024 * 4);
-            assert_int_equal(half.waiting_q20, sign * 1024 * 2);
-            assert_int_equal(half.sure_q20, sign * 1024);
-            (void)bt_drift_unseen(&drift, 100000);
-            assert_true(drift.rate_q20 == 0 && drift.waiting_q20 == 0 && drift.sure_q20 == 0);
-        }
-    }
-}
-
-// What temperature explains of a rate is taken out of it: no more than there is, and nothing the other way.
-static void a_rate_that_temperature_makes_is_none_of_drift(void **state)
-{
-    (void)state;
-    for (int sign = -1; sign <= 1; sign += 2) {
-        static const int warming[][2] = {{0, 160}, {3, 112}, {10, 0}, {11, 0}, {-1, 160}};
-        for (int k = 0; k < 5; k++) {
-            bt_drift drift = {.rate_q20 = sign * 160, .waiting_q20 = 1, .sure_q20 = 2};
-            bt_drift_remove_warming(&drift, sign * warming[k][0]);
-            assert_int_equal(drift.rate_q20, sign * warming[k][1]);
-            assert_int_equal(drift.waiting_q20, drift.rate_q20);
-            assert_int_equal(drift.sure_q20, drift.rate_q20);
-        }
-        // Of the distance a 32nd is added, and never more than the worst drift.
-        const bt_drift drift = {.rate_q20 = sign * 160};
-        assert_int_equal(bt_drift_step_q16(&drift, 0), sign * 10);
-        assert_int_equal(bt_drift_step_q16(&drift, sign * 320), sign * 20);
-        assert_int_equal(bt_drift_step_q16(&drift, sign * 32 * (WORST_Q16 - 10)), sign * WORST_Q16);
-        assert_int_equal(bt_drift_step_q16(&drift, sign * 32 * (WORST_Q16 - 9)), sign * WORST_Q16);
-    }
 }
 
 // Nothing drifted before: a silence and a fault leave a hold's tare as it was, to the last bit.
@@ -417,11 +296,7 @@ int main(void)
         cmocka_unit_test(a_young_hold_comes_back_from_a_silence_where_drift_has_taken_it),
         cmocka_unit_test(a_load_that_changed_in_a_silence_is_no_drift),
         cmocka_unit_test(what_gets_warmer_at_rest_is_not_counted_twice_in_a_touch),
-        cmocka_unit_test(a_hold_is_watched_again_once_its_means_are_new),
         cmocka_unit_test(what_was_learned_of_a_load_is_forgotten),
-        cmocka_unit_test(a_rate_is_learned_as_a_mean_that_grows),
-        cmocka_unit_test(a_rate_that_is_not_seen_lasts_for_a_while),
-        cmocka_unit_test(a_rate_that_temperature_makes_is_none_of_drift),
         cmocka_unit_test(a_hold_without_drift_stays_as_it_is),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
