@@ -9,7 +9,7 @@ import pytest
 
 from biotac import Finger, FrameFlags, Setting
 from biotac.core.compiled import default_settings
-from biotac.lab.crosscheck import CrossCheck
+from biotac.recording.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
 from biotac.wire.dtypes_gen import DTYPES
 

@@ -13,8 +13,8 @@ from rig import Rig
 import biotac
 from biotac import Calibration, CalibrationState, PocWeights
 from biotac.errors import CommandRefusedError
-from biotac.lab.crosscheck import CrossCheck
 from biotac.recording import Recording
+from biotac.recording.crosscheck import CrossCheck
 
 OWN = Calibration(
     PocWeights.COMPRESS_N2, (900_000, -800_000, 700_000), (600_000, -500_000), 300, "", 1_763_731_310, 9_500_000

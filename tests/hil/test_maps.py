@@ -18,8 +18,8 @@ from biotac import CalibrationState
 from biotac.cli.main import main
 from biotac.errors import CommandRefusedError
 from biotac.keep.map_blob import PART_BYTES, for_any_sensor, part
-from biotac.lab.crosscheck import CrossCheck
 from biotac.recording import Recording
+from biotac.recording.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
 
 SECTOR = 4096

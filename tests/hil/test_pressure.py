@@ -13,9 +13,9 @@ from rig import Rig
 import biotac
 from biotac import Calibration, QuantityFlags, Setting
 from biotac.core.compiled import default_settings
-from biotac.lab.crosscheck import CrossCheck
 from biotac.lab.experiments import navarro
 from biotac.recording import Recording
+from biotac.recording.crosscheck import CrossCheck
 from biotac.sim.physics import Profile
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import Batch

@@ -12,7 +12,7 @@ import numpy as np
 
 from biotac import FrameFlags, Setting, TareReason, TareState
 from biotac.core.finger import Finger
-from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM, CrossCheck
+from biotac.recording.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM, CrossCheck
 from biotac.sim import sampling
 from biotac.sim.timeline import Pose
 from biotac.wire import messages_gen as wire

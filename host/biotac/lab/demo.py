@@ -20,6 +20,7 @@ from ..hand.opening import shake_hands
 from ..markdown import table
 from ..picture import check_drawable, picture
 from ..recording import Recording
+from ..recording.crosscheck import CrossCheck
 from ..sim.loading import load_source
 from ..sim.process import SimBoard, SimLink
 from ..sim.source import Source
@@ -28,7 +29,6 @@ from ..wire import sensor_gen as sensor
 from ..wire.batches import Batch, join
 from ..wire.frames import electrode_signals
 from ..wire.slots import FRAME_HZ, PAC_SLOT
-from .crosscheck import CrossCheck
 from .demo_answers import Answers, answers_to
 
 Show = Callable[[str], None]

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 
 from ..errors import InputError
 from ..keep.calibration import own_settings
-from ..lab.crosscheck import CrossCheck
+from ..recording.crosscheck import CrossCheck
 from ..recording.facts import Facts
 from ..wire.fields import FRAME_FIELDS
 from ..wire.frames import FRAME_DTYPE, StructArray, frames_to_wire

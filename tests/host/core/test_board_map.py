@@ -20,7 +20,7 @@ from biotac.core.board_map import BoardBlock, BoardMap, from_blob
 from biotac.core.compiled import default_settings, on_board_q4, pressure_filtered_q4, pressure_force_100un
 from biotac.core.map_float64 import exact, result_units
 from biotac.errors import InputError
-from biotac.lab.crosscheck import CrossCheck
+from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.rounds import Rounds, frames_and_tares
 from biotac.wire import map_gen as _map
 from biotac.wire import messages_gen as wire

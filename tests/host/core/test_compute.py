@@ -17,7 +17,7 @@ from biotac.cli import main
 from biotac.core.compiled import default_settings
 from biotac.core.compute import per_frame
 from biotac.lab.bench import batch as bench
-from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
+from biotac.recording.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 from biotac.wire import messages_gen as wire
 from biotac.wire.dtypes_gen import DTYPES
 

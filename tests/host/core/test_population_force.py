@@ -12,7 +12,7 @@ from biotac.core import population
 from biotac.core.compiled import on_board_q4
 from biotac.core.finger import Finger
 from biotac.core.map_columns import tared
-from biotac.lab.crosscheck import CrossCheck
+from biotac.recording.crosscheck import CrossCheck
 from biotac.wire import messages_gen as wire
 
 POPULATION = {wire.Setting.FORCE_MODEL: int(wire.ForceModel.POPULATION)}

@@ -19,8 +19,8 @@ from biotac import Calibration, CalibrationState, PocWeights, Setting
 from biotac.cli.main import main
 from biotac.keep import calibration_file as file
 from biotac.keep import flash_record
-from biotac.lab.crosscheck import CrossCheck
 from biotac.recording import Recording
+from biotac.recording.crosscheck import CrossCheck
 from biotac.recording.facts import Facts
 from biotac.sim.loading import load_source
 from biotac.sim.process import SimBoard

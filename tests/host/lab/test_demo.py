@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import biotac
-from biotac.lab.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 from biotac.lab.demo import DemoRun, expected_frames, run_demo
+from biotac.recording.crosscheck import FORCE_BOUND_MN, POC_BOUND_UM
 from biotac.sim.loading import load_source
 
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import pressure_filtered_q4
+from ...recording.pressure_check import usable
 from ...wire import messages_gen as wire
 from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
-from .check import usable
 from .force_source import Reference
 
 #: ``pressure`` is PDC through the board's filter and ``rest`` the tare of the same frame, in counts, NaN where unknown.

@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from ...lab.crosscheck import CrossCheck
+from ...recording.crosscheck import CrossCheck
 from .loading import load
 
 EXAMPLE = "biotac check grasp.mcap"

@@ -26,13 +26,13 @@ from ...calibrate.pressure.rows import rows_of
 from ...hand.hand import Hand
 from ...hand.opening import shake_hands
 from ...markdown import table
+from ...recording.crosscheck import CrossCheck
 from ...sim.physics import Profile
 from ...sim.play import play
 from ...sim.ports import start_board
 from ...sim.process import SimLink
 from ...sim.scenario import parse_scenario
 from ...sim.source import Source
-from ..crosscheck import CrossCheck
 from .outcome import Facts, Options, Show, check, claim, number, numbers, text
 
 RECORDING = ""

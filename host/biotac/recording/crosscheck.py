@@ -14,14 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibrate.pressure.check import FORCE_BOUND_N, PressureCheck
-from ..calibrate.wrench import board
 from ..core import population
 from ..core.board_map import BoardMap, pdc_above_rest_q4
 from ..core.compiled import NN_PER_N, TORQUE_GAINS, Results, Settings, reference_q4
 from ..core.map_bound import bound_of
 from ..core.map_columns import Signals, tared
-from ..core.map_float64 import exact, replace_gains
+from ..core.map_float64 import exact, replace_gains, result_units, tared_chunks
 from ..core.map_versions import opened
 from ..hand.compatibility import PRESSURE_SINCE_MINOR
 from ..wire import map_gen as _map
@@ -29,6 +27,7 @@ from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, UM_PER_MM, StructArray, electrode_signals, to_units
 from ..wire.native import ffi, lib
 from ..wire.sensor_gen import CORE_RADIUS_UM
+from .pressure_check import FORCE_BOUND_N, PressureCheck
 
 #: Of the PoC's distance and of each axis of force, see firmware/reference/kernel_bounds.h.
 POC_BOUND_UM: float = lib.bt_poc_bound_um()
@@ -222,7 +221,8 @@ def _by_map(
     and 0 for a map without torsion.
     """
     frames = messages["counts"], messages["tare_q4"], pdc_above_rest_q4(messages)
-    wrench, off = exact(its, *frames), board.bound(its, None, *frames)
+    wrench = exact(its, *frames)
+    off = np.concatenate([bound_of(its, None, s) for s in tared_chunks(its, *frames)]) / result_units(its.axes)
     torsion = np.empty((len(messages), 1))
     replace_gains(its, wrench, truth.poc_mm, truth.force_n, truth.torque_nmm, torsion[:, 0])
     force_off, torque_off, torsion_off = np.split(np.nan_to_num(off), (3, 6), axis=1)

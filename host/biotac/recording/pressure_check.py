@@ -1,4 +1,4 @@
-"""Checks the board's filtered pressure and the force from it against Eq 1 and 3 in float64, frame by frame.
+"""Checks the board's filtered pressure and the force from it in float64, frame by frame: Navarro 2015, Eq 1 and 3.
 
 The force depends on its own frame alone, which holds filtered pressure and rest. The filter's state is all in the
 previous frame's output, so each frame is checked by Eq 3 from the previous frame's published value. Without a previous
@@ -13,12 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.compiled import NN_PER_N, Settings
-from ...core.finger import ROUND_US
-from ...wire import messages_gen as wire
-from ...wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
-from ...wire.native import lib
-from . import formulas
+from ..core.compiled import NN_PER_N, Settings
+from ..core.finger import ROUND_US
+from ..wire import messages_gen as wire
+from ..wire.frames import FORCE_LSB_PER_N, Q4_PER_COUNT, StructArray, to_units
+from ..wire.native import lib
 
 RAIL_COUNT: int = lib.bt_rail_count()
 #: Half a step of the published force, N.
@@ -61,7 +60,7 @@ class PressureCheck:
         gain_n = settings[wire.Setting.PRESSURE_GAIN_NN] / NN_PER_N or np.nan
         pressure = to_units(messages["pdc_filtered_q4"], Q4_PER_COUNT)
         rest = to_units(messages["pdc_tare_q4"], Q4_PER_COUNT)
-        truth = formulas.force(pressure, rest, gain_n)
+        truth = (pressure - rest) * gain_n
         told = to_units(messages["pressure_force_100un"], FORCE_LSB_PER_N)
         error = np.abs(told - truth)
         self.force_n_max = max(self.force_n_max, float(np.nanmax(error, initial=0.0)))
