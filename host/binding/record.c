@@ -27,7 +27,7 @@ int bt_record_unpack(bt_calibration *calibration, const uint8_t *record, size_t 
     if (id < BT_RECORD_CALIBRATION || id >= BT_RECORD_CALIBRATION + BT_MAX_FINGERS) {
         return BT_RECORD_OF_SOMETHING;
     }
-    if (version == 0 || version > BT_CALIBRATION_RECORD_VERSION) {
+    if (version != BT_CALIBRATION_RECORD_VERSION) {
         return BT_RECORD_OTHER_VERSION;
     }
     size_t size = bt_get_u32(page + 8);

@@ -116,11 +116,3 @@ def test_what_nobody_asked_for_is_no_fault() -> None:
     outcome = CrossCheck()
     outcome.add(sent, SETTINGS)
     assert outcome.violations == 0
-
-
-def test_a_board_of_before_pressure_owes_none() -> None:
-    sent = frames(default_settings())
-    sent["pdc_filtered_q4"] = wire.INVALID_COUNT
-    outcome = CrossCheck(wire_minor=3)
-    outcome.add(sent, default_settings())
-    assert outcome.violations == 0

@@ -67,21 +67,6 @@ static void put(int kind, const void *bytes, size_t count)
     want.filled[kind] += (uint32_t)count;
 }
 
-// What boards of wire 1.0 to 1.4 sent less than ours at a message's end, and what has to stand there
-// instead. NULL: no board ever sent this length.
-static const char *fill_of_older(uint8_t id, size_t bytes)
-{
-    static const char nothing[54];
-    return id == BT_FRAME_ID && bytes == 126
-               ? "\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\0\0\0\x80\0\0\0\x80\0\0"
-           : id == BT_STATUS_ID && (bytes == 33 || bytes == 53 || bytes == 65) ? nothing
-           : id == BT_FRAME_ID && bytes == 134      ? "\xFF\xFF\0\0\0\x80\0\0\0\x80\0\0"
-           : id == BT_FRAME_ID && bytes == 144      ? "\0\0"
-           : id == BT_HELLO_ID && bytes == 35       ? "\xFF\xFF\xFF\xFF"
-           : id == BT_CALIBRATION_ID && bytes == 51 ? "\0\0\0\0"
-                                                    : NULL;
-}
-
 static void expect(const uint8_t *bytes, size_t count)
 {
     memset(want.filled, 0, sizeof want.filled);
@@ -91,14 +76,6 @@ static void expect(const uint8_t *bytes, size_t count)
         uint8_t length = want.deframer.payload_bytes;
         if (outcome == BT_DEFRAMED_BAD_LENGTH && decoder.allow_longer && length > bt_wire_payload_bytes(id)) {
             outcome = BT_DEFRAMED_GOOD;
-            length = (uint8_t)bt_wire_payload_bytes(id);
-        }
-        uint8_t payload[256];
-        memcpy(payload, want.deframer.buffer + 1, length);
-        const char *fill = outcome == BT_DEFRAMED_BAD_LENGTH ? fill_of_older(id, length) : NULL;
-        if (fill != NULL) {
-            outcome = BT_DEFRAMED_GOOD;
-            memcpy(payload + length, fill, (size_t)bt_wire_payload_bytes(id) - length);
             length = (uint8_t)bt_wire_payload_bytes(id);
         }
         want.outcomes[outcome]++;
@@ -113,7 +90,7 @@ static void expect(const uint8_t *bytes, size_t count)
             put(kind, &id, 1);
             put(kind, &length, 1);
         }
-        put(kind, payload, length);
+        put(kind, want.deframer.buffer + 1, length);
         put(BT_DECODED_IDS, &id, 1);
     }
 }

@@ -105,7 +105,6 @@ REFUSED = [
     ("link.toml", 'reply = "HELLO"', 'reply = "HALLO"', "HELLO_REQUEST is answered by unknown message HALLO"),
     ("link.toml", '{ name = "seq", type = "u16", unit = "1", doc = "counts STATUS messages" },', "",
      "stream message STATUS must start with seq, t_us"),
-    ("link.toml", "before = 0", "before = 7", "`before` of force_model is outside its range"),
     ("map.toml", "BULGE = { value = 3", "BULGE = { value = 9", r"values of \[kind\] must be 0, 1, 2"),
     ("map.toml", 'BULGE = { value = 3, columns = "electrodes"', 'BULGE = { value = 3, columns = "all"',
      "BULGE has unknown columns all"),

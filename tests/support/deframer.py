@@ -12,13 +12,6 @@ from biotac.wire import messages_gen as wire
 from biotac.wire.framing import FramingCounts
 
 CRC_BYTES = 4
-# What an older peer's message lacks at its end, and is filled up with (host/binding/decode/decode.h).
-LACKS = {
-    wire.Frame.ID: (b"\xff" * 10 + b"\0\0\0\x80\0\0\0\x80\0\0", b"\xff\xff\0\0\0\x80\0\0\0\x80\0\0", bytes(2)),
-    wire.Hello.ID: (b"\xff" * 4,),
-    wire.Status.ID: (bytes(54), bytes(34), bytes(22)),
-    wire.Calibration.ID: (bytes(4),),
-}
 ENCODED_MAX_BYTES = wire.MAX_FRAME_BYTES + 1  # COBS adds exactly one byte to frames this short
 
 
@@ -75,11 +68,7 @@ class Deframer:
         message_id, payload = covered[0], covered[1:]
         known = wire.MESSAGES.get(message_id)
         if known is not None and len(payload) != known.STRUCT.size:
-            missing = known.STRUCT.size - len(payload)
-            fills = [fill for fill in LACKS.get(message_id, ()) if len(fill) == missing]
-            if fills:
-                payload += fills[0]
-            elif not (self.allow_longer and len(payload) > known.STRUCT.size):
+            if not (self.allow_longer and len(payload) > known.STRUCT.size):
                 self.counts.bad_length += 1
                 return None
             payload = payload[: known.STRUCT.size]

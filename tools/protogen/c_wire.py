@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .schema import GENERATED, TYPE_BYTES, Contract, Field, Message, before, c_header, entries
+from .schema import GENERATED, TYPE_BYTES, Contract, Field, Message, c_header, entries
 
 PACKED_AS_HALFWORDS = ("FRAME",)  # what a board sends most of, in messages and in bytes
 C_TYPE = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "i16": "int16_t", "i32": "int32_t"}
@@ -95,7 +95,6 @@ def header(contract: Contract) -> str:
         "    int32_t min;",
         "    int32_t max;",
         "    int32_t initial;",
-        "    int32_t before; // what firmware that does not have it does",
         "} bt_setting_spec;",
         "extern const bt_setting_spec bt_setting_specs[BT_SETTINGS];",
         "",
@@ -157,7 +156,7 @@ def source(contract: Contract) -> str:
     out += ["const bt_setting_spec bt_setting_specs[BT_SETTINGS] = {"]
     for name, setting in contract.link["setting"].items():
         low, high = setting["range"]
-        out += [f"    {{BT_SETTING_{name.upper()}, {low}, {high}, {setting['default']}, {before(setting)}}},"]
+        out += [f"    {{BT_SETTING_{name.upper()}, {low}, {high}, {setting['default']}}},"]
     out += ["};", "", "const uint8_t bt_calibration_setting[BT_CALIBRATION_VALUES] = {"]
     out += [f"    BT_SETTING_{name.upper()}," for name in contract.per_finger] + ["};", ""]
     return "\n".join(out)

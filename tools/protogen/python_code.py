@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from .c_map import BLOCK_BYTES, EXPONENTS, HEADER_BYTES, columns, gate_max, halves
-from .schema import GENERATED, Contract, Field, Message, before, entries
+from .schema import GENERATED, Contract, Field, Message, entries
 
 STRUCT_CODE = {"u8": "B", "u16": "H", "u32": "I", "i16": "h", "i32": "i"}
 NUMPY_CODE = {"u8": "u1", "u16": "<u2", "u32": "<u4", "i16": "<i2", "i32": "<i4"}
@@ -125,14 +125,13 @@ def wire(contract: Contract) -> str:
     out += ["", "class Setting(IntEnum):", '    """Ids of the settings; see SETTINGS for units and ranges."""', ""]
     out += [f"    {name.upper()} = {s['id']}" for name, s in link["setting"].items()]
     out += ["", "", "class SettingSpec(NamedTuple):", '    """Unit, range and default of one setting."""', ""]
-    out += ["    unit: str", "    low: int", "    high: int", "    default: int"]
-    out += ["    before: int  # what firmware that does not have it does", "    doc: str", "", ""]
+    out += ["    unit: str", "    low: int", "    high: int", "    default: int", "    doc: str", "", ""]
     out += ["SETTINGS: dict[Setting, SettingSpec] = {"]
     for name, s in link["setting"].items():
         low, high = s["range"]
         out += [
             f"    Setting.{name.upper()}: SettingSpec(",
-            f'        "{s["unit"]}", {low}, {high}, {s["default"]}, {before(s)},',
+            f'        "{s["unit"]}", {low}, {high}, {s["default"]},',
         ]
         out += [f'        "{s["doc"]}",', "    ),"]
     out += ["}", "", "# What each value of a calibration stands for."]

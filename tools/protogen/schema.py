@@ -133,12 +133,6 @@ def per_finger(link: dict[str, Any]) -> list[str]:
     return [name for _, name in sorted(named)]
 
 
-def before(setting: dict[str, Any]) -> int:
-    """The value of the setting that firmware without it behaves as if it had."""
-    value: int = setting.get("before", setting["default"])
-    return value
-
-
 def check_link(link: dict[str, Any], messages: tuple[Message, ...]) -> None:
     ids = [message.id for message in messages]
     if len(set(ids)) != len(ids):
@@ -151,8 +145,6 @@ def check_link(link: dict[str, Any], messages: tuple[Message, ...]) -> None:
         low, high = setting["range"]
         if not low <= setting["default"] <= high:
             raise ValueError(f"link.toml: default of {name} is outside its range")
-        if not low <= before(setting) <= high:
-            raise ValueError(f"link.toml: `before` of {name} is outside its range")
     for message in messages:
         for field in message.fields:
             values = len(per_finger(link))

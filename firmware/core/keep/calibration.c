@@ -7,8 +7,6 @@
 #define MADE_AT  BT_SERIAL_BYTES
 #define VALUE_AT (MADE_AT + 4)
 
-#define VALUES_OF_VERSION_1 7 // the first by id; the rest take their defaults
-
 _Static_assert(BT_SERIAL_BYTES == sizeof(((bt_msg_sensor_info *)NULL)->serial)
                    && BT_SERIAL_BYTES == sizeof(((bt_msg_calibration *)NULL)->serial)
                    && BT_SERIAL_BYTES == sizeof(((bt_msg_set_calibration *)NULL)->serial),
@@ -50,27 +48,18 @@ size_t bt_calibration_pack(const bt_calibration *calibration, uint8_t record[BT_
     return BT_CALIBRATION_RECORD_BYTES;
 }
 
-static int values_of(uint16_t version)
-{
-    return version == BT_CALIBRATION_RECORD_VERSION ? BT_CALIBRATION_VALUES
-           : version == 1                           ? VALUES_OF_VERSION_1
-                                                    : 0;
-}
-
 void bt_calibration_unpack(bt_calibration *calibration, uint16_t version, const uint8_t *record, size_t bytes)
 {
     bt_settings trial;
     memset(calibration, 0, sizeof *calibration);
-    int values = values_of(version);
-    if (values == 0 || bytes != (size_t)(VALUE_AT + 4 * values)) {
+    if (version != BT_CALIBRATION_RECORD_VERSION || bytes != BT_CALIBRATION_RECORD_BYTES) {
         return;
     }
     bt_settings_reset(&trial);
     memcpy(calibration->serial, record, BT_SERIAL_BYTES);
     calibration->made_s = bt_get_u32(record + MADE_AT);
     for (int k = 0; k < BT_CALIBRATION_VALUES; k++) {
-        calibration->value[k] = k < values ? (int32_t)bt_get_u32(record + VALUE_AT + 4 * k)
-                                           : bt_settings_get(&trial, bt_calibration_setting[k]);
+        calibration->value[k] = (int32_t)bt_get_u32(record + VALUE_AT + 4 * k);
     }
     calibration->present = bt_calibration_apply(calibration, &trial) == BT_ERROR_OK;
 }

@@ -26,15 +26,14 @@ bool bt_serial_fits(const uint8_t made_for[BT_SERIAL_BYTES], const uint8_t there
 uint8_t bt_calibration_apply(const bt_calibration *calibration, bt_settings *settings);
 
 // The stored record, little-endian: u8 serial[16], u32 made_s, i32 value[8]. A cleared calibration is a
-// record of no bytes. More values make a new version: 1 ended before pressure_gain_nn, which then is not
-// calibrated.
-#define BT_CALIBRATION_RECORD_VERSION 2
+// record of no bytes. Other values make a new version.
+#define BT_CALIBRATION_RECORD_VERSION 1
 #define BT_CALIBRATION_RECORD_BYTES   (BT_SERIAL_BYTES + 4 + 4 * BT_CALIBRATION_VALUES)
 
 // Returns the record's size.
 size_t bt_calibration_pack(const bt_calibration *calibration, uint8_t record[BT_CALIBRATION_RECORD_BYTES]);
 
-// A record of an unknown version, of the wrong size or with a value out of range gives no calibration.
+// A record of another version, of the wrong size or with a value out of range gives no calibration.
 void bt_calibration_unpack(bt_calibration *calibration, uint16_t version, const uint8_t *record,
                            size_t bytes);
 

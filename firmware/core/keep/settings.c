@@ -57,17 +57,8 @@ void bt_settings_unpack(bt_settings *settings, uint16_t version, const uint8_t *
     if (version != BT_SETTINGS_RECORD_VERSION) {
         return;
     }
-    uint32_t named = 0;
     for (; bytes >= BT_SETTING_PAIR_BYTES; record += BT_SETTING_PAIR_BYTES, bytes -= BT_SETTING_PAIR_BYTES) {
-        int at = find(record[0]);
-        named |= at < 0 ? 0 : 1u << at;
         // A refused value leaves the default.
         (void)bt_settings_set(settings, record[0], (int32_t)bt_get_u32(record + 1));
     }
-    for (int k = 0; k < BT_SETTINGS; k++) {
-        if (!(named >> k & 1)) {
-            settings->value[k] = bt_setting_specs[k].before;
-        }
-    }
 }
-_Static_assert(BT_SETTINGS <= 32, "each setting must have a bit");

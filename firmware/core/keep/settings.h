@@ -22,9 +22,8 @@ uint8_t bt_settings_set(bt_settings *settings, uint8_t id, int32_t value);
 uint8_t bt_settings_has(uint8_t id);
 
 // The stored record: pairs of u8 id and i32 value, so that firmware with more or fewer settings, or other
-// ranges, takes over what it knows. A setting that the record does not name was unknown to the firmware that
-// wrote it, and gets the value that behaves like that firmware (`before`). A value that is refused leaves the
-// default.
+// ranges, takes over what it knows. A setting that the record does not name, and a value that is refused,
+// leave what was there.
 #define BT_SETTINGS_RECORD_VERSION 1
 #define BT_SETTING_PAIR_BYTES      5
 #define BT_SETTINGS_RECORD_BYTES   (BT_SETTINGS * BT_SETTING_PAIR_BYTES)

@@ -3,23 +3,6 @@
 #include "talk/commands.h"
 #include "talk/status.h"
 
-#include <string.h>
-
-// A host of wire 1.3 ends SET_CALIBRATION before pressure_gain_nn. This is then filled up with 0, not
-// calibrated.
-#define SET_CALIBRATION_1_3_BYTES 50
-_Static_assert(BT_SET_CALIBRATION_BYTES == SET_CALIBRATION_1_3_BYTES + 4,
-               "a field that is appended must be filled up too");
-
-static bool filled_up(bt_deframer *deframer)
-{
-    if (deframer->id != BT_SET_CALIBRATION_ID || deframer->payload_bytes != SET_CALIBRATION_1_3_BYTES) {
-        return false;
-    }
-    memset(deframer->buffer + 1 + SET_CALIBRATION_1_3_BYTES, 0, 4); // overwrites the CRC
-    return true;
-}
-
 static void damaged(bt_session *session)
 {
     session->rx_errors++;
@@ -30,9 +13,6 @@ void bt_session_receive(bt_session *session, const uint8_t *data, size_t bytes, 
 {
     for (size_t k = 0; k < bytes; k++) {
         enum bt_deframed outcome = bt_deframer_push(&session->deframer, data[k]);
-        if (outcome == BT_DEFRAMED_BAD_LENGTH && filled_up(&session->deframer)) {
-            outcome = BT_DEFRAMED_GOOD;
-        }
         if (outcome == BT_DEFRAMED_GOOD) {
             session->rx_frames++;
             bool empty = session->deframer.payload_bytes == 0; // the id is unknown; there is no req_id

@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 #define BT_WIRE_MAJOR 1
-#define BT_WIRE_MINOR 5
-#define BT_SCHEMA_HASH 0xDB7A8CBFu
+#define BT_WIRE_MINOR 0
+#define BT_SCHEMA_HASH 0x6BE768D5u
 #define BT_FRAME_MAX_BYTES 254 // id + payload + CRC
 #define BT_INVALID_COUNT 0xFFFF
 #define BT_INVALID_I16 INT16_MIN
@@ -237,7 +237,6 @@ typedef struct {
     int32_t min;
     int32_t max;
     int32_t initial;
-    int32_t before; // what firmware that does not have it does
 } bt_setting_spec;
 extern const bt_setting_spec bt_setting_specs[BT_SETTINGS];
 

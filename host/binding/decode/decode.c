@@ -13,42 +13,6 @@ _Static_assert(BT_DECODE_ROOM >= BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1,
 
 #define COBS_MAX_BYTES (BT_FRAME_MAX_BYTES + 1)
 
-// What an older peer's message lacks at its end, and stands there then.
-#define FRAME_1_0_BYTES  126
-#define AROUND           (1 + BT_CRC_BYTES + 2) // id, CRC, COBS byte, delimiter
-#define STATUS_1_0_BYTES 33
-#define LACKS_MAX_BYTES  54
-static const struct {
-    uint8_t id;
-    uint8_t bytes;
-    uint8_t fill[LACKS_MAX_BYTES];
-} lacks[] = {
-    // poc_sigma_um, force_sigma_100un, pdc_filtered_q4, pressure_force_100un and torsion_mnmm: none.
-    // wrench_age_ms: never repeated.
-    {BT_FRAME_ID,
-     20,
-     {0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 0x80, 0, 0, 0, 0x80}},
-    {BT_FRAME_ID, 12, {0xFF, 0xFF, 0, 0, 0, 0x80, 0, 0, 0, 0x80, 0, 0}},
-    {BT_FRAME_ID, 2, {0}},
-    {BT_HELLO_ID, 4, {0xFF, 0xFF, 0xFF, 0xFF}}, // image_crc32: unknown
-    {BT_STATUS_ID, 54, {0}},                    // frames_idle, what was skipped, what was shed, faults: none
-    {BT_STATUS_ID, 34, {0}},                    // sigma_shed, wrench_repeated, frames_shed, faults
-    {BT_STATUS_ID, 22, {0}},                    // faults, finger_faults
-    {BT_CALIBRATION_ID, 4, {0}},                // pressure_gain_nn: not calibrated
-};
-_Static_assert(BT_FRAME_BYTES == FRAME_1_0_BYTES + 20 && BT_STATUS_BYTES == STATUS_1_0_BYTES + 54
-                   && BT_CALIBRATION_BYTES == 51 + 4 && BT_HELLO_BYTES == 35 + 4,
-               "list appended fields in the table above");
-// A FRAME or a STATUS filled up is longer than what came.
-_Static_assert((int64_t)(BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1) * BT_FRAME_BYTES
-                   <= (int64_t)BT_DECODE_ROOM * (FRAME_1_0_BYTES + AROUND),
-               "padded rows must fit");
-_Static_assert((int64_t)(BT_DECODE_BYTES + BT_FRAME_MAX_BYTES + 1) * (2 + BT_STATUS_BYTES)
-                   <= (int64_t)BT_DECODE_ROOM * (STATUS_1_0_BYTES + AROUND),
-               "padded STATUS messages must fit with id and length");
-_Static_assert(2 + BT_CALIBRATION_BYTES <= 51 + AROUND && 2 + BT_HELLO_BYTES <= 35 + AROUND,
-               "no other padded message may exceed its input");
-
 void bt_decoder_reset(bt_decoder *decoder)
 {
     decoder->allow_longer = 0;
@@ -93,22 +57,10 @@ static void keep(bt_decoder *decoder, uint8_t id, const uint8_t *payload, size_t
     append(decoder, BT_DECODED_IDS, &id, 1);
 }
 
-// Fills payload, with room for the whole message, up where an older peer's ends. False when it is none.
-static int fill_up(uint8_t id, uint8_t *payload, int payload_bytes, int expected)
-{
-    for (size_t k = 0; k < sizeof lacks / sizeof *lacks; k++) {
-        if (lacks[k].id == id && payload_bytes == expected - lacks[k].bytes) {
-            memcpy(payload + payload_bytes, lacks[k].fill, lacks[k].bytes);
-            return 1;
-        }
-    }
-    return 0;
-}
-
 // What stood between two delimiters.
 static enum bt_deframed finish(bt_decoder *decoder, const uint8_t *in, size_t bytes)
 {
-    uint8_t zeros_and_plain[BT_CRC_PAD_BYTES + COBS_MAX_BYTES + LACKS_MAX_BYTES];
+    uint8_t zeros_and_plain[BT_CRC_PAD_BYTES + COBS_MAX_BYTES];
     uint8_t *plain = zeros_and_plain + BT_CRC_PAD_BYTES;
     if (bytes == 0) {
         return BT_DEFRAMED_NOTHING;
@@ -130,8 +82,7 @@ static enum bt_deframed finish(bt_decoder *decoder, const uint8_t *in, size_t by
     int payload_bytes = (int)covered - 1;
     int expected = decoder->payload_bytes[plain[0]];
     if (expected != BT_UNKNOWN_ID && payload_bytes != expected) {
-        int longer = decoder->allow_longer && payload_bytes > expected;
-        if (!longer && !fill_up(plain[0], plain + 1, payload_bytes, expected)) {
+        if (!decoder->allow_longer || payload_bytes < expected) {
             return BT_DEFRAMED_BAD_LENGTH;
         }
         payload_bytes = expected;

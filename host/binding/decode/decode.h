@@ -3,20 +3,15 @@
 //
 // It rests on what framing.h asserts: a frame fits one COBS block. So COBS has put one byte in front and only
 // replaced zeros, and undoing it is one copy and a walk from zero to zero.
-//
-// One thing more than a board's own: a message of an older minor ends before what was appended since, and is
-// filled up with the mark for invalid or the default. So a board that was not updated, and every recording
-// that was made with one, is still read.
 #ifndef BIOTAC_DECODE_H
 #define BIOTAC_DECODE_H
 
 #include "decode/crc_fast.h"
 #include "wire/framing.h"
 
-#define BT_DECODE_BYTES    65536 // what one call takes
-// The call's bytes and the rest of the call before; more than twice of it where messages are filled up.
-#define BT_DECODE_ROOM     (BT_DECODE_BYTES / 4 * 9 + 512)
-#define BT_DECODE_OUTCOMES 6 // enum bt_deframed
+#define BT_DECODE_BYTES    65536                   // what one call takes
+#define BT_DECODE_ROOM     (BT_DECODE_BYTES + 512) // its bytes and the rest of the call before
+#define BT_DECODE_OUTCOMES 6                       // enum bt_deframed
 #define BT_UNKNOWN_ID      (-1)
 
 // What a call gives out. FRAME, PAC, IDLE: payloads back to back, rows of wire.DTYPES. OTHER: u8 id, u8

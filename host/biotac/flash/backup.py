@@ -22,8 +22,6 @@ from ..wire.identity import board_text, serial_text, version_text
 
 FORMAT = "biotac settings 1"
 LAST_ID = 255
-#: Settings whose default differs from how firmware without them acts: the value for that, by setting id.
-_BEFORE = {int(key): spec.before for key, spec in wire.SETTINGS.items() if spec.before != spec.default}
 
 
 @dataclass(frozen=True)
@@ -121,12 +119,11 @@ def read_backup(path: Path) -> Backup:
 def restore(hand: Hand, wanted: Backup) -> Restored:
     """Set and save the values that differ, then read them all back.
 
-    Settings that the board's firmware does not know are left out. Settings that the backup's firmware did not know are
-    set so that the board acts as that firmware did. Raises CommandRefusedError for a value that the board refuses, and
-    InputError when one does not read back.
+    Settings that the board's firmware does not know are left out. Raises CommandRefusedError for a value that the board
+    refuses, and InputError when one does not read back.
     """
     found = read_settings(hand)
-    values = {key: value for key, value in _BEFORE.items() if key in found} | wanted.values
+    values = wanted.values
     changed = [key for key, value in values.items() if key in found and found[key] != value]
     for key in changed:
         hand.set_setting(key, values[key])

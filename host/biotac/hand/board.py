@@ -226,8 +226,6 @@ class Board:
         except struct.error as error:
             name = type(message).__name__
             raise InputError(f"{name} cannot hold these values ({error}); see its ranges in MESSAGES.md") from error
-        if message.ID in compatibility.APPENDED:
-            payload = compatibility.cut(message.ID, payload, self.info.wire_minor)
         with self._writing:
             if self.closed:
                 self.raise_closed()

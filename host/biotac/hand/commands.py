@@ -157,7 +157,7 @@ class Commands:
         self._board.tell(wire.RebootBootloader(0, wire.BOOTLOADER_MAGIC))
 
     def settings(self) -> dict[wire.Setting, int]:
-        """All settings. For one that the board's firmware does not have yet, the value that matches what it does."""
+        """All settings. For one that the board's firmware does not have, the default."""
         return {setting: self._known_setting(setting) for setting in wire.Setting}
 
     def _known_setting(self, setting: wire.Setting) -> int:
@@ -166,7 +166,7 @@ class Commands:
         except CommandRefusedError as error:
             if error.error != wire.Error.UNKNOWN_SETTING:
                 raise
-            return wire.SETTINGS[setting].before
+            return wire.SETTINGS[setting].default
 
     # ---- calibrations --------------------------------------------------------------------------
 

@@ -7,17 +7,14 @@ from dataclasses import dataclass
 from ..errors import WireVersionError
 from ..wire import messages_gen as wire
 
-# The minor version of wire 1.x in which each feature appeared.
-CALIBRATION_SINCE_MINOR = 3
-MAP_SINCE_MINOR = 4
-PRESSURE_SINCE_MINOR = 4
-HOLD_SINCE_MINOR = 5
-FAULTS_SINCE_MINOR = 5
-EVENTS_SINCE_MINOR = 5
-BANDS_SINCE_MINOR = 5
-
-#: Commands that have grown: the wire minor in which they grew, and how many bytes older boards know.
-APPENDED = {wire.SetCalibration.ID: ((4, 50),)}
+# The wire minor since which boards have each feature.
+CALIBRATION_SINCE_MINOR = 0
+MAP_SINCE_MINOR = 0
+PRESSURE_SINCE_MINOR = 0
+HOLD_SINCE_MINOR = 0
+FAULTS_SINCE_MINOR = 0
+EVENTS_SINCE_MINOR = 0
+BANDS_SINCE_MINOR = 0
 
 
 @dataclass(frozen=True)
@@ -47,14 +44,6 @@ def need(hello: wire.Hello, since_minor: int, what: str) -> None:
     if hello.wire_minor < since_minor:
         seen = f"the board speaks wire {hello.wire_major}.{hello.wire_minor}"
         raise WireVersionError(f"{seen}, expected at least 1.{since_minor}, which has {what}; {cure(hello)}")
-
-
-def cut(message_id: int, payload: bytes, minor: int) -> bytes:
-    """``payload`` as a board of this wire minor knows it: without the fields appended to the command since."""
-    for since, known_bytes in APPENDED.get(message_id, ()):
-        if minor < since:
-            return payload[:known_bytes]
-    return payload
 
 
 def cure(hello: wire.Hello) -> str:

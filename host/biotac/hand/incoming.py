@@ -66,14 +66,13 @@ class Incoming:
         if isinstance(came, Batch):
             if self.record is not None:
                 self._record(decoder.chunk())
-            self._arrived(came, decoder.arrived_s)
+            self._arrived(came)
             return True
         if self.record is not None:
             self._record(came or b"")
         if not came:
             return False
-        arrived_s = time.monotonic()
-        self._arrived(decoder.feed(came), arrived_s)
+        self._arrived(decoder.feed(came, time.monotonic()))
         return True
 
     def end_packet(self) -> None:
@@ -87,19 +86,19 @@ class Incoming:
         except OSError as error:
             self.record, self.trouble = None, error
 
-    def _arrived(self, batch: Batch, arrived_s: float) -> None:
+    def _arrived(self, batch: Batch) -> None:
         decoder = self._decoder
         self._bytes += decoder.taken
         last_us = decoder.last_t_us
         if last_us is not None:
-            self._arrivals.note(last_us + LAST_SAMPLE_US, arrived_s)
+            self._arrivals.note(last_us + LAST_SAMPLE_US, batch.arrived_s)
             self._frames += len(batch.wire)
         elif not (len(batch.pac) or batch.messages):
             return
         if self.gap is not None:
             self._end_gap(self.gap, batch)
         if self._time_asked and batch.messages:
-            self._time_told(batch, arrived_s)
+            self._time_told(batch)
         self._deliver(batch)
 
     def _end_gap(self, gap: Gap, batch: Batch) -> None:
@@ -120,11 +119,11 @@ class Incoming:
             self._time_asked = {}  # the board does not answer, or it restarted
         self._time_asked[req_id] = time.monotonic()
 
-    def _time_told(self, batch: Batch, arrived_s: float) -> None:
+    def _time_told(self, batch: Batch) -> None:
         for answer in [m for m in batch.messages if isinstance(m, wire.Status) and m.req_id in self._time_asked]:
             sent_s = self._time_asked.pop(answer.req_id)
             batch.messages.remove(answer)
-            self.round_trip(answer, sent_s, max(sent_s, arrived_s))
+            self.round_trip(answer, sent_s, max(sent_s, batch.arrived_s))
 
     def round_trip(self, answer: wire.Status, sent_s: float, arrived_s: float) -> None:
         """Feed ``clock``: ``answer`` was made between these two times of time.monotonic()."""

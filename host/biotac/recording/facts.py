@@ -45,8 +45,8 @@ class Facts:
         return cls(
             wire.Hello(**_tuples(hello)),
             [wire.SensorInfo(**_tuples(s)) for s in json.loads(metadata.get("sensors", "[]"))],
-            # A setting that the recording's firmware did not have yet gets the value it acted by; a calibration, none.
-            {s: int(named.get(s.name.lower(), wire.SETTINGS[s].before)) for s in wire.Setting},
+            # A setting that the recording's firmware did not have yet gets its default; a calibration, none.
+            {s: int(named.get(s.name.lower(), wire.SETTINGS[s].default)) for s in wire.Setting},
             {int(finger): from_dict(its) for finger, its in own.items()},
             _maps(metadata.get("maps", "{}")),
             layout.names_of(metadata),

@@ -6,6 +6,7 @@ The live link, the reader of recordings and the tests all feed the same class. T
 
 from __future__ import annotations
 
+import math
 import os
 import struct
 import threading
@@ -43,7 +44,8 @@ class Batch:
     ``wire`` holds the FRAME messages as sent (DTYPES); ``seq`` and ``t_us`` (int64) are their unwrapped sequence
     numbers and device times in us. ``frames`` are the same rows in user units, converted on first use. ``pac`` is
     PAC_DTYPE, ``idle`` IDLE_DTYPE; ``messages`` is everything else, in order. ``fingers`` is the bit mask of the
-    fingers that may have rows in ``wire`` and ``idle``; -1 where this is unknown.
+    fingers that may have rows in ``wire`` and ``idle``; -1 where this is unknown. ``arrived_s`` is when the last of its
+    bytes came, by time.monotonic(); NaN where nobody knows, as for a recording.
     """
 
     wire: StructArray
@@ -53,6 +55,7 @@ class Batch:
     idle: StructArray
     messages: list[Any] = field(default_factory=list)
     fingers: int = field(default=-1, repr=False)
+    arrived_s: float = math.nan
     _numbers: bytes = field(default=b"", init=False, repr=False, compare=False)  # begins with seq, then t_us
 
     @cached_property
@@ -113,7 +116,6 @@ class StreamDecoder:
         self.lost_after: list[tuple[int, int, int]] = []
         # These are of the last call that returned a batch.
         self.taken = 0  #: how many bytes it took
-        self.arrived_s = 0.0  #: when ``read`` got them, by time.monotonic()
         self.last_t_us: int | None = None  #: device time of the latest frame or heartbeat
 
     @property
@@ -157,15 +159,17 @@ class StreamDecoder:
         """A message's 32-bit device time on the same axis as the batches' ``t_us``."""
         return int(lib.bt_unwrapped(ffi.addressof(self._state, "t_us"), t_us))
 
-    def feed(self, chunk: Buffer) -> Batch:
-        """Take any number of bytes; return what they complete.
+    def feed(self, chunk: Buffer, arrived_s: float = math.nan) -> Batch:
+        """Take any number of bytes, which came at ``arrived_s``; return what they complete.
 
         Raises RuntimeError when another thread is in ``feed``: bytes from two threads have no order.
         """
         if not self._alone.acquire(blocking=False):
             raise RuntimeError("another thread is feeding this decoder; give each thread its own")
         try:
-            return self._feed(chunk)
+            batch = self._feed(chunk)
+            batch.arrived_s = arrived_s
+            return batch
         finally:
             self._alone.release()
 
@@ -211,7 +215,6 @@ class StreamDecoder:
     def _batch(self) -> Batch:
         # Copy everything out of the state: the next call overwrites it.
         self.taken, arrived_ns, size, n, pacs, idles, others, gaps, last_us, fingers = _FACTS(self._facts)
-        self.arrived_s = arrived_ns * 1e-9
         self.last_t_us = last_us if n or idles else None
         raw = self._out[:size]
         at = 16 * (n + pacs + idles)
@@ -224,6 +227,7 @@ class StreamDecoder:
         batch.idle = _NO_IDLE
         batch.messages = []
         batch.fingers = fingers
+        batch.arrived_s = arrived_ns * 1e-9
         if not (pacs or idles or others):
             return batch
         at += n * FRAME.itemsize
@@ -256,7 +260,9 @@ def split(batch: Batch, end_us: int) -> tuple[Batch, Batch]:
     idle_now = batch.idle["t_us"] < end_us
 
     def rows(mine: Any, pac: Any, idle: Any, messages: list[Any]) -> Batch:
-        return Batch(batch.wire[mine], batch.seq[mine], batch.t_us[mine], batch.pac[pac], batch.idle[idle], messages)
+        part = Batch(batch.wire[mine], batch.seq[mine], batch.t_us[mine], batch.pac[pac], batch.idle[idle], messages)
+        part.arrived_s = batch.arrived_s
+        return part
 
     return rows(now, pac_now, idle_now, batch.messages), rows(~now, ~pac_now, ~idle_now, [])
 
@@ -272,4 +278,5 @@ def join(batches: list[Batch]) -> Batch:
         np.concatenate([b.pac for b in batches]),
         np.concatenate([b.idle for b in batches]),
         [m for b in batches for m in b.messages],
+        arrived_s=batches[-1].arrived_s,
     )

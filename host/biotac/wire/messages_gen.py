@@ -12,8 +12,8 @@ from enum import IntEnum, IntFlag
 from typing import Any, ClassVar, NamedTuple
 
 WIRE_MAJOR = 1
-WIRE_MINOR = 5
-SCHEMA_HASH = 0xDB7A8CBF
+WIRE_MINOR = 0
+SCHEMA_HASH = 0x6BE768D5
 MAX_FRAME_BYTES = 254
 INVALID_COUNT = 0xFFFF
 BOOTLOADER_MAGIC = 0xB0071DE5
@@ -397,73 +397,72 @@ class SettingSpec(NamedTuple):
     low: int
     high: int
     default: int
-    before: int  # what firmware that does not have it does
     doc: str
 
 
 SETTINGS: dict[Setting, SettingSpec] = {
     Setting.POC_WEIGHTS: SettingSpec(
-        "enum poc_weights", 0, 2, 1, 1,
+        "enum poc_weights", 0, 2, 1,
         "electrode weights of the point of contact; COMPRESS_N1 is best on real plates",
     ),
     Setting.FORCE_GAIN_X_NN: SettingSpec(
-        "nN/count", -100000000, 100000000, 1063440, 1063440,
+        "nN/count", -100000000, 100000000, 1063440,
         "S_x of Lin Eq 3; default: fitted to one real finger, by least squares without offset; calibrate yours",
     ),
     Setting.FORCE_GAIN_Y_NN: SettingSpec(
-        "nN/count", -100000000, 100000000, 252325, 252325,
+        "nN/count", -100000000, 100000000, 252325,
         "S_y of Lin Eq 3",
     ),
     Setting.FORCE_GAIN_Z_NN: SettingSpec(
-        "nN/count", -100000000, 100000000, 2262234, 2262234,
+        "nN/count", -100000000, 100000000, 2262234,
         "S_z of Lin Eq 3",
     ),
     Setting.TORQUE_GAIN_Y_NN: SettingSpec(
-        "nN/count", -100000000, 100000000, 2262234, 2262234,
+        "nN/count", -100000000, 100000000, 2262234,
         "scale of M_y in Lin Eq 4; default: S_z, as the force along z makes M_y; there is no measured torque of a real finger",
     ),
     Setting.TORQUE_GAIN_Z_NN: SettingSpec(
-        "nN/count", -100000000, 100000000, 252325, 252325,
+        "nN/count", -100000000, 100000000, 252325,
         "scale of M_z in Lin Eq 4; default: S_y",
     ),
     Setting.CONTACT_ENERGY_COUNT2: SettingSpec(
-        "count^2", 50, 1000000, 1000, 1000,
+        "count^2", 50, 1000000, 1000,
         "sum of e^2 above which a finger is touched (Lin IV.B); or three times the measured noise energy if that is more, but at most three times this setting",
     ),
     Setting.STATUS_PERIOD_MS: SettingSpec(
-        "ms", 100, 60000, 1000, 1000,
+        "ms", 100, 60000, 1000,
         "time between periodic STATUS messages",
     ),
     Setting.IDLE_PERIOD_MS: SettingSpec(
-        "ms", 20, 60000, 100, 100,
+        "ms", 20, 60000, 100,
         "time between IDLE heartbeats of an untouched finger",
     ),
     Setting.THERMAL_GAIN_MILLI: SettingSpec(
-        "count/1000 per TDC count", -5000, 5000, 500, 500,
+        "count/1000 per TDC count", -5000, 5000, 500,
         "change of a resting electrode per count of TDC, which the tare follows in contact; real fingers showed 700 to 970, but TDC does not explain all of it",
     ),
     Setting.PRESSURE_GAIN_NN: SettingSpec(
-        "nN/count", 0, 100000000, 0, 0,
+        "nN/count", 0, 100000000, 0,
         "K of Navarro 2015 Eq 1, force per count of static pressure; 0: not calibrated, no force. Navarro has 9 to 16 million; `biotac calibrate pressure` finds yours",
     ),
     Setting.PRESSURE_FILTER_MILLI: SettingSpec(
-        "1/1000", 10, 1000, 500, 500,
+        "1/1000", 10, 1000, 500,
         "alpha of Navarro 2015 Eq 3, the weight of a new static pressure word in the filter; 1000: no filter",
     ),
     Setting.HOLD_TIMEOUT_MS: SettingSpec(
-        "ms", 0, 3600000, 2000, 2000,
+        "ms", 0, 3600000, 2000,
         "how long a HOLD lasts after the host's last message; 0: without limit",
     ),
     Setting.FORCE_MODEL: SettingSpec(
-        "enum force_model", 0, 1, 1, 0,
-        "force of a finger without a wrench map or force gains of its own; firmware, records and recordings without this setting: LIN",
+        "enum force_model", 0, 1, 1,
+        "force of a finger without a wrench map or force gains of its own",
     ),
     Setting.UART_BITS_PER_S: SettingSpec(
-        "bit/s", 0, 3000000, 0, 0,
+        "bit/s", 0, 3000000, 0,
         "bit rate of a UART for this protocol while no host has the USB port open: 8 data bits, no parity, one stop bit; below 1200: off. Used from the board's next start if saved; only a Pico has one",
     ),
     Setting.UART_PINS: SettingSpec(
-        "enum uart_pins", 0, 3, 0, 0,
+        "enum uart_pins", 0, 3, 0,
         "pins of that UART; likewise from the next start",
     ),
 }

@@ -291,64 +291,21 @@ static void a_record_is_read_back_and_a_strange_one_passed_over(void **state)
     // The layout that calibration.h states: serial, made_s, values, little-endian.
     assert_memory_equal(record, SENSOR "\x98\xBA\xDC\xFE\0\0\0\0\1\0\0\0\xFE\xFF\xFF\xFF", 32);
     assert_memory_equal(record + 44, "\xA8\xFD\xFF\xFF\x60\xF5\x90\0", 8); // -600, 9500000
-    bt_calibration_unpack(&back, 2, record, 52);
+    bt_calibration_unpack(&back, 1, record, 52);
     assert_memory_equal(&back, &out, sizeof out);
     static const struct {
         uint16_t version;
         size_t bytes; // 0: a cleared one
-    } strange[] = {{0, 52}, {3, 52}, {2, 51}, {2, 53}, {2, 48}, {2, 0}, {1, 52}, {1, 47}, {1, 49}, {1, 0}};
+    } strange[] = {{0, 52}, {2, 52}, {1, 51}, {1, 53}, {1, 48}, {1, 0}};
     for (size_t k = 0; k < sizeof strange / sizeof *strange; k++) {
         bt_calibration_unpack(&back, strange[k].version, record, strange[k].bytes);
         assert_false(back.present);
     }
     record[20] = 3; // no such weights
-    bt_calibration_unpack(&back, 2, record, 52);
+    bt_calibration_unpack(&back, 1, record, 52);
     assert_false(back.present);
     out.present = false;
     assert_int_equal(bt_calibration_pack(&out, record), 0);
-}
-
-static void a_record_of_a_firmware_before_pressure_keeps_all_that_it_has(void **state)
-{
-    (void)state;
-    bt_calibration out = {.present = true, .made_s = 7}, back;
-    uint8_t record[BT_CALIBRATION_RECORD_BYTES];
-    memcpy(out.serial, SENSOR, sizeof out.serial);
-    memcpy(out.value, values, sizeof values);
-    (void)bt_calibration_pack(&out, record);
-    bt_calibration_unpack(&back, 1, record, 48); // seven values, then nothing
-    out.value[7] = 0;                            // not calibrated
-    assert_memory_equal(&back, &out, sizeof out);
-    for (size_t bytes = 0; bytes <= sizeof record; bytes++) { // of a version that is not known
-        back.present = false;
-        bt_calibration_unpack(&back, 99, record, bytes);
-        assert_false(back.present);
-    }
-}
-
-// Its SET_CALIBRATION ends before pressure_gain_nn, which is then 0: not calibrated.
-static void a_host_of_wire_1_3_is_understood(void **state)
-{
-    (void)state;
-    uint8_t payload[BT_SET_CALIBRATION_BYTES];
-    bt_msg_set_calibration msg = {.req_id = 31, .finger = 1};
-    plug(1, SENSOR);
-    memcpy(msg.serial, SENSOR, sizeof msg.serial);
-    memcpy(msg.value, values, sizeof msg.value);
-    bt_msg_set_calibration_pack(&msg, payload);
-    assert_int_equal(host_ask(&session, BT_SET_CALIBRATION_ID, payload, 50)->id, BT_CALIBRATION_ID);
-    assert_int_equal(session.rx_errors, 0);
-    bt_msg_calibration has = get(1);
-    assert_memory_equal(has.value, values, 7 * sizeof *values);
-    assert_int_equal(has.value[7], 0);
-    (void)host_ask(&session, BT_SET_CALIBRATION_ID, payload, 50);
-    host_forget();
-    bt_session_receive(&session, (const uint8_t *)"noise\0\0", 7, 0); // is not the same again
-    assert_int_equal(host.count, 0);
-    assert_int_equal(session.rx_errors, 1);
-    for (size_t bytes = 49; bytes <= 51; bytes += 2) {
-        assert_int_equal(host_error(&session, BT_SET_CALIBRATION_ID, payload, bytes), BT_ERROR_BAD_LENGTH);
-    }
 }
 
 #define T(name) cmocka_unit_test_setup(name, new_session)
@@ -364,8 +321,6 @@ int main(void)
         T(every_end_of_a_stream_counts),
         T(only_what_has_changed_is_stored),
         T(a_record_is_read_back_and_a_strange_one_passed_over),
-        T(a_host_of_wire_1_3_is_understood),
-        T(a_record_of_a_firmware_before_pressure_keeps_all_that_it_has),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -78,15 +78,6 @@ def test_a_setting_that_the_new_firmware_has_not_is_named(fake: FakeBoard, tmp_p
     assert outcome.settings.unknown == (f"setting {NEW_SETTING}",)
 
 
-def test_a_board_from_before_the_force_model_goes_on_with_lins(fake: FakeBoard, tmp_path: Path) -> None:
-    model = int(wire.Setting.FORCE_MODEL)
-    del fake.settings[model]
-    outcome = flash(read_image(make_image(tmp_path)), fake, [fake])  # stored by the new firmware: its default
-    assert outcome.settings is not None
-    assert outcome.settings.changed == ("force_model",)
-    assert fake.stored[model] == wire.ForceModel.LIN
-
-
 def fails(fake: FakeBoard, folder: Path, kind: type[BiotacError] = FlashError, **options: object) -> str:
     with pytest.raises(kind) as caught:
         flash(read_image(make_image(folder)), fake, [fake], **options)  # type: ignore[arg-type]

@@ -7,7 +7,6 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -161,12 +160,6 @@ def test_bands_are_streamed_to_who_wants_them(live: Live) -> None:
     live.send(biotac.wire.framing.encode(bands.ID, bands.pack()), frame(0))
     live.until(lambda: len(seen) == 1)
     assert seen == [bands]
-
-
-def test_a_board_that_knows_no_events_is_not_asked_for_them(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(live.hand._board, "info", replace(live.hand.info, wire_minor=4))
-    live.hand.subscribe(wire.QuantityFlags.EVENTS | wire.QuantityFlags.FORCE)
-    assert live.firmware.of(wire.Subscribe)[-1].quantities == wire.QuantityFlags.FORCE
 
 
 def test_what_a_callback_raises_comes_up_at_the_next_call_and_kills_nobody(live: Live) -> None:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cobs import cobs
 from kept_board import boot, serial_of
 
 import biotac
@@ -157,7 +156,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
 
 def test_a_record_is_that_of_the_specification() -> None:
     data = SERIAL.encode() + struct.pack("<I8i", 1_763_731_310, 0, 1, -2, 3, -4, 5, -600, 9_500_000)
-    header = struct.pack("<IHHI", 0x52544F42, 2, 2, 52)
+    header = struct.pack("<IHHI", 0x52544F42, 2, 1, 52)
     crc = zlib.crc32((header + b"\xff" * 4 + data).ljust(256, b"\xff"))
     assert flash_record.pack(ODD) == header + struct.pack("<I", crc) + data
     assert flash_record.unpack(flash_record.pack(ODD), "it") == ODD
@@ -181,21 +180,16 @@ GOOD = flash_record.pack(ODD)[16:]
         (flash_record.pack(ODD) + b"\0", "no intact record"),
         (sealed(1, 1, GOOD), "a record other than a calibration"),
         (sealed(7, 1, GOOD), "a record other than a calibration"),
-        (sealed(2, 3, GOOD), "a newer format"),
-        (sealed(2, 1, GOOD), "a value out of range"),
-        (sealed(2, 2, b""), "a cleared calibration"),
-        (sealed(2, 2, GOOD[:20] + b"\7" + GOOD[21:]), "a value out of range"),
-        (sealed(2, 2, b"B\xe4" + GOOD[2:]), "an invalid calibration"),
+        (sealed(2, 2, GOOD), "a newer format"),
+        (sealed(2, 1, GOOD[:-4]), "a value out of range"),
+        (sealed(2, 1, b""), "a cleared calibration"),
+        (sealed(2, 1, GOOD[:20] + b"\7" + GOOD[21:]), "a value out of range"),
+        (sealed(2, 1, b"B\xe4" + GOOD[2:]), "an invalid calibration"),
     ],
 )
 def test_a_record_that_is_none_says_why(data: bytes, words: str) -> None:
     with pytest.raises(biotac.InputError, match=words):
         flash_record.unpack(data, "it")
-
-
-def test_a_record_from_before_pressure_keeps_all_that_it_has() -> None:
-    old = sealed(2, 1, GOOD[:-4])
-    assert flash_record.unpack(old, "it") == replace(ODD, pressure_gain_nn=0)
 
 
 @pytest.mark.parametrize("at", range(68))
@@ -230,69 +224,6 @@ def test_a_saved_calibration_is_the_record_and_holds_after_the_next_boot(tmp_pat
 
 
 # ---- boards, recordings ------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("minor", "what", "question"), [(2, "calibrations", wire.GetCalibration), (3, "maps", wire.GetMap)]
-)
-def test_a_board_that_knows_of_no_such_thing_is_not_asked(scripted_board, hello, minor, what, question) -> None:
-    asked: list[int] = []
-
-    def answer(message_id: int, payload: bytes) -> bytes:
-        asked.append(message_id)
-        return hello(payload, wire_minor=minor) if message_id == wire.HelloRequest.ID else b""
-
-    with biotac.open(scripted_board(answer).path) as hand:
-        assert getattr(hand, what)() == {}
-    assert question.ID not in asked
-
-
-def test_a_board_of_before_pressure_is_spoken_to_in_its_own_words(scripted_board, hello) -> None:
-    """Wire 1.3: seven values, no PRESSURE, ten settings."""
-    told: list[tuple[int, bytes]] = []
-
-    def answer(message_id: int, payload: bytes) -> bytes:
-        told.append((message_id, payload))
-        if message_id == wire.HelloRequest.ID:
-            return hello(payload, wire_minor=3)
-        if message_id in (wire.SetCalibration.ID, wire.GetCalibration.ID):
-            whole = wire.Calibration(payload[0], payload[1], 1, (66, 84) + (0,) * 14, 5, (0, 1, 2, 3, 4, 5, 6, 99))
-            return encode(wire.Calibration.ID, whole.pack()[:51])
-        if message_id == wire.GetSetting.ID and payload[1] > 10:
-            return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.UNKNOWN_SETTING).pack())
-        if message_id == wire.GetSetting.ID:
-            return encode(wire.SettingValue.ID, wire.SettingValue(payload[0], payload[1], 7).pack())
-        return encode(wire.Reply.ID, wire.Reply(payload[0], message_id, wire.Error.OK).pack())
-
-    set_calibration: list[bytes] = []
-
-    with biotac.open(scripted_board(answer).path) as hand:
-        write = hand.link.write
-
-        def write_as_heard(data: bytes) -> None:
-            plain = cobs.decode(data[:-1])
-            if plain[0] == wire.SetCalibration.ID:  # the scripted board splits by today's lengths
-                set_calibration.append(plain[1:-4])
-                data = encode(wire.SetCalibration.ID, plain[1:-4] + bytes(4))
-            write(data)
-
-        hand.link.write = write_as_heard  # type: ignore[method-assign]
-        hand.set_calibration(0, replace(ODD, pressure_gain_nn=0))
-        (sent,) = set_calibration
-        assert sent == wire.SetCalibration(sent[0], 0, ODD.wire_serial(), ODD.made_s, ODD.wire_values()).pack()[:50]
-        with pytest.raises(
-            biotac.WireVersionError, match=r"expected at least 1\.4, which has pressure_gain_nn; .*biotac flash"
-        ):
-            hand.set_calibration(0, ODD)
-        back = hand.calibration(0)
-        assert back is not None and (back.thermal_gain_milli, back.pressure_gain_nn) == (6, 0)
-        settings = hand.settings()
-        assert settings[wire.Setting.THERMAL_GAIN_MILLI] == 7
-        assert (settings[wire.Setting.PRESSURE_GAIN_NN], settings[wire.Setting.PRESSURE_FILTER_MILLI]) == (0, 500)
-        assert settings[wire.Setting.FORCE_MODEL] == wire.ForceModel.LIN  # all that it had
-        hand.subscribe(biotac.QuantityFlags.FORCE | biotac.QuantityFlags.PRESSURE)
-        (asked,) = (payload for message_id, payload in told if message_id == wire.Subscribe.ID)
-        assert asked[2] == biotac.QuantityFlags.FORCE
 
 
 def test_another_sensors_calibration_is_refused_in_words() -> None:

@@ -71,7 +71,7 @@ def test_the_bytes_are_those_of_the_specification(monkeypatch) -> None:
     store("24c32", NEW)
     # protocol/SPEC.md, Calibrations; values by id: poc_weights, force x y z, torque y z, thermal, pressure.
     data = b"BTEMU00000000001" + struct.pack("<I8i", 2, 1, 1_063_440, 252_325, 2_262_234, 7, -8, -5000, 0)
-    header = struct.pack("<IHHI", 0x52544F42, 2, 2, len(data))
+    header = struct.pack("<IHHI", 0x52544F42, 2, 1, len(data))
     page = (header + b"\xff" * 4 + data).ljust(256, b"\xff")
     record = header + struct.pack("<I", zlib.crc32(page)) + data
     covered = (struct.pack("<I", 2) + record).ljust(124, b"\xff")

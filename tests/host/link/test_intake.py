@@ -233,5 +233,6 @@ def test_the_time_of_arrival_is_pythons(port: Port) -> None:
 
     before = time.monotonic()
     os.write(port.far, encode(*START))
-    assert port.read() is not None
-    assert before <= port.decoder.arrived_s <= time.monotonic()
+    batch = port.read()
+    assert batch is not None
+    assert before <= batch.arrived_s <= time.monotonic()

@@ -12,7 +12,6 @@ import biotac
 from biotac.cli.main import main
 from biotac.core.compiled import FORCE_GAINS, reference_q4
 from biotac.hand.subscription import RESULTS
-from biotac.recording.file import RecordingFile
 from biotac.wire import messages_gen as wire
 
 
@@ -123,23 +122,6 @@ def test_the_population_map_gives_what_a_board_with_it_sends(tmp_path, options: 
     assert main(["recompute", str(names[0]), str(names[2]), "--settings", str(model), *options]) == 0
     assert biotac.Recording(names[2]).wire.tobytes() == sent.wire.tobytes()
     assert main(["check", str(names[1])]) == 0
-
-
-def test_a_recording_from_before_the_force_model_means_lins(tmp_path) -> None:
-    gains = {s.name.lower(): wire.SETTINGS[s].default for s in FORCE_GAINS}
-    was = record(tmp_path / "a.mcap", "sim:press.toml", force_model=wire.ForceModel.LIN, **gains)
-    settings = json.loads(was.metadata["settings"])
-    del settings["force_model"]
-    with (tmp_path / "old.mcap").open("xb") as stream:
-        file = RecordingFile(stream, was.metadata | {"settings": json.dumps(settings)})
-        for block, arrived_ns in zip(was.blocks, was.arrived_ns, strict=True):
-            file.add(block, arrived_ns)
-        file.close()
-    old = biotac.Recording(tmp_path / "old.mcap")
-    assert old.settings[wire.Setting.FORCE_MODEL] == wire.ForceModel.LIN
-    assert main(["check", str(old.path)]) == 0
-    assert main(["recompute", str(old.path), str(tmp_path / "new.mcap")]) == 0
-    assert biotac.Recording(tmp_path / "new.mcap").wire.tobytes() == was.wire.tobytes()
 
 
 def test_settings_come_from_a_file(folder, recorded, capsys) -> None:

@@ -6,7 +6,6 @@ import threading
 
 import numpy as np
 import pytest
-from tests.support.deframer import Deframer
 
 from biotac.wire import messages_gen as wire
 from biotac.wire.batches import StreamDecoder
@@ -149,40 +148,19 @@ def test_a_damaged_frame_is_lost_and_counted_and_the_next_one_is_not() -> None:
     assert (decoder.lost, decoder.counts.bad) == (1, 1)
 
 
-def test_a_newer_minor_may_append_fields_and_an_older_may_not_drop_them() -> None:
+def test_a_newer_minor_may_append_fields_and_messages() -> None:
+    """SPEC.md, Versions; the field and the message are made up."""
     payload = wire.Reply(7, 0x81, 0).pack()
     longer, shorter = encode(wire.Reply.ID, payload + b"new"), encode(wire.Reply.ID, payload[:-1])
     strict, lenient = StreamDecoder(), StreamDecoder()
+    assert 0x7E not in wire.MESSAGES
+    assert lenient.feed(encode(0x7E, b"a new message")).messages == []
+    assert lenient.counts.bad == 0
     lenient.accept_newer_minor()
     assert strict.feed(longer).messages == []
     assert lenient.feed(longer).messages == [wire.Reply(7, 0x81, 0)]
     assert lenient.feed(shorter).messages == []
     assert (strict.counts.bad_length, lenient.counts.bad_length) == (1, 1)
-
-
-def test_a_frame_of_wire_1_3_is_read_without_a_force_from_pressure_and_torsion() -> None:
-    whole = frame(0, 7, 0)
-    ((_, payload),) = Deframer().feed(whole)
-    decoder = StreamDecoder()
-    row = decoder.feed(encode(wire.Frame.ID, payload[:134])).frames[0]
-    assert (row["seq"], row["force_sigma_n"][2]) == (7, 0.004)
-    assert np.isnan(row["pdc_filtered"]) and np.isnan(row["pressure_force_n"]) and np.isnan(row["torsion_nmm"])
-    assert decoder.counts.bad == 0
-    for wrong in (*range(128, 134), *range(135, 144)):
-        assert not len(decoder.feed(encode(wire.Frame.ID, payload[:wrong])).frames)
-    assert decoder.counts.bad_length == 15
-
-
-def test_a_whole_chunk_of_wire_1_3_fills_up_in_its_own_room() -> None:
-    ((_, payload),) = Deframer().feed(frame(0, 7, 0))
-    old = encode(wire.Frame.ID, payload[:134])
-    pac = encode(wire.Pac.ID, wire.Pac(8, 0, 0, (0xABC,) * 22).pack())  # lies behind the frames
-    count = (65536 - 10 * len(pac)) // len(old)
-    got = StreamDecoder().feed(count * old + 10 * pac)
-    assert (len(got.wire), len(got.pac)) == (count, 10)
-    for name in ("torsion_mnmm", "pressure_force_100un"):
-        assert (got.wire[name] == wire.INVALID_I32).all()
-    assert (got.wire["counts"] == np.arange(100, 119)).all()
 
 
 def test_frames_made_while_nobody_listened_are_not_lost() -> None:
