@@ -116,7 +116,7 @@ def c_arrows(root: Path, files: Iterable[str]) -> Iterator[Arrow]:
                 continue
             beside = str(Path(file).parent / include[1])
             found = [beside] if beside in named else [h for h in named if h.endswith(f"/{include[1]}")]
-            one_a_board = all(header.startswith("firmware/boards/") for header in found)
+            one_a_board = all(header.startswith(("firmware/boards/", "firmware/sensor_board/")) for header in found)
             assert found and (len(found) == 1 or one_a_board), f"{file}:{number}: {include[1]} is {found or 'nowhere'}"
             yield from (Arrow(file, number, header) for header in found)
 

@@ -20,6 +20,7 @@ from biotac.wire.framing import encode
 
 ROOT = Path(__file__).resolve().parents[2]
 TOOLS = ("node", "npm", "clang", "wasm-ld", "arm-none-eabi-gcc")
+BUILD = "build/sensor-board"
 SLOTS = 55
 ROUND = len(sensor.SLOTS)
 SETTLE_US, GAP_US = 50, 10
@@ -34,9 +35,9 @@ def image() -> Path:
         assert "BIOTAC_CI" not in os.environ, f"{missing} missing"
         pytest.skip(f"{', '.join(missing)} missing; tools/test installs what the emulated rig needs")
     subprocess.run([ROOT / "tools/emulator/prepare"], check=True)
-    for words in (["-S", "firmware", "--preset", "pico-sensor"], ["--build", "build/pico-sensor"]):
+    for words in (["-S", "firmware/sensor_board", "-B", BUILD, "-G", "Ninja"], ["--build", BUILD]):
         subprocess.run(["cmake", *words], check=True, cwd=ROOT, capture_output=True)
-    return ROOT / "build/pico-sensor/biotac-sensor.bin"
+    return ROOT / BUILD / "biotac-sensor.bin"
 
 
 def word_of(count: int) -> int:

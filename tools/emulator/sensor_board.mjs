@@ -1,4 +1,4 @@
-// The sensors as a board of their own: a second emulated Pico that runs firmware/boards/pico_sensor, and the leads to the
+// The sensors as a board of their own: a second emulated Pico that runs firmware/sensor_board, and the leads to the
 // gateway's. Takes the place of Sensors (sensors.mjs), edge by edge: SCK and MOSI as the gateway's SPI block would drive
 // them, MISO as the pad carries it when the clock rises.
 //
@@ -14,7 +14,7 @@ import { Board, BootRom } from './rom.mjs'
 import { CHIP_SELECTS, WIDTHS } from './sensors.mjs'
 import { UsbHost } from './usb.mjs'
 
-const [MISO, SCK, MOSI] = [16, 18, 19] // firmware/boards/pico_sensor/pins.h
+const [MISO, SCK, MOSI] = [16, 18, 19] // firmware/sensor_board/pins.h
 export const SELECTS = [2, 3, 4, 5, 6]
 const LEADS = { SCK, MOSI, MISO, SS0: 2, SS1: 3, SS2: 4, SS3: 5, SS4: 6 } // where each goes to when all is well
 const SYNCHRONISER_NS = 16 // two flip-flops behind each input

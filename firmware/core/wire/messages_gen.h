@@ -87,7 +87,7 @@ enum bt_board {
     BT_BOARD_POSIX_SIM = 1, // a process on a pty with emulated sensors
     BT_BOARD_PICO = 2, // Raspberry Pi Pico (RP2040)
     BT_BOARD_LINUX_SBC = 3, // a Linux computer with the sensors on its own SPI bus (spidev)
-    BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico that emulates one to five sensors (firmware/boards/pico_sensor): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
+    BT_BOARD_PICO_SENSOR = 4, // Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
 };
 
 // Faults of an emulated sensor. On a tape, these codes stand in place of counts.

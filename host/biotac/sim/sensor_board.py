@@ -1,4 +1,4 @@
-"""The emulated sensors as a board of their own (firmware/boards/pico_sensor): plugged, fed with a Source, and asked.
+"""The emulated sensors as a board of their own (firmware/sensor_board): plugged, fed with a Source, and asked.
 
 The board serves its tape in order, a sample for each sample command. It keeps 3.5 s of five fingers, 17 s of one.
 """

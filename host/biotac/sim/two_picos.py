@@ -32,9 +32,9 @@ class TwoPicos(EmulatedBoard):
         super().__init__("pico", source or NOTHING, pace=pace, hold=hold, image=image)
 
     def _start(self, options: list[str]) -> subprocess.Popen[bytes]:
-        image = self._tools.image.parent.parent / "pico-sensor" / "biotac-sensor.bin"
+        image = self._tools.image.parent.parent / "sensor-board" / "biotac-sensor.bin"
         if not image.is_file():
-            raise PortError(f"no image at {image}; build it as firmware/boards/pico_sensor/README.md says")
+            raise PortError(f"no image at {image}; build it as firmware/sensor_board/README.md says")
         with new_pty() as (master, path):
             self._pass_fds = (master,)
             self.sensor_path = path

@@ -102,7 +102,7 @@ class Board(IntEnum):
     POSIX_SIM = 1  # a process on a pty with emulated sensors
     PICO = 2  # Raspberry Pi Pico (RP2040)
     LINUX_SBC = 3  # a Linux computer with the sensors on its own SPI bus (spidev)
-    PICO_SENSOR = 4  # Raspberry Pi Pico that emulates one to five sensors (firmware/boards/pico_sensor): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
+    PICO_SENSOR = 4  # Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages
 
 
 class EmuFault(IntEnum):
@@ -273,7 +273,7 @@ BOARD_DOC: dict[int, str] = {
     1: "a process on a pty with emulated sensors",
     2: "Raspberry Pi Pico (RP2040)",
     3: "a Linux computer with the sensors on its own SPI bus (spidev)",
-    4: "Raspberry Pi Pico that emulates one to five sensors (firmware/boards/pico_sensor): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages",
+    4: "Raspberry Pi Pico that emulates one to five sensors (firmware/sensor_board): it knows only HELLO_REQUEST, REBOOT_BOOTLOADER and the EMU messages",
 }
 
 

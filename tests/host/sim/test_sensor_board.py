@@ -20,7 +20,7 @@ from biotac.wire.framing import encode
 
 
 class FakeSensorBoard:
-    """Takes a tape as firmware/boards/pico_sensor does; ``serve`` slots of it are played between two questions."""
+    """Takes a tape as firmware/sensor_board does; ``serve`` slots of it are played between two questions."""
 
     def __init__(self, hello: Any, *, room: int = 100_000, serve: int = 0, deaf_to: int = -1) -> None:
         self.hello = hello

@@ -1,6 +1,6 @@
 // A tape in flash, where a gateway has its wrench maps: played from power-up on, until a host brings another.
-#ifndef BIOTAC_PICO_SENSOR_LOOP_H
-#define BIOTAC_PICO_SENSOR_LOOP_H
+#ifndef BIOTAC_SENSOR_BOARD_LOOP_H
+#define BIOTAC_SENSOR_BOARD_LOOP_H
 
 #include "stream.h"
 

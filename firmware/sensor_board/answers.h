@@ -1,6 +1,6 @@
 // The sensors' answers, ready in the bus's own time: the device model, run ahead of the bus.
-#ifndef BIOTAC_PICO_SENSOR_ANSWERS_H
-#define BIOTAC_PICO_SENSOR_ANSWERS_H
+#ifndef BIOTAC_SENSOR_BOARD_ANSWERS_H
+#define BIOTAC_SENSOR_BOARD_ANSWERS_H
 
 #include "stream.h"
 

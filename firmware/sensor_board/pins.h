@@ -1,6 +1,6 @@
 // Which of the Pico's GPIOs goes where; README.md beside this file has the wiring.
-#ifndef BIOTAC_PICO_SENSOR_PINS_H
-#define BIOTAC_PICO_SENSOR_PINS_H
+#ifndef BIOTAC_SENSOR_BOARD_PINS_H
+#define BIOTAC_SENSOR_BOARD_PINS_H
 
 // Who this image is.
 #define IMAGE_BOARD   BT_BOARD_PICO_SENSOR

@@ -1,6 +1,6 @@
 // What the host says to the board, and what it is told: protocol/link.toml, from 0x40 and 0xC0 on.
-#ifndef BIOTAC_PICO_SENSOR_COMMANDS_H
-#define BIOTAC_PICO_SENSOR_COMMANDS_H
+#ifndef BIOTAC_SENSOR_BOARD_COMMANDS_H
+#define BIOTAC_SENSOR_BOARD_COMMANDS_H
 
 #include "stream.h"
 

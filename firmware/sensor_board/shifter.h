@@ -1,6 +1,6 @@
 // The sensors' end of the bus, in hardware: whoever is selected, his offer is out before the first clock.
-#ifndef BIOTAC_PICO_SENSOR_SHIFTER_H
-#define BIOTAC_PICO_SENSOR_SHIFTER_H
+#ifndef BIOTAC_SENSOR_BOARD_SHIFTER_H
+#define BIOTAC_SENSOR_BOARD_SHIFTER_H
 
 #include <stdbool.h>
 #include <stdint.h>
