@@ -32,6 +32,8 @@ _Static_assert(((int64_t)BT_GAIN_MAX_NN << FORCE_BITS) / FORCE_DIVISOR <= 1 << 3
                "a force gain must fit bt_scale");
 _Static_assert(((int64_t)BT_GAIN_MAX_NN << TORQUE_BITS) / TORQUE_DIVISOR <= 1 << 30,
                "a torque gain must fit bt_scale");
+_Static_assert(0x7FFFLL * 0xFFFF + 0xFFFFLL * (1 << 14) + 0xFFFF <= UINT32_MAX,
+               "the middle products of bt_scale must fit uint32");
 _Static_assert(BT_SUM_ARM_MAX_Q4_NM / BT_SUMS_TORQUE_UNIT_NM + 2 + BT_ELECTRODES * (int64_t)BT_E_MAX_Q4
                    <= INT32_MAX,
                "a torque sum must fit int32, even with arms rounded to whole units");
