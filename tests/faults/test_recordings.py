@@ -45,7 +45,7 @@ def said(path: Path) -> tuple[dict[str, Any], list[str]]:
     facts = {name: getattr(its, name) for name in names} | {
         name: getattr(its, name).tobytes() for name in ("frames", "pac", "idle", "wire")
     }
-    return facts | {"blocks": its.blocks, "arrivals": its._arrivals}, its.problems
+    return facts | {"blocks": its.blocks, "gaps": its.gaps, "arrivals": list(its._arrivals())}, its.problems
 
 
 def loaded(path: Path) -> tuple[bytes, bool]:

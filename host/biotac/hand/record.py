@@ -12,7 +12,7 @@ from ..link.serial_port import nowhere
 from ..wire.sensor_gen import MAX_SENSORS
 from .board import Board
 from .commands import Commands
-from .gap import GAP
+from .gap import Gap
 
 
 class Recorder(Protocol):
@@ -24,7 +24,7 @@ class Recorder(Protocol):
     @property
     def closed(self) -> bool: ...
     def write(self, chunk: bytes) -> None: ...
-    def mark(self, what: str, facts: dict[str, str]) -> None: ...
+    def write_gap(self, gap: Gap) -> None: ...
     def go_on(self, facts: Any) -> None: ...
     def close(self) -> None: ...
     def fileno(self) -> int: ...
@@ -53,7 +53,7 @@ class Recorded:
         self._recorder = recorder
         incoming = self._board.incoming
         incoming.record = recorder.write
-        incoming.record_gap = lambda gap: recorder.mark(GAP, gap.as_text())
+        incoming.record_gap = recorder.write_gap
 
     def go_on(self) -> None:
         """Begin a new file after the board restarted."""

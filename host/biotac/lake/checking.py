@@ -51,7 +51,7 @@ def check(lake: str, topics: dict[str, set[str]], partition: dict[str, str], rec
     except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise InputError(f"{seal} is damaged ({error}); export its recording again with --force") from error
     wrong = []
-    outcome = CrossCheck(wire_minor=facts.info.wire_minor)
+    outcome = CrossCheck()
     for topic in sorted({*files, *(topic for topic, its in topics.items() if recording in its)} - {RECORDINGS}):
         path = place(folder, topic, partition[recording], recording)
         told = files.get(topic)

@@ -31,7 +31,7 @@ def recording_id(path: Path) -> str:
         Recording(path)  # raises an error that says what is wrong
         raise RecordingError(f"{path} holds no data; there is nothing to export")
     begin = json.dumps([blocks.metadata, first.arrived_ns], sort_keys=True).encode()
-    return hashlib.sha256(begin + first.bytes()).hexdigest()[:_LETTERS]
+    return hashlib.sha256(begin + b"".join(packet.data for packet in first.packets())).hexdigest()[:_LETTERS]
 
 
 def partition(recording: Recording) -> str:

@@ -1,18 +1,18 @@
-"""A block of the wire, about one second, split by finger and field and reassembled byte for byte.
+"""One block of a recording, about a second: a table per finger of its FRAMEs, PACs and heartbeats, and the packets.
 
-A finger's part holds its FRAMEs, PACs and heartbeats, one column per field. A column holds the change from row to row
-(the first row's is from 0), zigzag-encoded so that small changes are small numbers, as byte planes, lowest first. zstd
-compresses this well, and a field can be read without the others. ``seq`` and ``t_us`` are unwrapped. The rest of a
-block is the order of the messages, and all other messages as they came.
+A table has one column per field. A column is stored as the change from row to row (the first row's is from 0),
+zigzag-encoded so that small changes are small numbers, as byte planes, lowest first: zstd compresses this well, and a
+field can be read without the others. ``seq`` and ``t_us`` are unwrapped. The packets are all other messages as they
+came, damaged ones too, with the order of all.
 """
 
 from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,175 +22,173 @@ from ..wire.batches import Batch
 from ..wire.dtypes_gen import DTYPES
 from ..wire.fields import WIRE_INVALID
 from ..wire.frames import StructArray
+from ..wire.framing import encode, open_frame
 from ..wire.native import ffi, lib
 
 KINDS = (wire.Frame.ID, wire.Pac.ID, wire.Idle.ID)
 FRAME, PAC, IDLE = range(len(KINDS))
-_RAW = int(lib.BT_REBUILD_RAW)
-_FINGER_BITS = 3  # a code is a kind and a finger
-_ROWS = struct.Struct("<3I")
-_HEAD = struct.Struct("<qqI")  # first and last t_us of the FRAMEs and heartbeats, number of codes that follow
-_MOST_PER_MESSAGE = 256
-_MOST_MESSAGES = 1 << 16  # per block; one second of five fingers is about 1100
-
-#: Name, dtype of a value, values per row.
-Column = tuple[str, np.dtype[Any], int]
+PACKET = 0xFFFF  #: in an order: the next of the packets. Any other code is kind << 8 | finger: that finger's next row.
+_COUNTS = struct.Struct(f"<{len(KINDS)}I")  # rows of each kind, at the beginning of a table
 
 
-def _columns(message_id: int) -> dict[str, np.dtype[Any]]:
-    """Columns of one kind: the message's fields without the finger, with seq and t_us unwrapped."""
-    fields = {name: DTYPES[message_id][name] for name in DTYPES[message_id].names or () if name != "finger"}
-    return fields | {"seq": np.dtype("<u4"), "t_us": np.dtype("<i8")}
+class Column(NamedTuple):
+    """A stored field: ``parts`` values per row."""
+
+    name: str
+    dtype: np.dtype[Any]
+    parts: int
 
 
-COLUMNS = tuple(_columns(message_id) for message_id in KINDS)
+class Packet(NamedTuple):
+    """Bytes up to and including a delimiter. ``message_id`` is None where they are not a valid message."""
+
+    data: bytes
+    message_id: int | None
+    payload: bytes
+
+
+def row_dtype(kind: int) -> np.dtype[Any]:
+    """Rows of one kind: the message's fields, with ``seq`` and ``t_us`` wide enough to be unwrapped."""
+    sent = DTYPES[KINDS[kind]]
+    wide = {"seq": np.dtype("<u4"), "t_us": np.dtype("<i8")}
+    names = ["finger", *(name for name in sent.names or () if name != "finger")]
+    return np.dtype([(name, wide.get(name, sent[name])) for name in names])
+
+
+ROWS = tuple(row_dtype(kind) for kind in range(len(KINDS)))
+_COLUMNS = tuple(
+    [Column(name, dtype[name].base, int(np.prod(dtype[name].shape))) for name in dtype.names or () if name != "finger"]
+    for dtype in ROWS
+)
 
 
 def schema() -> bytes:
-    """The columns of a finger's part as JSON; stored in the recording."""
-    kinds = {
-        wire.MESSAGES[message_id].__name__.upper(): [
-            [name, dtype.base.str, int(np.prod(dtype.shape))] for name, dtype in columns.items()
-        ]
-        for message_id, columns in zip(KINDS, COLUMNS, strict=True)
-    }
-    return json.dumps(kinds).encode()
+    """The columns of a table as JSON; stored in the recording."""
+    kinds = zip(KINDS, _COLUMNS, strict=True)
+    return json.dumps(
+        {_name(message_id): [[c.name, c.dtype.str, c.parts] for c in columns] for message_id, columns in kinds}
+    ).encode()
+
+
+def _name(message_id: int) -> str:
+    return wire.MESSAGES[message_id].__name__.upper()
 
 
 @dataclass(frozen=True)
 class Rest:
-    """The order of a block's messages, as codes, and the messages that are not rows, as they came."""
+    """What a block holds beside its tables.
 
-    first_us: int
-    last_us: int
-    codes: NDArray[np.uint8]
-    raw: bytes
+    ``fingers`` have a table. ``first_us`` and ``last_us`` are the first and last time of FRAMEs and heartbeats, None
+    without any. ``lost`` has (finger, seq before, frames lost) for each loss found by the sequence numbers. ``gaps``
+    are times during which the board was away, before this block's first row.
+    """
+
+    order: NDArray[np.uint16]
+    packets: bytes
+    fingers: list[int] = field(default_factory=list)
+    first_us: int | None = None
+    last_us: int | None = None
+    lost: list[tuple[int, int, int]] = field(default_factory=list)
+    lost_pac: int = 0
+    disordered: int = 0
+    gaps: list[dict[str, Any]] = field(default_factory=list)
 
     def pack(self) -> bytes:
-        """Inverse of ``unpack``."""
-        return _HEAD.pack(self.first_us, self.last_us, len(self.codes)) + self.codes.tobytes() + self.raw
+        """A line of JSON, the order, the packets."""
+        head = {name: value for name, value in vars(self).items() if name not in ("order", "packets")}
+        line = json.dumps(head | {"messages": len(self.order)}, separators=(",", ":"))
+        return line.encode() + b"\n" + self.order.astype("<u2").tobytes() + self.packets
 
     @classmethod
     def unpack(cls, data: bytes) -> Rest:
-        """Inverse of ``pack``. Raises ValueError or struct.error for invalid data."""
-        first_us, last_us, n = _HEAD.unpack_from(data)
-        if n > _MOST_MESSAGES:
-            raise ValueError(f"a block of {n} messages, expected at most {_MOST_MESSAGES}")
-        return cls(first_us, last_us, np.frombuffer(data, np.uint8, n, _HEAD.size), data[_HEAD.size + n :])
+        """Inverse of ``pack``. Raises ValueError, TypeError or KeyError for anything else."""
+        line, _, body = data.partition(b"\n")
+        head = json.loads(line)
+        size = 2 * int(head.pop("messages"))
+        order = np.frombuffer(body[:size], "<u2")
+        if 2 * len(order) != size:
+            raise ValueError(f"the order of {size // 2} messages is cut off")
+        head["lost"] = [(int(finger), int(before), int(frames)) for finger, before, frames in head["lost"]]
+        return cls(order, body[size:], **head)
 
-    def fingers(self, kind: int) -> NDArray[np.uint8]:
-        """The finger of each message of ``kind``, in order of arrival."""
-        mine = self.codes[(self.codes != _RAW) & (self.codes >> _FINGER_BITS == kind)]
-        fingers: NDArray[np.uint8] = mine & ((1 << _FINGER_BITS) - 1)
+    def finger_of_row(self, kind: int) -> NDArray[np.uint8]:
+        """The finger of each row of ``kind``, in order of arrival."""
+        fingers: NDArray[np.uint8] = self.order[self.order >> 8 == kind].astype(np.uint8)
         return fingers
 
     def without(self, fingers: Collection[int]) -> Rest:
         """A copy without the rows of ``fingers``."""
-        gone = np.isin(self.codes & ((1 << _FINGER_BITS) - 1), list(fingers)) & (self.codes != _RAW)
-        return Rest(self.first_us, self.last_us, self.codes[~gone], self.raw)
-
-    @property
-    def all_fingers(self) -> set[int]:
-        """Fingers with at least one row."""
-        there = np.bincount(self.codes, minlength=256)[:_RAW].nonzero()[0]
-        return set((there & ((1 << _FINGER_BITS) - 1)).tolist())
+        gone = np.isin(self.order & 0xFF, list(fingers)) & (self.order != PACKET)
+        return Rest(**{**vars(self), "order": self.order[~gone]})
 
 
-@dataclass(frozen=True)
-class Block:
-    """A block split up. ``parts`` by finger, encoded; ``read_part`` reads them."""
-
-    parts: dict[int, bytes]
-    rest: Rest
-
-
-def take_apart(data: bytes, batch: Batch) -> Block | None:
-    """Split up ``data``, whole messages whose decoded rows are ``batch``; None if it could not be reassembled."""
-    if data.count(0) > _MOST_MESSAGES:
-        return None
+def take_apart(data: bytes, batch: Batch) -> tuple[dict[int, bytes], NDArray[np.uint16], bytes]:
+    """Tables by finger, the order and the packets of ``data``, whole messages whose decoded rows are ``batch``."""
     pieces = data.split(b"\0")[:-1]
-    ids = np.array([piece[1] if len(piece) > 1 else 0 for piece in pieces], np.intp)  # the id follows COBS's first byte
-    codes = np.full(len(pieces), _RAW, np.uint8)
-    tables = _tables(batch)
+    tables = [_frames(batch), batch.pac, batch.idle]
+    # COBS's first byte precedes the id. A row is at least as long as here; it is longer from a newer board.
+    ids = [piece[1] if len(piece) > 1 else 0 for piece in pieces]
+    order = np.full(len(pieces), PACKET, np.uint16)
     for kind, rows in enumerate(tables):
-        at = np.flatnonzero(ids == KINDS[kind])
-        if len(at) != len(rows) or (rows["finger"] >= 1 << _FINGER_BITS).any():
-            return None
-        codes[at] = kind << _FINGER_BITS | rows["finger"]
-    raw = b"".join(pieces[k] + b"\0" for k in np.flatnonzero(codes == _RAW).tolist())
-    ends = [rows["t_us"] for rows in (tables[FRAME], tables[IDLE]) if len(rows)]
-    first_us, last_us = (min(int(t.min()) for t in ends), max(int(t.max()) for t in ends)) if ends else (0, 0)
-    rest = Rest(first_us, last_us, codes, raw)
-    if together(rest, [as_sent(rows, kind) for kind, rows in enumerate(tables)]) != data:
-        return None
-    parts = {
-        finger: b"".join(_encoded([rows[rows["finger"] == finger] for rows in tables])) for finger in rest.all_fingers
-    }
-    return Block(parts, rest)
+        least = DTYPES[KINDS[kind]].itemsize
+        at = [k for k, message_id in enumerate(ids) if message_id == KINDS[kind]]
+        if len(at) != len(rows):  # some are damaged
+            at = [k for k in at if (whole := open_frame(pieces[k])) is not None and len(whole[1]) >= least]
+        if len(at) == len(rows):
+            order[at] = kind << 8 | rows["finger"].astype(np.uint16)
+        else:
+            tables[kind] = rows[:0]  # kept as packets
+    fingers = np.unique(order[order != PACKET] & 0xFF).tolist()
+    packets = b"".join(pieces[k] + b"\0" for k in np.flatnonzero(order == PACKET).tolist())
+    return {f: _table([rows[rows["finger"] == f] for rows in tables]) for f in fingers}, order, packets
 
 
-def _tables(batch: Batch) -> list[StructArray]:
-    """FRAMEs as sent, but with seq and t_us unwrapped; those of PAC and heartbeats already are."""
-    frames = np.empty(len(batch.wire), table_dtype(FRAME))
-    for name in frames.dtype.names or ():
-        frames[name] = batch.seq if name == "seq" else batch.t_us if name == "t_us" else batch.wire[name]
-    return [frames, batch.pac, batch.idle]
-
-
-#: Bytes of finger, seq and t_us at the start of a table's row; messages start with the same three fields.
-_LEAD = 1 + 4 + 8
-
-
-def table_dtype(kind: int) -> np.dtype[Any]:
-    return np.dtype([("finger", "u1"), *((name, dtype) for name, dtype in COLUMNS[kind].items())])
+def _frames(batch: Batch) -> StructArray:
+    rows = np.empty(len(batch.wire), ROWS[FRAME])
+    for name in ROWS[FRAME].names or ():
+        rows[name] = batch.seq if name == "seq" else batch.t_us if name == "t_us" else batch.wire[name]
+    return rows
 
 
 def as_sent(rows: StructArray, kind: int) -> StructArray:
-    """Messages of one kind with seq and t_us wrapped again; ``rows`` itself if it already has that dtype."""
+    """Messages of one kind with ``seq`` and ``t_us`` wrapped again; ``rows`` itself if it already has that dtype."""
     sent = DTYPES[KINDS[kind]]
     if rows.dtype == sent:
         return rows
     out = np.empty(len(rows), sent)
-    out["finger"] = rows["finger"]
-    for name in ("seq", "t_us"):
-        out[name] = rows[name] & np.iinfo(sent[name]).max
-    rest = rows.dtype.itemsize - _LEAD  # the same in both, so one copy per row
-    _bytes(out)[:, -rest:] = _bytes(rows)[:, -rest:]
+    for name in sent.names or ():
+        out[name] = rows[name] & np.iinfo(sent[name]).max if name in ("seq", "t_us") else rows[name]
     return out
 
 
-def _bytes(rows: StructArray) -> NDArray[np.uint8]:
-    return rows.view(np.uint8).reshape(len(rows), rows.dtype.itemsize)
+def packets_of(rest: Rest, rows: list[StructArray]) -> Iterator[Packet]:
+    """All messages of a block in order of arrival; ``rows`` by kind."""
+    of_kind = [iter(_payloads(as_sent(table, kind))) for kind, table in enumerate(rows)]
+    others = iter(rest.packets.split(b"\0"))
+    for kind in (rest.order >> 8).tolist():
+        if kind < len(KINDS):
+            payload = next(of_kind[kind])
+            yield Packet(encode(KINDS[kind], payload), KINDS[kind], payload)
+        else:
+            data = next(others)
+            yield Packet(data + b"\0", *(open_frame(data) or (None, b"")))
 
 
-def together(rest: Rest, sent: list[StructArray]) -> bytes:
-    """The wire bytes of ``sent``, the messages by kind, each kind in order of arrival."""
-    n = 1 << _FINGER_BITS
-    tables, sizes, ids = (ffi.new(f"{kind}[64]") for kind in ("uint8_t const *", "uint32_t", "uint8_t"))
-    keep = []
-    for kind, rows in enumerate(sent):
-        finger = rows["finger"]
-        for one in np.unique(finger).tolist():
-            mine = rows[finger == one]
-            keep.append(ffi.from_buffer("uint8_t[]", mine))
-            code = kind * n + one
-            tables[code], sizes[code], ids[code] = keep[-1], rows.dtype.itemsize, KINDS[kind]
-    out = ffi.new("uint8_t[]", _MOST_PER_MESSAGE * len(rest.codes) + len(rest.raw) + 1)
-    codes = rest.codes.tobytes()
-    size = lib.bt_rebuild(codes, len(codes), tables, sizes, ids, rest.raw, len(rest.raw), out)
-    data: bytes = ffi.buffer(out, size)[:]
-    return data
+def _payloads(sent: StructArray) -> Iterator[bytes]:
+    data, size = sent.tobytes(), sent.dtype.itemsize
+    return (data[at : at + size] for at in range(0, len(data), size))
 
 
-# ---- columns ----------------------------------------------------------------------------------------
+# ---- tables -----------------------------------------------------------------------------------------
 
 
-def _encoded(tables: list[StructArray]) -> Iterator[bytes]:
-    yield _ROWS.pack(*map(len, tables))
-    for columns, rows in zip(COLUMNS, tables, strict=True):
-        for name, dtype in columns.items() if len(rows) else ():
-            values = np.ascontiguousarray(rows[name].astype(dtype.base, copy=False)).reshape(len(rows), -1)
-            yield _planes(values)
+def _table(rows_of_kind: list[StructArray]) -> bytes:
+    parts = [_COUNTS.pack(*map(len, rows_of_kind))]
+    for columns, rows in zip(_COLUMNS, rows_of_kind, strict=True):
+        for name, dtype, _ in columns if len(rows) else ():
+            values = np.ascontiguousarray(rows[name].astype(dtype, copy=False)).reshape(len(rows), -1)
+            parts.append(_planes(values))
+    return b"".join(parts)
 
 
 def _planes(values: NDArray[Any]) -> bytes:
@@ -203,69 +201,67 @@ def _planes(values: NDArray[Any]) -> bytes:
     return planes.tobytes()
 
 
-class Reading:
-    """Turns the stored columns of one kind into rows of the fields ``wanted``; None: into no rows at all."""
+class TableReader:
+    """Reads tables of the columns that ``schema`` wrote, and of these only the fields ``wanted``, by kind.
 
-    def __init__(self, kind: int, columns: list[Column], wanted: Collection[str] | None) -> None:
-        full = table_dtype(kind)
+    Raises ValueError, KeyError or TypeError for another schema.
+    """
+
+    def __init__(self, text: bytes, wanted: Mapping[int, Collection[str]]) -> None:
+        stored = json.loads(text)
+        self._kinds = [_KindReader(kind, stored[_name(KINDS[kind])], wanted.get(kind)) for kind in range(len(KINDS))]
+
+    def rows(self, kind: int, fingers: NDArray[np.uint8]) -> StructArray:
+        """Rows of these fingers, for ``read`` to fill; fields that the recording does not have are invalid."""
+        reader = self._kinds[kind]
+        rows = np.empty(len(fingers), reader.dtype)
+        rows["finger"] = fingers
+        for name in reader.missing:
+            rows[name] = WIRE_INVALID.get(reader.dtype[name].base.str[1:], 0)
+        return rows
+
+    def read(self, data: bytes, finger: int, rows_of_kind: list[StructArray]) -> None:
+        """Fill a finger's rows. Raises ValueError or struct.error if the table has another size than they."""
+        counts = _COUNTS.unpack_from(data)
+        size = _COUNTS.size + sum(n * reader.row_bytes for n, reader in zip(counts, self._kinds, strict=True))
+        if size != len(data):
+            raise ValueError(f"a finger's table of {len(data)} bytes, expected {size}")
+        begin = _COUNTS.size
+        for n, reader, rows in zip(counts, self._kinds, rows_of_kind, strict=True):
+            end = begin + n * reader.row_bytes
+            if reader.wanted:
+                at = np.flatnonzero(rows["finger"] == finger).astype(np.uint32)
+                if len(at) != n:
+                    raise ValueError(f"a finger's table of {n} rows, expected {len(at)}")
+                reader.read(memoryview(data)[begin:end], rows, at)
+            begin = end
+
+
+class _KindReader:
+    def __init__(self, kind: int, stored: list[list[Any]], wanted: Collection[str] | None) -> None:
+        columns = [Column(str(name), np.dtype(dtype), int(parts)) for name, dtype, parts in stored]
+        if any(column.dtype.kind not in "iu" or not 0 < column.parts <= 64 for column in columns):
+            raise ValueError("a column is not of integers, or not 1 to 64 wide")
         chosen = {"finger", *(wanted or ())}
-        self.dtype = np.dtype([(name, full[name]) for name in full.names or () if name in chosen])
         self.wanted = wanted is not None
-        self.row_bytes = sum(stored.itemsize * parts for _, stored, parts in columns)
+        self.dtype = np.dtype([(name, ROWS[kind][name]) for name in ROWS[kind].names or () if name in chosen])
+        self.row_bytes = sum(column.dtype.itemsize * column.parts for column in columns)
         fields = dict(self.dtype.fields or {})
         del fields["finger"]
         specs = []
-        for name, stored, parts in columns:
-            its = fields.pop(name, None)
-            if its is not None and (its[0].base, int(np.prod(its[0].shape))) != (stored, parts):
-                raise ValueError(f"{name} is {parts} x {stored}, expected {its[0]}")
-            specs.append((stored.itemsize, parts, -1 if its is None else its[1]))
+        for name, stored_dtype, parts in columns:
+            own = fields.pop(name, None)
+            if own is not None and (own[0].base, int(np.prod(own[0].shape))) != (stored_dtype, parts):
+                raise ValueError(f"{name} is {parts} x {stored_dtype}, expected {own[0]}")
+            specs.append((stored_dtype.itemsize, parts, -1 if own is None else own[1]))
+        self.missing = list(fields)
         self._columns = ffi.new("bt_stored_column[]", specs)
-        self._missing = list(fields)
-        self.nothing = self.table(np.empty(0, np.uint8))
-
-    def table(self, finger: NDArray[np.uint8]) -> StructArray:
-        """Rows of these fingers, for ``read`` to fill; fields that the recording's version did not have are invalid."""
-        rows = np.empty(len(finger), self.dtype)
-        rows["finger"] = finger
-        for name in self._missing:
-            rows[name] = WIRE_INVALID.get(self.dtype[name].base.str[1:], 0)
-        return rows
 
     def read(self, planes: memoryview, rows: StructArray, at: NDArray[np.uint32]) -> None:
-        """Decode a part's columns of this kind, ``len(at) * row_bytes`` bytes, into the rows ``at`` of a table."""
+        """Decode ``len(at) * row_bytes`` bytes into the rows ``at``."""
         source, index, out = (
             ffi.from_buffer("uint8_t[]", planes),
             ffi.from_buffer("uint32_t[]", at),
             ffi.from_buffer("uint8_t[]", rows),
         )
         lib.bt_columns(source, len(at), self._columns, len(self._columns), index, out, rows.dtype.itemsize)
-
-
-def read_part(data: bytes, readings: Sequence[Reading], tables: list[StructArray], finger: int) -> None:
-    """Decode a finger's part into its rows of ``tables``, by kind. Raises ValueError or struct.error for wrong size."""
-    counts = _ROWS.unpack_from(data)
-    expected = _ROWS.size + sum(n * reading.row_bytes for n, reading in zip(counts, readings, strict=True))
-    if expected != len(data):
-        raise ValueError(f"a finger's part of {len(data)} bytes, expected {expected}")
-    begin = _ROWS.size
-    for n, reading, rows in zip(counts, readings, tables, strict=True):
-        end = begin + n * reading.row_bytes
-        if reading.wanted:
-            at = np.flatnonzero(rows["finger"] == finger).astype(np.uint32)
-            if len(at) != n:
-                raise ValueError(f"a finger's part of {n} rows, expected {len(at)}")
-            reading.read(memoryview(data)[begin:end], rows, at)
-        begin = end
-
-
-def layout_of(text: bytes) -> list[list[Column]]:
-    """The columns by kind that ``schema`` wrote. Raises ValueError, KeyError or TypeError for anything else."""
-    kinds = json.loads(text)
-    out = []
-    for message_id in KINDS:
-        columns = [(str(n), np.dtype(d), int(p)) for n, d, p in kinds[wire.MESSAGES[message_id].__name__.upper()]]
-        if any(dtype.kind not in "iu" or not 0 < parts <= 64 for _, dtype, parts in columns):
-            raise ValueError("a column is not of integers, or not 1 to 64 wide")
-        out.append(columns)
-    return out

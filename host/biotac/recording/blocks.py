@@ -1,49 +1,44 @@
-"""The blocks of a recording, one by one: rows of the wanted fields and fingers, or the wire bytes."""
+"""The blocks of a recording, one by one, with the wanted fields and fingers."""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from mcap.records import Message, Metadata
 from numpy.typing import NDArray
 
-from ..hand.gap import GAP
 from ..wire.frames import StructArray
 from . import layout
-from .block import KINDS, Reading, Rest, as_sent, layout_of, read_part, table_dtype, together
+from .block import FRAME, IDLE, KINDS, ROWS, Packet, Rest, TableReader, packets_of
 from .scan import Scan
 
-ALL = {kind: table_dtype(kind).names or () for kind in range(len(KINDS))}
+_NO_FINGER = np.empty(0, np.uint8)
+ALL = {kind: dtype.names or () for kind, dtype in enumerate(ROWS)}
 
 
 @dataclass(frozen=True)
-class Piece:
-    """One block. ``rows``: the wanted fingers and fields, by kind, in order of arrival.
-
-    If ``rest`` is None, the block is ``raw``: wire bytes as they came. ``whole``: none of it is damaged.
-    """
+class Block:
+    """``rows``: the wanted fingers and fields, by kind, in order of arrival. ``missing``: FRAMEs in damaged tables."""
 
     arrived_ns: int
     all_here_ns: int
     number: int
     rows: list[StructArray]
-    rest: Rest | None = None
-    raw: bytes = b""
-    whole: bool = True
+    rest: Rest
+    missing: int = 0
 
-    def bytes(self) -> bytes:
-        """The wire bytes as they came; only for a piece with all fields and fingers."""
-        if self.rest is None:
-            return self.raw
-        return together(self.rest, [as_sent(rows, kind) for kind, rows in enumerate(self.rows)])
+    def packets(self) -> Iterator[Packet]:
+        """All messages in order of arrival; only for a block with all fields and fingers."""
+        return packets_of(self.rest, self.rows)
 
 
 class Blocks:
-    """Iterates over Pieces; ``metadata`` (None until seen), ``gaps`` and ``scan.problems`` are complete afterwards."""
+    """Iterates over Blocks; ``metadata`` (None until seen) and ``scan.problems`` are complete afterwards."""
 
     def __init__(
         self,
@@ -55,15 +50,14 @@ class Blocks:
     ) -> None:
         self.metadata: dict[str, str] | None = None
         self.damaged_metadata = 0
-        self.gaps: list[dict[str, str]] = []
         self._wanted = wanted
         self._fingers = None if fingers is None else set(fingers)
-        self._chosen = None if fingers is None else np.isin(np.arange(256), list(fingers))
+        self._is_chosen = None if fingers is None else np.isin(np.arange(256), list(fingers))
         self.scan = Scan(path, self._is_wanted, check=check)
-        self._readings: list[Reading] = []
+        self._reader: TableReader | None = None
 
-    def __iter__(self) -> Iterator[Piece]:
-        parts: dict[int, bytes] = {}
+    def __iter__(self) -> Iterator[Block]:
+        tables: dict[int, bytes] = {}
         number = 0
         for record in self.scan:
             if isinstance(record, Metadata):
@@ -71,25 +65,22 @@ class Blocks:
                 continue
             topic, message = record
             if message.sequence != number:
-                if parts or message.sequence < number:
-                    self._told_misplaced()
-                parts, number = {}, message.sequence
-            if topic == layout.TOPIC:
-                none = [np.empty(0, table_dtype(kind)) for kind in range(len(KINDS))]
-                yield Piece(message.publish_time, message.log_time, number, none, raw=message.data)
-            elif topic == layout.REST:
-                piece = self._piece(message, parts)
-                if piece is not None:
-                    yield piece
-                parts = {}
-            else:
-                parts[int(topic.removeprefix(layout.PARTS))] = message.data
+                if tables or message.sequence < number:
+                    self._report_misplaced()
+                tables, number = {}, message.sequence
+            if topic != layout.PACKETS:
+                tables[int(topic.removeprefix(layout.TABLE))] = message.data
+                continue
+            block = self._block(message, tables)
+            if block is not None:
+                yield block
+            tables = {}
 
     def _is_wanted(self, topic: str) -> bool:
-        if topic.startswith(layout.PARTS):
-            finger = topic.removeprefix(layout.PARTS)
-            return finger.isdigit() and (self._fingers is None or int(finger) in self._fingers)
-        return topic in (layout.TOPIC, layout.REST)
+        if topic.startswith(layout.TABLE):
+            finger = topic.removeprefix(layout.TABLE)
+            return finger.isdecimal() and (self._fingers is None or int(finger) in self._fingers)
+        return topic == layout.PACKETS
 
     def _take_metadata(self, record: Metadata) -> None:
         try:
@@ -100,57 +91,58 @@ class Blocks:
             return
         if record.name == layout.METADATA_NAME and self.metadata is None:
             self.metadata = facts
-        elif record.name == f"{layout.METADATA_NAME}.{GAP}":
-            self.gaps.append(facts)
 
-    def _told_misplaced(self) -> None:
-        """Report parts that are missing or misplaced, unless an earlier problem already explains it."""
+    def _report_misplaced(self) -> None:
+        """Report tables that are missing or misplaced, unless an earlier problem already explains it."""
         if not self.scan.problems:
             name = self.scan.path.name
             self.scan.problems.append(f"{name} is damaged: parts of it are missing or out of order, and were skipped")
 
-    def _piece(self, message: Message, parts: dict[int, bytes]) -> Piece | None:
+    def _block(self, message: Message, tables: dict[int, bytes]) -> Block | None:
         try:
             rest = Rest.unpack(message.data)
-            if not self._readings:
-                columns = layout_of(self.scan.schemas[layout.REST])
-                self._readings = [Reading(kind, its, self._wanted.get(kind)) for kind, its in enumerate(columns)]
-            wanted = rest.all_fingers if self._fingers is None else rest.all_fingers & self._fingers
-            whole = set(parts) >= wanted
-            if not whole:
-                self._told_misplaced()
-                rest = rest.without(wanted - set(parts))
-            rows = self._tables(rest, self._readings)
-            for finger, data in parts.items():
-                read_part(data, self._readings, rows, finger)
+            if tables and self._reader is None:
+                self._reader = TableReader(self.scan.schemas[f"{layout.TABLE}{min(tables)}"], self._wanted)
+            wanted = set(rest.fingers) if self._fingers is None else self._fingers.intersection(rest.fingers)
+            damaged, missing = wanted - set(tables), 0
+            if damaged:
+                self._report_misplaced()
+                missing = int(np.isin(rest.finger_of_row(FRAME), list(damaged)).sum())
+                rest = rest.without(damaged)
+            rows = self._rows(rest, tables)
         except (KeyError, TypeError, ValueError, struct.error, IndexError, RecursionError) as error:
             self.scan.damaged_chunks += 1
             self.scan.problems.append(f"one second of {self.scan.path.name} is damaged and was skipped ({error})")
             return None
-        return Piece(message.publish_time, message.log_time, message.sequence, rows, rest, whole=whole)
+        return Block(message.publish_time, message.log_time, message.sequence, rows, rest, missing)
 
-    def _tables(self, rest: Rest, readings: list[Reading]) -> list[StructArray]:
-        """Rows for ``read_part`` to fill, by kind, with their fingers set."""
-        return [
-            reading.table(self._mine(rest.fingers(kind))) if reading.wanted else reading.nothing
-            for kind, reading in enumerate(readings)
-        ]
+    def _rows(self, rest: Rest, tables: dict[int, bytes]) -> list[StructArray]:
+        if self._reader is None:
+            return [np.empty(0, dtype) for dtype in ROWS]
+        of_row = [rest.finger_of_row(kind) if kind in self._wanted else _NO_FINGER for kind in range(len(KINDS))]
+        if self._is_chosen is not None:
+            of_row = [fingers[self._is_chosen[fingers]] for fingers in of_row]
+        rows = [self._reader.rows(kind, fingers) for kind, fingers in enumerate(of_row)]
+        for finger, data in tables.items():
+            self._reader.read(data, finger, rows)
+        return rows
 
-    def _mine(self, fingers: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """The wanted ones of ``fingers``."""
-        return fingers if self._chosen is None else fingers[self._chosen[fingers]]
+
+def lost_between(blocks: list[Block]) -> int:
+    """FRAMEs of missing blocks, by the sequence numbers around them; losses that are known are left out."""
+    lost = 0
+    for before, after in pairwise(blocks):
+        for finger in before.rest.fingers if after.number > before.number + 1 else ():
+            (ends, _), (numbers, rounds) = _numbers(before, finger), _numbers(after, finger)
+            if len(ends) and len(numbers):
+                first = int(np.argmin(numbers))
+                known = sum(n for which, seq, n in after.rest.lost if which == finger and seq < numbers[first])
+                lost += max(0, int(numbers[first] - rounds[first] - ends.max()) - known)
+    return lost
 
 
-def is_lossless(frames: StructArray, pac: StructArray, idle: StructArray) -> bool:
-    """True if every finger's rounds are all there, each once, as a FRAME or in a heartbeat, and so is every PAC."""
-    for finger in range(8):
-        mine, waits = frames["seq"][frames["finger"] == finger], idle[idle["finger"] == finger]
-        ends = np.concatenate([mine, waits["seq"]]).astype(np.int64)
-        rounds = np.concatenate([np.ones(len(mine), np.int64), waits["frames"]])
-        order = np.argsort(ends, kind="stable")
-        blocks = pac["seq"][pac["finger"] == finger].astype(np.int64)
-        if (np.diff(ends[order]) != rounds[order][1:]).any() or (np.diff(blocks) != 1).any():
-            return False
-        if (np.diff(mine.astype(np.int64)) <= 0).any():
-            return False
-    return True
+def _numbers(block: Block, finger: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Sequence numbers of a finger's FRAMEs and heartbeats, and how many rounds each stands for."""
+    frames, idle = (block.rows[kind][block.rows[kind]["finger"] == finger] for kind in (FRAME, IDLE))
+    numbers = np.concatenate([frames["seq"], idle["seq"]]).astype(np.int64)
+    return numbers, np.concatenate([np.ones(len(frames)), idle["frames"]]).astype(np.int64)

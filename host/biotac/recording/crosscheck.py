@@ -21,7 +21,6 @@ from ..core.map_bound import bound_of
 from ..core.map_columns import Signals, tared
 from ..core.map_float64 import exact, replace_gains, result_units, tared_chunks
 from ..core.map_versions import opened
-from ..hand.compatibility import PRESSURE_SINCE_MINOR
 from ..wire import map_gen as _map
 from ..wire import messages_gen as wire
 from ..wire.frames import FORCE_LSB_PER_N, UM_PER_MM, StructArray, electrode_signals, to_units
@@ -66,7 +65,6 @@ class CrossCheck:
     force_mn_max: float = 0.0
     torque_nmm_max: float = 0.0
     torque_nmm_bound: float = 0.0  # the largest that applied to any frame
-    wire_minor: int = wire.WIRE_MINOR  # of the board: before 1.4 no board sent a force from pressure
     pressure: PressureCheck = field(default_factory=PressureCheck)
     mapped: int = 0  # frames with a wrench map, whose force has a bound of its own
     mapped_force_mn_bound: float = 0.0  # the largest of those, and of frames with the population map
@@ -160,9 +158,8 @@ class CrossCheck:
         self.force_mn_max = max(self.force_mn_max, largest["force"])
         self.torque_nmm_max = max(self.torque_nmm_max, largest["torque"], largest["torsion"])
         self._judge_flag(messages)
-        if self.wire_minor >= PRESSURE_SINCE_MINOR:
-            for row, what in self.pressure.add(messages, settings):
-                self._find(messages, row, what)
+        for row, what in self.pressure.add(messages, settings):
+            self._find(messages, row, what)
         self.frames += len(messages)
 
     def _judge_flag(self, messages: StructArray) -> None:

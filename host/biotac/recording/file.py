@@ -2,23 +2,23 @@
 
 Each second is stored as one chunk per finger, one chunk with the other messages and the order of all, which cannot be
 recovered from elsewhere, and one chunk for plotting. Each chunk is closed and handed to the operating system at once.
-A second that cannot be split so that it could be reassembled byte for byte (it holds damaged messages, or another
-version's) is stored as it came.
 """
 
 from __future__ import annotations
 
 import contextlib
+from dataclasses import asdict
 from importlib import resources
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
+import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 
+from ..hand.gap import Gap
 from ..version import __version__
 from ..wire.batches import StreamDecoder
 from . import layout
-from .block import schema as schema_of_parts
-from .block import take_apart
+from .block import Rest, schema, take_apart
 from .plots import Plots
 
 # Large enough that only flush() closes a chunk; the library would also close it by size.
@@ -47,18 +47,27 @@ class RecordingFile:
             enable_data_crcs=True,
         )
         self._writer.start(profile="", library=f"biotac-gateway {__version__}")
-        self._last = (0, 0)
         self._tail = b""  # of a message whose end has not arrived yet
+        self._gaps: list[dict[str, Any]] = []  # to be written with the next block
         self._decoder = StreamDecoder()
         self._decoder.accept_newer_minor()
-        schema = resources.files("biotac").joinpath("schema.json").read_bytes()
-        self._wire_schema = self._writer.register_schema(layout.SCHEMA_NAME, layout.SCHEMA_ENCODING, schema)
-        self._parts_schema = self._writer.register_schema(layout.PARTS_SCHEMA, layout.PARTS_ENCODING, schema_of_parts())
+        self._last_ns: int | None = None  # when the last block's bytes had all arrived
+        self.frames = 0  #: FRAMEs written so far
+        wire_schema = resources.files("biotac").joinpath("schema.json").read_bytes()
+        self._packets_schema = self._writer.register_schema(
+            layout.WIRE_SCHEMA, layout.WIRE_SCHEMA_ENCODING, wire_schema
+        )
+        self._table_schema = self._writer.register_schema(layout.TABLE_SCHEMA, layout.TABLE_ENCODING, schema())
         self._channels: dict[str, int] = {}
         self._plots = Plots(self._writer)
         self._metadata = layout.signed(metadata)
         self._writer.add_metadata(layout.METADATA_NAME, self._metadata)
         self._writer.flush()  # type: ignore[no-untyped-call]
+
+    @property
+    def frames_lost(self) -> int:
+        """FRAMEs lost on the way, by their sequence numbers."""
+        return self._decoder.lost
 
     def add(self, block: bytes, arrived_ns: int, all_here_ns: int | None = None) -> None:
         """Append wire bytes; ``arrived_ns`` is when their first byte arrived, in ns on the host's clock (Unix).
@@ -71,37 +80,47 @@ class RecordingFile:
         data, self._tail = data[:end], data[end:]
         if not data:
             return
-        batch = self._decoder.feed(data)
-        apart = take_apart(data, batch)
-        stamps = all_here_ns or arrived_ns, arrived_ns
-        if apart is None:
-            self._put(layout.TOPIC, data, stamps)
-        else:
-            for finger, part in sorted(apart.parts.items()):
-                self._put(f"{layout.PARTS}{finger}", part, stamps)
-            self._put(layout.REST, apart.rest.pack(), stamps)
-        self._sequence += 1
-        self._last = stamps
-        if self._plots.add(batch, self._decoder, arrived_ns, all_here_ns):
+        if all_here_ns is not None and self._last_ns is not None:
+            self._decoder.passed((arrived_ns - self._last_ns) / 1e9)
+        self._last_ns = all_here_ns
+        decoder = self._decoder
+        losses, lost_pac, disordered = len(decoder.lost_after), decoder.lost_pac, decoder.disordered
+        batch = decoder.feed(data)
+        tables, order, packets = take_apart(data, batch)
+        rest = Rest(
+            order,
+            packets,
+            sorted(tables),
+            batch.first_t_us(),
+            batch.last_t_us(),
+            decoder.lost_after[losses:],
+            decoder.lost_pac - lost_pac,
+            decoder.disordered - disordered,
+        )
+        self._put(tables, rest, arrived_ns, all_here_ns)
+        self.frames += len(batch.wire)
+        self._plots.add(batch, decoder, arrived_ns, all_here_ns)
+        self._writer.flush()  # type: ignore[no-untyped-call]
+
+    def add_gap(self, gap: Gap) -> None:
+        """Note that the board was away before the bytes that are added next."""
+        self._gaps.append(asdict(gap))
+        self._plots.gap(gap)
+
+    def _put(self, tables: dict[int, bytes], rest: Rest, arrived_ns: int, all_here_ns: int | None) -> None:
+        """Write a block, each part as a chunk of its own, so that a reader need not open the others."""
+        rest.gaps.extend(self._gaps)
+        self._gaps.clear()
+        parts = {f"{layout.TABLE}{finger}": data for finger, data in sorted(tables.items())}
+        for topic, data in (parts | {layout.PACKETS: rest.pack()}).items():
+            if topic not in self._channels:
+                of_packets = layout.PACKETS_ENCODING, self._packets_schema
+                of_table = layout.TABLE_ENCODING, self._table_schema
+                encoding, schema_id = of_packets if topic == layout.PACKETS else of_table
+                self._channels[topic] = self._writer.register_channel(topic, encoding, schema_id)
+            self._writer.add_message(self._channels[topic], all_here_ns or arrived_ns, data, arrived_ns, self._sequence)
             self._writer.flush()  # type: ignore[no-untyped-call]
-
-    def _put(self, topic: str, data: bytes, stamps: tuple[int, int]) -> None:
-        """Write a message as a chunk of its own, so that a reader need not open the others."""
-        if topic not in self._channels:
-            encoding, schema = (
-                (layout.MESSAGE_ENCODING, self._wire_schema)
-                if topic == layout.TOPIC
-                else (layout.PARTS_ENCODING, self._parts_schema)
-            )
-            self._channels[topic] = self._writer.register_channel(topic, encoding, schema)
-        all_here_ns, arrived_ns = stamps
-        self._writer.add_message(self._channels[topic], all_here_ns, data, arrived_ns, self._sequence)
-        self._writer.flush()  # type: ignore[no-untyped-call]
-
-    def mark(self, what: str, facts: dict[str, str]) -> None:
-        """Append a metadata record ``biotac.WHAT``."""
-        self._writer.add_metadata(f"{layout.METADATA_NAME}.{what}", layout.signed(facts))
-        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._sequence += 1
 
     @property
     def closed(self) -> bool:
@@ -117,8 +136,9 @@ class RecordingFile:
         if self._stream.closed:
             return
         try:
-            if self._tail:
-                self._put(layout.TOPIC, self._tail, self._last)
+            if self._gaps:
+                at_ns = self._gaps[-1]["back_at_ns"]
+                self._put({}, Rest(np.empty(0, np.uint16), b""), at_ns, at_ns)
             self._writer.add_metadata(layout.METADATA_NAME, self._metadata)  # again, in case the first one gets damaged
             self._writer.flush()  # type: ignore[no-untyped-call]  # finish() leaves what it flushes itself out of its checksum
             self._writer.finish()  # type: ignore[no-untyped-call]

@@ -10,31 +10,27 @@ from pathlib import Path
 
 from ..errors import RecordingError
 
-# Additions that an older reader may ignore (topics, metadata keys) do not change it.
-FORMAT_VERSION = "2"
-KNOWN_VERSIONS = ("1", "2")
-# 1: blocks of the wire. 2: split blocks (block.py), one message per finger and one for the rest, which comes last and
-# has the same sequence number; blocks that cannot be split are stored as in 1.
-TOPIC = "/biotac/wire"
-PARTS = "/biotac/parts/finger"
-REST = "/biotac/parts/rest"
-PARTS_ENCODING = "biotac-parts"
-PARTS_SCHEMA = "biotac.Parts"
+# Additions that an older reader may ignore (topics, metadata keys, columns) do not change it.
+FORMAT_VERSION = "1"
+TABLE = "/biotac/table/finger"  # with the finger's number: its rows of one block (block.py)
+PACKETS = "/biotac/packets"  # all else of that block; comes after its tables, with the same sequence number
+TABLE_ENCODING = "biotac-table"
+PACKETS_ENCODING = "biotac-packets"
 NAMES = "names"  # metadata key: JSON, fingers by name
 CHECKSUM = "crc32"  # metadata key: of all others
-MESSAGE_ENCODING = "biotac-wire"
-SCHEMA_NAME = "biotac.link"
-SCHEMA_ENCODING = "biotac-schema"
+TABLE_SCHEMA = "biotac.Table"
+WIRE_SCHEMA = "biotac.link"
+WIRE_SCHEMA_ENCODING = "biotac-schema"
 METADATA_NAME = "biotac"
 CONTINUES = "continues"  # metadata key: the file that ended when the board restarted
 
 
 def check_version(path: Path, metadata: Mapping[str, str]) -> None:
     """Raise RecordingError for a recording that this version cannot read."""
-    if metadata.get("format") not in KNOWN_VERSIONS:
+    if metadata.get("format") != FORMAT_VERSION:
         raise RecordingError(
-            f"{path} has recording format {metadata.get('format')}, this version reads "
-            f"{' and '.join(KNOWN_VERSIONS)}; install a newer biotac-gateway"
+            f"{path} has recording format {metadata.get('format')}, this version reads {FORMAT_VERSION}; "
+            "read it with the biotac-gateway that wrote it, or a newer one"
         )
 
 
@@ -50,7 +46,7 @@ def maps_text(maps: Mapping[int, bytes]) -> str:
 
 def maps_of(text: str) -> dict[int, bytes]:
     """Inverse of maps_text. Raises ValueError for invalid text."""
-    return {int(finger): base64.b64decode(its, validate=True) for finger, its in json.loads(text).items()}
+    return {int(finger): base64.b64decode(blob, validate=True) for finger, blob in json.loads(text).items()}
 
 
 def names_of(metadata: Mapping[str, str]) -> dict[str, int]:
@@ -71,9 +67,9 @@ def signed(facts: Mapping[str, str]) -> dict[str, str]:
 
 
 def unsigned(facts: Mapping[str, str]) -> dict[str, str]:
-    """Inverse of ``signed``. Raises ValueError when the checksum is wrong; format 1 had none and is accepted as is."""
+    """Inverse of ``signed``. Raises ValueError when the checksum is wrong or missing."""
     rest = {key: value for key, value in facts.items() if key != CHECKSUM}
-    if facts.get(CHECKSUM, _checksum(rest)) != _checksum(rest):
+    if facts.get(CHECKSUM) != _checksum(rest):
         raise ValueError("wrong checksum")
     return rest
 

@@ -16,70 +16,101 @@ from . import layout
 
 ARRAY = "std_msgs/msg/Float64MultiArray"
 POSE = "geometry_msgs/msg/PoseStamped"
-_RULE = "=" * 80
-_CDR = b"\0\1\0\0"
+FLAGS = "std_msgs/msg/UInt32"
+LOG = "rcl_interfaces/msg/Log"
+INFO, WARN = 20, 30  # levels of a log
+_LAST_S = 2**31 - 1  # that ROS's time can say, in 2038
+_RULE = "=" * 80 + "\n"
+_TIME = f"{_RULE}MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
 
 #: ROS 2 message definitions by type name.
 SCHEMAS = {
     ARRAY: f"""std_msgs/MultiArrayLayout layout
 float64[] data
-{_RULE}
-MSG: std_msgs/MultiArrayLayout
+{_RULE}MSG: std_msgs/MultiArrayLayout
 std_msgs/MultiArrayDimension[] dim
 uint32 data_offset
-{_RULE}
-MSG: std_msgs/MultiArrayDimension
+{_RULE}MSG: std_msgs/MultiArrayDimension
 string label
 uint32 size
 uint32 stride
 """,
     POSE: f"""std_msgs/Header header
 geometry_msgs/Pose pose
-{_RULE}
-MSG: std_msgs/Header
+{_RULE}MSG: std_msgs/Header
 builtin_interfaces/Time stamp
 string frame_id
-{_RULE}
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-{_RULE}
-MSG: geometry_msgs/Pose
+{_TIME}{_RULE}MSG: geometry_msgs/Pose
 geometry_msgs/Point position
 geometry_msgs/Quaternion orientation
-{_RULE}
-MSG: geometry_msgs/Point
+{_RULE}MSG: geometry_msgs/Point
 float64 x
 float64 y
 float64 z
-{_RULE}
-MSG: geometry_msgs/Quaternion
+{_RULE}MSG: geometry_msgs/Quaternion
 float64 x
 float64 y
 float64 z
 float64 w
 """,
+    FLAGS: "uint32 data\n",
+    LOG: f"""byte DEBUG=10
+byte INFO=20
+byte WARN=30
+byte ERROR=40
+byte FATAL=50
+builtin_interfaces/Time stamp
+uint8 level
+string name
+string msg
+string file
+string function
+uint32 line
+{_TIME}""",
 }
 
 
 def array(label: str, values: Any) -> bytes:
     """A Float64MultiArray of ``values`` (n,), NaN where one is invalid; ``label`` says what they are."""
     n = len(values)
-    text = label.encode() + b"\0"
-    head = struct.pack("<II", 1, len(text)) + text + bytes(-len(text) % 4) + struct.pack("<IIII", n, n, 0, n)
-    return _CDR + head + bytes(-len(head) % 8) + _numbers(values)
+    return _cdr(1, label, n, n, 0, n, np.asarray(values, np.float32))
+
+
+def flags(value: int) -> bytes:
+    """A UInt32."""
+    return _cdr(value)
 
 
 def contact(finger: int, poc_m: Any, force_n: Any, stamp_ns: int) -> bytes:
     """A PoseStamped at the point of contact, its x axis along the force (the finger's own x where there is none)."""
-    text = layout.frame_id(finger).encode() + b"\0"
+    pose = np.array([*poc_m, *_turned_to(force_n)], np.float32)
+    return _cdr(*_time(stamp_ns), layout.frame_id(finger), pose)
+
+
+def log(name: str, text: str, stamp_ns: int, level: int = INFO) -> bytes:
+    """A Log of ``text``, said by ``name``."""
+    return _cdr(*_time(stamp_ns), bytes([level]), name, text, "", "", 0)
+
+
+def _time(stamp_ns: int) -> tuple[int, int]:
     seconds, ns = divmod(stamp_ns, 10**9)
-    head = struct.pack("<iII", min(seconds, 2**31 - 1), ns, len(text)) + text
-    return _CDR + head + bytes(-len(head) % 8) + _numbers([*poc_m, *_turned_to(force_n)])
+    return min(seconds, _LAST_S), ns
 
 
-def _numbers(values: Any) -> bytes:
-    return np.asarray(values, np.float32).astype("<f8").tobytes()
+def _cdr(*fields: int | str | bytes | Any) -> bytes:
+    """uint32, string, octets, or an array of float64 from float32."""
+    out = bytearray()
+    for field in fields:
+        if isinstance(field, bytes):
+            out += field
+        elif isinstance(field, str):
+            text = field.encode() + b"\0"
+            out += bytes(-len(out) % 4) + struct.pack("<I", len(text)) + text
+        elif isinstance(field, int):
+            out += bytes(-len(out) % 4) + struct.pack("<I", field)
+        else:
+            out += bytes(-len(out) % 8) + field.astype("<f8").tobytes()
+    return b"\0\1\0\0" + bytes(out)
 
 
 def _turned_to(force_n: Any) -> tuple[float, float, float, float]:

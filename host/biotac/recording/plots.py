@@ -1,35 +1,51 @@
-"""Messages stored beside the wire for other programs: in SI units, with a frame_id, fewer than on the wire.
+"""Messages of ROS 2 types beside the rows, for other programs: in SI units, with a frame_id, fewer than on the wire.
 
-They are derived from the wire, thinned so that a long recording stays small, and our own readers ignore them. JSON
-messages (plot_json.py) name every value; messages of ROS 2 types (plot_ros.py) are drawn without setup.
+They are derived from the wire, thinned so that a long recording stays small, and our own readers ignore them.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mcap.writer import Writer
 
+from ..hand.gap import Gap
 from ..wire import messages_gen as wire
 from ..wire.batches import Batch, StreamDecoder
+from ..wire.events import event_age_s, kind_name
+from ..wire.fields import INVALID_U32
 from ..wire.frames import StructArray, electrode_signals
-from . import plot_json, plot_ros
+from . import plot_ros
 from .stamps import Stamps
 
-RESULTS_US = 40_000  # 25 a second
+#: Type of each topic of a finger.
+TOPICS = {
+    "force": plot_ros.ARRAY,
+    "torque": plot_ros.ARRAY,
+    "flags": plot_ros.FLAGS,
+    "contact": plot_ros.POSE,
+    "counts": plot_ros.ARRAY,
+    "signals": plot_ros.ARRAY,
+    "pac": plot_ros.ARRAY,
+    "log": plot_ros.LOG,
+}
+FORCE_US = 40_000  # 25 a second
 CONTACT_US = 100_000  # 10 a second: seven numbers that hardly compress
 COUNTS_US = 200_000  # 5 a second
-_PERIOD_US = {"results": RESULTS_US, "contact": CONTACT_US, "counts": COUNTS_US, "pac": COUNTS_US}
-_ROS = {"force": plot_ros.ARRAY, "signals": plot_ros.ARRAY, "contact": plot_ros.POSE}
+_PERIOD_US = {"force": FORCE_US, "contact": CONTACT_US, "counts": COUNTS_US, "pac": COUNTS_US}
+_LABELS = {
+    "force": "force on the finger, N: x, y, z, and its magnitude from static pressure",
+    "torque": "torque on the finger, N*m: x, y, z about the origin, and about the normal at the contact",
+    "counts": "count: E1 to E19, PDC, TAC, TDC",
+    "signals": "above rest, count: E1 to E19",
+    "pac": "dynamic pressure, 1/2200 s apart, count",
+}
 
 
-@dataclass(frozen=True)
-class _Message:
+class _Message(NamedTuple):
     """A message to be written; ``encode`` builds its bytes, given its stamp in ns."""
 
     topic: str
@@ -45,12 +61,12 @@ class Plots:
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
         self._stamps: Stamps | None = None
-        self._channels: dict[tuple[str, int], int] = {}
+        self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
-        self._due_us: dict[tuple[str, int], int] = {}
+        self._due: dict[tuple[str, int], int] = {}
 
-    def add(self, batch: Batch, decoder: StreamDecoder, arrived_ns: int, all_here_ns: int | None) -> bool:
-        """Write the messages for the next rows; return True if there were any.
+    def add(self, batch: Batch, decoder: StreamDecoder, arrived_ns: int, all_here_ns: int | None) -> None:
+        """Write the messages for the next rows.
 
         ``decoder`` is the one that decoded them. Their first byte arrived at ``arrived_ns``, the last at
         ``all_here_ns`` (None if unknown).
@@ -59,85 +75,98 @@ class Plots:
         if self._stamps is None and begin_us is not None:
             self._stamps = Stamps(begin_us, arrived_ns)
         if self._stamps is None:
-            return False
+            return
         if end_us is not None and all_here_ns is not None:
             self._stamps.arrived(end_us, all_here_ns)
-        messages = [*_results(batch, self._thinned("results", batch.frames))]
-        messages += _contacts(batch, self._thinned("contact", batch.frames))
-        messages += _counts(batch, self._thinned("counts", batch.frames), self._thinned("pac", batch.pac))
-        for told in batch.messages:
-            if isinstance(told, wire.Tare):
-                t_us = decoder.unwrap_t_us(told.t_us)
-                messages.append(_json("tare", told.finger, t_us, told.seq, plot_json.tare_change(told)))
-            elif isinstance(told, wire.Event):
-                t_us = decoder.unwrap_t_us(told.t_us)
-                messages.append(_json("events", told.finger, t_us, told.seq, plot_json.event(told)))
+        messages = [*self._of_rows(batch), *_logs(batch, decoder)]
         messages.sort(key=lambda message: message.t_us)
         stamps = self._stamps(np.array([message.t_us for message in messages], np.int64))
         for message, stamp_ns in zip(messages, np.maximum(stamps, 0).tolist(), strict=True):
-            channel = self._channel(message.topic, message.finger)
+            channel = self._channel(message.topic, f"/biotac/finger{message.finger}/{message.topic}")
             self._writer.add_message(channel, stamp_ns, message.encode(stamp_ns), stamp_ns, message.seq)
-        return bool(messages)
 
-    def _thinned(self, what: str, rows: StructArray) -> list[int]:
+    def gap(self, gap: Gap) -> None:
+        """Write a log of a time without the board."""
+        text = plot_ros.log("biotac", gap.words(), gap.back_at_ns, plot_ros.WARN)
+        self._writer.add_message(self._channel("log", "/biotac/log"), gap.back_at_ns, text, gap.back_at_ns, 0)
+
+    def _of_rows(self, batch: Batch) -> Iterator[_Message]:
+        frames = batch.frames
+        rows = frames[self._thinned("force", frames)]
+        yield from _arrays("force", rows, np.column_stack([rows["force_n"], rows["pressure_force_n"]]))
+        yield from _arrays("torque", rows, np.column_stack([rows["torque_nmm"], rows["torsion_nmm"]]) / 1000)
+        for row in rows:
+            yield _Message("flags", *_whose(row), partial(_ignoring_stamp, plot_ros.flags(int(row["flags"]))))
+        chosen = self._thinned("counts", frames)
+        rows = frames[chosen]
+        counts = np.column_stack([rows["counts"], rows["pdc"], rows["tac"], rows["tdc"]])
+        yield from _arrays("counts", rows, _without_invalid(counts))
+        yield from _arrays("signals", rows, electrode_signals(batch.wire[chosen]))
+        pac = batch.pac[self._thinned("pac", batch.pac)]
+        yield from _arrays("pac", pac, _without_invalid(pac["pac"]))
+        for row in frames[self._thinned("contact", frames)]:
+            if not np.isnan(row["poc_mm"]).any():
+                pose = partial(plot_ros.contact, int(row["finger"]), row["poc_mm"] / 1000, row["force_n"])
+                yield _Message("contact", *_whose(row), pose)
+
+    def _thinned(self, topic: str, rows: StructArray) -> list[int]:
         """Indices of the rows to show: each finger's first row in every period of device time."""
-        period_us = _PERIOD_US[what]
         chosen: list[int] = []
-        for finger in np.unique(rows["finger"]):
-            mine = np.flatnonzero(rows["finger"] == finger)
-            slot = rows["t_us"][mine] // period_us
-            fresh = np.diff(slot, prepend=self._due_us.get((what, int(finger)), -1)) != 0
-            self._due_us[what, int(finger)] = int(slot[-1])
-            chosen += mine[fresh].tolist()
+        for finger in np.unique(rows["finger"]).tolist():
+            at = np.flatnonzero(rows["finger"] == finger)
+            period = rows["t_us"][at] // _PERIOD_US[topic]
+            chosen += at[np.diff(period, prepend=self._due.get((topic, finger), -1)) != 0].tolist()
+            self._due[topic, finger] = int(period[-1])
         return chosen
 
-    def _channel(self, topic: str, finger: int) -> int:
-        if (topic, finger) not in self._channels:
-            encoding = "cdr" if topic in _ROS else "json"
-            name = f"/biotac/finger{finger}/{topic}"
-            self._channels[topic, finger] = self._writer.register_channel(name, encoding, self._schema(topic))
-        return self._channels[topic, finger]
-
-    def _schema(self, topic: str) -> int:
-        title = _ROS.get(topic) or str(plot_json.SCHEMAS[topic]["title"])
-        if title not in self._schemas:
-            encoding, text = (
-                ("ros2msg", plot_ros.SCHEMAS[title])
-                if topic in _ROS
-                else ("jsonschema", json.dumps(plot_json.SCHEMAS[topic]))
-            )
-            self._schemas[title] = self._writer.register_schema(title, encoding, text.encode())
-        return self._schemas[title]
+    def _channel(self, topic: str, name: str) -> int:
+        if name not in self._channels:
+            kind = TOPICS[topic]
+            if kind not in self._schemas:
+                text = plot_ros.SCHEMAS[kind].encode()
+                self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", text)
+            self._channels[name] = self._writer.register_channel(name, "cdr", self._schemas[kind])
+        return self._channels[name]
 
 
-def _results(batch: Batch, chosen: list[int]) -> Iterator[_Message]:
-    for k in chosen:
-        row = batch.frames[k]
-        whose = int(row["finger"]), int(row["t_us"]), int(row["seq"])
-        yield _json("results", *whose, plot_json.results(batch.wire[k]))
-        yield _array("force", *whose, "force on the finger, N: x, y, z", row["force_n"])
+def _whose(row: Any) -> tuple[int, int, int]:
+    return int(row["finger"]), int(row["t_us"]), int(row["seq"])
 
 
-def _contacts(batch: Batch, chosen: list[int]) -> Iterator[_Message]:
-    for row in batch.frames[chosen]:
-        whose = int(row["finger"]), int(row["t_us"]), int(row["seq"])
-        poc_m = row["poc_mm"] / 1000
-        if not np.isnan(poc_m).any():
-            yield _Message("contact", *whose, partial(plot_ros.contact, whose[0], poc_m, row["force_n"]))
+def _arrays(topic: str, rows: StructArray, values: Any) -> Iterator[_Message]:
+    for row, own in zip(rows, values, strict=True):
+        yield _Message(topic, *_whose(row), partial(_ignoring_stamp, plot_ros.array(_LABELS[topic], own)))
 
 
-def _counts(batch: Batch, chosen: list[int], pacs: list[int]) -> Iterator[_Message]:
-    pac = {(int(row["finger"]), int(row["seq"])): row["pac"] for row in batch.pac[pacs]}
-    signals = electrode_signals(batch.wire[chosen])
-    for row, its in zip(batch.frames[chosen], signals, strict=True):
-        whose = int(row["finger"]), int(row["t_us"]), int(row["seq"])
-        yield _json("counts", *whose, plot_json.counts(row, pac.get((whose[0], whose[2]))))
-        yield _array("signals", *whose, "above rest, count: E1 to E19", its)
+def _ignoring_stamp(data: bytes, stamp_ns: int) -> bytes:
+    return data
 
 
-def _json(topic: str, finger: int, t_us: int, seq: int, body: dict[str, Any]) -> _Message:
-    return _Message(topic, finger, t_us, seq, partial(plot_json.encoded, body, finger, seq))
+def _without_invalid(counts: Any) -> Any:
+    return np.where(counts == wire.INVALID_COUNT, np.nan, counts)
 
 
-def _array(topic: str, finger: int, t_us: int, seq: int, label: str, values: Any) -> _Message:
-    return _Message(topic, finger, t_us, seq, lambda stamp_ns: plot_ros.array(label, values))
+def _logs(batch: Batch, decoder: StreamDecoder) -> Iterator[_Message]:
+    for message in batch.messages:
+        if isinstance(message, (wire.Tare, wire.Event)):
+            text = _tare_text(message) if isinstance(message, wire.Tare) else _event_text(message)
+            encode = partial(plot_ros.log, f"finger{message.finger}", text)
+            yield _Message("log", message.finger, decoder.unwrap_t_us(message.t_us), message.seq, encode)
+
+
+def _tare_text(tare: wire.Tare) -> str:
+    values = " ".join("-" if q16 == INVALID_U32 else f"{q16 / 65536:.1f}" for q16 in tare.tare_q16)
+    return f"tare {_name(wire.TareReason, tare.reason)}, {_name(wire.TareState, tare.tare_state)}: {values}"
+
+
+def _event_text(event: wire.Event) -> str:
+    parts = [kind_name(event), f"{event_age_s(event):.4f} s ago"]
+    if event.energy_count2 != INVALID_U32:
+        parts.append(f"energy {event.energy_count2} count^2")
+    if event.peak_count != wire.INVALID_COUNT:
+        parts.append(f"peak {event.peak_count} count")
+    return ", ".join(parts)
+
+
+def _name(kind: Any, value: int) -> str:
+    return str(kind(value).name) if value in list(kind) else str(value)

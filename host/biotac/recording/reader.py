@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -17,13 +17,13 @@ from ..errors import RecordingError
 from ..hand.gap import Gap
 from ..keep.calibration import own_settings
 from ..wire import messages_gen as wire
-from ..wire.batches import Batch, StreamDecoder, join
-from ..wire.frames import StructArray
+from ..wire.batches import StreamDecoder
+from ..wire.frames import StructArray, frames_from_wire
 from ..wire.messages_gen import Setting
 from . import layout
 from .bands import recorded_bands
-from .block import FRAME, IDLE, PAC, as_sent
-from .blocks import Blocks, is_lossless
+from .block import FRAME, IDLE, PAC, ROWS, Packet, as_sent
+from .blocks import Block, Blocks, lost_between
 from .facts import Facts
 from .layout import finger_of
 from .stamps import Stamps
@@ -45,7 +45,7 @@ class Recording:
     index. ``damaged_chunks``: number of seconds left out. ``wrong_checksums``: number of wrong checksums over the
     file's records and its index. ``gaps``: times when the board was away.
 
-    ``blocks`` are the wire bytes as they came, about one block per second. ``arrived_ns`` is when each block began,
+    ``blocks`` are the wire bytes, about one block per second. ``arrived_ns`` is when each block began,
     ``all_here_ns`` when it was complete (None where unknown), both in ns on the host's clock (Unix).
 
     Raises RecordingError when nothing can be read. ``show`` is called with the share of the work done, 0 to 1.
@@ -53,38 +53,15 @@ class Recording:
 
     def __init__(self, path: str | os.PathLike[str], show: Callable[[float], None] = lambda share: None) -> None:
         self.path = Path(path)
-        self.gaps: list[Gap] = []
         blocks = Blocks(self.path)
-        self._pieces = list(blocks)
-        self._take_facts(blocks)
-        self.arrived_ns: list[int] = [piece.arrived_ns for piece in self._pieces]
-        # Imported recordings store the first time for both.
-        self.all_here_ns: list[int | None] = [
-            piece.all_here_ns if piece.all_here_ns != piece.arrived_ns else None for piece in self._pieces
-        ]
-        decoder = StreamDecoder()
-        decoder.accept_newer_minor()
-        batch = self._rows(decoder) or self._decoded(decoder, show)
-        show(1.0)
-        self._batch = batch  # seq and t_us of its wire may be unwrapped
-        self.seq, self.t_us = batch.seq, batch.t_us
-        self.pac: StructArray = batch.pac
-        self.idle: StructArray = batch.idle
-        self.messages: list[Any] = batch.messages
-        self.frames_lost = decoder.lost
-        self.pac_lost = decoder.lost_pac
-        self.disordered = decoder.disordered
-        if self.cut_off and not len(self.seq):
-            raise RecordingError(f"{self.path} was cut off before its first second was complete; record it again")
-        self._describe_losses(decoder)
-
-    def _take_facts(self, blocks: Blocks) -> None:
+        self._blocks: list[Block] = []
+        for block in blocks:
+            self._blocks.append(block)
+            show(blocks.scan.share)
         self.problems: list[str] = blocks.scan.problems
         self.cut_off = blocks.scan.cut_off
         self.damaged_chunks = blocks.scan.damaged_chunks
         self.wrong_checksums = blocks.scan.wrong_checksums
-        for facts in blocks.gaps:
-            self._take_gap(facts)
         if blocks.metadata is None:
             raise RecordingError(self._without_metadata(blocks.damaged_metadata > 0))
         try:
@@ -93,52 +70,46 @@ class Recording:
             raise RecordingError(
                 f"{self.path} has damaged metadata ({error}) and cannot be used; try another copy"
             ) from error
-        numbers = {piece.number for piece in self._pieces}
-        missing = max(numbers, default=-1) + 1 - len(numbers) - self.damaged_chunks
-        if self.metadata["format"] != "1" and missing > 0:
-            self.problems.append(
-                f"{missing} second(s) of {self.path.name} are missing: the file is too damaged to find them"
-            )
+        self.arrived_ns: list[int] = [block.arrived_ns for block in self._blocks]
+        # Imported recordings store the first time for both.
+        self.all_here_ns: list[int | None] = [
+            block.all_here_ns if block.all_here_ns != block.arrived_ns else None for block in self._blocks
+        ]
+        decoder = StreamDecoder()
+        decoder.accept_newer_minor()
+        self.messages: list[Any] = decoder.feed(b"".join(block.rest.packets for block in self._blocks)).messages
+        self._sent, self.pac, self.idle = (self._rows_of(kind) for kind in (FRAME, PAC, IDLE))
+        self.seq, self.t_us = self._sent["seq"].astype(np.int64), self._sent["t_us"]
+        rows = len(self._sent) + len(self.pac) + len(self.idle)
+        self.counts = replace(decoder.counts, good=decoder.counts.good + rows)
+        rests = [block.rest for block in self._blocks]
+        self.pac_lost = sum(rest.lost_pac for rest in rests)
+        self.disordered = sum(rest.disordered for rest in rests)
+        self.gaps = [gap for rest in rests for facts in rest.gaps if (gap := self._gap(facts)) is not None]
+        in_damaged = sum(block.missing for block in self._blocks) + lost_between(self._blocks)
+        self.frames_lost = sum(frames for rest in rests for _, _, frames in rest.lost) + in_damaged
+        if self.cut_off and not len(self.seq):
+            raise RecordingError(f"{self.path} was cut off before its first second was complete; record it again")
+        self._describe_losses([loss for rest in rests for loss in rest.lost], in_damaged)
 
-    def _rows(self, decoder: StreamDecoder) -> Batch | None:
-        """The rows of all pieces; None when the wire must be decoded to find out what is missing."""
-        pieces = self._pieces
-        if not pieces or any(piece.rest is None or not piece.whole for piece in pieces):
-            return None
-        sent, pac, idle = (np.concatenate([piece.rows[kind] for piece in pieces]) for kind in (FRAME, PAC, IDLE))
-        if not is_lossless(sent, pac, idle):
-            return None
-        others = decoder.feed(b"".join(piece.rest.raw for piece in pieces if piece.rest))
-        if len(others.wire) or len(others.pac) or len(others.idle):
-            return None
-        self._take_arrivals([piece.rest.last_us if piece.rest else None for piece in pieces])
-        self.counts = replace(decoder.counts, good=decoder.counts.good + len(sent) + len(pac) + len(idle))
-        rows = Batch(sent, sent["seq"].astype(np.int64), sent["t_us"], pac, idle, others.messages)
-        return rows
+    def _rows_of(self, kind: int) -> StructArray:
+        return np.concatenate([np.empty(0, ROWS[kind]), *(block.rows[kind] for block in self._blocks)])
 
-    def _decoded(self, decoder: StreamDecoder, show: Callable[[float], None]) -> Batch:
-        parts = []
-        for k, piece in enumerate(self._pieces):
-            parts.append(decoder.feed(piece.bytes()))
-            show((k + 1) / len(self._pieces))
-        self._take_arrivals([part.last_t_us() for part in parts])
-        self.counts = decoder.counts
-        return join(parts)
+    def packets(self) -> Iterator[tuple[int, Packet]]:
+        """All messages in order of arrival, each with the number of its block."""
+        for k, block in enumerate(self._blocks):
+            for packet in block.packets():
+                yield k, packet
 
-    def _take_arrivals(self, last_us: list[int | None]) -> None:
-        """``last_us``: last device time of each block's rows, None or 0 for a block without rows."""
-        ends = zip(last_us, self.all_here_ns, strict=True)
-        self._arrivals = [(t_us, at_ns) for t_us, at_ns in ends if t_us and at_ns is not None]
-
-    @property
+    @cached_property
     def frames(self) -> StructArray:
         """The FRAMEs in user units, FRAME_DTYPE (n,), in order of arrival."""
-        return self._batch.frames
+        return frames_from_wire(self._sent, self.seq, self.t_us)
 
     @cached_property
     def wire(self) -> StructArray:
         """The FRAME messages as sent, with seq and t_us wrapped."""
-        return as_sent(self._batch.wire, FRAME)
+        return as_sent(self._sent, FRAME)
 
     @cached_property
     def bands(self) -> StructArray:
@@ -148,7 +119,7 @@ class Recording:
     @cached_property
     def blocks(self) -> list[bytes]:
         """The wire bytes as they came, about one second per block."""
-        return [piece.bytes() for piece in self._pieces]
+        return [b"".join(packet.data for packet in block.packets()) for block in self._blocks]
 
     def to_pandas(self) -> Any:
         """The frames as a pandas DataFrame (tabular.py), in order of arrival. Needs the extra ``pandas``."""
@@ -170,9 +141,15 @@ class Recording:
     @cached_property
     def _stamps(self) -> Stamps:
         stamps = Stamps(self.begin_us, self.begin_ns)
-        for t_us, at_ns in self._arrivals:
+        for t_us, at_ns in self._arrivals():
             stamps.arrived(t_us, at_ns)
         return stamps
+
+    def _arrivals(self) -> Iterator[tuple[int, int]]:
+        """Last device time of each block that has rows, and when it had arrived."""
+        for block, at_ns in zip(self._blocks, self.all_here_ns, strict=True):
+            if block.rest.last_us is not None and at_ns is not None:
+                yield block.rest.last_us, at_ns
 
     def __getitem__(self, finger: int | str) -> StructArray:
         """The frames of one finger, by number or by its recorded name. Raises KeyError for an unknown name."""
@@ -187,18 +164,18 @@ class Recording:
         longer than this from the board to the file.
         """
         clock = DeviceClock(promised_delay_s=promised_delay_s, unix_offset_s=0.0)
-        for t_us, at_ns in self._arrivals:
+        for t_us, at_ns in self._arrivals():
             clock.arrived(t_us + LAST_SAMPLE_US, at_ns / 1e9)
         return clock
 
-    def _take_gap(self, text: dict[str, str]) -> None:
+    def _gap(self, facts: dict[str, Any]) -> Gap | None:
         try:
-            gap = Gap.from_text(text)
-        except (KeyError, ValueError) as error:
-            self.problems.append(f"a gap is marked in {self.path.name}, but its record is damaged ({error})")
-            return
-        self.gaps.append(gap)
-        self.problems.append(gap.words())
+            gap = Gap(**facts)
+            self.problems.append(gap.words())
+        except TypeError as error:
+            self.problems.append(f"a gap is marked in {self.path.name}, but its entry is damaged ({error})")
+            return None
+        return gap
 
     def _without_metadata(self, damaged: bool) -> str:
         if damaged:
@@ -230,31 +207,38 @@ class Recording:
     @property
     def fingers(self) -> list[int]:
         """Fingers with at least one frame, heartbeat, PAC, BANDS or EVENT."""
-        rows = (self._batch.wire, self.idle, self.pac)
-        told = {m.finger for m in self.messages if isinstance(m, (wire.Bands, wire.Event))}
-        return sorted(told | {int(finger) for table in rows for finger in np.unique(table["finger"])})
+        rows = (self._sent, self.idle, self.pac)
+        others = {m.finger for m in self.messages if isinstance(m, (wire.Bands, wire.Event))}
+        return sorted(others | {int(finger) for table in rows for finger in np.unique(table["finger"])})
 
     @property
     def begin_us(self) -> int:
         """Device time of the first frame or heartbeat, us; 0 if there is none."""
-        return self._batch.first_t_us() or 0
+        times = [block.rest.first_us for block in self._blocks if block.rest.first_us is not None]
+        return min(times, default=0)
 
     @property
     def end_us(self) -> int:
         """Device time of the last frame or heartbeat, us; 0 if there is none."""
-        return self._batch.last_t_us() or 0
+        times = [block.rest.last_us for block in self._blocks if block.rest.last_us is not None]
+        return max(times, default=0)
 
     @property
     def begin_ns(self) -> int:
         """``begin_us`` on the host's clock (Unix), in ns; late by the delay of the link."""
         return self.arrived_ns[0] if self.arrived_ns else 0
 
-    def _describe_losses(self, decoder: StreamDecoder) -> None:
-        for finger, seq, lost in decoder.lost_after[:10]:
+    def _describe_losses(self, losses: list[tuple[int, int, int]], in_damaged: int) -> None:
+        for finger, seq, lost in losses[:10]:
             self.problems.append(f"finger {finger}: {lost} frame(s) missing after frame {seq}")
-        if len(decoder.lost_after) > 10:
-            self.problems.append(f"{len(decoder.lost_after) - 10} more gaps")
-        counts = decoder.counts
+        if len(losses) > 10:
+            self.problems.append(f"{len(losses) - 10} more losses")
+        if in_damaged:
+            self.problems.append(f"{in_damaged} frame(s) of damaged seconds are missing")
+        numbers = {block.number for block in self._blocks}
+        if not self.problems and len(numbers) != max(numbers, default=-1) + 1:
+            self.problems.append(f"{self.path.name} is damaged: seconds of it are missing")
+        counts = self.counts
         if counts.bad:
             self.problems.append(
                 f"{counts.bad} packet(s) rejected: {counts.bad_crc} bad CRC, {counts.bad_cobs} bad COBS, "

@@ -28,7 +28,6 @@ from .facts import in_force
 from .file import RecordingFile
 from .reader import Recording
 from .rounds import HostTare, Rounds, frames_and_tares, with_silence
-from .wire_messages import split
 
 Settings = dict[wire.Setting, int]
 Show = Callable[[float], None]
@@ -263,14 +262,14 @@ def _write(
     show: Show,
 ) -> None:
     """Write the wire as it was, with FRAMEs replaced, and TAREs too unless they are kept (``tares`` None)."""
-    blocks = [bytearray() for _ in recording.blocks]
+    blocks = [bytearray() for _ in recording.arrived_ns]
     row = 0
-    for piece in split(recording.blocks):
-        block = blocks[piece.block]
-        if piece.message_id == wire.Tare.ID and tares is not None:
+    for number, packet in recording.packets():
+        block = blocks[number]
+        if packet.message_id == wire.Tare.ID and tares is not None:
             continue
-        if piece.message_id != wire.Frame.ID:
-            block += piece.data
+        if packet.message_id != wire.Frame.ID:
+            block += packet.data
             continue
         if tares is not None and row in tares:
             block += encode(wire.Tare.ID, tares[row].pack())

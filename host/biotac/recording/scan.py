@@ -25,8 +25,8 @@ from mcap.writer import MCAP0_MAGIC
 from ..errors import RecordingError
 from .chunk import HEAD, chunk_of, records_of, unpack
 
-# A second of five fingers is 0.1 MB. Files are a quarter of the size they unpack to; those of format 1 with fingers at
-# rest, a fiftieth. In memory the data takes ten times its unpacked size.
+# A second of five fingers is 0.1 MB. Files are a quarter of the size they unpack to, or less with fingers at rest. In
+# memory the data takes ten times its unpacked size.
 _CHUNK_MAX_BYTES = 1 << 23
 _RATIO_MAX = 100
 _FREE_BYTES = 1 << 24
@@ -75,6 +75,7 @@ class Scan:
         self.path = path
         self.problems: list[str] = []
         self.cut_off = False
+        self.share = 0.0  #: of the file that was read so far
         self.damaged_chunks = self.wrong_checksums = 0
         self.schemas: dict[str, bytes] = {}
         self._wanted = cache(wanted)
@@ -128,6 +129,7 @@ class Scan:
                     if opcode in _READ and opcode != _DATA_END:
                         yield from self._one(opcode, _content(stream, at, length))
                 good_until = at + length
+                self.share = good_until / self._size
                 stream.seek(good_until)
             self.cut_off = not whole or self._size - at - length < len(MCAP0_MAGIC)
         if self.cut_off:
@@ -141,19 +143,19 @@ class Scan:
             )
 
     def _prove(self, stream: BinaryIO, opcode: int, at: int, length: int) -> None:
-        """Verify the checksum in a DataEnd or Footer; 0 means that there is none, as in format 1."""
+        """Verify the checksum in a DataEnd or Footer; 0 means that the program that wrote it made none."""
         record = self._read(opcode, _content(stream, at, length))
         if isinstance(record, DataEnd):
             self._data_end = at + length
-            begin, end, told = 0, at - HEAD.size, record.data_section_crc
+            begin, end, expected = 0, at - HEAD.size, record.data_section_crc
         elif isinstance(record, Footer):
-            begin, end, told = record.summary_start, at - HEAD.size + _FOOTER_BYTES, record.summary_crc
+            begin, end, expected = record.summary_start, at - HEAD.size + _FOOTER_BYTES, record.summary_crc
             if begin != self._data_end:
                 self.problems.append(f"{self.path.name} is damaged: its index is not where its footer says")
                 return
         else:
             return
-        if self._check and told and _crc32(stream, begin, end) != told:
+        if self._check and expected and _crc32(stream, begin, end) != expected:
             self.wrong_checksums += 1
             what = "records" if opcode == Opcode.DATA_END else "index"
             self.problems.append(f"{self.path.name} is damaged: the checksum of its {what} is wrong")

@@ -62,4 +62,6 @@ class Stamps:
         if math.isnan(self._begin_s):
             self._begin_s = float(self._clock.host_time_s(self._begin_us))
         since_s = self._clock.host_time_s(t_us) - self._begin_s
+        if not np.isfinite(since_s).all():  # too few blocks, hours apart
+            return plain
         return self._begin_ns + np.round(since_s * 1e9).astype(np.int64)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ..errors import InputError, taken
+from ..hand.gap import Gap
 from ..wire import messages_gen as wire
 from ..wire.dtypes_gen import DTYPES
 from ..wire.framing import OVERHEAD_BYTES
@@ -53,6 +54,7 @@ class Recorder:
         self._arrived_ns = 0
         self._block_bytes = int(FLUSH_S * FINGER_BYTES_PER_S * max(1, facts.info.fingers_present.bit_count()))
         self._skip_to_delimiter = mid_stream
+        self._frames_before = self._lost_before = 0  # in earlier files
         self._file = RecordingFile(create(path, overwrite=overwrite), facts.metadata(port))
 
     def go_on(self, facts: Facts) -> None:
@@ -62,10 +64,12 @@ class Recorder:
         exists and may not be overwritten, or cannot be written; nothing more is recorded then.
         """
         self.close()
+        frames, lost = self.frames, self.frames_lost
         first = self.paths[0]
         path = first.with_name(f"{first.stem}.{len(self.paths) + 1}{first.suffix}")
         metadata = facts.metadata(self._port) | {layout.CONTINUES: self.path.name}
         self._file = RecordingFile(create(path, overwrite=self._overwrite), metadata)
+        self._frames_before, self._lost_before = frames, lost
         self._skip_to_delimiter = False
         self.path = path
         self.paths.append(path)
@@ -97,12 +101,21 @@ class Recorder:
         self._pending_since = now_s
         self._arrived_ns = self._unix_ns()
 
-    def mark(self, what: str, facts: dict[str, str]) -> None:
-        """Mark an event at this point of the recording: append a metadata record ``biotac.WHAT``."""
-        if self._file.closed:
-            return
-        self.flush()
-        self._file.mark(what, facts)
+    def write_gap(self, gap: Gap) -> None:
+        """Record that the board was away, before the bytes that come next."""
+        if not self._file.closed:
+            self.flush()
+            self._file.add_gap(gap)
+
+    @property
+    def frames(self) -> int:
+        """FRAMEs in the recording's files so far; after ``close``, all of them."""
+        return self._frames_before + self._file.frames
+
+    @property
+    def frames_lost(self) -> int:
+        """FRAMEs lost on the way to the recording's files so far, by their sequence numbers."""
+        return self._lost_before + self._file.frames_lost
 
     def flush(self) -> None:
         """Close the current block and hand it to the operating system.

@@ -23,6 +23,7 @@ from .decoder import FRAME, IDLE, NO_FRAME, ONE_STEP_BYTES, PAC, Buffer, counts_
 from .frames import IDLE_DTYPE, PAC_DTYPE, StructArray, frames_from_wire
 from .framing import FramingCounts
 from .native import ffi, lib
+from .sensor_gen import SLOT_HZ, SLOTS
 
 # Looked up once: a live link brings few messages at a time, thousands of times a second.
 _feed = lib.bt_intake_feed
@@ -32,6 +33,9 @@ _blank = object.__new__
 _NOTHING, _AGAIN = int(lib.BT_DESCRIPTOR_NOTHING), int(lib.BT_DESCRIPTOR_AGAIN)
 _HUNG_UP = int(lib.BT_DESCRIPTOR_HUNG_UP)
 _FACTS = struct.Struct(f"={int(lib.BT_INTAKE_FACTS)}q").unpack_from
+ROUND_US = 1_000_000 * len(SLOTS) // SLOT_HZ
+_WRAP_US = 1 << 32
+_UNSURE_US = 1 << 27  # of a silence: the drift of the clocks, and messages under way
 _INT64 = np.dtype(np.int64)
 _NO_INT64 = np.frombuffer(b"", _INT64)
 _NO_PAC, _NO_IDLE = (np.frombuffer(b"", dtype) for dtype in (PAC_DTYPE, IDLE_DTYPE))
@@ -154,6 +158,17 @@ class StreamDecoder:
     def accept_newer_minor(self) -> None:
         """Accept messages that are longer than known here, from a peer with a newer wire minor."""
         self._state.decoder.allow_longer = True
+
+    def passed(self, seconds: float) -> None:
+        """Tell that no byte came for this long by the host's clock: device time may have wrapped, every 71.6 min.
+
+        Shorter silences need no telling, as time goes forward.
+        """
+        silence_us = int(seconds * 1e6)
+        if silence_us > _WRAP_US - _UNSURE_US and self._state.t_us.seen:
+            skip_us = silence_us - _WRAP_US // 2  # the next time is then the one nearest to what is expected
+            self._state.t_us.last += skip_us
+            self._state.unheard += skip_us // ROUND_US
 
     def unwrap_t_us(self, t_us: int) -> int:
         """A message's 32-bit device time on the same axis as the batches' ``t_us``."""

@@ -103,7 +103,7 @@ def test_a_killed_recorder_loses_at_most_the_last_second(tmp_path: Path, capsys,
     assert len(arrived) - len(kept) <= FINGERS * ROUNDS_PER_S
     assert recording.cut_off and recording.frames_lost == 0 and recording.counts.bad == 0
 
-    assert main(["check", str(path), "--json"]) == 0
+    assert main(["check", str(path), "--json"]) == 1
     facts = json.loads(capsys.readouterr().out)
     assert facts["cut_off"] is True and facts["frames"] == len(kept)
     assert main(["replay", str(path), "--pace", "fast", "--rate", "0", "--json"]) == 0

@@ -17,8 +17,8 @@ import biotac
 from biotac.cli.main import main
 from biotac.hand.hand import Hand
 from biotac.link.ports import open_link
-from biotac.recording.replay.link import ReplayLink, open_replay
-from biotac.recording.replay.playback import Playback
+from biotac.recording.file import RecordingFile
+from biotac.recording.replay.link import open_replay
 from biotac.wire import messages_gen as wire
 
 SECONDS = 4
@@ -172,12 +172,16 @@ def test_a_restart_within_the_recording_is_no_loss(tmp_path) -> None:
 
 def test_a_damaged_frame_is_damaged_in_the_replay_too(recorded, tmp_path) -> None:
     _, recording = recorded
-    damaged = biotac.Recording(recorded[0])
-    block = bytearray(damaged.blocks[1])
+    blocks = list(recording.blocks)
+    block = bytearray(blocks[1])
     at = block.index(0, len(block) // 2) + 30
     block[at] = block[at] % 255 + 1  # another byte, and no delimiter
-    damaged.blocks[1] = bytes(block)
-    with Hand(ReplayLink("replay:damaged", Playback(damaged))) as hand:
+    blocks[1] = bytes(block)
+    file = RecordingFile((tmp_path / "damaged.mcap").open("wb"), recording.metadata)
+    for data, arrived_ns in zip(blocks, recording.arrived_ns, strict=True):
+        file.add(data, arrived_ns)
+    file.close()
+    with biotac.open(f"replay:{tmp_path / 'damaged.mcap'}") as hand:
         frames = hand.read(100)
         assert hand.stats.crc_errors + hand.stats.other_errors == 1
     assert len(recording.frames) - len(frames) in (0, 1)  # 0 when it was a PAC

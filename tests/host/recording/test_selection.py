@@ -1,9 +1,7 @@
-"""Parts of a recording, and recordings of format 1: the same numbers as from all of it, in less memory."""
+"""Parts of a recording: the same numbers as from all of it, in less memory."""
 
 from __future__ import annotations
 
-import gzip
-import hashlib
 import json
 import tracemalloc
 from pathlib import Path
@@ -15,22 +13,16 @@ from record_all import record_all
 
 import biotac
 from biotac.recording import layout
+from biotac.recording.block import FRAME, IDLE, PAC, ROWS, TableReader, schema
+from biotac.recording.block import _table as tables_of
+from biotac.recording.blocks import ALL
+from biotac.wire.fields import WIRE_INVALID
 from biotac.wire.framing import encode
-
-OLD = Path(__file__).parents[2] / "data" / "recordings"
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> Path:
     return record_all("sim:press.toml?fingers=5&seconds=20", tmp_path_factory.mktemp("parts") / "a.mcap")
-
-
-@pytest.fixture(scope="module")
-def old(tmp_path_factory) -> Path:
-    """0.3 s of sim:press.toml?fingers=2, recorded by the library of commit ca7096c."""
-    path = tmp_path_factory.mktemp("old") / "format1.mcap"
-    path.write_bytes(gzip.decompress((OLD / "format1.mcap.gz").read_bytes()))
-    return path
 
 
 def same(rows: np.ndarray, wanted: np.ndarray) -> None:
@@ -39,33 +31,28 @@ def same(rows: np.ndarray, wanted: np.ndarray) -> None:
         np.testing.assert_array_equal(rows[name], wanted[name])
 
 
-def digest(values: np.ndarray) -> str:
-    return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()[:16]
+def test_a_part_is_what_all_has_there(recorded: Path) -> None:
+    full = biotac.load(recorded)
+    same(full, biotac.Recording(recorded).frames)
+    since_s = (full["t_us"] - full["t_us"].min()) / 1e6
+    part = biotac.load(recorded, fields=["force_n", "t_us", "tare"], fingers=[1], start_s=0.1, stop_s=3.5)
+    wanted = full[(full["finger"] == 1) & (since_s >= 0.1) & (since_s < 3.5)]
+    assert part.dtype.names == ("t_us", "tare", "force_n") and len(part) > 15
+    for name in part.dtype.names:
+        np.testing.assert_array_equal(part[name], wanted[name])
 
 
-def test_an_old_recording_loads_as_it_did(old: Path) -> None:
-    """The digests are those of the arrays that the library of then gave."""
-    then = json.loads((OLD / "format1.json").read_text())
-    recording = biotac.Recording(old)
-    assert recording.problems == [] and recording.metadata["format"] == "1"
-    assert hashlib.sha256(b"".join(recording.blocks)).hexdigest()[:16] == then["blocks"]
-    assert (len(recording.frames), recording.begin_ns) == (then["rows"], then["begin_ns"])
-    for kind in ("frames", "pac", "idle", "wire"):
-        rows = getattr(recording, kind)
-        assert {name: digest(rows[name]) for name in then[kind]} == then[kind]
-    same(biotac.load(old), recording.frames)
-
-
-def test_a_part_is_what_all_has_there(recorded: Path, old: Path) -> None:
-    for path in (recorded, old):
-        full = biotac.load(path)
-        same(full, biotac.Recording(path).frames)
-        since_s = (full["t_us"] - full["t_us"].min()) / 1e6
-        part = biotac.load(path, fields=["force_n", "t_us", "tare"], fingers=[1], start_s=0.1, stop_s=3.5)
-        wanted = full[(full["finger"] == 1) & (since_s >= 0.1) & (since_s < 3.5)]
-        assert part.dtype.names == ("t_us", "tare", "force_n") and len(part) > 15
-        for name in part.dtype.names:
-            np.testing.assert_array_equal(part[name], wanted[name])
+def test_a_field_that_the_recording_does_not_have_is_invalid(recorded: Path) -> None:
+    """A later version adds fields; here one is taken out of the schema's and the table's end."""
+    columns = json.loads(schema())
+    table = np.zeros(2, ROWS[FRAME])
+    name, dtype, parts = columns["FRAME"].pop()
+    data = tables_of([table, np.empty(0, ROWS[PAC]), np.empty(0, ROWS[IDLE])])
+    reader = TableReader(json.dumps(columns).encode(), ALL)
+    rows = [reader.rows(kind, np.zeros(2 * (kind == FRAME), np.uint8)) for kind in (FRAME, PAC, IDLE)]
+    reader.read(data[: len(data) - 2 * np.dtype(dtype).itemsize * parts], 0, rows)
+    assert (rows[FRAME][name] == WIRE_INVALID.get(np.dtype(dtype).str[1:], 0)).all()
+    assert (rows[FRAME]["seq"] == 0).all()
 
 
 def test_one_fingers_force_takes_little_memory(recorded: Path) -> None:
@@ -114,8 +101,8 @@ def test_a_bomb_is_refused_before_it_unpacks(recorded: Path, tmp_path: Path, tol
     with bomb.open("wb") as stream:
         writer = Writer(stream, chunk_size=1, compression=CompressionType.ZSTD)
         writer.start()
-        schema = writer.register_schema(layout.SCHEMA_NAME, layout.SCHEMA_ENCODING, b"")
-        channel = writer.register_channel(layout.TOPIC, layout.MESSAGE_ENCODING, schema)
+        schema = writer.register_schema(layout.WIRE_SCHEMA, layout.WIRE_SCHEMA_ENCODING, b"")
+        channel = writer.register_channel(layout.PACKETS, layout.PACKETS_ENCODING, schema)
         writer.add_metadata(layout.METADATA_NAME, biotac.Recording(recorded).metadata)
         for k in range(3):
             writer.add_message(channel, k, bytes(200_000_000), k)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 from ...recording.crosscheck import CrossCheck
@@ -19,15 +20,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0 if the recording is good, 1 for a wrong result, damaged data or no frame. Raises if unreadable (code 2).
+    """Return 0 if all that is there is right, 1 for a wrong result, damaged or cut-off data or no frame.
 
-    A recording that was merely cut off, as by a kill, is good as far as it goes; stderr says so.
+    A recording with gaps is good, with holes that are listed. Raises if it cannot be read (code 2).
     """
     recording = load(args.recording, quiet=True)
-    outcome = CrossCheck(wire_minor=recording.info.wire_minor)
+    outcome = CrossCheck()
     outcome.add(recording.wire, recording.settings, recording.finger_settings, recording.maps)
     damaged = recording.counts.bad + recording.damaged_chunks + recording.wrong_checksums
-    good = outcome.violations == 0 and damaged == 0 and len(recording.frames) > 0
+    good = outcome.violations == 0 and damaged == 0 and not recording.cut_off and len(recording.frames) > 0
     if args.json:
         facts = {
             "recording": str(args.recording),
@@ -36,6 +37,7 @@ def run(args: argparse.Namespace) -> int:
             "frames_lost": recording.frames_lost,
             "crc_errors": recording.counts.bad_crc,
             "cut_off": recording.cut_off,
+            "gaps": [asdict(gap) for gap in recording.gaps],
             "problems": recording.problems,
             "crosscheck": outcome.as_dict(),
         }
@@ -46,6 +48,8 @@ def run(args: argparse.Namespace) -> int:
     for finding in outcome.findings:
         print(finding)
     verdict = "good" if good else f"{outcome.violations} violation(s), {damaged} damaged part(s)"
+    verdict += f", {len(recording.gaps)} gap(s)" if recording.gaps else ""
+    verdict += ", cut off" if recording.cut_off else ""
     print(
         f"{args.recording}: {len(recording.frames)} frames, {recording.frames_lost} lost, {verdict}; largest error "
         f"PoC {outcome.poc_um_max:.3f} um, force {outcome.force_mn_max:.4f} mN, "

@@ -116,8 +116,7 @@ def mcap_parts(path: Path) -> dict[str, int]:
     from mcap.records import Channel, Chunk, Message
     from mcap.stream_reader import StreamReader, breakup_chunk
 
-    from ...recording.layout import PARTS as FINGERS
-    from ...recording.layout import REST, TOPIC
+    from ...recording.layout import PACKETS, TABLE
 
     topics: dict[int, str] = {}
     sizes = dict.fromkeys(PARTS, 0)
@@ -128,6 +127,6 @@ def mcap_parts(path: Path) -> dict[str, int]:
                 topics |= {r.id: r.topic for r in inner if isinstance(r, Channel)}
                 first = next(r for r in inner if isinstance(r, Message))
                 topic = topics[first.channel_id]
-                sizes["wire" if topic in (TOPIC, REST) or topic.startswith(FINGERS) else "plots"] += len(record.data)
+                sizes["wire" if topic == PACKETS or topic.startswith(TABLE) else "plots"] += len(record.data)
     sizes["index and headers"] = path.stat().st_size - sizes["wire"] - sizes["plots"]
     return sizes

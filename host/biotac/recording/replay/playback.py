@@ -18,8 +18,8 @@ from ...wire.counters import nearest
 from ...wire.decoder import Decoder
 from ...wire.dtypes_gen import DTYPES
 from ...wire.framing import encode
+from ..block import Packet
 from ..reader import Recording
-from ..wire_messages import Piece, split
 
 
 def _offset(message: type[Any], name: str) -> int:
@@ -82,9 +82,9 @@ class Playback:
     def next_us(self) -> int | None:
         """Device time in us since ``from_s`` at which the next bytes are due; None when the playback is over."""
         while self._next is None and not self.over:
-            t_us, piece = next(self._stream, (0, None))
-            self.over = piece is None
-            data = None if piece is None else self._wanted(piece)
+            t_us, packet = next(self._stream, (0, None))
+            self.over = packet is None
+            data = None if packet is None else self._wanted(packet)
             self._next = None if data is None else (t_us - self._from_us, data)
         return None if self._next is None else self._next[0]
 
@@ -95,23 +95,23 @@ class Playback:
         self._next = None
         return data
 
-    def _timed(self) -> Iterator[tuple[int, Piece]]:
-        """Pieces in the range played, each with the device time at which it came."""
+    def _timed(self) -> Iterator[tuple[int, Packet]]:
+        """Packets in the range played, each with the device time at which it came."""
         now_us = self.recording.begin_us
-        for piece in split(self.recording.blocks):
-            if piece.message_id in _CLOCKS:
-                (raw_us,) = _TIME.unpack_from(piece.payload, _TIME_AT)
+        for _, packet in self.recording.packets():
+            if packet.message_id in _CLOCKS:
+                (raw_us,) = _TIME.unpack_from(packet.payload, _TIME_AT)
                 now_us = nearest(raw_us, now_us)
             if self._to_us is not None and now_us >= self._to_us:
                 return
             if now_us >= self._from_us:
-                yield now_us, piece
+                yield now_us, packet
 
-    def _wanted(self, piece: Piece) -> bytes | None:
-        """The piece's bytes as sent to this session; None if they are not sent."""
-        message_id, payload = piece.message_id, piece.payload
+    def _wanted(self, packet: Packet) -> bytes | None:
+        """The packet's bytes as sent to this session; None if they are not sent."""
+        message_id, payload = packet.message_id, packet.payload
         if message_id is None:
-            return piece.data  # damaged then, and passed on for the host to count
+            return packet.data  # damaged then, and passed on for the host to count
         if self._asked is None:
             return None
         if message_id == wire.Reply.ID:
@@ -127,12 +127,12 @@ class Playback:
             return None  # it answered a request at the time
         if message_id == wire.Status.ID:
             self._status = wire.Status.unpack(payload[: wire.Status.STRUCT.size])
-            return piece.data
+            return packet.data
         if message_id == wire.SensorStatus.ID:
             status = wire.SensorStatus.unpack(payload[: wire.SensorStatus.STRUCT.size])
             self._sensor_status[status.finger] = status
         at = _FINGER_AT_IN_STATUS if message_id == wire.SensorStatus.ID else _FINGER_AT
-        return piece.data if self._asked.fingers >> payload[at] & 1 else None
+        return packet.data if self._asked.fingers >> payload[at] & 1 else None
 
     # ---- what it answers -----------------------------------------------------------------------
 
