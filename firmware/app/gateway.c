@@ -4,8 +4,8 @@
 #include "port.h"
 #include "properties.h"
 #include "talk/host.h"
+#include "talk/rounds.h"
 #include "talk/sensors.h"
-#include "talk/streams.h"
 #include "word.h"
 
 #include "version.h"

@@ -184,10 +184,8 @@ static uint16_t seq_of(const bt_finger *finger)
     return (uint16_t)(finger->seq - 1);
 }
 
-static void tell_pressure(const bt_finger *finger, bt_msg_frame *msg)
+static void tell_pressure(const bt_pressure *pressure, bool asked, bt_msg_frame *msg)
 {
-    const bt_pressure *pressure = &finger->pressure;
-    bool asked = finger->quantities & BT_QUANTITY_FLAG_PRESSURE;
     msg->pdc_filtered_q4 = asked ? bt_pressure_filtered_q4(pressure) : BT_INVALID_COUNT;
     msg->pressure_force_100un = bt_pressure_force(msg->pdc_filtered_q4, msg->pdc_tare_q4, pressure->gain_nn);
 }
@@ -208,13 +206,12 @@ static void keep_wrench(bt_finger *finger, const bt_msg_frame *msg)
     kept->torsion_mnmm = msg->torsion_mnmm;
 }
 
-static void repeat_wrench(const bt_finger *finger, bt_msg_frame *msg)
+static void repeat_wrench(const bt_kept_wrench *kept, uint8_t quantities, bt_msg_frame *msg)
 {
-    const bt_kept_wrench *kept = &finger->kept;
-    if (finger->quantities & BT_QUANTITY_FLAG_FORCE) {
+    if (quantities & BT_QUANTITY_FLAG_FORCE) {
         memcpy(msg->force_100un, kept->force_100un, sizeof msg->force_100un);
     }
-    if (finger->quantities & BT_QUANTITY_FLAG_TORQUE) {
+    if (quantities & BT_QUANTITY_FLAG_TORQUE) {
         memcpy(msg->torque_mnmm, kept->torque_mnmm, sizeof msg->torque_mnmm);
         msg->torsion_mnmm = kept->torsion_mnmm;
     }
@@ -223,17 +220,17 @@ static void repeat_wrench(const bt_finger *finger, bt_msg_frame *msg)
 }
 
 // The results without what is shed; flags distinguish that from what nobody asked for.
-static void tell_results(bt_finger *finger, const bt_solve_settings *settings, uint32_t shed,
-                         bt_msg_frame *msg)
+static void tell_results(bt_finger *finger, const bt_solve_settings *settings, uint8_t quantities,
+                         uint32_t shed, bt_msg_frame *msg)
 {
     const uint32_t wrench = BT_QUANTITY_FLAG_FORCE | BT_QUANTITY_FLAG_TORQUE;
-    uint32_t without = shed & BT_SHED_SIGMA ? BT_QUANTITY_FLAG_SIGMA & finger->quantities : 0;
+    uint32_t without = shed & BT_SHED_SIGMA ? BT_QUANTITY_FLAG_SIGMA & quantities : 0;
     without |= shed & BT_SHED_MAP ? wrench : 0;
-    bt_results(&finger->round, &finger->tare, settings, finger->quantities & ~without, msg);
+    bt_results(&finger->round, &finger->tare, settings, quantities & ~without, msg);
     msg->wrench_age_ms = 0;
     if (shed & BT_SHED_MAP) {
-        msg->flags = (msg->flags & ~BT_FRAME_FLAG_NOT_ASKED) | bt_not_asked(finger->quantities);
-        repeat_wrench(finger, msg);
+        msg->flags = (msg->flags & ~BT_FRAME_FLAG_NOT_ASKED) | bt_not_asked(quantities);
+        repeat_wrench(&finger->kept, quantities, msg);
     } else if (settings->map != NULL) {
         keep_wrench(finger, msg);
     }
@@ -241,7 +238,8 @@ static void tell_results(bt_finger *finger, const bt_solve_settings *settings, u
     finger->shed = false;
 }
 
-void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint32_t shed, bt_msg_frame *msg)
+void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8_t quantities, uint32_t shed,
+                     bt_msg_frame *msg)
 {
     const bt_round *round = &finger->round;
     msg->seq = seq_of(finger);
@@ -254,8 +252,8 @@ void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint3
     msg->pdc_tare_q4 = bt_tare_q4(finger->tare.base.pdc_q16);
     memcpy(msg->counts, round->electrode, sizeof msg->counts);
     memcpy(msg->tare_q4, finger->tare.electrode_q4, sizeof msg->tare_q4);
-    tell_results(finger, settings, shed, msg);
-    tell_pressure(finger, msg);
+    tell_results(finger, settings, quantities, shed, msg);
+    tell_pressure(&finger->pressure, quantities & BT_QUANTITY_FLAG_PRESSURE, msg);
     msg->flags |= finger->tare_unsent ? BT_FRAME_FLAG_TARE_CHANGED : 0;
     finger->sent = finger->tare.trigger.smooth;
 }

@@ -28,8 +28,8 @@ typedef struct {
     int32_t torsion_mnmm;
 } bt_kept_wrench;
 
-// What is left out of a FRAME when time is short; a bit mask.
-enum bt_shed { BT_SHED_SIGMA = 1, BT_SHED_MAP = 2 };
+// What is left out when time is short: of a FRAME, or all of it; a bit mask.
+enum bt_shed { BT_SHED_SIGMA = 1, BT_SHED_MAP = 2, BT_SHED_FRAME = 4 };
 
 // A wrench is repeated for at most a tenth of a second.
 #define BT_REPEAT_MAX_ROUNDS 10
@@ -100,10 +100,11 @@ bool bt_finger_moved(const bt_finger *finger);
 // to repeat.
 uint32_t bt_finger_wrench_age(const bt_finger *finger, const bt_solve_settings *settings);
 
-// The messages of the round that has just ended. bt_finger_frame computes PoC, force and torque, except what
-// `shed` leaves out; BT_SHED_MAP needs a bt_finger_wrench_age of at most BT_REPEAT_MAX_ROUNDS. An IDLE
-// reports `unsent` rounds, up to this one or, if this one's FRAME follows, up to the one before.
-void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint32_t shed, bt_msg_frame *msg);
+// The messages of the round that has just ended. bt_finger_frame computes `quantities`, BT_QUANTITY_FLAG_*,
+// except what `shed` leaves out; BT_SHED_MAP needs a bt_finger_wrench_age of at most BT_REPEAT_MAX_ROUNDS. An
+// IDLE reports `unsent` rounds, up to this one or, if this one's FRAME follows, up to the one before.
+void bt_finger_frame(bt_finger *finger, const bt_solve_settings *settings, uint8_t quantities, uint32_t shed,
+                     bt_msg_frame *msg);
 void bt_finger_idle_message(const bt_finger *finger, bool frame_follows, bt_msg_idle *msg);
 void bt_finger_pac(const bt_finger *finger, bt_msg_pac *msg);
 void bt_finger_bands(bt_finger *finger, bt_msg_bands *msg); // once a round

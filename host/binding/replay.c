@@ -50,7 +50,7 @@ void bt_replay(bt_finger *finger, const bt_settings *settings, const bt_map *map
         }
         bool present = bt_finger_end(finger, &tare_settings);
         if (present) {
-            bt_finger_frame(finger, &kernel_settings, 0, &msg);
+            bt_finger_frame(finger, &kernel_settings, finger->quantities, 0, &msg);
         } else {
             mark_absent(finger, &msg);
         }

@@ -3,8 +3,8 @@
 #define BIOTAC_TEST_FAKE_BOARD_H
 
 #include "talk/host.h"
+#include "talk/rounds.h"
 #include "talk/sensors.h"
-#include "talk/streams.h"
 
 static inline uint8_t keep_settings(const bt_settings *settings)
 {

@@ -5,7 +5,7 @@
 #include "support.h"
 
 #include "talk/host.h"
-#include "talk/streams.h"
+#include "talk/rounds.h"
 
 #define MAX_RECEIVED 4096
 

@@ -48,7 +48,7 @@ static bool finish(void)
     }
     tare_changed = finger.tare_unsent;
     bt_finger_tare(&finger, &tare);
-    bt_finger_frame(&finger, &settings, 0, &frame);
+    bt_finger_frame(&finger, &settings, finger.quantities, 0, &frame);
     bt_finger_pac(&finger, &pac);
     return true;
 }

@@ -43,7 +43,8 @@ static void a_late_main_loop_loses_whole_slots_that_are_counted_and_marked(void 
             shed += (uint32_t)gap;
         }
     }
-    assert_int_equal(shed, gateway.session.sheds.frames); // those whose slots had waited for too long
+    assert_int_equal(shed,
+                     gateway.session.scheduler.sheds.frames); // those whose slots had waited for too long
 }
 
 static void rounds_lost_whole_leave_a_gap_in_time(void **state)

@@ -109,7 +109,7 @@ static void what_there_is_time_for_is_all_done(void **state)
     frame_ns = 200000;
     run_ms(3000);
     const bt_shed_counts none = {0, 0, 0};
-    assert_memory_equal(&gateway.session.sheds, &none, sizeof none);
+    assert_memory_equal(&gateway.session.scheduler.sheds, &none, sizeof none);
     slots_and_commands_are_kept();
 }
 
@@ -120,9 +120,9 @@ static void sigma_goes_first(void **state)
     map_ns = 1240000;
     sigma_ns = 1700000; // 150 % together, 70 % without it
     run_ms(3000);
-    assert_true(gateway.session.sheds.sigma > 100);
-    assert_int_equal(gateway.session.sheds.wrench, 0);
-    assert_int_equal(gateway.session.sheds.frames, 0);
+    assert_true(gateway.session.scheduler.sheds.sigma > 100);
+    assert_int_equal(gateway.session.scheduler.sheds.wrench, 0);
+    assert_int_equal(gateway.session.scheduler.sheds.frames, 0);
     slots_and_commands_are_kept();
 }
 
@@ -159,9 +159,9 @@ static void then_a_maps_rate_whose_last_wrench_is_repeated_with_its_age(void **s
         assert_in_range(host.frames[f], 298, 301);
         assert_true(fresh > 3 * 10); // at 150 % no finger is starved
     }
-    assert_int_equal(repeated, gateway.session.sheds.wrench);
-    assert_true(gateway.session.sheds.sigma > 0);
-    assert_int_equal(gateway.session.sheds.frames, 0);
+    assert_int_equal(repeated, gateway.session.scheduler.sheds.wrench);
+    assert_true(gateway.session.scheduler.sheds.sigma > 0);
+    assert_int_equal(gateway.session.scheduler.sheds.frames, 0);
     slots_and_commands_are_kept();
 }
 
@@ -173,7 +173,7 @@ static void whole_frames_go_last(void **state)
     frame_ns = 3000000; // 150 % for packing alone
     map_ns = 500000;
     run_ms(3000);
-    const bt_shed_counts *sheds = &gateway.session.sheds;
+    const bt_shed_counts *sheds = &gateway.session.scheduler.sheds;
     assert_true(sheds->frames > 100 && sheds->wrench > 0 && sheds->sigma > 0);
     for (int f = 0; f < FINGERS; f++) {
         for (int k = 1; k < host.frames[f]; k++) {

@@ -11,7 +11,7 @@
 
 #include "fake_board.h"
 #include "talk/host.h"
-#include "talk/streams.h"
+#include "talk/rounds.h"
 #include "wire/crc32.h"
 
 #include <string.h>

@@ -105,7 +105,7 @@ static inline uint32_t bits_finger_hash(void)
         }
         if (bt_finger_end(&finger, &tare)) {
             bt_msg_frame msg;
-            bt_finger_frame(&finger, &solve, 0, &msg);
+            bt_finger_frame(&finger, &solve, finger.quantities, 0, &msg);
             bt_msg_frame_pack(&msg, payload);
             bits_add(&chain, payload, BT_FRAME_BYTES);
             bt_msg_bands bands;

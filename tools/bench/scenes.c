@@ -322,7 +322,7 @@ void bench_scenes_init(void)
     }
     bt_finger finger = press_front;
     const bt_solve_settings settings = bt_solve_settings_from(&all);
-    bt_finger_frame(&finger, &settings, 0, &sent);
+    bt_finger_frame(&finger, &settings, finger.quantities, 0, &sent);
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
         rest_five[f] = rest_front;
         press_five[f] = press_front;

@@ -32,6 +32,8 @@ ROM = "(boot ROM)"
 ROM_STACK_BYTES = 256  # an allowance: the ROM's use is not documented
 EXCEPTION_BYTES = 32 + 4  # pushed by the core, with alignment
 
+COMMANDS = (ROOT / "firmware" / "core" / "talk" / "commands.c").read_text(encoding="utf-8")
+
 # The functions that each call through a pointer in the source may reach.
 POINTERS = {
     "session->write(": ("port_link_write",),
@@ -43,6 +45,7 @@ POINTERS = {
     "flash->erase(": ("port_flash_erase", "erase_map_sector"),
     "flash->program(": ("port_flash_program", "program_map_page"),
     "flash->read(": ("port_flash_read",),
+    "commands[k].run(": tuple(re.findall(r"^    {BT_\w+_ID, .*, (\w+)},$", COMMANDS, re.MULTILINE)),
     "rom.": (ROM,),
     "boot2_copy": (ROM,),
     "device->source(": ("bt_emu_stream_count",),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .schema import GENERATED, TYPE_BYTES, Contract, Field, Message, c_header, entries
+from .schema import FINGER_AT, GENERATED, REQ_ID_AT, TYPE_BYTES, Contract, Field, Message, c_header, entries
 
 PACKED_AS_HALFWORDS = ("FRAME",)  # what a board sends most of, in messages and in bytes
 C_TYPE = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "i16": "int16_t", "i32": "int32_t"}
@@ -79,6 +79,8 @@ def header(contract: Contract) -> str:
         "",
         *constants(contract),
         f"#define BT_BOOTLOADER_MAGIC 0x{wire['bootloader_magic']:08X}u // of REBOOT_BOOTLOADER",
+        f"#define BT_COMMAND_REQ_ID_AT {REQ_ID_AT} // in every command's payload",
+        f"#define BT_COMMAND_FINGER_AT {FINGER_AT} // in that of every command to one finger",
         f"#define BT_USB_VENDOR 0x{contract.link['usb']['vendor']:04X}",
         f"#define BT_USB_PRODUCT 0x{contract.link['usb']['product']:04X}",
         "",

@@ -25,6 +25,8 @@ def c_header(name: str, about: list[str], body: list[str], *, generated: str = G
 
 PER_FINGER_UNIT = "the per-finger settings'"  # of a field with one value for each of them
 
+REQ_ID_AT, FINGER_AT = 0, 1  # in every command, so that one place checks the finger
+
 TYPE_BYTES = {"u8": 1, "u16": 2, "u32": 4, "i16": 2, "i32": 4}
 
 
@@ -153,10 +155,18 @@ def check_link(link: dict[str, Any], messages: tuple[Message, ...]) -> None:
         # id + payload + CRC-32 must fit, so that COBS adds exactly one byte.
         if 1 + message.payload_bytes + 4 > link["wire"]["max_frame_bytes"]:
             raise ValueError(f"link.toml: {message.name} is too long for one frame")
+        if message.id & 0x80:
+            check_command(message)
         if message.reply is not None and message.reply not in names:
             raise ValueError(f"link.toml: {message.name} is answered by unknown message {message.reply}")
         if message.stream and [f.name for f in message.fields[:2]] != ["seq", "t_us"]:
             raise ValueError(f"link.toml: stream message {message.name} must start with seq, t_us")
+
+
+def check_command(message: Message) -> None:
+    at = {field.name: k for k, field in enumerate(message.fields)}
+    if at.get("req_id") != REQ_ID_AT or at.get("finger", FINGER_AT) != FINGER_AT:
+        raise ValueError(f"link.toml: command {message.name} must begin with req_id, and with finger if it has one")
 
 
 def check_map(wrench_map: dict[str, Any]) -> None:

@@ -7,6 +7,10 @@
 
 #include <string.h>
 
+// A command's payload has its right length and begins with req_id; checks are done. Each returns an enum
+// bt_error. After an error a REPLY with it is sent, and after BT_ERROR_OK likewise, unless the table below
+// says that the command has sent its own answer.
+
 static void reply(bt_session *session, uint8_t req_id, uint8_t command, uint8_t error)
 {
     uint8_t payload[BT_REPLY_BYTES];
@@ -15,7 +19,7 @@ static void reply(bt_session *session, uint8_t req_id, uint8_t command, uint8_t 
     bt_session_send(session, BT_REPLY_ID, payload);
 }
 
-static void hello(bt_session *session, const uint8_t *payload)
+static uint8_t hello_request(bt_session *session, const uint8_t *payload)
 {
     uint8_t out[BT_HELLO_BYTES];
     const bt_identity *identity = &session->identity;
@@ -39,6 +43,7 @@ static void hello(bt_session *session, const uint8_t *payload)
     memcpy(msg.board_serial, identity->board_serial, sizeof msg.board_serial);
     bt_msg_hello_pack(&msg, out);
     bt_session_send(session, BT_HELLO_ID, out);
+    return BT_ERROR_OK;
 }
 
 static uint8_t start(bt_session *session, const uint8_t *payload)
@@ -65,6 +70,20 @@ static uint8_t start(bt_session *session, const uint8_t *payload)
     return BT_ERROR_OK;
 }
 
+static uint8_t stop(bt_session *session, const uint8_t *payload)
+{
+    (void)payload;
+    bt_session_stop(session);
+    return BT_ERROR_OK;
+}
+
+static uint8_t ping(bt_session *session, const uint8_t *payload)
+{
+    (void)session;
+    (void)payload;
+    return BT_ERROR_OK;
+}
+
 static uint8_t subscribe(bt_session *session, const uint8_t *payload)
 {
     bt_msg_subscribe msg;
@@ -85,22 +104,15 @@ static uint8_t subscribe(bt_session *session, const uint8_t *payload)
 
 static uint8_t tare_now(bt_session *session, const uint8_t *payload)
 {
-    bt_msg_tare_now msg;
-    bt_msg_tare_now_unpack(&msg, payload);
-    if (msg.finger >= BT_MAX_FINGERS || !session->finger[msg.finger].present) {
-        return BT_ERROR_NO_SUCH_FINGER;
-    }
-    return bt_tare_now(&session->finger[msg.finger].tare);
+    bt_finger *finger = &session->finger[payload[BT_COMMAND_FINGER_AT]];
+    return finger->present ? bt_tare_now(&finger->tare) : BT_ERROR_NO_SUCH_FINGER;
 }
 
+// Accepted even if the finger has not answered yet: a stored tare may come before the first frame.
 static uint8_t tare_set(bt_session *session, const uint8_t *payload)
 {
     bt_msg_tare_set msg;
     bt_msg_tare_set_unpack(&msg, payload);
-    // Accepted even if the finger has not answered yet: a stored tare may come before the first frame.
-    if (msg.finger >= BT_MAX_FINGERS) {
-        return BT_ERROR_NO_SUCH_FINGER;
-    }
     bt_baseline base;
     for (int i = 0; i < BT_ELECTRODES; i++) {
         if (msg.tare_q4[i] > BT_E_MAX_Q4) {
@@ -115,45 +127,83 @@ static uint8_t tare_set(bt_session *session, const uint8_t *payload)
     return bt_tare_set(&session->finger[msg.finger].tare, &base);
 }
 
-// HOLD and RELEASE.
-static uint8_t hold_fingers(bt_session *session, const uint8_t *payload, bool held)
+static uint8_t set_held(bt_session *session, uint8_t fingers, bool held)
 {
-    bt_msg_hold msg;
-    bt_msg_hold_unpack(&msg, payload);
-    if (msg.fingers >> BT_MAX_FINGERS != 0) {
+    if (fingers >> BT_MAX_FINGERS != 0) {
         return BT_ERROR_NO_SUCH_FINGER;
     }
     for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        if (msg.fingers >> f & 1) {
+        if (fingers >> f & 1) {
             held ? bt_tare_hold(&session->finger[f].tare) : bt_tare_release(&session->finger[f].tare);
         }
     }
     return BT_ERROR_OK;
 }
 
-_Static_assert(BT_HOLD_BYTES == BT_RELEASE_BYTES, "HOLD and RELEASE are read alike");
-
-static void sensor_info(bt_session *session, uint8_t req_id, uint8_t finger)
+static uint8_t hold(bt_session *session, const uint8_t *payload)
 {
-    uint8_t payload[BT_SENSOR_INFO_BYTES];
-    bt_sensor_info info = session->info[finger];
-    info.req_id = req_id;
-    info.finger = finger;
-    info.present = info.present && session->finger[finger].silent_rounds < BT_UNPLUGGED_ROUNDS;
-    bt_msg_sensor_info_pack(&info, payload);
-    bt_session_send(session, BT_SENSOR_INFO_ID, payload);
+    bt_msg_hold msg;
+    bt_msg_hold_unpack(&msg, payload);
+    return set_held(session, msg.fingers, true);
 }
 
-static void point(bt_session *session, uint8_t req_id, uint8_t finger)
+static uint8_t release(bt_session *session, const uint8_t *payload)
 {
-    uint8_t payload[BT_POINT_BYTES];
-    bt_msg_point msg = {.req_id = req_id};
-    bt_finger_point(&session->finger[finger], &session->solve[finger], &msg);
-    bt_msg_point_pack(&msg, payload);
-    bt_session_send(session, BT_POINT_ID, payload);
+    bt_msg_release msg;
+    bt_msg_release_unpack(&msg, payload);
+    return set_held(session, msg.fingers, false);
 }
 
-static void setting(bt_session *session, uint8_t req_id, uint8_t id)
+static uint8_t clear_faults(bt_session *session, const uint8_t *payload)
+{
+    bt_faults_clear(session, payload);
+    return BT_ERROR_OK;
+}
+
+static uint8_t get_status(bt_session *session, const uint8_t *payload)
+{
+    bt_session_send_status(session, payload[BT_COMMAND_REQ_ID_AT], session->heard_us);
+    return BT_ERROR_OK;
+}
+
+static uint8_t get_sensor_status(bt_session *session, const uint8_t *payload)
+{
+    bt_session_send_sensor_status(session, payload[BT_COMMAND_REQ_ID_AT], payload[BT_COMMAND_FINGER_AT],
+                                  session->heard_us);
+    return BT_ERROR_OK;
+}
+
+static uint8_t get_sensor_info(bt_session *session, const uint8_t *payload)
+{
+    uint8_t out[BT_SENSOR_INFO_BYTES];
+    const uint8_t f = payload[BT_COMMAND_FINGER_AT];
+    bt_sensor_info info = session->info[f];
+    info.req_id = payload[BT_COMMAND_REQ_ID_AT];
+    info.finger = f;
+    info.present = info.present && session->finger[f].silent_rounds < BT_UNPLUGGED_ROUNDS;
+    bt_msg_sensor_info_pack(&info, out);
+    bt_session_send(session, BT_SENSOR_INFO_ID, out);
+    return BT_ERROR_OK;
+}
+
+static uint8_t get_point(bt_session *session, const uint8_t *payload)
+{
+    uint8_t out[BT_POINT_BYTES];
+    const uint8_t f = payload[BT_COMMAND_FINGER_AT];
+    bt_msg_point msg = {.req_id = payload[BT_COMMAND_REQ_ID_AT]};
+    if (bt_sensors_refused(session, f)) {
+        return BT_ERROR_OTHER_SENSOR;
+    }
+    if (!session->finger[f].present) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    bt_finger_point(&session->finger[f], &session->solve[f], &msg);
+    bt_msg_point_pack(&msg, out);
+    bt_session_send(session, BT_POINT_ID, out);
+    return BT_ERROR_OK;
+}
+
+static void send_setting(bt_session *session, uint8_t req_id, uint8_t id)
 {
     uint8_t payload[BT_SETTING_BYTES];
     bt_msg_setting msg = {.req_id = req_id, .setting = id, .value = bt_settings_get(&session->settings, id)};
@@ -161,75 +211,73 @@ static void setting(bt_session *session, uint8_t req_id, uint8_t id)
     bt_session_send(session, BT_SETTING_ID, payload);
 }
 
+static uint8_t get_setting(bt_session *session, const uint8_t *payload)
+{
+    bt_msg_get_setting msg;
+    bt_msg_get_setting_unpack(&msg, payload);
+    if (!bt_settings_has(msg.setting)) {
+        return BT_ERROR_UNKNOWN_SETTING;
+    }
+    send_setting(session, msg.req_id, msg.setting);
+    return BT_ERROR_OK;
+}
+
 static uint8_t set_setting(bt_session *session, const uint8_t *payload)
 {
     bt_msg_set_setting msg;
     bt_msg_set_setting_unpack(&msg, payload);
-    if (session->streams != 0) {
-        return BT_ERROR_BUSY; // one recording, one set of settings
-    }
     uint8_t error = bt_settings_set(&session->settings, msg.setting, msg.value);
     if (error == BT_ERROR_OK) {
         bt_session_use_settings(session);
-        setting(session, msg.req_id, msg.setting);
+        send_setting(session, msg.req_id, msg.setting);
     }
     return error;
 }
 
-static void calibration(bt_session *session, uint8_t req_id, uint8_t finger)
+static uint8_t get_calibration(bt_session *session, const uint8_t *payload)
 {
-    uint8_t payload[BT_CALIBRATION_BYTES];
-    const bt_calibration *its = &session->calibration[finger];
+    uint8_t out[BT_CALIBRATION_BYTES];
+    const uint8_t f = payload[BT_COMMAND_FINGER_AT];
+    const bt_calibration *calibration = &session->calibration[f];
     bt_msg_calibration msg = {
-        .req_id = req_id,
-        .finger = finger,
-        .state = session->calibration_state[finger],
-        .made_s = its->made_s,
+        .req_id = payload[BT_COMMAND_REQ_ID_AT],
+        .finger = f,
+        .state = session->calibration_state[f],
+        .made_s = calibration->made_s,
     };
-    memcpy(msg.serial, its->serial, sizeof msg.serial);
+    memcpy(msg.serial, calibration->serial, sizeof msg.serial);
     for (int k = 0; k < BT_CALIBRATION_VALUES; k++) {
-        msg.value[k] =
-            its->present ? its->value[k] : bt_settings_get(&session->settings, bt_calibration_setting[k]);
+        msg.value[k] = calibration->present ? calibration->value[k]
+                                            : bt_settings_get(&session->settings, bt_calibration_setting[k]);
     }
-    bt_msg_calibration_pack(&msg, payload);
-    bt_session_send(session, BT_CALIBRATION_ID, payload);
+    bt_msg_calibration_pack(&msg, out);
+    bt_session_send(session, BT_CALIBRATION_ID, out);
+    return BT_ERROR_OK;
 }
 
 static uint8_t set_calibration(bt_session *session, const uint8_t *payload)
 {
     bt_msg_set_calibration msg;
     bt_msg_set_calibration_unpack(&msg, payload);
-    if (msg.finger >= BT_MAX_FINGERS) {
-        return BT_ERROR_NO_SUCH_FINGER;
-    }
-    if (session->streams != 0) {
-        return BT_ERROR_BUSY;
-    }
     bt_settings trial = session->settings;
-    bt_calibration its = {.present = true, .unsaved = true, .made_s = msg.made_s};
-    memcpy(its.serial, msg.serial, sizeof its.serial);
-    memcpy(its.value, msg.value, sizeof its.value);
-    if (!bt_serial_fits(its.serial, session->info[msg.finger].serial)) {
+    bt_calibration calibration = {.present = true, .unsaved = true, .made_s = msg.made_s};
+    memcpy(calibration.serial, msg.serial, sizeof calibration.serial);
+    memcpy(calibration.value, msg.value, sizeof calibration.value);
+    if (!bt_serial_fits(calibration.serial, session->info[msg.finger].serial)) {
         return BT_ERROR_OTHER_SENSOR;
     }
-    uint8_t error = bt_calibration_apply(&its, &trial);
-    if (error == BT_ERROR_OK) {
-        session->calibration[msg.finger] = its;
-        bt_session_use_settings(session);
-        calibration(session, msg.req_id, msg.finger);
+    uint8_t error = bt_calibration_apply(&calibration, &trial);
+    if (error != BT_ERROR_OK) {
+        return error;
     }
-    return error;
+    session->calibration[msg.finger] = calibration;
+    bt_session_use_settings(session);
+    return get_calibration(session, payload);
 }
 
-static uint8_t clear_calibration(bt_session *session, uint8_t finger)
+static uint8_t clear_calibration(bt_session *session, const uint8_t *payload)
 {
-    if (finger >= BT_MAX_FINGERS) {
-        return BT_ERROR_NO_SUCH_FINGER;
-    }
-    if (session->streams != 0) {
-        return BT_ERROR_BUSY;
-    }
-    session->calibration[finger] = (bt_calibration){.unsaved = true};
+    session->calibration[payload[BT_COMMAND_FINGER_AT]] = (bt_calibration){.unsaved = true};
     bt_session_use_settings(session);
     return BT_ERROR_OK;
 }
@@ -249,11 +297,9 @@ static uint8_t save_calibrations(bt_session *session)
     return BT_ERROR_OK;
 }
 
-static uint8_t save(bt_session *session)
+static uint8_t save(bt_session *session, const uint8_t *payload)
 {
-    if (session->streams != 0) {
-        return BT_ERROR_BUSY; // sampling stops while flash is written
-    }
+    (void)payload;
     const bt_board_actions *board = &session->board;
     if (board->save_settings == NULL || board->save_calibration == NULL || board->save_map == NULL) {
         return BT_ERROR_NOT_HERE;
@@ -265,7 +311,7 @@ static uint8_t save(bt_session *session)
     return error == BT_ERROR_OK ? bt_save_maps(session) : error;
 }
 
-static uint8_t reboot_bootloader(const bt_session *session, const uint8_t *payload)
+static uint8_t reboot(bt_session *session, const uint8_t *payload)
 {
     bt_msg_reboot_bootloader msg;
     bt_msg_reboot_bootloader_unpack(&msg, payload);
@@ -273,6 +319,58 @@ static uint8_t reboot_bootloader(const bt_session *session, const uint8_t *paylo
         return BT_ERROR_OUT_OF_RANGE;
     }
     return session->board.reboot_bootloader == NULL ? BT_ERROR_NOT_HERE : session->board.reboot_bootloader();
+}
+
+enum check {
+    ANSWERS = 1, // has sent a message of its own where it returns BT_ERROR_OK
+    FINGER = 2,  // the byte at BT_COMMAND_FINGER_AT must be a finger
+    STOPPED = 4, // not while streaming: one recording, one set of values; and flash stops the sampling
+    MAPS = 8,    // the board must have a place for maps
+};
+
+static const struct {
+    uint8_t id;
+    uint8_t checks; // in the order of enum check
+    uint8_t (*run)(bt_session *session, const uint8_t *payload);
+} commands[] = {
+    {BT_HELLO_REQUEST_ID, ANSWERS, hello_request},
+    {BT_START_ID, 0, start},
+    {BT_STOP_ID, 0, stop},
+    {BT_PING_ID, 0, ping},
+    {BT_SUBSCRIBE_ID, 0, subscribe},
+    {BT_TARE_NOW_ID, FINGER, tare_now},
+    {BT_TARE_SET_ID, FINGER, tare_set},
+    {BT_HOLD_ID, 0, hold},
+    {BT_RELEASE_ID, 0, release},
+    {BT_CLEAR_FAULTS_ID, 0, clear_faults},
+    {BT_GET_STATUS_ID, ANSWERS, get_status},
+    {BT_GET_SENSOR_STATUS_ID, ANSWERS | FINGER, get_sensor_status},
+    {BT_GET_SENSOR_INFO_ID, ANSWERS | FINGER, get_sensor_info},
+    {BT_GET_POINT_ID, ANSWERS | FINGER, get_point},
+    {BT_GET_SETTING_ID, ANSWERS, get_setting},
+    {BT_SET_SETTING_ID, ANSWERS | STOPPED, set_setting},
+    {BT_GET_CALIBRATION_ID, ANSWERS | FINGER, get_calibration},
+    {BT_SET_CALIBRATION_ID, ANSWERS | FINGER | STOPPED, set_calibration},
+    {BT_CLEAR_CALIBRATION_ID, FINGER | STOPPED, clear_calibration},
+    {BT_GET_MAP_ID, ANSWERS | FINGER, bt_map_get},
+    {BT_READ_MAP_ID, ANSWERS | FINGER, bt_map_read},
+    {BT_BEGIN_MAP_ID, FINGER | STOPPED | MAPS, bt_map_begin},
+    {BT_WRITE_MAP_ID, FINGER | STOPPED | MAPS, bt_map_write},
+    {BT_END_MAP_ID, ANSWERS | FINGER | STOPPED | MAPS, bt_map_end},
+    {BT_CLEAR_MAP_ID, FINGER | STOPPED | MAPS, bt_map_clear},
+    {BT_SAVE_SETTINGS_ID, STOPPED, save},
+    {BT_REBOOT_BOOTLOADER_ID, 0, reboot},
+};
+
+static uint8_t check(const bt_session *session, uint8_t checks, const uint8_t *payload)
+{
+    if (checks & FINGER && payload[BT_COMMAND_FINGER_AT] >= BT_MAX_FINGERS) {
+        return BT_ERROR_NO_SUCH_FINGER;
+    }
+    if (checks & STOPPED && session->streams != 0) {
+        return BT_ERROR_BUSY;
+    }
+    return checks & MAPS && session->board.maps == NULL ? BT_ERROR_NOT_HERE : BT_ERROR_OK;
 }
 
 void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_t now_us)
@@ -285,108 +383,16 @@ void bt_command(bt_session *session, uint8_t id, const uint8_t *payload, uint32_
         reply(session, 0, id, bt_wire_payload_bytes(id) < 0 ? BT_ERROR_UNKNOWN_COMMAND : BT_ERROR_BAD_LENGTH);
         return;
     }
-    uint8_t req_id = payload[0];
-    uint8_t error = BT_ERROR_OK;
-    bool answered;
-    switch (id) {
-    case BT_HELLO_REQUEST_ID:
-        hello(session, payload);
-        return;
-    case BT_START_ID:
-        error = start(session, payload);
-        break;
-    case BT_STOP_ID:
-        bt_session_stop(session);
-        break;
-    case BT_PING_ID:
-        break;
-    case BT_SUBSCRIBE_ID:
-        error = subscribe(session, payload);
-        break;
-    case BT_TARE_NOW_ID:
-        error = tare_now(session, payload);
-        break;
-    case BT_TARE_SET_ID:
-        error = tare_set(session, payload);
-        break;
-    case BT_HOLD_ID:
-        error = hold_fingers(session, payload, true);
-        break;
-    case BT_RELEASE_ID:
-        error = hold_fingers(session, payload, false);
-        break;
-    case BT_CLEAR_FAULTS_ID:
-        bt_faults_clear(session, payload);
-        break;
-    case BT_GET_STATUS_ID:
-        bt_session_send_status(session, req_id, now_us);
-        return;
-    case BT_GET_SENSOR_STATUS_ID:
-        if (payload[1] < BT_MAX_FINGERS) {
-            bt_session_send_sensor_status(session, req_id, payload[1], now_us);
+    uint8_t error = BT_ERROR_UNKNOWN_COMMAND;
+    for (size_t k = 0; k < sizeof commands / sizeof *commands; k++) {
+        if (commands[k].id != id) {
+            continue;
+        }
+        error = check(session, commands[k].checks, payload);
+        error = error == BT_ERROR_OK ? commands[k].run(session, payload) : error;
+        if (error == BT_ERROR_OK && commands[k].checks & ANSWERS) {
             return;
         }
-        error = BT_ERROR_NO_SUCH_FINGER;
-        break;
-    case BT_GET_SENSOR_INFO_ID:
-        if (payload[1] < BT_MAX_FINGERS) {
-            sensor_info(session, req_id, payload[1]);
-            return;
-        }
-        error = BT_ERROR_NO_SUCH_FINGER;
-        break;
-    case BT_GET_POINT_ID:
-        if (payload[1] < BT_MAX_FINGERS && bt_sensors_refused(session, payload[1])) {
-            error = BT_ERROR_OTHER_SENSOR;
-            break;
-        }
-        if (payload[1] < BT_MAX_FINGERS && session->finger[payload[1]].present) {
-            point(session, req_id, payload[1]);
-            return;
-        }
-        error = BT_ERROR_NO_SUCH_FINGER;
-        break;
-    case BT_GET_SETTING_ID:
-        if (bt_settings_has(payload[1])) {
-            setting(session, req_id, payload[1]);
-            return;
-        }
-        error = BT_ERROR_UNKNOWN_SETTING;
-        break;
-    case BT_SET_SETTING_ID:
-        error = set_setting(session, payload);
-        if (error == BT_ERROR_OK) {
-            return;
-        }
-        break;
-    case BT_GET_CALIBRATION_ID:
-        if (payload[1] < BT_MAX_FINGERS) {
-            calibration(session, req_id, payload[1]);
-            return;
-        }
-        error = BT_ERROR_NO_SUCH_FINGER;
-        break;
-    case BT_SET_CALIBRATION_ID:
-        error = set_calibration(session, payload);
-        if (error == BT_ERROR_OK) {
-            return;
-        }
-        break;
-    case BT_CLEAR_CALIBRATION_ID:
-        error = clear_calibration(session, payload[1]);
-        break;
-    case BT_REBOOT_BOOTLOADER_ID:
-        error = reboot_bootloader(session, payload);
-        break;
-    case BT_SAVE_SETTINGS_ID:
-        error = save(session);
-        break;
-    default:
-        error = bt_map_command(session, id, payload, &answered);
-        if (answered) {
-            return;
-        }
-        break;
     }
-    reply(session, req_id, id, error);
+    reply(session, payload[BT_COMMAND_REQ_ID_AT], id, error);
 }

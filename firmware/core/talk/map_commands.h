@@ -4,8 +4,14 @@
 
 #include "talk/session.h"
 
-// Both return an enum bt_error. *answered: the command has sent a message of its own instead of a REPLY.
-uint8_t bt_map_command(bt_session *session, uint8_t id, const uint8_t *payload, bool *answered);
-uint8_t bt_save_maps(bt_session *session);
+// Rows of the table in commands.c, which says what is checked before.
+uint8_t bt_map_get(bt_session *session, const uint8_t *payload);
+uint8_t bt_map_read(bt_session *session, const uint8_t *payload);
+uint8_t bt_map_begin(bt_session *session, const uint8_t *payload);
+uint8_t bt_map_write(bt_session *session, const uint8_t *payload);
+uint8_t bt_map_end(bt_session *session, const uint8_t *payload);
+uint8_t bt_map_clear(bt_session *session, const uint8_t *payload);
+
+uint8_t bt_save_maps(bt_session *session); // enum bt_error
 
 #endif

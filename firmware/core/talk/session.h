@@ -8,6 +8,7 @@
 #include "keep/calibration.h"
 #include "keep/settings.h"
 #include "map/upload.h"
+#include "talk/scheduler.h"
 #include "wire/framing.h"
 
 #define BT_BOARD_SERIAL_BYTES sizeof(((bt_msg_hello *)NULL)->board_serial)
@@ -35,13 +36,6 @@ typedef struct {
     const bt_map_flash *maps;           // where wrench maps are kept; NULL: nowhere
     uint32_t (*now_us)(void);           // device time; NULL: the board is never short of time
 } bt_board_actions;
-
-// What FRAMEs lacked because time was short, in the order of shedding; wrap at 2^32.
-typedef struct {
-    uint32_t sigma;
-    uint32_t wrench; // repeated
-    uint32_t frames;
-} bt_shed_counts;
 
 // Finger-rounds of FRAME streams in which something was skipped because nobody needed it; wrap at 2^32.
 typedef struct {
@@ -99,10 +93,7 @@ typedef struct {
     uint32_t messages_sent;
     uint32_t messages_dropped;
     bt_skip_counts skips;
-    bt_shed_counts sheds;
-    uint8_t sigma_pause; // rounds left in which no finger gets a sigma
-    uint8_t first;       // first finger of the next round: 0, or the first that something was left out for
-    uint8_t first_next;  // the same, as found in this round; BT_MAX_FINGERS: none so far
+    bt_scheduler scheduler;
     uint32_t slots_late;
     uint32_t rx_frames;
     uint32_t rx_errors;

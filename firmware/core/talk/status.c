@@ -22,9 +22,9 @@ void bt_session_send_status(bt_session *session, uint8_t req_id, uint32_t now_us
         .force_skipped = session->skips.force,
         .torque_skipped = session->skips.torque,
         .sigma_skipped = session->skips.sigma,
-        .sigma_shed = session->sheds.sigma,
-        .wrench_repeated = session->sheds.wrench,
-        .frames_shed = session->sheds.frames,
+        .sigma_shed = session->scheduler.sheds.sigma,
+        .wrench_repeated = session->scheduler.sheds.wrench,
+        .frames_shed = session->scheduler.sheds.frames,
         .faults = session->faults,
     };
     memcpy(msg.finger_faults, session->finger_faults, sizeof msg.finger_faults);

@@ -5,20 +5,13 @@
 
 #include <string.h>
 
-// How long after its round's last slot a finger's FRAME may begin before something is left out. At full load
-// the last of five begins 8 ms late; slots are buffered for 29 ms (BT_SLOT_RING).
-#define SIGMA_LATE_US      9000
-#define MAP_LATE_US        11000
-#define FRAME_LATE_US      22000
-#define SIGMA_PAUSE_ROUNDS 50 // for all fingers, or the first ones' sigmas would cost the last ones even more
-
 static bool streams(const bt_session *session, const bt_finger *finger, uint8_t what)
 {
     return (session->streams & what) && (session->fingers >> finger->index & 1);
 }
 
 // A finger that starts sending events starts without a history.
-static void begin_events(bt_session *session)
+void bt_streams_begin(bt_session *session)
 {
     static const uint8_t pac_slot[] = BT_FINGER_EVENT_SLOTS;
     const uint8_t before = session->event_fingers;
@@ -44,14 +37,6 @@ static void begin_events(bt_session *session)
         } else if (now >> f & 1 && events->watched != BT_EVENTS_NO_SLOT) {
             session->events_due[events->watched] |= (uint8_t)(1u << f);
         }
-    }
-}
-
-void bt_session_begin(bt_session *session, uint32_t t_us)
-{
-    begin_events(session);
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_finger_begin(&session->finger[f], t_us, &session->tare[f]);
     }
 }
 
@@ -112,13 +97,10 @@ static void send_events(bt_session *session, uint8_t slot, uint32_t due, uint32_
     }
 }
 
-void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_MAX_FINGERS], uint32_t t_us)
+void bt_streams_slot(bt_session *session, uint8_t slot, uint32_t touched, uint32_t t_us)
 {
-    uint32_t touched = 0; // bit mask
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_sensors_word(session, (unsigned)f, count[f] != BT_INVALID_COUNT);
-        if (bt_finger_put(&session->finger[f], slot, count[f])) {
-            touched |= 1u << f;
+    for (int f = 0; touched >> f != 0; f++) {
+        if (touched >> f & 1) {
             send_touch(session, &session->finger[f], slot, t_us);
         }
     }
@@ -168,24 +150,6 @@ static int32_t late_us(const bt_session *session, const bt_finger *finger)
     return (int32_t)(session->board.now_us() - (finger->round.t_us + BT_FRAME_MS * 1000));
 }
 
-static uint32_t to_shed(bt_session *session, const bt_finger *finger, int32_t late)
-{
-    uint32_t age = bt_finger_wrench_age(finger, &session->solve[finger->index]);
-    if (late > SIGMA_LATE_US) {
-        session->sigma_pause = SIGMA_PAUSE_ROUNDS;
-    }
-    return (session->sigma_pause > 0 ? BT_SHED_SIGMA : 0)
-           | (late > MAP_LATE_US && age <= BT_REPEAT_MAX_ROUNDS ? BT_SHED_MAP : 0);
-}
-
-// The first finger for which something is left out comes first in the next round.
-static void went_without(bt_session *session, uint8_t finger)
-{
-    if (session->first_next == BT_MAX_FINGERS) {
-        session->first_next = finger;
-    }
-}
-
 static void send_frame(bt_session *session, bt_finger *finger)
 {
     _Alignas(4) uint16_t frame[(BT_ENCODED_MAX_BYTES + 1) / 2];
@@ -193,23 +157,16 @@ static void send_frame(bt_session *session, bt_finger *finger)
     if (finger->tare_unsent) {
         send_tare(session, finger);
     }
-    int32_t late = late_us(session, finger);
-    if (late > FRAME_LATE_US) {
+    const bt_solve_settings *solve = &session->solve[finger->index];
+    uint32_t shed =
+        bt_scheduler_shed(&session->scheduler, finger->index, late_us(session, finger), finger->quantities,
+                          bt_finger_wrench_age(finger, solve) <= BT_REPEAT_MAX_ROUNDS);
+    if (shed & BT_SHED_FRAME) {
         finger->shed = true;
-        session->sheds.frames++;
-        went_without(session, finger->index);
         return;
     }
-    uint32_t shed = to_shed(session, finger, late);
-    session->sheds.sigma += shed & BT_SHED_SIGMA && finger->quantities & BT_QUANTITY_FLAG_SIGMA;
-    if (shed & BT_SHED_MAP) {
-        session->sheds.wrench++;
-        went_without(session, finger->index);
-    }
-    uint8_t quantities = finger->quantities;
-    finger->quantities = bt_sensors_refused(session, finger->index) ? 0 : quantities;
-    bt_finger_frame(finger, &session->solve[finger->index], shed, &msg);
-    finger->quantities = quantities;
+    uint8_t quantities = bt_sensors_refused(session, finger->index) ? 0 : finger->quantities;
+    bt_finger_frame(finger, solve, quantities, shed, &msg);
     msg.flags |= bt_sensors_flags(session, finger->index);
     bt_faults_of_round(session, finger->index, msg.flags);
     bt_msg_frame_pack_even(&msg, frame + BT_PAYLOAD_AT / 2);
@@ -219,8 +176,11 @@ static void send_frame(bt_session *session, bt_finger *finger)
 
 // Send a FRAME, or count the round for an IDLE. An IDLE is sent when its period is over and before the next
 // FRAME, so that every round is accounted for and a gap is a loss.
-static void send_round(bt_session *session, bt_finger *finger)
+void bt_streams_frame(bt_session *session, bt_finger *finger)
 {
+    if (!streams(session, finger, BT_STREAM_FLAG_FRAMES)) {
+        return;
+    }
     bool idle = bt_finger_idle(finger) && !finger->fresh;
     if (idle && finger->unsent + 1 >= session->idle_rounds) {
         idle = !bt_finger_moved(finger);
@@ -259,48 +219,12 @@ static void send_bands(bt_session *session, bt_finger *finger)
     bt_session_send(session, BT_BANDS_ID, payload);
 }
 
-void bt_session_end_round(bt_session *session)
+void bt_streams_vibration(bt_session *session, bt_finger *finger)
 {
-    uint32_t answering = 0; // bit mask
-    const int first = session->first;
-    session->first_next = BT_MAX_FINGERS;
-    session->sigma_pause = (uint8_t)(session->sigma_pause - (session->sigma_pause > 0));
-    for (int k = 0; k < BT_MAX_FINGERS; k++) {
-        const int f = first + k < BT_MAX_FINGERS ? first + k : first + k - BT_MAX_FINGERS;
-        bt_finger *finger = &session->finger[f];
-        if (session->asked >> f & 1) {
-            bt_finger_pass(finger);
-            continue;
-        }
-        if (finger->answered) {
-            bt_faults_of_round(session, (unsigned)f, bt_sensors_flags(session, (unsigned)f));
-        }
-        if (!bt_finger_end(finger, &session->tare[f])) {
-            // Without a serial number, only the silence shows that another sensor may come.
-            if (finger->silent_rounds == BT_UNPLUGGED_ROUNDS && finger->answered
-                && !session->info[f].present) {
-                bt_finger_forget(finger);
-            }
-            continue;
-        }
-        bt_faults_of_round(session, (unsigned)f, bt_channel_flags(&finger->round, &finger->tare));
-        answering |= 1u << f;
-        if (streams(session, finger, BT_STREAM_FLAG_FRAMES)) {
-            send_round(session, finger);
-        }
+    if (streams(session, finger, BT_STREAM_FLAG_PAC)) {
+        send_pac(session, finger);
     }
-    session->first = (uint8_t)(session->first_next % BT_MAX_FINGERS);
-    // Vibration after the forces of all fingers, as a controller closing a grip waits for those.
-    for (int f = 0; f < BT_MAX_FINGERS; f++) {
-        bt_finger *finger = &session->finger[f];
-        if (!(answering >> f & 1)) {
-            continue;
-        }
-        if (streams(session, finger, BT_STREAM_FLAG_PAC)) {
-            send_pac(session, finger);
-        }
-        if (streams(session, finger, BT_STREAM_FLAG_BANDS)) {
-            send_bands(session, finger);
-        }
+    if (streams(session, finger, BT_STREAM_FLAG_BANDS)) {
+        send_bands(session, finger);
     }
 }

@@ -1,14 +1,20 @@
-// Turns rounds of slots into the messages subscribed to: FRAME, IDLE, TARE, TOUCH, EVENT, PAC and BANDS.
-// Times are device time in us, wrapping at 2^32.
+// The messages of a round that are subscribed to: FRAME, IDLE, TARE, TOUCH, EVENT, PAC and BANDS. rounds.c
+// says when.
 #ifndef BIOTAC_STREAMS_H
 #define BIOTAC_STREAMS_H
 
 #include "talk/session.h"
 
-// A round of slots: begin, each slot's counts (BT_INVALID_COUNT where no good word came), end. Slots come in
-// order; skipped ones count as missing. The end computes and sends what is subscribed to.
-void bt_session_begin(bt_session *session, uint32_t t_us);
-void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_MAX_FINGERS], uint32_t t_us);
-void bt_session_end_round(bt_session *session);
+// A round begins: which fingers send EVENTs in it.
+void bt_streams_begin(bt_session *session);
+
+// After a slot: TOUCH of the fingers in `touched` (a bit mask), then EVENTs.
+void bt_streams_slot(bt_session *session, uint8_t slot, uint32_t touched, uint32_t t_us);
+
+// After a finger's round: FRAME with its TARE, or IDLE.
+void bt_streams_frame(bt_session *session, bt_finger *finger);
+
+// Then PAC and BANDS.
+void bt_streams_vibration(bt_session *session, bt_finger *finger);
 
 #endif

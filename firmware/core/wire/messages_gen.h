@@ -14,6 +14,8 @@
 #define BT_INVALID_I16 INT16_MIN
 #define BT_INVALID_I32 INT32_MIN
 #define BT_BOOTLOADER_MAGIC 0xB0071DE5u // of REBOOT_BOOTLOADER
+#define BT_COMMAND_REQ_ID_AT 0 // in every command's payload
+#define BT_COMMAND_FINGER_AT 1 // in that of every command to one finger
 #define BT_USB_VENDOR 0x1209
 #define BT_USB_PRODUCT 0x0001
 

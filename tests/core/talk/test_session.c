@@ -385,10 +385,10 @@ static void a_board_saves_all_or_says_that_it_cannot(void **state)
 static void sigmas_come_back_after_a_pause(void **state)
 {
     (void)state;
-    session.sigma_pause = 3;
+    session.scheduler.sigma_pause = 3;
     for (int left = 2; left >= -1; left--) {
         host_round(&session, 1 << 2, 2000);
-        assert_int_equal(session.sigma_pause, left > 0 ? left : 0);
+        assert_int_equal(session.scheduler.sigma_pause, left > 0 ? left : 0);
     }
 }
 

@@ -79,20 +79,20 @@ static void sigma_goes_first(void **state)
     tare();
     all_late(9000);
     assert_false(frame_of(2000).flags & BT_FRAME_FLAG_SHED);
-    assert_int_equal(session.sheds.sigma, 0);
+    assert_int_equal(session.scheduler.sheds.sigma, 0);
     late_us[0] = 9001;
     for (int rounds = 1; rounds <= 50; rounds++) {
         assert_true(frame_of(2000).flags & BT_FRAME_FLAG_SHED);
-        assert_int_equal(session.sheds.sigma, 2 * rounds);
+        assert_int_equal(session.scheduler.sheds.sigma, 2 * rounds);
         all_late(0);
     }
     assert_false(frame_of(2000).flags & BT_FRAME_FLAG_SHED);
-    assert_int_equal(session.sheds.sigma, 100);
+    assert_int_equal(session.scheduler.sheds.sigma, 100);
     all_late(9001);
     subscribe(ALL & ~BT_QUANTITY_FLAG_SIGMA);
     assert_false(frame_of(2000).flags & BT_FRAME_FLAG_SHED);
-    assert_int_equal(session.sheds.sigma, 100);
-    assert_true(session.sheds.wrench == 0 && session.sheds.frames == 0);
+    assert_int_equal(session.scheduler.sheds.sigma, 100);
+    assert_true(session.scheduler.sheds.wrench == 0 && session.scheduler.sheds.frames == 0);
 }
 
 // Later than 11 ms a map's last wrench stands for the next, for a tenth of a second.
@@ -108,7 +108,7 @@ static void then_a_map_is_not_computed_but_its_wrench_repeated(void **state)
     all_late(11000);
     fresh = frame_of(1985);
     assert_false(fresh.flags & BT_FRAME_FLAG_REPEATED);
-    assert_int_equal(session.sheds.wrench, 0);
+    assert_int_equal(session.scheduler.sheds.wrench, 0);
     all_late(11001);
     for (int age = 1; age <= 10; age++) {
         bt_msg_frame frame = frame_of((uint16_t)(1980 - age));
@@ -119,7 +119,7 @@ static void then_a_map_is_not_computed_but_its_wrench_repeated(void **state)
         assert_memory_equal(frame.torque_mnmm, fresh.torque_mnmm, sizeof fresh.torque_mnmm);
         assert_int_equal(frame.torsion_mnmm, fresh.torsion_mnmm);
         assert_int_not_equal(frame.poc_um[0], BT_INVALID_I16);
-        assert_int_equal(session.sheds.wrench, 2 * age);
+        assert_int_equal(session.scheduler.sheds.wrench, 2 * age);
     }
     bt_msg_frame again = frame_of(1960);
     assert_false(again.flags & BT_FRAME_FLAG_REPEATED);
@@ -145,18 +145,18 @@ static void whole_frames_go_last(void **state)
     tare();
     all_late(22000);
     (void)frame_of(1990);
-    assert_int_equal(session.sheds.frames, 0);
+    assert_int_equal(session.scheduler.sheds.frames, 0);
     all_late(22001);
     round_of(1990);
     assert_int_equal(host_count(BT_FRAME_ID), 0);
-    assert_int_equal(session.sheds.frames, 2);
+    assert_int_equal(session.scheduler.sheds.frames, 2);
     all_late(0);
-    session.sigma_pause = 0;
+    session.scheduler.sigma_pause = 0;
     assert_true(frame_of(1990).flags & BT_FRAME_FLAG_SHED);
     assert_false(frame_of(1990).flags & BT_FRAME_FLAG_SHED);
     all_late(UINT32_MAX - ON_TIME); // a round that is still to end is not late
     (void)frame_of(1990);
-    assert_int_equal(session.sheds.frames, 2);
+    assert_int_equal(session.scheduler.sheds.frames, 2);
 }
 
 static void who_went_without_comes_first_in_the_next_round(void **state)
@@ -165,17 +165,17 @@ static void who_went_without_comes_first_in_the_next_round(void **state)
     tare();
     late_us[1] = 22001; // finger 3
     round_of(1990);
-    assert_int_equal(session.first, 3);
+    assert_int_equal(session.scheduler.first, 3);
     late_us[1] = 0;
     round_of(1990);
     assert_int_equal(host_count(BT_FRAME_ID), 2);
     assert_int_equal(host.message[0].payload[6], 3);
     assert_int_equal(host.message[1].payload[6], 1);
-    assert_int_equal(session.first, 0);
+    assert_int_equal(session.scheduler.first, 0);
     late_us[0] = 11001; // finger 1, whose map is not computed
     late_us[1] = 22001; // one comes first, and the first of them
     round_of(1990);
-    assert_int_equal(session.first, 1);
+    assert_int_equal(session.scheduler.first, 1);
 }
 
 // One that never said who it is cannot be told from the next one: a quarter of a second of silence ends it.

@@ -2,7 +2,7 @@
 #include "support.h"
 
 #include "talk/host.h"
-#include "talk/streams.h"
+#include "talk/rounds.h"
 #include "wire/crc32.h"
 #include "wire/framing.h"
 

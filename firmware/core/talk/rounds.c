@@ -1,0 +1,67 @@
+#include "talk/rounds.h"
+
+#include "talk/faults.h"
+#include "talk/sensors.h"
+#include "talk/streams.h"
+
+void bt_session_begin(bt_session *session, uint32_t t_us)
+{
+    bt_streams_begin(session);
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_finger_begin(&session->finger[f], t_us, &session->tare[f]);
+    }
+}
+
+void bt_session_slot(bt_session *session, uint8_t slot, const uint16_t count[BT_MAX_FINGERS], uint32_t t_us)
+{
+    uint32_t touched = 0; // bit mask
+    for (unsigned f = 0; f < BT_MAX_FINGERS; f++) {
+        bt_sensors_word(session, f, count[f] != BT_INVALID_COUNT);
+        if (bt_finger_put(&session->finger[f], slot, count[f])) {
+            touched |= 1u << f;
+        }
+    }
+    bt_streams_slot(session, slot, touched, t_us);
+}
+
+// Returns whether the finger's sensor answered in this round.
+static bool end_finger(bt_session *session, unsigned f)
+{
+    bt_finger *finger = &session->finger[f];
+    if (session->asked >> f & 1) {
+        bt_finger_pass(finger);
+        return false;
+    }
+    if (finger->answered) {
+        bt_faults_of_round(session, f, bt_sensors_flags(session, f));
+    }
+    if (!bt_finger_end(finger, &session->tare[f])) {
+        // Without a serial number, only the silence shows that another sensor may come.
+        if (finger->silent_rounds == BT_UNPLUGGED_ROUNDS && finger->answered && !session->info[f].present) {
+            bt_finger_forget(finger);
+        }
+        return false;
+    }
+    bt_faults_of_round(session, f, bt_channel_flags(&finger->round, &finger->tare));
+    return true;
+}
+
+void bt_session_end_round(bt_session *session)
+{
+    uint32_t answering = 0; // bit mask
+    bt_scheduler_begin(&session->scheduler);
+    for (int k = 0; k < BT_MAX_FINGERS; k++) {
+        const uint8_t f = bt_scheduler_finger(&session->scheduler, k);
+        if (end_finger(session, f)) {
+            answering |= 1u << f;
+            bt_streams_frame(session, &session->finger[f]);
+        }
+    }
+    bt_scheduler_end(&session->scheduler);
+    // Vibration after the forces of all fingers, as a controller closing a grip waits for those.
+    for (int f = 0; f < BT_MAX_FINGERS; f++) {
+        if (answering >> f & 1) {
+            bt_streams_vibration(session, &session->finger[f]);
+        }
+    }
+}
